@@ -1,0 +1,3 @@
+//! `descry`: the command line.
+
+fn main() {}

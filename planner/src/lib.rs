@@ -1,0 +1,1 @@
+//! From a goal and a state to a timed plan.

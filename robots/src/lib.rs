@@ -1,0 +1,1 @@
+//! Bodies: the `Robot` trait and its implementations.

@@ -1,0 +1,1 @@
+//! From a PDDL action to motion and looking.

@@ -1,0 +1,23 @@
+//! One look at the world: a cloud, where it was taken from, and how well that is known.
+
+use crate::camera::Intrinsics;
+use crate::cloud::Cloud;
+use nalgebra::Isometry3;
+use serde::{Deserialize, Serialize};
+
+/// What a camera saw from one pose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct View {
+    /// When, nanoseconds in the clock of the recording.
+    pub stamp_ns: i64,
+    /// What, in the camera's optical frame (x right, y down, z forward), metres.
+    pub cloud: Cloud,
+    /// The camera, if known: lets later steps tell free space from space that was not seen.
+    pub intrinsics: Option<Intrinsics>,
+    /// Where the camera stood, as localisation says.
+    pub world_from_camera: Isometry3<f64>,
+    /// Standard deviation of that position along each axis, metres.
+    pub pose_sigma_m: f64,
+    /// Standard deviation of that orientation about each axis, radians.
+    pub pose_sigma_rad: f64,
+}

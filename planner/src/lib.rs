@@ -1,1 +1,8 @@
 //! From a goal and a state to a timed plan.
+
+mod attachment;
+
+pub use attachment::{
+    Answer, Attachment, AttachmentError, Attachments, Call, CallError, CallKind, CallStatistics, FactValue,
+    Level, Read, Reading,
+};

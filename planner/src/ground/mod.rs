@@ -1,0 +1,5 @@
+//! The grounded task: what every search works on.
+
+mod task;
+
+pub use task::*;

@@ -1,0 +1,365 @@
+//! The grounded task: finite-domain variables, numeric fluents, actions without parameters.
+//!
+//! Ids are plain indices. Those of predicates, fluents, objects, actions and modules are the lifted task's own.
+
+/// Index of a finite-domain variable in [`GroundTask::variables`].
+pub type VariableId = u32;
+/// Index of a numeric fluent in [`GroundTask::numerics`].
+pub type NumericId = u32;
+/// Index of a ground attachment call in [`GroundTask::calls`].
+pub type CallId = u32;
+/// Index of a numeric comparison in [`GroundTask::comparisons`].
+pub type ComparisonId = u32;
+
+/// A variable together with one of its values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Fact {
+    /// The variable.
+    pub variable: VariableId,
+    /// One of its values, below [`Variable::domain_size`].
+    pub value: u32,
+}
+
+/// What a value of a finite-domain variable says in the words of the lifted task.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Meaning {
+    /// The atom holds (and no other atom of its variable does).
+    Atom {
+        /// Predicate of the lifted task.
+        predicate: u32,
+        /// Objects of the lifted task.
+        arguments: Vec<u32>,
+    },
+    /// The object fluent has this value.
+    Object {
+        /// Object fluent of the lifted task.
+        fluent: u32,
+        /// Objects of the lifted task.
+        arguments: Vec<u32>,
+        /// The value, or `None` for an undefined fluent.
+        value: Option<u32>,
+    },
+    /// An inner condition that got a variable of its own: a disjunction inside a condition.
+    Inner,
+    /// None of the other values' atoms holds.
+    NoneOfThose,
+}
+
+/// A finite-domain variable: a group of atoms of which at most one holds, or one object fluent.
+#[derive(Clone, Debug)]
+pub struct Variable {
+    /// What each value says. Of a two-valued variable over one atom, value 0 is the atom, value 1 its absence.
+    pub values: Vec<Meaning>,
+    /// Set for a derived variable, which no effect writes: the stratum of its axioms. Its default is value 1 (absent).
+    pub stratum: Option<u32>,
+}
+
+impl Variable {
+    /// The number of values.
+    pub fn domain_size(&self) -> u32 {
+        self.values.len() as u32
+    }
+}
+
+/// A numeric fluent that some effect, timed literal or attachment writes; all others are folded into constants.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct NumericFluent {
+    /// Numeric function of the lifted task.
+    pub function: u32,
+    /// Objects of the lifted task.
+    pub arguments: Vec<u32>,
+}
+
+/// An arithmetic expression over the state. Evaluates to NaN where a fluent is undefined (its number is NaN).
+#[derive(Clone, Debug, PartialEq)]
+pub enum Expression {
+    /// A number.
+    Constant(f64),
+    /// The value of a numeric fluent.
+    Fluent(NumericId),
+    /// The answer of an attachment.
+    Call(CallId),
+    /// `?duration` of the action at hand, in seconds.
+    Duration,
+    /// `total-time`: the makespan, only in metrics.
+    TotalTime,
+    /// `#t`: only in continuous effects.
+    Elapsed,
+    /// Whether a preference is violated, as a number; only in metrics.
+    Violated(u32),
+    /// The sum of all.
+    Sum(Vec<Expression>),
+    /// The product of all.
+    Product(Vec<Expression>),
+    /// First minus second.
+    Difference(Box<Expression>, Box<Expression>),
+    /// First over second.
+    Quotient(Box<Expression>, Box<Expression>),
+    /// Minus the expression.
+    Negative(Box<Expression>),
+}
+
+/// How two numbers compare.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Relation {
+    /// `<`
+    Less,
+    /// `<=`
+    AtMost,
+    /// `=`
+    Equal,
+    /// `>=`
+    AtLeast,
+    /// `>`
+    Greater,
+    /// Not `=`; only from negated conditions.
+    Unequal,
+}
+
+/// A numeric condition. False where a side is NaN.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// Left side.
+    pub left: Expression,
+    /// How left must compare to right.
+    pub relation: Relation,
+    /// Right side.
+    pub right: Expression,
+}
+
+/// A conjunction of conditions; empty is true. Disjunctions have been split off into actions or derived variables.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Conjunction {
+    /// Facts, sorted, at most one a variable.
+    pub facts: Vec<Fact>,
+    /// Numeric conditions, sorted.
+    pub comparisons: Vec<ComparisonId>,
+    /// Attachment calls and the answer wanted, sorted.
+    pub calls: Vec<(CallId, bool)>,
+}
+
+impl Conjunction {
+    /// Whether nothing is asked.
+    pub fn is_empty(&self) -> bool {
+        self.facts.is_empty() && self.comparisons.is_empty() && self.calls.is_empty()
+    }
+}
+
+/// How an effect changes a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Change {
+    /// `assign`
+    Assign,
+    /// `increase`
+    Increase,
+    /// `decrease`
+    Decrease,
+    /// `scale-up`
+    ScaleUp,
+    /// `scale-down`
+    ScaleDown,
+}
+
+/// What one effect does.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// The variable takes the value.
+    Set(Fact),
+    /// The number changes.
+    Change {
+        /// Which number.
+        fluent: NumericId,
+        /// How it changes.
+        change: Change,
+        /// By or to how much; evaluated in the state before the effects.
+        amount: Expression,
+    },
+    /// The number changes continuously while the action runs: by `rate` a second.
+    Flow {
+        /// Which number.
+        fluent: NumericId,
+        /// Change a second.
+        rate: Expression,
+    },
+    /// An effect module writes the numbers that [`Call::writes`] lists.
+    Call(CallId),
+}
+
+/// An effect and when it happens. A `Set` to an atom wins over one that takes the same atom's variable away from it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effect {
+    /// Must hold where the effect happens.
+    pub when: Conjunction,
+    /// Must have held at the start of the durative action (only in effects at its end).
+    pub when_at_start: Conjunction,
+    /// Must have held all the time (only in effects at the end of a durative action).
+    pub when_over_all: Conjunction,
+    /// What happens.
+    pub outcome: Outcome,
+}
+
+impl Effect {
+    /// An effect that happens always.
+    pub fn always(outcome: Outcome) -> Effect {
+        Effect {
+            when: Conjunction::default(),
+            when_at_start: Conjunction::default(),
+            when_over_all: Conjunction::default(),
+            outcome,
+        }
+    }
+}
+
+/// Where a ground thing comes from: an action, axiom or module of the lifted task with its arguments.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Origin {
+    /// Index in the lifted task's list (actions: instantaneous and durative share one).
+    pub schema: u32,
+    /// Objects of the lifted task, in the order of the parameters.
+    pub arguments: Vec<u32>,
+}
+
+/// An instantaneous action. One lifted instance may give several when its condition is a disjunction.
+#[derive(Clone, Debug)]
+pub struct Action {
+    /// The lifted action and its arguments.
+    pub origin: Origin,
+    /// What must hold.
+    pub condition: Conjunction,
+    /// What happens.
+    pub effects: Vec<Effect>,
+    /// What it adds to the metric; see [`Metric::additive`].
+    pub cost: Expression,
+}
+
+/// A durative action.
+#[derive(Clone, Debug)]
+pub struct DurativeAction {
+    /// The lifted action and its arguments.
+    pub origin: Origin,
+    /// Bounds on the duration in seconds, evaluated in the state at the start (`true`) or at the end (`false`).
+    pub duration: Vec<DurationBound>,
+    /// What must hold right before the start.
+    pub at_start: Conjunction,
+    /// What must hold strictly between start and end.
+    pub over_all: Conjunction,
+    /// What must hold right before the end.
+    pub at_end: Conjunction,
+    /// What happens at the start.
+    pub start_effects: Vec<Effect>,
+    /// What happens while it runs ([`Outcome::Flow`] only).
+    pub flow_effects: Vec<Effect>,
+    /// What happens at the end.
+    pub end_effects: Vec<Effect>,
+    /// What it adds to the metric besides time; see [`Metric::additive`].
+    pub cost: Expression,
+}
+
+/// A bound on a duration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DurationBound {
+    /// Evaluated at the end of the action instead of at its start.
+    pub at_end: bool,
+    /// How `?duration` must compare to the expression.
+    pub relation: Relation,
+    /// Seconds.
+    pub seconds: Expression,
+}
+
+/// Makes a derived variable true (value 0) in every state where the body holds.
+#[derive(Clone, Debug)]
+pub struct Axiom {
+    /// The derived fact, always value 0 of its variable.
+    pub head: Fact,
+    /// What must hold.
+    pub body: Conjunction,
+}
+
+/// Effects that happen by themselves at a time (timed initial literals and fluents).
+#[derive(Clone, Debug)]
+pub struct TimedEffect {
+    /// When, in seconds from the start of the plan.
+    pub time_s: f64,
+    /// What happens, in the order of the problem file.
+    pub outcomes: Vec<Outcome>,
+}
+
+/// A ground call of an attachment.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Call {
+    /// The module of the lifted task and the arguments.
+    pub origin: Origin,
+    /// The numbers that an effect module writes, in its order; empty for others.
+    pub writes: Vec<NumericId>,
+}
+
+/// What is to be made small or large.
+#[derive(Clone, Debug)]
+pub struct Metric {
+    /// Whether to make it small.
+    pub minimise: bool,
+    /// The whole expression.
+    pub expression: Expression,
+    /// True where the metric is a constant, plus the costs of the plan's actions, plus `time_weight` × makespan.
+    pub additive: bool,
+    /// The weight of `total-time` in an additive metric.
+    pub time_weight: f64,
+}
+
+/// A state: a value a variable (derived ones included and up to date), a number a numeric fluent (NaN where undefined).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Values {
+    /// By variable.
+    pub values: Vec<u32>,
+    /// By numeric fluent.
+    pub numbers: Vec<f64>,
+}
+
+/// A goal fact, or a condition, that nothing can reach even when nothing is ever taken away.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unreachable {
+    /// What the goal asks for, as lifted atoms and the reasons why each cannot be had, outermost first.
+    pub chain: Vec<Missing>,
+}
+
+/// One link of the proof that a goal is out of reach.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Missing {
+    /// The condition that never holds.
+    pub condition: Meaning,
+    /// Whether the condition asks for the atom (`true`) or for its absence.
+    pub wanted: bool,
+    /// The lifted actions and axioms that could bring it about, each with the condition it lacks in some instance.
+    pub achievers: Vec<Origin>,
+}
+
+/// The grounded task.
+#[derive(Clone, Debug)]
+pub struct GroundTask {
+    /// Finite-domain variables, derived ones last.
+    pub variables: Vec<Variable>,
+    /// Numeric fluents.
+    pub numerics: Vec<NumericFluent>,
+    /// Numeric conditions, each once.
+    pub comparisons: Vec<Comparison>,
+    /// Attachment calls, each once.
+    pub calls: Vec<Call>,
+    /// Instantaneous actions.
+    pub actions: Vec<Action>,
+    /// Durative actions.
+    pub durative: Vec<DurativeAction>,
+    /// Axioms, by stratum.
+    pub axioms: Vec<Axiom>,
+    /// Timed effects, by time.
+    pub timed: Vec<TimedEffect>,
+    /// The first state, with derived variables evaluated where no call is involved.
+    pub initial: Values,
+    /// What must hold in the end.
+    pub goal: Conjunction,
+    /// What is to be made small or large; `None` counts steps (classical) or time (temporal).
+    pub metric: Option<Metric>,
+    /// Sets of facts of which at most one holds, beyond those that share a variable.
+    pub mutex_groups: Vec<Vec<Fact>>,
+    /// Set where the goal is out of reach whatever the search does.
+    pub unreachable: Option<Unreachable>,
+}

@@ -1,0 +1,139 @@
+//! What is wrong with a text, where, and how to mend it.
+
+use serde::Serialize;
+
+/// A named text: a domain, a problem or a plan. The name is what messages call it, usually the path.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Source {
+    /// What messages call the text.
+    pub name: String,
+    /// The text itself.
+    pub text: String,
+}
+
+impl Source {
+    /// A source from its name and its text.
+    pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { name: name.into(), text: text.into() }
+    }
+}
+
+/// A place in one of the sources of a task: byte offsets `start..end` of source number `source`
+/// (0 is the domain, 1 the problem).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize)]
+pub struct Span {
+    /// Number of the source.
+    pub source: u32,
+    /// First byte.
+    pub start: u32,
+    /// One past the last byte.
+    pub end: u32,
+}
+
+impl Span {
+    /// The smallest span that holds both; they are taken to be in the same source.
+    pub fn to(self, other: Span) -> Span {
+        Span { source: self.source, start: self.start.min(other.start), end: self.end.max(other.end) }
+    }
+}
+
+/// Whether a finding stops the work or only deserves a look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// A fault: the text means nothing, or certainly not what was intended.
+    Error,
+    /// Readable and usable, but surely not quite what was intended.
+    Warning,
+}
+
+/// A place and what is to be said about it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Label {
+    /// The place.
+    pub span: Span,
+    /// What is there.
+    pub text: String,
+}
+
+/// One finding: what is wrong, the places that show it, and a mend where one is known.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Diagnostic {
+    /// Fault or warning.
+    pub severity: Severity,
+    /// A stable name of the kind of finding, such as `undeclared-predicate`.
+    pub code: &'static str,
+    /// One sentence, without the place.
+    pub message: String,
+    /// The places; the first is where the finding is reported.
+    pub labels: Vec<Label>,
+    /// What to do about it.
+    pub help: Option<String>,
+}
+
+impl Diagnostic {
+    /// A fault at a place.
+    pub fn error(
+        code: &'static str,
+        message: impl Into<String>,
+        span: Span,
+        label: impl Into<String>,
+    ) -> Self {
+        Self::new(Severity::Error, code, message, span, label)
+    }
+
+    /// A warning at a place.
+    pub fn warning(
+        code: &'static str,
+        message: impl Into<String>,
+        span: Span,
+        label: impl Into<String>,
+    ) -> Self {
+        Self::new(Severity::Warning, code, message, span, label)
+    }
+
+    fn new(
+        severity: Severity,
+        code: &'static str,
+        message: impl Into<String>,
+        span: Span,
+        label: impl Into<String>,
+    ) -> Self {
+        let labels = vec![Label { span, text: label.into() }];
+        Self { severity, code, message: message.into(), labels, help: None }
+    }
+
+    /// The same finding with one more place.
+    pub fn with_label(mut self, span: Span, text: impl Into<String>) -> Self {
+        self.labels.push(Label { span, text: text.into() });
+        self
+    }
+
+    /// The same finding with a mend.
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+}
+
+/// Every finding of one reading, in the order of the text, with the sources that they point into.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Findings {
+    /// The texts, by the numbers that spans use.
+    #[serde(skip)]
+    pub sources: Vec<Source>,
+    /// The findings.
+    pub list: Vec<Diagnostic>,
+}
+
+impl Findings {
+    /// Whether a fault is among them (warnings do not count).
+    pub fn has_errors(&self) -> bool {
+        self.list.iter().any(|finding| finding.severity == Severity::Error)
+    }
+
+    /// Whether there is nothing to say at all.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+}

@@ -1,0 +1,429 @@
+//! The tree of a domain or problem file as it was written: names not yet looked up, every part with its place.
+
+use crate::attachment::CallKind;
+use crate::diagnostic::Span;
+
+/// A name or token, case-folded (names of modules and of their functions keep their case in `text`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Symbol(pub u32);
+
+/// A name where it was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Name {
+    /// The case-folded name.
+    pub symbol: Symbol,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// One name of a typed list, such as `?x - (either car truck)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Typed {
+    /// The name that is declared.
+    pub name: Name,
+    /// Its types, alternatives of an `either`; empty where none is given.
+    pub types: Vec<Name>,
+}
+
+/// A declared predicate, or the head of a derived one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Signature {
+    /// Its name.
+    pub name: Name,
+    /// Its parameters.
+    pub parameters: Vec<Typed>,
+}
+
+/// A declared function; `result` is empty or `number` for numeric ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FunctionDeclaration {
+    /// Name and parameters.
+    pub signature: Signature,
+    /// Types of its value.
+    pub result: Vec<Name>,
+}
+
+/// A declared module: `(can-see ?p - pose conditionchecker fn@lib.so)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModuleDeclaration {
+    /// Name and parameters.
+    pub signature: Signature,
+    /// The fluents that an effect module writes.
+    pub writes: Vec<Term>,
+    /// What it is.
+    pub kind: CallKind,
+    /// The token `fn@lib.so`.
+    pub function: Name,
+}
+
+/// An option line `(init@lib arg …)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModuleOption {
+    /// The token `init@lib`.
+    pub function: Name,
+    /// Its arguments.
+    pub arguments: Vec<Name>,
+}
+
+/// A call of a module, `[name arg …]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Call {
+    /// The module's name.
+    pub name: Name,
+    /// Its arguments.
+    pub arguments: Vec<Term>,
+    /// The whole call.
+    pub span: Span,
+}
+
+/// Something with a value: an object or a number.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Term {
+    /// A plain name: an object, or a function without parameters written without parentheses.
+    Name(Name),
+    /// `?x`
+    Variable(Name),
+    /// `3.5`
+    Number(f64, Span),
+    /// `(f a b)`
+    Apply {
+        /// The function.
+        name: Name,
+        /// Its arguments.
+        arguments: Vec<Term>,
+        /// The whole term.
+        span: Span,
+    },
+    /// `(+ a b …)`
+    Arithmetic {
+        /// The operation.
+        operator: Arithmetic,
+        /// One or more operands.
+        operands: Vec<Term>,
+        /// The whole term.
+        span: Span,
+    },
+    /// `[cost a b]`
+    Call(Call),
+    /// `?duration`
+    Duration(Span),
+    /// `#t`
+    ContinuousTime(Span),
+    /// `total-time`
+    TotalTime(Span),
+    /// `(is-violated name)`
+    Violated(Name),
+}
+
+/// Operations on numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Arithmetic {
+    /// `+`
+    Add,
+    /// `-`, with one operand the negative
+    Subtract,
+    /// `*`
+    Multiply,
+    /// `/`
+    Divide,
+}
+
+/// Comparisons.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+pub enum Comparison {
+    /// `<`
+    Less,
+    /// `<=`
+    LessOrEqual,
+    /// `=`
+    Equal,
+    /// `>=`
+    GreaterOrEqual,
+    /// `>`
+    Greater,
+}
+
+/// When in a durative action a part holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum When {
+    /// `at start`
+    Start,
+    /// `over all`
+    OverAll,
+    /// `at end`
+    End,
+}
+
+/// A condition, goal or constraint.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Formula {
+    /// `(and …)`, also `()`
+    And(Vec<Formula>),
+    /// `(or …)`
+    Or(Vec<Formula>),
+    /// `(not f)`
+    Not(Box<Formula>),
+    /// `(imply f g)`
+    Imply(Box<Formula>, Box<Formula>),
+    /// `(exists (…) f)`
+    Exists(Vec<Typed>, Box<Formula>),
+    /// `(forall (…) f)`
+    Forall(Vec<Typed>, Box<Formula>),
+    /// `(p a b)`
+    Atom {
+        /// The predicate.
+        name: Name,
+        /// Its arguments.
+        arguments: Vec<Term>,
+        /// The whole atom.
+        span: Span,
+    },
+    /// `(= a b)`, `(< a b)`, …
+    Compare {
+        /// The comparison.
+        comparison: Comparison,
+        /// Both sides.
+        sides: Box<[Term; 2]>,
+        /// The whole comparison.
+        span: Span,
+    },
+    /// `[can-see a b]`
+    Call(Call),
+    /// `(at start f)`, …
+    Timed(When, Box<Formula>, Span),
+    /// `(preference name f)`
+    Preference(Option<Name>, Box<Formula>, Span),
+    /// `(sometime f)` and the other modal operators of PDDL3
+    Modal {
+        /// The operator.
+        operator: Modal,
+        /// Its numbers (times).
+        times_s: Vec<f64>,
+        /// Its formulas.
+        formulas: Vec<Formula>,
+        /// The whole constraint.
+        span: Span,
+    },
+}
+
+/// Modal operators of PDDL3.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Modal {
+    /// `(at end f)`: in the last state
+    AtEnd,
+    /// `(always f)`
+    Always,
+    /// `(sometime f)`
+    Sometime,
+    /// `(within t f)`
+    Within,
+    /// `(at-most-once f)`
+    AtMostOnce,
+    /// `(sometime-after f g)`
+    SometimeAfter,
+    /// `(sometime-before f g)`
+    SometimeBefore,
+    /// `(always-within t f g)`
+    AlwaysWithin,
+    /// `(hold-during t u f)`
+    HoldDuring,
+    /// `(hold-after t f)`
+    HoldAfter,
+}
+
+/// The five ways to change a fluent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Assignment {
+    /// `assign`
+    Assign,
+    /// `increase`
+    Increase,
+    /// `decrease`
+    Decrease,
+    /// `scale-up`
+    ScaleUp,
+    /// `scale-down`
+    ScaleDown,
+}
+
+/// An effect.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Effect {
+    /// `(and …)`
+    And(Vec<Effect>),
+    /// `(forall (…) e)`
+    Forall(Vec<Typed>, Box<Effect>),
+    /// `(when f e)`
+    When(Formula, Box<Effect>),
+    /// `(p a b)` or `(not (p a b))`
+    Literal {
+        /// Whether the atom becomes false.
+        negated: bool,
+        /// The predicate.
+        name: Name,
+        /// Its arguments.
+        arguments: Vec<Term>,
+        /// The whole literal.
+        span: Span,
+    },
+    /// `(increase (f a) e)`, …
+    Assign {
+        /// How the value changes.
+        assignment: Assignment,
+        /// The fluent that changes.
+        fluent: Term,
+        /// By what.
+        value: Term,
+        /// The whole effect.
+        span: Span,
+    },
+    /// `[update a b]`
+    Call(Call),
+    /// `(at end e)`, …
+    Timed(When, Box<Effect>, Span),
+}
+
+/// A bound on a duration, `(<= ?duration e)`, at start or end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DurationBound {
+    /// When the bound is evaluated.
+    pub when: When,
+    /// `?duration` stands on the left of it.
+    pub comparison: Comparison,
+    /// The bound.
+    pub value: Term,
+    /// The whole bound.
+    pub span: Span,
+}
+
+/// An action, instantaneous or durative.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Action {
+    /// Its name.
+    pub name: Name,
+    /// Whether it was declared `:durative-action`.
+    pub durative: bool,
+    /// Its parameters.
+    pub parameters: Vec<Typed>,
+    /// Calls of grounding modules.
+    pub grounding: Vec<Call>,
+    /// Bounds on its duration.
+    pub duration: Vec<DurationBound>,
+    /// When it may be taken.
+    pub condition: Option<Formula>,
+    /// What it does.
+    pub effect: Option<Effect>,
+    /// The whole declaration.
+    pub span: Span,
+}
+
+/// A derived predicate's rule.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Derived {
+    /// Its head.
+    pub head: Signature,
+    /// When the head is true.
+    pub body: Formula,
+    /// The whole rule.
+    pub span: Span,
+}
+
+/// A domain file.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Domain {
+    /// Its name.
+    pub name: Option<Name>,
+    /// Declared requirements.
+    pub requirements: Vec<Name>,
+    /// Declared types.
+    pub types: Vec<Typed>,
+    /// Declared semantic modules.
+    pub modules: Vec<ModuleDeclaration>,
+    /// Declared constants.
+    pub constants: Vec<Typed>,
+    /// Declared predicates.
+    pub predicates: Vec<Signature>,
+    /// Declared functions.
+    pub functions: Vec<FunctionDeclaration>,
+    /// Trajectory constraints.
+    pub constraints: Vec<Formula>,
+    /// Rules of derived predicates.
+    pub derived: Vec<Derived>,
+    /// Actions of both kinds.
+    pub actions: Vec<Action>,
+}
+
+/// What the initial state says.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Initial {
+    /// `(p a b)`, or `(not (p a b))`
+    Literal {
+        /// Whether it is said to be false.
+        negated: bool,
+        /// The predicate.
+        name: Name,
+        /// Its arguments.
+        arguments: Vec<Name>,
+        /// The whole literal.
+        span: Span,
+    },
+    /// `(= (f a b) v)`
+    Value {
+        /// The function.
+        name: Name,
+        /// Its arguments.
+        arguments: Vec<Name>,
+        /// Its value.
+        value: InitialValue,
+        /// The whole equation.
+        span: Span,
+    },
+    /// `(at 3.5 (p a b))`
+    At(f64, Box<Initial>),
+}
+
+/// The value of a function in the initial state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum InitialValue {
+    /// A number.
+    Number(f64),
+    /// An object.
+    Object(Name),
+}
+
+/// The metric of a problem.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Metric {
+    /// Minimised, or else maximised.
+    pub minimise: bool,
+    /// What.
+    pub value: Term,
+    /// The whole section.
+    pub span: Span,
+}
+
+/// A problem file.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Problem {
+    /// Its name.
+    pub name: Option<Name>,
+    /// The domain that it says it belongs to.
+    pub domain: Option<Name>,
+    /// Requirements repeated in the problem.
+    pub requirements: Vec<Name>,
+    /// `:moduleoptions`
+    pub module_options: Vec<ModuleOption>,
+    /// `:moduleexitoptions`
+    pub module_exit_options: Vec<ModuleOption>,
+    /// Its objects.
+    pub objects: Vec<Typed>,
+    /// The initial state, timed literals included.
+    pub initial: Vec<Initial>,
+    /// The goal.
+    pub goal: Option<Formula>,
+    /// Trajectory constraints.
+    pub constraints: Vec<Formula>,
+    /// The metric.
+    pub metric: Option<Metric>,
+}

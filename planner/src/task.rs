@@ -1,0 +1,586 @@
+//! The lifted task: a checked domain and problem with every name looked up.
+//!
+//! Conditions are in negation normal form (`Not` stands only before an atom, an equation of objects, a numeric
+//! `=` or a call; `imply` is an `or`). Variables are slots: an action's parameters are slots `0..parameters.len()`, quantified
+//! variables follow, each with a slot of its own, so that one flat array of `slots` objects binds everything.
+
+use std::sync::Arc;
+
+use crate::attachment::CallKind;
+use crate::diagnostic::{Source, Span};
+pub use crate::pddl::ast::{Assignment, Comparison, Modal, When};
+
+macro_rules! identifiers {
+    ($($(#[$doc:meta])* $name:ident)*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct $name(pub u32);
+
+        impl $name {
+            /// As an index into the task's list.
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
+        }
+    )*};
+}
+
+identifiers! {
+    /// Index into [`Task::types`].
+    TypeId
+    /// Index into [`Task::objects`].
+    ObjectId
+    /// Index into [`Task::predicates`].
+    PredicateId
+    /// Index into [`Task::functions`].
+    FunctionId
+    /// Index into [`Task::modules`].
+    ModuleId
+    /// Index into [`Task::actions`].
+    ActionId
+    /// Index into [`Task::preferences`].
+    PreferenceId
+    /// A variable of an action, rule or formula: index into its binding.
+    Slot
+}
+
+/// A checked domain and problem.
+#[derive(Debug, Clone)]
+pub struct Task {
+    /// The two texts that all spans point into: domain and problem.
+    pub sources: Arc<[Source]>,
+    /// Name of the domain.
+    pub domain: String,
+    /// Name of the problem.
+    pub problem: String,
+    /// Types; number 0 is `object`.
+    pub types: Vec<Type>,
+    /// Constants of the domain, then objects of the problem.
+    pub objects: Vec<Object>,
+    /// Predicates, derived ones included.
+    pub predicates: Vec<Predicate>,
+    /// Functions, numeric and object-valued.
+    pub functions: Vec<Function>,
+    /// Semantic modules.
+    pub modules: Vec<Module>,
+    /// Rules of the derived predicates, lower strata first.
+    pub rules: Vec<Rule>,
+    /// Actions, instantaneous and durative.
+    pub actions: Vec<Action>,
+    /// The initial state.
+    pub init: Init,
+    /// The goal.
+    pub goal: Scoped<Condition>,
+    /// Trajectory constraints; those that a preference stands before carry it.
+    pub constraints: Vec<Trajectory>,
+    /// Preferences, by name; several preferences may share a name, which then counts their violations.
+    pub preferences: Vec<Preference>,
+    /// What to minimise or maximise.
+    pub metric: Option<Metric>,
+    /// `:moduleoptions` of the problem.
+    pub module_options: Vec<ModuleOption>,
+    /// `:moduleexitoptions` of the problem.
+    pub module_exit_options: Vec<ModuleOption>,
+}
+
+/// A type.
+#[derive(Debug, Clone)]
+pub struct Type {
+    /// Its name, lower case.
+    pub name: String,
+    /// Its direct supertypes; none for `object` alone.
+    pub parents: Vec<TypeId>,
+    /// Every type that it is, itself first.
+    pub ancestors: Vec<TypeId>,
+    /// The objects that are of it, in rising order.
+    pub objects: Vec<ObjectId>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// An object or constant.
+#[derive(Debug, Clone)]
+pub struct Object {
+    /// Its name, lower case.
+    pub name: String,
+    /// Its declared types (more than one after `either`: it is of all of them).
+    pub types: Vec<TypeId>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A variable with the alternatives of its type.
+#[derive(Debug, Clone)]
+pub struct Parameter {
+    /// Its name, with the question mark.
+    pub name: String,
+    /// An object fits that is of one of these.
+    pub types: Vec<TypeId>,
+    /// The objects that fit, in rising order.
+    pub objects: Arc<[ObjectId]>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A predicate.
+#[derive(Debug, Clone)]
+pub struct Predicate {
+    /// Its name, lower case.
+    pub name: String,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// The stratum of its rules, if it is derived: rules of stratum `n` use negated derived atoms only of lower strata.
+    pub stratum: Option<u32>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A function.
+#[derive(Debug, Clone)]
+pub struct Function {
+    /// Its name, lower case.
+    pub name: String,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
+    /// `None` for numbers, else the types of the objects that are its values.
+    pub result: Option<Vec<TypeId>>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A semantic module of PDDL/M.
+#[derive(Debug, Clone)]
+pub struct Module {
+    /// Its name, case kept.
+    pub name: String,
+    /// What it does.
+    pub kind: CallKind,
+    /// Its parameters: slots `0..parameters.len()` of `writes`.
+    pub parameters: Vec<Parameter>,
+    /// What an effect module writes, over its parameters, in the order in which it answers.
+    pub writes: Vec<Written>,
+    /// The token as it was written, `fn@lib.so`, case kept.
+    pub function: String,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A place that an effect module writes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Written {
+    /// A number.
+    Number(Fluent),
+    /// The value of an object function.
+    Object(Fluent),
+    /// The truth of an atom.
+    Truth(Atom),
+}
+
+/// A line of `:moduleoptions`.
+#[derive(Debug, Clone)]
+pub struct ModuleOption {
+    /// The token `init@lib`, case kept.
+    pub function: String,
+    /// Its arguments, case kept.
+    pub arguments: Vec<String>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// Something over variables, and how many slots a binding for it has.
+#[derive(Debug, Clone)]
+pub struct Scoped<T> {
+    /// Number of slots.
+    pub slots: usize,
+    /// The thing itself.
+    pub body: T,
+}
+
+/// A term whose value is an object.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Term {
+    /// A variable.
+    Variable(Slot),
+    /// An object.
+    Object(ObjectId),
+    /// The value of an object function; may be undefined, which equals nothing.
+    Function(Box<Fluent>),
+}
+
+/// A predicate with its arguments.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Atom {
+    /// The predicate.
+    pub predicate: PredicateId,
+    /// Its arguments.
+    pub arguments: Vec<Term>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A function with its arguments.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fluent {
+    /// The function.
+    pub function: FunctionId,
+    /// Its arguments.
+    pub arguments: Vec<Term>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A call of a semantic module.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Call {
+    /// The module.
+    pub module: ModuleId,
+    /// Its arguments.
+    pub arguments: Vec<Term>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A condition in negation normal form.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Condition {
+    /// All of them; empty is true.
+    And(Vec<Condition>),
+    /// One of them; empty is false.
+    Or(Vec<Condition>),
+    /// Not the leaf inside: an `Atom`, `Same`, `Call`, or a `Compare` for equality.
+    Not(Box<Condition>),
+    /// For all objects that fit the quantified variables.
+    Forall(Vec<Quantified>, Box<Condition>),
+    /// For some objects that fit the quantified variables.
+    Exists(Vec<Quantified>, Box<Condition>),
+    /// A fact, basic or derived.
+    Atom(Atom),
+    /// Two terms are the same object.
+    Same(Box<[Term; 2]>, Span),
+    /// A comparison of numbers; false where a number has no value.
+    Compare(Comparison, Box<[Expression; 2]>, Span),
+    /// A condition module says yes.
+    Call(Call),
+}
+
+impl Condition {
+    /// The condition that always holds.
+    pub const TRUE: Condition = Condition::And(Vec::new());
+
+    /// Whether it is the empty conjunction.
+    pub fn is_true(&self) -> bool {
+        matches!(self, Condition::And(parts) if parts.is_empty())
+    }
+}
+
+/// A quantified variable and its slot.
+#[derive(Debug, Clone)]
+pub struct Quantified {
+    /// Its slot.
+    pub slot: Slot,
+    /// Its name, type and objects.
+    pub parameter: Parameter,
+}
+
+impl PartialEq for Quantified {
+    fn eq(&self, other: &Self) -> bool {
+        self.slot == other.slot && self.parameter.types == other.parameter.types
+    }
+}
+
+/// A number.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Expression {
+    /// A constant.
+    Number(f64),
+    /// The value of a numeric function; may be undefined.
+    Fluent(Fluent),
+    /// A sum.
+    Add(Vec<Expression>),
+    /// The first less the second.
+    Subtract(Box<[Expression; 2]>),
+    /// A product.
+    Multiply(Vec<Expression>),
+    /// The first by the second.
+    Divide(Box<[Expression; 2]>),
+    /// The negative.
+    Negative(Box<Expression>),
+    /// `?duration` of the action, in seconds.
+    Duration,
+    /// Makespan of the plan, in seconds; in metrics alone. For a plan of instantaneous actions the number of its steps.
+    TotalTime,
+    /// How often preferences of this name are violated; in metrics alone.
+    Violated(PreferenceId),
+    /// What a cost module answers.
+    Call(Call),
+}
+
+/// What holds or happens at the start, through the inside, and at the end of an action.
+/// Everything of an instantaneous action is at its start.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Timed<T> {
+    /// At start.
+    pub start: T,
+    /// Over all: the open interval between start and end.
+    pub over_all: T,
+    /// At end.
+    pub end: T,
+}
+
+impl Default for Condition {
+    fn default() -> Self {
+        Condition::TRUE
+    }
+}
+
+/// An action.
+#[derive(Debug, Clone)]
+pub struct Action {
+    /// Its name, lower case.
+    pub name: String,
+    /// Its parameters: slots `0..parameters.len()`.
+    pub parameters: Vec<Parameter>,
+    /// Slots in all, quantified variables included.
+    pub slots: usize,
+    /// `None` for an instantaneous action. Bounds on the duration of a durative one (all must hold).
+    pub duration: Option<Vec<DurationBound>>,
+    /// When it may be taken.
+    pub condition: Timed<Condition>,
+    /// Effects at start and at end (`over_all` is always empty).
+    pub effects: Timed<Vec<Effect>>,
+    /// Changes at a rate over the whole duration, from `#t`.
+    pub continuous: Vec<Rate>,
+    /// Calls of grounding modules that propose parameters.
+    pub grounding: Vec<Call>,
+    /// Preferences over its conditions; a violation counts each time.
+    pub preferences: Vec<(PreferenceId, Timed<Condition>)>,
+    /// Where its name stands.
+    pub span: Span,
+}
+
+impl Action {
+    /// Whether it takes time.
+    pub fn is_durative(&self) -> bool {
+        self.duration.is_some()
+    }
+}
+
+/// `?duration` compared with a bound, in seconds.
+#[derive(Debug, Clone)]
+pub struct DurationBound {
+    /// When the bound is evaluated: start or end.
+    pub when: When,
+    /// `?duration` stands on the left of it: `<=`, `=`, `>=`, `<` or `>`.
+    pub comparison: Comparison,
+    /// The bound.
+    pub value: Expression,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// One change, for all objects of its quantified variables, where its condition holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    /// Quantified variables.
+    pub forall: Vec<Quantified>,
+    /// When it happens. For an effect at start only `start` may say something; for one at end `start` and `over_all`
+    /// are conditions on those earlier times.
+    pub when: Timed<Condition>,
+    /// What changes.
+    pub change: Change,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// What an effect changes. Deletions happen before additions.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Change {
+    /// The atom becomes true.
+    Add(Atom),
+    /// The atom becomes false.
+    Delete(Atom),
+    /// A number changes.
+    Number(Assignment, Fluent, Expression),
+    /// An object function gets a value, or loses it.
+    Object(Fluent, Option<Term>),
+    /// An effect module writes its fluents.
+    Call(Call),
+}
+
+/// A number that changes at a rate while an action runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rate {
+    /// The number.
+    pub fluent: Fluent,
+    /// Change per second, sign included.
+    pub per_second: Expression,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A rule of a derived predicate: the head is true if the body is.
+#[derive(Debug, Clone)]
+pub struct Rule {
+    /// The predicate of the head.
+    pub predicate: PredicateId,
+    /// Its variables: slots `0..parameters.len()`.
+    pub parameters: Vec<Parameter>,
+    /// Slots in all.
+    pub slots: usize,
+    /// The body.
+    pub body: Condition,
+    /// Where its head stands.
+    pub span: Span,
+}
+
+/// A ground fact.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Fact {
+    /// The predicate.
+    pub predicate: PredicateId,
+    /// Its arguments.
+    pub arguments: Box<[ObjectId]>,
+}
+
+/// A ground fluent.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct GroundFluent {
+    /// The function.
+    pub function: FunctionId,
+    /// Its arguments.
+    pub arguments: Box<[ObjectId]>,
+}
+
+/// The initial state in the order of the text.
+#[derive(Debug, Clone, Default)]
+pub struct Init {
+    /// What is true; everything else is false.
+    pub facts: Vec<Fact>,
+    /// Numbers; every other one is undefined.
+    pub numbers: Vec<(GroundFluent, f64)>,
+    /// Values of object functions; every other one is undefined.
+    pub objects: Vec<(GroundFluent, ObjectId)>,
+    /// What happens by itself later, in order of time.
+    pub timed: Vec<TimedInitial>,
+}
+
+/// A timed initial literal or fluent.
+#[derive(Debug, Clone)]
+pub struct TimedInitial {
+    /// When, from the beginning of the plan.
+    pub time_s: f64,
+    /// What changes.
+    pub change: GroundChange,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A change without variables.
+#[derive(Debug, Clone, PartialEq)]
+pub enum GroundChange {
+    /// The fact becomes true.
+    Add(Fact),
+    /// The fact becomes false.
+    Delete(Fact),
+    /// The number becomes this.
+    Number(GroundFluent, f64),
+    /// The object function gets this value.
+    Object(GroundFluent, ObjectId),
+}
+
+/// A modal constraint of PDDL3 on the trajectory of states.
+#[derive(Debug, Clone)]
+pub struct Trajectory {
+    /// It holds for all objects of these.
+    pub forall: Vec<Quantified>,
+    /// The operator.
+    pub operator: Modal,
+    /// Its times, in seconds.
+    pub times_s: Vec<f64>,
+    /// Its one or two conditions.
+    pub conditions: Vec<Condition>,
+    /// Slots in all.
+    pub slots: usize,
+    /// If it is only preferred: the preference, once for each binding of `forall`.
+    pub preference: Option<PreferenceId>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// A named preference. Its goal conditions are here; those on trajectories and actions point to it.
+#[derive(Debug, Clone)]
+pub struct Preference {
+    /// Its name.
+    pub name: String,
+    /// Conditions on the last state: each counts one violation for each binding of its quantified variables.
+    pub goals: Vec<PreferredGoal>,
+}
+
+/// A condition on the last state that is only preferred.
+#[derive(Debug, Clone)]
+pub struct PreferredGoal {
+    /// One instance for all objects of these.
+    pub forall: Vec<Quantified>,
+    /// The condition.
+    pub condition: Condition,
+    /// Slots in all.
+    pub slots: usize,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// The metric.
+#[derive(Debug, Clone)]
+pub struct Metric {
+    /// Minimised, or else maximised.
+    pub minimise: bool,
+    /// What.
+    pub value: Expression,
+    /// Where it stands.
+    pub span: Span,
+}
+
+impl Task {
+    /// A type by its index.
+    pub fn type_of(&self, id: TypeId) -> &Type {
+        &self.types[id.index()]
+    }
+
+    /// An object by its index.
+    pub fn object(&self, id: ObjectId) -> &Object {
+        &self.objects[id.index()]
+    }
+
+    /// A predicate by its index.
+    pub fn predicate(&self, id: PredicateId) -> &Predicate {
+        &self.predicates[id.index()]
+    }
+
+    /// A function by its index.
+    pub fn function(&self, id: FunctionId) -> &Function {
+        &self.functions[id.index()]
+    }
+
+    /// A module by its index.
+    pub fn module(&self, id: ModuleId) -> &Module {
+        &self.modules[id.index()]
+    }
+
+    /// An action by its index.
+    pub fn action(&self, id: ActionId) -> &Action {
+        &self.actions[id.index()]
+    }
+
+    /// Whether an object is of one of the types.
+    pub fn fits(&self, object: ObjectId, types: &[TypeId]) -> bool {
+        self.object(object)
+            .types
+            .iter()
+            .any(|&own| types.iter().any(|wanted| self.type_of(own).ancestors.contains(wanted)))
+    }
+
+    /// Whether any action takes time, or anything happens by itself: plans then carry times.
+    pub fn is_temporal(&self) -> bool {
+        !self.init.timed.is_empty() || self.actions.iter().any(Action::is_durative)
+    }
+}

@@ -1,1 +1,17 @@
 //! Bodies: the `Robot` trait and its implementations.
+
+pub mod body;
+pub mod failure;
+pub mod grid;
+
+pub use async_trait::async_trait;
+pub use body::{
+    CancellationToken, Colour, Description, Driven, Footprint, Frames, Head, Looked, Place, Pose2,
+    PoseEstimate, Progress, Push, Pushed, Robot, Sensed, Speeds, Stamp, StampedTransform, Station,
+    SurfaceHint, Travel, Watch,
+};
+pub use descry_perception as perception;
+pub use failure::Failure;
+pub use grid::OccupancyGrid;
+pub use image;
+pub use nalgebra;

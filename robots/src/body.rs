@@ -1,0 +1,423 @@
+//! What every body can be asked: where it is, to drive, to look, and what it would take.
+//!
+//! Frames: `map` (the room; z up where [`Description::up`] says so), `base` (x forward), `camera` (optical: x right, y down, z forward).
+
+use crate::failure::Failure;
+use crate::grid::OccupancyGrid;
+use descry_perception::{Cloud, Intrinsics, View};
+use image::RgbImage;
+use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+pub use tokio_util::sync::CancellationToken;
+
+/// Nanoseconds on the body's clock.
+pub type Stamp = i64;
+
+/// A pose on the floor, in the map.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pose2 {
+    /// Metres.
+    pub x_m: f64,
+    /// Metres.
+    pub y_m: f64,
+    /// Heading, counter-clockwise from the map's x.
+    pub yaw_rad: f64,
+}
+
+impl Pose2 {
+    /// A pose on the floor.
+    pub fn new(x_m: f64, y_m: f64, yaw_rad: f64) -> Self {
+        Pose2 { x_m, y_m, yaw_rad }
+    }
+
+    /// The pose at (`x_m`, `y_m`) that faces `point`.
+    pub fn facing(x_m: f64, y_m: f64, point: &Point2<f64>) -> Self {
+        Pose2 { x_m, y_m, yaw_rad: (point.y - y_m).atan2(point.x - x_m) }
+    }
+
+    /// Where it stands.
+    pub fn point(&self) -> Point2<f64> {
+        Point2::new(self.x_m, self.y_m)
+    }
+
+    /// The same in space: z is zero, upright.
+    pub fn isometry(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(
+            Translation3::new(self.x_m, self.y_m, 0.0),
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw_rad),
+        )
+    }
+
+    /// The pose in space laid on the floor: height, roll and pitch are dropped.
+    pub fn from_isometry(map_from_base: &Isometry3<f64>) -> Self {
+        let forward = map_from_base.rotation * Vector3::x();
+        let at = map_from_base.translation.vector;
+        Pose2 { x_m: at.x, y_m: at.y, yaw_rad: forward.y.atan2(forward.x) }
+    }
+}
+
+/// Somewhere a body can be asked to go.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// Any pose on the floor.
+    Pose(Pose2),
+    /// One of [`Robot::stations`], by name.
+    Station(String),
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Place::Pose(p) => write!(f, "({:.2} m, {:.2} m, {:.0}°)", p.x_m, p.y_m, p.yaw_rad.to_degrees()),
+            Place::Station(name) => write!(f, "{name}"),
+        }
+    }
+}
+
+/// A pose that the body knows by name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Station {
+    /// Unique among the stations of the body.
+    pub name: String,
+    /// Where the base stands there.
+    pub map_from_base: Isometry3<f64>,
+}
+
+/// The outline of the base on the floor, in its own frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Footprint {
+    /// A disc around the base's origin.
+    Disc {
+        /// Metres.
+        radius_m: f64,
+    },
+    /// Corners in order, metres.
+    Polygon {
+        /// At least three.
+        corners_m: Vec<Point2<f64>>,
+    },
+}
+
+impl Footprint {
+    /// Radius of the least disc around the base's origin that holds the footprint, metres: a base that turns anywhere needs this much room.
+    pub fn radius_m(&self) -> f64 {
+        match self {
+            Footprint::Disc { radius_m } => *radius_m,
+            Footprint::Polygon { corners_m } => corners_m.iter().map(|c| c.coords.norm()).fold(0.0, f64::max),
+        }
+    }
+}
+
+/// How fast a body moves.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Speeds {
+    /// Along the ground, metres a second.
+    pub linear_m_s: f64,
+    /// Turning on the spot, radians a second.
+    pub angular_rad_s: f64,
+}
+
+/// The head that carries the camera.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Head {
+    /// Where the head's axes cross, in the base frame, metres. The camera looks from there.
+    pub base_from_head: Point3<f64>,
+    /// Greatest turn to either side, radians.
+    pub pan_limit_rad: f64,
+    /// Greatest turn down, radians.
+    pub tilt_down_rad: f64,
+    /// Greatest turn up, radians.
+    pub tilt_up_rad: f64,
+}
+
+/// Names of the frames in [`Sensed::transforms`].
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Frames {
+    /// The room.
+    pub map: String,
+    /// The body.
+    pub base: String,
+    /// The camera's optical frame.
+    pub camera: String,
+}
+
+impl Default for Frames {
+    fn default() -> Self {
+        Frames { map: "map".into(), base: "base".into(), camera: "camera".into() }
+    }
+}
+
+/// What a body is and can do. Does not change while it lives.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Description {
+    /// For people and records.
+    pub name: String,
+    /// True if the world is simulated too.
+    pub simulated: bool,
+    /// Outline on the floor.
+    pub footprint: Footprint,
+    /// For costs and time limits.
+    pub speeds: Speeds,
+    /// The depth camera.
+    pub camera: Intrinsics,
+    /// Least and greatest depth that the camera measures, metres.
+    pub range_m: (f64, f64),
+    /// The head; `None` if the camera looks where the base's pose says.
+    pub head: Option<Head>,
+    /// Names of frames.
+    pub frames: Frames,
+    /// True if [`Robot::push_aside`] can work.
+    pub can_manipulate: bool,
+    /// Direction of "up" in the map, if it is known.
+    pub up: Option<Vector3<f64>>,
+    /// Standard deviation of localisation along each axis, metres.
+    pub pose_sigma_m: f64,
+    /// Standard deviation of the heading, radians.
+    pub pose_sigma_rad: f64,
+}
+
+/// A surface that the map knows: things may stand on it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceHint {
+    /// As people call it: `table`.
+    pub name: String,
+    /// Outline in the map, corners in order, metres.
+    pub outline_m: Vec<Point2<f64>>,
+    /// Roughly, above the floor, metres.
+    pub height_m: f64,
+}
+
+/// Where the body believes it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PoseEstimate {
+    /// When.
+    pub stamp_ns: Stamp,
+    /// Where the base is, as localisation says.
+    pub map_from_base: Isometry3<f64>,
+    /// Standard deviation along each axis, metres.
+    pub sigma_m: f64,
+    /// Standard deviation about each axis, radians.
+    pub sigma_rad: f64,
+    /// The station it stands at, if the body has stations.
+    pub station: Option<String>,
+}
+
+impl PoseEstimate {
+    /// The same as somewhere to go from or to.
+    pub fn place(&self) -> Place {
+        match &self.station {
+            Some(name) => Place::Station(name.clone()),
+            None => Place::Pose(Pose2::from_isometry(&self.map_from_base)),
+        }
+    }
+}
+
+/// What going somewhere takes, predicted on the map.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Travel {
+    /// Length of the route, metres.
+    pub distance_m: f64,
+    /// Σ max(ds/v, dθ/ω) along the route, seconds.
+    pub duration_s: f64,
+}
+
+/// A drive that arrived.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Driven {
+    /// As odometry counted it, metres.
+    pub distance_m: f64,
+    /// On the body's clock, seconds.
+    pub duration_s: f64,
+    /// Where localisation says that the base is now.
+    pub map_from_base: Isometry3<f64>,
+}
+
+/// The head has turned.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Looked {
+    /// On the body's clock, seconds.
+    pub duration_s: f64,
+    /// Angle between the line of sight and the point asked for, radians; above zero where the head's limits ended the turn.
+    pub miss_rad: f64,
+}
+
+/// One frame's place in another at one time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StampedTransform {
+    /// When.
+    pub stamp_ns: Stamp,
+    /// The frame that `parent_from_child` takes points to.
+    pub parent: String,
+    /// The frame that it takes points from.
+    pub child: String,
+    /// The transform.
+    pub parent_from_child: Isometry3<f64>,
+}
+
+/// A colour image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Colour {
+    /// The pixels.
+    pub image: RgbImage,
+    /// True if its pixels are those of the depth image.
+    pub registered: bool,
+}
+
+/// One frame of the camera with all that is needed to place it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensed {
+    /// When.
+    pub stamp_ns: Stamp,
+    /// Organised, in the optical frame, metres; NaN is "no return".
+    pub cloud: Cloud,
+    /// Depth along z, metres, row by row; NaN is "no return".
+    pub depth_m: Vec<f32>,
+    /// If the camera has colour.
+    pub colour: Option<Colour>,
+    /// The camera.
+    pub intrinsics: Intrinsics,
+    /// The chain map -> base -> camera at that time, as the body believes it.
+    pub transforms: Vec<StampedTransform>,
+    /// The chain multiplied out.
+    pub map_from_camera: Isometry3<f64>,
+    /// Standard deviation of that position along each axis, metres.
+    pub pose_sigma_m: f64,
+    /// Standard deviation of that orientation about each axis, radians.
+    pub pose_sigma_rad: f64,
+}
+
+impl Sensed {
+    /// The frame as perception takes it.
+    pub fn view(&self) -> View {
+        View {
+            stamp_ns: self.stamp_ns,
+            cloud: self.cloud.clone(),
+            intrinsics: Some(self.intrinsics),
+            world_from_camera: self.map_from_camera,
+            pose_sigma_m: self.pose_sigma_m,
+            pose_sigma_rad: self.pose_sigma_rad,
+        }
+    }
+}
+
+/// A push against one object, so that what is behind it can be seen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Push {
+    /// Centre of the object, in the map, metres.
+    pub object: Point3<f64>,
+    /// Which way, in the map; its length does not matter.
+    pub direction: Vector2<f64>,
+    /// How far, metres.
+    pub distance_m: f64,
+}
+
+/// A push that ended.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pushed {
+    /// How far the hand moved while it felt the object, metres.
+    pub moved_m: f64,
+    /// On the body's clock, seconds.
+    pub duration_s: f64,
+}
+
+/// How far something that takes time has got.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// On the body's clock since the start, seconds.
+    pub elapsed_s: f64,
+    /// Done so far, 0 to 1.
+    pub fraction: f64,
+    /// Driven so far, metres.
+    pub distance_m: f64,
+}
+
+/// Who watches over something that takes time: stops it, limits it, hears of it.
+#[derive(Clone)]
+pub struct Watch<'a> {
+    /// Stops it as soon as possible, with [`Failure::Cancelled`].
+    pub cancel: CancellationToken,
+    /// Ends it with [`Failure::TimedOut`], seconds on the body's clock.
+    pub time_limit_s: f64,
+    /// Called now and then.
+    pub progress: &'a (dyn Fn(&Progress) + Send + Sync),
+}
+
+fn nobody_listens(_: &Progress) {}
+
+impl Default for Watch<'_> {
+    /// Nobody stops it, five minutes are enough, nobody listens.
+    fn default() -> Self {
+        Watch { cancel: CancellationToken::new(), time_limit_s: 300.0, progress: &nobody_listens }
+    }
+}
+
+/// A body: simulated, recorded or real. Passing `conformance::check` is part of being one.
+///
+/// What takes time is `async`, can be stopped and has a limit; what is only asked is not. After a failure the body stands still
+/// and can be asked again, unless it said [`Failure::Broken`].
+#[async_trait::async_trait]
+pub trait Robot: Send + Sync {
+    /// What it is and can do.
+    fn description(&self) -> &Description;
+
+    /// The body's clock. Simulated and recorded time advances by driving, looking and sensing, not by waiting.
+    fn now_ns(&self) -> Stamp;
+
+    /// The room as known from mapping; `None` if the body has no map (a recording).
+    fn map(&self) -> Option<&OccupancyGrid>;
+
+    /// Surfaces that the map knows.
+    fn surfaces(&self) -> &[SurfaceHint];
+
+    /// `Some` if the body can stand at these poses only.
+    fn stations(&self) -> Option<&[Station]>;
+
+    /// What going from one place to each of the others takes, predicted on the map: nothing moves.
+    ///
+    /// # Errors
+    /// Each entry by itself: [`Failure::Unreachable`] with the reason.
+    fn travel(&self, from: &Place, to: &[Place]) -> Vec<Result<Travel, Failure>>;
+
+    /// Where the camera would be (`map_from_camera`) if the base stood at `place` and the head looked towards `look_at` (straight
+    /// ahead if `None`), within the head's limits. A body without a head looks where the place says.
+    ///
+    /// # Errors
+    /// [`Failure::Unreachable`] for an unknown station, or a pose where only stations exist.
+    fn camera_at(&self, place: &Place, look_at: Option<&Point3<f64>>) -> Result<Isometry3<f64>, Failure>;
+
+    /// Where localisation says that the base is.
+    ///
+    /// # Errors
+    /// [`Failure::Lost`], [`Failure::Broken`].
+    async fn pose(&self) -> Result<PoseEstimate, Failure>;
+
+    /// Drives there along a route on the map.
+    ///
+    /// # Errors
+    /// [`Failure::Unreachable`], [`Failure::Blocked`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
+    async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure>;
+
+    /// Turns the head towards a point in the map, as far as its limits allow. A body without a head says by how much it misses.
+    ///
+    /// # Errors
+    /// [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure>;
+
+    /// Takes one frame.
+    ///
+    /// # Errors
+    /// [`Failure::SensorDropped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
+    async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure>;
+
+    /// Pushes an object aside.
+    ///
+    /// # Errors
+    /// [`Failure::Unable`] unless [`Description::can_manipulate`]; [`Failure::Unreachable`] if it is out of the arm's reach;
+    /// [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
+        let _ = (push, watch);
+        Err(Failure::Unable { because: format!("{} has no arm", self.description().name) })
+    }
+}

@@ -1,0 +1,108 @@
+//! How a body says that something did not work. A failure is news for the belief: each kind is another thing to learn.
+
+use crate::body::Stamp;
+
+/// Why a body did not do what it was asked to. `because` is one plain sentence for people and logs.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Failure {
+    /// By the map, no route leads there: trying again is useless until the map changes.
+    #[error("unreachable: {because}")]
+    Unreachable {
+        /// What stands in the way, or what was asked for that does not exist.
+        because: String,
+    },
+    /// Something that the map does not know stood in the way; another route or a later try may work.
+    #[error("blocked: {because}")]
+    Blocked {
+        /// Where and by what, as far as the body knows.
+        because: String,
+    },
+    /// The time limit passed. The body stands still, wherever it got to.
+    #[error("timed out: {because}")]
+    TimedOut {
+        /// What took how long.
+        because: String,
+    },
+    /// Somebody stopped it.
+    #[error("cancelled: {because}")]
+    Cancelled {
+        /// What was stopped.
+        because: String,
+    },
+    /// No frame came although one was due.
+    #[error("no frame: {because}")]
+    SensorDropped {
+        /// What is missing.
+        because: String,
+        /// When it was due, on the body's clock.
+        stamp_ns: Stamp,
+    },
+    /// The body does not know where it is.
+    #[error("lost: {because}")]
+    Lost {
+        /// How it noticed.
+        because: String,
+    },
+    /// The hand did not do what it was asked to; the scene may have changed nevertheless.
+    #[error("slipped: {because}")]
+    Slipped {
+        /// What happened, as far as the body felt it.
+        because: String,
+    },
+    /// This body cannot do that at all (see [`Description`](crate::Description)).
+    #[error("not able to: {because}")]
+    Unable {
+        /// What is missing.
+        because: String,
+    },
+    /// The body is broken for good; nothing more can be asked of it.
+    #[error("broken: {because}")]
+    Broken {
+        /// What broke.
+        because: String,
+    },
+}
+
+impl Failure {
+    /// The sentence behind the kind.
+    pub fn because(&self) -> &str {
+        match self {
+            Failure::Unreachable { because }
+            | Failure::Blocked { because }
+            | Failure::TimedOut { because }
+            | Failure::Cancelled { because }
+            | Failure::SensorDropped { because, .. }
+            | Failure::Lost { because }
+            | Failure::Slipped { because }
+            | Failure::Unable { because }
+            | Failure::Broken { because } => because,
+        }
+    }
+
+    /// One word for records and counts: `unreachable`, `blocked`, `timed_out`, …
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Failure::Unreachable { .. } => "unreachable",
+            Failure::Blocked { .. } => "blocked",
+            Failure::TimedOut { .. } => "timed_out",
+            Failure::Cancelled { .. } => "cancelled",
+            Failure::SensorDropped { .. } => "sensor_dropped",
+            Failure::Lost { .. } => "lost",
+            Failure::Slipped { .. } => "slipped",
+            Failure::Unable { .. } => "unable",
+            Failure::Broken { .. } => "broken",
+        }
+    }
+
+    /// True if the same call may work when it is tried again.
+    pub fn is_passing(&self) -> bool {
+        matches!(
+            self,
+            Failure::Blocked { .. }
+                | Failure::TimedOut { .. }
+                | Failure::SensorDropped { .. }
+                | Failure::Lost { .. }
+                | Failure::Slipped { .. }
+        )
+    }
+}

@@ -1,0 +1,60 @@
+//! The room as cells that are free or not.
+
+use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
+
+/// Free and occupied cells of the floor, in the map frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OccupancyGrid {
+    /// Side of a cell, metres.
+    pub resolution_m: f64,
+    /// Outer corner of cell (0, 0), metres.
+    pub origin_m: Point2<f64>,
+    /// Cells along x.
+    pub width: usize,
+    /// Cells along y.
+    pub height: usize,
+    /// Row by row (x fastest); true where something stands.
+    pub occupied: Vec<bool>,
+}
+
+impl OccupancyGrid {
+    /// The smallest grid of cells that covers the box between two corners; all of it free.
+    pub fn covering(low: Point2<f64>, high: Point2<f64>, resolution_m: f64) -> Self {
+        let cells = |from: f64, to: f64| (((to - from) / resolution_m).ceil() as usize).max(1);
+        let (width, height) = (cells(low.x, high.x), cells(low.y, high.y));
+        OccupancyGrid { resolution_m, origin_m: low, width, height, occupied: vec![false; width * height] }
+    }
+
+    /// Column and row of the cell that holds a point; `None` outside.
+    pub fn cell(&self, p: &Point2<f64>) -> Option<(usize, usize)> {
+        let column = ((p.x - self.origin_m.x) / self.resolution_m).floor();
+        let row = ((p.y - self.origin_m.y) / self.resolution_m).floor();
+        let inside = column >= 0.0 && row >= 0.0 && column < self.width as f64 && row < self.height as f64;
+        inside.then_some((column as usize, row as usize))
+    }
+
+    /// Centre of a cell, metres.
+    pub fn centre(&self, column: usize, row: usize) -> Point2<f64> {
+        Point2::new(
+            self.origin_m.x + (column as f64 + 0.5) * self.resolution_m,
+            self.origin_m.y + (row as f64 + 0.5) * self.resolution_m,
+        )
+    }
+
+    /// True if something stands there; everything outside is occupied.
+    pub fn is_occupied(&self, p: &Point2<f64>) -> bool {
+        self.cell(p).is_none_or(|(c, r)| self.occupied[r * self.width + c])
+    }
+
+    /// Marks the cells whose centres satisfy `inside`.
+    pub fn occupy(&mut self, inside: impl Fn(&Point2<f64>) -> bool) {
+        for row in 0..self.height {
+            for column in 0..self.width {
+                if inside(&self.centre(column, row)) {
+                    self.occupied[row * self.width + column] = true;
+                }
+            }
+        }
+    }
+}

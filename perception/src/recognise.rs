@@ -1,0 +1,19 @@
+//! From the objects on a surface to percepts (paper 004, section V, "Tabletop Scene Perception").
+
+mod model;
+mod percept;
+
+use crate::segment::Scene;
+use crate::visibility::Visibility;
+
+pub use model::{Handle, ModelError, ObjectModel, Range, Shape, Top, check_models};
+pub use percept::{Evidence, Percept, Sighting, Stance};
+
+/// A way to tell which known object each segment is.
+pub trait Recogniser: Send + Sync {
+    /// The name by which it is chosen on the command line and in files.
+    fn name(&self) -> &'static str;
+
+    /// One percept a segment, in the order of the segments. The models exclude each other.
+    fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept>;
+}

@@ -1,0 +1,108 @@
+//! What recognition gives: percepts with their evidence. No identity: that begins in memory.
+
+use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
+
+/// How the object stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stance {
+    /// Its base is down.
+    Upright,
+    /// Its top is down.
+    UpsideDown,
+    /// Its axis lies in the plane of the surface.
+    Lying,
+    /// What was seen does not tell.
+    #[default]
+    Unknown,
+}
+
+/// Whether something is there, and whether one could have seen it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sighting {
+    /// It was seen.
+    Seen,
+    /// The places where it could be were looked through: it is not there.
+    Absent,
+    /// Places where it could be have not been seen.
+    #[default]
+    Unseen,
+}
+
+/// What speaks for and against each model. Fractions are between 0 and 1.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// Radius of the best upright round body at its widest, metres; 0 if none was fitted.
+    pub radius_m: f64,
+    /// Standard deviation of the radius.
+    pub radius_sigma_m: f64,
+    /// Diameter at the base over diameter at the top.
+    pub taper: f64,
+    /// Root mean square distance of the points from that body, metres.
+    pub round_residual_m: f64,
+    /// Share of the points that lie on that body.
+    pub round_inliers: f64,
+    /// Share of the body's circumference where its side was measured.
+    pub arc: f64,
+    /// Root mean square distance of the outline from the best rectangle, metres.
+    pub box_residual_m: f64,
+    /// Share of the side that lies on flat vertical faces.
+    pub flatness: f64,
+    /// Share of the top that was looked into below the rim.
+    pub open: f64,
+    /// Share of the top on which a lid or face was measured.
+    pub lid: f64,
+    /// The open rim with an inside.
+    pub inside: Sighting,
+    /// The handle.
+    pub handle: Sighting,
+    /// Share of the directions in which a handle could still hide.
+    pub handle_unseen: f64,
+    /// How far the protrusion reaches out of the body, metres.
+    pub protrusion_m: f64,
+    /// How many views looked at the object.
+    pub views: usize,
+}
+
+/// One object on the surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Percept {
+    /// Name of the known object that it most likely is; `None` is *unknown*.
+    pub label: Option<String>,
+    /// Its kind.
+    pub kind: Option<String>,
+    /// Probability of each model, in the order of the models. With `unknown` they sum to one.
+    /// (The published recogniser gives similarity scores here, which are no probabilities.)
+    pub probabilities: Vec<(String, f64)>,
+    /// Probability of each kind: the sum over its models, in order of first mention.
+    pub kinds: Vec<(String, f64)>,
+    /// Probability that it is none of the models.
+    pub unknown: f64,
+    /// Where it stands: world frame, metres, the centre of its body's footprint on what it stands on.
+    pub position_m: Point3<f64>,
+    /// Standard deviation of each coordinate of the position within the cloud, metres (errors of localisation not included).
+    pub position_sigma_m: f64,
+    /// Longer and shorter side of its footprint, height; metres, what the plane cut off added again.
+    pub size_m: [f64; 3],
+    /// How it stands.
+    pub stance: Stance,
+    /// Points of the cloud that belong to it.
+    pub points: usize,
+    /// Share of its visible hull (sides and top) that some view saw or looked past.
+    pub seen_fraction: f64,
+    /// What speaks for and against.
+    pub evidence: Evidence,
+    /// Those points: indices into the cloud that was segmented.
+    #[serde(skip)]
+    pub indices: Vec<u32>,
+}
+
+impl Percept {
+    /// Probability that it is the object or kind called `name`; 0 for names that no model has.
+    pub fn probability_of(&self, name: &str) -> f64 {
+        let of = |list: &[(String, f64)]| list.iter().find(|(n, _)| n == name).map(|&(_, p)| p);
+        of(&self.probabilities).or_else(|| of(&self.kinds)).unwrap_or(0.0)
+    }
+}

@@ -1,0 +1,232 @@
+//! What the cameras could see: free, surface, hidden or never looked at.
+//!
+//! A recogniser may only count something as absent (a handle, a lid) where a camera looked *through* the place.
+
+use crate::camera::Intrinsics;
+use crate::cloud::{Cloud, is_finite};
+use crate::view::View;
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+/// What one camera, or the best of several, knows of a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Seen {
+    /// No camera had it in view, or the pixel gave no return.
+    Never,
+    /// Behind what a camera saw.
+    Hidden,
+    /// A surface was measured here.
+    Surface,
+    /// A camera looked through it.
+    Free,
+}
+
+/// The depth image of one look with the (corrected) pose of its camera.
+#[derive(Clone, Debug)]
+pub struct DepthMap {
+    /// The camera; the image has its size.
+    pub intrinsics: Intrinsics,
+    /// World to optical frame.
+    pub camera_from_world: Isometry3<f64>,
+    /// Depth along z in metres, row by row; NaN where there was no return.
+    pub depths_m: Vec<f32>,
+}
+
+/// All that the cameras of a scene saw.
+#[derive(Clone, Debug, Default)]
+pub struct Visibility {
+    /// One map a look.
+    pub maps: Vec<DepthMap>,
+}
+
+impl DepthMap {
+    /// The depth map of a view, `None` if its cloud is neither organised nor has a camera.
+    ///
+    /// An organised cloud without intrinsics gets them by least squares from its own pixels.
+    pub fn from_view(view: &View, world_from_camera: &Isometry3<f64>) -> Option<DepthMap> {
+        let intrinsics = match (view.cloud.grid, view.intrinsics) {
+            (Some(grid), Some(known)) if (known.width, known.height) == (grid.width, grid.height) => known,
+            (Some(_), _) => estimate_intrinsics(&view.cloud)?,
+            (None, Some(known)) => {
+                return Some(Self::project(&view.cloud, &Isometry3::identity(), known, world_from_camera));
+            }
+            (None, None) => return None,
+        };
+        let depths_m = view.cloud.points.iter().map(|p| if is_finite(p) { p.z } else { f32::NAN }).collect();
+        Some(DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m })
+    }
+
+    /// A depth map made by projecting a cloud (least depth a pixel); holes stay "no return".
+    fn project(
+        cloud: &Cloud,
+        camera_from_cloud: &Isometry3<f64>,
+        intrinsics: Intrinsics,
+        world_from_camera: &Isometry3<f64>,
+    ) -> DepthMap {
+        let mut depths_m = vec![f32::NAN; intrinsics.width * intrinsics.height];
+        for p in cloud.points.iter().filter(|p| is_finite(p)) {
+            let q = camera_from_cloud * p.cast::<f64>();
+            let Some(pixel) = intrinsics.project(&q).and_then(|(u, v)| intrinsics.pixel(u, v)) else {
+                continue;
+            };
+            let depth = &mut depths_m[pixel];
+            if !(*depth <= q.z as f32) {
+                *depth = q.z as f32;
+            }
+        }
+        DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m }
+    }
+
+    /// Position of the camera in the world, metres.
+    pub fn viewpoint(&self) -> Point3<f64> {
+        Point3::from(self.camera_from_world.inverse().translation.vector)
+    }
+
+    /// What this camera knows of a point of the world. `tolerance_m` is how near to the measured surface still counts as surface.
+    ///
+    /// Free needs every return in the 3×3 pixels around to lie beyond the point: a depth edge is no proof.
+    pub fn look(&self, p: &Point3<f64>, tolerance_m: f64) -> Seen {
+        let q = self.camera_from_world * p;
+        let Some((u, v)) = self.intrinsics.project(&q) else { return Seen::Never };
+        let Some(middle) = self.intrinsics.pixel(u, v) else { return Seen::Never };
+        let (width, height) = (self.intrinsics.width, self.intrinsics.height);
+        let (column, row) = (middle % width, middle / width);
+        let mut nearest = f64::INFINITY;
+        for r in row.saturating_sub(1)..(row + 2).min(height) {
+            for c in column.saturating_sub(1)..(column + 2).min(width) {
+                let depth = self.depths_m[r * width + c];
+                if depth.is_finite() {
+                    nearest = nearest.min(f64::from(depth));
+                }
+            }
+        }
+        if nearest == f64::INFINITY {
+            return Seen::Never;
+        }
+        if nearest > q.z + tolerance_m {
+            return Seen::Free;
+        }
+        let here = f64::from(self.depths_m[middle]);
+        match (here - q.z).abs() <= tolerance_m || (nearest - q.z).abs() <= tolerance_m {
+            true => Seen::Surface,
+            false => Seen::Hidden,
+        }
+    }
+}
+
+impl Visibility {
+    /// What the views saw from the poses they state; views without a camera or grid are left out.
+    pub fn from_views(views: &[View]) -> Visibility {
+        let map = |v: &View| DepthMap::from_view(v, &v.world_from_camera);
+        Visibility { maps: views.iter().filter_map(map).collect() }
+    }
+
+    /// What a bare cloud (world frame) lets one say if it was seen from `viewpoints`: it is projected onto a virtual camera at each.
+    pub fn from_viewpoints(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Visibility {
+        Visibility { maps: viewpoints.iter().filter_map(|v| virtual_map(cloud, v)).collect() }
+    }
+
+    /// The best knowledge of a point: free in any look outweighs surface, hidden and never.
+    pub fn look(&self, p: &Point3<f64>, tolerance_m: f64) -> Seen {
+        self.maps.iter().map(|m| m.look(p, tolerance_m)).max().unwrap_or(Seen::Never)
+    }
+
+    /// Positions of the cameras in the world, metres.
+    pub fn viewpoints(&self) -> Vec<Point3<f64>> {
+        self.maps.iter().map(DepthMap::viewpoint).collect()
+    }
+}
+
+/// A camera at `viewpoint` that looks at the middle of the cloud, its pixels as coarse as the cloud is dense.
+fn virtual_map(cloud: &Cloud, viewpoint: &Point3<f64>) -> Option<DepthMap> {
+    const SIDE: usize = 320;
+    let (low, high) = cloud.bounds()?;
+    let target: Point3<f64> = nalgebra::center(&low.cast(), &high.cast());
+    let forward = (target - viewpoint).try_normalize(1e-9)?;
+    let aside = if forward.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
+    let camera_from_world = Isometry3::look_at_rh(viewpoint, &target, &aside);
+    // nalgebra looks along -z with y up; the optical frame looks along +z with y down.
+    let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let camera_from_world =
+        Isometry3::from_parts(nalgebra::Translation3::identity(), turn) * camera_from_world;
+    let reach = cloud.points.iter().filter(|p| is_finite(p)).fold(0.0_f64, |reach, p| {
+        let q = camera_from_world * p.cast::<f64>();
+        if q.z > 0.05 { reach.max(q.x.abs() / q.z).max(q.y.abs() / q.z) } else { reach }
+    });
+    let middle = (SIDE / 2) as f64;
+    let focal = middle / reach.clamp(0.05, 2.0);
+    let intrinsics = Intrinsics { width: SIDE, height: SIDE, fx: focal, fy: focal, cx: middle, cy: middle };
+    Some(DepthMap::project(cloud, &camera_from_world, intrinsics, &camera_from_world.inverse()))
+}
+
+/// The pinhole camera that explains an organised cloud in its optical frame: least squares of `u·z = f·x + c·z` over its pixels.
+///
+/// `None` if there is no grid or the pixels do not tell.
+pub fn estimate_intrinsics(cloud: &Cloud) -> Option<Intrinsics> {
+    let grid = cloud.grid?;
+    let mut x = Matrix3::<f64>::zeros();
+    let mut y = Matrix3::<f64>::zeros();
+    for (i, p) in cloud.points.iter().enumerate().step_by(7) {
+        if is_finite(p) && p.z > 0.0 {
+            let (u, v) = ((i % grid.width) as f64, (i / grid.width) as f64);
+            let row = |a: f32, pixel: f64| Vector3::new(f64::from(a / p.z), 1.0, pixel);
+            let (rx, ry) = (row(p.x, u), row(p.y, v));
+            x += rx * rx.transpose();
+            y += ry * ry.transpose();
+        }
+    }
+    let line = |m: &Matrix3<f64>| {
+        let solved = m.fixed_view::<2, 2>(0, 0).into_owned().try_inverse()?;
+        let answer = solved * m.fixed_view::<2, 1>(0, 2);
+        (answer[0] > 1.0 && answer[0].is_finite()).then_some((answer[0], answer[1]))
+    };
+    let ((fx, cx), (fy, cy)) = (line(&x)?, line(&y)?);
+    Some(Intrinsics { width: grid.width, height: grid.height, fx, fy, cx, cy })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: Intrinsics = Intrinsics { width: 64, height: 48, fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5 };
+
+    fn wall_at(depth_m: f32) -> View {
+        let cloud = CAMERA.cloud_from_depth(&vec![depth_m; 64 * 48]).unwrap_or_default();
+        View {
+            stamp_ns: 0,
+            cloud,
+            intrinsics: None,
+            world_from_camera: Isometry3::translation(0.0, 0.0, 1.0),
+            pose_sigma_m: 0.0,
+            pose_sigma_rad: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_wall_parts_the_world_into_free_surface_hidden_and_never() {
+        let visibility = Visibility::from_views(&[wall_at(2.0)]);
+        let cases = [
+            ((0.0, 0.0, 2.5), Seen::Free),
+            ((0.0, 0.0, 3.0), Seen::Surface),
+            ((0.0, 0.0, 3.5), Seen::Hidden),
+            ((0.0, 0.0, 0.5), Seen::Never),
+            ((9.0, 0.0, 2.0), Seen::Never),
+        ];
+        for ((x, y, z), expected) in cases {
+            assert_eq!(visibility.look(&Point3::new(x, y, z), 0.01), expected, "at {x} {y} {z}");
+        }
+    }
+
+    #[test]
+    fn a_camera_is_recovered_from_its_organised_cloud() {
+        let found = estimate_intrinsics(&wall_at(2.0).cloud);
+        let close = found.is_some_and(|f| {
+            (f.fx - 60.0).abs() < 1e-3 && (f.cx - 31.5).abs() < 1e-3 && (f.cy - 23.5).abs() < 1e-3
+        });
+        assert!(close, "{found:?}");
+    }
+
+    #[test]
+    fn nothing_is_known_without_a_view() {
+        assert_eq!(Visibility::default().look(&Point3::origin(), 0.01), Seen::Never);
+    }
+}

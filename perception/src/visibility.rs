@@ -69,7 +69,7 @@ impl DepthMap {
                 continue;
             };
             let depth = &mut depths_m[pixel];
-            if !(*depth <= q.z as f32) {
+            if depth.is_nan() || *depth > q.z as f32 {
                 *depth = q.z as f32;
             }
         }

@@ -2,9 +2,11 @@
 
 mod attachment;
 pub mod diagnostic;
+mod explain;
 pub mod ground;
 pub mod pddl;
 pub mod plan;
+mod solve;
 pub mod task;
 
 pub use attachment::{
@@ -12,5 +14,7 @@ pub use attachment::{
     Level, Read, Reading,
 };
 pub use diagnostic::{Diagnostic, Findings, Label, Severity, Source, Span};
+pub use explain::Explanation;
 pub use plan::{Plan, Step};
+pub use solve::{EPSILON_S, Options, Outcome, PlanError, Statistics, plan};
 pub use task::Task;

@@ -1,0 +1,106 @@
+//! Clouds and depth images from bytes and back. Nothing here touches a file system.
+
+pub mod depth;
+mod lzf;
+pub mod pcd;
+pub mod ply;
+
+use crate::cloud::{Cloud, CloudError, Grid};
+use nalgebra::{Isometry3, Point3};
+
+/// Where in a file something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A line of text, counted from 1.
+    Line(usize),
+    /// An offset in bytes from the beginning.
+    Byte(usize),
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Place::Line(line) => write!(f, "line {line}"),
+            Place::Byte(byte) => write!(f, "byte {byte}"),
+        }
+    }
+}
+
+/// A file that cannot be read: where, what was expected, what was found, and how to mend it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{place}: expected {expected}, found {found}; {mend}")]
+pub struct FileError {
+    /// Where.
+    pub place: Place,
+    /// What would have been right.
+    pub expected: String,
+    /// What is there.
+    pub found: String,
+    /// What to do about it.
+    pub mend: String,
+}
+
+impl FileError {
+    fn new(
+        place: Place,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+        mend: impl Into<String>,
+    ) -> Self {
+        FileError { place, expected: expected.into(), found: found.into(), mend: mend.into() }
+    }
+}
+
+/// A cloud read from a file, with what the file says besides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// The cloud. Without a grid it holds finite points only.
+    pub cloud: Cloud,
+    /// The sensor's pose as the file states it (`VIEWPOINT` of PCD); identity if it states none. The points are not moved by it.
+    pub viewpoint: Isometry3<f64>,
+    /// What a person should know: points left out, suspicious units, attributes ignored.
+    pub notes: Vec<String>,
+}
+
+/// Reads a PCD or PLY file, told apart by its first bytes.
+///
+/// # Errors
+/// If it is neither, or broken.
+pub fn read_cloud(bytes: &[u8]) -> Result<Loaded, FileError> {
+    if bytes.starts_with(b"ply") {
+        return ply::read(bytes);
+    }
+    pcd::read(bytes)
+}
+
+/// Makes raw points sane: infinite becomes "no return", what has no return leaves clouds without a grid; says what it did.
+fn finish(
+    mut cloud: Cloud,
+    viewpoint: Isometry3<f64>,
+    mut notes: Vec<String>,
+    place: Place,
+) -> Result<Loaded, FileError> {
+    if cloud.grid.is_some_and(|Grid { width, height }| height <= 1 || width <= 1) {
+        cloud.grid = None;
+    }
+    let organised = cloud.grid.is_some();
+    let mut infinite = 0usize;
+    let mut missing = 0usize;
+    for p in cloud.points.iter_mut().filter(|p| !crate::cloud::is_finite(p)) {
+        missing += 1;
+        infinite += usize::from(p.iter().any(|c| c.is_infinite()));
+        *p = Point3::new(f32::NAN, f32::NAN, f32::NAN);
+    }
+    if infinite > 0 {
+        notes.push(format!("{infinite} points with infinite coordinates are taken as \"no return\""));
+    }
+    if !organised && missing > 0 {
+        notes.push(format!("{missing} points without finite coordinates were left out"));
+        cloud = cloud.finite();
+    }
+    notes.extend(cloud.unit_warning());
+    cloud.check().map_err(|e: CloudError| {
+        FileError::new(place, "attributes that fit the points", e.to_string(), "mend the header")
+    })?;
+    Ok(Loaded { cloud, viewpoint, notes })
+}

@@ -1,0 +1,67 @@
+//! Depth images of 16 bits: PNG and PGM.
+
+use super::{FileError, Place};
+
+/// Depths along the optical axis, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthImage {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Metres; NaN where the sensor had no return.
+    pub depths_m: Vec<f32>,
+}
+
+/// Reads a depth image of 16 bits a pixel (PNG or PGM); `metres_per_unit` is 0.001 for millimetres. 0 and 65535 are "no return".
+///
+/// # Errors
+/// If it is no such image or has another depth of pixel.
+pub fn read(bytes: &[u8], metres_per_unit: f64) -> Result<DepthImage, FileError> {
+    let start = Place::Byte(0);
+    let decoded = image::load_from_memory(bytes).map_err(|e| {
+        FileError::new(
+            start,
+            "a PNG or PGM image",
+            e.to_string(),
+            "give a grey image of 16 bits (millimetres)",
+        )
+    })?;
+    let image::DynamicImage::ImageLuma16(grey) = decoded else {
+        let found = format!("pixels of kind {:?}", decoded.color());
+        return Err(FileError::new(
+            start,
+            "one grey channel of 16 bits",
+            found,
+            "a colour image is no depth image",
+        ));
+    };
+    let to_metres = |&raw: &u16| match raw {
+        0 | u16::MAX => f32::NAN,
+        raw => (f64::from(raw) * metres_per_unit) as f32,
+    };
+    let (width, height) = (grey.width() as usize, grey.height() as usize);
+    Ok(DepthImage { width, height, depths_m: grey.as_raw().iter().map(to_metres).collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pgm_of_millimetres() {
+        let mut file = b"P5\n3 1\n65535\n".to_vec();
+        file.extend([0x04, 0xD2, 0, 0, 0xFF, 0xFF]);
+        let image = read(&file, 0.001).unwrap();
+        assert_eq!((image.width, image.height), (3, 1));
+        assert!((image.depths_m[0] - 1.234).abs() < 1e-6);
+        assert!(image.depths_m[1].is_nan() && image.depths_m[2].is_nan());
+    }
+
+    #[test]
+    fn eight_bits_are_no_depth() {
+        let error = read(b"P5\n1 1\n255\n\x07", 0.001).unwrap_err().to_string();
+        assert!(error.contains("16 bits"), "{error}");
+        assert!(read(b"rubbish", 0.001).is_err());
+    }
+}

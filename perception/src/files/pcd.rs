@@ -1,0 +1,309 @@
+//! PCD 0.5 to 0.7 of the Point Cloud Library: `ascii`, `binary` and `binary_compressed`, any order, type and count of fields.
+
+mod header;
+
+use super::{FileError, Loaded, Place, finish, lzf};
+use crate::cloud::{Cloud, Grid};
+use header::{Encoding as Stored, Field, Header};
+use nalgebra::{Point3, Vector3};
+
+/// How [`write`] stores the points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// Text, one point a line.
+    Ascii,
+    /// Point after point, little endian.
+    Binary,
+    /// Field after field, LZF.
+    BinaryCompressed,
+}
+
+/// Reads a PCD file. Fields used: `x y z`, `rgb` or `rgba` (packed), `normal_x normal_y normal_z`, `label`; others are noted and left out.
+///
+/// # Errors
+/// If the header or the data are broken: with the line or byte, what was expected, and what to do.
+pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
+    let header = header::parse(bytes)?;
+    let data = &bytes[header.data_at..];
+    let place = Place::Byte(header.data_at);
+    let table = match header.encoding {
+        Stored::Ascii => Table::from_text(&header, data)?,
+        Stored::Binary => Table::from_rows(&header, data)?,
+        Stored::BinaryCompressed => Table::from_columns(&header, data)?,
+    };
+    let mut notes = header.notes.clone();
+    let cloud = table.cloud(&header, &mut notes)?;
+    finish(cloud, header.viewpoint, notes, place)
+}
+
+/// The bytes of all points and where each field of point `i` begins: `offset + i * step`.
+struct Table {
+    bytes: Vec<u8>,
+    /// Per field: begin and step.
+    layout: Vec<(usize, usize)>,
+}
+
+impl Table {
+    fn from_rows(header: &Header, data: &[u8]) -> Result<Table, FileError> {
+        let stride = header.stride();
+        let needed = header.points.saturating_mul(stride);
+        let bytes = data.get(..needed).ok_or_else(|| header.too_short(data.len(), needed))?.to_vec();
+        let layout = header.offsets().map(|offset| (offset, stride)).collect();
+        Ok(Table { bytes, layout })
+    }
+
+    fn from_columns(header: &Header, data: &[u8]) -> Result<Table, FileError> {
+        let needed = header.points.saturating_mul(header.stride());
+        let word = |at: usize| -> Option<usize> {
+            Some(u32::from_le_bytes(data.get(at..at + 4)?.try_into().ok()?) as usize)
+        };
+        let (Some(packed), Some(unpacked)) = (word(0), word(4)) else {
+            return Err(header.too_short(data.len(), 8));
+        };
+        if unpacked != needed {
+            return Err(FileError::new(
+                Place::Byte(header.data_at + 4),
+                format!("{needed} unpacked bytes for {} points", header.points),
+                format!("a size of {unpacked}"),
+                "header and data do not belong together: write the file again",
+            ));
+        }
+        let stream =
+            data.get(8..8usize.saturating_add(packed)).ok_or_else(|| header.too_short(data.len(), packed))?;
+        let bytes = lzf::unpack(stream, needed).map_err(|e| {
+            let place = Place::Byte(header.data_at + 8 + e.at());
+            FileError::new(place, "an LZF stream", e.to_string(), "the file is damaged: write it again")
+        })?;
+        let layout =
+            header.offsets().zip(&header.fields).map(|(o, f)| (o * header.points, f.bytes())).collect();
+        Ok(Table { bytes, layout })
+    }
+
+    fn from_text(header: &Header, data: &[u8]) -> Result<Table, FileError> {
+        let stride = header.stride();
+        // Each point needs at least one character and one separator for each value.
+        let values: usize = header.fields.iter().map(|f| f.count).sum();
+        if header.points.saturating_mul(values).saturating_mul(2) > data.len().saturating_add(1) {
+            return Err(header.too_short(data.len(), header.points.saturating_mul(values).saturating_mul(2)));
+        }
+        let mut bytes = Vec::with_capacity(header.points.saturating_mul(stride));
+        let mut rows = 0;
+        for (number, line) in data.split(|&b| b == b'\n').enumerate() {
+            if rows == header.points {
+                break;
+            }
+            let line = std::str::from_utf8(line).unwrap_or("\u{fffd}");
+            if line.trim().is_empty() || line.trim_start().starts_with('#') {
+                continue;
+            }
+            parse_row(&header.fields, line, Place::Line(header.data_line + number), &mut bytes)?;
+            rows += 1;
+        }
+        if rows < header.points {
+            return Err(FileError::new(
+                Place::Byte(header.data_at + data.len()),
+                format!("{} lines of points", header.points),
+                format!("{rows}"),
+                "set POINTS, WIDTH and HEIGHT to what is there, or write the file again",
+            ));
+        }
+        let layout = header.offsets().map(|offset| (offset, stride)).collect();
+        Ok(Table { bytes, layout })
+    }
+
+    /// Four (or fewer) raw bytes of field `field` of point `point`, zero-extended to eight.
+    fn raw(&self, field: usize, size: usize, point: usize) -> [u8; 8] {
+        let (begin, step) = self.layout[field];
+        let at = begin + step * point;
+        let mut out = [0; 8];
+        out[..size].copy_from_slice(&self.bytes[at..at + size]);
+        out
+    }
+
+    fn column<T>(
+        &self,
+        header: &Header,
+        field: usize,
+        convert: impl Fn([u8; 8]) -> T,
+    ) -> impl Iterator<Item = T> {
+        let size = header.fields[field].size;
+        (0..header.points).map(move |i| convert(self.raw(field, size, i)))
+    }
+
+    fn number(&self, header: &Header, field: usize) -> impl Iterator<Item = f64> {
+        let kind = header.fields[field].clone();
+        self.column(header, field, move |raw| kind.number(raw))
+    }
+
+    fn cloud(&self, header: &Header, notes: &mut Vec<String>) -> Result<Cloud, FileError> {
+        let find = |name: &str| header.fields.iter().position(|f| f.name == name);
+        let need = |name: &str| {
+            find(name).ok_or_else(|| {
+                let found = header.fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(" ");
+                FileError::new(
+                    Place::Line(header.fields_line),
+                    format!("a field {name}"),
+                    found,
+                    "a cloud has fields x, y and z",
+                )
+            })
+        };
+        let (x, y, z) = (need("x")?, need("y")?, need("z")?);
+        let points = self.triples(header, [x, y, z]).map(Point3::from).collect();
+        let colour = find("rgb").or_else(|| find("rgba")).filter(|&c| header.fields[c].size == 4);
+        let colours = colour.map(|c| {
+            self.column(header, c, |raw| {
+                let [blue, green, red, ..] = raw;
+                [red, green, blue]
+            })
+            .collect()
+        });
+        let normal = [find("normal_x"), find("normal_y"), find("normal_z")];
+        let normals = match normal {
+            [Some(a), Some(b), Some(c)] => Some(self.triples(header, [a, b, c]).map(Vector3::from).collect()),
+            _ => None,
+        };
+        let label = find("label");
+        let labels = label.map(|l| self.number(header, l).map(|v| v as u32).collect());
+        let used = [Some(x), Some(y), Some(z), colour, label];
+        let left: Vec<&str> = header
+            .fields
+            .iter()
+            .enumerate()
+            .filter(|(i, f)| {
+                f.name != "_"
+                    && !used.contains(&Some(*i))
+                    && !(normals.is_some() && normal.contains(&Some(*i)))
+            })
+            .map(|(_, f)| f.name.as_str())
+            .collect();
+        if !left.is_empty() {
+            notes.push(format!("fields left out: {}", left.join(" ")));
+        }
+        let grid = (header.height > 1).then_some(Grid { width: header.width, height: header.height });
+        Ok(Cloud { points, grid, colours, normals, labels })
+    }
+
+    fn triples(&self, header: &Header, fields: [usize; 3]) -> impl Iterator<Item = [f32; 3]> {
+        let [a, b, c] = fields.map(|f| self.number(header, f));
+        a.zip(b).zip(c).map(|((a, b), c)| [a as f32, b as f32, c as f32])
+    }
+}
+
+/// Appends the bytes of one line of text.
+fn parse_row(fields: &[Field], line: &str, place: Place, out: &mut Vec<u8>) -> Result<(), FileError> {
+    let mut tokens = line.split_ascii_whitespace();
+    for field in fields {
+        for _ in 0..field.count {
+            let bad = |found: &str| {
+                FileError::new(
+                    place,
+                    format!("a number for field {}", field.name),
+                    found,
+                    "one line holds one point, one number a field",
+                )
+            };
+            let token = tokens.next().ok_or_else(|| bad("the end of the line"))?;
+            field.encode(token, out).ok_or_else(|| bad(&format!("{token:?}")))?;
+        }
+    }
+    match tokens.next() {
+        None => Ok(()),
+        Some(extra) => Err(FileError::new(
+            place,
+            "the end of the line",
+            format!("{extra:?}"),
+            "FIELDS and COUNT must name every column",
+        )),
+    }
+}
+
+/// A cloud as a PCD 0.7 file: `x y z` (F 4), then `rgb` (U 4), `normal_x normal_y normal_z` and `label` (U 4) as far as it has them.
+pub fn write(cloud: &Cloud, encoding: Encoding) -> Vec<u8> {
+    let columns = columns(cloud);
+    let points = cloud.len();
+    let (width, height) = cloud.grid.map_or((points, 1), |g| (g.width, g.height));
+    let per_field =
+        |value: &dyn Fn(&Column) -> String| columns.iter().map(value).collect::<Vec<_>>().join(" ");
+    let name = match encoding {
+        Encoding::Ascii => "ascii",
+        Encoding::Binary => "binary",
+        Encoding::BinaryCompressed => "binary_compressed",
+    };
+    let mut out = format!(
+        "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
+         WIDTH {width}\nHEIGHT {height}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {points}\nDATA {name}\n",
+        per_field(&|c| c.name.to_string()),
+        per_field(&|_| "4".to_string()),
+        per_field(&|c| if c.float { "F" } else { "U" }.to_string()),
+        per_field(&|_| "1".to_string()),
+    )
+    .into_bytes();
+    match encoding {
+        Encoding::Ascii => write_text(&columns, points, &mut out),
+        Encoding::Binary => {
+            for i in 0..points {
+                for column in &columns {
+                    out.extend_from_slice(&(column.bits)(i).to_le_bytes());
+                }
+            }
+        }
+        Encoding::BinaryCompressed => {
+            let raw: Vec<u8> =
+                columns.iter().flat_map(|c| (0..points).flat_map(|i| (c.bits)(i).to_le_bytes())).collect();
+            let packed = lzf::pack(&raw);
+            out.extend_from_slice(&(packed.len() as u32).to_le_bytes());
+            out.extend_from_slice(&(raw.len() as u32).to_le_bytes());
+            out.extend_from_slice(&packed);
+        }
+    }
+    out
+}
+
+/// One column to write: four bytes a point.
+struct Column<'a> {
+    name: &'static str,
+    float: bool,
+    bits: Box<dyn Fn(usize) -> u32 + 'a>,
+}
+
+fn columns(cloud: &Cloud) -> Vec<Column<'_>> {
+    let mut columns = Vec::new();
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        columns.push(Column { name, float: true, bits: Box::new(move |i| cloud.points[i][axis].to_bits()) });
+    }
+    if let Some(colours) = &cloud.colours {
+        let bits = move |i: usize| {
+            let [red, green, blue] = colours[i];
+            u32::from_be_bytes([0, red, green, blue])
+        };
+        columns.push(Column { name: "rgb", float: false, bits: Box::new(bits) });
+    }
+    if let Some(normals) = &cloud.normals {
+        for (axis, name) in ["normal_x", "normal_y", "normal_z"].into_iter().enumerate() {
+            columns.push(Column { name, float: true, bits: Box::new(move |i| normals[i][axis].to_bits()) });
+        }
+    }
+    if let Some(labels) = &cloud.labels {
+        columns.push(Column { name: "label", float: false, bits: Box::new(move |i| labels[i]) });
+    }
+    columns
+}
+
+fn write_text(columns: &[Column], points: usize, out: &mut Vec<u8>) {
+    for i in 0..points {
+        for (k, column) in columns.iter().enumerate() {
+            if k > 0 {
+                out.push(b' ');
+            }
+            let bits = (column.bits)(i);
+            let text = match f32::from_bits(bits) {
+                _ if !column.float => bits.to_string(),
+                v if v.is_nan() => "nan".to_string(),
+                v => v.to_string(),
+            };
+            out.extend_from_slice(text.as_bytes());
+        }
+        out.push(b'\n');
+    }
+}

@@ -1,0 +1,394 @@
+//! PLY: `ascii`, `binary_little_endian`, `binary_big_endian`; any elements and properties, of which the vertices are used.
+
+use super::{FileError, Loaded, Place, finish};
+use crate::cloud::Cloud;
+use nalgebra::{Isometry3, Point3, Vector3};
+
+/// How [`write`] stores the vertices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// Text, one vertex a line.
+    Ascii,
+    /// Little endian.
+    Binary,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stored {
+    Ascii,
+    Little,
+    Big,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    fn named(name: &str) -> Option<Scalar> {
+        Some(match name {
+            "char" | "int8" => Scalar::I8,
+            "uchar" | "uint8" => Scalar::U8,
+            "short" | "int16" => Scalar::I16,
+            "ushort" | "uint16" => Scalar::U16,
+            "int" | "int32" => Scalar::I32,
+            "uint" | "uint32" => Scalar::U32,
+            "float" | "float32" => Scalar::F32,
+            "double" | "float64" => Scalar::F64,
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Scalar::I8 | Scalar::U8 => 1,
+            Scalar::I16 | Scalar::U16 => 2,
+            Scalar::I32 | Scalar::U32 | Scalar::F32 => 4,
+            Scalar::F64 => 8,
+        }
+    }
+
+    /// The value of `raw`, little endian, zero-extended.
+    fn value(self, raw: [u8; 8]) -> f64 {
+        let low = u64::from_le_bytes(raw);
+        match self {
+            Scalar::I8 => f64::from(low as i8),
+            Scalar::I16 => f64::from(low as i16),
+            Scalar::I32 => f64::from(low as i32),
+            Scalar::U8 | Scalar::U16 | Scalar::U32 => low as f64,
+            Scalar::F32 => f64::from(f32::from_bits(low as u32)),
+            Scalar::F64 => f64::from_bits(low),
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Property {
+    name: String,
+    scalar: Scalar,
+    /// Type of the count, if it is a list.
+    list: Option<Scalar>,
+}
+
+#[derive(Clone, Debug)]
+struct Element {
+    name: String,
+    count: usize,
+    properties: Vec<Property>,
+    line: usize,
+}
+
+/// Reads the vertices of a PLY file: `x y z`, `red green blue` (or `diffuse_red` …; whole numbers to 255 or floats to 1), `nx ny nz`, `label`.
+///
+/// # Errors
+/// If the header or the data are broken: with the line or byte, what was expected, and what to do.
+pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
+    let (stored, elements, mut cursor) = header(bytes)?;
+    for element in &elements {
+        if element.name == "vertex" {
+            let table = cursor.rows(stored, element)?;
+            let mut notes = Vec::new();
+            let cloud = cloud(element, &table, &mut notes)?;
+            return finish(cloud, Isometry3::identity(), notes, Place::Line(element.line));
+        }
+        cursor.rows(stored, element)?;
+    }
+    Err(FileError::new(
+        Place::Line(cursor.line),
+        "an element \"vertex\"",
+        "none",
+        "a cloud is the vertices of a PLY file",
+    ))
+}
+
+/// Where reading stands.
+struct Cursor<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    line: usize,
+}
+
+impl<'a> Cursor<'a> {
+    fn text_line(&mut self) -> Option<(usize, &'a str)> {
+        let rest = self.bytes.get(self.at..).filter(|r| !r.is_empty())?;
+        let end = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
+        self.at += (end + 1).min(rest.len());
+        self.line += 1;
+        Some((self.line, std::str::from_utf8(&rest[..end]).unwrap_or("\u{fffd}")))
+    }
+
+    /// All values of an element that are no lists, row after row.
+    fn rows(&mut self, stored: Stored, element: &Element) -> Result<Vec<f64>, FileError> {
+        let least: usize = match stored {
+            Stored::Ascii => 2 * element.properties.len(),
+            _ => element.properties.iter().map(|p| p.list.unwrap_or(p.scalar).size()).sum(),
+        };
+        let left = self.bytes.len() - self.at;
+        if element.count.saturating_mul(least.max(1)) > left.saturating_add(1) {
+            return Err(FileError::new(
+                Place::Byte(self.bytes.len()),
+                format!("{} rows of element {}", element.count, element.name),
+                format!("the end of the file after {left} bytes"),
+                "the file was cut: write it again",
+            ));
+        }
+        let columns = element.properties.iter().filter(|p| p.list.is_none()).count();
+        let mut values = Vec::with_capacity(element.count.saturating_mul(columns));
+        for _ in 0..element.count {
+            match stored {
+                Stored::Ascii => self.text_row(element, &mut values)?,
+                _ => self.binary_row(stored, element, &mut values)?,
+            }
+        }
+        Ok(values)
+    }
+
+    fn text_row(&mut self, element: &Element, values: &mut Vec<f64>) -> Result<(), FileError> {
+        let (line, text) = loop {
+            match self.text_line() {
+                Some((_, text)) if text.trim().is_empty() => continue,
+                Some(found) => break found,
+                None => {
+                    let expected = format!("{} rows of element {}", element.count, element.name);
+                    let place = Place::Line(self.line);
+                    return Err(FileError::new(
+                        place,
+                        expected,
+                        "the end of the file",
+                        "the file was cut: write it again",
+                    ));
+                }
+            }
+        };
+        let mut words = text.split_ascii_whitespace();
+        for property in &element.properties {
+            let mut number = || -> Result<f64, FileError> {
+                let word = words.next();
+                word.and_then(|w| w.parse().ok()).ok_or_else(|| {
+                    let found = word.map_or("the end of the line".to_string(), |w| format!("{w:?}"));
+                    let expected = format!("a number for {}", property.name);
+                    FileError::new(
+                        Place::Line(line),
+                        expected,
+                        found,
+                        "one line holds one row of the element",
+                    )
+                })
+            };
+            let first = number()?;
+            if property.list.is_none() {
+                values.push(first);
+                continue;
+            }
+            for _ in 0..first.max(0.0) as u64 {
+                number()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn binary_row(
+        &mut self,
+        stored: Stored,
+        element: &Element,
+        values: &mut Vec<f64>,
+    ) -> Result<(), FileError> {
+        for property in &element.properties {
+            let Some(count) = property.list else {
+                values.push(self.scalar(stored, property.scalar, &property.name)?);
+                continue;
+            };
+            let entries = self.scalar(stored, count, &property.name)?.max(0.0) as usize;
+            let skip = entries.saturating_mul(property.scalar.size());
+            if skip > self.bytes.len() - self.at {
+                return Err(self.cut(&property.name));
+            }
+            self.at += skip;
+        }
+        Ok(())
+    }
+
+    fn scalar(&mut self, stored: Stored, scalar: Scalar, name: &str) -> Result<f64, FileError> {
+        let size = scalar.size();
+        let found = self.bytes.get(self.at..self.at + size).ok_or_else(|| self.cut(name))?;
+        let mut raw = [0; 8];
+        raw[..size].copy_from_slice(found);
+        if stored == Stored::Big {
+            raw[..size].reverse();
+        }
+        self.at += size;
+        Ok(scalar.value(raw))
+    }
+
+    fn cut(&self, name: &str) -> FileError {
+        let place = Place::Byte(self.at);
+        FileError::new(
+            place,
+            format!("a value of {name}"),
+            "the end of the file",
+            "the file was cut: write it again",
+        )
+    }
+}
+
+fn header(bytes: &[u8]) -> Result<(Stored, Vec<Element>, Cursor<'_>), FileError> {
+    let mut cursor = Cursor { bytes, at: 0, line: 0 };
+    let mut stored = None;
+    let mut elements: Vec<Element> = Vec::new();
+    while let Some((line, text)) = cursor.text_line() {
+        let words: Vec<&str> = text.split_ascii_whitespace().collect();
+        let bad = |expected: &str, mend: &str| {
+            let shown: String = text.chars().take(60).collect();
+            Err(FileError::new(Place::Line(line), expected, format!("{shown:?}"), mend))
+        };
+        match words.as_slice() {
+            ["ply"] if line == 1 => {}
+            _ if line == 1 => return bad("\"ply\"", "is this a PLY file?"),
+            [] | ["comment", ..] | ["obj_info", ..] => {}
+            ["format", "ascii", ..] => stored = Some(Stored::Ascii),
+            ["format", "binary_little_endian", ..] => stored = Some(Stored::Little),
+            ["format", "binary_big_endian", ..] => stored = Some(Stored::Big),
+            ["element", name, count] => {
+                let Ok(count) = count.parse::<u32>() else {
+                    return bad("element NAME COUNT", "the count is a whole number below 2^32");
+                };
+                elements.push(Element {
+                    name: name.to_string(),
+                    count: count as usize,
+                    properties: vec![],
+                    line,
+                });
+            }
+            ["property", rest @ ..] => match (property(rest), elements.last_mut()) {
+                (Some(property), Some(element)) => element.properties.push(property),
+                (_, None) => {
+                    return bad("an element before its properties", "move the line below its element");
+                }
+                _ => {
+                    return bad(
+                        "property TYPE NAME or property list TYPE TYPE NAME",
+                        "check the type's name",
+                    );
+                }
+            },
+            ["end_header"] => {
+                let Some(stored) = stored else { return bad("a line format before end_header", "add it") };
+                return Ok((stored, elements, cursor));
+            }
+            _ => return bad("a line of a PLY header", "see the PLY format: element, property, end_header"),
+        }
+    }
+    let place = Place::Line(cursor.line + 1);
+    Err(FileError::new(place, "end_header", "the end of the file", "the header is cut"))
+}
+
+fn property(words: &[&str]) -> Option<Property> {
+    match words {
+        ["list", count, of, name] => Some(Property {
+            name: name.to_string(),
+            scalar: Scalar::named(of)?,
+            list: Some(Scalar::named(count)?),
+        }),
+        [of, name] => Some(Property { name: name.to_string(), scalar: Scalar::named(of)?, list: None }),
+        _ => None,
+    }
+}
+
+fn cloud(element: &Element, values: &[f64], notes: &mut Vec<String>) -> Result<Cloud, FileError> {
+    let flat: Vec<&Property> = element.properties.iter().filter(|p| p.list.is_none()).collect();
+    let find = |name: &str| flat.iter().position(|p| p.name == name);
+    let triple = |names: [&str; 3]| Some([find(names[0])?, find(names[1])?, find(names[2])?]);
+    let rows = || values.chunks_exact(flat.len().max(1));
+    let Some([x, y, z]) = triple(["x", "y", "z"]) else {
+        let found = flat.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(" ");
+        return Err(FileError::new(
+            Place::Line(element.line),
+            "properties x, y and z of the vertices",
+            found,
+            "a cloud needs all three",
+        ));
+    };
+    let points = rows().map(|r| Point3::new(r[x] as f32, r[y] as f32, r[z] as f32)).collect();
+    let colour = triple(["red", "green", "blue"])
+        .or_else(|| triple(["diffuse_red", "diffuse_green", "diffuse_blue"]))
+        .or_else(|| triple(["r", "g", "b"]));
+    let colours = colour.map(|at| {
+        let scale = at.map(|i| if matches!(flat[i].scalar, Scalar::F32 | Scalar::F64) { 255.0 } else { 1.0 });
+        rows().map(|r| [0, 1, 2].map(|k| (r[at[k]] * scale[k]).round() as u8)).collect()
+    });
+    let normal = triple(["nx", "ny", "nz"]);
+    let normals =
+        normal.map(|[a, b, c]| rows().map(|r| Vector3::new(r[a] as f32, r[b] as f32, r[c] as f32)).collect());
+    let label = find("label");
+    let labels = label.map(|at| rows().map(|r| r[at] as u32).collect());
+    let used: Vec<usize> =
+        [Some([x, y, z]), colour, normal].into_iter().flatten().flatten().chain(label).collect();
+    let left: Vec<&str> =
+        (0..flat.len()).filter(|i| !used.contains(i)).map(|i| flat[i].name.as_str()).collect();
+    if !left.is_empty() {
+        notes.push(format!("properties left out: {}", left.join(" ")));
+    }
+    Ok(Cloud { points, grid: None, colours, normals, labels })
+}
+
+/// The finite points of a cloud as a PLY file (float coordinates, uchar colours, float normals, uint label). PLY knows no grid.
+pub fn write(cloud: &Cloud, encoding: Encoding) -> Vec<u8> {
+    let finite = cloud.finite();
+    let format = match encoding {
+        Encoding::Ascii => "ascii",
+        Encoding::Binary => "binary_little_endian",
+    };
+    let mut head = format!("ply\nformat {format} 1.0\nelement vertex {}\n", finite.len());
+    let mut declare = |kind: &str, names: &[&str]| {
+        names.iter().for_each(|name| head.push_str(&format!("property {kind} {name}\n")));
+    };
+    declare("float", &["x", "y", "z"]);
+    if finite.colours.is_some() {
+        declare("uchar", &["red", "green", "blue"]);
+    }
+    if finite.normals.is_some() {
+        declare("float", &["nx", "ny", "nz"]);
+    }
+    if finite.labels.is_some() {
+        declare("uint", &["label"]);
+    }
+    head.push_str("end_header\n");
+    let mut out = head.into_bytes();
+    for i in 0..finite.len() {
+        match encoding {
+            Encoding::Ascii => text_vertex(&finite, i, &mut out),
+            Encoding::Binary => binary_vertex(&finite, i, &mut out),
+        }
+    }
+    out
+}
+
+fn text_vertex(cloud: &Cloud, i: usize, out: &mut Vec<u8>) {
+    let mut words: Vec<String> = cloud.points[i].iter().map(f32::to_string).collect();
+    words.extend(cloud.colours.iter().flat_map(|c| c[i].map(|v| v.to_string())));
+    words.extend(cloud.normals.iter().flat_map(|n| n[i].iter().map(f32::to_string).collect::<Vec<_>>()));
+    words.extend(cloud.labels.iter().map(|l| l[i].to_string()));
+    out.extend_from_slice(words.join(" ").as_bytes());
+    out.push(b'\n');
+}
+
+fn binary_vertex(cloud: &Cloud, i: usize, out: &mut Vec<u8>) {
+    cloud.points[i].iter().for_each(|c| out.extend_from_slice(&c.to_le_bytes()));
+    if let Some(colours) = &cloud.colours {
+        out.extend_from_slice(&colours[i]);
+    }
+    if let Some(normals) = &cloud.normals {
+        normals[i].iter().for_each(|c| out.extend_from_slice(&c.to_le_bytes()));
+    }
+    if let Some(labels) = &cloud.labels {
+        out.extend_from_slice(&labels[i].to_le_bytes());
+    }
+}

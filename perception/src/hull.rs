@@ -1,0 +1,165 @@
+//! The convex hull of points in a plane.
+
+use crate::plane::Plane;
+use crate::spread::tangents;
+use nalgebra::{Point2, Point3, Vector3};
+
+/// A convex region of a plane.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hull {
+    /// The plane.
+    pub plane: Plane,
+    /// Origin of the plane's own coordinates.
+    pub origin: Point3<f64>,
+    /// Its first axis, a unit vector.
+    pub u: Vector3<f64>,
+    /// Its second axis; `u`, `v`, normal are right-handed.
+    pub v: Vector3<f64>,
+    /// Corners in those coordinates, anticlockwise seen from where the normal points, metres. Two for points on a line, one for one place.
+    pub corners: Vec<Point2<f64>>,
+}
+
+impl Hull {
+    /// The hull of the finite points, projected along the normal; `None` if there is none.
+    pub fn around<'a>(plane: Plane, points: impl IntoIterator<Item = &'a Point3<f32>>) -> Option<Hull> {
+        let (u, v) = tangents(&plane.normal);
+        let origin = Point3::from(plane.normal * plane.offset_m);
+        let flat: Vec<Point2<f64>> = points
+            .into_iter()
+            .filter(|p| crate::cloud::is_finite(p))
+            .map(|p| p.cast::<f64>() - origin)
+            .map(|d| Point2::new(d.dot(&u), d.dot(&v)))
+            .collect();
+        (!flat.is_empty()).then(|| Hull { plane, origin, u, v, corners: convex(flat) })
+    }
+
+    /// A point's foot in the plane's coordinates, metres.
+    pub fn flatten(&self, p: &Point3<f64>) -> Point2<f64> {
+        let d = p - self.origin;
+        Point2::new(d.dot(&self.u), d.dot(&self.v))
+    }
+
+    /// A point of the plane from its coordinates.
+    pub fn lift(&self, q: &Point2<f64>) -> Point3<f64> {
+        self.origin + self.u * q.x + self.v * q.y
+    }
+
+    /// The corners in space.
+    pub fn corners_in_space(&self) -> Vec<Point3<f64>> {
+        self.corners.iter().map(|c| self.lift(c)).collect()
+    }
+
+    /// Distance from the foot of `p` to the border, metres: negative inside, positive outside.
+    pub fn distance_m(&self, p: &Point3<f64>) -> f64 {
+        let q = self.flatten(p);
+        let mut inside = self.corners.len() > 2;
+        let mut nearest = f64::INFINITY;
+        for (a, b) in self.edges() {
+            let (along, to) = (b - a, q - a);
+            inside &= along.perp(&to) >= 0.0;
+            let length_sq = along.norm_squared();
+            let t = if length_sq > 0.0 { (to.dot(&along) / length_sq).clamp(0.0, 1.0) } else { 0.0 };
+            nearest = nearest.min((to - along * t).norm());
+        }
+        if inside { -nearest } else { nearest }
+    }
+
+    /// True if the foot of `p` lies in the hull, or no farther than `margin_m` outside (a negative margin: at least as far inside).
+    pub fn contains(&self, p: &Point3<f64>, margin_m: f64) -> bool {
+        self.distance_m(p) <= margin_m
+    }
+
+    /// Area, square metres.
+    pub fn area_m2(&self) -> f64 {
+        self.edges().map(|(a, b)| a.coords.perp(&b.coords)).sum::<f64>() / 2.0
+    }
+
+    /// Length of the border, metres.
+    pub fn perimeter_m(&self) -> f64 {
+        self.edges().map(|(a, b)| (b - a).norm()).sum()
+    }
+
+    fn edges(&self) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> {
+        let n = self.corners.len();
+        (0..n).map(move |i| (self.corners[i], self.corners[(i + 1) % n]))
+    }
+}
+
+/// Corners of the convex hull, anticlockwise, without points on its edges (Andrew 1979).
+pub fn convex(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
+    points.retain(|p| p.x.is_finite() && p.y.is_finite());
+    points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let mut corners: Vec<Point2<f64>> = Vec::new();
+    let mut chain = |points: &mut dyn Iterator<Item = &Point2<f64>>| {
+        let base = corners.len();
+        for p in points {
+            while corners.len() >= base + 2 {
+                let (a, b) = (corners[corners.len() - 2], corners[corners.len() - 1]);
+                if (b - a).perp(&(p - a)) > 0.0 {
+                    break;
+                }
+                corners.pop();
+            }
+            corners.push(*p);
+        }
+        corners.pop();
+    };
+    chain(&mut points.iter());
+    chain(&mut points.iter().rev());
+    corners
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn square() -> Hull {
+        let plane = Plane { normal: Vector3::z(), offset_m: 0.7 };
+        let points: Vec<Point3<f32>> =
+            (0..121).map(|i| Point3::new((i % 11) as f32 * 0.1, (i / 11) as f32 * 0.1, 0.7)).collect();
+        Hull::around(plane, &points).unwrap()
+    }
+
+    #[test]
+    fn a_square_metre() {
+        let hull = square();
+        assert_eq!(hull.corners.len(), 4);
+        assert!((hull.area_m2() - 1.0).abs() < 1e-6 && (hull.perimeter_m() - 4.0).abs() < 1e-6);
+        assert!(hull.contains(&Point3::new(0.5, 0.5, 9.0), 0.0));
+        assert!(!hull.contains(&Point3::new(1.05, 0.5, 0.7), 0.0));
+        assert!(hull.contains(&Point3::new(1.05, 0.5, 0.7), 0.06));
+        assert!(!hull.contains(&Point3::new(0.95, 0.5, 0.7), -0.06));
+    }
+
+    #[test]
+    fn points_on_a_line_and_in_one_place() {
+        let plane = Plane { normal: Vector3::z(), offset_m: 0.0 };
+        let line: Vec<Point3<f32>> = (0..5).map(|i| Point3::new(i as f32, 0.0, 0.0)).collect();
+        let hull = Hull::around(plane, &line).unwrap();
+        assert_eq!((hull.corners.len(), hull.area_m2()), (2, 0.0));
+        assert!(
+            hull.contains(&Point3::new(2.0, 0.0, 0.0), 1e-9)
+                && !hull.contains(&Point3::new(2.0, 0.1, 0.0), 1e-9)
+        );
+        let place = Hull::around(plane, &[Point3::origin(); 3]).unwrap();
+        assert_eq!((place.corners.len(), place.area_m2()), (1, 0.0));
+        assert!(Hull::around(plane, &[]).is_none());
+    }
+
+    proptest! {
+        #[test]
+        fn holds_every_point(points in proptest::collection::vec((-1.0f64..1.0, -1.0f64..1.0), 1..60)) {
+            let points: Vec<Point2<f64>> = points.into_iter().map(|(x, y)| Point2::new(x, y)).collect();
+            let corners = convex(points.clone());
+            for i in 0..corners.len() {
+                let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);
+                prop_assert!(points.iter().all(|p| (b - a).perp(&(p - a)) > -1e-12));
+            }
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! How a structured-light depth camera errs (Nguyen, Izadi, Lovell: Modeling Kinect Sensor Noise, 2012).
+
+/// Steepest angle between ray and normal that still returns, degrees.
+pub const STEEPEST_DEG: f64 = 85.0;
+
+/// Standard deviation along the ray, metres, of a return at depth `z_m` from a surface whose normal makes `angle_rad` with the ray (eq. 2 and the
+/// steep-angle term); `None` beyond the steepest angle, where there is no return.
+pub fn axial_sigma_m(z_m: f64, angle_rad: f64) -> Option<f64> {
+    let degrees = angle_rad.abs().to_degrees();
+    (degrees <= STEEPEST_DEG && z_m > 0.0).then(|| {
+        let steep = 0.0001 * degrees * degrees / (z_m.sqrt() * (90.0 - degrees).powi(2));
+        0.0012 + 0.0019 * (z_m - 0.4).powi(2) + steep
+    })
+}
+
+/// Standard deviation across the ray, metres, at depth `z_m` for focal length `focal_px` (eq. 1: pixels times depth over focal length).
+pub fn lateral_sigma_m(z_m: f64, angle_rad: f64, focal_px: f64) -> Option<f64> {
+    let degrees = angle_rad.abs().to_degrees();
+    (degrees <= STEEPEST_DEG && z_m > 0.0)
+        .then(|| (0.8 + 0.034 * degrees / (90.0 - degrees)) * z_m / focal_px)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grows_with_depth_and_angle_and_ends() {
+        let axial = |z, degrees: f64| axial_sigma_m(z, degrees.to_radians());
+        assert!((axial(0.4, 0.0).unwrap() - 0.0012).abs() < 1e-12);
+        assert!(axial(2.0, 0.0) > axial(1.0, 0.0) && axial(1.0, 80.0) > axial(1.0, 20.0));
+        assert_eq!((axial(1.0, 86.0), lateral_sigma_m(1.0, 1.5, 525.0)), (None, None));
+        assert!((lateral_sigma_m(1.0, 0.0, 525.0).unwrap() - 0.8 / 525.0).abs() < 1e-12);
+    }
+}

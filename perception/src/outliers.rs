@@ -1,0 +1,34 @@
+//! Stray points.
+
+use crate::neighbours::Neighbours;
+
+/// What [`statistical`] found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kept {
+    /// Indices of the points that stay, ascending. Points without a return do not.
+    pub indices: Vec<u32>,
+    /// Mean over the cloud of the mean distance to the neighbours, metres.
+    pub mean_m: f64,
+    /// Its standard deviation, metres.
+    pub sigma_m: f64,
+    /// Points whose neighbours are on average farther than this were dropped, metres.
+    pub limit_m: f64,
+}
+
+/// Keeps the points whose mean distance to their `k` nearest (the point itself counts) is below the cloud's mean plus `sigmas` standard deviations
+/// (Rusu et al. 2008, section 4.1). With fewer than `k` points all there are count.
+pub fn statistical(tree: &Neighbours, k: usize, sigmas: f64) -> Kept {
+    let _span = tracing::debug_span!("statistical outliers", points = tree.len(), k).entered();
+    let means = tree.map_all(k, f32::NAN, |_, near| {
+        near.iter().map(|f| f.distance_sq().sqrt()).sum::<f32>() / near.len() as f32
+    });
+    let valid = || means.iter().filter(|m| !m.is_nan()).map(|&m| f64::from(m));
+    let count = valid().count() as f64;
+    let mean_m = if count > 0.0 { valid().sum::<f64>() / count } else { 0.0 };
+    let square = valid().map(|m| (m - mean_m).powi(2)).sum::<f64>();
+    let sigma_m = if count > 1.0 { (square / (count - 1.0)).sqrt() } else { 0.0 };
+    let limit_m = mean_m + sigmas * sigma_m;
+    let stays = |m: f32| f64::from(m) < limit_m || (sigma_m == 0.0 && f64::from(m) <= limit_m);
+    let indices = (0u32..).zip(&means).filter(|(_, m)| stays(**m)).map(|(i, _)| i).collect();
+    Kept { indices, mean_m, sigma_m, limit_m }
+}

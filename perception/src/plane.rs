@@ -1,0 +1,101 @@
+//! The plane that most points lie in.
+
+mod search;
+
+use nalgebra::{Point3, Unit, Vector3};
+use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
+
+pub use search::{find, refit};
+
+/// All points `p` with `normal · p = offset_m`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plane {
+    /// Unit normal.
+    pub normal: Vector3<f64>,
+    /// Distance from the origin along the normal, metres.
+    pub offset_m: f64,
+}
+
+impl Plane {
+    /// The plane through `at` with a unit `normal`.
+    pub fn through(at: &Point3<f64>, normal: Vector3<f64>) -> Plane {
+        Plane { normal, offset_m: normal.dot(&at.coords) }
+    }
+
+    /// Signed distance, metres: positive where the normal points.
+    pub fn height_m(&self, p: &Point3<f64>) -> f64 {
+        self.normal.dot(&p.coords) - self.offset_m
+    }
+
+    /// The same plane seen from its other side.
+    pub fn flipped(&self) -> Plane {
+        Plane { normal: -self.normal, offset_m: -self.offset_m }
+    }
+
+    /// The plane with its normal on the side of `p`.
+    pub fn facing(&self, p: &Point3<f64>) -> Plane {
+        if self.height_m(p) < 0.0 { self.flipped() } else { *self }
+    }
+}
+
+/// What plane to look for, and how hard.
+#[derive(Clone, Debug)]
+pub struct PlaneOptions {
+    /// Points no farther from the plane belong to it, metres.
+    pub tolerance_m: f32,
+    /// Rounds of random sampling.
+    pub rounds: usize,
+    /// Fixes the sampling.
+    pub seed: u64,
+    /// Only planes whose normal lies within this angle (radians) of a direction; the normal found then points along it.
+    pub tilt: Option<(Unit<Vector3<f64>>, f64)>,
+    /// With `tilt`: only planes whose offset along their normal lies in this range, metres. The height of a table, if the direction is up and the frame's origin on the floor.
+    pub offset_m: Option<RangeInclusive<f64>>,
+}
+
+impl Default for PlaneOptions {
+    fn default() -> Self {
+        PlaneOptions { tolerance_m: 0.01, rounds: 1000, seed: 0, tilt: None, offset_m: None }
+    }
+}
+
+/// A plane, and how well it is borne out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlaneFit {
+    /// The plane. Its normal points along the asked direction, or else to the side of the origin (the sensor).
+    pub plane: Plane,
+    /// Indices of the points within the tolerance, ascending.
+    pub inliers: Vec<u32>,
+    /// Finite points that were looked at.
+    pub of: usize,
+    /// Root mean square distance of the inliers, metres.
+    pub rms_m: f64,
+    /// Sampling rounds that gave a plane that was asked for.
+    pub rounds_used: usize,
+}
+
+/// Why there is no plane.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PlaneError {
+    /// Fewer than three finite points.
+    #[error("{found} finite points: a plane needs three")]
+    TooFew {
+        /// How many there are.
+        found: usize,
+    },
+    /// Not one sample gave a plane that was asked for.
+    #[error(
+        "none of {rounds} samples gave a plane of the asked tilt and height: do the points lie on one line? widen the band, or sample more"
+    )]
+    None {
+        /// Samples taken.
+        rounds: usize,
+    },
+    /// The tolerance is no positive length.
+    #[error("a tolerance of {tolerance_m} m: give a positive length, such as 0.01")]
+    Tolerance {
+        /// What was asked for.
+        tolerance_m: f32,
+    },
+}

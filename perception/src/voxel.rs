@@ -1,0 +1,187 @@
+//! Thinning by voxels: one point a cube, at the centroid of what lies in it.
+
+use crate::cloud::{Cloud, is_finite};
+use nalgebra::{Point3, Vector3};
+
+/// Voxels that cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum VoxelError {
+    /// The edge is no positive length.
+    #[error("a voxel edge of {edge_m} m: give a positive length, such as 0.01")]
+    Edge {
+        /// What was asked for.
+        edge_m: f32,
+    },
+    /// A point lies outside of the two million voxels that an axis can count.
+    #[error(
+        "point {index} lies {distance_m} m out, too far for voxels of {edge_m} m (the farthest is {farthest_m} m): \
+         are these millimetres (scale by 0.001), or a stray return?"
+    )]
+    TooFar {
+        /// Which point.
+        index: usize,
+        /// Its farthest coordinate.
+        distance_m: f32,
+        /// The voxels' edge.
+        edge_m: f32,
+        /// The farthest coordinate that can be counted.
+        farthest_m: f32,
+    },
+}
+
+/// Voxels an axis on each side of zero; three axes fill 63 bits.
+const HALF_RANGE: f32 = (1 << 20) as f32;
+
+/// One point a voxel of edge `edge_m`, at the centroid of its points, in the order in which the voxels first occur.
+///
+/// The grid is fixed to the origin of the frame, so that the same surface gives the same voxels in every cloud. Colours and normals are
+/// averaged, a label is that of the voxel's first point. Points without a return are left out.
+///
+/// # Errors
+/// If the edge is not positive or a point lies more than a million voxels from the origin.
+pub fn downsample(cloud: &Cloud, edge_m: f32) -> Result<Cloud, VoxelError> {
+    let _span = tracing::debug_span!("voxels", points = cloud.len()).entered();
+    let assigned = assign(&cloud.points, edge_m)?;
+    let counts = assigned.counts();
+    let points = assigned
+        .sums(cloud.points.iter().map(|p| [f64::from(p.x), f64::from(p.y), f64::from(p.z)]))
+        .zip(&counts)
+        .map(|(sum, &n)| Point3::from(sum.map(|s| (s / f64::from(n)) as f32)))
+        .collect();
+    let colours = cloud.colours.as_ref().map(|colours| {
+        assigned
+            .sums(colours.iter().map(|c| c.map(f64::from)))
+            .zip(&counts)
+            .map(|(sum, &n)| sum.map(|s| (s / f64::from(n)).round() as u8))
+            .collect()
+    });
+    let normals = cloud.normals.as_ref().map(|normals| {
+        assigned
+            .sums(normals.iter().map(|n| {
+                if n.iter().all(|c| c.is_finite()) { [n.x, n.y, n.z].map(f64::from) } else { [0.0; 3] }
+            }))
+            .map(|sum| Vector3::from(sum).try_normalize(0.0).map_or(Vector3::repeat(f32::NAN), |n| n.cast()))
+            .collect()
+    });
+    let labels = cloud.labels.as_ref().map(|labels| {
+        let mut first = vec![None; assigned.voxels];
+        for (&voxel, &label) in assigned.voxel.iter().zip(labels).filter(|(v, _)| **v != NONE) {
+            first[voxel as usize].get_or_insert(label);
+        }
+        first.into_iter().flatten().collect()
+    });
+    Ok(Cloud { points, grid: None, colours, normals, labels })
+}
+
+/// The voxel of a point that has none.
+pub const NONE: u32 = u32::MAX;
+
+/// Which voxel each point lies in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assigned {
+    /// Per point the number of its voxel, counted in order of first occurrence; [`NONE`] for points without a return.
+    pub voxel: Vec<u32>,
+    /// How many voxels there are.
+    pub voxels: usize,
+}
+
+impl Assigned {
+    /// Points in each voxel.
+    pub fn counts(&self) -> Vec<u32> {
+        let mut counts = vec![0u32; self.voxels];
+        self.voxel.iter().filter(|v| **v != NONE).for_each(|&v| counts[v as usize] += 1);
+        counts
+    }
+
+    fn sums(&self, values: impl Iterator<Item = [f64; 3]>) -> std::vec::IntoIter<[f64; 3]> {
+        let mut sums = vec![[0.0; 3]; self.voxels];
+        for (&voxel, value) in self.voxel.iter().zip(values).filter(|(v, _)| **v != NONE) {
+            let sum: &mut [f64; 3] = &mut sums[voxel as usize];
+            (0..3).for_each(|k| sum[k] += value[k]);
+        }
+        sums.into_iter()
+    }
+}
+
+/// Numbers the voxels of edge `edge_m` that hold points, in order of first occurrence.
+///
+/// # Errors
+/// As [`downsample`].
+pub fn assign(points: &[Point3<f32>], edge_m: f32) -> Result<Assigned, VoxelError> {
+    if !(edge_m.is_finite() && edge_m > 0.0) {
+        return Err(VoxelError::Edge { edge_m });
+    }
+    let mut table = Table::with_room_for(points.len() / 8);
+    let mut voxel = Vec::with_capacity(points.len());
+    let mut last = (u64::MAX, NONE);
+    for (index, p) in points.iter().enumerate() {
+        if !is_finite(p) {
+            voxel.push(NONE);
+            continue;
+        }
+        let cell = p.coords.map(|c| (f64::from(c) / f64::from(edge_m)).floor());
+        if cell.iter().any(|c| !(f64::from(-HALF_RANGE)..f64::from(HALF_RANGE)).contains(c)) {
+            let distance_m = p.coords.amax();
+            return Err(VoxelError::TooFar { index, distance_m, edge_m, farthest_m: HALF_RANGE * edge_m });
+        }
+        let axis = |c: f64| (c as i64 + (1 << 20)) as u64;
+        let key = axis(cell.x) << 42 | axis(cell.y) << 21 | axis(cell.z);
+        if key != last.0 {
+            last = (key, table.number(key));
+        }
+        voxel.push(last.1);
+    }
+    Ok(Assigned { voxel, voxels: table.len as usize })
+}
+
+/// Numbers keys in order of first occurrence: open addressing, linear probing.
+struct Table {
+    slots: Vec<(u64, u32)>,
+    mask: usize,
+    len: u32,
+}
+
+impl Table {
+    fn with_room_for(keys: usize) -> Table {
+        let size = (2 * keys).next_power_of_two().max(1 << 10);
+        Table { slots: vec![(u64::MAX, 0); size], mask: size - 1, len: 0 }
+    }
+
+    fn number(&mut self, key: u64) -> u32 {
+        let mut at = self.home(key);
+        loop {
+            let (found, number) = self.slots[at];
+            if found == key {
+                return number;
+            }
+            if found == u64::MAX {
+                break;
+            }
+            at = (at + 1) & self.mask;
+        }
+        let number = self.len;
+        self.slots[at] = (key, number);
+        self.len += 1;
+        if self.len as usize * 2 > self.slots.len() {
+            self.grow();
+        }
+        number
+    }
+
+    fn home(&self, key: u64) -> usize {
+        let mixed = key.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        (mixed >> 32) as usize & self.mask
+    }
+
+    fn grow(&mut self) {
+        let old = std::mem::replace(self, Table::with_room_for(self.slots.len()));
+        self.len = old.len;
+        for slot in old.slots.into_iter().filter(|s| s.0 != u64::MAX) {
+            let mut at = self.home(slot.0);
+            while self.slots[at].0 != u64::MAX {
+                at = (at + 1) & self.mask;
+            }
+            self.slots[at] = slot;
+        }
+    }
+}

@@ -4,6 +4,7 @@ mod attachment;
 pub mod diagnostic;
 mod explain;
 pub mod ground;
+mod invariants;
 pub mod pddl;
 pub mod plan;
 mod solve;

@@ -1,5 +1,18 @@
-//! The grounded task: what every search works on.
+//! The grounded task, which every search works on, and how it is made from the lifted one.
 
+mod assemble;
+mod atoms;
+mod build;
+mod instantiate;
+mod metric;
+mod normal;
+mod raw;
+mod reach;
+mod relaxed;
+mod relevant;
+mod rules;
 mod task;
+mod variables;
 
+pub use build::{GroundError, ground};
 pub use task::*;

@@ -83,8 +83,6 @@ pub enum Expression {
     Duration,
     /// `total-time`: the makespan, only in metrics.
     TotalTime,
-    /// `#t`: only in continuous effects.
-    Elapsed,
     /// Whether a preference is violated, as a number; only in metrics.
     Violated(u32),
     /// The sum of all.
@@ -185,29 +183,25 @@ pub enum Outcome {
     Call(CallId),
 }
 
-/// An effect and when it happens. A `Set` to an atom wins over one that takes the same atom's variable away from it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Effect {
+/// When a conditional effect happens.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct When {
     /// Must hold where the effect happens.
-    pub when: Conjunction,
+    pub here: Conjunction,
     /// Must have held at the start of the durative action (only in effects at its end).
-    pub when_at_start: Conjunction,
+    pub at_start: Conjunction,
     /// Must have held all the time (only in effects at the end of a durative action).
-    pub when_over_all: Conjunction,
-    /// What happens.
-    pub outcome: Outcome,
+    pub over_all: Conjunction,
 }
 
-impl Effect {
-    /// An effect that happens always.
-    pub fn always(outcome: Outcome) -> Effect {
-        Effect {
-            when: Conjunction::default(),
-            when_at_start: Conjunction::default(),
-            when_over_all: Conjunction::default(),
-            outcome,
-        }
-    }
+/// An effect and when it happens. Of the effects of one action that happen together, conditions and amounts are
+/// evaluated before any of them; then they are applied in their order (what takes away stands before what adds).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effect {
+    /// `None` where it happens always.
+    pub when: Option<Box<When>>,
+    /// What happens.
+    pub outcome: Outcome,
 }
 
 /// Where a ground thing comes from: an action, axiom or module of the lifted task with its arguments.
@@ -289,8 +283,21 @@ pub struct TimedEffect {
 pub struct Call {
     /// The module of the lifted task and the arguments.
     pub origin: Origin,
-    /// The numbers that an effect module writes, in its order; empty for others.
-    pub writes: Vec<NumericId>,
+    /// What an effect module writes, in its order; empty for others.
+    pub writes: Vec<Place>,
+}
+
+/// A place that an effect module writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Place {
+    /// A number.
+    Number(NumericId),
+    /// The truth of an atom: value 0 of this two-valued variable is true, 1 false.
+    Truth(VariableId),
+    /// An object fluent: the variable whose values' meanings are [`Meaning::Object`].
+    Object(VariableId),
+    /// Something that no condition depends on.
+    Nowhere,
 }
 
 /// What is to be made small or large.
@@ -313,24 +320,6 @@ pub struct Values {
     pub values: Vec<u32>,
     /// By numeric fluent.
     pub numbers: Vec<f64>,
-}
-
-/// A goal fact, or a condition, that nothing can reach even when nothing is ever taken away.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Unreachable {
-    /// What the goal asks for, as lifted atoms and the reasons why each cannot be had, outermost first.
-    pub chain: Vec<Missing>,
-}
-
-/// One link of the proof that a goal is out of reach.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Missing {
-    /// The condition that never holds.
-    pub condition: Meaning,
-    /// Whether the condition asks for the atom (`true`) or for its absence.
-    pub wanted: bool,
-    /// The lifted actions and axioms that could bring it about, each with the condition it lacks in some instance.
-    pub achievers: Vec<Origin>,
 }
 
 /// The grounded task.
@@ -360,6 +349,6 @@ pub struct GroundTask {
     pub metric: Option<Metric>,
     /// Sets of facts of which at most one holds, beyond those that share a variable.
     pub mutex_groups: Vec<Vec<Fact>>,
-    /// Set where the goal is out of reach whatever the search does.
-    pub unreachable: Option<Unreachable>,
+    /// False where the goal is out of reach even when nothing is ever taken away.
+    pub goal_reachable: bool,
 }

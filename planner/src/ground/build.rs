@@ -1,0 +1,585 @@
+//! From the lifted task to the grounded one, step by step.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+use tracing::debug_span;
+
+use crate::invariants::{AtomNames, Transition, mutex_groups};
+use crate::task::{GroundChange, Task};
+
+use super::assemble::assemble;
+use super::atoms::{Atoms, NONE};
+use super::instantiate::{Clauses, Deed, Instantiate, Statics};
+use super::metric;
+use super::normal::{self, Action_, Change_, Effect_, Formula, Normal, Number, Target};
+use super::raw::{Later, RawAction, RawAxiom, RawTask, Resolve};
+use super::reach::Reach;
+use super::relaxed;
+use super::relevant::{self, Relevant};
+use super::rules::{self, Rules};
+use super::task::{DurationBound, Expression, GroundTask, NumericFluent};
+
+/// Why a task was not grounded.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum GroundError {
+    /// The caller's stop signal.
+    #[error("stopped while grounding")]
+    Stopped,
+    /// More atoms and actions than memory allows.
+    #[error("grounding needs more than the memory allowed: over {0} ground atoms and actions")]
+    TooLarge(usize),
+    /// A limit of the implementation.
+    #[error("`{0}` has more than 31 arguments, values of functions included; split it")]
+    TooManyArguments(String),
+}
+
+/// Bytes that a ground action takes until the search has its own form, roughly.
+const BYTES_AN_INSTANCE: usize = 600;
+
+/// Grounds a task: relaxed reachability, static parts evaluated away, what is unreachable or irrelevant left out,
+/// atoms grouped into finite-domain variables by mutex groups.
+///
+/// # Errors
+/// [`GroundError`] when stopped, too large, or beyond the limit on arguments.
+pub fn ground(
+    task: &Task,
+    memory_limit_bytes: Option<usize>,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<GroundTask, GroundError> {
+    let _span = debug_span!("ground").entered();
+    widths(task)?;
+    let normal = normal::normalise(task);
+    let mut atoms = Atoms::new(normal.predicate_count, task.objects.len());
+    let rules = rules::make(task, &normal, &mut || atoms.add_predicate());
+    let statics = statics(task, &normal, &rules);
+    insert_initial(task, &mut atoms);
+    let limit = memory_limit_bytes.map_or(usize::MAX / 2, |bytes| bytes / BYTES_AN_INSTANCE);
+    let mut reach = Reach {
+        atoms,
+        rules: &rules.rules,
+        fluent: &rules.fluent,
+        possible: &statics,
+        instances: vec![Vec::new(); normal.actions.len() + rules.alternatives.len()],
+        limit,
+        count: 0,
+        stop,
+    };
+    let span = debug_span!("reach").entered();
+    if reach.run(task.objects.len()).is_err() {
+        let large = reach.count + reach.atoms.len() > limit;
+        return Err(if large { GroundError::TooLarge(limit) } else { GroundError::Stopped });
+    }
+    drop(span);
+    let (atoms, instances) = (reach.atoms, reach.instances);
+    let mut make = Instantiate::new(&statics, atoms);
+    let _span = debug_span!("instantiate").entered();
+    mark_always(task, &normal, &instances, &mut make);
+    let (mut raw, goal_possible) = instantiate(task, &normal, &rules, instances, &mut make);
+    let expression = normal.metric.as_ref().map(|m| make.expression(m, &[]));
+    let reached = relaxed::prune(&mut raw, &make.calls);
+    let keep = !task.modules.is_empty() || !task.preferences.is_empty() || !task.constraints.is_empty();
+    let signed = expression.map(|e| (task.metric.as_ref().is_none_or(|m| m.minimise), e));
+    let costs = metric::costs(&raw, &make.comparisons, make.numerics.len(), signed, keep);
+    let groups = groups(&raw, &make, &reached, &rules, &normal, task);
+    let everything = |wanted: bool| vec![wanted; raw.init.len()];
+    let relevant = if keep {
+        let unwanted = absences(&raw);
+        Relevant { wanted: everything(true), unwanted, numerics: vec![true; make.numerics.len()] }
+    } else {
+        relevant::prune(&mut raw, &make.comparisons, &make.calls, make.numerics.len(), &costs.read)
+    };
+    Ok(assemble(task, raw, make, reached, relevant, groups, costs, goal_possible))
+}
+
+fn widths(task: &Task) -> Result<(), GroundError> {
+    let named = task.predicates.iter().map(|p| (&p.name, p.parameters.len()));
+    let named = named.chain(task.functions.iter().map(|f| (&f.name, f.parameters.len() + 1)));
+    let mut named = named.chain(task.actions.iter().map(|a| (&a.name, a.parameters.len())));
+    match named.find(|(_, width)| *width > 31) {
+        Some((name, _)) => Err(GroundError::TooManyArguments(name.clone())),
+        None => Ok(()),
+    }
+}
+
+fn statics<'a>(task: &'a Task, normal: &Normal, rules: &Rules) -> Statics<'a> {
+    let mut written = vec![false; task.functions.len()];
+    for action in &normal.actions {
+        for effect in action.start_effects.iter().chain(&action.end_effects) {
+            match &effect.change {
+                Change_::Number(_, fluent, _) => written[fluent.index as usize] = true,
+                Change_::Call(call) => {
+                    for target in normal::module_writes(task, call.index) {
+                        if let Target::Number(number) = target {
+                            written[number.index as usize] = true;
+                        }
+                    }
+                }
+                _ => {}
+            }
+        }
+        for (fluent, _) in &action.flows {
+            written[fluent.index as usize] = true;
+        }
+    }
+    let mut fluent = rules.fluent.clone();
+    for timed in &task.init.timed {
+        match &timed.change {
+            GroundChange::Add(fact) | GroundChange::Delete(fact) => fluent[fact.predicate.index()] = true,
+            GroundChange::Number(number, _) => written[number.function.index()] = true,
+            GroundChange::Object(function, _) => {
+                fluent[task.predicates.len() + function.function.index()] = true;
+            }
+        }
+    }
+    let number = |(fluent, value): &(crate::task::GroundFluent, f64)| {
+        ((fluent.function.0, fluent.arguments.iter().map(|o| o.0).collect()), *value)
+    };
+    Statics { task, fluent, written, numbers: task.init.numbers.iter().map(number).collect() }
+}
+
+/// Predicate and arguments of an object function with a value.
+fn object_atom(task: &Task, fluent: &crate::task::GroundFluent, value: u32) -> (u32, Vec<u32>) {
+    let mut arguments: Vec<u32> = fluent.arguments.iter().map(|o| o.0).collect();
+    arguments.push(value);
+    (task.predicates.len() as u32 + fluent.function.0, arguments)
+}
+
+fn fact_atom(fact: &crate::task::Fact) -> (u32, Vec<u32>) {
+    (fact.predicate.0, fact.arguments.iter().map(|o| o.0).collect())
+}
+
+fn insert_initial(task: &Task, atoms: &mut Atoms) {
+    let facts = task.init.facts.iter().map(fact_atom);
+    let objects = task.init.objects.iter().map(|(fluent, value)| object_atom(task, fluent, value.0));
+    let timed = task.init.timed.iter().filter_map(|timed| match &timed.change {
+        GroundChange::Add(fact) => Some(fact_atom(fact)),
+        GroundChange::Object(fluent, value) => Some(object_atom(task, fluent, value.0)),
+        _ => None,
+    });
+    for (predicate, arguments) in facts.chain(objects).chain(timed) {
+        atoms.insert(predicate, &arguments);
+    }
+}
+
+/// Atoms that hold at first and that no instance can take away hold always.
+fn mark_always(task: &Task, normal: &Normal, instances: &[Vec<u32>], make: &mut Instantiate<'_>) {
+    let mut always = vec![false; make.atoms.len()];
+    for fact in &task.init.facts {
+        let (predicate, arguments) = fact_atom(fact);
+        if let Some(atom) = make.atoms.find(predicate, &arguments) {
+            always[atom as usize] = task.predicates[predicate as usize].stratum.is_none();
+        }
+    }
+    for (action, list) in normal.actions.iter().zip(instances) {
+        let deletes: Vec<&Effect_> = action
+            .start_effects
+            .iter()
+            .chain(&action.end_effects)
+            .filter(|e| matches!(e.change, Change_::Delete(_)))
+            .collect();
+        for_instances(action, list, |binding| {
+            for effect in &deletes {
+                let mut out = Vec::new();
+                let bare = Effect_ {
+                    forall: effect.forall.clone(),
+                    when: normal::Timed3 {
+                        start: Formula::And(Vec::new()),
+                        over_all: Formula::And(Vec::new()),
+                        end: Formula::And(Vec::new()),
+                    },
+                    change: effect.change.clone(),
+                };
+                make.effect(&bare, false, binding, &action.domains, &mut out);
+                for gone in out {
+                    if let Deed::Delete(atom) = gone.deed {
+                        always[atom as usize] = false;
+                    }
+                }
+            }
+        });
+    }
+    for module in 0..task.modules.len() as u32 {
+        for target in normal::module_writes(task, module) {
+            if let Target::Truth(pattern) = target {
+                make.atoms.of(pattern.predicate).iter().for_each(|&a| always[a as usize] = false);
+            }
+        }
+    }
+    for timed in &task.init.timed {
+        if let GroundChange::Delete(fact) = &timed.change {
+            let (predicate, arguments) = fact_atom(fact);
+            if let Some(atom) = make.atoms.find(predicate, &arguments) {
+                always[atom as usize] = false;
+            }
+        }
+    }
+    make.always = always;
+}
+
+fn for_instances(action: &Action_, list: &[u32], mut body: impl FnMut(&mut Vec<u32>)) {
+    let width = action.arity + action.extra.len();
+    let mut binding = vec![NONE; action.domains.len()];
+    // Instances without arguments leave no trace: such an action is always made, and goes in the relaxed fixpoint
+    // where it cannot be applied.
+    let count = list.len().checked_div(width).unwrap_or(1);
+    for i in 0..count {
+        let arguments = &list[i * width..(i + 1) * width];
+        binding[..action.arity].copy_from_slice(&arguments[..action.arity]);
+        for (&slot, &value) in action.extra.iter().zip(&arguments[action.arity..]) {
+            binding[slot as usize] = value;
+        }
+        body(&mut binding);
+    }
+}
+
+fn distinct(list: Vec<u32>, width: usize) -> Vec<u32> {
+    if width == 0 {
+        return list;
+    }
+    let mut seen: FxHashSet<&[u32]> = FxHashSet::default();
+    let kept: Vec<&[u32]> = list.chunks(width).filter(|&chunk| seen.insert(chunk)).collect();
+    kept.concat()
+}
+
+fn instantiate(
+    task: &Task,
+    normal: &Normal,
+    rules: &Rules,
+    mut instances: Vec<Vec<u32>>,
+    make: &mut Instantiate<'_>,
+) -> (RawTask, bool) {
+    let top = normal.rules.iter().map(|r| r.stratum + 1).max().unwrap_or(0);
+    let mut resolve = Resolve::new(make.atoms.len() as u32);
+    let mut axioms = Vec::new();
+    for (i, alternative) in rules.alternatives.iter().enumerate() {
+        let list = std::mem::take(&mut instances[normal.actions.len() + i]);
+        axioms_of(normal, alternative, &list, make, &mut resolve, &mut axioms);
+    }
+    let mut actions = Vec::new();
+    for (index, action) in normal.actions.iter().enumerate() {
+        let mut list = std::mem::take(&mut instances[index]);
+        if rules.repeats[index] {
+            list = distinct(list, action.arity + action.extra.len());
+        }
+        for_instances(action, &list, |binding| {
+            raw_actions(action, binding, make, &mut resolve, top, &mut actions);
+        });
+    }
+    let mut goal = Clauses::default();
+    let mut binding = vec![NONE; normal.goal_domains.len()];
+    let possible = make.conjoin(&normal.goal, &mut binding, &normal.goal_domains, &mut goal);
+    let goal = resolve.flat(goal, top);
+    axioms.append(&mut resolve.axioms);
+    axioms.sort_by_key(|a: &RawAxiom| a.stratum);
+    let timed = timed(task, make);
+    let mut init = vec![false; resolve.atoms() as usize];
+    let facts = task.init.facts.iter().map(fact_atom);
+    let objects = task.init.objects.iter().map(|(fluent, value)| object_atom(task, fluent, value.0));
+    for (predicate, arguments) in facts.chain(objects) {
+        if let Some(atom) = make.atoms.find(predicate, &arguments) {
+            init[atom as usize] = true;
+        }
+    }
+    (RawTask { actions, axioms, goal, init, inner: make.atoms.len() as u32, timed }, possible)
+}
+
+fn axioms_of(
+    normal: &Normal,
+    alternative: &rules::Alternative,
+    list: &[u32],
+    make: &mut Instantiate<'_>,
+    resolve: &mut Resolve,
+    axioms: &mut Vec<RawAxiom>,
+) {
+    let rule = &normal.rules[alternative.rule];
+    let width = alternative.slots.len();
+    let mut binding = vec![NONE; rule.domains.len()];
+    let count = list.len().checked_div(width).unwrap_or(1);
+    for i in 0..count {
+        for (&slot, &value) in alternative.slots.iter().zip(&list[i * width..(i + 1) * width]) {
+            binding[slot as usize] = value;
+        }
+        let arguments: Vec<u32> = rule.head.terms.iter().map(|t| t.bound(&binding)).collect();
+        let Some(head) = make.atoms.find(rule.head.predicate, &arguments) else { continue };
+        let mut body = Clauses::default();
+        if !alternative.parts.iter().all(|p| make.conjoin(p, &mut binding, &rule.domains, &mut body)) {
+            continue;
+        }
+        for body in resolve.split(body, rule.stratum) {
+            axioms.push(RawAxiom { head, body, stratum: rule.stratum });
+        }
+    }
+}
+
+fn raw_actions(
+    action: &Action_,
+    binding: &mut Vec<u32>,
+    make: &mut Instantiate<'_>,
+    resolve: &mut Resolve,
+    top: u32,
+    out: &mut Vec<RawAction>,
+) {
+    let mut start = Clauses::default();
+    if !make.conjoin(&action.condition.start, binding, &action.domains, &mut start) {
+        return;
+    }
+    let mut effects = Vec::with_capacity(action.start_effects.len());
+    for effect in &action.start_effects {
+        make.effect(effect, false, binding, &action.domains, &mut effects);
+    }
+    flatten(&mut effects, resolve, top);
+    let later = match &action.duration {
+        None => None,
+        Some(bounds) => match later(action, bounds, binding, make, resolve, top) {
+            Some(later) => Some(Box::new(later)),
+            None => return,
+        },
+    };
+    let arguments: Box<[u32]> = binding[..action.arity].into();
+    let mut ways = resolve.split(start, top);
+    let Some(last) = ways.pop() else { return };
+    for start in ways {
+        let (arguments, effects, later) = (arguments.clone(), effects.clone(), later.clone());
+        out.push(RawAction { schema: action.schema, arguments, start, effects, later });
+    }
+    out.push(RawAction { schema: action.schema, arguments, start: last, effects, later });
+}
+
+fn later(
+    action: &Action_,
+    bounds: &[(bool, crate::task::Comparison, Number)],
+    binding: &mut Vec<u32>,
+    make: &mut Instantiate<'_>,
+    resolve: &mut Resolve,
+    top: u32,
+) -> Option<Later> {
+    let (mut over_all, mut end) = (Clauses::default(), Clauses::default());
+    let possible = make.conjoin(&action.condition.over_all, binding, &action.domains, &mut over_all)
+        && make.conjoin(&action.condition.end, binding, &action.domains, &mut end);
+    if !possible {
+        return None;
+    }
+    let mut end_effects = Vec::new();
+    for effect in &action.end_effects {
+        make.effect(effect, true, binding, &action.domains, &mut end_effects);
+    }
+    flatten(&mut end_effects, resolve, top);
+    let flows = action
+        .flows
+        .iter()
+        .map(|(fluent, rate)| (make.numeric(fluent, binding), make.expression(rate, binding)))
+        .collect();
+    let duration = bounds
+        .iter()
+        .map(|(at_end, comparison, number)| DurationBound {
+            at_end: *at_end,
+            relation: super::instantiate::relation(*comparison, true),
+            seconds: make.expression(number, binding),
+        })
+        .collect();
+    let (over_all, end) = (resolve.flat(over_all, top), resolve.flat(end, top));
+    Some(Later { over_all, end, end_effects, flows, duration })
+}
+
+fn flatten(effects: &mut [super::instantiate::GroundEffect], resolve: &mut Resolve, top: u32) {
+    for effect in effects {
+        for clauses in effect.when.iter_mut().flat_map(|w| w.iter_mut()) {
+            if !clauses.ors.is_empty() {
+                *clauses = resolve.flat(std::mem::take(clauses), top);
+            }
+        }
+    }
+}
+
+fn timed(task: &Task, make: &mut Instantiate<'_>) -> Vec<(f64, Vec<Deed>)> {
+    let mut timed: Vec<(f64, Vec<Deed>)> = Vec::new();
+    for entry in &task.init.timed {
+        let deeds = match &entry.change {
+            GroundChange::Add(fact) => {
+                let (predicate, arguments) = fact_atom(fact);
+                make.atoms.find(predicate, &arguments).map(Deed::Add).into_iter().collect()
+            }
+            GroundChange::Delete(fact) => {
+                let (predicate, arguments) = fact_atom(fact);
+                make.atoms.find(predicate, &arguments).map(Deed::Delete).into_iter().collect()
+            }
+            GroundChange::Number(fluent, value) => {
+                let arguments = fluent.arguments.iter().map(|o| o.0).collect();
+                let id = make.numeric_id(NumericFluent { function: fluent.function.0, arguments });
+                vec![Deed::Change(id, super::task::Change::Assign, Box::new(Expression::Constant(*value)))]
+            }
+            GroundChange::Object(fluent, value) => {
+                let (predicate, arguments) = object_atom(task, fluent, value.0);
+                make.atoms.find(predicate, &arguments).map(Deed::Add).into_iter().collect()
+            }
+        };
+        let deeds: Vec<Deed> = deeds;
+        match timed.last_mut() {
+            Some((time_s, list)) if *time_s == entry.time_s => list.extend(deeds),
+            _ => timed.push((entry.time_s, deeds)),
+        }
+    }
+    timed
+}
+
+/// Atoms whose absence some condition asks for.
+fn absences(raw: &RawTask) -> Vec<bool> {
+    let mut unwanted = vec![false; raw.init.len()];
+    let mut mark = |clauses: &Clauses| {
+        for &literal in clauses.literals.iter().filter(|&&l| l & 1 == 1) {
+            unwanted[(literal >> 1) as usize] = true;
+        }
+    };
+    mark(&raw.goal);
+    raw.axioms.iter().for_each(|a| mark(&a.body));
+    for action in &raw.actions {
+        mark(&action.start);
+        let later = action.later.as_ref();
+        if let Some(later) = later {
+            mark(&later.over_all);
+            mark(&later.end);
+        }
+        for effect in action.effects.iter().chain(later.iter().flat_map(|l| &l.end_effects)) {
+            effect.when.iter().flat_map(|w| w.iter()).for_each(&mut mark);
+        }
+    }
+    unwanted
+}
+
+/// Names of atoms, and of the tokens that say that a durative action runs.
+struct Names<'a> {
+    atoms: &'a Atoms,
+    /// Atoms at and beyond this one are tokens.
+    first: u32,
+    first_token: u32,
+    tokens: Vec<(u32, &'a [u32])>,
+}
+
+impl AtomNames for Names<'_> {
+    fn predicate(&self, atom: u32) -> u32 {
+        if atom < self.first {
+            return self.atoms.predicate(atom);
+        }
+        self.first_token + self.tokens[(atom - self.first) as usize].0
+    }
+
+    fn arguments(&self, atom: u32) -> &[u32] {
+        if atom < self.first {
+            return self.atoms.arguments(atom);
+        }
+        self.tokens[(atom - self.first) as usize].1
+    }
+}
+
+/// Mutex groups by synthesis, and those of object functions, which must share a variable.
+pub(super) struct Groups {
+    pub found: Vec<Vec<u32>>,
+    pub fixed: Vec<Vec<u32>>,
+}
+
+fn groups(
+    raw: &RawTask,
+    make: &Instantiate<'_>,
+    reached: &relaxed::Reached,
+    rules: &Rules,
+    normal: &Normal,
+    task: &Task,
+) -> Groups {
+    let _span = debug_span!("invariants").entered();
+    let functions = task.predicates.len() as u32;
+    let live: Vec<u32> = (0..raw.inner)
+        .filter(|&a| reached.atoms[a as usize] && rules.fluent[make.atoms.predicate(a) as usize])
+        .filter(|&a| (make.atoms.predicate(a) as usize) < normal.predicate_count)
+        .collect();
+    let mut fixed: FxHashMap<Vec<u32>, usize> = FxHashMap::default();
+    let mut fixed_groups: Vec<Vec<u32>> = Vec::new();
+    for &atom in live.iter().filter(|&&a| make.atoms.predicate(a) >= functions) {
+        let arguments = make.atoms.arguments(atom);
+        let mut key = vec![make.atoms.predicate(atom)];
+        key.extend(&arguments[..arguments.len() - 1]);
+        let place = *fixed.entry(key).or_insert_with(|| {
+            fixed_groups.push(Vec::new());
+            fixed_groups.len() - 1
+        });
+        fixed_groups[place].push(atom);
+    }
+    let first = raw.init.len() as u32;
+    let first_token = rules.fluent.len() as u32;
+    let durative: Vec<usize> = (0..raw.actions.len()).filter(|&i| raw.actions[i].later.is_some()).collect();
+    let tokens = durative.iter().map(|&i| (raw.actions[i].schema, &raw.actions[i].arguments[..])).collect();
+    let names = Names { atoms: &make.atoms, first, first_token, tokens };
+    let mut transitions = Vec::with_capacity(raw.actions.len());
+    let mut token = first;
+    for action in &raw.actions {
+        let mut start = transition(&[&action.start], &action.effects, raw.inner);
+        let Some(later) = &action.later else {
+            transitions.push(start);
+            continue;
+        };
+        start.adds.push((token, Vec::new()));
+        let mut end = transition(&[&later.over_all, &later.end], &later.end_effects, raw.inner);
+        end.before.push(token);
+        end.deletes.push((token, Vec::new()));
+        token += 1;
+        transitions.extend([start, end]);
+    }
+    for (_, deeds) in &raw.timed {
+        let adds =
+            deeds.iter().filter_map(|d| if let Deed::Add(a) = d { Some((*a, Vec::new())) } else { None });
+        transitions.push(Transition { adds: adds.collect(), ..Transition::default() });
+    }
+    let by_module: Vec<u32> = (0..task.modules.len() as u32)
+        .flat_map(|module| normal::module_writes(task, module))
+        .filter_map(|target| if let Target::Truth(pattern) = target { Some(pattern.predicate) } else { None })
+        .collect();
+    let plain: Vec<u32> = live
+        .iter()
+        .copied()
+        .filter(|&a| {
+            let predicate = make.atoms.predicate(a);
+            !by_module.contains(&predicate)
+                && predicate < functions
+                && task.predicates[predicate as usize].stratum.is_none()
+        })
+        .collect();
+    let mut predicates: Vec<(u32, usize)> =
+        plain.iter().map(|&a| (make.atoms.predicate(a), make.atoms.arguments(a).len())).collect();
+    predicates.sort_unstable();
+    predicates.dedup();
+    let initial: Vec<u32> = plain.iter().copied().filter(|&a| raw.init[a as usize]).collect();
+    let found = mutex_groups(&names, &plain, &initial, &transitions, &predicates, first_token);
+    Groups { found, fixed: fixed_groups }
+}
+
+/// A start or an end as a transition; conditions that are not atoms make a deletion unreliable.
+fn transition(before: &[&Clauses], effects: &[super::instantiate::GroundEffect], inner: u32) -> Transition {
+    let positive =
+        |c: &Clauses| c.literals.iter().filter(|&&l| l & 1 == 0).map(|&l| l >> 1).collect::<Vec<_>>();
+    let mut made =
+        Transition { before: before.iter().flat_map(|c| positive(c)).collect(), ..Transition::default() };
+    made.before.sort_unstable();
+    made.before.dedup();
+    for effect in effects {
+        let when = effect.when.as_deref();
+        match effect.deed {
+            Deed::Add(atom) => {
+                made.adds.push((atom, when.map_or_else(Vec::new, |w| positive(&w[0]))));
+            }
+            Deed::Delete(atom) => {
+                let plain = |c: &Clauses| {
+                    c.comparisons.is_empty()
+                        && c.calls.is_empty()
+                        && c.literals.iter().all(|l| l & 1 == 0 && l >> 1 < inner)
+                };
+                match when {
+                    None => made.deletes.push((atom, Vec::new())),
+                    Some(w) if plain(&w[0]) && w[1].is_true() && w[2].is_true() => {
+                        made.deletes.push((atom, positive(&w[0])));
+                    }
+                    Some(_) => {}
+                }
+            }
+            Deed::Change(..) | Deed::Call(_) => {}
+        }
+    }
+    made
+}

@@ -1,0 +1,649 @@
+//! Lifted conditions, effects and expressions under a binding: static parts are evaluated away.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use crate::task::{Assignment, Comparison as Compare, ObjectId, Task};
+
+use super::atoms::{Atoms, NONE};
+use super::normal::{Change_, Effect_, Formula, Named, Number, Pattern, Target, Term, module_writes};
+use super::reach::Possible;
+use super::task::{Change, Comparison, Expression, NumericFluent, Origin, Relation};
+
+/// A ground condition with its disjunctions still in place. A literal is `atom << 1 | negated`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) struct Clauses {
+    pub literals: Vec<u32>,
+    pub comparisons: Vec<u32>,
+    pub calls: Vec<(u32, bool)>,
+    pub ors: Vec<Vec<Clauses>>,
+}
+
+impl Clauses {
+    /// Whether it always holds.
+    pub(super) fn is_true(&self) -> bool {
+        self.literals.is_empty()
+            && self.comparisons.is_empty()
+            && self.calls.is_empty()
+            && self.ors.is_empty()
+    }
+
+    /// Sorts and removes repetitions.
+    pub(super) fn tidy(&mut self) {
+        self.literals.sort_unstable();
+        self.literals.dedup();
+        self.comparisons.sort_unstable();
+        self.comparisons.dedup();
+        self.calls.sort_unstable();
+        self.calls.dedup();
+        for or in &mut self.ors {
+            or.iter_mut().for_each(Clauses::tidy);
+            or.sort();
+            or.dedup();
+        }
+        self.ors.sort();
+        self.ors.dedup();
+    }
+
+    fn merge(&mut self, other: Clauses) {
+        self.literals.extend(other.literals);
+        self.comparisons.extend(other.comparisons);
+        self.calls.extend(other.calls);
+        self.ors.extend(other.ors);
+    }
+}
+
+/// What a ground effect does, in atoms.
+#[derive(Clone, Debug)]
+pub(super) enum Deed {
+    Add(u32),
+    Delete(u32),
+    Change(u32, Change, Box<Expression>),
+    Call(u32),
+}
+
+/// A ground call, with what it writes.
+#[derive(Clone, Debug)]
+pub(super) struct RawCall {
+    pub origin: Origin,
+    pub writes: Vec<RawPlace>,
+}
+
+/// What a call writes: a number, an atom, or one of the values of an object function.
+#[derive(Clone, Debug)]
+pub(super) enum RawPlace {
+    Number(u32),
+    Truth(Option<u32>),
+    Object(Vec<u32>),
+}
+
+impl RawCall {
+    /// The atoms that it may make true or false.
+    pub(super) fn atoms(&self) -> impl Iterator<Item = u32> {
+        self.writes
+            .iter()
+            .flat_map(|place| match place {
+                RawPlace::Number(_) => &[][..],
+                RawPlace::Truth(atom) => atom.as_slice(),
+                RawPlace::Object(atoms) => atoms,
+            })
+            .copied()
+    }
+}
+
+/// A ground effect.
+#[derive(Clone, Debug)]
+pub(super) struct GroundEffect {
+    /// Where it happens, at the start, over all; `None` for always.
+    pub when: Option<Box<[Clauses; 3]>>,
+    pub deed: Deed,
+}
+
+/// What does not change in any state.
+pub(super) struct Statics<'a> {
+    pub task: &'a Task,
+    /// By predicate (object functions after them): whether its atoms change.
+    pub fluent: Vec<bool>,
+    /// By function: whether some effect writes its numbers.
+    pub written: Vec<bool>,
+    /// The initial numbers.
+    pub numbers: FxHashMap<(u32, Box<[u32]>), f64>,
+}
+
+impl Statics<'_> {
+    /// The number of a function that nothing writes, NaN where it has none.
+    fn number(&self, named: &Named, binding: &[u32]) -> f64 {
+        let arguments: Box<[u32]> = named.terms.iter().map(|t| t.bound(binding)).collect();
+        self.numbers.get(&(named.index, arguments)).copied().unwrap_or(f64::NAN)
+    }
+
+    /// The value where everything is static.
+    fn constant(&self, number: &Number, binding: &[u32]) -> Option<f64> {
+        Some(match number {
+            Number::Constant(value) => *value,
+            Number::Fluent(named) if !self.written[named.index as usize] => self.number(named, binding),
+            Number::Sum(parts) => {
+                parts.iter().map(|p| self.constant(p, binding)).try_fold(0.0, |s, p| Some(s + p?))?
+            }
+            Number::Product(parts) => {
+                parts.iter().map(|p| self.constant(p, binding)).try_fold(1.0, |s, p| Some(s * p?))?
+            }
+            Number::Difference(pair) => {
+                self.constant(&pair[0], binding)? - self.constant(&pair[1], binding)?
+            }
+            Number::Quotient(pair) => self.constant(&pair[0], binding)? / self.constant(&pair[1], binding)?,
+            Number::Negative(inner) => -self.constant(inner, binding)?,
+            _ => return None,
+        })
+    }
+}
+
+/// Whether the comparison holds; never where a side is NaN.
+pub(super) fn holds(relation: Relation, left: f64, right: f64) -> bool {
+    match relation {
+        Relation::Less => left < right,
+        Relation::AtMost => left <= right,
+        Relation::Equal => left == right,
+        Relation::AtLeast => left >= right,
+        Relation::Greater => left > right,
+        Relation::Unequal => left < right || left > right,
+    }
+}
+
+pub(super) fn relation(comparison: Compare, wanted: bool) -> Relation {
+    match (comparison, wanted) {
+        (Compare::Less, true) | (Compare::GreaterOrEqual, false) => Relation::Less,
+        (Compare::LessOrEqual, true) | (Compare::Greater, false) => Relation::AtMost,
+        (Compare::Equal, true) => Relation::Equal,
+        (Compare::Equal, false) => Relation::Unequal,
+        (Compare::GreaterOrEqual, true) | (Compare::Less, false) => Relation::AtLeast,
+        (Compare::Greater, true) | (Compare::LessOrEqual, false) => Relation::Greater,
+    }
+}
+
+impl Possible for &Statics<'_> {
+    fn possible(
+        &self,
+        atoms: &Atoms,
+        formula: &Formula,
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+    ) -> bool {
+        match formula {
+            Formula::And(parts) => parts.iter().all(|p| self.possible(atoms, p, binding, domains)),
+            Formula::Or(parts) => parts.iter().any(|p| self.possible(atoms, p, binding, domains)),
+            Formula::Literal(pattern, wanted) => {
+                self.fluent[pattern.predicate as usize] || found(atoms, pattern, binding).is_some() == *wanted
+            }
+            Formula::Same(a, b, wanted) => (a.bound(binding) == b.bound(binding)) == *wanted,
+            Formula::Compare(comparison, left, right, wanted) => {
+                match (self.constant(left, binding), self.constant(right, binding)) {
+                    (Some(left), Some(right)) => holds(relation(*comparison, *wanted), left, right),
+                    _ => true,
+                }
+            }
+            Formula::Call(..) => true,
+            Formula::Forall(slots, body) => {
+                each(slots, binding, domains, &mut |binding| self.possible(atoms, body, binding, domains))
+            }
+            Formula::Exists(slots, body) => {
+                !each(slots, binding, domains, &mut |binding| !self.possible(atoms, body, binding, domains))
+            }
+        }
+    }
+}
+
+/// Whether the test holds for every combination of objects of the slots.
+fn each(
+    slots: &[u32],
+    binding: &mut Vec<u32>,
+    domains: &[Arc<[ObjectId]>],
+    test: &mut dyn FnMut(&mut Vec<u32>) -> bool,
+) -> bool {
+    let Some((&slot, rest)) = slots.split_first() else {
+        return test(binding);
+    };
+    domains[slot as usize].iter().all(|object| {
+        binding[slot as usize] = object.0;
+        each(rest, binding, domains, test)
+    })
+}
+
+fn found(atoms: &Atoms, pattern: &Pattern, binding: &[u32]) -> Option<u32> {
+    let mut arguments = [NONE; 32];
+    for (out, term) in arguments.iter_mut().zip(&pattern.terms) {
+        *out = term.bound(binding);
+    }
+    atoms.find(pattern.predicate, &arguments[..pattern.terms.len()])
+}
+
+/// Makes ground things and numbers numeric fluents, comparisons and calls.
+pub(super) struct Instantiate<'a> {
+    pub statics: &'a Statics<'a>,
+    pub atoms: Atoms,
+    /// By atom: true in every reachable state.
+    pub always: Vec<bool>,
+    pub numerics: Vec<NumericFluent>,
+    pub comparisons: Vec<Comparison>,
+    pub calls: Vec<RawCall>,
+    numeric_ids: FxHashMap<NumericFluent, u32>,
+    comparison_ids: FxHashMap<Vec<u64>, u32>,
+    call_ids: FxHashMap<Origin, u32>,
+}
+
+impl<'a> Instantiate<'a> {
+    pub(super) fn new(statics: &'a Statics<'a>, atoms: Atoms) -> Self {
+        let always = vec![false; atoms.len()];
+        Instantiate {
+            statics,
+            atoms,
+            always,
+            numerics: Vec::new(),
+            comparisons: Vec::new(),
+            calls: Vec::new(),
+            numeric_ids: FxHashMap::default(),
+            comparison_ids: FxHashMap::default(),
+            call_ids: FxHashMap::default(),
+        }
+    }
+
+    /// Adds the formula to a condition; `false` where it can never hold.
+    pub(super) fn conjoin(
+        &mut self,
+        formula: &Formula,
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+        into: &mut Clauses,
+    ) -> bool {
+        match formula {
+            Formula::And(parts) => parts.iter().all(|p| self.conjoin(p, binding, domains, into)),
+            Formula::Literal(pattern, wanted) => self.literal(pattern, *wanted, binding, into),
+            Formula::Same(a, b, wanted) => (a.bound(binding) == b.bound(binding)) == *wanted,
+            Formula::Compare(comparison, left, right, wanted) => {
+                let left = self.expression(left, binding);
+                let right = self.expression(right, binding);
+                self.comparison(relation(*comparison, *wanted), left, right, into)
+            }
+            Formula::Call(call, wanted) => {
+                let id = self.call(call, binding);
+                into.calls.push((id, *wanted));
+                true
+            }
+            Formula::Forall(slots, body) => {
+                each(slots, binding, domains, &mut |binding| self.conjoin(body, binding, domains, into))
+            }
+            Formula::Or(parts) => {
+                let mut branches = Vec::new();
+                let mut certain = false;
+                for part in parts {
+                    certain |= !self.branch(part, binding, domains, &mut branches);
+                }
+                Self::close(branches, certain, into)
+            }
+            Formula::Exists(slots, body) => {
+                let mut branches = Vec::new();
+                let guards = guards_of(body);
+                let mut certain = false;
+                self.for_matches(slots, &guards, binding, domains, &mut |this, binding| {
+                    certain |= !this.branch(body, binding, domains, &mut branches);
+                });
+                Self::close(branches, certain, into)
+            }
+        }
+    }
+
+    /// `false` once a branch that always holds was met.
+    fn branch(
+        &mut self,
+        part: &Formula,
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+        branches: &mut Vec<Clauses>,
+    ) -> bool {
+        let mut branch = Clauses::default();
+        if !self.conjoin(part, binding, domains, &mut branch) {
+            return true;
+        }
+        if branch.is_true() {
+            return false;
+        }
+        branch.tidy();
+        branches.push(branch);
+        true
+    }
+
+    fn close(mut branches: Vec<Clauses>, certain: bool, into: &mut Clauses) -> bool {
+        if certain {
+            return true;
+        }
+        branches.sort();
+        branches.dedup();
+        match branches.len() {
+            0 => return false,
+            1 => into.merge(branches.remove(0)),
+            _ => into.ors.push(branches),
+        }
+        true
+    }
+
+    fn literal(&mut self, pattern: &Pattern, wanted: bool, binding: &[u32], into: &mut Clauses) -> bool {
+        let Some(atom) = found(&self.atoms, pattern, binding) else {
+            return !wanted;
+        };
+        if !self.statics.fluent[pattern.predicate as usize] || self.always[atom as usize] {
+            return wanted;
+        }
+        into.literals.push(atom << 1 | u32::from(!wanted));
+        true
+    }
+
+    fn comparison(
+        &mut self,
+        relation: Relation,
+        left: Expression,
+        right: Expression,
+        into: &mut Clauses,
+    ) -> bool {
+        if let (Expression::Constant(left), Expression::Constant(right)) = (&left, &right) {
+            return holds(relation, *left, *right);
+        }
+        if [&left, &right].iter().any(|side| matches!(side, Expression::Constant(v) if v.is_nan())) {
+            return false;
+        }
+        let mut key = vec![relation as u64];
+        encode(&left, &mut key);
+        encode(&right, &mut key);
+        let next = self.comparisons.len() as u32;
+        let id = *self.comparison_ids.entry(key).or_insert(next);
+        if id == next {
+            self.comparisons.push(Comparison { left, relation, right });
+        }
+        into.comparisons.push(id);
+        true
+    }
+
+    /// The expression under the binding, constants folded.
+    pub(super) fn expression(&mut self, number: &Number, binding: &[u32]) -> Expression {
+        if let Some(value) = self.statics.constant(number, binding) {
+            return Expression::Constant(value);
+        }
+        let mut pair = |p: &[Number; 2]| {
+            (Box::new(self.expression(&p[0], binding)), Box::new(self.expression(&p[1], binding)))
+        };
+        match number {
+            Number::Constant(value) => Expression::Constant(*value),
+            Number::Fluent(named) => Expression::Fluent(self.numeric(named, binding)),
+            Number::Call(call) => Expression::Call(self.call(call, binding)),
+            Number::Sum(parts) => {
+                Expression::Sum(parts.iter().map(|p| self.expression(p, binding)).collect())
+            }
+            Number::Product(parts) => {
+                Expression::Product(parts.iter().map(|p| self.expression(p, binding)).collect())
+            }
+            Number::Difference(sides) => {
+                let (left, right) = pair(sides);
+                Expression::Difference(left, right)
+            }
+            Number::Quotient(sides) => {
+                let (left, right) = pair(sides);
+                Expression::Quotient(left, right)
+            }
+            Number::Negative(inner) => Expression::Negative(Box::new(self.expression(inner, binding))),
+            Number::Duration => Expression::Duration,
+            Number::TotalTime => Expression::TotalTime,
+            Number::Violated(preference) => Expression::Violated(*preference),
+        }
+    }
+
+    /// The number of a written numeric fluent.
+    pub(super) fn numeric(&mut self, named: &Named, binding: &[u32]) -> u32 {
+        let arguments = named.terms.iter().map(|t| t.bound(binding)).collect();
+        self.numeric_id(NumericFluent { function: named.index, arguments })
+    }
+
+    /// The number of a numeric fluent by name.
+    pub(super) fn numeric_id(&mut self, fluent: NumericFluent) -> u32 {
+        let next = self.numerics.len() as u32;
+        let id = *self.numeric_ids.entry(fluent.clone()).or_insert(next);
+        if id == next {
+            self.numerics.push(fluent);
+        }
+        id
+    }
+
+    fn call(&mut self, call: &Named, binding: &[u32]) -> u32 {
+        let arguments: Vec<u32> = call.terms.iter().map(|t| t.bound(binding)).collect();
+        let origin = Origin { schema: call.index, arguments };
+        if let Some(&id) = self.call_ids.get(&origin) {
+            return id;
+        }
+        let mut writes = Vec::new();
+        for target in module_writes(self.statics.task, call.index) {
+            writes.push(match target {
+                Target::Number(named) => RawPlace::Number(self.numeric(&named, &origin.arguments)),
+                Target::Truth(pattern) => RawPlace::Truth(found(&self.atoms, &pattern, &origin.arguments)),
+                Target::Object(pattern) => {
+                    let prefix: Vec<u32> = pattern.terms.iter().map(|t| t.bound(&origin.arguments)).collect();
+                    RawPlace::Object(self.values_of(pattern.predicate, &prefix))
+                }
+            });
+        }
+        let id = self.calls.len() as u32;
+        self.call_ids.insert(origin.clone(), id);
+        self.calls.push(RawCall { origin, writes });
+        id
+    }
+
+    /// The ground effects of a lifted one.
+    pub(super) fn effect(
+        &mut self,
+        effect: &Effect_,
+        at_end: bool,
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+        into: &mut Vec<GroundEffect>,
+    ) {
+        if effect.forall.is_empty() {
+            return self.one_effect(effect, at_end, binding, domains, into);
+        }
+        let guards = guards_of(if at_end { &effect.when.end } else { &effect.when.start });
+        self.for_matches(&effect.forall, &guards, binding, domains, &mut |this, binding| {
+            this.one_effect(effect, at_end, binding, domains, into);
+        });
+    }
+
+    fn one_effect(
+        &mut self,
+        effect: &Effect_,
+        at_end: bool,
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+        into: &mut Vec<GroundEffect>,
+    ) {
+        let mut parts = [Clauses::default(), Clauses::default(), Clauses::default()];
+        let formulas = [&effect.when.start, &effect.when.over_all, &effect.when.end];
+        for (formula, part) in formulas.into_iter().zip(&mut parts) {
+            if !self.conjoin(formula, binding, domains, part) {
+                return;
+            }
+            part.tidy();
+        }
+        let [start, over_all, end] = parts;
+        let (here, at_start) = if at_end { (end, start) } else { (start, Clauses::default()) };
+        let always = here.is_true() && at_start.is_true() && over_all.is_true();
+        let when = if always { None } else { Some(Box::new([here, at_start, over_all])) };
+        let mut push = |deed| into.push(GroundEffect { when: when.clone(), deed });
+        match &effect.change {
+            Change_::Add(pattern) => {
+                if let Some(atom) = found(&self.atoms, pattern, binding)
+                    && !self.always[atom as usize]
+                {
+                    push(Deed::Add(atom));
+                }
+            }
+            Change_::Delete(pattern) => {
+                if let Some(atom) = found(&self.atoms, pattern, binding) {
+                    push(Deed::Delete(atom));
+                }
+            }
+            Change_::Unset(pattern) => {
+                let prefix: Vec<u32> = pattern.terms.iter().map(|t| t.bound(binding)).collect();
+                for atom in self.values_of(pattern.predicate, &prefix) {
+                    push(Deed::Delete(atom));
+                }
+            }
+            Change_::Number(how, fluent, amount) => {
+                let fluent = self.numeric(fluent, binding);
+                push(Deed::Change(fluent, change(*how), Box::new(self.expression(amount, binding))));
+            }
+            Change_::Call(call) => push(Deed::Call(self.call(call, binding))),
+        }
+    }
+
+    /// The reached atoms of an object function's instance, one a value.
+    pub(super) fn values_of(&mut self, predicate: u32, prefix: &[u32]) -> Vec<u32> {
+        let mut pattern = prefix.to_vec();
+        pattern.push(NONE);
+        let (index, mut row) = self.atoms.first(predicate, &pattern);
+        let mut found = Vec::new();
+        while row != NONE {
+            let (atom, arguments) = self.atoms.row(predicate, row);
+            if arguments[..prefix.len()] == *prefix {
+                found.push(atom);
+            }
+            row = self.atoms.next(predicate, index, row);
+        }
+        found
+    }
+
+    /// Calls `body` for every binding of the slots under which all guards are reached atoms.
+    fn for_matches(
+        &mut self,
+        slots: &[u32],
+        guards: &[&Pattern],
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+        body: &mut dyn FnMut(&mut Self, &mut Vec<u32>),
+    ) {
+        for &slot in slots {
+            binding[slot as usize] = NONE;
+        }
+        self.match_next(slots, guards, binding, domains, body);
+    }
+
+    fn match_next(
+        &mut self,
+        slots: &[u32],
+        guards: &[&Pattern],
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+        body: &mut dyn FnMut(&mut Self, &mut Vec<u32>),
+    ) {
+        let mut best: Option<(u32, usize)> = None;
+        for (i, guard) in guards.iter().enumerate() {
+            let pattern = guard.terms.iter().map(|t| t.bound(binding)).collect::<Vec<_>>();
+            let open = |t: &Term| matches!(*t, Term::Slot(s) if binding[s as usize] == NONE);
+            if guard.terms.iter().any(|t| open(t) && !matches!(*t, Term::Slot(s) if slots.contains(&s))) {
+                continue;
+            }
+            if guard.terms.iter().any(open) {
+                let count = self.atoms.count(guard.predicate, &pattern);
+                if best.is_none_or(|(least, _)| count < least) {
+                    best = Some((count, i));
+                }
+            }
+        }
+        if let Some((_, i)) = best {
+            return self.match_guard(slots, guards, i, binding, domains, body);
+        }
+        match slots.iter().find(|&&slot| binding[slot as usize] == NONE) {
+            None => body(self, binding),
+            Some(&slot) => {
+                for object in domains[slot as usize].iter() {
+                    binding[slot as usize] = object.0;
+                    self.match_next(slots, guards, binding, domains, body);
+                }
+                binding[slot as usize] = NONE;
+            }
+        }
+    }
+
+    fn match_guard(
+        &mut self,
+        slots: &[u32],
+        guards: &[&Pattern],
+        i: usize,
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+        body: &mut dyn FnMut(&mut Self, &mut Vec<u32>),
+    ) {
+        let guard = guards[i];
+        let pattern = guard.terms.iter().map(|t| t.bound(binding)).collect::<Vec<_>>();
+        let rest: Vec<&Pattern> =
+            guards.iter().enumerate().filter(|&(j, _)| j != i).map(|(_, &g)| g).collect();
+        let (index, mut row) = self.atoms.first(guard.predicate, &pattern);
+        while row != NONE {
+            let arguments = self.atoms.row(guard.predicate, row).1.to_vec();
+            let mut bound = Vec::new();
+            let fits = guard.terms.iter().zip(&arguments).all(|(term, &argument)| match *term {
+                Term::Object(object) => object == argument,
+                Term::Slot(slot) if binding[slot as usize] == NONE => {
+                    binding[slot as usize] = argument;
+                    bound.push(slot);
+                    domains[slot as usize].binary_search(&ObjectId(argument)).is_ok()
+                }
+                Term::Slot(slot) => binding[slot as usize] == argument,
+            });
+            if fits {
+                self.match_next(slots, &rest, binding, domains, body);
+            }
+            for slot in bound {
+                binding[slot as usize] = NONE;
+            }
+            row = self.atoms.next(guard.predicate, index, row);
+        }
+    }
+}
+
+/// Positive literals that the formula needs.
+fn guards_of(formula: &Formula) -> Vec<&Pattern> {
+    match formula {
+        Formula::And(parts) => parts.iter().flat_map(guards_of).collect(),
+        Formula::Literal(pattern, true) => vec![pattern],
+        _ => Vec::new(),
+    }
+}
+
+fn change(how: Assignment) -> Change {
+    match how {
+        Assignment::Assign => Change::Assign,
+        Assignment::Increase => Change::Increase,
+        Assignment::Decrease => Change::Decrease,
+        Assignment::ScaleUp => Change::ScaleUp,
+        Assignment::ScaleDown => Change::ScaleDown,
+    }
+}
+
+/// A key that two expressions share only if they are the same.
+fn encode(expression: &Expression, key: &mut Vec<u64>) {
+    let mut list = |tag: u64, parts: &[&Expression]| {
+        key.push(tag << 32 | parts.len() as u64);
+        for part in parts {
+            encode(part, key);
+        }
+    };
+    match expression {
+        Expression::Constant(value) => key.extend([1, value.to_bits()]),
+        Expression::Fluent(id) => key.extend([2, u64::from(*id)]),
+        Expression::Call(id) => key.extend([3, u64::from(*id)]),
+        Expression::Duration => key.push(4),
+        Expression::TotalTime => key.push(5),
+        Expression::Violated(id) => key.extend([7, u64::from(*id)]),
+        Expression::Sum(parts) => list(8, &parts.iter().collect::<Vec<_>>()),
+        Expression::Product(parts) => list(9, &parts.iter().collect::<Vec<_>>()),
+        Expression::Difference(left, right) => list(10, &[left, right]),
+        Expression::Quotient(left, right) => list(11, &[left, right]),
+        Expression::Negative(inner) => list(12, &[inner]),
+    }
+}

@@ -1,0 +1,152 @@
+//! The metric, and the numeric fluents that only add up costs.
+
+use super::instantiate::Deed;
+use super::raw::{RawAction, RawTask};
+use super::relevant::reads;
+use super::task::{Change, Comparison, Expression, Metric};
+
+/// How the metric is made up.
+pub(super) struct Costs {
+    /// By numeric fluent: its weight in the metric, if all it does is add up costs.
+    pub weights: Vec<Option<f64>>,
+    pub metric: Option<Metric>,
+    /// Numeric fluents that the metric reads otherwise.
+    pub read: Vec<u32>,
+}
+
+/// Splits a linear expression into weights; `false` if it is not linear.
+fn linear(expression: &Expression, factor: f64, weights: &mut [f64], time: &mut f64) -> bool {
+    match expression {
+        Expression::Constant(_) => true,
+        Expression::Fluent(id) => {
+            weights[*id as usize] += factor;
+            true
+        }
+        Expression::TotalTime => {
+            *time += factor;
+            true
+        }
+        Expression::Sum(parts) => parts.iter().all(|p| linear(p, factor, weights, time)),
+        Expression::Difference(left, right) => {
+            linear(left, factor, weights, time) && linear(right, -factor, weights, time)
+        }
+        Expression::Negative(inner) => linear(inner, -factor, weights, time),
+        Expression::Product(parts) => {
+            let constant: f64 = parts
+                .iter()
+                .filter_map(|p| if let Expression::Constant(v) = p { Some(*v) } else { None })
+                .product();
+            let rest: Vec<_> = parts.iter().filter(|p| !matches!(p, Expression::Constant(_))).collect();
+            rest.len() <= 1 && rest.iter().all(|p| linear(p, factor * constant, weights, time))
+        }
+        Expression::Quotient(left, right) => match **right {
+            Expression::Constant(by) => linear(left, factor / by, weights, time),
+            _ => false,
+        },
+        Expression::Call(_) | Expression::Duration | Expression::Violated(_) => false,
+    }
+}
+
+/// Numeric fluents that something besides the metric reads, or that are not only increased without condition.
+fn not_just_costs(task: &RawTask, comparisons: &[Comparison], count: usize) -> Vec<bool> {
+    let mut read = vec![false; count];
+    let mark = |expression: &Expression, read: &mut Vec<bool>| {
+        reads(expression, &mut |id| read[id as usize] = true, &mut |_| {});
+    };
+    for comparison in comparisons {
+        mark(&comparison.left, &mut read);
+        mark(&comparison.right, &mut read);
+    }
+    for action in &task.actions {
+        let later = action.later.as_ref();
+        for effect in action.effects.iter().chain(later.iter().flat_map(|l| &l.end_effects)) {
+            if let Deed::Change(id, change, amount) = &effect.deed {
+                mark(amount, &mut read);
+                let adds = matches!(change, Change::Increase | Change::Decrease);
+                read[*id as usize] |= !adds || effect.when.is_some();
+            }
+        }
+        if let Some(later) = later {
+            later.duration.iter().for_each(|bound| mark(&bound.seconds, &mut read));
+            for (id, rate) in &later.flows {
+                read[*id as usize] = true;
+                mark(rate, &mut read);
+            }
+        }
+    }
+    for (_, deeds) in &task.timed {
+        for deed in deeds {
+            if let Deed::Change(id, ..) = deed {
+                read[*id as usize] = true;
+            }
+        }
+    }
+    read
+}
+
+/// Looks into the metric. `keep` keeps every numeric fluent in the state.
+pub(super) fn costs(
+    task: &RawTask,
+    comparisons: &[Comparison],
+    count: usize,
+    metric: Option<(bool, Expression)>,
+    keep: bool,
+) -> Costs {
+    let read = not_just_costs(task, comparisons, count);
+    let mut weights = vec![0.0; count];
+    let mut time_weight = 0.0;
+    let Some((minimise, expression)) = metric else {
+        let weights = (0..count).map(|id| (!read[id] && !keep).then_some(0.0)).collect();
+        return Costs { weights, metric: None, read: Vec::new() };
+    };
+    let additive = linear(&expression, 1.0, &mut weights, &mut time_weight)
+        && (0..count).all(|id| weights[id] == 0.0 || !read[id]);
+    let mut used = Vec::new();
+    reads(&expression, &mut |id| used.push(id), &mut |_| {});
+    let weights = (0..count).map(|id| {
+        let in_metric = used.contains(&(id as u32));
+        (!read[id] && if in_metric { additive } else { !keep }).then_some(weights[id])
+    });
+    let weights: Vec<_> = weights.collect();
+    let read = if additive { Vec::new() } else { used };
+    Costs { weights, metric: Some(Metric { minimise, expression, additive, time_weight }), read }
+}
+
+impl Costs {
+    /// What the action adds to the metric by fluents that only add up; those effects are removed.
+    pub(super) fn of(&self, action: &mut RawAction) -> Expression {
+        if self.metric.is_none() && action.later.is_none() {
+            strip(&self.weights, &mut action.effects, &mut Vec::new());
+            return Expression::Constant(1.0);
+        }
+        let mut terms = Vec::new();
+        strip(&self.weights, &mut action.effects, &mut terms);
+        if let Some(later) = &mut action.later {
+            strip(&self.weights, &mut later.end_effects, &mut terms);
+        }
+        let constant = |e: &Expression| if let Expression::Constant(v) = e { Some(*v) } else { None };
+        if let Some(sum) = terms.iter().map(constant).try_fold(0.0, |sum, v| Some(sum + v?)) {
+            return Expression::Constant(sum);
+        }
+        Expression::Sum(terms)
+    }
+}
+
+fn strip(
+    weights: &[Option<f64>],
+    effects: &mut Vec<super::instantiate::GroundEffect>,
+    terms: &mut Vec<Expression>,
+) {
+    effects.retain(|effect| {
+        let Deed::Change(id, change, amount) = &effect.deed else { return true };
+        let Some(weight) = weights[*id as usize] else { return true };
+        let weight = if *change == Change::Decrease { -weight } else { weight };
+        if weight != 0.0 {
+            terms.push(match **amount {
+                Expression::Constant(value) => Expression::Constant(weight * value),
+                ref other => Expression::Product(vec![Expression::Constant(weight), other.clone()]),
+            });
+        }
+        false
+    });
+}

@@ -1,0 +1,121 @@
+//! The ground task over single atoms, before atoms are grouped into variables.
+
+use rustc_hash::FxHashMap;
+
+use super::instantiate::{Clauses, Deed, GroundEffect};
+use super::task::{DurationBound, Expression};
+
+/// A disjunctive condition gives at most this many copies of its action; beyond, it becomes a derived variable.
+const MOST_COPIES: usize = 4;
+
+/// The durative part of an action.
+#[derive(Clone, Debug)]
+pub(super) struct Later {
+    pub over_all: Clauses,
+    pub end: Clauses,
+    pub end_effects: Vec<GroundEffect>,
+    pub flows: Vec<(u32, Expression)>,
+    pub duration: Vec<DurationBound>,
+}
+
+/// A ground action; no disjunctions are left in its conditions.
+#[derive(Clone, Debug)]
+pub(super) struct RawAction {
+    pub schema: u32,
+    pub arguments: Box<[u32]>,
+    pub start: Clauses,
+    pub effects: Vec<GroundEffect>,
+    pub later: Option<Box<Later>>,
+}
+
+/// A ground axiom.
+#[derive(Clone, Debug)]
+pub(super) struct RawAxiom {
+    pub head: u32,
+    pub body: Clauses,
+    pub stratum: u32,
+}
+
+/// The ground task. Atoms from `inner` on stand for disjunctions.
+pub(super) struct RawTask {
+    pub actions: Vec<RawAction>,
+    pub axioms: Vec<RawAxiom>,
+    pub goal: Clauses,
+    /// By atom: true at first (derived atoms are not).
+    pub init: Vec<bool>,
+    /// Number of the first atom that stands for a disjunction.
+    pub inner: u32,
+    pub timed: Vec<(f64, Vec<Deed>)>,
+}
+
+/// Replaces disjunctions by derived atoms.
+pub(super) struct Resolve {
+    next: u32,
+    known: FxHashMap<Vec<Clauses>, u32>,
+    pub axioms: Vec<RawAxiom>,
+}
+
+impl Resolve {
+    /// Numbers new atoms from `next` on.
+    pub(super) fn new(next: u32) -> Self {
+        Resolve { next, known: FxHashMap::default(), axioms: Vec::new() }
+    }
+
+    /// How many atoms there are now.
+    pub(super) fn atoms(&self) -> u32 {
+        self.next
+    }
+
+    /// The condition with every disjunction as one derived atom.
+    pub(super) fn flat(&mut self, mut clauses: Clauses, stratum: u32) -> Clauses {
+        for or in std::mem::take(&mut clauses.ors) {
+            clauses.literals.push(self.derived(or, stratum) << 1);
+        }
+        clauses.tidy();
+        clauses
+    }
+
+    fn derived(&mut self, branches: Vec<Clauses>, stratum: u32) -> u32 {
+        if let Some(&atom) = self.known.get(&branches) {
+            return atom;
+        }
+        let bodies: Vec<Clauses> = branches.iter().map(|b| self.flat(b.clone(), stratum)).collect();
+        let head = self.next;
+        self.next += 1;
+        self.axioms.extend(bodies.into_iter().map(|body| RawAxiom { head, body, stratum }));
+        self.known.insert(branches, head);
+        head
+    }
+
+    /// The condition as few alternatives without disjunctions.
+    pub(super) fn split(&mut self, mut clauses: Clauses, stratum: u32) -> Vec<Clauses> {
+        let mut all = vec![Clauses::default()];
+        for or in std::mem::take(&mut clauses.ors) {
+            if all.len() * or.len() > MOST_COPIES {
+                let atom = self.derived(or, stratum);
+                clauses.literals.push(atom << 1);
+                continue;
+            }
+            let branches: Vec<Clauses> = or.into_iter().map(|b| self.flat(b, stratum)).collect();
+            all = all.iter().flat_map(|left| branches.iter().map(move |right| join(left, right))).collect();
+        }
+        let mut done: Vec<Clauses> = all.iter().map(|extra| join(extra, &clauses)).collect();
+        done.iter_mut().for_each(Clauses::tidy);
+        done.retain(|c| !contradictory(c));
+        done.dedup();
+        done
+    }
+}
+
+fn join(left: &Clauses, right: &Clauses) -> Clauses {
+    let mut joined = left.clone();
+    joined.literals.extend(&right.literals);
+    joined.comparisons.extend(&right.comparisons);
+    joined.calls.extend(&right.calls);
+    joined
+}
+
+/// Whether it asks for an atom and its absence (literals sorted).
+pub(super) fn contradictory(clauses: &Clauses) -> bool {
+    clauses.literals.windows(2).any(|pair| pair[0] ^ 1 == pair[1])
+}

@@ -1,0 +1,310 @@
+//! Relaxed reachability over the lifted task: a semi-naive join for every new atom (nothing is ever taken away).
+//!
+//! Each rule's body is matched by taking the atom with the fewest candidates next, given what is bound so far; a body
+//! atom with no candidate ends the branch at once.
+
+use std::sync::Arc;
+
+use crate::task::ObjectId;
+
+use super::atoms::{Atoms, NONE};
+use super::normal::{Formula, Pattern, Term};
+
+/// A rule of the relaxed task.
+pub(super) struct Rule {
+    /// The objects of each slot.
+    pub domains: Vec<Arc<[ObjectId]>>,
+    pub body: Vec<Pattern>,
+    /// Conditions beyond the body, tested when everything is bound.
+    pub filters: Vec<Formula>,
+    /// Pairs of terms that must differ, tested early.
+    pub unequal: Vec<(Term, Term)>,
+    /// Pairs of terms that must be the same.
+    pub equal: Vec<(Term, Term)>,
+    /// Slots that must be bound in the end, body or not.
+    pub slots: Vec<u32>,
+    pub heads: Vec<Head>,
+    /// The action whose instances the rule finds, and how many of the first entries of `slots` make the instance.
+    pub instance: Option<(u32, usize)>,
+}
+
+/// An atom that a rule brings about, for all objects of `forall`.
+pub(super) struct Head {
+    pub forall: Vec<u32>,
+    pub atom: Pattern,
+}
+
+/// Tests a filter under a complete binding, with what is known to be static; true where it is not known to be false.
+pub(super) trait Possible {
+    /// Whether the formula may hold in some reachable state.
+    fn possible(
+        &self,
+        atoms: &Atoms,
+        formula: &Formula,
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+    ) -> bool;
+}
+
+/// Who ended the work before it was done.
+pub(super) struct Stopped;
+
+/// The work in progress.
+pub(super) struct Reach<'a, P: Possible> {
+    pub atoms: Atoms,
+    pub rules: &'a [Rule],
+    /// By predicate: whether effects or rules add its atoms.
+    pub fluent: &'a [bool],
+    pub possible: P,
+    /// By action: its instances, flat.
+    pub instances: Vec<Vec<u32>>,
+    /// Upper bound on atoms and instances together.
+    pub limit: usize,
+    pub count: usize,
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// Scratch space of one join.
+struct Join<'r> {
+    rule: &'r Rule,
+    domains: &'r [Arc<[ObjectId]>],
+    /// By slot, sorted objects as bits, where the domain is not everything.
+    fits: &'r [Option<Vec<u64>>],
+    binding: Vec<u32>,
+    trigger: u32,
+    trigger_position: usize,
+}
+
+impl<P: Possible> Reach<'_, P> {
+    /// Runs to the fixpoint.
+    pub(super) fn run(&mut self, objects: usize) -> Result<(), Stopped> {
+        let rules = self.rules;
+        let fits: Vec<Vec<Option<Vec<u64>>>> =
+            rules.iter().map(|r| r.domains.iter().map(|d| bits_of(d, objects)).collect()).collect();
+        let mut triggers: Vec<Vec<(usize, usize)>> = vec![Vec::new(); self.fluent.len()];
+        for (r, rule) in rules.iter().enumerate() {
+            for (position, pattern) in rule.body.iter().enumerate() {
+                if self.fluent[pattern.predicate as usize] {
+                    triggers[pattern.predicate as usize].push((r, position));
+                }
+            }
+            if rule.body.iter().all(|p| !self.fluent[p.predicate as usize]) {
+                let mut join = self.start(r, &fits[r], NONE, usize::MAX);
+                self.extend(&mut join, (1u64 << rule.body.len()) - 1)?;
+            }
+        }
+        let mut next = 0;
+        while next < self.atoms.len() {
+            if next % 1024 == 0 && (self.stop)() {
+                return Err(Stopped);
+            }
+            let atom = next as u32;
+            let predicate = self.atoms.predicate(atom) as usize;
+            for &(r, position) in &triggers[predicate] {
+                let mut join = self.start(r, &fits[r], atom, position);
+                let arguments = self.atoms.arguments(atom);
+                if join.unify(&rules[r].body[position].terms, arguments, &mut Vec::new()) {
+                    let rest = ((1u64 << rules[r].body.len()) - 1) & !(1 << position);
+                    self.extend(&mut join, rest)?;
+                }
+            }
+            next += 1;
+        }
+        Ok(())
+    }
+
+    fn start<'r>(
+        &self,
+        rule: usize,
+        fits: &'r [Option<Vec<u64>>],
+        trigger: u32,
+        trigger_position: usize,
+    ) -> Join<'r>
+    where
+        Self: 'r,
+    {
+        let rules: &'r [Rule] = self.rules;
+        let domains = &rules[rule].domains[..];
+        let binding = vec![NONE; domains.len()];
+        Join { rule: &rules[rule], domains, fits, binding, trigger, trigger_position }
+    }
+
+    fn extend(&mut self, join: &mut Join<'_>, mut rest: u64) -> Result<(), Stopped> {
+        if !join.consistent() {
+            return Ok(());
+        }
+        let rule = join.rule;
+        let mut best: Option<(u32, usize)> = None;
+        let mut pattern = [NONE; 32];
+        let mut left = rest;
+        while left != 0 {
+            let i = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let body = &rule.body[i];
+            let arity = body.terms.len();
+            let bound = join.pattern(&body.terms, &mut pattern);
+            if bound == arity {
+                match self.atoms.find(body.predicate, &pattern[..arity]) {
+                    Some(atom) if self.visible(join, i, atom) => rest &= !(1 << i),
+                    _ => return Ok(()),
+                }
+                continue;
+            }
+            let count = self.atoms.count(body.predicate, &pattern[..arity]);
+            if count == 0 {
+                return Ok(());
+            }
+            if best.is_none_or(|(least, _)| count < least) {
+                best = Some((count, i));
+            }
+        }
+        match best {
+            Some((_, i)) => self.branch(join, rest & !(1 << i), i),
+            None => self.enumerate(join, 0),
+        }
+    }
+
+    fn branch(&mut self, join: &mut Join<'_>, rest: u64, i: usize) -> Result<(), Stopped> {
+        let rule = join.rule;
+        let body = &rule.body[i];
+        let mut pattern = [NONE; 32];
+        join.pattern(&body.terms, &mut pattern);
+        let (index, mut row) = self.atoms.first(body.predicate, &pattern[..body.terms.len()]);
+        let mut bound = Vec::new();
+        while row != NONE {
+            let (atom, arguments) = self.atoms.row(body.predicate, row);
+            if !self.visible(join, i, atom) {
+                break;
+            }
+            bound.clear();
+            if join.unify(&body.terms, arguments, &mut bound) {
+                self.extend(join, rest)?;
+            }
+            for &slot in &bound {
+                join.binding[slot as usize] = NONE;
+            }
+            row = self.atoms.next(body.predicate, index, row);
+        }
+        Ok(())
+    }
+
+    /// Each instance is found once: by its newest atom, at that atom's first position in the body.
+    fn visible(&self, join: &Join<'_>, position: usize, atom: u32) -> bool {
+        if !self.fluent[join.rule.body[position].predicate as usize] {
+            return true;
+        }
+        if position < join.trigger_position { atom < join.trigger } else { atom <= join.trigger }
+    }
+
+    fn enumerate(&mut self, join: &mut Join<'_>, from: usize) -> Result<(), Stopped> {
+        let rule = join.rule;
+        let Some(at) = (from..rule.slots.len()).find(|&i| join.binding[rule.slots[i] as usize] == NONE)
+        else {
+            return self.fire(join);
+        };
+        let slot = rule.slots[at] as usize;
+        for object in join.domains[slot].iter() {
+            join.binding[slot] = object.0;
+            if join.consistent() {
+                self.enumerate(join, at + 1)?;
+            }
+        }
+        join.binding[slot] = NONE;
+        Ok(())
+    }
+
+    fn fire(&mut self, join: &mut Join<'_>) -> Result<(), Stopped> {
+        let rule = join.rule;
+        for filter in &rule.filters {
+            if !self.possible.possible(&self.atoms, filter, &mut join.binding, join.domains) {
+                return Ok(());
+            }
+        }
+        if let Some((action, arity)) = rule.instance {
+            let list = &mut self.instances[action as usize];
+            list.extend(rule.slots[..arity].iter().map(|&slot| join.binding[slot as usize]));
+            self.count += 1;
+        }
+        for head in &rule.heads {
+            self.head(join, head, 0);
+        }
+        if self.count + self.atoms.len() > self.limit || (self.count % 4096 == 1 && (self.stop)()) {
+            return Err(Stopped);
+        }
+        Ok(())
+    }
+
+    fn head(&mut self, join: &mut Join<'_>, head: &Head, at: usize) {
+        if at < head.forall.len() {
+            let slot = head.forall[at] as usize;
+            for object in join.domains[slot].iter() {
+                join.binding[slot] = object.0;
+                self.head(join, head, at + 1);
+            }
+            join.binding[slot] = NONE;
+            return;
+        }
+        let mut arguments = [NONE; 32];
+        let arity = join.pattern(&head.atom.terms, &mut arguments);
+        self.atoms.insert(head.atom.predicate, &arguments[..arity]);
+    }
+}
+
+impl Join<'_> {
+    /// Writes the bound arguments (others `NONE`), and tells how many are bound.
+    fn pattern(&self, terms: &[Term], out: &mut [u32; 32]) -> usize {
+        let mut bound = 0;
+        for (i, term) in terms.iter().enumerate() {
+            out[i] = term.bound(&self.binding);
+            bound += usize::from(out[i] != NONE);
+        }
+        bound
+    }
+
+    fn unify(&mut self, terms: &[Term], arguments: &[u32], bound: &mut Vec<u32>) -> bool {
+        for (term, &argument) in terms.iter().zip(arguments) {
+            match *term {
+                Term::Object(object) if object == argument => {}
+                Term::Object(_) => return false,
+                Term::Slot(slot) => {
+                    let held = self.binding[slot as usize];
+                    if held != NONE {
+                        if held != argument {
+                            return false;
+                        }
+                        continue;
+                    }
+                    let fits = self.fits[slot as usize]
+                        .as_ref()
+                        .is_none_or(|bits| bits[argument as usize / 64] >> (argument % 64) & 1 == 1);
+                    if !fits {
+                        return false;
+                    }
+                    self.binding[slot as usize] = argument;
+                    bound.push(slot);
+                }
+            }
+        }
+        true
+    }
+
+    fn consistent(&self) -> bool {
+        let value = |t: Term| t.bound(&self.binding);
+        self.rule.unequal.iter().all(|&(a, b)| value(a) != value(b) || value(a) == NONE)
+            && self.rule.equal.iter().all(|&(a, b)| {
+                let (a, b) = (value(a), value(b));
+                a == b || a == NONE || b == NONE
+            })
+    }
+}
+
+fn bits_of(domain: &[ObjectId], objects: usize) -> Option<Vec<u64>> {
+    if domain.len() == objects {
+        return None;
+    }
+    let mut bits = vec![0u64; objects.div_ceil(64)];
+    for object in domain {
+        bits[object.index() / 64] |= 1 << (object.0 % 64);
+    }
+    Some(bits)
+}

@@ -1,0 +1,176 @@
+//! Relaxed reachability of the ground task: what no sequence of actions can bring about goes.
+
+use super::instantiate::{Clauses, Deed, GroundEffect, RawCall};
+use super::raw::{RawAction, RawTask};
+
+/// What the fixpoint found.
+pub(super) struct Reached {
+    /// By atom.
+    pub atoms: Vec<bool>,
+    /// By atom: something may take it away, or it is not there at first.
+    pub absent: Vec<bool>,
+}
+
+/// A relaxed operator: reaches its atom (or does nothing but count) once its conditions are.
+struct Unary {
+    missing: u32,
+    reaches: u32,
+}
+
+struct Fixpoint {
+    unary: Vec<Unary>,
+    /// By atom (those beyond the task's stand for "the action was started"): operators that wait for it.
+    waiting: Vec<Vec<u32>>,
+}
+
+impl Fixpoint {
+    fn add<'c>(&mut self, conditions: impl Iterator<Item = &'c Clauses>, extra: Option<u32>, reaches: u32) {
+        let mut wanted: Vec<u32> =
+            conditions.flat_map(|c| &c.literals).filter(|&&l| l & 1 == 0).map(|l| l >> 1).collect();
+        wanted.extend(extra);
+        wanted.sort_unstable();
+        wanted.dedup();
+        let id = self.unary.len() as u32;
+        for &atom in &wanted {
+            self.waiting[atom as usize].push(id);
+        }
+        self.unary.push(Unary { missing: wanted.len() as u32, reaches });
+    }
+
+    fn effect(&mut self, base: &[&Clauses], effect: &GroundEffect, started: u32, calls: &[RawCall]) {
+        let mut add = |atom| {
+            let when = effect.when.iter().flat_map(|w| w.iter());
+            self.add(base.iter().copied().chain(when), Some(started), atom);
+        };
+        match effect.deed {
+            Deed::Add(atom) => add(atom),
+            Deed::Call(call) => calls[call as usize].atoms().for_each(add),
+            Deed::Delete(_) | Deed::Change(..) => {}
+        }
+    }
+
+    fn run(mut self, init: &[bool]) -> Vec<bool> {
+        let mut reached = vec![false; self.waiting.len()];
+        let mut queue: Vec<u32> = Vec::new();
+        let reach = |atom: u32, queue: &mut Vec<u32>, reached: &mut Vec<bool>| {
+            if !std::mem::replace(&mut reached[atom as usize], true) {
+                queue.push(atom);
+            }
+        };
+        for (atom, _) in init.iter().enumerate().filter(|&(_, &there)| there) {
+            reach(atom as u32, &mut queue, &mut reached);
+        }
+        for unary in &self.unary {
+            if unary.missing == 0 {
+                reach(unary.reaches, &mut queue, &mut reached);
+            }
+        }
+        while let Some(atom) = queue.pop() {
+            for id in std::mem::take(&mut self.waiting[atom as usize]) {
+                let unary = &mut self.unary[id as usize];
+                unary.missing -= 1;
+                if unary.missing == 0 {
+                    reach(unary.reaches, &mut queue, &mut reached);
+                }
+            }
+        }
+        reached
+    }
+}
+
+/// Removes actions, effects and axioms that need what cannot be reached, and conditions that always hold. Returns
+/// what is reachable.
+pub(super) fn prune(task: &mut RawTask, calls: &[RawCall]) -> Reached {
+    let count = task.init.len();
+    let mut fixpoint = Fixpoint { unary: Vec::new(), waiting: vec![Vec::new(); count + task.actions.len()] };
+    for (index, action) in task.actions.iter().enumerate() {
+        let started = (count + index) as u32;
+        fixpoint.add(std::iter::once(&action.start), None, started);
+        for effect in &action.effects {
+            fixpoint.effect(&[], effect, started, calls);
+        }
+        if let Some(later) = &action.later {
+            for effect in &later.end_effects {
+                fixpoint.effect(&[&later.over_all, &later.end], effect, started, calls);
+            }
+        }
+    }
+    for axiom in &task.axioms {
+        fixpoint.add(std::iter::once(&axiom.body), None, axiom.head);
+    }
+    let mut init = task.init.clone();
+    for (_, deeds) in &task.timed {
+        for deed in deeds {
+            if let Deed::Add(atom) = deed {
+                init[*atom as usize] = true;
+            }
+        }
+    }
+    let mut atoms = fixpoint.run(&init);
+    task.actions.retain({
+        let mut index = 0;
+        let atoms = &atoms;
+        move |action| {
+            index += 1;
+            let later = action.later.as_ref();
+            atoms[count + index - 1]
+                && later.is_none_or(|l| possible(&l.over_all, atoms) && possible(&l.end, atoms))
+        }
+    });
+    atoms.truncate(count);
+    task.axioms.retain(|axiom| possible(&axiom.body, &atoms));
+    let mut absent: Vec<bool> = task.init.iter().map(|there| !there).collect();
+    calls.iter().flat_map(RawCall::atoms).for_each(|a| absent[a as usize] = true);
+    simplify(task, &atoms, &mut absent);
+    Reached { atoms, absent }
+}
+
+fn possible(clauses: &Clauses, reached: &[bool]) -> bool {
+    clauses.literals.iter().all(|&l| l & 1 == 1 || reached[(l >> 1) as usize])
+}
+
+fn simplify(task: &mut RawTask, reached: &[bool], absent: &mut [bool]) {
+    let drop = |clauses: &mut Clauses| {
+        clauses.literals.retain(|&l| l & 1 == 0 || reached[(l >> 1) as usize]);
+    };
+    let effects = |list: &mut Vec<GroundEffect>, absent: &mut [bool]| {
+        list.retain_mut(|effect| {
+            if let Some(when) = &mut effect.when {
+                if !when.iter().all(|c| possible(c, reached)) {
+                    return false;
+                }
+                when.iter_mut().for_each(drop);
+                if when.iter().all(Clauses::is_true) {
+                    effect.when = None;
+                }
+            }
+            match effect.deed {
+                Deed::Delete(atom) => {
+                    absent[atom as usize] = true;
+                    reached[atom as usize]
+                }
+                _ => true,
+            }
+        });
+    };
+    for RawAction { start, effects: at_start, later, .. } in &mut task.actions {
+        drop(start);
+        effects(at_start, absent);
+        if let Some(later) = later {
+            drop(&mut later.over_all);
+            drop(&mut later.end);
+            effects(&mut later.end_effects, absent);
+        }
+    }
+    for axiom in &mut task.axioms {
+        drop(&mut axiom.body);
+    }
+    drop(&mut task.goal);
+    for (_, deeds) in &task.timed {
+        for deed in deeds {
+            if let Deed::Delete(atom) = deed {
+                absent[*atom as usize] = true;
+            }
+        }
+    }
+}

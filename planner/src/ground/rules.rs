@@ -1,0 +1,317 @@
+//! The rules of relaxed reachability: one an action or axiom, and further ones for conditional and end effects.
+
+use std::sync::Arc;
+
+use crate::task::{ObjectId, Task};
+
+use super::normal::{
+    Action_, Change_, Effect_, Formula, Named, Normal, Pattern, Rule_, Target, Term, module_writes,
+};
+use super::reach::{Head, Rule};
+
+/// Body atoms beyond this many are tested only against what is static.
+const LONGEST_BODY: usize = 60;
+/// Disjunctions are distributed over a condition as long as it gives at most this many alternatives.
+const MOST_ALTERNATIVES: usize = 16;
+
+/// One way to satisfy a derived predicate: a conjunction over the rule's variables and witnesses.
+pub(super) struct Alternative {
+    /// Index of the rule in the normal form.
+    pub rule: usize,
+    /// Parameters, then witnesses.
+    pub slots: Vec<u32>,
+    pub parts: Vec<Formula>,
+}
+
+/// All rules, and the alternatives of the axioms; their instances are numbered after those of the actions.
+pub(super) struct Rules {
+    pub rules: Vec<Rule>,
+    pub alternatives: Vec<Alternative>,
+    /// By action: an instance may be found more than once.
+    pub repeats: Vec<bool>,
+    /// By predicate, the ones that stand for "the action was applied" included.
+    pub fluent: Vec<bool>,
+    /// By predicate: whether rules define it.
+    derived: Vec<bool>,
+}
+
+/// Which predicates change, before any "applied" predicate is added.
+pub(super) fn fluent_predicates(task: &Task, normal: &Normal) -> Vec<bool> {
+    let mut fluent = vec![false; normal.predicate_count];
+    for action in &normal.actions {
+        for effect in action.start_effects.iter().chain(&action.end_effects) {
+            match &effect.change {
+                Change_::Add(p) | Change_::Delete(p) | Change_::Unset(p) => {
+                    fluent[p.predicate as usize] = true
+                }
+                Change_::Call(call) => {
+                    for target in module_writes(task, call.index) {
+                        if let Target::Truth(p) | Target::Object(p) = target {
+                            fluent[p.predicate as usize] = true;
+                        }
+                    }
+                }
+                Change_::Number(..) => {}
+            }
+        }
+    }
+    for rule in &normal.rules {
+        fluent[rule.head.predicate as usize] = true;
+    }
+    fluent
+}
+
+/// The conjunctive parts of a condition, sorted by what a join can use.
+#[derive(Clone, Default)]
+struct Parts {
+    slots: Vec<u32>,
+    leaves: Vec<Formula>,
+}
+
+/// Distributes disjunctions at the top and lifts existential variables out.
+fn alternatives(formula: &Formula) -> Vec<Parts> {
+    match formula {
+        Formula::And(parts) => parts.iter().fold(vec![Parts::default()], |done, part| {
+            let mut more = alternatives(part);
+            if done.len() * more.len() > MOST_ALTERNATIVES {
+                more = vec![Parts { slots: Vec::new(), leaves: vec![part.clone()] }];
+            }
+            done.iter()
+                .flat_map(|left| {
+                    more.iter().map(|right| Parts {
+                        slots: [&left.slots[..], &right.slots[..]].concat(),
+                        leaves: [&left.leaves[..], &right.leaves[..]].concat(),
+                    })
+                })
+                .collect()
+        }),
+        Formula::Or(parts) => {
+            let all: Vec<Parts> = parts.iter().flat_map(alternatives).collect();
+            if all.len() > MOST_ALTERNATIVES {
+                return vec![Parts { slots: Vec::new(), leaves: vec![formula.clone()] }];
+            }
+            all
+        }
+        Formula::Exists(slots, body) => {
+            let mut all = alternatives(body);
+            for parts in &mut all {
+                parts.slots.extend(slots);
+            }
+            all
+        }
+        leaf => vec![Parts { slots: Vec::new(), leaves: vec![leaf.clone()] }],
+    }
+}
+
+fn rule(domains: &[Arc<[ObjectId]>], slots: Vec<u32>, leaves: &[Formula], fluent: &[bool]) -> Rule {
+    let mut rule = Rule {
+        domains: domains.to_vec(),
+        body: Vec::new(),
+        filters: Vec::new(),
+        unequal: Vec::new(),
+        equal: Vec::new(),
+        slots,
+        heads: Vec::new(),
+        instance: None,
+    };
+    for leaf in leaves {
+        match leaf {
+            Formula::Literal(pattern, true) if rule.body.len() < LONGEST_BODY => {
+                rule.body.push(pattern.clone())
+            }
+            Formula::Literal(pattern, false) if fluent[pattern.predicate as usize] => {}
+            Formula::Same(a, b, true) => rule.equal.push((*a, *b)),
+            Formula::Same(a, b, false) => rule.unequal.push((*a, *b)),
+            Formula::Call(..) => {}
+            other => rule.filters.push(other.clone()),
+        }
+    }
+    rule
+}
+
+/// The atoms that an effect adds.
+fn heads(task: &Task, effect: &Effect_, domains: &mut Vec<Arc<[ObjectId]>>) -> Vec<Head> {
+    match &effect.change {
+        Change_::Add(atom) => vec![Head { forall: effect.forall.clone(), atom: atom.clone() }],
+        Change_::Call(call) => module_writes(task, call.index)
+            .iter()
+            .filter_map(|t| written(task, effect, call, t, domains))
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// A module may make its atoms true and give its object functions any value.
+fn written(
+    task: &Task,
+    effect: &Effect_,
+    call: &Named,
+    target: &Target,
+    domains: &mut Vec<Arc<[ObjectId]>>,
+) -> Option<Head> {
+    let place = |term: &Term| match *term {
+        Term::Slot(slot) => call.terms[slot as usize],
+        object => object,
+    };
+    let (Target::Truth(pattern) | Target::Object(pattern)) = target else { return None };
+    let mut terms: Vec<Term> = pattern.terms.iter().map(place).collect();
+    let mut forall = effect.forall.clone();
+    if let Target::Object(_) = target {
+        let function = &task.functions[pattern.predicate as usize - task.predicates.len()];
+        let types = function.result.as_deref().unwrap_or_default();
+        let value = domains.len() as u32;
+        domains.push((0..task.objects.len() as u32).map(ObjectId).filter(|&o| task.fits(o, types)).collect());
+        terms.push(Term::Slot(value));
+        forall.push(value);
+    }
+    Some(Head { forall, atom: Pattern { predicate: pattern.predicate, terms } })
+}
+
+fn is_true(formula: &Formula) -> bool {
+    matches!(formula, Formula::And(parts) if parts.iter().all(is_true))
+}
+
+/// Makes the rules; `fresh` gives predicates for "the action was applied".
+pub(super) fn make(task: &Task, normal: &Normal, fresh: &mut dyn FnMut() -> u32) -> Rules {
+    let mut all = Rules {
+        rules: Vec::new(),
+        alternatives: Vec::new(),
+        repeats: Vec::new(),
+        fluent: fluent_predicates(task, normal),
+        derived: vec![false; normal.predicate_count],
+    };
+    for axiom in &normal.rules {
+        all.derived[axiom.head.predicate as usize] = true;
+    }
+    for (index, action) in normal.actions.iter().enumerate() {
+        all.action(task, index, action, fresh);
+    }
+    for (index, axiom) in normal.rules.iter().enumerate() {
+        all.axiom(index, axiom, normal.actions.len());
+    }
+    all
+}
+
+impl Rules {
+    fn axiom(&mut self, index: usize, axiom: &Rule_, first: usize) {
+        for parts in alternatives(&axiom.body) {
+            let mut slots: Vec<u32> = (0..axiom.head.terms.len() as u32).collect();
+            slots.extend(&parts.slots);
+            let mut made = rule(&axiom.domains, slots.clone(), &parts.leaves, &self.fluent);
+            made.heads.push(Head { forall: Vec::new(), atom: axiom.head.clone() });
+            made.instance = Some(((first + self.alternatives.len()) as u32, slots.len()));
+            self.alternatives.push(Alternative { rule: index, slots, parts: parts.leaves });
+            self.rules.push(made);
+        }
+    }
+
+    fn action(&mut self, task: &Task, index: usize, action: &Action_, fresh: &mut dyn FnMut() -> u32) {
+        let mut own: Vec<u32> = (0..action.arity as u32).collect();
+        own.extend(&action.extra);
+        let (start, later) = self.split(action);
+        let mut domains = action.domains.clone();
+        let (mut at_once, mut conditional) = (Vec::new(), Vec::new());
+        let ends = action.end_effects.iter().map(|e| (e, true));
+        for (effect, at_end) in action.start_effects.iter().map(|e| (e, false)).chain(ends) {
+            let when = &effect.when;
+            let free = is_true(&when.start) && is_true(&when.over_all) && is_true(&when.end);
+            let made = heads(task, effect, &mut domains);
+            if free && (!at_end || later.is_empty()) {
+                at_once.extend(made);
+            } else if !made.is_empty() {
+                conditional.push((effect, at_end, made));
+            }
+        }
+        let applied = Pattern {
+            predicate: if conditional.is_empty() { 0 } else { fresh() },
+            terms: own.iter().map(|&slot| Term::Slot(slot)).collect(),
+        };
+        let ways = alternatives(&Formula::And(start));
+        self.repeats.push(ways.len() > 1 || ways.iter().any(|w| !w.slots.is_empty()));
+        for way in ways {
+            let slots = [&own[..], &way.slots[..]].concat();
+            let mut made = rule(&domains, slots, &way.leaves, &self.fluent);
+            made.instance = Some((index as u32, own.len()));
+            made.heads
+                .extend(at_once.iter().map(|h| Head { forall: h.forall.clone(), atom: h.atom.clone() }));
+            if !conditional.is_empty() {
+                made.heads.push(Head { forall: Vec::new(), atom: applied.clone() });
+            }
+            self.rules.push(made);
+        }
+        if !conditional.is_empty() {
+            self.fluent.push(true);
+        }
+        for (effect, at_end, made) in conditional {
+            self.conditional(&own, &applied, &later, &domains, effect, at_end, made);
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn conditional(
+        &mut self,
+        own: &[u32],
+        applied: &Pattern,
+        later: &[Formula],
+        domains: &[Arc<[ObjectId]>],
+        effect: &Effect_,
+        at_end: bool,
+        heads: Vec<Head>,
+    ) {
+        let when = &effect.when;
+        let mut condition = vec![when.start.clone(), when.over_all.clone(), when.end.clone()];
+        if at_end {
+            condition.extend_from_slice(later);
+        }
+        for way in alternatives(&Formula::And(condition)) {
+            let slots = [own, &effect.forall[..], &way.slots[..]].concat();
+            let mut leaves = vec![Formula::Literal(applied.clone(), true)];
+            leaves.extend(way.leaves);
+            let mut made = rule(domains, slots, &leaves, &self.fluent);
+            for head in &heads {
+                let forall = head.forall.iter().copied().filter(|s| !effect.forall.contains(s)).collect();
+                made.heads.push(Head { forall, atom: head.atom.clone() });
+            }
+            self.rules.push(made);
+        }
+    }
+
+    /// What must hold for the action to start, and what may still be brought about while it runs. A condition over
+    /// all must hold at the start already unless the start itself brings it about.
+    fn split(&self, action: &Action_) -> (Vec<Formula>, Vec<Formula>) {
+        let mut start = vec![action.condition.start.clone()];
+        let mut later = Vec::new();
+        let adds = |predicate: u32| {
+            action.start_effects.iter().any(|e| match &e.change {
+                Change_::Add(p) => p.predicate == predicate,
+                Change_::Call(_) => true,
+                _ => false,
+            })
+        };
+        for leaf in leaves(&action.condition.over_all) {
+            let changing = mentions(leaf, &|p| self.derived[p as usize] || adds(p));
+            if changing { later.push(leaf.clone()) } else { start.push(leaf.clone()) }
+        }
+        for leaf in leaves(&action.condition.end) {
+            let changing = mentions(leaf, &|p| self.fluent[p as usize]);
+            if changing { later.push(leaf.clone()) } else { start.push(leaf.clone()) }
+        }
+        (start, later)
+    }
+}
+
+fn leaves(formula: &Formula) -> Vec<&Formula> {
+    match formula {
+        Formula::And(parts) => parts.iter().flat_map(leaves).collect(),
+        leaf => vec![leaf],
+    }
+}
+
+fn mentions(formula: &Formula, test: &dyn Fn(u32) -> bool) -> bool {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(|p| mentions(p, test)),
+        Formula::Literal(pattern, _) => test(pattern.predicate),
+        Formula::Forall(_, body) | Formula::Exists(_, body) => mentions(body, test),
+        Formula::Same(..) | Formula::Compare(..) | Formula::Call(..) => false,
+    }
+}

@@ -1,0 +1,264 @@
+//! Atoms grouped into finite-domain variables, and conditions and effects translated to them.
+
+use super::instantiate::{Clauses, Deed, GroundEffect};
+use super::task::{Conjunction, Effect, Fact, Outcome, Variable, When};
+
+/// An atom that no variable carries.
+const NOWHERE: Fact = Fact { variable: u32::MAX, value: 0 };
+
+/// Where each atom went.
+pub(super) struct Encoding {
+    /// By atom: the fact that says it holds; `NOWHERE` for atoms that never change or do not matter.
+    facts: Vec<Fact>,
+    /// By atom: the fact that says it does not hold, where one fact says so.
+    absent: Vec<Option<Fact>>,
+    /// By atom: a two-valued variable of its own besides the one that it shares.
+    doubles: Vec<Option<u32>>,
+    /// By variable: the value for "none of those".
+    none: Vec<Option<u32>>,
+    /// By atom: holds in every reachable state.
+    always: Vec<bool>,
+    /// By variable: its atoms, by value.
+    pub atoms: Vec<Vec<u32>>,
+}
+
+/// What decides about the grouping.
+pub(super) struct Choice<'a> {
+    /// Atoms that get a variable.
+    pub carried: &'a [bool],
+    /// Atoms that hold in every reachable state.
+    pub always: Vec<bool>,
+    /// Groups of which at most one atom holds.
+    pub groups: &'a [Vec<u32>],
+    /// Groups that must share a variable (object functions).
+    pub fixed: &'a [Vec<u32>],
+    /// Atoms whose absence is asked for.
+    pub unwanted: &'a [bool],
+    /// Derived atoms: alone, last.
+    pub derived: &'a [Option<u32>],
+}
+
+/// Chooses the variables: fixed groups, then the group that covers most uncovered atoms again and again.
+pub(super) fn encode(choice: Choice<'_>) -> Encoding {
+    let count = choice.carried.len();
+    let mut covered: Vec<bool> = choice.carried.iter().map(|c| !c).collect();
+    for (atom, stratum) in choice.derived.iter().enumerate() {
+        covered[atom] |= stratum.is_some();
+    }
+    let mut chosen: Vec<Vec<u32>> = Vec::new();
+    let mut take = |group: &[u32], covered: &mut [bool]| {
+        let atoms: Vec<u32> = group.iter().copied().filter(|&a| !covered[a as usize]).collect();
+        atoms.iter().for_each(|&a| covered[a as usize] = true);
+        if !atoms.is_empty() {
+            chosen.push(atoms);
+        }
+    };
+    choice.fixed.iter().for_each(|group| take(group, &mut covered));
+    let left = |group: &[u32], covered: &[bool]| group.iter().filter(|&&a| !covered[a as usize]).count();
+    let mut heap: std::collections::BinaryHeap<(usize, std::cmp::Reverse<usize>)> = choice
+        .groups
+        .iter()
+        .enumerate()
+        .map(|(i, group)| (left(group, &covered), std::cmp::Reverse(i)))
+        .collect();
+    while let Some((size, std::cmp::Reverse(i))) = heap.pop() {
+        let now = left(&choice.groups[i], &covered);
+        if now < 2 {
+            continue;
+        }
+        if now < size {
+            heap.push((now, std::cmp::Reverse(i)));
+            continue;
+        }
+        take(&choice.groups[i], &mut covered);
+    }
+    for atom in 0..count as u32 {
+        take(&[atom], &mut covered);
+    }
+    let mut order: Vec<u32> = (0..count as u32)
+        .filter(|&a| choice.carried[a as usize] && choice.derived[a as usize].is_some())
+        .collect();
+    order.sort_by_key(|&a| (choice.derived[a as usize], a));
+    let plain = chosen.len();
+    chosen.extend(order.into_iter().map(|a| vec![a]));
+    place(choice, chosen, plain)
+}
+
+fn place(choice: Choice<'_>, mut chosen: Vec<Vec<u32>>, plain: usize) -> Encoding {
+    let count = choice.carried.len();
+    let wants_double = |group: &[u32], a: u32| group.len() > 1 && choice.unwanted[a as usize];
+    let doubled: Vec<u32> =
+        chosen[..plain].iter().flat_map(|g| g.iter().copied().filter(move |&a| wants_double(g, a))).collect();
+    let mut encoding = Encoding {
+        facts: vec![NOWHERE; count],
+        absent: vec![None; count],
+        doubles: vec![None; count],
+        none: Vec::new(),
+        always: choice.always,
+        atoms: Vec::new(),
+    };
+    let derived: Vec<Vec<u32>> = chosen.split_off(plain);
+    for group in chosen {
+        encoding.add(group);
+    }
+    for &atom in &doubled {
+        let variable = encoding.atoms.len() as u32;
+        encoding.atoms.push(vec![atom]);
+        encoding.none.push(Some(1));
+        encoding.doubles[atom as usize] = Some(variable);
+        encoding.absent[atom as usize] = Some(Fact { variable, value: 1 });
+    }
+    for group in derived {
+        encoding.add(group);
+    }
+    encoding
+}
+
+impl Encoding {
+    fn add(&mut self, group: Vec<u32>) {
+        let variable = self.atoms.len() as u32;
+        let none = group.len() as u32;
+        for (value, &atom) in group.iter().enumerate() {
+            self.facts[atom as usize] = Fact { variable, value: value as u32 };
+        }
+        if let [atom] = group[..] {
+            self.absent[atom as usize] = Some(Fact { variable, value: 1 });
+        }
+        self.none.push(Some(none));
+        self.atoms.push(group);
+    }
+
+    /// The fact that says that the atom holds.
+    pub(super) fn fact(&self, atom: u32) -> Option<Fact> {
+        let fact = self.facts[atom as usize];
+        (fact != NOWHERE).then_some(fact)
+    }
+
+    /// The condition over variables; `None` if it can never hold. Expects conditions without disjunctions.
+    pub(super) fn conjunction(&self, clauses: &Clauses) -> Option<Conjunction> {
+        let mut facts = Vec::with_capacity(clauses.literals.len());
+        for &literal in &clauses.literals {
+            let atom = literal >> 1;
+            if literal & 1 == 0 {
+                if !self.always[atom as usize] {
+                    facts.push(self.fact(atom)?);
+                }
+            } else if self.always[atom as usize] {
+                return None;
+            } else if self.facts[atom as usize] != NOWHERE {
+                facts.push(self.absent[atom as usize]?);
+            }
+        }
+        facts.sort_unstable();
+        facts.dedup();
+        if facts.windows(2).any(|pair| pair[0].variable == pair[1].variable) {
+            return None;
+        }
+        Some(Conjunction { facts, comparisons: clauses.comparisons.clone(), calls: clauses.calls.clone() })
+    }
+
+    /// The effects over variables, given what holds before them. What takes away comes first.
+    pub(super) fn effects(&self, effects: &[GroundEffect], before: &[&Conjunction]) -> Vec<Effect> {
+        let (mut away, mut rest) = (Vec::new(), Vec::new());
+        for effect in effects {
+            match &effect.deed {
+                Deed::Delete(atom) => self.delete(*atom, effect, effects, before, &mut away),
+                Deed::Add(atom) => {
+                    let double = self.doubles[*atom as usize].map(|variable| Fact { variable, value: 0 });
+                    for fact in self.fact(*atom).into_iter().chain(double) {
+                        self.push(effect, None, Outcome::Set(fact), &mut rest);
+                    }
+                }
+                Deed::Change(fluent, change, amount) => {
+                    let amount = (**amount).clone();
+                    let outcome = Outcome::Change { fluent: *fluent, change: *change, amount };
+                    self.push(effect, None, outcome, &mut rest);
+                }
+                Deed::Call(call) => self.push(effect, None, Outcome::Call(*call), &mut rest),
+            }
+        }
+        away.append(&mut rest);
+        away
+    }
+
+    fn delete(
+        &self,
+        atom: u32,
+        effect: &GroundEffect,
+        all: &[GroundEffect],
+        before: &[&Conjunction],
+        out: &mut Vec<Effect>,
+    ) {
+        let added_again = all.iter().any(|other| {
+            matches!(other.deed, Deed::Add(a) if a == atom)
+                && (other.when.is_none() || other.when == effect.when)
+        });
+        if added_again {
+            return;
+        }
+        if let Some(variable) = self.doubles[atom as usize] {
+            self.push(effect, None, Outcome::Set(Fact { variable, value: 1 }), out);
+        }
+        let Some(fact) = self.fact(atom) else { return };
+        let Some(none) = self.none[fact.variable as usize] else { return };
+        let replaced = all.iter().any(|other| {
+            matches!(other.deed, Deed::Add(a) if self.facts[a as usize].variable == fact.variable)
+                && (other.when.is_none() || other.when == effect.when)
+        });
+        if replaced {
+            return;
+        }
+        let known = before.iter().any(|c| c.facts.binary_search(&fact).is_ok());
+        let alone = self.atoms[fact.variable as usize].len() == 1;
+        let extra = if known || alone { None } else { Some(fact) };
+        self.push(effect, extra, Outcome::Set(Fact { variable: fact.variable, value: none }), out);
+    }
+
+    fn push(&self, effect: &GroundEffect, extra: Option<Fact>, outcome: Outcome, out: &mut Vec<Effect>) {
+        let mut when = When::default();
+        if let Some(parts) = &effect.when {
+            let [here, at_start, over_all] = &**parts;
+            let all = (self.conjunction(here), self.conjunction(at_start), self.conjunction(over_all));
+            let (Some(here), Some(at_start), Some(over_all)) = all else { return };
+            when = When { here, at_start, over_all };
+        }
+        if let Some(fact) = extra {
+            if when.here.facts.iter().any(|f| f.variable == fact.variable && *f != fact) {
+                return;
+            }
+            if let Err(place) = when.here.facts.binary_search(&fact) {
+                when.here.facts.insert(place, fact);
+            }
+        }
+        let always = when.here.is_empty() && when.at_start.is_empty() && when.over_all.is_empty();
+        out.push(Effect { when: if always { None } else { Some(Box::new(when)) }, outcome });
+    }
+
+    /// The initial value of a variable.
+    pub(super) fn initial(&self, variable: usize, init: &[bool]) -> u32 {
+        let atoms = &self.atoms[variable];
+        atoms.iter().position(|&a| init[a as usize]).unwrap_or(atoms.len()) as u32
+    }
+}
+
+/// By variable: whether "none of those" is needed at first, or the variable has one atom only.
+pub(super) fn used_none(variables: &[Variable], initial: &[u32]) -> Vec<bool> {
+    variables.iter().zip(initial).map(|(v, &i)| v.values.len() <= 2 || i + 1 == v.domain_size()).collect()
+}
+
+/// Notes that an effect brings "none of those" about.
+pub(super) fn mark_none(variables: &[Variable], effect: &Effect, used: &mut [bool]) {
+    if let Outcome::Set(fact) = effect.outcome {
+        let variable = fact.variable as usize;
+        used[variable] |= fact.value + 1 == variables[variable].domain_size();
+    }
+}
+
+/// Removes the value "none of those" where nothing brings it about.
+pub(super) fn drop_none(variables: &mut [Variable], used: &[bool]) {
+    for (variable, used) in variables.iter_mut().zip(used) {
+        if !used {
+            variable.values.pop();
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! Mutex groups: sets of atoms of which at most one holds in every reachable state.
+//!
+//! Candidates are those of Helmert (2009), "Concise finite-domain representations for PDDL planning tasks", section 5:
+//! a set of predicates, each with a key (the arguments that name an instance) and the rest counted. They are tested
+//! against the ground actions instead of the lifted ones, which is exact about equal objects. A durative action is two
+//! transitions joined by a token that says it runs, so that what its start takes away and its end gives back stays counted.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// A transition of the task, in atoms.
+#[derive(Debug, Default)]
+pub(crate) struct Transition {
+    /// Atoms that hold before it, sorted.
+    pub before: Vec<u32>,
+    /// Atoms that it adds, with further atoms that then held before it (of conditional effects).
+    pub adds: Vec<(u32, Vec<u32>)>,
+    /// Atoms that it takes away, with all that this depends on; what it depends on otherwise must be left out.
+    pub deletes: Vec<(u32, Vec<u32>)>,
+}
+
+/// The atoms whose groups are asked for.
+pub(crate) trait AtomNames {
+    /// Predicate of an atom.
+    fn predicate(&self, atom: u32) -> u32;
+    /// Objects of an atom.
+    fn arguments(&self, atom: u32) -> &[u32];
+}
+
+/// One predicate of a candidate, with the argument positions that make the key, in the order of the key.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+struct Part {
+    predicate: u32,
+    key: Vec<u8>,
+}
+
+/// How much is tried before giving up the search for further groups.
+const MOST_CANDIDATES: usize = 400;
+/// Transitions looked at in all.
+const MOST_WORK: usize = 30_000_000;
+
+struct Synthesis<'a, N: AtomNames> {
+    names: &'a N,
+    transitions: &'a [Transition],
+    /// By predicate: transitions that add an atom of it.
+    adders: FxHashMap<u32, Vec<u32>>,
+    /// Predicates at and beyond this one are tokens, of which any number of arguments may be counted.
+    first_token: u32,
+    work: usize,
+}
+
+/// Why a candidate fails: a transition that adds to a key without taking away.
+struct Unbalanced {
+    transition: u32,
+    add: usize,
+    key: Vec<u32>,
+}
+
+/// Finds mutex groups among `atoms`. `predicates` are the ones to start from, with their arities; `initial` are the
+/// atoms that hold at first. Deterministic: the order of everything is the order of the input.
+pub(crate) fn mutex_groups<N: AtomNames>(
+    names: &N,
+    atoms: &[u32],
+    initial: &[u32],
+    transitions: &[Transition],
+    predicates: &[(u32, usize)],
+    first_token: u32,
+) -> Vec<Vec<u32>> {
+    let mut adders: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
+    for (index, transition) in transitions.iter().enumerate() {
+        for (atom, _) in &transition.adds {
+            let list = adders.entry(names.predicate(*atom)).or_default();
+            if list.last() != Some(&(index as u32)) {
+                list.push(index as u32);
+            }
+        }
+    }
+    let mut synthesis = Synthesis { names, transitions, adders, first_token, work: 0 };
+    let invariants = synthesis.run(predicates);
+    let mut groups: FxHashSet<Vec<u32>> = FxHashSet::default();
+    let mut ordered = Vec::new();
+    for invariant in &invariants {
+        for group in instances(names, atoms, initial, invariant) {
+            if group.len() > 1 && groups.insert(group.clone()) {
+                ordered.push(group);
+            }
+        }
+    }
+    ordered
+}
+
+impl<N: AtomNames> Synthesis<'_, N> {
+    fn run(&mut self, predicates: &[(u32, usize)]) -> Vec<Vec<Part>> {
+        let mut queue: Vec<Vec<Part>> = Vec::new();
+        let mut seen = FxHashSet::default();
+        for &(predicate, arity) in predicates {
+            let all: Vec<u8> = (0..arity as u8).collect();
+            queue.push(vec![Part { predicate, key: all.clone() }]);
+            for counted in 0..arity as u8 {
+                let key = all.iter().copied().filter(|&p| p != counted).collect();
+                queue.push(vec![Part { predicate, key }]);
+            }
+        }
+        seen.extend(queue.iter().cloned());
+        let mut valid = Vec::new();
+        let mut next = 0;
+        while next < queue.len() && next < MOST_CANDIDATES && self.work < MOST_WORK {
+            let candidate = queue[next].clone();
+            next += 1;
+            match self.test(&candidate) {
+                None => valid.push(candidate),
+                Some(Some(unbalanced)) => {
+                    for refined in self.refine(&candidate, &unbalanced) {
+                        if seen.insert(refined.clone()) {
+                            queue.push(refined);
+                        }
+                    }
+                }
+                Some(None) => {}
+            }
+        }
+        valid
+    }
+
+    /// `None` if the candidate is an invariant; otherwise the reason, if refinement may help.
+    fn test(&mut self, candidate: &[Part]) -> Option<Option<Unbalanced>> {
+        for part in candidate {
+            let list = self.adders.get(&part.predicate).map_or(&[][..], |l| l);
+            for &index in list {
+                self.work += 1;
+                let transition = &self.transitions[index as usize];
+                if let Some(reason) = self.test_one(candidate, index, transition) {
+                    return Some(reason);
+                }
+            }
+        }
+        None
+    }
+
+    fn test_one(
+        &self,
+        candidate: &[Part],
+        index: u32,
+        transition: &Transition,
+    ) -> Option<Option<Unbalanced>> {
+        for (i, (atom, extra)) in transition.adds.iter().enumerate() {
+            let held = |a: &u32| transition.before.binary_search(a).is_ok() || extra.contains(a);
+            let Some(part) = self.part(candidate, *atom) else { continue };
+            if held(atom) {
+                continue;
+            }
+            let heavy = transition.adds[..i].iter().any(|(other, _)| {
+                other != atom
+                    && !transition.before.contains(other)
+                    && self.part(candidate, *other).is_some_and(|p| self.same_key(part, *atom, p, *other))
+            });
+            if heavy {
+                return Some(None);
+            }
+            let balanced = transition.deletes.iter().any(|(gone, needs)| {
+                held(gone)
+                    && needs.iter().all(held)
+                    && self.part(candidate, *gone).is_some_and(|p| self.same_key(part, *atom, p, *gone))
+                    && !transition.adds.iter().any(|(added, _)| added == gone)
+            });
+            if !balanced {
+                let arguments = self.names.arguments(*atom);
+                let key = part.key.iter().map(|&p| arguments[p as usize]).collect();
+                return Some(Some(Unbalanced { transition: index, add: i, key }));
+            }
+        }
+        None
+    }
+
+    fn part<'c>(&self, candidate: &'c [Part], atom: u32) -> Option<&'c Part> {
+        let predicate = self.names.predicate(atom);
+        candidate.iter().find(|part| part.predicate == predicate)
+    }
+
+    fn same_key(&self, left: &Part, a: u32, right: &Part, b: u32) -> bool {
+        let (a, b) = (self.names.arguments(a), self.names.arguments(b));
+        left.key.iter().zip(&right.key).all(|(&l, &r)| a[l as usize] == b[r as usize])
+    }
+
+    /// Adds a predicate that the unbalanced transition takes away, its key placed wherever the objects fit.
+    fn refine(&self, candidate: &[Part], unbalanced: &Unbalanced) -> Vec<Vec<Part>> {
+        let transition = &self.transitions[unbalanced.transition as usize];
+        let extra = &transition.adds[unbalanced.add].1;
+        let held = |a: &u32| transition.before.binary_search(a).is_ok() || extra.contains(a);
+        let mut refined = Vec::new();
+        for (gone, needs) in &transition.deletes {
+            let predicate = self.names.predicate(*gone);
+            let known = candidate.iter().any(|part| part.predicate == predicate);
+            if known || !held(gone) || !needs.iter().all(held) {
+                continue;
+            }
+            let arguments = self.names.arguments(*gone);
+            let counted = arguments.len().wrapping_sub(unbalanced.key.len());
+            if arguments.len() < unbalanced.key.len() || (counted > 1 && predicate < self.first_token) {
+                continue;
+            }
+            placements(&unbalanced.key, arguments, &mut Vec::new(), &mut |key| {
+                let mut parts = candidate.to_vec();
+                parts.push(Part { predicate, key: key.to_vec() });
+                parts.sort();
+                refined.push(parts);
+            });
+        }
+        refined
+    }
+}
+
+fn placements(key: &[u32], arguments: &[u32], chosen: &mut Vec<u8>, found: &mut dyn FnMut(&[u8])) {
+    let Some(wanted) = key.get(chosen.len()) else {
+        return found(chosen);
+    };
+    for (position, argument) in arguments.iter().enumerate() {
+        if argument == wanted && !chosen.contains(&(position as u8)) {
+            chosen.push(position as u8);
+            placements(key, arguments, chosen, found);
+            chosen.pop();
+        }
+    }
+}
+
+/// The atoms of each key that exactly one atom has at first.
+fn instances<N: AtomNames>(names: &N, atoms: &[u32], initial: &[u32], invariant: &[Part]) -> Vec<Vec<u32>> {
+    let key_of = |atom: u32| {
+        let predicate = names.predicate(atom);
+        let part = invariant.iter().find(|part| part.predicate == predicate)?;
+        let arguments = names.arguments(atom);
+        Some(part.key.iter().map(|&p| arguments[p as usize]).collect::<Vec<u32>>())
+    };
+    let mut weights: FxHashMap<Vec<u32>, u32> = FxHashMap::default();
+    for &atom in initial {
+        if let Some(key) = key_of(atom) {
+            *weights.entry(key).or_default() += 1;
+        }
+    }
+    let mut places: FxHashMap<Vec<u32>, usize> = FxHashMap::default();
+    let mut groups: Vec<Vec<u32>> = Vec::new();
+    for &atom in atoms {
+        let Some(key) = key_of(atom) else { continue };
+        if weights.get(&key) != Some(&1) {
+            continue;
+        }
+        let place = *places.entry(key).or_insert_with(|| {
+            groups.push(Vec::new());
+            groups.len() - 1
+        });
+        groups[place].push(atom);
+    }
+    groups
+}

@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod cloud;
 pub mod cluster;
+pub mod cylinder;
 mod draw;
 pub mod files;
 pub mod hull;
@@ -13,6 +14,7 @@ pub mod normals;
 pub mod outliers;
 pub mod plane;
 pub mod recognise;
+pub mod register;
 pub mod segment;
 mod spread;
 pub mod surface;

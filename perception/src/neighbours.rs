@@ -200,12 +200,26 @@ impl Neighbours {
         }
     }
 
-    fn root(&self) -> Span {
-        Span { node: 0, from: 0, to: self.nodes.len().div_ceil(2) }
+    /// Indices of the points by slot.
+    pub(crate) fn indices(&self) -> &[u32] {
+        &self.index[..self.len]
+    }
+
+    pub(crate) fn leaves(&self) -> usize {
+        self.nodes.len().div_ceil(2)
     }
 
     #[inline(always)]
-    fn leaf_distances(&self, leaf: usize, q: &[f32; 3]) -> [f32; LEAF] {
+    pub(crate) fn node_distance_sq(&self, node: usize, q: &[f32; 3]) -> f32 {
+        self.nodes[node].distance_sq(q)
+    }
+
+    fn root(&self) -> Span {
+        Span { node: 0, from: 0, to: self.leaves() }
+    }
+
+    #[inline(always)]
+    pub(crate) fn leaf_distances(&self, leaf: usize, q: &[f32; 3]) -> [f32; LEAF] {
         let range = leaf * LEAF..(leaf + 1) * LEAF;
         let (x, y, z) = (&self.x[range.clone()], &self.y[range.clone()], &self.z[range]);
         let mut out = [0.0; LEAF];

@@ -1,0 +1,189 @@
+//! Bringing one cloud onto another: iterative closest point in three kinds, with results that explain themselves.
+
+mod align;
+mod equations;
+mod pairs;
+
+use crate::cloud::CloudError;
+use crate::neighbours::Neighbours;
+use crate::normals;
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
+
+pub use align::align;
+pub use pairs::{Pair, pairs};
+
+/// A cloud made ready for registration: its finite points, their tree and, if asked for, their normals.
+pub struct Prepared {
+    pub(crate) points: Vec<Point3<f32>>,
+    pub(crate) normals: Option<Vec<Vector3<f32>>>,
+    pub(crate) tree: Neighbours,
+}
+
+impl Prepared {
+    /// Makes points ready for [`Method::PointToPoint`]. Points without a return are left out.
+    ///
+    /// # Errors
+    /// If there are more points than 32-bit indices can name.
+    pub fn new(points: &[Point3<f32>]) -> Result<Prepared, CloudError> {
+        let points: Vec<Point3<f32>> = points.iter().copied().filter(crate::cloud::is_finite).collect();
+        let tree = Neighbours::new(&points)?;
+        Ok(Prepared { points, normals: None, tree })
+    }
+
+    /// Makes points ready for every method, with normals by the `k` nearest points.
+    ///
+    /// # Errors
+    /// As [`Prepared::new`].
+    pub fn with_normals(points: &[Point3<f32>], k: usize) -> Result<Prepared, CloudError> {
+        let mut prepared = Prepared::new(points)?;
+        prepared.normals = Some(normals::estimate(&prepared.tree, k, &Point3::origin()).normals);
+        Ok(prepared)
+    }
+
+    /// The finite points, metres.
+    pub fn points(&self) -> &[Point3<f32>] {
+        &self.points
+    }
+
+    /// Their normals, if they were asked for; NaN where there is no surface.
+    pub fn normals(&self) -> Option<&[Vector3<f32>]> {
+        self.normals.as_deref()
+    }
+
+    /// Their tree.
+    pub fn tree(&self) -> &Neighbours {
+        &self.tree
+    }
+}
+
+/// What is made small.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Distances between partners (Besl and McKay 1992).
+    PointToPoint,
+    /// Distances of the source's points from the target's tangent planes (Chen and Medioni 1992).
+    PointToPlane,
+    /// Distances weighted by the shape of the surface at both ends (Segal, Haehnel, Thrun 2009).
+    Generalised,
+}
+
+/// How to register.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RegisterOptions {
+    /// What is made small.
+    pub method: Method,
+    /// Where to start.
+    pub start_target_from_source: Isometry3<f64>,
+    /// Partners are no farther apart, metres.
+    pub within_m: f32,
+    /// Most rounds of pairing and moving.
+    pub rounds: usize,
+    /// Settled if a round shifts the middle of the matched points by less, metres …
+    pub settle_m: f64,
+    /// … and turns by less, radians.
+    pub settle_rad: f64,
+    /// If given, residuals beyond this length (metres) lose weight as `1 / (1 + (r/s)²)` (Cauchy), so that what has no true partner pulls little.
+    pub robust_m: Option<f64>,
+    /// Fewest partners to go on with.
+    pub least: usize,
+}
+
+impl Default for RegisterOptions {
+    fn default() -> Self {
+        RegisterOptions {
+            method: Method::Generalised,
+            start_target_from_source: Isometry3::identity(),
+            within_m: 0.05,
+            rounds: 50,
+            settle_m: 1e-5,
+            settle_rad: 1e-5,
+            robust_m: None,
+            least: 10,
+        }
+    }
+}
+
+/// Why registration ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// The last round moved less than asked.
+    Settled,
+    /// All rounds were used and it still moved.
+    OutOfRounds,
+    /// Fewer partners than asked: the clouds do not overlap where they were put.
+    TooFewPartners,
+}
+
+impl std::fmt::Display for Ending {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Ending::Settled => "settled",
+            Ending::OutOfRounds => "out of rounds while still moving",
+            Ending::TooFewPartners => "too few partners: the clouds do not overlap there",
+        })
+    }
+}
+
+/// Where the source belongs, and how far to trust it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// The pose found.
+    pub target_from_source: Isometry3<f64>,
+    /// Points of the source with a partner at that pose.
+    pub matched: usize,
+    /// Points of the source.
+    pub of: usize,
+    /// Root mean square of what the method makes small, over the matched, metres: between partners, or from the tangent planes.
+    pub residual_m: f64,
+    /// Rounds used.
+    pub rounds: usize,
+    /// Why it ended.
+    pub ending: Ending,
+    /// How far the middle of the matched points moved from where it started, metres.
+    pub moved_m: f64,
+    /// How far the source turned from where it started, radians.
+    pub moved_rad: f64,
+    /// Directions of motion (of six) that the partners leave free: 3 for two planes, 1 for two cylinders without ends … Nothing was moved along them.
+    pub free: usize,
+    /// Normal matrix of the last round about `centre`, by small rotation then shift in the target's frame: what each direction of motion is worth, for weighting this fit among others.
+    pub information: Matrix6<f64>,
+    /// The point of the target's frame that the matrix refers to.
+    pub centre: Point3<f64>,
+}
+
+impl Fit {
+    /// True if it settled and every direction of motion was held.
+    pub fn converged(&self) -> bool {
+        self.ending == Ending::Settled && self.free == 0
+    }
+}
+
+/// Clouds that cannot be registered.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum RegisterError {
+    /// A cloud without a finite point.
+    #[error("the {which} cloud has no finite point")]
+    Empty {
+        /// `source` or `target`.
+        which: &'static str,
+    },
+    /// The method needs normals.
+    #[error("{method:?} needs normals of the {which} cloud: prepare it with `with_normals`")]
+    NoNormals {
+        /// `source` or `target`.
+        which: &'static str,
+        /// The method.
+        method: Method,
+    },
+    /// An option that is no positive length.
+    #[error("{name} is {value_m} m: give a positive length")]
+    Length {
+        /// Which option.
+        name: &'static str,
+        /// What was given.
+        value_m: f64,
+    },
+    /// The start is not finite.
+    #[error("the start pose is not finite: mend the transform it came from")]
+    Start,
+}

@@ -1,0 +1,235 @@
+//! The rounds: pair, sum, move, until it settles.
+
+use super::equations::{Motion, Sums};
+use super::pairs::{Partner, Place};
+use super::{Ending, Fit, Method, Prepared, RegisterError, RegisterOptions};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
+use rayon::prelude::*;
+
+/// Points whose sums are added up together: fixed, so that the sums do not depend on the number of threads.
+const CHUNK: usize = 1024;
+
+/// Spread of a surface along its normal against along itself in [`Method::Generalised`] (Segal et al. 2009, section III.B).
+const FLAT: f64 = 1e-3;
+
+/// Moves the source until its points lie on the target.
+///
+/// # Errors
+/// If a cloud is empty, lacks the normals that the method needs, or an option makes no sense. Clouds that do not overlap are no error: see [`Fit::ending`].
+pub fn align(source: &Prepared, target: &Prepared, options: &RegisterOptions) -> Result<Fit, RegisterError> {
+    let _span = tracing::debug_span!("register", points = source.points.len()).entered();
+    check(source, target, options)?;
+    let start = options.start_target_from_source;
+    let mut run = Run::new(source, target, options);
+    let mut pose = start;
+    let mut rounds = 0;
+    let mut centre = middle(&source.points, &pose);
+    let mut last: Option<Motion> = None;
+    let ending = loop {
+        let sums = run.sums(&pose, &centre);
+        if sums.matched < options.least.max(1) {
+            break Ending::TooFewPartners;
+        }
+        let settled =
+            last.as_ref().is_some_and(|m| m.shift_m < options.settle_m && m.turn_rad < options.settle_rad);
+        if settled {
+            break Ending::Settled;
+        }
+        if rounds == options.rounds {
+            break Ending::OutOfRounds;
+        }
+        let motion = match options.method {
+            Method::PointToPoint => sums.closed_form(&centre),
+            _ => sums.motion(&centre),
+        };
+        pose = motion.step * pose;
+        pose.rotation.renormalize_fast();
+        centre = motion.step * centre;
+        rounds += 1;
+        last = Some(motion);
+    };
+    let (matched, residual_m) = run.quality();
+    let from_start = pose * start.inverse();
+    let before = middle(&source.points, &start);
+    Ok(Fit {
+        target_from_source: pose,
+        matched,
+        of: source.points.len(),
+        residual_m,
+        rounds,
+        ending,
+        moved_m: (from_start * before - before).norm(),
+        moved_rad: from_start.rotation.angle(),
+        free: last.as_ref().map_or(6, |m| m.free),
+        information: last.as_ref().map_or(Matrix6::zeros(), |m| m.information),
+        centre,
+    })
+}
+
+fn check(source: &Prepared, target: &Prepared, options: &RegisterOptions) -> Result<(), RegisterError> {
+    for (which, cloud) in [("source", source), ("target", target)] {
+        if cloud.points.is_empty() {
+            return Err(RegisterError::Empty { which });
+        }
+    }
+    let method = options.method;
+    if method != Method::PointToPoint && target.normals.is_none() {
+        return Err(RegisterError::NoNormals { which: "target", method });
+    }
+    if method == Method::Generalised && source.normals.is_none() {
+        return Err(RegisterError::NoNormals { which: "source", method });
+    }
+    let lengths = [("within_m", f64::from(options.within_m)), ("robust_m", options.robust_m.unwrap_or(1.0))];
+    for (name, value_m) in lengths {
+        if !(value_m > 0.0 && value_m.is_finite()) {
+            return Err(RegisterError::Length { name, value_m });
+        }
+    }
+    let pose = options.start_target_from_source;
+    let finite = pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|v| v.is_finite());
+    if finite { Ok(()) } else { Err(RegisterError::Start) }
+}
+
+/// The mean of the source's points under a pose.
+fn middle(points: &[Point3<f32>], pose: &Isometry3<f64>) -> Point3<f64> {
+    let sum = points.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords.cast::<f64>());
+    pose * Point3::from(sum / points.len().max(1) as f64)
+}
+
+struct Run<'a> {
+    target: &'a Prepared,
+    options: &'a RegisterOptions,
+    /// The source in the order of its tree, so that neighbours are searched for one after another.
+    points: Vec<Point3<f32>>,
+    source_normals: Vec<[f64; 3]>,
+    /// Target normals by slot.
+    target_normals: Vec<[f64; 3]>,
+    partners: Vec<Partner>,
+    matched: usize,
+    square: f64,
+}
+
+impl<'a> Run<'a> {
+    fn new(source: &Prepared, target: &'a Prepared, options: &'a RegisterOptions) -> Run<'a> {
+        let by_slot = |cloud: &Prepared| -> Vec<[f64; 3]> {
+            let Some(normals) = &cloud.normals else { return Vec::new() };
+            cloud.tree.indices().iter().map(|&i| normals[i as usize].cast::<f64>().into()).collect()
+        };
+        let generalised = options.method == Method::Generalised;
+        let to_point = options.method == Method::PointToPoint;
+        let points: Vec<Point3<f32>> =
+            source.tree.indices().iter().map(|&i| source.points[i as usize]).collect();
+        Run {
+            target,
+            options,
+            partners: vec![Partner::UNKNOWN; points.len()],
+            points,
+            source_normals: if generalised { by_slot(source) } else { Vec::new() },
+            target_normals: if to_point { Vec::new() } else { by_slot(target) },
+            matched: 0,
+            square: 0.0,
+        }
+    }
+
+    /// Pairs at a pose, and sums up.
+    fn sums(&mut self, pose: &Isometry3<f64>, centre: &Point3<f64>) -> Sums {
+        let place = Place::of(pose);
+        let centre = [centre.x, centre.y, centre.z];
+        let mut partners = std::mem::take(&mut self.partners);
+        let parts: Vec<Sums> = partners
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .map(|(chunk, partners)| self.part(chunk * CHUNK, partners, &place, centre))
+            .collect();
+        self.partners = partners;
+        let sums = parts.iter().fold(Sums::ZERO, Sums::join);
+        (self.matched, self.square) = (sums.matched, sums.square);
+        sums
+    }
+
+    fn quality(&self) -> (usize, f64) {
+        (self.matched, (self.square / self.matched.max(1) as f64).sqrt())
+    }
+
+    fn part(&self, from: usize, partners: &mut [Partner], place: &Place, centre: [f64; 3]) -> Sums {
+        let tree = &self.target.tree;
+        let mut sums = Sums::ZERO;
+        for (offset, partner) in partners.iter_mut().enumerate() {
+            let i = from + offset;
+            let at = place.apply(&self.points[i]);
+            let Some(slot) = partner.update(tree, at, self.options.within_m) else { continue };
+            let target = tree.at(slot);
+            let about = |p: [f32; 3]| [0, 1, 2].map(|k| f64::from(p[k]) - centre[k]);
+            let (p, t) = (about(at), about(target));
+            match self.options.method {
+                Method::PointToPoint => {
+                    sums.add_points(p, t, self.weight(f64::from(partner.distance_sq)));
+                }
+                Method::PointToPlane => self.to_plane(&mut sums, p, t, self.target_normals[slot]),
+                Method::Generalised => {
+                    let turned = place.turn(self.source_normals[i]);
+                    self.generalised(&mut sums, p, t, turned, self.target_normals[slot]);
+                }
+            }
+        }
+        sums
+    }
+
+    fn weight(&self, square: f64) -> f64 {
+        self.options.robust_m.map_or(1.0, |scale| 1.0 / (1.0 + square / (scale * scale)))
+    }
+
+    #[inline(always)]
+    fn to_plane(&self, sums: &mut Sums, p: [f64; 3], t: [f64; 3], n: [f64; 3]) {
+        if n[0].is_nan() {
+            return;
+        }
+        let r = n[0] * (t[0] - p[0]) + n[1] * (t[1] - p[1]) + n[2] * (t[2] - p[2]);
+        let j = [
+            p[1] * n[2] - p[2] * n[1],
+            p[2] * n[0] - p[0] * n[2],
+            p[0] * n[1] - p[1] * n[0],
+            n[0],
+            n[1],
+            n[2],
+        ];
+        sums.add_scalar(j, r, self.weight(r * r));
+    }
+
+    /// The covariance of a surface with normal n is I − (1 − ε) n nᵀ; where there is no surface it is I.
+    #[inline(always)]
+    fn generalised(&self, sums: &mut Sums, p: [f64; 3], t: [f64; 3], ns: [f64; 3], nt: [f64; 3]) {
+        let clean = |n: [f64; 3]| if n[0].is_nan() { [0.0; 3] } else { n };
+        let (a, b) = (clean(ns), clean(nt));
+        let flat = 1.0 - FLAT;
+        let term = |i: usize, j: usize| -flat * (a[i] * a[j] + b[i] * b[j]);
+        let c = [2.0 + term(0, 0), term(0, 1), term(0, 2), 2.0 + term(1, 1), term(1, 2), 2.0 + term(2, 2)];
+        let m = inverse(c);
+        let d = [t[0] - p[0], t[1] - p[1], t[2] - p[2]];
+        let md = [
+            m[0] * d[0] + m[1] * d[1] + m[2] * d[2],
+            m[1] * d[0] + m[3] * d[1] + m[4] * d[2],
+            m[2] * d[0] + m[4] * d[1] + m[5] * d[2],
+        ];
+        // Scaled so that two parallel planes at a distance r count r².
+        let square = 2.0 * FLAT * (md[0] * d[0] + md[1] * d[1] + md[2] * d[2]);
+        sums.count(square);
+        sums.add_weighted(p, d, m, self.weight(square));
+    }
+}
+
+/// Inverse of a symmetric, positive definite matrix (xx xy xz yy yz zz).
+#[inline(always)]
+fn inverse(c: [f64; 6]) -> [f64; 6] {
+    let [xx, xy, xz, yy, yz, zz] = c;
+    let (a, b, d) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - yy * xz);
+    let per = 1.0 / (xx * a + xy * b + xz * d);
+    [
+        a * per,
+        b * per,
+        d * per,
+        (xx * zz - xz * xz) * per,
+        (xy * xz - xx * yz) * per,
+        (xx * yy - xy * xy) * per,
+    ]
+}

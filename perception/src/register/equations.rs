@@ -1,0 +1,237 @@
+//! The sums of one round, and the motion that follows from them.
+
+use nalgebra::{
+    Isometry3, Matrix3, Matrix6, Point3, Rotation3, SymmetricEigen, Translation3, UnitQuaternion, Vector3,
+    Vector6,
+};
+
+/// Sums over pairs. Motions are small rotations, then shifts, about `centre` in the target's frame.
+#[derive(Clone, Copy)]
+pub(super) struct Sums {
+    pub matched: usize,
+    /// Sum of squared residuals, without weights.
+    pub square: f64,
+    /// Upper triangle of the normal matrix, row by row.
+    h: [f64; 21],
+    g: [f64; 6],
+    /// Weights, and weighted sums of source and target points about the centre and of their products: for the closed form.
+    weight: f64,
+    source: [f64; 3],
+    target: [f64; 3],
+    cross: [[f64; 3]; 3],
+}
+
+impl Sums {
+    pub(super) const ZERO: Sums = Sums {
+        matched: 0,
+        square: 0.0,
+        h: [0.0; 21],
+        g: [0.0; 6],
+        weight: 0.0,
+        source: [0.0; 3],
+        target: [0.0; 3],
+        cross: [[0.0; 3]; 3],
+    };
+
+    /// A residual `r` whose derivative by the motion is `j`.
+    #[inline(always)]
+    pub(super) fn add_scalar(&mut self, j: [f64; 6], r: f64, weight: f64) {
+        self.matched += 1;
+        self.square += r * r;
+        let mut at = 0;
+        for row in 0..6 {
+            let wj = weight * j[row];
+            self.g[row] += wj * r;
+            for &column in &j[row..] {
+                self.h[at] += wj * column;
+                at += 1;
+            }
+        }
+    }
+
+    /// Two points about the centre, for the closed form of point to point.
+    #[inline(always)]
+    pub(super) fn add_points(&mut self, p: [f64; 3], t: [f64; 3], weight: f64) {
+        self.matched += 1;
+        self.weight += weight;
+        for k in 0..3 {
+            self.square += (p[k] - t[k]) * (p[k] - t[k]);
+            self.source[k] += weight * p[k];
+            self.target[k] += weight * t[k];
+            for (sum, source) in self.cross[k].iter_mut().zip(p) {
+                *sum += weight * t[k] * source;
+            }
+        }
+        // Normal matrix of the same pair: J = [-[p]x, I].
+        let [x, y, z] = p;
+        let terms = [
+            y * y + z * z,
+            -x * y,
+            -x * z,
+            0.0,
+            -z,
+            y, //
+            x * x + z * z,
+            -y * z,
+            z,
+            0.0,
+            -x, //
+            x * x + y * y,
+            -y,
+            x,
+            0.0, //
+            1.0,
+            0.0,
+            0.0,
+            1.0,
+            0.0,
+            1.0,
+        ];
+        self.h.iter_mut().zip(terms).for_each(|(h, t)| *h += weight * t);
+    }
+
+    /// A difference `d` of two points about the centre, of which the moved one is `p`, weighed by the symmetric matrix `m` (xx xy xz yy yz zz).
+    #[inline(always)]
+    pub(super) fn add_weighted(&mut self, p: [f64; 3], d: [f64; 3], m: [f64; 6], weight: f64) {
+        let [x, y, z] = p;
+        let m = m.map(|v| v * weight);
+        let row = [[m[0], m[1], m[2]], [m[1], m[3], m[4]], [m[2], m[4], m[5]]];
+        // With A = [p]x: H = [A M Aᵀ, A M; ·, M] and g = [A M d; M d].
+        let md = row.map(|r| r[0] * d[0] + r[1] * d[1] + r[2] * d[2]);
+        let left = |v: [f64; 3]| [y * v[2] - z * v[1], z * v[0] - x * v[2], x * v[1] - y * v[0]];
+        let columns = [0, 1, 2].map(|k| left([row[0][k], row[1][k], row[2][k]]));
+        // am[r][k] = (A M)(r, k)
+        let am = [0, 1, 2].map(|r| [columns[0][r], columns[1][r], columns[2][r]]);
+        let ama = am.map(left);
+        let turn = left(md);
+        let terms = [
+            ama[0][0], ama[0][1], ama[0][2], am[0][0], am[0][1], am[0][2], //
+            ama[1][1], ama[1][2], am[1][0], am[1][1], am[1][2], //
+            ama[2][2], am[2][0], am[2][1], am[2][2], //
+            m[0], m[1], m[2], m[3], m[4], m[5],
+        ];
+        self.h.iter_mut().zip(terms).for_each(|(h, t)| *h += t);
+        for k in 0..3 {
+            self.g[k] += turn[k];
+            self.g[k + 3] += md[k];
+        }
+    }
+
+    /// Counts a pair and its squared residual beside [`Sums::add_weighted`].
+    #[inline(always)]
+    pub(super) fn count(&mut self, square: f64) {
+        self.matched += 1;
+        self.square += square;
+    }
+
+    pub(super) fn join(mut self, other: &Sums) -> Sums {
+        self.matched += other.matched;
+        self.square += other.square;
+        self.weight += other.weight;
+        self.h.iter_mut().zip(other.h).for_each(|(a, b)| *a += b);
+        self.g.iter_mut().zip(other.g).for_each(|(a, b)| *a += b);
+        self.source.iter_mut().zip(other.source).for_each(|(a, b)| *a += b);
+        self.target.iter_mut().zip(other.target).for_each(|(a, b)| *a += b);
+        self.cross.iter_mut().flatten().zip(other.cross.iter().flatten()).for_each(|(a, b)| *a += b);
+        self
+    }
+
+    pub(super) fn information(&self) -> Matrix6<f64> {
+        let mut full = Matrix6::zeros();
+        let mut at = 0;
+        for row in 0..6 {
+            for column in row..6 {
+                full[(row, column)] = self.h[at];
+                full[(column, row)] = self.h[at];
+                at += 1;
+            }
+        }
+        full
+    }
+
+    /// The motion of least squares by the normal matrix. Directions that the pairs leave free are not moved along.
+    pub(super) fn motion(&self, centre: &Point3<f64>) -> Motion {
+        let information = self.information();
+        let (inverse, free) = held_inverse(&information);
+        let twist = inverse * Vector6::from(self.g);
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(twist[0], twist[1], twist[2]));
+        Motion::about(centre, rotation, Vector3::new(twist[3], twist[4], twist[5]), free, information)
+    }
+
+    /// The rotation and shift of least squares between partners (Arun, Huang, Blostein 1987; Umeyama 1991 for the sign).
+    pub(super) fn closed_form(&self, centre: &Point3<f64>) -> Motion {
+        let per = 1.0 / self.weight;
+        let source = Vector3::from(self.source) * per;
+        let target = Vector3::from(self.target) * per;
+        let cross = Matrix3::from_fn(|r, c| self.cross[r][c] * per - target[r] * source[c]);
+        let svd = cross.svd(true, true);
+        let information = self.information();
+        let (_, free) = held_inverse(&information);
+        let rotation = match (svd.u, svd.v_t) {
+            (Some(u), Some(v_t)) if free == 0 => {
+                let sign = (u * v_t).determinant().signum();
+                let flip = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign));
+                let (u, v_t) = ordered(u, v_t, &svd.singular_values);
+                UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * flip * v_t))
+            }
+            _ => UnitQuaternion::identity(),
+        };
+        let shift = target - rotation * source;
+        Motion::about(centre, rotation, shift, free, information)
+    }
+}
+
+/// Singular vectors with the least value last, where the sign of a reflection belongs.
+fn ordered(u: Matrix3<f64>, v_t: Matrix3<f64>, values: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
+    let (u, v_t) =
+        (Matrix3::from_columns(&order.map(|k| u.column(k))), Matrix3::from_rows(&order.map(|k| v_t.row(k))));
+    (u, v_t)
+}
+
+/// A direction of motion is free if its information is below this part of the best-held one (rotations measured at the typical distance from the centre).
+const FREE: f64 = 1e-5;
+
+/// The inverse of a normal matrix on the directions that are held, and how many are not.
+pub(super) fn held_inverse(information: &Matrix6<f64>) -> (Matrix6<f64>, usize) {
+    let turn = (0..3).map(|k| information[(k, k)]).sum::<f64>();
+    let shift = (3..6).map(|k| information[(k, k)]).sum::<f64>();
+    if !(shift > 0.0 && turn.is_finite() && shift.is_finite()) {
+        return (Matrix6::zeros(), 6);
+    }
+    // Rotations in units of the typical lever, so that both kinds compare.
+    let lever = (turn / shift).sqrt();
+    let unit = if lever > 0.0 { 1.0 / lever } else { 1.0 };
+    let scale = Matrix6::from_diagonal(&Vector6::new(unit, unit, unit, 1.0, 1.0, 1.0));
+    let eigen = SymmetricEigen::new(scale * information * scale);
+    let largest = eigen.eigenvalues.amax();
+    let free = eigen.eigenvalues.iter().filter(|&&v| v <= FREE * largest).count();
+    let inverted = eigen.eigenvalues.map(|v| if v <= FREE * largest { 0.0 } else { 1.0 / v });
+    let inverse = eigen.eigenvectors * Matrix6::from_diagonal(&inverted) * eigen.eigenvectors.transpose();
+    (scale * inverse * scale, free)
+}
+
+/// One step of the pose.
+pub(super) struct Motion {
+    /// To be applied on the left of the pose so far.
+    pub step: Isometry3<f64>,
+    pub shift_m: f64,
+    pub turn_rad: f64,
+    pub free: usize,
+    pub information: Matrix6<f64>,
+}
+
+impl Motion {
+    fn about(
+        centre: &Point3<f64>,
+        rotation: UnitQuaternion<f64>,
+        shift: Vector3<f64>,
+        free: usize,
+        information: Matrix6<f64>,
+    ) -> Motion {
+        let translation = centre.coords - rotation * centre.coords + shift;
+        let step = Isometry3::from_parts(Translation3::from(translation), rotation);
+        Motion { step, shift_m: shift.norm(), turn_rad: rotation.angle(), free, information }
+    }
+}

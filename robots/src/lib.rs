@@ -3,6 +3,10 @@
 pub mod body;
 pub mod failure;
 pub mod grid;
+pub mod head;
+pub mod input;
+pub mod route;
+pub mod sim;
 
 pub use async_trait::async_trait;
 pub use body::{

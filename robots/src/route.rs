@@ -1,0 +1,458 @@
+//! Where a body can go on its map, and what that costs.
+//!
+//! The map is inflated by the footprint. Shortest any-angle routes bend only at convex corners of what is blocked, so the search runs
+//! on those corners (a visibility graph, Lozano-Pérez and Wesley 1979) and a pair of poses costs a few lines of sight. Duration after
+//! TFD/M's navigation module: Σ max(ds/v, dθ/ω) over the steps of the route, where a base that turns on the spot makes each turn and
+//! each straight line a step of its own.
+
+use crate::body::{Pose2, Speeds, Travel};
+use crate::failure::Failure;
+use crate::grid::OccupancyGrid;
+use nalgebra::Point2;
+use pathfinding::directed::dijkstra::dijkstra_all;
+use std::sync::OnceLock;
+
+/// Farthest that a start inside the inflated zone is moved to free floor, metres: localisation may well say that a base which stands
+/// beside a table stands in it.
+const START_SLACK_M: f64 = 0.35;
+
+/// A way to go.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Route {
+    /// From the start to the goal, both included; straight lines between, turns on the spot at each.
+    pub points_m: Vec<Point2<f64>>,
+    /// What it takes, the turns at both ends included.
+    pub travel: Travel,
+}
+
+/// Answers questions about routes on one map for one footprint. Distances between corners are computed once, when first needed.
+#[derive(Debug)]
+pub struct Router {
+    blocked: OccupancyGrid,
+    map: OccupancyGrid,
+    radius_m: f64,
+    speeds: Speeds,
+    corners: Vec<Point2<f64>>,
+    seen: Vec<OnceLock<Vec<u32>>>,
+    rows: Vec<OnceLock<Vec<Option<Leg>>>>,
+}
+
+/// The shortest route from one corner to another: what the search for a pair of poses needs of it.
+#[derive(Clone, Copy, Debug)]
+struct Leg {
+    distance_m: f64,
+    turned_rad: f64,
+    first_heading_rad: f64,
+    last_heading_rad: f64,
+    previous: u32,
+}
+
+/// How a pose reaches the corners: straight lines to those that it sees.
+struct Access {
+    point: Point2<f64>,
+    corners: Vec<(u32, f64, f64)>,
+}
+
+/// Which corners a route passes.
+#[derive(Clone, Copy)]
+enum Via {
+    Straight,
+    Corners(u32, u32),
+}
+
+impl Router {
+    /// Inflates the map by `radius_m` (footprint and safety margin) and finds the corners of what is left.
+    pub fn new(map: &OccupancyGrid, radius_m: f64, speeds: Speeds) -> Self {
+        let blocked = inflate(map, radius_m);
+        let corners = convex_corners(&blocked);
+        Router {
+            seen: corners.iter().map(|_| OnceLock::new()).collect(),
+            rows: corners.iter().map(|_| OnceLock::new()).collect(),
+            map: map.clone(),
+            blocked,
+            radius_m,
+            speeds,
+            corners,
+        }
+    }
+
+    /// The map with every cell occupied that the centre of the base must not enter.
+    pub fn blocked(&self) -> &OccupancyGrid {
+        &self.blocked
+    }
+
+    /// The map that it was made from.
+    pub fn map(&self) -> &OccupancyGrid {
+        &self.map
+    }
+
+    /// Checks that the base can stand there.
+    ///
+    /// # Errors
+    /// [`Failure::Unreachable`] that names what is in the way.
+    pub fn fits(&self, p: &Point2<f64>) -> Result<(), Failure> {
+        if !(p.x.is_finite() && p.y.is_finite()) {
+            return Err(unreachable(format!("({}, {}) is no place", p.x, p.y)));
+        }
+        if self.blocked.cell(p).is_none() {
+            return Err(unreachable(format!("({:.2}, {:.2}) lies outside the map", p.x, p.y)));
+        }
+        if !self.blocked.is_occupied(p) {
+            return Ok(());
+        }
+        Err(unreachable(match nearest_occupied(&self.map, p) {
+            Some((at, gap_m)) => format!(
+                "({:.2}, {:.2}) is {gap_m:.2} m from what stands at ({:.2}, {:.2}); the base needs {:.2} m",
+                p.x, p.y, at.x, at.y, self.radius_m
+            ),
+            None => format!("({:.2}, {:.2}) is too near to the edge of the map", p.x, p.y),
+        }))
+    }
+
+    /// What going from one pose to another takes.
+    ///
+    /// # Errors
+    /// [`Failure::Unreachable`] with the reason.
+    pub fn travel(&self, from: &Pose2, to: &Pose2) -> Result<Travel, Failure> {
+        self.travel_to_each(from, std::slice::from_ref(to)).swap_remove(0)
+    }
+
+    /// What going from one pose to each of the others takes; the lines of sight of the start are shared.
+    pub fn travel_to_each(&self, from: &Pose2, to: &[Pose2]) -> Vec<Result<Travel, Failure>> {
+        let start = self.start_access(from);
+        to.iter()
+            .map(|goal| {
+                let start = start.as_ref().map_err(Clone::clone)?;
+                let end = self.goal_access(goal)?;
+                self.best(from, start, goal, &end).map(|(travel, _)| travel)
+            })
+            .collect()
+    }
+
+    /// What going from each pose to each other takes: `table[from][to]`.
+    pub fn travel_table(&self, poses: &[Pose2]) -> Vec<Vec<Result<Travel, Failure>>> {
+        let ends: Vec<_> = poses.iter().map(|p| self.goal_access(p)).collect();
+        let row = |from: &Pose2, start: &Result<Access, Failure>| {
+            let cost = |(to, end): (&Pose2, &Result<Access, Failure>)| {
+                let start = start.as_ref().map_err(Clone::clone)?;
+                let end = end.as_ref().map_err(Clone::clone)?;
+                self.best(from, start, to, end).map(|(travel, _)| travel)
+            };
+            poses.iter().zip(&ends).map(cost).collect()
+        };
+        poses.iter().map(|from| row(from, &self.start_access(from))).collect()
+    }
+
+    /// The way itself.
+    ///
+    /// # Errors
+    /// [`Failure::Unreachable`] with the reason.
+    pub fn route(&self, from: &Pose2, to: &Pose2) -> Result<Route, Failure> {
+        let start = self.start_access(from)?;
+        let end = self.goal_access(to)?;
+        let (travel, via) = self.best(from, &start, to, &end)?;
+        let mut points_m = vec![from.point()];
+        if start.point != from.point() {
+            points_m.push(start.point);
+        }
+        if let Via::Corners(first, last) = via {
+            points_m.extend(self.corner_path(first, last).into_iter().map(|c| self.corners[c as usize]));
+        }
+        points_m.push(to.point());
+        points_m.dedup();
+        Ok(Route { points_m, travel })
+    }
+
+    fn start_access(&self, from: &Pose2) -> Result<Access, Failure> {
+        let point = match self.fits(&from.point()) {
+            Ok(()) => from.point(),
+            Err(why) => self.nearest_free(&from.point()).ok_or(why)?,
+        };
+        Ok(self.access(point))
+    }
+
+    fn goal_access(&self, to: &Pose2) -> Result<Access, Failure> {
+        self.fits(&to.point())?;
+        Ok(self.access(to.point()))
+    }
+
+    fn access(&self, point: Point2<f64>) -> Access {
+        let line = |(c, corner): (u32, &Point2<f64>)| {
+            let step = corner - point;
+            self.sees(&point, corner).then(|| (c, step.norm(), step.y.atan2(step.x)))
+        };
+        Access { point, corners: (0u32..).zip(&self.corners).filter_map(line).collect() }
+    }
+
+    /// Centre of the free cell nearest to a point within [`START_SLACK_M`].
+    fn nearest_free(&self, p: &Point2<f64>) -> Option<Point2<f64>> {
+        let reach = (START_SLACK_M / self.blocked.resolution_m).ceil() as i64;
+        let (column, row) = self.blocked.cell(p)?;
+        let mut best: Option<(f64, Point2<f64>)> = None;
+        for dr in -reach..=reach {
+            for dc in -reach..=reach {
+                let (c, r) = (column as i64 + dc, row as i64 + dr);
+                if c < 0 || r < 0 || is_blocked(&self.blocked, c, r) {
+                    continue;
+                }
+                let centre = self.blocked.centre(c as usize, r as usize);
+                let gap_m = (centre - p).norm();
+                if gap_m <= START_SLACK_M && best.is_none_or(|(least, _)| gap_m < least) {
+                    best = Some((gap_m, centre));
+                }
+            }
+        }
+        best.map(|(_, centre)| centre)
+    }
+
+    fn best(&self, from: &Pose2, start: &Access, to: &Pose2, end: &Access) -> Result<(Travel, Via), Failure> {
+        let seconds = |distance_m: f64, turned_rad: f64| {
+            distance_m / self.speeds.linear_m_s + turned_rad / self.speeds.angular_rad_s
+        };
+        let escape = start.point - from.point();
+        let (escape_m, escape_rad, heading_rad) = match escape.norm() {
+            gap if gap > 0.0 => {
+                let heading = escape.y.atan2(escape.x);
+                (gap, turn(from.yaw_rad, heading), heading)
+            }
+            _ => (0.0, 0.0, from.yaw_rad),
+        };
+        let total = |distance_m: f64, turned_rad: f64| Travel {
+            distance_m: escape_m + distance_m,
+            duration_s: seconds(escape_m + distance_m, escape_rad + turned_rad),
+        };
+        if self.sees(&start.point, &end.point) {
+            let step = end.point - start.point;
+            let distance_m = step.norm();
+            let turned = if distance_m > 0.0 {
+                let heading = step.y.atan2(step.x);
+                turn(heading_rad, heading) + turn(heading, to.yaw_rad)
+            } else {
+                turn(heading_rad, to.yaw_rad)
+            };
+            return Ok((total(distance_m, turned), Via::Straight));
+        }
+        let mut best: Option<(Travel, Via)> = None;
+        for &(a, out_m, out_rad) in &start.corners {
+            let row = self.row(a);
+            let leaving = turn(heading_rad, out_rad);
+            for &(b, in_m, back_rad) in &end.corners {
+                let Some(leg) = row[b as usize] else { continue };
+                let in_rad = back_rad + std::f64::consts::PI;
+                let bends = if a == b {
+                    turn(out_rad, in_rad)
+                } else {
+                    turn(out_rad, leg.first_heading_rad) + leg.turned_rad + turn(leg.last_heading_rad, in_rad)
+                };
+                let turned = leaving + bends + turn(in_rad, to.yaw_rad);
+                let travel = total(out_m + leg.distance_m + in_m, turned);
+                if best.is_none_or(|(least, _)| travel.duration_s < least.duration_s) {
+                    best = Some((travel, Via::Corners(a, b)));
+                }
+            }
+        }
+        best.ok_or_else(|| {
+            unreachable(format!(
+                "no passage {:.2} m wide leads from ({:.2}, {:.2}) to ({:.2}, {:.2})",
+                2.0 * self.radius_m,
+                from.x_m,
+                from.y_m,
+                to.x_m,
+                to.y_m
+            ))
+        })
+    }
+
+    fn neighbours(&self, corner: u32) -> &[u32] {
+        self.seen[corner as usize].get_or_init(|| {
+            let here = &self.corners[corner as usize];
+            let visible = |&(c, there): &(u32, &Point2<f64>)| c != corner && self.sees(here, there);
+            (0u32..).zip(&self.corners).filter(visible).map(|(c, _)| c).collect()
+        })
+    }
+
+    /// Shortest routes from one corner to every other.
+    fn row(&self, from: u32) -> &[Option<Leg>] {
+        self.rows[from as usize].get_or_init(|| {
+            let micrometres = |a: u32, b: u32| {
+                ((self.corners[b as usize] - self.corners[a as usize]).norm() * 1e6).round() as u64
+            };
+            let reached =
+                dijkstra_all(&from, |&c| self.neighbours(c).iter().map(move |&n| (n, micrometres(c, n))));
+            let mut row: Vec<Option<Leg>> = vec![None; self.corners.len()];
+            row[from as usize] = Some(Leg {
+                distance_m: 0.0,
+                turned_rad: 0.0,
+                first_heading_rad: 0.0,
+                last_heading_rad: 0.0,
+                previous: from,
+            });
+            let mut by_distance: Vec<(u64, u32, u32)> =
+                reached.iter().map(|(&c, &(previous, d))| (d, c, previous)).collect();
+            by_distance.sort_unstable();
+            for (_, corner, previous) in by_distance {
+                let Some(before) = row[previous as usize] else { continue };
+                let step = self.corners[corner as usize] - self.corners[previous as usize];
+                let heading = step.y.atan2(step.x);
+                let first = previous == from;
+                row[corner as usize] = Some(Leg {
+                    distance_m: before.distance_m + step.norm(),
+                    turned_rad: before.turned_rad
+                        + if first { 0.0 } else { turn(before.last_heading_rad, heading) },
+                    first_heading_rad: if first { heading } else { before.first_heading_rad },
+                    last_heading_rad: heading,
+                    previous,
+                });
+            }
+            row
+        })
+    }
+
+    fn corner_path(&self, from: u32, to: u32) -> Vec<u32> {
+        let row = self.row(from);
+        let mut path = vec![to];
+        let mut at = to;
+        while at != from {
+            let Some(leg) = row[at as usize] else { break };
+            at = leg.previous;
+            path.push(at);
+        }
+        path.reverse();
+        path
+    }
+
+    /// True if the centre of the base can go straight from `a` to `b`: every cell that the line touches is free.
+    pub fn sees(&self, a: &Point2<f64>, b: &Point2<f64>) -> bool {
+        let scaled = |p: &Point2<f64>| (p - self.blocked.origin_m) / self.blocked.resolution_m;
+        let (from, to) = (scaled(a), scaled(b));
+        let step = to - from;
+        let (mut column, mut row) = (from.x.floor() as i64, from.y.floor() as i64);
+        let (last_column, last_row) = (to.x.floor() as i64, to.y.floor() as i64);
+        let (sign_x, sign_y) = (if step.x > 0.0 { 1 } else { -1 }, if step.y > 0.0 { 1 } else { -1 });
+        let first_edge = |at: f64, cell: i64, step: f64| match step {
+            s if s > 0.0 => (cell as f64 + 1.0 - at) / s,
+            s if s < 0.0 => (cell as f64 - at) / s,
+            _ => f64::INFINITY,
+        };
+        let (mut next_x, mut next_y) = (first_edge(from.x, column, step.x), first_edge(from.y, row, step.y));
+        let (stride_x, stride_y) = (1.0 / step.x.abs(), 1.0 / step.y.abs());
+        let steps = (last_column - column).abs() + (last_row - row).abs();
+        if is_blocked(&self.blocked, column, row) {
+            return false;
+        }
+        let mut done = 0;
+        while done < steps {
+            if (next_x - next_y).abs() < 1e-9 && column != last_column && row != last_row {
+                // Through the very corner of four cells: a gap of no width between two blocked ones is none.
+                if is_blocked(&self.blocked, column + sign_x, row)
+                    && is_blocked(&self.blocked, column, row + sign_y)
+                {
+                    return false;
+                }
+                (column, row) = (column + sign_x, row + sign_y);
+                (next_x, next_y) = (next_x + stride_x, next_y + stride_y);
+                done += 2;
+            } else if (next_x < next_y && column != last_column) || row == last_row {
+                column += sign_x;
+                next_x += stride_x;
+                done += 1;
+            } else {
+                row += sign_y;
+                next_y += stride_y;
+                done += 1;
+            }
+            if is_blocked(&self.blocked, column, row) {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+fn unreachable(because: String) -> Failure {
+    Failure::Unreachable { because }
+}
+
+/// Least angle between two headings, 0 to π.
+pub fn turn(from_rad: f64, to_rad: f64) -> f64 {
+    let full = std::f64::consts::TAU;
+    let d = (to_rad - from_rad).rem_euclid(full);
+    d.min(full - d)
+}
+
+fn is_blocked(grid: &OccupancyGrid, column: i64, row: i64) -> bool {
+    column < 0
+        || row < 0
+        || column >= grid.width as i64
+        || row >= grid.height as i64
+        || grid.occupied[row as usize * grid.width + column as usize]
+}
+
+/// Blocks every cell whose centre is nearer than `radius_m` to an occupied cell or to the edge of the map.
+fn inflate(map: &OccupancyGrid, radius_m: f64) -> OccupancyGrid {
+    let mut blocked = map.clone();
+    let cells = radius_m / map.resolution_m;
+    let reach = (cells + 0.5).ceil() as i64;
+    let gap = |d: i64| (d.abs() as f64 - 0.5).max(0.0);
+    let disc: Vec<(i64, i64)> = (-reach..=reach)
+        .flat_map(|r| (-reach..=reach).map(move |c| (c, r)))
+        .filter(|&(c, r)| gap(c).hypot(gap(r)) < cells)
+        .collect();
+    let (width, height) = (map.width as i64, map.height as i64);
+    // The rows and columns just outside count as occupied: beyond the map nothing is known.
+    for row in -1..=height {
+        for column in -1..=width {
+            let hidden =
+                [(1, 0), (-1, 0), (0, 1), (0, -1)].iter().all(|&(c, r)| is_blocked(map, column + c, row + r));
+            if !is_blocked(map, column, row) || hidden {
+                continue;
+            }
+            for &(dc, dr) in &disc {
+                let (c, r) = (column + dc, row + dr);
+                if c >= 0 && r >= 0 && c < width && r < height {
+                    blocked.occupied[(r * width + c) as usize] = true;
+                }
+            }
+        }
+    }
+    blocked
+}
+
+/// Centres of the free cells that touch a blocked one with a corner only: where shortest routes bend.
+fn convex_corners(blocked: &OccupancyGrid) -> Vec<Point2<f64>> {
+    let mut corners = Vec::new();
+    for row in 0..blocked.height as i64 {
+        for column in 0..blocked.width as i64 {
+            let is_corner = |dc: i64, dr: i64| {
+                is_blocked(blocked, column + dc, row + dr)
+                    && !is_blocked(blocked, column + dc, row)
+                    && !is_blocked(blocked, column, row + dr)
+            };
+            let bends = [(1, 1), (1, -1), (-1, 1), (-1, -1)].iter().any(|&(c, r)| is_corner(c, r));
+            if bends && !is_blocked(blocked, column, row) {
+                corners.push(blocked.centre(column as usize, row as usize));
+            }
+        }
+    }
+    corners
+}
+
+/// Centre of the occupied cell nearest to a point, and how far its side is, metres.
+fn nearest_occupied(map: &OccupancyGrid, p: &Point2<f64>) -> Option<(Point2<f64>, f64)> {
+    let half_m = 0.5 * map.resolution_m;
+    let mut best: Option<(Point2<f64>, f64)> = None;
+    for row in 0..map.height {
+        for column in 0..map.width {
+            if !map.occupied[row * map.width + column] {
+                continue;
+            }
+            let centre = map.centre(column, row);
+            let off = (centre - p).abs();
+            let gap_m = (off.x - half_m).max(0.0).hypot((off.y - half_m).max(0.0));
+            if best.is_none_or(|(_, least)| gap_m < least) {
+                best = Some((centre, gap_m));
+            }
+        }
+    }
+    best
+}

@@ -1,0 +1,298 @@
+//! A seed makes a scene out of what was written: places that do not overlap, and a target hidden as far as was asked for.
+
+use crate::body::Pose2;
+use crate::head;
+use crate::input::InputError;
+use crate::route::Router;
+use crate::sim::body::{self, SAFETY_M};
+use crate::sim::render::visible_share;
+use crate::sim::scene::{ObjectSpec, SceneSpec, SurfaceSpec, TargetSpec};
+use crate::sim::shape::Outline;
+use crate::sim::world::{LABEL_OBJECT, Object, Scene, upright};
+use nalgebra::{Isometry2, Point2, Vector2};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Whole arrangements tried before a scene is given up.
+const ROUNDS: usize = 400;
+/// Places tried for one object within an arrangement.
+const PLACES: usize = 60;
+/// Places tried for the target among the others.
+const TARGET_PLACES: usize = 40;
+/// Every how many-th pixel decides about visibility; final shares are measured with all.
+const COARSE_STRIDE: usize = 3;
+/// Poses asked whether some view shows the target: on a ring around its surface's centre (FACTS of the published set-up: 1.2-1.6 m).
+const RING_M: f64 = 1.4;
+const RING_POSES: usize = 16;
+
+/// Chooses what the scene leaves open. The same seed gives the same scene.
+///
+/// # Errors
+/// If no arrangement fits: what was tried and which demand failed most.
+pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut scene = Scene {
+        title: spec.title.clone(),
+        room: spec.room,
+        surfaces: spec.surfaces.clone(),
+        obstacles: spec.obstacles.clone(),
+        start: Pose2::new(
+            spec.start.position_m[0],
+            spec.start.position_m[1],
+            spec.start.yaw_deg.to_radians(),
+        ),
+        objects: Vec::new(),
+        target: spec.target.clone(),
+        target_visible_from_start: None,
+    };
+    let mut failures = Failures::default();
+    for _ in 0..ROUNDS {
+        if !place_all(spec, &mut scene, &mut rng) {
+            failures.crowded += 1;
+            continue;
+        }
+        let Some(target) = &spec.target else { return Ok(scene) };
+        if let Some(share) = settle_target(spec, target, &mut scene, &mut rng, &mut failures) {
+            scene.target_visible_from_start = Some(share);
+            return Ok(scene);
+        }
+    }
+    Err(failures.report(spec, seed))
+}
+
+#[derive(Default)]
+struct Failures {
+    crowded: usize,
+    start: usize,
+    nowhere: usize,
+    shares: Vec<f64>,
+}
+
+impl Failures {
+    fn report(self, spec: &SceneSpec, seed: u64) -> InputError {
+        let name = if spec.title.is_empty() { "the scene" } else { &spec.title };
+        let target = spec.target.as_ref().map_or("", |t| t.object.as_str());
+        let (problem, mend) = if self.crowded >= ROUNDS / 2 {
+            (
+                format!(
+                    "its objects found no room for {} of {ROUNDS} arrangements (seed {seed})",
+                    self.crowded
+                ),
+                "take fewer or smaller objects, a larger `area_m` or a smaller `gap_m`",
+            )
+        } else if self.start >= self.nowhere {
+            let low = self.shares.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = self.shares.iter().copied().fold(0.0, f64::max);
+            (
+                format!(
+                    "in {} places \"{target}\" was seen from the start by a share of {low:.2} to {high:.2}, never within the range asked for (seed {seed})",
+                    self.start
+                ),
+                "add or enlarge something that hides it, or widen `visible_from_start`",
+            )
+        } else {
+            (
+                format!(
+                    "in {} places that suit the start no pose around the surface saw enough of \"{target}\" (seed {seed})",
+                    self.nowhere
+                ),
+                "make what hides it smaller, or lower `visible_from_some`",
+            )
+        };
+        InputError::whole(name, problem, mend)
+    }
+}
+
+fn place_all(spec: &SceneSpec, scene: &mut Scene, rng: &mut ChaCha8Rng) -> bool {
+    scene.objects.clear();
+    // What is fixed stands first, then what is large: small things find room between large ones.
+    let shapes: Vec<_> = spec
+        .objects
+        .iter()
+        .map(|o| o.scale.map_or(o.shape.clone(), |[low, high]| o.shape.scaled(rng.random_range(low..=high))))
+        .collect();
+    let mut order: Vec<usize> = (0..spec.objects.len()).collect();
+    let reach = |i: usize| match shapes[i].outline() {
+        Outline::Disc { radius_m } => radius_m,
+        Outline::Rectangle { half_m } => half_m[0].hypot(half_m[1]),
+    };
+    order.sort_by(|&a, &b| {
+        let free = |i: usize| spec.objects[i].position_m.is_none();
+        free(a).cmp(&free(b)).then(reach(b).total_cmp(&reach(a))).then(a.cmp(&b))
+    });
+    let mut placed: Vec<Option<Object>> = vec![None; spec.objects.len()];
+    for i in order {
+        let o = &spec.objects[i];
+        let Some(surface) = spec.surface_of(o) else { return false };
+        let mut object = Object {
+            name: o.name.clone(),
+            kind: o.kind.clone().unwrap_or_else(|| o.name.clone()),
+            shape: shapes[i].clone(),
+            colour: o.colour,
+            surface: surface.name.clone(),
+            map_from_object: surface.map_from_top(),
+            present: true,
+        };
+        let tries = if o.position_m.is_some() { 1 } else { PLACES };
+        let fixed = o.position_m.is_some();
+        let found = (0..tries).any(|_| {
+            move_somewhere(o, surface, &mut object, rng);
+            fixed || fits(&object, surface, placed.iter().flatten(), spec.gap_m)
+        });
+        if !found {
+            return false;
+        }
+        placed[i] = Some(object);
+    }
+    scene.objects = placed.into_iter().flatten().collect();
+    true
+}
+
+fn move_somewhere(o: &ObjectSpec, surface: &SurfaceSpec, object: &mut Object, rng: &mut ChaCha8Rng) {
+    let [x, y] = o.position_m.unwrap_or_else(|| {
+        let area = o.area_m.unwrap_or(surface.size_m);
+        [0, 1].map(|k| o.area_centre_m[k] + area[k] * (rng.random::<f64>() - 0.5))
+    });
+    let yaw_rad =
+        o.yaw_deg.map_or_else(|| rng.random_range(0.0..std::f64::consts::TAU), |deg| deg.to_radians());
+    object.map_from_object = surface.map_from_top() * upright(x, y, 0.0, yaw_rad);
+}
+
+/// True if the object stands on its surface as a whole and keeps its gap to the others.
+pub(crate) fn fits<'a>(
+    object: &Object,
+    surface: &SurfaceSpec,
+    others: impl Iterator<Item = &'a Object>,
+    gap_m: f64,
+) -> bool {
+    let local = surface.map_from_top().inv_mul(&object.map_from_object);
+    let outline = object.shape.outline();
+    let on_top = corners(&outline, &flat(&local))
+        .iter()
+        .all(|(p, r)| p.x.abs() + r <= 0.5 * surface.size_m[0] && p.y.abs() + r <= 0.5 * surface.size_m[1]);
+    let here = flat(&object.map_from_object);
+    on_top
+        && others
+            .filter(|o| o.present && o.name != object.name && o.surface == object.surface)
+            .all(|o| gap_between(&outline, &here, &o.shape.outline(), &flat(&o.map_from_object)) >= gap_m)
+}
+
+fn flat(map_from_object: &nalgebra::Isometry3<f64>) -> Isometry2<f64> {
+    let pose = Pose2::from_isometry(map_from_object);
+    Isometry2::new(Vector2::new(pose.x_m, pose.y_m), pose.yaw_rad)
+}
+
+/// Discs whose hull is the outline: four corners of radius zero, or one disc.
+fn corners(outline: &Outline, at: &Isometry2<f64>) -> Vec<(Point2<f64>, f64)> {
+    match *outline {
+        Outline::Disc { radius_m } => vec![(at * Point2::origin(), radius_m)],
+        Outline::Rectangle { half_m: [x, y] } => {
+            [(-x, -y), (x, -y), (x, y), (-x, y)].iter().map(|&(x, y)| (at * Point2::new(x, y), 0.0)).collect()
+        }
+    }
+}
+
+/// Gap between two outlines, metres; zero or below where they overlap. For two boxes by separating axes: never more than the true gap.
+fn gap_between(a: &Outline, at_a: &Isometry2<f64>, b: &Outline, at_b: &Isometry2<f64>) -> f64 {
+    match (a, b) {
+        (Outline::Disc { radius_m: ra }, Outline::Disc { radius_m: rb }) => {
+            (at_a.translation.vector - at_b.translation.vector).norm() - ra - rb
+        }
+        (Outline::Rectangle { half_m }, Outline::Disc { radius_m }) => {
+            let p = at_a.inverse_transform_point(&(at_b * Point2::origin()));
+            let (dx, dy) = (p.x.abs() - half_m[0], p.y.abs() - half_m[1]);
+            if dx <= 0.0 && dy <= 0.0 {
+                dx.max(dy) - radius_m
+            } else {
+                dx.max(0.0).hypot(dy.max(0.0)) - radius_m
+            }
+        }
+        (Outline::Disc { .. }, Outline::Rectangle { .. }) => gap_between(b, at_b, a, at_a),
+        (Outline::Rectangle { .. }, Outline::Rectangle { .. }) => {
+            let (ca, cb) = (corners(a, at_a), corners(b, at_b));
+            let axes = [at_a, at_b]
+                .into_iter()
+                .flat_map(|at| [at.rotation * Vector2::x(), at.rotation * Vector2::y()]);
+            let spread = |points: &[(Point2<f64>, f64)], axis: &Vector2<f64>| {
+                points
+                    .iter()
+                    .map(|(p, _)| p.coords.dot(axis))
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+            };
+            axes.map(|axis| {
+                let (a, b) = (spread(&ca, &axis), spread(&cb, &axis));
+                (b.0 - a.1).max(a.0 - b.1)
+            })
+            .fold(f64::NEG_INFINITY, f64::max)
+        }
+    }
+}
+
+/// Moves the target among the others until it is hidden as asked for; its share seen from the start.
+fn settle_target(
+    spec: &SceneSpec,
+    target: &TargetSpec,
+    scene: &mut Scene,
+    rng: &mut ChaCha8Rng,
+    failures: &mut Failures,
+) -> Option<f64> {
+    let index = spec.objects.iter().position(|o| o.name == target.object)?;
+    let o = &spec.objects[index];
+    let surface = spec.surface_of(o)?;
+    let label = LABEL_OBJECT + index as u16;
+    let [low, high] = target.visible_from_start;
+    let tries = if o.position_m.is_some() { 1 } else { TARGET_PLACES };
+    for attempt in 0..tries {
+        if attempt > 0 {
+            let mut moved = scene.objects[index].clone();
+            move_somewhere(o, surface, &mut moved, rng);
+            if !fits(&moved, surface, scene.objects.iter(), spec.gap_m) {
+                continue;
+            }
+            scene.objects[index] = moved;
+        }
+        let coarse = share_from(scene, label, &scene.start, COARSE_STRIDE);
+        // The coarse share only spares the exact one where it is far off.
+        if coarse < low - 0.1 || coarse > high + 0.1 {
+            failures.start += 1;
+            failures.shares.push(coarse);
+            continue;
+        }
+        let share = share_from(scene, label, &scene.start, 1);
+        if share < low || share > high {
+            failures.start += 1;
+            failures.shares.push(share);
+            continue;
+        }
+        if some_pose_sees(scene, label, surface, target.visible_from_some) {
+            return Some(share);
+        }
+        failures.nowhere += 1;
+    }
+    None
+}
+
+fn share_from(scene: &Scene, label: u16, pose: &Pose2, stride: usize) -> f64 {
+    let index = usize::from(label - LABEL_OBJECT);
+    let description = body::description();
+    let Some(head) = &description.head else { return 0.0 };
+    let look_at = scene.objects[index].centre_m();
+    let map_from_camera = head::camera_towards(head, &pose.isometry(), Some(&look_at));
+    visible_share(scene, label, &map_from_camera, &description.camera, stride).unwrap_or(0.0)
+}
+
+fn some_pose_sees(scene: &Scene, label: u16, surface: &SurfaceSpec, least: f64) -> bool {
+    if least <= 0.0 {
+        return true;
+    }
+    let description = body::description();
+    let router = Router::new(&scene.map(), description.footprint.radius_m() + SAFETY_M, description.speeds);
+    let centre = Point2::new(surface.position_m[0], surface.position_m[1]);
+    (0..RING_POSES)
+        .map(|k| {
+            let angle = std::f64::consts::TAU * k as f64 / RING_POSES as f64;
+            Pose2::facing(centre.x + RING_M * angle.cos(), centre.y + RING_M * angle.sin(), &centre)
+        })
+        .filter(|pose| router.travel(&scene.start, pose).is_ok())
+        .any(|pose| share_from(scene, label, &pose, COARSE_STRIDE) >= least)
+}

@@ -1,0 +1,115 @@
+//! Motion of the simulated base: along a route in its own estimate of the map, while the truth is a little elsewhere.
+
+use crate::body::{Pose2, Speeds};
+use crate::route::{Route, turn};
+use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Straight lines are driven in steps of this length, metres; between two the base can be stopped.
+const STEP_M: f64 = 0.05;
+
+/// One step of a drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Where the base is after it.
+    pub pose: Pose2,
+    /// What it takes, seconds.
+    pub seconds: f64,
+    /// What it drives, metres.
+    pub metres: f64,
+}
+
+/// The steps of a route: a turn on the spot, then straight on, for each line; a turn to the goal's heading at the end. Their seconds
+/// add up to the duration of the route.
+pub fn steps(from: &Pose2, route: &Route, goal: &Pose2, speeds: &Speeds) -> Vec<Step> {
+    let mut steps = Vec::new();
+    let mut heading_rad = from.yaw_rad;
+    let turn_to = |at: &Point2<f64>, from_rad: f64, to_rad: f64, steps: &mut Vec<Step>| {
+        let seconds = turn(from_rad, to_rad) / speeds.angular_rad_s;
+        if seconds > 0.0 {
+            steps.push(Step { pose: Pose2::new(at.x, at.y, to_rad), seconds, metres: 0.0 });
+        }
+    };
+    for line in route.points_m.windows(2) {
+        let along = line[1] - line[0];
+        let length_m = along.norm();
+        if length_m <= 0.0 {
+            continue;
+        }
+        let line_rad = along.y.atan2(along.x);
+        turn_to(&line[0], heading_rad, line_rad, &mut steps);
+        heading_rad = line_rad;
+        let count = (length_m / STEP_M).ceil().max(1.0);
+        for k in 1..=count as usize {
+            let at = line[0] + along * (k as f64 / count);
+            steps.push(Step {
+                pose: Pose2::new(at.x, at.y, heading_rad),
+                seconds: length_m / count / speeds.linear_m_s,
+                metres: length_m / count,
+            });
+        }
+    }
+    turn_to(&goal.point(), heading_rad, goal.yaw_rad, &mut steps);
+    steps
+}
+
+/// How well the base knows where it is and stops where it wants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Localisation {
+    /// Standard deviation of the estimate along x and y, metres.
+    pub sigma_m: f64,
+    /// Standard deviation of its heading, radians.
+    pub sigma_rad: f64,
+    /// Standard deviation of where it stops against where it wants to, along x and y, metres. The estimate shows it.
+    pub stop_sigma_m: f64,
+    /// The same for the heading, radians.
+    pub stop_sigma_rad: f64,
+}
+
+impl Default for Localisation {
+    /// 3 cm and 2°, as in the published set-up.
+    fn default() -> Self {
+        Localisation {
+            sigma_m: 0.03,
+            sigma_rad: 2f64.to_radians(),
+            stop_sigma_m: 0.01,
+            stop_sigma_rad: 0.5f64.to_radians(),
+        }
+    }
+}
+
+impl Localisation {
+    /// The estimate at a stop: the pose that the base meant to take, give or take.
+    pub fn stop(&self, wanted: &Pose2, rng: &mut ChaCha8Rng) -> Pose2 {
+        Pose2::new(
+            wanted.x_m + self.stop_sigma_m * normal(rng),
+            wanted.y_m + self.stop_sigma_m * normal(rng),
+            wanted.yaw_rad + self.stop_sigma_rad * normal(rng),
+        )
+    }
+
+    /// `estimate_from_truth` at a stop. It stays while the base stands: asking again does not average it out.
+    pub fn error(&self, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
+        shift(self.sigma_m * normal(rng), self.sigma_m * normal(rng), self.sigma_rad * normal(rng))
+    }
+
+    /// `estimate_from_truth` when localisation is wrong: 10 cm and 6° in directions that the seed chooses.
+    pub fn bad_error(rng: &mut ChaCha8Rng) -> Isometry3<f64> {
+        let direction: f64 = std::f64::consts::TAU * rand::Rng::random::<f64>(rng);
+        let sign = if rand::Rng::random::<bool>(rng) { 1.0 } else { -1.0 };
+        shift(0.1 * direction.cos(), 0.1 * direction.sin(), sign * 6f64.to_radians())
+    }
+}
+
+/// A standard normal number.
+pub(crate) fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+fn shift(x_m: f64, y_m: f64, yaw_rad: f64) -> Isometry3<f64> {
+    Isometry3::from_parts(
+        Translation3::new(x_m, y_m, 0.0),
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad),
+    )
+}

@@ -1,0 +1,247 @@
+//! The ideal depth camera: every pixel's ray against every solid that can be in its way, in closed form.
+//!
+//! A ray has depth 1 along z, so that its parameter *is* the depth. Each solid is asked only within the rectangle of pixels that its
+//! bounding box covers. Rows are rendered in parallel; no pixel depends on another.
+
+use crate::body::Stamp;
+use crate::sim::scene::RoomSpec;
+use crate::sim::world::{LABEL_NOTHING, LABEL_ROOM, Scene, Solid};
+use descry_perception::Intrinsics;
+use image::RgbImage;
+use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
+use rayon::prelude::*;
+
+/// What an ideal camera sees; row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// The camera.
+    pub intrinsics: Intrinsics,
+    /// When.
+    pub stamp_ns: Stamp,
+    /// Depth along z, metres; infinite where there is nothing.
+    pub depth_m: Vec<f32>,
+    /// Cosine of the angle between the ray and the surface's normal.
+    pub cosine: Vec<f32>,
+    /// What it shows: see the labels of [`world`](crate::sim::world).
+    pub label: Vec<u16>,
+    /// Red, green, blue, shaded.
+    pub colour: Vec<[u8; 3]>,
+}
+
+impl Frame {
+    /// The colours as an image.
+    pub fn image(&self) -> RgbImage {
+        let width = self.intrinsics.width;
+        RgbImage::from_fn(width as u32, self.intrinsics.height as u32, |u, v| {
+            image::Rgb(self.colour[v as usize * width + u as usize])
+        })
+    }
+}
+
+/// A solid as the camera sees it.
+struct Placed<'a> {
+    solid: &'a Solid,
+    origin: Point3<f64>,
+    solid_from_camera: Rotation3<f64>,
+    columns: (usize, usize),
+    rows: (usize, usize),
+}
+
+/// Nearer than this to the camera's plane a bounding box is taken to cover the whole image, metres.
+const NEAR_M: f64 = 0.02;
+const FLOOR_COLOUR: [u8; 3] = [120, 115, 110];
+const WALL_COLOUR: [u8; 3] = [205, 205, 195];
+/// Towards the lamp, in the map.
+const LIGHT: Vector3<f64> = Vector3::new(0.32, -0.24, 0.917);
+
+impl<'a> Placed<'a> {
+    fn new(solid: &'a Solid, map_from_camera: &Isometry3<f64>, camera: &Intrinsics) -> Option<Self> {
+        let solid_from_camera = solid.map_from_solid.inv_mul(map_from_camera);
+        let camera_from_solid = solid_from_camera.inverse();
+        let (low, high) = solid.bounds;
+        let mut box_ = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+        let (mut behind, mut before) = (false, false);
+        for corner in 0..8 {
+            let pick = |bit: usize, axis: usize| if corner & bit == 0 { low[axis] } else { high[axis] };
+            let p = camera_from_solid * Point3::new(pick(1, 0), pick(2, 1), pick(4, 2));
+            if p.z < NEAR_M {
+                behind = true;
+                continue;
+            }
+            before = true;
+            let (u, v) = (camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy);
+            box_ = [box_[0].min(u), box_[1].min(v), box_[2].max(u), box_[3].max(v)];
+        }
+        if !before {
+            return None;
+        }
+        if behind {
+            box_ = [0.0, 0.0, camera.width as f64, camera.height as f64];
+        }
+        let span = |from: f64, to: f64, size: usize| {
+            (from.floor().max(0.0) as usize, ((to.ceil() + 1.0).max(0.0) as usize).min(size))
+        };
+        let columns = span(box_[0], box_[2], camera.width);
+        let rows = span(box_[1], box_[3], camera.height);
+        (columns.0 < columns.1 && rows.0 < rows.1).then(|| Placed {
+            solid,
+            origin: Point3::from(solid_from_camera.translation.vector),
+            solid_from_camera: solid_from_camera.rotation.to_rotation_matrix(),
+            columns,
+            rows,
+        })
+    }
+}
+
+/// The ray through a pixel, depth 1, in the optical frame.
+#[inline]
+fn ray(camera: &Intrinsics, column: usize, row: usize) -> Vector3<f64> {
+    Vector3::new((column as f64 - camera.cx) / camera.fx, (row as f64 - camera.cy) / camera.fy, 1.0)
+}
+
+/// Renders the room and its solids.
+pub fn render(
+    room: &RoomSpec,
+    solids: &[Solid],
+    map_from_camera: &Isometry3<f64>,
+    camera: &Intrinsics,
+    stamp_ns: Stamp,
+) -> Frame {
+    let placed: Vec<Placed> = solids.iter().filter_map(|s| Placed::new(s, map_from_camera, camera)).collect();
+    let pixels = camera.width * camera.height;
+    let mut frame = Frame {
+        intrinsics: *camera,
+        stamp_ns,
+        depth_m: vec![f32::INFINITY; pixels],
+        cosine: vec![0.0; pixels],
+        label: vec![LABEL_NOTHING; pixels],
+        colour: vec![[0; 3]; pixels],
+    };
+    let width = camera.width.max(1);
+    let rows = frame
+        .depth_m
+        .par_chunks_mut(width)
+        .zip(frame.cosine.par_chunks_mut(width))
+        .zip(frame.label.par_chunks_mut(width))
+        .zip(frame.colour.par_chunks_mut(width));
+    rows.enumerate().with_min_len(8).for_each_init(
+        || vec![f64::INFINITY; width],
+        |exact, (row, (((depth, cosine), label), colour))| {
+            exact.fill(f64::INFINITY);
+            let mut line = Line { depth: exact, cosine, label, colour };
+            draw_room(room, map_from_camera, camera, row, &mut line);
+            for p in placed.iter().filter(|p| (p.rows.0..p.rows.1).contains(&row)) {
+                draw_solid(p, camera, row, &mut line);
+            }
+            for (out, exact) in depth.iter_mut().zip(exact.iter()) {
+                *out = *exact as f32;
+            }
+        },
+    );
+    frame
+}
+
+/// One row of the frame while it is drawn.
+struct Line<'a> {
+    depth: &'a mut [f64],
+    cosine: &'a mut [f32],
+    label: &'a mut [u16],
+    colour: &'a mut [[u8; 3]],
+}
+
+/// Floor and walls: the inside of a box without a lid.
+fn draw_room(
+    room: &RoomSpec,
+    map_from_camera: &Isometry3<f64>,
+    camera: &Intrinsics,
+    row: usize,
+    line: &mut Line,
+) {
+    let rotation = map_from_camera.rotation.to_rotation_matrix();
+    let o = map_from_camera.translation.vector;
+    let half = [0.5 * room.size_m[0], 0.5 * room.size_m[1]];
+    for column in 0..camera.width {
+        let in_camera = ray(camera, column, row);
+        let d = rotation * in_camera;
+        let mut nearest = (f64::INFINITY, Vector3::z(), FLOOR_COLOUR);
+        if d.z < 0.0 {
+            nearest.0 = -o.z / d.z;
+        }
+        for axis in 0..2 {
+            let wall = if d[axis] > 0.0 { half[axis] } else { -half[axis] };
+            let t = (wall - o[axis]) / d[axis];
+            if t > 0.0 && t < nearest.0 {
+                let mut normal = Vector3::zeros();
+                normal[axis] = -d[axis].signum();
+                nearest = (t, normal, WALL_COLOUR);
+            }
+        }
+        let (t, normal, colour) = nearest;
+        let height = o.z + t * d.z;
+        if t.is_finite() && t > 0.0 && height <= room.wall_height_m {
+            line.depth[column] = t;
+            line.cosine[column] = (d.dot(&normal).abs() / in_camera.norm()) as f32;
+            line.label[column] = LABEL_ROOM;
+            line.colour[column] = shade(colour, &normal);
+        }
+    }
+}
+
+fn draw_solid(p: &Placed, camera: &Intrinsics, row: usize, line: &mut Line) {
+    let rotation = p.solid.map_from_solid.rotation;
+    for column in p.columns.0..p.columns.1 {
+        let in_camera = ray(camera, column, row);
+        let d = p.solid_from_camera * in_camera;
+        if let Some(hit) = p.solid.hit(&p.origin, &d, line.depth[column]) {
+            // Seen from inside a cup the surface faces the other way.
+            let facing = if d.dot(&hit.normal) > 0.0 { -hit.normal } else { hit.normal };
+            line.depth[column] = hit.t;
+            line.cosine[column] = (-d.dot(&facing) / in_camera.norm()) as f32;
+            line.label[column] = p.solid.label;
+            line.colour[column] = shade(p.solid.colour, &(rotation * facing));
+        }
+    }
+}
+
+fn shade(colour: [u8; 3], normal: &Vector3<f64>) -> [u8; 3] {
+    let light = 0.45 + 0.55 * normal.dot(&LIGHT).max(0.0);
+    colour.map(|c| (f64::from(c) * light).min(255.0) as u8)
+}
+
+/// Share of a solid that nothing hides from the camera: pixels where it is seen over pixels that it would cover alone, every
+/// `stride`-th column and row. `None` if it covers no pixel of the image at all.
+pub fn visible_share(
+    scene: &Scene,
+    label: u16,
+    map_from_camera: &Isometry3<f64>,
+    camera: &Intrinsics,
+    stride: usize,
+) -> Option<f64> {
+    let solids = scene.solids();
+    let target = solids.iter().find(|s| s.label == label)?;
+    let target = Placed::new(target, map_from_camera, camera)?;
+    let others: Vec<Placed> = solids
+        .iter()
+        .filter(|s| s.label != label)
+        .filter_map(|s| Placed::new(s, map_from_camera, camera))
+        .collect();
+    let (mut alone, mut seen) = (0usize, 0usize);
+    for row in (target.rows.0..target.rows.1).step_by(stride.max(1)) {
+        for column in (target.columns.0..target.columns.1).step_by(stride.max(1)) {
+            let in_camera = ray(camera, column, row);
+            let Some(hit) =
+                target.solid.hit(&target.origin, &(target.solid_from_camera * in_camera), f64::INFINITY)
+            else {
+                continue;
+            };
+            alone += 1;
+            let hidden = others
+                .iter()
+                .filter(|o| (o.rows.0..o.rows.1).contains(&row))
+                .filter(|o| (o.columns.0..o.columns.1).contains(&column))
+                .any(|o| o.solid.hit(&o.origin, &(o.solid_from_camera * in_camera), hit.t).is_some());
+            seen += usize::from(!hidden);
+        }
+    }
+    (alone > 0).then(|| seen as f64 / alone as f64)
+}

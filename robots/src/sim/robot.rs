@@ -1,0 +1,461 @@
+//! The simulated body in its room.
+
+use crate::body::{
+    CancellationToken, Colour, Description, Driven, Looked, Place, Pose2, PoseEstimate, Progress, Push,
+    Pushed, Robot, Sensed, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
+};
+use crate::failure::Failure;
+use crate::grid::OccupancyGrid;
+use crate::head::{self, Gaze};
+use crate::route::Router;
+use crate::sim::body::{self, HEAD_SPEED_RAD_S, REACH_M, SAFETY_M};
+use crate::sim::drive::{self, Localisation};
+use crate::sim::faults::{Fault, FaultKind, FaultPlan};
+use crate::sim::noise::{self, DepthNoise};
+use crate::sim::push::{self, Effect};
+use crate::sim::render::{Frame, render, visible_share};
+use crate::sim::state::{End, State};
+use crate::sim::truth::Truth;
+use crate::sim::world::{LABEL_OBJECT, Scene};
+use nalgebra::{Isometry3, Point3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// From the trigger to the frame, seconds.
+const FRAME_S: f64 = 0.1;
+/// A push without the way that the hand moves with the object, seconds.
+const PUSH_S: f64 = 8.0;
+/// Speed of the hand while it pushes, metres a second.
+const HAND_M_S: f64 = 0.1;
+/// A hand that moved less than this share of what was asked for reports that it slipped.
+const SLIPPED_SHARE: f64 = 0.5;
+
+/// What a run of the simulator is made with besides the scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SimOptions {
+    /// Fixes noise, localisation and mishaps. The arrangement has a seed of its own.
+    pub seed: u64,
+    /// What goes wrong on purpose.
+    pub faults: FaultPlan,
+    /// How well the body knows where it is.
+    pub localisation: Localisation,
+    /// How the camera falls short.
+    pub noise: DepthNoise,
+}
+
+/// A simulated body in a scene. The truth is asked of [`SimRobot::truth`]; the [`Robot`] trait shows only what a real body would.
+pub struct SimRobot {
+    description: Description,
+    options: SimOptions,
+    map: OccupancyGrid,
+    surfaces: Vec<SurfaceHint>,
+    state: Mutex<State>,
+}
+
+/// A drive as decided before the base moves.
+struct Departure {
+    number: u64,
+    steps: Vec<drive::Step>,
+    /// After how many steps it ends early, and why.
+    end: Option<(usize, End)>,
+}
+
+/// How a drive went.
+struct Trip {
+    at: Option<Pose2>,
+    elapsed_s: f64,
+    distance_m: f64,
+    failure: Option<Failure>,
+}
+
+impl SimRobot {
+    /// Puts the body at the start of a scene.
+    pub fn new(scene: Scene, options: SimOptions) -> SimRobot {
+        let mut description = body::description();
+        description.pose_sigma_m = options.localisation.sigma_m;
+        description.pose_sigma_rad = options.localisation.sigma_rad;
+        let map = scene.map();
+        let router = Router::new(&map, description.footprint.radius_m() + SAFETY_M, description.speeds);
+        let hint = |s: &crate::sim::scene::SurfaceSpec| SurfaceHint {
+            name: s.name.clone(),
+            outline_m: s.outline_m(),
+            height_m: s.height_m,
+        };
+        let surfaces = scene.surfaces.iter().map(hint).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(noise::mix(options.seed));
+        let error = options.localisation.error(&mut rng);
+        let state = State {
+            now_ns: 0,
+            events: Vec::new(),
+            rng,
+            router: Arc::new(router),
+            // The scene says where the body stands, not where it believes to be.
+            estimate: Pose2::from_isometry(&(scene.start.isometry() * error)),
+            error,
+            gaze: Gaze::default(),
+            drives: 0,
+            frames: 0,
+            unreachable: Vec::new(),
+            scene,
+        };
+        SimRobot { description, options, map, surfaces, state: Mutex::new(state) }
+    }
+
+    /// How everything really is. For scoring and reports: nothing that decides may ask.
+    pub fn truth(&self) -> Truth {
+        let state = self.lock();
+        Truth::of(&state.scene, state.now_ns, &state.map_from_base(), &state.events)
+    }
+
+    /// Share of an object that nothing hides from the camera at a pose when the head looks at it; 0 if it is not there. For the oracle
+    /// of experiments and for reports.
+    pub fn true_visible_share(&self, object: &str, pose: &Pose2) -> f64 {
+        let state = self.lock();
+        let Some(index) = state.scene.objects.iter().position(|o| o.name == object && o.present) else {
+            return 0.0;
+        };
+        let Some(head) = &self.description.head else { return 0.0 };
+        let look_at = state.scene.objects[index].centre_m();
+        let map_from_camera = head::camera_towards(head, &pose.isometry(), Some(&look_at));
+        let label = LABEL_OBJECT + index as u16;
+        visible_share(&state.scene, label, &map_from_camera, &self.description.camera, 1).unwrap_or(0.0)
+    }
+
+    /// The ideal frame that the camera would take now, with what each pixel really shows. For reports and tests.
+    pub fn true_frame(&self) -> Frame {
+        let state = self.lock();
+        self.render(&state)
+    }
+
+    fn render(&self, state: &State) -> Frame {
+        let mount = self.base_from_camera(&state.gaze);
+        let map_from_camera = state.map_from_base() * mount;
+        let solids = state.scene.solids();
+        render(&state.scene.room, &solids, &map_from_camera, &self.description.camera, state.now_ns)
+    }
+
+    fn base_from_camera(&self, gaze: &Gaze) -> Isometry3<f64> {
+        self.description.head.as_ref().map_or(Isometry3::identity(), |h| head::base_from_camera(h, gaze))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn pose_of(&self, place: &Place) -> Result<Pose2, Failure> {
+        match place {
+            Place::Pose(pose) => Ok(*pose),
+            Place::Station(name) => Err(Failure::Unreachable {
+                because: format!("{} has no station \"{name}\"; give a pose", self.description.name),
+            }),
+        }
+    }
+
+    fn strikes(&self, kind: FaultKind, number: u64) -> Option<&Fault> {
+        self.options.faults.strikes(kind, number, self.options.seed)
+    }
+
+    fn room_m(&self) -> f64 {
+        self.description.footprint.radius_m() + SAFETY_M
+    }
+
+    fn depart(&self, goal: &Pose2) -> Result<Departure, Failure> {
+        let mut state = self.lock();
+        state.drives += 1;
+        let number = state.drives;
+        let route = state.router.route(&state.estimate, goal)?;
+        if self.strikes(FaultKind::UnreachablePose, number).is_some() {
+            state.note("the goal of this drive turns out to be unreachable");
+            state.unreachable.push(*goal);
+        }
+        state.known_unreachable(goal)?;
+        let steps = drive::steps(&state.estimate, &route, goal, &self.description.speeds);
+        let on_the_way = state.rng.random_range(0.2..0.8) * steps.len() as f64;
+        let mut end = None;
+        if self.strikes(FaultKind::BlockedPath, number).is_some() {
+            end = Some((on_the_way as usize, End::Person));
+        } else if self.strikes(FaultKind::TimedOutDrive, number).is_some() {
+            end = Some((on_the_way as usize, End::Stuck));
+        }
+        if let Some((at, obstacle)) = state.first_bump(&steps, self.description.footprint.radius_m())
+            && end.as_ref().is_none_or(|(earlier, _)| at < *earlier)
+        {
+            end = Some((at, End::Obstacle(obstacle)));
+        }
+        Ok(Departure { number, steps, end })
+    }
+
+    async fn travel_along(&self, departure: &Departure, watch: &Watch<'_>) -> Trip {
+        let total_s: f64 = departure.steps.iter().map(|s| s.seconds).sum();
+        let mut trip = Trip { at: None, elapsed_s: 0.0, distance_m: 0.0, failure: None };
+        for (i, step) in departure.steps.iter().enumerate() {
+            if watch.cancel.is_cancelled() {
+                trip.failure = Some(cancelled("the drive", trip.elapsed_s));
+                return trip;
+            }
+            if let Some((_, end)) = departure.end.as_ref().filter(|(at, _)| *at == i) {
+                trip.failure = Some(self.end_early(end, watch, &mut trip.elapsed_s));
+                return trip;
+            }
+            if trip.elapsed_s + step.seconds > watch.time_limit_s {
+                self.lock().pass(watch.time_limit_s - trip.elapsed_s);
+                trip.failure = Some(timed_out("the drive", watch.time_limit_s));
+                return trip;
+            }
+            // The base is there at once: who drops this future leaves it where it got to.
+            self.lock().follow(step);
+            trip.elapsed_s += step.seconds;
+            trip.distance_m += step.metres;
+            trip.at = Some(step.pose);
+            let fraction = trip.elapsed_s / total_s;
+            (watch.progress)(&Progress { elapsed_s: trip.elapsed_s, fraction, distance_m: trip.distance_m });
+            tokio::task::yield_now().await;
+        }
+        trip
+    }
+
+    fn end_early(&self, end: &End, watch: &Watch<'_>, elapsed_s: &mut f64) -> Failure {
+        let mut state = self.lock();
+        match end {
+            End::Person => {
+                state.note("somebody stands in the way");
+                Failure::Blocked { because: "somebody stands in the way".into() }
+            }
+            End::Stuck => {
+                state.note("the wheels slip until the time is up");
+                state.pass((watch.time_limit_s - *elapsed_s).max(0.0));
+                *elapsed_s = watch.time_limit_s;
+                timed_out("the drive", watch.time_limit_s)
+            }
+            End::Obstacle(obstacle) => {
+                let name = state.scene.obstacles.get(*obstacle).map_or("", |o| &o.name).to_string();
+                state.note(format!("the base meets \"{name}\", which its map does not show"));
+                Failure::Blocked { because: "something stands in the way that the map does not show".into() }
+            }
+        }
+    }
+
+    /// What others do while the base drives.
+    fn disturb(&self, number: u64) {
+        for kind in [FaultKind::ObjectMoved, FaultKind::ObjectTaken] {
+            if let Some(fault) = self.strikes(kind, number) {
+                self.lock().disturb(fault);
+            }
+        }
+    }
+
+    fn turn_head(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
+        let Some(head) = &self.description.head else {
+            return Err(Failure::Unable { because: format!("{} has no head", self.description.name) });
+        };
+        let mut state = self.lock();
+        let (gaze, miss_rad) = head::aim(head, &state.estimate.isometry().inverse_transform_point(point));
+        let turned =
+            (gaze.pan_rad - state.gaze.pan_rad).abs().max((gaze.tilt_rad - state.gaze.tilt_rad).abs());
+        let duration_s = turned / HEAD_SPEED_RAD_S;
+        if duration_s > watch.time_limit_s {
+            state.pass(watch.time_limit_s);
+            return Err(timed_out("turning the head", watch.time_limit_s));
+        }
+        state.gaze = gaze;
+        state.pass(duration_s);
+        Ok(Looked { duration_s, miss_rad })
+    }
+
+    fn expose(&self) -> Result<Sensed, Failure> {
+        let mut state = self.lock();
+        state.pass(FRAME_S);
+        state.frames += 1;
+        let (number, stamp_ns) = (state.frames, state.now_ns);
+        if self.strikes(FaultKind::DroppedFrame, number).is_some() {
+            state.note("a frame is lost");
+            let because = format!("frame {number} was triggered and did not come");
+            return Err(Failure::SensorDropped { because, stamp_ns });
+        }
+        let frame = self.render(&state);
+        let base_from_camera = self.base_from_camera(&state.gaze);
+        let map_from_base = state.estimate.isometry();
+        drop(state);
+        let depth_m =
+            noise::observe(&frame, &self.options.noise, self.description.range_m, self.options.seed, number);
+        let intrinsics = self.description.camera;
+        let mut cloud = intrinsics
+            .cloud_from_depth(&depth_m)
+            .map_err(|e| Failure::Broken { because: format!("the camera: {e}") })?;
+        cloud.colours = Some(frame.colour.clone());
+        let frames = &self.description.frames;
+        let link = |parent: &str, child: &str, parent_from_child| StampedTransform {
+            stamp_ns,
+            parent: parent.into(),
+            child: child.into(),
+            parent_from_child,
+        };
+        Ok(Sensed {
+            stamp_ns,
+            cloud,
+            depth_m,
+            colour: Some(Colour { image: frame.image(), registered: true }),
+            intrinsics,
+            transforms: vec![
+                link(&frames.map, &frames.base, map_from_base),
+                link(&frames.base, &frames.camera, base_from_camera),
+            ],
+            map_from_camera: map_from_base * base_from_camera,
+            pose_sigma_m: self.description.pose_sigma_m,
+            pose_sigma_rad: self.description.pose_sigma_rad,
+        })
+    }
+
+    fn push(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
+        let mut state = self.lock();
+        let reach_m = (push.object.xy() - state.estimate.point()).norm();
+        if reach_m > REACH_M {
+            return Err(Failure::Unreachable {
+                because: format!("the object is {reach_m:.2} m away and the arm reaches {REACH_M:.2} m"),
+            });
+        }
+        if !(push.direction.norm() > 0.0 && push.distance_m.is_finite() && push.distance_m > 0.0) {
+            return Err(Failure::Unreachable { because: "a push needs a direction and a distance".into() });
+        }
+        let needed_s = PUSH_S + push.distance_m / HAND_M_S;
+        if needed_s > watch.time_limit_s {
+            state.pass(watch.time_limit_s);
+            return Err(timed_out("the push, before the hand touched anything,", watch.time_limit_s));
+        }
+        let really = state.truth_from_estimate();
+        let at = really * push.object;
+        let direction = (really.rotation * push.direction.push(0.0)).xy();
+        let State { scene, rng, .. } = &mut *state;
+        let effect = push::push(scene, &at, &direction, push.distance_m, rng);
+        let Effect::Moved { object, moved_m, stopped } = effect else {
+            state.pass(PUSH_S);
+            return Err(Failure::Slipped { because: "the hand met nothing there".into() });
+        };
+        let duration_s = PUSH_S + moved_m / HAND_M_S;
+        state.pass(duration_s);
+        let name = state.scene.objects[object].name.clone();
+        state.note(format!("the hand pushes \"{name}\" by {moved_m:.3} m"));
+        match stopped {
+            Some(why) if moved_m < SLIPPED_SHARE * push.distance_m => {
+                Err(Failure::Slipped { because: format!("{why} after {moved_m:.2} m") })
+            }
+            _ => Ok(Pushed { moved_m, duration_s }),
+        }
+    }
+}
+
+fn cancelled(what: &str, after_s: f64) -> Failure {
+    Failure::Cancelled { because: format!("{what} was stopped after {after_s:.1} s") }
+}
+
+fn timed_out(what: &str, limit_s: f64) -> Failure {
+    Failure::TimedOut { because: format!("{what} took longer than {limit_s:.1} s") }
+}
+
+fn go_on(cancel: &CancellationToken, what: &str) -> Result<(), Failure> {
+    if cancel.is_cancelled() { Err(cancelled(what, 0.0)) } else { Ok(()) }
+}
+
+#[async_trait::async_trait]
+impl Robot for SimRobot {
+    fn description(&self) -> &Description {
+        &self.description
+    }
+
+    fn now_ns(&self) -> Stamp {
+        self.lock().now_ns
+    }
+
+    fn map(&self) -> Option<&OccupancyGrid> {
+        Some(&self.map)
+    }
+
+    fn surfaces(&self) -> &[SurfaceHint] {
+        &self.surfaces
+    }
+
+    fn stations(&self) -> Option<&[Station]> {
+        None
+    }
+
+    fn travel(&self, from: &Place, to: &[Place]) -> Vec<Result<Travel, Failure>> {
+        let (router, tried) = {
+            let state = self.lock();
+            let tried = |p: &Place| self.pose_of(p).and_then(|pose| state.known_unreachable(&pose));
+            (state.router.clone(), to.iter().map(tried).collect::<Vec<_>>())
+        };
+        let from = match self.pose_of(from) {
+            Ok(pose) => pose,
+            Err(failure) => return to.iter().map(|_| Err(failure.clone())).collect(),
+        };
+        let goals: Vec<Pose2> =
+            to.iter().map(|p| self.pose_of(p).unwrap_or(Pose2::new(f64::NAN, f64::NAN, f64::NAN))).collect();
+        let found = router.travel_to_each(&from, &goals);
+        found.into_iter().zip(tried).map(|(travel, tried)| tried.and(travel)).collect()
+    }
+
+    fn camera_at(&self, place: &Place, look_at: Option<&Point3<f64>>) -> Result<Isometry3<f64>, Failure> {
+        let base = self.pose_of(place)?.isometry();
+        Ok(self.description.head.as_ref().map_or(base, |h| head::camera_towards(h, &base, look_at)))
+    }
+
+    async fn pose(&self) -> Result<PoseEstimate, Failure> {
+        let state = self.lock();
+        Ok(PoseEstimate {
+            stamp_ns: state.now_ns,
+            map_from_base: state.estimate.isometry(),
+            sigma_m: self.description.pose_sigma_m,
+            sigma_rad: self.description.pose_sigma_rad,
+            station: None,
+        })
+    }
+
+    #[tracing::instrument(level = "debug", skip_all, fields(%to))]
+    async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure> {
+        go_on(&watch.cancel, "the drive")?;
+        let goal = self.pose_of(to)?;
+        let departure = self.depart(&goal)?;
+        let trip = self.travel_along(&departure, watch).await;
+        self.disturb(departure.number);
+        let mut state = self.lock();
+        let misled = self.strikes(FaultKind::BadLocalisation, departure.number).is_some();
+        let wanted = if trip.failure.is_none() { Some(goal) } else { trip.at };
+        if let Some(pose) = wanted {
+            state.stop(&pose, &self.options.localisation, misled);
+        }
+        if let (Some(Failure::Blocked { .. }), Some((_, End::Obstacle(obstacle)))) =
+            (&trip.failure, &departure.end)
+        {
+            state.learn_obstacle(*obstacle, self.room_m(), self.description.speeds);
+        }
+        match trip.failure {
+            Some(failure) => Err(failure),
+            None => Ok(Driven {
+                distance_m: trip.distance_m,
+                duration_s: trip.elapsed_s,
+                map_from_base: state.estimate.isometry(),
+            }),
+        }
+    }
+
+    async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
+        go_on(&watch.cancel, "turning the head")?;
+        self.turn_head(point, watch)
+    }
+
+    #[tracing::instrument(level = "debug", skip_all)]
+    async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure> {
+        go_on(&watch.cancel, "taking a frame")?;
+        if watch.time_limit_s < FRAME_S {
+            return Err(timed_out("taking a frame", watch.time_limit_s));
+        }
+        self.expose()
+    }
+
+    #[tracing::instrument(level = "debug", skip_all)]
+    async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
+        go_on(&watch.cancel, "the push")?;
+        self.push(push, watch)
+    }
+}

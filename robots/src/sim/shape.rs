@@ -1,0 +1,461 @@
+//! The solids that stand in a scene, and where rays meet them. Frame of a shape: origin at the centre of its base, z up.
+
+use nalgebra::{Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// What an object is made of. Lengths in metres, outer sizes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Shape {
+    /// Open at the top, hollow, without a handle.
+    Cup(Cup),
+    /// A cup with a handle towards its x axis.
+    Mug(Mug),
+    /// Closed; may taper.
+    Cylinder(Cylinder),
+    /// A cylinder under a lid.
+    Canister(Canister),
+    /// A box along its axes.
+    Box(Cuboid),
+}
+
+/// An open, hollow, possibly tapered cylinder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cup {
+    /// At the rim.
+    pub diameter_m: f64,
+    /// At the base; as at the rim if left out.
+    pub base_diameter_m: Option<f64>,
+    /// From base to rim.
+    pub height_m: f64,
+    /// Thickness of wall and base.
+    #[serde(default = "default_wall_m")]
+    pub wall_m: f64,
+}
+
+/// A cup with a handle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mug {
+    /// At the rim.
+    pub diameter_m: f64,
+    /// At the base; as at the rim if left out.
+    pub base_diameter_m: Option<f64>,
+    /// From base to rim.
+    pub height_m: f64,
+    /// Thickness of wall and base.
+    #[serde(default = "default_wall_m")]
+    pub wall_m: f64,
+    /// How far the handle stands out from the wall: half a ring of this outer radius.
+    #[serde(default = "default_handle_m")]
+    pub handle_m: f64,
+    /// Thickness of the handle.
+    #[serde(default = "default_handle_thickness_m")]
+    pub handle_thickness_m: f64,
+}
+
+/// A closed, possibly tapered cylinder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cylinder {
+    /// At the base.
+    pub diameter_m: f64,
+    /// At the top; as at the base if left out.
+    pub top_diameter_m: Option<f64>,
+    /// From base to top.
+    pub height_m: f64,
+}
+
+/// A closed cylinder with a lid of another diameter on top.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Canister {
+    /// Of the body.
+    pub diameter_m: f64,
+    /// From base to the top of the lid.
+    pub height_m: f64,
+    /// Of the lid.
+    pub lid_diameter_m: f64,
+    /// Of the lid alone.
+    pub lid_height_m: f64,
+}
+
+/// A box.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cuboid {
+    /// Along x, y and z.
+    pub size_m: [f64; 3],
+}
+
+fn default_wall_m() -> f64 {
+    0.003
+}
+fn default_handle_m() -> f64 {
+    0.032
+}
+fn default_handle_thickness_m() -> f64 {
+    0.01
+}
+
+/// What two shapes need to keep apart on a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outline {
+    /// Around the origin.
+    Disc {
+        /// Metres.
+        radius_m: f64,
+    },
+    /// Along the axes, around the origin.
+    Rectangle {
+        /// Half the sides, metres.
+        half_m: [f64; 2],
+    },
+}
+
+impl Shape {
+    /// Height above its base, metres.
+    pub fn height_m(&self) -> f64 {
+        match self {
+            Shape::Cup(Cup { height_m, .. })
+            | Shape::Mug(Mug { height_m, .. })
+            | Shape::Cylinder(Cylinder { height_m, .. })
+            | Shape::Canister(Canister { height_m, .. }) => *height_m,
+            Shape::Box(Cuboid { size_m }) => size_m[2],
+        }
+    }
+
+    /// Corners of the box around it in its own frame.
+    pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
+        let (half_x, half_y, high_x) = match self {
+            Shape::Mug(m) => {
+                let r = 0.5 * m.diameter_m.max(m.base_diameter_m.unwrap_or(0.0));
+                (r, r, handle_centre_m(m) + m.handle_m)
+            }
+            Shape::Box(Cuboid { size_m }) => (0.5 * size_m[0], 0.5 * size_m[1], 0.5 * size_m[0]),
+            _ => {
+                let r = self.round_radius_m();
+                (r, r, r)
+            }
+        };
+        (Point3::new(-half_x, -half_y, 0.0), Point3::new(high_x.max(half_x), half_y, self.height_m()))
+    }
+
+    /// What it covers on the table, at any height.
+    pub fn outline(&self) -> Outline {
+        match self {
+            Shape::Box(Cuboid { size_m }) => {
+                Outline::Rectangle { half_m: [0.5 * size_m[0], 0.5 * size_m[1]] }
+            }
+            Shape::Mug(m) => Outline::Disc { radius_m: handle_centre_m(m) + m.handle_m },
+            _ => Outline::Disc { radius_m: self.round_radius_m() },
+        }
+    }
+
+    /// The same shape, larger.
+    pub fn scaled(&self, factor: f64) -> Shape {
+        let mut shape = self.clone();
+        match &mut shape {
+            Shape::Cup(c) => {
+                c.diameter_m *= factor;
+                c.base_diameter_m = c.base_diameter_m.map(|d| d * factor);
+                c.height_m *= factor;
+            }
+            Shape::Mug(m) => {
+                m.diameter_m *= factor;
+                m.base_diameter_m = m.base_diameter_m.map(|d| d * factor);
+                m.height_m *= factor;
+                m.handle_m *= factor;
+            }
+            Shape::Cylinder(c) => {
+                c.diameter_m *= factor;
+                c.top_diameter_m = c.top_diameter_m.map(|d| d * factor);
+                c.height_m *= factor;
+            }
+            Shape::Canister(c) => {
+                c.diameter_m *= factor;
+                c.height_m *= factor;
+                c.lid_diameter_m *= factor;
+                c.lid_height_m *= factor;
+            }
+            Shape::Box(b) => b.size_m.iter_mut().for_each(|s| *s *= factor),
+        }
+        shape
+    }
+
+    fn round_radius_m(&self) -> f64 {
+        let diameter = match self {
+            Shape::Cup(c) => c.diameter_m.max(c.base_diameter_m.unwrap_or(0.0)),
+            Shape::Mug(m) => m.diameter_m.max(m.base_diameter_m.unwrap_or(0.0)),
+            Shape::Cylinder(c) => c.diameter_m.max(c.top_diameter_m.unwrap_or(0.0)),
+            Shape::Canister(c) => c.diameter_m.max(c.lid_diameter_m),
+            Shape::Box(b) => b.size_m[0].hypot(b.size_m[1]),
+        };
+        0.5 * diameter
+    }
+
+    /// The surfaces that a ray can meet.
+    pub fn parts(&self) -> Vec<Part> {
+        match self {
+            Shape::Cup(c) => shell(c.diameter_m, c.base_diameter_m, c.height_m, c.wall_m),
+            Shape::Mug(m) => {
+                let mut parts = shell(m.diameter_m, m.base_diameter_m, m.height_m, m.wall_m);
+                let minor_m = 0.5 * m.handle_thickness_m;
+                parts.push(Part::Handle {
+                    centre: Point3::new(handle_centre_m(m), 0.0, 0.5 * m.height_m),
+                    major_m: m.handle_m - minor_m,
+                    minor_m,
+                });
+                parts
+            }
+            Shape::Cylinder(c) => {
+                let (base, top) = (0.5 * c.diameter_m, 0.5 * c.top_diameter_m.unwrap_or(c.diameter_m));
+                vec![
+                    Part::frustum(base, top, 0.0, c.height_m),
+                    Part::Disc { z_m: c.height_m, inner_m: 0.0, outer_m: top },
+                    Part::Disc { z_m: 0.0, inner_m: 0.0, outer_m: base },
+                ]
+            }
+            Shape::Canister(c) => {
+                let (body, lid) = (0.5 * c.diameter_m, 0.5 * c.lid_diameter_m);
+                let seam = c.height_m - c.lid_height_m;
+                vec![
+                    Part::frustum(body, body, 0.0, seam),
+                    Part::Disc { z_m: seam, inner_m: 0.0, outer_m: body.max(lid) },
+                    Part::frustum(lid, lid, seam, c.height_m),
+                    Part::Disc { z_m: c.height_m, inner_m: 0.0, outer_m: lid },
+                    Part::Disc { z_m: 0.0, inner_m: 0.0, outer_m: body },
+                ]
+            }
+            Shape::Box(Cuboid { size_m: [x, y, z] }) => vec![Part::Cuboid {
+                low: Point3::new(-0.5 * x, -0.5 * y, 0.0),
+                high: Point3::new(0.5 * x, 0.5 * y, *z),
+            }],
+        }
+    }
+}
+
+/// Distance of the handle's ring centre from the axis: on the wall at half height.
+fn handle_centre_m(m: &Mug) -> f64 {
+    0.25 * (m.diameter_m + m.base_diameter_m.unwrap_or(m.diameter_m))
+}
+
+fn shell(diameter_m: f64, base_diameter_m: Option<f64>, height_m: f64, wall_m: f64) -> Vec<Part> {
+    let (rim, base) = (0.5 * diameter_m, 0.5 * base_diameter_m.unwrap_or(diameter_m));
+    let slope = (rim - base) / height_m;
+    let inner_base = base + slope * wall_m - wall_m;
+    vec![
+        Part::frustum(base, rim, 0.0, height_m),
+        Part::frustum(inner_base, rim - wall_m, wall_m, height_m),
+        Part::Disc { z_m: height_m, inner_m: rim - wall_m, outer_m: rim },
+        Part::Disc { z_m: wall_m, inner_m: 0.0, outer_m: inner_base },
+        Part::Disc { z_m: 0.0, inner_m: 0.0, outer_m: base },
+    ]
+}
+
+/// A surface with a closed answer for rays (the handle: to a tenth of a millimetre).
+#[derive(Clone, Debug, PartialEq)]
+pub enum Part {
+    /// Side of a cone around z between two heights: radius = `axis_m` + `slope`·z.
+    Frustum {
+        /// Radius at z = 0.
+        axis_m: f64,
+        /// Change of radius a metre.
+        slope: f64,
+        /// Lower end.
+        low_m: f64,
+        /// Upper end.
+        high_m: f64,
+    },
+    /// A level ring.
+    Disc {
+        /// Height.
+        z_m: f64,
+        /// Radius of the hole.
+        inner_m: f64,
+        /// Outer radius.
+        outer_m: f64,
+    },
+    /// Half of a torus that stands upright in the x-z plane, on the side away from the axis.
+    Handle {
+        /// Of the ring.
+        centre: Point3<f64>,
+        /// From the ring's centre to the middle of the rod.
+        major_m: f64,
+        /// Half the thickness of the rod.
+        minor_m: f64,
+    },
+    /// A box.
+    Cuboid {
+        /// Least corner.
+        low: Point3<f64>,
+        /// Greatest corner.
+        high: Point3<f64>,
+    },
+}
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// In units of the ray's direction.
+    pub t: f64,
+    /// Outward or inward, unit length.
+    pub normal: Vector3<f64>,
+}
+
+/// Hits nearer than this are the ray's own start, in units of its direction.
+const NEAREST_T: f64 = 1e-6;
+const HANDLE_TOLERANCE_M: f64 = 1e-4;
+const HANDLE_STEPS: usize = 64;
+
+impl Part {
+    fn frustum(base_m: f64, top_m: f64, low_m: f64, high_m: f64) -> Part {
+        let slope = (top_m - base_m) / (high_m - low_m);
+        Part::Frustum { axis_m: base_m - slope * low_m, slope, low_m, high_m }
+    }
+
+    /// The first hit with 0 < t < `before`.
+    #[inline]
+    pub fn hit(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<Hit> {
+        match *self {
+            Part::Frustum { axis_m, slope, low_m, high_m } => {
+                frustum_hit(o, d, before, (axis_m, slope), (low_m, high_m))
+            }
+            Part::Disc { z_m, inner_m, outer_m } => {
+                let t = (z_m - o.z) / d.z;
+                if !(t > NEAREST_T && t < before) {
+                    return None;
+                }
+                let (x, y) = (o.x + t * d.x, o.y + t * d.y);
+                let square = x * x + y * y;
+                (square >= inner_m * inner_m && square <= outer_m * outer_m)
+                    .then_some(Hit { t, normal: Vector3::z() })
+            }
+            Part::Handle { centre, major_m, minor_m } => handle_hit(o, d, before, &centre, major_m, minor_m),
+            Part::Cuboid { low, high } => cuboid_hit(o, d, before, &low, &high),
+        }
+    }
+}
+
+#[inline]
+fn frustum_hit(
+    o: &Point3<f64>,
+    d: &Vector3<f64>,
+    before: f64,
+    (axis_m, slope): (f64, f64),
+    (low_m, high_m): (f64, f64),
+) -> Option<Hit> {
+    let radius = axis_m + slope * o.z;
+    let a = d.x * d.x + d.y * d.y - slope * slope * d.z * d.z;
+    let b = o.x * d.x + o.y * d.y - radius * slope * d.z;
+    let c = o.x * o.x + o.y * o.y - radius * radius;
+    let roots = if a.abs() > 1e-12 {
+        let square = b * b - a * c;
+        if square < 0.0 {
+            return None;
+        }
+        let root = square.sqrt();
+        let (first, second) = ((-b - root) / a, (-b + root) / a);
+        if first < second { [first, second] } else { [second, first] }
+    } else {
+        [-0.5 * c / b, f64::INFINITY]
+    };
+    for t in roots {
+        if !(t > NEAREST_T && t < before) {
+            continue;
+        }
+        let p = o + d * t;
+        let radius = axis_m + slope * p.z;
+        if p.z >= low_m && p.z <= high_m && radius >= 0.0 {
+            let normal = Vector3::new(p.x, p.y, -slope * radius).normalize();
+            return Some(Hit { t, normal });
+        }
+    }
+    None
+}
+
+#[inline]
+fn cuboid_hit(
+    o: &Point3<f64>,
+    d: &Vector3<f64>,
+    before: f64,
+    low: &Point3<f64>,
+    high: &Point3<f64>,
+) -> Option<Hit> {
+    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+    let (mut enter_axis, mut leave_axis) = (0, 0);
+    for axis in 0..3 {
+        if d[axis] == 0.0 {
+            if o[axis] < low[axis] || o[axis] > high[axis] {
+                return None;
+            }
+            continue;
+        }
+        let inverse = 1.0 / d[axis];
+        let (a, b) = ((low[axis] - o[axis]) * inverse, (high[axis] - o[axis]) * inverse);
+        let (near, far) = if a < b { (a, b) } else { (b, a) };
+        if near > enter {
+            (enter, enter_axis) = (near, axis);
+        }
+        if far < leave {
+            (leave, leave_axis) = (far, axis);
+        }
+    }
+    if enter > leave {
+        return None;
+    }
+    let (t, axis) = if enter > NEAREST_T { (enter, enter_axis) } else { (leave, leave_axis) };
+    if !(t > NEAREST_T && t < before) {
+        return None;
+    }
+    let mut normal = Vector3::zeros();
+    normal[axis] = 1.0;
+    Some(Hit { t, normal })
+}
+
+/// Sphere tracing: the distance to half a torus is known exactly, so no step can pass through it.
+fn handle_hit(
+    o: &Point3<f64>,
+    d: &Vector3<f64>,
+    before: f64,
+    centre: &Point3<f64>,
+    major_m: f64,
+    minor_m: f64,
+) -> Option<Hit> {
+    let from = o - centre;
+    let (square, along) = (d.norm_squared(), from.dot(d));
+    let reach = major_m + minor_m;
+    let spread = along * along - square * (from.norm_squared() - reach * reach);
+    if spread < 0.0 {
+        return None;
+    }
+    let (enter, leave) = ((-along - spread.sqrt()) / square, (-along + spread.sqrt()) / square);
+    let length = square.sqrt();
+    let mut t = enter.max(NEAREST_T);
+    for _ in 0..HANDLE_STEPS {
+        if t > leave.min(before) {
+            return None;
+        }
+        let p = from + d * t;
+        let ring = Vector3::new(p.x, 0.0, p.z);
+        let nearest = if p.x >= 0.0 {
+            match ring.norm() {
+                n if n > 1e-12 => ring * (major_m / n),
+                _ => Vector3::new(major_m, 0.0, 0.0),
+            }
+        } else {
+            Vector3::new(0.0, 0.0, major_m.copysign(p.z))
+        };
+        let off = p - nearest;
+        let gap = off.norm() - minor_m;
+        if gap < HANDLE_TOLERANCE_M {
+            // The ends of the rod inside the wall are no surface.
+            let at = o + d * t;
+            let outside = at.x.hypot(at.y) >= centre.x;
+            return outside.then(|| Hit { t, normal: off.normalize() });
+        }
+        t += gap / length;
+    }
+    None
+}

@@ -1,1 +1,22 @@
 //! What was seen and what is believed.
+
+mod clouds;
+mod document;
+mod error;
+mod flusher;
+mod foxglove;
+mod record;
+pub mod stores;
+pub mod transforms;
+
+pub use clouds::Sensing;
+pub use descry_perception as perception;
+pub use document::{
+    Blob, BlobInfo, Bounds, Document, Draft, Form, Meta, Near, Order, Query, RecordId, Sighting,
+};
+pub use error::Error;
+pub use foxglove::LogLevel;
+pub use nalgebra;
+pub use record::{Image, Options, Record, kind};
+pub use stores::local::{Durability, LocalOptions, LocalStore, Recovery};
+pub use stores::{Count, Fault, Report, Retention, Stats, Store};

@@ -1,0 +1,177 @@
+//! Clouds as bytes and back, bit for bit.
+
+use crate::document::{Blob, BlobInfo, Form};
+use descry_perception::nalgebra::{Point3, Vector3};
+use descry_perception::{Cloud, Grid, Intrinsics};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::borrow::Cow;
+
+/// The name of a cloud's blob.
+pub(crate) const CLOUD: &str = "cloud";
+
+/// The sensor behind a cloud, and how well its pose is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sensing {
+    /// The camera, if known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intrinsics: Option<Intrinsics>,
+    /// Standard deviation of its position along each axis, metres.
+    #[serde(default)]
+    pub pose_sigma_m: f64,
+    /// Standard deviation of its orientation about each axis, radians.
+    #[serde(default)]
+    pub pose_sigma_rad: f64,
+}
+
+/// How the points of a cloud are packed.
+#[derive(Serialize, Deserialize)]
+struct Layout {
+    points: usize,
+    stride: usize,
+    fields: Vec<LayoutField>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    grid: Option<Grid>,
+    #[serde(default)]
+    sensing: Sensing,
+}
+
+#[derive(Serialize, Deserialize, PartialEq)]
+struct LayoutField {
+    name: String,
+    offset: usize,
+    #[serde(rename = "type")]
+    kind: String,
+}
+
+/// Names, type and bytes a value of the parts of a point, in their order; colours take four bytes, the last always 255.
+const POSITION: (&[&str], &str, usize) = (&["x", "y", "z"], "f32", 4);
+const COLOUR: (&[&str], &str, usize) = (&["red", "green", "blue", "alpha"], "u8", 1);
+const NORMAL: (&[&str], &str, usize) = (&["normal_x", "normal_y", "normal_z"], "f32", 4);
+const LABEL: (&[&str], &str, usize) = (&["label"], "u32", 4);
+
+fn layout(cloud: &Cloud, sensing: &Sensing) -> Layout {
+    let parts = [
+        (true, POSITION),
+        (cloud.colours.is_some(), COLOUR),
+        (cloud.normals.is_some(), NORMAL),
+        (cloud.labels.is_some(), LABEL),
+    ];
+    let mut fields = Vec::new();
+    let mut stride = 0;
+    for (_, (names, kind, bytes)) in parts.into_iter().filter(|(there, _)| *there) {
+        for name in names {
+            fields.push(LayoutField { name: (*name).into(), offset: stride, kind: kind.into() });
+            stride += bytes;
+        }
+    }
+    Layout { points: cloud.len(), stride, fields, grid: cloud.grid, sensing: *sensing }
+}
+
+/// A cloud as a blob; one of bare points is not copied.
+pub(crate) fn encode<'a>(cloud: &'a Cloud, sensing: &Sensing) -> Blob<'a> {
+    let layout = layout(cloud, sensing);
+    let bare = layout.fields.len() == 3 && cfg!(target_endian = "little");
+    let data = if bare {
+        Cow::Borrowed(bytemuck::cast_slice(&cloud.points))
+    } else {
+        Cow::Owned(pack(cloud, layout.stride))
+    };
+    Blob { name: CLOUD.into(), form: Form::PointCloud, layout: json!(layout), data }
+}
+
+fn pack(cloud: &Cloud, stride: usize) -> Vec<u8> {
+    let mut out = Vec::with_capacity(cloud.len() * stride);
+    for (i, p) in cloud.points.iter().enumerate() {
+        p.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
+        if let Some([r, g, b]) = cloud.colours.as_ref().map(|c| c[i]) {
+            out.extend_from_slice(&[r, g, b, 255]);
+        }
+        if let Some(n) = cloud.normals.as_ref().map(|n| n[i]) {
+            n.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
+        }
+        if let Some(label) = cloud.labels.as_ref().map(|l| l[i]) {
+            out.extend_from_slice(&label.to_le_bytes());
+        }
+    }
+    out
+}
+
+/// A cloud from its blob.
+///
+/// # Errors
+/// What of the layout does not fit, in words.
+pub(crate) fn decode(info: &BlobInfo, data: &[u8]) -> Result<(Cloud, Sensing), String> {
+    let layout: Layout =
+        Layout::deserialize(&info.layout).map_err(|e| format!("its layout cannot be read: {e}"))?;
+    if layout.stride == 0 || layout.points.checked_mul(layout.stride) != Some(data.len()) {
+        return Err(format!(
+            "{} points of {} bytes do not make {} bytes",
+            layout.points,
+            layout.stride,
+            data.len()
+        ));
+    }
+    let at = |(names, kind, bytes): (&[&str], &str, usize)| {
+        let first = layout.fields.iter().find(|f| f.name == names[0] && f.kind == kind)?.offset;
+        let whole = names.iter().enumerate().all(|(i, name)| {
+            layout.fields.iter().any(|f| f.name == *name && f.kind == kind && f.offset == first + i * bytes)
+        });
+        (whole && first + names.len() * bytes <= layout.stride).then_some(first)
+    };
+    let position = at(POSITION).ok_or("it has no x, y, z of f32 side by side")?;
+    let rows = || data.chunks_exact(layout.stride);
+    let three = |row: &[u8], from: usize| [0, 1, 2].map(|i| f32::from_bits(word(row, from + 4 * i)));
+    let cloud = Cloud {
+        points: rows().map(|row| Point3::from(three(row, position))).collect(),
+        grid: layout.grid,
+        colours: at(COLOUR).map(|from| rows().map(|row| [row[from], row[from + 1], row[from + 2]]).collect()),
+        normals: at(NORMAL).map(|from| rows().map(|row| Vector3::from(three(row, from))).collect()),
+        labels: at(LABEL).map(|from| rows().map(|row| word(row, from)).collect()),
+    };
+    cloud.check().map_err(|e| e.to_string())?;
+    Ok((cloud, layout.sensing))
+}
+
+fn word(row: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes([row[at], row[at + 1], row[at + 2], row[at + 3]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cloud_comes_back_bit_for_bit() {
+        let points = vec![
+            Point3::new(1.0, -0.0, f32::MIN_POSITIVE / 2.0),
+            Point3::new(f32::from_bits(0x7fc0_1234), f32::INFINITY, f32::NAN),
+        ];
+        let bare = Cloud { points, grid: Some(Grid { width: 2, height: 1 }), ..Cloud::default() };
+        let colours = Some(vec![[1, 2, 3], [255, 0, 7]]);
+        let normals = Some(vec![Vector3::new(0.0, 0.6, 0.8), Vector3::new(f32::NAN, 0.0, 1.0)]);
+        let labels = Some(vec![7, u32::MAX]);
+        let cases = [
+            bare.clone(),
+            Cloud::default(),
+            Cloud { colours: colours.clone(), ..bare.clone() },
+            Cloud { labels: labels.clone(), ..bare.clone() },
+            Cloud { colours, normals, labels, ..bare },
+        ];
+        let bits = |c: &Cloud| pack(c, 32);
+        let camera = Intrinsics { width: 2, height: 1, fx: 0.1 + 0.2, fy: 1.0, cx: 0.5, cy: 0.0 };
+        let sensing = Sensing { intrinsics: Some(camera), pose_sigma_m: 0.03, pose_sigma_rad: 1.0 / 3.0 };
+        for cloud in cases {
+            let blob = encode(&cloud, &sensing);
+            let text = blob.layout.to_string();
+            let layout = serde_json::from_str(&text).unwrap();
+            let info = BlobInfo { name: blob.name, form: blob.form, bytes: blob.data.len() as u64, layout };
+            let (back, sensed) = decode(&info, &blob.data).unwrap();
+            assert_eq!((bits(&back), back.grid, sensed), (bits(&cloud), cloud.grid, sensing));
+            assert_eq!(back.normals.is_some(), cloud.normals.is_some());
+            if !cloud.is_empty() {
+                assert!(decode(&info, &blob.data[1..]).is_err());
+            }
+        }
+    }
+}

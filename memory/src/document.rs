@@ -1,0 +1,286 @@
+//! What a record consists of: a document of any shape, and blobs beside it.
+
+use crate::error::Error;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::borrow::Cow;
+
+/// The number of a record, unique in its store and never used again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct RecordId(pub u64);
+
+impl std::fmt::Display for RecordId {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}", self.0)
+    }
+}
+
+/// An axis-aligned box, metres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bounds {
+    /// Least corner.
+    pub min_m: [f64; 3],
+    /// Greatest corner.
+    pub max_m: [f64; 3],
+}
+
+impl Bounds {
+    /// Distance from a point to the box, metres; 0 inside.
+    pub fn distance_m(&self, p: [f64; 3]) -> f64 {
+        (0..3).map(|i| (self.min_m[i] - p[i]).max(p[i] - self.max_m[i]).max(0.0).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+/// An object that a record speaks of, and how sure it is (0 to 1).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sighting {
+    /// The object's name.
+    pub object: String,
+    /// Probability or score, 0 to 1.
+    pub confidence: f64,
+}
+
+/// What can be said of any record beside its content: the handles by which it is found again.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Meta {
+    /// Where the sensor stood, in the world frame, metres.
+    pub seen_from_m: Option<[f64; 3]>,
+    /// The part of the world that it shows or speaks of, metres.
+    pub covers_m: Option<Bounds>,
+    /// Objects that it speaks of.
+    pub objects: Vec<Sighting>,
+    /// Anything else, of any shape.
+    pub body: Value,
+}
+
+/// The form of a blob; decides the schema under which viewers read it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Form {
+    /// Points, packed as [`BlobInfo::layout`] says (`foxglove.PointCloud`).
+    PointCloud,
+    /// A PNG or JPEG (`foxglove.CompressedImage`).
+    CompressedImage,
+    /// Plain pixels (`foxglove.RawImage`).
+    RawImage,
+    /// Transforms of one child frame (`foxglove.FrameTransforms`).
+    FrameTransforms,
+    /// One line of the log (`foxglove.Log`).
+    Log,
+    /// Bytes without a form that viewers know (`descry.Blob`).
+    Bytes,
+}
+
+/// What is known of a blob without its bytes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BlobInfo {
+    /// Its name within the record.
+    pub name: String,
+    /// Its form.
+    pub form: Form,
+    /// Its length, bytes.
+    pub bytes: u64,
+    /// How to read it: fields and stride of a cloud, size and encoding of an image.
+    #[serde(default, skip_serializing_if = "Value::is_null")]
+    pub layout: Value,
+}
+
+/// A record as it is kept, without the bytes of its blobs.
+///
+/// Fields that a newer format adds are ignored by older readers, fields that an older format lacked take their default.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Document {
+    /// Its number.
+    pub id: RecordId,
+    /// What it is: `cloud`, `image`, `transforms`, `log`, or any word.
+    pub kind: String,
+    /// When, nanoseconds in the clock of the recording.
+    pub stamp_ns: i64,
+    /// When it ends, for what lasts, nanoseconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub end_ns: Option<i64>,
+    /// The coordinate frame that it is given in; for transforms the child frame.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub frame: String,
+    /// Who recorded it, where several write into one store.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub robot: String,
+    /// Where the sensor stood, in the world frame, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seen_from_m: Option<[f64; 3]>,
+    /// The part of the world that it shows or speaks of, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covers_m: Option<Bounds>,
+    /// Objects that it speaks of.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub objects: Vec<Sighting>,
+    /// Its content.
+    #[serde(default, skip_serializing_if = "Value::is_null")]
+    pub body: Value,
+    /// Its blobs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub blobs: Vec<BlobInfo>,
+}
+
+/// A blob to be recorded.
+#[derive(Clone, Debug)]
+pub struct Blob<'a> {
+    /// Its name within the record.
+    pub name: String,
+    /// Its form.
+    pub form: Form,
+    /// See [`BlobInfo::layout`].
+    pub layout: Value,
+    /// Its bytes.
+    pub data: Cow<'a, [u8]>,
+}
+
+/// A record to be made.
+#[derive(Clone, Debug)]
+pub struct Draft<'a> {
+    /// What it is.
+    pub kind: String,
+    /// When, nanoseconds; not negative.
+    pub stamp_ns: i64,
+    /// When it ends, for what lasts, nanoseconds.
+    pub end_ns: Option<i64>,
+    /// The coordinate frame, or "".
+    pub frame: String,
+    /// By what it is found again, and its content.
+    pub meta: Meta,
+    /// Blobs, each with a name of its own.
+    pub blobs: Vec<Blob<'a>>,
+}
+
+impl Draft<'_> {
+    /// A record of that kind and time with nothing in it.
+    pub fn new(kind: &str, stamp_ns: i64) -> Self {
+        Draft {
+            kind: kind.into(),
+            stamp_ns,
+            end_ns: None,
+            frame: String::new(),
+            meta: Meta::default(),
+            blobs: Vec::new(),
+        }
+    }
+
+    /// The document under which it will be kept.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if a part of it could not be found or read again.
+    pub(crate) fn document(&self, id: RecordId, robot: &str) -> Result<Document, Error> {
+        self.check()?;
+        let blobs = self.blobs.iter().map(|b| BlobInfo {
+            name: b.name.clone(),
+            form: b.form,
+            bytes: b.data.len() as u64,
+            layout: b.layout.clone(),
+        });
+        Ok(Document {
+            id,
+            kind: self.kind.clone(),
+            stamp_ns: self.stamp_ns,
+            end_ns: self.end_ns,
+            frame: self.frame.clone(),
+            robot: robot.into(),
+            seen_from_m: self.meta.seen_from_m,
+            covers_m: self.meta.covers_m,
+            objects: self.meta.objects.clone(),
+            body: self.meta.body.clone(),
+            blobs: blobs.collect(),
+        })
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let fail = |what: String, mend: &str| Err(Error::Input { what, mend: mend.into() });
+        if self.kind.is_empty() || self.kind.contains(char::is_control) {
+            return fail(format!("the kind {:?} is no word", self.kind), "name what is recorded, as `cloud`");
+        }
+        if self.stamp_ns < 0 {
+            return fail(
+                format!("the stamp {} ns is negative", self.stamp_ns),
+                "count from the start of the recording",
+            );
+        }
+        if self.end_ns.is_some_and(|e| e < self.stamp_ns) {
+            return fail(
+                format!("it ends at {:?} ns, before its start {}", self.end_ns, self.stamp_ns),
+                "swap them",
+            );
+        }
+        let places =
+            self.meta.seen_from_m.iter().chain(self.meta.covers_m.iter().flat_map(|b| [&b.min_m, &b.max_m]));
+        if places.flatten().any(|v| !v.is_finite()) {
+            return fail("a place is not finite".into(), "leave out places that are not known");
+        }
+        if let Some(s) = self.meta.objects.iter().find(|s| !(0.0..=1.0).contains(&s.confidence)) {
+            return fail(
+                format!("the confidence {} of {} is not within 0 to 1", s.confidence, s.object),
+                "give a probability",
+            );
+        }
+        for (i, blob) in self.blobs.iter().enumerate() {
+            if self.blobs[..i].iter().any(|b| b.name == blob.name) {
+                return fail(format!("two blobs are called {:?}", blob.name), "give each a name of its own");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A ball in the world, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Near {
+    /// Its centre.
+    pub place_m: [f64; 3],
+    /// Its radius.
+    pub radius_m: f64,
+}
+
+/// The order of what is found; records of one stamp stand in the order of their numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// Oldest first.
+    #[default]
+    Oldest,
+    /// Newest first.
+    Newest,
+}
+
+/// What is looked for; every condition that is given must hold.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Query {
+    /// Of this kind.
+    pub kind: Option<String>,
+    /// In this frame.
+    pub frame: Option<String>,
+    /// By this robot.
+    pub robot: Option<String>,
+    /// At or after this stamp, nanoseconds; what lasts counts until its end.
+    pub from_ns: Option<i64>,
+    /// At or before this stamp, nanoseconds.
+    pub to_ns: Option<i64>,
+    /// Seen from near here.
+    pub seen_from: Option<Near>,
+    /// Showing this spot.
+    pub covers: Option<Near>,
+    /// Speaking of this object…
+    pub object: Option<String>,
+    /// …or of any, with at least this confidence.
+    pub min_confidence: Option<f64>,
+    /// Which come first.
+    pub order: Order,
+    /// At most so many.
+    pub limit: Option<usize>,
+    /// What comes behind this stamp and number in that order: the way to go through more than fits into memory.
+    pub after: Option<(i64, RecordId)>,
+}
+
+impl Query {
+    /// All of one kind.
+    pub fn of_kind(kind: &str) -> Self {
+        Query { kind: Some(kind.into()), ..Query::default() }
+    }
+}

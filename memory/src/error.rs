@@ -1,0 +1,156 @@
+//! What can go wrong with a record, said with the place and a mend.
+
+use std::path::{Path, PathBuf};
+
+/// A record that cannot be read or written as asked.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The disk has no room. What was acknowledged is safe, the record stays readable and goes on once there is room.
+    #[error(
+        "no room left on the disk of {place}: free some, or bound the record by age, bytes or free space; nothing that was acknowledged is lost"
+    )]
+    Full {
+        /// The file that was being written.
+        place: PathBuf,
+    },
+    /// The system refused a file.
+    #[error("{what} {place}: {because}")]
+    File {
+        /// What was being done, as "cannot read".
+        what: &'static str,
+        /// The file or folder.
+        place: PathBuf,
+        /// The system's reason.
+        because: std::io::Error,
+    },
+    /// The folder holds no record.
+    #[error("{place} holds no record (no `{expected}` in it): name the folder of a run or of its record")]
+    NoRecord {
+        /// The folder.
+        place: PathBuf,
+        /// What makes a folder a record.
+        expected: &'static str,
+    },
+    /// A record exists where a new one was to be made.
+    #[error("{place} holds a record already: open it, or name another folder")]
+    Exists {
+        /// The folder.
+        place: PathBuf,
+    },
+    /// Another process writes this record.
+    #[error(
+        "{place} is being written by another process: read it with `open_shared`, or stop the other first"
+    )]
+    InUse {
+        /// The folder.
+        place: PathBuf,
+    },
+    /// What is on the disk is not what was written.
+    #[error("{place}, byte {at}: {what}; `descry memory verify` lists what is whole")]
+    Damaged {
+        /// The file.
+        place: PathBuf,
+        /// Offset in it.
+        at: u64,
+        /// What was found and expected.
+        what: String,
+    },
+    /// The index refused.
+    #[error("the index of {place}: {because}")]
+    Index {
+        /// The folder of the record.
+        place: PathBuf,
+        /// SQLite's reason.
+        because: rusqlite::Error,
+    },
+    /// A remote store refused.
+    #[error("the store at {place}: {because}")]
+    Remote {
+        /// Its address.
+        place: String,
+        /// Its reason.
+        because: String,
+    },
+    /// What was given cannot be recorded.
+    #[error("{what}: {mend}")]
+    Input {
+        /// What is wrong with it.
+        what: String,
+        /// What would do.
+        mend: String,
+    },
+    /// No such record, or one that was pruned.
+    #[error("there is no record {id}: it was pruned or never written; pin what must stay")]
+    Missing {
+        /// The number asked for.
+        id: u64,
+    },
+    /// A record without such a blob.
+    #[error("record {id} ({kind}) has no blob `{name}`; it has: {has}")]
+    NoBlob {
+        /// The record.
+        id: u64,
+        /// Its kind.
+        kind: String,
+        /// The blob asked for.
+        name: String,
+        /// Its blobs.
+        has: String,
+    },
+    /// Nothing near enough in time.
+    #[error("no {what} within {:.3} s of {stamp_ns} ns{}", *tolerance_ns as f64 * 1e-9, nearest_text(*nearest_ns, *stamp_ns))]
+    NotNear {
+        /// What was looked for.
+        what: String,
+        /// The time asked for, nanoseconds.
+        stamp_ns: i64,
+        /// How far off would have done, nanoseconds.
+        tolerance_ns: i64,
+        /// The stamp of the nearest there is, nanoseconds.
+        nearest_ns: Option<i64>,
+    },
+    /// The transform tree has no answer for that time.
+    #[error(transparent)]
+    Transform(#[from] crate::transforms::TransformError),
+    /// A write in the background failed earlier; what it held was not acknowledged.
+    #[error("an earlier write of transforms failed: {because}")]
+    Earlier {
+        /// That failure.
+        because: String,
+    },
+}
+
+fn nearest_text(nearest_ns: Option<i64>, stamp_ns: i64) -> String {
+    match nearest_ns {
+        Some(n) => format!(
+            "; the nearest is {:.3} s {}",
+            (n as f64 - stamp_ns as f64).abs() * 1e-9,
+            if n < stamp_ns { "earlier" } else { "later" }
+        ),
+        None => "; there is none at any time".into(),
+    }
+}
+
+impl Error {
+    /// A file error, or [`Error::Full`] where that is the reason.
+    pub(crate) fn file(what: &'static str, place: &Path, because: std::io::Error) -> Self {
+        use std::io::ErrorKind;
+        match because.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Error::Full { place: place.to_owned() },
+            _ => Error::File { what, place: place.to_owned(), because },
+        }
+    }
+
+    /// An index error, or [`Error::Full`] where that is the reason.
+    pub(crate) fn index(place: &Path, because: rusqlite::Error) -> Self {
+        match because.sqlite_error_code() {
+            Some(rusqlite::ErrorCode::DiskFull) => Error::Full { place: place.to_owned() },
+            _ => Error::Index { place: place.to_owned(), because },
+        }
+    }
+
+    /// Whether this is a lack of room on the disk.
+    pub fn is_full(&self) -> bool {
+        matches!(self, Error::Full { .. })
+    }
+}

@@ -1,0 +1,535 @@
+//! What was seen: the handle by which the rest of descry records and recalls.
+
+use crate::clouds::{self, CLOUD, Sensing};
+use crate::document::{Blob, Document, Draft, Form, Meta, Query, RecordId};
+use crate::error::Error;
+use crate::flusher::{Flusher, Group};
+use crate::foxglove::{self, LogLevel};
+use crate::stores::local::{Durability, LocalOptions, LocalStore, Recovery};
+use crate::stores::{Report, Retention, Stats, Store};
+use crate::transforms::{self, Reach, Sample, Transforms};
+use descry_perception::{Cloud, View};
+use nalgebra::Isometry3;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The kinds that have a form of their own; any other word is a kind, too.
+pub mod kind {
+    /// A point cloud.
+    pub const CLOUD: &str = "cloud";
+    /// An image.
+    pub const IMAGE: &str = "image";
+    /// Transforms of one child frame over some time.
+    pub const TRANSFORMS: &str = "transforms";
+    /// A transform that holds always.
+    pub const STATIC_TRANSFORM: &str = "static_transform";
+    /// A line of the log.
+    pub const LOG: &str = "log";
+}
+
+/// How a record is kept and read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// When a record counts as acknowledged.
+    pub durability: Durability,
+    /// What goes when it is too much.
+    pub retention: Retention,
+    /// Length of a segment, bytes.
+    pub segment_bytes: u64,
+    /// Who records, where several write into one store.
+    pub robot: String,
+    /// Transforms of a child frame are grouped over so long, nanoseconds (paper 004's recorder: 2 s).
+    pub group_ns: i64,
+    /// How far transforms are carried from where they were measured.
+    pub reach: Reach,
+    /// How far a cloud may be off the time asked for to be a view of it, nanoseconds.
+    pub view_tolerance_ns: i64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        let local = LocalOptions::default();
+        Options {
+            durability: local.durability,
+            retention: local.retention,
+            segment_bytes: local.segment_bytes,
+            robot: String::new(),
+            group_ns: 2_000_000_000,
+            reach: Reach::default(),
+            view_tolerance_ns: 500_000_000,
+        }
+    }
+}
+
+impl Options {
+    fn local(&self) -> LocalOptions {
+        LocalOptions {
+            durability: self.durability,
+            retention: self.retention,
+            segment_bytes: self.segment_bytes,
+        }
+    }
+}
+
+/// An image to be recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Image<'a> {
+    /// A PNG or JPEG.
+    Compressed {
+        /// `png` or `jpeg`.
+        format: &'a str,
+        /// The file's bytes.
+        data: &'a [u8],
+    },
+    /// Plain pixels, row by row.
+    Raw {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// As viewers name it: `rgb8`, `mono8`, `16UC1` (depth in millimetres), `32FC1` (depth in metres).
+        encoding: &'a str,
+        /// The pixels.
+        data: &'a [u8],
+    },
+}
+
+/// A record: everything that was sensed, done and believed, in order of time.
+///
+/// What `put_cloud`, `put_image`, `put_document` and `put_log` return is acknowledged: it is on the disk as far as
+/// [`Options::durability`] promises. Transforms come thousands a second and are grouped; they are acknowledged by the
+/// next [`Record::sync`], or when their group is written in the background.
+pub struct Record {
+    store: Arc<dyn Store>,
+    recovery: Recovery,
+    options: Options,
+    groups: Mutex<Groups>,
+    flusher: Flusher,
+}
+
+/// Transforms on their way into a document, by child and parent.
+#[derive(Default)]
+struct Groups {
+    open: BTreeMap<(String, String), Vec<Sample>>,
+    /// Which span of [`Options::group_ns`] the open groups belong to.
+    span: i64,
+}
+
+impl Record {
+    /// Makes a record in a folder.
+    ///
+    /// # Errors
+    /// [`Error::Exists`], or what the system refuses.
+    pub fn create(dir: &Path, options: Options) -> Result<Self, Error> {
+        Ok(Self::local(LocalStore::create(dir, &options.robot, options.local())?, options))
+    }
+
+    /// Opens a record to go on with it; what a crash has left is mended.
+    ///
+    /// # Errors
+    /// [`Error::NoRecord`], [`Error::InUse`], or what the system refuses.
+    pub fn open(dir: &Path, options: Options) -> Result<Self, Error> {
+        Ok(Self::local(LocalStore::open(dir, &options.robot, options.local())?, options))
+    }
+
+    /// Opens a record to read it, beside a process that may be writing.
+    ///
+    /// # Errors
+    /// [`Error::NoRecord`], or what the system refuses.
+    pub fn open_shared(dir: &Path) -> Result<Self, Error> {
+        Ok(Self::local(LocalStore::open_shared(dir)?, Options::default()))
+    }
+
+    fn local(store: LocalStore, options: Options) -> Self {
+        let recovery = store.recovery().clone();
+        let mut record = Self::on(Arc::new(store), options);
+        record.recovery = recovery;
+        record
+    }
+
+    /// A record on any store.
+    pub fn on(store: Arc<dyn Store>, options: Options) -> Self {
+        Record {
+            flusher: Flusher::start(store.clone()),
+            store,
+            recovery: Recovery::default(),
+            options,
+            groups: Mutex::default(),
+        }
+    }
+
+    /// What opening found and mended.
+    pub fn recovery(&self) -> &Recovery {
+        &self.recovery
+    }
+
+    /// The store beneath.
+    pub fn store(&self) -> &dyn Store {
+        &*self.store
+    }
+
+    /// Records a cloud, in `frame` (a camera's optical frame, for [`Record::view_at`]).
+    ///
+    /// # Errors
+    /// [`Error::Input`] if its parts do not fit together; [`Error::Full`].
+    pub fn put_cloud(
+        &self,
+        stamp_ns: i64,
+        frame: &str,
+        cloud: &Cloud,
+        sensing: &Sensing,
+        meta: Meta,
+    ) -> Result<RecordId, Error> {
+        cloud.check().map_err(|e| Error::Input { what: e.to_string(), mend: "mend the cloud".into() })?;
+        let blobs = vec![clouds::encode(cloud, sensing)];
+        self.put(Draft { frame: frame.into(), meta, blobs, ..Draft::new(kind::CLOUD, stamp_ns) })
+    }
+
+    /// Records an image, in `frame`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if its pixels do not fit its size; [`Error::Full`].
+    pub fn put_image(&self, stamp_ns: i64, frame: &str, image: Image, meta: Meta) -> Result<RecordId, Error> {
+        let (form, layout, data) = match image {
+            Image::Compressed { format, data } => (Form::CompressedImage, json!({ "format": format }), data),
+            Image::Raw { width, height, encoding, data } => {
+                let step = data.len() / height.max(1) as usize;
+                if width == 0
+                    || step == 0
+                    || step * height as usize != data.len()
+                    || !step.is_multiple_of(width as usize)
+                {
+                    return Err(Error::Input {
+                        what: format!("{} bytes are no image of {width} x {height} pixels", data.len()),
+                        mend: "give every row the same number of bytes, and each pixel as well".into(),
+                    });
+                }
+                (
+                    Form::RawImage,
+                    json!({ "width": width, "height": height, "encoding": encoding, "step": step }),
+                    data,
+                )
+            }
+        };
+        let blobs = vec![Blob { name: "image".into(), form, layout, data: data.into() }];
+        self.put(Draft { frame: frame.into(), meta, blobs, ..Draft::new(kind::IMAGE, stamp_ns) })
+    }
+
+    /// Records where a frame stood. It is there for lookups at once, on the disk when its group is full or at [`Record::sync`].
+    ///
+    /// # Errors
+    /// [`transforms::TransformError::Invalid`], or the failure of an earlier group to reach the disk; then this one was not taken.
+    pub fn put_transform(
+        &self,
+        stamp_ns: i64,
+        parent: &str,
+        child: &str,
+        parent_from_child: &Isometry3<f64>,
+    ) -> Result<(), Error> {
+        transforms::check(stamp_ns, parent, child, parent_from_child)?;
+        if stamp_ns < 0 {
+            return Err(Error::Input {
+                what: format!("the stamp {stamp_ns} ns is negative"),
+                mend: "count from the start of the recording".into(),
+            });
+        }
+        if self.flusher.has_failed() {
+            self.flusher.drain()?;
+        }
+        let span = stamp_ns / self.options.group_ns.max(1);
+        let mut groups = self.groups.lock().unwrap_or_else(PoisonError::into_inner);
+        // Stamps of several sources interleave; only a later span closes the open one.
+        if span > groups.span {
+            self.flusher.send(groups.take());
+            groups.span = span;
+        }
+        let sample = Sample { stamp_ns, parent_from_child: *parent_from_child };
+        groups.open.entry((child.into(), parent.into())).or_default().push(sample);
+        Ok(())
+    }
+
+    /// Records a transform that holds at all times for which nothing was measured.
+    ///
+    /// # Errors
+    /// [`transforms::TransformError::Invalid`], [`Error::Full`].
+    pub fn put_static_transform(
+        &self,
+        parent: &str,
+        child: &str,
+        parent_from_child: &Isometry3<f64>,
+    ) -> Result<RecordId, Error> {
+        transforms::check(0, parent, child, parent_from_child)?;
+        let sample = Sample { stamp_ns: 0, parent_from_child: *parent_from_child };
+        let group = Group { parent: parent.into(), child: child.into(), samples: vec![sample] };
+        self.put(group.draft(kind::STATIC_TRANSFORM))
+    }
+
+    /// Records a document of any kind, with blobs beside it.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for what could not be found again; [`Error::Full`].
+    pub fn put_document(
+        &self,
+        kind: &str,
+        stamp_ns: i64,
+        body: Value,
+        blobs: Vec<Blob>,
+    ) -> Result<RecordId, Error> {
+        self.put(Draft { meta: Meta { body, ..Meta::default() }, blobs, ..Draft::new(kind, stamp_ns) })
+    }
+
+    /// Records a line of the log; `name` says whose.
+    ///
+    /// # Errors
+    /// [`Error::Full`].
+    pub fn put_log(
+        &self,
+        stamp_ns: i64,
+        level: LogLevel,
+        name: &str,
+        message: &str,
+    ) -> Result<RecordId, Error> {
+        let data = foxglove::log(stamp_ns, level, name, message);
+        let meta = Meta {
+            body: json!({ "level": format!("{level:?}").to_lowercase(), "name": name, "message": message }),
+            ..Meta::default()
+        };
+        let blobs =
+            vec![Blob { name: "log".into(), form: Form::Log, layout: Value::Null, data: data.into() }];
+        self.put(Draft { meta, blobs, ..Draft::new(kind::LOG, stamp_ns) })
+    }
+
+    /// Records a draft as it is.
+    ///
+    /// # Errors
+    /// As [`Store::append`].
+    pub fn put(&self, draft: Draft) -> Result<RecordId, Error> {
+        let ids = self.store.append(std::slice::from_ref(&draft))?;
+        ids.first().copied().ok_or(Error::Missing { id: 0 })
+    }
+
+    /// Records several drafts, all or none.
+    ///
+    /// # Errors
+    /// As [`Store::append`].
+    pub fn put_all(&self, drafts: &[Draft]) -> Result<Vec<RecordId>, Error> {
+        self.store.append(drafts)
+    }
+
+    /// Brings everything to the disk, open groups of transforms included.
+    ///
+    /// # Errors
+    /// If it cannot be brought there; it is kept and tried again.
+    pub fn sync(&self) -> Result<(), Error> {
+        self.flush_open()?;
+        self.store.sync()
+    }
+
+    /// What meets a query.
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub fn find(&self, query: &Query) -> Result<Vec<Document>, Error> {
+        self.store.find(query)
+    }
+
+    /// The newest of a kind.
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub fn newest(&self, kind: &str) -> Result<Option<Document>, Error> {
+        let query = Query { order: crate::document::Order::Newest, limit: Some(1), ..Query::of_kind(kind) };
+        Ok(self.store.find(&query)?.pop())
+    }
+
+    /// The record of a kind nearest in time, within a tolerance.
+    ///
+    /// # Errors
+    /// [`Error::NotNear`] with the nearest there is.
+    pub fn nearest(&self, kind: &str, stamp_ns: i64, tolerance_ns: i64) -> Result<Document, Error> {
+        self.nearest_of(&Query::of_kind(kind), stamp_ns, tolerance_ns)
+    }
+
+    /// Of what meets a query the record nearest in time, within a tolerance.
+    ///
+    /// # Errors
+    /// [`Error::NotNear`] with the nearest there is.
+    pub fn nearest_of(&self, query: &Query, stamp_ns: i64, tolerance_ns: i64) -> Result<Document, Error> {
+        let nearest = self.store.nearest(query, stamp_ns)?;
+        let nearest_ns = nearest.as_ref().map(|d| d.stamp_ns);
+        nearest.filter(|d| d.stamp_ns.abs_diff(stamp_ns) <= tolerance_ns.max(0) as u64).ok_or_else(|| {
+            let kind = query.kind.as_deref().unwrap_or("record");
+            let what = query.frame.as_ref().map_or(kind.to_owned(), |f| format!("{kind} in `{f}`"));
+            Error::NotNear { what, stamp_ns, tolerance_ns, nearest_ns }
+        })
+    }
+
+    /// A cloud that was recorded, and its sensor.
+    ///
+    /// # Errors
+    /// [`Error::Missing`], [`Error::NoBlob`], [`Error::Damaged`].
+    pub fn cloud(&self, document: &Document) -> Result<(Cloud, Sensing), Error> {
+        let info = document.blobs.iter().find(|b| b.name == CLOUD && b.form == Form::PointCloud);
+        let info = info.ok_or_else(|| crate::stores::local::no_blob(document, CLOUD))?;
+        let data = self.store.blob(document.id, CLOUD)?;
+        clouds::decode(info, &data).map_err(|what| Error::Damaged {
+            place: format!("record {}", document.id).into(),
+            at: 0,
+            what,
+        })
+    }
+
+    /// What a camera saw nearest to a time, and where it stood in `world` at the stamp of that cloud (paper 004, section V, step 0).
+    ///
+    /// # Errors
+    /// [`Error::NotNear`] without a cloud within [`Options::view_tolerance_ns`]; a missing link or gap of the transforms of that time.
+    pub fn view_at(&self, stamp_ns: i64, world: &str) -> Result<View, Error> {
+        let document = self.nearest(kind::CLOUD, stamp_ns, self.options.view_tolerance_ns)?;
+        self.view(&document, world)
+    }
+
+    /// The view that a recorded cloud is, with the transforms of its time.
+    ///
+    /// # Errors
+    /// As [`Record::view_at`].
+    pub fn view(&self, document: &Document, world: &str) -> Result<View, Error> {
+        let (cloud, sensing) = self.cloud(document)?;
+        let world_from_camera = self.transform(world, &document.frame, document.stamp_ns)?;
+        Ok(View {
+            stamp_ns: document.stamp_ns,
+            cloud,
+            intrinsics: sensing.intrinsics,
+            world_from_camera,
+            pose_sigma_m: sensing.pose_sigma_m,
+            pose_sigma_rad: sensing.pose_sigma_rad,
+        })
+    }
+
+    /// `target_from_origin` at a time, interpolated through the tree of that time.
+    ///
+    /// # Errors
+    /// An error that names the missing link, or the gap.
+    pub fn transform(&self, target: &str, origin: &str, stamp_ns: i64) -> Result<Isometry3<f64>, Error> {
+        Ok(self.transforms_around(stamp_ns)?.lookup(target, origin, stamp_ns, self.options.reach)?)
+    }
+
+    /// The transforms that say something about a time: what was measured around it and what holds always.
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub fn transforms_around(&self, stamp_ns: i64) -> Result<Transforms, Error> {
+        self.flusher.drain()?;
+        let mut around = Transforms::default();
+        for document in self.store.find(&Query::of_kind(kind::STATIC_TRANSFORM))? {
+            let (parent, samples) = self.samples(&document)?;
+            for sample in samples {
+                around.insert_static(&parent, &document.frame, &sample.parent_from_child)?;
+            }
+        }
+        let reach_ns = self.options.reach.max_gap_ns.max(self.options.reach.hold_ns);
+        for child in self.store.frames(kind::TRANSFORMS)? {
+            let of_child = Query { frame: Some(child), ..Query::of_kind(kind::TRANSFORMS) };
+            let near = Query {
+                from_ns: Some(stamp_ns.saturating_sub(reach_ns)),
+                to_ns: Some(stamp_ns.saturating_add(reach_ns)),
+                ..of_child.clone()
+            };
+            let mut groups = self.store.find(&near)?;
+            if groups.is_empty() {
+                // Not to be used, but to say how far off it is.
+                groups.extend(self.store.nearest(&of_child, stamp_ns)?);
+            }
+            for document in groups {
+                let (parent, samples) = self.samples(&document)?;
+                for sample in samples {
+                    around.insert(sample.stamp_ns, &parent, &document.frame, &sample.parent_from_child)?;
+                }
+            }
+        }
+        let groups = self.groups.lock().unwrap_or_else(PoisonError::into_inner);
+        for ((child, parent), samples) in &groups.open {
+            for sample in samples {
+                around.insert(sample.stamp_ns, parent, child, &sample.parent_from_child)?;
+            }
+        }
+        Ok(around)
+    }
+
+    /// Parent frame and samples of recorded transforms.
+    fn samples(&self, document: &Document) -> Result<(String, Vec<Sample>), Error> {
+        let damaged = |what: &str| Error::Damaged {
+            place: format!("record {}", document.id).into(),
+            at: 0,
+            what: what.into(),
+        };
+        let parent = document
+            .body
+            .get("parent")
+            .and_then(Value::as_str)
+            .ok_or_else(|| damaged("transforms without a parent"))?;
+        let bytes = self.store.blob(document.id, "tf")?;
+        let samples =
+            foxglove::read_frame_transforms(&bytes).ok_or_else(|| damaged("these are no transforms"))?;
+        Ok((parent.to_owned(), samples))
+    }
+
+    /// Keeps records from being pruned, in the name of `by` (a belief, a model, a plan).
+    ///
+    /// # Errors
+    /// [`Error::Missing`] if one is not there; then none is pinned.
+    pub fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
+        self.store.pin(ids, by)
+    }
+
+    /// Takes back every pin in the name of `by`.
+    ///
+    /// # Errors
+    /// If the store cannot be written.
+    pub fn unpin(&self, by: &str) -> Result<(), Error> {
+        self.store.unpin(by)
+    }
+
+    /// Reads every record and says what is whole.
+    ///
+    /// # Errors
+    /// If the store itself cannot be read.
+    pub fn verify(&self) -> Result<Report, Error> {
+        self.store.verify()
+    }
+
+    /// Counts and sizes.
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub fn stats(&self) -> Result<Stats, Error> {
+        self.store.stats()
+    }
+}
+
+impl Groups {
+    fn take(&mut self) -> Vec<Group> {
+        let open = std::mem::take(&mut self.open);
+        open.into_iter().map(|((child, parent), samples)| Group { parent, child, samples }).collect()
+    }
+}
+
+impl Drop for Record {
+    /// Writes what is open. Who must know whether that succeeded calls [`Record::sync`] first.
+    fn drop(&mut self) {
+        if let Err(e) = self.flush_open() {
+            tracing::warn!("transforms were lost at the end of the record: {e}");
+        }
+    }
+}
+
+impl Record {
+    fn flush_open(&self) -> Result<(), Error> {
+        let open = self.groups.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if !open.is_empty() {
+            self.flusher.send(open);
+        }
+        self.flusher.drain()
+    }
+}

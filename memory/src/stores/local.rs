@@ -1,0 +1,603 @@
+//! The store on this machine's disk: segments that any MCAP reader opens, and an index beside them.
+//!
+//! A folder holds `segments/NNNNNNNN.mcap`, `index.sqlite` and `lock`. A batch of records is one chunk of a segment,
+//! and what the index says follows from the segments: opening reads on from where the index ends, so that a crash costs
+//! what was not acknowledged and nothing else.
+
+mod index;
+mod prune;
+mod scan;
+mod segment;
+mod verify;
+
+use crate::document::{Document, Draft, Query, RecordId};
+use crate::error::Error;
+use crate::stores::{Report, Retention, Stats, Store};
+use index::{INDEX, Index, Place};
+use segment::{Encoded, Segment};
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File, TryLockError};
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// When a record counts as acknowledged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Durability {
+    /// It is on the disk (`fdatasync`) before recording returns: it survives a power cut.
+    #[default]
+    Disk,
+    /// The system has it before recording returns: it survives the end of the process in any way, and a power cut from
+    /// the next [`Store::sync`] or change of segment on.
+    Process,
+}
+
+/// How a local store keeps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalOptions {
+    /// When a record counts as acknowledged.
+    pub durability: Durability,
+    /// What goes when it is too much.
+    pub retention: Retention,
+    /// A segment is followed by another once it is so long, bytes; where sizes are bounded, at most a sixteenth of that bound.
+    pub segment_bytes: u64,
+}
+
+impl Default for LocalOptions {
+    fn default() -> Self {
+        LocalOptions {
+            durability: Durability::Disk,
+            retention: Retention::default(),
+            segment_bytes: 64 << 20,
+        }
+    }
+}
+
+/// What opening found and mended.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Recovery {
+    /// Records that were whole in a segment and not yet in the index.
+    pub regained: u64,
+    /// Bytes behind the last whole record that were dropped.
+    pub dropped_bytes: u64,
+    /// Whether the index had to be made again.
+    pub index_rebuilt: bool,
+}
+
+/// What only the process that writes has.
+struct WriteState {
+    segment: Segment,
+    /// Takes in what is pinned when its segment goes.
+    kept: Option<Segment>,
+    next_id: RecordId,
+    next_segment: u64,
+    /// Bytes of all finished segments.
+    sealed_bytes: u64,
+    newest_ns: i64,
+    /// What was written since the last sync.
+    unsynced: bool,
+    _lock: File,
+}
+
+/// A store in a folder.
+pub struct LocalStore {
+    dir: PathBuf,
+    robot: String,
+    options: LocalOptions,
+    recovery: Recovery,
+    writer: Option<Mutex<WriteState>>,
+    index: Mutex<Index>,
+    files: Mutex<BTreeMap<u64, Arc<File>>>,
+}
+
+/// How many segments are kept open for reading.
+const OPEN_FILES: usize = 64;
+
+impl LocalStore {
+    /// Makes a store in a folder that holds none.
+    ///
+    /// # Errors
+    /// [`Error::Exists`], or what the system refuses.
+    pub fn create(dir: &Path, robot: &str, options: LocalOptions) -> Result<Self, Error> {
+        if dir.join(INDEX).exists() || segment_dir(dir).exists() {
+            return Err(Error::Exists { place: dir.to_owned() });
+        }
+        Self::open_or_create(dir, robot, options)
+    }
+
+    /// Opens a store and mends what a crash has left.
+    ///
+    /// # Errors
+    /// [`Error::NoRecord`], [`Error::InUse`], or what the system refuses.
+    pub fn open(dir: &Path, robot: &str, options: LocalOptions) -> Result<Self, Error> {
+        must_exist(dir)?;
+        Self::open_or_create(dir, robot, options)
+    }
+
+    /// Opens a store for reading, while another process may be writing it. If none does, a crash is mended first.
+    ///
+    /// # Errors
+    /// [`Error::NoRecord`], or what the system refuses.
+    pub fn open_shared(dir: &Path) -> Result<Self, Error> {
+        must_exist(dir)?;
+        let mended = match Self::open_or_create(dir, "", LocalOptions::default()) {
+            Ok(store) => store.recovery.clone(),
+            Err(Error::InUse { .. }) => Recovery::default(),
+            // A folder that may not be written has nobody writing it: what its index says is what there is.
+            Err(Error::File { because, .. }) if is_refusal(&because) => Recovery::default(),
+            Err(e) => return Err(e),
+        };
+        Ok(LocalStore {
+            index: Mutex::new(Index::open_shared(dir)?),
+            dir: dir.to_owned(),
+            robot: String::new(),
+            options: LocalOptions::default(),
+            recovery: mended,
+            writer: None,
+            files: Mutex::default(),
+        })
+    }
+
+    fn open_or_create(dir: &Path, robot: &str, mut options: LocalOptions) -> Result<Self, Error> {
+        if let Some(bound) = options.retention.max_bytes {
+            options.segment_bytes = options.segment_bytes.min(bound / 16).max(64 << 10);
+        }
+        fs::create_dir_all(segment_dir(dir)).map_err(|e| Error::file("cannot create", dir, e))?;
+        let lock = lock(dir)?;
+        let mut recovery = Recovery::default();
+        let mut index = match Index::open(dir) {
+            Err(e) if index::is_broken(&e) => {
+                set_aside(dir)?;
+                recovery.index_rebuilt = true;
+                Index::open(dir)?
+            }
+            opened => opened?,
+        };
+        let (sealed_bytes, next_segment) = recover(dir, &mut index, &mut recovery)?;
+        let segment = new_segment(dir, next_segment)?;
+        let writer = WriteState {
+            segment,
+            kept: None,
+            next_id: index.next_id()?,
+            next_segment: next_segment + 1,
+            sealed_bytes,
+            newest_ns: index.stats()?.newest_ns.unwrap_or(i64::MIN),
+            unsynced: false,
+            _lock: lock,
+        };
+        Ok(LocalStore {
+            dir: dir.to_owned(),
+            robot: robot.into(),
+            options,
+            recovery,
+            writer: Some(Mutex::new(writer)),
+            index: Mutex::new(index),
+            files: Mutex::default(),
+        })
+    }
+
+    /// What opening found and mended.
+    pub fn recovery(&self) -> &Recovery {
+        &self.recovery
+    }
+
+    /// The folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    fn writer(&self) -> Result<MutexGuard<'_, WriteState>, Error> {
+        let writer = self.writer.as_ref().ok_or_else(|| Error::Input {
+            what: format!("{} was opened for reading", self.dir.display()),
+            mend: "open it with `Record::open` to write".into(),
+        })?;
+        Ok(unpoisoned(writer))
+    }
+
+    fn index(&self) -> MutexGuard<'_, Index> {
+        unpoisoned(&self.index)
+    }
+
+    /// Writes a batch whose numbers are given, without regard to limits.
+    fn write(&self, writer: &mut WriteState, batch: &[Encoded]) -> Result<(), Error> {
+        if writer.segment.is_long(self.options.segment_bytes) {
+            self.roll(writer)?;
+        }
+        let before = writer.segment.end;
+        let located = writer.segment.append(batch)?;
+        let rows: Vec<_> = batch.iter().map(|r| &r.document).zip(&located).collect();
+        let kept = if self.options.durability == Durability::Disk { writer.segment.sync() } else { Ok(()) }
+            .and_then(|()| self.index().insert(writer.segment.number, writer.segment.end, &rows));
+        if kept.is_err() {
+            writer.segment.take_back(before)?;
+        }
+        writer.unsynced |= self.options.durability == Durability::Process;
+        kept
+    }
+
+    /// Finishes the segment and starts the next.
+    fn roll(&self, writer: &mut WriteState) -> Result<(), Error> {
+        // The new one first: without room for it the old one stays open and nothing has changed.
+        let next = new_segment(&self.dir, writer.next_segment)?;
+        let bytes = match writer.segment.finish() {
+            Ok(bytes) => bytes,
+            Err(e) => {
+                fs::remove_file(&next.path).map_err(|e| Error::file("cannot delete", &next.path, e))?;
+                return Err(e);
+            }
+        };
+        let number = writer.segment.number;
+        writer.segment = next;
+        writer.next_segment += 1;
+        writer.sealed_bytes += bytes;
+        writer.unsynced = false;
+        self.index().seal(number, bytes)
+    }
+
+    fn read(&self, place: &Place, at: u64, length: u64) -> Result<Vec<u8>, Error> {
+        let path = segment_path(&self.dir, place.segment);
+        let file = self.file(place, &path)?;
+        let mut bytes = vec![0; usize::try_from(length).unwrap_or(0)];
+        file.read_exact_at(&mut bytes, at).map_err(|e| Error::Damaged {
+            place: path,
+            at,
+            what: format!("the {length} bytes of record {} cannot be read: {e}", place.id),
+        })?;
+        Ok(bytes)
+    }
+
+    fn file(&self, place: &Place, path: &Path) -> Result<Arc<File>, Error> {
+        let mut files = unpoisoned(&self.files);
+        if let Some(file) = files.get(&place.segment) {
+            return Ok(file.clone());
+        }
+        let file = File::open(path).map_err(|e| match e.kind() {
+            std::io::ErrorKind::NotFound => Error::Missing { id: place.id.0 },
+            _ => Error::file("cannot open", path, e),
+        })?;
+        if files.len() >= OPEN_FILES {
+            files.pop_first();
+        }
+        let file = Arc::new(file);
+        files.insert(place.segment, file.clone());
+        Ok(file)
+    }
+
+    fn document(&self, place: &Place) -> Result<Document, Error> {
+        let bytes = self.read(place, place.located.document, place.located.document_bytes)?;
+        let damaged = |what: String| Error::Damaged {
+            place: segment_path(&self.dir, place.segment),
+            at: place.located.document,
+            what,
+        };
+        let document: Document = serde_json::from_slice(&bytes)
+            .map_err(|e| damaged(format!("the document of record {} is no longer one: {e}", place.id)))?;
+        if document.id != place.id {
+            return Err(damaged(format!("record {} stands where {} should", document.id, place.id)));
+        }
+        Ok(document)
+    }
+
+    fn place(&self, id: RecordId) -> Result<Place, Error> {
+        self.index().place(id)?.ok_or(Error::Missing { id: id.0 })
+    }
+
+    /// Reads documents; what is pruned in between is left out.
+    fn documents(&self, places: &[Place]) -> Result<Vec<Document>, Error> {
+        let mut documents = Vec::with_capacity(places.len());
+        for place in places {
+            match self.document(place) {
+                Err(Error::Missing { id }) => match self.index().place(RecordId(id))? {
+                    Some(moved) if moved.segment != place.segment => documents.push(self.document(&moved)?),
+                    Some(_) => return Err(Error::Missing { id }),
+                    None => (),
+                },
+                document => documents.push(document?),
+            }
+        }
+        Ok(documents)
+    }
+
+    /// Records a batch of drafts with what else is to go into the index with it.
+    fn record(&self, writer: &mut WriteState, drafts: &[Draft]) -> Result<Vec<RecordId>, Error> {
+        let mut batch = Vec::with_capacity(drafts.len());
+        for (id, draft) in (writer.next_id.0..).zip(drafts) {
+            let blobs = draft.blobs.iter().map(|b| b.data.as_ref()).collect();
+            batch.push(Encoded { document: draft.document(RecordId(id), &self.robot)?, blobs });
+        }
+        loop {
+            match self.write(writer, &batch) {
+                Ok(()) => break,
+                // What may be pruned makes room for what is new.
+                Err(e) if e.is_full() && self.options.retention != Retention::default() => {
+                    if self.drop_oldest(writer)?.is_none() {
+                        return Err(e);
+                    }
+                }
+                Err(e) => return Err(e),
+            }
+        }
+        writer.next_id.0 += batch.len() as u64;
+        let newest = batch.iter().map(|r| r.document.end_ns.unwrap_or(r.document.stamp_ns)).max();
+        writer.newest_ns = newest.map_or(writer.newest_ns, |n| n.max(writer.newest_ns));
+        let retention = self.options.retention;
+        self.keep_within(writer, &retention)?;
+        Ok(batch.iter().map(|r| r.document.id).collect())
+    }
+}
+
+impl Store for LocalStore {
+    fn append(&self, drafts: &[Draft]) -> Result<Vec<RecordId>, Error> {
+        if drafts.is_empty() {
+            return Ok(Vec::new());
+        }
+        self.record(&mut *self.writer()?, drafts)
+    }
+
+    fn get(&self, id: RecordId) -> Result<Document, Error> {
+        let place = self.place(id)?;
+        self.documents(&[place])?.pop().ok_or(Error::Missing { id: id.0 })
+    }
+
+    fn blob(&self, id: RecordId, name: &str) -> Result<Vec<u8>, Error> {
+        let place = self.place(id)?;
+        let document = self.document(&place)?;
+        let found = document.blobs.iter().zip(&place.located.blobs).find(|(info, _)| info.name == name);
+        let Some((info, at)) = found else {
+            return Err(no_blob(&document, name));
+        };
+        self.read(&place, *at, info.bytes)
+    }
+
+    fn find(&self, query: &Query) -> Result<Vec<Document>, Error> {
+        let places = self.index().find(query)?;
+        self.documents(&places)
+    }
+
+    fn nearest(&self, query: &Query, stamp_ns: i64) -> Result<Option<Document>, Error> {
+        let place = self.index().nearest(query, stamp_ns)?;
+        place.map(|p| self.document(&p)).transpose()
+    }
+
+    fn frames(&self, kind: &str) -> Result<Vec<String>, Error> {
+        self.index().frames(kind)
+    }
+
+    fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
+        let mut writer = self.writer()?;
+        for id in ids {
+            self.place(*id)?;
+        }
+        let mut draft = Draft::new(PIN, writer.newest_ns.max(0));
+        draft.meta.body = json!({ "records": ids, "by": by });
+        let written = self.record(&mut writer, &[draft])?;
+        writer.segment.sync()?;
+        // What says that they are pinned is pinned with them.
+        self.index().pin(&[ids, written.as_slice()].concat(), by)
+    }
+
+    fn unpin(&self, by: &str) -> Result<(), Error> {
+        let mut writer = self.writer()?;
+        let mut draft = Draft::new(UNPIN, writer.newest_ns.max(0));
+        draft.meta.body = json!({ "by": by });
+        self.record(&mut writer, &[draft])?;
+        writer.segment.sync()?;
+        self.index().unpin(by)
+    }
+
+    fn pins(&self) -> Result<BTreeMap<RecordId, BTreeSet<String>>, Error> {
+        self.index().pins()
+    }
+
+    fn sync(&self) -> Result<(), Error> {
+        let mut writer = self.writer()?;
+        if writer.unsynced {
+            writer.segment.sync()?;
+            writer.unsynced = false;
+        }
+        Ok(())
+    }
+
+    fn prune(&self, retention: &Retention) -> Result<u64, Error> {
+        let mut writer = self.writer()?;
+        if !writer.segment.chunks.is_empty() && !retention.eq(&Retention::default()) {
+            self.roll(&mut writer)?;
+        }
+        self.keep_within(&mut writer, retention)
+    }
+
+    fn stats(&self) -> Result<Stats, Error> {
+        let mut stats = self.index().stats()?;
+        stats.bytes = self.bytes_on_disk()?;
+        Ok(stats)
+    }
+
+    fn verify(&self) -> Result<Report, Error> {
+        verify::verify(self)
+    }
+}
+
+impl Drop for LocalStore {
+    /// Finishes the segment, so that any viewer finds its way in it. Without room it is finished when the store is next opened.
+    fn drop(&mut self) {
+        let Ok(mut writer) = self.writer() else { return };
+        if writer.segment.chunks.is_empty() {
+            drop(fs::remove_file(&writer.segment.path));
+        } else if let Ok(bytes) = writer.segment.finish() {
+            drop(self.index().seal(writer.segment.number, bytes));
+        }
+        if let Some(mut kept) = writer.kept.take()
+            && let Ok(bytes) = kept.finish()
+        {
+            drop(self.index().seal(kept.number, bytes));
+        }
+    }
+}
+
+/// The kinds under which pins are recorded.
+const PIN: &str = "pin";
+const UNPIN: &str = "unpin";
+
+/// A lock whose holder panicked guards data that is checked on the disk anyway.
+fn unpoisoned<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+pub(crate) fn no_blob(document: &Document, name: &str) -> Error {
+    let has: Vec<_> = document.blobs.iter().map(|b| format!("`{}`", b.name)).collect();
+    Error::NoBlob {
+        id: document.id.0,
+        kind: document.kind.clone(),
+        name: name.into(),
+        has: if has.is_empty() { "none".into() } else { has.join(", ") },
+    }
+}
+
+fn segment_dir(dir: &Path) -> PathBuf {
+    dir.join("segments")
+}
+
+fn segment_path(dir: &Path, number: u64) -> PathBuf {
+    segment_dir(dir).join(format!("{number:08}.mcap"))
+}
+
+fn must_exist(dir: &Path) -> Result<(), Error> {
+    if segment_dir(dir).is_dir() {
+        Ok(())
+    } else {
+        Err(Error::NoRecord { place: dir.to_owned(), expected: "segments" })
+    }
+}
+
+fn is_refusal(e: &std::io::Error) -> bool {
+    use std::io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
+    matches!(e.kind(), PermissionDenied | ReadOnlyFilesystem)
+}
+
+fn lock(dir: &Path) -> Result<File, Error> {
+    let path = dir.join("lock");
+    let file = File::options().create(true).truncate(false).write(true).open(&path);
+    let file = file.map_err(|e| Error::file("cannot open", &path, e))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(Error::InUse { place: dir.to_owned() }),
+        Err(TryLockError::Error(e)) => Err(Error::file("cannot lock", &path, e)),
+    }
+}
+
+/// Moves an index that cannot be read out of the way.
+fn set_aside(dir: &Path) -> Result<(), Error> {
+    for suffix in ["", "-wal", "-shm"] {
+        let path = dir.join(format!("{INDEX}{suffix}"));
+        if path.exists() {
+            let aside = dir.join(format!("{INDEX}{suffix}.broken"));
+            fs::rename(&path, &aside).map_err(|e| Error::file("cannot move", &path, e))?;
+        }
+    }
+    Ok(())
+}
+
+/// Starts a segment whose name is on the disk before anything in it is acknowledged.
+fn new_segment(dir: &Path, number: u64) -> Result<Segment, Error> {
+    let path = segment_path(dir, number);
+    let made = Segment::create(&path, number).and_then(|segment| {
+        let folder = segment_dir(dir);
+        File::open(&folder).and_then(|f| f.sync_all()).map_err(|e| Error::file("cannot sync", &folder, e))?;
+        Ok(segment)
+    });
+    if made.as_ref().is_err_and(
+        |e| !matches!(e, Error::File { because, .. } if because.kind() == std::io::ErrorKind::AlreadyExists),
+    ) {
+        drop(fs::remove_file(&path));
+    }
+    made
+}
+
+/// Brings segments and index together again. Returns the bytes of all segments and the next free number.
+fn recover(dir: &Path, index: &mut Index, recovery: &mut Recovery) -> Result<(u64, u64), Error> {
+    let mut on_disk = BTreeSet::new();
+    let folder = segment_dir(dir);
+    let fail = |e| Error::file("cannot read", &folder, e);
+    for entry in fs::read_dir(&folder).map_err(fail)? {
+        let name = entry.map_err(fail)?.file_name();
+        let number = name.to_str().and_then(|n| n.strip_suffix(".mcap")).and_then(|n| n.parse::<u64>().ok());
+        on_disk.extend(number);
+    }
+    let known: BTreeMap<u64, _> = index.segments()?.into_iter().map(|row| (row.number, row)).collect();
+    for row in known.values().filter(|row| row.going) {
+        let path = segment_path(dir, row.number);
+        if on_disk.remove(&row.number) {
+            fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e))?;
+        }
+        index.forget(row.number)?;
+    }
+    let mut bytes = 0;
+    for number in &on_disk {
+        let row = known.get(number);
+        bytes += match row {
+            Some(row) if row.sealed => row.bytes,
+            _ => recover_segment(dir, *number, row.map_or(0, |r| r.bytes), index, recovery)?,
+        };
+    }
+    let last = on_disk.last().max(known.keys().next_back()).copied().unwrap_or(0);
+    Ok((bytes, last + 1))
+}
+
+/// Takes in what a segment holds beyond what the index knows, drops its torn end and finishes it.
+fn recover_segment(
+    dir: &Path,
+    number: u64,
+    known: u64,
+    index: &mut Index,
+    recovery: &mut Recovery,
+) -> Result<u64, Error> {
+    let path = segment_path(dir, number);
+    let length = fs::metadata(&path).map_err(|e| Error::file("cannot read", &path, e))?.len();
+    let mut take = |records: Vec<(Document, segment::Located)>, end: u64| {
+        if end <= known {
+            return Ok(());
+        }
+        let rows: Vec<_> = records.iter().map(|(d, l)| (d, l)).collect();
+        index.insert(number, end, &rows)?;
+        for (document, _) in &records {
+            replay_pin(index, document)?;
+        }
+        recovery.regained += records.len() as u64;
+        Ok(())
+    };
+    let scan = scan::scan(&path, &mut take)?;
+    if scan.end < known {
+        // Acknowledged records are damaged: leave the file as it is, for `verify` to say which.
+        index.seal(number, length)?;
+        return Ok(length);
+    }
+    if scan.chunks.is_empty() {
+        recovery.dropped_bytes += length;
+        fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e))?;
+        index.forget(number)?;
+        return Ok(0);
+    }
+    let bytes = if scan.complete {
+        length
+    } else {
+        recovery.dropped_bytes += length - scan.end;
+        Segment::reopen(&path, number, scan.end, scan.channels, scan.chunks)?.finish()?
+    };
+    index.seal(number, bytes)?;
+    Ok(bytes)
+}
+
+fn replay_pin(index: &mut Index, document: &Document) -> Result<(), Error> {
+    let by = document.body.get("by").and_then(|v| v.as_str()).unwrap_or("");
+    match document.kind.as_str() {
+        PIN => {
+            let listed = document.body.get("records").and_then(|v| v.as_array()).into_iter().flatten();
+            let ids: Vec<_> =
+                listed.filter_map(|v| v.as_u64()).chain([document.id.0]).map(RecordId).collect();
+            index.pin(&ids, by)
+        }
+        UNPIN => index.unpin(by),
+        _ => Ok(()),
+    }
+}

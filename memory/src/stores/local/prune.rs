@@ -1,0 +1,117 @@
+//! Keeping a store within its bounds: whole segments go, oldest first; what is pinned in them moves on.
+
+use super::segment::Encoded;
+use super::{INDEX, LocalStore, WriteState, new_segment, segment_path, unpoisoned};
+use crate::error::Error;
+use crate::stores::Retention;
+use std::fs;
+
+impl LocalStore {
+    /// Drops segments until the limits hold or nothing is left to drop. Returns the number of records that went.
+    pub(super) fn keep_within(&self, writer: &mut WriteState, retention: &Retention) -> Result<u64, Error> {
+        let mut gone = 0;
+        while self.is_over(writer, retention)? {
+            match self.drop_oldest(writer)? {
+                Some(records) => gone += records,
+                None => break,
+            }
+        }
+        Ok(gone)
+    }
+
+    fn is_over(&self, writer: &WriteState, retention: &Retention) -> Result<bool, Error> {
+        if let Some(most) = retention.max_bytes
+            && writer.sealed_bytes
+                + writer.segment.end
+                + writer.kept.as_ref().map_or(0, |k| k.end)
+                + self.index_bytes()
+                > most
+        {
+            return Ok(true);
+        }
+        if let Some(least) = retention.min_free_bytes {
+            let free = rustix::fs::statvfs(&self.dir)
+                .map_err(|e| Error::file("cannot ask for the room on", &self.dir, e.into()))?;
+            if free.f_bavail.saturating_mul(free.f_frsize) < least {
+                return Ok(true);
+            }
+        }
+        if let Some(age) = retention.max_age_ns
+            && let Some((_, newest)) = self.index().oldest_segment()?
+        {
+            return Ok(newest < writer.newest_ns.saturating_sub(age));
+        }
+        Ok(false)
+    }
+
+    /// Drops the oldest segment that holds anything not pinned; `None` if there is none.
+    pub(super) fn drop_oldest(&self, writer: &mut WriteState) -> Result<Option<u64>, Error> {
+        let Some((number, _)) = self.index().oldest_segment()? else { return Ok(None) };
+        self.carry_pinned(writer, number)?;
+        self.index().mark_going(number)?;
+        let path = segment_path(&self.dir, number);
+        let bytes = fs::metadata(&path).map(|m| m.len()).unwrap_or(0);
+        unpoisoned(&self.files).remove(&number);
+        match fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+                return Err(Error::file("cannot delete", &path, e));
+            }
+            _ => writer.sealed_bytes = writer.sealed_bytes.saturating_sub(bytes),
+        }
+        self.index().forget(number).map(Some)
+    }
+
+    /// Copies what is pinned in a segment to the one that keeps, one record at a time.
+    fn carry_pinned(&self, writer: &mut WriteState, number: u64) -> Result<(), Error> {
+        let places = self.index().places(number, true)?;
+        if places.is_empty() {
+            return Ok(());
+        }
+        for place in &places {
+            let document = self.document(place)?;
+            let mut blobs = Vec::with_capacity(document.blobs.len());
+            for (info, at) in document.blobs.iter().zip(&place.located.blobs) {
+                blobs.push(self.read(place, *at, info.bytes)?);
+            }
+            let mut kept = match writer.kept.take() {
+                Some(kept) if !kept.is_long(self.options.segment_bytes) => kept,
+                full => {
+                    if let Some(mut full) = full {
+                        let bytes = full.finish()?;
+                        writer.sealed_bytes += bytes;
+                        self.index().seal(full.number, bytes)?;
+                    }
+                    let kept = new_segment(&self.dir, writer.next_segment)?;
+                    writer.next_segment += 1;
+                    kept
+                }
+            };
+            let before = kept.end;
+            let record = Encoded { document, blobs: blobs.iter().map(Vec::as_slice).collect() };
+            let moved = kept.append(&[record]).and_then(|located| {
+                kept.sync()?;
+                let rows: Vec<_> = located.iter().map(|l| (place.id, l)).collect();
+                self.index().relocate(kept.number, kept.end, &rows)
+            });
+            if moved.is_err() {
+                kept.take_back(before)?;
+            }
+            writer.kept = Some(kept);
+            moved?;
+        }
+        Ok(())
+    }
+
+    fn index_bytes(&self) -> u64 {
+        let size =
+            |suffix: &str| fs::metadata(self.dir.join(format!("{INDEX}{suffix}"))).map_or(0, |m| m.len());
+        size("") + size("-wal") + size("-shm")
+    }
+
+    /// The size of everything in the folder.
+    pub(super) fn bytes_on_disk(&self) -> Result<u64, Error> {
+        let segments = self.index().segments()?;
+        let size = |number| fs::metadata(segment_path(&self.dir, number)).map_or(0, |m| m.len());
+        Ok(segments.iter().map(|row| size(row.number)).sum::<u64>() + self.index_bytes())
+    }
+}

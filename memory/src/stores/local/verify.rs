@@ -1,0 +1,60 @@
+//! Reading everything there is, and saying what is not whole.
+
+use super::scan::scan;
+use super::{LocalStore, segment_path};
+use crate::document::RecordId;
+use crate::error::Error;
+use crate::stores::{Fault, Report};
+use std::collections::BTreeMap;
+
+/// Reads every segment, checks its checksums, and compares what lies in it with what the index says.
+pub(super) fn verify(store: &LocalStore) -> Result<Report, Error> {
+    let mut report = Report::default();
+    let faults = |what: Vec<String>| {
+        what.into_iter().map(|what| Fault { record: None, place: super::INDEX.into(), what })
+    };
+    report.faults.extend(faults(store.index().check()?));
+    let segments = store.index().segments()?;
+    for row in segments {
+        let path = segment_path(&store.dir, row.number);
+        let place = path.display().to_string();
+        let mut expected: BTreeMap<RecordId, _> =
+            store.index().places(row.number, false)?.into_iter().map(|p| (p.id, p.located)).collect();
+        let mut misplaced = Vec::new();
+        let result = scan(&path, |records, _| {
+            for (document, located) in records {
+                // Records that were pinned and moved on are found here and expected elsewhere.
+                if let Some(known) = expected.remove(&document.id) {
+                    if known.document == located.document && known.blobs == located.blobs {
+                        report.whole += 1;
+                        report.bytes +=
+                            located.document_bytes + document.blobs.iter().map(|b| b.bytes).sum::<u64>();
+                    } else {
+                        misplaced.push(document.id);
+                    }
+                }
+            }
+            Ok(())
+        });
+        match result {
+            Ok(scan) => {
+                let cut = scan.fault.filter(|(at, _)| row.sealed || *at < row.bytes);
+                report.faults.extend(cut.map(|(at, what)| Fault {
+                    record: None,
+                    place: place.clone(),
+                    what: format!("byte {at}: {what}"),
+                }));
+            }
+            Err(e) => report.faults.push(Fault { record: None, place: place.clone(), what: e.to_string() }),
+        }
+        for id in misplaced {
+            let what = "lies elsewhere than the index says".to_owned();
+            report.faults.push(Fault { record: Some(id), place: place.clone(), what });
+        }
+        for id in expected.into_keys() {
+            let what = "is lost: it cannot be read from its segment any more".to_owned();
+            report.faults.push(Fault { record: Some(id), place: place.clone(), what });
+        }
+    }
+    Ok(report)
+}

@@ -1,0 +1,463 @@
+//! The tree of frames through time: transforms as they were measured, interpolated for the moment asked for.
+
+use nalgebra::{Isometry3, Translation3};
+use petgraph::algo::astar;
+use petgraph::graphmap::UnGraphMap;
+use std::collections::BTreeMap;
+
+/// A transform that cannot be given, or taken in.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TransformError {
+    /// No transform ever named that frame.
+    #[error("no transform names the frame `{frame}`; known are: {known}")]
+    UnknownFrame {
+        /// The frame asked for.
+        frame: String,
+        /// Frames that are known.
+        known: String,
+    },
+    /// Two frames hang in different trees at that time.
+    #[error(
+        "at {stamp_ns} ns no chain links `{target}` to `{origin}`: `{origin}` ends at `{origin_root}` and `{target}` at `{target_root}`; record the transform between those two"
+    )]
+    NotLinked {
+        /// Frame to transform into.
+        target: String,
+        /// Frame to transform from.
+        origin: String,
+        /// Where the chain of the first ends.
+        target_root: String,
+        /// Where the chain of the second ends.
+        origin_root: String,
+        /// The time, nanoseconds.
+        stamp_ns: i64,
+    },
+    /// A link was not measured near that time.
+    #[error("the link `{parent}` <- `{child}` was not measured near {stamp_ns} ns: {}", gap_text(*stamp_ns, *before_ns, *after_ns, *max_gap_ns))]
+    Gap {
+        /// Its parent frame.
+        parent: String,
+        /// Its child frame.
+        child: String,
+        /// The time, nanoseconds.
+        stamp_ns: i64,
+        /// Last measurement before, nanoseconds.
+        before_ns: Option<i64>,
+        /// First measurement after, nanoseconds.
+        after_ns: Option<i64>,
+        /// Widest gap that is bridged, nanoseconds.
+        max_gap_ns: i64,
+    },
+    /// Following the parents comes round to the start.
+    #[error(
+        "at {stamp_ns} ns the frames {frames} are each other's parents: one of these links is the wrong way round"
+    )]
+    Loop {
+        /// The frames on the round.
+        frames: String,
+        /// The time, nanoseconds.
+        stamp_ns: i64,
+    },
+    /// A transform that is none.
+    #[error("the transform `{parent}` <- `{child}` at {stamp_ns} ns {what}")]
+    Invalid {
+        /// Its parent frame.
+        parent: String,
+        /// Its child frame.
+        child: String,
+        /// Its time, nanoseconds.
+        stamp_ns: i64,
+        /// What is wrong with it.
+        what: &'static str,
+    },
+}
+
+fn gap_text(stamp_ns: i64, before_ns: Option<i64>, after_ns: Option<i64>, max_gap_ns: i64) -> String {
+    let seconds = |ns: i128| ns as f64 * 1e-9;
+    let limit = seconds(max_gap_ns.into());
+    match (before_ns, after_ns) {
+        (Some(b), Some(a)) => format!(
+            "a gap of {:.3} s, from {:.3} s before to {:.3} s after, where at most {limit:.3} s are bridged",
+            seconds(i128::from(a) - i128::from(b)),
+            seconds(i128::from(stamp_ns) - i128::from(b)),
+            seconds(i128::from(a) - i128::from(stamp_ns))
+        ),
+        (Some(b), None) => {
+            format!("the last is {:.3} s earlier", seconds(i128::from(stamp_ns) - i128::from(b)))
+        }
+        (None, Some(a)) => {
+            format!("the first is {:.3} s later", seconds(i128::from(a) - i128::from(stamp_ns)))
+        }
+        (None, None) => "it was never measured".into(),
+    }
+}
+
+/// How far transforms are carried from where they were measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reach {
+    /// Widest gap between two measurements that is bridged by interpolation, nanoseconds. Paper 004's recorder restores 4 s around a stamp.
+    pub max_gap_ns: i64,
+    /// How long the first or last measurement holds beyond its stamp, nanoseconds.
+    pub hold_ns: i64,
+}
+
+impl Default for Reach {
+    fn default() -> Self {
+        Reach { max_gap_ns: 4_000_000_000, hold_ns: 100_000_000 }
+    }
+}
+
+/// Where a child stood in its parent at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// The time, nanoseconds.
+    pub stamp_ns: i64,
+    /// The transform.
+    pub parent_from_child: Isometry3<f64>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Link {
+    fixed: Option<Isometry3<f64>>,
+    samples: BTreeMap<i64, Isometry3<f64>>,
+}
+
+/// What a link says about a time.
+enum At {
+    Known(Isometry3<f64>),
+    Gap { before_ns: Option<i64>, after_ns: Option<i64> },
+}
+
+impl Link {
+    fn at(&self, stamp_ns: i64, reach: Reach) -> At {
+        let before = self.samples.range(..=stamp_ns).next_back();
+        let after = self.samples.range(stamp_ns..).next();
+        match (before, after) {
+            (Some((&b, iso)), _) if b == stamp_ns => At::Known(*iso),
+            (Some((&b, from)), Some((&a, to))) if a.saturating_sub(b) <= reach.max_gap_ns => {
+                At::Known(interpolate(from, to, (stamp_ns - b) as f64 / (a - b) as f64))
+            }
+            (Some((&b, iso)), _) if stamp_ns.saturating_sub(b) <= reach.hold_ns => At::Known(*iso),
+            (_, Some((&a, iso))) if a.saturating_sub(stamp_ns) <= reach.hold_ns => At::Known(*iso),
+            _ => match self.fixed {
+                Some(iso) => At::Known(iso),
+                None => At::Gap { before_ns: before.map(|(&b, _)| b), after_ns: after.map(|(&a, _)| a) },
+            },
+        }
+    }
+
+    /// Orders the links of a child: the one in force at a time is the last begun, or else the first to come.
+    fn precedence(&self, stamp_ns: i64) -> (u8, i64) {
+        let before = self.samples.range(..=stamp_ns).next_back().map(|(&b, _)| b);
+        let after = self.samples.range(stamp_ns..).next().map(|(&a, _)| a);
+        match (before, after) {
+            (Some(b), _) => (2, b),
+            _ if self.fixed.is_some() => (1, 0),
+            (None, Some(a)) => (0, -a),
+            (None, None) => (0, i64::MIN),
+        }
+    }
+}
+
+/// The transform a share `t` (0 to 1) of the way between two: straight in position, the shorter arc in orientation.
+pub fn interpolate(from: &Isometry3<f64>, to: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
+    let position = from.translation.vector.lerp(&to.translation.vector, t);
+    // Opposite orientations have no shorter arc; any is as good, as long as it is always the same.
+    let rotation = from.rotation.try_slerp(&to.rotation, t, 1e-12).unwrap_or(if t < 0.5 {
+        from.rotation
+    } else {
+        to.rotation
+    });
+    Isometry3::from_parts(Translation3::from(position), rotation)
+}
+
+/// Transforms in memory.
+#[derive(Clone, Debug, Default)]
+pub struct Transforms {
+    /// By child, then parent: a child may change its parent through time.
+    links: BTreeMap<String, BTreeMap<String, Link>>,
+}
+
+impl Transforms {
+    /// Takes in a measurement; a second one of the same link and stamp replaces the first.
+    ///
+    /// # Errors
+    /// [`TransformError::Invalid`] for numbers that are not finite, a rotation that is none, or a frame that is its own parent.
+    pub fn insert(
+        &mut self,
+        stamp_ns: i64,
+        parent: &str,
+        child: &str,
+        parent_from_child: &Isometry3<f64>,
+    ) -> Result<(), TransformError> {
+        check(stamp_ns, parent, child, parent_from_child)?;
+        self.link(parent, child).samples.insert(stamp_ns, *parent_from_child);
+        Ok(())
+    }
+
+    /// Takes in a transform that holds at all times for which nothing was measured.
+    ///
+    /// # Errors
+    /// As [`Transforms::insert`].
+    pub fn insert_static(
+        &mut self,
+        parent: &str,
+        child: &str,
+        parent_from_child: &Isometry3<f64>,
+    ) -> Result<(), TransformError> {
+        check(0, parent, child, parent_from_child)?;
+        self.link(parent, child).fixed = Some(*parent_from_child);
+        Ok(())
+    }
+
+    fn link(&mut self, parent: &str, child: &str) -> &mut Link {
+        if !self.links.contains_key(child) {
+            self.links.insert(child.into(), BTreeMap::new());
+        }
+        self.links.entry(child.into()).or_default().entry(parent.into()).or_default()
+    }
+
+    /// Whether nothing was taken in.
+    pub fn is_empty(&self) -> bool {
+        self.links.is_empty()
+    }
+
+    /// Every frame that is named, sorted.
+    pub fn frames(&self) -> Vec<&str> {
+        let mut all: Vec<&str> = self
+            .links
+            .iter()
+            .flat_map(|(c, parents)| parents.keys().chain([c]).map(String::as_str))
+            .collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// `target_from_origin` at a time, through the tree of that time.
+    ///
+    /// # Errors
+    /// An unknown frame, a missing link (named by the two frames that it would join), a gap in time, or a loop.
+    pub fn lookup(
+        &self,
+        target: &str,
+        origin: &str,
+        stamp_ns: i64,
+        reach: Reach,
+    ) -> Result<Isometry3<f64>, TransformError> {
+        let frames = self.frames();
+        for frame in [target, origin] {
+            if target != origin && !frames.contains(&frame) {
+                return Err(TransformError::UnknownFrame { frame: frame.into(), known: listed(&frames) });
+            }
+        }
+        let tree = self.tree_at(stamp_ns);
+        let chain = astar(&tree, origin, |f| f == target, |_| 1_u32, |_| 0);
+        let Some((_, chain)) = chain else {
+            let root = |frame| self.root(frame, stamp_ns);
+            return Err(TransformError::NotLinked {
+                target: target.into(),
+                origin: origin.into(),
+                target_root: root(target)?,
+                origin_root: root(origin)?,
+                stamp_ns,
+            });
+        };
+        chain.windows(2).try_fold(Isometry3::identity(), |here_from_origin, pair| {
+            Ok(self.step(pair[0], pair[1], stamp_ns, reach)? * here_from_origin)
+        })
+    }
+
+    /// `next_from_here` for two neighbours in the tree.
+    fn step(
+        &self,
+        here: &str,
+        next: &str,
+        stamp_ns: i64,
+        reach: Reach,
+    ) -> Result<Isometry3<f64>, TransformError> {
+        let up = self.parent_at(here, stamp_ns).is_some_and(|(parent, _)| parent == next);
+        let (child, parent) = if up { (here, next) } else { (next, here) };
+        let link = self.links.get(child).and_then(|parents| parents.get(parent));
+        match link.map(|l| l.at(stamp_ns, reach)) {
+            Some(At::Known(parent_from_child)) if up => Ok(parent_from_child),
+            Some(At::Known(parent_from_child)) => Ok(parent_from_child.inverse()),
+            gap => {
+                let (before_ns, after_ns) = match gap {
+                    Some(At::Gap { before_ns, after_ns }) => (before_ns, after_ns),
+                    _ => (None, None),
+                };
+                Err(TransformError::Gap {
+                    parent: parent.into(),
+                    child: child.into(),
+                    stamp_ns,
+                    before_ns,
+                    after_ns,
+                    max_gap_ns: reach.max_gap_ns,
+                })
+            }
+        }
+    }
+
+    fn parent_at(&self, child: &str, stamp_ns: i64) -> Option<(&str, &Link)> {
+        let parents = self.links.get(child)?;
+        parents.iter().max_by_key(|(_, link)| link.precedence(stamp_ns)).map(|(p, link)| (p.as_str(), link))
+    }
+
+    fn tree_at(&self, stamp_ns: i64) -> UnGraphMap<&str, ()> {
+        let mut tree = UnGraphMap::new();
+        for child in self.links.keys() {
+            if let Some((parent, _)) = self.parent_at(child, stamp_ns) {
+                tree.add_edge(child.as_str(), parent, ());
+            }
+        }
+        tree
+    }
+
+    fn root(&self, frame: &str, stamp_ns: i64) -> Result<String, TransformError> {
+        let mut chain = vec![frame];
+        while let Some((parent, _)) = self.parent_at(chain[chain.len() - 1], stamp_ns) {
+            if chain.contains(&parent) {
+                chain.push(parent);
+                return Err(TransformError::Loop { frames: listed(&chain), stamp_ns });
+            }
+            chain.push(parent);
+        }
+        Ok(chain[chain.len() - 1].into())
+    }
+}
+
+/// Refuses what is no rigid transform between two frames.
+pub(crate) fn check(
+    stamp_ns: i64,
+    parent: &str,
+    child: &str,
+    iso: &Isometry3<f64>,
+) -> Result<(), TransformError> {
+    let fail =
+        |what| Err(TransformError::Invalid { parent: parent.into(), child: child.into(), stamp_ns, what });
+    if parent.is_empty() || child.is_empty() {
+        return fail("has a frame without a name: name both");
+    }
+    if parent == child {
+        return fail("joins a frame to itself: name the frame that it is given in");
+    }
+    if !iso.translation.vector.iter().chain(iso.rotation.coords.iter()).all(|v| v.is_finite()) {
+        return fail("is not finite: leave out poses that are not known");
+    }
+    if (iso.rotation.coords.norm() - 1.0).abs() > 1e-6 {
+        return fail("has a quaternion that is not of length 1: normalise it");
+    }
+    Ok(())
+}
+
+fn listed(frames: &[&str]) -> String {
+    if frames.is_empty() {
+        "none".into()
+    } else {
+        frames.iter().map(|f| format!("`{f}`")).collect::<Vec<_>>().join(", ")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    const S: i64 = 1_000_000_000;
+
+    fn iso(x: f64, y: f64, yaw: f64) -> Isometry3<f64> {
+        Isometry3::from_parts(
+            Translation3::new(x, y, 0.0),
+            UnitQuaternion::from_scaled_axis(Vector3::z() * yaw),
+        )
+    }
+
+    /// A robot that drives 1 m/s along x and turns .1 rad/s, its camera fixed .5 m ahead, and an island of frames.
+    fn drive() -> Transforms {
+        let mut t = Transforms::default();
+        for i in 0..=4 {
+            t.insert(i * S, "map", "base", &iso(i as f64, 0.0, 0.1 * i as f64)).unwrap();
+        }
+        t.insert_static("base", "camera", &iso(0.5, 0.0, 0.0)).unwrap();
+        t.insert(0, "shelf", "box", &iso(1.0, 1.0, 0.0)).unwrap();
+        t.insert(0, "base", "hand", &iso(0.0, 0.0, 0.0)).unwrap();
+        t.insert(9 * S, "base", "hand", &iso(0.0, 0.0, 0.0)).unwrap();
+        t
+    }
+
+    #[test]
+    fn a_moment_between_two_measurements_is_interpolated_through_the_tree() {
+        let t = drive();
+        for (stamp, x, yaw) in
+            [(0, 0.0, 0.0), (2 * S, 2.0, 0.2), (2 * S + S / 2, 2.5, 0.25), (4 * S + S / 20, 4.0, 0.4)]
+        {
+            let expected = iso(x, 0.0, yaw) * iso(0.5, 0.0, 0.0);
+            let found = t.lookup("map", "camera", stamp, Reach::default()).unwrap();
+            assert!((found.to_homogeneous() - expected.to_homogeneous()).norm() < 1e-12, "{stamp}: {found}");
+            let back = t.lookup("camera", "map", stamp, Reach::default()).unwrap();
+            assert!((back * found).to_homogeneous().is_identity(1e-12));
+        }
+        assert_eq!(t.lookup("map", "map", 0, Reach::default()).unwrap(), Isometry3::identity());
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let cases = [
+            (
+                "map",
+                "lamp",
+                S,
+                "no transform names the frame `lamp`; known are: `base`, `box`, `camera`, `hand`, `map`, `shelf`",
+            ),
+            (
+                "map",
+                "box",
+                S,
+                "at 1000000000 ns no chain links `map` to `box`: `box` ends at `shelf` and `map` at `map`; record the transform between those two",
+            ),
+            (
+                "map",
+                "base",
+                7 * S,
+                "the link `map` <- `base` was not measured near 7000000000 ns: the last is 3.000 s earlier",
+            ),
+            (
+                "base",
+                "hand",
+                3 * S,
+                "the link `base` <- `hand` was not measured near 3000000000 ns: a gap of 9.000 s, from 3.000 s before to 6.000 s after, where at most 4.000 s are bridged",
+            ),
+        ];
+        let t = drive();
+        for (target, origin, stamp, message) in cases {
+            assert_eq!(t.lookup(target, origin, stamp, Reach::default()).unwrap_err().to_string(), message);
+        }
+    }
+
+    #[test]
+    fn a_child_may_change_its_parent() {
+        let mut t = Transforms::default();
+        t.insert(0, "table", "cup", &iso(1.0, 0.0, 0.0)).unwrap();
+        t.insert(S, "table", "cup", &iso(1.0, 0.0, 0.0)).unwrap();
+        t.insert(2 * S, "hand", "cup", &iso(0.0, 2.0, 0.0)).unwrap();
+        t.insert_static("table", "hand", &iso(5.0, 0.0, 0.0)).unwrap();
+        for (stamp, x, y) in [(S / 2, 1.0, 0.0), (2 * S, 5.0, 2.0)] {
+            let p = t.lookup("table", "cup", stamp, Reach::default()).unwrap().translation;
+            assert_eq!((p.x, p.y), (x, y));
+        }
+    }
+
+    #[test]
+    fn a_loop_is_an_error_and_so_is_nonsense() {
+        let mut t = Transforms::default();
+        t.insert(0, "a", "b", &iso(1.0, 0.0, 0.0)).unwrap();
+        t.insert(0, "b", "a", &iso(1.0, 0.0, 0.0)).unwrap();
+        t.insert(0, "x", "y", &iso(1.0, 0.0, 0.0)).unwrap();
+        assert!(matches!(t.lookup("x", "a", 0, Reach::default()), Err(TransformError::Loop { .. })));
+        let mut nan = iso(0.0, 0.0, 0.0);
+        nan.translation.x = f64::NAN;
+        assert!(matches!(t.insert(0, "a", "c", &nan), Err(TransformError::Invalid { .. })));
+        assert!(matches!(t.insert(0, "c", "c", &iso(0.0, 0.0, 0.0)), Err(TransformError::Invalid { .. })));
+    }
+}

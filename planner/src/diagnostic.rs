@@ -137,3 +137,63 @@ impl Findings {
         self.list.is_empty()
     }
 }
+
+impl Findings {
+    /// The findings drawn under the texts that they are about, with or without colour.
+    pub fn render(&self, colour: bool) -> String {
+        let mut drawn = Vec::new();
+        let names: Vec<String> = self.sources.iter().map(|source| source.name.clone()).collect();
+        let texts = self.sources.iter().map(|source| (source.name.clone(), source.text.clone()));
+        let mut cache = ariadne::sources(texts.collect::<Vec<_>>());
+        for finding in &self.list {
+            if !drawn.is_empty() {
+                drawn.push(b'\n');
+            }
+            // Writing to memory does not fail.
+            let _ = report(finding, &names, colour).write(&mut cache, &mut drawn);
+        }
+        let text = String::from_utf8_lossy(&drawn);
+        text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+    }
+}
+
+impl std::fmt::Display for Findings {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.render(false))
+    }
+}
+
+impl std::error::Error for Findings {}
+
+type Place = (String, std::ops::Range<usize>);
+
+fn report(finding: &Diagnostic, names: &[String], colour: bool) -> ariadne::Report<'static, Place> {
+    use ariadne::{Color, Config, IndexType, ReportKind};
+    let place = |span: Span| -> Place {
+        let name = names.get(span.source as usize).cloned().unwrap_or_default();
+        (name, span.start as usize..span.end as usize)
+    };
+    let (kind, hue) = match finding.severity {
+        Severity::Error => (ReportKind::Error, Color::Red),
+        Severity::Warning => (ReportKind::Warning, Color::Yellow),
+    };
+    let first = finding.labels.first().map_or(Span::default(), |label| label.span);
+    let mut report = ariadne::Report::build(kind, place(first))
+        .with_config(Config::default().with_color(colour).with_index_type(IndexType::Byte))
+        .with_code(finding.code)
+        .with_message(&finding.message);
+    let mut labels: Vec<(usize, &Label)> = finding.labels.iter().enumerate().collect();
+    labels.sort_by_key(|(_, label)| (label.span.source != first.source, label.span));
+    for (order, label) in labels {
+        let hue = if order == 0 { hue } else { Color::Cyan };
+        let mut drawn = ariadne::Label::new(place(label.span)).with_color(hue).with_order(order as i32);
+        if !label.text.is_empty() {
+            drawn = drawn.with_message(&label.text);
+        }
+        report = report.with_label(drawn);
+    }
+    if let Some(help) = &finding.help {
+        report = report.with_help(help);
+    }
+    report.finish()
+}

@@ -16,6 +16,7 @@ pub use attachment::{
 };
 pub use diagnostic::{Diagnostic, Findings, Label, Severity, Source, Span};
 pub use explain::Explanation;
+pub use pddl::check;
 pub use plan::{Plan, Step};
 pub use solve::{EPSILON_S, Options, Outcome, PlanError, Statistics, plan};
 pub use task::Task;

@@ -83,8 +83,8 @@ pub enum Term {
     Name(Name),
     /// `?x`
     Variable(Name),
-    /// `3.5`
-    Number(f64, Span),
+    /// `3.5`, and the word, which may be an object's name
+    Number(f64, Name),
     /// `(f a b)`
     Apply {
         /// The function.
@@ -386,8 +386,8 @@ pub enum Initial {
 /// The value of a function in the initial state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum InitialValue {
-    /// A number.
-    Number(f64),
+    /// A number, and the word, which may be an object's name.
+    Number(f64, Name),
     /// An object.
     Object(Name),
 }

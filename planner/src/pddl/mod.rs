@@ -1,3 +1,43 @@
 //! PDDL text: from characters to a tree of names, and the checks that make a [`Task`](crate::Task) of it.
 
 pub mod ast;
+mod check;
+pub mod lex;
+pub mod parse;
+
+pub use check::check;
+
+/// The name most like `name`, if one is near enough to be meant: at most a third of its letters differ.
+fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let limit = (name.chars().count() / 3).max(1);
+    known
+        .into_iter()
+        .map(|candidate| (distance(name, candidate, limit), candidate))
+        .filter(|&(distance, _)| distance <= limit)
+        .min_by_key(|&(distance, _)| distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// Edits (insertions, deletions, replacements, swaps of neighbours) from one word to the other; above `limit` just more than it.
+fn distance(from: &str, to: &str, limit: usize) -> usize {
+    let (from, to): (Vec<char>, Vec<char>) = (from.chars().collect(), to.chars().collect());
+    if from.len().abs_diff(to.len()) > limit {
+        return limit + 1;
+    }
+    let mut before: Vec<usize> = vec![0; to.len() + 1];
+    let mut above: Vec<usize> = (0..=to.len()).collect();
+    for row in 1..=from.len() {
+        let mut line = vec![row; to.len() + 1];
+        for column in 1..=to.len() {
+            let same = usize::from(from[row - 1] != to[column - 1]);
+            line[column] = (above[column - 1] + same).min(above[column] + 1).min(line[column - 1] + 1);
+            let swapped =
+                row > 1 && column > 1 && from[row - 1] == to[column - 2] && from[row - 2] == to[column - 1];
+            if swapped {
+                line[column] = line[column].min(before[column - 2] + 1);
+            }
+        }
+        before = std::mem::replace(&mut above, line);
+    }
+    above[to.len()]
+}

@@ -1,0 +1,414 @@
+//! Terms and numeric expressions: arguments counted and typed, functions told apart by what they yield.
+
+use super::{Checker, Scope};
+use crate::attachment::CallKind;
+use crate::diagnostic::{Diagnostic, Span};
+use crate::pddl::ast::{self, Arithmetic, Name};
+use crate::task::{Call, Expression, Fluent, FunctionId, Parameter, PredicateId, PreferenceId, Term, TypeId};
+
+/// A term by what it yields.
+pub(super) enum Value {
+    /// An object of one of these types.
+    Object(Term, Vec<TypeId>),
+    /// A number.
+    Number(Expression),
+    /// The word `undefined`.
+    Undefined,
+}
+
+/// What an expression may speak of besides fluents.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    /// Conditions and goals.
+    Condition,
+    /// Effects of an instantaneous action.
+    Effect,
+    /// Conditions, effects and duration bounds of a durative action: `?duration` has a value.
+    Durative,
+    /// A metric: `total-time` and `is-violated` have values.
+    Metric,
+}
+
+pub(super) fn span_of(term: &ast::Term) -> Span {
+    match term {
+        ast::Term::Name(name)
+        | ast::Term::Variable(name)
+        | ast::Term::Number(_, name)
+        | ast::Term::Violated(name) => name.span,
+        ast::Term::Apply { span, .. } | ast::Term::Arithmetic { span, .. } => *span,
+        ast::Term::Call(call) => call.span,
+        ast::Term::Duration(span) | ast::Term::ContinuousTime(span) | ast::Term::TotalTime(span) => *span,
+    }
+}
+
+impl Checker<'_> {
+    /// An object term with the types that it may be of.
+    pub(super) fn object_term(&mut self, term: &ast::Term, scope: &Scope) -> Option<(Term, Vec<TypeId>)> {
+        match term {
+            ast::Term::Variable(name) => match scope.find(name.symbol) {
+                Some(variable) => Some((Term::Variable(variable.slot), variable.types.clone())),
+                None => {
+                    self.unknown_variable(*name, scope);
+                    None
+                }
+            },
+            ast::Term::Name(name) | ast::Term::Number(_, name) => {
+                if self.objects[name.symbol.0 as usize].is_none() && self.functions.contains_key(&name.symbol)
+                {
+                    return self.object_function(*name, &[], name.span, scope);
+                }
+                let id = self.find_object(*name)?;
+                Some((Term::Object(id), self.task.object(id).types.clone()))
+            }
+            ast::Term::Apply { name, arguments, span } => {
+                self.object_function(*name, arguments, *span, scope)
+            }
+            other => {
+                let span = span_of(other);
+                self.push(Diagnostic::error(
+                    "wrong-kind",
+                    "a number where an object belongs",
+                    span,
+                    "this is a number",
+                ));
+                None
+            }
+        }
+    }
+
+    fn object_function(
+        &mut self,
+        name: Name,
+        arguments: &[ast::Term],
+        span: Span,
+        scope: &Scope,
+    ) -> Option<(Term, Vec<TypeId>)> {
+        let fluent = self.fluent(name, arguments, span, scope)?;
+        match self.task.function(fluent.function).result.clone() {
+            Some(types) => Some((Term::Function(Box::new(fluent)), types)),
+            None => {
+                let declared = self.task.function(fluent.function).span;
+                let message =
+                    format!("the value of `{}` is a number, an object was expected", self.name(name.symbol));
+                self.push(
+                    Diagnostic::error("wrong-kind", message, span, "this is a number")
+                        .with_label(declared, "declared here"),
+                );
+                None
+            }
+        }
+    }
+
+    /// A function with its arguments.
+    pub(super) fn fluent(
+        &mut self,
+        name: Name,
+        arguments: &[ast::Term],
+        span: Span,
+        scope: &Scope,
+    ) -> Option<Fluent> {
+        let function = self.find_function(name)?;
+        let parameters = self.task.function(function).parameters.clone();
+        let declared = self.task.function(function).span;
+        let arguments = self.arguments("function", name, &parameters, declared, arguments, span, scope)?;
+        Some(Fluent { function, arguments, span })
+    }
+
+    /// Arguments of a predicate.
+    pub(super) fn predicate_arguments(
+        &mut self,
+        predicate: PredicateId,
+        name: Name,
+        arguments: &[ast::Term],
+        span: Span,
+        scope: &Scope,
+    ) -> Option<Vec<Term>> {
+        let parameters = self.task.predicate(predicate).parameters.clone();
+        let declared = self.task.predicate(predicate).span;
+        self.arguments("predicate", name, &parameters, declared, arguments, span, scope)
+    }
+
+    /// A call of a module of the wanted kind.
+    pub(super) fn call(&mut self, call: &ast::Call, kind: CallKind, scope: &Scope) -> Option<Call> {
+        let module = self.find_module(call.name)?;
+        let known = self.task.module(module);
+        let (declared, parameters, is) = (known.span, known.parameters.clone(), known.kind);
+        if is != kind {
+            let written = self.written(call.name.span).to_string();
+            let message = format!("module `{written}` is {}, {} was expected", article(is), article(kind));
+            let help = match kind {
+                CallKind::Condition => "in conditions stand calls of modules of kind `conditionchecker`",
+                CallKind::Cost => "durations and costs are calls of modules of kind `cost`",
+                CallKind::Effect => "in effects stand calls of modules of kind `effect`",
+                CallKind::Grounding => "after `:grounding` stand calls of modules of kind `grounding`",
+            };
+            self.push(
+                Diagnostic::error(
+                    "wrong-kind",
+                    message,
+                    call.span,
+                    format!("{} was expected", article(kind)),
+                )
+                .with_label(declared, "declared here")
+                .with_help(help),
+            );
+            return None;
+        }
+        let arguments =
+            self.arguments("module", call.name, &parameters, declared, &call.arguments, call.span, scope)?;
+        Some(Call { module, arguments, span: call.span })
+    }
+
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one place that words findings on arguments of all three kinds"
+    )]
+    fn arguments(
+        &mut self,
+        kind: &str,
+        name: Name,
+        parameters: &[Parameter],
+        declared: Span,
+        arguments: &[ast::Term],
+        span: Span,
+        scope: &Scope,
+    ) -> Option<Vec<Term>> {
+        let terms: Vec<Option<(Term, Vec<TypeId>)>> =
+            arguments.iter().map(|argument| self.object_term(argument, scope)).collect();
+        if arguments.len() != parameters.len() {
+            let (wanted, found) = (parameters.len(), arguments.len());
+            self.wrong_arity(kind, name, declared, (wanted, found), span);
+            return None;
+        }
+        let mut list = Vec::with_capacity(terms.len());
+        for ((term, parameter), written) in terms.into_iter().zip(parameters).zip(arguments) {
+            let (term, types) = term?;
+            let fits = match &term {
+                Term::Object(id) => self.task.fits(*id, &parameter.types),
+                _ => self.overlap(&types, &parameter.types),
+            };
+            if !fits {
+                self.wrong_type(kind, name, parameter, &types, span_of(written));
+            }
+            list.push(term);
+        }
+        Some(list)
+    }
+
+    pub(super) fn wrong_arity(
+        &mut self,
+        kind: &str,
+        name: Name,
+        declared: Span,
+        (wanted, found): (usize, usize),
+        span: Span,
+    ) {
+        let written = self.name(name.symbol);
+        let plural = if wanted == 1 { "argument" } else { "arguments" };
+        let message = format!("{kind} `{written}` takes {wanted} {plural}, found {found}");
+        let difference = if found > wanted {
+            format!("{} too many", found - wanted)
+        } else {
+            format!("{} missing", wanted - found)
+        };
+        let head = self.written(declared_list(self, declared)).to_string();
+        self.push(
+            Diagnostic::error("arity", message, span, difference)
+                .with_label(declared, "declared here")
+                .with_help(format!("its declaration is `{}`", crate::pddl::parse::shortened(&head))),
+        );
+    }
+
+    pub(super) fn wrong_type(
+        &mut self,
+        kind: &str,
+        name: Name,
+        parameter: &Parameter,
+        found: &[TypeId],
+        span: Span,
+    ) {
+        let (wanted, is) = (self.types_text(&parameter.types), self.types_text(found));
+        let message = format!(
+            "{kind} `{}` takes a `{wanted}` for {}, found a `{is}`",
+            self.name(name.symbol),
+            parameter.name
+        );
+        self.push(
+            Diagnostic::error("wrong-type", message, span, format!("this is a `{is}`"))
+                .with_label(parameter.span, format!("a `{wanted}` is asked for here")),
+        );
+    }
+
+    /// A term by what it yields.
+    pub(super) fn value(&mut self, term: &ast::Term, place: Place, scope: &Scope) -> Option<Value> {
+        let object = |(term, types)| Value::Object(term, types);
+        match term {
+            ast::Term::Variable(_) => self.object_term(term, scope).map(object),
+            ast::Term::Name(name) if self.objects[name.symbol.0 as usize].is_some() => {
+                self.object_term(term, scope).map(object)
+            }
+            ast::Term::Name(name) if self.name(name.symbol) == "undefined" => Some(Value::Undefined),
+            ast::Term::Name(name) if !self.functions.contains_key(&name.symbol) => {
+                self.object_term(term, scope).map(object)
+            }
+            ast::Term::Name(name) => self.function_value(*name, &[], name.span, scope),
+            ast::Term::Apply { name, arguments, span } => self.function_value(*name, arguments, *span, scope),
+            _ => self.expression(term, place, scope).map(Value::Number),
+        }
+    }
+
+    fn function_value(
+        &mut self,
+        name: Name,
+        arguments: &[ast::Term],
+        span: Span,
+        scope: &Scope,
+    ) -> Option<Value> {
+        let fluent = self.fluent(name, arguments, span, scope)?;
+        Some(match self.task.function(fluent.function).result.clone() {
+            Some(types) => Value::Object(Term::Function(Box::new(fluent)), types),
+            None => Value::Number(Expression::Fluent(fluent)),
+        })
+    }
+
+    /// A numeric expression.
+    pub(super) fn expression(&mut self, term: &ast::Term, place: Place, scope: &Scope) -> Option<Expression> {
+        match term {
+            ast::Term::Number(number, _) => Some(Expression::Number(*number)),
+            ast::Term::Arithmetic { operator, operands, .. } => {
+                self.arithmetic(*operator, operands, place, scope)
+            }
+            ast::Term::Call(call) => self.call(call, CallKind::Cost, scope).map(Expression::Call),
+            ast::Term::Duration(span) => {
+                if place == Place::Durative {
+                    return Some(Expression::Duration);
+                }
+                let message = "`?duration` has a value in durative actions alone";
+                self.push(Diagnostic::error("duration", message, *span, "nothing here takes time"));
+                None
+            }
+            ast::Term::ContinuousTime(span) => {
+                let message = "`#t` stands only in a change at a rate";
+                let help =
+                    "as in `(increase (fuel ?r) (* #t 2))`, an effect of a durative action without a time";
+                self.push(Diagnostic::error("continuous", message, *span, "not here").with_help(help));
+                None
+            }
+            ast::Term::TotalTime(span) => self.total_time(*span, place),
+            ast::Term::Violated(name) => self.violated(*name, place),
+            _ => match self.value(term, place, scope)? {
+                Value::Number(expression) => Some(expression),
+                Value::Object(_, types) => {
+                    let message = format!("a number was expected, found a `{}`", self.types_text(&types));
+                    self.push(Diagnostic::error("wrong-kind", message, span_of(term), "this is an object"));
+                    None
+                }
+                Value::Undefined => {
+                    let message = "`undefined` is no number";
+                    self.push(Diagnostic::error(
+                        "wrong-kind",
+                        message,
+                        span_of(term),
+                        "a number was expected",
+                    ));
+                    None
+                }
+            },
+        }
+    }
+
+    fn arithmetic(
+        &mut self,
+        operator: Arithmetic,
+        operands: &[ast::Term],
+        place: Place,
+        scope: &Scope,
+    ) -> Option<Expression> {
+        let all: Vec<Option<Expression>> =
+            operands.iter().map(|operand| self.expression(operand, place, scope)).collect();
+        let mut all: Vec<Expression> = all.into_iter().collect::<Option<_>>()?;
+        Some(match operator {
+            Arithmetic::Add => Expression::Add(all),
+            Arithmetic::Multiply => Expression::Multiply(all),
+            Arithmetic::Subtract if all.len() == 1 => Expression::Negative(Box::new(all.pop()?)),
+            Arithmetic::Subtract | Arithmetic::Divide => {
+                let (right, left) = (all.pop()?, all.pop()?);
+                let both = Box::new([left, right]);
+                if operator == Arithmetic::Divide {
+                    Expression::Divide(both)
+                } else {
+                    Expression::Subtract(both)
+                }
+            }
+        })
+    }
+
+    fn total_time(&mut self, span: Span, place: Place) -> Option<Expression> {
+        if place == Place::Metric {
+            return Some(Expression::TotalTime);
+        }
+        // A domain may have a function of this name.
+        if let Some(&function) =
+            self.symbols.find("total-time").and_then(|symbol| self.functions.get(&symbol))
+        {
+            return Some(Expression::Fluent(Fluent {
+                function: FunctionId(function),
+                arguments: Vec::new(),
+                span,
+            }));
+        }
+        let message = "`total-time` has a value in the metric alone";
+        self.push(Diagnostic::error("wrong-kind", message, span, "not known while the plan runs"));
+        None
+    }
+
+    fn violated(&mut self, name: Name, place: Place) -> Option<Expression> {
+        if place != Place::Metric {
+            let message = "`is-violated` has a value in the metric alone";
+            self.push(Diagnostic::error("wrong-kind", message, name.span, "not known while the plan runs"));
+            return None;
+        }
+        if let Some(&id) = self.preferences.get(&name.symbol) {
+            return Some(Expression::Violated(PreferenceId(id)));
+        }
+        // A preference over the parameters of an action that does not exist counts nothing; one that is misspelt is
+        // a fault.
+        let known: Vec<&str> = self.task.preferences.iter().map(|own| own.name.as_str()).collect();
+        let message = format!("no preference is called `{}`", self.name(name.symbol));
+        let near = crate::pddl::nearest(self.name(name.symbol), known.iter().copied());
+        let finding = Diagnostic::error("undeclared-preference", message, name.span, "unknown preference");
+        let finding = match near {
+            Some(near) => finding.with_help(format!("did you mean `{near}`?")),
+            None => finding,
+        };
+        self.push(finding);
+        None
+    }
+}
+
+fn article(kind: CallKind) -> &'static str {
+    match kind {
+        CallKind::Cost => "a cost module",
+        CallKind::Condition => "a condition module",
+        CallKind::Effect => "an effect module",
+        CallKind::Grounding => "a grounding module",
+    }
+}
+
+/// The whole list in which a declared name stands first.
+fn declared_list(checker: &Checker<'_>, name: Span) -> Span {
+    let text = checker.task.sources.get(name.source as usize).map_or("", |source| source.text.as_str());
+    let start = text[..name.start as usize].rfind('(').unwrap_or(name.start as usize);
+    let mut depth = 0usize;
+    for (offset, byte) in text.bytes().enumerate().skip(start) {
+        match byte {
+            b'(' => depth += 1,
+            b')' => depth = depth.saturating_sub(1),
+            _ => continue,
+        }
+        if depth == 0 {
+            return Span { source: name.source, start: start as u32, end: offset as u32 + 1 };
+        }
+    }
+    name
+}

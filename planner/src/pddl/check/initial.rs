@@ -1,0 +1,257 @@
+//! The initial state, timed literals included.
+
+use rustc_hash::FxHashSet;
+
+use super::Checker;
+use crate::diagnostic::{Diagnostic, Span};
+use crate::pddl::ast::{Initial, InitialValue, Name, Symbol};
+use crate::pddl::nearest;
+use crate::task::{
+    Fact, FunctionId, GroundChange, GroundFluent, Init, ObjectId, Parameter, PredicateId, TimedInitial,
+};
+
+impl Checker<'_> {
+    pub(super) fn initial(&mut self, all: &[Initial]) {
+        let mut init = Init::default();
+        let mut facts: FxHashSet<Fact> = FxHashSet::default();
+        let mut values: rustc_hash::FxHashMap<GroundFluent, (usize, Span)> = rustc_hash::FxHashMap::default();
+        init.facts.reserve(all.len());
+        for one in all {
+            let (time_s, one) = match one {
+                Initial::At(time_s, inner) => (Some(*time_s), &**inner),
+                other => (None, other),
+            };
+            let Some((change, span)) = self.ground_change(one) else { continue };
+            if let Some(time_s) = time_s {
+                init.timed.push(TimedInitial { time_s, change, span });
+                continue;
+            }
+            match change {
+                GroundChange::Add(fact) => {
+                    if facts.insert(fact.clone()) {
+                        init.facts.push(fact);
+                    }
+                }
+                // Everything that is not said to be true is false.
+                GroundChange::Delete(_) => {}
+                GroundChange::Number(fluent, value) => match values.get(&fluent) {
+                    Some(&(at, first)) => {
+                        let before = std::mem::replace(&mut init.numbers[at].1, value);
+                        self.two_values(before == value, first, span);
+                    }
+                    None => {
+                        values.insert(fluent.clone(), (init.numbers.len(), span));
+                        init.numbers.push((fluent, value));
+                    }
+                },
+                GroundChange::Object(fluent, value) => match values.get(&fluent) {
+                    Some(&(at, first)) => {
+                        let before = std::mem::replace(&mut init.objects[at].1, value);
+                        self.two_values(before == value, first, span);
+                    }
+                    None => {
+                        values.insert(fluent.clone(), (init.objects.len(), span));
+                        init.objects.push((fluent, value));
+                    }
+                },
+            }
+        }
+        init.timed.sort_by(|one, other| one.time_s.total_cmp(&other.time_s));
+        self.task.init = init;
+    }
+
+    fn two_values(&mut self, same: bool, first: Span, second: Span) {
+        if same {
+            return;
+        }
+        self.push(
+            Diagnostic::warning("duplicate", "two values for one function", second, "this value counts")
+                .with_label(first, "it has this value already")
+                .with_help("remove one of them"),
+        );
+    }
+
+    fn ground_change(&mut self, one: &Initial) -> Option<(GroundChange, Span)> {
+        match one {
+            Initial::Literal { negated, name, arguments, span } => {
+                let Some(&predicate) = self.predicates.get(&name.symbol) else {
+                    self.unknown_initial(*name, true);
+                    return None;
+                };
+                let declared = &self.task.predicates[predicate as usize];
+                let derived = declared.stratum.is_some();
+                let arguments =
+                    self.ground_arguments("predicate", *name, Place::Predicate(predicate), arguments, *span)?;
+                if derived && !negated {
+                    let message =
+                        format!("derived predicate `{}` in the initial state", self.name(name.symbol));
+                    let finding =
+                        Diagnostic::warning("derived", message, *span, "this follows from its rules alone");
+                    self.push(finding.with_help("it is not taken as a fact; remove it"));
+                    return None;
+                }
+                let fact = Fact { predicate: PredicateId(predicate), arguments };
+                Some((if *negated { GroundChange::Delete(fact) } else { GroundChange::Add(fact) }, *span))
+            }
+            Initial::Value { name, arguments, value, span } => {
+                let Some(&function) = self.functions.get(&name.symbol) else {
+                    self.unknown_initial(*name, false);
+                    return None;
+                };
+                let arguments =
+                    self.ground_arguments("function", *name, Place::Function(function), arguments, *span)?;
+                let fluent = GroundFluent { function: FunctionId(function), arguments };
+                self.ground_value(fluent, *value, *span).map(|change| (change, *span))
+            }
+            Initial::At(_, inner) => self.ground_change(inner),
+        }
+    }
+
+    fn ground_value(
+        &mut self,
+        fluent: GroundFluent,
+        value: InitialValue,
+        span: Span,
+    ) -> Option<GroundChange> {
+        let declared = self.task.function(fluent.function);
+        let place = declared.span;
+        match (&declared.result, value) {
+            (None, InitialValue::Number(number, _)) => Some(GroundChange::Number(fluent, number)),
+            (Some(types), InitialValue::Object(name) | InitialValue::Number(_, name)) => {
+                let types = types.clone();
+                if self.name(name.symbol) == "undefined" {
+                    return None;
+                }
+                let object = self.find_object(name)?;
+                if !self.task.fits(object, &types) {
+                    let is = self.types_text(&self.task.object(object).types);
+                    let wanted = self.types_text(&types);
+                    let message = format!(
+                        "the value of `{}` is a `{wanted}`, found a `{is}`",
+                        self.task.function(fluent.function).name
+                    );
+                    self.push(
+                        Diagnostic::error("wrong-type", message, name.span, format!("this is a `{is}`"))
+                            .with_label(place, "declared here"),
+                    );
+                }
+                Some(GroundChange::Object(fluent, object))
+            }
+            (None, InitialValue::Object(name)) => {
+                let message = format!("the value of `{}` is a number", declared.name);
+                let label = format!("`{}` is not a number", self.name(name.symbol));
+                self.push(
+                    Diagnostic::error("wrong-kind", message, span, label).with_label(place, "declared here"),
+                );
+                None
+            }
+        }
+    }
+
+    /// What no declaration knows cannot matter to any action: only a likely misspelling is a fault.
+    fn unknown_initial(&mut self, name: Name, predicate: bool) {
+        let task = &self.task;
+        let known: Vec<&str> = if predicate {
+            task.predicates.iter().map(|own| own.name.as_str()).collect()
+        } else {
+            task.functions.iter().map(|own| own.name.as_str()).collect()
+        };
+        let written = self.name(name.symbol);
+        if nearest(written, known).is_some() {
+            if predicate {
+                self.find_predicate(name);
+            } else {
+                self.find_function(name);
+            }
+            return;
+        }
+        let code = if predicate { "undeclared-predicate" } else { "undeclared-function" };
+        if self.reported.contains_key(&(code, name.symbol)) {
+            return;
+        }
+        self.reported.insert((code, name.symbol), self.findings.len());
+        let kind = if predicate { "predicate" } else { "function" };
+        let message = format!("{kind} `{written}` is not declared in the domain");
+        let finding = Diagnostic::warning(code, message, name.span, "nothing can depend on this");
+        self.push(
+            finding.with_help(format!("declare it in `(:{kind}s …)` of the domain, or remove it here")),
+        );
+    }
+
+    fn ground_arguments(
+        &mut self,
+        kind: &str,
+        name: Name,
+        place: Place,
+        arguments: &[Name],
+        span: Span,
+    ) -> Option<Box<[ObjectId]>> {
+        let (wanted, declared) = {
+            let (parameters, span) = self.declared(place);
+            (parameters.len(), span)
+        };
+        if wanted != arguments.len() {
+            self.wrong_arity(kind, name, declared, (wanted, arguments.len()), span);
+            return None;
+        }
+        let mut ids = Vec::with_capacity(wanted);
+        for (position, argument) in arguments.iter().enumerate() {
+            let Some(id) = self.object_id(*argument) else {
+                // The others may be unknown too.
+                for other in &arguments[position + 1..] {
+                    self.object_id(*other);
+                }
+                return None;
+            };
+            if !self.task.fits(id, &self.declared(place).0[position].types) {
+                let parameter = self.declared(place).0[position].clone();
+                let found = self.task.object(id).types.clone();
+                self.wrong_type(kind, name, &parameter, &found, argument.span);
+            }
+            ids.push(id);
+        }
+        Some(ids.into())
+    }
+
+    /// A fact about an object that does not exist cannot matter to any action; it is left out, and said so.
+    fn object_id(&mut self, name: Name) -> Option<ObjectId> {
+        let Symbol(symbol) = name.symbol;
+        if let Some(id) = self.objects[symbol as usize] {
+            return Some(id);
+        }
+        let code = "undeclared-object";
+        if !self.reported.contains_key(&(code, name.symbol)) {
+            self.reported.insert((code, name.symbol), self.findings.len());
+            let written = self.name(name.symbol);
+            let near = nearest(written, self.task.objects.iter().map(|own| own.name.as_str()));
+            let message = format!("object `{written}` is not declared");
+            let finding = Diagnostic::warning(code, message, name.span, "what is said about it is left out");
+            let finding = match near {
+                Some(near) => finding.with_help(format!("did you mean `{near}`?")),
+                None => finding.with_help("declare it in `(:objects …)`"),
+            };
+            self.push(finding);
+        }
+        None
+    }
+
+    fn declared(&self, place: Place) -> (&[Parameter], Span) {
+        match place {
+            Place::Predicate(id) => {
+                let declared = &self.task.predicates[id as usize];
+                (&declared.parameters, declared.span)
+            }
+            Place::Function(id) => {
+                let declared = &self.task.functions[id as usize];
+                (&declared.parameters, declared.span)
+            }
+        }
+    }
+}
+
+/// Whose arguments are looked at.
+#[derive(Clone, Copy)]
+enum Place {
+    Predicate(u32),
+    Function(u32),
+}

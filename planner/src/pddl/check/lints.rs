@@ -1,0 +1,179 @@
+//! Findings on a task that can be read: what it asks for and nothing can bring about.
+
+use super::Checker;
+use crate::diagnostic::{Diagnostic, Span};
+use crate::task::{Atom, Change, Condition, Effect, GroundChange, ObjectId, Parameter, Task, Term, Written};
+
+impl Checker<'_> {
+    pub(super) fn lints(&mut self) {
+        let goal = std::mem::replace(&mut self.task.goal.body, Condition::TRUE);
+        let mut wanted = Vec::new();
+        certain_atoms(&goal, &mut wanted);
+        let mut findings: Vec<Diagnostic> = Vec::new();
+        for atom in wanted {
+            findings.extend(unreachable_goal(&self.task, atom));
+        }
+        self.findings.append(&mut findings);
+        self.task.goal.body = goal;
+    }
+}
+
+/// Ground atoms that hold in every state in which the condition holds.
+fn certain_atoms<'c>(condition: &'c Condition, into: &mut Vec<&'c Atom>) {
+    match condition {
+        Condition::And(parts) => parts.iter().for_each(|part| certain_atoms(part, into)),
+        Condition::Atom(atom) if atom.arguments.iter().all(|term| matches!(term, Term::Object(_))) => {
+            into.push(atom)
+        }
+        _ => {}
+    }
+}
+
+fn objects(atom: &Atom) -> Vec<ObjectId> {
+    let object = |term: &Term| match term {
+        Term::Object(id) => Some(*id),
+        _ => None,
+    };
+    atom.arguments.iter().filter_map(object).collect()
+}
+
+/// A goal fact that is false at first and that nothing can make true.
+fn unreachable_goal(task: &Task, goal: &Atom) -> Option<Diagnostic> {
+    let wanted = objects(goal);
+    let predicate = task.predicate(goal.predicate);
+    let initially =
+        task.init.facts.iter().any(|fact| fact.predicate == goal.predicate && *fact.arguments == *wanted);
+    if initially || predicate.stratum.is_some() {
+        return None;
+    }
+    let timed =
+        |change: &GroundChange| matches!(change, GroundChange::Add(fact) if fact.predicate == goal.predicate);
+    if task.init.timed.iter().any(|timed_one| timed(&timed_one.change)) {
+        return None;
+    }
+    let writes =
+        |written: &Written| matches!(written, Written::Truth(atom) if atom.predicate == goal.predicate);
+    if task.modules.iter().any(|module| module.writes.iter().any(writes)) {
+        return None;
+    }
+    let achievers: Vec<(Span, Vec<Achiever<'_>>)> = task
+        .actions
+        .iter()
+        .flat_map(|action| {
+            let effects = action.effects.start.iter().chain(&action.effects.end);
+            effects.map(move |effect| (action, effect))
+        })
+        .filter_map(|(action, effect)| match &effect.change {
+            Change::Add(atom) if atom.predicate == goal.predicate => {
+                Some((effect.span, arguments(task, atom, &action.parameters, effect)))
+            }
+            _ => None,
+        })
+        .collect();
+    let fits = |all: &[Achiever<'_>]| all.iter().zip(&wanted).all(|(one, object)| one.can_be(*object));
+    if achievers.iter().any(|(_, all)| fits(all)) {
+        return None;
+    }
+    let text = fact_text(task, goal);
+    let finding = Diagnostic::error(
+        "unreachable-goal",
+        format!("nobody achieves the goal `{text}`"),
+        goal.span,
+        "not true at first",
+    );
+    Some(match achievers.first() {
+        None => nothing_adds(task, goal, finding),
+        Some((span, all)) => {
+            let (position, object) = all
+                .iter()
+                .zip(&wanted)
+                .enumerate()
+                .find(|(_, (one, object))| !one.can_be(**object))
+                .map(|(position, (_, object))| (position, *object))?;
+            let name = &task.object(object).name;
+            let is: Vec<&str> =
+                task.object(object).types.iter().map(|&id| task.type_of(id).name.as_str()).collect();
+            let wants = all[position].text(task);
+            finding
+                .with_label(*span, format!("this makes `{}` true of {wants} only", predicate.name))
+                .with_help(format!("`{name}` is a `{}`: no effect can add this fact", is.join(" or ")))
+        }
+    })
+}
+
+fn nothing_adds(task: &Task, goal: &Atom, finding: Diagnostic) -> Diagnostic {
+    let predicate = task.predicate(goal.predicate);
+    let deleted = task.actions.iter().find_map(|action| {
+        let mut effects = action.effects.start.iter().chain(&action.effects.end);
+        effects.find_map(|effect| match &effect.change {
+            Change::Delete(atom) if atom.predicate == goal.predicate => {
+                Some((effect.span, action.name.clone()))
+            }
+            _ => None,
+        })
+    });
+    let finding = match deleted {
+        Some((span, name)) => finding.with_label(span, format!("`{name}` only ever makes it false")),
+        None => finding.with_label(predicate.span, "no action has this predicate in its effect"),
+    };
+    finding.with_help(format!(
+        "give an action the effect `({}{})`, or state the fact in `(:init …)`",
+        predicate.name,
+        predicate.parameters.iter().map(|own| format!(" {}", own.name)).collect::<String>()
+    ))
+}
+
+/// What an argument of an effect can be.
+enum Achiever<'t> {
+    Constant(ObjectId),
+    Of(&'t Parameter),
+    Anything,
+}
+
+impl Achiever<'_> {
+    fn can_be(&self, object: ObjectId) -> bool {
+        match self {
+            Achiever::Constant(own) => *own == object,
+            Achiever::Of(parameter) => parameter.objects.binary_search(&object).is_ok(),
+            Achiever::Anything => true,
+        }
+    }
+
+    fn text(&self, task: &Task) -> String {
+        match self {
+            Achiever::Constant(own) => format!("`{}`", task.object(*own).name),
+            Achiever::Of(parameter) => {
+                let types: Vec<&str> =
+                    parameter.types.iter().map(|&id| task.type_of(id).name.as_str()).collect();
+                format!("a `{}`", types.join(" or "))
+            }
+            Achiever::Anything => "anything".to_string(),
+        }
+    }
+}
+
+fn arguments<'t>(
+    task: &'t Task,
+    atom: &Atom,
+    parameters: &'t [Parameter],
+    effect: &'t Effect,
+) -> Vec<Achiever<'t>> {
+    let of = |term: &Term| match term {
+        Term::Object(id) => Achiever::Constant(*id),
+        Term::Variable(slot) => match parameters.get(slot.index()) {
+            Some(parameter) => Achiever::Of(parameter),
+            None => match effect.forall.iter().find(|one| one.slot == *slot) {
+                Some(one) => Achiever::Of(&one.parameter),
+                None => Achiever::Anything,
+            },
+        },
+        Term::Function(_) => Achiever::Anything,
+    };
+    debug_assert_eq!(atom.arguments.len(), task.predicate(atom.predicate).parameters.len());
+    atom.arguments.iter().map(of).collect()
+}
+
+fn fact_text(task: &Task, atom: &Atom) -> String {
+    let names: String = objects(atom).iter().map(|&id| format!(" {}", task.object(id).name)).collect();
+    format!("({}{names})", task.predicate(atom.predicate).name)
+}

@@ -1,0 +1,262 @@
+//! From trees of names to a [`Task`]: every name looked up, every argument counted and typed, all findings at once.
+
+mod actions;
+mod conditions;
+mod declarations;
+mod expressions;
+mod goals;
+mod initial;
+mod lints;
+mod names;
+mod strata;
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use super::ast::{self, Symbol};
+use super::lex::Symbols;
+use super::parse;
+use crate::diagnostic::{Diagnostic, Findings, Source, Span};
+use crate::task::{Condition, Init, Object, ObjectId, Quantified, Scoped, Slot, Task, Type, TypeId};
+
+/// Every finding in a domain, or in a domain and a problem, faults and warnings, in the order of the text.
+pub fn check(domain: &Source, problem: Option<&Source>) -> Findings {
+    read_all(domain, problem, true).1
+}
+
+impl Task {
+    /// Reads and checks a domain and a problem.
+    ///
+    /// # Errors
+    /// Every finding, if any of them is a fault.
+    pub fn read(domain: &Source, problem: &Source) -> Result<Task, Findings> {
+        let (task, findings) = read_all(domain, Some(problem), false);
+        if findings.has_errors() { Err(findings) } else { Ok(task) }
+    }
+}
+
+fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Findings) {
+    let _span = tracing::debug_span!("read", domain = domain.name).entered();
+    let sources: Vec<Source> = [Some(domain), problem].into_iter().flatten().cloned().collect();
+    let mut symbols = Symbols::default();
+    let mut list = Vec::new();
+    let domain_tree = parse::domain(&domain.text, 0, &mut symbols, &mut list);
+    let problem_tree = problem.map(|problem| parse::problem(&problem.text, 1, &mut symbols, &mut list));
+    let readable = list.iter().all(|finding| finding.severity != crate::diagnostic::Severity::Error);
+    let mut checker = Checker::new(&sources, &symbols, list);
+    checker.domain(&domain_tree, problem_tree.as_ref());
+    if let Some(problem) = &problem_tree {
+        checker.problem(problem, &domain_tree);
+    }
+    if lints && readable && problem_tree.is_some() {
+        checker.lints();
+    }
+    let Checker { task, mut findings, .. } = checker;
+    // Stable: findings at one place stay in the order in which they were made.
+    findings.sort_by_key(|finding: &Diagnostic| finding.labels.first().map(|label| label.span));
+    (task, Findings { sources, list: findings })
+}
+
+/// A variable in scope.
+struct Variable {
+    symbol: Symbol,
+    slot: Slot,
+    types: Vec<TypeId>,
+}
+
+/// The variables in scope, innermost last, and the slots given out so far.
+#[derive(Default)]
+struct Scope {
+    variables: Vec<Variable>,
+    slots: usize,
+}
+
+impl Scope {
+    fn find(&self, symbol: Symbol) -> Option<&Variable> {
+        self.variables.iter().rev().find(|variable| variable.symbol == symbol)
+    }
+}
+
+struct Checker<'a> {
+    symbols: &'a Symbols,
+    task: Task,
+    findings: Vec<Diagnostic>,
+    types: FxHashMap<Symbol, TypeId>,
+    objects: Vec<Option<ObjectId>>,
+    predicates: FxHashMap<Symbol, u32>,
+    functions: FxHashMap<Symbol, u32>,
+    modules: FxHashMap<Symbol, u32>,
+    preferences: FxHashMap<Symbol, u32>,
+    /// Objects that fit, by alternatives of types.
+    fitting: FxHashMap<Vec<TypeId>, Arc<[ObjectId]>>,
+    /// Undeclared names reported already, by kind, with the finding that further uses are added to.
+    reported: FxHashMap<(&'static str, Symbol), usize>,
+}
+
+impl<'a> Checker<'a> {
+    fn new(sources: &[Source], symbols: &'a Symbols, findings: Vec<Diagnostic>) -> Self {
+        let task = Task {
+            sources: sources.to_vec().into(),
+            domain: String::new(),
+            problem: String::new(),
+            types: Vec::new(),
+            objects: Vec::new(),
+            predicates: Vec::new(),
+            functions: Vec::new(),
+            modules: Vec::new(),
+            rules: Vec::new(),
+            actions: Vec::new(),
+            init: Init::default(),
+            goal: Scoped { slots: 0, body: Condition::TRUE },
+            constraints: Vec::new(),
+            preferences: Vec::new(),
+            metric: None,
+            module_options: Vec::new(),
+            module_exit_options: Vec::new(),
+        };
+        Checker {
+            symbols,
+            task,
+            findings,
+            types: FxHashMap::default(),
+            objects: vec![None; symbols.len()],
+            predicates: FxHashMap::default(),
+            functions: FxHashMap::default(),
+            modules: FxHashMap::default(),
+            preferences: FxHashMap::default(),
+            fitting: FxHashMap::default(),
+            reported: FxHashMap::default(),
+        }
+    }
+
+    fn name(&self, symbol: Symbol) -> &'a str {
+        self.symbols.name(symbol)
+    }
+
+    /// The text of a place as it was written.
+    fn written(&self, span: Span) -> &str {
+        let text = self.task.sources.get(span.source as usize).map_or("", |source| source.text.as_str());
+        text.get(span.start as usize..span.end as usize).unwrap_or("")
+    }
+
+    fn push(&mut self, finding: Diagnostic) {
+        self.findings.push(finding);
+    }
+
+    fn domain(&mut self, domain: &ast::Domain, problem: Option<&ast::Problem>) {
+        self.task.domain = domain.name.map(|name| self.name(name.symbol).to_string()).unwrap_or_default();
+        self.declare_types(&domain.types);
+        self.declare_objects(&domain.constants);
+        if let Some(problem) = problem {
+            self.declare_objects(&problem.objects);
+        }
+        self.fill_types();
+        self.declare_predicates(&domain.predicates);
+        self.declare_functions(&domain.functions);
+        self.declare_derived(&domain.derived);
+        self.declare_modules(&domain.modules);
+        self.derived_rules(&domain.derived);
+        self.order_strata();
+        for action in &domain.actions {
+            self.action(action);
+        }
+        for constraint in &domain.constraints {
+            self.constraint(constraint);
+        }
+    }
+
+    fn problem(&mut self, problem: &ast::Problem, domain: &ast::Domain) {
+        self.task.problem = problem.name.map(|name| self.name(name.symbol).to_string()).unwrap_or_default();
+        self.same_domain(problem, domain);
+        self.initial(&problem.initial);
+        match &problem.goal {
+            Some(goal) => self.goal(goal),
+            None if problem.name.is_some() => self.no_goal(problem),
+            None => {}
+        }
+        for constraint in &problem.constraints {
+            self.constraint(constraint);
+        }
+        if let Some(metric) = &problem.metric {
+            self.metric(metric);
+        }
+        self.task.module_options = self.options(&problem.module_options);
+        self.task.module_exit_options = self.options(&problem.module_exit_options);
+    }
+
+    fn same_domain(&mut self, problem: &ast::Problem, domain: &ast::Domain) {
+        let (Some(said), Some(is)) = (problem.domain, domain.name) else { return };
+        if said.symbol != is.symbol {
+            let (said_name, is_name) = (self.name(said.symbol), self.name(is.symbol));
+            let message =
+                format!("the problem belongs to domain `{said_name}`, the domain is called `{is_name}`");
+            self.push(
+                Diagnostic::warning("other-domain", message, said.span, "another domain is named here")
+                    .with_label(is.span, "this is the domain that was read"),
+            );
+        }
+    }
+
+    fn no_goal(&mut self, problem: &ast::Problem) {
+        if let Some(name) = problem.name {
+            self.push(
+                Diagnostic::error("no-goal", "the problem has no goal", name.span, "this problem")
+                    .with_help("add `(:goal (and …))`"),
+            );
+        }
+    }
+
+    /// Objects that are of one of the types.
+    fn fitting(&mut self, types: &[TypeId]) -> Arc<[ObjectId]> {
+        if let Some(objects) = self.fitting.get(types) {
+            return objects.clone();
+        }
+        let objects: Arc<[ObjectId]> = match types {
+            [one] => self.task.type_of(*one).objects.as_slice().into(),
+            _ => {
+                let mut all: Vec<ObjectId> =
+                    types.iter().flat_map(|&id| self.task.type_of(id).objects.iter().copied()).collect();
+                all.sort_unstable();
+                all.dedup();
+                all.into()
+            }
+        };
+        self.fitting.insert(types.to_vec(), objects.clone());
+        objects
+    }
+
+    /// Opens a scope with quantified variables; close it by truncating `scope.variables` to the returned length.
+    fn quantify(&mut self, variables: &[ast::Typed], scope: &mut Scope) -> (usize, Vec<Quantified>) {
+        let before = scope.variables.len();
+        let mut quantified = Vec::with_capacity(variables.len());
+        for typed in variables {
+            let parameter = self.parameter(typed);
+            let slot = Slot(scope.slots as u32);
+            scope.slots += 1;
+            scope.variables.push(Variable {
+                symbol: typed.name.symbol,
+                slot,
+                types: parameter.types.clone(),
+            });
+            quantified.push(Quantified { slot, parameter });
+        }
+        (before, quantified)
+    }
+
+    /// Types as text: `block`, `car or truck`.
+    fn types_text(&self, types: &[TypeId]) -> String {
+        types.iter().map(|&id| self.task.type_of(id).name.as_str()).collect::<Vec<_>>().join(" or ")
+    }
+
+    /// Whether an object could be of one of the first and of one of the second types at once.
+    fn overlap(&self, one: &[TypeId], other: &[TypeId]) -> bool {
+        let is = |own: &Type, types: &[TypeId]| own.ancestors.iter().any(|ancestor| types.contains(ancestor));
+        self.task.types.iter().any(|own| is(own, one) && is(own, other))
+            || self.task.objects.iter().any(|Object { types, .. }| {
+                types.len() > 1
+                    && types.iter().any(|&own| is(self.task.type_of(own), one))
+                    && types.iter().any(|&own| is(self.task.type_of(own), other))
+            })
+    }
+}

@@ -1,0 +1,143 @@
+//! Looking names up: what is not declared is reported once, with the nearest declared name.
+
+use rustc_hash::FxHashMap;
+
+use super::{Checker, Scope};
+use crate::diagnostic::{Diagnostic, Span};
+use crate::pddl::ast::{Name, Symbol};
+use crate::pddl::nearest;
+use crate::task::{FunctionId, ModuleId, ObjectId, PredicateId, TypeId};
+
+/// More uses of one undeclared name that are shown.
+const MORE_USES: usize = 2;
+
+impl Checker<'_> {
+    pub(super) fn find_type(&mut self, name: Name) -> Option<TypeId> {
+        if let Some(&id) = self.types.get(&name.symbol) {
+            return Some(id);
+        }
+        let known = self.task.types.iter().map(|own| own.name.clone()).collect();
+        self.undeclared("undeclared-type", "type", ":types", name, known);
+        None
+    }
+
+    pub(super) fn find_object(&mut self, name: Name) -> Option<ObjectId> {
+        if let Some(id) = self.objects[name.symbol.0 as usize] {
+            return Some(id);
+        }
+        let known = self.task.objects.iter().map(|own| own.name.clone()).collect();
+        let section = if name.span.source == 0 { ":constants" } else { ":objects" };
+        self.undeclared("undeclared-object", "object", section, name, known);
+        None
+    }
+
+    pub(super) fn find_predicate(&mut self, name: Name) -> Option<PredicateId> {
+        if let Some(&id) = self.predicates.get(&name.symbol) {
+            return Some(PredicateId(id));
+        }
+        let known = self.task.predicates.iter().map(|own| own.name.clone()).collect();
+        self.undeclared("undeclared-predicate", "predicate", ":predicates", name, known);
+        None
+    }
+
+    pub(super) fn find_function(&mut self, name: Name) -> Option<FunctionId> {
+        if let Some(&id) = self.functions.get(&name.symbol) {
+            return Some(FunctionId(id));
+        }
+        if self.predicates.contains_key(&name.symbol) {
+            let message = format!("`{}` is a predicate, a function was expected", self.name(name.symbol));
+            let label = "true or false, not a value";
+            self.push(Diagnostic::error("wrong-kind", message, name.span, label));
+            return None;
+        }
+        let known = self.task.functions.iter().map(|own| own.name.clone()).collect();
+        self.undeclared("undeclared-function", "function", ":functions", name, known);
+        None
+    }
+
+    pub(super) fn find_module(&mut self, name: Name) -> Option<ModuleId> {
+        if let Some(&id) = self.modules.get(&name.symbol) {
+            return Some(ModuleId(id));
+        }
+        let known = self.task.modules.iter().map(|own| own.name.to_ascii_lowercase()).collect();
+        self.undeclared("missing-attachment", "module", ":modules", name, known);
+        None
+    }
+
+    pub(super) fn unknown_variable(&mut self, name: Name, scope: &Scope) {
+        let variable = self.name(name.symbol);
+        let message = format!("variable `{variable}` is not a parameter and not quantified here");
+        let known: Vec<&str> = scope.variables.iter().map(|variable| self.name(variable.symbol)).collect();
+        let near = nearest(variable, known.iter().copied());
+        let finding = Diagnostic::error("undeclared-variable", message, name.span, "unknown variable");
+        let finding = match near {
+            Some(near) => finding.with_help(format!("did you mean `{near}`?")),
+            None if known.is_empty() => finding.with_help("no variable is declared here"),
+            None => finding.with_help(format!("variables here: {}", known.join(" "))),
+        };
+        self.push(finding);
+    }
+
+    fn undeclared(&mut self, code: &'static str, kind: &str, section: &str, name: Name, known: Vec<String>) {
+        if let Some(&finding) = self.reported.get(&(code, name.symbol)) {
+            let finding = &mut self.findings[finding];
+            if finding.labels.len() <= MORE_USES {
+                finding
+                    .labels
+                    .push(crate::diagnostic::Label { span: name.span, text: "used here too".into() });
+            }
+            return;
+        }
+        let written = self.name(name.symbol);
+        let message = format!("{kind} `{written}` is not declared");
+        let finding = Diagnostic::error(code, message, name.span, format!("unknown {kind}"));
+        let finding = match nearest(written, known.iter().map(String::as_str)) {
+            Some(near) => {
+                let declared = self.declaration(kind, near);
+                let finding = finding.with_help(format!("did you mean `{near}`?"));
+                match declared {
+                    Some(span) => finding.with_label(span, format!("`{near}` is declared here")),
+                    None => finding,
+                }
+            }
+            None => finding.with_help(format!("declare it in `({section} …)`")),
+        };
+        self.reported.insert((code, name.symbol), self.findings.len());
+        self.push(finding);
+    }
+
+    /// Where a name is declared that is offered instead.
+    fn declaration(&self, kind: &str, name: &str) -> Option<Span> {
+        let task = &self.task;
+        match kind {
+            "type" => task.types.iter().find(|own| own.name == name).map(|own| own.span),
+            "object" => task.objects.iter().find(|own| own.name == name).map(|own| own.span),
+            "predicate" => task.predicates.iter().find(|own| own.name == name).map(|own| own.span),
+            "function" => task.functions.iter().find(|own| own.name == name).map(|own| own.span),
+            _ => task.modules.iter().find(|own| own.name.eq_ignore_ascii_case(name)).map(|own| own.span),
+        }
+        .filter(|span| span.end > 0)
+    }
+
+    /// A name declared before. True if it is new.
+    pub(super) fn declare(
+        &mut self,
+        kind: &str,
+        name: Name,
+        first: Option<Span>,
+        index: impl FnOnce(&mut Self) -> &mut FxHashMap<Symbol, u32>,
+        id: usize,
+    ) -> bool {
+        if let Some(first) = first {
+            let message = format!("{kind} `{}` is declared twice", self.name(name.symbol));
+            self.push(
+                Diagnostic::error("duplicate", message, name.span, "declared again here")
+                    .with_label(first, "first declared here")
+                    .with_help("remove or rename one of them"),
+            );
+            return false;
+        }
+        index(self).insert(name.symbol, id as u32);
+        true
+    }
+}

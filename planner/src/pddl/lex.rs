@@ -1,0 +1,491 @@
+//! From characters to a tree of lists and words, with mended parentheses.
+//!
+//! The tree is flat: nodes in the order of the text, each with the index just after its last descendant. Unbalanced
+//! parentheses are found here, where the layout of the text still shows which one is meant, and mended so that the rest
+//! of the file is read as its author intended.
+
+use rustc_hash::FxHashMap;
+
+use super::ast::Symbol;
+use crate::diagnostic::{Diagnostic, Span};
+
+/// Deepest nesting that is read. Everything after works recursively, so that this bounds the stack.
+pub const MAX_DEPTH: usize = 512;
+
+/// Names, each once, case-folded. Shared by the files of one task.
+#[derive(Debug, Default)]
+pub struct Symbols {
+    names: Vec<Box<str>>,
+    index: FxHashMap<Box<str>, Symbol>,
+    folded: String,
+}
+
+impl Symbols {
+    /// The symbol of a name in any case.
+    pub fn intern(&mut self, name: &str) -> Symbol {
+        let name = if name.bytes().any(|byte| byte.is_ascii_uppercase()) {
+            self.folded.clear();
+            self.folded.extend(name.chars().map(|letter| letter.to_ascii_lowercase()));
+            self.folded.as_str()
+        } else {
+            name
+        };
+        if let Some(&symbol) = self.index.get(name) {
+            return symbol;
+        }
+        let symbol = Symbol(self.names.len() as u32);
+        self.names.push(name.into());
+        self.index.insert(name.into(), symbol);
+        symbol
+    }
+
+    /// The symbol of a case-folded name that occurs somewhere already.
+    pub fn find(&self, name: &str) -> Option<Symbol> {
+        self.index.get(name).copied()
+    }
+
+    /// The case-folded name of a symbol.
+    pub fn name(&self, symbol: Symbol) -> &str {
+        &self.names[symbol.0 as usize]
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.names.is_empty()
+    }
+}
+
+/// What a node is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// `( … )`
+    List,
+    /// `[ … ]`
+    Bracket,
+    /// Anything between delimiters.
+    Word(Symbol),
+}
+
+/// A list or word.
+#[derive(Debug, Clone, Copy)]
+pub struct Node {
+    /// What it is.
+    pub kind: Kind,
+    /// First byte.
+    pub start: u32,
+    /// One past the last byte.
+    pub end: u32,
+    /// Index of the node after this one and all that is in it.
+    pub next: u32,
+}
+
+/// The nodes of a file in the order of the text.
+#[derive(Debug, Default)]
+pub struct Tree {
+    /// The nodes; top-level ones follow each other by `next`.
+    pub nodes: Vec<Node>,
+}
+
+impl Tree {
+    /// The nodes directly inside a list.
+    pub fn children(&self, list: usize) -> Children<'_> {
+        let end = self.nodes[list].next as usize;
+        let first = if matches!(self.nodes[list].kind, Kind::Word(_)) { end } else { list + 1 };
+        Children { nodes: &self.nodes, at: first, end }
+    }
+
+    /// The nodes that stand in no list.
+    pub fn roots(&self) -> Children<'_> {
+        Children { nodes: &self.nodes, at: 0, end: self.nodes.len() }
+    }
+}
+
+/// Indices of sibling nodes.
+#[derive(Debug, Clone)]
+pub struct Children<'t> {
+    nodes: &'t [Node],
+    at: usize,
+    end: usize,
+}
+
+impl Iterator for Children<'_> {
+    type Item = usize;
+
+    fn next(&mut self) -> Option<usize> {
+        (self.at < self.end).then(|| {
+            let found = self.at;
+            self.at = self.nodes[found].next as usize;
+            found
+        })
+    }
+}
+
+/// Sections: lists that stand directly in `(define …)` and nowhere else.
+const SECTIONS: &[&str] = &[
+    ":requirements",
+    ":types",
+    ":modules",
+    ":constants",
+    ":predicates",
+    ":functions",
+    ":action",
+    ":durative-action",
+    ":derived",
+    ":process",
+    ":event",
+    ":domain",
+    ":moduleoptions",
+    ":moduleexitoptions",
+    ":objects",
+    ":init",
+    ":goal",
+    ":constraints",
+    ":metric",
+];
+
+/// Sections that have parts.
+const ACTIONS: &[&str] = &[":action", ":durative-action", ":process", ":event"];
+
+/// Keywords that stand directly in an action.
+const ACTION_PARTS: &[&str] =
+    &[":parameters", ":precondition", ":condition", ":duration", ":effect", ":grounding"];
+
+/// Reads a text of source number `source` into a tree; what is wrong with its parentheses goes to `findings`.
+pub fn read(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec<Diagnostic>) -> Tree {
+    let mut builder = Builder {
+        text,
+        bytes: text.as_bytes(),
+        source,
+        tree: Tree::default(),
+        open: Vec::new(),
+        last_close: None,
+        last_action: None,
+        suspect: None,
+        suspect_before: None,
+        line_start: 0,
+        fresh_line: true,
+        too_deep: false,
+        findings,
+    };
+    builder.tree.nodes.reserve(text.len() / 6);
+    builder.run(symbols);
+    builder.tree
+}
+
+struct Builder<'a> {
+    text: &'a str,
+    bytes: &'a [u8],
+    source: u32,
+    tree: Tree,
+    /// Nodes that are not closed yet, outermost first.
+    open: Vec<usize>,
+    /// The last parenthesis that closed an action or the whole definition.
+    last_close: Option<u32>,
+    /// The action closed last, directly in the definition.
+    last_action: Option<usize>,
+    /// An open list that a later line stands left of, with that line's first byte: probably never closed.
+    suspect: Option<(usize, u32)>,
+    /// The same of the section closed last.
+    suspect_before: Option<(usize, u32)>,
+    line_start: usize,
+    fresh_line: bool,
+    too_deep: bool,
+    findings: &'a mut Vec<Diagnostic>,
+}
+
+impl Builder<'_> {
+    fn run(&mut self, symbols: &mut Symbols) {
+        let mut at = if self.text.starts_with('\u{feff}') { 3 } else { 0 };
+        while let Some(&byte) = self.bytes.get(at) {
+            match byte {
+                b'\n' => {
+                    at += 1;
+                    self.line_start = at;
+                    self.fresh_line = true;
+                }
+                b' ' | b'\t' | b'\r' | 0x0b | 0x0c => at += 1,
+                b';' => {
+                    at += self.bytes[at..]
+                        .iter()
+                        .position(|&byte| byte == b'\n')
+                        .unwrap_or(self.bytes.len() - at)
+                }
+                b'(' | b'[' => {
+                    self.open_list(at);
+                    at += 1;
+                }
+                b')' | b']' => {
+                    self.close_list(at);
+                    at += 1;
+                }
+                _ => {
+                    let end = self.word_end(at);
+                    self.word(at, end, symbols);
+                    at = end;
+                }
+            }
+        }
+        self.finish();
+    }
+
+    /// A word ends at a delimiter; a question mark begins the next one, so that `at?x` is read as two.
+    fn word_end(&self, start: usize) -> usize {
+        let rest = &self.bytes[start + 1..];
+        let delimiter = |byte: &u8| byte.is_ascii_whitespace() || b"\x0b()[];?".contains(byte);
+        start + 1 + rest.iter().position(delimiter).unwrap_or(rest.len())
+    }
+
+    fn span(&self, start: usize, end: usize) -> Span {
+        Span { source: self.source, start: start as u32, end: end as u32 }
+    }
+
+    fn open_list(&mut self, at: usize) {
+        self.note_layout(at);
+        let kind = if self.bytes[at] == b'(' { Kind::List } else { Kind::Bracket };
+        if kind == Kind::List && self.begins(at, SECTIONS) {
+            self.expect_section(at);
+        }
+        if self.open.len() == MAX_DEPTH && !self.too_deep {
+            self.too_deep = true;
+            self.findings.push(Diagnostic::error(
+                "too-deep",
+                format!("nested more than {MAX_DEPTH} lists deep"),
+                self.span(at, at + 1),
+                "what is in here is not read",
+            ));
+        }
+        self.open.push(self.tree.nodes.len());
+        self.tree.nodes.push(Node { kind, start: at as u32, end: at as u32 + 1, next: 0 });
+    }
+
+    fn close_list(&mut self, at: usize) {
+        self.note_layout(at);
+        let Some(&list) = self.open.last() else {
+            self.surplus(at);
+            return;
+        };
+        let wanted = if self.tree.nodes[list].kind == Kind::List { b')' } else { b']' };
+        if self.bytes[at] != wanted && !self.mend_mixed(at, list) {
+            return;
+        }
+        self.close_top(at + 1);
+        match self.open.len() {
+            0 => self.last_close = Some(at as u32),
+            1 => {
+                self.last_close = Some(at as u32);
+                self.last_action = Some(list);
+                self.suspect_before = self.suspect.take();
+            }
+            _ => {}
+        }
+    }
+
+    /// A closing sign of the other kind. Says so; true if it closes a list all the same.
+    fn mend_mixed(&mut self, at: usize, list: usize) -> bool {
+        let node = self.tree.nodes[list];
+        let (open, wanted, got) = if node.kind == Kind::List { ('(', ')', ']') } else { ('[', ']', ')') };
+        let opening = self.span(node.start as usize, node.start as usize + 1);
+        self.findings.push(
+            Diagnostic::error(
+                "unbalanced",
+                format!("`{got}` where `{wanted}` was expected"),
+                self.span(at, at + 1),
+                format!("`{wanted}` was expected here"),
+            )
+            .with_label(opening, format!("to close this `{open}`")),
+        );
+        let line_end =
+            self.bytes[at..].iter().position(|&byte| byte == b'\n').map_or(self.bytes.len(), |n| at + n);
+        let line = &self.bytes[self.line_start..line_end];
+        let count = |sign: u8| line.iter().filter(|&&byte| byte == sign).count();
+        match got {
+            // The parentheses of the line are balanced without it: the bracket was forgotten.
+            ')' if count(b'(') == count(b')') => {
+                self.close_top(at);
+                true
+            }
+            ')' => true,
+            _ => count(b']') <= count(b'['),
+        }
+    }
+
+    fn close_top(&mut self, end: usize) {
+        if let Some(list) = self.open.pop() {
+            let next = self.tree.nodes.len() as u32;
+            let node = &mut self.tree.nodes[list];
+            (node.end, node.next) = (end as u32, next);
+            if self.open.len() >= MAX_DEPTH {
+                // What is too deep is dropped, so that nothing later has to go there.
+                self.tree.nodes.truncate(list);
+            }
+        }
+    }
+
+    fn word(&mut self, start: usize, end: usize, symbols: &mut Symbols) {
+        self.note_layout(start);
+        let text = &self.text[start..end];
+        if text.starts_with(':') && ACTION_PARTS.iter().any(|part| part.eq_ignore_ascii_case(text)) {
+            self.expect_action_part(start, end);
+        }
+        let next = self.tree.nodes.len() as u32 + 1;
+        if text.len() > 1 && text.starts_with('-') {
+            // `?x -block` with its space missing names a type.
+            symbols.intern(&text[1..]);
+        }
+        let kind = Kind::Word(symbols.intern(text));
+        self.tree.nodes.push(Node { kind, start: start as u32, end: end as u32, next });
+    }
+
+    /// Remembers the first open list that a new line stands left of.
+    fn note_layout(&mut self, at: usize) {
+        if !std::mem::take(&mut self.fresh_line) || self.suspect.is_some() || self.open.len() < 3 {
+            return;
+        }
+        if b")]".contains(&self.bytes[at]) {
+            return;
+        }
+        if let Some(&list) = self.open.last() {
+            let start = self.tree.nodes[list].start as usize;
+            if start < self.line_start && self.column(at) <= self.column(start) {
+                self.suspect = Some((list, at as u32));
+            }
+        }
+    }
+
+    /// Column of a byte, tabs to the next multiple of eight.
+    fn column(&self, at: usize) -> usize {
+        let line = self.bytes[..at].iter().rposition(|&byte| byte == b'\n').map_or(0, |newline| newline + 1);
+        self.bytes[line..at]
+            .iter()
+            .fold(0, |column, &byte| if byte == b'\t' { column / 8 * 8 + 8 } else { column + 1 })
+    }
+
+    /// Whether the list that opens at `at` begins with one of these words.
+    fn begins(&self, at: usize, words: &[&str]) -> bool {
+        let rest = &self.bytes[at + 1..];
+        let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+        let start = at + 1 + blanks;
+        if self.bytes.get(start) != Some(&b':') {
+            return false;
+        }
+        let word = &self.text[start..self.word_end(start)];
+        words.iter().any(|section| section.eq_ignore_ascii_case(word))
+    }
+
+    /// A section begins here: everything before it but `(define` should be closed.
+    fn expect_section(&mut self, at: usize) {
+        if self.open.len() > 1 {
+            self.unclosed(1, at, "a new section begins here");
+            while self.open.len() > 1 {
+                self.close_top(at);
+            }
+            return;
+        }
+        let Some(close) = self.last_close.filter(|_| self.open.is_empty()) else { return };
+        let Some(define) = self.tree.roots().last().filter(|&root| self.tree.nodes[root].kind == Kind::List)
+        else {
+            return;
+        };
+        let close = close as usize;
+        let diagnostic = Diagnostic::error(
+            "unbalanced",
+            "a closing parenthesis too many",
+            self.span(close, close + 1),
+            "this one closes the whole definition",
+        );
+        let diagnostic = diagnostic.with_label(self.span(at, at + 1), "but it goes on here");
+        self.findings.push(diagnostic.with_help("remove one `)` between here and the section before"));
+        self.open.push(define);
+    }
+
+    /// A part of an action begins here: it should stand directly in the action.
+    fn expect_action_part(&mut self, start: usize, end: usize) {
+        let in_action =
+            self.open.get(1).is_some_and(|&list| self.begins(self.tree.nodes[list].start as usize, ACTIONS));
+        if in_action && self.open.len() > 2 {
+            self.unclosed(2, start, "the action's next part begins here");
+            while self.open.len() > 2 {
+                self.close_top(start);
+            }
+        } else if let (1, Some(action), Some(close)) = (self.open.len(), self.last_action, self.last_close) {
+            if !self.begins(self.tree.nodes[action].start as usize, ACTIONS) {
+                return;
+            }
+            let close = close as usize;
+            let diagnostic = Diagnostic::error(
+                "unbalanced",
+                "a closing parenthesis too many",
+                self.span(close, close + 1),
+                "this one closes the action",
+            );
+            let diagnostic = diagnostic.with_label(self.span(start, end), "but the action goes on here");
+            self.findings.push(diagnostic.with_help("remove one `)` before the next part of the action"));
+            self.open.push(action);
+        }
+    }
+
+    /// Reports the list that misses its closing sign, of those open beyond `depth`; `there` says what stands at `at`.
+    fn unclosed(&mut self, depth: usize, at: usize, there: &str) {
+        let outer = depth.checked_sub(1).map(|parent| self.open[parent]);
+        let (list, before, there) = match self.suspect.take().filter(|&(list, _)| Some(list) > outer) {
+            Some((list, line)) if line as usize != at => {
+                (list, line as usize, "it should be closed before this")
+            }
+            Some((list, _)) => (list, at, there),
+            None => (self.open[self.open.len() - 1], at, there),
+        };
+        let node = self.tree.nodes[list];
+        let (sign, close) = if node.kind == Kind::List { ('(', ')') } else { ('[', ']') };
+        let start = node.start as usize;
+        let message = match self.open.len() - depth {
+            1 => format!("a closing `{close}` is missing"),
+            missing => format!("{missing} closing parentheses are missing"),
+        };
+        let label = format!("this `{sign}` is never closed");
+        let mut diagnostic = Diagnostic::error("unbalanced", message, self.span(start, start + 1), label);
+        if before < self.text.len() {
+            diagnostic = diagnostic.with_label(self.span(before, self.word_end(before)), there);
+        }
+        self.findings.push(diagnostic.with_help(format!("add `{close}` where this list is to end")));
+    }
+
+    fn surplus(&mut self, at: usize) {
+        let sign = self.bytes[at] as char;
+        self.findings.push(
+            Diagnostic::error(
+                "unbalanced",
+                format!("`{sign}` closes nothing"),
+                self.span(at, at + 1),
+                "everything was closed before",
+            )
+            .with_help("remove it, or one of those before it"),
+        );
+    }
+
+    fn finish(&mut self) {
+        let end = self.text.len();
+        match (self.open.as_slice(), self.suspect_before) {
+            ([], _) => {}
+            ([_], Some(suspect)) => {
+                self.suspect = Some(suspect);
+                self.unclosed(0, end, "");
+            }
+            ([define], None) => {
+                let start = self.tree.nodes[*define].start as usize;
+                let label = "this `(` is never closed";
+                let span = self.span(start, start + 1);
+                let diagnostic = Diagnostic::error("unbalanced", "the last `)` is missing", span, label);
+                self.findings.push(diagnostic.with_help("add `)` at the end of the file"));
+            }
+            _ => self.unclosed(1, end, ""),
+        }
+        while !self.open.is_empty() {
+            self.close_top(end);
+        }
+    }
+}

@@ -16,6 +16,7 @@ impl Checker<'_> {
         let mut facts: FxHashSet<Fact> = FxHashSet::default();
         let mut values: rustc_hash::FxHashMap<GroundFluent, (usize, Span)> = rustc_hash::FxHashMap::default();
         init.facts.reserve(all.len());
+        facts.reserve(all.len());
         for one in all {
             let (time_s, one) = match one {
                 Initial::At(time_s, inner) => (Some(*time_s), &**inner),

@@ -1,8 +1,12 @@
 //! Findings on a task that can be read: what it asks for and nothing can bring about.
 
+use rustc_hash::FxHashSet;
+
 use super::Checker;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::task::{Atom, Change, Condition, Effect, GroundChange, ObjectId, Parameter, Task, Term, Written};
+use crate::task::{
+    Atom, Change, Condition, Effect, Fact, GroundChange, ObjectId, Parameter, Task, Term, Written,
+};
 
 impl Checker<'_> {
     pub(super) fn lints(&mut self) {
@@ -10,8 +14,12 @@ impl Checker<'_> {
         let mut wanted = Vec::new();
         certain_atoms(&goal, &mut wanted);
         let mut findings: Vec<Diagnostic> = Vec::new();
+        let initially: FxHashSet<&Fact> = self.task.init.facts.iter().collect();
         for atom in wanted {
-            findings.extend(unreachable_goal(&self.task, atom));
+            let fact = Fact { predicate: atom.predicate, arguments: objects(atom).into() };
+            if !initially.contains(&fact) {
+                findings.extend(unreachable_goal(&self.task, atom, &fact.arguments));
+            }
         }
         self.findings.append(&mut findings);
         self.task.goal.body = goal;
@@ -38,12 +46,9 @@ fn objects(atom: &Atom) -> Vec<ObjectId> {
 }
 
 /// A goal fact that is false at first and that nothing can make true.
-fn unreachable_goal(task: &Task, goal: &Atom) -> Option<Diagnostic> {
-    let wanted = objects(goal);
+fn unreachable_goal(task: &Task, goal: &Atom, wanted: &[ObjectId]) -> Option<Diagnostic> {
     let predicate = task.predicate(goal.predicate);
-    let initially =
-        task.init.facts.iter().any(|fact| fact.predicate == goal.predicate && *fact.arguments == *wanted);
-    if initially || predicate.stratum.is_some() {
+    if predicate.stratum.is_some() {
         return None;
     }
     let timed =
@@ -70,7 +75,7 @@ fn unreachable_goal(task: &Task, goal: &Atom) -> Option<Diagnostic> {
             _ => None,
         })
         .collect();
-    let fits = |all: &[Achiever<'_>]| all.iter().zip(&wanted).all(|(one, object)| one.can_be(*object));
+    let fits = |all: &[Achiever<'_>]| all.iter().zip(wanted).all(|(one, object)| one.can_be(*object));
     if achievers.iter().any(|(_, all)| fits(all)) {
         return None;
     }
@@ -86,7 +91,7 @@ fn unreachable_goal(task: &Task, goal: &Atom) -> Option<Diagnostic> {
         Some((span, all)) => {
             let (position, object) = all
                 .iter()
-                .zip(&wanted)
+                .zip(wanted)
                 .enumerate()
                 .find(|(_, (one, object))| !one.can_be(**object))
                 .map(|(position, (_, object))| (position, *object))?;

@@ -87,6 +87,7 @@ struct Checker<'a> {
     predicates: FxHashMap<Symbol, u32>,
     functions: FxHashMap<Symbol, u32>,
     modules: FxHashMap<Symbol, u32>,
+    actions: FxHashMap<Symbol, Span>,
     preferences: FxHashMap<Symbol, u32>,
     /// Objects that fit, by alternatives of types.
     fitting: FxHashMap<Vec<TypeId>, Arc<[ObjectId]>>,
@@ -124,6 +125,7 @@ impl<'a> Checker<'a> {
             predicates: FxHashMap::default(),
             functions: FxHashMap::default(),
             modules: FxHashMap::default(),
+            actions: FxHashMap::default(),
             preferences: FxHashMap::default(),
             fitting: FxHashMap::default(),
             reported: FxHashMap::default(),

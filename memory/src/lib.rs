@@ -1,11 +1,13 @@
 //! What was seen and what is believed.
 
+pub mod belief;
 mod clouds;
 mod document;
 mod error;
 mod flusher;
 mod foxglove;
 mod record;
+pub mod space;
 pub mod stores;
 pub mod transforms;
 

@@ -1,0 +1,228 @@
+//! What is believed of the objects: which there are, where, what they may be, and from where that was seen. Identity
+//! begins here: percepts of later merges are taken for the objects of earlier ones.
+
+use descry_perception::nalgebra::Point3;
+use descry_perception::recognise::{Evidence, Percept};
+use pathfinding::prelude::{Matrix, kuhn_munkres_min};
+use serde::{Deserialize, Serialize};
+
+use crate::document::RecordId;
+
+/// A percept farther from an object than this is another object.
+const GATE_M: f64 = 0.10;
+
+/// An object that is believed to be there.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Track {
+    /// Its number, never used again.
+    pub id: u64,
+    /// Where it stands: the centre of its body's footprint, world frame, metres.
+    pub position_m: Point3<f64>,
+    /// Standard deviation of each coordinate, metres.
+    pub position_sigma_m: f64,
+    /// Longer and shorter side of its footprint and its height, metres.
+    pub size_m: [f64; 3],
+    /// Probability of each known object; with `unknown` they sum to one.
+    pub probabilities: Vec<(String, f64)>,
+    /// Probability of each kind.
+    pub kinds: Vec<(String, f64)>,
+    /// Probability that it is none of the known objects.
+    pub unknown: f64,
+    /// Share of its visible hull that some view saw or looked past.
+    pub seen_fraction: f64,
+    /// Where the cameras stood that saw it.
+    pub viewpoints_m: Vec<Point3<f64>>,
+    /// What speaks for and against, as of the last merge.
+    pub evidence: Evidence,
+    /// The records that the belief rests on.
+    pub cites: Vec<RecordId>,
+    /// When it was first and last seen.
+    pub first_ns: i64,
+    /// When it was last seen.
+    pub last_ns: i64,
+}
+
+/// A percept with where it was seen from.
+#[derive(Debug, Clone, Copy)]
+pub struct Sighted<'a> {
+    /// What was recognised.
+    pub percept: &'a Percept,
+    /// Cameras that saw it.
+    pub viewpoints_m: &'a [Point3<f64>],
+}
+
+/// Everything that is believed of the objects.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Belief {
+    /// The objects, in the order in which they were first seen.
+    pub tracks: Vec<Track>,
+    /// Objects that were believed in and are no longer seen: gone, or never there.
+    pub gone: Vec<Track>,
+    next_id: u64,
+}
+
+impl Track {
+    /// Probability that it is the known object, or of the kind, called `name`; 0 for names that no model has.
+    pub fn probability_of(&self, name: &str) -> f64 {
+        let of = |list: &[(String, f64)]| list.iter().find(|(n, _)| n == name).map(|&(_, p)| p);
+        of(&self.probabilities).or_else(|| of(&self.kinds)).unwrap_or(0.0)
+    }
+
+    /// The known object that it most likely is; none: unknown.
+    pub fn label(&self) -> Option<&str> {
+        let best = self.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (best.1 > self.unknown).then_some(best.0.as_str())
+    }
+
+    /// The kind that it most likely is; none: unknown.
+    pub fn kind(&self) -> Option<&str> {
+        let best = self.kinds.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (best.1 > self.unknown).then_some(best.0.as_str())
+    }
+
+    /// How sure it is what the object is, *none of the known* among the answers, 0 to 1. Which of a kind does not count:
+    /// the kind does.
+    pub fn certainty(&self) -> f64 {
+        self.kinds.iter().map(|&(_, p)| p).fold(self.unknown, f64::max)
+    }
+}
+
+impl Belief {
+    /// Takes in what the merge of all views shows. A percept is the object that was believed nearest to it, at the least
+    /// sum of distances; what no percept is taken for is gone.
+    ///
+    /// The percepts rest on every view so far, so that their probabilities replace the earlier ones.
+    pub fn update(&mut self, sighted: &[Sighted<'_>], stamp_ns: i64, cites: &[RecordId]) {
+        let partner = self.associate(sighted);
+        let mut kept: Vec<Track> = Vec::with_capacity(sighted.len());
+        for (track, found) in std::mem::take(&mut self.tracks).into_iter().zip(partner.tracks) {
+            match found {
+                Some(n) => kept.push(Track {
+                    id: track.id,
+                    first_ns: track.first_ns,
+                    ..seen(&sighted[n], stamp_ns, cites)
+                }),
+                None => self.gone.push(track),
+            }
+        }
+        for n in partner.new {
+            kept.push(Track { id: self.next_id, ..seen(&sighted[n], stamp_ns, cites) });
+            self.next_id += 1;
+        }
+        self.tracks = kept;
+    }
+
+    /// The percept of each track, and the percepts of none: the assignment of least distance within the gate.
+    fn associate(&self, sighted: &[Sighted<'_>]) -> Association {
+        let (rows, columns) = (self.tracks.len(), sighted.len());
+        let mut tracks = vec![None; rows];
+        if rows > 0 {
+            // Beside every track stands a place for "gone", at the cost of the gate.
+            let gate = (GATE_M * 1e4) as i64;
+            let weights = Matrix::from_fn(rows, columns + rows, |(r, c)| match sighted.get(c) {
+                Some(s) => {
+                    let distance = (self.tracks[r].position_m - s.percept.position_m).norm();
+                    if distance < GATE_M { (distance * 1e4) as i64 } else { 4 * gate }
+                }
+                None => gate,
+            });
+            let (_, chosen) = kuhn_munkres_min(&weights);
+            tracks = chosen.into_iter().map(|c| (c < columns).then_some(c)).collect();
+        }
+        let new = (0..columns).filter(|c| !tracks.contains(&Some(*c))).collect();
+        Association { tracks, new }
+    }
+}
+
+struct Association {
+    tracks: Vec<Option<usize>>,
+    new: Vec<usize>,
+}
+
+fn seen(sighted: &Sighted<'_>, stamp_ns: i64, cites: &[RecordId]) -> Track {
+    let p = sighted.percept;
+    Track {
+        id: 0,
+        position_m: p.position_m,
+        position_sigma_m: p.position_sigma_m,
+        size_m: p.size_m,
+        probabilities: p.probabilities.clone(),
+        kinds: p.kinds.clone(),
+        unknown: p.unknown,
+        seen_fraction: p.seen_fraction,
+        viewpoints_m: sighted.viewpoints_m.to_vec(),
+        evidence: p.evidence.clone(),
+        cites: cites.to_vec(),
+        first_ns: stamp_ns,
+        last_ns: stamp_ns,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn percept(x: f64, cup: f64) -> Percept {
+        Percept {
+            label: None,
+            kind: None,
+            probabilities: vec![("cup A".into(), cup)],
+            kinds: vec![("cup".into(), cup)],
+            unknown: 1.0 - cup,
+            position_m: Point3::new(x, 0.0, 0.0),
+            position_sigma_m: 0.002,
+            size_m: [0.07, 0.07, 0.1],
+            stance: Default::default(),
+            points: 100,
+            seen_fraction: 0.5,
+            evidence: Evidence::default(),
+            indices: vec![],
+        }
+    }
+
+    /// The numbers of the tracks after merges that show percepts at the given places.
+    fn check(merges: &[&[f64]], expected: &[u64], gone: &[u64]) {
+        let mut belief = Belief::default();
+        for (places, stamp_ns) in merges.iter().zip(1..) {
+            let percepts: Vec<Percept> = places.iter().map(|&x| percept(x, 0.5)).collect();
+            let sighted: Vec<Sighted<'_>> =
+                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[] }).collect();
+            belief.update(&sighted, stamp_ns, &[]);
+        }
+        let ids = |tracks: &[Track]| tracks.iter().map(|t| t.id).collect::<Vec<_>>();
+        assert_eq!(
+            (ids(&belief.tracks), ids(&belief.gone)),
+            (expected.to_vec(), gone.to_vec()),
+            "{merges:?}"
+        );
+    }
+
+    #[test]
+    fn objects_keep_their_numbers() {
+        check(&[&[0.0, 1.0], &[1.01, 0.02]], &[0, 1], &[]);
+        check(&[&[0.0], &[0.0, 0.5]], &[0, 1], &[]);
+        check(&[&[0.0, 0.5], &[0.52]], &[1], &[0]);
+        check(&[&[0.0], &[0.2]], &[1], &[0]);
+        check(&[&[0.0, 0.08], &[0.06, 0.14]], &[0, 1], &[]);
+        check(&[&[], &[0.0], &[]], &[], &[0]);
+    }
+
+    #[test]
+    fn the_last_merge_decides_what_it_is() {
+        let mut belief = Belief::default();
+        for (cup, stamp_ns) in [(0.4, 1), (0.9, 2)] {
+            let p = percept(0.0, cup);
+            belief.update(
+                &[Sighted { percept: &p, viewpoints_m: &[Point3::origin()] }],
+                stamp_ns,
+                &[RecordId(7)],
+            );
+        }
+        let track = &belief.tracks[0];
+        assert_eq!((track.first_ns, track.last_ns, track.label()), (1, 2, Some("cup A")));
+        assert!(
+            (track.certainty() - 0.9).abs() < 1e-12
+                && track.probability_of("cup") == track.probability_of("cup A")
+        );
+    }
+}

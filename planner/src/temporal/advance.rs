@@ -1,0 +1,332 @@
+//! From one situation of the search to the next: an action done in one go, started, ended, or a timed effect.
+
+use std::sync::Arc;
+
+use crate::attachment::Level;
+use crate::calls::Failure;
+use crate::ground::{Effect, Outcome, Values};
+
+use super::order::Access;
+use super::relaxed::Part;
+use super::touch::{Touched, expression_touches};
+use super::world::{Act, Moment, Span, World};
+
+/// An action in progress.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Open {
+    /// The action.
+    pub act: u32,
+    /// The parameter that its grounding module proposed.
+    pub proposal: Option<Arc<str>>,
+    /// How long it may take.
+    pub span: Span,
+    /// By end effect (the first 64), whether its conditions at the start were met.
+    pub gates: u64,
+}
+
+/// Where the search stands: a state, the actions in progress, and how many timed effects have happened.
+#[derive(Debug, Clone)]
+pub(crate) struct Situation {
+    /// Facts and numbers.
+    pub state: Values,
+    /// Actions in progress, in the order of their starts.
+    pub open: Vec<Open>,
+    /// Timed effects that have happened.
+    pub timed: usize,
+}
+
+/// One step of the search.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Step {
+    /// The action; meaningless for timed effects.
+    pub act: u32,
+    /// Which part of it; [`Part::Free`] is the next timed effect.
+    pub part: Part,
+    /// The parameter that its grounding module proposed.
+    pub proposal: Option<Arc<str>>,
+    /// How long the action may take; filled in by [`World::advance`].
+    pub span: Span,
+}
+
+impl World<'_> {
+    /// The situation after a step, or `None` if it cannot be taken. Fills in the step's span.
+    pub fn advance(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {
+        match step.part {
+            Part::Whole => self.whole(from, step),
+            Part::Start => self.start(from, step),
+            Part::End => self.end(from, step),
+            Part::Free => self.timed(from),
+        }
+    }
+
+    fn whole(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {
+        let Some((after, span)) = self.started(from, step)? else { return Ok(None) };
+        step.span = span;
+        let act = &self.acts[step.act as usize];
+        let mut next = Situation { state: after, open: from.open.clone(), timed: from.timed };
+        if !self.invariants_hold(&next)? {
+            return Ok(None);
+        }
+        if !act.durative {
+            return Ok(Some(next));
+        }
+        let gates = self.start_gates(act, &from.state, step)?;
+        if !self.finish(act, step.proposal.as_ref(), span, gates, &mut next.state)?
+            || !self.invariants_hold(&next)?
+        {
+            return Ok(None);
+        }
+        Ok(Some(next))
+    }
+
+    fn start(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {
+        let Some((after, span)) = self.started(from, step)? else { return Ok(None) };
+        step.span = span;
+        let act = &self.acts[step.act as usize];
+        let gates = self.start_gates(act, &from.state, step)?;
+        let mut next = Situation { state: after, open: from.open.clone(), timed: from.timed };
+        next.open.push(Open { act: step.act, proposal: step.proposal.clone(), span, gates });
+        Ok(self.invariants_hold(&next)?.then_some(next))
+    }
+
+    fn end(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {
+        let same = |open: &Open| open.act == step.act && open.proposal == step.proposal;
+        let Some(position) = from.open.iter().position(same) else { return Ok(None) };
+        let mut next = from.clone();
+        let open = next.open.remove(position);
+        step.span = open.span;
+        let act = &self.acts[step.act as usize];
+        if !self.finish(act, open.proposal.as_ref(), open.span, open.gates, &mut next.state)? {
+            return Ok(None);
+        }
+        Ok(self.invariants_hold(&next)?.then_some(next))
+    }
+
+    fn timed(&self, from: &Situation) -> Result<Option<Situation>, Failure> {
+        let Some(timed) = self.ground.timed.get(from.timed) else { return Ok(None) };
+        let effects = always(&timed.outcomes);
+        let mut next = from.clone();
+        next.timed += 1;
+        let moment = Moment { state: &from.state, duration_s: 0.0, proposal: None, level: Level::Exact };
+        if !self.apply(&effects, &moment, &|_, _| true, &mut next.state)? {
+            return Ok(None);
+        }
+        Ok(self.invariants_hold(&next)?.then_some(next))
+    }
+
+    /// The state after the start, and the durations possible.
+    fn started(&self, from: &Situation, step: &Step) -> Result<Option<(Values, Span)>, Failure> {
+        let act = &self.acts[step.act as usize];
+        let mut moment = Moment {
+            state: &from.state,
+            duration_s: 0.0,
+            proposal: step.proposal.as_ref(),
+            level: Level::Exact,
+        };
+        if !self.holds(&act.at_start, &moment)? {
+            return Ok(None);
+        }
+        let span = match act.durative {
+            true => self.span(act, &moment)?,
+            false => Some(Span { least_s: 0.0, most_s: 0.0 }),
+        };
+        let Some(span) = span else { return Ok(None) };
+        moment.duration_s = span.least_s;
+        let mut after = from.state.clone();
+        if !self.apply(&act.start_effects, &moment, &|_, _| true, &mut after)? {
+            return Ok(None);
+        }
+        let inside = Moment { state: &after, ..moment };
+        Ok(self.holds(&act.over_all, &inside)?.then_some((after, span)))
+    }
+
+    fn start_gates(&self, act: &Act, before: &Values, step: &Step) -> Result<u64, Failure> {
+        let moment = Moment {
+            state: before,
+            duration_s: step.span.least_s,
+            proposal: step.proposal.as_ref(),
+            level: Level::Exact,
+        };
+        let mut gates = u64::MAX;
+        for (index, effect) in act.end_effects.iter().enumerate().take(64) {
+            let Some(when) = &effect.when else { continue };
+            if !self.holds(&when.at_start, &moment)? {
+                gates &= !(1 << index);
+            }
+        }
+        Ok(gates)
+    }
+
+    /// Lets the action end in a state; `false` if it cannot.
+    fn finish(
+        &self,
+        act: &Act,
+        proposal: Option<&Arc<str>>,
+        span: Span,
+        gates: u64,
+        state: &mut Values,
+    ) -> Result<bool, Failure> {
+        let duration_s = span.least_s;
+        if !act.flow_effects.is_empty() {
+            let before = state.clone();
+            let moment = Moment { state: &before, duration_s, proposal, level: Level::Exact };
+            if !self.apply(&act.flow_effects, &moment, &|_, _| true, state)? {
+                return Ok(false);
+            }
+            if !self.holds(&act.over_all, &Moment { state, ..moment })? {
+                return Ok(false);
+            }
+        }
+        let before = state.clone();
+        let moment = Moment { state: &before, duration_s, proposal, level: Level::Exact };
+        if !self.holds(&act.at_end, &moment)? || !self.end_allows(act, &moment)? {
+            return Ok(false);
+        }
+        let mut inside = Vec::with_capacity(act.end_effects.len());
+        for effect in &act.end_effects {
+            inside.push(effect.when.as_ref().map_or(Ok(true), |when| self.holds(&when.over_all, &moment))?);
+        }
+        let gate = |index: usize, _: &Effect| inside[index] && (index >= 64 || gates & (1 << index) != 0);
+        self.apply(&act.end_effects, &moment, &gate, state)
+    }
+
+    fn invariants_hold(&self, situation: &Situation) -> Result<bool, Failure> {
+        for open in &situation.open {
+            let moment = Moment {
+                state: &situation.state,
+                duration_s: open.span.least_s,
+                proposal: open.proposal.as_ref(),
+                level: Level::Exact,
+            };
+            if !self.holds(&self.acts[open.act as usize].over_all, &moment)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Whether a situation fulfils the goal.
+    pub fn is_goal(&self, situation: &Situation) -> Result<bool, Failure> {
+        let moment = Moment { state: &situation.state, duration_s: 0.0, proposal: None, level: Level::Exact };
+        Ok(situation.open.is_empty() && self.holds(&self.ground.goal, &moment)?)
+    }
+}
+
+/// What the happenings of every action touch, derived variables traced back to what they are derived from.
+pub(crate) struct Accesses {
+    /// At the start; and for durative actions at the end.
+    pub acts: Vec<(Access, Option<Access>)>,
+    /// Of timed effects.
+    pub timed: Vec<Access>,
+    /// Number of resources.
+    pub resources: usize,
+}
+
+impl Accesses {
+    /// Of all actions and timed effects.
+    pub fn new(world: &World) -> Accesses {
+        let variables = world.ground.variables.len();
+        let roots = derived_roots(world);
+        let acts = world.acts.iter().map(|act| {
+            let mut start = Touched::default();
+            start.condition(world, &act.at_start);
+            start.condition(world, &act.over_all);
+            act.bounds.iter().for_each(|bound| expression_touches(world, &bound.seconds, &mut start));
+            for when in act.end_effects.iter().filter_map(|effect| effect.when.as_ref()) {
+                start.condition(world, &when.at_start);
+                start.condition(world, &when.over_all);
+            }
+            let at_start = access(world, &roots, start, &act.start_effects);
+            let at_end = act.durative.then(|| {
+                let mut end = Touched::default();
+                end.condition(world, &act.over_all);
+                end.condition(world, &act.at_end);
+                let effects: Vec<Effect> = act.flow_effects.iter().chain(&act.end_effects).cloned().collect();
+                access(world, &roots, end, &effects)
+            });
+            (at_start, at_end)
+        });
+        let acts = acts.collect();
+        let timed = world.ground.timed.iter().map(|timed| {
+            let effects = always(&timed.outcomes);
+            access(world, &roots, Touched::default(), &effects)
+        });
+        let timed = timed.collect();
+        Accesses { acts, timed, resources: variables + world.ground.numerics.len() }
+    }
+}
+
+fn access(world: &World, roots: &[Vec<u32>], mut reads: Touched, effects: &[Effect]) -> Access {
+    use crate::ground::Change;
+    let variables = world.ground.variables.len();
+    let (mut written, mut added) = (Touched::default(), Touched::default());
+    for effect in effects {
+        if let Some(when) = &effect.when {
+            reads.condition(world, &when.here);
+            reads.condition(world, &when.over_all);
+        }
+        match &effect.outcome {
+            Outcome::Change { fluent, change: Change::Increase | Change::Decrease, amount } => {
+                expression_touches(world, amount, &mut reads);
+                added.numbers.push(*fluent);
+            }
+            Outcome::Change { amount, .. } => {
+                expression_touches(world, amount, &mut reads);
+                written.outcome(world, &effect.outcome);
+            }
+            Outcome::Flow { rate, .. } => {
+                expression_touches(world, rate, &mut reads);
+                written.outcome(world, &effect.outcome);
+            }
+            Outcome::Call(call) => {
+                reads.call(world, *call);
+                written.outcome(world, &effect.outcome);
+            }
+            Outcome::Set(_) => written.outcome(world, &effect.outcome),
+        }
+    }
+    let mut read: Vec<u32> = Vec::new();
+    for resource in reads.resources(variables) {
+        match roots.get(resource as usize).filter(|roots| !roots.is_empty()) {
+            Some(roots) => read.extend(roots),
+            None => read.push(resource),
+        }
+    }
+    read.sort_unstable();
+    read.dedup();
+    Access { reads: read, writes: written.resources(variables), adds: added.resources(variables) }
+}
+
+/// By derived variable, the resources that its axioms read in the end; empty for others.
+fn derived_roots(world: &World) -> Vec<Vec<u32>> {
+    let variables = world.ground.variables.len();
+    let mut direct: Vec<Vec<u32>> = vec![Vec::new(); variables];
+    for axiom in &world.ground.axioms {
+        let mut touched = Touched::default();
+        touched.condition(world, &axiom.body);
+        direct[axiom.head.variable as usize].extend(touched.resources(variables));
+    }
+    let derived =
+        |resource: u32| world.ground.variables.get(resource as usize).is_some_and(|v| v.stratum.is_some());
+    let close = |start: usize| {
+        let mut seen = vec![false; variables];
+        let (mut agenda, mut roots) = (direct[start].clone(), Vec::new());
+        while let Some(resource) = agenda.pop() {
+            if !derived(resource) {
+                roots.push(resource);
+            } else if !std::mem::replace(&mut seen[resource as usize], true) {
+                agenda.extend(&direct[resource as usize]);
+            }
+        }
+        roots.sort_unstable();
+        roots.dedup();
+        roots
+    };
+    (0..variables)
+        .map(|variable| if derived(variable as u32) { close(variable) } else { Vec::new() })
+        .collect()
+}
+
+fn always(outcomes: &[Outcome]) -> Vec<Effect> {
+    outcomes.iter().map(|outcome| Effect { when: None, outcome: outcome.clone() }).collect()
+}

@@ -1,0 +1,250 @@
+//! The partial order that a sequence of happenings stands for, and its earliest schedule.
+//!
+//! A happening reads and writes resources (variables and numbers). Two happenings that could disturb each other keep
+//! the order of the sequence, [`EPSILON_S`] apart; others are free, so the sequence only fixes what matters. Durations
+//! and timed effects bound the distance from above; the whole is a simple temporal network whose earliest solution
+//! is kept up to date by propagation.
+
+use crate::solve::EPSILON_S;
+
+use super::world::Span;
+
+/// What one happening touches; indices of resources.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Access {
+    /// Must not change between the happening before and this one.
+    pub reads: Vec<u32>,
+    /// Get a new value.
+    pub writes: Vec<u32>,
+    /// Numbers that are increased or decreased by an amount: these commute with one another.
+    pub adds: Vec<u32>,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Resource {
+    writer: Option<u32>,
+    readers: Vec<u32>,
+    adders: Vec<u32>,
+}
+
+/// Start and end of an action in progress or done.
+#[derive(Debug, Clone, Copy)]
+struct Tie {
+    start: u32,
+    end: u32,
+    span: Span,
+}
+
+/// Happenings in the order of a sequence, with their earliest times.
+#[derive(Debug, Clone)]
+pub(crate) struct Order {
+    earliest_s: Vec<f64>,
+    /// By happening: earlier ones that it must follow, by how much.
+    after: Vec<Vec<(u32, f64)>>,
+    fixed: Vec<(u32, f64)>,
+    ties: Vec<Tie>,
+    resources: Vec<Resource>,
+}
+
+/// The times cannot be made to fit: a duration or a timed effect is too early or too short.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Inconsistent;
+
+impl Order {
+    /// Nothing has happened yet.
+    pub fn new(resources: usize) -> Order {
+        Order {
+            earliest_s: Vec::new(),
+            after: Vec::new(),
+            fixed: Vec::new(),
+            ties: Vec::new(),
+            resources: vec![Resource::default(); resources],
+        }
+    }
+
+    /// The earliest time of a happening.
+    pub fn earliest_s(&self, happening: u32) -> f64 {
+        self.earliest_s[happening as usize]
+    }
+
+    /// The time of the last happening that is not given from outside.
+    pub fn makespan_s(&self) -> f64 {
+        let given = |index: usize| self.fixed.iter().any(|&(node, _)| node as usize == index);
+        let own =
+            self.earliest_s.iter().enumerate().filter(|&(index, _)| self.fixed.is_empty() || !given(index));
+        own.fold(0.0, |latest, (_, &time_s)| latest.max(time_s))
+    }
+
+    /// An instantaneous happening, or the start of an action that stays open.
+    pub fn push(&mut self, access: &Access) -> u32 {
+        let node = self.earliest_s.len() as u32;
+        let mut after = Vec::new();
+        let mut follow = |other: u32| after.push((other, EPSILON_S));
+        for &resource in access.reads.iter().chain(&access.adds).chain(&access.writes) {
+            let resource = &self.resources[resource as usize];
+            if resource.readers.is_empty() && resource.adders.is_empty() {
+                resource.writer.iter().for_each(|&writer| follow(writer));
+            }
+        }
+        for &resource in &access.reads {
+            let resource = &self.resources[resource as usize];
+            resource.writer.iter().chain(&resource.adders).for_each(|&other| follow(other));
+        }
+        for &resource in &access.adds {
+            let resource = &self.resources[resource as usize];
+            resource.writer.iter().chain(&resource.readers).for_each(|&other| follow(other));
+        }
+        for &resource in &access.writes {
+            let resource = &self.resources[resource as usize];
+            resource.readers.iter().chain(&resource.adders).for_each(|&other| follow(other));
+        }
+        after.sort_unstable_by_key(|&(other, _)| other);
+        after.dedup();
+        let time_s =
+            after.iter().fold(0.0, |time_s: f64, &(other, gap_s)| time_s.max(self.earliest_s(other) + gap_s));
+        self.earliest_s.push(time_s);
+        self.after.push(after);
+        self.record(node, access);
+        node
+    }
+
+    /// The end of the action whose start is `start`.
+    pub fn push_end(&mut self, start: u32, access: &Access, span: Span) -> Result<u32, Inconsistent> {
+        let end = self.push(access);
+        let tie = Tie { start, end, span };
+        self.ties.push(tie);
+        let end_s = self.earliest_s(end).max(self.earliest_s(start) + span.least_s);
+        self.earliest_s[end as usize] = end_s;
+        let start_s = end_s - span.most_s;
+        // A shift below a billionth of a second is rounding.
+        if start_s > self.earliest_s(start) + 1e-9 {
+            self.earliest_s[start as usize] = start_s;
+            if end != start + 1 {
+                self.propagate()?;
+            }
+        }
+        Ok(end)
+    }
+
+    /// A happening that is given from outside at this time.
+    pub fn push_fixed(&mut self, access: &Access, time_s: f64) -> Result<u32, Inconsistent> {
+        let node = self.push(access);
+        self.fixed.push((node, time_s));
+        if self.earliest_s(node) > time_s {
+            return Err(Inconsistent);
+        }
+        self.earliest_s[node as usize] = time_s;
+        Ok(node)
+    }
+
+    fn record(&mut self, node: u32, access: &Access) {
+        for &resource in &access.reads {
+            self.resources[resource as usize].readers.push(node);
+        }
+        for &resource in &access.adds {
+            self.resources[resource as usize].adders.push(node);
+        }
+        for &resource in &access.writes {
+            let resource = &mut self.resources[resource as usize];
+            resource.readers.clear();
+            resource.adders.clear();
+            resource.writer = Some(node);
+        }
+    }
+
+    /// Raises earliest times until every distance holds (Bellman and Ford over the network, whose edges mostly follow
+    /// the sequence, so that each pass settles everything but what upper bounds push).
+    fn propagate(&mut self) -> Result<(), Inconsistent> {
+        for _ in 0..self.ties.len() + 2 {
+            let mut pushed = false;
+            let mut tie_of: Vec<Option<usize>> = vec![None; self.earliest_s.len()];
+            for (index, tie) in self.ties.iter().enumerate() {
+                tie_of[tie.end as usize] = Some(index);
+            }
+            for (node, tie) in tie_of.iter().enumerate() {
+                let mut time_s = self.earliest_s[node];
+                for &(other, gap_s) in &self.after[node] {
+                    time_s = time_s.max(self.earliest_s(other) + gap_s);
+                }
+                if let Some(tie) = tie.map(|index| self.ties[index]) {
+                    time_s = time_s.max(self.earliest_s(tie.start) + tie.span.least_s);
+                }
+                self.earliest_s[node] = time_s;
+            }
+            if self.fixed.iter().any(|&(node, time_s)| self.earliest_s(node) > time_s) {
+                return Err(Inconsistent);
+            }
+            for tie in &self.ties {
+                let start_s = self.earliest_s[tie.end as usize] - tie.span.most_s;
+                // A shift below a billionth of a second is rounding.
+                if start_s > self.earliest_s[tie.start as usize] + 1e-9 {
+                    self.earliest_s[tie.start as usize] = start_s;
+                    pushed = true;
+                }
+            }
+            if !pushed {
+                return Ok(());
+            }
+        }
+        Err(Inconsistent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn access(reads: &[u32], writes: &[u32]) -> Access {
+        Access { reads: reads.to_vec(), writes: writes.to_vec(), adds: Vec::new() }
+    }
+
+    fn exactly(seconds: f64) -> Span {
+        Span { least_s: seconds, most_s: seconds }
+    }
+
+    #[test]
+    fn independent_actions_overlap_and_dependent_ones_follow() {
+        let mut order = Order::new(2);
+        let first = order.push(&access(&[], &[0]));
+        let first_end = order.push_end(first, &access(&[], &[0]), exactly(3.0)).expect("fits");
+        let second = order.push(&access(&[], &[1]));
+        order.push_end(second, &access(&[], &[1]), exactly(5.0)).expect("fits");
+        let third = order.push(&access(&[0], &[]));
+        assert_eq!(order.earliest_s(first_end), 3.0);
+        assert_eq!(order.earliest_s(second), 0.0);
+        assert_eq!(order.earliest_s(third), 3.0 + EPSILON_S);
+        assert_eq!(order.makespan_s(), 5.0);
+    }
+
+    #[test]
+    fn an_envelope_starts_late_enough_to_hold_what_it_must() {
+        // The envelope (resource 0, 4 s) must end after an action of 2 s that needs it and, from before, 3 s on resource 1.
+        let mut order = Order::new(2);
+        let before = order.push(&access(&[], &[1]));
+        order.push_end(before, &access(&[], &[1]), exactly(3.0)).expect("fits");
+        let envelope = order.push(&access(&[], &[0]));
+        let inside = order.push(&access(&[0, 1], &[]));
+        order.push_end(inside, &access(&[0], &[]), exactly(2.0)).expect("fits");
+        order.push_end(envelope, &access(&[], &[0]), exactly(4.0)).expect("fits");
+        assert!((order.earliest_s(envelope) - (3.0 + 2.0 + 2.0 * EPSILON_S - 4.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_found() {
+        let mut order = Order::new(1);
+        let envelope = order.push(&access(&[], &[0]));
+        let inside = order.push(&access(&[0], &[]));
+        order.push_end(inside, &access(&[0], &[]), exactly(4.0)).expect("fits");
+        assert_eq!(order.push_end(envelope, &access(&[], &[0]), exactly(4.0)), Err(Inconsistent));
+    }
+
+    #[test]
+    fn a_deadline_bounds_what_comes_before_it() {
+        for (deadline_s, fits) in [(2.0, false), (4.0, true)] {
+            let mut order = Order::new(1);
+            let start = order.push(&access(&[0], &[]));
+            order.push_end(start, &access(&[0], &[]), exactly(3.0)).expect("fits");
+            assert_eq!(order.push_fixed(&access(&[], &[0]), deadline_s).is_ok(), fits);
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! Which variables and numbers conditions, expressions and effects read or change.
+
+use crate::ground::{CallId, ComparisonId, Conjunction, Expression, NumericId, Outcome, Place, VariableId};
+
+use super::world::World;
+
+/// Variables and numbers.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Touched {
+    /// Finite-domain variables.
+    pub variables: Vec<VariableId>,
+    /// Numbers.
+    pub numbers: Vec<NumericId>,
+}
+
+impl Touched {
+    /// Both as resources: variables, then numbers after all `variables` of the task; in order, each once.
+    pub fn resources(&self, variables: usize) -> Vec<u32> {
+        let numbers = self.numbers.iter().map(|&number| number + variables as u32);
+        let mut resources: Vec<u32> = self.variables.iter().copied().chain(numbers).collect();
+        resources.sort_unstable();
+        resources.dedup();
+        resources
+    }
+
+    /// What the answer of a call depends on.
+    pub fn call(&mut self, world: &World, call: CallId) {
+        let (variables, numbers) = world.calls.reads(call);
+        self.variables.extend(variables);
+        self.numbers.extend(numbers);
+    }
+
+    /// What a numeric condition reads.
+    pub fn comparison(&mut self, world: &World, comparison: ComparisonId) {
+        let comparison = &world.ground.comparisons[comparison as usize];
+        expression_touches(world, &comparison.left, self);
+        expression_touches(world, &comparison.right, self);
+    }
+
+    /// What a condition reads.
+    pub fn condition(&mut self, world: &World, condition: &Conjunction) {
+        self.variables.extend(condition.facts.iter().map(|fact| fact.variable));
+        condition.comparisons.iter().for_each(|&comparison| self.comparison(world, comparison));
+        condition.calls.iter().for_each(|&(call, _)| self.call(world, call));
+    }
+
+    /// What an outcome changes.
+    pub fn outcome(&mut self, world: &World, outcome: &Outcome) {
+        match outcome {
+            Outcome::Set(fact) => self.variables.push(fact.variable),
+            Outcome::Change { fluent, .. } | Outcome::Flow { fluent, .. } => self.numbers.push(*fluent),
+            Outcome::Call(call) => {
+                for place in &world.ground.calls[*call as usize].writes {
+                    match place {
+                        Place::Number(number) => self.numbers.push(*number),
+                        Place::Truth(variable) | Place::Object(variable) => self.variables.push(*variable),
+                        Place::Nowhere => {}
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Adds what an expression reads.
+pub(crate) fn expression_touches(world: &World, expression: &Expression, touched: &mut Touched) {
+    match expression {
+        Expression::Fluent(fluent) => touched.numbers.push(*fluent),
+        Expression::Call(call) => touched.call(world, *call),
+        Expression::Sum(parts) | Expression::Product(parts) => {
+            parts.iter().for_each(|part| expression_touches(world, part, touched));
+        }
+        Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+            expression_touches(world, left, touched);
+            expression_touches(world, right, touched);
+        }
+        Expression::Negative(inner) => expression_touches(world, inner, touched),
+        Expression::Constant(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {}
+    }
+}

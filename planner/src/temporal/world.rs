@@ -1,0 +1,327 @@
+//! What happens when an action starts, runs and ends: conditions and effects on packed-free states.
+
+use std::sync::Arc;
+
+use crate::attachment::Level;
+use crate::calls::{Calls, Failure};
+use crate::ground::{
+    Axiom, Change, ComparisonId, Conjunction, DurationBound, Effect, Expression, GroundTask, Origin, Outcome,
+    Relation, Values,
+};
+use crate::solve::EPSILON_S;
+use crate::task::{Task, Term};
+
+/// An action of the temporal search; an instantaneous one has everything at its start.
+#[derive(Debug, Clone)]
+pub(crate) struct Act {
+    /// The lifted action and its arguments.
+    pub origin: Origin,
+    /// Whether it takes time.
+    pub durative: bool,
+    /// Bounds on the duration.
+    pub bounds: Vec<DurationBound>,
+    /// Holds right before the start.
+    pub at_start: Conjunction,
+    /// Holds strictly between start and end.
+    pub over_all: Conjunction,
+    /// Holds right before the end.
+    pub at_end: Conjunction,
+    /// Happens at the start.
+    pub start_effects: Vec<Effect>,
+    /// Changes at a rate while it runs.
+    pub flow_effects: Vec<Effect>,
+    /// Happens at the end.
+    pub end_effects: Vec<Effect>,
+    /// What it adds to an additive metric.
+    pub cost: Expression,
+    /// Grounding calls: module and arguments.
+    pub grounding: Vec<(usize, Vec<u32>)>,
+}
+
+/// A state, with what expressions may refer to besides it.
+#[derive(Clone, Copy)]
+pub(crate) struct Moment<'s> {
+    /// The state.
+    pub state: &'s Values,
+    /// `?duration` of the action at hand, in seconds.
+    pub duration_s: f64,
+    /// The parameter that a grounding module proposed.
+    pub proposal: Option<&'s Arc<str>>,
+    /// How carefully attachments answer.
+    pub level: Level,
+}
+
+/// The duration that an action may take, in seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Span {
+    /// At least.
+    pub least_s: f64,
+    /// At most; may be infinite.
+    pub most_s: f64,
+}
+
+/// The ground task in the form that the temporal search applies.
+pub(crate) struct World<'a> {
+    /// The ground task.
+    pub ground: &'a GroundTask,
+    /// Its calls.
+    pub calls: Calls<'a>,
+    /// Durative actions first, in the ground task's order, then instantaneous ones.
+    pub acts: Vec<Act>,
+    /// Axioms by stratum.
+    strata: Vec<Vec<&'a Axiom>>,
+    /// Variables that axioms set.
+    derived: Vec<usize>,
+}
+
+impl<'a> World<'a> {
+    /// From a ground task and its bound calls.
+    pub fn new(task: &'a Task, ground: &'a GroundTask, calls: Calls<'a>) -> World<'a> {
+        let durative = ground.durative.iter().map(|action| Act {
+            origin: action.origin.clone(),
+            durative: true,
+            bounds: action.duration.clone(),
+            at_start: action.at_start.clone(),
+            over_all: action.over_all.clone(),
+            at_end: action.at_end.clone(),
+            start_effects: action.start_effects.clone(),
+            flow_effects: action.flow_effects.clone(),
+            end_effects: action.end_effects.clone(),
+            cost: action.cost.clone(),
+            grounding: grounding(task, &action.origin),
+        });
+        let instantaneous = ground.actions.iter().map(|action| Act {
+            origin: action.origin.clone(),
+            durative: false,
+            bounds: Vec::new(),
+            at_start: action.condition.clone(),
+            over_all: Conjunction::default(),
+            at_end: Conjunction::default(),
+            start_effects: action.effects.clone(),
+            flow_effects: Vec::new(),
+            end_effects: Vec::new(),
+            cost: action.cost.clone(),
+            grounding: grounding(task, &action.origin),
+        });
+        let acts = durative.chain(instantaneous).collect();
+        let stratum_of =
+            |axiom: &Axiom| ground.variables[axiom.head.variable as usize].stratum.unwrap_or(0) as usize;
+        let mut strata: Vec<Vec<&Axiom>> = Vec::new();
+        for axiom in &ground.axioms {
+            let stratum = stratum_of(axiom);
+            strata.resize(strata.len().max(stratum + 1), Vec::new());
+            strata[stratum].push(axiom);
+        }
+        let derived = (0..ground.variables.len())
+            .filter(|&variable| ground.variables[variable].stratum.is_some())
+            .collect();
+        World { ground, calls, acts, strata, derived }
+    }
+
+    /// The first state, with derived variables up to date.
+    pub fn initial(&self) -> Result<Values, Failure> {
+        let mut state = self.ground.initial.clone();
+        self.derive(&mut state)?;
+        Ok(state)
+    }
+
+    /// The value of an expression; NaN where it is undefined. `total-time` and preferences count as zero.
+    pub fn evaluate(&self, expression: &Expression, moment: &Moment) -> Result<f64, Failure> {
+        Ok(match expression {
+            Expression::Constant(number) => *number,
+            Expression::Fluent(fluent) => moment.state.numbers[*fluent as usize],
+            Expression::Call(call) => self.calls.cost(*call, moment.proposal, moment.state, moment.level)?,
+            Expression::Duration => moment.duration_s,
+            Expression::TotalTime | Expression::Violated(_) => 0.0,
+            Expression::Sum(parts) => {
+                let mut sum = 0.0;
+                for part in parts {
+                    sum += self.evaluate(part, moment)?;
+                }
+                sum
+            }
+            Expression::Product(parts) => {
+                let mut product = 1.0;
+                for part in parts {
+                    product *= self.evaluate(part, moment)?;
+                }
+                product
+            }
+            Expression::Difference(left, right) => {
+                self.evaluate(left, moment)? - self.evaluate(right, moment)?
+            }
+            Expression::Quotient(left, right) => {
+                self.evaluate(left, moment)? / self.evaluate(right, moment)?
+            }
+            Expression::Negative(inner) => -self.evaluate(inner, moment)?,
+        })
+    }
+
+    /// Whether a numeric condition holds.
+    pub fn compare(&self, comparison: ComparisonId, moment: &Moment) -> Result<bool, Failure> {
+        let comparison = &self.ground.comparisons[comparison as usize];
+        let left = self.evaluate(&comparison.left, moment)?;
+        let right = self.evaluate(&comparison.right, moment)?;
+        Ok(relates(left, comparison.relation, right))
+    }
+
+    /// Whether a conjunction holds; calls are asked last.
+    pub fn holds(&self, condition: &Conjunction, moment: &Moment) -> Result<bool, Failure> {
+        let facts =
+            condition.facts.iter().all(|fact| moment.state.values[fact.variable as usize] == fact.value);
+        if !facts {
+            return Ok(false);
+        }
+        for &comparison in &condition.comparisons {
+            if !self.compare(comparison, moment)? {
+                return Ok(false);
+            }
+        }
+        for &(call, wanted) in &condition.calls {
+            if self.calls.truth(call, moment.proposal, moment.state, moment.level)? != wanted {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// The durations that the bounds at the start allow, or `None` if there is none.
+    ///
+    /// A durative action takes at least [`EPSILON_S`].
+    pub fn span(&self, act: &Act, moment: &Moment) -> Result<Option<Span>, Failure> {
+        let mut span = Span { least_s: EPSILON_S, most_s: f64::INFINITY };
+        for bound in act.bounds.iter().filter(|bound| !bound.at_end) {
+            let seconds = self.evaluate(&bound.seconds, moment)?;
+            if seconds.is_nan() {
+                return Ok(None);
+            }
+            match bound.relation {
+                Relation::Less => span.most_s = span.most_s.min(seconds - EPSILON_S),
+                Relation::AtMost => span.most_s = span.most_s.min(seconds),
+                Relation::Equal => {
+                    span.least_s = span.least_s.max(seconds);
+                    span.most_s = span.most_s.min(seconds);
+                }
+                Relation::AtLeast => span.least_s = span.least_s.max(seconds),
+                Relation::Greater => span.least_s = span.least_s.max(seconds + EPSILON_S),
+                Relation::Unequal => {}
+            }
+        }
+        Ok((span.least_s <= span.most_s && span.least_s.is_finite()).then_some(span))
+    }
+
+    /// Whether the bounds that are evaluated at the end allow this duration.
+    pub fn end_allows(&self, act: &Act, moment: &Moment) -> Result<bool, Failure> {
+        for bound in act.bounds.iter().filter(|bound| bound.at_end) {
+            let seconds = self.evaluate(&bound.seconds, moment)?;
+            if !relates(moment.duration_s, bound.relation, seconds) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Lets effects happen: `moment` is the state before them, `into` a copy of it that becomes the state after, with
+    /// derived variables up to date. `gate` says whether an effect's conditions on earlier times were met.
+    ///
+    /// `Ok(false)` if a number becomes undefined or infinite: then the effects cannot happen.
+    pub fn apply(
+        &self,
+        effects: &[Effect],
+        moment: &Moment,
+        gate: &dyn Fn(usize, &Effect) -> bool,
+        into: &mut Values,
+    ) -> Result<bool, Failure> {
+        for (index, effect) in effects.iter().enumerate() {
+            let here = effect.when.as_ref().map(|when| &when.here);
+            if !gate(index, effect) || !here.map_or(Ok(true), |here| self.holds(here, moment))? {
+                continue;
+            }
+            match &effect.outcome {
+                Outcome::Set(fact) => into.values[fact.variable as usize] = fact.value,
+                Outcome::Change { fluent, change, amount } => {
+                    let amount = self.evaluate(amount, moment)?;
+                    change_number(&mut into.numbers[*fluent as usize], *change, amount);
+                    if !into.numbers[*fluent as usize].is_finite() {
+                        return Ok(false);
+                    }
+                }
+                Outcome::Flow { fluent, rate } => {
+                    let change = self.evaluate(rate, moment)? * moment.duration_s;
+                    into.numbers[*fluent as usize] += change;
+                }
+                Outcome::Call(call) => {
+                    self.calls.write(*call, moment.proposal, moment.state, moment.level, into)?;
+                }
+            }
+        }
+        self.derive(into)?;
+        Ok(true)
+    }
+
+    /// Brings derived variables up to date.
+    fn derive(&self, state: &mut Values) -> Result<(), Failure> {
+        if self.derived.is_empty() {
+            return Ok(());
+        }
+        for &variable in &self.derived {
+            state.values[variable] = 1;
+        }
+        for stratum in &self.strata {
+            loop {
+                let mut changed = false;
+                for axiom in stratum {
+                    let head = axiom.head.variable as usize;
+                    if state.values[head] == axiom.head.value {
+                        continue;
+                    }
+                    let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Exact };
+                    if self.holds(&axiom.body, &moment)? {
+                        state.values[head] = axiom.head.value;
+                        changed = true;
+                    }
+                }
+                if !changed {
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether two numbers relate so; never if one is undefined.
+pub(crate) fn relates(left: f64, relation: Relation, right: f64) -> bool {
+    match relation {
+        Relation::Less => left < right,
+        Relation::AtMost => left <= right,
+        Relation::Equal => left == right,
+        Relation::AtLeast => left >= right,
+        Relation::Greater => left > right,
+        Relation::Unequal => left.partial_cmp(&right).is_some_and(std::cmp::Ordering::is_ne),
+    }
+}
+
+/// Changes a number.
+pub(crate) fn change_number(number: &mut f64, change: Change, amount: f64) {
+    match change {
+        Change::Assign => *number = amount,
+        Change::Increase => *number += amount,
+        Change::Decrease => *number -= amount,
+        Change::ScaleUp => *number *= amount,
+        Change::ScaleDown => *number /= amount,
+    }
+}
+
+fn grounding(task: &Task, origin: &Origin) -> Vec<(usize, Vec<u32>)> {
+    let object = |term: &Term| match term {
+        Term::Variable(slot) => origin.arguments.get(slot.index()).copied(),
+        Term::Object(object) => Some(object.0),
+        Term::Function(_) => None,
+    };
+    let calls = &task.actions[origin.schema as usize].grounding;
+    calls
+        .iter()
+        .map(|call| (call.module.index(), call.arguments.iter().filter_map(object).collect()))
+        .collect()
+}

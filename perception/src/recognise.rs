@@ -1,13 +1,20 @@
 //! From the objects on a surface to percepts (paper 004, section V, "Tabletop Scene Perception").
 
+mod descry;
+mod evidence;
 mod model;
+mod outline;
 mod percept;
+mod published;
+mod round;
 
 use crate::segment::Scene;
 use crate::visibility::Visibility;
 
+pub use descry::Descry;
 pub use model::{Handle, ModelError, ObjectModel, Range, Shape, Top, check_models};
 pub use percept::{Evidence, Percept, Sighting, Stance};
+pub use published::Published;
 
 /// A way to tell which known object each segment is.
 pub trait Recogniser: Send + Sync {

@@ -1,13 +1,60 @@
-//! The objects on a surface, each in one piece.
+//! The objects on a surface, each in one piece (paper 004, section V: plane away, clusters; here also touching and stacked objects).
+//!
+//! Points above the surface are gathered into voxels, voxels into small flat patches. Patches of one object meet convexly or
+//! smoothly; where two objects touch, the surface has a concave crease. Vessels are the exception that is mended afterwards: what lies inside
+//! the outline of a body and below its top is the body's own inside.
 
-use crate::surface::Surface;
+mod join;
+mod patches;
+
+use crate::cloud::{Cloud, is_finite};
+use crate::surface::{Surface, SurfaceError, SurfaceOptions, find_surface};
+use crate::visibility::Visibility;
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
+
+/// How to part a scene into objects.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SceneOptions {
+    /// How to find the surface.
+    pub surface: SurfaceOptions,
+    /// Least height above the surface of a point that belongs to an object, metres. The surface's own roughness may raise it.
+    pub clearance_m: f64,
+    /// Greatest height above the surface of a point that belongs to an object, metres.
+    pub tallest_m: f64,
+    /// Side of the voxels, metres. Objects that stand twice as far apart are always separate.
+    pub voxel_m: f64,
+    /// Fewest points of an object.
+    pub fewest_points: usize,
+    /// Least height of an object's top above what it stands on, metres.
+    pub least_height_m: f64,
+    /// Whether touching objects are parted at concave creases.
+    pub part_touching: bool,
+}
+
+impl Default for SceneOptions {
+    fn default() -> Self {
+        SceneOptions {
+            surface: SurfaceOptions::default(),
+            clearance_m: 0.008,
+            tallest_m: 0.6,
+            voxel_m: 0.008,
+            fewest_points: 60,
+            least_height_m: 0.025,
+            part_touching: true,
+        }
+    }
+}
 
 /// One object: points that belong together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
     /// Indices into the cloud that was segmented, ascending.
     pub indices: Vec<u32>,
+    /// Its points in the surface's frame (z is the height above the surface), metres, in the order of `indices`.
+    #[serde(skip)]
+    pub points: Vec<Point3<f64>>,
     /// Height of what it stands on above the surface, metres: 0 on the surface itself, more on another object.
     pub base_m: f64,
 }
@@ -17,6 +64,123 @@ pub struct Segment {
 pub struct Scene {
     /// What they stand on.
     pub surface: Surface,
-    /// The objects, largest first.
+    /// The objects, most points first.
     pub segments: Vec<Segment>,
+}
+
+/// Finds the surface in a cloud (world frame) and parts what stands on it.
+///
+/// # Errors
+/// If no surface is found.
+pub fn segment(cloud: &Cloud, seen: &Visibility, options: &SceneOptions) -> Result<Scene, SurfaceError> {
+    let surface = find_surface(cloud, seen, &options.surface)?;
+    Ok(segment_on(cloud, seen, surface, options))
+}
+
+/// Parts what stands on a known surface.
+pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &SceneOptions) -> Scene {
+    let _span = tracing::debug_span!("segment", points = cloud.len()).entered();
+    let (indices, points) = above(cloud, &surface, options);
+    let viewpoints: Vec<_> = seen.viewpoints().iter().map(|v| surface.surface_from_world * v).collect();
+    let voxels = patches::voxels(&points, options.voxel_m, &viewpoints);
+    let part_of_voxel = join::parts(&voxels, options);
+    let mut parts: Vec<Segment> = Vec::new();
+    let mut slots: Vec<Option<usize>> = vec![None; voxels.len()];
+    for ((&index, &point), &voxel) in indices.iter().zip(&points).zip(&voxels.of_point) {
+        let part = part_of_voxel[voxel as usize] as usize;
+        let slot = *slots[part].get_or_insert_with(|| {
+            parts.push(Segment { indices: Vec::new(), points: Vec::new(), base_m: 0.0 });
+            parts.len() - 1
+        });
+        parts[slot].indices.push(index);
+        parts[slot].points.push(point);
+    }
+    parts.retain(|s| s.indices.len() >= options.fewest_points);
+    stand(&mut parts);
+    parts.retain(|s| top_m(s) - s.base_m >= options.least_height_m);
+    parts.sort_by(|a, b| b.indices.len().cmp(&a.indices.len()).then(a.indices.cmp(&b.indices)));
+    Scene { surface, segments: parts }
+}
+
+/// Indices and positions (surface frame) of the points that stand above the surface, inside its outline.
+fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>, Vec<Point3<f64>>) {
+    let clearance_m = options.clearance_m.max(2.5 * surface.residual_m);
+    let up = surface.up.cast::<f32>();
+    let offset = surface.offset_m as f32;
+    let band = clearance_m as f32..options.tallest_m as f32;
+    let mut indices = Vec::new();
+    let mut points = Vec::new();
+    for (i, p) in (0u32..).zip(&cloud.points) {
+        if is_finite(p) && band.contains(&(up.dot(&p.coords) - offset)) {
+            let world = p.cast::<f64>();
+            if surface.covers(&world, 0.0) {
+                indices.push(i);
+                points.push(surface.surface_from_world * world);
+            }
+        }
+    }
+    (indices, points)
+}
+
+/// Height of a segment's top above the surface, metres: its highest points but for a few that may be noise.
+pub(crate) fn top_m(segment: &Segment) -> f64 {
+    let mut heights: Vec<f64> = segment.points.iter().map(|p| p.z).collect();
+    quantile(&mut heights, 0.99)
+}
+
+/// The value below which a share of the values lies; 0 for none. Reorders them.
+pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let at = ((values.len() - 1) as f64 * share).round() as usize;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// Tells for each segment what it stands on: the surface, or the top of another segment under its footprint.
+fn stand(parts: &mut [Segment]) {
+    /// A lower edge this high has been cut or hidden rather than set on something, unless something is below it.
+    const LIFTED_M: f64 = 0.02;
+    let tops: Vec<f64> = parts.iter().map(top_m).collect();
+    let bases: Vec<f64> = parts
+        .iter()
+        .enumerate()
+        .map(|(i, part)| {
+            let mut heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
+            let low = quantile(&mut heights, 0.01);
+            if low < LIFTED_M {
+                return 0.0;
+            }
+            let (cx, cy) = middle(&part.points);
+            let below = parts.iter().zip(&tops).enumerate().filter(|&(j, (other, &top))| {
+                j != i && top < low + 0.03 && top > low - 0.03 && footprint_holds(&other.points, cx, cy)
+            });
+            below.map(|(_, (_, &top))| top).max_by(f64::total_cmp).unwrap_or(0.0)
+        })
+        .collect();
+    for (part, base) in parts.iter_mut().zip(bases) {
+        part.base_m = base;
+    }
+}
+
+fn middle(points: &[Point3<f64>]) -> (f64, f64) {
+    let n = points.len().max(1) as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.x, y + p.y));
+    (x / n, y / n)
+}
+
+/// True if the convex outline of the points, seen from above, holds the place.
+fn footprint_holds(points: &[Point3<f64>], x: f64, y: f64) -> bool {
+    let hull = crate::surface::convex_hull(points.iter().map(|p| [p.x, p.y]).collect());
+    holds(&hull, [x, y])
+}
+
+/// True if a convex anticlockwise outline holds the place.
+pub(crate) fn holds(hull: &[[f64; 2]], p: [f64; 2]) -> bool {
+    let n = hull.len();
+    n >= 3
+        && (0..n).all(|i| {
+            let (a, b) = (hull[i], hull[(i + 1) % n]);
+            (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) >= 0.0
+        })
 }

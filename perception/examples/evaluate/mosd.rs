@@ -1,0 +1,202 @@
+//! Kinect scenes of the Object Segmentation Database with a label a point.
+
+use descry_perception::cloud::is_finite;
+use descry_perception::files::read_cloud;
+use descry_perception::nalgebra::Isometry3;
+use descry_perception::recognise::{Descry, Published, Range, Top};
+use descry_perception::segment::{SceneOptions, segment};
+use descry_perception::{ObjectModel, Percept, Recogniser, Scene, View, Visibility};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The kind of thing that the labels call a cup.
+pub fn cup() -> ObjectModel {
+    ObjectModel {
+        name: "cup".into(),
+        kind: "cup".into(),
+        phrases: Vec::new(),
+        shape: Default::default(),
+        height_m: Range { low: 0.085, high: 0.115 },
+        diameter_m: Some(Range { low: 0.065, high: 0.095 }),
+        width_m: None,
+        depth_m: None,
+        taper: Range { low: 0.7, high: 1.05 },
+        top: Top::Open,
+        handle: Default::default(),
+    }
+}
+
+#[derive(Default)]
+struct Tally {
+    found: usize,
+    objects: usize,
+    split: usize,
+    merged: usize,
+    extra: usize,
+}
+
+/// Scores every scene of the folder.
+pub fn run(dir: &Path) -> Result<(), String> {
+    let cups = table(&dir.join("cups.csv"))?;
+    let objects = table(&dir.join("objects.csv"))?;
+    let mut scenes: Vec<PathBuf> = std::fs::read_dir(dir)
+        .map_err(|e| format!("{}: {e}", dir.display()))?
+        .filter_map(|entry| entry.ok().map(|e| e.path()))
+        .filter(|p| p.extension().is_some_and(|e| e == "pcd"))
+        .collect();
+    scenes.sort();
+    let recognisers: [&dyn Recogniser; 2] = [&Published::default(), &Descry::default()];
+    let mut hits = vec![[0_usize; 3]; recognisers.len()];
+    let mut tally = Tally::default();
+    for path in scenes {
+        let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let bytes = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let cloud = read_cloud(&bytes).map_err(|e| format!("{}: {e}", path.display()))?.cloud;
+        let labels = cloud.labels.clone().ok_or_else(|| format!("{name}: no labels"))?;
+        let view = View {
+            stamp_ns: 0,
+            cloud,
+            intrinsics: None,
+            world_from_camera: Isometry3::identity(),
+            pose_sigma_m: 0.0,
+            pose_sigma_rad: 0.0,
+        };
+        let start = std::time::Instant::now();
+        let seen = Visibility::from_views(std::slice::from_ref(&view));
+        let scene = match segment(&view.cloud, &seen, &SceneOptions::default()) {
+            Ok(scene) => scene,
+            Err(why) => {
+                println!("{name}: {why}");
+                continue;
+            }
+        };
+        let segmented_ms = start.elapsed().as_secs_f64() * 1e3;
+        println!(
+            "{name}: table {:.2} m2, residual {:.1} mm, {} segments, {segmented_ms:.1} ms",
+            scene.surface.area_m2,
+            scene.surface.residual_m * 1e3,
+            scene.segments.len()
+        );
+        let truth: Vec<u32> = objects.iter().filter(|r| r[0] == name).filter_map(|r| r[1].parse().ok()).collect();
+        let owner = overlap(&scene, &view.cloud, &labels, &truth, &mut tally);
+        for (r, recogniser) in recognisers.iter().enumerate() {
+            let percepts = recogniser.recognise(&scene, &seen, &[cup()]);
+            let mut called = Vec::new();
+            for (percept, owner) in percepts.iter().zip(&owner) {
+                let is_cup = owner.is_some_and(|o| {
+                    cups.iter().any(|c| c[0] == name && c[1] == o.to_string() && c[2] == "cup")
+                });
+                match (percept.label.is_some(), is_cup) {
+                    (true, true) => called.extend(*owner),
+                    (true, false) => hits[r][1] += 1,
+                    _ => {}
+                }
+                if r == 1 || percept.label.is_some() {
+                    println!("   {:>10} object {owner:?} cup {is_cup}: {}", recogniser.name(), words(percept));
+                }
+            }
+            called.sort_unstable();
+            called.dedup();
+            hits[r][0] += called.len();
+            hits[r][2] += cups.iter().filter(|c| c[0] == name && c[2] == "cup").count();
+        }
+    }
+    println!(
+        "\nobjects found at IoU 0.5: {} of {}; split {}, merged {}, segments on no object {}",
+        tally.found, tally.objects, tally.split, tally.merged, tally.extra
+    );
+    println!("\n{:12} {:>9} {:>9}   (cups found, false cups, cups)", "recogniser", "precision", "recall");
+    for (recogniser, [right, wrong, all]) in recognisers.iter().zip(hits) {
+        let precision = right as f64 / (right + wrong).max(1) as f64;
+        println!("{:12} {precision:9.2} {:9.2}   {right} {wrong} {all}", recogniser.name(), right as f64 / all.max(1) as f64);
+    }
+    Ok(())
+}
+
+fn words(p: &Percept) -> String {
+    let e = &p.evidence;
+    format!(
+        "p {:.2} size {:.0}x{:.0}x{:.0} mm, d {:.0}±{:.0} taper {:.2} res {:.1} box {:.1} in {:.2} arc {:.2} open {:.2} lid {:.2} {:?}, handle {:?} unseen {:.2} out {:.0} mm, {:?}",
+        p.probabilities.first().map_or(0.0, |p| p.1),
+        p.size_m[0] * 1e3,
+        p.size_m[1] * 1e3,
+        p.size_m[2] * 1e3,
+        2e3 * e.radius_m,
+        2e3 * e.radius_sigma_m,
+        e.taper,
+        e.round_residual_m * 1e3,
+        e.box_residual_m * 1e3,
+        e.round_inliers,
+        e.arc,
+        e.open,
+        e.lid,
+        e.inside,
+        e.handle,
+        e.handle_unseen,
+        e.protrusion_m * 1e3,
+        p.stance
+    )
+}
+
+/// The object that most of each segment belongs to; counts what was found, split and merged.
+fn overlap(
+    scene: &Scene,
+    cloud: &descry_perception::Cloud,
+    labels: &[u32],
+    truth: &[u32],
+    tally: &mut Tally,
+) -> Vec<Option<u32>> {
+    let mut sizes: BTreeMap<u32, usize> = BTreeMap::new();
+    for (label, p) in labels.iter().zip(&cloud.points) {
+        if is_finite(p) {
+            *sizes.entry(label / 10).or_default() += 1;
+        }
+    }
+    let shares: Vec<BTreeMap<u32, usize>> = scene
+        .segments
+        .iter()
+        .map(|s| {
+            let mut counts = BTreeMap::new();
+            s.indices.iter().for_each(|&i| *counts.entry(labels[i as usize] / 10).or_default() += 1);
+            counts
+        })
+        .collect();
+    for object in truth {
+        let size = sizes.get(object).copied().unwrap_or(0);
+        let best = scene
+            .segments
+            .iter()
+            .zip(&shares)
+            .map(|(s, share)| {
+                let both = share.get(object).copied().unwrap_or(0);
+                both as f64 / (s.indices.len() + size - both).max(1) as f64
+            })
+            .fold(0.0, f64::max);
+        let pieces = shares.iter().filter(|s| s.get(object).copied().unwrap_or(0) * 10 > size).count();
+        tally.objects += 1;
+        tally.found += usize::from(best >= 0.5);
+        tally.split += usize::from(pieces > 1);
+        if best < 0.5 || pieces > 1 {
+            println!("   object {object} of {size} points: best IoU {best:.2}, {pieces} pieces");
+        }
+    }
+    scene
+        .segments
+        .iter()
+        .zip(&shares)
+        .map(|(s, share)| {
+            let held = truth.iter().filter(|o| share.get(o).copied().unwrap_or(0) * 5 > sizes.get(o).copied().unwrap_or(0)).count();
+            tally.merged += usize::from(held > 1);
+            let most = share.iter().max_by_key(|(_, n)| **n).map(|(&o, &n)| (o, n));
+            let owner = most.filter(|&(o, n)| truth.contains(&o) && n * 2 > s.indices.len()).map(|(o, _)| o);
+            tally.extra += usize::from(owner.is_none());
+            owner
+        })
+        .collect()
+}
+
+fn table(path: &Path) -> Result<Vec<Vec<String>>, String> {
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let rows = text.lines().filter(|l| !l.starts_with('#')).skip(1);
+    Ok(rows.map(|l| l.split(',').map(str::to_owned).collect()).collect())
+}

@@ -1,0 +1,304 @@
+//! Our recogniser: which hypothesis makes most likely what was measured, given what could be measured.
+//!
+//! Every known object and every family of things that are none of them is a hypothesis with a likelihood for size, form,
+//! upper end and handle. A feature that was not in view has the same likelihood under all of them, so that doubt stays.
+
+use super::Recogniser;
+use super::evidence::{Measured, measure};
+use super::model::{Handle, ObjectModel, Range, Shape, Top};
+use super::percept::{Percept, Sighting, Stance};
+use crate::segment::{Scene, Segment};
+use crate::visibility::Visibility;
+use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
+
+/// Our recogniser with its few numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Descry {
+    /// Probability before looking that an object on a table is one of the models.
+    pub known: f64,
+    /// Probability that a known object stands upside down.
+    pub upside_down: f64,
+    /// Least probability with which a percept carries a model's name.
+    pub least: f64,
+    /// Exponent on all likelihoods: below 1 softens them for what the model of the measurements leaves out.
+    pub temper: f64,
+}
+
+impl Default for Descry {
+    fn default() -> Self {
+        Descry { known: 0.5, upside_down: 0.06, least: 0.5, temper: 0.7 }
+    }
+}
+
+/// A family of everyday things: its share, form, upper end and handle. Sizes are broad.
+struct Family {
+    share: f64,
+    shape: Option<Shape>,
+    top: Top,
+    handle: Handle,
+}
+
+/// What stands on tables besides the known objects: a census guess that only sets how sceptical we start.
+const FAMILIES: [Family; 5] = [
+    Family { share: 0.35, shape: Some(Shape::Box), top: Top::Closed, handle: Handle::None },
+    Family { share: 0.20, shape: Some(Shape::Round), top: Top::Closed, handle: Handle::None },
+    Family { share: 0.10, shape: Some(Shape::Round), top: Top::Open, handle: Handle::None },
+    Family { share: 0.10, shape: Some(Shape::Round), top: Top::Open, handle: Handle::One },
+    Family { share: 0.25, shape: None, top: Top::Any, handle: Handle::Any },
+];
+
+impl Recogniser for Descry {
+    fn name(&self) -> &'static str {
+        "descry"
+    }
+
+    fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
+        let _span = tracing::debug_span!("recognise", segments = scene.segments.len()).entered();
+        scene.segments.iter().map(|segment| self.judge(scene, segment, seen, models)).collect()
+    }
+}
+
+impl Descry {
+    fn judge(&self, scene: &Scene, segment: &Segment, seen: &Visibility, models: &[ObjectModel]) -> Percept {
+        let measured = measure(scene, segment, seen);
+        let each = self.known / models.len().max(1) as f64;
+        let mut stances = vec![Stance::Upright; models.len()];
+        let logs: Vec<f64> = models
+            .iter()
+            .enumerate()
+            .map(|(i, model)| {
+                let up = (1.0 - self.upside_down).ln()
+                    + self.temper * model_log(model, Stance::Upright, &measured);
+                let down =
+                    self.upside_down.ln() + self.temper * model_log(model, Stance::UpsideDown, &measured);
+                if down > up {
+                    stances[i] = Stance::UpsideDown;
+                }
+                each.ln() + log_sum(&[up, down])
+            })
+            .collect();
+        let rest: Vec<f64> = FAMILIES
+            .iter()
+            .map(|f| ((1.0 - self.known) * f.share).ln() + self.temper * family_log(f, &measured))
+            .collect();
+        let unknown_log = log_sum(&rest);
+        let total = log_sum(&[logs.as_slice(), &[unknown_log]].concat());
+        let share = |log: f64| if total.is_finite() { (log - total).exp() } else { 0.0 };
+        let probabilities: Vec<(String, f64)> =
+            models.iter().zip(&logs).map(|(m, &log)| (m.name.clone(), share(log))).collect();
+        let unknown = 1.0 - probabilities.iter().map(|p| p.1).sum::<f64>();
+        let best = (0..models.len()).max_by(|&a, &b| logs[a].total_cmp(&logs[b]).then(b.cmp(&a)));
+        let named = best.filter(|&b| probabilities[b].1 >= self.least);
+        percept(scene, segment, measured, models, named, stances, probabilities, unknown)
+    }
+}
+
+#[allow(clippy::too_many_arguments)]
+fn percept(
+    scene: &Scene,
+    segment: &Segment,
+    measured: Measured,
+    models: &[ObjectModel],
+    named: Option<usize>,
+    stances: Vec<Stance>,
+    probabilities: Vec<(String, f64)>,
+    unknown: f64,
+) -> Percept {
+    let kinds = kinds(models, &probabilities);
+    let round_fits = measured
+        .round
+        .filter(|_| form_log(Some(Shape::Round), &measured) > form_log(Some(Shape::Box), &measured));
+    let (x, y) = round_fits.map_or((measured.middle[0], measured.middle[1]), |r| (r.x, r.y));
+    let sigma = round_fits.map_or(0.02, |r| r.place_sigma_m.max(0.001));
+    Percept {
+        label: named.map(|i| models[i].name.clone()),
+        kind: named.map(|i| models[i].kind.clone()),
+        probabilities,
+        kinds,
+        unknown: unknown.max(0.0),
+        position_m: scene.surface.surface_from_world.inverse() * Point3::new(x, y, segment.base_m),
+        position_sigma_m: sigma,
+        size_m: [measured.footprint_m[0], measured.footprint_m[1], measured.height_m],
+        stance: named.map_or(Stance::Unknown, |i| stances[i]),
+        points: segment.indices.len(),
+        seen_fraction: measured.seen_fraction,
+        evidence: measured.evidence,
+        indices: segment.indices.clone(),
+    }
+}
+
+/// Sums the models' probabilities by kind, in order of first mention.
+pub(super) fn kinds(models: &[ObjectModel], probabilities: &[(String, f64)]) -> Vec<(String, f64)> {
+    let mut kinds: Vec<(String, f64)> = Vec::new();
+    for (model, (_, p)) in models.iter().zip(probabilities) {
+        match kinds.iter_mut().find(|(kind, _)| *kind == model.kind) {
+            Some((_, sum)) => *sum += p,
+            None => kinds.push((model.kind.clone(), *p)),
+        }
+    }
+    kinds
+}
+
+fn model_log(model: &ObjectModel, stance: Stance, m: &Measured) -> f64 {
+    let size = height_log(Some(model.height_m), m);
+    let form = form_log(Some(model.shape), m);
+    let (top, taper) = match (stance, model.top) {
+        (Stance::UpsideDown, _) => {
+            (Top::Closed, Range { low: 1.0 / model.taper.high, high: 1.0 / model.taper.low })
+        }
+        (_, top) => (top, model.taper),
+    };
+    let wide = match model.shape {
+        Shape::Round => diameter_log(model.diameter_m, m) + taper_log(Some(taper), m),
+        Shape::Box => sides_log(model.width_m.zip(model.depth_m), m),
+    };
+    size + wide + form + top_log(top, m) + handle_log(model.handle, m)
+}
+
+fn family_log(family: &Family, m: &Measured) -> f64 {
+    let wide = match family.shape {
+        Some(Shape::Round) => diameter_log(None, m) + taper_log(None, m),
+        _ => sides_log(None, m),
+    };
+    height_log(None, m)
+        + wide
+        + form_log(family.shape, m)
+        + top_log(family.top, m)
+        + handle_log(family.handle, m)
+}
+
+/// Log density of a measure under a range (uniform, blurred by the measurement) or, without one, under everyday sizes (log-normal).
+fn measure_log(value: f64, sigma: f64, range: Option<Range>, everyday: (f64, f64)) -> f64 {
+    match range {
+        Some(r) => {
+            let width = (r.high - r.low).max(1e-6);
+            // The blurred uniform: difference of two normal distribution functions over the width.
+            let inside = normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma);
+            let density =
+                if width > 0.2 * sigma { inside / width } else { normal_density(value - r.middle(), sigma) };
+            // Flat tails: a measurement goes wrong altogether now and then.
+            (0.99 * density + 0.01 * everyday_density(value, everyday)).max(1e-12).ln()
+        }
+        None => everyday_density(value, everyday).max(1e-12).ln(),
+    }
+}
+
+const HEIGHTS: (f64, f64) = (0.11, 0.6);
+const WIDTHS: (f64, f64) = (0.10, 0.6);
+
+fn height_log(range: Option<Range>, m: &Measured) -> f64 {
+    if m.top_hidden {
+        // Only a lower bound: the chance of being at least that high.
+        let chance = match range {
+            Some(r) => 1.0 - normal_cdf((m.height_m - r.high) / m.height_sigma_m),
+            None => 1.0 - normal_cdf((m.height_m / HEIGHTS.0).ln() / HEIGHTS.1),
+        };
+        return chance.max(1e-6).ln();
+    }
+    measure_log(m.height_m, m.height_sigma_m, range, HEIGHTS)
+}
+
+fn diameter_log(range: Option<Range>, m: &Measured) -> f64 {
+    if m.round.is_none() {
+        return 0.0;
+    }
+    let sigma = (2.0 * m.evidence.radius_sigma_m).hypot(0.003);
+    measure_log(2.0 * m.evidence.radius_m, sigma, range, WIDTHS)
+}
+
+fn taper_log(range: Option<Range>, m: &Measured) -> f64 {
+    let Some(round) = m.round else { return 0.0 };
+    let sigma = (m.height_m * round.slope_sigma / round.radius_m.max(0.005)).hypot(0.05);
+    measure_log(m.evidence.taper, sigma, range, (0.95, 0.25))
+}
+
+/// A footprint is measured only as far as it was seen: a side may be longer than it looks.
+fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
+    let sigma = 0.005_f64.hypot(2.0 * m.sigma_m);
+    match ranges {
+        Some((width, depth)) => {
+            measure_log(m.footprint_m[0], sigma, Some(width), WIDTHS)
+                + measure_log(m.footprint_m[1], sigma, Some(depth), WIDTHS)
+        }
+        // One side only, as for a round body: densities of as many measures must be compared.
+        None => {
+            measure_log(m.footprint_m[0], sigma, None, WIDTHS) + measure_log(1.0, 0.05, None, (0.95, 0.25))
+        }
+    }
+}
+
+/// How well the side keeps to the form. `None` is a form that is neither round nor a box.
+fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
+    /// Irregular things miss both forms by about this much, metres.
+    const IRREGULAR_M: f64 = 0.006;
+    let floor = 0.0015_f64.hypot(0.7 * m.sigma_m);
+    let scale = match shape {
+        Some(Shape::Round) => m.round.map_or(0.02, |r| r.spread_m.hypot(floor)),
+        Some(Shape::Box) => m.rectangle.map_or(0.02, |r| r.residual_m.hypot(floor)),
+        None => IRREGULAR_M.hypot(floor),
+    };
+    let through = match shape {
+        // A camera that looked through the side says that there is none.
+        Some(Shape::Round) => -25.0 * m.looked_through,
+        _ => 0.0,
+    };
+    (-m.independent * (scale / floor).ln()).max(-25.0) + through
+}
+
+fn top_log(top: Top, m: &Measured) -> f64 {
+    let (open, lid) = match m.evidence.inside {
+        Sighting::Seen => (0.93_f64, 0.05_f64),
+        Sighting::Absent => (0.04, 0.93),
+        Sighting::Unseen => (0.5, 0.5),
+    };
+    match top {
+        Top::Open => open.ln(),
+        Top::Closed => lid.ln(),
+        Top::Any => (0.5 * (open + lid)).ln(),
+    }
+}
+
+fn handle_log(handle: Handle, m: &Measured) -> f64 {
+    let unseen = m.evidence.handle_unseen.clamp(0.0, 1.0);
+    let (with, without) = match m.evidence.handle {
+        Sighting::Seen => (0.9 * (1.0 - unseen) + 0.02, 0.02_f64),
+        // A handle that is there is missed in view now and then; out of view always.
+        _ => (unseen + (1.0 - unseen) * 0.04, 0.98),
+    };
+    match handle {
+        Handle::One => with.ln(),
+        Handle::None => without.ln(),
+        Handle::Any => (0.5 * (with + without)).ln(),
+    }
+}
+
+fn everyday_density(value: f64, (median, spread): (f64, f64)) -> f64 {
+    if value <= 0.0 {
+        return 0.0;
+    }
+    normal_density((value / median).ln(), spread) / value
+}
+
+fn normal_density(x: f64, sigma: f64) -> f64 {
+    (-0.5 * (x / sigma).powi(2)).exp() / (sigma * std::f64::consts::TAU.sqrt())
+}
+
+/// Standard normal distribution function (Abramowitz and Stegun 26.2.17, error below 1e-7).
+fn normal_cdf(x: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
+    let series = t
+        * (0.319_381_530
+            + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
+    let upper = normal_density(x, 1.0) * series;
+    if x >= 0.0 { 1.0 - upper } else { upper }
+}
+
+fn log_sum(logs: &[f64]) -> f64 {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if most == f64::NEG_INFINITY {
+        return most;
+    }
+    most + logs.iter().map(|l| (l - most).exp()).sum::<f64>().ln()
+}

@@ -1,0 +1,328 @@
+//! Measuring on one segment what tells objects apart, and what could have been measured at all.
+
+use super::outline::{self, Rectangle};
+use super::percept::{Evidence, Sighting};
+use super::round::{self, Round};
+use crate::segment::{Scene, Segment, top_m};
+use crate::surface::range_sigma_m;
+use crate::visibility::{Seen, Visibility};
+use nalgebra::{Isometry3, Point3};
+
+/// Directions around the body that are looked at one by one.
+const SECTORS: usize = 36;
+/// Distances from the body at which a handle has some of itself, metres.
+const HANDLE_REACHES_M: [f64; 3] = [0.010, 0.018, 0.026];
+/// Heights at which it has, as shares of the body's height.
+const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
+/// Least and greatest reach of a handle out of the body, metres.
+const HANDLE_M: (f64, f64) = (0.014, 0.06);
+/// Greatest width of a handle across, metres.
+const HANDLE_WIDTH_M: f64 = 0.035;
+/// How far below the rim a look must reach to be a look inside, metres.
+const INSIDE_M: f64 = 0.014;
+
+/// All that was measured on one segment.
+#[derive(Clone, Debug)]
+pub(super) struct Measured {
+    pub evidence: Evidence,
+    pub round: Option<Round>,
+    pub rectangle: Option<Rectangle>,
+    /// Height above what it stands on, metres.
+    pub height_m: f64,
+    pub height_sigma_m: f64,
+    /// True if something in front may hide its true top.
+    pub top_hidden: bool,
+    /// Footprint: longer and shorter side, metres.
+    pub footprint_m: [f64; 2],
+    /// Middle of the footprint, surface frame.
+    pub middle: [f64; 2],
+    /// Share of the round body's visible-to-be side through which a camera looked: it is no body of that form.
+    pub looked_through: f64,
+    /// Points that tell the side's form, counted once for each group that shares its error.
+    pub independent: f64,
+    /// Spread of one measurement, metres.
+    pub sigma_m: f64,
+    /// Share of sides and top that was seen or looked past.
+    pub seen_fraction: f64,
+}
+
+/// A place above the surface, asked of the cameras.
+struct Asker<'a> {
+    seen: &'a Visibility,
+    world_from_surface: Isometry3<f64>,
+    tolerance_m: f64,
+}
+
+impl Asker<'_> {
+    fn look(&self, x: f64, y: f64, z: f64) -> Seen {
+        self.seen.look(&(self.world_from_surface * Point3::new(x, y, z)), self.tolerance_m)
+    }
+}
+
+/// Measures one segment of a scene.
+pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Measured {
+    let base_m = segment.base_m;
+    let top = top_m(segment);
+    let height_m = (top - base_m).max(0.001);
+    let (footprint_m, middle) = outline::bounding(&segment.points).unwrap_or_default();
+    let world_from_surface = scene.surface.surface_from_world.inverse();
+    let place = world_from_surface * Point3::new(middle[0], middle[1], 0.5 * (base_m + top));
+    let near = seen.viewpoints().iter().map(|v| (place - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
+    let sigma_m = range_sigma_m(near).min(0.012);
+    let asker = Asker { seen, world_from_surface, tolerance_m: (3.0 * sigma_m).clamp(0.006, 0.015) };
+    let side: Vec<Point3<f64>> = segment
+        .points
+        .iter()
+        .filter(|p| p.z > base_m + 0.15 * height_m && p.z < top - 0.1 * height_m)
+        .copied()
+        .collect();
+    let mut measured = Measured {
+        evidence: Evidence { taper: 1.0, ..Evidence::default() },
+        round: round::fit(&segment.points, base_m, top, sigma_m, 7),
+        rectangle: outline::fit(&side),
+        height_m,
+        height_sigma_m: 0.003 + sigma_m + 0.5 * scene.surface.residual_m.min(0.004),
+        top_hidden: top_hidden(&asker, middle, footprint_m, top),
+        footprint_m,
+        middle,
+        looked_through: 0.0,
+        independent: (side.len() as f64 / 12.0).clamp(1.0, 60.0),
+        sigma_m,
+        seen_fraction: 0.0,
+    };
+    measured.evidence.views = views_of(seen, &place);
+    if let Some(rectangle) = &measured.rectangle {
+        measured.evidence.box_residual_m = rectangle.residual_m;
+    }
+    if let Some(round) = measured.round {
+        measure_round(&mut measured, &round, segment, &asker, (base_m, top));
+    }
+    measured
+}
+
+/// Number of looks with the place inside the image and not behind something else.
+fn views_of(seen: &Visibility, place: &Point3<f64>) -> usize {
+    seen.maps.iter().filter(|m| !matches!(m.look(place, 0.06), Seen::Never)).count()
+}
+
+/// True if most places just above the object are hidden by something nearer to the cameras.
+fn top_hidden(asker: &Asker, middle: [f64; 2], footprint_m: [f64; 2], top: f64) -> bool {
+    let reach = 0.25 * footprint_m[1];
+    let places = [(0.0, 0.0), (reach, 0.0), (-reach, 0.0), (0.0, reach), (0.0, -reach)];
+    let above = top + 0.02;
+    let hidden = places
+        .iter()
+        .filter(|(dx, dy)| asker.look(middle[0] + dx, middle[1] + dy, above) < Seen::Surface)
+        .count();
+    !asker.seen.maps.is_empty() && hidden >= 3
+}
+
+fn measure_round(
+    measured: &mut Measured,
+    round: &Round,
+    segment: &Segment,
+    asker: &Asker,
+    (base_m, top): (f64, f64),
+) {
+    let height = top - base_m;
+    let evidence = &mut measured.evidence;
+    let (at_base, at_top) = (round.radius_at(base_m), round.radius_at(top));
+    evidence.radius_m = at_base.max(at_top);
+    evidence.radius_sigma_m = round.radius_sigma_m.hypot(0.5 * height * round.slope_sigma);
+    evidence.taper = at_base / at_top;
+    evidence.round_residual_m = round.spread_m;
+    evidence.round_inliers = round.inliers;
+
+    let sectors = Sectors::measure(round, segment, asker, base_m, height);
+    evidence.arc = sectors.measured_share();
+    measured.looked_through = sectors.looked_through_share();
+    let handle = Protrusion::find(round, segment, base_m, height, measured.sigma_m);
+    evidence.protrusion_m = handle.as_ref().map_or(0.0, |h| h.reach_m);
+    evidence.handle_unseen = sectors.unseen_share();
+    evidence.handle = match handle.filter(Protrusion::is_handle) {
+        Some(_) => Sighting::Seen,
+        None if evidence.handle_unseen < 0.08 => Sighting::Absent,
+        None => Sighting::Unseen,
+    };
+
+    let top_face = TopFace::measure(round, segment, asker, top);
+    (evidence.open, evidence.lid) = (top_face.open, top_face.lid);
+    evidence.inside = match (top_face.open, top_face.lid) {
+        (open, lid) if open > 0.15 && open > 1.5 * lid => Sighting::Seen,
+        (open, lid) if lid > 0.3 && lid > 2.0 * open => Sighting::Absent,
+        _ => Sighting::Unseen,
+    };
+    measured.seen_fraction = 0.75 * sectors.covered_share() + 0.25 * (top_face.open + top_face.lid).min(1.0);
+}
+
+/// What is known around the body, direction by direction.
+struct Sectors {
+    measured: [bool; SECTORS],
+    looked_through: [bool; SECTORS],
+    /// Share of the places of a handle through which a camera looked.
+    handle_free: [f64; SECTORS],
+}
+
+impl Sectors {
+    fn measure(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Sectors {
+        let mut counts = [0_u32; SECTORS];
+        for p in &segment.points {
+            let inner = p.z > base_m + 0.15 * height && p.z < base_m + 0.9 * height;
+            if inner && round.outside_m(p).abs() < 0.009 {
+                counts[sector_of(round, p)] += 1;
+            }
+        }
+        let mut sectors = Sectors {
+            measured: counts.map(|c| c >= 2),
+            looked_through: [false; SECTORS],
+            handle_free: [0.0; SECTORS],
+        };
+        for i in 0..SECTORS {
+            let (sin, cos) = (std::f64::consts::TAU * (i as f64 + 0.5) / SECTORS as f64).sin_cos();
+            let look = |reach: f64, share: f64| {
+                let z = base_m + share * height;
+                let d = round.radius_at(z) + reach;
+                asker.look(round.x + d * cos, round.y + d * sin, z)
+            };
+            sectors.looked_through[i] = !sectors.measured[i]
+                && [0.35, 0.5, 0.65].iter().all(|&share| look(-0.006, share) == Seen::Free);
+            let free = HANDLE_REACHES_M
+                .iter()
+                .flat_map(|&reach| HANDLE_HEIGHTS.map(|share| look(reach, share)))
+                .filter(|&s| s == Seen::Free)
+                .count();
+            sectors.handle_free[i] = free as f64 / (HANDLE_REACHES_M.len() * HANDLE_HEIGHTS.len()) as f64;
+        }
+        sectors
+    }
+
+    fn measured_share(&self) -> f64 {
+        share(&self.measured)
+    }
+
+    fn looked_through_share(&self) -> f64 {
+        share(&self.looked_through)
+    }
+
+    /// Share of the circumference that was measured or beside which a camera looked past.
+    fn covered_share(&self) -> f64 {
+        let covered = |i: usize| self.measured[i] || self.handle_free[i] > 0.5;
+        (0..SECTORS).filter(|&i| covered(i)).count() as f64 / SECTORS as f64
+    }
+
+    /// Share of the directions in which a handle, about two sectors wide, could hide.
+    fn unseen_share(&self) -> f64 {
+        let hides = |i: usize| self.handle_free[i] < 0.6 && self.handle_free[(i + 1) % SECTORS] < 0.6;
+        (0..SECTORS).filter(|&i| hides(i)).count() as f64 / SECTORS as f64
+    }
+}
+
+fn share(flags: &[bool; SECTORS]) -> f64 {
+    flags.iter().filter(|f| **f).count() as f64 / SECTORS as f64
+}
+
+fn sector_of(round: &Round, p: &Point3<f64>) -> usize {
+    let angle = (p.y - round.y).atan2(p.x - round.x).rem_euclid(std::f64::consts::TAU);
+    ((angle / std::f64::consts::TAU * SECTORS as f64) as usize).min(SECTORS - 1)
+}
+
+/// The largest thing that sticks out of the body in one direction.
+pub(super) struct Protrusion {
+    pub reach_m: f64,
+    width_m: f64,
+    points: usize,
+    least: usize,
+    inside_height: bool,
+}
+
+impl Protrusion {
+    fn find(round: &Round, segment: &Segment, base_m: f64, height: f64, sigma_m: f64) -> Option<Protrusion> {
+        let clear = (3.0 * sigma_m).clamp(0.007, 0.012);
+        let out: Vec<&Point3<f64>> = segment
+            .points
+            .iter()
+            .filter(|p| {
+                p.z > base_m + 0.08 * height && p.z < base_m + 1.02 * height && round.outside_m(p) > clear
+            })
+            .collect();
+        let mut counts = [0_usize; SECTORS];
+        out.iter().for_each(|p| counts[sector_of(round, p)] += 1);
+        let window = |i: usize| (0..3).map(|k| counts[(i + k) % SECTORS]).sum::<usize>();
+        let start = (0..SECTORS).max_by_key(|&i| (window(i), SECTORS - i))?;
+        let middle = std::f64::consts::TAU * (start as f64 + 1.5) / SECTORS as f64;
+        let (sin, cos) = middle.sin_cos();
+        // Along and across the direction of the protrusion, in the half plane on its side.
+        let local: Vec<(f64, f64, f64)> = out
+            .iter()
+            .map(|p| {
+                (
+                    (p.x - round.x) * cos + (p.y - round.y) * sin,
+                    (p.y - round.y) * cos - (p.x - round.x) * sin,
+                    p.z,
+                )
+            })
+            .filter(|&(along, across, _)| along > 0.6 * round.radius_m && across.abs() < 0.06)
+            .collect();
+        if local.len() < 3 {
+            return None;
+        }
+        let mut reaches: Vec<f64> =
+            local.iter().map(|&(along, across, z)| along.hypot(across) - round.radius_at(z)).collect();
+        let mut across: Vec<f64> = local.iter().map(|l| l.1).collect();
+        let mut heights: Vec<f64> = local.iter().map(|l| l.2).collect();
+        let ends = |v: &mut Vec<f64>| (crate::segment::quantile(v, 0.1), crate::segment::quantile(v, 0.9));
+        let (left, right) = ends(&mut across);
+        let (low, high) = ends(&mut heights);
+        Some(Protrusion {
+            reach_m: crate::segment::quantile(&mut reaches, 0.95),
+            width_m: right - left,
+            points: local.len(),
+            least: (segment.points.len() / 150).clamp(6, 60),
+            inside_height: high - low > 0.012 && low > base_m + 0.05 * height,
+        })
+    }
+
+    fn is_handle(&self) -> bool {
+        self.points >= self.least
+            && (HANDLE_M.0..HANDLE_M.1).contains(&self.reach_m)
+            && self.width_m < HANDLE_WIDTH_M
+            && self.inside_height
+    }
+}
+
+/// What was seen of the upper end: the share of it that was looked into, and the share that is a face.
+struct TopFace {
+    open: f64,
+    lid: f64,
+}
+
+impl TopFace {
+    fn measure(round: &Round, segment: &Segment, asker: &Asker, top: f64) -> TopFace {
+        const STEP_M: f64 = 0.005;
+        let radius = round.radius_at(top) - 0.008;
+        let cells = (radius / STEP_M).floor().max(0.0) as i32;
+        let level: Vec<&Point3<f64>> = segment.points.iter().filter(|p| p.z > top - 0.009).collect();
+        let deep: Vec<&Point3<f64>> = segment.points.iter().filter(|p| p.z < top - INSIDE_M).collect();
+        let near = |of: &[&Point3<f64>], x: f64, y: f64| {
+            of.iter().any(|p| (p.x - x).abs() < STEP_M && (p.y - y).abs() < STEP_M)
+        };
+        let (mut all, mut open, mut lid) = (0_u32, 0_u32, 0_u32);
+        for i in -cells..=cells {
+            for j in -cells..=cells {
+                let (dx, dy) = (f64::from(i) * STEP_M, f64::from(j) * STEP_M);
+                if dx.hypot(dy) > radius {
+                    continue;
+                }
+                let (x, y) = (round.x + dx, round.y + dy);
+                all += 1;
+                if near(&level, x, y) {
+                    lid += 1;
+                } else if asker.look(x, y, top - INSIDE_M) == Seen::Free || near(&deep, x, y) {
+                    open += 1;
+                }
+            }
+        }
+        let share = |n: u32| f64::from(n) / f64::from(all.max(1));
+        TopFace { open: share(open), lid: share(lid) }
+    }
+}

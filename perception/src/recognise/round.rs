@@ -1,0 +1,228 @@
+//! Fitting an upright body of revolution with straight sides (a cylinder, a cup) to one object.
+
+use crate::draw::Draws;
+use nalgebra::{Matrix4, Point3, Vector4};
+
+/// Radii that are tried, metres.
+const RADII_M: (f64, f64) = (0.012, 0.20);
+/// Circles proposed.
+const PROPOSALS: usize = 120;
+/// Points that judge a proposal.
+const JUDGES: usize = 160;
+
+/// An upright cone frustum in the surface's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Round {
+    /// Axis, metres.
+    pub x: f64,
+    /// Axis, metres.
+    pub y: f64,
+    /// Radius at the middle height, metres.
+    pub radius_m: f64,
+    /// Growth of the radius with height, metres a metre.
+    pub slope: f64,
+    /// The middle height, metres above the surface.
+    pub middle_m: f64,
+    /// Standard deviation of axis position and of radius, metres.
+    pub place_sigma_m: f64,
+    /// Standard deviation of the radius, metres.
+    pub radius_sigma_m: f64,
+    /// Standard deviation of the slope.
+    pub slope_sigma: f64,
+    /// Root mean square distance of the inliers, metres.
+    pub residual_m: f64,
+    /// Root mean square distance of all side points that are not inside it, metres, each at most `OUTSIDE_M`.
+    pub spread_m: f64,
+    /// Share of the points between base and top that lie on it.
+    pub inliers: f64,
+}
+
+/// A point farther out than this tells no more by being still farther, metres.
+const OUTSIDE_M: f64 = 0.02;
+
+impl Round {
+    /// Radius at a height above the surface, metres.
+    pub fn radius_at(&self, z: f64) -> f64 {
+        (self.radius_m + self.slope * (z - self.middle_m)).max(0.003)
+    }
+
+    /// Distance of a point from the side, positive outside, metres.
+    pub fn outside_m(&self, p: &Point3<f64>) -> f64 {
+        (p.x - self.x).hypot(p.y - self.y) - self.radius_at(p.z)
+    }
+}
+
+/// Fits the side of a round body to the points between `base_m` and `top_m`; `sigma_m` is the spread of a measurement.
+///
+/// `None` if there are too few side points or they lie on no circle of a sensible size.
+pub(super) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64, seed: u64) -> Option<Round> {
+    let height = top_m - base_m;
+    let side: Vec<Point3<f64>> = points
+        .iter()
+        .filter(|p| p.z > base_m + 0.15 * height && p.z < top_m - 0.1 * height)
+        .copied()
+        .collect();
+    if side.len() < 20 {
+        return None;
+    }
+    let tolerance = (2.0 * sigma_m).clamp(0.004, 0.008);
+    let circle = propose(&side, tolerance, seed)?;
+    let middle_m = base_m + 0.5 * height;
+    let mut round = Round {
+        x: circle[0],
+        y: circle[1],
+        radius_m: circle[2],
+        slope: 0.0,
+        middle_m,
+        place_sigma_m: 0.0,
+        radius_sigma_m: 0.0,
+        slope_sigma: 0.0,
+        residual_m: 0.0,
+        spread_m: 0.0,
+        inliers: 0.0,
+    };
+    for gate in [3.0, 2.0, 1.5, 1.5, 1.5] {
+        round = improve(&round, &side, gate * tolerance, sigma_m)?;
+    }
+    (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * 1.2).then_some(round)
+}
+
+/// The circle through three points that most points lie on and fewest outside of, seen from above.
+fn propose(side: &[Point3<f64>], tolerance: f64, seed: u64) -> Option<[f64; 3]> {
+    let mut rng = Draws::new(seed);
+    let stride = (side.len() / JUDGES).max(1);
+    let mut best: Option<(f64, [f64; 3])> = None;
+    for _ in 0..PROPOSALS {
+        let mut pick = || side[rng.below(side.len())];
+        let Some([x, y, r]) = circumcircle(&pick(), &pick(), &pick()) else { continue };
+        if r < RADII_M.0 || r > RADII_M.1 {
+            continue;
+        }
+        let score: f64 = side
+            .iter()
+            .step_by(stride)
+            .map(|p| {
+                let d = (p.x - x).hypot(p.y - y) - r;
+                // Inside may be the inside of a vessel; outside can only be a handle or another body.
+                if d.abs() < tolerance {
+                    1.0 - (d / tolerance).powi(2)
+                } else if d > 0.0 {
+                    -0.5
+                } else {
+                    -0.15
+                }
+            })
+            .sum();
+        if best.as_ref().is_none_or(|(s, _)| score > *s) {
+            best = Some((score, [x, y, r]));
+        }
+    }
+    best.map(|(_, circle)| circle)
+}
+
+fn circumcircle(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -> Option<[f64; 3]> {
+    let (bx, by, cx, cy) = (b.x - a.x, b.y - a.y, c.x - a.x, c.y - a.y);
+    let twice = 2.0 * (bx * cy - by * cx);
+    if twice.abs() < 1e-7 {
+        return None;
+    }
+    let (b2, c2) = (bx * bx + by * by, cx * cx + cy * cy);
+    let (ux, uy) = ((cy * b2 - by * c2) / twice, (bx * c2 - cx * b2) / twice);
+    Some([a.x + ux, a.y + uy, ux.hypot(uy)])
+}
+
+/// One Gauss-Newton step on axis, radius and slope over the points within `gate` of the side.
+fn improve(round: &Round, side: &[Point3<f64>], gate: f64, sigma_m: f64) -> Option<Round> {
+    let mut normal = Matrix4::<f64>::zeros();
+    let mut right = Vector4::<f64>::zeros();
+    let (mut squares, mut count, mut outside, mut spread) = (0.0, 0.0, 0.0, 0.0);
+    for p in side {
+        let (dx, dy) = (p.x - round.x, p.y - round.y);
+        let d = dx.hypot(dy).max(1e-9);
+        let rise = p.z - round.middle_m;
+        let residual = d - round.radius_m - round.slope * rise;
+        if residual > -gate {
+            outside += 1.0;
+            spread += residual.min(OUTSIDE_M).powi(2);
+        }
+        if residual.abs() > gate {
+            continue;
+        }
+        let row = Vector4::new(-dx / d, -dy / d, -1.0, -rise);
+        normal += row * row.transpose();
+        right -= row * residual;
+        squares += residual * residual;
+        count += 1.0;
+    }
+    if count < 12.0 {
+        return None;
+    }
+    // Weak priors keep what the points do not tell near a cylinder: radius within decimetres, slope about 0.1.
+    let weight = 1.0 / (sigma_m * sigma_m);
+    let mut damped = normal * weight;
+    damped[(2, 2)] += 1.0 / (0.05_f64 * 0.05);
+    damped[(3, 3)] += 1.0 / (0.1_f64 * 0.1);
+    let right = right * weight - Vector4::new(0.0, 0.0, 0.0, round.slope / (0.1 * 0.1));
+    let inverse = damped.try_inverse()?;
+    let step = inverse * right;
+    // Neighbouring measurements share their errors: about one in eight tells something new.
+    let shared = 8.0;
+    let sd = |i: usize| (inverse[(i, i)] * shared).max(0.0).sqrt();
+    let improved = Round {
+        x: round.x + step[0],
+        y: round.y + step[1],
+        radius_m: round.radius_m + step[2],
+        slope: (round.slope + step[3]).clamp(-0.6, 0.6),
+        middle_m: round.middle_m,
+        place_sigma_m: sd(0).hypot(sd(1)) / std::f64::consts::SQRT_2,
+        radius_sigma_m: sd(2),
+        slope_sigma: sd(3),
+        residual_m: (squares / count).sqrt(),
+        spread_m: (spread / f64::max(outside, 1.0)).sqrt(),
+        inliers: count / side.len() as f64,
+    };
+    [improved.x, improved.y, improved.radius_m].iter().all(|v| v.is_finite()).then_some(improved)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on the side of a cup, over an arc, with a ripple in place of noise.
+    fn cup(x: f64, y: f64, base: f64, top: f64, arc_rad: f64) -> Vec<Point3<f64>> {
+        (0..2000)
+            .map(|i| {
+                let z = f64::from(i % 40) / 40.0 * 0.1;
+                let angle = f64::from(i / 40) / 50.0 * arc_rad;
+                let r = base + (top - base) * z / 0.1 + 0.001 * f64::from(i).sin();
+                Point3::new(x + r * angle.cos(), y + r * angle.sin(), z)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn radius_place_and_taper_come_back() {
+        let cases = [
+            ("all around", 0.0, 0.0, 0.035, 0.035, 6.28),
+            ("half", 0.4, -0.2, 0.035, 0.035, 2.6),
+            ("a tapered cup", -0.3, 0.1, 0.025, 0.04, 3.0),
+        ];
+        for (name, x, y, base, top, arc) in cases {
+            let found = fit(&cup(x, y, base, top, arc), 0.0, 0.1, 0.001, 1);
+            let close = found.is_some_and(|r| {
+                (r.x - x).abs() < 0.001
+                    && (r.y - y).abs() < 0.001
+                    && (r.radius_at(0.0) - base).abs() < 0.001
+                    && (r.radius_at(0.1) - top).abs() < 0.001
+            });
+            assert!(close, "{name}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_circle_is_none() {
+        assert_eq!(fit(&[], 0.0, 0.1, 0.001, 1), None);
+        let same = vec![Point3::new(0.1, 0.1, 0.05); 100];
+        assert_eq!(fit(&same, 0.0, 0.1, 0.001, 1), None);
+    }
+}

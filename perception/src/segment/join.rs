@@ -1,0 +1,250 @@
+//! Which voxels are one object: patches, the creases between them, and the mends for vessels and handles.
+
+use super::patches::Voxels;
+use super::{SceneOptions, holds, quantile};
+use crate::surface::convex_hull;
+use nalgebra::{Point3, Vector3};
+use std::collections::BTreeMap;
+
+/// Greatest distance of a patch's voxels from its seed, metres.
+const PATCH_REACH_M: f64 = 0.02;
+/// Greatest angle between a voxel's normal and its patch's, as a cosine (25°).
+const PATCH_COS: f64 = 0.906;
+/// A concave joint is still smooth up to this angle, radians (as in locally convex connected patches).
+const SMOOTH_RAD: f64 = 0.35;
+/// A part smaller than this share of its neighbour is no object of its own.
+const CRUMB_SHARE: f64 = 0.12;
+/// A part whose base is lifted and which is smaller than this share of what it hangs on belongs to it (a handle, a spout).
+const HANGING_SHARE: f64 = 0.25;
+
+/// For each voxel the number of its part. Numbers are voxel indices, the same in every run.
+pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
+    if !options.part_touching {
+        let mut whole = Union::new(voxels.len());
+        for (i, near) in voxels.neighbours.iter().enumerate() {
+            near.iter().for_each(|&j| whole.join(i as u32, j));
+        }
+        return (0..voxels.len() as u32).map(|i| whole.root(i)).collect();
+    }
+    let patch_of = grow_patches(voxels);
+    let patches = describe(voxels, &patch_of);
+    let borders = borders(voxels, &patch_of);
+    let mut joined = Union::new(patches.len());
+    for (&(a, b), border) in &borders {
+        if meets_convexly(&patches[a as usize], &patches[b as usize], border) {
+            joined.join(a, b);
+        }
+    }
+    mend(&mut joined, &patches, &borders, voxels, &patch_of);
+    let root_voxel = first_voxels(&patch_of, &mut joined, patches.len());
+    patch_of.iter().map(|&p| root_voxel[joined.root(p) as usize]).collect()
+}
+
+/// Patches: voxels around a flat seed with like normals. Flattest seeds first.
+fn grow_patches(voxels: &Voxels) -> Vec<u32> {
+    const NONE: u32 = u32::MAX;
+    let mut order: Vec<u32> = (0..voxels.len() as u32).collect();
+    order.sort_by(|&a, &b| {
+        voxels.curvatures[a as usize].total_cmp(&voxels.curvatures[b as usize]).then(a.cmp(&b))
+    });
+    let mut patch_of = vec![NONE; voxels.len()];
+    let mut patches = 0;
+    for seed in order {
+        if patch_of[seed as usize] != NONE {
+            continue;
+        }
+        let (origin, normal) = (voxels.centres[seed as usize], voxels.normals[seed as usize]);
+        let mut open = vec![seed];
+        patch_of[seed as usize] = patches;
+        while let Some(voxel) = open.pop() {
+            for &next in &voxels.neighbours[voxel as usize] {
+                let n = next as usize;
+                if patch_of[n] == NONE
+                    && (voxels.centres[n] - origin).norm() < PATCH_REACH_M
+                    && voxels.normals[n].dot(&normal) > PATCH_COS
+                {
+                    patch_of[n] = patches;
+                    open.push(next);
+                }
+            }
+        }
+        patches += 1;
+    }
+    patch_of
+}
+
+struct Patch {
+    centre: Point3<f64>,
+    normal: Vector3<f64>,
+    points: u32,
+    voxels: u32,
+}
+
+fn describe(voxels: &Voxels, patch_of: &[u32]) -> Vec<Patch> {
+    let count = patch_of.iter().max().map_or(0, |&m| m as usize + 1);
+    let mut patches: Vec<Patch> = (0..count)
+        .map(|_| Patch { centre: Point3::origin(), normal: Vector3::zeros(), points: 0, voxels: 0 })
+        .collect();
+    for (i, &p) in patch_of.iter().enumerate() {
+        let patch = &mut patches[p as usize];
+        patch.centre.coords += voxels.centres[i].coords;
+        patch.normal += voxels.normals[i] * (1.0 - 3.0 * voxels.curvatures[i]).max(0.05);
+        patch.points += voxels.counts[i];
+        patch.voxels += 1;
+    }
+    for patch in &mut patches {
+        patch.centre.coords /= f64::from(patch.voxels.max(1));
+        patch.normal = patch.normal.try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
+    }
+    patches
+}
+
+/// Pairs of neighbouring patches (lower number first) with the number of voxel pairs along their border and its middle.
+fn borders(voxels: &Voxels, patch_of: &[u32]) -> BTreeMap<(u32, u32), Border> {
+    let mut borders: BTreeMap<(u32, u32), Border> = BTreeMap::new();
+    for (i, near) in voxels.neighbours.iter().enumerate() {
+        for &j in near.iter().filter(|&&j| j as usize > i) {
+            let (a, b) = (patch_of[i], patch_of[j as usize]);
+            if a != b {
+                borders.entry((a.min(b), a.max(b))).or_default().length += 1;
+            }
+        }
+    }
+    borders
+}
+
+#[derive(Default)]
+struct Border {
+    length: u32,
+}
+
+/// True if the surface bends outwards from one patch to the other, or hardly bends.
+fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
+    if a.normal == Vector3::zeros() || b.normal == Vector3::zeros() || border.length < 2 {
+        return false;
+    }
+    let between = b.centre - a.centre;
+    let bend = (b.normal - a.normal).dot(&between);
+    let angle = a.normal.dot(&b.normal).clamp(-1.0, 1.0).acos();
+    // A step sideways between parallel patches (a box before another) is no smooth surface.
+    let step = between.dot(&(a.normal + b.normal)).abs() / 2.0;
+    let smooth = angle < SMOOTH_RAD && step < 0.012;
+    if bend < 0.0 {
+        return smooth;
+    }
+    // Patches that only touch at a corner: the crease must run across the line between their centres.
+    let crease = a.normal.cross(&b.normal);
+    let along = crease.try_normalize(1e-3).map_or(0.0, |c| c.dot(&between.normalize()).abs());
+    smooth || along < 0.85
+}
+
+/// Joins what the creases wrongly parted: insides of vessels, handles, crumbs.
+fn mend(
+    joined: &mut Union,
+    patches: &[Patch],
+    borders: &BTreeMap<(u32, u32), Border>,
+    voxels: &Voxels,
+    patch_of: &[u32],
+) {
+    loop {
+        let parts = gather(joined, patches, voxels, patch_of);
+        let mut links: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+        for (&(a, b), border) in borders {
+            let (a, b) = (joined.root(a), joined.root(b));
+            if a != b {
+                *links.entry((a, b)).or_default() += border.length;
+                *links.entry((b, a)).or_default() += border.length;
+            }
+        }
+        // The smallest part that belongs to a neighbour goes first; then everything is looked at anew.
+        let belongs = |small: &Part, large: &Part| {
+            small.points <= large.points
+                && (is_crumb(small, large) || is_inside(small, large) || hangs_on(small, large))
+        };
+        let next = links
+            .iter()
+            .filter(|((s, l), _)| belongs(&parts[s], &parts[l]))
+            .min_by_key(|((s, _), length)| (parts[s].points, *s, u32::MAX - **length));
+        let Some((&(small, large), _)) = next else { return };
+        joined.join(small, large);
+    }
+}
+
+struct Part {
+    points: u32,
+    low_m: f64,
+    top_m: f64,
+    hull: Vec<[f64; 2]>,
+    places: Vec<[f64; 2]>,
+}
+
+fn gather(joined: &mut Union, patches: &[Patch], voxels: &Voxels, patch_of: &[u32]) -> BTreeMap<u32, Part> {
+    let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (i, &p) in patch_of.iter().enumerate() {
+        members.entry(joined.root(p)).or_default().push(i);
+    }
+    debug_assert!(patches.len() >= members.len());
+    let part = |of: Vec<usize>| {
+        let places: Vec<[f64; 2]> = of.iter().map(|&i| [voxels.centres[i].x, voxels.centres[i].y]).collect();
+        let mut heights: Vec<f64> = of.iter().map(|&i| voxels.centres[i].z).collect();
+        Part {
+            points: of.iter().map(|&i| voxels.counts[i]).sum(),
+            low_m: quantile(&mut heights, 0.03),
+            top_m: quantile(&mut heights, 0.97),
+            hull: convex_hull(places.clone()),
+            places,
+        }
+    };
+    members.into_iter().map(|(root, of)| (root, part(of))).collect()
+}
+
+fn is_crumb(small: &Part, large: &Part) -> bool {
+    f64::from(small.points) < CRUMB_SHARE * f64::from(large.points) && small.places.len() < 40
+}
+
+/// The inside of a vessel: within the outline of the body and no higher than its rim.
+fn is_inside(small: &Part, large: &Part) -> bool {
+    let within = small.places.iter().filter(|&&p| holds(&large.hull, p)).count();
+    within * 10 >= small.places.len() * 7 && small.top_m < large.top_m + 0.01
+}
+
+/// A handle: small, lifted off the surface, not above the body.
+fn hangs_on(small: &Part, large: &Part) -> bool {
+    f64::from(small.points) < HANGING_SHARE * f64::from(large.points)
+        && small.low_m > large.low_m + 0.01
+        && small.top_m < large.top_m + 0.005
+}
+
+/// A voxel of each root patch, to name parts by.
+fn first_voxels(patch_of: &[u32], joined: &mut Union, patches: usize) -> Vec<u32> {
+    let mut first = vec![u32::MAX; patches];
+    for (i, &p) in patch_of.iter().enumerate() {
+        let slot = &mut first[joined.root(p) as usize];
+        *slot = (*slot).min(i as u32);
+    }
+    first
+}
+
+/// Disjoint sets; the lowest member is the root, whatever the order of joins.
+struct Union {
+    parent: Vec<u32>,
+}
+
+impl Union {
+    fn new(n: usize) -> Self {
+        Union { parent: (0..n as u32).collect() }
+    }
+
+    fn root(&mut self, mut i: u32) -> u32 {
+        while self.parent[i as usize] != i {
+            self.parent[i as usize] = self.parent[self.parent[i as usize] as usize];
+            i = self.parent[i as usize];
+        }
+        i
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b) as usize] = a.min(b);
+    }
+}

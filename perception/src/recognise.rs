@@ -3,10 +3,8 @@
 mod descry;
 mod evidence;
 mod model;
-mod outline;
 mod percept;
 mod published;
-mod round;
 
 use crate::segment::Scene;
 use crate::visibility::Visibility;

@@ -6,6 +6,7 @@
 
 mod join;
 mod patches;
+mod vessels;
 
 use crate::cloud::{Cloud, is_finite};
 use crate::surface::{Surface, SurfaceError, SurfaceOptions, find_surface};
@@ -94,6 +95,9 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
         });
         parts[slot].indices.push(index);
         parts[slot].points.push(point);
+    }
+    if options.part_touching {
+        parts = vessels::whole(parts, &viewpoints);
     }
     parts.retain(|s| s.indices.len() >= options.fewest_points);
     stand(&mut parts);

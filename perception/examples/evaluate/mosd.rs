@@ -77,7 +77,8 @@ pub fn run(dir: &Path) -> Result<(), String> {
             scene.surface.residual_m * 1e3,
             scene.segments.len()
         );
-        let truth: Vec<u32> = objects.iter().filter(|r| r[0] == name).filter_map(|r| r[1].parse().ok()).collect();
+        let truth: Vec<u32> =
+            objects.iter().filter(|r| r[0] == name).filter_map(|r| r[1].parse().ok()).collect();
         let owner = overlap(&scene, &view.cloud, &labels, &truth, &mut tally);
         for (r, recogniser) in recognisers.iter().enumerate() {
             let percepts = recogniser.recognise(&scene, &seen, &[cup()]);
@@ -92,7 +93,11 @@ pub fn run(dir: &Path) -> Result<(), String> {
                     _ => {}
                 }
                 if r == 1 || percept.label.is_some() {
-                    println!("   {:>10} object {owner:?} cup {is_cup}: {}", recogniser.name(), words(percept));
+                    println!(
+                        "   {:>10} object {owner:?} cup {is_cup}: {}",
+                        recogniser.name(),
+                        words(percept)
+                    );
                 }
             }
             called.sort_unstable();
@@ -108,7 +113,11 @@ pub fn run(dir: &Path) -> Result<(), String> {
     println!("\n{:12} {:>9} {:>9}   (cups found, false cups, cups)", "recogniser", "precision", "recall");
     for (recogniser, [right, wrong, all]) in recognisers.iter().zip(hits) {
         let precision = right as f64 / (right + wrong).max(1) as f64;
-        println!("{:12} {precision:9.2} {:9.2}   {right} {wrong} {all}", recogniser.name(), right as f64 / all.max(1) as f64);
+        println!(
+            "{:12} {precision:9.2} {:9.2}   {right} {wrong} {all}",
+            recogniser.name(),
+            right as f64 / all.max(1) as f64
+        );
     }
     Ok(())
 }
@@ -185,7 +194,10 @@ fn overlap(
         .iter()
         .zip(&shares)
         .map(|(s, share)| {
-            let held = truth.iter().filter(|o| share.get(o).copied().unwrap_or(0) * 5 > sizes.get(o).copied().unwrap_or(0)).count();
+            let held = truth
+                .iter()
+                .filter(|o| share.get(o).copied().unwrap_or(0) * 5 > sizes.get(o).copied().unwrap_or(0))
+                .count();
             tally.merged += usize::from(held > 1);
             let most = share.iter().max_by_key(|(_, n)| **n).map(|(&o, &n)| (o, n));
             let owner = most.filter(|&(o, n)| truth.contains(&o) && n * 2 > s.indices.len()).map(|(o, _)| o);

@@ -22,13 +22,13 @@ pub struct Descry {
     pub upside_down: f64,
     /// Least probability with which a percept carries a model's name.
     pub least: f64,
-    /// Exponent on all likelihoods: below 1 softens them for what the model of the measurements leaves out.
+    /// Exponent on the likelihoods of sizes and form: below 1 softens them for what the model of the measurements leaves out.
     pub temper: f64,
 }
 
 impl Default for Descry {
     fn default() -> Self {
-        Descry { known: 0.5, upside_down: 0.06, least: 0.5, temper: 0.7 }
+        Descry { known: 0.5, upside_down: 0.03, least: 0.5, temper: 0.7 }
     }
 }
 
@@ -38,15 +38,47 @@ struct Family {
     shape: Option<Shape>,
     top: Top,
     handle: Handle,
+    /// Median and log-normal spread of height and width, metres.
+    height: (f64, f64),
+    width: (f64, f64),
 }
 
 /// What stands on tables besides the known objects: a census guess that only sets how sceptical we start.
 const FAMILIES: [Family; 5] = [
-    Family { share: 0.35, shape: Some(Shape::Box), top: Top::Closed, handle: Handle::None },
-    Family { share: 0.20, shape: Some(Shape::Round), top: Top::Closed, handle: Handle::None },
-    Family { share: 0.10, shape: Some(Shape::Round), top: Top::Open, handle: Handle::None },
-    Family { share: 0.10, shape: Some(Shape::Round), top: Top::Open, handle: Handle::One },
-    Family { share: 0.25, shape: None, top: Top::Any, handle: Handle::Any },
+    Family {
+        share: 0.35,
+        shape: Some(Shape::Box),
+        top: Top::Closed,
+        handle: Handle::None,
+        height: HEIGHTS,
+        width: WIDTHS,
+    },
+    // Tins, jars and bottles are made for the hand.
+    Family {
+        share: 0.22,
+        shape: Some(Shape::Round),
+        top: Top::Closed,
+        handle: Handle::None,
+        height: (0.12, 0.5),
+        width: (0.075, 0.35),
+    },
+    Family {
+        share: 0.08,
+        shape: Some(Shape::Round),
+        top: Top::Open,
+        handle: Handle::None,
+        height: (0.10, 0.5),
+        width: (0.10, 0.5),
+    },
+    Family {
+        share: 0.10,
+        shape: Some(Shape::Round),
+        top: Top::Open,
+        handle: Handle::One,
+        height: (0.10, 0.4),
+        width: (0.085, 0.35),
+    },
+    Family { share: 0.25, shape: None, top: Top::Any, handle: Handle::Any, height: HEIGHTS, width: WIDTHS },
 ];
 
 impl Recogniser for Descry {
@@ -69,10 +101,8 @@ impl Descry {
             .iter()
             .enumerate()
             .map(|(i, model)| {
-                let up = (1.0 - self.upside_down).ln()
-                    + self.temper * model_log(model, Stance::Upright, &measured);
-                let down =
-                    self.upside_down.ln() + self.temper * model_log(model, Stance::UpsideDown, &measured);
+                let up = (1.0 - self.upside_down).ln() + self.model_log(model, Stance::Upright, &measured);
+                let down = self.upside_down.ln() + self.model_log(model, Stance::UpsideDown, &measured);
                 if down > up {
                     stances[i] = Stance::UpsideDown;
                 }
@@ -81,7 +111,7 @@ impl Descry {
             .collect();
         let rest: Vec<f64> = FAMILIES
             .iter()
-            .map(|f| ((1.0 - self.known) * f.share).ln() + self.temper * family_log(f, &measured))
+            .map(|f| ((1.0 - self.known) * f.share).ln() + self.family_log(f, &measured))
             .collect();
         let unknown_log = log_sum(&rest);
         let total = log_sum(&[logs.as_slice(), &[unknown_log]].concat());
@@ -92,6 +122,31 @@ impl Descry {
         let best = (0..models.len()).max_by(|&a, &b| logs[a].total_cmp(&logs[b]).then(b.cmp(&a)));
         let named = best.filter(|&b| probabilities[b].1 >= self.least);
         percept(scene, segment, measured, models, named, stances, probabilities, unknown)
+    }
+
+    fn model_log(&self, model: &ObjectModel, stance: Stance, m: &Measured) -> f64 {
+        let size = height_log(Some(model.height_m), HEIGHTS, m);
+        let form = form_log(Some(model.shape), m);
+        let (top, taper) = match (stance, model.top) {
+            (Stance::UpsideDown, _) => {
+                (Top::Closed, Range { low: 1.0 / model.taper.high, high: 1.0 / model.taper.low })
+            }
+            (_, top) => (top, model.taper),
+        };
+        let wide = match model.shape {
+            Shape::Round => diameter_log(model.diameter_m, WIDTHS, m) + taper_log(Some(taper), m),
+            Shape::Box => sides_log(model.width_m.zip(model.depth_m), m),
+        };
+        self.temper * (size + wide + form) + top_log(top, m) + handle_log(model.handle, m)
+    }
+
+    fn family_log(&self, family: &Family, m: &Measured) -> f64 {
+        let wide = match family.shape {
+            Some(Shape::Round) => diameter_log(None, family.width, m) + taper_log(None, m),
+            _ => sides_log(None, m),
+        };
+        let metric = height_log(None, family.height, m) + wide + form_log(family.shape, m);
+        self.temper * metric + top_log(family.top, m) + handle_log(family.handle, m)
     }
 }
 
@@ -141,34 +196,6 @@ pub(super) fn kinds(models: &[ObjectModel], probabilities: &[(String, f64)]) -> 
     kinds
 }
 
-fn model_log(model: &ObjectModel, stance: Stance, m: &Measured) -> f64 {
-    let size = height_log(Some(model.height_m), m);
-    let form = form_log(Some(model.shape), m);
-    let (top, taper) = match (stance, model.top) {
-        (Stance::UpsideDown, _) => {
-            (Top::Closed, Range { low: 1.0 / model.taper.high, high: 1.0 / model.taper.low })
-        }
-        (_, top) => (top, model.taper),
-    };
-    let wide = match model.shape {
-        Shape::Round => diameter_log(model.diameter_m, m) + taper_log(Some(taper), m),
-        Shape::Box => sides_log(model.width_m.zip(model.depth_m), m),
-    };
-    size + wide + form + top_log(top, m) + handle_log(model.handle, m)
-}
-
-fn family_log(family: &Family, m: &Measured) -> f64 {
-    let wide = match family.shape {
-        Some(Shape::Round) => diameter_log(None, m) + taper_log(None, m),
-        _ => sides_log(None, m),
-    };
-    height_log(None, m)
-        + wide
-        + form_log(family.shape, m)
-        + top_log(family.top, m)
-        + handle_log(family.handle, m)
-}
-
 /// Log density of a measure under a range (uniform, blurred by the measurement) or, without one, under everyday sizes (log-normal).
 fn measure_log(value: f64, sigma: f64, range: Option<Range>, everyday: (f64, f64)) -> f64 {
     match range {
@@ -188,28 +215,29 @@ fn measure_log(value: f64, sigma: f64, range: Option<Range>, everyday: (f64, f64
 const HEIGHTS: (f64, f64) = (0.11, 0.6);
 const WIDTHS: (f64, f64) = (0.10, 0.6);
 
-fn height_log(range: Option<Range>, m: &Measured) -> f64 {
+fn height_log(range: Option<Range>, everyday: (f64, f64), m: &Measured) -> f64 {
     if m.top_hidden {
         // Only a lower bound: the chance of being at least that high.
         let chance = match range {
             Some(r) => 1.0 - normal_cdf((m.height_m - r.high) / m.height_sigma_m),
-            None => 1.0 - normal_cdf((m.height_m / HEIGHTS.0).ln() / HEIGHTS.1),
+            None => 1.0 - normal_cdf((m.height_m / everyday.0).ln() / everyday.1),
         };
         return chance.max(1e-6).ln();
     }
-    measure_log(m.height_m, m.height_sigma_m, range, HEIGHTS)
+    measure_log(m.height_m, m.height_sigma_m, range, everyday)
 }
 
-fn diameter_log(range: Option<Range>, m: &Measured) -> f64 {
+fn diameter_log(range: Option<Range>, everyday: (f64, f64), m: &Measured) -> f64 {
     if m.round.is_none() {
-        return 0.0;
+        // No circle fits; were it round, its footprint would be its diameter.
+        return measure_log(m.footprint_m[0], 0.02, range, everyday);
     }
     let sigma = (2.0 * m.evidence.radius_sigma_m).hypot(0.003);
-    measure_log(2.0 * m.evidence.radius_m, sigma, range, WIDTHS)
+    measure_log(2.0 * m.evidence.radius_m, sigma, range, everyday)
 }
 
 fn taper_log(range: Option<Range>, m: &Measured) -> f64 {
-    let Some(round) = m.round else { return 0.0 };
+    let Some(round) = m.round else { return measure_log(1.0, 0.2, range, (0.95, 0.25)) };
     let sigma = (m.height_m * round.slope_sigma / round.radius_m.max(0.005)).hypot(0.05);
     measure_log(m.evidence.taper, sigma, range, (0.95, 0.25))
 }
@@ -249,8 +277,8 @@ fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
 
 fn top_log(top: Top, m: &Measured) -> f64 {
     let (open, lid) = match m.evidence.inside {
-        Sighting::Seen => (0.93_f64, 0.05_f64),
-        Sighting::Absent => (0.04, 0.93),
+        Sighting::Seen => (0.95_f64, 0.01_f64),
+        Sighting::Absent => (0.01, 0.95),
         Sighting::Unseen => (0.5, 0.5),
     };
     match top {

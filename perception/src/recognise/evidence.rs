@@ -1,8 +1,8 @@
 //! Measuring on one segment what tells objects apart, and what could have been measured at all.
 
-use super::outline::{self, Rectangle};
 use super::percept::{Evidence, Sighting};
-use super::round::{self, Round};
+use crate::outline::{self, Rectangle};
+use crate::round::{self, Edge, Round};
 use crate::segment::{Scene, Segment, top_m};
 use crate::surface::range_sigma_m;
 use crate::visibility::{Seen, Visibility};
@@ -94,10 +94,53 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
     if let Some(rectangle) = &measured.rectangle {
         measured.evidence.box_residual_m = rectangle.residual_m;
     }
+    if let Some(first) = measured.round {
+        let edges = silhouettes(&first, segment, &asker, base_m, height_m);
+        measured.round = round::refit(&first, &segment.points, &edges, base_m, top, sigma_m);
+    }
     if let Some(round) = measured.round {
         measure_round(&mut measured, &round, segment, &asker, (base_m, top));
     }
     measured
+}
+
+/// Where the outline of the body, seen from each camera, ends against free space: left and right, at three heights.
+fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Vec<Edge> {
+    /// Lost pixels at depth edges make what is seen narrower by about this on each side, metres.
+    const LOST_M: f64 = 0.001;
+    let mut edges = Vec::new();
+    for map in &asker.seen.maps {
+        let eye = asker.world_from_surface.inverse() * map.viewpoint();
+        let (ex, ey) = (round.x - eye.x, round.y - eye.y);
+        let distance = ex.hypot(ey);
+        if distance < 2.0 * round.radius_m {
+            continue;
+        }
+        for side in [-1.0, 1.0] {
+            // The tangent point leans a little towards the camera: across the ray, not across the table.
+            let across = [side * -ey / distance, side * ex / distance];
+            for (low, high) in [(0.15, 0.4), (0.4, 0.65), (0.65, 0.92)] {
+                let (low, high) = (base_m + low * height, base_m + high * height);
+                let z = 0.5 * (low + high);
+                let mut reaches: Vec<f64> = segment
+                    .points
+                    .iter()
+                    .filter(|p| p.z >= low && p.z < high && round.outside_m(p) < 0.012)
+                    .map(|p| across[0] * p.x + across[1] * p.y)
+                    .collect();
+                if reaches.len() < 25 {
+                    continue;
+                }
+                let reach_m = crate::segment::quantile(&mut reaches, 0.985) + LOST_M;
+                let beyond = reach_m + 0.012 - (across[0] * round.x + across[1] * round.y);
+                let place = Point3::new(round.x + across[0] * beyond, round.y + across[1] * beyond, z);
+                if map.look(&(asker.world_from_surface * place), asker.tolerance_m) == Seen::Free {
+                    edges.push(Edge { direction: across, reach_m, height_m: z });
+                }
+            }
+        }
+    }
+    edges
 }
 
 /// Number of looks with the place inside the image and not behind something else.

@@ -5,7 +5,7 @@ use nalgebra::Point3;
 
 /// An upright box in the surface's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Rectangle {
+pub(crate) struct Rectangle {
     /// Middle, metres.
     pub x: f64,
     /// Middle, metres.
@@ -20,7 +20,7 @@ pub(super) struct Rectangle {
 const TURNS: usize = 30;
 
 /// Fits a rectangle to points by turning it: the extents bound nearly all points, the residual tells how well they keep to its edges.
-pub(super) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
+pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.len() < 8 {
         return None;
     }
@@ -56,7 +56,7 @@ fn turned(points: &[[f64; 2]], angle_rad: f64) -> Rectangle {
 }
 
 /// Sides of the rectangle of least area around nearly all points (longer, shorter), and its middle.
-pub(super) fn bounding(points: &[Point3<f64>]) -> Option<([f64; 2], [f64; 2])> {
+pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<([f64; 2], [f64; 2])> {
     if points.is_empty() {
         return None;
     }

@@ -12,7 +12,7 @@ const JUDGES: usize = 160;
 
 /// An upright cone frustum in the surface's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Round {
+pub(crate) struct Round {
     /// Axis, metres.
     pub x: f64,
     /// Axis, metres.
@@ -37,6 +37,22 @@ pub(super) struct Round {
     pub inliers: f64,
 }
 
+/// Where the silhouette of the body ended against free space: its side reaches `reach_m` from the origin along `direction` at a height.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Edge {
+    /// Horizontal unit vector.
+    pub direction: [f64; 2],
+    /// Metres.
+    pub reach_m: f64,
+    /// Height above the surface, metres.
+    pub height_m: f64,
+}
+
+/// Spread of where a silhouette ends, metres: about a pixel and a half at arm's length.
+const EDGE_SIGMA_M: f64 = 0.0025;
+/// Depths of one body share systematic errors (a structured-light camera flattens what is round): however many points, they weigh no more than so many.
+const MOST_INDEPENDENT: f64 = 25.0;
+
 /// A point farther out than this tells no more by being still farther, metres.
 const OUTSIDE_M: f64 = 0.02;
 
@@ -55,13 +71,9 @@ impl Round {
 /// Fits the side of a round body to the points between `base_m` and `top_m`; `sigma_m` is the spread of a measurement.
 ///
 /// `None` if there are too few side points or they lie on no circle of a sensible size.
-pub(super) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64, seed: u64) -> Option<Round> {
+pub(crate) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64, seed: u64) -> Option<Round> {
     let height = top_m - base_m;
-    let side: Vec<Point3<f64>> = points
-        .iter()
-        .filter(|p| p.z > base_m + 0.15 * height && p.z < top_m - 0.1 * height)
-        .copied()
-        .collect();
+    let side = side_points(points, base_m, top_m);
     if side.len() < 20 {
         return None;
     }
@@ -82,9 +94,34 @@ pub(super) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64,
         inliers: 0.0,
     };
     for gate in [3.0, 2.0, 1.5, 1.5, 1.5] {
-        round = improve(&round, &side, gate * tolerance, sigma_m)?;
+        round = improve(&round, &side, &[], gate * tolerance, sigma_m)?;
     }
     (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * 1.2).then_some(round)
+}
+
+/// The fit again with what silhouettes say, which depth alone measures badly: how wide the body is.
+pub(crate) fn refit(
+    round: &Round,
+    points: &[Point3<f64>],
+    edges: &[Edge],
+    base_m: f64,
+    top_m: f64,
+    sigma_m: f64,
+) -> Option<Round> {
+    let side = side_points(points, base_m, top_m);
+    let tolerance = (2.0 * sigma_m).clamp(0.004, 0.008);
+    let mut round = *round;
+    for _ in 0..4 {
+        round = improve(&round, &side, edges, 1.5 * tolerance, sigma_m)?;
+    }
+    (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * 1.2).then_some(round)
+}
+
+/// The points between base and top that can lie on the side.
+fn side_points(points: &[Point3<f64>], base_m: f64, top_m: f64) -> Vec<Point3<f64>> {
+    let height = top_m - base_m;
+    let band = base_m + 0.15 * height..top_m - 0.1 * height;
+    points.iter().filter(|p| band.contains(&p.z)).copied().collect()
 }
 
 /// The circle through three points that most points lie on and fewest outside of, seen from above.
@@ -132,7 +169,7 @@ fn circumcircle(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -> Option<[f6
 }
 
 /// One Gauss-Newton step on axis, radius and slope over the points within `gate` of the side.
-fn improve(round: &Round, side: &[Point3<f64>], gate: f64, sigma_m: f64) -> Option<Round> {
+fn improve(round: &Round, side: &[Point3<f64>], edges: &[Edge], gate: f64, sigma_m: f64) -> Option<Round> {
     let mut normal = Matrix4::<f64>::zeros();
     let mut right = Vector4::<f64>::zeros();
     let (mut squares, mut count, mut outside, mut spread) = (0.0, 0.0, 0.0, 0.0);
@@ -157,17 +194,25 @@ fn improve(round: &Round, side: &[Point3<f64>], gate: f64, sigma_m: f64) -> Opti
     if count < 12.0 {
         return None;
     }
+    let weight = (MOST_INDEPENDENT / count).min(0.125) / sigma_m.powi(2);
+    let (mut normal, mut right) = (normal * weight, right * weight);
+    for edge in edges {
+        let [a, b] = edge.direction;
+        let rise = edge.height_m - round.middle_m;
+        let missing = edge.reach_m - (a * round.x + b * round.y + round.radius_m + round.slope * rise);
+        let row = Vector4::new(a, b, 1.0, rise);
+        // An edge far off is another thing's edge: its pull stays bounded.
+        let w = 1.0 / (EDGE_SIGMA_M.powi(2) * (1.0 + (missing / 0.008).powi(2)));
+        normal += row * row.transpose() * w;
+        right += row * (missing * w);
+    }
     // Weak priors keep what the points do not tell near a cylinder: radius within decimetres, slope about 0.1.
-    let weight = 1.0 / (sigma_m * sigma_m);
-    let mut damped = normal * weight;
-    damped[(2, 2)] += 1.0 / (0.05_f64 * 0.05);
-    damped[(3, 3)] += 1.0 / (0.1_f64 * 0.1);
-    let right = right * weight - Vector4::new(0.0, 0.0, 0.0, round.slope / (0.1 * 0.1));
-    let inverse = damped.try_inverse()?;
+    normal[(2, 2)] += 1.0 / (0.05_f64 * 0.05);
+    normal[(3, 3)] += 1.0 / (0.1_f64 * 0.1);
+    right[3] -= round.slope / (0.1 * 0.1);
+    let inverse = normal.try_inverse()?;
     let step = inverse * right;
-    // Neighbouring measurements share their errors: about one in eight tells something new.
-    let shared = 8.0;
-    let sd = |i: usize| (inverse[(i, i)] * shared).max(0.0).sqrt();
+    let sd = |i: usize| inverse[(i, i)].max(0.0).sqrt();
     let improved = Round {
         x: round.x + step[0],
         y: round.y + step[1],

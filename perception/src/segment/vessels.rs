@@ -1,0 +1,97 @@
+//! Vessels in one piece: their near outside and far inside meet only in a thin rim, which no camera resolves.
+
+use super::{Segment, holds, top_m};
+use crate::outline;
+use crate::round::{self, Round};
+use crate::surface::{convex_hull, range_sigma_m};
+use nalgebra::Point3;
+
+/// Parts this far apart can be one vessel, metres.
+const APART_M: f64 = 0.015;
+/// Their tops are this level, metres.
+const LEVEL_M: f64 = 0.015;
+/// Widest vessel, metres of radius.
+const WIDEST_M: f64 = 0.14;
+/// Share of the points of both that lie on the common round body.
+const ON_BODY: f64 = 0.85;
+/// The smaller part has at least this share of the points.
+const LEAST_SHARE: f64 = 0.08;
+
+/// Joins parts that lie on one upright round body, and what lies inside it.
+pub(super) fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<Segment> {
+    parts.sort_by(|a, b| b.indices.len().cmp(&a.indices.len()).then(a.indices.cmp(&b.indices)));
+    let mut first = 0;
+    while first < parts.len() {
+        let found =
+            (first + 1..parts.len()).find(|&second| one_vessel(&parts[first], &parts[second], viewpoints));
+        match found {
+            Some(second) => {
+                let other = parts.remove(second);
+                parts[first] = union(&parts[first], &other);
+            }
+            None => first += 1,
+        }
+    }
+    parts
+}
+
+fn union(a: &Segment, b: &Segment) -> Segment {
+    let mut both: Vec<(u32, Point3<f64>)> =
+        a.indices.iter().chain(&b.indices).copied().zip(a.points.iter().chain(&b.points).copied()).collect();
+    both.sort_by_key(|(i, _)| *i);
+    let (indices, points) = both.into_iter().unzip();
+    Segment { indices, points, base_m: 0.0 }
+}
+
+fn one_vessel(large: &Segment, small: &Segment, viewpoints: &[Point3<f64>]) -> bool {
+    let (n, m) = (large.indices.len(), small.indices.len());
+    if m < 12 || !near(large, small) {
+        return false;
+    }
+    let (top, other_top) = (top_m(large), top_m(small));
+    let inside = other_top < top + 0.005 && footprint_inside(large, small);
+    if inside && round_body(large, top, viewpoints).is_some() {
+        return true;
+    }
+    if (top - other_top).abs() > LEVEL_M || (m as f64) < LEAST_SHARE * n as f64 {
+        return false;
+    }
+    let both = union(large, small);
+    round_body(&both, top.max(other_top), viewpoints).is_some_and(|body| {
+        // Each part on its own must keep to the common body: one alone may carry the fit.
+        [large, small].iter().all(|part| share_on(&body, part) >= ON_BODY - 0.1)
+    })
+}
+
+/// The round body that nearly all of the segment's side lies on, if it is one rather than a box.
+fn round_body(segment: &Segment, top: f64, viewpoints: &[Point3<f64>]) -> Option<Round> {
+    let low = segment.points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+    let near =
+        viewpoints.iter().map(|v| (segment.points[0] - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
+    let sigma_m = range_sigma_m(near).min(0.012);
+    let body = round::fit(&segment.points, low, top, sigma_m, 3)?;
+    let box_residual = outline::fit(&segment.points)?.residual_m;
+    let tight = body.spread_m < 2.0 * sigma_m + 0.0015 && body.spread_m < 0.6 * box_residual;
+    (tight && body.radius_m < WIDEST_M && body.inliers >= ON_BODY).then_some(body)
+}
+
+fn share_on(body: &Round, part: &Segment) -> f64 {
+    let on = part.points.iter().filter(|p| body.outside_m(p) < 0.008).count();
+    on as f64 / part.points.len().max(1) as f64
+}
+
+/// True if some points of the two are near each other, judged by boxes around slices of them.
+fn near(a: &Segment, b: &Segment) -> bool {
+    let bounds = |s: &Segment| {
+        let first = s.points[0];
+        s.points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)))
+    };
+    let ((a0, a1), (b0, b1)) = (bounds(a), bounds(b));
+    (0..3).all(|k| a0[k] - APART_M < b1[k] && b0[k] - APART_M < a1[k])
+}
+
+fn footprint_inside(large: &Segment, small: &Segment) -> bool {
+    let hull = convex_hull(large.points.iter().map(|p| [p.x, p.y]).collect());
+    let within = small.points.iter().filter(|p| holds(&hull, [p.x, p.y])).count();
+    within * 10 >= small.points.len() * 7
+}

@@ -248,7 +248,7 @@ mod tests {
     #[test]
     fn radius_place_and_taper_come_back() {
         let cases = [
-            ("all around", 0.0, 0.0, 0.035, 0.035, 6.28),
+            ("all around", 0.0, 0.0, 0.035, 0.035, std::f64::consts::TAU),
             ("half", 0.4, -0.2, 0.035, 0.035, 2.6),
             ("a tapered cup", -0.3, 0.1, 0.025, 0.04, 3.0),
         ];

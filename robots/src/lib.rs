@@ -1,10 +1,12 @@
 //! Bodies: the `Robot` trait and its implementations.
 
 pub mod body;
+pub mod conformance;
 pub mod failure;
 pub mod grid;
 pub mod head;
 pub mod input;
+pub mod recorded;
 pub mod route;
 pub mod sim;
 

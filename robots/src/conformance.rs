@@ -1,0 +1,315 @@
+//! What every body promises, as one check that any implementation of [`Robot`] can run in its tests.
+//!
+//! The body is driven, looks and takes frames; it needs one place besides its own that it can reach, and no mishaps.
+
+use crate::body::{CancellationToken, Place, Pose2, Progress, Push, Robot, Sensed, Watch};
+use crate::failure::Failure;
+use nalgebra::{Isometry3, Point3, Vector2};
+use std::sync::Mutex;
+
+/// A promise that a body did not keep.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{promise}: {found}")]
+pub struct Breach {
+    /// What every body does.
+    pub promise: &'static str,
+    /// What this one did.
+    pub found: String,
+}
+
+/// Transforms that should be equal may differ by this much (rounding), metres and radians.
+const ROUNDING: f64 = 1e-6;
+/// A body that has arrived believes to be this near to its goal, in standard deviations of its localisation.
+const ARRIVED_SIGMAS: f64 = 5.0;
+/// Free places of the map that are asked for routes.
+const PLACES: usize = 40;
+
+fn ensure(holds: bool, promise: &'static str, found: impl FnOnce() -> String) -> Result<(), Breach> {
+    if holds { Ok(()) } else { Err(Breach { promise, found: found() }) }
+}
+
+fn done<T>(answer: Result<T, Failure>, promise: &'static str) -> Result<T, Breach> {
+    answer.map_err(|f| Breach { promise, found: f.to_string() })
+}
+
+/// Runs every check.
+///
+/// # Errors
+/// The first promise that is not kept, and how.
+pub async fn check(robot: &dyn Robot) -> Result<(), Breach> {
+    check_description(robot)?;
+    check_stations(robot)?;
+    check_frame(robot).await?;
+    let goal = check_travel(robot).await?;
+    check_drive(robot, &goal).await?;
+    check_frame(robot).await?;
+    check_refusals(robot).await?;
+    check_stops(robot).await?;
+    check_frame(robot).await
+}
+
+fn check_description(robot: &dyn Robot) -> Result<(), Breach> {
+    let d = robot.description();
+    ensure(!d.name.trim().is_empty(), "a body has a name", || "it is empty".into())?;
+    let radius_m = d.footprint.radius_m();
+    ensure(radius_m.is_finite() && radius_m >= 0.0, "a footprint has a size", || radius_m.to_string())?;
+    let fast = |v: f64| v.is_finite() && v > 0.0;
+    ensure(fast(d.speeds.linear_m_s) && fast(d.speeds.angular_rad_s), "speeds are above zero", || {
+        format!("{:?}", d.speeds)
+    })?;
+    let c = &d.camera;
+    ensure(c.width > 0 && c.height > 0 && fast(c.fx) && fast(c.fy), "the camera has pixels", || {
+        format!("{c:?}")
+    })?;
+    ensure(d.range_m.0 >= 0.0 && d.range_m.0 < d.range_m.1, "the range is one", || {
+        format!("{:?}", d.range_m)
+    })?;
+    ensure(fast(d.pose_sigma_m) && fast(d.pose_sigma_rad), "no body knows its pose exactly", || {
+        format!("{} m, {} rad", d.pose_sigma_m, d.pose_sigma_rad)
+    })?;
+    let f = &d.frames;
+    ensure(
+        f.map != f.base && f.base != f.camera && f.map != f.camera,
+        "frames have names of their own",
+        || format!("{f:?}"),
+    )?;
+    let length = d.up.map_or(1.0, |up| up.norm());
+    ensure((length - 1.0).abs() < ROUNDING, "\"up\" is a unit vector", || format!("of length {length}"))
+}
+
+fn check_stations(robot: &dyn Robot) -> Result<(), Breach> {
+    let Some(stations) = robot.stations() else {
+        return ensure(robot.map().is_some(), "a body has stations or a map", || "it has neither".into());
+    };
+    ensure(!stations.is_empty(), "a body with stations has at least one", || "it has none".into())?;
+    for (i, s) in stations.iter().enumerate() {
+        let double = stations[..i].iter().any(|other| other.name == s.name);
+        ensure(!double, "stations have names of their own", || format!("two are called \"{}\"", s.name))?;
+    }
+    Ok(())
+}
+
+/// How far two transforms are apart, metres and radians, whichever is more.
+fn gap(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
+    let moved = (a.translation.vector - b.translation.vector).norm();
+    moved.max(a.rotation.angle_to(&b.rotation))
+}
+
+async fn check_frame(robot: &dyn Robot) -> Result<(), Breach> {
+    let watch = Watch::default();
+    let estimate = done(robot.pose().await, "a body knows where it is")?;
+    ensure(estimate.stamp_ns <= robot.now_ns(), "an estimate is not of the future", || {
+        format!("{} after {}", estimate.stamp_ns, robot.now_ns())
+    })?;
+    ensure(
+        estimate.station.is_some() == robot.stations().is_some(),
+        "a body with stations stands at one",
+        || format!("{:?}", estimate.station),
+    )?;
+    let ahead = estimate.map_from_base * Point3::new(1.0, 0.1, 0.7);
+    done(robot.look_at(&ahead, &watch).await, "a body can be told where to look")?;
+    let before_ns = robot.now_ns();
+    let sensed = done(robot.sense(&watch).await, "a body takes frames")?;
+    ensure(sensed.stamp_ns >= before_ns && sensed.stamp_ns <= robot.now_ns(), "a frame is of now", || {
+        format!("{} outside {before_ns} to {}", sensed.stamp_ns, robot.now_ns())
+    })?;
+    ensure(robot.now_ns() > before_ns, "taking a frame takes time", || "the clock stood still".into())?;
+    check_pixels(robot, &sensed)?;
+    check_chain(robot, &sensed)?;
+    let expected =
+        done(robot.camera_at(&estimate.place(), Some(&ahead)), "a body can say where its camera would be")?;
+    let off = gap(&expected, &sensed.map_from_camera);
+    ensure(off < ROUNDING, "the camera is where the body said it would be", || format!("{off} off"))
+}
+
+fn check_pixels(robot: &dyn Robot, sensed: &Sensed) -> Result<(), Breach> {
+    let camera = &robot.description().camera;
+    ensure(&sensed.intrinsics == camera, "frames are of the described camera", || {
+        format!("{:?}", sensed.intrinsics)
+    })?;
+    let pixels = camera.width * camera.height;
+    ensure(
+        sensed.depth_m.len() == pixels && sensed.cloud.len() == pixels,
+        "a frame has a depth and a point for each pixel",
+        || format!("{} depths, {} points, {pixels} pixels", sensed.depth_m.len(), sensed.cloud.len()),
+    )?;
+    ensure(sensed.cloud.check().is_ok(), "the parts of a cloud fit together", || {
+        format!("{:?}", sensed.cloud.check())
+    })?;
+    let grid = sensed.cloud.grid.map(|g| (g.width, g.height));
+    ensure(grid == Some((camera.width, camera.height)), "a frame's cloud is organised", || {
+        format!("{grid:?}")
+    })?;
+    let differs =
+        sensed.cloud.points.iter().zip(&sensed.depth_m).position(|(p, d)| {
+            if d.is_nan() { p.z.is_finite() } else { *d <= 0.0 || (p.z - d).abs() > 1e-4 }
+        });
+    ensure(differs.is_none(), "cloud and depth image say the same", || format!("not at pixel {differs:?}"))
+}
+
+fn check_chain(robot: &dyn Robot, sensed: &Sensed) -> Result<(), Breach> {
+    let frames = &robot.description().frames;
+    let [base, camera] = sensed.transforms.as_slice() else {
+        return Err(Breach {
+            promise: "a frame comes with the chain map, base, camera",
+            found: format!("{} transforms", sensed.transforms.len()),
+        });
+    };
+    let names = [&base.parent, &base.child, &camera.parent, &camera.child];
+    ensure(
+        names == [&frames.map, &frames.base, &frames.base, &frames.camera],
+        "the chain is map, base, camera",
+        || format!("{names:?}"),
+    )?;
+    let now = base.stamp_ns == sensed.stamp_ns && camera.stamp_ns == sensed.stamp_ns;
+    ensure(now, "the chain is of the frame's time", || format!("{} {}", base.stamp_ns, camera.stamp_ns))?;
+    let off = gap(&(base.parent_from_child * camera.parent_from_child), &sensed.map_from_camera);
+    ensure(off < ROUNDING, "the chain multiplies to the camera's pose", || format!("{off} off"))
+}
+
+/// Places to ask about: the stations, or places all over the map.
+fn places(robot: &dyn Robot) -> Vec<Place> {
+    if let Some(stations) = robot.stations() {
+        return stations.iter().map(|s| Place::Station(s.name.clone())).collect();
+    }
+    let Some(map) = robot.map() else { return Vec::new() };
+    let stride = (map.occupied.len() / PLACES).max(1);
+    (0..map.occupied.len())
+        .step_by(stride)
+        .map(|i| {
+            let p = map.centre(i % map.width, i / map.width);
+            Place::Pose(Pose2::new(p.x, p.y, i as f64))
+        })
+        .collect()
+}
+
+async fn check_travel(robot: &dyn Robot) -> Result<Place, Breach> {
+    let here = done(robot.pose().await, "a body knows where it is")?.place();
+    let before_ns = robot.now_ns();
+    let to = places(robot);
+    let answers = robot.travel(&here, &to);
+    ensure(answers.len() == to.len(), "each question about a route has an answer", || {
+        format!("{} answers to {} questions", answers.len(), to.len())
+    })?;
+    ensure(answers == robot.travel(&here, &to), "the same question has the same answer", || {
+        "two answers differ".into()
+    })?;
+    ensure(robot.now_ns() == before_ns, "asking for routes takes no time", || "the clock moved".into())?;
+    for (place, answer) in to.iter().zip(&answers) {
+        match answer {
+            Ok(t) => {
+                let sound = t.distance_m.is_finite() && t.distance_m >= 0.0 && t.duration_s >= 0.0;
+                ensure(sound && t.duration_s.is_finite(), "a route costs a number", || {
+                    format!("{place}: {t:?}")
+                })?;
+            }
+            Err(Failure::Unreachable { .. }) => {}
+            Err(other) => {
+                return Err(Breach {
+                    promise: "what has no route is unreachable",
+                    found: format!("{place}: {other}"),
+                });
+            }
+        }
+    }
+    let longest = to.into_iter().zip(answers).filter_map(|(place, t)| Some((place, t.ok()?.duration_s)));
+    let goal = longest.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, s)| *s > 0.0);
+    let Some((goal, _)) = goal else {
+        return Err(Breach { promise: "a body can reach another place", found: "it can reach none".into() });
+    };
+    Ok(goal)
+}
+
+async fn check_drive(robot: &dyn Robot, goal: &Place) -> Result<(), Breach> {
+    let here = done(robot.pose().await, "a body knows where it is")?.place();
+    let predicted = robot.travel(&here, std::slice::from_ref(goal)).remove(0);
+    let predicted = done(predicted, "a route that was found is found again")?;
+    let heard: Mutex<Vec<f64>> = Mutex::new(Vec::new());
+    let listen = |p: &Progress| {
+        if let Ok(mut heard) = heard.lock() {
+            heard.push(p.fraction);
+        }
+    };
+    let before_ns = robot.now_ns();
+    let watch = Watch { progress: &listen, ..Watch::default() };
+    let driven = done(robot.drive_to(goal, &watch).await, "a body drives where a route leads")?;
+    let passed_s = (robot.now_ns() - before_ns) as f64 * 1e-9;
+    ensure((passed_s - driven.duration_s).abs() < 0.01, "driving takes the time that it says", || {
+        format!("{passed_s} s on the clock, {} s reported", driven.duration_s)
+    })?;
+    let simulated = robot.description().simulated;
+    let as_said = (driven.duration_s - predicted.duration_s).abs() <= 0.05 * predicted.duration_s + 0.01;
+    ensure(!simulated || as_said, "without mishaps a simulated drive takes what was predicted", || {
+        format!("{} s, predicted {} s", driven.duration_s, predicted.duration_s)
+    })?;
+    let fractions = heard.into_inner().unwrap_or_default();
+    let rising = fractions.windows(2).all(|w| w[0] <= w[1] + 1e-9)
+        && fractions.iter().all(|f| (0.0..=1.0 + 1e-9).contains(f));
+    ensure(rising && !fractions.is_empty(), "progress rises from 0 to 1", || format!("{fractions:?}"))?;
+    let estimate = done(robot.pose().await, "a body knows where it is")?;
+    match goal {
+        Place::Station(name) => ensure(
+            estimate.station.as_ref() == Some(name),
+            "a body that arrived stands at the station",
+            || format!("{:?}", estimate.station),
+        ),
+        Place::Pose(goal) => {
+            let off_m = (Pose2::from_isometry(&estimate.map_from_base).point() - goal.point()).norm();
+            ensure(off_m <= ARRIVED_SIGMAS * estimate.sigma_m, "a body that arrived is at its goal", || {
+                format!("{off_m} m off")
+            })
+        }
+    }
+}
+
+async fn check_refusals(robot: &dyn Robot) -> Result<(), Breach> {
+    let watch = Watch::default();
+    let before = done(robot.pose().await, "a body knows where it is")?;
+    let nowhere = [
+        Place::Station("there is no station of this name".into()),
+        Place::Pose(Pose2::new(1e6, 1e6, 0.0)),
+        Place::Pose(Pose2::new(f64::NAN, 0.0, 0.0)),
+    ];
+    for place in &nowhere {
+        let answer = robot.drive_to(place, &watch).await;
+        let refused = matches!(&answer, Err(Failure::Unreachable { because }) if !because.is_empty());
+        ensure(refused, "a place that is none is unreachable, with a reason", || {
+            format!("{place}: {answer:?}")
+        })?;
+    }
+    let after = done(robot.pose().await, "a body knows where it is")?;
+    ensure(before.map_from_base == after.map_from_base, "a body that refuses does not move", || {
+        format!("{} off", gap(&before.map_from_base, &after.map_from_base))
+    })?;
+    if !robot.description().can_manipulate {
+        let push = Push { object: Point3::origin(), direction: Vector2::x(), distance_m: 0.1 };
+        let answer = robot.push_aside(&push, &watch).await;
+        ensure(matches!(answer, Err(Failure::Unable { .. })), "who has no arm says so", || {
+            format!("{answer:?}")
+        })?;
+    }
+    Ok(())
+}
+
+async fn check_stops(robot: &dyn Robot) -> Result<(), Breach> {
+    let cancel = CancellationToken::new();
+    cancel.cancel();
+    let stopped = Watch { cancel, ..Watch::default() };
+    let here = done(robot.pose().await, "a body knows where it is")?.place();
+    let to = places(robot);
+    let far = to.iter().zip(robot.travel(&here, &to)).find(|(_, t)| matches!(t, Ok(t) if t.duration_s > 0.1));
+    let Some((far, _)) = far else { return Ok(()) };
+    let answer = robot.drive_to(far, &stopped).await;
+    ensure(matches!(answer, Err(Failure::Cancelled { .. })), "a drive can be stopped", || {
+        format!("{answer:?}")
+    })?;
+    let answer = robot.sense(&stopped).await;
+    ensure(matches!(answer, Err(Failure::Cancelled { .. })), "taking a frame can be stopped", || {
+        format!("{:?}", answer.map(|s| s.stamp_ns))
+    })?;
+    let hurried = Watch { time_limit_s: 0.01, ..Watch::default() };
+    let answer = robot.drive_to(far, &hurried).await;
+    ensure(matches!(answer, Err(Failure::TimedOut { .. })), "a drive has a limit", || format!("{answer:?}"))?;
+    done(robot.drive_to(far, &Watch::default()).await, "a body that was stopped drives again")?;
+    Ok(())
+}

@@ -1,0 +1,41 @@
+//! A folder of depth frames with poses is a robot too: it can stand where a frame was taken, and looking returns that frame.
+//!
+//! Two layouts are known:
+//!
+//! | | frames side by side | lists |
+//! |---|---|---|
+//! | depth, 16 bits | `NAME.depth.png` | `depth/NAME.pgm` or `.png` |
+//! | pose (`world_from_camera`) | `NAME.pose.txt`, 4x4 | `pose.txt`, a line `tx ty tz qx qy qz qw` a frame, in the order of the names |
+//! | colour, may be absent | `NAME.color.jpg` or `.png` | `color/NAME.png` or `.jpg` |
+//! | camera | `camera-intrinsics.txt`, 3x3 | `[camera]` in `recording.toml` |
+//!
+//! A depth of 0 or of the greatest value is "no return". What the folder does not say stands in a `recording.toml` in it, or anywhere
+//! else with a `folder` entry; the robot is opened by the folder or by that file:
+//!
+//! ```toml
+//! name = "dining room"
+//! folder = "../data/dining_room"   # where the frames are, from this file; its own folder if left out
+//! depth_scale = 1000.0             # units of a depth image in a metre
+//! start = "1"                      # the first station; the first frame if left out
+//! up = [0.0, -1.0, 0.0]            # in the world of the poses, if known
+//! registered = true                # pixels of colour and depth are the same
+//! pose_sigma_m = 0.03
+//! pose_sigma_deg = 1.0
+//! linear_m_s = 0.3
+//! angular_deg_s = 30.0
+//!
+//! [camera]
+//! fx = 518.0
+//! fy = 519.0
+//! cx = 325.5
+//! cy = 253.5
+//! ```
+
+mod folder;
+mod pose;
+mod robot;
+mod settings;
+
+pub use folder::{Recording, StoredFrame};
+pub use robot::RecordedRobot;
+pub use settings::{CameraSettings, Settings};

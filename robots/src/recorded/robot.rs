@@ -1,0 +1,247 @@
+//! The body that a recording is.
+
+use crate::body::{
+    Colour, Description, Driven, Footprint, Frames, Looked, Place, PoseEstimate, Progress, Robot, Sensed,
+    Speeds, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
+};
+use crate::failure::Failure;
+use crate::grid::OccupancyGrid;
+use crate::input::InputError;
+use crate::recorded::folder::Recording;
+use nalgebra::{Isometry3, Point3, Vector3};
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// From asking to having a frame, on the body's clock, seconds.
+const FRAME_S: f64 = 0.1;
+
+/// A recording as a robot. Its base is the camera; it stands at one of its frames and knows no map.
+pub struct RecordedRobot {
+    recording: Recording,
+    description: Description,
+    stations: Vec<Station>,
+    state: Mutex<State>,
+}
+
+struct State {
+    at: usize,
+    now_ns: Stamp,
+}
+
+impl RecordedRobot {
+    /// Opens a folder of frames, or a `recording.toml` that names one.
+    ///
+    /// # Errors
+    /// See [`Recording::open`].
+    pub fn open(path: &Path) -> Result<RecordedRobot, InputError> {
+        Ok(RecordedRobot::new(Recording::open(path)?))
+    }
+
+    /// The body that stands at the recording's first station.
+    pub fn new(recording: Recording) -> RecordedRobot {
+        let settings = &recording.settings;
+        let description = Description {
+            name: format!("recording {}", recording.name),
+            simulated: false,
+            footprint: Footprint::Disc { radius_m: 0.0 },
+            speeds: Speeds {
+                linear_m_s: settings.linear_m_s,
+                angular_rad_s: settings.angular_deg_s.to_radians(),
+            },
+            camera: recording.intrinsics,
+            range_m: (settings.range_m[0], settings.range_m[1]),
+            head: None,
+            frames: Frames::default(),
+            can_manipulate: false,
+            up: settings.up.map(|[x, y, z]| Vector3::new(x, y, z).normalize()),
+            pose_sigma_m: settings.pose_sigma_m,
+            pose_sigma_rad: settings.pose_sigma_deg.to_radians(),
+        };
+        let station = |f: &crate::recorded::StoredFrame| Station {
+            name: f.name.clone(),
+            map_from_base: f.world_from_camera,
+        };
+        let stations = recording.frames.iter().map(station).collect();
+        let state = Mutex::new(State { at: recording.start, now_ns: 0 });
+        RecordedRobot { description, stations, state, recording }
+    }
+
+    /// What it plays.
+    pub fn recording(&self) -> &Recording {
+        &self.recording
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn pass(&self, seconds: f64) -> Stamp {
+        let mut state = self.lock();
+        state.now_ns += (seconds * 1e9).round() as Stamp;
+        state.now_ns
+    }
+
+    fn index(&self, place: &Place) -> Result<usize, Failure> {
+        let because = match place {
+            Place::Station(name) => match self.stations.iter().position(|s| &s.name == name) {
+                Some(index) => return Ok(index),
+                None => format!("{} has no station \"{name}\"", self.description.name),
+            },
+            Place::Pose(_) => {
+                format!("{} can stand at its {} stations only", self.description.name, self.stations.len())
+            }
+        };
+        Err(Failure::Unreachable { because })
+    }
+
+    /// A straight line at constant speed while turning: max(ds/v, dθ/ω).
+    fn cost(&self, from: usize, to: usize) -> Travel {
+        let (a, b) = (&self.stations[from].map_from_base, &self.stations[to].map_from_base);
+        let distance_m = (a.translation.vector - b.translation.vector).norm();
+        let turned_rad = a.rotation.angle_to(&b.rotation);
+        let speeds = &self.description.speeds;
+        Travel {
+            distance_m,
+            duration_s: (distance_m / speeds.linear_m_s).max(turned_rad / speeds.angular_rad_s),
+        }
+    }
+
+    fn play(&self) -> Result<Sensed, Failure> {
+        let stamp_ns = self.pass(FRAME_S);
+        let frame = &self.recording.frames[self.lock().at];
+        let dropped = |e: InputError| Failure::SensorDropped { because: e.to_string(), stamp_ns };
+        let depth_m = self.recording.depth_m(frame).map_err(dropped)?;
+        let intrinsics = self.recording.intrinsics;
+        let mut cloud = intrinsics.cloud_from_depth(&depth_m).map_err(|e| Failure::SensorDropped {
+            because: format!("{}: {e}", frame.depth.display()),
+            stamp_ns,
+        })?;
+        let image = self.recording.colour(frame).map_err(dropped)?;
+        let registered = self.recording.settings.registered;
+        if let Some(image) = image.as_ref().filter(|i| registered && i.pixels().len() == depth_m.len()) {
+            cloud.colours = Some(image.pixels().map(|p| p.0).collect());
+        }
+        let frames = &self.description.frames;
+        let link = |parent: &str, child: &str, parent_from_child| StampedTransform {
+            stamp_ns,
+            parent: parent.into(),
+            child: child.into(),
+            parent_from_child,
+        };
+        Ok(Sensed {
+            stamp_ns,
+            cloud,
+            depth_m,
+            colour: image.map(|image| Colour { image, registered }),
+            intrinsics,
+            transforms: vec![
+                link(&frames.map, &frames.base, frame.world_from_camera),
+                link(&frames.base, &frames.camera, Isometry3::identity()),
+            ],
+            map_from_camera: frame.world_from_camera,
+            pose_sigma_m: self.description.pose_sigma_m,
+            pose_sigma_rad: self.description.pose_sigma_rad,
+        })
+    }
+}
+
+fn go_on(watch: &Watch<'_>, what: &str) -> Result<(), Failure> {
+    if watch.cancel.is_cancelled() {
+        return Err(Failure::Cancelled { because: format!("{what} was stopped") });
+    }
+    Ok(())
+}
+
+#[async_trait::async_trait]
+impl Robot for RecordedRobot {
+    fn description(&self) -> &Description {
+        &self.description
+    }
+
+    fn now_ns(&self) -> Stamp {
+        self.lock().now_ns
+    }
+
+    fn map(&self) -> Option<&OccupancyGrid> {
+        None
+    }
+
+    fn surfaces(&self) -> &[SurfaceHint] {
+        &[]
+    }
+
+    fn stations(&self) -> Option<&[Station]> {
+        Some(&self.stations)
+    }
+
+    fn travel(&self, from: &Place, to: &[Place]) -> Vec<Result<Travel, Failure>> {
+        let from = self.index(from);
+        to.iter()
+            .map(|place| {
+                let from = from.as_ref().map_err(Clone::clone)?;
+                Ok(self.cost(*from, self.index(place)?))
+            })
+            .collect()
+    }
+
+    fn camera_at(&self, place: &Place, _look_at: Option<&Point3<f64>>) -> Result<Isometry3<f64>, Failure> {
+        Ok(self.stations[self.index(place)?].map_from_base)
+    }
+
+    async fn pose(&self) -> Result<PoseEstimate, Failure> {
+        let state = self.lock();
+        let station = &self.stations[state.at];
+        Ok(PoseEstimate {
+            stamp_ns: state.now_ns,
+            map_from_base: station.map_from_base,
+            sigma_m: self.description.pose_sigma_m,
+            sigma_rad: self.description.pose_sigma_rad,
+            station: Some(station.name.clone()),
+        })
+    }
+
+    /// A body that is stopped on its way is back where it came from: between stations it cannot stand.
+    async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure> {
+        go_on(watch, "the drive")?;
+        let goal = self.index(to)?;
+        let from = self.lock().at;
+        let travel = self.cost(from, goal);
+        if travel.duration_s > watch.time_limit_s {
+            self.pass(watch.time_limit_s);
+            let because = format!(
+                "the drive takes {:.1} s and the limit is {:.1} s",
+                travel.duration_s, watch.time_limit_s
+            );
+            return Err(Failure::TimedOut { because });
+        }
+        tokio::task::yield_now().await;
+        go_on(watch, "the drive")?;
+        self.pass(travel.duration_s);
+        self.lock().at = goal;
+        (watch.progress)(&Progress {
+            elapsed_s: travel.duration_s,
+            fraction: 1.0,
+            distance_m: travel.distance_m,
+        });
+        Ok(Driven {
+            distance_m: travel.distance_m,
+            duration_s: travel.duration_s,
+            map_from_base: self.stations[goal].map_from_base,
+        })
+    }
+
+    async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
+        go_on(watch, "looking")?;
+        let seen = self.stations[self.lock().at].map_from_base.inverse_transform_point(point);
+        Ok(Looked { duration_s: 0.0, miss_rad: seen.coords.angle(&Vector3::z()) })
+    }
+
+    async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure> {
+        go_on(watch, "taking a frame")?;
+        if watch.time_limit_s < FRAME_S {
+            let because = format!("a frame takes {FRAME_S} s and the limit is {:.2} s", watch.time_limit_s);
+            return Err(Failure::TimedOut { because });
+        }
+        self.play()
+    }
+}

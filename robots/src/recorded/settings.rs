@@ -1,0 +1,125 @@
+//! What a folder of frames does not say by itself.
+
+use crate::input::{self, InputError, Objection, Step};
+use serde::{Deserialize, Serialize};
+
+/// The contents of `recording.toml`; everything may be left out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// For people; the folder's name if left out.
+    pub name: Option<String>,
+    /// Where the frames are, from the file's own folder.
+    pub folder: Option<String>,
+    /// Units of a depth image in a metre.
+    pub depth_scale: f64,
+    /// Name of the first station.
+    pub start: Option<String>,
+    /// Direction of "up" in the world of the poses.
+    pub up: Option<[f64; 3]>,
+    /// True if pixels of colour and depth are the same.
+    pub registered: bool,
+    /// Standard deviation of the positions along each axis, metres.
+    pub pose_sigma_m: f64,
+    /// Standard deviation of the orientations about each axis, degrees.
+    pub pose_sigma_deg: f64,
+    /// For what driving between stations takes, metres a second.
+    pub linear_m_s: f64,
+    /// For what turning between stations takes, degrees a second.
+    pub angular_deg_s: f64,
+    /// Least and greatest depth that the camera measures, metres.
+    pub range_m: [f64; 2],
+    /// The camera.
+    pub camera: Option<CameraSettings>,
+}
+
+/// A pinhole camera, pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSettings {
+    /// Focal length along x.
+    pub fx: f64,
+    /// Focal length along y.
+    pub fy: f64,
+    /// Column of the principal point.
+    pub cx: f64,
+    /// Row of the principal point.
+    pub cy: f64,
+}
+
+impl Default for Settings {
+    /// Millimetres, poses good to 3 cm and 1°, a body as slow as the published navigation module (0.3 m/s, 30°/s).
+    fn default() -> Self {
+        Settings {
+            name: None,
+            folder: None,
+            depth_scale: 1000.0,
+            start: None,
+            up: None,
+            registered: false,
+            pose_sigma_m: 0.03,
+            pose_sigma_deg: 1.0,
+            linear_m_s: 0.3,
+            angular_deg_s: 30.0,
+            range_m: [0.4, 8.0],
+            camera: None,
+        }
+    }
+}
+
+impl Settings {
+    /// Reads a `recording.toml`. `file` is its name for messages.
+    ///
+    /// # Errors
+    /// The first mistake, with its place in the text and how to mend it.
+    pub fn parse(file: &str, text: &str) -> Result<Settings, InputError> {
+        let settings: Settings = input::parse_toml(file, text)?;
+        settings.check().map_err(|objection| input::draw(file, text, objection))?;
+        Ok(settings)
+    }
+
+    fn check(&self) -> Result<(), Objection> {
+        let above_zero = [
+            ("depth_scale", self.depth_scale),
+            ("pose_sigma_m", self.pose_sigma_m),
+            ("pose_sigma_deg", self.pose_sigma_deg),
+            ("linear_m_s", self.linear_m_s),
+            ("angular_deg_s", self.angular_deg_s),
+        ];
+        let objection =
+            |path: Vec<Step>, problem: String, mend: &str| Objection { path, problem, mend: mend.into() };
+        for (key, value) in above_zero {
+            if !(value.is_finite() && value > 0.0) {
+                let problem = format!("found {value}, expected a number above zero");
+                return Err(objection(vec![Step::Key(key)], problem, "leave it out for the usual value"));
+            }
+        }
+        if let Some(up) = self.up {
+            let length = up.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if !(length.is_finite() && length > 0.0) {
+                let problem = format!("{up:?} is no direction");
+                return Err(objection(vec![Step::Key("up")], problem, "such as [0.0, 0.0, 1.0]"));
+            }
+        }
+        let [near, far] = self.range_m;
+        if !(near >= 0.0 && near < far) {
+            let problem = format!("[{near}, {far}] is no range");
+            return Err(objection(vec![Step::Key("range_m")], problem, "least and greatest depth in metres"));
+        }
+        if let Some(camera) = self.camera {
+            for (key, value) in [("fx", camera.fx), ("fy", camera.fy)] {
+                if !(value.is_finite() && value > 0.0) {
+                    let problem = format!("found {value}, expected a focal length above zero");
+                    return Err(objection(vec![Step::Key("camera"), Step::Key(key)], problem, "in pixels"));
+                }
+            }
+            for (key, value) in [("cx", camera.cx), ("cy", camera.cy)] {
+                if !value.is_finite() {
+                    let problem = format!("found {value}, expected a pixel");
+                    return Err(objection(vec![Step::Key("camera"), Step::Key(key)], problem, "a number"));
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,131 @@
+//! Every body of this crate keeps the promises of bodies, and a body that does not is found out.
+
+mod folders;
+
+use descry_robots::conformance;
+use descry_robots::recorded::RecordedRobot;
+use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};
+use descry_robots::{
+    Description, Driven, Failure, Looked, OccupancyGrid, Place, PoseEstimate, Robot, Sensed, Stamp, Station,
+    SurfaceHint, Travel, Watch, async_trait, nalgebra,
+};
+
+const SCENE: &str = r#"
+[[surface]]
+name = "table"
+size_m = [1.6, 0.8]
+height_m = 0.72
+[start]
+position_m = [-2.0, 0.3]
+[[object]]
+name = "cup"
+shape.cup = { diameter_m = 0.07, height_m = 0.1 }
+"#;
+
+fn simulated(seed: u64) -> SimRobot {
+    let scene = arrange(&SceneSpec::parse("scene.toml", SCENE).unwrap(), seed).unwrap();
+    SimRobot::new(scene, SimOptions { seed, ..SimOptions::default() })
+}
+
+#[tokio::test]
+async fn the_simulated_body_conforms() {
+    for seed in 0..3 {
+        conformance::check(&simulated(seed)).await.unwrap();
+    }
+}
+
+#[tokio::test]
+async fn recordings_conform() {
+    for folder in [folders::side_by_side(), folders::listed()] {
+        let robot = RecordedRobot::open(folder.path()).unwrap();
+        conformance::check(&robot).await.unwrap();
+    }
+}
+
+/// A body that breaks one promise and keeps the others.
+struct Liar {
+    honest: SimRobot,
+    lie: Lie,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Lie {
+    Backwards,
+    Unstoppable,
+    WrongChain,
+    Everywhere,
+    Moody,
+}
+
+#[async_trait]
+impl Robot for Liar {
+    fn description(&self) -> &Description {
+        self.honest.description()
+    }
+    fn now_ns(&self) -> Stamp {
+        if self.lie == Lie::Backwards { -self.honest.now_ns() } else { self.honest.now_ns() }
+    }
+    fn map(&self) -> Option<&OccupancyGrid> {
+        self.honest.map()
+    }
+    fn surfaces(&self) -> &[SurfaceHint] {
+        self.honest.surfaces()
+    }
+    fn stations(&self) -> Option<&[Station]> {
+        None
+    }
+    fn travel(&self, from: &Place, to: &[Place]) -> Vec<Result<Travel, Failure>> {
+        let mut answers = self.honest.travel(from, to);
+        if self.lie == Lie::Moody {
+            answers.pop();
+        }
+        answers
+    }
+    fn camera_at(
+        &self,
+        place: &Place,
+        look_at: Option<&nalgebra::Point3<f64>>,
+    ) -> Result<nalgebra::Isometry3<f64>, Failure> {
+        self.honest.camera_at(place, look_at)
+    }
+    async fn pose(&self) -> Result<PoseEstimate, Failure> {
+        self.honest.pose().await
+    }
+    async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure> {
+        match (self.lie, self.honest.drive_to(to, watch).await) {
+            (Lie::Everywhere, Err(Failure::Unreachable { .. })) => Ok(Driven {
+                distance_m: 0.0,
+                duration_s: 0.0,
+                map_from_base: nalgebra::Isometry3::identity(),
+            }),
+            (Lie::Unstoppable, Err(Failure::Cancelled { .. })) => {
+                self.honest.drive_to(to, &Watch::default()).await
+            }
+            (_, answer) => answer,
+        }
+    }
+    async fn look_at(&self, point: &nalgebra::Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
+        self.honest.look_at(point, watch).await
+    }
+    async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure> {
+        let mut sensed = self.honest.sense(watch).await?;
+        if self.lie == Lie::WrongChain {
+            sensed.transforms.reverse();
+        }
+        Ok(sensed)
+    }
+}
+
+#[tokio::test]
+async fn broken_promises_are_found() {
+    for (lie, promise) in [
+        (Lie::Backwards, "a frame is of now"),
+        (Lie::Unstoppable, "a drive can be stopped"),
+        (Lie::WrongChain, "the chain is map, base, camera"),
+        (Lie::Everywhere, "a place that is none is unreachable, with a reason"),
+        (Lie::Moody, "each question about a route has an answer"),
+    ] {
+        let breach = conformance::check(&Liar { honest: simulated(1), lie }).await.unwrap_err();
+        assert_eq!(breach.promise, promise, "{lie:?}: {breach}");
+    }
+}

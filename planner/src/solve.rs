@@ -10,6 +10,8 @@ use crate::diagnostic::{Diagnostic, Findings};
 use crate::explain::Explanation;
 use crate::ground::{Expression, GroundError, GroundTask, ground};
 use crate::plan::Plan;
+use crate::search::classical::plan_classical;
+use crate::search::compiled::is_classical;
 use crate::task::Task;
 use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans};
 
@@ -181,6 +183,10 @@ pub fn plan(
         Ok(grounded) => grounded,
         Err(error) => return grounding_ended(task, error),
     };
+    if grounded.goal_reachable && is_classical(&grounded) {
+        let check = |plan| checked(task, attachments, plan);
+        return plan_classical(task, &grounded, options, stop, &check, on_plan);
+    }
     let calls = Calls::bind(task, &grounded, attachments)?;
     configure(task, attachments)?;
     let world = World::new(task, &grounded, calls);

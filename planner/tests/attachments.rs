@@ -1,8 +1,8 @@
 //! Plans for domains whose actions call attachments.
 
 use descry_planner::{
-    Answer, Attachment, Attachments, Call, CallError, FactValue, Options, Outcome, Plan, PlanError, Read, Source, Task,
-    plan,
+    Answer, Attachment, Attachments, Call, CallError, FactValue, Options, Outcome, Plan, PlanError, Read,
+    Source, Task, plan,
 };
 
 /// Halves the doubt about the thing, which it reads from the state.
@@ -75,7 +75,9 @@ fn names(plan: &Plan) -> Vec<String> {
 #[test]
 fn the_shortest_tour_of_views_is_found() {
     // One view suffices at 0.5: the nearest pose that sees is 3 m behind. Two views, at 0.7: 3 m behind, then 2 m further.
-    for (poses, threshold, expected_s, moves) in [(5, 0.5, 3.0 + 2.0, 1), (5, 0.7, 5.0 + 4.0, 2), (20, 0.7, 9.0, 2)] {
+    for (poses, threshold, expected_s, moves) in
+        [(5, 0.5, 3.0 + 2.0, 1), (5, 0.7, 5.0 + 4.0, 2), (20, 0.7, 9.0, 2)]
+    {
         let plan = solved(&look(poses, threshold), &attachments());
         let moved = plan.steps.iter().filter(|step| step.action == "move").count();
         assert_eq!(moved, moves, "{:?}", names(&plan));
@@ -114,7 +116,8 @@ fn an_infinite_cost_means_that_the_way_is_closed() {
 #[test]
 fn missing_and_failing_attachments_are_errors_at_their_module() {
     let task = look(3, 0.5);
-    let run = |attachments: &Attachments| plan(&task, attachments, &Options::default(), &|| false, &mut |_| {});
+    let run =
+        |attachments: &Attachments| plan(&task, attachments, &Options::default(), &|| false, &mut |_| {});
     let missing = run(&Attachments::new());
     let Err(PlanError::Refused(findings)) = missing else { panic!("{missing:?}") };
     assert_eq!(findings.list.len(), 3, "every module without an attachment is named");

@@ -6,7 +6,6 @@ use crate::task::Task;
 
 use super::build::Groups;
 use super::instantiate::{Deed, GroundEffect, Instantiate, RawCall, RawPlace, holds};
-use super::metric::Costs;
 use super::raw::{RawAction, RawTask};
 use super::relaxed::Reached;
 use super::relevant::{Relevant, reads};
@@ -30,7 +29,7 @@ pub(super) fn assemble(
     reached: Reached,
     relevant: Relevant,
     groups: Groups,
-    costs: Costs,
+    metric: Option<Metric>,
     goal_possible: bool,
 ) -> GroundTask {
     let strata = strata(&raw);
@@ -58,9 +57,8 @@ pub(super) fn assemble(
     let missing = raw.goal.literals.iter().any(|&l| l & 1 == 0 && !reached.atoms[(l >> 1) as usize]);
     let unreachable = !goal_possible || goal.is_none() || missing;
     let (mut actions, mut durative) = (Vec::with_capacity(raw.actions.len()), Vec::new());
-    for mut action in std::mem::take(&mut raw.actions) {
-        let cost = costs.of(&mut action);
-        encode_action(&encoding, action, cost, &mut actions, &mut durative);
+    for action in std::mem::take(&mut raw.actions) {
+        encode_action(&encoding, action, &mut actions, &mut durative);
     }
     let axioms = raw.axioms.iter().filter_map(|axiom| {
         Some(Axiom { head: encoding.fact(axiom.head)?, body: encoding.conjunction(&axiom.body)? })
@@ -91,7 +89,7 @@ pub(super) fn assemble(
         timed,
         initial: Values { values: initial, numbers },
         goal: goal.unwrap_or_default(),
-        metric: costs.metric,
+        metric,
         mutex_groups,
         goal_reachable: !unreachable,
     };
@@ -176,11 +174,11 @@ fn variables(
 fn encode_action(
     encoding: &Encoding,
     action: RawAction,
-    cost: Expression,
     actions: &mut Vec<Action>,
     durative: &mut Vec<DurativeAction>,
 ) {
     let Some(condition) = encoding.conjunction(&action.start) else { return };
+    let cost = action.cost;
     let origin = Origin { schema: action.schema, arguments: action.arguments.into_vec() };
     let effects = encoding.effects(&action.effects, &[&condition]);
     let Some(later) = action.later else {
@@ -245,7 +243,10 @@ fn compact(ground: &mut GroundTask, keep: bool) {
     let mut renumber = Renumber::default();
     for_expressions(ground, &mut |e| {
         let numerics = &mut renumber.numerics;
-        reads(e, &mut |id| drop(numerics.insert(id, 0)), &mut |_| {});
+        let mut mention = |id| {
+            numerics.insert(id, 0);
+        };
+        reads(e, &mut mention, &mut |_| {});
     });
     for_outcomes(ground, &mut |o| {
         if let Outcome::Change { fluent, .. } | Outcome::Flow { fluent, .. } = o {

@@ -79,6 +79,9 @@ pub fn ground(
     let keep = !task.modules.is_empty() || !task.preferences.is_empty() || !task.constraints.is_empty();
     let signed = expression.map(|e| (task.metric.as_ref().is_none_or(|m| m.minimise), e));
     let costs = metric::costs(&raw, &make.comparisons, make.numerics.len(), signed, keep);
+    for action in &mut raw.actions {
+        action.cost = costs.of(action);
+    }
     let groups = groups(&raw, &make, &reached, &rules, &normal, task);
     let everything = |wanted: bool| vec![wanted; raw.init.len()];
     let relevant = if keep {
@@ -87,7 +90,7 @@ pub fn ground(
     } else {
         relevant::prune(&mut raw, &make.comparisons, &make.calls, make.numerics.len(), &costs.read)
     };
-    Ok(assemble(task, raw, make, reached, relevant, groups, costs, goal_possible))
+    Ok(assemble(task, raw, make, reached, relevant, groups, costs.metric, goal_possible))
 }
 
 fn widths(task: &Task) -> Result<(), GroundError> {
@@ -334,14 +337,15 @@ fn raw_actions(
             None => return,
         },
     };
+    let free = Expression::Constant(0.0);
     let arguments: Box<[u32]> = binding[..action.arity].into();
     let mut ways = resolve.split(start, top);
     let Some(last) = ways.pop() else { return };
     for start in ways {
         let (arguments, effects, later) = (arguments.clone(), effects.clone(), later.clone());
-        out.push(RawAction { schema: action.schema, arguments, start, effects, later });
+        out.push(RawAction { schema: action.schema, arguments, start, effects, later, cost: free.clone() });
     }
-    out.push(RawAction { schema: action.schema, arguments, start: last, effects, later });
+    out.push(RawAction { schema: action.schema, arguments, start: last, effects, later, cost: free });
 }
 
 fn later(

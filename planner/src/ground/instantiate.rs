@@ -147,7 +147,7 @@ pub(super) fn holds(relation: Relation, left: f64, right: f64) -> bool {
         Relation::Equal => left == right,
         Relation::AtLeast => left >= right,
         Relation::Greater => left > right,
-        Relation::Unequal => left < right || left > right,
+        Relation::Unequal => left != right && !left.is_nan() && !right.is_nan(),
     }
 }
 

@@ -26,6 +26,8 @@ pub(super) struct RawAction {
     pub start: Clauses,
     pub effects: Vec<GroundEffect>,
     pub later: Option<Box<Later>>,
+    /// What it adds to the metric.
+    pub cost: Expression,
 }
 
 /// A ground axiom.

@@ -1,0 +1,58 @@
+//! A radix heap: a priority queue for keys that never fall below the last one taken (Ahuja et al. 1990).
+
+/// Entries with 32-bit keys; equal keys leave in the reverse order of their moves, always the same way.
+#[derive(Clone, Debug)]
+pub(crate) struct RadixHeap {
+    buckets: Vec<Vec<(u32, u32)>>,
+    last: u32,
+    len: usize,
+}
+
+impl RadixHeap {
+    /// Empty.
+    pub(crate) fn new() -> Self {
+        RadixHeap { buckets: vec![Vec::new(); 33], last: 0, len: 0 }
+    }
+
+    /// Empties it for keys from 0 on.
+    pub(crate) fn clear(&mut self) {
+        if self.len > 0 {
+            self.buckets.iter_mut().for_each(Vec::clear);
+        }
+        self.last = 0;
+        self.len = 0;
+    }
+
+    /// Adds an entry; its key must not be below the last one taken.
+    #[inline]
+    pub(crate) fn push(&mut self, key: u32, item: u32) {
+        let bucket = 32 - (key ^ self.last).leading_zeros() as usize;
+        self.buckets[bucket].push((key, item));
+        self.len += 1;
+    }
+
+    /// Takes an entry with the least key.
+    #[inline]
+    pub(crate) fn pop(&mut self) -> Option<(u32, u32)> {
+        if self.len == 0 {
+            return None;
+        }
+        self.len -= 1;
+        if let Some(entry) = self.buckets[0].pop() {
+            return Some(entry);
+        }
+        let from = self.buckets.iter().position(|b| !b.is_empty())?;
+        let entries = std::mem::take(&mut self.buckets[from]);
+        self.last = entries.iter().map(|e| e.0).min().unwrap_or(self.last);
+        for &(key, item) in &entries {
+            let bucket = 32 - (key ^ self.last).leading_zeros() as usize;
+            self.buckets[bucket].push((key, item));
+        }
+        let mut entries = entries;
+        entries.clear();
+        if self.buckets[from].is_empty() {
+            self.buckets[from] = entries;
+        }
+        self.buckets[0].pop()
+    }
+}

@@ -1,0 +1,348 @@
+//! Landmarks: facts that every plan makes true at some time, with orderings, and how many are still to come.
+//!
+//! Found by backchaining from the goal (Hoffmann, Porteous and Sebastia 2004; Richter, Helmert and Westphal 2008):
+//! what all operators need that can bring a landmark about for the first time is a landmark too, ordered right before.
+
+use rustc_hash::FxHashMap;
+
+use crate::search::compiled::{Compiled, Lists};
+
+/// Most facts of a disjunctive landmark.
+const MOST_ALTERNATIVES: usize = 4;
+/// Most landmarks.
+const MOST_LANDMARKS: usize = 20_000;
+/// Once so many operators have been looked at, first achievers are no longer told from later ones.
+const EXPLORATION_WORK: usize = 40_000_000;
+
+/// One landmark: one of the facts (a single one unless it is disjunctive).
+#[derive(Clone, Debug)]
+struct Landmark {
+    facts: Vec<u32>,
+    /// Asked for by the goal.
+    goal: bool,
+    /// Landmarks that must be true right before this one first becomes true.
+    before: Vec<u32>,
+    /// Landmarks for whose first achievement this one must be true.
+    enables: Vec<u32>,
+}
+
+/// The landmarks of a task.
+pub(crate) struct Landmarks {
+    all: Vec<Landmark>,
+    /// By fact: landmarks that it makes true.
+    by_fact: Lists<u32>,
+    words: usize,
+}
+
+/// The search for landmarks.
+struct Find<'a> {
+    task: &'a Compiled,
+    /// By fact: operators (and, after them, axioms) that bring it about.
+    achievers: Lists<u32>,
+    /// By fact: operators and axioms that need it.
+    needed_by: Lists<u32>,
+    all: Vec<Landmark>,
+    by_facts: FxHashMap<Vec<u32>, u32>,
+    queue: Vec<u32>,
+    initial: Vec<bool>,
+    work: usize,
+}
+
+impl Landmarks {
+    /// Finds the landmarks of a task.
+    pub(crate) fn new(task: &Compiled) -> Landmarks {
+        let mut find = Find::new(task);
+        for &fact in &task.goal {
+            let id = find.landmark(vec![task.id(fact)]);
+            find.all[id as usize].goal = true;
+        }
+        let mut next = 0;
+        while next < find.queue.len() && find.all.len() < MOST_LANDMARKS {
+            let id = find.queue[next];
+            next += 1;
+            find.backchain(id);
+        }
+        let all = find.all;
+        let pairs = (0..all.len()).flat_map(|l| all[l].facts.iter().map(move |&f| (f, l as u32)));
+        let by_fact = Lists::group(task.facts, pairs);
+        Landmarks { words: all.len().div_ceil(64).max(1), by_fact, all }
+    }
+
+    /// No landmarks.
+    pub(crate) fn none(task: &Compiled) -> Landmarks {
+        Landmarks { all: Vec::new(), by_fact: Lists::group(task.facts, std::iter::empty()), words: 1 }
+    }
+
+    /// How many there are.
+    pub(crate) fn len(&self) -> usize {
+        self.all.len()
+    }
+}
+
+impl<'a> Find<'a> {
+    fn new(task: &'a Compiled) -> Self {
+        let operators = task.operators() as u32;
+        let effects = (0..operators)
+            .flat_map(|op| task.effects.get(op as usize).iter().map(move |e| (task.id(e.fact), op)));
+        let heads = task.axiom_heads.iter().enumerate().map(|(a, &h)| (task.id(h), operators + a as u32));
+        let needs = (0..operators)
+            .flat_map(|op| task.preconditions.get(op as usize).iter().map(move |&f| (task.id(f), op)));
+        let bodies = (0..task.axiom_heads.len())
+            .flat_map(|a| task.axiom_bodies.get(a).iter().map(move |&f| (task.id(f), operators + a as u32)));
+        let mut initial = vec![false; task.facts];
+        for (&offset, &value) in task.offsets.iter().zip(&task.initial) {
+            initial[(offset + value) as usize] = true;
+        }
+        Find {
+            task,
+            achievers: Lists::group(task.facts, effects.chain(heads)),
+            needed_by: Lists::group(task.facts, needs.chain(bodies)),
+            all: Vec::new(),
+            by_facts: FxHashMap::default(),
+            queue: Vec::new(),
+            initial,
+            work: 0,
+        }
+    }
+
+    fn needs(&self, operator: u32) -> &'a [crate::ground::Fact] {
+        let task = self.task;
+        let operators = task.operators() as u32;
+        if operator < operators {
+            task.preconditions.get(operator as usize)
+        } else {
+            task.axiom_bodies.get((operator - operators) as usize)
+        }
+    }
+
+    fn landmark(&mut self, facts: Vec<u32>) -> u32 {
+        let next = self.all.len() as u32;
+        let id = *self.by_facts.entry(facts.clone()).or_insert(next);
+        if id == next {
+            self.all.push(Landmark { facts, goal: false, before: Vec::new(), enables: Vec::new() });
+            self.queue.push(id);
+        }
+        id
+    }
+
+    /// Adds what must hold right before the landmark first becomes true.
+    fn backchain(&mut self, id: u32) {
+        let task = self.task;
+        let facts = self.all[id as usize].facts.clone();
+        if facts.iter().any(|&f| self.initial[f as usize]) {
+            return;
+        }
+        let reached = (self.work < EXPLORATION_WORK).then(|| self.reach_without(&facts));
+        let possible = |op: u32| {
+            self.needs(op).iter().all(|&f| {
+                let f = task.id(f);
+                !facts.contains(&f) && reached.as_ref().is_none_or(|r| r[f as usize])
+            })
+        };
+        let mut first: Vec<u32> = facts
+            .iter()
+            .flat_map(|&f| self.achievers.get(f as usize).iter().copied())
+            .filter(|&op| possible(op))
+            .collect();
+        first.sort_unstable();
+        first.dedup();
+        if first.is_empty() {
+            return;
+        }
+        self.work += first.len();
+        for facts in self.shared(&first) {
+            let before = self.landmark(facts);
+            if before != id && !self.all[id as usize].before.contains(&before) {
+                self.all[id as usize].before.push(before);
+                self.all[before as usize].enables.push(id);
+            }
+        }
+    }
+
+    /// Facts that all operators need, and small sets of facts over one predicate of which each operator needs one.
+    fn shared(&self, operators: &[u32]) -> Vec<Vec<u32>> {
+        let task = self.task;
+        let mut counts: FxHashMap<u32, u32> = FxHashMap::default();
+        let mut symbols: FxHashMap<u32, (u32, u32, Vec<u32>)> = FxHashMap::default();
+        for (index, &op) in operators.iter().enumerate() {
+            for &fact in self.needs(op) {
+                let fact = task.id(fact);
+                *counts.entry(fact).or_default() += 1;
+                let symbol = task.symbols[fact as usize];
+                let entry = symbols.entry(symbol).or_insert((u32::MAX, 0, Vec::new()));
+                if entry.0 != index as u32 {
+                    entry.0 = index as u32;
+                    entry.1 += 1;
+                }
+                if entry.2.len() <= MOST_ALTERNATIVES && !entry.2.contains(&fact) {
+                    entry.2.push(fact);
+                }
+            }
+        }
+        let all = operators.len() as u32;
+        let mut found: Vec<Vec<u32>> =
+            counts.iter().filter(|&(_, &n)| n == all).map(|(&fact, _)| vec![fact]).collect();
+        let single: Vec<u32> = found.iter().map(|f| f[0]).collect();
+        for (&symbol, (_, count, facts)) in &symbols {
+            let fits = *count == all && symbol != u32::MAX && (2..=MOST_ALTERNATIVES).contains(&facts.len());
+            if fits && facts.iter().all(|f| !self.initial[*f as usize] && !single.contains(f)) {
+                let mut facts = facts.clone();
+                facts.sort_unstable();
+                found.push(facts);
+            }
+        }
+        found.sort();
+        found
+    }
+
+    /// By fact: reachable (nothing ever taken away) if none of `without` ever becomes true.
+    fn reach_without(&mut self, without: &[u32]) -> Vec<bool> {
+        let task = self.task;
+        let operators = task.operators();
+        let mut missing: Vec<u32> = (0..operators)
+            .map(|op| task.preconditions.get(op).len() as u32)
+            .chain((0..task.axiom_heads.len()).map(|a| task.axiom_bodies.get(a).len() as u32))
+            .collect();
+        let mut reached = self.initial.clone();
+        for variable in task.basic..task.domains.len() {
+            reached[task.offsets[variable] as usize + 1] = true;
+        }
+        let mut queue: Vec<u32> = (0..task.facts as u32).filter(|&f| reached[f as usize]).collect();
+        let fire = |op: usize, reached: &mut Vec<bool>, queue: &mut Vec<u32>| {
+            let mut reach = |fact: u32| {
+                if !reached[fact as usize] && !without.contains(&fact) {
+                    reached[fact as usize] = true;
+                    queue.push(fact);
+                }
+            };
+            if op < operators {
+                task.effects.get(op).iter().for_each(|e| reach(task.id(e.fact)));
+            } else {
+                reach(task.id(task.axiom_heads[op - operators]));
+            }
+        };
+        for op in (0..missing.len()).filter(|&op| missing[op] == 0) {
+            fire(op, &mut reached, &mut queue);
+        }
+        while let Some(fact) = queue.pop() {
+            let waiting = self.needed_by.get(fact as usize);
+            self.work += waiting.len() + 1;
+            for &op in waiting {
+                missing[op as usize] -= 1;
+                if missing[op as usize] == 0 {
+                    fire(op as usize, &mut reached, &mut queue);
+                }
+            }
+        }
+        self.work += missing.len() / 4;
+        reached
+    }
+}
+
+/// Which landmarks each state of a search has seen on its way.
+pub(crate) struct Status {
+    words: usize,
+    accepted: Vec<u64>,
+    scratch: Vec<u64>,
+}
+
+impl Status {
+    /// Empty.
+    pub(crate) fn new(landmarks: &Landmarks) -> Status {
+        Status { words: landmarks.words, accepted: Vec::new(), scratch: vec![0; landmarks.words] }
+    }
+
+    /// Bytes taken.
+    pub(crate) fn bytes(&self) -> usize {
+        self.accepted.capacity() * 8
+    }
+
+    fn of(&self, id: u32) -> &[u64] {
+        &self.accepted[id as usize * self.words..(id as usize + 1) * self.words]
+    }
+
+    fn has(bits: &[u64], landmark: u32) -> bool {
+        bits[landmark as usize / 64] >> (landmark % 64) & 1 == 1
+    }
+
+    /// Sets the status of state 0.
+    pub(crate) fn initial(&mut self, landmarks: &Landmarks, task: &Compiled, state: &[u32]) {
+        self.scratch.fill(0);
+        for (&offset, &value) in task.offsets.iter().zip(state) {
+            for &l in landmarks.by_fact.get((offset + value) as usize) {
+                self.scratch[l as usize / 64] |= 1 << (l % 64);
+            }
+        }
+        self.accepted.extend_from_slice(&self.scratch);
+    }
+
+    /// Sets the status of a state reached from another; where it was known already, only what both ways have seen
+    /// counts.
+    pub(crate) fn follow(
+        &mut self,
+        landmarks: &Landmarks,
+        task: &Compiled,
+        step: (u32, u32, u32),
+        state: &[u32],
+        new: bool,
+    ) {
+        let (parent, operator, id) = step;
+        let words = self.words;
+        let from = parent as usize * words;
+        self.scratch.copy_from_slice(&self.accepted[from..from + words]);
+        let mut accept = |fact: u32| {
+            for &l in landmarks.by_fact.get(fact as usize) {
+                let before = &landmarks.all[l as usize].before;
+                if before.iter().all(|&b| Self::has(&self.accepted[from..from + words], b)) {
+                    self.scratch[l as usize / 64] |= 1 << (l % 64);
+                }
+            }
+        };
+        for effect in task.effects.get(operator as usize) {
+            if state[effect.fact.variable as usize] == effect.fact.value {
+                accept(task.id(effect.fact));
+            }
+        }
+        for variable in task.basic..task.domains.len() {
+            accept(task.offsets[variable] + state[variable]);
+        }
+        if new {
+            self.accepted.extend_from_slice(&self.scratch);
+        } else {
+            let place = id as usize * words;
+            for (held, now) in self.accepted[place..place + words].iter_mut().zip(&self.scratch) {
+                *held &= now;
+            }
+        }
+    }
+
+    /// How many landmarks are still to come: not yet seen, or seen and needed again.
+    pub(crate) fn left(&self, landmarks: &Landmarks, task: &Compiled, id: u32, state: &[u32]) -> u32 {
+        let bits = self.of(id);
+        let seen: u32 = bits.iter().map(|w| w.count_ones()).sum();
+        let mut left = landmarks.all.len() as u32 - seen;
+        for (word, &bits_here) in bits.iter().enumerate() {
+            let mut rest = bits_here;
+            while rest != 0 {
+                let l = (word * 64) as u32 + rest.trailing_zeros();
+                rest &= rest - 1;
+                let landmark = &landmarks.all[l as usize];
+                let wanted = landmark.goal || landmark.enables.iter().any(|&e| !Self::has(bits, e));
+                if wanted && !landmark.facts.iter().any(|&f| task.holds(f, state)) {
+                    left += 1;
+                }
+            }
+        }
+        left
+    }
+
+    /// Whether an operator brings about a landmark that is due.
+    pub(crate) fn advances(&self, landmarks: &Landmarks, task: &Compiled, id: u32, operator: u32) -> bool {
+        let bits = self.of(id);
+        task.effects.get(operator as usize).iter().any(|effect| {
+            landmarks.by_fact.get(task.id(effect.fact) as usize).iter().any(|&l| {
+                !Self::has(bits, l) && landmarks.all[l as usize].before.iter().all(|&b| Self::has(bits, b))
+            })
+        })
+    }
+}

@@ -1,0 +1,71 @@
+//! From a grounded classical task to an outcome.
+
+use crate::ground::GroundTask;
+use crate::plan::{Plan, Step};
+use crate::solve::{Options, Outcome, PlanError, Statistics};
+use crate::task::Task;
+
+use super::run::{ClassicalEnd, ClassicalOptions, solve};
+
+/// Plans for a task that is [`super::compiled::is_classical`]; `check` validates each plan.
+pub(crate) fn plan_classical(
+    task: &Task,
+    grounded: &GroundTask,
+    options: &Options,
+    stop: &(dyn Fn() -> bool + Sync),
+    check: &dyn Fn(Plan) -> Result<Plan, PlanError>,
+    on_plan: &mut dyn FnMut(&Plan),
+) -> Result<Outcome, PlanError> {
+    let classical = ClassicalOptions {
+        anytime: options.anytime,
+        bound: options.bound,
+        memory_limit_bytes: options.memory_limit_bytes.map(|b| usize::try_from(b).unwrap_or(usize::MAX)),
+        evaluation_limit: options.evaluation_limit,
+    };
+    let mut statistics = Statistics { actions: grounded.actions.len() as u64, ..Statistics::default() };
+    let mut best = None;
+    let mut invalid = None;
+    let mut plans = 0;
+    let outcome = solve(grounded, &classical, stop, &mut |operators, _cost| match check(named(
+        task, grounded, operators,
+    )) {
+        Ok(plan) => {
+            plans += 1;
+            on_plan(&plan);
+            best = Some(plan);
+        }
+        Err(error) => invalid = Some(error),
+    });
+    if let Some(error) = invalid {
+        return Err(error);
+    }
+    statistics.plans = plans;
+    statistics.evaluated = outcome.evaluated;
+    statistics.expanded = outcome.expanded;
+    Ok(match (best, outcome.end) {
+        (Some(plan), ClassicalEnd::Done) => Outcome::Solved { plan, statistics },
+        (Some(plan), ClassicalEnd::Exhausted) => {
+            statistics.optimal = true;
+            Outcome::Solved { plan, statistics }
+        }
+        (None, ClassicalEnd::Done | ClassicalEnd::Exhausted) => {
+            Outcome::Unsolvable { why: crate::explain::Explanation::default(), statistics }
+        }
+        (best, ClassicalEnd::Stopped) => Outcome::OutOfTime { best, statistics },
+        (best, ClassicalEnd::Memory) => Outcome::OutOfMemory { best, statistics },
+    })
+}
+
+/// The plan in the words of the task.
+fn named(task: &Task, grounded: &GroundTask, operators: &[u32]) -> Plan {
+    let steps = operators.iter().map(|&operator| {
+        let origin = &grounded.actions[operator as usize].origin;
+        Step {
+            start_s: None,
+            action: task.actions[origin.schema as usize].name.clone(),
+            arguments: origin.arguments.iter().map(|&o| task.objects[o as usize].name.clone()).collect(),
+            duration_s: 0.0,
+        }
+    });
+    Plan { steps: steps.collect(), ..Plan::default() }
+}

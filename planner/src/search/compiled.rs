@@ -1,0 +1,296 @@
+//! A ground task of instantaneous actions over finite-domain variables, in flat arrays.
+
+use crate::ground::{Effect, Expression, Fact, GroundTask, Meaning, Outcome};
+
+/// Costs that are not whole numbers are multiplied by this and rounded for the search; plans report exact costs.
+const COST_SCALE: f64 = 1000.0;
+/// Costs above this are scaled down for the search.
+const LARGEST_COST: f64 = 1.0e6;
+
+/// Lists of different lengths in one array.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Lists<T> {
+    starts: Vec<u32>,
+    items: Vec<T>,
+}
+
+impl<T> Lists<T> {
+    /// No lists.
+    pub(crate) fn new() -> Self {
+        Lists { starts: vec![0], items: Vec::new() }
+    }
+
+    /// Appends a list.
+    pub(crate) fn push(&mut self, list: impl IntoIterator<Item = T>) {
+        self.items.extend(list);
+        self.starts.push(self.items.len() as u32);
+    }
+
+    /// One list.
+    #[inline]
+    pub(crate) fn get(&self, index: usize) -> &[T] {
+        &self.items[self.starts[index] as usize..self.starts[index + 1] as usize]
+    }
+
+    /// How many lists.
+    pub(crate) fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// From pairs of list number and item, keeping the order of items within a list.
+    pub(crate) fn group(count: usize, pairs: impl Iterator<Item = (u32, T)> + Clone) -> Self
+    where
+        T: Copy + Default,
+    {
+        let mut starts = vec![0u32; count + 1];
+        for (list, _) in pairs.clone() {
+            starts[list as usize + 1] += 1;
+        }
+        for i in 0..count {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let mut items = vec![T::default(); starts[count] as usize];
+        for (list, item) in pairs {
+            items[next[list as usize] as usize] = item;
+            next[list as usize] += 1;
+        }
+        Lists { starts, items }
+    }
+}
+
+/// One effect: a fact that comes about where the conditions hold.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Achieve {
+    /// First condition in [`Compiled::conditions`].
+    pub from: u32,
+    /// One past the last.
+    pub to: u32,
+    /// The fact.
+    pub fact: Fact,
+}
+
+/// The task.
+#[derive(Clone, Debug)]
+pub(crate) struct Compiled {
+    /// By variable; derived variables last.
+    pub domains: Vec<u32>,
+    /// Number of variables that are not derived.
+    pub basic: usize,
+    /// By variable: number of its first fact.
+    pub offsets: Vec<u32>,
+    /// Number of facts.
+    pub facts: usize,
+    /// By operator.
+    pub preconditions: Lists<Fact>,
+    /// By operator.
+    pub effects: Lists<Achieve>,
+    /// Of effects.
+    pub conditions: Vec<Fact>,
+    /// By operator: for the search.
+    pub costs: Vec<u32>,
+    /// By operator: as the metric counts.
+    pub exact_costs: Vec<f64>,
+    /// Whether all costs are one.
+    pub unit_cost: bool,
+    /// Bodies of axioms, by stratum in rising order.
+    pub axiom_bodies: Lists<Fact>,
+    /// Heads of axioms.
+    pub axiom_heads: Vec<Fact>,
+    /// First axiom of each stratum, and the number of axioms.
+    pub strata: Vec<usize>,
+    /// By fact: axioms with the fact in their body.
+    pub axioms_with: Lists<u32>,
+    /// What must hold in the end.
+    pub goal: Vec<Fact>,
+    /// The first state, derived variables included.
+    pub initial: Vec<u32>,
+    /// By fact: its predicate or function; `u32::MAX` for "none of those".
+    pub symbols: Vec<u32>,
+    /// By fact: its variable.
+    pub variables: Vec<u32>,
+}
+
+/// Whether the search over finite-domain variables alone can plan for the task.
+pub(crate) fn is_classical(task: &GroundTask) -> bool {
+    let plain = |c: &crate::ground::Conjunction| c.comparisons.is_empty() && c.calls.is_empty();
+    let plain_effect =
+        |e: &Effect| matches!(e.outcome, Outcome::Set(_)) && e.when.as_ref().is_none_or(|w| plain(&w.here));
+    task.durative.is_empty()
+        && task.timed.is_empty()
+        && plain(&task.goal)
+        && task.axioms.iter().all(|a| plain(&a.body))
+        && task.metric.as_ref().is_none_or(|m| m.additive)
+        && task.actions.iter().all(|a| {
+            plain(&a.condition)
+                && matches!(a.cost, Expression::Constant(_))
+                && a.effects.iter().all(plain_effect)
+        })
+}
+
+impl Compiled {
+    /// The task in flat arrays, for tasks that [`is_classical`].
+    pub(crate) fn new(task: &GroundTask) -> Compiled {
+        let domains: Vec<u32> = task.variables.iter().map(|v| v.domain_size()).collect();
+        let basic = task.variables.iter().filter(|v| v.stratum.is_none()).count();
+        let mut offsets = Vec::with_capacity(domains.len());
+        let mut facts = 0;
+        for &size in &domains {
+            offsets.push(facts);
+            facts += size;
+        }
+        let mut preconditions = Lists::new();
+        let mut effects = Lists::new();
+        let mut conditions = Vec::new();
+        for action in &task.actions {
+            preconditions.push(action.condition.facts.iter().copied());
+            let mut list = Vec::with_capacity(action.effects.len());
+            for effect in &action.effects {
+                let Outcome::Set(fact) = effect.outcome else { continue };
+                let from = conditions.len() as u32;
+                conditions.extend(effect.when.iter().flat_map(|w| w.here.facts.iter().copied()));
+                list.push(Achieve { from, to: conditions.len() as u32, fact });
+            }
+            effects.push(list);
+        }
+        let (costs, exact_costs) = costs(task);
+        let mut axiom_bodies = Lists::new();
+        let mut strata = Vec::new();
+        let mut last = None;
+        for (index, axiom) in task.axioms.iter().enumerate() {
+            let stratum = task.variables[axiom.head.variable as usize].stratum;
+            if last != Some(stratum) {
+                strata.push(index);
+                last = Some(stratum);
+            }
+            axiom_bodies.push(axiom.body.facts.iter().copied());
+        }
+        strata.push(task.axioms.len());
+        let fact_id = |f: &Fact| offsets[f.variable as usize] + f.value;
+        let pairs = (0..axiom_bodies.len())
+            .flat_map(|i| axiom_bodies.get(i).iter().map(move |f: &Fact| (fact_id(f), i as u32)));
+        let axioms_with = Lists::group(facts as usize, pairs);
+        Compiled {
+            basic,
+            facts: facts as usize,
+            preconditions,
+            effects,
+            conditions,
+            unit_cost: exact_costs.iter().all(|&c| c == 1.0),
+            costs,
+            exact_costs,
+            axiom_heads: task.axioms.iter().map(|a| a.head).collect(),
+            axiom_bodies,
+            strata,
+            axioms_with,
+            goal: task.goal.facts.clone(),
+            initial: task.initial.values.clone(),
+            symbols: task.variables.iter().flat_map(|v| v.values.iter().map(symbol)).collect(),
+            variables: (0..domains.len() as u32)
+                .flat_map(|v| std::iter::repeat_n(v, domains[v as usize] as usize))
+                .collect(),
+            domains,
+            offsets,
+        }
+    }
+
+    /// Number of a fact.
+    #[inline]
+    pub(crate) fn id(&self, fact: Fact) -> u32 {
+        self.offsets[fact.variable as usize] + fact.value
+    }
+
+    /// Whether a fact holds.
+    #[inline]
+    pub(crate) fn holds(&self, fact: u32, state: &[u32]) -> bool {
+        let variable = self.variables[fact as usize] as usize;
+        self.offsets[variable] + state[variable] == fact
+    }
+
+    /// Number of operators.
+    pub(crate) fn operators(&self) -> usize {
+        self.costs.len()
+    }
+
+    /// Whether the operator can be applied.
+    #[inline]
+    pub(crate) fn applicable(&self, operator: u32, state: &[u32]) -> bool {
+        self.preconditions.get(operator as usize).iter().all(|f| state[f.variable as usize] == f.value)
+    }
+
+    /// Whether the goal holds.
+    pub(crate) fn is_goal(&self, state: &[u32]) -> bool {
+        self.goal.iter().all(|f| state[f.variable as usize] == f.value)
+    }
+
+    /// The state after the operator, derived variables up to date.
+    pub(crate) fn apply(&self, operator: u32, state: &[u32], next: &mut Vec<u32>) {
+        next.clear();
+        next.extend_from_slice(state);
+        for effect in self.effects.get(operator as usize) {
+            let conditions = &self.conditions[effect.from as usize..effect.to as usize];
+            if conditions.iter().all(|f| state[f.variable as usize] == f.value) {
+                next[effect.fact.variable as usize] = effect.fact.value;
+            }
+        }
+        self.derive(next);
+    }
+
+    /// Brings the derived variables of a state up to date.
+    pub(crate) fn derive(&self, state: &mut [u32]) {
+        if self.axiom_heads.is_empty() {
+            return;
+        }
+        state[self.basic..].fill(1);
+        let mut queue: Vec<u32> = Vec::new();
+        for bounds in self.strata.windows(2) {
+            let holds = |axiom: usize, state: &[u32]| {
+                self.axiom_bodies.get(axiom).iter().all(|f| state[f.variable as usize] == f.value)
+            };
+            for axiom in bounds[0]..bounds[1] {
+                let head = self.axiom_heads[axiom];
+                if state[head.variable as usize] != head.value && holds(axiom, state) {
+                    state[head.variable as usize] = head.value;
+                    queue.push(self.id(head));
+                }
+            }
+            while let Some(fact) = queue.pop() {
+                for &axiom in self.axioms_with.get(fact as usize) {
+                    let axiom = axiom as usize;
+                    if axiom < bounds[0] || axiom >= bounds[1] {
+                        continue;
+                    }
+                    let head = self.axiom_heads[axiom];
+                    if state[head.variable as usize] != head.value && holds(axiom, state) {
+                        state[head.variable as usize] = head.value;
+                        queue.push(self.id(head));
+                    }
+                }
+            }
+        }
+    }
+
+    /// The exact cost of a plan.
+    pub(crate) fn plan_cost(&self, plan: &[u32]) -> f64 {
+        plan.iter().map(|&op| self.exact_costs[op as usize]).sum()
+    }
+}
+
+fn symbol(meaning: &Meaning) -> u32 {
+    match meaning {
+        Meaning::Atom { predicate, .. } => *predicate << 1,
+        Meaning::Object { fluent, value: Some(_), .. } => *fluent << 1 | 1,
+        _ => u32::MAX,
+    }
+}
+
+fn costs(task: &GroundTask) -> (Vec<u32>, Vec<f64>) {
+    let sign = if task.metric.as_ref().is_none_or(|m| m.minimise) { 1.0 } else { -1.0 };
+    let value = |e: &Expression| if let Expression::Constant(v) = e { sign * v } else { 1.0 };
+    let exact: Vec<f64> = task.actions.iter().map(|a| value(&a.cost)).collect();
+    let largest = exact.iter().copied().fold(0.0, f64::max);
+    let whole = exact.iter().all(|c| c.fract() == 0.0);
+    let scale = if whole { 1.0 } else { COST_SCALE }.min(LARGEST_COST / largest.max(1.0));
+    let costs = exact.iter().map(|c| (c * scale).round().clamp(0.0, LARGEST_COST) as u32).collect();
+    (costs, exact)
+}

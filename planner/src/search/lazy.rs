@@ -1,0 +1,272 @@
+//! Lazy best-first search with several open lists, preferred operators and lookahead; greedy or weighted A*
+//! (Richter and Westphal 2010, sections 5 and 6).
+
+use crate::heuristics::relaxed::{Counting, Relaxed};
+use crate::landmarks::{Landmarks, Status};
+
+use super::compiled::Compiled;
+use super::lookahead::Lookahead;
+use super::open::OpenList;
+use super::store::{NO_STATE, Store};
+use super::successor::Successors;
+
+/// How far preferred operators get ahead when a heuristic makes progress.
+const BOOST: i64 = 1000;
+
+/// What one search does.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Strategy {
+    /// Greedy where `None`, else weighted A* with this weight.
+    pub weight: Option<u32>,
+    /// How the heuristics count operators.
+    pub counting: Counting,
+    /// Whether to try lookahead states.
+    pub lookahead: bool,
+    /// Whether the number of landmarks left orders open lists of its own.
+    pub landmarks: bool,
+    /// Only plans cheaper than this (in the search's costs) are of interest.
+    pub bound: u32,
+    /// Give up after this much work (see [`Relaxed::work`]).
+    pub work_limit: u64,
+}
+
+/// How a search ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum End {
+    /// A plan.
+    Plan(Vec<u32>),
+    /// There is no (cheaper) plan.
+    Exhausted,
+    /// The work limit.
+    Limit,
+    /// The caller's stop signal.
+    Stopped,
+    /// The memory limit.
+    Memory,
+}
+
+/// Counts of a search.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Counts {
+    pub evaluated: u64,
+    pub expanded: u64,
+    pub work: u64,
+}
+
+/// What is shared between searches of one task.
+pub(crate) struct Shared<'a> {
+    pub task: &'a Compiled,
+    pub successors: &'a Successors,
+    pub landmarks: &'a Landmarks,
+    pub memory_limit: usize,
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+struct Search<'a, 's> {
+    shared: &'s Shared<'a>,
+    strategy: Strategy,
+    store: Store,
+    relaxed: Relaxed,
+    lookahead: Lookahead,
+    /// Relaxed-plan lists, then landmark lists; each: all operators, preferred ones.
+    lists: [OpenList; 4],
+    best: [u32; 2],
+    /// By state: landmarks accepted so far.
+    status: Status,
+    counts: Counts,
+    state: Vec<u32>,
+    next: Vec<u32>,
+    applicable: Vec<u32>,
+    preferred: Vec<u32>,
+}
+
+/// Runs one search.
+pub(crate) fn search(shared: &Shared<'_>, strategy: Strategy, counts: &mut Counts) -> End {
+    let task = shared.task;
+    let mut search = Search {
+        shared,
+        strategy,
+        store: Store::new(task),
+        relaxed: Relaxed::new(task, strategy.counting),
+        lookahead: Lookahead::new(task),
+        lists: Default::default(),
+        best: [u32::MAX; 2],
+        status: Status::new(shared.landmarks),
+        counts: Counts::default(),
+        state: Vec::new(),
+        next: Vec::new(),
+        applicable: Vec::new(),
+        preferred: Vec::new(),
+    };
+    let end = search.run();
+    counts.evaluated += search.counts.evaluated;
+    counts.expanded += search.counts.expanded;
+    counts.work += search.work();
+    end
+}
+
+/// A fixed price of making and storing a state, in units of [`Relaxed::work`].
+const STATE_WORK: u64 = 20;
+
+impl Search<'_, '_> {
+    fn work(&self) -> u64 {
+        self.relaxed.work + (self.counts.evaluated + self.counts.expanded) * STATE_WORK
+    }
+
+    fn run(&mut self) -> End {
+        let task = self.shared.task;
+        let (first, _) = self.store.insert(&task.initial, NO_STATE, 0, 0);
+        self.status.initial(self.shared.landmarks, task, &task.initial);
+        self.state = task.initial.clone();
+        if let Some(plan) = self.visit(first) {
+            return End::Plan(plan);
+        }
+        let mut round = 0u64;
+        loop {
+            round += 1;
+            if round % 64 == 0 && (self.shared.stop)() {
+                return End::Stopped;
+            }
+            if round % 256 == 0 && self.bytes() > self.shared.memory_limit {
+                return End::Memory;
+            }
+            if self.work() > self.strategy.work_limit {
+                return End::Limit;
+            }
+            let list = (0..4).filter(|&i| self.lists[i].len() > 0).min_by_key(|&i| self.lists[i].priority);
+            let Some(list) = list else { return End::Exhausted };
+            self.lists[list].priority += 1;
+            let Some((parent, operator)) = self.lists[list].pop() else { continue };
+            if let Some(plan) = self.follow(parent, operator) {
+                return End::Plan(plan);
+            }
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        let entries: usize = self.lists.iter().map(OpenList::len).sum();
+        self.store.bytes() + entries * 12 + self.status.bytes() + self.relaxed.bytes()
+    }
+
+    /// Makes the state behind an entry and visits it if that is worth while.
+    fn follow(&mut self, parent: u32, operator: u32) -> Option<Vec<u32>> {
+        let task = self.shared.task;
+        let cost = self.store.cost(parent).saturating_add(task.costs[operator as usize]);
+        if cost >= self.strategy.bound {
+            return None;
+        }
+        let mut state = std::mem::take(&mut self.state);
+        let mut next = std::mem::take(&mut self.next);
+        self.store.load(task, parent, &mut state);
+        task.apply(operator, &state, &mut next);
+        (self.state, self.next) = (next, state);
+        let (id, new) = self.store.insert(&self.state, parent, operator, cost);
+        self.status.follow(self.shared.landmarks, task, (parent, operator, id), &self.state, new);
+        if !new && !self.again(id, parent, operator, cost) {
+            return None;
+        }
+        self.visit(id)
+    }
+
+    /// Whether a known state is to be visited: never expanded, or (weighted A*) reached more cheaply.
+    fn again(&mut self, id: u32, parent: u32, operator: u32, cost: u32) -> bool {
+        if cost < self.store.cost(id) && self.strategy.weight.is_some() {
+            self.store.improve(id, parent, operator, cost);
+            return true;
+        }
+        !self.store.is_expanded(id)
+    }
+
+    /// Evaluates and expands the state in `self.state`, then its lookahead states as long as they are better.
+    fn visit(&mut self, mut id: u32) -> Option<Vec<u32>> {
+        let task = self.shared.task;
+        let mut last = u32::MAX;
+        loop {
+            if task.is_goal(&self.state) {
+                return Some(self.store.plan_to(id));
+            }
+            self.store.set_expanded(id, true);
+            self.counts.evaluated += 1;
+            let estimate = self.relaxed.evaluate(task, &self.state)?;
+            let left = self.status.left(self.shared.landmarks, task, id, &self.state);
+            self.progress([estimate, left]);
+            self.expand(id, estimate, left);
+            if !self.strategy.lookahead || estimate >= last {
+                return None;
+            }
+            last = estimate;
+            id = self.look_ahead(id)?;
+        }
+    }
+
+    fn progress(&mut self, estimates: [u32; 2]) {
+        let mut better = false;
+        for (best, estimate) in self.best.iter_mut().zip(estimates) {
+            if estimate < *best {
+                *best = estimate;
+                better = true;
+            }
+        }
+        if better {
+            self.lists[1].priority -= BOOST;
+            self.lists[3].priority -= BOOST;
+        }
+    }
+
+    fn expand(&mut self, id: u32, estimate: u32, left: u32) {
+        let task = self.shared.task;
+        self.counts.expanded += 1;
+        self.applicable.clear();
+        self.shared.successors.applicable(&self.state, &mut self.applicable);
+        self.preferred.clear();
+        self.preferred.extend_from_slice(&self.relaxed.preferred);
+        if self.strategy.landmarks {
+            let ahead = |op: &&u32| self.status.advances(self.shared.landmarks, task, id, **op);
+            let more: Vec<u32> = self.applicable.iter().filter(ahead).copied().collect();
+            self.preferred.extend(more);
+        }
+        let cost = self.store.cost(id);
+        let key = |h: u32| match self.strategy.weight {
+            None => h,
+            Some(weight) => h.saturating_mul(weight).saturating_add(cost),
+        };
+        let keys = [key(estimate), key(left)];
+        let lists = if self.strategy.landmarks { 2 } else { 1 };
+        for l in 0..lists {
+            for &operator in &self.applicable {
+                self.lists[2 * l].push(keys[l], (id, operator));
+            }
+            for &operator in &self.preferred {
+                self.lists[2 * l + 1].push(keys[l], (id, operator));
+            }
+        }
+    }
+
+    /// Moves `self.state` to the lookahead state; `None` if there is none or it is known already.
+    fn look_ahead(&mut self, mut id: u32) -> Option<u32> {
+        let task = self.shared.task;
+        self.lookahead.run(task, &self.state, &self.relaxed.plan);
+        let plan = std::mem::take(&mut self.lookahead.plan);
+        let mut fresh = None;
+        if plan.len() > 1 {
+            for &operator in &plan {
+                let cost = self.store.cost(id).saturating_add(task.costs[operator as usize]);
+                if cost >= self.strategy.bound {
+                    fresh = None;
+                    break;
+                }
+                task.apply(operator, &self.state, &mut self.next);
+                std::mem::swap(&mut self.state, &mut self.next);
+                let (next, new) = self.store.insert(&self.state, id, operator, cost);
+                if !new && self.strategy.weight.is_some() && cost < self.store.cost(next) {
+                    self.store.improve(next, id, operator, cost);
+                }
+                self.status.follow(self.shared.landmarks, task, (id, operator, next), &self.state, new);
+                id = next;
+                fresh = (new || !self.store.is_expanded(id)).then_some(id);
+            }
+        }
+        self.lookahead.plan = plan;
+        fresh
+    }
+}

@@ -1,0 +1,109 @@
+//! Lookahead states: as much of a relaxed plan as can really be applied, mended where an operator no longer fits
+//! (Vidal 2004, "A lookahead strategy for heuristic search planning").
+
+use crate::heuristics::relaxed::Relevant;
+
+use super::compiled::{Compiled, Lists};
+
+/// Working memory of the lookahead.
+pub(crate) struct Lookahead {
+    /// By fact: operators that bring it about.
+    achievers: Lists<u32>,
+    /// By fact: how many operators of the rest (and goals) need it.
+    needed: Vec<i32>,
+    rest: Vec<u32>,
+    state: Vec<u32>,
+    next: Vec<u32>,
+    /// The operators applied, in order.
+    pub plan: Vec<u32>,
+}
+
+impl Lookahead {
+    /// For a task.
+    pub(crate) fn new(task: &Compiled) -> Lookahead {
+        let pairs = (0..task.operators())
+            .flat_map(|op| task.effects.get(op).iter().map(move |e| (task.id(e.fact), op as u32)));
+        let mut needed = vec![0; task.facts];
+        task.goal.iter().for_each(|&f| needed[task.id(f) as usize] += 1);
+        Lookahead {
+            achievers: Lists::group(task.facts, pairs),
+            needed,
+            rest: Vec::new(),
+            state: Vec::new(),
+            next: Vec::new(),
+            plan: Vec::new(),
+        }
+    }
+
+    /// Applies what can be applied of the relaxed plan; leaves the operators in `plan`.
+    pub(crate) fn run(&mut self, task: &Compiled, from: &[u32], relaxed: &[Relevant]) {
+        self.plan.clear();
+        self.rest.clear();
+        self.rest.extend(relaxed.iter().map(|r| r.operator));
+        self.state.clear();
+        self.state.extend_from_slice(from);
+        for r in relaxed {
+            self.need(task, r.operator, 1);
+        }
+        loop {
+            while self.pass(task) {}
+            if self.rest.is_empty() || !self.mend(task) {
+                break;
+            }
+        }
+        for operator in std::mem::take(&mut self.rest) {
+            self.need(task, operator, -1);
+        }
+    }
+
+    /// Counts an operator's preconditions among those that the rest of the plan needs.
+    fn need(&mut self, task: &Compiled, operator: u32, by: i32) {
+        for &fact in task.preconditions.get(operator as usize) {
+            self.needed[task.id(fact) as usize] += by;
+        }
+    }
+
+    /// Applies every operator that can be applied, in order; tells whether there was one.
+    fn pass(&mut self, task: &Compiled) -> bool {
+        let before = self.plan.len();
+        let mut rest = std::mem::take(&mut self.rest);
+        rest.retain(|&operator| {
+            if !task.applicable(operator, &self.state) {
+                return true;
+            }
+            self.need(task, operator, -1);
+            self.step(task, operator);
+            false
+        });
+        self.rest = rest;
+        self.plan.len() > before
+    }
+
+    fn step(&mut self, task: &Compiled, operator: u32) {
+        task.apply(operator, &self.state, &mut self.next);
+        std::mem::swap(&mut self.state, &mut self.next);
+        self.plan.push(operator);
+    }
+
+    /// Finds two operators of which the first was to give the second a fact, and another operator that gives it and
+    /// can be applied now; puts that in the first one's place.
+    fn mend(&mut self, task: &Compiled) -> bool {
+        for i in 0..self.rest.len() {
+            for effect in task.effects.get(self.rest[i] as usize) {
+                let fact = task.id(effect.fact);
+                if task.holds(fact, &self.state) || self.needed[fact as usize] == 0 {
+                    continue;
+                }
+                let fits = |&&op: &&u32| op != self.rest[i] && task.applicable(op, &self.state);
+                let achievers = self.achievers.get(fact as usize).iter();
+                if let Some(&operator) = achievers.filter(fits).min_by_key(|&&op| task.costs[op as usize]) {
+                    let gone = self.rest.remove(i);
+                    self.need(task, gone, -1);
+                    self.step(task, operator);
+                    return true;
+                }
+            }
+        }
+        false
+    }
+}

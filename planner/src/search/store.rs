@@ -1,0 +1,171 @@
+//! States met so far, packed into words, each once.
+
+use super::compiled::Compiled;
+
+/// No state.
+pub(crate) const NO_STATE: u32 = u32::MAX;
+
+/// Where a variable lies in a packed state.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    word: u32,
+    shift: u32,
+    mask: u64,
+}
+
+/// Packed states with what led to each.
+pub(crate) struct Store {
+    places: Vec<Place>,
+    words: usize,
+    packed: Vec<u64>,
+    /// Open addressing: state numbers, `NO_STATE` for free.
+    table: Vec<u32>,
+    parents: Vec<u32>,
+    operators: Vec<u32>,
+    /// Cost from the first state, in the search's costs.
+    costs: Vec<u32>,
+    expanded: Vec<bool>,
+    scratch: Vec<u64>,
+}
+
+fn hash(words: &[u64]) -> u64 {
+    let mut h = 0x9e37_79b9_7f4a_7c15u64;
+    for &word in words {
+        h = (h ^ word).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        h ^= h >> 32;
+    }
+    h
+}
+
+impl Store {
+    /// Empty, for the states of a task (derived variables are not stored).
+    pub(crate) fn new(task: &Compiled) -> Store {
+        let mut order: Vec<usize> = (0..task.basic).collect();
+        let bits = |v: usize| 32 - task.domains[v].saturating_sub(1).leading_zeros();
+        order.sort_by_key(|&v| std::cmp::Reverse(bits(v)));
+        let mut places = vec![Place { word: 0, shift: 0, mask: 0 }; task.basic];
+        let mut free: Vec<u32> = Vec::new();
+        for v in order {
+            let need = bits(v);
+            let word = match free.iter().position(|&f| f >= need) {
+                Some(word) => word,
+                None => {
+                    free.push(64);
+                    free.len() - 1
+                }
+            };
+            places[v] = Place { word: word as u32, shift: 64 - free[word], mask: (1u64 << need) - 1 };
+            free[word] -= need;
+        }
+        let words = free.len().max(1);
+        Store {
+            places,
+            words,
+            packed: Vec::new(),
+            table: vec![NO_STATE; 1024],
+            parents: Vec::new(),
+            operators: Vec::new(),
+            costs: Vec::new(),
+            expanded: Vec::new(),
+            scratch: vec![0; words],
+        }
+    }
+
+    /// Number of states.
+    pub(crate) fn len(&self) -> usize {
+        self.parents.len()
+    }
+
+    /// Bytes taken, with what growth may take.
+    pub(crate) fn bytes(&self) -> usize {
+        self.packed.capacity() * 8 + self.table.len() * 4 + self.parents.capacity() * 13
+    }
+
+    /// Number of the state and whether it is new. A new one gets the parent, operator and cost.
+    pub(crate) fn insert(&mut self, state: &[u32], parent: u32, operator: u32, cost: u32) -> (u32, bool) {
+        self.scratch.fill(0);
+        for (place, &value) in self.places.iter().zip(state) {
+            self.scratch[place.word as usize] |= u64::from(value) << place.shift;
+        }
+        let mask = self.table.len() - 1;
+        let mut slot = hash(&self.scratch) as usize & mask;
+        while self.table[slot] != NO_STATE {
+            let id = self.table[slot] as usize;
+            if self.packed[id * self.words..(id + 1) * self.words] == self.scratch[..] {
+                return (id as u32, false);
+            }
+            slot = (slot + 1) & mask;
+        }
+        let id = self.parents.len() as u32;
+        self.table[slot] = id;
+        self.packed.extend_from_slice(&self.scratch);
+        self.parents.push(parent);
+        self.operators.push(operator);
+        self.costs.push(cost);
+        self.expanded.push(false);
+        if self.parents.len() * 3 > self.table.len() * 2 {
+            self.grow();
+        }
+        (id, true)
+    }
+
+    fn grow(&mut self) {
+        let size = self.table.len() * 2;
+        self.table.clear();
+        self.table.resize(size, NO_STATE);
+        for (id, words) in self.packed.chunks_exact(self.words).enumerate() {
+            let mut slot = hash(words) as usize & (size - 1);
+            while self.table[slot] != NO_STATE {
+                slot = (slot + 1) & (size - 1);
+            }
+            self.table[slot] = id as u32;
+        }
+    }
+
+    /// Unpacks a state, derived variables included.
+    pub(crate) fn load(&self, task: &Compiled, id: u32, state: &mut Vec<u32>) {
+        let words = &self.packed[id as usize * self.words..(id as usize + 1) * self.words];
+        state.clear();
+        state.extend(self.places.iter().map(|p| (words[p.word as usize] >> p.shift & p.mask) as u32));
+        state.resize(task.domains.len(), 1);
+        task.derive(state);
+    }
+
+    /// Cost from the first state.
+    pub(crate) fn cost(&self, id: u32) -> u32 {
+        self.costs[id as usize]
+    }
+
+    /// The state before it, and the operator in between.
+    pub(crate) fn parent(&self, id: u32) -> (u32, u32) {
+        (self.parents[id as usize], self.operators[id as usize])
+    }
+
+    /// Gives a state a cheaper way to it.
+    pub(crate) fn improve(&mut self, id: u32, parent: u32, operator: u32, cost: u32) {
+        self.parents[id as usize] = parent;
+        self.operators[id as usize] = operator;
+        self.costs[id as usize] = cost;
+    }
+
+    /// Whether its successors were made.
+    pub(crate) fn is_expanded(&self, id: u32) -> bool {
+        self.expanded[id as usize]
+    }
+
+    /// Notes that its successors were made, or (`false`) must be made again.
+    pub(crate) fn set_expanded(&mut self, id: u32, expanded: bool) {
+        self.expanded[id as usize] = expanded;
+    }
+
+    /// The operators from the first state to this one.
+    pub(crate) fn plan_to(&self, mut id: u32) -> Vec<u32> {
+        let mut plan = Vec::new();
+        while self.parents[id as usize] != NO_STATE {
+            plan.push(self.operators[id as usize]);
+            id = self.parents[id as usize];
+        }
+        plan.reverse();
+        plan
+    }
+}

@@ -1,8 +1,22 @@
 //! Clouds of several views in one (paper 004, section V, "Point Cloud Merging and Alignment").
+//!
+//! The paper chains pairwise ICP. Here all views are aligned together, against each other and against where localisation had them, so that
+//! nothing drifts and the merged frame stays the average of what localisation said. A view that cannot be placed is left out and says so.
+
+mod check;
+mod fuse;
+mod joint;
+mod prepare;
+mod search;
 
 use crate::cloud::Cloud;
-use crate::visibility::Visibility;
-use nalgebra::{Isometry3, Unit, Vector3};
+use crate::surface;
+use crate::view::View;
+use crate::visibility::{DepthMap, Visibility};
+use joint::{Found, Round, in_world};
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use prepare::Prepared;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How to merge.
@@ -28,9 +42,9 @@ impl Default for MergeOptions {
         MergeOptions {
             up: None,
             height_band_m: None,
-            range_m: 4.0,
+            range_m: 3.5,
             align_voxel_m: 0.01,
-            fuse_voxel_m: 0.002,
+            fuse_voxel_m: 0.003,
             most_points: 2_000_000,
         }
     }
@@ -117,4 +131,264 @@ pub enum MergeError {
         /// Words about the height band, or nothing.
         band: String,
     },
+}
+
+/// First alignment: everything, from far to near (the table weighs most; paper step 3).
+const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 400, plane_weight: 1.0 };
+/// Second alignment: planes weigh little, the objects decide (paper step 4).
+const SECOND: Round = Round { from_m: 0.04, to_m: 0.012, passes: 9, asked: 600, plane_weight: 0.2 };
+/// After a view was left out, the rest settles again.
+const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 600, plane_weight: 0.2 };
+/// A plane is dominant from this share of all points.
+const DOMINANT: f64 = 0.06;
+
+/// Merges views into one cloud in the world frame. One view is filtered and fused only.
+///
+/// # Errors
+/// If there is no view, no usable point, a pose that is not finite, or an option that means nothing.
+pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeError> {
+    let _span = tracing::debug_span!("merge", views = views.len()).entered();
+    check(views, options)?;
+    let mut steps = Vec::new();
+
+    let prepared = filter_and_thin(views, options, &mut steps)?;
+    let mut poses: Vec<Isometry3<f64>> = views.iter().map(|v| v.world_from_camera).collect();
+    let mut whys: Vec<Option<String>> = prepared
+        .iter()
+        .map(|p| p.points.is_empty().then(|| "it has no usable point in range".to_owned()))
+        .collect();
+    let mut used: Vec<bool> = whys.iter().map(Option::is_none).collect();
+
+    align_everything(&prepared, &used, &mut poses, &mut steps);
+    let (on_plane, up) = remove_planes(&prepared, &used, &poses, options, &mut steps);
+    let found = align_objects(&prepared, &mut used, &mut whys, &on_plane, up, &mut poses, views, &mut steps);
+    let seen = visibility(views, &used, &poses);
+    let fused = fuse::fuse(views, &used, &poses, &seen, options);
+    steps.push(Step {
+        name: "fuse".to_owned(),
+        points: fused.cloud.len(),
+        result: format!("{} returns in voxels of {:.1} mm", fused.returns, 1e3 * fused.voxel_m),
+    });
+
+    let fits =
+        (0..views.len()).map(|i| fit(&prepared[i], &poses[i], &found[i], used[i], whys[i].take())).collect();
+    Ok(Merged { cloud: fused.cloud, views_per_point: fused.views_per_point, visibility: seen, fits, steps })
+}
+
+fn check(views: &[View], options: &MergeOptions) -> Result<(), MergeError> {
+    if views.is_empty() {
+        return Err(MergeError::NoViews);
+    }
+    let positive = [
+        ("range_m", options.range_m),
+        ("align_voxel_m", options.align_voxel_m),
+        ("fuse_voxel_m", options.fuse_voxel_m),
+        ("most_points", options.most_points as f64),
+    ];
+    for (field, value) in positive {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(MergeError::Option { field, value, expected: "a positive number" });
+        }
+    }
+    let finite = |v: &View| v.world_from_camera.to_homogeneous().iter().all(|x| x.is_finite());
+    match views.iter().position(|v| !finite(v)) {
+        Some(view) => Err(MergeError::Pose { view }),
+        None => Ok(()),
+    }
+}
+
+/// Steps 1 and 2 of the paper: views by their poses into the world, filtered by height and range, thinned.
+fn filter_and_thin(
+    views: &[View],
+    options: &MergeOptions,
+    steps: &mut Vec<Step>,
+) -> Result<Vec<Prepared>, MergeError> {
+    let prepared: Vec<Prepared> = views.par_iter().map(|v| prepare::prepare(v, options)).collect();
+    let given = views.iter().map(|v| v.cloud.count_finite()).sum();
+    let points = prepared.iter().map(|p| p.points.len()).sum();
+    if points == 0 {
+        let band =
+            options.height_band_m.map_or(String::new(), |(low, high)| format!(" and {low} to {high} m high"));
+        return Err(MergeError::Empty { views: views.len(), range_m: options.range_m, band });
+    }
+    let step = |name: &str, points, result: String| Step { name: name.to_owned(), points, result };
+    steps.push(step("initial alignment", given, format!("{} views by their stated poses", views.len())));
+    let thinned = format!("within {} m, voxels of {:.0} mm", options.range_m, 1e3 * options.align_voxel_m);
+    steps.push(step("filter and thin", points, thinned));
+    Ok(prepared)
+}
+
+/// Step 3: all points; the table levels the views.
+fn align_everything(
+    prepared: &[Prepared],
+    used: &[bool],
+    poses: &mut [Isometry3<f64>],
+    steps: &mut Vec<Step>,
+) {
+    let nothing: Vec<Vec<bool>> = prepared.iter().map(|p| vec![false; p.points.len()]).collect();
+    let found = joint::align(prepared, used, &nothing, poses, &FIRST);
+    steps.push(aligned("first alignment", &found));
+}
+
+fn aligned(name: &str, found: &[Found]) -> Step {
+    let matched: usize = found.iter().map(|f| f.matched).sum();
+    let squares: f64 = found.iter().map(|f| f.matched as f64 * f.residual_m.powi(2)).sum();
+    let residual_m = (squares / matched.max(1) as f64).sqrt();
+    Step {
+        name: name.to_owned(),
+        points: matched,
+        result: format!("matched within {:.1} mm of each other's planes", 1e3 * residual_m),
+    }
+}
+
+/// Step 4, first half: which points lie on dominant planes, and which way is up.
+fn remove_planes(
+    prepared: &[Prepared],
+    used: &[bool],
+    poses: &[Isometry3<f64>],
+    options: &MergeOptions,
+    steps: &mut Vec<Step>,
+) -> (Vec<Vec<bool>>, Option<Unit<Vector3<f64>>>) {
+    let places: Vec<Vec<Point3<f64>>> = (0..prepared.len())
+        .map(|i| if used[i] { in_world(&prepared[i], &poses[i]) } else { Vec::new() })
+        .collect();
+    let planes = surface::dominant_planes(&places, prepared.iter().map(|p| p.sigmas_m.as_slice()), DOMINANT);
+    let held: Vector3<f64> =
+        poses.iter().zip(used).filter(|(_, u)| **u).map(|(p, _)| p.rotation * -Vector3::y()).sum();
+    let held = options.up.or_else(|| Unit::try_new(held, 1e-6));
+    let upright = planes.iter().find(|n| held.is_none_or(|up| n.0.dot(&up).abs() > 0.5));
+    let up = upright.map(|(normal, _)| match held {
+        Some(held) if held.dot(normal) < 0.0 => Unit::new_normalize(-normal),
+        _ => Unit::new_normalize(*normal),
+    });
+    let mut left = 0;
+    let on_plane: Vec<Vec<bool>> = (0..prepared.len())
+        .map(|i| {
+            let mut flags = vec![false; prepared[i].points.len()];
+            for (k, place) in places[i].iter().enumerate() {
+                let normal = poses[i].rotation * prepared[i].normals[k];
+                flags[k] = planes.iter().any(|(n, offset)| {
+                    let near = (n.dot(&place.coords) - offset).abs() < 3.0 * prepared[i].sigmas_m[k] + 0.006;
+                    near && n.dot(&normal).abs() > 0.8
+                });
+                left += usize::from(!flags[k]);
+            }
+            flags
+        })
+        .collect();
+    let result = format!("{} dominant planes removed", planes.len());
+    steps.push(Step { name: "plane removal".to_owned(), points: left, result });
+    (on_plane, up)
+}
+
+/// Step 4, second half: the objects decide; views that contradict the others are left out one by one.
+#[allow(clippy::too_many_arguments)]
+fn align_objects(
+    prepared: &[Prepared],
+    used: &mut [bool],
+    whys: &mut [Option<String>],
+    on_plane: &[Vec<bool>],
+    up: Option<Unit<Vector3<f64>>>,
+    poses: &mut [Isometry3<f64>],
+    views: &[View],
+    steps: &mut Vec<Step>,
+) -> Vec<Found> {
+    if let Some(up) = up {
+        place_objects(prepared, used, on_plane, &up, poses);
+    }
+    let mut found = joint::align(prepared, used, on_plane, poses, &SECOND);
+    let maps: Vec<Option<DepthMap>> =
+        views.iter().map(|v| DepthMap::from_view(v, &v.world_from_camera)).collect();
+    while let Some((worst, why)) = check::misfit(prepared, used, on_plane, poses, &maps, &found) {
+        used[worst] = false;
+        whys[worst] = Some(why);
+        poses[worst] = prepared[worst].prior;
+        let settled = joint::align(prepared, used, on_plane, poses, &SETTLE);
+        found.iter_mut().zip(settled).zip(used.iter()).for_each(|((f, s), u)| {
+            if *u {
+                *f = s;
+            }
+        });
+    }
+    steps.push(aligned("second alignment", &found));
+    found
+}
+
+/// Puts the objects of one view after another onto those already placed, nearest camera first.
+fn place_objects(
+    prepared: &[Prepared],
+    used: &[bool],
+    on_plane: &[Vec<bool>],
+    up: &Unit<Vector3<f64>>,
+    poses: &mut [Isometry3<f64>],
+) {
+    let objects = |i: usize, pose: &Isometry3<f64>| -> Vec<(Point3<f64>, Vector3<f64>)> {
+        let view = &prepared[i];
+        let off = (0..view.points.len()).filter(|&k| !on_plane[i][k]);
+        off.map(|k| (pose * view.points[k], pose.rotation * view.normals[k])).collect()
+    };
+    let mut left: Vec<usize> = (0..prepared.len()).filter(|&i| used[i]).collect();
+    let count = |i: usize| on_plane[i].iter().filter(|p| !**p).count();
+    let Some(first) = left.iter().copied().max_by_key(|&i| (count(i), usize::MAX - i)) else { return };
+    left.retain(|&i| i != first);
+    let mut placed = objects(first, &poses[first]);
+    let mut done = vec![first];
+    while !left.is_empty() {
+        let apart = |i: usize| {
+            let turns = done.iter().map(|&d| poses[i].rotation.angle_to(&poses[d].rotation));
+            turns.min_by(f64::total_cmp).unwrap_or(0.0)
+        };
+        let Some(next) = left.iter().copied().min_by(|&a, &b| apart(a).total_cmp(&apart(b)).then(a.cmp(&b)))
+        else {
+            return;
+        };
+        left.retain(|&i| i != next);
+        let own = objects(next, &poses[next]);
+        let window = window(&prepared[next], &own, &poses[next]);
+        if let Some(correction) = search::place(&own, &placed, up, window) {
+            poses[next] = correction * poses[next];
+        }
+        placed.extend(objects(next, &poses[next]));
+        done.push(next);
+    }
+}
+
+/// How far off two views may be from each other at the distance of the objects: three spreads, at least the 10 cm and 6° of a poor localisation.
+fn window(view: &Prepared, objects: &[(Point3<f64>, Vector3<f64>)], pose: &Isometry3<f64>) -> search::Window {
+    let sum = objects.iter().fold(Vector3::zeros(), |s, (p, _)| s + p.coords);
+    let distance = (sum / objects.len().max(1) as f64 - pose.translation.vector).norm().min(3.0);
+    let turn_rad = (3.0 * view.sigma_rad).clamp(0.02, 0.12);
+    let shift_m = (3.0 * view.sigma_m).clamp(0.02, 0.12) + distance * turn_rad;
+    search::Window { shift_m: shift_m.min(0.27), turn_rad: 1.2 * turn_rad }
+}
+
+fn visibility(views: &[View], used: &[bool], poses: &[Isometry3<f64>]) -> Visibility {
+    let of = |i: usize| if used[i] { DepthMap::from_view(&views[i], &poses[i]) } else { None };
+    Visibility { maps: (0..views.len()).filter_map(of).collect() }
+}
+
+fn fit(
+    prepared: &Prepared,
+    pose: &Isometry3<f64>,
+    found: &Found,
+    used: bool,
+    left_out: Option<String>,
+) -> ViewFit {
+    let (turn, shift) = joint::departure(pose, &prepared.prior);
+    let why = match left_out {
+        Some(why) => format!("left out: {why}"),
+        None if found.matched == 0 => "nothing to align with".to_owned(),
+        None if found.converged => "settled".to_owned(),
+        None => "the passes ran out before it settled".to_owned(),
+    };
+    ViewFit {
+        world_from_camera: *pose,
+        moved_m: shift.norm(),
+        moved_rad: turn.norm(),
+        matched: found.matched,
+        residual_m: found.residual_m,
+        converged: used && (found.converged || found.matched == 0),
+        used,
+        why,
+    }
 }

@@ -237,6 +237,29 @@ fn large_planes(samples: &[Sample], seed: u64, plausible: impl Fn(&Plane) -> boo
     planes
 }
 
+/// Normals and offsets of planes that hold at least a share of all points; points by view, with their spreads.
+pub(crate) fn dominant_planes<'a>(
+    places: &[Vec<Point3<f64>>],
+    sigmas_m: impl Iterator<Item = &'a [f64]>,
+    share: f64,
+) -> Vec<(Vector3<f64>, f64)> {
+    let total: usize = places.iter().map(Vec::len).sum();
+    let stride = (total / (SAMPLE / 2)).max(1);
+    let samples: Vec<Sample> = places
+        .iter()
+        .zip(sigmas_m)
+        .flat_map(|(view, sigmas)| view.iter().zip(sigmas))
+        .step_by(stride)
+        .map(|(point, sigma_m)| Sample { point: *point, sigma_m: *sigma_m })
+        .collect();
+    let holds = |plane: &Plane| {
+        let near = |s: &&Sample| plane.distance(&s.point).abs() < 3.0 * s.sigma_m + 0.004;
+        samples.iter().filter(near).count() as f64 >= share * samples.len() as f64
+    };
+    let planes = large_planes(&samples, 1, |_| true);
+    planes.into_iter().filter(holds).map(|p| (p.normal, p.offset)).collect()
+}
+
 /// The best of planes through three neighbouring points.
 fn propose(left: &[&Sample], rng: &mut Draws, plausible: &impl Fn(&Plane) -> bool) -> Option<Plane> {
     const REACH_M: f64 = 0.3;

@@ -85,8 +85,12 @@ impl DepthMap {
     ///
     /// Free needs every return in the 3×3 pixels around to lie beyond the point: a depth edge is no proof.
     pub fn look(&self, p: &Point3<f64>, tolerance_m: f64) -> Seen {
-        let q = self.camera_from_world * p;
-        let Some((u, v)) = self.intrinsics.project(&q) else { return Seen::Never };
+        self.look_from(&(self.camera_from_world * p), tolerance_m)
+    }
+
+    /// As [`DepthMap::look`], for a point in the camera's optical frame.
+    pub(crate) fn look_from(&self, q: &Point3<f64>, tolerance_m: f64) -> Seen {
+        let Some((u, v)) = self.intrinsics.project(q) else { return Seen::Never };
         let Some(middle) = self.intrinsics.pixel(u, v) else { return Seen::Never };
         let (width, height) = (self.intrinsics.width, self.intrinsics.height);
         let (column, row) = (middle % width, middle / width);

@@ -1,0 +1,97 @@
+//! Which views belong together, and which contradict the others.
+
+use super::joint::Found;
+use super::prepare::Prepared;
+use crate::visibility::{DepthMap, Seen};
+use nalgebra::Isometry3;
+
+/// Fewest matched points for a view to count as overlapping.
+const FEWEST_MATCHED: usize = 80;
+/// How far a surface may lie from where another camera looked through before it contradicts, metres.
+const CLEAR_M: f64 = 0.03;
+/// Share of points that another camera looked through from which a view counts as wrongly placed.
+const MOST_CONTRADICTED: f64 = 0.22;
+
+/// The view that least belongs, with the reason; `None` if all that are used belong together.
+pub(super) fn misfit(
+    views: &[Prepared],
+    used: &[bool],
+    on_plane: &[Vec<bool>],
+    poses: &[Isometry3<f64>],
+    maps: &[Option<DepthMap>],
+    found: &[Found],
+) -> Option<(usize, String)> {
+    let active: Vec<usize> = (0..views.len()).filter(|&i| used[i]).collect();
+    if active.len() < 2 {
+        return None;
+    }
+    let lonely = active.iter().copied().filter(|&i| found[i].matched < FEWEST_MATCHED);
+    if let Some(i) = lonely.min_by_key(|&i| (views[i].points.len(), usize::MAX - i)) {
+        return Some((i, format!("it shares only {} points with the other views", found[i].matched)));
+    }
+    let far = active.iter().copied().filter_map(|i| too_far(&views[i], &poses[i]).map(|why| (i, why)));
+    if let Some(worst) = far.max_by(|a, b| a.1.0.total_cmp(&b.1.0)) {
+        return Some((worst.0, worst.1.1));
+    }
+    let mut contradicted: Vec<(f64, usize)> = active
+        .iter()
+        .map(|&i| {
+            let others = active.iter().copied().filter(|&j| j != i);
+            let worst = others.map(|j| {
+                contradiction(&views[i], &on_plane[i], &poses[i], maps[j].as_ref(), &poses[j])
+                    .max(contradiction(&views[j], &on_plane[j], &poses[j], maps[i].as_ref(), &poses[i]))
+            });
+            // With one other view there is nobody to ask who is wrong: the mean over partners blames who disagrees with most.
+            let (n, sum) = worst.fold((0, 0.0), |(n, s), c| (n + 1, s + c));
+            (sum / f64::from(n.max(1)), i)
+        })
+        .collect();
+    contradicted.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
+    let (share, worst) = contradicted[0];
+    (share > MOST_CONTRADICTED).then(|| {
+        (
+            worst,
+            format!("{:.0} % of what it shows contradicts what the other views saw through", 100.0 * share),
+        )
+    })
+}
+
+/// How far beyond belief the camera was moved, with words.
+fn too_far(view: &Prepared, pose: &Isometry3<f64>) -> Option<(f64, String)> {
+    // Localisation errs by more than it states now and then; 10 cm and 6° must be mended.
+    let most = ((5.0 * view.sigma_m).max(0.2), (5.0 * view.sigma_rad).max(0.2));
+    let (turn, shift) = super::joint::departure(pose, &view.prior);
+    let excess = (shift.norm() / most.0).max(turn.norm() / most.1);
+    (excess > 1.0).then(|| {
+        let words = format!(
+            "it would have to move {:.2} m and turn {:.1}°, more than localisation errs",
+            shift.norm(),
+            turn.norm().to_degrees()
+        );
+        (excess, words)
+    })
+}
+
+/// Share of a view's points off the planes, among those another camera can judge, through which that camera looked.
+fn contradiction(
+    view: &Prepared,
+    on_plane: &[bool],
+    pose: &Isometry3<f64>,
+    map: Option<&DepthMap>,
+    map_pose: &Isometry3<f64>,
+) -> f64 {
+    const ASKED: usize = 300;
+    let Some(map) = map else { return 0.0 };
+    let map_from_view = map_pose.inv_mul(pose);
+    let off: Vec<usize> = (0..view.points.len()).filter(|&k| !on_plane[k]).collect();
+    let stride = (off.len() / ASKED).max(1);
+    let (mut judged, mut through) = (0_u32, 0_u32);
+    for &k in off.iter().step_by(stride) {
+        match map.look_from(&(map_from_view * view.points[k]), CLEAR_M) {
+            Seen::Free => (judged, through) = (judged + 1, through + 1),
+            Seen::Surface => judged += 1,
+            Seen::Hidden | Seen::Never => {}
+        }
+    }
+    if judged < 25 { 0.0 } else { f64::from(through) / f64::from(judged) }
+}

@@ -1,0 +1,243 @@
+//! Steps 3 and 4: all views moved together until their surfaces meet.
+//!
+//! One least-squares problem over all poses: point-to-plane distances between every two views that overlap, and each pose's distance
+//! from where localisation had it. The second part fixes the common frame: it is the robust average of what localisation said.
+
+use super::prepare::Prepared;
+use nalgebra::{
+    DMatrix, DVector, Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6,
+};
+use rayon::prelude::*;
+
+/// How one round of alignment looks for partners.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Round {
+    /// Partners lie within this, metres, at the first pass ...
+    pub from_m: f64,
+    /// ... and at the last.
+    pub to_m: f64,
+    /// Most passes.
+    pub passes: usize,
+    /// Points of each view and pair that are asked for a partner at most.
+    pub asked: usize,
+    /// Weight of points on planes against the others.
+    pub plane_weight: f64,
+}
+
+/// What a round found of one view.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Found {
+    pub matched: usize,
+    pub residual_m: f64,
+    pub converged: bool,
+}
+
+struct Link {
+    from: usize,
+    to: usize,
+    /// Normal equations of the two poses, and residual sums.
+    blocks: [Matrix6<f64>; 3],
+    rights: [Vector6<f64>; 2],
+    matched: usize,
+    squares: f64,
+}
+
+/// Smallest cosine between the normals of partners.
+const SAME_SIDE: f64 = 0.75;
+/// A pass that moves no camera farther than this, metres and radians, ends the round.
+const SETTLED: (f64, f64) = (2e-4, 2e-4);
+
+/// Aligns the views that are `used` among each other. `on_plane` tells for each view which points lie on dominant planes.
+pub(super) fn align(
+    views: &[Prepared],
+    used: &[bool],
+    on_plane: &[Vec<bool>],
+    poses: &mut [Isometry3<f64>],
+    round: &Round,
+) -> Vec<Found> {
+    let pairs = pairs(views, used, poses);
+    let mut found = vec![Found::default(); views.len()];
+    for pass in 0..round.passes {
+        let share = pass as f64 / (round.passes.max(2) - 1) as f64;
+        let radius = round.from_m * (round.to_m / round.from_m).powf(share);
+        let links: Vec<Link> =
+            pairs.par_iter().map(|&(i, j)| link(views, on_plane, poses, (i, j), radius, round)).collect();
+        let moved = step(views, used, poses, &links);
+        for (i, f) in found.iter_mut().enumerate() {
+            let own = links.iter().filter(|l| l.from == i || l.to == i);
+            let (n, squares) = own.fold((0, 0.0), |(n, s), l| (n + l.matched, s + l.squares));
+            *f = Found {
+                matched: n,
+                residual_m: (squares / n.max(1) as f64).sqrt(),
+                converged: moved.0 < 5.0 * SETTLED.0 && moved.1 < 5.0 * SETTLED.1,
+            };
+        }
+        if share >= 0.5 && moved.0 < SETTLED.0 && moved.1 < SETTLED.1 && radius <= 1.5 * round.to_m {
+            break;
+        }
+    }
+    found
+}
+
+/// Pairs of views to match: all if they are few, else each with those whose cameras are nearest.
+fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
+    const ALL_BELOW: usize = 7;
+    const PARTNERS: usize = 5;
+    let active: Vec<usize> = (0..views.len()).filter(|&i| used[i] && !views[i].points.is_empty()).collect();
+    let mut pairs = Vec::new();
+    for &i in &active {
+        let mut others: Vec<usize> = active.iter().copied().filter(|&j| j != i).collect();
+        if active.len() >= ALL_BELOW {
+            let apart = |j: usize| {
+                let turn = poses[i].rotation.angle_to(&poses[j].rotation);
+                (poses[i].translation.vector - poses[j].translation.vector).norm() + turn
+            };
+            others.sort_by(|&a, &b| apart(a).total_cmp(&apart(b)).then(a.cmp(&b)));
+            // Near neighbours hold the chain, a few far ones close the ring.
+            let far: Vec<usize> =
+                others.iter().copied().skip(PARTNERS).step_by(others.len() / 2 + 1).collect();
+            others.truncate(PARTNERS);
+            others.extend(far);
+        }
+        pairs.extend(others.into_iter().map(|j| (i, j)));
+    }
+    pairs
+}
+
+/// Partners of view i's points in view j and what they ask of both poses.
+fn link(
+    views: &[Prepared],
+    on_plane: &[Vec<bool>],
+    poses: &[Isometry3<f64>],
+    (i, j): (usize, usize),
+    radius: f64,
+    round: &Round,
+) -> Link {
+    let (a, b) = (&views[i], &views[j]);
+    let j_from_i = poses[j].inv_mul(&poses[i]);
+    let turn_i = poses[i].rotation;
+    let mut link = Link {
+        from: i,
+        to: j,
+        blocks: [Matrix6::zeros(); 3],
+        rights: [Vector6::zeros(); 2],
+        matched: 0,
+        squares: 0.0,
+    };
+    let planes = on_plane[i].iter().filter(|p| **p).count();
+    let stride_of = |count: usize| (count / round.asked).max(1);
+    let (plane_stride, free_stride) = (stride_of(planes), stride_of(a.points.len() - planes));
+    let (mut seen_plane, mut seen_free) = (0, 0);
+    for (k, p) in a.points.iter().enumerate() {
+        let (seen, stride) =
+            if on_plane[i][k] { (&mut seen_plane, plane_stride) } else { (&mut seen_free, free_stride) };
+        *seen += 1;
+        if (*seen + j) % stride != 0 {
+            continue;
+        }
+        let in_j = j_from_i * p;
+        let Some(near) = b.tree.nearest(&in_j.cast(), radius as f32) else { continue };
+        let partner = near.index as usize;
+        let normal_j = b.normals[partner];
+        if (j_from_i.rotation * a.normals[k]).dot(&normal_j) < SAME_SIDE {
+            continue;
+        }
+        let normal = poses[j].rotation * normal_j;
+        let (from_i, from_j) = (turn_i * p.coords, poses[j].rotation * b.points[partner].coords);
+        let gap = poses[i].translation.vector + from_i - poses[j].translation.vector - from_j;
+        let residual = normal.dot(&gap);
+        let sigma = a.sigmas_m[k].hypot(b.sigmas_m[partner]).hypot(0.002);
+        // Geman-McClure: what does not fit within the radius loses its say smoothly.
+        let scale = (0.5 * radius).max(2.0 * sigma);
+        let robust = (1.0 / (1.0 + (residual / scale).powi(2))).powi(2);
+        let plane = if on_plane[i][k] { round.plane_weight } else { 1.0 };
+        let weight = plane * robust / (sigma * sigma);
+        let own = jacobian(&from_i, &normal);
+        let other = -jacobian(&from_j, &normal);
+        link.blocks[0] += own * own.transpose() * weight;
+        link.blocks[1] += own * other.transpose() * weight;
+        link.blocks[2] += other * other.transpose() * weight;
+        link.rights[0] -= own * (residual * weight);
+        link.rights[1] -= other * (residual * weight);
+        link.matched += 1;
+        link.squares += residual * residual;
+    }
+    link
+}
+
+/// Change of the distance along `normal` with a turn about the camera and a shift of it.
+fn jacobian(arm: &Vector3<f64>, normal: &Vector3<f64>) -> Vector6<f64> {
+    let turn = arm.cross(normal);
+    Vector6::new(turn.x, turn.y, turn.z, normal.x, normal.y, normal.z)
+}
+
+/// One Gauss-Newton step on all poses; returns the largest shift and turn.
+fn step(views: &[Prepared], used: &[bool], poses: &mut [Isometry3<f64>], links: &[Link]) -> (f64, f64) {
+    let mut slots = vec![usize::MAX; views.len()];
+    let active: Vec<usize> = (0..views.len()).filter(|&i| used[i]).collect();
+    active.iter().enumerate().for_each(|(slot, &i)| slots[i] = slot);
+    let n = 6 * active.len();
+    let mut normal = DMatrix::<f64>::zeros(n, n);
+    let mut right = DVector::<f64>::zeros(n);
+    for link in links {
+        let (i, j) = (6 * slots[link.from], 6 * slots[link.to]);
+        // Neighbouring points share their errors; the matched surface counts as this many independent looks.
+        let shared = (150.0 / link.matched.max(1) as f64).min(1.0);
+        let mut add = |r: usize, c: usize, m: &Matrix6<f64>| {
+            let mut view = normal.fixed_view_mut::<6, 6>(r, c);
+            view += m * shared;
+        };
+        add(i, i, &link.blocks[0]);
+        add(i, j, &link.blocks[1]);
+        add(j, i, &link.blocks[1].transpose());
+        add(j, j, &link.blocks[2]);
+        let mut rows = right.fixed_rows_mut::<6>(i);
+        rows += link.rights[0] * shared;
+        let mut rows = right.fixed_rows_mut::<6>(j);
+        rows += link.rights[1] * shared;
+    }
+    for (slot, &i) in active.iter().enumerate() {
+        let (turn, shift) = departure(&poses[i], &views[i].prior);
+        for (k, (off, sigma)) in
+            [(turn, views[i].sigma_rad), (shift, views[i].sigma_m)].into_iter().enumerate()
+        {
+            let weight = prior_weight(off.norm() / sigma) / (sigma * sigma);
+            for axis in 0..3 {
+                let at = 6 * slot + 3 * k + axis;
+                normal[(at, at)] += weight;
+                right[at] -= weight * off[axis];
+            }
+        }
+    }
+    let Some(solution) = normal.cholesky().map(|c| c.solve(&right)) else { return (0.0, 0.0) };
+    let mut most = (0.0_f64, 0.0_f64);
+    for (slot, &i) in active.iter().enumerate() {
+        let d = solution.fixed_rows::<6>(6 * slot);
+        let (turn, shift) = (Vector3::new(d[0], d[1], d[2]), Vector3::new(d[3], d[4], d[5]));
+        if !(turn.norm() < 1.0 && shift.norm() < 1.0) {
+            continue;
+        }
+        poses[i] = Isometry3::from_parts(
+            Translation3::from(poses[i].translation.vector + shift),
+            UnitQuaternion::from_scaled_axis(turn) * poses[i].rotation,
+        );
+        most = (most.0.max(shift.norm()), most.1.max(turn.norm()));
+    }
+    most
+}
+
+/// A camera far from where localisation had it loses its say on the common frame: one lost view must not drag the others.
+fn prior_weight(sigmas: f64) -> f64 {
+    1.0 / (1.0 + (sigmas / 4.0).powi(2))
+}
+
+/// Turn (scaled axis) and shift of the camera from where localisation had it.
+pub(super) fn departure(pose: &Isometry3<f64>, prior: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let turn = (pose.rotation * prior.rotation.inverse()).scaled_axis();
+    (turn, pose.translation.vector - prior.translation.vector)
+}
+
+/// Points of the view in the world.
+pub(super) fn in_world(view: &Prepared, pose: &Isometry3<f64>) -> Vec<Point3<f64>> {
+    view.points.iter().map(|p| pose * p).collect()
+}

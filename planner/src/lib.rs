@@ -11,9 +11,12 @@ mod landmarks;
 pub mod pddl;
 pub mod plan;
 mod search;
+pub mod semantics;
 mod solve;
+pub mod state;
 pub mod task;
 mod temporal;
+mod validate;
 
 pub use attachment::{
     Answer, Attachment, AttachmentError, Attachments, Call, CallError, CallKind, CallStatistics, FactValue,
@@ -23,5 +26,8 @@ pub use diagnostic::{Diagnostic, Findings, Label, Severity, Source, Span};
 pub use explain::Explanation;
 pub use pddl::check;
 pub use plan::{Plan, Step};
+pub use semantics::Semantics;
 pub use solve::{EPSILON_S, Options, Outcome, PlanError, Statistics, plan};
+pub use state::State;
 pub use task::Task;
+pub use validate::{Broken, SEPARATION_S, Verdict, monitor, validate};

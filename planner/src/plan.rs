@@ -1,13 +1,17 @@
-//! Plans: what to do, when, for how long.
+//! Plans: what to do, when, for how long; in the form of the planning competitions.
+
+use std::fmt;
+
+use crate::diagnostic::{Diagnostic, Findings, Source, Span};
 
 /// One step of a plan.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Step {
     /// When it starts, from the beginning of the plan; `None` in a classical plan.
     pub start_s: Option<f64>,
-    /// Name of the action, lower case.
+    /// Name of the action.
     pub action: String,
-    /// Names of the objects, lower case.
+    /// Names of the objects, and behind them what grounding modules proposed.
     pub arguments: Vec<String>,
     /// How long it takes; 0 for an instantaneous action.
     pub duration_s: f64,
@@ -20,4 +24,208 @@ pub struct Plan {
     pub steps: Vec<Step>,
     /// Its cost, as far as known.
     pub cost: Option<f64>,
+}
+
+impl Plan {
+    /// Reads `0.000: (move a b) [3.200]` and `(move a b)`, one or more to a line; steps come in order of time.
+    ///
+    /// # Errors
+    /// Every line that is no step.
+    pub fn read(source: &Source) -> Result<Plan, Findings> {
+        let mut reader = Reader { text: &source.text, at: 0, findings: Vec::new() };
+        let mut plan = Plan { steps: Vec::new(), cost: cost_comment(&source.text) };
+        let mut places: Vec<Span> = Vec::new();
+        while let Some((step, place)) = reader.step() {
+            plan.steps.push(step);
+            places.push(place);
+        }
+        let timed = plan.steps.first().map(|step| step.start_s.is_some());
+        let other = plan.steps.iter().position(|step| Some(step.start_s.is_some()) != timed);
+        if let (Some(other), Some(&first)) = (other, places.first()) {
+            let message = "some steps have a time and some have none";
+            let finding = Diagnostic::error("plan", message, places[other], "unlike the first step");
+            reader.findings.push(finding.with_label(first, "the first step"));
+        }
+        if !reader.findings.is_empty() {
+            return Err(Findings { sources: vec![source.clone()], list: reader.findings });
+        }
+        plan.steps.sort_by(|one, other| one.start_s.unwrap_or(0.0).total_cmp(&other.start_s.unwrap_or(0.0)));
+        Ok(plan)
+    }
+
+    /// When the last step ends; 0 for an empty plan, `None` for a classical one.
+    pub fn makespan_s(&self) -> Option<f64> {
+        self.steps.iter().try_fold(0.0, |last: f64, step| Some(last.max(step.start_s? + step.duration_s)))
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for step in &self.steps {
+            if let Some(start_s) = step.start_s {
+                write!(f, "{}: ", seconds(start_s))?;
+            }
+            write!(f, "({}", step.action)?;
+            for argument in &step.arguments {
+                write!(f, " {argument}")?;
+            }
+            f.write_str(")")?;
+            if step.start_s.is_some() {
+                write!(f, " [{}]", seconds(step.duration_s))?;
+            }
+            f.write_str("\n")?;
+        }
+        if let Some(cost) = self.cost {
+            writeln!(f, "; cost = {cost}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Three digits, or six where three are not exact.
+fn seconds(value: f64) -> String {
+    if ((value * 1e3).round() / 1e3 - value).abs() < 1e-9 {
+        format!("{value:.3}")
+    } else {
+        format!("{value:.6}")
+    }
+}
+
+fn cost_comment(text: &str) -> Option<f64> {
+    let comment = text.lines().filter_map(|line| line.trim().strip_prefix(';'));
+    let value =
+        comment.filter_map(|line| line.trim().strip_prefix("cost")?.trim().strip_prefix('=')).next()?;
+    value.split_whitespace().next()?.parse().ok()
+}
+
+struct Reader<'a> {
+    text: &'a str,
+    at: usize,
+    findings: Vec<Diagnostic>,
+}
+
+impl Reader<'_> {
+    fn rest(&self) -> &str {
+        &self.text[self.at..]
+    }
+
+    fn skip_blanks(&mut self) {
+        loop {
+            let blanks = self.rest().len() - self.rest().trim_start().len();
+            self.at += blanks;
+            if !self.rest().starts_with(';') {
+                return;
+            }
+            self.at += self.rest().find('\n').unwrap_or(self.rest().len());
+        }
+    }
+
+    /// The next step that can be read; what cannot is reported, line by line.
+    fn step(&mut self) -> Option<(Step, Span)> {
+        loop {
+            self.skip_blanks();
+            if self.rest().is_empty() {
+                return None;
+            }
+            let start = self.at;
+            match self.try_step() {
+                Ok(step) => return Some((step, span(start, self.at))),
+                Err((message, help)) => {
+                    let end = self.text[start..].find('\n').map_or(self.text.len(), |line| start + line);
+                    let written = self.text[start..end].trim_end().len();
+                    let finding =
+                        Diagnostic::error("plan", message, span(start, start + written), "not a step");
+                    self.findings.push(finding.with_help(help));
+                    self.at = end;
+                }
+            }
+        }
+    }
+
+    fn try_step(&mut self) -> Result<Step, (&'static str, &'static str)> {
+        const SHAPE: &str =
+            "a step looks like `0.000: (move a b) [3.200]`, or `(move a b)` in a plan without times";
+        let start_s = match self.rest().find([':', '(', '\n']) {
+            Some(colon) if self.rest()[colon..].starts_with(':') => {
+                let time = self.rest()[..colon].trim().parse::<f64>().ok().filter(|time| time.is_finite());
+                let time = time.ok_or(("a time was expected before `:`", SHAPE))?;
+                self.at += colon + 1;
+                self.skip_blanks();
+                Some(time)
+            }
+            _ => None,
+        };
+        if start_s.is_some_and(|time| time < 0.0) {
+            return Err(("a step before the beginning of the plan", "times start at 0"));
+        }
+        if !self.rest().starts_with('(') {
+            return Err(("a step was expected", SHAPE));
+        }
+        let close = self.rest().find(')').ok_or(("a step without its `)`", SHAPE))?;
+        let mut words = self.rest()[1..close].split_whitespace().map(str::to_string);
+        let action = words.next().ok_or(("a step without an action", SHAPE))?.to_ascii_lowercase();
+        let arguments: Vec<String> = words.collect();
+        if action.contains('(') || arguments.iter().any(|word| word.contains('(')) {
+            return Err(("a step without its `)`", SHAPE));
+        }
+        self.at += close + 1;
+        let line = self.rest().trim_start_matches([' ', '\t']);
+        let mut duration_s = 0.0;
+        if line.starts_with('[') {
+            let end = line.find(']').ok_or(("a duration without its `]`", SHAPE))?;
+            // Some planners write `[D:3.0; C:1.0]`.
+            let inside = line[1..end].split(';').next().unwrap_or("").trim().trim_start_matches("D:").trim();
+            duration_s = inside
+                .parse::<f64>()
+                .ok()
+                .filter(|duration| duration.is_finite() && *duration >= 0.0)
+                .ok_or(("a duration that is not a number from 0", SHAPE))?;
+            self.at = self.text.len() - line.len() + end + 1;
+        }
+        Ok(Step { start_s, action, arguments, duration_s })
+    }
+}
+
+fn span(start: usize, end: usize) -> Span {
+    Span { source: 0, start: start as u32, end: end as u32 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Plan, Findings> {
+        Plan::read(&Source::new("plan", text))
+    }
+
+    #[test]
+    fn both_forms_are_read_and_written() {
+        for (text, written) in [
+            ("(move a b)\n(move B c)\n; cost = 2 (unit cost)\n", "(move a b)\n(move B c)\n; cost = 2\n"),
+            ("0.5: (b) [1]\n0: (A x) [D:2.25; C:1]", "0.000: (a x) [2.250]\n0.500: (b) [1.000]\n"),
+            ("; a comment\n0.333333: (a)[0.1](b)", ""),
+            ("", ""),
+        ] {
+            match read(text) {
+                Ok(plan) => assert_eq!(plan.to_string(), written),
+                Err(findings) => {
+                    assert!(written.is_empty(), "{findings}");
+                    assert!(findings.to_string().contains("some steps have a time"), "{findings}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_bad_line_is_a_finding() {
+        let findings = read("0: (a) [x]\nmove a b\n1: (b) [2]\n2: (c [1]\nNaN: (d) [1]\n-1: (e) [1]\n");
+        let findings = findings.expect_err("five lines are no steps");
+        assert_eq!(findings.list.len(), 5, "{findings}");
+    }
+
+    #[test]
+    fn the_makespan_is_the_last_end() {
+        assert_eq!(read("0: (a) [5]\n1: (b) [1]").ok().and_then(|plan| plan.makespan_s()), Some(5.0));
+        assert_eq!(read("(a)").ok().and_then(|plan| plan.makespan_s()), None);
+    }
 }

@@ -6,6 +6,8 @@
 
 use std::sync::Arc;
 
+use rustc_hash::FxHashMap;
+
 use crate::attachment::CallKind;
 use crate::diagnostic::{Source, Span};
 pub use crate::pddl::ast::{Assignment, Comparison, Modal, When};
@@ -81,6 +83,8 @@ pub struct Task {
     pub module_options: Vec<ModuleOption>,
     /// `:moduleexitoptions` of the problem.
     pub module_exit_options: Vec<ModuleOption>,
+    /// Objects by name.
+    pub(crate) objects_by_name: Arc<FxHashMap<String, ObjectId>>,
 }
 
 /// A type.

@@ -8,7 +8,7 @@ pub mod parse;
 pub use check::check;
 
 /// The name most like `name`, if one is near enough to be meant: at most a third of its letters differ.
-fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let limit = (name.chars().count() / 3).max(1);
     known
         .into_iter()

@@ -28,8 +28,7 @@ struct Found {
 impl Checker<'_> {
     pub(super) fn action(&mut self, action: &ast::Action) {
         let name = self.name(action.name.symbol).to_string();
-        if let Some(first) = self.task.actions.iter().find(|known| known.name == name).map(|known| known.span)
-        {
+        if let Some(first) = self.actions.insert(action.name.symbol, action.name.span) {
             let message = format!("action `{name}` is declared twice");
             self.push(
                 Diagnostic::error("duplicate", message, action.name.span, "declared again here")

@@ -1,5 +1,7 @@
 //! Types, objects, predicates, functions and modules.
 
+use std::sync::Arc;
+
 use super::{Checker, Scope, Variable};
 use crate::attachment::CallKind;
 use crate::diagnostic::{Diagnostic, Span};
@@ -170,6 +172,9 @@ impl Checker<'_> {
                 self.task.types[own.index()].objects.push(id);
             }
         }
+        let names = self.task.objects.iter().enumerate();
+        self.task.objects_by_name =
+            Arc::new(names.map(|(index, own)| (own.name.clone(), ObjectId(index as u32))).collect());
     }
 
     /// The declared types of a name; `object` where none is given or known.

@@ -57,6 +57,16 @@ impl Checker<'_> {
                 },
             }
         }
+        // Costs start at 0 where nothing else is said.
+        let costs = self.task.find_function("total-cost").map(|id| (id, self.task.function(id)));
+        if let Some((function, _)) =
+            costs.filter(|(_, own)| own.parameters.is_empty() && own.result.is_none())
+        {
+            let fluent = GroundFluent { function, arguments: Box::default() };
+            if !values.contains_key(&fluent) {
+                init.numbers.push((fluent, 0.0));
+            }
+        }
         init.timed.sort_by(|one, other| one.time_s.total_cmp(&other.time_s));
         self.task.init = init;
     }

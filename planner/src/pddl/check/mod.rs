@@ -115,6 +115,7 @@ impl<'a> Checker<'a> {
             metric: None,
             module_options: Vec::new(),
             module_exit_options: Vec::new(),
+            objects_by_name: Arc::default(),
         };
         Checker {
             symbols,

@@ -105,7 +105,7 @@ impl Parser<'_> {
                         break;
                     };
                     let types = self.types(node);
-                    self.give_types(&mut declared, untyped_from, types, node);
+                    self.give_types(&mut declared, untyped_from, types);
                     untyped_from = declared.len();
                 }
                 // A missing space: `?x -block`.
@@ -118,7 +118,7 @@ impl Parser<'_> {
                     };
                     let mut span = self.span(node);
                     span.start += 1;
-                    self.give_types(&mut declared, untyped_from, vec![Name { symbol, span }], node);
+                    self.give_types(&mut declared, untyped_from, vec![Name { symbol, span }]);
                     untyped_from = declared.len();
                 }
                 (Kind::Word(symbol), Some(word)) => {
@@ -140,10 +140,8 @@ impl Parser<'_> {
         declared
     }
 
-    fn give_types(&mut self, declared: &mut [Typed], from: usize, types: Vec<Name>, node: usize) {
-        if from == declared.len() {
-            self.fault("syntax", "a type without names before it", node, "which names are of this type?");
-        }
+    /// Generated files have types without names before them, which say nothing.
+    fn give_types(&self, declared: &mut [Typed], from: usize, types: Vec<Name>) {
         for typed in &mut declared[from..] {
             typed.types.clone_from(&types);
         }
@@ -266,7 +264,7 @@ impl Parser<'_> {
             match (self.tree.nodes[node].kind, self.word(node)) {
                 (_, Some("-")) => {
                     let types = nodes.next().map(|node| self.types(node)).unwrap_or_default();
-                    self.give_types(&mut declared, untyped_from, types, node);
+                    self.give_types(&mut declared, untyped_from, types);
                     untyped_from = declared.len();
                 }
                 (Kind::Word(symbol), Some(word)) if word.starts_with('?') => {

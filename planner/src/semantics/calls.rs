@@ -1,0 +1,133 @@
+//! Calls of semantic modules in a state.
+
+use std::sync::Arc;
+
+use super::{Binding, CallFailure, Semantics};
+use crate::attachment::{self, Answer, FactValue, Level, Read, Reading};
+use crate::state::State;
+use crate::task::{Call, FunctionId, ObjectId, Parameter, PredicateId, Task};
+
+/// A predicate or function.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Symbol {
+    /// A predicate.
+    Predicate(PredicateId),
+    /// A function.
+    Function(FunctionId),
+}
+
+impl Semantics<'_> {
+    /// The exact answer of a call; `None` where an argument of it is undefined.
+    pub(crate) fn ask(
+        &self,
+        state: &State,
+        call: &Call,
+        binding: &Binding,
+    ) -> Result<Option<Answer>, CallFailure> {
+        let Some(arguments) = self.objects(state, &call.arguments, binding) else { return Ok(None) };
+        let question = self.question(state, call, &arguments, binding);
+        let name = &self.bound[call.module.index()];
+        match self.attachments.call(name, &question, Level::Exact) {
+            Ok(answer) => Ok(Some(answer)),
+            Err(error) => Err(CallFailure { error, span: call.span }),
+        }
+    }
+
+    /// What a grounding module proposes.
+    pub(crate) fn proposals(
+        &self,
+        state: &State,
+        call: &Call,
+        binding: &Binding,
+    ) -> Result<Vec<Arc<str>>, CallFailure> {
+        Ok(match self.ask(state, call, binding)? {
+            Some(Answer::Proposals(proposals)) => proposals,
+            _ => Vec::new(),
+        })
+    }
+
+    /// The call as the attachment gets it: names, and the facts that it declares to read.
+    fn question(
+        &self,
+        state: &State,
+        call: &Call,
+        arguments: &[ObjectId],
+        binding: &Binding,
+    ) -> attachment::Call {
+        let module = self.task.module(call.module);
+        let mut readings = Vec::new();
+        for read in self.attachments.reads(&self.bound[call.module.index()]) {
+            for (symbol, instance) in instances(self.task, read, arguments) {
+                readings.push(self.reading(state, symbol, &instance));
+            }
+        }
+        let names = arguments.iter().map(|&id| self.object_names[id.index()].clone());
+        attachment::Call {
+            module: self.module_names[call.module.index()].clone(),
+            kind: module.kind,
+            arguments: names.chain(binding.proposals.iter().cloned()).collect(),
+            readings,
+        }
+    }
+
+    fn reading(&self, state: &State, symbol: Symbol, arguments: &[ObjectId]) -> Reading {
+        let (name, value) = match symbol {
+            Symbol::Predicate(id) => {
+                (&self.task.predicate(id).name, FactValue::Truth(state.holds(id, arguments)))
+            }
+            Symbol::Function(id) => {
+                let value = match self.task.function(id).result {
+                    None => state.number(id, arguments).map(FactValue::Number),
+                    Some(_) => state
+                        .object(id, arguments)
+                        .map(|object| FactValue::Object(self.object_names[object.index()].clone())),
+                };
+                (&self.task.function(id).name, value.unwrap_or(FactValue::Undefined))
+            }
+        };
+        let names: Vec<Arc<str>> =
+            arguments.iter().map(|&id| self.object_names[id.index()].clone()).collect();
+        Reading { symbol: name.as_str().into(), arguments: names, value }
+    }
+}
+
+/// The ground facts and fluents that a declared read covers for a call with these arguments, in the order of the
+/// declaration and of the task's objects. A symbol that the task does not have covers nothing.
+pub(crate) fn instances(task: &Task, read: &Read, arguments: &[ObjectId]) -> Vec<(Symbol, Vec<ObjectId>)> {
+    match read {
+        Read::At(name, positions) => {
+            let chosen: Option<Vec<ObjectId>> =
+                positions.iter().map(|&position| arguments.get(position).copied()).collect();
+            find(task, name).zip(chosen).into_iter().collect()
+        }
+        Read::All(name) => find(task, name).map(|symbol| all_instances(task, symbol)).unwrap_or_default(),
+        Read::Everything => {
+            let predicates =
+                (0..task.predicates.len()).map(|index| Symbol::Predicate(PredicateId(index as u32)));
+            let functions = (0..task.functions.len()).map(|index| Symbol::Function(FunctionId(index as u32)));
+            predicates.chain(functions).flat_map(|symbol| all_instances(task, symbol)).collect()
+        }
+    }
+}
+
+fn find(task: &Task, name: &str) -> Option<Symbol> {
+    match task.find_predicate(name) {
+        Some(id) => Some(Symbol::Predicate(id)),
+        None => task.find_function(name).map(Symbol::Function),
+    }
+}
+
+fn all_instances(task: &Task, symbol: Symbol) -> Vec<(Symbol, Vec<ObjectId>)> {
+    let parameters: &[Parameter] = match symbol {
+        Symbol::Predicate(id) => &task.predicate(id).parameters,
+        Symbol::Function(id) => &task.function(id).parameters,
+    };
+    let mut all: Vec<Vec<ObjectId>> = vec![Vec::new()];
+    for parameter in parameters {
+        let longer = all.iter().flat_map(|known| {
+            parameter.objects.iter().map(|&object| known.iter().copied().chain([object]).collect())
+        });
+        all = longer.collect();
+    }
+    all.into_iter().map(|arguments| (symbol, arguments)).collect()
+}

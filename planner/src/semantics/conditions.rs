@@ -1,0 +1,241 @@
+//! Conditions, terms and expressions in a state.
+
+use super::{Binding, CallFailure, Semantics};
+use crate::attachment::Answer;
+use crate::diagnostic::Span;
+use crate::state::State;
+use crate::task::{Comparison, Condition, Expression, Fluent, ObjectId, Quantified, Term};
+
+/// How far numbers may miss a non-strict comparison, relative to their size: plans are printed with few digits.
+const SLACK: f64 = 1e-7;
+
+/// The part of a condition that does not hold.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Why {
+    /// The part, with objects for its variables.
+    pub condition: String,
+    /// Values that it depends on, such as `(fuel r)` and `3`.
+    pub values: Vec<(String, String)>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+impl Semantics<'_> {
+    /// Whether a condition holds.
+    pub fn holds(
+        &self,
+        state: &State,
+        condition: &Condition,
+        binding: &mut Binding,
+    ) -> Result<bool, CallFailure> {
+        Ok(match condition {
+            Condition::And(parts) => {
+                for part in parts {
+                    if !self.holds(state, part, binding)? {
+                        return Ok(false);
+                    }
+                }
+                true
+            }
+            Condition::Or(parts) => {
+                for part in parts {
+                    if self.holds(state, part, binding)? {
+                        return Ok(true);
+                    }
+                }
+                false
+            }
+            Condition::Not(leaf) => match &**leaf {
+                Condition::Compare(_, sides, _) => match self.both(state, sides, binding)? {
+                    Some((left, right)) => !compare(Comparison::Equal, left, right),
+                    None => false,
+                },
+                other => !self.holds(state, other, binding)?,
+            },
+            Condition::Forall(variables, inner) => {
+                !self.some_binding(variables, binding, &mut |binding| {
+                    Ok(!self.holds(state, inner, binding)?)
+                })?
+            }
+            Condition::Exists(variables, inner) => {
+                self.some_binding(variables, binding, &mut |binding| self.holds(state, inner, binding))?
+            }
+            Condition::Atom(atom) => match self.objects(state, &atom.arguments, binding) {
+                Some(arguments) => state.holds(atom.predicate, &arguments),
+                None => false,
+            },
+            Condition::Same(terms, _) => {
+                let [left, right] = &**terms;
+                let left = self.object(state, left, binding);
+                left.is_some() && left == self.object(state, right, binding)
+            }
+            Condition::Compare(comparison, sides, _) => match self.both(state, sides, binding)? {
+                Some((left, right)) => compare(*comparison, left, right),
+                None => false,
+            },
+            Condition::Call(call) => matches!(self.ask(state, call, binding)?, Some(Answer::Truth(true))),
+        })
+    }
+
+    /// Whether `test` is true of some objects for the variables.
+    pub(crate) fn some_binding(
+        &self,
+        variables: &[Quantified],
+        binding: &mut Binding,
+        test: &mut dyn FnMut(&mut Binding) -> Result<bool, CallFailure>,
+    ) -> Result<bool, CallFailure> {
+        let Some((first, rest)) = variables.split_first() else { return test(binding) };
+        for &object in first.parameter.objects.iter() {
+            binding.set(first.slot, object);
+            if self.some_binding(rest, binding, test)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn both(
+        &self,
+        state: &State,
+        sides: &[Expression; 2],
+        binding: &Binding,
+    ) -> Result<Option<(f64, f64)>, CallFailure> {
+        let (left, right) =
+            (self.number(state, &sides[0], binding)?, self.number(state, &sides[1], binding)?);
+        Ok(left.zip(right))
+    }
+
+    /// The object that a term stands for; `None` where it is undefined.
+    pub fn object(&self, state: &State, term: &Term, binding: &Binding) -> Option<ObjectId> {
+        match term {
+            Term::Variable(slot) => Some(binding.get(*slot)),
+            Term::Object(id) => Some(*id),
+            Term::Function(fluent) => {
+                let arguments = self.objects(state, &fluent.arguments, binding)?;
+                state.object(fluent.function, &arguments)
+            }
+        }
+    }
+
+    pub(crate) fn objects(&self, state: &State, terms: &[Term], binding: &Binding) -> Option<Vec<ObjectId>> {
+        terms.iter().map(|term| self.object(state, term, binding)).collect()
+    }
+
+    fn fluent(&self, state: &State, fluent: &Fluent, binding: &Binding) -> Option<f64> {
+        let arguments = self.objects(state, &fluent.arguments, binding)?;
+        state.number(fluent.function, &arguments)
+    }
+
+    /// The value of an expression; `None` where a part of it is undefined. `total-time` and `is-violated` have values
+    /// in metrics alone, which the validator evaluates.
+    pub fn number(
+        &self,
+        state: &State,
+        expression: &Expression,
+        binding: &Binding,
+    ) -> Result<Option<f64>, CallFailure> {
+        let all = |parts: &[Expression]| -> Result<Option<Vec<f64>>, CallFailure> {
+            parts.iter().map(|part| self.number(state, part, binding)).collect()
+        };
+        Ok(match expression {
+            Expression::Number(number) => Some(*number),
+            Expression::Fluent(fluent) => self.fluent(state, fluent, binding),
+            Expression::Add(parts) => all(parts)?.map(|values| values.iter().sum()),
+            Expression::Multiply(parts) => all(parts)?.map(|values| values.iter().product()),
+            Expression::Subtract(sides) => {
+                self.both(state, sides, binding)?.map(|(left, right)| left - right)
+            }
+            Expression::Divide(sides) => self
+                .both(state, sides, binding)?
+                .map(|(left, right)| left / right)
+                .filter(|value| value.is_finite()),
+            Expression::Negative(inner) => self.number(state, inner, binding)?.map(|value| -value),
+            Expression::Duration => binding.duration_s,
+            Expression::TotalTime | Expression::Violated(_) => None,
+            Expression::Call(call) => match self.ask(state, call, binding)? {
+                Some(Answer::Number(number)) => Some(number),
+                _ => None,
+            },
+        })
+    }
+
+    /// The innermost part that keeps a condition from holding; `None` if it holds.
+    pub fn why_not(
+        &self,
+        state: &State,
+        condition: &Condition,
+        binding: &mut Binding,
+    ) -> Result<Option<Why>, CallFailure> {
+        if self.holds(state, condition, binding)? {
+            return Ok(None);
+        }
+        match condition {
+            Condition::And(parts) => {
+                for part in parts {
+                    if let Some(why) = self.why_not(state, part, binding)? {
+                        return Ok(Some(why));
+                    }
+                }
+                Ok(None)
+            }
+            Condition::Forall(variables, inner) => {
+                let mut found = None;
+                self.some_binding(variables, binding, &mut |binding| {
+                    found = self.why_not(state, inner, binding)?;
+                    Ok(found.is_some())
+                })?;
+                Ok(found)
+            }
+            Condition::Or(parts) if parts.len() == 1 => self.why_not(state, &parts[0], binding),
+            other => Ok(Some(Why {
+                condition: self.condition_text(other, binding),
+                values: self.values_in(state, other, binding)?,
+                span: self.span_of(other),
+            })),
+        }
+    }
+
+    /// The values that a comparison, equation or call depends on.
+    fn values_in(
+        &self,
+        state: &State,
+        condition: &Condition,
+        binding: &Binding,
+    ) -> Result<Vec<(String, String)>, CallFailure> {
+        let mut values = Vec::new();
+        match condition {
+            Condition::Not(leaf) => return self.values_in(state, leaf, binding),
+            Condition::Compare(_, sides, _) => {
+                for side in sides.iter().filter(|side| !matches!(side, Expression::Number(_))) {
+                    let value = self.number(state, side, binding)?;
+                    values.push((self.expression_text(side, binding), value_text(value)));
+                }
+            }
+            Condition::Same(terms, _) => {
+                for term in terms.iter().filter(|term| matches!(term, Term::Function(_))) {
+                    let value = self.object(state, term, binding);
+                    let value = value.map_or("undefined", |id| self.task.object(id).name.as_str());
+                    values.push((self.term_text(term, binding), value.to_string()));
+                }
+            }
+            _ => {}
+        }
+        Ok(values)
+    }
+}
+
+/// A number for people: short, and the word `undefined` where there is none.
+pub(crate) fn value_text(value: Option<f64>) -> String {
+    value.map_or("undefined".to_string(), |value| format!("{}", (value * 1e6).round() / 1e6))
+}
+
+pub(crate) fn compare(comparison: Comparison, left: f64, right: f64) -> bool {
+    let slack = SLACK * left.abs().max(right.abs()).max(1.0);
+    match comparison {
+        Comparison::Less => left < right,
+        Comparison::LessOrEqual => left <= right || left - right <= slack,
+        Comparison::Equal => left == right || (left - right).abs() <= slack,
+        Comparison::GreaterOrEqual => left >= right || right - left <= slack,
+        Comparison::Greater => left > right,
+    }
+}

@@ -1,0 +1,158 @@
+//! What conditions, expressions and effects mean: the one implementation of applying an action.
+//!
+//! The validator, the monitor and the executive use it directly. PDDL 2.1 (Fox and Long 2003), section 8, says what the
+//! temporal parts mean.
+
+mod calls;
+mod conditions;
+mod derive;
+mod describe;
+pub(crate) mod effects;
+mod reads;
+
+use std::sync::Arc;
+
+use crate::attachment::{AttachmentError, Attachments};
+use crate::diagnostic::{Diagnostic, Findings, Span};
+use crate::plan::Step;
+use crate::state::State;
+use crate::task::{ActionId, ObjectId, Slot, Task};
+
+pub use conditions::Why;
+pub(crate) use conditions::{compare, value_text};
+pub use effects::{Changes, Clash, Pending};
+pub use reads::Touched;
+
+/// A slot that no object is bound to.
+pub(crate) const UNBOUND: ObjectId = ObjectId(u32::MAX);
+
+/// Values for the slots of an action, rule or formula.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Binding {
+    /// Objects by slot.
+    pub objects: Vec<ObjectId>,
+    /// `?duration`, in seconds.
+    pub duration_s: Option<f64>,
+    /// What grounding modules proposed; every call of the action gets them as further arguments.
+    pub proposals: Vec<Arc<str>>,
+}
+
+impl Binding {
+    /// A binding with nothing bound.
+    pub fn new(slots: usize) -> Binding {
+        Binding { objects: vec![UNBOUND; slots], duration_s: None, proposals: Vec::new() }
+    }
+
+    fn get(&self, slot: Slot) -> ObjectId {
+        self.objects.get(slot.index()).copied().unwrap_or(UNBOUND)
+    }
+
+    fn set(&mut self, slot: Slot, object: ObjectId) {
+        if let Some(place) = self.objects.get_mut(slot.index()) {
+            *place = object;
+        }
+    }
+}
+
+/// An attachment failed while something was evaluated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{error}")]
+pub struct CallFailure {
+    /// The failed call.
+    pub error: AttachmentError,
+    /// Where the call stands in the domain.
+    pub span: Span,
+}
+
+impl CallFailure {
+    /// The failure drawn under the call.
+    pub fn findings(&self, task: &Task) -> Findings {
+        let finding =
+            Diagnostic::error("attachment-failed", self.error.to_string(), self.span, "this call failed");
+        Findings { sources: task.sources.to_vec(), list: vec![finding] }
+    }
+}
+
+/// A step that does not fit the task.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Misfit {
+    /// What is wrong with it.
+    pub reason: String,
+    /// Where in the task what it should fit is declared.
+    pub span: Option<Span>,
+}
+
+/// A task and its attachments, ready to evaluate.
+pub struct Semantics<'a> {
+    /// The task.
+    pub task: &'a Task,
+    /// What its modules mean.
+    pub attachments: &'a Attachments,
+    /// The name under which each module's attachment is registered.
+    bound: Vec<String>,
+    object_names: Vec<Arc<str>>,
+    module_names: Vec<Arc<str>>,
+}
+
+impl<'a> Semantics<'a> {
+    /// A task with its attachments. A module without one fails when it is called.
+    pub fn new(task: &'a Task, attachments: &'a Attachments) -> Semantics<'a> {
+        let bound = task.modules.iter().map(|module| {
+            attachments.resolve(&module.function, &module.name).unwrap_or(&module.function).to_string()
+        });
+        Semantics {
+            task,
+            attachments,
+            bound: bound.collect(),
+            object_names: task.objects.iter().map(|object| object.name.as_str().into()).collect(),
+            module_names: task.modules.iter().map(|module| module.name.as_str().into()).collect(),
+        }
+    }
+
+    /// The initial state with its derived facts.
+    pub fn initial(&self) -> Result<State, CallFailure> {
+        let mut state = State::initial(self.task);
+        self.derive(&mut state)?;
+        Ok(state)
+    }
+
+    /// The action that a step names, and its binding.
+    pub fn bind(&self, step: &Step) -> Result<(ActionId, Binding), Misfit> {
+        let task = self.task;
+        let Some(at) = task.actions.iter().position(|action| action.name.eq_ignore_ascii_case(&step.action))
+        else {
+            let known = task.actions.iter().map(|action| action.name.as_str());
+            let near = crate::pddl::nearest(&step.action, known);
+            let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            return Err(Misfit {
+                reason: format!("no action is called `{}`{hint}", step.action),
+                span: None,
+            });
+        };
+        let action = &task.actions[at];
+        let (wanted, found) = (action.parameters.len() + action.grounding.len(), step.arguments.len());
+        if wanted != found {
+            let reason = format!("`{}` takes {wanted} arguments, found {found}", action.name);
+            return Err(Misfit { reason, span: Some(action.span) });
+        }
+        let mut binding = Binding::new(action.slots);
+        for (index, (parameter, name)) in action.parameters.iter().zip(&step.arguments).enumerate() {
+            let Some(object) = task.find_object(name) else {
+                let reason = format!("no object is called `{name}`");
+                return Err(Misfit { reason, span: Some(parameter.span) });
+            };
+            if parameter.objects.binary_search(&object).is_err() {
+                let types: Vec<&str> =
+                    parameter.types.iter().map(|&id| task.type_of(id).name.as_str()).collect();
+                let reason =
+                    format!("`{name}` is no {}, which {} must be", types.join(" or "), parameter.name);
+                return Err(Misfit { reason, span: Some(parameter.span) });
+            }
+            binding.objects[index] = object;
+        }
+        binding.duration_s = action.is_durative().then_some(step.duration_s);
+        binding.proposals =
+            step.arguments[action.parameters.len()..].iter().map(|name| name.as_str().into()).collect();
+        Ok((ActionId(at as u32), binding))
+    }
+}

@@ -1,0 +1,217 @@
+//! What a happening reads and writes, to tell which happenings disturb each other.
+//!
+//! PDDL 2.1, section 8.1: two actions may happen at the same time only if neither touches what the other reads, and
+//! neither undoes what the other does ("no moving targets").
+
+use rustc_hash::FxHashSet;
+
+use super::calls::{Symbol, instances};
+use super::effects::Changes;
+use super::{Binding, CallFailure, Semantics};
+use crate::state::State;
+use crate::task::{
+    Assignment, Call, Change, Condition, Effect, Expression, Fact, GroundFluent, ObjectId, PredicateId, Term,
+};
+
+/// What one participant of a happening reads and writes.
+#[derive(Debug, Clone, Default)]
+pub struct Touched {
+    facts: FxHashSet<Fact>,
+    fluents: FxHashSet<GroundFluent>,
+    /// Predicates of which any instance may matter: those that a derived fact depends on.
+    predicates: FxHashSet<PredicateId>,
+    /// What it writes.
+    pub changes: Changes,
+}
+
+impl Touched {
+    /// Something that one of the two writes and the other reads or writes otherwise.
+    pub fn conflict(&self, other: &Touched, semantics: &Semantics<'_>) -> Option<String> {
+        self.disturbs(other, semantics).or_else(|| other.disturbs(self, semantics))
+    }
+
+    fn disturbs(&self, other: &Touched, semantics: &Semantics<'_>) -> Option<String> {
+        let written = self.changes.added.iter().chain(&self.changes.deleted);
+        let read = |fact: &&Fact| other.facts.contains(*fact) || other.predicates.contains(&fact.predicate);
+        if let Some(fact) = written.clone().find(read) {
+            return Some(semantics.fact_text(fact));
+        }
+        if let Some(fact) = self.changes.added.iter().find(|fact| other.changes.deleted.contains(fact)) {
+            return Some(semantics.fact_text(fact));
+        }
+        let numbers = self.changes.numbers.iter().map(|(fluent, assignment, ..)| (fluent, Some(*assignment)));
+        let cleared = self.changes.cleared.iter().map(|fluent| (fluent, None));
+        for (fluent, assignment) in numbers.chain(cleared) {
+            let additive = |kind: Assignment| matches!(kind, Assignment::Increase | Assignment::Decrease);
+            let both_write = other.changes.numbers.iter().any(|(own, kind, ..)| {
+                own == fluent && !(additive(*kind) && assignment.is_some_and(additive))
+            });
+            if other.fluents.contains(fluent) || both_write {
+                return Some(semantics.ground_text(fluent));
+            }
+        }
+        for (fluent, ..) in &self.changes.objects {
+            if other.fluents.contains(fluent) || other.changes.objects.iter().any(|(own, ..)| own == fluent) {
+                return Some(semantics.ground_text(fluent));
+            }
+        }
+        None
+    }
+}
+
+impl Semantics<'_> {
+    /// Notes what a condition reads.
+    pub fn reads(
+        &self,
+        state: &State,
+        condition: &Condition,
+        binding: &mut Binding,
+        touched: &mut Touched,
+    ) -> Result<(), CallFailure> {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                for part in parts {
+                    self.reads(state, part, binding, touched)?;
+                }
+            }
+            Condition::Not(inner) => self.reads(state, inner, binding, touched)?,
+            Condition::Forall(variables, inner) | Condition::Exists(variables, inner) => {
+                self.some_binding(variables, binding, &mut |binding| {
+                    self.reads(state, inner, binding, touched)?;
+                    Ok(false)
+                })?;
+            }
+            Condition::Atom(atom) => {
+                self.terms_read(state, &atom.arguments, binding, touched);
+                if let Some(arguments) = self.objects(state, &atom.arguments, binding) {
+                    self.fact_read(atom.predicate, arguments, touched);
+                }
+            }
+            Condition::Same(terms, _) => self.terms_read(state, &**terms, binding, touched),
+            Condition::Compare(_, sides, _) => {
+                sides.iter().for_each(|side| self.expression_reads(state, side, binding, touched));
+            }
+            Condition::Call(call) => self.call_reads(state, call, binding, touched),
+        }
+        Ok(())
+    }
+
+    /// Notes what effects read: their conditions and values.
+    pub fn effect_reads(
+        &self,
+        state: &State,
+        effects: &[Effect],
+        at_end: bool,
+        binding: &mut Binding,
+        touched: &mut Touched,
+    ) -> Result<(), CallFailure> {
+        for effect in effects {
+            self.some_binding(&effect.forall, binding, &mut |binding| {
+                let when = if at_end { &effect.when.end } else { &effect.when.start };
+                self.reads(state, when, binding, touched)?;
+                match &effect.change {
+                    Change::Add(atom) | Change::Delete(atom) => {
+                        self.terms_read(state, &atom.arguments, binding, touched);
+                    }
+                    Change::Number(_, fluent, value) => {
+                        self.terms_read(state, &fluent.arguments, binding, touched);
+                        self.expression_reads(state, value, binding, touched);
+                    }
+                    Change::Object(fluent, value) => {
+                        self.terms_read(state, &fluent.arguments, binding, touched);
+                        self.terms_read(state, value.as_slice(), binding, touched);
+                    }
+                    Change::Call(call) => self.call_reads(state, call, binding, touched),
+                }
+                Ok(false)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn fact_read(&self, predicate: PredicateId, arguments: Vec<ObjectId>, touched: &mut Touched) {
+        if self.task.predicate(predicate).stratum.is_some() {
+            self.depends_on(predicate, &mut touched.predicates);
+        }
+        touched.facts.insert(Fact { predicate, arguments: arguments.into() });
+    }
+
+    /// All predicates that a derived one depends on.
+    fn depends_on(&self, derived: PredicateId, into: &mut FxHashSet<PredicateId>) {
+        if !into.insert(derived) {
+            return;
+        }
+        for rule in self.task.rules.iter().filter(|rule| rule.predicate == derived) {
+            self.predicates_in(&rule.body, into);
+        }
+    }
+
+    fn predicates_in(&self, condition: &Condition, into: &mut FxHashSet<PredicateId>) {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                parts.iter().for_each(|part| self.predicates_in(part, into));
+            }
+            Condition::Not(inner) | Condition::Forall(_, inner) | Condition::Exists(_, inner) => {
+                self.predicates_in(inner, into);
+            }
+            Condition::Atom(atom) if self.task.predicate(atom.predicate).stratum.is_some() => {
+                self.depends_on(atom.predicate, into);
+            }
+            Condition::Atom(atom) => {
+                into.insert(atom.predicate);
+            }
+            Condition::Same(..) | Condition::Compare(..) | Condition::Call(_) => {}
+        }
+    }
+
+    fn terms_read(&self, state: &State, terms: &[Term], binding: &Binding, touched: &mut Touched) {
+        for term in terms {
+            if let Term::Function(fluent) = term {
+                self.terms_read(state, &fluent.arguments, binding, touched);
+                touched.fluents.extend(self.ground(state, fluent, binding));
+            }
+        }
+    }
+
+    pub(crate) fn expression_reads(
+        &self,
+        state: &State,
+        expression: &Expression,
+        binding: &Binding,
+        touched: &mut Touched,
+    ) {
+        match expression {
+            Expression::Fluent(fluent) => {
+                self.terms_read(state, &fluent.arguments, binding, touched);
+                touched.fluents.extend(self.ground(state, fluent, binding));
+            }
+            Expression::Add(parts) | Expression::Multiply(parts) => {
+                parts.iter().for_each(|part| self.expression_reads(state, part, binding, touched));
+            }
+            Expression::Subtract(sides) | Expression::Divide(sides) => {
+                sides.iter().for_each(|side| self.expression_reads(state, side, binding, touched));
+            }
+            Expression::Negative(inner) => self.expression_reads(state, inner, binding, touched),
+            Expression::Call(call) => self.call_reads(state, call, binding, touched),
+            Expression::Number(_)
+            | Expression::Duration
+            | Expression::TotalTime
+            | Expression::Violated(_) => {}
+        }
+    }
+
+    fn call_reads(&self, state: &State, call: &Call, binding: &Binding, touched: &mut Touched) {
+        self.terms_read(state, &call.arguments, binding, touched);
+        let Some(arguments) = self.objects(state, &call.arguments, binding) else { return };
+        for read in self.attachments.reads(&self.bound[call.module.index()]) {
+            for (symbol, arguments) in instances(self.task, read, &arguments) {
+                match symbol {
+                    Symbol::Predicate(id) => self.fact_read(id, arguments, touched),
+                    Symbol::Function(function) => {
+                        touched.fluents.insert(GroundFluent { function, arguments: arguments.into() });
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! A state of the lifted task: what is true, what has which value.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::task::{Fact, FunctionId, GroundChange, GroundFluent, Init, ObjectId, PredicateId, Task};
+
+/// Facts, numbers and object values. What is not held is false or undefined.
+///
+/// Derived facts are held too; [`Semantics`](crate::Semantics) keeps them up to date.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct State {
+    facts: Vec<FxHashSet<Box<[ObjectId]>>>,
+    numbers: Vec<FxHashMap<Box<[ObjectId]>, f64>>,
+    objects: Vec<FxHashMap<Box<[ObjectId]>, ObjectId>>,
+}
+
+impl State {
+    /// The state of a task in which nothing is true and nothing has a value.
+    pub fn empty(task: &Task) -> State {
+        State {
+            facts: vec![FxHashSet::default(); task.predicates.len()],
+            numbers: vec![FxHashMap::default(); task.functions.len()],
+            objects: vec![FxHashMap::default(); task.functions.len()],
+        }
+    }
+
+    /// The initial state of a task, without derived facts and timed changes.
+    pub fn initial(task: &Task) -> State {
+        let mut state = State::empty(task);
+        for fact in &task.init.facts {
+            state.facts[fact.predicate.index()].insert(fact.arguments.clone());
+        }
+        for (fluent, value) in &task.init.numbers {
+            state.numbers[fluent.function.index()].insert(fluent.arguments.clone(), *value);
+        }
+        for (fluent, value) in &task.init.objects {
+            state.objects[fluent.function.index()].insert(fluent.arguments.clone(), *value);
+        }
+        state
+    }
+
+    /// Whether a fact is true.
+    pub fn holds(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
+        self.facts[predicate.index()].contains(arguments)
+    }
+
+    /// The value of a numeric function.
+    pub fn number(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<f64> {
+        self.numbers[function.index()].get(arguments).copied()
+    }
+
+    /// The value of an object function.
+    pub fn object(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<ObjectId> {
+        self.objects[function.index()].get(arguments).copied()
+    }
+
+    /// Makes a fact true or false.
+    pub fn set_fact(&mut self, predicate: PredicateId, arguments: &[ObjectId], holds: bool) {
+        let facts = &mut self.facts[predicate.index()];
+        if !holds {
+            facts.remove(arguments);
+        } else if !facts.contains(arguments) {
+            facts.insert(arguments.into());
+        }
+    }
+
+    /// Gives a numeric function a value, or takes it away.
+    pub fn set_number(&mut self, function: FunctionId, arguments: &[ObjectId], value: Option<f64>) {
+        let numbers = &mut self.numbers[function.index()];
+        match (value, numbers.get_mut(arguments)) {
+            (None, _) => {
+                numbers.remove(arguments);
+            }
+            (Some(value), Some(place)) => *place = value,
+            (Some(value), None) => {
+                numbers.insert(arguments.into(), value);
+            }
+        }
+    }
+
+    /// Gives an object function a value, or takes it away.
+    pub fn set_object(&mut self, function: FunctionId, arguments: &[ObjectId], value: Option<ObjectId>) {
+        let objects = &mut self.objects[function.index()];
+        match value {
+            None => {
+                objects.remove(arguments);
+            }
+            Some(value) => {
+                objects.insert(arguments.into(), value);
+            }
+        }
+    }
+
+    /// Makes a change.
+    pub fn apply(&mut self, change: &GroundChange) {
+        match change {
+            GroundChange::Add(fact) => self.set_fact(fact.predicate, &fact.arguments, true),
+            GroundChange::Delete(fact) => self.set_fact(fact.predicate, &fact.arguments, false),
+            GroundChange::Number(fluent, value) => {
+                self.set_number(fluent.function, &fluent.arguments, Some(*value))
+            }
+            GroundChange::Object(fluent, value) => {
+                self.set_object(fluent.function, &fluent.arguments, Some(*value))
+            }
+        }
+    }
+
+    /// The arguments of which a predicate is true, in no particular order.
+    pub fn instances(&self, predicate: PredicateId) -> impl Iterator<Item = &[ObjectId]> {
+        self.facts[predicate.index()].iter().map(|arguments| &**arguments)
+    }
+
+    /// Of how many arguments a predicate is true.
+    pub fn count(&self, predicate: PredicateId) -> usize {
+        self.facts[predicate.index()].len()
+    }
+
+    pub(crate) fn clear_predicate(&mut self, predicate: PredicateId) {
+        self.facts[predicate.index()].clear();
+    }
+
+    /// Everything that is true of basic predicates, and every value, sorted: an initial state without timed changes.
+    pub fn to_init(&self, task: &Task) -> Init {
+        let mut init = Init::default();
+        for (index, facts) in self.facts.iter().enumerate() {
+            if task.predicates[index].stratum.is_none() {
+                let predicate = PredicateId(index as u32);
+                init.facts
+                    .extend(facts.iter().map(|arguments| Fact { predicate, arguments: arguments.clone() }));
+            }
+        }
+        let fluent = |index: usize, arguments: &[ObjectId]| GroundFluent {
+            function: FunctionId(index as u32),
+            arguments: arguments.into(),
+        };
+        for (index, numbers) in self.numbers.iter().enumerate() {
+            init.numbers.extend(numbers.iter().map(|(arguments, value)| (fluent(index, arguments), *value)));
+        }
+        for (index, objects) in self.objects.iter().enumerate() {
+            init.objects.extend(objects.iter().map(|(arguments, value)| (fluent(index, arguments), *value)));
+        }
+        init.facts.sort_unstable();
+        init.numbers.sort_by(|one, other| one.0.cmp(&other.0));
+        init.objects.sort_unstable();
+        init
+    }
+}
+
+impl Task {
+    /// The same task from another initial state. Timed changes are dropped: they counted from the old beginning.
+    pub fn with_state(&self, state: &State) -> Task {
+        Task { init: state.to_init(self), ..self.clone() }
+    }
+
+    /// An object by its name, in any case.
+    pub fn find_object(&self, name: &str) -> Option<ObjectId> {
+        let by_name = &self.objects_by_name;
+        by_name.get(name).or_else(|| by_name.get(&name.to_ascii_lowercase())).copied()
+    }
+
+    /// A predicate by its name, in any case.
+    pub fn find_predicate(&self, name: &str) -> Option<PredicateId> {
+        let at = self.predicates.iter().position(|own| own.name.eq_ignore_ascii_case(name))?;
+        Some(PredicateId(at as u32))
+    }
+
+    /// A function by its name, in any case.
+    pub fn find_function(&self, name: &str) -> Option<FunctionId> {
+        let at = self.functions.iter().position(|own| own.name.eq_ignore_ascii_case(name))?;
+        Some(FunctionId(at as u32))
+    }
+}

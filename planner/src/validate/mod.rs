@@ -1,0 +1,146 @@
+//! Does a plan do what it should? Every happening is replayed exactly.
+//!
+//! Classical plans are replayed step by step; plans with times as happenings after PDDL 2.1 (Fox and Long 2003, section 8):
+//! what happens at one time must not interfere, conditions over all hold strictly between start and end, durations
+//! meet their bounds, timed literals happen by themselves.
+
+mod monitor;
+mod replay;
+mod timeline;
+mod trajectory;
+
+use serde::Serialize;
+
+use crate::attachment::Attachments;
+use crate::diagnostic::{Diagnostic, Findings};
+use crate::plan::Plan;
+use crate::semantics::{Binding, CallFailure, Semantics};
+use crate::state::State;
+use crate::task::{Expression, Task};
+
+pub use monitor::{Broken, monitor};
+
+/// Happenings closer than this are at the same time, in seconds. Plans are printed with few digits, and peers keep
+/// their happenings as little as this apart.
+pub const SEPARATION_S: f64 = 1e-4;
+
+/// What the validator says of a plan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// Whether the plan reaches the goal as it stands.
+    pub valid: bool,
+    /// Why not, in one sentence.
+    pub reason: Option<String>,
+    /// The step at fault, counted from 0.
+    pub step: Option<usize>,
+    /// Value of the metric, or the number of steps where there is none.
+    pub cost: Option<f64>,
+    /// When the last step ends, in seconds; `None` for a plan without times.
+    pub makespan: Option<f64>,
+    /// Value of the metric.
+    pub metric: Option<f64>,
+    /// The fault, to be drawn under the text of the task.
+    #[serde(skip)]
+    pub findings: Findings,
+}
+
+/// Why a replay stopped.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Fault {
+    pub reason: String,
+    pub step: Option<usize>,
+    pub condition: String,
+    pub values: Vec<(String, String)>,
+    pub finding: Diagnostic,
+}
+
+/// The end of a replay.
+pub(crate) struct Replayed {
+    pub state: State,
+    /// States with the times at which they begin, for constraints on the trajectory.
+    pub trace: Vec<(f64, State)>,
+    /// How often conditions of actions were violated that were only preferred, by preference.
+    pub violations: Vec<f64>,
+    /// End of the plan: a time, or the number of steps.
+    pub end: f64,
+}
+
+/// Replays a plan from the initial state to the goal.
+///
+/// A failing attachment makes the verdict invalid, with the failure as its reason.
+pub fn validate(task: &Task, attachments: &Attachments, plan: &Plan) -> Verdict {
+    let _span = tracing::debug_span!("validate", steps = plan.steps.len()).entered();
+    let semantics = Semantics::new(task, attachments);
+    let makespan = plan.makespan_s().filter(|_| !plan.steps.is_empty() || task.is_temporal());
+    let invalid = |reason: String, step: Option<usize>, finding: Option<Diagnostic>| Verdict {
+        valid: false,
+        reason: Some(reason),
+        step,
+        cost: None,
+        makespan,
+        metric: None,
+        findings: Findings { sources: task.sources.to_vec(), list: finding.into_iter().collect() },
+    };
+    let failed = |failure: CallFailure| {
+        let finding = failure.findings(task).list.into_iter().next();
+        invalid(failure.to_string(), None, finding)
+    };
+    match whole(&semantics, plan) {
+        Err(failure) => failed(failure),
+        Ok(Err(fault)) => invalid(fault.reason, fault.step, Some(fault.finding)),
+        Ok(Ok(replayed)) => match metric(&semantics, &replayed) {
+            Err(failure) => failed(failure),
+            Ok(metric) => Verdict {
+                valid: true,
+                reason: None,
+                step: None,
+                cost: if task.metric.is_some() { metric } else { Some(plan.steps.len() as f64) },
+                makespan,
+                metric,
+                findings: Findings { sources: task.sources.to_vec(), list: Vec::new() },
+            },
+        },
+    }
+}
+
+/// Replays a plan and looks at the goal and the constraints.
+fn whole(semantics: &Semantics<'_>, plan: &Plan) -> Result<Result<Replayed, Box<Fault>>, CallFailure> {
+    let replayed = match replay::replay(semantics, plan)? {
+        Ok(replayed) => replayed,
+        Err(fault) => return Ok(Err(fault)),
+    };
+    let goal = &semantics.task.goal;
+    if let Some(why) = semantics.why_not(&replayed.state, &goal.body, &mut Binding::new(goal.slots))? {
+        let message = format!("the goal {} is not reached", why.condition);
+        return Ok(Err(Box::new(replay::fault(message, None, why, "not reached", None))));
+    }
+    Ok(match trajectory::broken_constraint(semantics, &replayed)? {
+        Some(fault) => Err(Box::new(fault)),
+        None => Ok(replayed),
+    })
+}
+
+/// The metric's value at the end.
+fn metric(semantics: &Semantics<'_>, replayed: &Replayed) -> Result<Option<f64>, CallFailure> {
+    let Some(metric) = &semantics.task.metric else { return Ok(None) };
+    let violations = trajectory::violations(semantics, replayed)?;
+    let known = known_values(&metric.value, replayed.end, &violations);
+    semantics.number(&replayed.state, &known, &Binding::new(0))
+}
+
+/// A metric with the values that only the end of a plan tells.
+fn known_values(expression: &Expression, end: f64, violations: &[f64]) -> Expression {
+    let all = |parts: &[Expression]| parts.iter().map(|part| known_values(part, end, violations)).collect();
+    let both =
+        |sides: &[Expression; 2]| Box::new(sides.each_ref().map(|side| known_values(side, end, violations)));
+    match expression {
+        Expression::TotalTime => Expression::Number(end),
+        Expression::Violated(id) => Expression::Number(violations.get(id.index()).copied().unwrap_or(0.0)),
+        Expression::Add(parts) => Expression::Add(all(parts)),
+        Expression::Multiply(parts) => Expression::Multiply(all(parts)),
+        Expression::Subtract(sides) => Expression::Subtract(both(sides)),
+        Expression::Divide(sides) => Expression::Divide(both(sides)),
+        Expression::Negative(inner) => Expression::Negative(Box::new(known_values(inner, end, violations))),
+        other => other.clone(),
+    }
+}

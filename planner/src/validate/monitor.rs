@@ -1,0 +1,67 @@
+//! Is the rest of a plan still good from here?
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Fault, whole};
+use crate::attachment::Attachments;
+use crate::diagnostic::{Findings, Span};
+use crate::plan::Plan;
+use crate::semantics::Semantics;
+use crate::task::Task;
+
+/// Why the rest of a plan no longer reaches the goal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Broken {
+    /// The step at fault, counted from 0 in the rest; `None` if the goal itself is missed.
+    pub step: Option<usize>,
+    /// Why, in one sentence.
+    pub reason: String,
+    /// The condition that does not hold, with objects for its variables; empty where it is not about a condition.
+    pub condition: String,
+    /// Where it stands in the task's texts.
+    pub span: Span,
+    /// Values that it depends on.
+    pub values: Vec<(String, String)>,
+    /// The same, to be drawn under the text of the task.
+    #[serde(skip)]
+    pub findings: Findings,
+}
+
+impl fmt::Display for Broken {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.reason)
+    }
+}
+
+impl std::error::Error for Broken {}
+
+/// Whether the rest of a plan, from the initial state of `task`, still reaches the goal.
+///
+/// Give the task the current state with [`Task::with_state`]. Times of the rest count from now.
+///
+/// # Errors
+/// The first thing that no longer works.
+pub fn monitor(task: &Task, attachments: &Attachments, rest: &Plan) -> Result<(), Box<Broken>> {
+    let _span = tracing::debug_span!("monitor", steps = rest.steps.len()).entered();
+    let semantics = Semantics::new(task, attachments);
+    let broken = match whole(&semantics, rest) {
+        Ok(Ok(_)) => return Ok(()),
+        Ok(Err(fault)) => {
+            let Fault { reason, step, condition, values, finding } = *fault;
+            let span = finding.labels.first().map_or(Span::default(), |label| label.span);
+            let findings = Findings { sources: task.sources.to_vec(), list: vec![finding] };
+            Broken { step, reason, condition, span, values, findings }
+        }
+        Err(failure) => Broken {
+            step: None,
+            reason: failure.to_string(),
+            condition: failure.error.call.clone(),
+            span: failure.span,
+            values: Vec::new(),
+            findings: failure.findings(task),
+        },
+    };
+    Err(Box::new(broken))
+}

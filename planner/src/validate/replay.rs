@@ -1,0 +1,421 @@
+//! One happening after the other, from the initial state to the end of a plan.
+
+use super::timeline::{Event, Happening, happenings};
+use super::{Fault, Replayed, SEPARATION_S};
+use crate::diagnostic::{Diagnostic, Span};
+use crate::plan::Plan;
+use crate::semantics::effects::Clash;
+use crate::semantics::{
+    Binding, CallFailure, Changes, Pending, Semantics, Touched, Why, compare, value_text,
+};
+use crate::solve::EPSILON_S;
+use crate::state::State;
+use crate::task::{Action, ActionId, Comparison, GroundChange, Timed, When};
+
+/// A durative action between its start and its end.
+struct Running {
+    step: usize,
+    action: ActionId,
+    binding: Binding,
+    pending: Pending,
+}
+
+/// Who takes part in a happening, and what it does there.
+struct Part {
+    step: Option<usize>,
+    touched: Touched,
+}
+
+struct Replay<'r, 'a> {
+    semantics: &'r Semantics<'a>,
+    plan: &'r Plan,
+    bound: Vec<(ActionId, Binding)>,
+    state: State,
+    running: Vec<Running>,
+    trace: Vec<(f64, State)>,
+    violations: Vec<f64>,
+    now_s: f64,
+}
+
+type Outcome<T> = Result<Result<T, Box<Fault>>, CallFailure>;
+
+/// Takes the value out of a nested result, or returns the fault.
+macro_rules! attempt {
+    ($result:expr) => {
+        match $result? {
+            Ok(value) => value,
+            Err(fault) => return Ok(Err(fault)),
+        }
+    };
+}
+
+/// Replays a plan up to its end, without looking at the goal.
+pub(super) fn replay(semantics: &Semantics<'_>, plan: &Plan) -> Outcome<Replayed> {
+    let task = semantics.task;
+    let mut bound = Vec::with_capacity(plan.steps.len());
+    for (index, step) in plan.steps.iter().enumerate() {
+        match semantics.bind(step) {
+            Ok(found) => bound.push(found),
+            Err(misfit) => {
+                let reason = format!("{}: {}", step_text(plan, index), misfit.reason);
+                let span = misfit.span.unwrap_or_default();
+                let finding = Diagnostic::error("plan", reason.clone(), span, "declared here");
+                let (step, condition) = (Some(index), String::new());
+                return Ok(Err(Box::new(Fault { reason, step, condition, values: Vec::new(), finding })));
+            }
+        }
+    }
+    let is_durative: Vec<bool> = bound.iter().map(|(action, _)| task.action(*action).is_durative()).collect();
+    if let Some(index) =
+        (0..plan.steps.len()).find(|&index| is_durative[index] && plan.steps[index].start_s.is_none())
+    {
+        let reason = format!("{} takes time, but the plan has no times", step_text(plan, index));
+        let span = task.action(bound[index].0).span;
+        let finding = Diagnostic::error("plan", reason.clone(), span, "durative")
+            .with_help("write steps like `0.000: (move a b) [3.200]`");
+        let (step, condition) = (Some(index), String::new());
+        return Ok(Err(Box::new(Fault { reason, step, condition, values: Vec::new(), finding })));
+    }
+    let happenings = happenings(task, plan, &is_durative);
+    let state = semantics.initial()?;
+    let trace = if task.constraints.is_empty() { Vec::new() } else { vec![(0.0, state.clone())] };
+    let (running, violations) = (Vec::new(), vec![0.0; task.preferences.len()]);
+    let mut replay = Replay { semantics, plan, bound, state, running, trace, violations, now_s: 0.0 };
+    for happening in &happenings {
+        attempt!(replay.happening(happening));
+    }
+    let end = plan.makespan_s().filter(|_| !plan.steps.is_empty()).unwrap_or(plan.steps.len() as f64);
+    Ok(Ok(Replayed { state: replay.state, trace: replay.trace, violations: replay.violations, end }))
+}
+
+/// A step for messages: its number, its text, its time.
+fn step_text(plan: &Plan, index: usize) -> String {
+    let step = &plan.steps[index];
+    let arguments: String = step.arguments.iter().map(|name| format!(" {name}")).collect();
+    let time = step.start_s.map_or(String::new(), |start_s| format!(" at {}", value_text(Some(start_s))));
+    format!("step {} ({}{arguments}){time}", index + 1, step.action)
+}
+
+/// A condition that does not hold, drawn where it stands.
+pub(super) fn fault(
+    reason: String,
+    step: Option<usize>,
+    why: Why,
+    label: &str,
+    action: Option<(Span, String)>,
+) -> Fault {
+    let values: Vec<String> = why.values.iter().map(|(name, value)| format!("{name} is {value}")).collect();
+    let reason = if values.is_empty() { reason } else { format!("{reason}: {}", values.join(", ")) };
+    let label = if values.is_empty() { label.to_string() } else { format!("{label}: {}", values.join(", ")) };
+    let finding = Diagnostic::error("plan", reason.clone(), why.span, label);
+    let finding = match action {
+        Some((span, text)) => finding.with_label(span, text),
+        None => finding,
+    };
+    Fault { reason, step, condition: why.condition, values: why.values, finding }
+}
+
+impl Replay<'_, '_> {
+    fn action(&self, step: usize) -> &Action {
+        self.semantics.task.action(self.bound[step].0)
+    }
+
+    fn happening(&mut self, happening: &Happening) -> Outcome<()> {
+        attempt!(self.flow(happening.time_s));
+        let alone = happening.events.len() == 1;
+        let mut parts: Vec<Part> = Vec::with_capacity(happening.events.len());
+        for &event in &happening.events {
+            parts.push(attempt!(self.part(event, alone)));
+        }
+        attempt!(self.conflicts(&parts, happening.time_s));
+        let mut all = Changes::default();
+        for part in parts {
+            let changes = part.touched.changes;
+            all.deleted.extend(changes.deleted);
+            all.added.extend(changes.added);
+            all.numbers.extend(changes.numbers);
+            all.cleared.extend(changes.cleared);
+            all.objects.extend(changes.objects);
+        }
+        self.start_and_end(&happening.events)?;
+        if let Err(clash) = self.semantics.apply(&mut self.state, &all)? {
+            let step = happening.events.iter().find_map(|event| event.step());
+            return Ok(Err(Box::new(self.clash(step, clash))));
+        }
+        if !self.trace.is_empty() {
+            self.trace.push((happening.time_s, self.state.clone()));
+        }
+        self.invariants()
+    }
+
+    /// What an event does, if it can happen now.
+    fn part(&mut self, event: Event, alone: bool) -> Outcome<Part> {
+        let mut touched = Touched::default();
+        let (step, at_end) = match event {
+            Event::Timed(index) => {
+                match &self.semantics.task.init.timed[index].change {
+                    GroundChange::Add(fact) => touched.changes.added.push(fact.clone()),
+                    GroundChange::Delete(fact) => touched.changes.deleted.push(fact.clone()),
+                    GroundChange::Number(fluent, value) => {
+                        let span = self.semantics.task.init.timed[index].span;
+                        let assign = crate::task::Assignment::Assign;
+                        touched.changes.numbers.push((fluent.clone(), assign, *value, span));
+                    }
+                    GroundChange::Object(fluent, value) => {
+                        let span = self.semantics.task.init.timed[index].span;
+                        touched.changes.objects.push((fluent.clone(), Some(*value), span));
+                    }
+                }
+                return Ok(Ok(Part { step: None, touched }));
+            }
+            Event::End(step) => (step, true),
+            Event::Start(step) | Event::Instant(step) => (step, false),
+        };
+        let (id, mut binding) = self.bound[step].clone();
+        let action = self.semantics.task.action(id);
+        let (condition, effects) = if at_end {
+            (&action.condition.end, &action.effects.end)
+        } else {
+            (&action.condition.start, &action.effects.start)
+        };
+        if let Some(why) = self.semantics.why_not(&self.state, condition, &mut binding)? {
+            let when = match event {
+                Event::End(_) => "at its end",
+                Event::Start(_) => "at its start",
+                _ => "before it",
+            };
+            return Ok(Err(Box::new(self.unmet(step, why, when))));
+        }
+        attempt!(self.duration(step, at_end, &mut binding));
+        if !at_end {
+            attempt!(self.proposed(step, &binding));
+        }
+        self.preferences(step, event, &mut binding)?;
+        let running = self.running.iter().find(|running| running.step == step);
+        let pending = at_end.then(|| running.map(|running| running.pending.clone()).unwrap_or_default());
+        let changes = self.semantics.changes(
+            &self.state,
+            effects,
+            &mut binding,
+            pending.as_ref(),
+            &mut touched.changes,
+        )?;
+        if let Err(clash) = changes {
+            return Ok(Err(Box::new(self.clash(Some(step), clash))));
+        }
+        if !alone {
+            self.semantics.reads(&self.state, condition, &mut binding, &mut touched)?;
+            self.semantics.effect_reads(&self.state, effects, at_end, &mut binding, &mut touched)?;
+        }
+        Ok(Ok(Part { step: Some(step), touched }))
+    }
+
+    fn unmet(&self, step: usize, why: Why, when: &str) -> Fault {
+        let text = step_text(self.plan, step);
+        let reason = format!("{text}: {} does not hold {when}", why.condition);
+        let label = format!("does not hold {when}");
+        fault(reason, Some(step), why, &label, Some((self.action(step).span, format!("in {text}"))))
+    }
+
+    fn clash(&self, step: Option<usize>, clash: Clash) -> Fault {
+        let text = step.map_or("a timed literal".to_string(), |step| step_text(self.plan, step));
+        let reason = format!("{text}: {}", clash.reason);
+        let finding = Diagnostic::error("plan", reason.clone(), clash.span, clash.reason);
+        Fault { reason, step, condition: String::new(), values: Vec::new(), finding }
+    }
+
+    /// The duration meets its bounds, as far as they are evaluated now. Plans may be off by ε.
+    fn duration(&self, step: usize, at_end: bool, binding: &mut Binding) -> Outcome<()> {
+        let Some(bounds) = &self.action(step).duration else { return Ok(Ok(())) };
+        let duration_s = self.plan.steps[step].duration_s;
+        for bound in bounds.iter().filter(|bound| (bound.when == When::End) == at_end) {
+            let value = self.semantics.number(&self.state, &bound.value, binding)?;
+            let slack = EPSILON_S + 1e-9 * duration_s;
+            let meets = value.filter(|value| value.is_finite()).is_some_and(|value| match bound.comparison {
+                Comparison::Less | Comparison::LessOrEqual => duration_s <= value + slack,
+                Comparison::Equal => (duration_s - value).abs() <= slack,
+                Comparison::Greater | Comparison::GreaterOrEqual => duration_s + slack >= value,
+            });
+            let strict = match (bound.comparison, value) {
+                (Comparison::Less | Comparison::Greater, Some(value)) => {
+                    compare(bound.comparison, duration_s, value)
+                }
+                _ => true,
+            };
+            if !meets || !strict {
+                let name = self.semantics.expression_text(&bound.value, binding);
+                let text = step_text(self.plan, step);
+                let wanted = match value {
+                    Some(value) if value.is_finite() => format!("{} is asked for", value_text(Some(value))),
+                    Some(_) => format!("{name} says that it cannot be done"),
+                    None => format!("{name} has no value"),
+                };
+                let reason = format!("{text} takes {}, {wanted}", value_text(Some(duration_s)));
+                let finding = Diagnostic::error("plan", reason.clone(), bound.span, wanted);
+                let values = vec![
+                    (name.clone(), value_text(value)),
+                    ("?duration".into(), value_text(Some(duration_s))),
+                ];
+                return Ok(Err(Box::new(Fault {
+                    reason,
+                    step: Some(step),
+                    condition: name,
+                    values,
+                    finding,
+                })));
+            }
+        }
+        Ok(Ok(()))
+    }
+
+    /// Grounding modules propose what the step says they do.
+    fn proposed(&self, step: usize, binding: &Binding) -> Outcome<()> {
+        let action = self.action(step);
+        for (call, proposal) in action.grounding.iter().zip(&binding.proposals) {
+            let mut plain = binding.clone();
+            plain.proposals.clear();
+            if !self.semantics.proposals(&self.state, call, &plain)?.contains(proposal) {
+                let text = step_text(self.plan, step);
+                let reason = format!(
+                    "{text}: `{proposal}` is not proposed by {}",
+                    self.semantics.call_text(call, &plain)
+                );
+                let finding = Diagnostic::error("plan", reason.clone(), call.span, "not proposed by this");
+                let condition = self.semantics.call_text(call, &plain);
+                return Ok(Err(Box::new(Fault {
+                    reason,
+                    step: Some(step),
+                    condition,
+                    values: Vec::new(),
+                    finding,
+                })));
+            }
+        }
+        Ok(Ok(()))
+    }
+
+    /// Counts conditions that were only preferred and do not hold.
+    fn preferences(&mut self, step: usize, event: Event, binding: &mut Binding) -> Result<(), CallFailure> {
+        let preferences = self.action(step).preferences.clone();
+        for (id, Timed { start, end, .. }) in &preferences {
+            let now = if matches!(event, Event::End(_)) { end } else { start };
+            if !self.semantics.holds(&self.state, now, binding)? {
+                self.violations[id.index()] += 1.0;
+            }
+        }
+        Ok(())
+    }
+
+    /// No part of a happening touches what another part reads or writes.
+    fn conflicts(&self, parts: &[Part], time_s: f64) -> Outcome<()> {
+        for (index, part) in parts.iter().enumerate() {
+            for other in &parts[..index] {
+                let Some(what) = part.touched.conflict(&other.touched, self.semantics) else { continue };
+                let text = |step: Option<usize>| match step {
+                    Some(step) => step_text(self.plan, step),
+                    None => "a timed literal".to_string(),
+                };
+                let reason = format!(
+                    "{} and {} both touch {what} at {}",
+                    text(other.step),
+                    text(part.step),
+                    value_text(Some(time_s))
+                );
+                let step = part.step.or(other.step);
+                let span = step.map_or(Span::default(), |step| self.action(step).span);
+                let finding = Diagnostic::error("plan", reason.clone(), span, format!("touches {what}")).with_help(
+                    format!("what depends on each other must be at least {SEPARATION_S} s apart; planners keep {EPSILON_S}"),
+                );
+                return Ok(Err(Box::new(Fault {
+                    reason,
+                    step,
+                    condition: what,
+                    values: Vec::new(),
+                    finding,
+                })));
+            }
+        }
+        Ok(Ok(()))
+    }
+
+    fn start_and_end(&mut self, events: &[Event]) -> Result<(), CallFailure> {
+        for event in events {
+            match *event {
+                Event::Start(step) => {
+                    let (action, mut binding) = self.bound[step].clone();
+                    let effects = &self.semantics.task.action(action).effects.end;
+                    let pending = self.semantics.remember(&self.state, effects, &mut binding)?;
+                    self.running.push(Running { step, action, binding, pending });
+                }
+                Event::End(step) => self.running.retain(|running| running.step != step),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Conditions over all of what is running hold in the present state.
+    fn invariants(&mut self) -> Outcome<()> {
+        let mut broken = None;
+        for running in &mut self.running {
+            let action = self.semantics.task.action(running.action);
+            if let Some(why) =
+                self.semantics.why_not(&self.state, &action.condition.over_all, &mut running.binding)?
+            {
+                broken = Some((running.step, why));
+                break;
+            }
+            let effects = &action.effects.end;
+            self.semantics.keep(&self.state, effects, &mut running.binding, &mut running.pending)?;
+            for (id, timed) in &action.preferences {
+                if !self.semantics.holds(&self.state, &timed.over_all, &mut running.binding)? {
+                    self.violations[id.index()] = self.violations[id.index()].max(1.0);
+                }
+            }
+        }
+        Ok(match broken {
+            Some((step, why)) => Err(Box::new(self.unmet(step, why, "all the time"))),
+            None => Ok(()),
+        })
+    }
+
+    /// Numbers that change at a rate, up to the next happening. Between happenings they change linearly, so that
+    /// conditions over all that hold at both ends hold between them.
+    fn flow(&mut self, until_s: f64) -> Outcome<()> {
+        let elapsed_s = until_s - self.now_s;
+        self.now_s = until_s;
+        let mut changes = Changes::default();
+        for running in &self.running {
+            for rate in &self.semantics.task.action(running.action).continuous {
+                let value = self.semantics.number(&self.state, &rate.per_second, &running.binding)?;
+                let fluent = self.semantics.ground(&self.state, &rate.fluent, &running.binding);
+                let (Some(value), Some(fluent)) = (value, fluent) else {
+                    let clash = Clash { reason: "this rate has no value".to_string(), span: rate.span };
+                    return Ok(Err(Box::new(self.clash(Some(running.step), clash))));
+                };
+                changes.numbers.push((
+                    fluent,
+                    crate::task::Assignment::Increase,
+                    value * elapsed_s,
+                    rate.span,
+                ));
+            }
+        }
+        if changes.numbers.is_empty() || elapsed_s <= 0.0 {
+            return Ok(Ok(()));
+        }
+        if let Err(clash) = self.semantics.apply(&mut self.state, &changes)? {
+            return Ok(Err(Box::new(self.clash(None, clash))));
+        }
+        self.invariants()
+    }
+}
+
+impl Event {
+    fn step(self) -> Option<usize> {
+        match self {
+            Event::Timed(_) => None,
+            Event::End(step) | Event::Start(step) | Event::Instant(step) => Some(step),
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! From the steps of a plan to what happens when.
+
+use super::SEPARATION_S;
+use crate::plan::Plan;
+use crate::task::Task;
+
+/// Something that happens at one time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Event {
+    /// A timed initial literal or fluent, by number.
+    Timed(usize),
+    /// The end of a step.
+    End(usize),
+    /// The start of a durative step.
+    Start(usize),
+    /// An instantaneous step.
+    Instant(usize),
+}
+
+/// Everything that happens at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Happening {
+    pub time_s: f64,
+    pub events: Vec<Event>,
+}
+
+/// The happenings of a plan in order of time. `is_durative` tells of each step whether its action takes time.
+///
+/// In a plan without times every step is a happening of its own, at 1, 2, ….
+pub(super) fn happenings(task: &Task, plan: &Plan, is_durative: &[bool]) -> Vec<Happening> {
+    if plan.steps.iter().any(|step| step.start_s.is_none()) {
+        let one = |step: usize| Happening { time_s: (step + 1) as f64, events: vec![Event::Instant(step)] };
+        return (0..plan.steps.len()).map(one).collect();
+    }
+    let mut events: Vec<(f64, Event)> = Vec::new();
+    for (index, step) in plan.steps.iter().enumerate() {
+        let start_s = step.start_s.unwrap_or(0.0);
+        if is_durative[index] {
+            events.push((start_s, Event::Start(index)));
+            events.push((start_s + step.duration_s, Event::End(index)));
+        } else {
+            events.push((start_s, Event::Instant(index)));
+        }
+    }
+    let end = plan.makespan_s().unwrap_or(0.0);
+    for (index, timed) in task.init.timed.iter().enumerate() {
+        if timed.time_s < end + SEPARATION_S {
+            events.push((timed.time_s, Event::Timed(index)));
+        }
+    }
+    events.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+    let mut all: Vec<Happening> = Vec::new();
+    for (time_s, event) in events {
+        match all
+            .last_mut()
+            .filter(|last| time_s - last.time_s < SEPARATION_S && !starts(&last.events, event))
+        {
+            Some(last) => last.events.push(event),
+            None => all.push(Happening { time_s, events: vec![event] }),
+        }
+    }
+    all
+}
+
+/// Whether `event` ends a step that starts among `events`: a step without duration still starts before it ends.
+fn starts(events: &[Event], event: Event) -> bool {
+    matches!(event, Event::End(step) if events.contains(&Event::Start(step)))
+}

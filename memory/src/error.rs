@@ -143,10 +143,13 @@ impl Error {
 
     /// An index error, or [`Error::Full`] where that is the reason.
     pub(crate) fn index(place: &Path, because: rusqlite::Error) -> Self {
-        match because.sqlite_error_code() {
-            Some(rusqlite::ErrorCode::DiskFull) => Error::Full { place: place.to_owned() },
-            _ => Error::Index { place: place.to_owned(), because },
+        // Without room for its shared memory SQLite reports a failure of input and output.
+        let shared_memory =
+            because.sqlite_error().is_some_and(|e| e.extended_code == rusqlite::ffi::SQLITE_IOERR_SHMSIZE);
+        if shared_memory || because.sqlite_error_code() == Some(rusqlite::ErrorCode::DiskFull) {
+            return Error::Full { place: place.to_owned() };
         }
+        Error::Index { place: place.to_owned(), because }
     }
 
     /// Whether this is a lack of room on the disk.

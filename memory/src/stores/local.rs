@@ -61,6 +61,8 @@ pub struct Recovery {
     pub regained: u64,
     /// Bytes behind the last whole record that were dropped.
     pub dropped_bytes: u64,
+    /// Records that the index knew and that never reached the disk: a power cut under [`Durability::Process`].
+    pub lost: u64,
     /// Whether the index had to be made again.
     pub index_rebuilt: bool,
 }
@@ -146,11 +148,12 @@ impl LocalStore {
         fs::create_dir_all(segment_dir(dir)).map_err(|e| Error::file("cannot create", dir, e))?;
         let lock = lock(dir)?;
         let mut recovery = Recovery::default();
-        let mut index = match Index::open(dir) {
+        let log_bytes = options.retention.max_bytes.map_or(u64::MAX, |bound| bound / 64);
+        let mut index = match Index::open(dir, log_bytes) {
             Err(e) if index::is_broken(&e) => {
                 set_aside(dir)?;
                 recovery.index_rebuilt = true;
-                Index::open(dir)?
+                Index::open(dir, log_bytes)?
             }
             opened => opened?,
         };
@@ -554,6 +557,8 @@ fn recover_segment(
 ) -> Result<u64, Error> {
     let path = segment_path(dir, number);
     let length = fs::metadata(&path).map_err(|e| Error::file("cannot read", &path, e))?.len();
+    let mut chunks: Vec<u64> = index.places(number, false)?.iter().map(|p| p.located.chunk).collect();
+    chunks.sort_unstable();
     let mut take = |records: Vec<(Document, segment::Located)>, end: u64| {
         if end <= known {
             return Ok(());
@@ -566,13 +571,11 @@ fn recover_segment(
         recovery.regained += records.len() as u64;
         Ok(())
     };
-    let scan = scan::scan(&path, &mut take)?;
+    let scan = scan::scan(&path, &chunks, &mut take)?;
     if scan.end < known {
-        // Acknowledged records are damaged: leave the file as it is, for `verify` to say which.
-        index.seal(number, length)?;
-        return Ok(length);
+        recovery.lost += index.forget_from(number, scan.end)?;
     }
-    if scan.chunks.is_empty() {
+    if scan.chunks.is_empty() && scan.damaged.is_empty() {
         recovery.dropped_bytes += length;
         fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e))?;
         index.forget(number)?;

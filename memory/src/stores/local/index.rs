@@ -70,7 +70,9 @@ pub(super) fn is_broken(error: &Error) -> bool {
 
 impl Index {
     /// Opens or makes the index of a folder for writing.
-    pub fn open(dir: &Path) -> Result<Self, Error> {
+    ///
+    /// `log_bytes` bounds the file beside it that holds what is new.
+    pub fn open(dir: &Path, log_bytes: u64) -> Result<Self, Error> {
         let index = Self::connect(dir, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE)?;
         let run = |sql: &str| index.db.execute_batch(sql).map_err(|e| index.err(e));
         let format: i64 =
@@ -78,9 +80,9 @@ impl Index {
         if format == 0 {
             run("PRAGMA auto_vacuum=INCREMENTAL")?;
         }
-        run(
-            "PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL; PRAGMA cache_size=-8192; PRAGMA journal_size_limit=4194304",
-        )?;
+        run("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL; PRAGMA cache_size=-8192")?;
+        let pages = (log_bytes / 4096).clamp(16, 1000);
+        run(&format!("PRAGMA wal_autocheckpoint={pages}; PRAGMA journal_size_limit={}", pages * 4096))?;
         if format == 0 {
             run(&format!("BEGIN; {TABLES} PRAGMA user_version={FORMAT}; COMMIT"))?;
         } else if format > FORMAT {
@@ -196,11 +198,21 @@ impl Index {
 
     /// Forgets a segment and what lay in it; returns the number of records.
     pub fn forget(&mut self, segment: u64) -> Result<u64, Error> {
+        let gone = self.forget_from(segment, 0)?;
+        self.db
+            .execute("DELETE FROM segments WHERE number = ?1", [segment as i64])
+            .map_err(|e| self.err(e))?;
+        Ok(gone)
+    }
+
+    /// Forgets what lay in a segment in chunks from an offset on; returns the number of records.
+    pub fn forget_from(&mut self, segment: u64, offset: u64) -> Result<u64, Error> {
+        const GOING: &str = "SELECT id FROM records WHERE segment = ?1 AND chunk >= ?2";
         let next = self.next_id()?;
         let dir = self.dir.clone();
+        let which = [segment as i64, offset as i64];
         let result = (|| -> rusqlite::Result<u64> {
             let tx = self.db.transaction()?;
-            let n = segment as i64;
             // Numbers are never used again, even when every record is gone.
             tx.execute(
                 "INSERT INTO meta VALUES('next', ?1) ON CONFLICT DO UPDATE SET value = max(value, ?1)",
@@ -208,25 +220,20 @@ impl Index {
             )?;
             tx.execute(
                 "UPDATE kinds SET records = records - g.n, bytes = bytes - g.b FROM
-                   (SELECT kind AS k, frame AS f, count(*) AS n, sum(bytes) AS b FROM records WHERE segment = ?1 GROUP BY kind, frame) AS g
+                   (SELECT kind AS k, frame AS f, count(*) AS n, sum(bytes) AS b FROM records
+                    WHERE segment = ?1 AND chunk >= ?2 GROUP BY kind, frame) AS g
                  WHERE kind = g.k AND frame = g.f",
-                [n],
+                which,
             )?;
             tx.execute("DELETE FROM kinds WHERE records = 0", [])?;
-            for (table, key) in
-                [("objects", "record"), ("seen_from", "record"), ("covers", "record"), ("pins", "record")]
-            {
-                tx.execute(
-                    &format!(
-                        "DELETE FROM {table} WHERE {key} IN (SELECT id FROM records WHERE segment = ?1)"
-                    ),
-                    [n],
-                )?;
+            for table in ["objects", "seen_from", "covers", "pins"] {
+                tx.execute(&format!("DELETE FROM {table} WHERE record IN ({GOING})"), which)?;
             }
-            let gone = tx.execute("DELETE FROM records WHERE segment = ?1", [n])?;
-            tx.execute("DELETE FROM segments WHERE number = ?1", [n])?;
+            let gone = tx.execute("DELETE FROM records WHERE segment = ?1 AND chunk >= ?2", which)?;
             tx.commit()?;
-            self.db.prepare("PRAGMA incremental_vacuum")?.query([])?.next()?;
+            let mut vacuum = self.db.prepare("PRAGMA incremental_vacuum")?;
+            let mut steps = vacuum.query([])?;
+            while steps.next()?.is_some() {}
             Ok(gone as u64)
         })();
         result.map_err(|e| Error::index(&dir, e))
@@ -431,6 +438,12 @@ impl Index {
         };
         read().map_err(|e| self.err(e))?;
         Ok(stats)
+    }
+
+    /// Brings what is new into the index proper and empties the file that held it.
+    pub fn empty_log(&mut self) -> Result<(), Error> {
+        let run = |r: &Row| r.get::<_, i64>(0);
+        self.db.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], run).map(|_| ()).map_err(|e| self.err(e))
     }
 
     /// What SQLite itself finds wrong with the file.

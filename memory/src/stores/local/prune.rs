@@ -10,6 +10,10 @@ impl LocalStore {
     /// Drops segments until the limits hold or nothing is left to drop. Returns the number of records that went.
     pub(super) fn keep_within(&self, writer: &mut WriteState, retention: &Retention) -> Result<u64, Error> {
         let mut gone = 0;
+        if self.is_over(writer, retention)? && retention.max_bytes.is_some() {
+            // What the index has yet to take in is no record: it goes first.
+            self.index().empty_log()?;
+        }
         while self.is_over(writer, retention)? {
             match self.drop_oldest(writer)? {
                 Some(records) => gone += records,

@@ -357,23 +357,8 @@ impl Segment {
         w.u64(chunk.len());
         let offset = self.end;
         let bytes = head.len() as u64 + chunk.len();
-        let mut index = Vec::new();
-        let mut indexes = Vec::new();
-        let mut by_channel: BTreeMap<u16, Vec<(u64, u64)>> = BTreeMap::new();
-        for (channel, stamp_ns, at) in &chunk.messages {
-            by_channel.entry(*channel).or_default().push((*stamp_ns, *at));
-        }
-        for (channel, entries) in by_channel {
-            indexes.push((channel, offset + bytes + index.len() as u64));
-            Writer(&mut index).record(op::MESSAGE_INDEX, |w| {
-                w.u16(channel);
-                w.u32(entries.len() as u32 * 16);
-                for (stamp_ns, at) in entries {
-                    w.u64(stamp_ns);
-                    w.u64(at);
-                }
-            });
-        }
+        let (index, indexes) = message_index(&chunk.messages);
+        let indexes = indexes.into_iter().map(|(channel, at)| (channel, offset + bytes + at)).collect();
         let mut parts = vec![head.as_slice()];
         parts.extend(slices);
         parts.push(&index);
@@ -527,6 +512,28 @@ impl ChunkEntry {
             w.u64(self.data_bytes);
         });
     }
+}
+
+/// The index of a chunk: its records, and where each channel's begins among them. Messages are channel, time and offset.
+pub(super) fn message_index(messages: &[(u16, u64, u64)]) -> (Vec<u8>, Vec<(u16, u64)>) {
+    let mut by_channel: BTreeMap<u16, Vec<(u64, u64)>> = BTreeMap::new();
+    for (channel, stamp_ns, at) in messages {
+        by_channel.entry(*channel).or_default().push((*stamp_ns, *at));
+    }
+    let mut index = Vec::new();
+    let mut begins = Vec::new();
+    for (channel, entries) in by_channel {
+        begins.push((channel, index.len() as u64));
+        Writer(&mut index).record(op::MESSAGE_INDEX, |w| {
+            w.u16(channel);
+            w.u32(entries.len() as u32 * 16);
+            for (stamp_ns, at) in entries {
+                w.u64(stamp_ns);
+                w.u64(at);
+            }
+        });
+    }
+    (index, begins)
 }
 
 /// A document as the bytes of its message.

@@ -1,0 +1,222 @@
+//! A store after the worst: cut files, damaged bytes, a lost index, no room.
+
+use descry_memory::stores::Store;
+use descry_memory::{
+    Blob, Draft, Durability, Error, Form, LocalOptions, LocalStore, Query, RecordId, Retention,
+};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn options() -> LocalOptions {
+    LocalOptions { segment_bytes: 1 << 20, ..LocalOptions::default() }
+}
+
+fn draft(i: u64, bytes: usize) -> Draft<'static> {
+    let data: Vec<u8> = (0..bytes).map(|k| (i as usize * 31 + k) as u8).collect();
+    let mut draft = Draft::new("scan", i as i64);
+    draft.meta.body = json!({ "i": i });
+    draft.blobs.push(Blob { name: "data".into(), form: Form::Bytes, layout: Value::Null, data: data.into() });
+    draft
+}
+
+/// Checks that a record is what [`draft`] made of its number.
+fn assert_whole(store: &dyn Store, id: RecordId, i: u64, bytes: usize) {
+    assert_eq!(store.get(id).unwrap().body, json!({ "i": i }));
+    assert_eq!(store.blob(id, "data").unwrap(), draft(i, bytes).blobs[0].data.as_ref());
+}
+
+fn segments(dir: &Path) -> Vec<PathBuf> {
+    let mut paths: Vec<_> = fs::read_dir(dir.join("segments")).unwrap().map(|e| e.unwrap().path()).collect();
+    paths.sort();
+    paths
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to.join("segments")).unwrap();
+    for entry in fs::read_dir(from).unwrap().chain(fs::read_dir(from.join("segments")).unwrap()) {
+        let path = entry.unwrap().path();
+        if path.is_file() {
+            fs::copy(&path, to.join(path.strip_prefix(from).unwrap())).unwrap();
+        }
+    }
+}
+
+/// A store as a killed process leaves it: five records, nothing finished. Also where each record's chunk ends.
+fn killed(dir: &Path) -> (Vec<RecordId>, Vec<u64>) {
+    let live = dir.join("live");
+    let store = LocalStore::create(&live, "", options()).unwrap();
+    let mut ends = Vec::new();
+    let mut ids = Vec::new();
+    for i in 0..5 {
+        ids.extend(store.append(&[draft(i, 300 + 40 * i as usize)]).unwrap());
+        ends.push(fs::metadata(&segments(&live)[0]).unwrap().len());
+    }
+    copy(&live, &dir.join("killed"));
+    (ids, ends)
+}
+
+#[test]
+fn a_segment_cut_anywhere_keeps_what_was_whole_and_goes_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let (ids, ends) = killed(dir.path());
+    let source = dir.path().join("killed");
+    let length = ends[4];
+    // With the index ahead of the segment, behind it, and gone.
+    for (round, cut) in (0..length).step_by(37).chain(ends.iter().copied()).enumerate() {
+        let here = dir.path().join(format!("cut-{round}"));
+        copy(&source, &here);
+        let segment = segments(&here)[0].clone();
+        fs::File::options().write(true).open(&segment).unwrap().set_len(cut).unwrap();
+        if round % 3 == 0 {
+            for file in ["index.sqlite", "index.sqlite-wal", "index.sqlite-shm"] {
+                drop(fs::remove_file(here.join(file)));
+            }
+        }
+        let store = LocalStore::open(&here, "", options()).unwrap();
+        let whole = ends.iter().filter(|end| **end <= cut).count();
+        let found = store.find(&Query::default()).unwrap();
+        assert_eq!(found.len(), whole, "cut at {cut} of {ends:?}: {:?}", store.recovery());
+        for (i, id) in ids.iter().take(whole).enumerate() {
+            assert_whole(&store, *id, i as u64, 300 + 40 * i);
+        }
+        let next = store.append(&[draft(9, 10)]).unwrap()[0];
+        assert_whole(&store, next, 9, 10);
+        let report = store.verify().unwrap();
+        assert!(report.is_whole() && report.whole == whole as u64 + 1, "cut at {cut}: {report:?}");
+        assert_eq!(store.stats().unwrap().kinds["scan"].records, whole as u64 + 1);
+        drop(store);
+        for path in segments(&here) {
+            let bytes = fs::read(path).unwrap();
+            assert!(mcap::Summary::read(&bytes).unwrap().is_some(), "every segment is complete");
+        }
+        fs::remove_dir_all(here).unwrap();
+    }
+}
+
+#[test]
+fn rubbish_behind_the_last_record_is_dropped() {
+    let dir = tempfile::tempdir().unwrap();
+    killed(dir.path());
+    let rubbish =
+        [vec![0_u8; 5000], vec![6; 100], b"\x06\xff\xff\xff\xff\xff\xff\xff\xff".to_vec(), vec![0xff; 3]];
+    for (i, rubbish) in rubbish.into_iter().enumerate() {
+        let here = dir.path().join(format!("rubbish-{i}"));
+        copy(&dir.path().join("killed"), &here);
+        let path = segments(&here)[0].clone();
+        let mut bytes = fs::read(&path).unwrap();
+        bytes.extend_from_slice(&rubbish);
+        fs::write(&path, bytes).unwrap();
+        let store = LocalStore::open(&here, "", options()).unwrap();
+        assert_eq!(store.find(&Query::default()).unwrap().len(), 5);
+        assert_eq!(store.recovery().dropped_bytes, rubbish.len() as u64);
+        assert!(store.verify().unwrap().is_whole());
+    }
+}
+
+#[test]
+fn damage_costs_the_batch_that_it_hits_and_is_reported() {
+    let dir = tempfile::tempdir().unwrap();
+    let source = dir.path().join("source");
+    let store = LocalStore::create(&source, "", options()).unwrap();
+    let ids: Vec<_> = (0..5).map(|i| store.append(&[draft(i, 1000)]).unwrap()[0]).collect();
+    drop(store);
+    let original = fs::read(&segments(&source)[0]).unwrap();
+    let data = mcap::read::footer(&original).unwrap().summary_start as usize;
+    // The header names the program that wrote; nothing depends on it.
+    let header = 8 + 9 + u64::from_le_bytes(original[9..17].try_into().unwrap()) as usize;
+    let here = dir.path().join("here");
+    for hit in (header..original.len()).step_by(53) {
+        copy(&source, &here);
+        let mut bytes = original.clone();
+        bytes[hit] ^= 1 << (hit % 8);
+        fs::write(&segments(&here)[0], bytes).unwrap();
+        let store = LocalStore::open(&here, "", options()).unwrap();
+        let report = store.verify().unwrap();
+        assert!(!report.is_whole(), "byte {hit} of {data}");
+        let lost: Vec<_> = report.faults.iter().filter_map(|f| f.record).collect();
+        assert_eq!(report.whole + lost.len() as u64, 5, "byte {hit} of {data}: {report:?}");
+        assert!(lost.len() <= 1, "byte {hit} of {data}: {report:?}");
+        for (i, id) in ids.iter().enumerate().filter(|(_, id)| !lost.contains(id)) {
+            assert_whole(&store, *id, i as u64, 1000);
+        }
+        drop(store);
+        fs::remove_dir_all(&here).unwrap();
+    }
+}
+
+#[test]
+fn an_index_that_is_none_is_made_again_with_its_pins() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = LocalStore::create(dir.path(), "", options()).unwrap();
+    let ids: Vec<_> = (0..5).map(|i| store.append(&[draft(i, 1000)]).unwrap()[0]).collect();
+    store.pin(&ids[1..3], "belief").unwrap();
+    store.pin(&ids[4..5], "plan").unwrap();
+    store.unpin("plan").unwrap();
+    let (stats, pins) = (store.stats().unwrap(), store.pins().unwrap());
+    drop(store);
+    fs::write(dir.path().join("index.sqlite"), b"this is no index, whatever its name may say").unwrap();
+    let store = LocalStore::open(dir.path(), "", options()).unwrap();
+    assert!(store.recovery().index_rebuilt);
+    assert_eq!(store.pins().unwrap(), pins);
+    assert_eq!(store.stats().unwrap().kinds, stats.kinds);
+    (0..5).for_each(|i| assert_whole(&store, ids[i], i as u64, 1000));
+}
+
+#[test]
+fn one_writes_and_many_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let nothing = LocalStore::open(&dir.path().join("none"), "", options());
+    assert!(matches!(nothing, Err(Error::NoRecord { .. })));
+    let store = LocalStore::create(dir.path(), "", options()).unwrap();
+    assert!(matches!(LocalStore::create(dir.path(), "", options()), Err(Error::Exists { .. })));
+    assert!(matches!(LocalStore::open(dir.path(), "", options()), Err(Error::InUse { .. })));
+    let reader = LocalStore::open_shared(dir.path()).unwrap();
+    for i in 0..3 {
+        let id = store.append(&[draft(i, 10)]).unwrap()[0];
+        assert_whole(&reader, id, i, 10);
+    }
+    assert!(matches!(reader.append(&[draft(3, 10)]), Err(Error::Input { .. })));
+    assert!(reader.verify().unwrap().is_whole());
+    drop(store);
+    assert_eq!(LocalStore::open_shared(dir.path()).unwrap().find(&Query::default()).unwrap().len(), 3);
+}
+
+/// Records ten times what a bound allows: it holds at every moment, give or take a segment, and what is pinned stays.
+#[test]
+fn a_bound_in_bytes_holds_while_recording() {
+    let dir = tempfile::tempdir().unwrap();
+    let limit = 4 << 20;
+    let retention = Retention { max_bytes: Some(limit), ..Retention::default() };
+    let bounded = LocalOptions { retention, durability: Durability::Process, ..options() };
+    let segment = limit / 16;
+    let store = LocalStore::create(dir.path(), "", bounded).unwrap();
+    let mut pinned = Vec::new();
+    for i in 0..640 {
+        let id = store.append(&[draft(i, 64 << 10)]).unwrap()[0];
+        if i % 100 == 7 {
+            store.pin(&[id], "model").unwrap();
+            pinned.push((id, i));
+        }
+        let used: u64 = segments(dir.path()).iter().map(|p| fs::metadata(p).unwrap().len()).sum();
+        let index: u64 = ["index.sqlite", "index.sqlite-wal", "index.sqlite-shm"]
+            .iter()
+            .map(|f| fs::metadata(dir.path().join(f)).map_or(0, |m| m.len()))
+            .sum();
+        assert!(used + index <= limit + segment, "after {i}: {used} + {index} of {limit}");
+        assert_eq!(store.stats().unwrap().bytes, used + index);
+    }
+    for (id, i) in &pinned {
+        assert_whole(&store, *id, *i, 64 << 10);
+    }
+    let report = store.verify().unwrap();
+    let stats = store.stats().unwrap();
+    assert!(report.is_whole() && report.whole == stats.records, "{report:?} {stats:?}");
+    assert!(stats.records > 30 && stats.records < 64 + 20, "{stats:?}");
+    drop(store);
+    let store = LocalStore::open(dir.path(), "", bounded).unwrap();
+    assert_eq!(store.recovery().regained, 0);
+    for (id, i) in &pinned {
+        assert_whole(&store, *id, *i, 64 << 10);
+    }
+}

@@ -93,8 +93,24 @@ pub struct Objection {
 pub fn parse_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, InputError> {
     toml::from_str(text).map_err(|e| {
         let byte = e.span().map_or(0, |s| s.start);
-        InputError::at(file, text, byte, e.message().replace('\n', " "), "mend this value")
+        let problem =
+            e.message().replace('\n', " ").replace("f64", "a number").replace("u8", "a number from 0 to 255");
+        InputError::at(file, text, byte, &problem, mend_of(&problem))
     })
+}
+
+fn mend_of(problem: &str) -> &'static str {
+    let mends = [
+        ("unknown field", "take one of the names that are known, or remove it"),
+        ("unknown variant", "take one of the names that are known"),
+        ("missing field", "add it here"),
+        ("duplicate", "keep one of them"),
+        ("invalid", "write what is expected"),
+    ];
+    mends
+        .iter()
+        .find(|(word, _)| problem.contains(word))
+        .map_or("this is no TOML from here on", |(_, mend)| mend)
 }
 
 /// Draws an objection under the deepest part of its path that stands in the text.

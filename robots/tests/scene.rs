@@ -1,0 +1,166 @@
+//! Scenes: mistakes in them, and what seeds make of them.
+
+use descry_robots::Pose2;
+use descry_robots::nalgebra::Point3;
+use descry_robots::sim::shape::Shape;
+use descry_robots::sim::{Object, Scene, SceneSpec, SimOptions, SimRobot, arrange};
+use std::path::Path;
+
+const GOOD: &str = r#"
+[[surface]]
+name = "table"
+size_m = [1.6, 0.8]
+height_m = 0.72
+[start]
+position_m = [-2.0, 0.0]
+[[object]]
+name = "cup"
+shape.cup = { diameter_m = 0.07, height_m = 0.1 }
+[[object]]
+name = "mug"
+shape.mug = { diameter_m = 0.08, height_m = 0.095 }
+[target]
+object = "cup"
+"#;
+
+#[test]
+fn mistakes_are_drawn_at_their_place() {
+    for (from, to, line, words) in [
+        ("height_m = 0.72", "height_m = -1", 5, &["found -1", "above zero"][..]),
+        ("height_m = 0.72", "heigth_m = 0.72", 5, &["unknown field `heigth_m`", "height_m"]),
+        (
+            "height_m = 0.72",
+            "height_m = \"high\"",
+            5,
+            &["invalid type", "expected a number", "write what is expected"],
+        ),
+        ("shape.cup =", "shape.cupp =", 10, &["cupp", "mug"]),
+        ("diameter_m = 0.07,", "diameter_m = 0,", 10, &["found 0"]),
+        ("height_m = 0.1 }", "height_m = 0.1, wall_m = 0.03 }", 10, &["leaves no inside", "at most 0.0175"]),
+        ("name = \"mug\"", "name = \"cup\"", 12, &["second object", "\"cup\""]),
+        ("name = \"mug\"", "name = \"mug\"\non = \"shelf\"", 13, &["no surface \"shelf\"", "table"]),
+        ("name = \"mug\"", "name = \"mug\"\nposition_m = [2.0, 0.0]", 13, &["beside"]),
+        ("height_m = 0.095 }", "height_m = 0.06 }", 13, &["handle", "at most half the height 0.03"]),
+        ("object = \"cup\"", "object = \"jug\"", 15, &["no object \"jug\"", "cup, mug"]),
+        ("object = \"cup\"", "object = \"cup\"\nvisible_from_start = [0.5, 0.2]", 16, &["no range"]),
+        ("[-2.0, 0.0]", "[-9.0, 0.0]", 7, &["outside the room"]),
+        ("[-2.0, 0.0]", "[-2.0, nan]", 7, &["expected a number"]),
+        ("[target]", "[target", 14, &["no TOML"]),
+        ("height_m = 0.72", "", 2, &["missing field `height_m`", "add it"]),
+        ("shape.cup =", "colour = [0, 300, 0]\nshape.cup =", 10, &["from 0 to 255"]),
+    ] {
+        assert!(GOOD.contains(from), "{from}");
+        let text = GOOD.replacen(from, to, 1);
+        let error = SceneSpec::parse("my.toml", &text).expect_err(to);
+        let drawn = error.to_string();
+        assert_eq!(error.line, line, "{drawn}");
+        assert!(drawn.starts_with(&format!("my.toml:{line}:")), "{drawn}");
+        for word in words {
+            assert!(drawn.contains(word), "no {word:?} in: {drawn}");
+        }
+    }
+}
+
+fn scenes() -> Vec<(String, SceneSpec)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../domains/tabletop/scenes");
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    files.sort();
+    let read = |path: &std::path::PathBuf| {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let text = std::fs::read_to_string(path).unwrap();
+        let spec = SceneSpec::parse(&name, &text).unwrap_or_else(|e| panic!("{e}"));
+        (name, spec)
+    };
+    files.iter().map(read).collect()
+}
+
+/// Is a point of the table, in the map, under the object?
+fn covers(o: &Object, p: &Point3<f64>) -> bool {
+    let q = o.map_from_object.inverse_transform_point(p);
+    match &o.shape {
+        Shape::Box(b) => q.x.abs() < 0.5 * b.size_m[0] && q.y.abs() < 0.5 * b.size_m[1],
+        other => q.x.hypot(q.y) < 0.5 * (other.bounds().1.y - other.bounds().0.y),
+    }
+}
+
+fn check_arrangement(name: &str, seed: u64, spec: &SceneSpec, scene: &Scene) {
+    for o in &scene.objects {
+        let surface = scene.surfaces.iter().find(|s| s.name == o.surface).unwrap();
+        let top = surface.map_from_top();
+        for i in -40..=40 {
+            for j in -20..=20 {
+                let p = top * Point3::new(f64::from(i) * 0.02, f64::from(j) * 0.02, 0.0);
+                let here: Vec<&str> =
+                    scene.objects.iter().filter(|o| covers(o, &p)).map(|o| o.name.as_str()).collect();
+                assert!(here.len() < 2, "{name} seed {seed}: {here:?} overlap");
+            }
+        }
+        let (low, high) = o.shape.bounds();
+        for x in [low.x, high.x] {
+            for y in [low.y, high.y] {
+                let p = top.inverse_transform_point(&(o.map_from_object * Point3::new(x, y, 0.0)));
+                let half = surface.size_m.map(|s| 0.5 * s + 0.02);
+                assert!(p.x.abs() <= half[0] && p.y.abs() <= half[1], "{name} {seed}: {} juts out", o.name);
+                assert!(p.z.abs() < 1e-9);
+            }
+        }
+    }
+    if let Some(target) = &spec.target {
+        let share = scene.target_visible_from_start.unwrap();
+        assert!(target.visible_from_start[0] <= share && share <= target.visible_from_start[1]);
+    }
+}
+
+#[test]
+fn every_scene_can_be_arranged() {
+    for (name, spec) in scenes() {
+        for seed in 1..=10 {
+            let scene = arrange(&spec, seed).unwrap_or_else(|e| panic!("{name}: {e}"));
+            assert_eq!(scene, arrange(&spec, seed).unwrap(), "{name}: the same seed, another scene");
+            check_arrangement(&name, seed, &spec, &scene);
+        }
+        if spec.objects.iter().any(|o| o.position_m.is_none()) {
+            assert_ne!(arrange(&spec, 1).unwrap(), arrange(&spec, 2).unwrap(), "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_target_hides_from_the_start_and_not_from_everywhere() {
+    let (_, spec) = scenes().into_iter().find(|(name, _)| name == "default.toml").unwrap();
+    for seed in 1..=20 {
+        let scene = arrange(&spec, seed).unwrap();
+        let start = scene.start;
+        let robot = SimRobot::new(scene, SimOptions::default());
+        assert_eq!(robot.true_visible_share("cup A", &start), 0.0, "seed {seed}");
+        let best = (0..16)
+            .map(|k| f64::from(k) * std::f64::consts::TAU / 16.0)
+            .map(|a| Pose2::facing(1.4 * a.cos(), 1.4 * a.sin(), &[0.0, 0.0].into()))
+            .map(|pose| robot.true_visible_share("cup A", &pose))
+            .fold(0.0, f64::max);
+        assert!(best > 0.5, "seed {seed}: {best} at best");
+    }
+}
+
+#[test]
+fn what_cannot_be_arranged_says_why() {
+    for (from, to, word) in [
+        ("object = \"cup\"", "object = \"cup\"\nvisible_from_start = [0.0, 0.0]", "seen from the start"),
+        (
+            "height_m = 0.1 }",
+            "height_m = 0.1 }\narea_m = [0.01, 0.01]\narea_centre_m = [0.9, 0.0]",
+            "no room",
+        ),
+    ] {
+        let spec = SceneSpec::parse("my.toml", &GOOD.replacen(from, to, 1)).unwrap();
+        let error = arrange(&spec, 1).unwrap_err().to_string();
+        assert!(error.contains(word), "{error}");
+    }
+}
+
+#[test]
+fn a_target_can_be_left_out() {
+    let spec = SceneSpec::parse("my.toml", GOOD).unwrap().without("cup");
+    assert!(spec.target.is_none() && spec.check().is_ok());
+    assert!(arrange(&spec, 1).unwrap().object("cup").is_none());
+}

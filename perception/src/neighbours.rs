@@ -4,11 +4,12 @@
 //! `2·(mid − a)` places on. Neighbours of all points are found leaf by leaf, so that 32 queries share one walk.
 
 mod all;
+mod nearby;
 
 use crate::cloud::{CloudError, is_finite};
 use nalgebra::Point3;
 
-pub(crate) use all::Found;
+pub(crate) use nearby::Nearby;
 
 /// Points a leaf. All leaves but the last are full; that one is padded with infinity, which is near nothing.
 pub(crate) const LEAF: usize = 32;

@@ -2,7 +2,7 @@
 
 mod organised;
 
-use crate::neighbours::{Found, Neighbours};
+use crate::neighbours::{Nearby, Neighbours};
 use crate::spread;
 use nalgebra::{Point3, Vector3};
 
@@ -32,12 +32,12 @@ pub fn estimate(tree: &Neighbours, k: usize, viewpoint: &Point3<f32>) -> Normals
 
 /// Normal and variation from the neighbours of a slot.
 #[inline(always)]
-fn surface(tree: &Neighbours, slot: usize, near: &[Found], viewpoint: &Point3<f32>) -> [f32; 4] {
+fn surface(tree: &Neighbours, slot: usize, near: &Nearby, viewpoint: &Point3<f32>) -> [f32; 4] {
     let at = tree.at(slot);
     let mut sum = [0f32; 3];
     let mut products = [0f32; 6];
-    for found in near {
-        let p = tree.at(found.slot());
+    for &slot in near.slots() {
+        let p = tree.at(slot as usize);
         let [x, y, z] = [p[0] - at[0], p[1] - at[1], p[2] - at[2]];
         sum = [sum[0] + x, sum[1] + y, sum[2] + z];
         let terms = [x * x, x * y, x * z, y * y, y * z, z * z];

@@ -20,7 +20,7 @@ pub struct Kept {
 pub fn statistical(tree: &Neighbours, k: usize, sigmas: f64) -> Kept {
     let _span = tracing::debug_span!("statistical outliers", points = tree.len(), k).entered();
     let means = tree.map_all(k, f32::NAN, |_, near| {
-        near.iter().map(|f| f.distance_sq().sqrt()).sum::<f32>() / near.len() as f32
+        near.distances_sq().iter().map(|d| d.sqrt()).sum::<f32>() / near.len() as f32
     });
     let valid = || means.iter().filter(|m| !m.is_nan()).map(|&m| f64::from(m));
     let count = valid().count() as f64;

@@ -1,0 +1,143 @@
+//! Candidates of a nearest-neighbour search, and the choice of the k nearest among them.
+
+use super::LEAF;
+
+/// Points near a query: squared distances and slots, in no particular order.
+#[derive(Default)]
+pub(crate) struct Nearby {
+    /// Both hold room for a leaf beyond `len`.
+    distances: Vec<f32>,
+    slots: Vec<u32>,
+    len: usize,
+    order: Vec<(u32, u32)>,
+}
+
+/// Bounds tried before giving up and sorting: many candidates just as far admit none that leaves few between.
+const GUESSES: usize = 12;
+/// Candidates around the k-th that are sorted.
+const FEW: usize = 8;
+
+/// Squared distances on both sides of the k-th nearest, and how many candidates are no farther than each.
+struct Parting {
+    low: f32,
+    below: usize,
+    high: f32,
+    above: usize,
+}
+
+impl Nearby {
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
+    pub(crate) fn slots(&self) -> &[u32] {
+        &self.slots[..self.len]
+    }
+
+    pub(crate) fn distances_sq(&self) -> &[f32] {
+        &self.distances[..self.len]
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Adds those of a leaf's points (its first slot is `first`) that are no farther than `bound`, which is finite.
+    #[inline(always)]
+    pub(super) fn add(&mut self, distances: &[f32; LEAF], first: usize, bound: f32) {
+        let end = self.len + LEAF;
+        if self.distances.len() < end {
+            self.distances.resize(2 * end, 0.0);
+            self.slots.resize(2 * end, 0);
+        }
+        let (Some(out), Some(slots)) = (
+            self.distances[self.len..].first_chunk_mut::<LEAF>(),
+            self.slots[self.len..].first_chunk_mut::<LEAF>(),
+        ) else {
+            return;
+        };
+        let mut kept = 0;
+        for (i, &d) in distances.iter().enumerate() {
+            // Every candidate is written where the next kept one belongs: no branch to predict. `kept` is never above `i`.
+            out[kept % LEAF] = d;
+            slots[kept % LEAF] = (first + i) as u32;
+            kept += usize::from(d <= bound);
+        }
+        self.len += kept;
+    }
+
+    /// Keeps the `k` nearest, all of which are no farther than `bound`, and tells the squared distance of the farthest of them. With `k` or fewer all stay.
+    #[inline(always)]
+    pub(super) fn keep(&mut self, k: usize, bound: f32) -> f32 {
+        if self.len > k {
+            match self.part(k, bound) {
+                Some(parting) => self.cut(k, parting),
+                None => self.sort(k),
+            }
+        } else if self.len < k {
+            return bound;
+        }
+        self.distances_sq().iter().copied().fold(0.0, f32::max)
+    }
+
+    /// Squared distances between which the k-th nearest lies, with at most `FEW` candidates between them. On a surface the number of candidates
+    /// grows with the squared distance, so that a guess by proportion is seldom far off.
+    #[inline(always)]
+    fn part(&self, k: usize, bound: f32) -> Option<Parting> {
+        let mut p = Parting { low: -1.0, below: 0, high: bound, above: self.len };
+        for guess in 0..GUESSES {
+            if p.above - p.below <= FEW {
+                return Some(p);
+            }
+            let from = p.low.max(0.0);
+            let share = (k as f32 - p.below as f32) / (p.above as f32 - p.below as f32);
+            // Every third guess halves, in case the candidates are spread otherwise.
+            let share = if guess % 3 == 2 { 0.5 } else { share };
+            let limit = from + (p.high - from) * share;
+            let count = self.distances_sq().iter().map(|d| u32::from(*d <= limit)).sum::<u32>() as usize;
+            if count < k {
+                (p.low, p.below) = (limit, count);
+            } else {
+                (p.high, p.above) = (limit, count);
+            }
+        }
+        None
+    }
+
+    /// Keeps what lies below the parting and, of the few between, the nearest; equals by slot.
+    #[inline(always)]
+    fn cut(&mut self, k: usize, parting: Parting) {
+        let mut between = [(f32::INFINITY, u32::MAX); FEW + 1];
+        let (mut kept, mut few) = (0, 0);
+        for i in 0..self.len {
+            let (d, slot) = (self.distances[i], self.slots[i]);
+            self.distances[kept] = d;
+            self.slots[kept] = slot;
+            kept += usize::from(d <= parting.low);
+            between[few] = (d, slot);
+            few = (few + usize::from(d > parting.low && d <= parting.high)).min(FEW);
+        }
+        let between = &mut between[..few];
+        between.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for &(d, slot) in between.iter().take(k - kept) {
+            self.distances[kept] = d;
+            self.slots[kept] = slot;
+            kept += 1;
+        }
+        self.len = kept;
+    }
+
+    /// By distance, equals by slot.
+    #[cold]
+    fn sort(&mut self, k: usize) {
+        self.order.clear();
+        let (distances, slots) = (&self.distances[..self.len], &self.slots[..self.len]);
+        self.order.extend(distances.iter().zip(slots).map(|(d, slot)| (d.to_bits(), *slot)));
+        self.order.select_nth_unstable(k - 1);
+        for (i, &(bits, slot)) in self.order[..k].iter().enumerate() {
+            self.distances[i] = f32::from_bits(bits);
+            self.slots[i] = slot;
+        }
+        self.len = k;
+    }
+}

@@ -45,12 +45,9 @@ impl Bounds {
 
     #[inline(always)]
     fn distance_sq(&self, q: &[f32; 3]) -> f32 {
-        let mut sum = 0.0;
-        for ((q, low), high) in q.iter().zip(&self.low).zip(&self.high) {
-            let d = (low - q).max(q - high).max(0.0);
-            sum += d * d;
-        }
-        sum
+        let beyond = |k: usize| (self.low[k] - q[k]).max(q[k] - self.high[k]).max(0.0);
+        let (x, y, z) = (beyond(0), beyond(1), beyond(2));
+        x * x + y * y + z * z
     }
 
     fn distance_sq_to(&self, other: &Bounds) -> f32 {

@@ -42,7 +42,7 @@ impl Moments {
 #[inline(always)]
 pub(crate) fn covariance(count: f64, sum: [f64; 3], products: [f64; 6]) -> [f64; 6] {
     let per = 1.0 / count;
-    let [x, y, z] = sum.map(|s| s * per);
+    let [x, y, z] = [sum[0] * per, sum[1] * per, sum[2] * per];
     [
         products[0] * per - x * x,
         products[1] * per - x * y,
@@ -71,7 +71,8 @@ pub(crate) fn least(c: &[f64; 6]) -> Option<Least> {
     if !(scale > 0.0 && scale.is_finite()) {
         return None;
     }
-    let [xx, xy, xz, yy, yz, zz] = c.map(|v| v / scale);
+    let per = 1.0 / scale;
+    let [xx, xy, xz, yy, yz, zz] = [c[0] * per, c[1] * per, c[2] * per, c[3] * per, c[4] * per, c[5] * per];
     let mean = (xx + yy + zz) / 3.0;
     let (dx, dy, dz) = (xx - mean, yy - mean, zz - mean);
     let off = xy * xy + xz * xz + yz * yz;
@@ -86,12 +87,13 @@ pub(crate) fn least(c: &[f64; 6]) -> Option<Least> {
         return None;
     }
     let rows = [[xx - smallest, xy, xz], [xy, yy - smallest, yz], [xz, yz, zz - smallest]];
-    let crosses = [cross(rows[0], rows[1]), cross(rows[0], rows[2]), cross(rows[1], rows[2])];
     let square = |v: [f64; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    let best = crosses.into_iter().fold([0.0; 3], |a, b| if square(b) > square(a) { b } else { a });
+    let longer = |a: [f64; 3], b: [f64; 3]| if square(b) > square(a) { b } else { a };
+    let best = longer(longer(cross(rows[0], rows[1]), cross(rows[0], rows[2])), cross(rows[1], rows[2]));
     let length = square(best).sqrt();
-    (length > 0.0)
-        .then(|| Least { normal: best.map(|v| v / length), share: smallest.max(0.0) / (3.0 * mean) })
+    let per = 1.0 / length;
+    let normal = [best[0] * per, best[1] * per, best[2] * per];
+    (length > 0.0).then_some(Least { normal, share: smallest.max(0.0) / (3.0 * mean) })
 }
 
 #[inline(always)]

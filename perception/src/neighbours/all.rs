@@ -40,11 +40,14 @@ impl Neighbours {
             return out;
         }
         let mut by_slot = vec![default; self.index.len()];
-        by_slot.par_chunks_mut(LEAF).enumerate().for_each_init(Scratch::default, |scratch, (leaf, answers)| {
-            self.leaf_neighbours(leaf, k, scratch, |slot_in_leaf, nearby| {
-                answers[slot_in_leaf] = result(leaf * LEAF + slot_in_leaf, nearby);
-            });
-        });
+        by_slot.par_chunks_mut(LEAF).enumerate().for_each_init(
+            Scratch::default,
+            |scratch, (leaf, answers)| {
+                self.leaf_neighbours(leaf, k, scratch, |slot_in_leaf, nearby| {
+                    answers[slot_in_leaf] = result(leaf * LEAF + slot_in_leaf, nearby);
+                });
+            },
+        );
         for (&index, &answer) in self.index.iter().zip(&by_slot).take(self.len) {
             out[index as usize] = answer;
         }

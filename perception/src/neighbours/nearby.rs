@@ -70,21 +70,25 @@ impl Nearby {
     #[inline(always)]
     pub(super) fn keep(&mut self, k: usize, bound: f32) -> f32 {
         if self.len > k {
-            match self.part(k, bound) {
+            match self.part(k) {
                 Some(parting) => self.cut(k, parting),
                 None => self.sort(k),
             }
         } else if self.len < k {
             return bound;
         }
-        self.distances_sq().iter().copied().fold(0.0, f32::max)
+        self.farthest()
+    }
+
+    fn farthest(&self) -> f32 {
+        self.distances_sq().iter().fold(0.0, |a, &b| if b > a { b } else { a })
     }
 
     /// Squared distances between which the k-th nearest lies, with at most `FEW` candidates between them. On a surface the number of candidates
     /// grows with the squared distance, so that a guess by proportion is seldom far off.
     #[inline(always)]
-    fn part(&self, k: usize, bound: f32) -> Option<Parting> {
-        let mut p = Parting { low: -1.0, below: 0, high: bound, above: self.len };
+    fn part(&self, k: usize) -> Option<Parting> {
+        let mut p = Parting { low: -1.0, below: 0, high: self.farthest(), above: self.len };
         for guess in 0..GUESSES {
             if p.above - p.below <= FEW {
                 return Some(p);

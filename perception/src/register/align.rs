@@ -12,6 +12,12 @@ const CHUNK: usize = 1024;
 /// Spread of a surface along its normal against along itself in [`Method::Generalised`] (Segal et al. 2009, section III.B).
 const FLAT: f64 = 1e-3;
 
+/// The first rounds look at one point in several only, as long as this many remain: far from the end, fewer points tell the way as well.
+const SAMPLE: usize = 2000;
+const WIDEST_STRIDE: usize = 16;
+/// The sample has done its work when a round moves less than this many times what counts as settled.
+const NEARLY: f64 = 10.0;
+
 /// Moves the source until its points lie on the target.
 ///
 /// # Errors
@@ -20,50 +26,39 @@ pub fn align(source: &Prepared, target: &Prepared, options: &RegisterOptions) ->
     let _span = tracing::debug_span!("register", points = source.points.len()).entered();
     check(source, target, options)?;
     let start = options.start_target_from_source;
-    let mut run = Run::new(source, target, options);
-    let mut pose = start;
-    let mut rounds = 0;
-    let mut centre = middle(&source.points, &pose);
-    let mut last: Option<Motion> = None;
-    let ending = loop {
-        let sums = run.sums(&pose, &centre);
-        if sums.matched < options.least.max(1) {
-            break Ending::TooFewPartners;
-        }
-        let settled =
-            last.as_ref().is_some_and(|m| m.shift_m < options.settle_m && m.turn_rad < options.settle_rad);
-        if settled {
-            break Ending::Settled;
-        }
-        if rounds == options.rounds {
-            break Ending::OutOfRounds;
-        }
-        let motion = match options.method {
-            Method::PointToPoint => sums.closed_form(&centre),
-            _ => sums.motion(&centre),
-        };
-        pose = motion.step * pose;
-        pose.rotation.renormalize_fast();
-        centre = motion.step * centre;
-        rounds += 1;
-        last = Some(motion);
-    };
-    let (matched, residual_m) = run.quality();
-    let from_start = pose * start.inverse();
     let before = middle(&source.points, &start);
+    let mut run = Run::new(source, target, options);
+    let mut at = Progress { pose: start, centre: before, rounds: 0, last: None };
+    let stride = (source.points.len() / SAMPLE).clamp(1, WIDEST_STRIDE);
+    if stride > 1 {
+        run.look_at_every(stride);
+        run.rounds(&mut at, options.rounds / 2, options.least.max(SAMPLE / 10), NEARLY);
+        run.look_at_every(1);
+    }
+    let ending = run.rounds(&mut at, options.rounds, options.least.max(1), 1.0);
+    let (matched, residual_m) = run.quality();
+    let from_start = at.pose * start.inverse();
     Ok(Fit {
-        target_from_source: pose,
+        target_from_source: at.pose,
         matched,
         of: source.points.len(),
         residual_m,
-        rounds,
+        rounds: at.rounds,
         ending,
         moved_m: (from_start * before - before).norm(),
         moved_rad: from_start.rotation.angle(),
-        free: last.as_ref().map_or(6, |m| m.free),
-        information: last.as_ref().map_or(Matrix6::zeros(), |m| m.information),
-        centre,
+        free: at.last.as_ref().map_or(6, |m| m.free),
+        information: at.last.as_ref().map_or(Matrix6::zeros(), |m| m.information),
+        centre: at.centre,
     })
+}
+
+/// Where the rounds stand.
+struct Progress {
+    pose: Isometry3<f64>,
+    centre: Point3<f64>,
+    rounds: usize,
+    last: Option<Motion>,
 }
 
 fn check(source: &Prepared, target: &Prepared, options: &RegisterOptions) -> Result<(), RegisterError> {
@@ -104,6 +99,9 @@ struct Run<'a> {
     source_normals: Vec<[f64; 3]>,
     /// Target normals by slot.
     target_normals: Vec<[f64; 3]>,
+    /// Every so many points are looked at.
+    stride: usize,
+    /// One for each of those.
     partners: Vec<Partner>,
     matched: usize,
     square: f64,
@@ -122,12 +120,50 @@ impl<'a> Run<'a> {
         Run {
             target,
             options,
+            stride: 1,
             partners: vec![Partner::UNKNOWN; points.len()],
             points,
             source_normals: if generalised { by_slot(source) } else { Vec::new() },
             target_normals: if to_point { Vec::new() } else { by_slot(target) },
             matched: 0,
             square: 0.0,
+        }
+    }
+
+    /// Looks at other points from now on. What was found for the points looked at so far is where the search for those beside them begins.
+    fn look_at_every(&mut self, stride: usize) {
+        let guess = |i: usize| self.partners[(i / self.stride).min(self.partners.len() - 1)].guess();
+        self.partners = (0..self.points.len()).step_by(stride).map(guess).collect();
+        self.stride = stride;
+    }
+
+    /// Rounds up to a number of them in all, until one moves less than `ease` times what counts as settled.
+    fn rounds(&mut self, at: &mut Progress, most: usize, least: usize, ease: f64) -> Ending {
+        let options = self.options;
+        let mut first = true;
+        loop {
+            let sums = self.sums(&at.pose, &at.centre);
+            if sums.matched < least {
+                return Ending::TooFewPartners;
+            }
+            let (settle_m, settle_rad) = (ease * options.settle_m, ease * options.settle_rad);
+            let settled = |m: &Motion| m.shift_m < settle_m && m.turn_rad < settle_rad;
+            if !first && at.last.as_ref().is_some_and(settled) {
+                return Ending::Settled;
+            }
+            if at.rounds >= most {
+                return Ending::OutOfRounds;
+            }
+            let motion = match options.method {
+                Method::PointToPoint => sums.closed_form(&at.centre),
+                _ => sums.motion(&at.centre),
+            };
+            at.pose = motion.step * at.pose;
+            at.pose.rotation.renormalize_fast();
+            at.centre = motion.step * at.centre;
+            at.rounds += 1;
+            at.last = Some(motion);
+            first = false;
         }
     }
 
@@ -155,11 +191,13 @@ impl<'a> Run<'a> {
         let tree = &self.target.tree;
         let mut sums = Sums::ZERO;
         for (offset, partner) in partners.iter_mut().enumerate() {
-            let i = from + offset;
+            let i = (from + offset) * self.stride;
             let at = place.apply(&self.points[i]);
             let Some(slot) = partner.update(tree, at, self.options.within_m) else { continue };
             let target = tree.at(slot);
-            let about = |p: [f32; 3]| [0, 1, 2].map(|k| f64::from(p[k]) - centre[k]);
+            let about = |p: [f32; 3]| {
+                [f64::from(p[0]) - centre[0], f64::from(p[1]) - centre[1], f64::from(p[2]) - centre[2]]
+            };
             let (p, t) = (about(at), about(target));
             match self.options.method {
                 Method::PointToPoint => {

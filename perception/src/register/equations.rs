@@ -19,6 +19,8 @@ pub(super) struct Sums {
     source: [f64; 3],
     target: [f64; 3],
     cross: [[f64; 3]; 3],
+    /// Weighted products of source points with themselves: xx xy xz yy yz zz.
+    spread: [f64; 6],
 }
 
 impl Sums {
@@ -31,6 +33,7 @@ impl Sums {
         source: [0.0; 3],
         target: [0.0; 3],
         cross: [[0.0; 3]; 3],
+        spread: [0.0; 6],
     };
 
     /// A residual `r` whose derivative by the motion is `j`.
@@ -58,51 +61,42 @@ impl Sums {
             self.square += (p[k] - t[k]) * (p[k] - t[k]);
             self.source[k] += weight * p[k];
             self.target[k] += weight * t[k];
-            for (sum, source) in self.cross[k].iter_mut().zip(p) {
+            for (sum, source) in self.cross[k].iter_mut().zip(&p) {
                 *sum += weight * t[k] * source;
             }
         }
-        // Normal matrix of the same pair: J = [-[p]x, I].
-        let [x, y, z] = p;
-        let terms = [
-            y * y + z * z,
-            -x * y,
-            -x * z,
-            0.0,
-            -z,
-            y, //
-            x * x + z * z,
-            -y * z,
-            z,
-            0.0,
-            -x, //
-            x * x + y * y,
-            -y,
-            x,
-            0.0, //
-            1.0,
-            0.0,
-            0.0,
-            1.0,
-            0.0,
-            1.0,
-        ];
-        self.h.iter_mut().zip(terms).for_each(|(h, t)| *h += weight * t);
+        let products = [p[0] * p[0], p[0] * p[1], p[0] * p[2], p[1] * p[1], p[1] * p[2], p[2] * p[2]];
+        for (sum, product) in self.spread.iter_mut().zip(&products) {
+            *sum += weight * product;
+        }
+    }
+
+    /// The normal matrix of pairs of points, J = [−[p]×, I], from their sums.
+    fn point_information(&self) -> Matrix6<f64> {
+        let [xx, xy, xz, yy, yz, zz] = self.spread;
+        let turn = Matrix3::new(yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy);
+        let mixed = Vector3::from(self.source).cross_matrix();
+        let mut full = Matrix6::from_diagonal_element(self.weight);
+        full.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+        full.fixed_view_mut::<3, 3>(0, 3).copy_from(&mixed);
+        full.fixed_view_mut::<3, 3>(3, 0).copy_from(&mixed.transpose());
+        full
     }
 
     /// A difference `d` of two points about the centre, of which the moved one is `p`, weighed by the symmetric matrix `m` (xx xy xz yy yz zz).
     #[inline(always)]
     pub(super) fn add_weighted(&mut self, p: [f64; 3], d: [f64; 3], m: [f64; 6], weight: f64) {
         let [x, y, z] = p;
-        let m = m.map(|v| v * weight);
+        let m = [m[0] * weight, m[1] * weight, m[2] * weight, m[3] * weight, m[4] * weight, m[5] * weight];
         let row = [[m[0], m[1], m[2]], [m[1], m[3], m[4]], [m[2], m[4], m[5]]];
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         // With A = [p]x: H = [A M Aᵀ, A M; ·, M] and g = [A M d; M d].
-        let md = row.map(|r| r[0] * d[0] + r[1] * d[1] + r[2] * d[2]);
+        let md = [dot(row[0], d), dot(row[1], d), dot(row[2], d)];
         let left = |v: [f64; 3]| [y * v[2] - z * v[1], z * v[0] - x * v[2], x * v[1] - y * v[0]];
-        let columns = [0, 1, 2].map(|k| left([row[0][k], row[1][k], row[2][k]]));
-        // am[r][k] = (A M)(r, k)
-        let am = [0, 1, 2].map(|r| [columns[0][r], columns[1][r], columns[2][r]]);
-        let ama = am.map(left);
+        // M is symmetric: its rows are its columns. am[r][k] = (A M)(r, k).
+        let (a, b, c) = (left(row[0]), left(row[1]), left(row[2]));
+        let am = [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]];
+        let ama = [left(am[0]), left(am[1]), left(am[2])];
         let turn = left(md);
         let terms = [
             ama[0][0], ama[0][1], ama[0][2], am[0][0], am[0][1], am[0][2], //
@@ -110,7 +104,9 @@ impl Sums {
             ama[2][2], am[2][0], am[2][1], am[2][2], //
             m[0], m[1], m[2], m[3], m[4], m[5],
         ];
-        self.h.iter_mut().zip(terms).for_each(|(h, t)| *h += t);
+        for (sum, term) in self.h.iter_mut().zip(&terms) {
+            *sum += term;
+        }
         for k in 0..3 {
             self.g[k] += turn[k];
             self.g[k + 3] += md[k];
@@ -132,11 +128,12 @@ impl Sums {
         self.g.iter_mut().zip(other.g).for_each(|(a, b)| *a += b);
         self.source.iter_mut().zip(other.source).for_each(|(a, b)| *a += b);
         self.target.iter_mut().zip(other.target).for_each(|(a, b)| *a += b);
+        self.spread.iter_mut().zip(other.spread).for_each(|(a, b)| *a += b);
         self.cross.iter_mut().flatten().zip(other.cross.iter().flatten()).for_each(|(a, b)| *a += b);
         self
     }
 
-    pub(super) fn information(&self) -> Matrix6<f64> {
+    fn information(&self) -> Matrix6<f64> {
         let mut full = Matrix6::zeros();
         let mut at = 0;
         for row in 0..6 {
@@ -165,7 +162,7 @@ impl Sums {
         let target = Vector3::from(self.target) * per;
         let cross = Matrix3::from_fn(|r, c| self.cross[r][c] * per - target[r] * source[c]);
         let svd = cross.svd(true, true);
-        let information = self.information();
+        let information = self.point_information();
         let (_, free) = held_inverse(&information);
         let rotation = match (svd.u, svd.v_t) {
             (Some(u), Some(v_t)) if free == 0 => {

@@ -49,13 +49,15 @@ impl Place {
 
     #[inline(always)]
     pub(super) fn apply(&self, p: &Point3<f32>) -> [f32; 3] {
-        let [x, y, z] = [p.x, p.y, p.z].map(f64::from);
-        self.rows.map(|r| (r[0] * x + r[1] * y + r[2] * z + r[3]) as f32)
+        let (x, y, z) = (f64::from(p.x), f64::from(p.y), f64::from(p.z));
+        let along = |r: &[f64; 4]| (r[0] * x + r[1] * y + r[2] * z + r[3]) as f32;
+        [along(&self.rows[0]), along(&self.rows[1]), along(&self.rows[2])]
     }
 
     #[inline(always)]
     pub(super) fn turn(&self, v: [f64; 3]) -> [f64; 3] {
-        self.rows.map(|r| r[0] * v[0] + r[1] * v[1] + r[2] * v[2])
+        let along = |r: &[f64; 4]| r[0] * v[0] + r[1] * v[1] + r[2] * v[2];
+        [along(&self.rows[0]), along(&self.rows[1]), along(&self.rows[2])]
     }
 }
 
@@ -81,6 +83,11 @@ impl Partner {
         others_m: f32::NEG_INFINITY,
         distance_sq: f32::INFINITY,
     };
+
+    /// The same partner, to be made sure of.
+    pub(super) fn guess(self) -> Partner {
+        Partner { slot: self.slot, ..Partner::UNKNOWN }
+    }
 
     /// Brings the partner up to date for the point at `at`; its slot, if it is no farther than `within_m`.
     #[inline(always)]
@@ -154,6 +161,9 @@ impl Neighbours {
     #[inline(always)]
     fn offer_leaf(&self, leaf: usize, q: &[f32; 3], two: &mut Two) {
         let distances = self.leaf_distances(leaf, q);
+        if distances.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a }) >= two.second_sq {
+            return;
+        }
         for (i, &d) in distances.iter().enumerate() {
             if d < two.second_sq {
                 two.offer((leaf * LEAF + i) as u32, d);

@@ -1,1 +1,3 @@
 //! The continual loop.
+
+pub mod experiment;

@@ -1,0 +1,199 @@
+//! `jobs.jsonl`: what has been done so far, a line a job, so that a batch goes on where it was cut off.
+//!
+//! The first line says which experiment the folder belongs to. A line counts once its line end is on the disk: what a power
+//! cut left of a line is ignored, and the job is done again.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::{ExperimentError, Finished};
+
+/// Name of the file in an experiment's folder.
+pub const FILE: &str = "jobs.jsonl";
+
+/// The first line: whose jobs these are.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Header {
+    /// The experiment's name.
+    pub experiment: String,
+    /// Hash of the experiment file and of every file that it names.
+    pub hash: String,
+    /// Version of descry.
+    pub version: String,
+    /// How many jobs there are, in all shards.
+    pub jobs: usize,
+}
+
+/// A journal that is open for writing; no other process writes to it meanwhile.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+}
+
+/// The finished jobs of a journal by their ids.
+pub type Done = BTreeMap<String, Finished>;
+
+impl Journal {
+    /// Opens the journal of a folder, or begins one. Gives what has been done already and how many lines were unreadable.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] if it belongs to another experiment, another process writes to it, or the disk refuses.
+    pub fn open(folder: &Path, header: &Header) -> Result<(Self, Done, usize), ExperimentError> {
+        let path = folder.join(FILE);
+        let io = |e: std::io::Error| ExperimentError::file(&path, &e);
+        std::fs::create_dir_all(folder).map_err(|e| ExperimentError::file(folder, &e))?;
+        let mut file =
+            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path).map_err(io)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(ExperimentError::Busy { folder: folder.display().to_string() });
+            }
+            Err(TryLockError::Error(e)) => return Err(io(e)),
+        }
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(io)?;
+        let contents = read(&path, &bytes, header)?;
+        file.set_len(contents.length).and_then(|()| file.seek(SeekFrom::End(0))).map_err(io)?;
+        let mut journal = Self { path, file };
+        if contents.length == 0 {
+            journal.write(header)?;
+        }
+        Ok((journal, contents.done, contents.unreadable))
+    }
+
+    /// Appends a finished job; it is on the disk when this returns.
+    ///
+    /// # Errors
+    /// [`ExperimentError::File`] if the disk refuses.
+    pub fn append(&mut self, finished: &Finished) -> Result<(), ExperimentError> {
+        self.write(finished)
+    }
+
+    fn write(&mut self, line: &impl Serialize) -> Result<(), ExperimentError> {
+        let text = serde_json::to_string(line).map_err(|e| ExperimentError::file(&self.path, &e))?;
+        let written = self.file.write_all((text + "\n").as_bytes()).and_then(|()| self.file.sync_data());
+        written.map_err(|e| ExperimentError::file(&self.path, &e))
+    }
+}
+
+/// What a folder's journal holds, without opening it for writing; nothing if there is none.
+///
+/// # Errors
+/// [`ExperimentError`] if it belongs to another experiment or cannot be read.
+pub fn done(folder: &Path, header: &Header) -> Result<Done, ExperimentError> {
+    let path = folder.join(FILE);
+    if !path.exists() {
+        return Ok(Done::new());
+    }
+    let bytes = std::fs::read(&path).map_err(|e| ExperimentError::file(&path, &e))?;
+    Ok(read(&path, &bytes, header)?.done)
+}
+
+struct Contents {
+    /// Bytes up to the last complete line.
+    length: u64,
+    done: Done,
+    unreadable: usize,
+}
+
+fn read(path: &Path, bytes: &[u8], header: &Header) -> Result<Contents, ExperimentError> {
+    let length = bytes.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
+    let mut contents = Contents { length: length as u64, done: Done::new(), unreadable: 0 };
+    if length == 0 {
+        return Ok(contents);
+    }
+    let mut lines = bytes[..length - 1].split(|&b| b == b'\n');
+    let found: Option<Header> = lines.next().and_then(|line| serde_json::from_slice(line).ok());
+    let found = found.ok_or_else(|| ExperimentError::NoJournal { path: path.display().to_string() })?;
+    if found != *header {
+        return Err(ExperimentError::Another {
+            path: path.display().to_string(),
+            found: Box::new(found),
+            expected: Box::new(header.clone()),
+        });
+    }
+    for line in lines {
+        match serde_json::from_slice::<Finished>(line) {
+            Ok(finished) => drop(contents.done.insert(finished.job.clone(), finished)),
+            Err(_) => contents.unreadable += 1,
+        }
+    }
+    Ok(contents)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header(hash: &str) -> Header {
+        Header { experiment: "e".into(), hash: hash.into(), version: "0".into(), jobs: 3 }
+    }
+
+    fn finished(job: &str) -> Finished {
+        Finished { job: job.into(), rows: vec![], clock: serde_json::Map::new(), error: None }
+    }
+
+    #[test]
+    fn goes_on_after_a_torn_line() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let (mut journal, done, _) = Journal::open(folder.path(), &header("a"))?;
+        assert!(done.is_empty());
+        journal.append(&finished("one"))?;
+        journal.append(&finished("two"))?;
+        drop(journal);
+        let path = folder.path().join(FILE);
+        let whole = std::fs::read(&path)?;
+        // Whatever the power cut leaves of the second job's line, the first is kept and the second can be written again.
+        let second = whole[..whole.len() - 1].iter().rposition(|&b| b == b'\n').unwrap_or(0) + 1;
+        for cut in second..whole.len() {
+            std::fs::write(&path, &whole[..cut])?;
+            let (mut journal, done, unreadable) = Journal::open(folder.path(), &header("a"))?;
+            assert_eq!(
+                (done.into_keys().collect::<Vec<_>>(), unreadable),
+                (vec!["one".to_string()], 0),
+                "cut at {cut}"
+            );
+            journal.append(&finished("two"))?;
+            drop(journal);
+            assert_eq!(std::fs::read(&path)?, whole);
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_spoiled_line_costs_one_job() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let (mut journal, ..) = Journal::open(folder.path(), &header("a"))?;
+        journal.append(&finished("one"))?;
+        journal.append(&finished("two"))?;
+        drop(journal);
+        let path = folder.path().join(FILE);
+        let text = std::fs::read_to_string(&path)?.replace(r#"{"job":"one""#, "\0\0\0");
+        std::fs::write(&path, text)?;
+        let (_, done, unreadable) = Journal::open(folder.path(), &header("a"))?;
+        assert_eq!((done.into_keys().collect::<Vec<_>>(), unreadable), (vec!["two".to_string()], 1));
+        Ok(())
+    }
+
+    #[test]
+    fn refuses_what_is_not_its_own() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let (journal, ..) = Journal::open(folder.path(), &header("a"))?;
+        let busy = Journal::open(folder.path(), &header("a"));
+        assert!(matches!(busy, Err(ExperimentError::Busy { .. })), "{busy:?}");
+        drop(journal);
+        let another = Journal::open(folder.path(), &header("b")).map(drop);
+        let Err(ExperimentError::Another { found, .. }) = another else { panic!("{another:?}") };
+        assert_eq!(found.hash, "a");
+        std::fs::write(folder.path().join(FILE), "something else\n")?;
+        let no_journal = Journal::open(folder.path(), &header("a")).map(drop);
+        assert!(matches!(no_journal, Err(ExperimentError::NoJournal { .. })), "{no_journal:?}");
+        Ok(())
+    }
+}

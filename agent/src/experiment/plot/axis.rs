@@ -1,0 +1,107 @@
+//! From values to places on the picture, with round ticks.
+
+/// How many ticks an axis has, about.
+const TICKS: f64 = 6.0;
+
+/// A linear scale.
+pub(super) struct Scale {
+    /// Value at the beginning.
+    pub low: f64,
+    /// Value at the end.
+    pub high: f64,
+    from: f64,
+    to: f64,
+    step: f64,
+}
+
+impl Scale {
+    /// A scale from `from` to `to` on the picture with given ends, or ends at round values around the data.
+    pub fn new(range: Option<[f64; 2]>, values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+        let (low, high) = match range {
+            Some([low, high]) if high > low => (low, high),
+            _ => around(values.filter(|v| v.is_finite())),
+        };
+        let step = round_step((high - low) / TICKS);
+        let (low, high) = match range {
+            Some([low, high]) if high > low => (low, high),
+            _ => ((low / step).floor() * step, (high / step).ceil() * step),
+        };
+        Self { low, high, from, to, step }
+    }
+
+    /// The place of a value; what lies beyond the ends is drawn at the end.
+    pub fn at(&self, value: f64) -> f64 {
+        let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
+        self.from + share * (self.to - self.from)
+    }
+
+    /// Round values along the axis.
+    pub fn ticks(&self) -> Vec<f64> {
+        let (first, last) =
+            ((self.low / self.step - 1e-9).ceil() as i64, (self.high / self.step + 1e-9).floor() as i64);
+        (first..=last).map(|k| k as f64 * self.step).collect()
+    }
+
+    /// A tick as text, with as many decimals as its step has.
+    pub fn text(&self, tick: f64) -> String {
+        let decimals = (-self.step.log10().floor()).max(0.0) as usize;
+        let text = format!("{tick:.decimals$}");
+        if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
+            text.trim_start_matches('-').into()
+        } else {
+            text
+        }
+    }
+}
+
+/// Ends around values, with zero if it is near; a unit wide at least for a single value.
+fn around(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    if low > high {
+        return (0.0, 1.0);
+    }
+    let low = if low > 0.0 && low < 0.5 * high { 0.0 } else { low };
+    if high - low < 1e-9 * (1.0 + high.abs()) { (low - 0.5, high + 0.5) } else { (low, high) }
+}
+
+/// The next 1, 2 or 5 times a power of ten.
+fn round_step(step: f64) -> f64 {
+    let power = 10f64.powf(step.log10().floor());
+    let share = step / power;
+    power
+        * if share <= 1.0 {
+            1.0
+        } else if share <= 2.0 {
+            2.0
+        } else if share <= 5.0 {
+            5.0
+        } else {
+            10.0
+        }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(range: Option<[f64; 2]>, values: &[f64], ticks: &[&str]) {
+        let scale = Scale::new(range, values.iter().copied(), 0.0, 100.0);
+        let texts: Vec<String> = scale.ticks().into_iter().map(|t| scale.text(t)).collect();
+        assert_eq!(texts, ticks);
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        check(Some([0.0, 1.0]), &[], &["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        check(None, &[1.0, 2.0, 5.0], &["0", "1", "2", "3", "4", "5"]);
+        check(None, &[-0.3, 0.2], &["-0.3", "-0.2", "-0.1", "0.0", "0.1", "0.2"]);
+        check(None, &[1000.0, 1250.0], &["1000", "1050", "1100", "1150", "1200", "1250"]);
+        check(None, &[3.0], &["2.4", "2.6", "2.8", "3.0", "3.2", "3.4", "3.6"]);
+    }
+
+    #[test]
+    fn places() {
+        let scale = Scale::new(Some([0.0, 10.0]), std::iter::empty(), 200.0, 100.0);
+        assert_eq!((scale.at(0.0), scale.at(5.0), scale.at(99.0)), (200.0, 150.0, 100.0));
+    }
+}

@@ -1,0 +1,261 @@
+//! Rates, means, differences and calibration, with intervals of 95 %.
+//!
+//! Rates get Wilson's score interval. Everything else gets a percentile bootstrap that resamples whole *groups* (all runs in
+//! one scene), since runs in the same scene are not independent; its seed is fixed, so the same rows give the same interval.
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+/// 97.5 % quantile of the standard normal distribution.
+const Z_95: f64 = 1.959_963_984_540_054;
+/// Resamples of the bootstrap.
+const RESAMPLES: usize = 2000;
+/// Seed of the bootstrap.
+const SEED: u64 = 4;
+
+/// A measured value with its interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimate {
+    /// The value itself.
+    pub value: f64,
+    /// Interval of 95 %; none where the sample is too small to say.
+    pub interval: Option<[f64; 2]>,
+    /// How many observations it rests on.
+    pub n: usize,
+}
+
+/// A value observed in a group: a run in a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation {
+    /// Observations of one group may depend on each other.
+    pub group: u64,
+    /// What was observed.
+    pub value: f64,
+}
+
+/// Two values observed under the same conditions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pair {
+    /// Pairs of one group may depend on each other.
+    pub group: u64,
+    /// The first.
+    pub a: f64,
+    /// The second.
+    pub b: f64,
+}
+
+/// A share `hits / n` with Wilson's score interval; none for `n = 0`.
+pub fn rate(hits: usize, n: usize) -> Option<Estimate> {
+    if n == 0 {
+        return None;
+    }
+    let (k, n_f) = (hits as f64, n as f64);
+    let p = k / n_f;
+    let z2 = Z_95 * Z_95;
+    let middle = (p + z2 / (2.0 * n_f)) / (1.0 + z2 / n_f);
+    let half = Z_95 / (1.0 + z2 / n_f) * (p * (1.0 - p) / n_f + z2 / (4.0 * n_f * n_f)).sqrt();
+    Some(Estimate { value: p, interval: Some([(middle - half).max(0.0), (middle + half).min(1.0)]), n })
+}
+
+/// The mean with its bootstrapped interval; none without observations.
+pub fn mean(observations: &[Observation]) -> Option<Estimate> {
+    let sums = sums(observations.iter().map(|o| (o.group, [o.value, 1.0])));
+    estimate(observations.len(), &sums, |[total, n]| total / n)
+}
+
+/// The ratio of two sums over the same observations, such as hits by attempts; none if the second sum is zero.
+pub fn ratio(pairs: &[Pair]) -> Option<Estimate> {
+    let sums = sums(pairs.iter().map(|p| (p.group, [p.a, p.b])));
+    let n = pairs.iter().map(|p| p.b).sum::<f64>() as usize;
+    estimate(n, &sums, |[a, b]| a / b)
+}
+
+/// The mean of `a - b`; none without pairs.
+pub fn difference(pairs: &[Pair]) -> Option<Estimate> {
+    let sums = sums(pairs.iter().map(|p| (p.group, [p.a - p.b, 1.0])));
+    estimate(pairs.len(), &sums, |[total, n]| total / n)
+}
+
+/// The share of `b` that `a` saves, `1 - mean(a) / mean(b)`; none if the mean of `b` is zero.
+pub fn saving(pairs: &[Pair]) -> Option<Estimate> {
+    let sums = sums(pairs.iter().map(|p| (p.group, [p.a, p.b])));
+    estimate(pairs.len(), &sums, |[a, b]| 1.0 - a / b)
+}
+
+/// The middle of the values (the mean of the two middle ones); none without values.
+pub fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    match n {
+        0 => None,
+        n if n % 2 == 1 => Some(sorted[n / 2]),
+        n => Some((sorted[n / 2 - 1] + sorted[n / 2]) / 2.0),
+    }
+}
+
+/// Sums of each group, in the order of the groups' numbers.
+fn sums(values: impl Iterator<Item = (u64, [f64; 2])>) -> Vec<[f64; 2]> {
+    let mut groups = std::collections::BTreeMap::<u64, [f64; 2]>::new();
+    for (group, [a, b]) in values {
+        let sum = groups.entry(group).or_insert([0.0; 2]);
+        *sum = [sum[0] + a, sum[1] + b];
+    }
+    groups.into_values().collect()
+}
+
+fn total(sums: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
+    sums.fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y])
+}
+
+fn estimate(n: usize, groups: &[[f64; 2]], statistic: impl Fn([f64; 2]) -> f64) -> Option<Estimate> {
+    let value = statistic(total(groups.iter().copied()));
+    if groups.is_empty() || !value.is_finite() {
+        return None;
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let mut resampled: Vec<f64> = (0..RESAMPLES)
+        .map(|_| statistic(total((0..groups.len()).map(|_| groups[rng.random_range(0..groups.len())]))))
+        .filter(|v| v.is_finite())
+        .collect();
+    resampled.sort_by(f64::total_cmp);
+    let at = |share: f64| resampled[(share * (resampled.len() - 1) as f64).round() as usize];
+    let interval = (groups.len() > 1 && !resampled.is_empty()).then(|| [at(0.025), at(0.975)]);
+    Some(Estimate { value, interval, n })
+}
+
+/// A stated probability and what turned out.
+pub type Forecast = (f64, bool);
+
+/// Mean squared distance of stated probabilities from the outcomes (Brier 1950): 0 is perfect, always saying one half
+/// gives .25; none without forecasts.
+pub fn brier(forecasts: &[Forecast]) -> Option<f64> {
+    let squared = |&(p, happened): &Forecast| (p - f64::from(happened)).powi(2);
+    (!forecasts.is_empty()).then(|| forecasts.iter().map(squared).sum::<f64>() / forecasts.len() as f64)
+}
+
+/// One bar of a reliability plot.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Bin {
+    /// Least probability that falls into it.
+    pub from: f64,
+    /// Probability from which the next bin begins; the last bin includes it.
+    pub to: f64,
+    /// Mean of the stated probabilities.
+    pub stated: f64,
+    /// Share of the forecasts that came true, with Wilson's interval.
+    pub observed: Estimate,
+}
+
+/// Forecasts in bins of equal width, without the empty ones.
+pub fn reliability(forecasts: &[Forecast], bins: usize) -> Vec<Bin> {
+    let bins = bins.max(1);
+    let bin_of = |p: f64| ((p * bins as f64).floor().max(0.0) as usize).min(bins - 1);
+    (0..bins)
+        .filter_map(|b| {
+            let inside: Vec<&Forecast> = forecasts.iter().filter(|(p, _)| bin_of(*p) == b).collect();
+            let hits = inside.iter().filter(|(_, happened)| *happened).count();
+            Some(Bin {
+                from: b as f64 / bins as f64,
+                to: (b + 1) as f64 / bins as f64,
+                stated: inside.iter().map(|(p, _)| p).sum::<f64>() / inside.len() as f64,
+                observed: rate(hits, inside.len())?,
+            })
+        })
+        .collect()
+}
+
+/// Expected calibration error: the distance between stated and observed, weighted by the bins' counts; none without forecasts.
+pub fn calibration_error(forecasts: &[Forecast], bins: usize) -> Option<f64> {
+    let weighted = |b: &Bin| b.observed.n as f64 * (b.stated - b.observed.value).abs();
+    let sum: f64 = reliability(forecasts, bins).iter().map(weighted).sum();
+    (!forecasts.is_empty()).then(|| sum / forecasts.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 5e-4, "{found} is not {expected}");
+    }
+
+    fn alone(values: &[f64]) -> Vec<Observation> {
+        values.iter().zip(0..).map(|(&value, group)| Observation { group, value }).collect()
+    }
+
+    #[test]
+    fn wilson_by_hand() {
+        // Hits, trials, and the bounds worked out from the formula by other means.
+        for (hits, n, low, high) in [(8, 10, 0.4902, 0.9433), (0, 20, 0.0, 0.1611), (49, 50, 0.8950, 0.9965)]
+        {
+            let Some(Estimate { value, interval: Some([l, h]), .. }) = rate(hits, n) else {
+                panic!("no interval")
+            };
+            close(value, hits as f64 / n as f64);
+            close(l, low);
+            close(h, high);
+        }
+        assert_eq!(rate(0, 0), None);
+    }
+
+    #[test]
+    fn bootstrap_of_two_groups_is_known_exactly() {
+        // Resampling the groups {0} and {10} gives the means 0, 5, 10 with chances 1/4, 1/2, 1/4: the interval is all of it.
+        let found = mean(&alone(&[0.0, 10.0]));
+        assert_eq!(found, Some(Estimate { value: 5.0, interval: Some([0.0, 10.0]), n: 2 }));
+        assert_eq!(mean(&alone(&[3.0])), Some(Estimate { value: 3.0, interval: None, n: 1 }));
+        assert_eq!(mean(&[]), None);
+    }
+
+    #[test]
+    fn bootstrap_agrees_with_the_normal_interval_of_a_large_sample() {
+        // 400 values 0..=19: mean 9.5, standard deviation 5.766, so 9.5 +- 1.96 * 5.766 / 20 = 9.5 +- 0.565.
+        let values: Vec<f64> = (0..400).map(|i| f64::from(i % 20)).collect();
+        let Some(Estimate { interval: Some([low, high]), .. }) = mean(&alone(&values)) else {
+            panic!("no interval")
+        };
+        assert!((low - 8.935).abs() < 0.1 && (high - 10.065).abs() < 0.1, "[{low}, {high}]");
+    }
+
+    #[test]
+    fn runs_of_one_group_stay_together() {
+        // Ten copies in each of two groups say no more than two observations.
+        let copies: Vec<Observation> =
+            (0..20).map(|i| Observation { group: i / 10, value: if i < 10 { 0.0 } else { 10.0 } }).collect();
+        assert_eq!(mean(&copies).and_then(|e| e.interval), Some([0.0, 10.0]));
+    }
+
+    #[test]
+    fn pairs() {
+        let pairs: Vec<Pair> =
+            [(2.0, 4.0), (3.0, 4.0)].iter().zip(0..).map(|(&(a, b), group)| Pair { group, a, b }).collect();
+        close(difference(&pairs).map_or(f64::NAN, |e| e.value), -1.5);
+        close(saving(&pairs).map_or(f64::NAN, |e| e.value), 0.375);
+        close(ratio(&pairs).map_or(f64::NAN, |e| e.value), 0.625);
+        assert_eq!(ratio(&[Pair { group: 0, a: 0.0, b: 0.0 }]), None);
+    }
+
+    #[test]
+    fn calibration_by_hand() {
+        let forecasts = [(0.9, true), (0.8, true), (0.95, false), (0.1, false)];
+        // (.01 + .04 + .9025 + .01) / 4
+        close(brier(&forecasts).unwrap_or(f64::NAN), 0.240_625);
+        let bins = reliability(&forecasts, 5);
+        assert_eq!(bins.len(), 2);
+        assert_eq!((bins[1].observed.n, bins[1].observed.value), (3, 2.0 / 3.0));
+        close(bins[1].stated, 0.8833);
+        // 1/4 * .1 + 3/4 * (.8833 - .6667)
+        close(calibration_error(&forecasts, 5).unwrap_or(f64::NAN), 0.1875);
+        assert_eq!(reliability(&[(1.0, true)], 10).first().map(|b| b.to), Some(1.0));
+        assert_eq!((brier(&[]), calibration_error(&[], 10)), (None, None));
+    }
+
+    #[test]
+    fn medians() {
+        assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!(median(&[]), None);
+    }
+}

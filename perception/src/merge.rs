@@ -293,6 +293,8 @@ fn align_objects(
     views: &[View],
     steps: &mut Vec<Step>,
 ) -> Vec<Found> {
+    let levelled = poses.to_vec();
+    let mut retried = vec![false; views.len()];
     if let Some(up) = up {
         place_objects(prepared, used, on_plane, &up, poses);
     }
@@ -300,6 +302,14 @@ fn align_objects(
     let maps: Vec<Option<DepthMap>> =
         views.iter().map(|v| DepthMap::from_view(v, &v.world_from_camera)).collect();
     while let Some((worst, why)) = check::misfit(prepared, used, on_plane, poses, &maps, &found) {
+        if let Some(up) = up.filter(|_| !retried[worst]) {
+            // The others have settled since: a better model to be placed on than a single view was.
+            retried[worst] = true;
+            poses[worst] = levelled[worst];
+            place_on_others(prepared, used, on_plane, &up, poses, worst);
+            found = joint::align(prepared, used, on_plane, poses, &SECOND);
+            continue;
+        }
         used[worst] = false;
         whys[worst] = Some(why);
         poses[worst] = prepared[worst].prior;
@@ -322,16 +332,11 @@ fn place_objects(
     up: &Unit<Vector3<f64>>,
     poses: &mut [Isometry3<f64>],
 ) {
-    let objects = |i: usize, pose: &Isometry3<f64>| -> Vec<(Point3<f64>, Vector3<f64>)> {
-        let view = &prepared[i];
-        let off = (0..view.points.len()).filter(|&k| !on_plane[i][k]);
-        off.map(|k| (pose * view.points[k], pose.rotation * view.normals[k])).collect()
-    };
     let mut left: Vec<usize> = (0..prepared.len()).filter(|&i| used[i]).collect();
     let count = |i: usize| on_plane[i].iter().filter(|p| !**p).count();
     let Some(first) = left.iter().copied().max_by_key(|&i| (count(i), usize::MAX - i)) else { return };
     left.retain(|&i| i != first);
-    let mut placed = objects(first, &poses[first]);
+    let mut placed = objects(&prepared[first], &on_plane[first], &poses[first]);
     let mut done = vec![first];
     while !left.is_empty() {
         let apart = |i: usize| {
@@ -343,14 +348,38 @@ fn place_objects(
             return;
         };
         left.retain(|&i| i != next);
-        let own = objects(next, &poses[next]);
+        let own = objects(&prepared[next], &on_plane[next], &poses[next]);
         let window = window(&prepared[next], &own, &poses[next]);
         if let Some(correction) = search::place(&own, &placed, up, window) {
             poses[next] = correction * poses[next];
         }
-        placed.extend(objects(next, &poses[next]));
+        placed.extend(objects(&prepared[next], &on_plane[next], &poses[next]));
         done.push(next);
     }
+}
+
+/// Puts the objects of one view onto those of all other used views.
+fn place_on_others(
+    prepared: &[Prepared],
+    used: &[bool],
+    on_plane: &[Vec<bool>],
+    up: &Unit<Vector3<f64>>,
+    poses: &mut [Isometry3<f64>],
+    view: usize,
+) {
+    let others = (0..prepared.len()).filter(|&i| used[i] && i != view);
+    let placed: Vec<_> = others.flat_map(|i| objects(&prepared[i], &on_plane[i], &poses[i])).collect();
+    let own = objects(&prepared[view], &on_plane[view], &poses[view]);
+    let window = window(&prepared[view], &own, &poses[view]);
+    if let Some(correction) = search::place(&own, &placed, up, window) {
+        poses[view] = correction * poses[view];
+    }
+}
+
+/// Points and normals of a view off the planes, in the world.
+fn objects(view: &Prepared, on_plane: &[bool], pose: &Isometry3<f64>) -> Vec<(Point3<f64>, Vector3<f64>)> {
+    let off = (0..view.points.len()).filter(|&k| !on_plane[k]);
+    off.map(|k| (pose * view.points[k], pose.rotation * view.normals[k])).collect()
 }
 
 /// How far off two views may be from each other at the distance of the objects: three spreads, at least the 10 cm and 6° of a poor localisation.

@@ -122,7 +122,7 @@ pub fn run(dir: &Path) -> Result<(), String> {
     Ok(())
 }
 
-fn words(p: &Percept) -> String {
+pub fn words(p: &Percept) -> String {
     let e = &p.evidence;
     format!(
         "p {:.2} size {:.0}x{:.0}x{:.0} mm, d {:.0}±{:.0} taper {:.2} res {:.1} box {:.1} in {:.2} arc {:.2} open {:.2} lid {:.2} {:?}, handle {:?} unseen {:.2} out {:.0} mm, {:?}",

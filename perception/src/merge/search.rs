@@ -15,6 +15,9 @@ const CELLS_M: [f64; 2] = [0.03, 0.012];
 /// Smallest share of points that must fall on the others' surfaces.
 const LEAST_SHARE: f64 = 0.25;
 
+/// What a correction at the edge of the window (three spreads of localisation) costs, as a share of the points.
+const PRIOR: f64 = 0.15;
+
 /// Surfaces of placed views in cells, with the sides they face.
 struct Cells {
     side_m: f64,
@@ -107,8 +110,8 @@ pub(super) fn place(
                     for j in -shifts..=shifts {
                         let (x, y) = (start.x + f64::from(i) * side_m, start.y + f64::from(j) * side_m);
                         let score = score(&cells, &turned, x, y)
-                            - 0.04 * (x.hypot(y) / window.shift_m).powi(2)
-                            - 0.04 * (angle / window.turn_rad).powi(2);
+                            - PRIOR * (x.hypot(y) / window.shift_m).powi(2)
+                            - PRIOR * (angle / window.turn_rad).powi(2);
                         found.push(Candidate { x, y, turn: angle, score });
                     }
                 }

@@ -257,22 +257,29 @@ fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
     }
 }
 
-/// How well the side keeps to the form. `None` is a form that is neither round nor a box.
+/// How well the side keeps to the form, against the form it keeps to best. `None` is a form that is neither round nor a box.
 fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
+    /// However many points: what the forms leave out (rounded boxes, bulging cups) bounds what they tell.
+    const LEAST: f64 = -12.0;
+    let all = [Some(Shape::Round), Some(Shape::Box), None].map(|s| raw_form_log(s, m));
+    let best = all.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    (raw_form_log(shape, m) - best).max(LEAST)
+}
+
+fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     /// Irregular things miss both forms by about this much, metres.
     const IRREGULAR_M: f64 = 0.006;
+    /// The miss of what no circle fits at all.
+    const NONE_M: f64 = 0.02;
     let floor = 0.0015_f64.hypot(0.7 * m.sigma_m);
-    let scale = match shape {
-        Some(Shape::Round) => m.round.map_or(0.02, |r| r.spread_m.hypot(floor)),
-        Some(Shape::Box) => m.rectangle.map_or(0.02, |r| r.residual_m.hypot(floor)),
-        None => IRREGULAR_M.hypot(floor),
+    let miss = match shape {
+        Some(Shape::Round) => m.round.map_or(NONE_M, |r| r.spread_m),
+        Some(Shape::Box) => m.rectangle.map_or(NONE_M, |r| r.residual_m),
+        None => IRREGULAR_M,
     };
-    let through = match shape {
-        // A camera that looked through the side says that there is none.
-        Some(Shape::Round) => -25.0 * m.looked_through,
-        _ => 0.0,
-    };
-    (-m.independent * (scale / floor).ln()).max(-25.0) + through
+    // A camera that looked through the side says that there is none.
+    let through = if shape == Some(Shape::Round) { -25.0 * m.looked_through } else { 0.0 };
+    -m.independent * miss.hypot(floor).ln() + through
 }
 
 fn top_log(top: Top, m: &Measured) -> f64 {

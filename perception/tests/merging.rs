@@ -1,0 +1,139 @@
+//! Views of a known table with wrong poses, merged, against the truth.
+
+mod tabletop;
+
+use descry_perception::merge::{MergeError, MergeOptions, merge};
+use descry_perception::nalgebra::{Isometry3, Point3, Unit, Vector3};
+use descry_perception::{Merged, View};
+use tabletop::{Draws, TABLE_M, Thing, disturbed, look, on_ring};
+
+fn things() -> Vec<Thing> {
+    vec![
+        Thing::Cup { x: 0.10, y: 0.05, radius: 0.035, height: 0.104, handle_rad: None },
+        Thing::Cup { x: -0.22, y: 0.10, radius: 0.044, height: 0.155, handle_rad: None },
+        Thing::Cup { x: 0.30, y: -0.12, radius: 0.04, height: 0.095, handle_rad: Some(2.0) },
+        Thing::Block { x: -0.05, y: -0.15, half: [0.09, 0.05], height: 0.2, turn_rad: 0.5 },
+        Thing::Tin { x: 0.42, y: 0.15, radius: 0.053, height: 0.277 },
+    ]
+}
+
+fn options() -> MergeOptions {
+    MergeOptions {
+        up: Some(Unit::new_normalize(Vector3::z())),
+        height_band_m: Some((0.5, 1.2)),
+        ..MergeOptions::default()
+    }
+}
+
+/// Views from a ring with truths; localisation errs by the given spreads.
+fn views(angles: &[f64], sigma_m: f64, sigma_rad: f64, seed: u64) -> (Vec<View>, Vec<Isometry3<f64>>) {
+    let mut draws = Draws(seed);
+    angles
+        .iter()
+        .map(|&angle| {
+            let truth = on_ring(angle, 1.2 + 0.3 * draws.next(), 1.35 + 0.15 * draws.next());
+            let stated = disturbed(&truth, sigma_m, sigma_rad, &mut draws);
+            (look(&things(), &truth, &stated, &mut draws), truth)
+        })
+        .unzip()
+}
+
+/// Largest disagreement between two used views about where a place near the table's middle is, metres.
+fn disagreement_m(merged: &Merged, truths: &[Isometry3<f64>]) -> f64 {
+    let places = [
+        Point3::new(0.3, 0.1, TABLE_M),
+        Point3::new(-0.3, -0.1, TABLE_M),
+        Point3::new(0.0, 0.0, TABLE_M + 0.2),
+    ];
+    let used: Vec<usize> = (0..truths.len()).filter(|&i| merged.fits[i].used).collect();
+    let at =
+        |i: usize, p: &Point3<f64>| merged.fits[i].world_from_camera * truths[i].inverse_transform_point(p);
+    let apart = |p: &Point3<f64>| {
+        let all: Vec<_> = used.iter().map(|&i| at(i, p)).collect();
+        all.iter().flat_map(|a| all.iter().map(move |b| (a - b).norm())).fold(0.0, f64::max)
+    };
+    places.iter().map(apart).fold(0.0, f64::max)
+}
+
+/// How far the middle of the table lies from the truth in the merged frame, metres.
+fn offset_m(merged: &Merged, truths: &[Isometry3<f64>]) -> f64 {
+    let middle = Point3::new(0.0, 0.0, TABLE_M);
+    let used: Vec<usize> = (0..truths.len()).filter(|&i| merged.fits[i].used).collect();
+    let sum: Vector3<f64> = used
+        .iter()
+        .map(|&i| merged.fits[i].world_from_camera * truths[i].inverse_transform_point(&middle) - middle)
+        .sum();
+    (sum / used.len().max(1) as f64).norm()
+}
+
+const RING: [f64; 5] = [0.0, 1.1, 2.4, 3.6, 5.0];
+
+#[test]
+fn views_with_wrong_poses_come_together() {
+    for (seed, sigma_m, sigma_rad, most_m) in
+        [(1, 0.03, 0.035, 0.008), (2, 0.03, 0.035, 0.008), (3, 0.05, 0.05, 0.012)]
+    {
+        let (views, truths) = views(&RING, sigma_m, sigma_rad, seed);
+        let merged = merge(&views, &options()).expect("the views are sound");
+        let (apart, off) = (disagreement_m(&merged, &truths), offset_m(&merged, &truths));
+        println!("seed {seed}: apart {:.1} mm, off {:.1} mm", apart * 1e3, off * 1e3);
+        for (i, (fit, truth)) in merged.fits.iter().zip(&truths).enumerate() {
+            println!(
+                "  {i} used {} moved {:.3} m {:.2}° residual {:.1} mm: {}; wrong by {:.3} m",
+                fit.used,
+                fit.moved_m,
+                fit.moved_rad.to_degrees(),
+                fit.residual_m * 1e3,
+                fit.why,
+                (fit.world_from_camera.translation.vector - truth.translation.vector).norm()
+            );
+        }
+        assert!(merged.fits.iter().all(|f| f.used), "seed {seed}: {:?}", merged.fits);
+        assert!(apart < most_m, "seed {seed}: {apart} m apart");
+        assert!(off < 0.06, "seed {seed}: off by {off} m");
+    }
+}
+
+#[test]
+fn one_view_is_filtered_and_kept_where_it_is() {
+    let (views, _) = views(&RING[..1], 0.0, 0.0, 4);
+    let merged = merge(&views, &options()).expect("the view is sound");
+    assert!(merged.fits[0].used && merged.fits[0].moved_m < 1e-9, "{:?}", merged.fits);
+    assert!(merged.cloud.len() > 10_000);
+}
+
+#[test]
+fn a_view_of_something_else_is_left_out_and_says_so() {
+    let (mut views, truths) = views(&RING[..4], 0.02, 0.02, 5);
+    let mut draws = Draws(6);
+    let other = [
+        Thing::Tin { x: -0.1, y: 0.1, radius: 0.08, height: 0.2 },
+        Thing::Block { x: 0.3, y: 0.1, half: [0.05, 0.12], height: 0.1, turn_rad: 0.0 },
+    ];
+    let truth = on_ring(5.5, 1.3, 1.4);
+    views.push(look(&other, &truth, &truth, &mut draws));
+    let merged = merge(&views, &options()).expect("the views are sound");
+    println!("{:#?}", merged.fits.iter().map(|f| &f.why).collect::<Vec<_>>());
+    assert!(!merged.fits[4].used && merged.fits[4].why.contains("left out"), "{:?}", merged.fits[4]);
+    assert!(merged.fits[..4].iter().all(|f| f.used));
+    assert!(disagreement_m(&merged, &truths) < 0.01);
+}
+
+#[test]
+fn what_cannot_be_merged_is_said() {
+    let (views, _) = views(&RING[..1], 0.0, 0.0, 4);
+    let mut lost = views.clone();
+    lost[0].world_from_camera.translation.vector.x = f64::NAN;
+    let narrow = MergeOptions { range_m: 0.2, ..options() };
+    let wrong = MergeOptions { fuse_voxel_m: 0.0, ..options() };
+    let cases: [(&[View], MergeOptions, fn(&MergeError) -> bool); 4] = [
+        (&[], options(), |e| matches!(e, MergeError::NoViews)),
+        (&lost, options(), |e| matches!(e, MergeError::Pose { view: 0 })),
+        (&views, narrow, |e| matches!(e, MergeError::Empty { .. })),
+        (&views, wrong, |e| matches!(e, MergeError::Option { field: "fuse_voxel_m", .. })),
+    ];
+    for (views, options, expected) in cases {
+        let error = merge(views, &options).err();
+        assert!(error.as_ref().is_some_and(expected), "{error:?}");
+    }
+}

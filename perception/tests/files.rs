@@ -1,0 +1,207 @@
+//! PCD and PLY: round trips, what strangers write, and files that are broken.
+
+use descry_perception::files::{self, Loaded, pcd, ply};
+use descry_perception::nalgebra::{Point3, Vector3};
+use descry_perception::{Cloud, Grid};
+use proptest::prelude::*;
+
+fn sample(organised: bool) -> Cloud {
+    let points: Vec<Point3<f32>> = (0..12)
+        .map(|i| Point3::new(i as f32 * 0.125, -0.3 + i as f32 * 0.001, 1.0 / (i + 1) as f32))
+        .collect();
+    let mut cloud = Cloud {
+        colours: Some((0..12).map(|i| [i, 200, 255 - i]).collect()),
+        normals: Some(vec![Vector3::new(0.0, 0.6, -0.8); 12]),
+        labels: Some((0..12).map(|i| i * 1_000_003).collect()),
+        grid: None,
+        points,
+    };
+    if organised {
+        cloud.grid = Some(Grid { width: 4, height: 3 });
+        cloud.points[5] = Point3::new(f32::NAN, f32::NAN, f32::NAN);
+    }
+    cloud
+}
+
+fn same(a: &Cloud, b: &Cloud) -> bool {
+    let bits = |c: &Cloud| -> Vec<[u32; 3]> {
+        let bits = |v: f32| if v.is_nan() { u32::MAX } else { v.to_bits() };
+        c.points.iter().map(|p| [bits(p.x), bits(p.y), bits(p.z)]).collect()
+    };
+    bits(a) == bits(b)
+        && a.grid == b.grid
+        && a.colours == b.colours
+        && a.normals == b.normals
+        && a.labels == b.labels
+}
+
+#[test]
+fn pcd_comes_back_as_it_was() {
+    for encoding in [pcd::Encoding::Ascii, pcd::Encoding::Binary, pcd::Encoding::BinaryCompressed] {
+        for organised in [false, true] {
+            let cloud = sample(organised);
+            let loaded = files::read_cloud(&pcd::write(&cloud, encoding)).unwrap();
+            assert!(same(&loaded.cloud, &cloud), "{encoding:?} {organised}: {:?}", loaded.cloud);
+            assert_eq!(loaded.notes, Vec::<String>::new());
+        }
+        let bare = Cloud::from_points(vec![]);
+        assert!(same(&files::read_cloud(&pcd::write(&bare, encoding)).unwrap().cloud, &bare));
+    }
+}
+
+#[test]
+fn ply_comes_back_as_it_was() {
+    for encoding in [ply::Encoding::Ascii, ply::Encoding::Binary] {
+        let cloud = sample(false);
+        assert!(
+            same(&files::read_cloud(&ply::write(&cloud, encoding)).unwrap().cloud, &cloud),
+            "{encoding:?}"
+        );
+    }
+    let organised = sample(true);
+    assert_eq!(files::read_cloud(&ply::write(&organised, ply::Encoding::Binary)).unwrap().cloud.len(), 11);
+}
+
+fn read(text: &str) -> Result<Loaded, String> {
+    files::read_cloud(text.as_bytes()).map_err(|e| e.to_string())
+}
+
+#[test]
+fn fields_in_any_order_type_and_count() {
+    let text = "# written by hand\nVERSION .5\nFIELDS label z _ y x rgb histogram\nSIZE 2 8 1 4 4 4 4\nTYPE U F U F F F F\n\
+                COUNT 1 1 3 1 1 1 2\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n\
+                7 3.5 0 0 0 2 1 4.2108e+06 9 9\n8 -3.5e-1 0 0 0 -2 -1 16711935 9 9\n";
+    let loaded = read(text).unwrap();
+    assert_eq!(loaded.cloud.points, vec![Point3::new(1.0, 2.0, 3.5), Point3::new(-1.0, -2.0, -0.35)]);
+    assert_eq!(loaded.cloud.labels, Some(vec![7, 8]));
+    assert_eq!(
+        loaded.cloud.colours,
+        Some(vec![[0x80, 0x80, 0x90], [255, 0, 255]]).map(|mut c| {
+            let bits = 4.2108e+06f32.to_bits().to_be_bytes();
+            c[0] = [bits[1], bits[2], bits[3]];
+            c
+        })
+    );
+    assert_eq!(loaded.notes, ["fields left out: histogram"]);
+}
+
+#[test]
+fn windows_lines_old_headers_and_viewpoints() {
+    let text = "COLUMNS x y z\r\nVIEWPOINT 1 2 3 0 1 0 0\r\nPOINTS 1\r\nDATA ascii\r\n1 2 3\r\n";
+    let loaded = read(text).unwrap();
+    assert_eq!((loaded.cloud.len(), loaded.cloud.grid), (1, None));
+    assert_eq!(loaded.viewpoint.translation.vector, Vector3::new(1.0, 2.0, 3.0));
+    assert!((loaded.viewpoint.rotation.angle() - std::f64::consts::PI).abs() < 1e-12);
+}
+
+#[test]
+fn what_is_left_out_is_said() {
+    let head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n";
+    let loaded =
+        read(&format!("{head}WIDTH 3\nHEIGHT 1\nDATA ascii\n1 2 3\nnan nan nan\ninf 0 0\n")).unwrap();
+    assert_eq!(loaded.cloud.len(), 1);
+    assert!(loaded.notes.iter().any(|n| n.starts_with("2 points without finite")), "{:?}", loaded.notes);
+    assert!(loaded.notes.iter().any(|n| n.starts_with("1 points with infinite")), "{:?}", loaded.notes);
+    let loaded = read(&format!("{head}WIDTH 2\nHEIGHT 1\nDATA ascii\n100 200 900\n110 210 1000\n")).unwrap();
+    assert!(loaded.notes.iter().any(|n| n.contains("millimetres")), "{:?}", loaded.notes);
+    assert_eq!(loaded.cloud.scaled(0.001).unit_warning(), None);
+}
+
+/// The error names the place, what was expected and a way out.
+fn check_error(text: &str, parts: &[&str]) {
+    let error = read(text).unwrap_err();
+    assert!(parts.iter().all(|p| error.contains(p)), "{error} lacks one of {parts:?}");
+}
+
+#[test]
+fn broken_files_are_explained() {
+    let head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 1\n";
+    check_error("", &["line 1", "DATA"]);
+    check_error("solid cube\n", &["line 1", "PCD"]);
+    check_error(&format!("{head}DATA ascii\n1 2 3\n1 two 3\n"), &["line 8", "number for field y", "two"]);
+    check_error(&format!("{head}DATA ascii\n1 2 3\n1 2\n"), &["line 8", "field z", "end of the line"]);
+    check_error(&format!("{head}DATA ascii\n1 2 3\n1 2 3 4\n"), &["line 8", "\"4\""]);
+    check_error(&format!("{head}DATA ascii\n11111 2 3\n"), &["2 lines of points", "found 1"]);
+    check_error(&format!("{head}DATA binary\n1234"), &["byte", "24 bytes", "after 4", "cut"]);
+    check_error(&format!("{head}POINTS 3\nDATA ascii\n"), &["line 6", "2 x 1", "3"]);
+    check_error(&format!("{head}DATA zip\n"), &["line 6", "binary_compressed", "zip"]);
+    check_error(
+        "FIELDS x y\nSIZE 4 4\nTYPE F F\nWIDTH 1\nDATA ascii\n1 2\n",
+        &["line 1", "a field z", "x y"],
+    );
+    check_error("FIELDS x y z\nSIZE 4 4\nDATA ascii\n", &["line 2", "3 values of SIZE"]);
+    check_error("FIELDS x y z\nTYPE F F Q\nWIDTH 1\nDATA ascii\n", &["field z", "TYPE Q"]);
+    check_error("FIELDS x y z\nWIDTH 4000000000\nHEIGHT 4000000000\nDATA binary\n", &["line 2", "POINTS"]);
+    check_error("FIELDS x y z\nWIDTH 4000000000\nDATA ascii\n", &["byte", "cut"]);
+    check_error(
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
+        &["line 3", "x, y and z"],
+    );
+    check_error("ply\nformat ascii 1.0\nelement vertex two\n", &["line 3", "COUNT"]);
+    check_error("ply\nproperty float x\n", &["line 2", "element before"]);
+    check_error("ply\nelement vertex 1\nproperty float x\nend_header\n", &["line 4", "format"]);
+    check_error("ply\nformat ascii 1.0\nend_header\n", &["vertex"]);
+    check_error(
+        "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n",
+        &["byte", "cut"],
+    );
+}
+
+#[test]
+fn ply_of_strangers() {
+    let text = "ply\nformat ascii 1.0\ncomment made by a scanner\nelement camera 1\nproperty list uchar float k\n\
+                element vertex 2\nproperty double x\nproperty double y\nproperty double z\nproperty float diffuse_red\n\
+                property float diffuse_green\nproperty float diffuse_blue\nproperty uchar quality\nelement face 1\n\
+                property list uchar int vertex_indices\nend_header\n2 0.5 0.5\n1 2 3 1.0 0.5 0 9\n\n4 5 6 0 0 1 9\n3 0 1 1\n";
+    let loaded = read(text).unwrap();
+    assert_eq!(loaded.cloud.points, vec![Point3::new(1.0, 2.0, 3.0), Point3::new(4.0, 5.0, 6.0)]);
+    assert_eq!(loaded.cloud.colours, Some(vec![[255, 128, 0], [0, 0, 255]]));
+    assert_eq!(loaded.notes, ["properties left out: quality"]);
+    let mut big = b"ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty float x\nproperty short y\nproperty int z\nend_header\n".to_vec();
+    big.extend(1.5f32.to_be_bytes());
+    big.extend((-2i16).to_be_bytes());
+    big.extend(3i32.to_be_bytes());
+    assert_eq!(files::read_cloud(&big).unwrap().cloud.points, vec![Point3::new(1.5, -2.0, 3.0)]);
+}
+
+fn files_of_all_kinds() -> Vec<Vec<u8>> {
+    let cloud = sample(true);
+    vec![
+        pcd::write(&cloud, pcd::Encoding::Ascii),
+        pcd::write(&cloud, pcd::Encoding::Binary),
+        pcd::write(&cloud, pcd::Encoding::BinaryCompressed),
+        ply::write(&cloud, ply::Encoding::Ascii),
+        ply::write(&cloud, ply::Encoding::Binary),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #[test]
+    fn damaged_files_never_panic(
+        kind in 0usize..5,
+        hits in proptest::collection::vec((any::<proptest::sample::Index>(), any::<u8>()), 0..6),
+        keep in 0.0f64..1.2,
+    ) {
+        let mut bytes = files_of_all_kinds().swap_remove(kind);
+        for (at, value) in hits {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        bytes.truncate((bytes.len() as f64 * keep) as usize);
+        if let Ok(loaded) = files::read_cloud(&bytes) {
+            prop_assert!(loaded.cloud.check().is_ok());
+            prop_assert!(loaded.cloud.grid.is_some() || loaded.cloud.count_finite() == loaded.cloud.len());
+        }
+    }
+
+    #[test]
+    fn digits_in_headers_never_panic(numbers in proptest::collection::vec(any::<u64>(), 4), kind in 0usize..3) {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|i| numbers[i] >> (numbers[(i + 1) % 4] % 64));
+        let data = ["ascii", "binary", "binary_compressed"][kind];
+        let text = format!("FIELDS x y z w\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 {a}\nWIDTH {b}\nHEIGHT {c}\nPOINTS {d}\nDATA {data}\n0123456789abcdef");
+        let _ = files::read_cloud(text.as_bytes());
+        let text = format!("FIELDS x y z w\nSIZE 4 4 4 4\nCOUNT 1 1 1 {a}\nWIDTH {b}\nDATA {data}\n0123456789abcdef");
+        let _ = files::read_cloud(text.as_bytes());
+    }
+}

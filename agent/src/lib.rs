@@ -1,3 +1,9 @@
-//! The continual loop.
+//! The continual loop and the command line.
 
+pub mod agent;
+pub mod body;
+pub mod commands;
+pub mod exit;
 pub mod experiment;
+pub mod report;
+pub mod run;

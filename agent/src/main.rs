@@ -1,3 +1,44 @@
-//! `descry`: the command line.
+//! `descry`: the command line, an interface that scripts depend on.
 
-fn main() {}
+use std::process::ExitCode;
+
+use clap::Parser;
+use descry_agent::commands::{self, Command};
+use descry_agent::exit::Exit;
+
+/// Finds things by looking carefully: plans where to look, drives there, records, merges, recognises, and looks again.
+#[derive(Parser)]
+#[command(name = "descry", version, about, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "Exit codes:
+  0   achieved, plan found, valid, no finding
+  1   an honest no: not found after every useful view, plan invalid, findings
+  2   bad input or usage
+  3   proven unsolvable
+  4   out of time or memory
+  5   the robot or a store failed for good
+  70  a bug of descry";
+
+fn main() -> ExitCode {
+    std::panic::set_hook(Box::new(|panic| {
+        eprintln!(
+            "descry: {panic}\n  this is a bug of descry; please report it with the command and its input"
+        );
+    }));
+    let outcome = std::panic::catch_unwind(|| {
+        let arguments = Arguments::parse();
+        commands::run(&arguments.command)
+    });
+    match outcome {
+        Ok(Ok(exit)) => exit.into(),
+        Ok(Err(error)) => {
+            eprintln!("descry: {error}");
+            error.exit().into()
+        }
+        Err(_) => Exit::Bug.into(),
+    }
+}

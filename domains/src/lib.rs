@@ -1,1 +1,11 @@
-//! Words and their meanings.
+//! Words and meanings: PDDL text, what may be said, and the Rust that grounds the symbols.
+
+pub mod attachments;
+pub mod candidates;
+pub mod doubt;
+mod facts;
+pub mod goal;
+pub mod load;
+pub mod situation;
+
+pub use descry_planner;

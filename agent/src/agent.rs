@@ -1,0 +1,345 @@
+//! The continual loop (paper 004, sections III to V): estimate, monitor, replan only if the plan is broken, execute,
+//! record, perceive, believe.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Instant;
+
+use descry_domains::attachments::{self, ProgramAttachment};
+use descry_domains::goal::Goal;
+use descry_domains::load::Domain;
+use descry_domains::situation::{self, Candidate, KnownSurface, Situation, Thing};
+use descry_memory::belief::Belief;
+use descry_memory::space::Space;
+use descry_memory::{Record, RecordId};
+use descry_perception::recognise::Recogniser;
+use descry_planner::{Attachments, Outcome as Planned, Plan, Task};
+use descry_robots::{CancellationToken, Robot};
+use descry_skills::{Call, Context, Outcome, SkillFailure, Symbols};
+
+use crate::exit::CommandError;
+use crate::report::{Event, Verdict};
+
+mod ground;
+mod look;
+
+/// An agent at work on one goal.
+pub struct Agent<'a> {
+    /// What may be said and what it means.
+    pub domain: &'a Domain,
+    /// The body.
+    pub robot: Arc<dyn Robot>,
+    /// Everything that is sensed, done and believed.
+    pub record: &'a Record,
+    /// Tells which object a segment is.
+    pub recogniser: &'a dyn Recogniser,
+    /// What is pursued.
+    pub goal: &'a Goal,
+    /// Stops the run.
+    pub cancel: CancellationToken,
+    tell: &'a mut dyn FnMut(&Event),
+    state: State,
+}
+
+/// What the agent has come to know and to want.
+struct State {
+    programs: Vec<(String, Arc<ProgramAttachment>)>,
+    things: Vec<Thing>,
+    candidates: Vec<Candidate>,
+    at: usize,
+    surfaces: Vec<KnownSurface>,
+    observed: BTreeSet<(usize, usize)>,
+    out_of_reach: BTreeSet<usize>,
+    failures: BTreeMap<String, usize>,
+    belief: Belief,
+    space: Arc<Space>,
+    looks: Vec<Look>,
+    plan: Option<Plan>,
+    totals: Totals,
+}
+
+/// A view that was taken and recorded.
+struct Look {
+    stamp_ns: i64,
+    record: RecordId,
+}
+
+/// What a run has taken so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Totals {
+    /// Views taken.
+    pub views: usize,
+    /// Plans made.
+    pub plans: usize,
+    /// Driven, metres.
+    pub distance_m: f64,
+    /// Longest time that one planning call took, seconds.
+    pub planning_s: f64,
+}
+
+/// How a run ended, and why.
+#[derive(Debug, Clone)]
+pub struct Conclusion {
+    /// How.
+    pub verdict: Verdict,
+    /// Why, in a sentence.
+    pub why: String,
+    /// How sure it is: of the thing that was looked for, or of everything on the surface.
+    pub confidence: f64,
+    /// Probability that the thing is there after all.
+    pub remaining: Option<f64>,
+    /// What is believed.
+    pub belief: Belief,
+    /// What it took.
+    pub totals: Totals,
+}
+
+/// The planning problem of one round, and what its calls are bound to.
+struct Round {
+    situation: Arc<Situation>,
+    task: Task,
+    attachments: Attachments,
+}
+
+/// What an agent needs to begin.
+pub struct Setup<'a> {
+    /// See [`Agent::domain`].
+    pub domain: &'a Domain,
+    /// See [`Agent::robot`].
+    pub robot: Arc<dyn Robot>,
+    /// See [`Agent::record`].
+    pub record: &'a Record,
+    /// See [`Agent::recogniser`].
+    pub recogniser: &'a dyn Recogniser,
+    /// See [`Agent::goal`].
+    pub goal: &'a Goal,
+    /// See [`Agent::cancel`].
+    pub cancel: CancellationToken,
+}
+
+impl<'a> Agent<'a> {
+    /// An agent that knows nothing yet. `tell` hears of everything that happens.
+    pub fn new(setup: Setup<'a>, tell: &'a mut dyn FnMut(&Event)) -> Self {
+        let Setup { domain, robot, record, recogniser, goal, cancel } = setup;
+        let state = State {
+            programs: attachments::programs(domain),
+            things: situation::things(domain, &goal.things),
+            candidates: Vec::new(),
+            at: 0,
+            surfaces: Vec::new(),
+            observed: BTreeSet::new(),
+            out_of_reach: BTreeSet::new(),
+            failures: BTreeMap::new(),
+            belief: Belief::default(),
+            space: Arc::default(),
+            looks: Vec::new(),
+            plan: None,
+            totals: Totals::default(),
+        };
+        Self { domain, robot, record, recogniser, goal, cancel, tell, state }
+    }
+
+    /// Pursues the goal until it is achieved, until no look can help any more, or until a limit is reached.
+    ///
+    /// # Errors
+    /// [`CommandError`] if the body or the store fails for good, or the domain cannot be used.
+    pub async fn pursue(&mut self) -> Result<Conclusion, CommandError> {
+        self.begin().await?;
+        loop {
+            let round = self.estimate()?;
+            match self.monitor(&round) {
+                Ok(()) if self.rest().steps.is_empty() => return Ok(self.achieved(&round)),
+                Ok(()) => self.keep()?,
+                Err(because) => {
+                    if let Some(why) = self.replan(&round, because)? {
+                        return Ok(self.not_found(&round, &why));
+                    }
+                }
+            }
+            if let Some(limit) = self.exhausted() {
+                return Ok(self.conclude(&round, Verdict::Failed, limit));
+            }
+            let call = self.next_call();
+            self.say(&Event::Acting { call: call.to_string(), because: ground::reason(&round, &call) })?;
+            match self.execute(&call).await {
+                Ok(outcome) => self.learn(&call, outcome)?,
+                Err(failure) => self.learn_from_failure(&call, &failure).await?,
+            }
+        }
+    }
+
+    /// Does the rest of the plan, applied to the current state, still reach the goal? If not, the condition that broke.
+    fn monitor(&self, round: &Round) -> Result<(), String> {
+        match (&self.state.plan, descry_planner::monitor(&round.task, &round.attachments, &self.rest())) {
+            (_, Ok(())) => Ok(()),
+            (None, Err(_)) => Err("there is no plan yet".into()),
+            (Some(_), Err(broken)) => Err(broken.to_string()),
+        }
+    }
+
+    /// Makes a new plan. Returns the reason if there can be none.
+    fn replan(&mut self, round: &Round, because: String) -> Result<Option<String>, CommandError> {
+        let started = Instant::now();
+        let options = descry_planner::Options::default();
+        let planned = descry_planner::plan(&round.task, &round.attachments, &options, &|| false, &mut |_| {})
+            .map_err(ground::planning_failed)?;
+        let took_s = started.elapsed().as_secs_f64();
+        self.state.totals.planning_s = self.state.totals.planning_s.max(took_s);
+        match planned {
+            Planned::Solved { plan, statistics } => {
+                self.state.totals.plans += 1;
+                let calls = statistics
+                    .attachments
+                    .iter()
+                    .map(|(name, c)| (name.clone(), c.calls + c.relaxed))
+                    .collect();
+                self.say(&Event::Planned {
+                    round: self.state.totals.plans,
+                    because,
+                    steps: plan
+                        .to_string()
+                        .lines()
+                        .filter(|l| !l.starts_with(';'))
+                        .map(str::to_string)
+                        .collect(),
+                    makespan_s: plan.makespan_s().unwrap_or(0.0),
+                    calls,
+                })?;
+                self.state.plan = Some(plan);
+                Ok(None)
+            }
+            Planned::Unsolvable { why, .. } => Ok(Some(why.to_string())),
+            Planned::OutOfTime { .. } | Planned::OutOfMemory { .. } => {
+                Err(CommandError::Bug("planning ended without an answer although nothing limited it".into()))
+            }
+        }
+    }
+
+    fn keep(&mut self) -> Result<(), CommandError> {
+        self.say(&Event::Kept { left: self.rest().steps.len() })
+    }
+
+    /// The steps of the plan that are still to be done.
+    fn rest(&self) -> Plan {
+        self.state.plan.clone().unwrap_or_default()
+    }
+
+    /// Takes the next step off the plan. There is one: a plan without steps that reaches the goal ends the loop.
+    fn next_call(&mut self) -> Call {
+        let plan = self.state.plan.get_or_insert_with(Plan::default);
+        let step = plan.steps.remove(0);
+        Call { action: step.action, arguments: step.arguments }
+    }
+
+    async fn execute(&self, call: &Call) -> Result<Outcome, SkillFailure> {
+        let skill = descry_skills::named(&call.action).ok_or_else(|| SkillFailure::Unknown {
+            name: call.action.clone(),
+            expected: "an action with a skill",
+        })?;
+        let symbols = Symbols {
+            places: self.state.candidates.iter().map(|c| (c.symbol.clone(), c.place.clone())).collect(),
+            surfaces: self.state.surfaces.iter().map(|s| (s.symbol.clone(), s.centre())).collect(),
+        };
+        let limits = &self.domain.config.limits;
+        let time_limit_s = if call.action == "move" { limits.drive_s } else { limits.look_s };
+        let context = Context {
+            robot: &*self.robot,
+            symbols: &symbols,
+            cancel: self.cancel.clone(),
+            time_limit_s,
+            progress: &|_| {},
+        };
+        skill.perform(call, &context).await
+    }
+
+    /// What a step brought about: record it, and believe what it showed.
+    fn learn(&mut self, call: &Call, outcome: Outcome) -> Result<(), CommandError> {
+        self.record_outcome(call, &outcome)?;
+        match outcome {
+            Outcome::Driven(driven) => {
+                self.state.totals.distance_m += driven.distance_m;
+                let to = self.candidate(&call.arguments[1])?;
+                self.state.at = to;
+                let outcome = format!("drove {:.2} m in {:.1} s", driven.distance_m, driven.duration_s);
+                self.say(&Event::Acted { call: call.to_string(), outcome })?;
+            }
+            Outcome::Seen(sensed) => {
+                self.remember(&sensed)?;
+                self.state.totals.views += 1;
+                let (from, on) = (self.candidate(&call.arguments[0])?, self.surface(&call.arguments[1])?);
+                self.state.observed.insert((from, on));
+                self.perceive(on)?;
+            }
+            Outcome::Pushed(_) => {}
+        }
+        Ok(())
+    }
+
+    /// What a failure teaches: where the body now is, and which pose is worth no further try.
+    async fn learn_from_failure(&mut self, call: &Call, failure: &SkillFailure) -> Result<(), CommandError> {
+        self.record_failure(call, failure)?;
+        self.state.plan = None;
+        let SkillFailure::Body(body) = failure else {
+            return Err(CommandError::Bug(failure.to_string()));
+        };
+        if matches!(body, descry_robots::Failure::Broken { .. } | descry_robots::Failure::Cancelled { .. }) {
+            return Err(CommandError::broken(body));
+        }
+        let about = call.arguments.get(usize::from(call.action == "move")).cloned().unwrap_or_default();
+        let tries = self.state.failures.entry(format!("{} {about}", call.action)).or_insert(0);
+        *tries += 1;
+        let limits = &self.domain.config.limits;
+        let limit = if call.action == "move" { limits.drive_retries } else { limits.look_retries };
+        let give_up = !body.is_passing() || *tries > limit;
+        let therefore =
+            if give_up { format!("{about} is given up") } else { format!("try {tries} of {}", limit + 1) };
+        if give_up {
+            let pose = self.candidate(&about)?;
+            self.state.out_of_reach.insert(pose);
+            if call.action != "move" {
+                let on = self.surface(&call.arguments[1])?;
+                self.state.observed.insert((pose, on));
+            }
+        }
+        self.say(&Event::Failed { call: call.to_string(), because: body.to_string(), therefore })?;
+        self.find_itself().await
+    }
+
+    /// The limit that the run has reached, if it has.
+    fn exhausted(&self) -> Option<String> {
+        let most = self.domain.config.limits.views;
+        (self.state.totals.views >= most).then(|| format!("{most} looks were taken and it is still in doubt"))
+    }
+
+    fn achieved(&self, round: &Round) -> Conclusion {
+        let on = self.goal.surfaces.first().map_or("the table", String::as_str);
+        let why = match round.situation.things.first() {
+            Some(thing) => format!("{} stands on the table", thing.name),
+            None => format!("everything on {on} is identified"),
+        };
+        self.conclude(round, Verdict::Achieved, why)
+    }
+
+    fn not_found(&self, round: &Round, planner_says: &str) -> Conclusion {
+        let looked = self.state.observed.len();
+        let poses = self.state.candidates.len() - self.state.out_of_reach.len();
+        let what = match round.situation.things.first() {
+            Some(thing) => format!("{} was not found with enough confidence", thing.name),
+            None => "not everything could be identified".into(),
+        };
+        let why =
+            format!("{what} after {looked} looks from {poses} poses that can be reached: {planner_says}");
+        self.conclude(round, Verdict::NotFound, why)
+    }
+
+    fn conclude(&self, round: &Round, verdict: Verdict, why: String) -> Conclusion {
+        let situation = &round.situation;
+        let confidence = match situation.things.is_empty() {
+            true => situation.clarity(0),
+            false => situation.confidence(0),
+        };
+        let remaining = (!situation.things.is_empty()).then(|| situation.doubt_about(0).remaining());
+        let (belief, totals) = (self.state.belief.clone(), self.state.totals);
+        Conclusion { verdict, why, confidence, remaining, belief, totals }
+    }
+}

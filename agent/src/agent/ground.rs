@@ -1,0 +1,153 @@
+//! The estimate of a round: from what the agent knows to a planning problem with its calls bound.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use descry_domains::situation::{Known, Situation};
+use descry_domains::{attachments, candidates};
+use descry_planner::{Diagnostic, Findings, PlanError, Source, Task};
+use descry_skills::Call;
+
+use super::{Agent, Round};
+use crate::exit::CommandError;
+use crate::report::Event;
+
+impl Agent<'_> {
+    /// Finds out where the body is and where it could look from.
+    pub(super) async fn begin(&mut self) -> Result<(), CommandError> {
+        let here = self.robot.pose().await.map_err(CommandError::broken)?;
+        self.state.surfaces = candidates::surfaces(self.domain, &*self.robot);
+        let config = &self.domain.config.candidates;
+        let (all, at) = candidates::candidates(&*self.robot, &self.state.surfaces, config, &here);
+        self.say(&Event::Goal {
+            said: self.goal.said.clone(),
+            pddl: self.goal.pddl.clone(),
+            start: here.place().to_string(),
+            candidates: all.len(),
+        })?;
+        (self.state.candidates, self.state.at) = (all, at);
+        Ok(())
+    }
+
+    /// The planning problem of this round: symbols, facts and the goal as PDDL, kept in the record.
+    pub(super) fn estimate(&mut self) -> Result<Round, CommandError> {
+        let s = &self.state;
+        let known = Known {
+            robot: Arc::clone(&self.robot),
+            belief: Arc::new(s.belief.clone()),
+            space: Arc::clone(&s.space),
+            candidates: s.candidates.clone(),
+            at: s.at,
+            surfaces: s.surfaces.clone(),
+            things: s.things.clone(),
+            observed: s.observed.clone(),
+            out_of_reach: s.out_of_reach.clone(),
+        };
+        let situation = Arc::new(Situation::new(known, self.domain.config.thresholds));
+        let name = format!("round-{}", s.totals.views + 1);
+        let problem =
+            Source::new(format!("{name}.pddl"), situation.problem(self.domain, &name, &self.goal.pddl));
+        let task = Task::read(&self.domain.pddl, &problem).map_err(|f| refused(&f))?;
+        check_skills(&task)?;
+        let started = Instant::now();
+        let bound = attachments::bind(&situation, &s.programs, move || started.elapsed().as_secs_f64());
+        self.record_problem(&problem)?;
+        Ok(Round { situation, task, attachments: bound })
+    }
+
+    /// After a failure the body may stand anywhere: that is one more pose to look from.
+    pub(super) async fn find_itself(&mut self) -> Result<(), CommandError> {
+        let here = self.robot.pose().await.map_err(CommandError::broken)?;
+        let place = here.place();
+        let known = self.state.candidates.iter().position(|c| c.place == place);
+        self.state.at = known.unwrap_or_else(|| {
+            let symbol = format!("here-{}", self.state.candidates.len());
+            self.state.candidates.push(descry_domains::situation::Candidate { symbol, place });
+            self.state.candidates.len() - 1
+        });
+        Ok(())
+    }
+
+    pub(super) fn candidate(&self, symbol: &str) -> Result<usize, CommandError> {
+        let found = self.state.candidates.iter().position(|c| c.symbol == symbol);
+        found.ok_or_else(|| CommandError::Bug(format!("the plan names `{symbol}`, which is no pose")))
+    }
+
+    pub(super) fn surface(&self, symbol: &str) -> Result<usize, CommandError> {
+        let found = self.state.surfaces.iter().position(|s| s.symbol == symbol);
+        found.ok_or_else(|| CommandError::Bug(format!("the plan names `{symbol}`, which is no surface")))
+    }
+}
+
+/// Every action of the domain has one skill of its name and arity; what has none is shown under its line.
+fn check_skills(task: &Task) -> Result<(), CommandError> {
+    let mut findings = Findings { sources: task.sources.to_vec(), list: Vec::new() };
+    for action in &task.actions {
+        let known: Vec<&str> = descry_skills::ALL.iter().map(|s| s.name()).collect();
+        let help =
+            format!("skills: {}; a new one is a file in skills/src named like its action", known.join(", "));
+        let (name, arity) = (&action.name, action.parameters.len());
+        let message = match descry_skills::named(name) {
+            None => format!("no skill carries out the action `{name}`"),
+            Some(skill) if skill.arity() != arity => {
+                format!(
+                    "the skill `{name}` takes {} objects, the action has {arity} parameters",
+                    skill.arity()
+                )
+            }
+            Some(_) => continue,
+        };
+        findings
+            .list
+            .push(Diagnostic::error("no-skill", message, action.span, "this action").with_help(help));
+    }
+    if findings.list.is_empty() { Ok(()) } else { Err(refused(&findings)) }
+}
+
+fn refused(findings: &Findings) -> CommandError {
+    CommandError::BadInput(crate::commands::drawn(findings))
+}
+
+pub(super) fn planning_failed(error: PlanError) -> CommandError {
+    match (error.findings(), &error) {
+        (Some(findings), _) => refused(findings),
+        (None, _) => CommandError::Bug(error.to_string()),
+    }
+}
+
+/// Why a step is taken: what it costs and what is hoped from it.
+pub(super) fn reason(round: &Round, call: &Call) -> String {
+    let s = &round.situation;
+    let argument = |n: usize| call.arguments.get(n).map_or("", String::as_str);
+    match call.action.as_str() {
+        "move" => match (s.candidate(argument(0)), s.candidate(argument(1))) {
+            (Ok(from), Ok(to)) => {
+                format!("to {}, {:.1} s of driving", s.candidates[to].place, s.travel_s(from, to))
+            }
+            _ => String::new(),
+        },
+        "observe" => match s.candidate(argument(0)) {
+            Ok(from) => hope(s, from),
+            Err(_) => String::new(),
+        },
+        _ => String::new(),
+    }
+}
+
+/// What a look is expected to settle.
+fn hope(s: &Situation, from: usize) -> String {
+    let doubts = match s.things.is_empty() {
+        true => (0..s.surfaces.len())
+            .map(|on| (s.surfaces[on].symbol.clone(), s.doubt_on(on)))
+            .collect::<Vec<_>>(),
+        false => (0..s.things.len()).map(|what| (s.things[what].name.clone(), s.doubt_about(what))).collect(),
+    };
+    let said = |(name, doubt): &(String, &descry_domains::doubt::Doubt)| {
+        if doubt.anywhere {
+            return format!("nothing is known yet of where {name} could be");
+        }
+        let share = doubt.share_settled(s, from, &[]) * 100.0;
+        format!("shows {share:.0} % of where {name} is in doubt ({:.2} left)", doubt.remaining())
+    };
+    doubts.iter().map(said).collect::<Vec<_>>().join(", ")
+}

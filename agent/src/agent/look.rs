@@ -1,0 +1,208 @@
+//! What happens with a view: recorded, read back with the others by timestamp, merged, recognised, believed.
+
+use std::sync::Arc;
+
+use descry_memory::belief::Sighted;
+use descry_memory::{Draft, Meta, RecordId, Sensing};
+use descry_perception::merge::{MergeOptions, Merged, merge};
+use descry_perception::nalgebra::{Point3, Unit, Vector3};
+use descry_perception::recognise::Percept;
+use descry_perception::segment::{Scene, SceneOptions, segment};
+use descry_perception::surface::SurfaceOptions;
+use descry_perception::visibility::{DepthMap, Seen, Visibility};
+use descry_planner::Source;
+use descry_robots::Sensed;
+use descry_skills::{Call, Outcome, SkillFailure};
+use serde::Serialize;
+use serde_json::json;
+
+use super::{Agent, Look};
+use crate::exit::CommandError;
+use crate::report::Event;
+
+/// A side counts as seen if a surface was measured this near to where it should be.
+const SIDE_TOLERANCE_M: f64 = 0.03;
+/// How far a surface may be from the height at which the map has it.
+const HEIGHT_TOLERANCE_M: f64 = 0.15;
+
+impl Agent<'_> {
+    /// Puts a view into the record: its transforms, then its cloud. When this returns it survives a crash.
+    pub(super) fn remember(&mut self, sensed: &Sensed) -> Result<(), CommandError> {
+        for t in &sensed.transforms {
+            self.record
+                .put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)
+                .map_err(CommandError::broken)?;
+        }
+        let eye = sensed.map_from_camera.translation.vector;
+        let sensing = Sensing {
+            intrinsics: Some(sensed.intrinsics),
+            pose_sigma_m: sensed.pose_sigma_m,
+            pose_sigma_rad: sensed.pose_sigma_rad,
+        };
+        let meta = Meta { seen_from_m: Some(eye.into()), ..Meta::default() };
+        let frame = &self.robot.description().frames.camera;
+        let id = self
+            .record
+            .put_cloud(sensed.stamp_ns, frame, &sensed.cloud, &sensing, meta)
+            .map_err(CommandError::broken)?;
+        self.record.sync().map_err(CommandError::broken)?;
+        self.state.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id });
+        Ok(())
+    }
+
+    /// The multi-view perception of paper 004, section V: restore the views by their timestamps, merge, recognise, believe.
+    pub(super) fn perceive(&mut self, on: usize) -> Result<(), CommandError> {
+        let views = self.restore()?;
+        let merged = match merge(&views, &self.merge_options()) {
+            Ok(merged) => merged,
+            Err(nothing) => return self.saw_nothing(nothing.to_string()),
+        };
+        if let (Some(fit), Some(view)) = (merged.fits.last(), views.last()) {
+            if let Some(map) = DepthMap::from_view(view, &fit.world_from_camera).filter(|_| fit.used) {
+                Arc::make_mut(&mut self.state.space).integrate(&map);
+            }
+        }
+        let scene = match segment(&merged.cloud, &merged.visibility, &self.scene_options()) {
+            Ok(scene) => scene,
+            Err(nothing) => return self.saw_nothing(nothing.to_string()),
+        };
+        let percepts = self.recogniser.recognise(&scene, &merged.visibility, &self.domain.objects);
+        self.note_surface(on, &scene);
+        self.believe(&merged, &percepts)
+    }
+
+    /// Reads the views back from the record by their timestamps, with the transforms of those times.
+    fn restore(&self) -> Result<Vec<descry_perception::View>, CommandError> {
+        let map = &self.robot.description().frames.map;
+        let view = |look: &Look| self.record.view_at(look.stamp_ns, map);
+        self.state.looks.iter().map(view).collect::<Result<_, _>>().map_err(CommandError::broken)
+    }
+
+    /// What the surface turned out to be: its height and tilt, and where the map knows none its outline.
+    fn note_surface(&mut self, on: usize, scene: &Scene) {
+        let known = &mut self.state.surfaces[on];
+        let seen = &scene.surface;
+        known.up = seen.up.into_inner();
+        if known.whole {
+            let onto_plane = |p: &Point3<f64>| p - seen.up.into_inner() * seen.height_m(p);
+            known.outline = known.outline.iter().map(onto_plane).collect();
+        } else {
+            known.outline.clone_from(&seen.hull);
+        }
+    }
+
+    fn believe(&mut self, merged: &Merged, percepts: &[Percept]) -> Result<(), CommandError> {
+        let before: Vec<f64> = self.confidences();
+        let stamp_ns = self.robot.now_ns();
+        let up = self.state.surfaces.first().map_or_else(Vector3::z, |s| s.up);
+        let viewpoints: Vec<Vec<Point3<f64>>> =
+            percepts.iter().map(|p| seen_from(p, &up, &merged.visibility)).collect();
+        let sighted: Vec<Sighted<'_>> = percepts
+            .iter()
+            .zip(&viewpoints)
+            .map(|(percept, v)| Sighted { percept, viewpoints_m: v })
+            .collect();
+        let cites: Vec<RecordId> = self.state.looks.iter().map(|look| look.record).collect();
+        self.state.belief.update(&sighted, stamp_ns, &cites);
+        let after = self.confidences();
+        let changed = self.state.things.iter().zip(before.iter().zip(&after));
+        let changed = changed
+            .map(|(thing, (b, a))| format!("confidence in {}: {b:.2} -> {a:.2}", thing.name))
+            .collect();
+        let used: Vec<_> = merged.fits.iter().filter(|fit| fit.used).collect();
+        let event = Event::Perceived {
+            merged: used.len(),
+            left_out: merged
+                .fits
+                .iter()
+                .zip(1..)
+                .filter(|(fit, _)| !fit.used)
+                .map(|(fit, n)| format!("view {n} left out: {}", fit.why))
+                .collect(),
+            points: merged.cloud.points.len(),
+            residual_m: used.iter().map(|fit| fit.residual_m).fold(0.0, f64::max),
+            objects: percepts.iter().map(crate::report::percept).collect(),
+            changed,
+        };
+        let percepts = serde_json::to_value(percepts).map_err(|e| CommandError::Bug(e.to_string()))?;
+        self.record_document(
+            "percepts",
+            &json!({ "percepts": percepts, "fits": merged.fits, "steps": merged.steps }),
+        )?;
+        self.record_document("belief", &self.state.belief)?;
+        self.say(&event)
+    }
+
+    fn confidences(&self) -> Vec<f64> {
+        let best =
+            |name: &str| self.state.belief.tracks.iter().map(|t| t.probability_of(name)).fold(0.0, f64::max);
+        self.state.things.iter().map(|thing| best(&thing.name)).collect()
+    }
+
+    fn saw_nothing(&mut self, because: String) -> Result<(), CommandError> {
+        self.say(&Event::Nothing { because })
+    }
+
+    fn merge_options(&self) -> MergeOptions {
+        let up = self.robot.description().up.map(Unit::new_normalize);
+        MergeOptions { up, ..MergeOptions::default() }
+    }
+
+    /// The surface is looked for where the map has it, if it has one.
+    fn scene_options(&self) -> SceneOptions {
+        let up = self.robot.description().up.map(Unit::new_normalize);
+        let heights = self.robot.surfaces().iter().map(|s| s.height_m);
+        let band = heights.fold(None, |band: Option<(f64, f64)>, h| {
+            let (low, high) = band.unwrap_or((h, h));
+            Some((low.min(h), high.max(h)))
+        });
+        let height_band_m = band.map(|(low, high)| (low - HEIGHT_TOLERANCE_M, high + HEIGHT_TOLERANCE_M));
+        SceneOptions {
+            surface: SurfaceOptions { up, height_band_m, ..SurfaceOptions::default() },
+            ..SceneOptions::default()
+        }
+    }
+
+    pub(super) fn record_outcome(&mut self, call: &Call, outcome: &Outcome) -> Result<(), CommandError> {
+        let said = match outcome {
+            Outcome::Driven(d) => json!({ "distance_m": d.distance_m, "duration_s": d.duration_s }),
+            Outcome::Seen(s) => json!({ "stamp_ns": s.stamp_ns }),
+            Outcome::Pushed(p) => json!({ "moved_m": p.moved_m, "duration_s": p.duration_s }),
+        };
+        self.record_document("skill", &json!({ "call": call.to_string(), "outcome": said }))
+    }
+
+    pub(super) fn record_failure(&mut self, call: &Call, failure: &SkillFailure) -> Result<(), CommandError> {
+        self.record_document("skill", &json!({ "call": call.to_string(), "failure": failure.to_string() }))
+    }
+
+    pub(super) fn record_problem(&mut self, problem: &Source) -> Result<(), CommandError> {
+        self.record_document("problem", &json!({ "name": problem.name, "pddl": problem.text }))
+    }
+
+    /// Tells of an event, and records it.
+    pub(super) fn say(&mut self, event: &Event) -> Result<(), CommandError> {
+        (self.tell)(event);
+        self.record_document("event", event)
+    }
+
+    pub(super) fn record_document(&self, kind: &str, body: &impl Serialize) -> Result<(), CommandError> {
+        let body = serde_json::to_value(body).map_err(|e| CommandError::Bug(e.to_string()))?;
+        let mut draft = Draft::new(kind, self.robot.now_ns());
+        draft.meta.body = body;
+        self.record.put(draft).map(|_| ()).map_err(CommandError::broken)
+    }
+}
+
+/// The cameras that saw an object: those that measured the side of its body which faces them.
+fn seen_from(p: &Percept, up: &Vector3<f64>, visibility: &Visibility) -> Vec<Point3<f64>> {
+    let middle = p.position_m + up * (p.size_m[2] / 2.0);
+    let radius = p.size_m[0].min(p.size_m[1]) / 2.0;
+    let sees = |map: &&DepthMap| {
+        let towards = map.viewpoint() - middle;
+        let aside = towards - up * towards.dot(up);
+        let side = middle + aside.try_normalize(1e-9).unwrap_or(*up) * radius;
+        map.look(&side, SIDE_TOLERANCE_M) == Seen::Surface
+    };
+    visibility.maps.iter().filter(sees).map(DepthMap::viewpoint).collect()
+}

@@ -1,0 +1,95 @@
+//! Which body pursues a goal: the simulated one in a scene, or a recording.
+
+use std::sync::Arc;
+
+use descry_domains::load::Domain;
+use descry_robots::Robot;
+use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
+
+use crate::exit::CommandError;
+
+/// A body that was opened.
+pub struct Body {
+    /// What the agent sees of it.
+    pub robot: Arc<dyn Robot>,
+    simulated: Option<Arc<SimRobot>>,
+}
+
+impl Body {
+    /// A simulated body, whose truth a report may show.
+    pub fn simulated(robot: SimRobot) -> Self {
+        let robot = Arc::new(robot);
+        Self { robot: robot.clone(), simulated: Some(robot) }
+    }
+
+    /// Where an object of that name or kind stands in truth (the centre of its base), the one nearest to where it is
+    /// believed to stand if there are several. None without a simulation, or if it is not there.
+    pub fn true_position_m(&self, name: &str, believed_m: Option<[f64; 3]>) -> Option<[f64; 3]> {
+        let truth = self.simulated.as_ref()?.truth();
+        let distance = |at: &[f64; 3]| {
+            let believed = believed_m.unwrap_or(*at);
+            at.iter().zip(&believed).map(|(a, b)| (a - b).powi(2)).sum::<f64>()
+        };
+        truth
+            .objects
+            .iter()
+            .filter(|o| o.present && (o.name == name || o.kind == name))
+            .map(|o| o.map_from_object.translation.vector.into())
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// The simulator, for experiments that score against the truth.
+    pub fn simulator(&self) -> Option<&Arc<SimRobot>> {
+        self.simulated.as_ref()
+    }
+}
+
+/// Opens the body of `--robot`: `sim`, or `recorded:DIR`.
+///
+/// # Errors
+/// [`CommandError::BadInput`] names the place and what was expected.
+pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Result<Body, CommandError> {
+    match robot.split_once(':') {
+        None if robot == "sim" => simulate(&scene_spec(scene, domain)?, seed, FaultPlan::default()),
+        Some(("recorded", folder)) => {
+            if let Some(scene) = scene {
+                let text = format!(
+                    "--scene {scene}: a recording shows what it shows\n  leave --scene out, or take --robot sim"
+                );
+                return Err(CommandError::BadInput(text));
+            }
+            let robot = descry_robots::recorded::RecordedRobot::open(std::path::Path::new(folder))
+                .map_err(CommandError::bad_input)?;
+            Ok(Body { robot: Arc::new(robot), simulated: None })
+        }
+        _ => Err(CommandError::BadInput(format!("--robot {robot}\n  expected: sim, or recorded:DIR"))),
+    }
+}
+
+/// A simulated body in one arrangement of a scene.
+///
+/// # Errors
+/// [`CommandError::BadInput`] if the scene cannot be arranged.
+pub fn simulate(spec: &SceneSpec, seed: u64, faults: FaultPlan) -> Result<Body, CommandError> {
+    let scene = arrange(spec, seed).map_err(CommandError::bad_input)?;
+    Ok(Body::simulated(SimRobot::new(scene, SimOptions { seed, faults, ..SimOptions::default() })))
+}
+
+/// A scene of the domain by its name, or any from a file.
+///
+/// # Errors
+/// [`CommandError::BadInput`] names the scenes that there are, or the mistake in the file.
+pub fn scene_spec(scene: Option<&str>, domain: &Domain) -> Result<SceneSpec, CommandError> {
+    let name = scene.unwrap_or(&domain.config.scene);
+    if let Some(text) = domain.scenes.get(name) {
+        return SceneSpec::parse(&format!("scenes/{name}.toml"), text).map_err(CommandError::bad_input);
+    }
+    let text = std::fs::read_to_string(name).map_err(|e| {
+        let known: Vec<&str> = domain.scenes.keys().map(String::as_str).collect();
+        CommandError::BadInput(format!(
+            "--scene {name}: {e}\n  expected a TOML file, or one of: {}",
+            known.join(", ")
+        ))
+    })?;
+    SceneSpec::parse(name, &text).map_err(CommandError::bad_input)
+}

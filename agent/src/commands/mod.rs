@@ -1,0 +1,58 @@
+//! The commands: one file each, and the list of them.
+
+mod check;
+mod find;
+mod goals;
+mod input;
+mod plan;
+mod recognise;
+mod runs;
+mod show;
+mod validate;
+
+use clap::Subcommand;
+
+pub use input::drawn;
+
+use crate::exit::{CommandError, Exit};
+
+/// What descry can be asked to do.
+#[derive(Subcommand)]
+pub enum Command {
+    /// Find something: short for `do "find THING"`
+    Find(find::FindArguments),
+    /// Pursue a goal, in the words of a domain
+    Do(find::DoArguments),
+    /// List what may be said to a domain
+    Goals(goals::Arguments),
+    /// Plan: any PDDL domain and problem
+    Plan(plan::Arguments),
+    /// Check a plan against its domain and problem
+    Validate(validate::Arguments),
+    /// Read a domain (and a problem) and show every finding under its text
+    Check(check::Arguments),
+    /// Find the table and the objects in point clouds (PCD, PLY)
+    Recognise(recognise::Arguments),
+    /// Show what happened in a run
+    Show(show::Arguments),
+    /// List the runs
+    Runs(runs::Arguments),
+}
+
+/// Carries a command out.
+///
+/// # Errors
+/// [`CommandError`] with its text ready to be shown.
+pub fn run(command: &Command) -> Result<Exit, CommandError> {
+    match command {
+        Command::Find(arguments) => find::find(arguments),
+        Command::Do(arguments) => find::pursue(arguments),
+        Command::Goals(arguments) => goals::run(arguments),
+        Command::Plan(arguments) => plan::run(arguments),
+        Command::Validate(arguments) => validate::run(arguments),
+        Command::Check(arguments) => check::run(arguments),
+        Command::Recognise(arguments) => recognise::run(arguments),
+        Command::Show(arguments) => show::run(arguments),
+        Command::Runs(arguments) => runs::run(arguments),
+    }
+}

@@ -1,0 +1,173 @@
+//! `descry plan DOMAIN PROBLEM`: a plan, or why there is none.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use descry_planner::{Outcome, Plan, PlanError, Statistics, Task};
+use serde::Serialize;
+use serde_json::json;
+
+use crate::commands::input::{self, AttachmentArguments};
+use crate::exit::{CommandError, Exit};
+
+/// Arguments of `descry plan`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// PDDL domain
+    domain: PathBuf,
+    /// PDDL problem
+    problem: PathBuf,
+    /// Give up after so many seconds
+    #[arg(long, value_name = "S")]
+    time_limit: Option<f64>,
+    /// Give up beyond so much memory
+    #[arg(long, value_name = "MB")]
+    memory_limit: Option<u64>,
+    /// Go on improving the plan until the time limit
+    #[arg(long)]
+    anytime: bool,
+    /// Decides every choice that is left open
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Threads that race; the plan does not depend on them
+    #[arg(long, default_value_t = 1)]
+    threads: usize,
+    /// Write the plan to a file (with --anytime, each better one replaces it)
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    attachments: AttachmentArguments,
+}
+
+/// How planning ended, in a word.
+#[derive(Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Status {
+    Solved,
+    Unsolvable,
+    OutOfTime,
+    OutOfMemory,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    let started = Instant::now();
+    if arguments.time_limit.is_some_and(|s| s.is_nan() || s <= 0.0) {
+        return Err(CommandError::BadInput("--time-limit takes seconds, above 0".into()));
+    }
+    let (domain, problem) = (input::source(&arguments.domain)?, input::source(&arguments.problem)?);
+    let task = Task::read(&domain, &problem).map_err(|f| CommandError::BadInput(input::drawn(&f)))?;
+    let attachments = arguments.attachments.bind(&arguments.domain)?;
+    let deadline = arguments.time_limit.map(|s| started + Duration::from_secs_f64(s.min(1e9)));
+    let stop = || deadline.is_some_and(|d| Instant::now() >= d);
+    let options = descry_planner::Options {
+        anytime: arguments.anytime,
+        seed: arguments.seed,
+        threads: arguments.threads.max(1),
+        memory_limit_bytes: arguments.memory_limit.map(|mb| mb << 20),
+        ..descry_planner::Options::default()
+    };
+    let mut unwritten = Ok(());
+    let mut on_plan = |plan: &Plan| {
+        if let Some(path) = &arguments.out {
+            unwritten = write_plan(path, plan);
+        }
+        if arguments.anytime && !arguments.json {
+            eprintln!("{:8.2} s: {}", started.elapsed().as_secs_f64(), summary(plan));
+        }
+    };
+    let outcome = descry_planner::plan(&task, &attachments, &options, &stop, &mut on_plan).map_err(failed)?;
+    unwritten?;
+    let (status, exit) = match &outcome {
+        Outcome::Solved { .. } => (Status::Solved, Exit::Done),
+        Outcome::Unsolvable { .. } => (Status::Unsolvable, Exit::Unsolvable),
+        // An improvement that was cut short leaves a plan, which is what was asked for.
+        Outcome::OutOfTime { best: Some(_), .. } | Outcome::OutOfMemory { best: Some(_), .. } => {
+            (Status::Solved, Exit::Done)
+        }
+        Outcome::OutOfTime { .. } => (Status::OutOfTime, Exit::OutOfTime),
+        Outcome::OutOfMemory { .. } => (Status::OutOfMemory, Exit::OutOfTime),
+    };
+    if let (Some(path), Some(plan)) = (&arguments.out, outcome.plan()) {
+        write_plan(path, plan)?;
+    }
+    if arguments.json {
+        print_json(status, &outcome, started)?;
+    } else {
+        show(&status, &outcome, arguments.out.is_some(), started)?;
+    }
+    Ok(exit)
+}
+
+fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(), CommandError> {
+    let plan = outcome.plan();
+    let why = match outcome {
+        Outcome::Unsolvable { why, .. } => Some(why.to_string()),
+        _ => None,
+    };
+    let Statistics { evaluated, expanded, plans, actions, optimal, attachments } = outcome.statistics();
+    input::print_json(&json!({
+        "status": status,
+        "cost": plan.and_then(|p| p.cost),
+        "makespan": plan.and_then(Plan::makespan_s),
+        "steps": plan.map(|p| p.steps.len()),
+        "time_s": started.elapsed().as_secs_f64(),
+        "evaluated": evaluated,
+        "expanded": expanded,
+        "plans": plans,
+        "actions": actions,
+        "optimal": optimal,
+        "attachments": attachments,
+        "why": why,
+        "plan": plan.map(|p| &p.steps),
+    }))
+}
+
+fn show(status: &Status, outcome: &Outcome, written: bool, started: Instant) -> Result<(), CommandError> {
+    let time = format!(
+        "{:.3} s, {} states evaluated",
+        started.elapsed().as_secs_f64(),
+        outcome.statistics().evaluated
+    );
+    match (outcome, outcome.plan()) {
+        (Outcome::Unsolvable { why, .. }, _) => eprintln!("proven unsolvable ({time})\n{why}"),
+        (_, Some(plan)) => {
+            if !written {
+                input::print_text(plan.to_string().trim_end())?;
+            }
+            eprintln!("{} ({time})", summary(plan));
+        }
+        _ if matches!(status, Status::OutOfMemory) => eprintln!("out of memory, no plan yet ({time})"),
+        _ => eprintln!("out of time, no plan yet ({time})"),
+    }
+    for (name, calls) in &outcome.statistics().attachments {
+        eprintln!(
+            "  [{name}] {} calls, {} from the cache, {:.3} s",
+            calls.calls + calls.relaxed,
+            calls.hits,
+            calls.time_s
+        );
+    }
+    Ok(())
+}
+
+fn summary(plan: &Plan) -> String {
+    let cost = plan.cost.map_or(String::new(), |c| format!(", cost {c}"));
+    let makespan = plan.makespan_s().map_or(String::new(), |s| format!(", makespan {s:.3}"));
+    format!("{} steps{cost}{makespan}", plan.steps.len())
+}
+
+fn write_plan(path: &Path, plan: &Plan) -> Result<(), CommandError> {
+    std::fs::write(path, plan.to_string())
+        .map_err(|e| CommandError::BadInput(format!("--out {}: {e}", path.display())))
+}
+
+fn failed(error: PlanError) -> CommandError {
+    match (error.findings(), &error) {
+        (Some(findings), _) => CommandError::BadInput(input::drawn(findings)),
+        (None, PlanError::Internal { .. }) => CommandError::Bug(error.to_string()),
+        (None, _) => CommandError::bad_input(error),
+    }
+}

@@ -1,0 +1,63 @@
+//! Exit codes, which scripts depend on, and the one place where an error becomes text.
+
+use std::process::ExitCode;
+
+/// How a command ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// Achieved, plan found, valid, no finding.
+    Done = 0,
+    /// An honest no: not found after every useful view, plan invalid, findings.
+    No = 1,
+    /// Bad input or usage.
+    BadInput = 2,
+    /// Proven unsolvable.
+    Unsolvable = 3,
+    /// Out of time or memory.
+    OutOfTime = 4,
+    /// The robot or a store failed for good.
+    Broken = 5,
+    /// A bug of descry.
+    Bug = 70,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        ExitCode::from(exit as u8)
+    }
+}
+
+/// Why a command could not do what it was asked, ready to be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum CommandError {
+    /// What was given cannot be used; the text points at the place and offers a mend.
+    #[error("{0}")]
+    BadInput(String),
+    /// The robot or a store failed for good.
+    #[error("{0}")]
+    Broken(String),
+    /// A fault of descry itself.
+    #[error("{0}\n  this is a bug of descry; please report it with the command and its input")]
+    Bug(String),
+}
+
+impl CommandError {
+    /// An input that cannot be used, from the error that says so.
+    pub fn bad_input(error: impl std::fmt::Display) -> Self {
+        Self::BadInput(error.to_string())
+    }
+
+    /// A robot or store that failed for good, from the error that says so.
+    pub fn broken(error: impl std::fmt::Display) -> Self {
+        Self::Broken(error.to_string())
+    }
+
+    /// The exit code that this error ends the process with.
+    pub fn exit(&self) -> Exit {
+        match self {
+            Self::BadInput(_) => Exit::BadInput,
+            Self::Broken(_) => Exit::Broken,
+            Self::Bug(_) => Exit::Bug,
+        }
+    }
+}

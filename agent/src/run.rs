@@ -1,0 +1,165 @@
+//! One run from beginning to end: its folder, its record, its report.
+
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use descry_domains::goal::{Goal, symbol};
+use descry_domains::load::Domain;
+use descry_memory::{Options, Query, Record};
+use descry_robots::CancellationToken;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::agent::{Agent, Conclusion, Setup};
+use crate::body::Body;
+use crate::exit::CommandError;
+use crate::report::{Believed, Event, Report};
+
+/// What a run was started with: enough to start it again.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Settings {
+    /// The body, as on the command line.
+    pub robot: String,
+    /// The scene, if one was named.
+    pub scene: Option<String>,
+    /// The seed.
+    pub seed: u64,
+    /// The domain, as on the command line.
+    pub domain: String,
+}
+
+/// `run.json` in a run's folder.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Header {
+    /// Version of descry.
+    pub version: String,
+    /// The goal in words.
+    pub goal: String,
+    /// The goal in PDDL.
+    pub pddl_goal: String,
+    /// When it was started, seconds since 1970.
+    pub started_unix_s: u64,
+    /// What it was started with.
+    #[serde(flatten)]
+    pub settings: Settings,
+}
+
+/// The folder of a new run: the one that was asked for, or a new one under `runs/`.
+///
+/// # Errors
+/// [`CommandError::BadInput`] if it holds a run already or cannot be made.
+pub fn folder(asked: Option<&Path>, goal: &Goal) -> Result<PathBuf, CommandError> {
+    let folder = match asked {
+        Some(folder) if folder.join("run.json").exists() => {
+            let text = format!("--run {}: it holds a run already\n  name another folder", folder.display());
+            return Err(CommandError::BadInput(text));
+        }
+        Some(folder) => folder.to_path_buf(),
+        None => unused(&Path::new("runs").join(symbol(&goal.said))),
+    };
+    std::fs::create_dir_all(&folder)
+        .map_err(|e| CommandError::BadInput(format!("{}: {e}", folder.display())))?;
+    Ok(folder)
+}
+
+fn unused(stem: &Path) -> PathBuf {
+    let numbered = |n: u32| PathBuf::from(format!("{}-{n:03}", stem.display()));
+    (1..).map(numbered).find(|path| !path.exists()).unwrap_or_else(|| stem.to_path_buf())
+}
+
+/// Pursues a goal and reports.
+///
+/// # Errors
+/// [`CommandError`] if the body or the record fails for good, or the domain cannot be used.
+pub fn pursue(
+    domain: &Domain,
+    goal: &Goal,
+    body: &Body,
+    folder: &Path,
+    settings: &Settings,
+    tell: &mut dyn FnMut(&Event),
+) -> Result<Report, CommandError> {
+    let header = Header {
+        version: env!("CARGO_PKG_VERSION").into(),
+        goal: goal.said.clone(),
+        pddl_goal: goal.pddl.clone(),
+        started_unix_s: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
+        settings: settings.clone(),
+    };
+    write_json(&folder.join("run.json"), &header)?;
+    let record = Record::create(&folder.join("record"), Options::default()).map_err(CommandError::broken)?;
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|e| CommandError::broken(format!("the runtime could not be started: {e}")))?;
+    let recogniser = descry_perception::recognise::Descry::default();
+    let start_ns = body.robot.now_ns();
+    let cancel = CancellationToken::new();
+    let conclusion = runtime.block_on(async {
+        let stop = cancel.clone();
+        tokio::spawn(async move {
+            if tokio::signal::ctrl_c().await.is_ok() {
+                stop.cancel();
+            }
+        });
+        let robot = std::sync::Arc::clone(&body.robot);
+        let setup = Setup { domain, robot, record: &record, recogniser: &recogniser, goal, cancel };
+        Agent::new(setup, tell).pursue().await
+    })?;
+    record.sync().map_err(CommandError::broken)?;
+    let things = descry_domains::situation::things(domain, &goal.things);
+    let object = things.first().map(|t| t.name.clone());
+    let mut report = Report::begin(goal, object, folder.display().to_string());
+    fill(&mut report, &conclusion);
+    report.sim_time_s = (body.robot.now_ns() - start_ns) as f64 * 1e-9;
+    report.true_position_m =
+        report.object.as_deref().and_then(|name| body.true_position_m(name, report.position_m));
+    Ok(report)
+}
+
+fn fill(report: &mut Report, conclusion: &Conclusion) {
+    report.verdict = conclusion.verdict;
+    report.why = conclusion.why.clone();
+    report.confidence = conclusion.confidence;
+    report.remaining = conclusion.remaining;
+    report.views = conclusion.totals.views;
+    report.replans = conclusion.totals.plans.saturating_sub(1);
+    report.distance_m = conclusion.totals.distance_m;
+    let tracks = &conclusion.belief.tracks;
+    report.objects = tracks
+        .iter()
+        .map(|t| Believed {
+            label: t.label().map(str::to_string),
+            kind: t.kind().map(str::to_string),
+            confidence: t.certainty(),
+            position_m: t.position_m.coords.into(),
+            size_m: t.size_m,
+        })
+        .collect();
+    if let Some(name) = &report.object {
+        let best = tracks.iter().max_by(|a, b| a.probability_of(name).total_cmp(&b.probability_of(name)));
+        report.position_m = best.map(|t| t.position_m.coords.into());
+    }
+}
+
+/// The events of a run in their order, from its record.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the record cannot be read.
+pub fn events(record: &Record) -> Result<Vec<Value>, CommandError> {
+    let documents = record.find(&Query::of_kind("event")).map_err(CommandError::broken)?;
+    Ok(documents.into_iter().map(|d| d.body).collect())
+}
+
+/// Writes the report beside the record.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the folder cannot be written.
+pub fn finish(folder: &Path, report: &Report) -> Result<(), CommandError> {
+    write_json(&folder.join("report.json"), report)
+}
+
+fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| CommandError::Bug(e.to_string()))?;
+    std::fs::write(path, text + "\n").map_err(|e| CommandError::broken(format!("{}: {e}", path.display())))
+}

@@ -1,0 +1,265 @@
+//! The command line as scripts see it: output, exit codes, messages.
+
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use assert_cmd::Command;
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn descry(arguments: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_descry"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("the binary runs")
+}
+
+fn shown(output: &Output) -> (String, String) {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (text(&output.stdout), text(&output.stderr))
+}
+
+/// Runs descry and expects an exit code and words in what it says.
+fn check(arguments: &[&str], exit: i32, words: &[&str]) -> (String, String) {
+    let folder = TempDir::new().expect("a folder can be made");
+    let output = descry(arguments, folder.path());
+    let (out, err) = shown(&output);
+    assert_eq!(output.status.code(), Some(exit), "{arguments:?}\n{out}\n{err}");
+    for word in words {
+        assert!(
+            out.contains(word) || err.contains(word),
+            "{arguments:?} does not say {word:?}\n{out}\n{err}"
+        );
+    }
+    (out, err)
+}
+
+fn json(arguments: &[&str], exit: i32) -> Value {
+    let (out, _) = check(arguments, exit, &[]);
+    assert_eq!(out.lines().count(), 1, "one object and nothing else: {out}");
+    serde_json::from_str(&out).expect("the output is JSON")
+}
+
+fn data(name: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name).display().to_string()
+}
+
+/// A folder beside the checkout; without it a test says that it is skipped.
+fn shared(path: &str) -> Option<PathBuf> {
+    let found = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared").join(path);
+    if !found.exists() {
+        eprintln!("skipped: {} is not there", found.display());
+        return None;
+    }
+    Some(found)
+}
+
+#[test]
+fn the_main_job() {
+    let found = json(&["find", "cup A", "--json"], 0);
+    for key in [
+        "goal",
+        "pddl_goal",
+        "verdict",
+        "object",
+        "confidence",
+        "threshold",
+        "position_m",
+        "true_position_m",
+        "views",
+        "replans",
+        "distance_m",
+        "sim_time_s",
+        "wall_s",
+        "run",
+    ] {
+        assert!(!found[key].is_null(), "{key} is missing: {found}");
+    }
+    assert_eq!((found["verdict"].as_str(), found["object"].as_str()), (Some("achieved"), Some("cup A")));
+    assert!(found["confidence"].as_f64() >= found["threshold"].as_f64());
+    let [at, truth] = ["position_m", "true_position_m"].map(|key| -> Vec<f64> {
+        serde_json::from_value(found[key].clone()).expect("a position is three numbers")
+    });
+    let error_m = at.iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    assert!(error_m < 0.03, "{error_m} m off");
+    assert!(found["views"].as_u64() > Some(1), "it cannot be seen from the start: {found}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run() {
+    let run = |threads: &str| {
+        let folder = TempDir::new().expect("a folder can be made");
+        let output = Command::new(env!("CARGO_BIN_EXE_descry"))
+            .args(["find", "cup A", "--seed", "3", "--json"])
+            .env("RAYON_NUM_THREADS", threads)
+            .current_dir(folder.path())
+            .output()
+            .expect("the binary runs");
+        let (out, err) = shown(&output);
+        let mut value: Value = serde_json::from_str(&out).unwrap_or_else(|e| panic!("{e}: {out}{err}"));
+        value["wall_s"] = Value::Null;
+        value["run"] = Value::Null;
+        value.to_string()
+    };
+    assert_eq!(run("1"), run("2"));
+}
+
+#[test]
+fn what_is_not_there_is_not_found() {
+    let said = json(&["find", "cup A", "--scene", "no-cup-a", "--json"], 1);
+    assert_eq!(said["verdict"], "not_found", "{said}");
+    assert!(said["why"].as_str().is_some_and(|why| why.contains("not found")), "{said}");
+}
+
+#[test]
+fn a_goal_that_is_not_understood_names_what_could_be_said() {
+    check(
+        &["find", "cup Q"],
+        2,
+        &["nothing is called \"cup q\"", "did you mean \"cup A\"?", "known: cup A, cup B"],
+    );
+    check(
+        &["do", "dance"],
+        2,
+        &["\"dance\" is not a goal", "find <thing>", "identify all objects on <surface>"],
+    );
+    check(&["do", "find cup A with confidence 2"], 2, &["no probability", "with confidence 0.9"]);
+    check(&["find", "cup A", "--scene", "attic"], 2, &["attic", "default", "no-cup-a"]);
+    check(&["find", "cup A", "--robot", "hoover"], 2, &["expected: sim, or recorded:DIR"]);
+    check(&["find", "cup A", "--domain", "attic"], 2, &["attic", "tabletop"]);
+}
+
+#[test]
+fn goals_lists_what_may_be_said() {
+    let (out, _) = check(&["goals"], 0, &["find <thing>", "cup A, green cup, small cup", "table"]);
+    assert!(!out.is_empty(), "the list is the result: it goes to standard output");
+    assert_eq!(json(&["goals", "--json"], 0)["domain"], "tabletop");
+}
+
+#[test]
+fn a_broken_domain_is_drawn_with_place_reason_and_mend() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let built_in = Path::new(env!("CARGO_MANIFEST_DIR")).join("../domains/tabletop");
+    copy(&built_in, folder.path());
+    let pddl = folder.path().join("domain.pddl");
+    let text = std::fs::read_to_string(&pddl).expect("the domain is text");
+    std::fs::write(&pddl, text.replace("(at end (at ?to))", "(at end (att ?to))"))
+        .expect("the folder is writable");
+    let domain = folder.path().display().to_string();
+    let (_, err) = check(&["find", "cup A", "--domain", &domain], 2, &["att", "domain.pddl", "did you mean"]);
+    assert!(err.contains("(att ?to)"), "the place is drawn: {err}");
+
+    std::fs::write(&pddl, text.replace("durative-action observe", "durative-action squint"))
+        .expect("writable");
+    check(
+        &["find", "cup A", "--domain", &domain],
+        2,
+        &["no skill carries out the action `squint`", "move, observe"],
+    );
+
+    std::fs::write(&pddl, text).expect("the folder is writable");
+    std::fs::write(folder.path().join("objects/cup-a.toml"), "name = \"cup A\"\nheight = 3\n")
+        .expect("writable");
+    check(&["find", "cup A", "--domain", &domain], 2, &["cup-a.toml", "height"]);
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).expect("a folder can be made");
+    for entry in std::fs::read_dir(from).expect("the domain is a folder").flatten() {
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            std::fs::copy(entry.path(), target).expect("a file can be copied");
+        }
+    }
+}
+
+#[test]
+fn plan_asks_a_program_and_goes_round_the_dear_edge() {
+    let attach = format!("path-cost=sh {}", data("dear_edge.sh"));
+    let (domain, problem) = (data("roads.pddl"), data("roads-problem.pddl"));
+    let said = json(&["plan", &domain, &problem, "--attach", &attach, "--json"], 0);
+    assert_eq!((said["status"].as_str(), said["steps"].as_u64()), (Some("solved"), Some(2)), "{said}");
+    assert!(said["attachments"]["path-cost"]["calls"].as_u64() > Some(0), "{said}");
+    check(&["plan", &domain, &problem], 2, &["path-cost"]);
+    let broken = "path-cost=sh -c exit";
+    check(&["plan", &domain, &problem, "--attach", broken], 2, &["path-cost", "ended"]);
+}
+
+#[test]
+fn a_plan_is_validated() {
+    let attach = format!("path-cost=sh {}", data("dear_edge.sh"));
+    let (domain, problem) = (data("roads.pddl"), data("roads-problem.pddl"));
+    let folder = TempDir::new().expect("a folder can be made");
+    let plan = folder.path().join("plan").display().to_string();
+    check(&["plan", &domain, &problem, "--attach", &attach, "--out", &plan], 0, &["2 steps"]);
+    let verdict = json(&["validate", &domain, &problem, &plan, "--attach", &attach, "--json"], 0);
+    assert_eq!(verdict["valid"], true, "{verdict}");
+    std::fs::write(&plan, "0.000: (drive van home market) [90.000]\n").expect("writable");
+    let verdict = json(&["validate", &domain, &problem, &plan, "--attach", &attach, "--json"], 1);
+    assert_eq!(verdict["valid"], false, "{verdict}");
+}
+
+#[test]
+fn an_unsolvable_task_says_why() {
+    let attach = format!("path-cost=sh {}", data("dear_edge.sh"));
+    let (domain, problem) = (data("roads.pddl"), data("roads-unsolvable.pddl"));
+    let said = json(&["plan", &domain, &problem, "--attach", &attach, "--json"], 3);
+    assert_eq!(said["status"], "unsolvable", "{said}");
+    assert!(said["why"].as_str().is_some_and(|why| why.contains("washed van")), "{said}");
+}
+
+#[test]
+fn the_published_cost_test_is_solved_with_a_program() {
+    let Some(folder) = shared("pddl/modules/costtest") else { return };
+    let file = |name: &str| folder.join(name).display().to_string();
+    let attach = format!("costDrive=sh {}", data("dear_edge.sh"));
+    let said =
+        json(&["plan", &file("domain_cost.pddl"), &file("p01.pddl"), "--attach", &attach, "--json"], 0);
+    assert_eq!(said["steps"], 2, "{said}");
+}
+
+#[test]
+fn real_clouds_are_recognised() {
+    let Some(cloud) = shared("data/mosd/learn33.pcd") else { return };
+    let said = json(&["recognise", &cloud.display().to_string(), "--json"], 0);
+    let seen = &said["clouds"][0];
+    assert!(seen["table"]["area_m2"].as_f64() > Some(0.1), "{said}");
+    assert!(seen["objects"].as_array().is_some_and(|objects| objects.len() >= 4), "{said}");
+}
+
+#[test]
+fn a_cloud_that_is_none_points_at_the_place() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let path = folder.path().join("cut.pcd");
+    std::fs::write(
+        &path,
+        "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 9\nHEIGHT 1\nPOINTS 9\nDATA ascii\n1 2\n",
+    )
+    .expect("writable");
+    check(&["recognise", &path.display().to_string()], 2, &["cut.pcd", "line 9"]);
+    check(&["recognise", "nowhere.pcd"], 2, &["nowhere.pcd"]);
+}
+
+#[test]
+fn the_mugs_are_found_on_real_views() {
+    let Some(folder) = shared("data/kitchen") else { return };
+    let robot = format!("recorded:{}", folder.display());
+    let said = json(&["find", "mug", "--robot", &robot, "--json"], 0);
+    assert_eq!(said["verdict"], "achieved", "{said}");
+}
+
+#[test]
+fn a_run_can_be_shown() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let made = descry(&["find", "cup A", "--run", "here"], folder.path());
+    assert_eq!(made.status.code(), Some(0), "{:?}", shown(&made));
+    let again = descry(&["find", "cup A", "--run", "here"], folder.path());
+    assert_eq!(again.status.code(), Some(2), "a run is not written over: {:?}", shown(&again));
+    let (out, _) = shown(&descry(&["show", "here"], folder.path()));
+    assert!(out.contains("goal      find cup A") && out.contains("achieved"), "{out}");
+    let (out, _) = shown(&descry(&["runs", "."], folder.path()));
+    assert!(out.contains("here") && out.contains("achieved"), "{out}");
+}

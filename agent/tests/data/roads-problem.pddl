@@ -1,0 +1,6 @@
+(define (problem to-market)
+  (:domain roads)
+  (:objects van - van home crossing market - place)
+  (:init (at van home))
+  (:goal (at van market))
+  (:metric minimize (total-time)))

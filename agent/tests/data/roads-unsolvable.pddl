@@ -1,0 +1,6 @@
+(define (problem clean-at-market)
+  (:domain roads)
+  (:objects van - van home crossing market - place)
+  (:init (at van home))
+  (:goal (and (at van market) (washed van)))
+  (:metric minimize (total-time)))

@@ -1,0 +1,15 @@
+//! `[expected-gain ?from ?what]`: by how much a look is expected to raise the confidence in an object, if what it settles
+//! is settled in the object's favour. What an earlier look of the plan settles does not count again.
+
+use descry_planner::{Answer, Call, CallError};
+
+use super::argument;
+use crate::situation::Situation;
+
+pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let from = situation.candidate(argument(call, 0)?)?;
+    let what = situation.thing(argument(call, 1)?)?;
+    let planned = situation.planned_looks(call);
+    let doubt = situation.doubt_about(what);
+    Ok(Answer::Number((1.0 - situation.confidence(what)) * doubt.share_settled(situation, from, &planned)))
+}

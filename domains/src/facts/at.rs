@@ -1,0 +1,7 @@
+//! `(at ?where)`: where the robot stands.
+
+use crate::situation::Situation;
+
+pub(super) fn state(situation: &Situation) -> Vec<String> {
+    vec![format!("(at {})", situation.candidates[situation.at].symbol)]
+}

@@ -1,0 +1,310 @@
+//! Everything that the symbols of a planning round are grounded in: the body, the belief, and where one could look from.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, OnceLock};
+
+use descry_memory::belief::Belief;
+use descry_memory::space::Space;
+use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
+use descry_perception::recognise::ObjectModel;
+use descry_planner::{Call, CallError, FactValue};
+use descry_robots::{Place, Robot};
+
+use crate::doubt::{Doubt, Hypothesis};
+use crate::goal::symbol;
+use crate::load::{Domain, Thresholds};
+
+/// Somewhere to stand and look from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Its PDDL symbol.
+    pub symbol: String,
+    /// Where it is.
+    pub place: Place,
+}
+
+/// A surface that goals speak of, as far as it is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownSurface {
+    /// Its PDDL symbol.
+    pub symbol: String,
+    /// Convex outline in the map, metres; empty while nothing is known of it.
+    pub outline: Vec<Point3<f64>>,
+    /// Unit normal, away from the floor.
+    pub up: Vector3<f64>,
+    /// Whether the outline is all of it (from the map) or what has been seen so far.
+    pub whole: bool,
+}
+
+impl KnownSurface {
+    /// The middle of the outline; none while nothing is known.
+    pub fn centre(&self) -> Option<Point3<f64>> {
+        if self.outline.is_empty() {
+            return None;
+        }
+        let sum = self.outline.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords);
+        Some(Point3::from(sum / self.outline.len() as f64))
+    }
+}
+
+/// Something that is looked for: a known object, or a kind of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thing {
+    /// Its PDDL symbol.
+    pub symbol: String,
+    /// The name by which percepts know it.
+    pub name: String,
+    /// The models that it may be.
+    pub models: Vec<ObjectModel>,
+}
+
+/// What grounds the symbols of one planning round. Nothing in it moves anything.
+pub struct Situation {
+    /// The body, which is only asked.
+    pub robot: Arc<dyn Robot>,
+    /// What is believed.
+    pub belief: Arc<Belief>,
+    /// What has been seen free, occupied, or not at all.
+    pub space: Arc<Space>,
+    /// Poses to look from.
+    pub candidates: Vec<Candidate>,
+    /// The one at which the body stands.
+    pub at: usize,
+    /// Surfaces that goals speak of.
+    pub surfaces: Vec<KnownSurface>,
+    /// What is looked for.
+    pub things: Vec<Thing>,
+    /// Looks that have been taken: candidate and surface.
+    pub observed: BTreeSet<(usize, usize)>,
+    /// Candidates that have been given up.
+    pub out_of_reach: BTreeSet<usize>,
+    /// What counts as sure.
+    pub thresholds: Thresholds,
+    derived: Derived,
+}
+
+/// What is computed at the first question and kept.
+#[derive(Default)]
+struct Derived {
+    travel_s: Vec<OnceLock<Vec<f64>>>,
+    cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
+    about: Vec<OnceLock<Doubt>>,
+    on: Vec<OnceLock<Doubt>>,
+}
+
+/// What an agent knows when a round begins.
+pub struct Known {
+    /// See [`Situation::robot`].
+    pub robot: Arc<dyn Robot>,
+    /// See [`Situation::belief`].
+    pub belief: Arc<Belief>,
+    /// See [`Situation::space`].
+    pub space: Arc<Space>,
+    /// See [`Situation::candidates`].
+    pub candidates: Vec<Candidate>,
+    /// See [`Situation::at`].
+    pub at: usize,
+    /// See [`Situation::surfaces`].
+    pub surfaces: Vec<KnownSurface>,
+    /// See [`Situation::things`].
+    pub things: Vec<Thing>,
+    /// See [`Situation::observed`].
+    pub observed: BTreeSet<(usize, usize)>,
+    /// See [`Situation::out_of_reach`].
+    pub out_of_reach: BTreeSet<usize>,
+}
+
+impl Situation {
+    /// Grounds a round in what is known.
+    pub fn new(known: Known, thresholds: Thresholds) -> Self {
+        fn cells<T>(n: usize) -> Vec<OnceLock<T>> {
+            (0..n).map(|_| OnceLock::new()).collect()
+        }
+        let derived = Derived {
+            travel_s: cells(known.candidates.len()),
+            cameras: cells(known.candidates.len() * known.surfaces.len()),
+            about: cells(known.things.len()),
+            on: cells(known.surfaces.len()),
+        };
+        let Known { robot, belief, space, candidates, at, surfaces, things, observed, out_of_reach } = known;
+        Self {
+            robot,
+            belief,
+            space,
+            candidates,
+            at,
+            surfaces,
+            things,
+            observed,
+            out_of_reach,
+            thresholds,
+            derived,
+        }
+    }
+
+    /// The candidate of a symbol.
+    ///
+    /// # Errors
+    /// [`CallError::Failed`] if there is none.
+    pub fn candidate(&self, name: &str) -> Result<usize, CallError> {
+        find(self.candidates.iter().map(|c| &c.symbol), name, "a pose to look from")
+    }
+
+    /// The surface of a symbol.
+    ///
+    /// # Errors
+    /// [`CallError::Failed`] if there is none.
+    pub fn surface(&self, name: &str) -> Result<usize, CallError> {
+        find(self.surfaces.iter().map(|s| &s.symbol), name, "a surface")
+    }
+
+    /// The thing of a symbol.
+    ///
+    /// # Errors
+    /// [`CallError::Failed`] if there is none.
+    pub fn thing(&self, name: &str) -> Result<usize, CallError> {
+        find(self.things.iter().map(|t| &t.symbol), name, "something that is looked for")
+    }
+
+    /// Seconds that a drive takes on the map; infinite where no route leads.
+    pub fn travel_s(&self, from: usize, to: usize) -> f64 {
+        let row = self.derived.travel_s[from].get_or_init(|| {
+            let places: Vec<Place> = self.candidates.iter().map(|c| c.place.clone()).collect();
+            let travel = self.robot.travel(&self.candidates[from].place, &places);
+            travel.into_iter().map(|t| t.map_or(f64::INFINITY, |t| t.duration_s)).collect()
+        });
+        row[to]
+    }
+
+    /// Where the camera would be if the body stood at a candidate and looked at a surface.
+    pub fn camera(&self, from: usize, on: usize) -> Option<Isometry3<f64>> {
+        *self.derived.cameras[from * self.surfaces.len() + on].get_or_init(|| {
+            let centre = self.surfaces[on].centre();
+            self.robot.camera_at(&self.candidates[from].place, centre.as_ref()).ok()
+        })
+    }
+
+    /// Whether a look from a candidate shows any of a surface. While nothing is known of the surface, it may.
+    pub fn sees(&self, from: usize, on: usize) -> bool {
+        let surface = &self.surfaces[on];
+        let Some(centre) = surface.centre() else { return true };
+        let Some(camera) = self.camera(from, on) else { return false };
+        let halfway = surface.outline.iter().map(|p| nalgebra_middle(p, &centre));
+        std::iter::once(centre)
+            .chain(surface.outline.iter().copied())
+            .chain(halfway)
+            .any(|p| self.in_view(&camera, &p))
+    }
+
+    /// Whether a point lies in the camera's field of view and range.
+    pub(crate) fn in_view(&self, map_from_camera: &Isometry3<f64>, point: &Point3<f64>) -> bool {
+        let body = self.robot.description();
+        let p = map_from_camera.inverse_transform_point(point);
+        if p.z < body.range_m.0 || p.z > body.range_m.1 {
+            return false;
+        }
+        let c = &body.camera;
+        let (u, v) = (c.fx * p.x / p.z + c.cx, c.fy * p.y / p.z + c.cy);
+        u >= 0.0 && v >= 0.0 && u < c.width as f64 && v < c.height as f64
+    }
+
+    /// Whether a look from a candidate at a surface would show a hypothesis: most of its points in view and not behind
+    /// what has been seen.
+    pub(crate) fn would_settle(&self, from: usize, on: usize, hypothesis: &Hypothesis) -> bool {
+        let Some(camera) = self.camera(from, on) else { return false };
+        let eye = Point3::from(camera.translation.vector);
+        if let Some(facing) = &hypothesis.facing {
+            let towards = (eye - hypothesis.centre).normalize();
+            if facing.dot(&towards) < SECTOR_COSINE {
+                return false;
+            }
+        }
+        let visible = |p: &&Point3<f64>| self.in_view(&camera, p) && self.space.line_of_sight(&eye, p);
+        2 * hypothesis.points.iter().filter(visible).count() > hypothesis.points.len()
+    }
+
+    /// How sure it is where a thing stands, 0 to 1: the most probable object that it may be.
+    pub fn confidence(&self, what: usize) -> f64 {
+        let name = &self.things[what].name;
+        self.belief.tracks.iter().map(|t| t.probability_of(name)).fold(0.0, f64::max)
+    }
+
+    /// How sure it is what each object on a surface is and that none is hidden, 0 to 1.
+    pub fn clarity(&self, on: usize) -> f64 {
+        let sure = self.belief.tracks.iter().map(|t| t.certainty()).fold(1.0, f64::min);
+        sure * (1.0 - self.doubt_on(on).hidden)
+    }
+
+    /// What is in doubt about a thing.
+    pub fn doubt_about(&self, what: usize) -> &Doubt {
+        self.derived.about[what].get_or_init(|| Doubt::about(self, what))
+    }
+
+    /// What is in doubt on a surface.
+    pub fn doubt_on(&self, on: usize) -> &Doubt {
+        self.derived.on[on].get_or_init(|| Doubt::on(self, on))
+    }
+
+    /// The looks that the plan takes before a call, by the `observed` facts that the call reads.
+    pub(crate) fn planned_looks(&self, call: &Call) -> Vec<(usize, usize)> {
+        let taken =
+            |r: &&descry_planner::Reading| &*r.symbol == "observed" && r.value == FactValue::Truth(true);
+        call.readings
+            .iter()
+            .filter(taken)
+            .filter_map(|r| {
+                let from = self.candidate(r.arguments.first()?).ok()?;
+                let on = self.surface(r.arguments.get(1)?).ok()?;
+                (!self.observed.contains(&(from, on))).then_some((from, on))
+            })
+            .collect()
+    }
+
+    /// The problem of this round in PDDL.
+    pub fn problem(&self, domain: &Domain, name: &str, goal: &str) -> String {
+        let names = |symbols: Vec<&String>, of: &str| match symbols.is_empty() {
+            true => String::new(),
+            false => format!("    {} - {of}\n", symbols.into_iter().cloned().collect::<Vec<_>>().join(" ")),
+        };
+        let mut text = format!("(define (problem {name})\n  (:domain {})\n  (:objects\n", domain.config.name);
+        text += &names(self.candidates.iter().map(|c| &c.symbol).collect(), "pose");
+        text += &names(self.surfaces.iter().map(|s| &s.symbol).collect(), "surface");
+        text += &names(self.things.iter().map(|t| &t.symbol).collect(), "thing");
+        text += "  )\n  (:init\n";
+        for (_, states) in crate::facts::ALL {
+            for line in states(self) {
+                text += &format!("    {line}\n");
+            }
+        }
+        text + &format!("  )\n  (:goal {goal})\n  (:metric minimize (total-time)))\n")
+    }
+}
+
+/// Cosine of the widest angle between the normal of a sector and the line of sight at which the sector still counts as seen.
+const SECTOR_COSINE: f64 = 0.5;
+
+fn nalgebra_middle(a: &Point3<f64>, b: &Point3<f64>) -> Point3<f64> {
+    Point3::from((a.coords + b.coords) / 2.0)
+}
+
+fn find<'a>(
+    mut symbols: impl Iterator<Item = &'a String>,
+    name: &str,
+    expected: &str,
+) -> Result<usize, CallError> {
+    symbols.position(|s| s == name).ok_or_else(|| CallError::Failed(format!("`{name}` is not {expected}")))
+}
+
+/// The things that a goal asks for, from the models of the domain.
+pub fn things(domain: &Domain, symbols: &[String]) -> Vec<Thing> {
+    let of = |wanted: &String| {
+        let single = domain.objects.iter().find(|o| symbol(&o.name) == *wanted);
+        let models: Vec<ObjectModel> = match single {
+            Some(model) => vec![model.clone()],
+            None => domain.objects.iter().filter(|o| symbol(&o.kind) == *wanted).cloned().collect(),
+        };
+        let name = single.map(|m| m.name.clone()).or_else(|| models.first().map(|m| m.kind.clone()));
+        Thing { symbol: wanted.clone(), name: name.unwrap_or_default(), models }
+    };
+    symbols.iter().map(of).collect()
+}

@@ -1,0 +1,56 @@
+; A robot that looks at what stands on surfaces.
+;
+; Two actions are enough to search a room: drive somewhere, and look from there. What geometry knows is asked of it
+; through calls in square brackets: how long a drive takes, whether a pose sees a surface at all, and how much of what
+; is still in doubt a look from there would settle.
+
+(define (domain tabletop)
+  (:requirements :typing :equality :negative-preconditions :universal-preconditions
+                 :durative-actions :numeric-fluents :modules)
+
+  (:types
+    pose        ; somewhere to stand and look from
+    surface     ; a table top, a shelf
+    thing)      ; a known object, or a kind of object, that is being looked for
+
+  (:modules
+    (path-cost ?from ?to - pose                 cost             path_cost@descry)
+    (can-see ?from - pose ?on - surface         conditionchecker can_see@descry)
+    (expected-gain ?from - pose ?what - thing   cost             expected_gain@descry)
+    (expected-clarity ?from - pose ?on - surface cost            expected_clarity@descry))
+
+  (:predicates
+    (at ?where - pose)                          ; where the robot stands
+    (out-of-reach ?where - pose)                ; a drive there has failed for good
+    (observed ?from - pose ?on - surface))      ; this look has been taken
+
+  (:functions
+    (confidence ?what - thing)                  ; how sure we are that it stands where we believe it does, 0 to 1
+    (clarity ?on - surface))                    ; how sure we are what each object on it is, the least sure one, 0 to 1
+
+  (:durative-action move
+    :parameters (?from ?to - pose)
+    :duration (= ?duration [path-cost ?from ?to])
+    :condition (and
+      (at start (at ?from))
+      (at start (not (= ?from ?to)))
+      (at start (not (out-of-reach ?to))))
+    :effect (and
+      (at start (not (at ?from)))
+      (at end (at ?to))))
+
+  ; A look is expected to raise confidence by the share of the doubt that it can settle. What one look shows, the next
+  ; cannot show again: the calls read which looks have been taken.
+  (:durative-action observe
+    :parameters (?from - pose ?on - surface)
+    :duration (= ?duration 2)
+    :condition (and
+      (at start (at ?from))
+      (over all (at ?from))
+      (at start (not (observed ?from ?on)))
+      (at start ([can-see ?from ?on])))
+    :effect (and
+      (at end (observed ?from ?on))
+      (at end (increase (clarity ?on) [expected-clarity ?from ?on]))
+      (forall (?what - thing)
+        (at end (increase (confidence ?what) [expected-gain ?from ?what]))))))

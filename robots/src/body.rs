@@ -402,7 +402,7 @@ pub trait Robot: Send + Sync {
     /// Turns the head towards a point in the map, as far as its limits allow. A body without a head says by how much it misses.
     ///
     /// # Errors
-    /// [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    /// [`Failure::Unreachable`] if a coordinate is no number; [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
     async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure>;
 
     /// Takes one frame.

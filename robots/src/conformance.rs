@@ -269,6 +269,11 @@ async fn check_refusals(robot: &dyn Robot) -> Result<(), Breach> {
         Place::Station("there is no station of this name".into()),
         Place::Pose(Pose2::new(1e6, 1e6, 0.0)),
         Place::Pose(Pose2::new(f64::NAN, 0.0, 0.0)),
+        Place::Pose(Pose2::new(
+            before.map_from_base.translation.x,
+            before.map_from_base.translation.y,
+            f64::NAN,
+        )),
     ];
     for place in &nowhere {
         let answer = robot.drive_to(place, &watch).await;
@@ -277,6 +282,12 @@ async fn check_refusals(robot: &dyn Robot) -> Result<(), Breach> {
             format!("{place}: {answer:?}")
         })?;
     }
+    let answer = robot.look_at(&Point3::new(f64::NAN, 0.0, 0.0), &watch).await;
+    ensure(
+        matches!(answer, Err(Failure::Unreachable { .. })),
+        "a point that is none cannot be looked at",
+        || format!("{answer:?}"),
+    )?;
     let after = done(robot.pose().await, "a body knows where it is")?;
     ensure(before.map_from_base == after.map_from_base, "a body that refuses does not move", || {
         format!("{} off", gap(&before.map_from_base, &after.map_from_base))

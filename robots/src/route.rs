@@ -164,6 +164,7 @@ impl Router {
     }
 
     fn start_access(&self, from: &Pose2) -> Result<Access, Failure> {
+        check_heading(from)?;
         let point = match self.fits(&from.point()) {
             Ok(()) => from.point(),
             Err(why) => self.nearest_free(&from.point()).ok_or(why)?,
@@ -172,6 +173,7 @@ impl Router {
     }
 
     fn goal_access(&self, to: &Pose2) -> Result<Access, Failure> {
+        check_heading(to)?;
         self.fits(&to.point())?;
         Ok(self.access(to.point()))
     }
@@ -366,6 +368,14 @@ impl Router {
             }
         }
         true
+    }
+}
+
+fn check_heading(pose: &Pose2) -> Result<(), Failure> {
+    if pose.yaw_rad.is_finite() {
+        Ok(())
+    } else {
+        Err(unreachable(format!("{} is no heading", pose.yaw_rad)))
     }
 }
 

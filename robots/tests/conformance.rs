@@ -42,6 +42,16 @@ async fn recordings_conform() {
     }
 }
 
+#[tokio::test]
+async fn a_real_recording_conforms() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/kitchen");
+    if !path.is_dir() {
+        println!("skipped: {} is not here", path.display());
+        return;
+    }
+    conformance::check(&RecordedRobot::open(&path).unwrap()).await.unwrap();
+}
+
 /// A body that breaks one promise and keeps the others.
 struct Liar {
     honest: SimRobot,

@@ -149,6 +149,7 @@ fn unreachable_says_why() {
         (Pose2::new(9.0, 0.45, 0.0), "outside"),
         (Pose2::new(0.95, 0.45, 0.0), "0.10 m"),
         (Pose2::new(f64::NAN, 0.45, 0.0), "no place"),
+        (Pose2::new(1.6, 0.45, f64::NAN), "no heading"),
     ] {
         match router.travel(&from, &to) {
             Err(Failure::Unreachable { because }) => assert!(because.contains(word), "{because}"),

@@ -43,6 +43,8 @@ fn mistakes_are_drawn_at_their_place() {
         ("height_m = 0.095 }", "height_m = 0.06 }", 13, &["handle", "at most half the height 0.03"]),
         ("object = \"cup\"", "object = \"jug\"", 15, &["no object \"jug\"", "cup, mug"]),
         ("object = \"cup\"", "object = \"cup\"\nvisible_from_start = [0.5, 0.2]", 16, &["no range"]),
+        ("name = \"mug\"", "name = \"mug\"\nscale = [0.01, 1.0]", 13, &["no inside"]),
+        ("[start]", "[room]\nsize_m = [1e9, 5]\n[start]", 7, &["at most 100"]),
         ("[-2.0, 0.0]", "[-9.0, 0.0]", 7, &["outside the room"]),
         ("[-2.0, 0.0]", "[-2.0, nan]", 7, &["expected a number"]),
         ("[target]", "[target", 14, &["no TOML"]),
@@ -142,9 +144,30 @@ fn the_target_hides_from_the_start_and_not_from_everywhere() {
     }
 }
 
+/// Occlusion levels as experiments ask for them, in every scene that has something to hide behind.
+#[test]
+fn every_level_of_occlusion_can_be_arranged() {
+    for (name, spec) in
+        scenes().into_iter().filter(|(name, _)| ["default.toml", "clutter.toml"].contains(&&**name))
+    {
+        for level in [[0.0, 0.0], [0.0, 0.25], [0.25, 0.6]] {
+            let mut spec = spec.clone();
+            if let Some(target) = &mut spec.target {
+                target.visible_from_start = level;
+            }
+            for seed in 100..130 {
+                let scene = arrange(&spec, seed).unwrap_or_else(|e| panic!("{name} {level:?}: {e}"));
+                let share = scene.target_visible_from_start.unwrap();
+                assert!(level[0] <= share && share <= level[1], "{name} {level:?} seed {seed}: {share}");
+            }
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_arranged_says_why() {
     for (from, to, word) in [
+        ("[-2.0, 0.0]", "[-0.9, 0.0]", "cannot stand at its start"),
         ("object = \"cup\"", "object = \"cup\"\nvisible_from_start = [0.0, 0.0]", "seen from the start"),
         (
             "height_m = 0.1 }",

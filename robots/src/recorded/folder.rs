@@ -136,6 +136,10 @@ impl Recording {
             0 | u16::MAX => f32::NAN,
             d => (f64::from(d) / scale) as f32,
         };
+        let metres = |d: &u16| match metres(d) {
+            z if z.is_finite() && z > 0.0 => z,
+            _ => f32::NAN,
+        };
         Ok(image.as_raw().iter().map(metres).collect())
     }
 

@@ -232,6 +232,9 @@ impl Robot for RecordedRobot {
 
     async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
         go_on(watch, "looking")?;
+        if !point.iter().all(|x| x.is_finite()) {
+            return Err(Failure::Unreachable { because: format!("{point} is no point to look at") });
+        }
         let seen = self.stations[self.lock().at].map_from_base.inverse_transform_point(point);
         Ok(Looked { duration_s: 0.0, miss_rad: seen.coords.angle(&Vector3::z()) })
     }

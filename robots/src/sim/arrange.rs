@@ -21,7 +21,7 @@ const PLACES: usize = 60;
 const TARGET_PLACES: usize = 40;
 /// Every how many-th pixel decides about visibility; final shares are measured with all.
 const COARSE_STRIDE: usize = 3;
-/// Poses asked whether some view shows the target: on a ring around its surface's centre (FACTS of the published set-up: 1.2-1.6 m).
+/// Poses asked whether some view shows the target: on a ring around its surface's centre, in the middle of the published 1.2 to 1.6 m.
 const RING_M: f64 = 1.4;
 const RING_POSES: usize = 16;
 
@@ -45,6 +45,15 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
         target: spec.target.clone(),
         target_visible_from_start: None,
     };
+    let description = body::description();
+    let router = Router::new(&scene.map(), description.footprint.radius_m() + SAFETY_M, description.speeds);
+    if let Err(failure) = router.fits(&scene.start.point()) {
+        return Err(InputError::whole(
+            title_of(spec),
+            format!("the robot cannot stand at its start: {}", failure.because()),
+            "move `position_m` of [start]",
+        ));
+    }
     let mut failures = Failures::default();
     for _ in 0..ROUNDS {
         if !place_all(spec, &mut scene, &mut rng) {
@@ -52,12 +61,16 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
             continue;
         }
         let Some(target) = &spec.target else { return Ok(scene) };
-        if let Some(share) = settle_target(spec, target, &mut scene, &mut rng, &mut failures) {
+        if let Some(share) = settle_target(spec, target, &router, &mut scene, &mut rng, &mut failures) {
             scene.target_visible_from_start = Some(share);
             return Ok(scene);
         }
     }
     Err(failures.report(spec, seed))
+}
+
+fn title_of(spec: &SceneSpec) -> &str {
+    if spec.title.is_empty() { "the scene" } else { &spec.title }
 }
 
 #[derive(Default)]
@@ -70,7 +83,6 @@ struct Failures {
 
 impl Failures {
     fn report(self, spec: &SceneSpec, seed: u64) -> InputError {
-        let name = if spec.title.is_empty() { "the scene" } else { &spec.title };
         let target = spec.target.as_ref().map_or("", |t| t.object.as_str());
         let (problem, mend) = if self.crowded >= ROUNDS / 2 {
             (
@@ -99,7 +111,7 @@ impl Failures {
                 "make what hides it smaller, or lower `visible_from_some`",
             )
         };
-        InputError::whole(name, problem, mend)
+        InputError::whole(title_of(spec), problem, mend)
     }
 }
 
@@ -232,6 +244,7 @@ fn gap_between(a: &Outline, at_a: &Isometry2<f64>, b: &Outline, at_b: &Isometry2
 fn settle_target(
     spec: &SceneSpec,
     target: &TargetSpec,
+    router: &Router,
     scene: &mut Scene,
     rng: &mut ChaCha8Rng,
     failures: &mut Failures,
@@ -264,7 +277,7 @@ fn settle_target(
             failures.shares.push(share);
             continue;
         }
-        if some_pose_sees(scene, label, surface, target.visible_from_some) {
+        if some_pose_sees(scene, label, surface, router, target.visible_from_some) {
             return Some(share);
         }
         failures.nowhere += 1;
@@ -281,12 +294,10 @@ fn share_from(scene: &Scene, label: u16, pose: &Pose2, stride: usize) -> f64 {
     visible_share(scene, label, &map_from_camera, &description.camera, stride).unwrap_or(0.0)
 }
 
-fn some_pose_sees(scene: &Scene, label: u16, surface: &SurfaceSpec, least: f64) -> bool {
+fn some_pose_sees(scene: &Scene, label: u16, surface: &SurfaceSpec, router: &Router, least: f64) -> bool {
     if least <= 0.0 {
         return true;
     }
-    let description = body::description();
-    let router = Router::new(&scene.map(), description.footprint.radius_m() + SAFETY_M, description.speeds);
     let centre = Point2::new(surface.position_m[0], surface.position_m[1]);
     (0..RING_POSES)
         .map(|k| {

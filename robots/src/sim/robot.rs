@@ -249,6 +249,9 @@ impl SimRobot {
         let Some(head) = &self.description.head else {
             return Err(Failure::Unable { because: format!("{} has no head", self.description.name) });
         };
+        if !point.iter().all(|x| x.is_finite()) {
+            return Err(Failure::Unreachable { because: format!("{point} is no point to look at") });
+        }
         let mut state = self.lock();
         let (gaze, miss_rad) = head::aim(head, &state.estimate.isometry().inverse_transform_point(point));
         let turned =

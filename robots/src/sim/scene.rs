@@ -191,6 +191,9 @@ pub struct TargetSpec {
     pub visible_from_some: f64,
 }
 
+/// A room's map is held in cells of a few centimetres: this is millions of them.
+const LARGEST_ROOM_M: f64 = 100.0;
+
 fn default_gap_m() -> f64 {
     0.02
 }
@@ -244,6 +247,13 @@ impl SceneSpec {
     pub fn check(&self) -> Result<(), Objection> {
         positive(&self.room.size_m, &[Step::Key("room"), Step::Key("size_m")])?;
         positive(&[self.room.wall_height_m], &[Step::Key("room"), Step::Key("wall_height_m")])?;
+        if let Some(side) = self.room.size_m.iter().find(|s| **s > LARGEST_ROOM_M) {
+            return Err(object(
+                &[Step::Key("room"), Step::Key("size_m")],
+                format!("a room of {side} m is larger than this simulator maps"),
+                format!("at most {LARGEST_ROOM_M} m a side"),
+            ));
+        }
         finite(&[self.gap_m], &[Step::Key("gap_m")])?;
         self.check_start()?;
         for (i, s) in self.surfaces.iter().enumerate() {
@@ -337,6 +347,7 @@ impl SceneSpec {
                     format!("[{high}, {low}]"),
                 ));
             }
+            check_shape(&o.shape.scaled(low), &at("scale"))?;
         }
         if let Some(position) = o.position_m {
             finite(&position, &at("position_m"))?;

@@ -117,10 +117,9 @@ impl Diagnostic {
 }
 
 /// Every finding of one reading, in the order of the text, with the sources that they point into.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Findings {
     /// The texts, by the numbers that spans use.
-    #[serde(skip)]
     pub sources: Vec<Source>,
     /// The findings.
     pub list: Vec<Diagnostic>,
@@ -157,6 +156,60 @@ impl Findings {
     }
 }
 
+/// Findings as data: a list, each place with its file, line and column (both from 1) beside its bytes.
+impl Serialize for Findings {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Place<'f> {
+            file: &'f str,
+            line: usize,
+            column: usize,
+            start: u32,
+            end: u32,
+            text: &'f str,
+        }
+        #[derive(Serialize)]
+        struct One<'f> {
+            severity: Severity,
+            code: &'static str,
+            message: &'f str,
+            labels: Vec<Place<'f>>,
+            help: Option<&'f str>,
+        }
+        let place = |label: &Label| -> Option<(usize, usize)> {
+            let text = &self.sources.get(label.span.source as usize)?.text;
+            let before = text.get(..label.span.start as usize)?;
+            let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+            Some((before.matches('\n').count() + 1, before[line_start..].chars().count() + 1))
+        };
+        serializer.collect_seq(self.list.iter().map(|finding| {
+            One {
+                severity: finding.severity,
+                code: finding.code,
+                message: &finding.message,
+                labels: finding
+                    .labels
+                    .iter()
+                    .map(|label| {
+                        let (line, column) = place(label).unwrap_or((1, 1));
+                        let file =
+                            self.sources.get(label.span.source as usize).map_or("", |source| &source.name);
+                        Place {
+                            file,
+                            line,
+                            column,
+                            start: label.span.start,
+                            end: label.span.end,
+                            text: &label.text,
+                        }
+                    })
+                    .collect(),
+                help: finding.help.as_deref(),
+            }
+        }))
+    }
+}
+
 impl std::fmt::Display for Findings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.render(false))
@@ -184,9 +237,9 @@ fn report(finding: &Diagnostic, names: &[String], colour: bool) -> ariadne::Repo
         .with_message(&finding.message);
     let mut labels: Vec<(usize, &Label)> = finding.labels.iter().enumerate().collect();
     labels.sort_by_key(|(_, label)| (label.span.source != first.source, label.span));
-    for (order, label) in labels {
-        let hue = if order == 0 { hue } else { Color::Cyan };
-        let mut drawn = ariadne::Label::new(place(label.span)).with_color(hue).with_order(order as i32);
+    for (number, label) in labels {
+        let hue = if number == 0 { hue } else { Color::Cyan };
+        let mut drawn = ariadne::Label::new(place(label.span)).with_color(hue);
         if !label.text.is_empty() {
             drawn = drawn.with_message(&label.text);
         }

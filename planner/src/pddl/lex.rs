@@ -10,7 +10,7 @@ use super::ast::Symbol;
 use crate::diagnostic::{Diagnostic, Span};
 
 /// Deepest nesting that is read. Everything after works recursively, so that this bounds the stack.
-pub const MAX_DEPTH: usize = 512;
+pub const MAX_DEPTH: usize = 200;
 
 /// Names, each once, case-folded. Shared by the files of one task.
 #[derive(Debug, Default)]
@@ -260,7 +260,7 @@ impl Builder<'_> {
             ));
         }
         self.open.push(self.tree.nodes.len());
-        self.tree.nodes.push(Node { kind, start: at as u32, end: at as u32 + 1, next: 0 });
+        self.tree.nodes.push(Node { kind, start: at as u32, end: at as u32 + 1, next: u32::MAX });
     }
 
     fn close_list(&mut self, at: usize) {
@@ -412,21 +412,38 @@ impl Builder<'_> {
             while self.open.len() > 2 {
                 self.close_top(start);
             }
-        } else if let (1, Some(action), Some(close)) = (self.open.len(), self.last_action, self.last_close) {
-            if !self.begins(self.tree.nodes[action].start as usize, ACTIONS) {
-                return;
-            }
-            let close = close as usize;
-            let diagnostic = Diagnostic::error(
-                "unbalanced",
-                "a closing parenthesis too many",
-                self.span(close, close + 1),
-                "this one closes the action",
-            );
-            let diagnostic = diagnostic.with_label(self.span(start, end), "but the action goes on here");
-            self.findings.push(diagnostic.with_help("remove one `)` before the next part of the action"));
-            self.open.push(action);
+        } else if self.open.len() < 2 {
+            self.reopen_action(start, end);
         }
+    }
+
+    /// An action goes on although a parenthesis closed it, and maybe the whole definition with it.
+    fn reopen_action(&mut self, start: usize, end: usize) {
+        let (Some(action), Some(close)) = (self.last_action, self.last_close) else { return };
+        // While a list is open its end is not known: only closed ones can be walked.
+        let define =
+            self.open.first().copied().or_else(|| self.tree.roots().last()).filter(|&root| root < action);
+        let (Some(define), true) = (define, self.begins(self.tree.nodes[action].start as usize, ACTIONS))
+        else {
+            return;
+        };
+        let surplus = 2 - self.open.len();
+        let message = match surplus {
+            1 => "a closing parenthesis too many".to_string(),
+            _ => "two closing parentheses too many".to_string(),
+        };
+        let close = close as usize;
+        let span = self.span(close + 1 - surplus, close + 1);
+        let label = if surplus == 1 { "this one closes the action" } else { "these close the action" };
+        let diagnostic = Diagnostic::error("unbalanced", message, span, label);
+        let diagnostic = diagnostic.with_label(self.span(start, end), "but the action goes on here");
+        let signs = ")".repeat(surplus);
+        self.findings
+            .push(diagnostic.with_help(format!("remove `{signs}` before the next part of the action")));
+        if self.open.is_empty() {
+            self.open.push(define);
+        }
+        self.open.push(action);
     }
 
     /// Reports the list that misses its closing sign, of those open beyond `depth`; `there` says what stands at `at`.

@@ -188,7 +188,10 @@ impl Checker<'_> {
                 _ => self.overlap(&types, &parameter.types),
             };
             if !fits {
-                self.wrong_type(kind, name, parameter, &types, span_of(written));
+                let fitting = scope.variables.iter().filter(|own| self.overlap(&own.types, &parameter.types));
+                let fitting: Vec<&str> = fitting.map(|own| self.name(own.symbol)).collect();
+                let help = (!fitting.is_empty()).then(|| format!("of that type here: {}", fitting.join(" ")));
+                self.wrong_type(kind, name, parameter, &types, span_of(written), help);
             }
             list.push(term);
         }
@@ -226,17 +229,17 @@ impl Checker<'_> {
         parameter: &Parameter,
         found: &[TypeId],
         span: Span,
+        help: Option<String>,
     ) {
         let (wanted, is) = (self.types_text(&parameter.types), self.types_text(found));
-        let message = format!(
-            "{kind} `{}` takes a `{wanted}` for {}, found a `{is}`",
-            self.name(name.symbol),
-            parameter.name
-        );
-        self.push(
-            Diagnostic::error("wrong-type", message, span, format!("this is a `{is}`"))
-                .with_label(parameter.span, format!("a `{wanted}` is asked for here")),
-        );
+        let name = self.name(name.symbol);
+        let message =
+            format!("{kind} `{name}` takes {} of type `{wanted}`, found type `{is}`", parameter.name);
+        let finding = Diagnostic::error("wrong-type", message, span, format!("this is of type `{is}`"))
+            .with_label(parameter.span, format!("type `{wanted}` is asked for here"));
+        let help =
+            help.unwrap_or_else(|| "use another one here, or change one of the two declarations".to_string());
+        self.push(finding.with_help(help));
     }
 
     /// A term by what it yields.

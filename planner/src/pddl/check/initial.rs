@@ -217,7 +217,7 @@ impl Checker<'_> {
             if !self.task.fits(id, &self.declared(place).0[position].types) {
                 let parameter = self.declared(place).0[position].clone();
                 let found = self.task.object(id).types.clone();
-                self.wrong_type(kind, name, &parameter, &found, argument.span);
+                self.wrong_type(kind, name, &parameter, &found, argument.span, None);
             }
             ids.push(id);
         }

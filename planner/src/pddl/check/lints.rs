@@ -84,7 +84,7 @@ fn unreachable_goal(task: &Task, goal: &Atom, wanted: &[ObjectId]) -> Option<Dia
         "unreachable-goal",
         format!("nobody achieves the goal `{text}`"),
         goal.span,
-        "not true at first",
+        "false at first, and nothing makes it true",
     );
     Some(match achievers.first() {
         None => nothing_adds(task, goal, finding),

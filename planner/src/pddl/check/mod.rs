@@ -17,7 +17,7 @@ use rustc_hash::FxHashMap;
 use super::ast::{self, Symbol};
 use super::lex::Symbols;
 use super::parse;
-use crate::diagnostic::{Diagnostic, Findings, Source, Span};
+use crate::diagnostic::{Diagnostic, Findings, Severity, Source, Span};
 use crate::task::{Condition, Init, Object, ObjectId, Quantified, Scoped, Slot, Task, Type, TypeId};
 
 /// Every finding in a domain, or in a domain and a problem, faults and warnings, in the order of the text.
@@ -43,19 +43,39 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
     let mut list = Vec::new();
     let domain_tree = parse::domain(&domain.text, 0, &mut symbols, &mut list);
     let problem_tree = problem.map(|problem| parse::problem(&problem.text, 1, &mut symbols, &mut list));
-    let readable = list.iter().all(|finding| finding.severity != crate::diagnostic::Severity::Error);
+    let torn: Vec<Span> = list
+        .iter()
+        .filter(|finding| finding.code == "unbalanced")
+        .map(|finding| finding.labels[0].span)
+        .collect();
     let mut checker = Checker::new(&sources, &symbols, list);
     checker.domain(&domain_tree, problem_tree.as_ref());
     if let Some(problem) = &problem_tree {
         checker.problem(problem, &domain_tree);
     }
+    let readable = checker.findings.iter().all(|finding| finding.severity != Severity::Error);
     if lints && readable && problem_tree.is_some() {
         checker.lints();
     }
     let Checker { task, mut findings, .. } = checker;
+    // What follows from a missing parenthesis is no finding of its own.
+    findings.retain(|finding| {
+        let place = finding.labels.first().map_or(Span::default(), |label| label.span);
+        finding.code == "unbalanced" || !torn.iter().any(|&span| same_section(&sources, span, place))
+    });
     // Stable: findings at one place stay in the order in which they were made.
     findings.sort_by_key(|finding: &Diagnostic| finding.labels.first().map(|label| label.span));
     (task, Findings { sources, list: findings })
+}
+
+/// Whether two places are in one section, which begins with `(:` at the start of a line.
+fn same_section(sources: &[Source], one: Span, other: Span) -> bool {
+    if one.source != other.source {
+        return false;
+    }
+    let (from, to) = (one.start.min(other.start) as usize, one.start.max(other.start) as usize);
+    let between = sources.get(one.source as usize).and_then(|source| source.text.get(from..to)).unwrap_or("");
+    !between.lines().skip(1).any(|line| line.trim_start().starts_with("(:"))
 }
 
 /// A variable in scope.

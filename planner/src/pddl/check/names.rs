@@ -17,8 +17,8 @@ impl Checker<'_> {
             return Some(id);
         }
         let known = self.task.types.iter().map(|own| own.name.clone()).collect();
-        self.undeclared("undeclared-type", "type", ":types", name, known);
-        None
+        let near = self.undeclared("undeclared-type", "type", ":types", name, known)?;
+        self.types.get(&self.symbols.find(&near)?).copied()
     }
 
     pub(super) fn find_object(&mut self, name: Name) -> Option<ObjectId> {
@@ -27,8 +27,8 @@ impl Checker<'_> {
         }
         let known = self.task.objects.iter().map(|own| own.name.clone()).collect();
         let section = if name.span.source == 0 { ":constants" } else { ":objects" };
-        self.undeclared("undeclared-object", "object", section, name, known);
-        None
+        let near = self.undeclared("undeclared-object", "object", section, name, known)?;
+        self.task.find_object(&near)
     }
 
     pub(super) fn find_predicate(&mut self, name: Name) -> Option<PredicateId> {
@@ -36,8 +36,8 @@ impl Checker<'_> {
             return Some(PredicateId(id));
         }
         let known = self.task.predicates.iter().map(|own| own.name.clone()).collect();
-        self.undeclared("undeclared-predicate", "predicate", ":predicates", name, known);
-        None
+        let near = self.undeclared("undeclared-predicate", "predicate", ":predicates", name, known)?;
+        self.task.find_predicate(&near)
     }
 
     pub(super) fn find_function(&mut self, name: Name) -> Option<FunctionId> {
@@ -51,8 +51,8 @@ impl Checker<'_> {
             return None;
         }
         let known = self.task.functions.iter().map(|own| own.name.clone()).collect();
-        self.undeclared("undeclared-function", "function", ":functions", name, known);
-        None
+        let near = self.undeclared("undeclared-function", "function", ":functions", name, known)?;
+        self.task.find_function(&near)
     }
 
     pub(super) fn find_module(&mut self, name: Name) -> Option<ModuleId> {
@@ -60,8 +60,9 @@ impl Checker<'_> {
             return Some(ModuleId(id));
         }
         let known = self.task.modules.iter().map(|own| own.name.to_ascii_lowercase()).collect();
-        self.undeclared("missing-attachment", "module", ":modules", name, known);
-        None
+        let near = self.undeclared("missing-attachment", "module", ":modules", name, known)?;
+        let at = self.task.modules.iter().position(|own| own.name.eq_ignore_ascii_case(&near))?;
+        Some(ModuleId(at as u32))
     }
 
     pub(super) fn unknown_variable(&mut self, name: Name, scope: &Scope) {
@@ -78,7 +79,17 @@ impl Checker<'_> {
         self.push(finding);
     }
 
-    fn undeclared(&mut self, code: &'static str, kind: &str, section: &str, name: Name, known: Vec<String>) {
+    /// Reports a name that is not declared. Gives the declared name that is surely meant, to go on with.
+    fn undeclared(
+        &mut self,
+        code: &'static str,
+        kind: &str,
+        section: &str,
+        name: Name,
+        known: Vec<String>,
+    ) -> Option<String> {
+        let written = self.name(name.symbol);
+        let near = nearest(written, known.iter().map(String::as_str)).map(str::to_string);
         if let Some(&finding) = self.reported.get(&(code, name.symbol)) {
             let finding = &mut self.findings[finding];
             if finding.labels.len() <= MORE_USES {
@@ -86,16 +97,14 @@ impl Checker<'_> {
                     .labels
                     .push(crate::diagnostic::Label { span: name.span, text: "used here too".into() });
             }
-            return;
+            return near;
         }
-        let written = self.name(name.symbol);
         let message = format!("{kind} `{written}` is not declared");
         let finding = Diagnostic::error(code, message, name.span, format!("unknown {kind}"));
-        let finding = match nearest(written, known.iter().map(String::as_str)) {
+        let finding = match &near {
             Some(near) => {
-                let declared = self.declaration(kind, near);
                 let finding = finding.with_help(format!("did you mean `{near}`?"));
-                match declared {
+                match self.declaration(kind, near) {
                     Some(span) => finding.with_label(span, format!("`{near}` is declared here")),
                     None => finding,
                 }
@@ -104,6 +113,7 @@ impl Checker<'_> {
         };
         self.reported.insert((code, name.symbol), self.findings.len());
         self.push(finding);
+        near
     }
 
     /// Where a name is declared that is offered instead.

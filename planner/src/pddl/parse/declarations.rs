@@ -234,15 +234,16 @@ impl Parser<'_> {
             self.findings.push(Diagnostic::error("syntax", message, span, "which kind?").with_help(SHAPE));
             return None;
         };
-        let Some(function) = children.get(at + 1).and_then(|&node| self.name(node, "the module's function"))
-        else {
+        let function = children.get(at + 1).and_then(|&node| self.name(node, "the module's function"));
+        if function.is_none() {
             let span = self.span(children[at]);
             let message = "a module without a function";
             let label = "expected `function@library` after this";
             self.findings
                 .push(Diagnostic::error("missing-attachment", message, span, label).with_help(SHAPE));
-            return None;
-        };
+        }
+        // Calls of it are looked at all the same.
+        let function = function.unwrap_or(name);
         if let Some(&extra) = children.get(at + 2) {
             self.expected("`)`", extra, SHAPE);
         }

@@ -420,16 +420,8 @@ impl<'a> Parser<'a> {
         action: &mut Action,
         variables: &mut Vec<Typed>,
     ) {
-        if !ACTION_PARTS.contains(&part) {
-            let message = format!("no part `{part}` is known in an action");
-            let span = self.span(keyword);
-            let diagnostic = Diagnostic::error("syntax", message, span, "unknown part");
-            self.findings.push(match nearest(part, ACTION_PARTS.iter().copied()) {
-                Some(near) => diagnostic.with_help(format!("did you mean `{near}`?")),
-                None => diagnostic.with_help(format!("parts of an action: {}", ACTION_PARTS.join(" "))),
-            });
-            return;
-        }
+        let known = ACTION_PARTS.contains(&part).then_some(part);
+        let Some(part) = known.or_else(|| self.unknown_part(keyword, part)) else { return };
         let Some(value) = value else {
             self.fault("syntax", format!("nothing follows `{part}`"), keyword, "expected a list after this");
             return;
@@ -449,6 +441,19 @@ impl<'a> Parser<'a> {
             ":grounding" => action.grounding = self.grounding(value),
             _ => action.duration = self.duration(value),
         }
+    }
+
+    /// Reports a part that no action has; gives the one that is surely meant.
+    fn unknown_part(&mut self, keyword: usize, part: &str) -> Option<&'static str> {
+        let message = format!("no part `{part}` is known in an action");
+        let span = self.span(keyword);
+        let diagnostic = Diagnostic::error("syntax", message, span, "unknown part");
+        let near = nearest(part, ACTION_PARTS.iter().copied());
+        self.findings.push(match near {
+            Some(near) => diagnostic.with_help(format!("did you mean `{near}`?")),
+            None => diagnostic.with_help(format!("parts of an action: {}", ACTION_PARTS.join(" "))),
+        });
+        near
     }
 
     /// A durative action says how long it takes, an instantaneous one must not.

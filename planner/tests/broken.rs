@@ -1,0 +1,53 @@
+//! Faulty domains and problems, and what a reader is told: each message alone should be enough to mend the fault.
+
+use std::path::Path;
+
+use descry_planner::{Findings, Source, check};
+
+fn source(name: &str) -> Source {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/broken").join(name);
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    Source::new(name, text)
+}
+
+fn findings(domain: &str, problem: Option<&str>) -> Findings {
+    check(&source(domain), problem.map(source).as_ref())
+}
+
+#[test]
+fn the_sound_one_has_no_finding() {
+    assert_eq!(findings("base-domain.pddl", Some("base-problem.pddl")).render(false), "");
+}
+
+#[test]
+fn each_fault_is_drawn_where_it_is() {
+    for (name, domain, problem) in [
+        ("predicate-typo", "predicate-typo.pddl", None),
+        ("wrong-arity", "wrong-arity.pddl", None),
+        ("undeclared-type", "undeclared-type.pddl", None),
+        ("goal-nobody-achieves", "goal-domain.pddl", Some("goal-nobody-achieves.pddl")),
+        ("goal-of-wrong-type", "base-domain.pddl", Some("goal-of-wrong-type.pddl")),
+        ("missing-parenthesis", "missing-parenthesis.pddl", None),
+        ("missing-inner-parenthesis", "missing-inner-parenthesis.pddl", None),
+        ("missing-last-parenthesis", "missing-last-parenthesis.pddl", None),
+        ("surplus-parenthesis", "surplus-parenthesis.pddl", None),
+        ("wrong-argument-type", "wrong-argument-type.pddl", None),
+        ("duplicate-action", "duplicate-action.pddl", None),
+        ("durations", "durations.pddl", None),
+        ("missing-attachment", "missing-attachment.pddl", None),
+        ("cyclic-types", "cyclic-types.pddl", None),
+        ("wrong-kind", "wrong-kind.pddl", None),
+        ("swapped-files", "base-problem.pddl", Some("base-domain.pddl")),
+        ("faulty-problem", "base-domain.pddl", Some("faulty-problem.pddl")),
+    ] {
+        let findings = findings(domain, problem);
+        assert!(findings.has_errors(), "{name} should have a fault");
+        insta::assert_snapshot!(name, findings.render(false));
+    }
+}
+
+#[test]
+fn findings_are_plain_data_too() {
+    let findings = findings("predicate-typo.pddl", None);
+    insta::assert_json_snapshot!("predicate-typo-data", findings);
+}

@@ -1,0 +1,5 @@
+(define (problem tidy)
+  (:domain kitchen)
+  (:objects mug - cup  saucer - plate  table shelf - place)
+  (:init (on mug table) (on saucer table) (hand-free))
+  (:goal (and (on mug shelf) (clean saucer))))

@@ -1,0 +1,7 @@
+(define (problem odd)
+  (:domain kitchn)
+  (:objects mug - cup  saucer - plat  table - place)
+  (:inti (on mug table))
+  (:init (on mug tabel) (on table mug) (handfree) (= (weight mug) 3) hand-free)
+  (:goal (and (on mug shelf) (not (on mug)) (clean saucer) (or)))
+  (:metric minimise (total-cost)))

@@ -1,0 +1,5 @@
+(define (problem odd)
+  (:domain kitchen)
+  (:objects mug - cup  table shelf - place)
+  (:init (on mug table) (hand-free))
+  (:goal (on shelf table)))

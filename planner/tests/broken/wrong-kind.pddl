@@ -1,0 +1,13 @@
+(define (domain mixed)
+  (:requirements :typing :fluents :derived-predicates)
+  (:types robot room door - object)
+  (:constants hall - room)
+  (:predicates (in ?r - robot ?x - room) (open ?d - door) (free ?x - room) (busy ?x - room))
+  (:functions (battery ?r - robot) (where ?r - robot) - room)
+  (:derived (free ?x - room) (not (busy ?x)))
+  (:derived (busy ?x - room) (not (free ?x)))
+  (:action go
+    :parameter (?r - robot ?x ?y - room)
+    :precondition (and (in ?r ?x) (> (battery ?r) hall) (= (where ?r) 5) (free ?z))
+    :effect (and (assign (where ?r) ?r) (increase (where ?r) 1) (free ?y) (decrease (batery ?r) 1)))
+  (:process leak :parameters () :effect ()))

@@ -9,7 +9,7 @@ mod nearby;
 use crate::cloud::{CloudError, is_finite};
 use nalgebra::Point3;
 
-pub(crate) use nearby::Nearby;
+pub(crate) use nearby::{Nearby, least};
 
 /// Points a leaf. All leaves but the last are full; that one is padded with infinity, which is near nothing.
 pub(crate) const LEAF: usize = 32;
@@ -231,6 +231,9 @@ impl Neighbours {
     fn visit_nearest(&self, q: &[f32; 3], span: Span, best: &mut Neighbour) {
         if span.is_leaf() {
             let distances = self.leaf_distances(span.from, q);
+            if least(&distances) >= best.distance_sq {
+                return;
+            }
             for (slot, &distance_sq) in distances.iter().enumerate() {
                 if distance_sq < best.distance_sq {
                     *best = Neighbour { index: self.index[span.from * LEAF + slot], distance_sq };

@@ -30,7 +30,14 @@ pub enum VoxelError {
 }
 
 /// Voxels an axis on each side of zero; three axes fill 63 bits.
-const HALF_RANGE: f32 = (1 << 20) as f32;
+const HALF_RANGE: i64 = 1 << 20;
+
+/// The whole number below. The standard one is a call where the processor's oldest instruction set is aimed at.
+#[inline(always)]
+fn floor(value: f64) -> i64 {
+    let toward_zero = value as i64;
+    toward_zero.saturating_sub(i64::from(toward_zero as f64 > value))
+}
 
 /// One point a voxel of edge `edge_m`, at the centroid of its points, in the order in which the voxels first occur.
 ///
@@ -111,6 +118,7 @@ pub fn assign(points: &[Point3<f32>], edge_m: f32) -> Result<Assigned, VoxelErro
     if !(edge_m.is_finite() && edge_m > 0.0) {
         return Err(VoxelError::Edge { edge_m });
     }
+    let per_m = 1.0 / f64::from(edge_m);
     let mut table = Table::with_room_for(points.len() / 8);
     let mut voxel = Vec::with_capacity(points.len());
     let mut last = (u64::MAX, NONE);
@@ -119,13 +127,18 @@ pub fn assign(points: &[Point3<f32>], edge_m: f32) -> Result<Assigned, VoxelErro
             voxel.push(NONE);
             continue;
         }
-        let cell = p.coords.map(|c| (f64::from(c) / f64::from(edge_m)).floor());
-        if cell.iter().any(|c| !(f64::from(-HALF_RANGE)..f64::from(HALF_RANGE)).contains(c)) {
+        let axis = |c: f32| floor(f64::from(c) * per_m).saturating_add(HALF_RANGE) as u64;
+        let [x, y, z] = [axis(p.x), axis(p.y), axis(p.z)];
+        if (x | y | z) >= 2 * HALF_RANGE as u64 {
             let distance_m = p.coords.amax();
-            return Err(VoxelError::TooFar { index, distance_m, edge_m, farthest_m: HALF_RANGE * edge_m });
+            return Err(VoxelError::TooFar {
+                index,
+                distance_m,
+                edge_m,
+                farthest_m: HALF_RANGE as f32 * edge_m,
+            });
         }
-        let axis = |c: f64| (c as i64 + (1 << 20)) as u64;
-        let key = axis(cell.x) << 42 | axis(cell.y) << 21 | axis(cell.z);
+        let key = x << 42 | y << 21 | z;
         if key != last.0 {
             last = (key, table.number(key));
         }

@@ -25,6 +25,19 @@ struct Parting {
     above: usize,
 }
 
+/// The least of a leaf's distances. Eight at a time: a chain of single comparisons would take longer than the distances themselves.
+#[inline(always)]
+pub(crate) fn least(distances: &[f32; LEAF]) -> f32 {
+    let (eights, _) = distances.as_chunks::<8>();
+    let mut lanes = [f32::INFINITY; 8];
+    for eight in eights {
+        for (lane, &d) in lanes.iter_mut().zip(eight) {
+            *lane = if d < *lane { d } else { *lane };
+        }
+    }
+    lanes.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a })
+}
+
 impl Nearby {
     pub(crate) fn len(&self) -> usize {
         self.len
@@ -80,8 +93,16 @@ impl Nearby {
         self.farthest()
     }
 
+    #[inline(always)]
     fn farthest(&self) -> f32 {
-        self.distances_sq().iter().fold(0.0, |a, &b| if b > a { b } else { a })
+        let (eights, rest) = self.distances_sq().as_chunks::<8>();
+        let mut lanes = [0.0f32; 8];
+        for eight in eights {
+            for (lane, &d) in lanes.iter_mut().zip(eight) {
+                *lane = if d > *lane { d } else { *lane };
+            }
+        }
+        lanes.iter().chain(rest).fold(0.0, |a, &b| if b > a { b } else { a })
     }
 
     /// Squared distances between which the k-th nearest lies, with at most `FEW` candidates between them. On a surface the number of candidates

@@ -4,7 +4,7 @@
 //! second nearest had, less δ. So most searches are spared once the pose settles, and the partners are those that a search would have found.
 
 use super::Prepared;
-use crate::neighbours::{LEAF, Neighbours};
+use crate::neighbours::{LEAF, Neighbours, least};
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
@@ -161,7 +161,7 @@ impl Neighbours {
     #[inline(always)]
     fn offer_leaf(&self, leaf: usize, q: &[f32; 3], two: &mut Two) {
         let distances = self.leaf_distances(leaf, q);
-        if distances.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a }) >= two.second_sq {
+        if least(&distances) >= two.second_sq {
             return;
         }
         for (i, &d) in distances.iter().enumerate() {

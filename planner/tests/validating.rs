@@ -1,0 +1,282 @@
+//! Plans replayed: what is valid, what is not, and why.
+
+use descry_planner::{
+    Answer, Attachments, Call, CallError, FactValue, Plan, Read, Semantics, Source, State, Task, Verdict,
+    monitor, validate,
+};
+
+const KITCHEN: &str = include_str!("data/kitchen-domain.pddl");
+const WORKSHOP: &str = include_str!("data/workshop-domain.pddl");
+
+fn task(domain: &str, problem: &str) -> Task {
+    Task::read(&Source::new("domain", domain), &Source::new("problem", problem))
+        .unwrap_or_else(|all| panic!("{all}"))
+}
+
+fn plan(text: &str) -> Plan {
+    Plan::read(&Source::new("plan", text)).unwrap_or_else(|all| panic!("{all}"))
+}
+
+fn verdict(domain: &str, problem: &str, steps: &str) -> Verdict {
+    validate(&task(domain, problem), &attachments(), &plan(steps))
+}
+
+struct Nearby;
+
+impl descry_planner::Attachment for Nearby {
+    fn reads(&self) -> Vec<Read> {
+        vec![Read::At("height".to_string(), vec![0])]
+    }
+
+    fn evaluate(&self, call: &Call) -> Result<Answer, CallError> {
+        Ok(Answer::Truth(call.number("height", &[&call.arguments[0]])? < 2.0))
+    }
+}
+
+fn attachments() -> Attachments {
+    let mut attachments = Attachments::new();
+    attachments.insert("reachable", Nearby);
+    attachments.insert("walk-time", |call: &Call| {
+        let same = call.arguments[0] == call.arguments[1];
+        Ok(Answer::Number(if same { f64::INFINITY } else { 3.0 }))
+    });
+    attachments
+        .insert("weigh", |_: &Call| Ok(Answer::Writes(vec![FactValue::Number(1.5), FactValue::Truth(true)])));
+    attachments.insert("broken", |_: &Call| Err(CallError::Failed("no scale".to_string())));
+    attachments
+}
+
+/// Checks a list of plans: its text, and a part of the reason why it is invalid (empty where it is valid).
+fn check(domain: &str, problem: &str, cases: &[(&str, &str)]) {
+    for (steps, reason) in cases {
+        let verdict = verdict(domain, problem, steps);
+        let said = verdict.reason.clone().unwrap_or_default();
+        assert_eq!(verdict.valid, reason.is_empty(), "{steps}\n{said}");
+        assert!(said.contains(reason), "{steps}\nexpected: {reason}\nsaid: {said}");
+        assert_eq!(verdict.findings.is_empty(), verdict.valid, "an invalid plan is drawn");
+    }
+}
+
+const KITCHEN_PROBLEM: &str = "(define (problem p) (:domain kitchen)
+  (:objects mug jug - dish  table shelf - place)
+  (:init (on mug table) (on jug table) (= (height shelf) 1) (= (height table) 1) (= (load) 0) (= (weight mug) 2)
+         (= (weight jug) 5) (= (owner mug) ann))
+  (:goal (and (on mug shelf) (tidy))) (:metric minimize (+ (* 2 (load)) (total-cost))))";
+
+#[test]
+fn classical_plans() {
+    check(
+        KITCHEN,
+        KITCHEN_PROBLEM,
+        &[
+            ("(take mug table)\n(put mug shelf)\n(take jug table)\n(put jug shelf)", ""),
+            ("(take mug table)\n(put mug shelf)", "the goal (tidy) is not reached"),
+            ("(take mug shelf)", "(on mug shelf) does not hold"),
+            ("(take mug table)\n(take jug table)", "(not (held mug)) does not hold"),
+            ("(grab mug table)", "no action is called `grab`"),
+            ("(take mug)", "takes 2 arguments, found 1"),
+            ("(take mug mug)", "`mug` is no place"),
+            ("(take mug attic)", "no object is called `attic`"),
+            (
+                "(give mug bob)\n(give mug bob)",
+                "(not (= (owner mug) bob)) does not hold before it: (owner mug) is bob",
+            ),
+            (
+                "(lift jug)\n(lift jug)",
+                "(<= (+ (load) (weight jug)) 8) does not hold before it: (+ (load) (weight jug)) is 10",
+            ),
+            ("(wobble shelf)\n(take mug table)\n(put mug shelf)", "[reachable shelf] does not hold"),
+            ("(ask)", "has no value"),
+        ],
+    );
+}
+
+#[test]
+fn cost_and_metric_come_from_the_last_state() {
+    let steps = "(lift mug)\n(take mug table)\n(put mug shelf)\n(take jug table)\n(put jug shelf)";
+    let verdict = verdict(KITCHEN, KITCHEN_PROBLEM, steps);
+    assert_eq!((verdict.valid, verdict.metric, verdict.makespan), (true, Some(8.0), None));
+    let data = serde_json::to_value(&verdict).expect("a verdict is data");
+    for key in ["valid", "reason", "step", "cost", "makespan", "metric"] {
+        assert!(data.get(key).is_some(), "{key}");
+    }
+}
+
+#[test]
+fn a_conditional_effect_reads_the_state_before() {
+    // `swap` exchanges two facts at once: each condition sees the old one.
+    let problem = "(define (problem p) (:domain kitchen) (:objects mug - dish  table - place)
+        (:init (on mug table) (left)) (:goal (and (right) (not (left)))))";
+    check(
+        KITCHEN,
+        problem,
+        &[("(swap)", ""), ("(swap)\n(swap)", "is not reached"), ("(swap)\n(swap)\n(swap)", "")],
+    );
+}
+
+const WORKSHOP_PROBLEM: &str = "(define (problem p) (:domain workshop)
+  (:objects a b - part  here there - spot)
+  (:init (raw a) (raw b) (at here) (= (heat) 20) (free) (at 10 (closed)) (at 30 (not (closed))))
+  (:goal (and (done a))))";
+
+#[test]
+fn plans_with_times() {
+    check(
+        WORKSHOP,
+        WORKSHOP_PROBLEM,
+        &[
+            ("0: (light) [5]\n1: (join a) [2]", ""),
+            ("0: (light) [5]\n1: (join a) [2.5]", "takes 2.5, 2 is asked for"),
+            ("0: (join a) [2]", "(lit) does not hold at its start"),
+            ("0: (light) [5]\n4: (join a) [2]", "(lit) does not hold all the time"),
+            ("0: (light) [5]\n3: (join a) [2]", "both touch (lit)"),
+            ("0: (light) [5]\n0: (join a) [2]", "(lit) does not hold at its start"),
+            ("0: (light) [5]\n0.001: (join a) [2]", ""),
+            ("0: (light) [5]\n1: (join a) [2]\n1: (join b) [2]", "both touch (free)"),
+            ("9: (light) [5]\n10: (join a) [2]", "both touch (closed)"),
+            ("10.5: (light) [5]\n11: (join a) [2]", "(not (closed)) does not hold at its start"),
+            ("30.5: (light) [5]\n31: (join a) [2]", ""),
+            ("0: (wait) [1]\n2: (light) [5]\n3: (join a) [2]", ""),
+            ("0: (wait) [0.5]", "takes 0.5, 1 is asked for"),
+            ("0: (wait) [4.5]", "takes 4.5, 4 is asked for"),
+            (
+                "0: (walk here there) [3]\n4: (walk there here) [3]\n8: (light) [5]\n8.5: (join a) [1]",
+                "takes 1, 2 is",
+            ),
+            ("0: (walk here here) [3]", "says that it cannot be done"),
+            ("(join a)", "takes time, but the plan has no times"),
+        ],
+    );
+}
+
+#[test]
+fn effects_at_the_end_remember_the_start() {
+    // What `heat-up` leaves behind depends on whether the door was closed when it began.
+    let problem = |goal: &str| {
+        format!(
+            "(define (problem p) (:domain workshop) (:objects a - part  here - spot)
+               (:init (raw a) (at here) (= (heat) 20) (free) (at 5 (closed))) (:goal {goal}))"
+        )
+    };
+    let early = "1: (heat-up) [8]";
+    let late = "6: (heat-up) [8]";
+    check(WORKSHOP, &problem("(aired)"), &[(early, ""), (late, "(aired) is not reached")]);
+    check(
+        WORKSHOP,
+        &problem("(= (heat) 36)"),
+        &[(early, ""), ("1: (heat-up) [4]", "is not reached: (heat) is 28")],
+    );
+    check(
+        WORKSHOP,
+        &problem("(> (heat) 100)"),
+        &[("0: (heat-up) [50]", "(<= (heat) 90) does not hold all the time")],
+    );
+}
+
+#[test]
+fn modules_are_asked_exactly() {
+    let problem = "(define (problem p) (:domain workshop) (:objects a b - part  here - spot)
+        (:init (raw a) (raw b) (at here) (= (heat) 20) (free)) (:goal (and (known a) (= (mass a) 1.5))))";
+    check(WORKSHOP, problem, &[("0: (weigh-it a) [1]", ""), ("0: (weigh-it b) [1]", "the goal (known a)")]);
+    let attachments = Attachments::new();
+    let verdict = validate(&task(WORKSHOP, problem), &attachments, &plan("0: (weigh-it a) [1]"));
+    assert!(!verdict.valid);
+    let reason = verdict.reason.unwrap_or_default();
+    assert!(reason.contains("[weigh a]") && reason.contains("no attachment of this name"), "{reason}");
+    assert!(verdict.findings.render(false).contains("([weigh ?p])"), "{}", verdict.findings);
+}
+
+#[test]
+fn derived_facts_follow_through_recursion_and_negation() {
+    let domain = "(define (domain net) (:types node)
+        (:predicates (link ?a ?b - node) (cut ?a - node) (reach ?a ?b - node) (isolated ?a - node) (goal-met))
+        (:derived (reach ?a ?b) (or (link ?a ?b) (exists (?c - node) (and (link ?a ?c) (not (cut ?c)) (reach ?c ?b)))))
+        (:derived (isolated ?a - node) (forall (?b - node) (imply (not (= ?a ?b)) (not (reach ?b ?a)))))
+        (:action sever :parameters (?a - node) :precondition (not (isolated ?a)) :effect (cut ?a))
+        (:action finish :parameters () :precondition (reach n0 n29) :effect (goal-met)) )";
+    let nodes: String = (0..30).map(|node| format!(" n{node}")).collect();
+    let links: String = (0..29).map(|node| format!("(link n{node} n{})", node + 1)).collect();
+    let domain = domain.replace("(:types node)", &format!("(:types node) (:constants{nodes} - node)"));
+    let problem = format!("(define (problem p) (:domain net) (:init {links}) (:goal (goal-met)))");
+    check(
+        &domain,
+        &problem,
+        &[
+            ("(finish)", ""),
+            ("(sever n7)\n(finish)", "(reach n0 n29) does not hold"),
+            ("(sever n29)\n(finish)", ""),
+            ("(sever n0)", "(not (isolated n0)) does not hold"),
+        ],
+    );
+}
+
+#[test]
+fn preferences_and_constraints_count() {
+    let problem = |constraints: &str| {
+        format!(
+            "(define (problem p) (:domain kitchen) (:objects mug jug - dish  table shelf - place)
+               (:init (on mug table) (on jug table) (= (height shelf) 1) (= (height table) 1))
+               (:goal (and (on mug shelf) (preference both (on jug shelf)) (forall (?d - dish) (preference up (on ?d shelf)))))
+               {constraints}
+               (:metric minimize (+ (* 10 (is-violated both)) (is-violated up))))"
+        )
+    };
+    let steps = "(take mug table)\n(put mug shelf)";
+    let free = verdict(KITCHEN, &problem(""), steps);
+    assert_eq!((free.valid, free.metric), (true, Some(11.0)));
+    for (constraint, holds) in [
+        ("(always (on jug table))", true),
+        ("(always (on mug table))", false),
+        ("(sometime (held mug))", true),
+        ("(at-most-once (held mug))", true),
+        ("(sometime-before (on mug shelf) (held mug))", true),
+        ("(sometime-before (held mug) (on mug shelf))", false),
+        ("(sometime-after (held mug) (on mug shelf))", true),
+        ("(forall (?d - dish) (sometime (held ?d)))", false),
+        ("(at end (on mug shelf))", true),
+        ("(within 1 (held mug))", true),
+        ("(within 1 (on mug shelf))", false),
+        ("(always-within 1 (held mug) (on mug shelf))", true),
+        ("(hold-after 2 (on mug shelf))", true),
+        ("(hold-during 0 1 (on mug table))", true),
+        ("(hold-during 0 2 (on mug table))", false),
+    ] {
+        let verdict = verdict(KITCHEN, &problem(&format!("(:constraints {constraint})")), steps);
+        assert_eq!(verdict.valid, holds, "{constraint}: {:?}", verdict.reason);
+    }
+}
+
+#[test]
+fn the_monitor_says_what_broke() {
+    let task = task(KITCHEN, KITCHEN_PROBLEM);
+    let attachments = attachments();
+    let rest = plan("(put mug shelf)\n(take jug table)\n(put jug shelf)");
+    let semantics = Semantics::new(&task, &attachments);
+    let mut state = semantics.initial().expect("no call fails");
+    let (action, mut binding) = semantics.bind(&plan("(take mug table)").steps[0]).expect("the step fits");
+    let applied = semantics.apply_action(&mut state, action, &mut binding).expect("no call fails");
+    assert_eq!(applied, Ok(()));
+    assert_eq!(monitor(&task.with_state(&state), &attachments, &rest), Ok(()));
+
+    // Somebody put the jug away, and the shelf is out of reach now.
+    let id = |name: &str| task.find_object(name).expect("declared");
+    let on = task.find_predicate("on").expect("declared");
+    let mut moved: State = state.clone();
+    moved.set_fact(on, &[id("jug"), id("table")], false);
+    let broken = monitor(&task.with_state(&moved), &attachments, &rest).expect_err("the jug is gone");
+    assert_eq!((broken.step, broken.condition.as_str()), (Some(1), "(on jug table)"));
+
+    let height = task.find_function("height").expect("declared");
+    state.set_number(height, &[id("shelf")], Some(5.0));
+    let broken = monitor(&task.with_state(&state), &attachments, &rest).expect_err("the shelf is too high");
+    assert_eq!((broken.step, broken.condition.as_str()), (Some(0), "[reachable shelf]"));
+    let place = &KITCHEN[broken.span.start as usize..broken.span.end as usize];
+    assert_eq!(place, "[reachable ?p]");
+    assert!(broken.to_string().starts_with("step 1 (put mug shelf)"), "{broken}");
+}
+
+#[test]
+fn an_invalid_step_is_drawn_in_the_domain() {
+    let verdict = verdict(WORKSHOP, WORKSHOP_PROBLEM, "0: (light) [5]\n4: (join a) [2]");
+    insta::assert_snapshot!("invalid-step", verdict.findings.render(false));
+}

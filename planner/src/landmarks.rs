@@ -5,6 +5,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::ground::Fact;
 use crate::search::compiled::{Compiled, Lists};
 
 /// Most facts of a disjunctive landmark.
@@ -20,7 +21,8 @@ struct Landmark {
     facts: Vec<u32>,
     /// Asked for by the goal.
     goal: bool,
-    /// Landmarks that must be true right before this one first becomes true.
+    /// Landmarks that are to be seen before this one: those that must be true right before it first becomes true, and
+    /// those for which it would have to be given up again.
     before: Vec<u32>,
     /// Landmarks for whose first achievement this one must be true.
     enables: Vec<u32>,
@@ -50,7 +52,7 @@ struct Find<'a> {
 
 impl Landmarks {
     /// Finds the landmarks of a task.
-    pub(crate) fn new(task: &Compiled) -> Landmarks {
+    pub(crate) fn new(task: &Compiled, mutex_groups: &[Vec<Fact>]) -> Landmarks {
         let mut find = Find::new(task);
         for &fact in &task.goal {
             let id = find.landmark(vec![task.id(fact)]);
@@ -62,15 +64,11 @@ impl Landmarks {
             next += 1;
             find.backchain(id);
         }
-        let all = find.all;
+        let mut all = find.all;
+        order_reasonably(task, mutex_groups, &mut all);
         let pairs = (0..all.len()).flat_map(|l| all[l].facts.iter().map(move |&f| (f, l as u32)));
         let by_fact = Lists::group(task.facts, pairs);
         Landmarks { words: all.len().div_ceil(64).max(1), by_fact, all }
-    }
-
-    /// No landmarks.
-    pub(crate) fn none(task: &Compiled) -> Landmarks {
-        Landmarks { all: Vec::new(), by_fact: Lists::group(task.facts, std::iter::empty()), words: 1 }
     }
 
     /// How many there are.
@@ -239,6 +237,77 @@ impl<'a> Find<'a> {
     }
 }
 
+/// Most steps of looking for cycles among orderings.
+const ORDERING_WORK: usize = 5_000_000;
+
+/// Orders a landmark before a goal that would have to be given up again for it (Hoffmann et al. 2004, reasonable
+/// orders): the goal excludes the landmark, or what must hold right before it. Orders that would close a cycle are left
+/// out.
+fn order_reasonably(task: &Compiled, mutex_groups: &[Vec<Fact>], all: &mut [Landmark]) {
+    let members = || {
+        mutex_groups
+            .iter()
+            .enumerate()
+            .flat_map(|(g, facts)| facts.iter().map(move |&f| (task.id(f), g as u32)))
+    };
+    let groups_of = Lists::group(task.facts, members());
+    let mut goal_of_fact = vec![u32::MAX; task.facts];
+    let mut goal_of_variable = vec![u32::MAX; task.domains.len()];
+    for (id, landmark) in all.iter().enumerate().filter(|(_, l)| l.goal) {
+        let fact = landmark.facts[0] as usize;
+        goal_of_fact[fact] = id as u32;
+        goal_of_variable[task.variables[fact] as usize] = id as u32;
+    }
+    // Goals that exclude a fact.
+    let excluded_by = |fact: u32, out: &mut Vec<u32>| {
+        let same = goal_of_variable[task.variables[fact as usize] as usize];
+        out.extend((same != u32::MAX && goal_of_fact[fact as usize] != same).then_some(same));
+        for &group in groups_of.get(fact as usize) {
+            let others = mutex_groups[group as usize].iter().map(|&f| task.id(f)).filter(|&f| f != fact);
+            out.extend(others.map(|f| goal_of_fact[f as usize]).filter(|&g| g != u32::MAX));
+        }
+    };
+    let initial = |l: &Landmark| l.facts.iter().any(|&f| task.holds(f, &task.initial));
+    let mut work = 0;
+    for id in 0..all.len() {
+        if all[id].facts.len() > 1 || initial(&all[id]) {
+            continue;
+        }
+        let mut later = Vec::new();
+        excluded_by(all[id].facts[0], &mut later);
+        for &b in &all[id].before {
+            if let [fact] = all[b as usize].facts[..] {
+                excluded_by(fact, &mut later);
+            }
+        }
+        later.sort_unstable();
+        later.dedup();
+        for goal in later {
+            let known = goal as usize == id || all[goal as usize].before.contains(&(id as u32));
+            if !known && work < ORDERING_WORK && !precedes(all, goal, id as u32, &mut work) {
+                all[goal as usize].before.push(id as u32);
+            }
+        }
+    }
+}
+
+/// Whether `first` is ordered before `second`, directly or not.
+fn precedes(all: &[Landmark], first: u32, second: u32, work: &mut usize) -> bool {
+    let mut seen = vec![false; all.len()];
+    let mut stack = vec![second];
+    *work += all.len() / 8;
+    while let Some(id) = stack.pop() {
+        if id == first {
+            return true;
+        }
+        *work += 1;
+        if !std::mem::replace(&mut seen[id as usize], true) {
+            stack.extend(&all[id as usize].before);
+        }
+    }
+    false
+}
+
 /// Which landmarks each state of a search has seen on its way.
 pub(crate) struct Status {
     words: usize,
@@ -282,29 +351,27 @@ impl Status {
         &mut self,
         landmarks: &Landmarks,
         task: &Compiled,
-        step: (u32, u32, u32),
+        step: (u32, u32),
         state: &[u32],
         new: bool,
     ) {
-        let (parent, operator, id) = step;
+        let (parent, id) = step;
         let words = self.words;
         let from = parent as usize * words;
         self.scratch.copy_from_slice(&self.accepted[from..from + words]);
-        let mut accept = |fact: u32| {
-            for &l in landmarks.by_fact.get(fact as usize) {
-                let before = &landmarks.all[l as usize].before;
-                if before.iter().all(|&b| Self::has(&self.accepted[from..from + words], b)) {
-                    self.scratch[l as usize / 64] |= 1 << (l % 64);
+        let parent = &self.accepted[from..from + words];
+        for (word, &held) in parent.iter().enumerate() {
+            let mut open = !held;
+            while open != 0 {
+                let l = word * 64 + open.trailing_zeros() as usize;
+                open &= open - 1;
+                let Some(landmark) = landmarks.all.get(l) else { break };
+                if landmark.facts.iter().any(|&f| task.holds(f, state))
+                    && landmark.before.iter().all(|&b| Self::has(parent, b))
+                {
+                    self.scratch[word] |= 1 << (l % 64);
                 }
             }
-        };
-        for effect in task.effects.get(operator as usize) {
-            if state[effect.fact.variable as usize] == effect.fact.value {
-                accept(task.id(effect.fact));
-            }
-        }
-        for variable in task.basic..task.domains.len() {
-            accept(task.offsets[variable] + state[variable]);
         }
         if new {
             self.accepted.extend_from_slice(&self.scratch);

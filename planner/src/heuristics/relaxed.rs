@@ -9,6 +9,9 @@ use super::queue::RadixHeap;
 /// No node, no operator, no cost.
 const NONE: u32 = u32::MAX;
 
+/// How many steps weigh as much as a unit of cost where operators without cost exist.
+const COST_OVER_STEPS: u32 = 64;
+
 /// How the heuristic counts operators.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Counting {
@@ -16,8 +19,8 @@ pub(crate) enum Counting {
     Steps,
     /// Cost, plus one unless all costs are one.
     CostAndSteps,
-    /// Cost alone.
-    Cost,
+    /// Cost first; steps only where operators without cost would make plans longer for nothing.
+    CostThenSteps,
 }
 
 impl Counting {
@@ -27,7 +30,10 @@ impl Counting {
             Counting::Steps => 1,
             Counting::CostAndSteps if task.unit_cost => 1,
             Counting::CostAndSteps => task.costs[operator] + 1,
-            Counting::Cost => task.costs[operator],
+            Counting::CostThenSteps if task.free_operators => {
+                task.costs[operator].saturating_mul(COST_OVER_STEPS).saturating_add(1)
+            }
+            Counting::CostThenSteps => task.costs[operator],
         }
     }
 }
@@ -47,7 +53,9 @@ pub(crate) struct Relaxed {
     /// By node (an operator's unconditional effects, one conditional effect, or an axiom).
     preconditions: Lists<u32>,
     effects: Lists<u32>,
+    /// By node: place of its operator in `names`; `NONE` for an axiom.
     operators: Vec<u32>,
+    names: Vec<u32>,
     base_costs: Vec<u32>,
     open: Vec<u32>,
     /// By fact: nodes that need it.
@@ -77,30 +85,40 @@ pub(crate) struct Relaxed {
 impl Relaxed {
     /// For a task, counting operators in this way, towards the task's goal.
     pub(crate) fn new(task: &Compiled, counting: Counting) -> Relaxed {
+        let all: Vec<u32> = (0..task.operators() as u32).collect();
+        let goal = task.goal.iter().map(|&f| task.id(f)).collect();
+        Relaxed::with(task, counting, all, goal)
+    }
+
+    /// With these operators only, towards these facts.
+    pub(crate) fn with(task: &Compiled, counting: Counting, operators: Vec<u32>, goal: Vec<u32>) -> Relaxed {
         let mut needed = vec![false; task.facts];
+        goal.iter().for_each(|&f| needed[f as usize] = true);
         let mut need = |facts: &[Fact]| facts.iter().for_each(|&f| needed[task.id(f) as usize] = true);
-        for op in 0..task.operators() {
-            need(task.preconditions.get(op));
+        for &op in &operators {
+            need(task.preconditions.get(op as usize));
+            for e in task.effects.get(op as usize) {
+                need(&task.conditions[e.from as usize..e.to as usize]);
+            }
         }
-        need(&task.conditions);
-        need(&task.goal);
         (0..task.axiom_bodies.len()).for_each(|a| need(task.axiom_bodies.get(a)));
         let mut build = Build {
             task,
+            goal,
             needed,
             preconditions: Lists::new(),
             effects: Lists::new(),
             operators: Vec::new(),
             base_costs: Vec::new(),
         };
-        for op in 0..task.operators() {
-            build.operator(op, counting.of(task, op));
+        for (place, &op) in operators.iter().enumerate() {
+            build.operator(op as usize, place as u32, counting.of(task, op as usize));
         }
         for (axiom, &head) in task.axiom_heads.iter().enumerate() {
             let body: Vec<u32> = task.axiom_bodies.get(axiom).iter().map(|&f| task.id(f)).collect();
             build.node(body, vec![task.id(head)], NONE, 0);
         }
-        build.finish()
+        build.finish(operators)
     }
 
     /// The estimate from a state, or `None` if the goal is out of reach even relaxed. Leaves the relaxed plan and the
@@ -110,18 +128,6 @@ impl Relaxed {
             return None;
         }
         Some(self.extract(task, state))
-    }
-
-    /// Replaces the goal.
-    pub(crate) fn set_goal(&mut self, goal: impl Iterator<Item = u32>) {
-        for &fact in &self.goal {
-            self.is_goal[fact as usize] = false;
-        }
-        self.goal.clear();
-        self.goal.extend(goal);
-        for &fact in &self.goal {
-            self.is_goal[fact as usize] = true;
-        }
     }
 
     fn explore(&mut self, task: &Compiled, state: &[u32]) -> bool {
@@ -199,11 +205,12 @@ impl Relaxed {
             let node = self.supporters[fact as usize] as usize;
             let preconditions = self.preconditions.get(node);
             self.stack.extend_from_slice(preconditions);
-            let operator = self.operators[node];
-            if operator == NONE {
+            let place = self.operators[node];
+            if place == NONE {
                 continue;
             }
-            let place = facts + operator as usize;
+            let operator = self.names[place as usize];
+            let place = facts + place as usize;
             if self.marked[place] != self.mark {
                 self.marked[place] = self.mark;
                 total = total.saturating_add(self.base_costs[node]);
@@ -218,15 +225,6 @@ impl Relaxed {
         total
     }
 
-    /// Whether a fact can be reached at all from a state, nothing ever taken away: by fact.
-    pub(crate) fn reachable(&mut self, task: &Compiled, state: &[u32]) -> Vec<bool> {
-        let goal = std::mem::take(&mut self.goal);
-        goal.iter().for_each(|&f| self.is_goal[f as usize] = false);
-        self.explore(task, state);
-        self.set_goal(goal.into_iter());
-        self.fact_costs.iter().map(|&c| c != NONE).collect()
-    }
-
     /// Bytes taken.
     pub(crate) fn bytes(&self) -> usize {
         self.base_costs.len() * 40 + self.fact_costs.len() * 24
@@ -236,6 +234,7 @@ impl Relaxed {
 /// Collects the nodes.
 struct Build<'a> {
     task: &'a Compiled,
+    goal: Vec<u32>,
     needed: Vec<bool>,
     preconditions: Lists<u32>,
     effects: Lists<u32>,
@@ -258,7 +257,7 @@ impl Build<'_> {
         self.base_costs.push(cost);
     }
 
-    fn operator(&mut self, op: usize, cost: u32) {
+    fn operator(&mut self, op: usize, place: u32, cost: u32) {
         let task = self.task;
         let own: Vec<u32> = task.preconditions.get(op).iter().map(|&f| task.id(f)).collect();
         let mut plain = Vec::new();
@@ -270,12 +269,12 @@ impl Build<'_> {
             let mut needs = own.clone();
             let conditions = &task.conditions[effect.from as usize..effect.to as usize];
             needs.extend(conditions.iter().map(|&f| task.id(f)));
-            self.node(needs, vec![task.id(effect.fact)], op as u32, cost);
+            self.node(needs, vec![task.id(effect.fact)], place, cost);
         }
-        self.node(own, plain, op as u32, cost);
+        self.node(own, plain, place, cost);
     }
 
-    fn finish(self) -> Relaxed {
+    fn finish(self, names: Vec<u32>) -> Relaxed {
         let task = self.task;
         let nodes = self.operators.len();
         let lists = &self.preconditions;
@@ -283,7 +282,7 @@ impl Build<'_> {
         let waiting = Lists::group(task.facts, pairs);
         let open: Vec<u32> = (0..nodes).map(|n| self.preconditions.get(n).len() as u32).collect();
         let always = (task.basic..task.domains.len()).map(|v| task.offsets[v] + 1).collect();
-        let goal: Vec<u32> = task.goal.iter().map(|&f| task.id(f)).collect();
+        let goal = self.goal;
         let mut is_goal = vec![false; task.facts];
         goal.iter().for_each(|&f| is_goal[f as usize] = true);
         Relaxed {
@@ -293,7 +292,8 @@ impl Build<'_> {
             fact_costs: vec![NONE; task.facts],
             supporters: vec![NONE; task.facts],
             heap: RadixHeap::new(),
-            marked: vec![0; task.facts + task.operators()],
+            marked: vec![0; task.facts + names.len()],
+            names,
             mark: 0,
             stack: Vec::new(),
             plan: Vec::new(),

@@ -91,8 +91,12 @@ pub(crate) struct Compiled {
     pub costs: Vec<u32>,
     /// By operator: as the metric counts.
     pub exact_costs: Vec<f64>,
+    /// What exact costs were multiplied by.
+    pub cost_scale: f64,
     /// Whether all costs are one.
     pub unit_cost: bool,
+    /// Whether some operator costs nothing.
+    pub free_operators: bool,
     /// Bodies of axioms, by stratum in rising order.
     pub axiom_bodies: Lists<Fact>,
     /// Heads of axioms.
@@ -153,7 +157,7 @@ impl Compiled {
             }
             effects.push(list);
         }
-        let (costs, exact_costs) = costs(task);
+        let (costs, exact_costs, cost_scale) = costs(task);
         let mut axiom_bodies = Lists::new();
         let mut strata = Vec::new();
         let mut last = None;
@@ -177,6 +181,8 @@ impl Compiled {
             effects,
             conditions,
             unit_cost: exact_costs.iter().all(|&c| c == 1.0),
+            cost_scale,
+            free_operators: costs.contains(&0),
             costs,
             exact_costs,
             axiom_heads: task.axioms.iter().map(|a| a.head).collect(),
@@ -236,6 +242,22 @@ impl Compiled {
         self.derive(next);
     }
 
+    /// Applies the operator to the state itself.
+    pub(crate) fn advance(&self, operator: u32, state: &mut [u32]) {
+        let effects = self.effects.get(operator as usize);
+        let conditional = effects.iter().any(|e| e.from != e.to);
+        if conditional {
+            let mut next = Vec::with_capacity(state.len());
+            self.apply(operator, state, &mut next);
+            state.copy_from_slice(&next);
+            return;
+        }
+        for effect in effects {
+            state[effect.fact.variable as usize] = effect.fact.value;
+        }
+        self.derive(state);
+    }
+
     /// Brings the derived variables of a state up to date.
     pub(crate) fn derive(&self, state: &mut [u32]) {
         if self.axiom_heads.is_empty() {
@@ -270,6 +292,21 @@ impl Compiled {
         }
     }
 
+    /// Whether the search counts costs as the metric does.
+    pub(crate) fn has_exact_costs(&self) -> bool {
+        self.costs.iter().zip(&self.exact_costs).all(|(&counted, &exact)| f64::from(counted) == exact)
+    }
+
+    /// The cost of a plan as the search counts.
+    pub(crate) fn search_cost(&self, plan: &[u32]) -> u32 {
+        plan.iter().fold(0, |sum: u32, &op| sum.saturating_add(self.costs[op as usize]))
+    }
+
+    /// A bound on costs as the search counts.
+    pub(crate) fn scaled(&self, cost: f64) -> u32 {
+        (cost * self.cost_scale).ceil().clamp(0.0, f64::from(u32::MAX)) as u32
+    }
+
     /// The exact cost of a plan.
     pub(crate) fn plan_cost(&self, plan: &[u32]) -> f64 {
         plan.iter().map(|&op| self.exact_costs[op as usize]).sum()
@@ -284,7 +321,7 @@ fn symbol(meaning: &Meaning) -> u32 {
     }
 }
 
-fn costs(task: &GroundTask) -> (Vec<u32>, Vec<f64>) {
+fn costs(task: &GroundTask) -> (Vec<u32>, Vec<f64>, f64) {
     let sign = if task.metric.as_ref().is_none_or(|m| m.minimise) { 1.0 } else { -1.0 };
     let value = |e: &Expression| if let Expression::Constant(v) = e { sign * v } else { 1.0 };
     let exact: Vec<f64> = task.actions.iter().map(|a| value(&a.cost)).collect();
@@ -292,5 +329,5 @@ fn costs(task: &GroundTask) -> (Vec<u32>, Vec<f64>) {
     let whole = exact.iter().all(|c| c.fract() == 0.0);
     let scale = if whole { 1.0 } else { COST_SCALE }.min(LARGEST_COST / largest.max(1.0));
     let costs = exact.iter().map(|c| (c * scale).round().clamp(0.0, LARGEST_COST) as u32).collect();
-    (costs, exact)
+    (costs, exact, scale)
 }

@@ -28,6 +28,8 @@ pub(crate) struct Strategy {
     pub bound: u32,
     /// Give up after this much work (see [`Relaxed::work`]).
     pub work_limit: u64,
+    /// Give up after this many evaluations.
+    pub evaluation_limit: u64,
 }
 
 /// How a search ended.
@@ -124,13 +126,15 @@ impl Search<'_, '_> {
         let mut round = 0u64;
         loop {
             round += 1;
-            if round % 64 == 0 && (self.shared.stop)() {
+            if round.is_multiple_of(64) && (self.shared.stop)() {
                 return End::Stopped;
             }
-            if round % 256 == 0 && self.bytes() > self.shared.memory_limit {
+            if round.is_multiple_of(256) && self.bytes() > self.shared.memory_limit {
                 return End::Memory;
             }
-            if self.work() > self.strategy.work_limit {
+            if self.work() > self.strategy.work_limit
+                || self.counts.evaluated >= self.strategy.evaluation_limit
+            {
                 return End::Limit;
             }
             let list = (0..4).filter(|&i| self.lists[i].len() > 0).min_by_key(|&i| self.lists[i].priority);
@@ -161,7 +165,7 @@ impl Search<'_, '_> {
         task.apply(operator, &state, &mut next);
         (self.state, self.next) = (next, state);
         let (id, new) = self.store.insert(&self.state, parent, operator, cost);
-        self.status.follow(self.shared.landmarks, task, (parent, operator, id), &self.state, new);
+        self.status.follow(self.shared.landmarks, task, (parent, id), &self.state, new);
         if !new && !self.again(id, parent, operator, cost) {
             return None;
         }
@@ -170,7 +174,8 @@ impl Search<'_, '_> {
 
     /// Whether a known state is to be visited: never expanded, or (weighted A*) reached more cheaply.
     fn again(&mut self, id: u32, parent: u32, operator: u32, cost: u32) -> bool {
-        if cost < self.store.cost(id) && self.strategy.weight.is_some() {
+        let reopens = self.strategy.weight.is_some() || self.strategy.bound != u32::MAX;
+        if cost < self.store.cost(id) && reopens {
             self.store.improve(id, parent, operator, cost);
             return true;
         }
@@ -232,12 +237,12 @@ impl Search<'_, '_> {
         };
         let keys = [key(estimate), key(left)];
         let lists = if self.strategy.landmarks { 2 } else { 1 };
-        for l in 0..lists {
+        for (pair, &key) in self.lists.chunks_exact_mut(2).zip(&keys).take(lists) {
             for &operator in &self.applicable {
-                self.lists[2 * l].push(keys[l], (id, operator));
+                pair[0].push(key, (id, operator));
             }
             for &operator in &self.preferred {
-                self.lists[2 * l + 1].push(keys[l], (id, operator));
+                pair[1].push(key, (id, operator));
             }
         }
     }
@@ -261,7 +266,7 @@ impl Search<'_, '_> {
                 if !new && self.strategy.weight.is_some() && cost < self.store.cost(next) {
                     self.store.improve(next, id, operator, cost);
                 }
-                self.status.follow(self.shared.landmarks, task, (id, operator, next), &self.state, new);
+                self.status.follow(self.shared.landmarks, task, (id, next), &self.state, new);
                 id = next;
                 fresh = (new || !self.store.is_expanded(id)).then_some(id);
             }

@@ -2,8 +2,10 @@
 
 pub(crate) mod classical;
 pub(crate) mod compiled;
+mod improve;
 pub(crate) mod lazy;
 mod lookahead;
+mod novelty;
 mod open;
 pub(crate) mod run;
 pub(crate) mod store;

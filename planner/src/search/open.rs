@@ -59,9 +59,4 @@ impl OpenList {
     pub(crate) fn len(&self) -> usize {
         self.len
     }
-
-    /// Removes all entries.
-    pub(crate) fn clear(&mut self) {
-        *self = OpenList::default();
-    }
 }

@@ -7,7 +7,9 @@ use crate::heuristics::relaxed::Counting;
 use crate::landmarks::Landmarks;
 
 use super::compiled::Compiled;
+use super::improve::Improve;
 use super::lazy::{Counts, End, Shared, Strategy, search};
+use super::novelty;
 use super::successor::Successors;
 
 /// How a classical task is to be solved.
@@ -26,8 +28,6 @@ pub(crate) struct ClassicalOptions {
 /// How it ended.
 #[derive(Clone, Debug)]
 pub(crate) struct ClassicalOutcome {
-    /// Indices of [`GroundTask::actions`], and the cost.
-    pub plan: Option<(Vec<u32>, f64)>,
     /// Why it ended.
     pub end: ClassicalEnd,
     /// States evaluated.
@@ -59,7 +59,7 @@ pub(crate) fn solve(
     let _span = debug_span!("classical").entered();
     let task = Compiled::new(ground);
     let successors = Successors::new(&task);
-    let landmarks = debug_span!("landmarks").in_scope(|| Landmarks::new(&task));
+    let landmarks = debug_span!("landmarks").in_scope(|| Landmarks::new(&task, &ground.mutex_groups));
     let shared = Shared {
         task: &task,
         successors: &successors,
@@ -67,26 +67,176 @@ pub(crate) fn solve(
         memory_limit: options.memory_limit_bytes.unwrap_or(usize::MAX),
         stop,
     };
-    let mut counts = Counts::default();
-    let strategy = Strategy {
-        weight: None,
-        counting: Counting::CostAndSteps,
-        lookahead: true,
-        landmarks: true,
-        bound: u32::MAX,
-        work_limit: u64::MAX,
-    };
-    let end = search(&shared, strategy, &mut counts);
-    let (plan, end) = match end {
-        End::Plan(plan) => {
-            let cost = task.plan_cost(&plan);
-            on_plan(&plan, cost);
-            (Some((plan, cost)), ClassicalEnd::Done)
+    let bound = options.bound.map_or(u32::MAX, |bound| task.scaled(bound));
+    let mut run =
+        Run { task: &task, shared: &shared, options, counts: Counts::default(), bound, best: None, on_plan };
+    let end = run.all();
+    tracing::debug!(landmarks = landmarks.len(), run.counts.evaluated, run.counts.work);
+    ClassicalOutcome { end, evaluated: run.counts.evaluated, expanded: run.counts.expanded }
+}
+
+/// Work that every plan is improved for, however small the task.
+const LEAST_WORK: u64 = 5_000_000;
+/// Further work for each operator.
+const WORK_PER_OPERATOR: u64 = 1500;
+/// Work of the first search before another is tried; later rounds get more.
+const FIRST_WORK: u64 = 60_000_000;
+/// How much more work each round of first searches gets.
+const ROUND_FACTOR: u64 = 3;
+/// Weights of the searches for better plans, one after another (Richter and Westphal 2010).
+const WEIGHTS: [u32; 4] = [5, 3, 2, 1];
+
+const GREEDY: Strategy = Strategy {
+    weight: None,
+    counting: Counting::CostAndSteps,
+    lookahead: true,
+    landmarks: true,
+    bound: u32::MAX,
+    work_limit: u64::MAX,
+    evaluation_limit: u64::MAX,
+};
+
+struct Run<'a, 's> {
+    task: &'a Compiled,
+    shared: &'s Shared<'a>,
+    options: &'s ClassicalOptions,
+    counts: Counts,
+    /// Only cheaper plans (in the search's costs) are of interest.
+    bound: u32,
+    best: Option<Vec<u32>>,
+    on_plan: &'s mut dyn FnMut(&[u32], f64),
+}
+
+impl Run<'_, '_> {
+    fn all(&mut self) -> ClassicalEnd {
+        let (plan, plain_too) = match self.first() {
+            Ok(found) => found,
+            Err(end) => return end,
+        };
+        let budget = LEAST_WORK + WORK_PER_OPERATOR * self.task.operators() as u64;
+        let mut plan = plan;
+        if plain_too {
+            let bound = self.bound.min(self.task.search_cost(&plan));
+            let strategy = Strategy { lookahead: false, bound, work_limit: budget / 2, ..GREEDY };
+            if let End::Plan(other) = self.search(strategy) {
+                plan = other;
+            }
         }
-        End::Exhausted => (None, ClassicalEnd::Exhausted),
-        End::Memory => (None, ClassicalEnd::Memory),
-        End::Limit | End::Stopped => (None, ClassicalEnd::Stopped),
-    };
-    tracing::debug!(landmarks = landmarks.len(), counts.evaluated, counts.work);
-    ClassicalOutcome { plan, end, evaluated: counts.evaluated, expanded: counts.expanded }
+        let first = if self.options.anytime { u64::MAX } else { budget };
+        self.improve(plan, first);
+        if self.limited() || (self.shared.stop)() {
+            return if self.options.anytime { ClassicalEnd::Stopped } else { ClassicalEnd::Done };
+        }
+        if self.options.anytime { self.anytime() } else { ClassicalEnd::Done }
+    }
+
+    /// The first plan, and whether a search without lookahead may still find a shorter one quickly.
+    fn first(&mut self) -> Result<(Vec<u32>, bool), ClassicalEnd> {
+        let mut work_limit = FIRST_WORK;
+        let mut turn = 0usize;
+        loop {
+            let strategy = Strategy { bound: self.bound, work_limit, ..GREEDY };
+            let end = match turn % 3 {
+                0 => self.search(strategy),
+                1 => novelty::search(self.shared, self.bound, work_limit, &mut self.counts),
+                _ => self.search(Strategy { lookahead: false, ..strategy }),
+            };
+            match end {
+                End::Plan(plan) => {
+                    return Ok((plan, turn == 0));
+                }
+                // With a bound, only a search that follows cheaper ways to known states proves anything.
+                End::Exhausted if turn % 3 == 2 || self.bound == u32::MAX => {
+                    return Err(ClassicalEnd::Exhausted);
+                }
+                End::Stopped => return Err(ClassicalEnd::Stopped),
+                // Another search may do with less.
+                End::Memory if turn >= 2 => return Err(ClassicalEnd::Memory),
+                End::Limit if self.limited() => return Err(ClassicalEnd::Stopped),
+                End::Memory | End::Limit | End::Exhausted => {}
+            }
+            turn += 1;
+            if turn.is_multiple_of(3) {
+                work_limit = work_limit.saturating_mul(ROUND_FACTOR);
+            }
+        }
+    }
+
+    fn limited(&self) -> bool {
+        self.options.evaluation_limit.is_some_and(|limit| self.counts.evaluated >= limit)
+    }
+
+    fn search(&mut self, strategy: Strategy) -> End {
+        let limit = self.options.evaluation_limit.unwrap_or(u64::MAX);
+        let evaluation_limit = limit.saturating_sub(self.counts.evaluated);
+        search(self.shared, Strategy { evaluation_limit, ..strategy }, &mut self.counts)
+    }
+
+    /// Improves a plan for so much work and takes it if it is the best so far.
+    fn improve(&mut self, mut plan: Vec<u32>, work: u64) {
+        let mut improve = Improve::new(self.task, self.shared.successors, self.shared.stop);
+        improve.evaluation_limit =
+            self.options.evaluation_limit.unwrap_or(u64::MAX).saturating_sub(self.counts.evaluated);
+        let anytime = self.options.anytime;
+        if anytime {
+            self.take(&plan);
+        }
+        improve.run(&mut plan, work, &mut |better| {
+            if anytime {
+                self.take(better);
+            }
+        });
+        self.counts.evaluated += improve.evaluated;
+        self.counts.work += improve.work();
+        self.take(&plan);
+    }
+
+    fn take(&mut self, plan: &[u32]) {
+        let cost = self.task.plan_cost(plan);
+        if self.best.as_ref().is_none_or(|best| cost < self.task.plan_cost(best)) {
+            self.bound = self.bound.min(self.task.search_cost(plan));
+            self.best = Some(plan.to_vec());
+            (self.on_plan)(plan, cost);
+        }
+    }
+
+    /// Searches with falling weights for plans below the bound, each improved, until there is none.
+    fn anytime(&mut self) -> ClassicalEnd {
+        let mut work_limit = FIRST_WORK * 4;
+        let mut turn = 0usize;
+        loop {
+            let weight = WEIGHTS[turn % WEIGHTS.len()];
+            let strategy = Strategy {
+                weight: Some(weight),
+                lookahead: turn % 2 == 1,
+                counting: if (turn / WEIGHTS.len()).is_multiple_of(2) {
+                    Counting::CostAndSteps
+                } else {
+                    Counting::CostThenSteps
+                },
+                bound: self.bound,
+                work_limit,
+                ..GREEDY
+            };
+            match self.search(strategy) {
+                End::Plan(plan) => {
+                    self.improve(plan, work_limit);
+                    continue;
+                }
+                End::Exhausted if !strategy.lookahead && self.task.has_exact_costs() => {
+                    return ClassicalEnd::Exhausted;
+                }
+                End::Exhausted if !strategy.lookahead => return ClassicalEnd::Done,
+                End::Stopped => return ClassicalEnd::Stopped,
+                End::Memory if turn > WEIGHTS.len() => return ClassicalEnd::Memory,
+                End::Limit if self.limited() => return ClassicalEnd::Stopped,
+                // A lookahead search keeps the first way to a state: it cannot prove that no cheaper plan exists.
+                End::Memory | End::Limit | End::Exhausted => {}
+            }
+            turn += 1;
+            if turn.is_multiple_of(WEIGHTS.len()) {
+                work_limit = work_limit.saturating_mul(2);
+            }
+        }
+    }
 }

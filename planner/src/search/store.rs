@@ -71,9 +71,18 @@ impl Store {
         }
     }
 
-    /// Number of states.
-    pub(crate) fn len(&self) -> usize {
-        self.parents.len()
+    /// Forgets all states.
+    pub(crate) fn clear(&mut self) {
+        if self.table.len() > 4096 {
+            self.table = vec![NO_STATE; 1024];
+        } else {
+            self.table.fill(NO_STATE);
+        }
+        self.packed.clear();
+        self.parents.clear();
+        self.operators.clear();
+        self.costs.clear();
+        self.expanded.clear();
     }
 
     /// Bytes taken, with what growth may take.
@@ -134,11 +143,6 @@ impl Store {
     /// Cost from the first state.
     pub(crate) fn cost(&self, id: u32) -> u32 {
         self.costs[id as usize]
-    }
-
-    /// The state before it, and the operator in between.
-    pub(crate) fn parent(&self, id: u32) -> (u32, u32) {
-        (self.parents[id as usize], self.operators[id as usize])
     }
 
     /// Gives a state a cheaper way to it.

@@ -87,9 +87,4 @@ impl Successors {
             node = self.nodes[at + 1];
         }
     }
-
-    /// Bytes taken.
-    pub(crate) fn bytes(&self) -> usize {
-        self.nodes.len() * 4
-    }
 }

@@ -1,0 +1,481 @@
+//! Making a plan cheaper: useless steps go, steps that belong together move together, and windows of the plan are
+//! planned again (in the spirit of Nakhost and Müller 2010 and of Siddiqui and Haslum 2015).
+
+use std::collections::BinaryHeap;
+
+use crate::heuristics::relaxed::{Counting, Relaxed};
+
+use super::compiled::{Compiled, Lists};
+use super::lookahead::Lookahead;
+use super::store::{NO_STATE, Store};
+use super::successor::Successors;
+
+/// Steps in the smallest windows.
+const SMALLEST_WINDOW: usize = 4;
+/// States evaluated for a window in the first round.
+const FIRST_EVALUATIONS: u32 = 12;
+/// How much the estimate of a state may overshoot before it is left out.
+const TRUST_PERCENT: u64 = 80;
+
+/// The work of improving one plan after another.
+pub(crate) struct Improve<'a> {
+    task: &'a Compiled,
+    successors: &'a Successors,
+    stop: &'a (dyn Fn() -> bool + Sync),
+    /// By variable: operators that write it.
+    writers: Lists<u32>,
+    /// By variable: written in the window at hand.
+    touched: Vec<bool>,
+    lookahead: Lookahead,
+    store: Store,
+    /// By operator: what improvement counts.
+    costs: Vec<u32>,
+    queue: BinaryHeap<std::cmp::Reverse<(u64, u32, u32, u32)>>,
+    state: Vec<u32>,
+    next: Vec<u32>,
+    applicable: Vec<u32>,
+    /// Evaluations made.
+    pub evaluated: u64,
+    /// Evaluations that may be made.
+    pub evaluation_limit: u64,
+    /// Work done besides the heuristic's.
+    work: u64,
+    work_limit: u64,
+}
+
+impl<'a> Improve<'a> {
+    /// For a task.
+    pub(crate) fn new(
+        task: &'a Compiled,
+        successors: &'a Successors,
+        stop: &'a (dyn Fn() -> bool + Sync),
+    ) -> Improve<'a> {
+        let counting = Counting::CostThenSteps;
+        Improve {
+            task,
+            successors,
+            stop,
+            writers: Lists::group(task.domains.len(), writes(task)),
+            touched: vec![false; task.domains.len()],
+            lookahead: Lookahead::new(task),
+            store: Store::new(task),
+            costs: (0..task.operators()).map(|op| counting.of(task, op)).collect(),
+            queue: BinaryHeap::new(),
+            state: Vec::new(),
+            next: Vec::new(),
+            applicable: Vec::new(),
+            evaluated: 0,
+            evaluation_limit: u64::MAX,
+            work: 0,
+            work_limit: 0,
+        }
+    }
+
+    /// What improvement counts for a plan.
+    pub(crate) fn cost(&self, plan: &[u32]) -> u64 {
+        plan.iter().map(|&op| u64::from(self.costs[op as usize])).sum()
+    }
+
+    /// Work done so far, comparable with that of a search.
+    pub(crate) fn work(&self) -> u64 {
+        self.work
+    }
+
+    /// Improves the plan in place until nothing helps any more, `work` more is done, or stopped. `on_better` hears of
+    /// every better plan.
+    pub(crate) fn run(&mut self, plan: &mut Vec<u32>, work: u64, on_better: &mut dyn FnMut(&[u32])) -> bool {
+        self.work_limit = self.work().saturating_add(work);
+        let mut best = self.cost(plan);
+        let mut tell = |this: &Self, plan: &[u32]| {
+            let cost = this.cost(plan);
+            if cost < best {
+                best = cost;
+                on_better(plan);
+            }
+        };
+        self.eliminate(plan);
+        tell(self, plan);
+        let mut evaluations = FIRST_EVALUATIONS;
+        let mut idle = 0;
+        let mut round = 0usize;
+        while idle < 6 && !self.over() {
+            let before = self.cost(plan);
+            if self.task.axiom_heads.is_empty() {
+                self.rearrange(plan, round);
+            }
+            let mut size = SMALLEST_WINDOW << (round % 2);
+            while size < plan.len() * 2 && !self.over() {
+                self.windows(plan, size, evaluations, round % 3 == 2);
+                tell(self, plan);
+                size *= 2;
+            }
+            self.eliminate(plan);
+            tell(self, plan);
+            let better = self.cost(plan) < before;
+            idle = if better { 0 } else { idle + 1 };
+            if !better {
+                evaluations = evaluations.saturating_mul(2);
+            }
+            round += 1;
+        }
+        !self.over()
+    }
+
+    fn over(&self) -> bool {
+        self.work() > self.work_limit || self.evaluated >= self.evaluation_limit || (self.stop)()
+    }
+
+    /// Removes a step, with all later ones that then lose a precondition, where the goal is still reached.
+    fn eliminate(&mut self, plan: &mut Vec<u32>) {
+        let task = self.task;
+        let mut state = task.initial.clone();
+        let mut i = 0;
+        while i < plan.len() && !self.over() {
+            self.next.clear();
+            self.next.extend_from_slice(&state);
+            let mut kept = Vec::with_capacity(plan.len());
+            let mut saved = u64::from(self.costs[plan[i] as usize]);
+            for &operator in &plan[i + 1..] {
+                if task.applicable(operator, &self.next) {
+                    task.advance(operator, &mut self.next);
+                    kept.push(operator);
+                } else {
+                    saved += u64::from(self.costs[operator as usize]);
+                }
+            }
+            self.work += (plan.len() - i) as u64 * 2 + state.len() as u64 / 4;
+            if task.is_goal(&self.next) && saved > 0 {
+                plan.truncate(i);
+                plan.extend(kept);
+            } else {
+                task.advance(plan[i], &mut state);
+                i += 1;
+            }
+        }
+    }
+
+    /// Puts steps that depend on each other next to each other. Every order that keeps steps apart that touch the same
+    /// variable, one of them writing, has the same effect.
+    fn rearrange(&mut self, plan: &mut Vec<u32>, round: usize) {
+        let reverse = round % 2 == 1;
+        let (mut after, mut waits) = dependencies(self.task, plan);
+        if reverse {
+            let mut before = vec![Vec::new(); plan.len()];
+            waits = vec![0; plan.len()];
+            for (i, list) in after.iter().enumerate() {
+                for &j in list {
+                    before[j as usize].push(i as u32);
+                }
+                waits[i] = list.len() as u32;
+            }
+            after = before;
+        }
+        self.work += plan.len() as u64 * 8;
+        let mut ready: Vec<u32> = (0..plan.len() as u32).filter(|&i| waits[i as usize] == 0).collect();
+        if !reverse {
+            ready.reverse();
+        }
+        let mut order = Vec::with_capacity(plan.len());
+        while let Some(i) = ready.pop() {
+            order.push(plan[i as usize]);
+            let mut freed: Vec<u32> = Vec::new();
+            for &j in &after[i as usize] {
+                waits[j as usize] -= 1;
+                if waits[j as usize] == 0 {
+                    freed.push(j);
+                }
+            }
+            freed.sort_unstable();
+            if !reverse {
+                freed.reverse();
+            }
+            ready.extend(freed);
+        }
+        if reverse {
+            order.reverse();
+        }
+        *plan = order;
+    }
+
+    /// Plans every window of this size again, each overlapping the one before by half.
+    fn windows(&mut self, plan: &mut Vec<u32>, size: usize, evaluations: u32, all: bool) {
+        let task = self.task;
+        let mut needs = Needs::new(task, plan);
+        let mut state = task.initial.clone();
+        let mut at = 0;
+        let mut start = 0;
+        while start + 1 < plan.len() && !self.over() {
+            while at < start {
+                task.advance(plan[at], &mut state);
+                at += 1;
+            }
+            let end = (start + size).min(plan.len());
+            let goal = needs.at(task, plan, end);
+            if let Some(better) = self.replan(&state, &goal, &plan[start..end], evaluations, all) {
+                plan.splice(start..end, better);
+                needs = Needs::new(task, plan);
+                continue;
+            }
+            start += (size / 2).max(1);
+        }
+    }
+
+    /// A way from the state to the goal facts that costs less than `budget`, if a short search finds one.
+    fn replan(
+        &mut self,
+        from: &[u32],
+        goal: &[u32],
+        window: &[u32],
+        evaluations: u32,
+        all: bool,
+    ) -> Option<Vec<u32>> {
+        let task = self.task;
+        let budget = self.cost(window);
+        let mut relaxed = self.restricted(window, goal);
+        self.store.clear();
+        self.queue.clear();
+        self.state.clear();
+        self.state.extend_from_slice(from);
+        let (first, _) = self.store.insert(from, NO_STATE, 0, 0);
+        let mut best: Option<(u64, Vec<u32>)> = None;
+        let mut left = evaluations;
+        let mut pending = Some(first);
+        let mut sequence = 0u32;
+        loop {
+            let id = match pending.take() {
+                Some(id) => id,
+                None => {
+                    let Some(std::cmp::Reverse((_, _, parent, operator))) = self.queue.pop() else { break };
+                    let Some(id) = self.child(parent, operator, best.as_ref().map_or(budget, |b| b.0)) else {
+                        continue;
+                    };
+                    id
+                }
+            };
+            let bound = best.as_ref().map_or(budget, |b| b.0);
+            let cost = u64::from(self.store.cost(id));
+            if goal.iter().all(|&f| task.holds(f, &self.state)) {
+                if cost < bound {
+                    best = Some((cost, self.store.plan_to(id)));
+                }
+                continue;
+            }
+            if left == 0 {
+                break;
+            }
+            left -= 1;
+            self.evaluated += 1;
+            self.store.set_expanded(id, true);
+            let Some(estimate) = relaxed.evaluate(task, &self.state) else { continue };
+            if cost + u64::from(estimate) * TRUST_PERCENT / 100 >= bound {
+                continue;
+            }
+            self.expand(&relaxed, id, cost, u64::from(estimate), all, &mut sequence);
+            self.try_lookahead(&relaxed, id, goal, &mut best, bound);
+        }
+        self.work += relaxed.work;
+        best.map(|(_, plan)| plan)
+    }
+
+    /// The heuristic over the operators that write only what the window writes.
+    fn restricted(&mut self, window: &[u32], goal: &[u32]) -> Relaxed {
+        let task = self.task;
+        self.touched.fill(false);
+        let mut variables: Vec<u32> = window
+            .iter()
+            .flat_map(|&op| task.effects.get(op as usize).iter().map(|e| e.fact.variable))
+            .collect();
+        variables.sort_unstable();
+        variables.dedup();
+        variables.iter().for_each(|&v| self.touched[v as usize] = true);
+        let mut operators = Vec::new();
+        for &variable in &variables {
+            let writers = self.writers.get(variable as usize);
+            self.work += writers.len() as u64;
+            // An operator is taken with the first variable that it writes.
+            operators.extend(writers.iter().filter(|&&op| {
+                let first = task.effects.get(op as usize).iter().map(|e| e.fact.variable).min();
+                first == Some(variable) && writes_only(task, op, &self.touched)
+            }));
+        }
+        operators.sort_unstable();
+        self.work += operators.len() as u64 * 4 + task.facts as u64 / 4;
+        Relaxed::with(task, Counting::CostThenSteps, operators, goal.to_vec())
+    }
+
+    fn child(&mut self, parent: u32, operator: u32, bound: u64) -> Option<u32> {
+        let task = self.task;
+        let cost = self.store.cost(parent).saturating_add(self.costs[operator as usize]);
+        if u64::from(cost) >= bound {
+            return None;
+        }
+        let mut before = std::mem::take(&mut self.next);
+        self.store.load(task, parent, &mut before);
+        task.apply(operator, &before, &mut self.state);
+        self.next = before;
+        self.work += 20 + self.state.len() as u64 / 4;
+        let (id, new) = self.store.insert(&self.state, parent, operator, cost);
+        if new {
+            return Some(id);
+        }
+        if cost < self.store.cost(id) {
+            self.store.improve(id, parent, operator, cost);
+            return Some(id);
+        }
+        None
+    }
+
+    fn expand(
+        &mut self,
+        relaxed: &Relaxed,
+        id: u32,
+        cost: u64,
+        estimate: u64,
+        all: bool,
+        sequence: &mut u32,
+    ) {
+        self.applicable.clear();
+        if all {
+            self.successors.applicable(&self.state, &mut self.applicable);
+            let (task, touched) = (self.task, &self.touched);
+            self.applicable.retain(|&op| writes_only(task, op, touched));
+        }
+        for &operator in relaxed.preferred.iter() {
+            *sequence += 1;
+            let key = cost + estimate;
+            self.queue.push(std::cmp::Reverse((key, *sequence, id, operator)));
+        }
+        for &operator in &self.applicable {
+            *sequence += 1;
+            let key = cost + estimate + u64::from(self.costs[operator as usize]);
+            self.queue.push(std::cmp::Reverse((key, *sequence, id, operator)));
+        }
+    }
+
+    /// Follows the relaxed plan as far as it can be applied; a goal on its way that is cheap enough is taken.
+    fn try_lookahead(
+        &mut self,
+        relaxed: &Relaxed,
+        id: u32,
+        goal: &[u32],
+        best: &mut Option<(u64, Vec<u32>)>,
+        bound: u64,
+    ) {
+        let task = self.task;
+        self.lookahead.run(task, &self.state, &relaxed.plan);
+        let steps = std::mem::take(&mut self.lookahead.plan);
+        let mut cost = u64::from(self.store.cost(id));
+        for (count, &operator) in steps.iter().enumerate() {
+            cost += u64::from(self.costs[operator as usize]);
+            if cost >= bound {
+                break;
+            }
+            task.advance(operator, &mut self.state);
+            if goal.iter().all(|&f| task.holds(f, &self.state)) {
+                let mut plan = self.store.plan_to(id);
+                plan.extend_from_slice(&steps[..=count]);
+                *best = Some((cost, plan));
+                break;
+            }
+        }
+        self.work += steps.len() as u64 * (4 + goal.len() as u64 / 4);
+        self.lookahead.plan = steps;
+    }
+}
+
+/// Pairs of variable and operator that writes it.
+fn writes(task: &Compiled) -> impl Iterator<Item = (u32, u32)> + Clone + '_ {
+    (0..task.operators() as u32).flat_map(move |op| {
+        let mut variables: Vec<u32> = task.effects.get(op as usize).iter().map(|e| e.fact.variable).collect();
+        variables.sort_unstable();
+        variables.dedup();
+        variables.into_iter().map(move |v| (v, op))
+    })
+}
+
+fn writes_only(task: &Compiled, operator: u32, touched: &[bool]) -> bool {
+    task.effects.get(operator as usize).iter().all(|e| touched[e.fact.variable as usize])
+}
+
+/// For each step: the later steps that must stay behind it; and how many steps each waits for.
+fn dependencies(task: &Compiled, plan: &[u32]) -> (Vec<Vec<u32>>, Vec<u32>) {
+    let mut after: Vec<Vec<u32>> = vec![Vec::new(); plan.len()];
+    let mut waits = vec![0u32; plan.len()];
+    let variables = task.domains.len();
+    let mut writer: Vec<u32> = vec![u32::MAX; variables];
+    let mut readers: Vec<Vec<u32>> = vec![Vec::new(); variables];
+    for (step, &operator) in plan.iter().enumerate() {
+        let step = step as u32;
+        let mut before: Vec<u32> = Vec::new();
+        let effects = task.effects.get(operator as usize);
+        let conditions = effects.iter().flat_map(|e| &task.conditions[e.from as usize..e.to as usize]);
+        let reads = task.preconditions.get(operator as usize).iter().chain(conditions);
+        for variable in reads.map(|f| f.variable as usize) {
+            before.push(writer[variable]);
+            readers[variable].push(step);
+        }
+        for variable in effects.iter().map(|e| e.fact.variable as usize) {
+            before.push(writer[variable]);
+            before.append(&mut readers[variable]);
+            writer[variable] = step;
+        }
+        before.sort_unstable();
+        before.dedup();
+        for &earlier in before.iter().filter(|&&b| b != u32::MAX && b != step) {
+            after[earlier as usize].push(step);
+            waits[step as usize] += 1;
+        }
+    }
+    (after, waits)
+}
+
+/// What the rest of a plan needs at each of its steps.
+struct Needs {
+    /// By variable: steps at which a value is needed, with the value, or written (`u32::MAX`); rising.
+    events: Vec<Vec<(u32, u32)>>,
+}
+
+impl Needs {
+    fn new(task: &Compiled, plan: &[u32]) -> Needs {
+        let mut events: Vec<Vec<(u32, u32)>> = vec![Vec::new(); task.domains.len()];
+        let simple = task.axiom_heads.is_empty() && task.conditions.is_empty();
+        if !simple {
+            return Needs { events: Vec::new() };
+        }
+        for (step, &operator) in plan.iter().enumerate() {
+            for fact in task.preconditions.get(operator as usize) {
+                events[fact.variable as usize].push((step as u32, fact.value));
+            }
+            for effect in task.effects.get(operator as usize) {
+                let list = &mut events[effect.fact.variable as usize];
+                if list.last().is_none_or(|last| last.0 < step as u32) {
+                    list.push((step as u32, u32::MAX));
+                }
+            }
+        }
+        for fact in &task.goal {
+            events[fact.variable as usize].push((plan.len() as u32, fact.value));
+        }
+        Needs { events }
+    }
+
+    /// Facts that must hold before step `end`. Where conditional effects or axioms make this hard to tell, the whole
+    /// state of the plan at that point.
+    fn at(&self, task: &Compiled, plan: &[u32], end: usize) -> Vec<u32> {
+        if self.events.is_empty() {
+            if end == plan.len() {
+                return task.goal.iter().map(|&f| task.id(f)).collect();
+            }
+            let mut state = task.initial.clone();
+            plan[..end].iter().for_each(|&op| task.advance(op, &mut state));
+            return (0..task.basic).map(|v| task.offsets[v] + state[v]).collect();
+        }
+        let needed = |list: &Vec<(u32, u32)>| {
+            let next = list.partition_point(|&(step, _)| (step as usize) < end);
+            list.get(next).map(|&(_, value)| value).filter(|&value| value != u32::MAX)
+        };
+        (0..self.events.len())
+            .filter_map(|v| needed(&self.events[v]).map(|value| task.offsets[v] + value))
+            .collect()
+    }
+}

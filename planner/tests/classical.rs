@@ -1,0 +1,159 @@
+//! Classical planning from text to a validated plan: small domains of our own, and (slow) the competition's.
+
+use std::path::Path;
+
+use descry_planner::{Attachments, Options, Outcome, Source, Task, plan, validate};
+
+/// What must come out.
+enum Expect {
+    /// A plan whose cost is at most this.
+    CostAtMost(f64),
+    /// A plan that is proven best, of this cost.
+    Best(f64),
+    /// Proven to have no plan.
+    Unsolvable,
+}
+
+fn source(name: &str, text: &str) -> Source {
+    Source { name: name.into(), text: text.into() }
+}
+
+fn check(domain: &str, problem: &str, expect: Expect) {
+    let task = Task::read(&source("domain", domain), &source("problem", problem));
+    let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
+    let attachments = Attachments::default();
+    let options = Options { anytime: matches!(expect, Expect::Best(_)), ..Options::default() };
+    let run =
+        || plan(&task, &attachments, &options, &|| false, &mut |_| {}).expect("no attachment, no refusal");
+    let outcome = run();
+    assert_eq!(outcome.plan(), run().plan(), "the same task twice");
+    match (expect, &outcome) {
+        (Expect::Unsolvable, Outcome::Unsolvable { .. }) => return,
+        (Expect::CostAtMost(most), Outcome::Solved { plan, .. }) => {
+            let cost = validate(&task, &attachments, plan).cost.unwrap_or(plan.steps.len() as f64);
+            assert!(cost <= most, "cost {cost} above {most}: {plan:?}");
+        }
+        (Expect::Best(cost), Outcome::Solved { plan, statistics }) => {
+            assert!(statistics.optimal);
+            assert_eq!(validate(&task, &attachments, plan).cost.unwrap_or(plan.steps.len() as f64), cost);
+        }
+        (_, other) => panic!("unexpected outcome {other:?}"),
+    }
+    let plan = outcome.plan().expect("solved");
+    let verdict = validate(&task, &attachments, plan);
+    assert!(verdict.valid, "{verdict:?}");
+}
+
+const SHUTTLE: &str = "(define (domain shuttle) (:requirements :typing :action-costs)
+  (:types place box)
+  (:predicates (at ?p - place) (in ?b - box) (box-at ?b - box ?p - place) (road ?a ?b - place) (free))
+  (:functions (total-cost) (length ?a ?b - place))
+  (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (road ?a ?b))
+    :effect (and (not (at ?a)) (at ?b) (increase (total-cost) (length ?a ?b))))
+  (:action take :parameters (?b - box ?p - place) :precondition (and (at ?p) (box-at ?b ?p) (free))
+    :effect (and (in ?b) (not (free)) (not (box-at ?b ?p)) (increase (total-cost) 1)))
+  (:action put :parameters (?b - box ?p - place) :precondition (and (at ?p) (in ?b))
+    :effect (and (not (in ?b)) (free) (box-at ?b ?p) (increase (total-cost) 1))))";
+
+const SHUTTLE_PROBLEM: &str = "(define (problem p) (:domain shuttle) (:objects a b c - place x y - box)
+  (:init (at a) (free) (box-at x a) (box-at y c) (road a b) (road b a) (road b c) (road c b) (road a c)
+    (= (total-cost) 0) (= (length a b) 1) (= (length b a) 1) (= (length b c) 2) (= (length c b) 2) (= (length a c) 9))
+  (:goal (and (box-at x c) (box-at y a))) (:metric minimize (total-cost)))";
+
+#[test]
+fn costs_are_minimised() {
+    check(SHUTTLE, SHUTTLE_PROBLEM, Expect::CostAtMost(10.0));
+    check(SHUTTLE, SHUTTLE_PROBLEM, Expect::Best(10.0));
+}
+
+#[test]
+fn a_goal_that_nothing_reaches_is_unsolvable() {
+    check(SHUTTLE, &SHUTTLE_PROBLEM.replace("(road b c)", ""), Expect::CostAtMost(99.0));
+    check(SHUTTLE, &SHUTTLE_PROBLEM.replace("(road c b)", ""), Expect::Unsolvable);
+}
+
+#[test]
+fn a_dead_end_that_only_search_shows_is_unsolvable() {
+    let domain = "(define (domain keys) (:predicates (key) (left) (right))
+      (:action open-left :parameters () :precondition (key) :effect (and (left) (not (key))))
+      (:action open-right :parameters () :precondition (key) :effect (and (right) (not (key)))))";
+    let problem = "(define (problem p) (:domain keys) (:init (key)) (:goal (and (left) (right))))";
+    check(domain, problem, Expect::Unsolvable);
+}
+
+#[test]
+fn conditional_effects_quantifiers_disjunctions_and_negations() {
+    let domain = "(define (domain lamps) (:requirements :adl)
+      (:types lamp) (:predicates (on ?l - lamp) (next ?a ?b - lamp) (inverted))
+      (:action press :parameters (?l - lamp)
+        :precondition (or (on ?l) (exists (?n - lamp) (and (next ?n ?l) (on ?n))) (not (inverted)))
+        :effect (and (when (on ?l) (not (on ?l))) (when (not (on ?l)) (on ?l))
+          (forall (?n - lamp) (when (next ?l ?n) (on ?n)))))
+      (:action invert :parameters () :precondition (forall (?l - lamp) (imply (on ?l) (not (inverted))))
+        :effect (inverted)))";
+    let problem = "(define (problem p) (:domain lamps) (:objects a b c d - lamp)
+      (:init (next a b) (next b c) (next c d)) (:goal (and (forall (?l - lamp) (on ?l)) (inverted))))";
+    check(domain, problem, Expect::CostAtMost(6.0));
+}
+
+#[test]
+fn derived_predicates_with_negation() {
+    let domain = "(define (domain net) (:requirements :typing :derived-predicates :adl)
+      (:types node) (:predicates (link ?a ?b - node) (up ?n - node) (fed ?n - node) (source ?n - node) (dark ?n - node))
+      (:derived (fed ?n - node) (or (source ?n) (exists (?m - node) (and (fed ?m) (up ?m) (link ?m ?n)))))
+      (:derived (dark ?n - node) (not (fed ?n)))
+      (:action switch-on :parameters (?n - node) :precondition (and (fed ?n) (not (up ?n))) :effect (up ?n))
+      (:action switch-off :parameters (?n - node) :precondition (up ?n) :effect (not (up ?n))))";
+    let problem = "(define (problem p) (:domain net) (:objects a b c d - node)
+      (:init (source a) (link a b) (link b c) (link a d) (up c)) (:goal (and (fed c) (not (up c)))))";
+    check(domain, problem, Expect::Best(3.0));
+    check(domain, &problem.replace("(and (fed c) (not (up c)))", "(and (up b) (dark d))"), Expect::Best(4.0));
+}
+
+#[test]
+fn object_fluents() {
+    let domain = "(define (domain tow) (:requirements :typing :object-fluents :negative-preconditions)
+      (:types place robot) (:predicates (road ?a ?b - place)) (:functions (where ?r - robot) - place)
+      (:action go :parameters (?r - robot ?to - place) :precondition (road (where ?r) ?to)
+        :effect (assign (where ?r) ?to))
+      (:action follow :parameters (?r ?s - robot) :precondition (not (= (where ?r) (where ?s)))
+        :effect (assign (where ?r) (where ?s))))";
+    let problem = "(define (problem p) (:domain tow) (:objects a b c d - place r s - robot)
+      (:init (= (where r) a) (= (where s) d) (road a b) (road b c) (road c d))
+      (:goal (and (= (where r) d) (= (where s) d))))";
+    check(domain, problem, Expect::Best(1.0));
+}
+
+/// Every classical task of the competition files, with a limit on evaluated states.
+#[test]
+#[ignore = "minutes"]
+fn competition_tasks() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/pddl/classical");
+    let Ok(folders) = std::fs::read_dir(&root) else {
+        println!("skipped: no {}", root.display());
+        return;
+    };
+    let mut solved = 0;
+    let mut folders: Vec<_> = folders.flatten().map(|f| f.path()).collect();
+    folders.sort();
+    for folder in folders {
+        for size in ["S", "M", "L"] {
+            let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("readable");
+            let (domain, problem) = (read("domain.pddl"), read(&format!("{size}.pddl")));
+            let task = Task::read(&source("domain", &domain), &source("problem", &problem));
+            let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
+            let attachments = Attachments::default();
+            let options = Options { evaluation_limit: Some(100_000), ..Options::default() };
+            let outcome = plan(&task, &attachments, &options, &|| false, &mut |_| {}).expect("no refusal");
+            let Some(plan) = outcome.plan() else {
+                println!("{} {size}: no plan", folder.display());
+                continue;
+            };
+            let verdict = validate(&task, &attachments, plan);
+            assert!(verdict.valid, "{} {size}: {verdict:?}", folder.display());
+            println!("{} {size}: cost {:?}", folder.display(), verdict.cost);
+            solved += 1;
+        }
+    }
+    assert!(solved >= 33, "{solved} solved");
+}

@@ -5,10 +5,11 @@ use rustc_hash::FxHashMap;
 use crate::task::Task;
 
 use super::build::Groups;
-use super::instantiate::{Deed, GroundEffect, Instantiate, RawCall, RawPlace, holds};
+use super::instantiate::{Deed, GroundEffect, Instantiate, RawCall, RawPlace};
 use super::raw::{RawAction, RawTask};
 use super::relaxed::Reached;
 use super::relevant::{Relevant, reads};
+use super::statics::holds;
 use super::task::{
     Action, Axiom, Call, Comparison, Conjunction, DurationBound, DurativeAction, Effect, Expression, Fact,
     GroundTask, Meaning, Metric, NumericFluent, Origin, Outcome, Place, TimedEffect, Values, Variable,

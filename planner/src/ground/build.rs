@@ -8,7 +8,7 @@ use crate::task::{GroundChange, Task};
 
 use super::assemble::assemble;
 use super::atoms::{Atoms, NONE};
-use super::instantiate::{Clauses, Deed, Instantiate, Statics};
+use super::instantiate::{Clauses, Deed, Instantiate};
 use super::metric;
 use super::normal::{self, Action_, Change_, Effect_, Formula, Normal, Number, Target};
 use super::raw::{Later, RawAction, RawAxiom, RawTask, Resolve};
@@ -16,6 +16,7 @@ use super::reach::Reach;
 use super::relaxed;
 use super::relevant::{self, Relevant};
 use super::rules::{self, Rules};
+use super::statics::{self, Statics};
 use super::task::{DurationBound, Expression, GroundTask, NumericFluent};
 
 /// Why a task was not grounded.
@@ -376,7 +377,7 @@ fn later(
         .iter()
         .map(|(at_end, comparison, number)| DurationBound {
             at_end: *at_end,
-            relation: super::instantiate::relation(*comparison, true),
+            relation: statics::relation(*comparison, true),
             seconds: make.expression(number, binding),
         })
         .collect();

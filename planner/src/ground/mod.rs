@@ -11,6 +11,7 @@ mod reach;
 mod relaxed;
 mod relevant;
 mod rules;
+mod statics;
 mod task;
 mod variables;
 

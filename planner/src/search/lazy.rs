@@ -22,6 +22,8 @@ pub(crate) struct Strategy {
     pub counting: Counting,
     /// Whether to try lookahead states.
     pub lookahead: bool,
+    /// Whether the newest of equally good states comes first instead of the oldest.
+    pub newest: bool,
     /// Whether the number of landmarks left orders open lists of its own.
     pub landmarks: bool,
     /// Only plans cheaper than this (in the search's costs) are of interest.
@@ -140,7 +142,7 @@ impl Search<'_, '_> {
             let list = (0..4).filter(|&i| self.lists[i].len() > 0).min_by_key(|&i| self.lists[i].priority);
             let Some(list) = list else { return End::Exhausted };
             self.lists[list].priority += 1;
-            let Some((parent, operator)) = self.lists[list].pop() else { continue };
+            let Some((parent, operator)) = self.lists[list].pop(self.strategy.newest) else { continue };
             if let Some(plan) = self.follow(parent, operator) {
                 return End::Plan(plan);
             }

@@ -138,7 +138,7 @@ impl Search<'_, '_> {
         let mut next = Vec::new();
         let mut applicable = Vec::new();
         let mut round = 0u64;
-        while let Some((id, _)) = self.open.pop() {
+        while let Some((id, _)) = self.open.pop(false) {
             round += 1;
             if round.is_multiple_of(64) && (self.shared.stop)() {
                 return End::Stopped;

@@ -1,4 +1,4 @@
-//! Open lists: entries by rising key, first in first out among equal keys.
+//! Open lists: entries by rising key, by age among equal keys.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -35,20 +35,22 @@ impl OpenList {
         self.lowest = self.lowest.min(bucket);
     }
 
-    /// Takes the first entry with the least key.
-    pub(crate) fn pop(&mut self) -> Option<Entry> {
+    /// Takes an entry with the least key: the first one that came, or (`newest`) the last.
+    pub(crate) fn pop(&mut self, newest: bool) -> Option<Entry> {
+        let take =
+            |entries: &mut VecDeque<Entry>| if newest { entries.pop_back() } else { entries.pop_front() };
         if self.len == 0 {
             return None;
         }
         self.len -= 1;
         while self.lowest < self.buckets.len() {
-            if let Some(entry) = self.buckets[self.lowest].pop_front() {
+            if let Some(entry) = take(&mut self.buckets[self.lowest]) {
                 return Some(entry);
             }
             self.lowest += 1;
         }
         let mut first = self.beyond.first_entry()?;
-        let entry = first.get_mut().pop_front();
+        let entry = take(first.get_mut());
         if first.get().is_empty() {
             first.remove();
         }

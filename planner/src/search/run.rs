@@ -90,6 +90,7 @@ const GREEDY: Strategy = Strategy {
     weight: None,
     counting: Counting::CostAndSteps,
     lookahead: true,
+    newest: false,
     landmarks: true,
     bound: u32::MAX,
     work_limit: u64::MAX,
@@ -135,7 +136,8 @@ impl Run<'_, '_> {
         let mut work_limit = FIRST_WORK;
         let mut turn = 0usize;
         loop {
-            let strategy = Strategy { bound: self.bound, work_limit, ..GREEDY };
+            let newest = turn / 3 % 2 == 1;
+            let strategy = Strategy { bound: self.bound, work_limit, newest, ..GREEDY };
             let end = match turn % 3 {
                 0 => self.search(strategy),
                 1 => novelty::search(self.shared, self.bound, work_limit, &mut self.counts),

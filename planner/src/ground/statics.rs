@@ -1,0 +1,130 @@
+//! What no action changes: evaluated away while grounding.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use crate::task::{Comparison as Compare, ObjectId, Task};
+
+use super::atoms::{Atoms, NONE};
+use super::normal::{Formula, Named, Number, Pattern};
+use super::reach::Possible;
+use super::task::Relation;
+
+/// What does not change in any state.
+pub(super) struct Statics<'a> {
+    pub task: &'a Task,
+    /// By predicate (object functions after them): whether its atoms change.
+    pub fluent: Vec<bool>,
+    /// By function: whether some effect writes its numbers.
+    pub written: Vec<bool>,
+    /// The initial numbers.
+    pub numbers: FxHashMap<(u32, Box<[u32]>), f64>,
+}
+
+impl Statics<'_> {
+    /// The number of a function that nothing writes, NaN where it has none.
+    pub(super) fn number(&self, named: &Named, binding: &[u32]) -> f64 {
+        let arguments: Box<[u32]> = named.terms.iter().map(|t| t.bound(binding)).collect();
+        self.numbers.get(&(named.index, arguments)).copied().unwrap_or(f64::NAN)
+    }
+
+    /// The value where everything is static.
+    pub(super) fn constant(&self, number: &Number, binding: &[u32]) -> Option<f64> {
+        Some(match number {
+            Number::Constant(value) => *value,
+            Number::Fluent(named) if !self.written[named.index as usize] => self.number(named, binding),
+            Number::Sum(parts) => {
+                parts.iter().map(|p| self.constant(p, binding)).try_fold(0.0, |s, p| Some(s + p?))?
+            }
+            Number::Product(parts) => {
+                parts.iter().map(|p| self.constant(p, binding)).try_fold(1.0, |s, p| Some(s * p?))?
+            }
+            Number::Difference(pair) => {
+                self.constant(&pair[0], binding)? - self.constant(&pair[1], binding)?
+            }
+            Number::Quotient(pair) => self.constant(&pair[0], binding)? / self.constant(&pair[1], binding)?,
+            Number::Negative(inner) => -self.constant(inner, binding)?,
+            _ => return None,
+        })
+    }
+}
+
+/// Whether the comparison holds; never where a side is NaN.
+pub(super) fn holds(relation: Relation, left: f64, right: f64) -> bool {
+    match relation {
+        Relation::Less => left < right,
+        Relation::AtMost => left <= right,
+        Relation::Equal => left == right,
+        Relation::AtLeast => left >= right,
+        Relation::Greater => left > right,
+        Relation::Unequal => left != right && !left.is_nan() && !right.is_nan(),
+    }
+}
+
+pub(super) fn relation(comparison: Compare, wanted: bool) -> Relation {
+    match (comparison, wanted) {
+        (Compare::Less, true) | (Compare::GreaterOrEqual, false) => Relation::Less,
+        (Compare::LessOrEqual, true) | (Compare::Greater, false) => Relation::AtMost,
+        (Compare::Equal, true) => Relation::Equal,
+        (Compare::Equal, false) => Relation::Unequal,
+        (Compare::GreaterOrEqual, true) | (Compare::Less, false) => Relation::AtLeast,
+        (Compare::Greater, true) | (Compare::LessOrEqual, false) => Relation::Greater,
+    }
+}
+
+impl Possible for &Statics<'_> {
+    fn possible(
+        &self,
+        atoms: &Atoms,
+        formula: &Formula,
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+    ) -> bool {
+        match formula {
+            Formula::And(parts) => parts.iter().all(|p| self.possible(atoms, p, binding, domains)),
+            Formula::Or(parts) => parts.iter().any(|p| self.possible(atoms, p, binding, domains)),
+            Formula::Literal(pattern, wanted) => {
+                self.fluent[pattern.predicate as usize] || found(atoms, pattern, binding).is_some() == *wanted
+            }
+            Formula::Same(a, b, wanted) => (a.bound(binding) == b.bound(binding)) == *wanted,
+            Formula::Compare(comparison, left, right, wanted) => {
+                match (self.constant(left, binding), self.constant(right, binding)) {
+                    (Some(left), Some(right)) => holds(relation(*comparison, *wanted), left, right),
+                    _ => true,
+                }
+            }
+            Formula::Call(..) => true,
+            Formula::Forall(slots, body) => {
+                each(slots, binding, domains, &mut |binding| self.possible(atoms, body, binding, domains))
+            }
+            Formula::Exists(slots, body) => {
+                !each(slots, binding, domains, &mut |binding| !self.possible(atoms, body, binding, domains))
+            }
+        }
+    }
+}
+
+/// Whether the test holds for every combination of objects of the slots.
+pub(super) fn each(
+    slots: &[u32],
+    binding: &mut Vec<u32>,
+    domains: &[Arc<[ObjectId]>],
+    test: &mut dyn FnMut(&mut Vec<u32>) -> bool,
+) -> bool {
+    let Some((&slot, rest)) = slots.split_first() else {
+        return test(binding);
+    };
+    domains[slot as usize].iter().all(|object| {
+        binding[slot as usize] = object.0;
+        each(rest, binding, domains, test)
+    })
+}
+
+pub(super) fn found(atoms: &Atoms, pattern: &Pattern, binding: &[u32]) -> Option<u32> {
+    let mut arguments = [NONE; 32];
+    for (out, term) in arguments.iter_mut().zip(&pattern.terms) {
+        *out = term.bound(binding);
+    }
+    atoms.find(pattern.predicate, &arguments[..pattern.terms.len()])
+}

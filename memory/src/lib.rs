@@ -4,6 +4,7 @@ pub mod belief;
 mod clouds;
 mod document;
 mod error;
+mod export;
 mod flusher;
 mod foxglove;
 mod record;
@@ -17,6 +18,7 @@ pub use document::{
     Blob, BlobInfo, Bounds, Document, Draft, Form, Meta, Near, Order, Query, RecordId, Sighting,
 };
 pub use error::Error;
+pub use export::{Exported, export};
 pub use foxglove::LogLevel;
 pub use nalgebra;
 pub use record::{Image, Options, Record, kind};

@@ -483,12 +483,32 @@ impl Record {
         self.store.pin(ids, by)
     }
 
+    /// Pins these records, and no others, in the name of `by`: what it cites now, in place of what it cited before.
+    ///
+    /// # Errors
+    /// [`Error::Missing`] if one is not there; then what it held before stays pinned.
+    pub fn hold(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
+        for id in ids {
+            self.store.get(*id)?;
+        }
+        self.store.unpin(by)?;
+        if ids.is_empty() { Ok(()) } else { self.store.pin(ids, by) }
+    }
+
     /// Takes back every pin in the name of `by`.
     ///
     /// # Errors
     /// If the store cannot be written.
     pub fn unpin(&self, by: &str) -> Result<(), Error> {
         self.store.unpin(by)
+    }
+
+    /// Writes what a query finds, in the order of time, into one MCAP file.
+    ///
+    /// # Errors
+    /// As [`crate::export`].
+    pub fn export(&self, query: &Query, path: &Path) -> Result<crate::Exported, Error> {
+        crate::export::export(&*self.store, query, path)
     }
 
     /// Reads every record and says what is whole.

@@ -1,4 +1,4 @@
-//! Where records are kept: one interface, a local store and (feature `mongodb`) a shared one.
+//! Where records are kept: one interface, and the store on this machine's disk.
 
 pub mod local;
 

@@ -190,6 +190,48 @@ fn segments_are_mcap_to_another_reader() {
     }
 }
 
+#[test]
+fn everything_goes_into_one_file_in_the_order_of_time() {
+    let dir = tempfile::tempdir().unwrap();
+    let record = one_of_each(&dir.path().join("record"));
+    let all = dir.path().join("all.mcap");
+    let exported = record.export(&Query::default(), &all).unwrap();
+    assert_eq!(exported.records, record.stats().unwrap().records);
+    let bytes = std::fs::read(&all).unwrap();
+    assert_eq!(exported.bytes, bytes.len() as u64);
+    let summary = mcap::Summary::read(&bytes).unwrap().expect("a summary");
+    let times: Vec<u64> = mcap::MessageStream::new(&bytes).unwrap().map(|m| m.unwrap().log_time).collect();
+    assert!(times.is_sorted());
+    assert_eq!(summary.stats.unwrap().message_count, times.len() as u64);
+    // Clouds are the same bytes as in the record.
+    let clouds: Vec<Vec<u8>> = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(Result::unwrap)
+        .filter(|m| m.channel.topic == "/cloud/side")
+        .map(|m| m.data.into_owned())
+        .collect();
+    let side = Query { frame: Some("side".into()), ..Query::of_kind(kind::CLOUD) };
+    for (message, document) in clouds.iter().zip(record.find(&side).unwrap()) {
+        assert!(message.ends_with(&record.store().blob(document.id, "cloud").unwrap()));
+    }
+    assert_eq!(clouds.len(), 200);
+    let few = Query { limit: Some(3), ..side };
+    assert_eq!(record.export(&few, &dir.path().join("few.mcap")).unwrap().records, 3);
+    assert!(record.export(&few, &all).is_err(), "what is there is not written over");
+}
+
+#[test]
+fn what_is_held_follows_what_is_cited() {
+    let dir = tempfile::tempdir().unwrap();
+    let record = Record::create(dir.path(), Options::default()).unwrap();
+    let ids: Vec<_> = (0..3).map(|i| record.put(Draft::new("scan", i)).unwrap()).collect();
+    record.hold(&ids[..2], "belief").unwrap();
+    record.hold(&ids[1..], "belief").unwrap();
+    assert!(record.hold(&[ids[0], descry_memory::RecordId(1 << 40)], "belief").is_err());
+    let held: Vec<_> = record.store().pins().unwrap().into_keys().filter(|id| ids.contains(id)).collect();
+    assert_eq!(held, ids[1..]);
+}
+
 /// Reads every message with the packages `mcap` and `mcap-protobuf-support` of a Python that has them, if there is one:
 /// `python3`, or what `DESCRY_MCAP_PYTHON` names.
 #[test]

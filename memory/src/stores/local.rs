@@ -6,8 +6,9 @@
 
 mod index;
 mod prune;
+mod recover;
 mod scan;
-mod segment;
+pub(crate) mod segment;
 mod verify;
 
 use crate::document::{Document, Draft, Query, RecordId};
@@ -108,13 +109,12 @@ impl LocalStore {
         Self::open_or_create(dir, robot, options)
     }
 
-    /// Opens a store and mends what a crash has left.
+    /// Opens a store (its folder, or that of the run that holds it as `record`) and mends what a crash has left.
     ///
     /// # Errors
     /// [`Error::NoRecord`], [`Error::InUse`], or what the system refuses.
     pub fn open(dir: &Path, robot: &str, options: LocalOptions) -> Result<Self, Error> {
-        must_exist(dir)?;
-        Self::open_or_create(dir, robot, options)
+        Self::open_or_create(&folder(dir)?, robot, options)
     }
 
     /// Opens a store for reading, while another process may be writing it. If none does, a crash is mended first.
@@ -122,7 +122,7 @@ impl LocalStore {
     /// # Errors
     /// [`Error::NoRecord`], or what the system refuses.
     pub fn open_shared(dir: &Path) -> Result<Self, Error> {
-        must_exist(dir)?;
+        let dir = &folder(dir)?;
         let mended = match Self::open_or_create(dir, "", LocalOptions::default()) {
             Ok(store) => store.recovery.clone(),
             Err(Error::InUse { .. }) => Recovery::default(),
@@ -151,13 +151,13 @@ impl LocalStore {
         let log_bytes = options.retention.max_bytes.map_or(u64::MAX, |bound| bound / 64);
         let mut index = match Index::open(dir, log_bytes) {
             Err(e) if index::is_broken(&e) => {
-                set_aside(dir)?;
+                recover::set_aside(dir)?;
                 recovery.index_rebuilt = true;
                 Index::open(dir, log_bytes)?
             }
             opened => opened?,
         };
-        let (sealed_bytes, next_segment) = recover(dir, &mut index, &mut recovery)?;
+        let (sealed_bytes, next_segment) = recover::recover(dir, &mut index, &mut recovery)?;
         let segment = new_segment(dir, next_segment)?;
         let writer = WriteState {
             segment,
@@ -465,12 +465,10 @@ fn segment_path(dir: &Path, number: u64) -> PathBuf {
     segment_dir(dir).join(format!("{number:08}.mcap"))
 }
 
-fn must_exist(dir: &Path) -> Result<(), Error> {
-    if segment_dir(dir).is_dir() {
-        Ok(())
-    } else {
-        Err(Error::NoRecord { place: dir.to_owned(), expected: "segments" })
-    }
+/// The folder of a record: the one that is named, or `record` in the folder of a run.
+fn folder(named: &Path) -> Result<PathBuf, Error> {
+    let found = [named.to_owned(), named.join("record")].into_iter().find(|dir| segment_dir(dir).is_dir());
+    found.ok_or_else(|| Error::NoRecord { place: named.to_owned(), expected: "segments" })
 }
 
 fn is_refusal(e: &std::io::Error) -> bool {
@@ -489,18 +487,6 @@ fn lock(dir: &Path) -> Result<File, Error> {
     }
 }
 
-/// Moves an index that cannot be read out of the way.
-fn set_aside(dir: &Path) -> Result<(), Error> {
-    for suffix in ["", "-wal", "-shm"] {
-        let path = dir.join(format!("{INDEX}{suffix}"));
-        if path.exists() {
-            let aside = dir.join(format!("{INDEX}{suffix}.broken"));
-            fs::rename(&path, &aside).map_err(|e| Error::file("cannot move", &path, e))?;
-        }
-    }
-    Ok(())
-}
-
 /// Starts a segment whose name is on the disk before anything in it is acknowledged.
 fn new_segment(dir: &Path, number: u64) -> Result<Segment, Error> {
     let path = segment_path(dir, number);
@@ -515,92 +501,4 @@ fn new_segment(dir: &Path, number: u64) -> Result<Segment, Error> {
         drop(fs::remove_file(&path));
     }
     made
-}
-
-/// Brings segments and index together again. Returns the bytes of all segments and the next free number.
-fn recover(dir: &Path, index: &mut Index, recovery: &mut Recovery) -> Result<(u64, u64), Error> {
-    let mut on_disk = BTreeSet::new();
-    let folder = segment_dir(dir);
-    let fail = |e| Error::file("cannot read", &folder, e);
-    for entry in fs::read_dir(&folder).map_err(fail)? {
-        let name = entry.map_err(fail)?.file_name();
-        let number = name.to_str().and_then(|n| n.strip_suffix(".mcap")).and_then(|n| n.parse::<u64>().ok());
-        on_disk.extend(number);
-    }
-    let known: BTreeMap<u64, _> = index.segments()?.into_iter().map(|row| (row.number, row)).collect();
-    for row in known.values().filter(|row| row.going) {
-        let path = segment_path(dir, row.number);
-        if on_disk.remove(&row.number) {
-            fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e))?;
-        }
-        index.forget(row.number)?;
-    }
-    let mut bytes = 0;
-    for number in &on_disk {
-        let row = known.get(number);
-        bytes += match row {
-            Some(row) if row.sealed => row.bytes,
-            _ => recover_segment(dir, *number, row.map_or(0, |r| r.bytes), index, recovery)?,
-        };
-    }
-    let last = on_disk.last().max(known.keys().next_back()).copied().unwrap_or(0);
-    Ok((bytes, last + 1))
-}
-
-/// Takes in what a segment holds beyond what the index knows, drops its torn end and finishes it.
-fn recover_segment(
-    dir: &Path,
-    number: u64,
-    known: u64,
-    index: &mut Index,
-    recovery: &mut Recovery,
-) -> Result<u64, Error> {
-    let path = segment_path(dir, number);
-    let length = fs::metadata(&path).map_err(|e| Error::file("cannot read", &path, e))?.len();
-    let mut chunks: Vec<u64> = index.places(number, false)?.iter().map(|p| p.located.chunk).collect();
-    chunks.sort_unstable();
-    let mut take = |records: Vec<(Document, segment::Located)>, end: u64| {
-        if end <= known {
-            return Ok(());
-        }
-        let rows: Vec<_> = records.iter().map(|(d, l)| (d, l)).collect();
-        index.insert(number, end, &rows)?;
-        for (document, _) in &records {
-            replay_pin(index, document)?;
-        }
-        recovery.regained += records.len() as u64;
-        Ok(())
-    };
-    let scan = scan::scan(&path, &chunks, &mut take)?;
-    if scan.end < known {
-        recovery.lost += index.forget_from(number, scan.end)?;
-    }
-    if scan.chunks.is_empty() && scan.damaged.is_empty() {
-        recovery.dropped_bytes += length;
-        fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e))?;
-        index.forget(number)?;
-        return Ok(0);
-    }
-    let bytes = if scan.complete {
-        length
-    } else {
-        recovery.dropped_bytes += length - scan.end;
-        Segment::reopen(&path, number, scan.end, scan.channels, scan.chunks)?.finish()?
-    };
-    index.seal(number, bytes)?;
-    Ok(bytes)
-}
-
-fn replay_pin(index: &mut Index, document: &Document) -> Result<(), Error> {
-    let by = document.body.get("by").and_then(|v| v.as_str()).unwrap_or("");
-    match document.kind.as_str() {
-        PIN => {
-            let listed = document.body.get("records").and_then(|v| v.as_array()).into_iter().flatten();
-            let ids: Vec<_> =
-                listed.filter_map(|v| v.as_u64()).chain([document.id.0]).map(RecordId).collect();
-            index.pin(&ids, by)
-        }
-        UNPIN => index.unpin(by),
-        _ => Ok(()),
-    }
 }

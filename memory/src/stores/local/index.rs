@@ -15,7 +15,7 @@ use std::time::Duration;
 
 /// The file name.
 pub(super) const INDEX: &str = "index.sqlite";
-/// What readers of the file expect; a newer one is refused, an older one is made again from the segments.
+/// What readers of the file expect; a newer one is refused.
 const FORMAT: i64 = 1;
 
 const TABLES: &str = "

@@ -11,10 +11,10 @@ use std::fs::File;
 use std::io::{IoSlice, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-pub(super) const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
+pub(crate) const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 
 /// Codes of the records of MCAP.
-pub(super) mod op {
+pub(crate) mod op {
     pub const HEADER: u8 = 0x01;
     pub const FOOTER: u8 = 0x02;
     pub const SCHEMA: u8 = 0x03;
@@ -29,24 +29,24 @@ pub(super) mod op {
 }
 
 /// Code and length in front of each record of MCAP, bytes.
-pub(super) const RECORD_HEAD: u64 = 9;
+pub(crate) const RECORD_HEAD: u64 = 9;
 /// What stands between the head of a chunk and its messages, bytes: times, size, checksum, no compression, size.
-pub(super) const CHUNK_HEAD: u64 = 8 + 8 + 8 + 4 + 4 + 8;
+pub(crate) const CHUNK_HEAD: u64 = 8 + 8 + 8 + 4 + 4 + 8;
 /// What stands between the head of a message and its data, bytes: channel, sequence, times.
-pub(super) const MESSAGE_HEAD: u64 = 2 + 4 + 8 + 8;
+pub(crate) const MESSAGE_HEAD: u64 = 2 + 4 + 8 + 8;
 
 /// A segment rolls after so many chunks, which bounds the memory that its summary takes.
-pub(super) const MAX_CHUNKS: usize = 1 << 14;
+pub(crate) const MAX_CHUNKS: usize = 1 << 14;
 
 /// A record on its way into a segment.
-pub(super) struct Encoded<'a> {
+pub(crate) struct Encoded<'a> {
     pub document: Document,
     pub blobs: Vec<&'a [u8]>,
 }
 
 /// Where a record came to lie: its document and the bytes of its blobs, as offsets in the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Located {
+pub(crate) struct Located {
     pub chunk: u64,
     pub document: u64,
     pub document_bytes: u64,
@@ -57,7 +57,7 @@ pub(super) struct Located {
 
 /// What a summary says of a chunk.
 #[derive(Clone, Debug)]
-pub(super) struct ChunkEntry {
+pub(crate) struct ChunkEntry {
     pub start_ns: u64,
     pub end_ns: u64,
     pub offset: u64,
@@ -70,7 +70,7 @@ pub(super) struct ChunkEntry {
 
 /// Schemas and channels of a segment, and how many messages each channel has.
 #[derive(Default)]
-pub(super) struct Channels {
+pub(crate) struct Channels {
     pub schemas: Vec<Vec<u8>>,
     schema_ids: BTreeMap<Option<Form>, u16>,
     pub channels: Vec<Vec<u8>>,
@@ -79,7 +79,7 @@ pub(super) struct Channels {
 }
 
 /// A segment that grows.
-pub(super) struct Segment {
+pub(crate) struct Segment {
     pub path: PathBuf,
     pub number: u64,
     file: File,
@@ -89,7 +89,7 @@ pub(super) struct Segment {
 }
 
 /// Appends the bytes of records of MCAP to a buffer.
-pub(super) struct Writer<'a>(pub &'a mut Vec<u8>);
+pub(crate) struct Writer<'a>(pub &'a mut Vec<u8>);
 
 impl Writer<'_> {
     pub fn u16(&mut self, v: u16) {
@@ -515,7 +515,7 @@ impl ChunkEntry {
 }
 
 /// The index of a chunk: its records, and where each channel's begins among them. Messages are channel, time and offset.
-pub(super) fn message_index(messages: &[(u16, u64, u64)]) -> (Vec<u8>, Vec<(u16, u64)>) {
+pub(crate) fn message_index(messages: &[(u16, u64, u64)]) -> (Vec<u8>, Vec<(u16, u64)>) {
     let mut by_channel: BTreeMap<u16, Vec<(u64, u64)>> = BTreeMap::new();
     for (channel, stamp_ns, at) in messages {
         by_channel.entry(*channel).or_default().push((*stamp_ns, *at));

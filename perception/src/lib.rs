@@ -1,5 +1,6 @@
 //! From views to percepts, models and maps.
 
+pub mod calibration;
 pub mod camera;
 pub mod cloud;
 pub mod cluster;
@@ -13,6 +14,7 @@ pub mod noise;
 pub mod normals;
 pub mod outliers;
 mod outline;
+pub mod picture;
 pub mod plane;
 pub mod recognise;
 pub mod register;

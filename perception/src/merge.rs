@@ -14,7 +14,7 @@ use crate::surface;
 use crate::view::View;
 use crate::visibility::{DepthMap, Visibility};
 use joint::{Found, Round, in_world};
-use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use prepare::Prepared;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -136,7 +136,7 @@ pub enum MergeError {
 /// First alignment: everything, from far to near (the table weighs most; paper step 3).
 const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 400, plane_weight: 1.0 };
 /// Second alignment: planes weigh little, the objects decide (paper step 4).
-const SECOND: Round = Round { from_m: 0.04, to_m: 0.012, passes: 9, asked: 600, plane_weight: 0.2 };
+const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 600, plane_weight: 0.2 };
 /// After a view was left out, the rest settles again.
 const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 600, plane_weight: 0.2 };
 /// A plane is dominant from this share of all points.
@@ -293,10 +293,12 @@ fn align_objects(
     views: &[View],
     steps: &mut Vec<Step>,
 ) -> Vec<Found> {
-    let levelled = poses.to_vec();
+    let levelled: Vec<Isometry3<f64>> = (0..views.len())
+        .map(|i| up.map_or(poses[i], |up| only_levelled(&prepared[i], &poses[i], &up)))
+        .collect();
     let mut retried = vec![false; views.len()];
     if let Some(up) = up {
-        place_objects(prepared, used, on_plane, &up, poses);
+        place_objects(prepared, used, on_plane, &up, &levelled, poses);
     }
     let mut found = joint::align(prepared, used, on_plane, poses, &SECOND);
     let maps: Vec<Option<DepthMap>> =
@@ -305,8 +307,11 @@ fn align_objects(
         if let Some(up) = up.filter(|_| !retried[worst]) {
             // The others have settled since: a better model to be placed on than a single view was.
             retried[worst] = true;
+            let others = (0..prepared.len()).filter(|&i| used[i] && i != worst);
+            let placed: Vec<_> =
+                others.flat_map(|i| objects(&prepared[i], &on_plane[i], &poses[i])).collect();
             poses[worst] = levelled[worst];
-            place_on_others(prepared, used, on_plane, &up, poses, worst);
+            place_on(prepared, on_plane, &up, &placed, &levelled, poses, worst);
             found = joint::align(prepared, used, on_plane, poses, &SECOND);
             continue;
         }
@@ -324,18 +329,38 @@ fn align_objects(
     found
 }
 
+/// The pose of the first alignment without its shift along the surface and its turn about the vertical: those were guesses,
+/// drawn by whatever surfaces happened to be near; tilt and height are certain.
+fn only_levelled(view: &Prepared, pose: &Isometry3<f64>, up: &Unit<Vector3<f64>>) -> Isometry3<f64> {
+    let n = view.points.len().max(1) as f64;
+    let middle = view.points.iter().fold(Vector3::zeros(), |s, p| s + p.coords) / n;
+    let (before, after) = (view.prior * Point3::from(middle), pose * Point3::from(middle));
+    let turn = pose.rotation * view.prior.rotation.inverse();
+    // Swing and twist: the twist is the part of the turn about the vertical.
+    let along = up.dot(&turn.imag());
+    let twist = nalgebra::Quaternion::from_parts(turn.scalar(), up.into_inner() * along);
+    let twist = UnitQuaternion::try_new(twist, 1e-9).unwrap_or_else(UnitQuaternion::identity);
+    let swing = turn * twist.inverse();
+    let rise = up.scale(up.dot(&(after - before)));
+    let rotation = swing * view.prior.rotation;
+    let translation = before.coords + rise - rotation * middle;
+    Isometry3::from_parts(translation.into(), rotation)
+}
+
 /// Puts the objects of one view after another onto those already placed, nearest camera first.
 fn place_objects(
     prepared: &[Prepared],
     used: &[bool],
     on_plane: &[Vec<bool>],
     up: &Unit<Vector3<f64>>,
+    levelled: &[Isometry3<f64>],
     poses: &mut [Isometry3<f64>],
 ) {
     let mut left: Vec<usize> = (0..prepared.len()).filter(|&i| used[i]).collect();
     let count = |i: usize| on_plane[i].iter().filter(|p| !**p).count();
     let Some(first) = left.iter().copied().max_by_key(|&i| (count(i), usize::MAX - i)) else { return };
     left.retain(|&i| i != first);
+    poses[first] = levelled[first];
     let mut placed = objects(&prepared[first], &on_plane[first], &poses[first]);
     let mut done = vec![first];
     while !left.is_empty() {
@@ -348,31 +373,29 @@ fn place_objects(
             return;
         };
         left.retain(|&i| i != next);
-        let own = objects(&prepared[next], &on_plane[next], &poses[next]);
-        let window = window(&prepared[next], &own, &poses[next]);
-        if let Some(correction) = search::place(&own, &placed, up, window) {
-            poses[next] = correction * poses[next];
-        }
+        place_on(prepared, on_plane, up, &placed, levelled, poses, next);
         placed.extend(objects(&prepared[next], &on_plane[next], &poses[next]));
         done.push(next);
     }
 }
 
-/// Puts the objects of one view onto those of all other used views.
-fn place_on_others(
+/// Puts the objects of one view onto placed ones: by search from its levelled pose, unless the pose it has fits them better already.
+fn place_on(
     prepared: &[Prepared],
-    used: &[bool],
     on_plane: &[Vec<bool>],
     up: &Unit<Vector3<f64>>,
+    placed: &[(Point3<f64>, Vector3<f64>)],
+    levelled: &[Isometry3<f64>],
     poses: &mut [Isometry3<f64>],
     view: usize,
 ) {
-    let others = (0..prepared.len()).filter(|&i| used[i] && i != view);
-    let placed: Vec<_> = others.flat_map(|i| objects(&prepared[i], &on_plane[i], &poses[i])).collect();
-    let own = objects(&prepared[view], &on_plane[view], &poses[view]);
-    let window = window(&prepared[view], &own, &poses[view]);
-    if let Some(correction) = search::place(&own, &placed, up, window) {
-        poses[view] = correction * poses[view];
+    let from = |pose: &Isometry3<f64>| objects(&prepared[view], &on_plane[view], pose);
+    let own = from(&levelled[view]);
+    let window = window(&prepared[view], &own, &levelled[view]);
+    let Some(found) = search::place(&own, placed, up, window) else { return };
+    let stays = search::fits(&from(&poses[view]), placed, up) > found.share + 0.05;
+    if !stays {
+        poses[view] = found.correction * levelled[view];
     }
 }
 
@@ -386,9 +409,9 @@ fn objects(view: &Prepared, on_plane: &[bool], pose: &Isometry3<f64>) -> Vec<(Po
 fn window(view: &Prepared, objects: &[(Point3<f64>, Vector3<f64>)], pose: &Isometry3<f64>) -> search::Window {
     let sum = objects.iter().fold(Vector3::zeros(), |s, (p, _)| s + p.coords);
     let distance = (sum / objects.len().max(1) as f64 - pose.translation.vector).norm().min(3.0);
-    let turn_rad = (3.0 * view.sigma_rad).clamp(0.02, 0.12);
-    let shift_m = (3.0 * view.sigma_m).clamp(0.02, 0.12) + distance * turn_rad;
-    search::Window { shift_m: shift_m.min(0.27), turn_rad: 1.2 * turn_rad }
+    let turn_rad = (3.0 * view.sigma_rad).clamp(0.105, 0.14);
+    let shift_m = (3.0 * view.sigma_m).clamp(0.10, 0.14) + distance * turn_rad;
+    search::Window { shift_m: shift_m.min(0.3), turn_rad: 1.2 * turn_rad }
 }
 
 fn visibility(views: &[View], used: &[bool], poses: &[Isometry3<f64>]) -> Visibility {

@@ -1,8 +1,11 @@
-//! Segmentation and recognition on recordings with labels:
-//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR`.
+//! Segmentation, merging and recognition against what is known, as tables:
+//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | table COUNT [PICTURES]`.
 
 mod kitchen;
 mod mosd;
+mod table;
+#[path = "../../tests/tabletop/mod.rs"]
+mod tabletop;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -12,7 +15,11 @@ fn main() -> ExitCode {
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["mosd", dir] => mosd::run(Path::new(dir)),
         ["kitchen", dir, ..] => kitchen::run(Path::new(dir)),
-        _ => Err("usage: evaluate mosd|kitchen DIR".to_owned()),
+        ["table", count, out @ ..] => match count.parse() {
+            Ok(count) => table::run(count, out.first().map(Path::new)),
+            Err(_) => Err(format!("`{count}` is no number of arrangements")),
+        },
+        _ => Err("usage: evaluate mosd DIR | kitchen DIR | table COUNT [PICTURES]".to_owned()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -190,6 +190,9 @@ fn is_flying(cloud: &Cloud, i: usize) -> bool {
     across || down
 }
 
+/// Position, normal, colour and number of views of a fused point.
+type Settled = (Point3<f32>, Vector3<f32>, [u8; 3], u16);
+
 /// Moves the voxels onto their common surface and drops what was looked through.
 fn settle(
     order: &[[i32; 3]],
@@ -199,7 +202,7 @@ fn settle(
     coloured: bool,
     returns: usize,
 ) -> Fused {
-    let points: Vec<Option<(Point3<f32>, Vector3<f32>, [u8; 3], u16)>> = order
+    let points: Vec<Option<Settled>> = order
         .par_iter()
         .map(|key| {
             let cell = &cells[key];

@@ -124,6 +124,7 @@ fn link(
         matched: 0,
         squares: 0.0,
     };
+    let Some(tree) = &b.tree else { return link };
     let planes = on_plane[i].iter().filter(|p| **p).count();
     let stride_of = |count: usize| (count / round.asked).max(1);
     let (plane_stride, free_stride) = (stride_of(planes), stride_of(a.points.len() - planes));
@@ -136,7 +137,7 @@ fn link(
             continue;
         }
         let in_j = j_from_i * p;
-        let Some(near) = b.tree.nearest(&in_j.cast(), radius as f32) else { continue };
+        let Some(near) = tree.nearest(&in_j.cast(), radius as f32) else { continue };
         let partner = near.index as usize;
         let normal_j = b.normals[partner];
         if (j_from_i.rotation * a.normals[k]).dot(&normal_j) < SAME_SIDE {

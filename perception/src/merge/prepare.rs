@@ -20,8 +20,8 @@ pub(super) struct Prepared {
     pub normals: Vec<Vector3<f64>>,
     /// Spread of each measurement, metres.
     pub sigmas_m: Vec<f64>,
-    /// The points as a search tree.
-    pub tree: Neighbours,
+    /// The points as a search tree; none if there are more than it can hold.
+    pub tree: Option<Neighbours>,
     /// Where localisation has the camera.
     pub prior: Isometry3<f64>,
     /// Spread of that position, metres.
@@ -70,8 +70,7 @@ pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
         }
     }
     let single: Vec<Point3<f32>> = points.iter().map(|p| p.cast()).collect();
-    let tree =
-        Neighbours::new(&single).unwrap_or_else(|_| Neighbours::new(&[]).unwrap_or_else(|_| unreachable!()));
+    let tree = Neighbours::new(&single).ok();
     Prepared {
         sigmas_m: points.iter().map(|p| range_sigma_m(p.coords.norm()).min(0.03)).collect(),
         points,

@@ -74,6 +74,34 @@ pub(super) struct Window {
     pub turn_rad: f64,
 }
 
+/// Where a view falls best.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed {
+    /// World from world.
+    pub correction: Isometry3<f64>,
+    /// Share of its points that fall on the others' surfaces then.
+    pub share: f64,
+}
+
+/// Share of the view's points that fall on the placed surfaces as they are.
+pub(super) fn fits(
+    view: &[(Point3<f64>, Vector3<f64>)],
+    placed: &[(Point3<f64>, Vector3<f64>)],
+    up: &Unit<Vector3<f64>>,
+) -> f64 {
+    let level = frame(up);
+    let flat = |of: &[(Point3<f64>, Vector3<f64>)]| {
+        of.iter().map(|(p, n)| (level * p, level * n)).collect::<Vec<_>>()
+    };
+    let (view, placed) = (flat(view), flat(placed));
+    let stride = (view.len() / TRIED).max(1);
+    let tried: Vec<_> = view.into_iter().step_by(stride).collect();
+    if tried.is_empty() {
+        return 0.0;
+    }
+    score(&Cells::new(&placed, CELLS_M[1]), &turned(&tried, &Vector3::zeros(), 0.0), 0.0, 0.0)
+}
+
 /// The correction (world from world) that puts `view` (points and normals off the planes, world frame) best onto `placed`.
 /// `None` if there is too little to go by or nothing falls together.
 pub(super) fn place(
@@ -81,7 +109,7 @@ pub(super) fn place(
     placed: &[(Point3<f64>, Vector3<f64>)],
     up: &Unit<Vector3<f64>>,
     window: Window,
-) -> Option<Isometry3<f64>> {
+) -> Option<Placed> {
     if view.len() < FEWEST || placed.len() < FEWEST {
         return None;
     }
@@ -120,14 +148,15 @@ pub(super) fn place(
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         best = distinct(&found, 2.0 * side_m);
     }
-    let Candidate { x, y, turn, score } = best[0];
+    let Candidate { x, y, turn: angle, score } = best[0];
     if score < LEAST_SHARE {
         return None;
     }
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
     let about = Translation3::from(middle) * turn * Translation3::from(-middle);
     let correction = Translation3::new(x, y, 0.0) * about;
-    Some(level.inverse() * correction * level)
+    let costs = PRIOR * (x.hypot(y) / window.shift_m).powi(2) + PRIOR * (angle / window.turn_rad).powi(2);
+    Some(Placed { correction: level.inverse() * correction * level, share: score + costs })
 }
 
 #[derive(Clone, Copy, Debug)]

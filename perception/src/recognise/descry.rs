@@ -18,6 +18,9 @@ use serde::{Deserialize, Serialize};
 pub struct Descry {
     /// Probability before looking that an object on a table is one of the models.
     pub known: f64,
+    /// How many things made like a known object but for one feature (a handle, a lid, flat sides) there are for each of it:
+    /// what has not been seen of that feature stays in doubt.
+    pub look_alikes: f64,
     /// Probability that a known object stands upside down.
     pub upside_down: f64,
     /// Least probability with which a percept carries a model's name.
@@ -28,7 +31,7 @@ pub struct Descry {
 
 impl Default for Descry {
     fn default() -> Self {
-        Descry { known: 0.5, upside_down: 0.03, least: 0.5, temper: 0.7 }
+        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.03, least: 0.5, temper: 0.7 }
     }
 }
 
@@ -109,10 +112,10 @@ impl Descry {
                 each.ln() + log_sum(&[up, down])
             })
             .collect();
-        let rest: Vec<f64> = FAMILIES
-            .iter()
-            .map(|f| ((1.0 - self.known) * f.share).ln() + self.family_log(f, &measured))
-            .collect();
+        let families =
+            FAMILIES.iter().map(|f| ((1.0 - self.known) * f.share).ln() + self.family_log(f, &measured));
+        let alike = models.iter().map(|m| (each * self.look_alikes).ln() + self.look_alike_log(m, &measured));
+        let rest: Vec<f64> = families.chain(alike).collect();
         let unknown_log = log_sum(&rest);
         let total = log_sum(&[logs.as_slice(), &[unknown_log]].concat());
         let share = |log: f64| if total.is_finite() { (log - total).exp() } else { 0.0 };
@@ -138,6 +141,28 @@ impl Descry {
             Shape::Box => sides_log(model.width_m.zip(model.depth_m), m),
         };
         self.temper * (size + wide + form) + top_log(top, m) + handle_log(model.handle, m)
+    }
+
+    /// The things made like a model but for one feature; sizes are like the model's within a tenth.
+    fn look_alike_log(&self, model: &ObjectModel, m: &Measured) -> f64 {
+        const ALIKE: f64 = 0.1;
+        let near = |r: Range| (r.middle(), ALIKE.hypot((r.high / r.low).ln() / 3.46));
+        let height = near(model.height_m);
+        let width = model.diameter_m.or(model.width_m).map_or(WIDTHS, near);
+        let family = |share: f64, shape: Shape, top: Top, handle: Handle| {
+            share.ln() + self.family_log(&Family { share, shape: Some(shape), top, handle, height, width }, m)
+        };
+        let mut logs = Vec::new();
+        if model.handle == Handle::None {
+            logs.push(family(0.5, model.shape, model.top, Handle::One));
+        }
+        if model.top != Top::Closed {
+            logs.push(family(0.3, model.shape, Top::Closed, Handle::None));
+        }
+        if model.shape == Shape::Round {
+            logs.push(family(0.2, Shape::Box, Top::Closed, Handle::None));
+        }
+        log_sum(&logs)
     }
 
     fn family_log(&self, family: &Family, m: &Measured) -> f64 {
@@ -206,7 +231,7 @@ fn measure_log(value: f64, sigma: f64, range: Option<Range>, everyday: (f64, f64
             let density =
                 if width > 0.2 * sigma { inside / width } else { normal_density(value - r.middle(), sigma) };
             // Flat tails: a measurement goes wrong altogether now and then.
-            (0.99 * density + 0.01 * everyday_density(value, everyday)).max(1e-12).ln()
+            (0.998 * density + 0.002 * everyday_density(value, everyday)).max(1e-12).ln()
         }
         None => everyday_density(value, everyday).max(1e-12).ln(),
     }
@@ -278,7 +303,7 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
         None => IRREGULAR_M,
     };
     // A camera that looked through the side says that there is none.
-    let through = if shape == Some(Shape::Round) { -25.0 * m.looked_through } else { 0.0 };
+    let through = if shape == Some(Shape::Round) { -25.0 * (m.looked_through - 0.08).max(0.0) } else { 0.0 };
     -m.independent * miss.hypot(floor).ln() + through
 }
 

@@ -227,8 +227,9 @@ impl Sectors {
                 let d = round.radius_at(z) + reach;
                 asker.look(round.x + d * cos, round.y + d * sin, z)
             };
+            // Free, or another thing's surface: either way the body's own side is not there.
             sectors.looked_through[i] = !sectors.measured[i]
-                && [0.35, 0.5, 0.65].iter().all(|&share| look(-0.006, share) == Seen::Free);
+                && [0.35, 0.5, 0.65].iter().all(|&share| look(-0.004, share) >= Seen::Surface);
             let free = HANDLE_REACHES_M
                 .iter()
                 .flat_map(|&reach| HANDLE_HEIGHTS.map(|share| look(reach, share)))
@@ -342,13 +343,27 @@ struct TopFace {
 impl TopFace {
     fn measure(round: &Round, segment: &Segment, asker: &Asker, top: f64) -> TopFace {
         const STEP_M: f64 = 0.005;
+        /// What is said of a cell of the top by the points over it.
+        const LEVEL: u8 = 1;
+        const DEEP: u8 = 2;
         let radius = round.radius_at(top) - 0.008;
         let cells = (radius / STEP_M).floor().max(0.0) as i32;
-        let level: Vec<&Point3<f64>> = segment.points.iter().filter(|p| p.z > top - 0.009).collect();
-        let deep: Vec<&Point3<f64>> = segment.points.iter().filter(|p| p.z < top - INSIDE_M).collect();
-        let near = |of: &[&Point3<f64>], x: f64, y: f64| {
-            of.iter().any(|p| (p.x - x).abs() < STEP_M && (p.y - y).abs() < STEP_M)
-        };
+        let side = 2 * cells + 1;
+        let mut points = vec![0_u8; (side * side) as usize];
+        for p in &segment.points {
+            let kind = if p.z > top - 0.009 {
+                LEVEL
+            } else if p.z < top - INSIDE_M {
+                DEEP
+            } else {
+                continue;
+            };
+            let (i, j) =
+                (((p.x - round.x) / STEP_M).round() as i32, ((p.y - round.y) / STEP_M).round() as i32);
+            if i.abs() <= cells && j.abs() <= cells {
+                points[((i + cells) * side + j + cells) as usize] |= kind;
+            }
+        }
         let (mut all, mut open, mut lid) = (0_u32, 0_u32, 0_u32);
         for i in -cells..=cells {
             for j in -cells..=cells {
@@ -356,11 +371,13 @@ impl TopFace {
                 if dx.hypot(dy) > radius {
                     continue;
                 }
-                let (x, y) = (round.x + dx, round.y + dy);
                 all += 1;
-                if near(&level, x, y) {
+                let kind = points[((i + cells) * side + j + cells) as usize];
+                if kind & LEVEL != 0 {
                     lid += 1;
-                } else if asker.look(x, y, top - INSIDE_M) == Seen::Free || near(&deep, x, y) {
+                } else if kind & DEEP != 0
+                    || asker.look(round.x + dx, round.y + dy, top - INSIDE_M) == Seen::Free
+                {
                     open += 1;
                 }
             }

@@ -48,8 +48,6 @@ pub struct Evidence {
     pub arc: f64,
     /// Root mean square distance of the outline from the best rectangle, metres.
     pub box_residual_m: f64,
-    /// Share of the side that lies on flat vertical faces.
-    pub flatness: f64,
     /// Share of the top that was looked into below the rim.
     pub open: f64,
     /// Share of the top on which a lid or face was measured.

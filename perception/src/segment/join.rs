@@ -20,15 +20,19 @@ const HANGING_SHARE: f64 = 0.25;
 /// For each voxel the number of its part. Numbers are voxel indices, the same in every run.
 pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
     if !options.part_touching {
+        let thin = thin(voxels);
         let mut whole = Union::new(voxels.len());
-        for (i, near) in voxels.neighbours.iter().enumerate() {
-            near.iter().for_each(|&j| whole.join(i as u32, j));
+        for (i, near) in voxels.neighbours.iter().enumerate().filter(|(i, _)| !thin[*i]) {
+            near.iter().filter(|&&j| !thin[j as usize]).for_each(|&j| whole.join(i as u32, j));
         }
-        return (0..voxels.len() as u32).map(|i| whole.root(i)).collect();
+        let mut parts: Vec<u32> = (0..voxels.len() as u32).map(|i| whole.root(i)).collect();
+        adopt(voxels, &thin, &mut parts);
+        return parts;
     }
-    let patch_of = grow_patches(voxels);
+    let thin = thin(voxels);
+    let patch_of = grow_patches(voxels, &thin);
     let patches = describe(voxels, &patch_of);
-    let borders = borders(voxels, &patch_of);
+    let borders = borders(voxels, &patch_of, &thin);
     let mut joined = Union::new(patches.len());
     for (&(a, b), border) in &borders {
         if meets_convexly(&patches[a as usize], &patches[b as usize], border) {
@@ -37,11 +41,38 @@ pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
     }
     mend(&mut joined, &patches, &borders, voxels, &patch_of);
     let root_voxel = first_voxels(&patch_of, &mut joined, patches.len());
-    patch_of.iter().map(|&p| root_voxel[joined.root(p) as usize]).collect()
+    let mut parts: Vec<u32> = patch_of.iter().map(|&p| root_voxel[joined.root(p) as usize]).collect();
+    adopt(voxels, &thin, &mut parts);
+    parts
+}
+
+/// Voxels with far fewer points than those around them: frayed edges, which hang between objects and connect nothing.
+fn thin(voxels: &Voxels) -> Vec<bool> {
+    const SHARE: f64 = 0.25;
+    (0..voxels.len())
+        .map(|i| {
+            let mut around: Vec<f64> =
+                voxels.neighbours[i].iter().map(|&j| f64::from(voxels.counts[j as usize])).collect();
+            around.is_empty() || f64::from(voxels.counts[i]) < SHARE * quantile(&mut around, 0.75)
+        })
+        .collect()
+}
+
+/// Gives each thin voxel to the part of its fullest neighbour that is not thin.
+fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
+    let full = |i: usize| {
+        let near = voxels.neighbours[i].iter().map(|&j| j as usize).filter(|&j| !thin[j]);
+        near.max_by_key(|&j| (voxels.counts[j], usize::MAX - j))
+    };
+    for i in (0..voxels.len()).filter(|&i| thin[i]) {
+        if let Some(j) = full(i) {
+            parts[i] = parts[j];
+        }
+    }
 }
 
 /// Patches: voxels around a flat seed with like normals. Flattest seeds first.
-fn grow_patches(voxels: &Voxels) -> Vec<u32> {
+fn grow_patches(voxels: &Voxels, thin: &[bool]) -> Vec<u32> {
     const NONE: u32 = u32::MAX;
     let mut order: Vec<u32> = (0..voxels.len() as u32).collect();
     order.sort_by(|&a, &b| {
@@ -60,6 +91,8 @@ fn grow_patches(voxels: &Voxels) -> Vec<u32> {
             for &next in &voxels.neighbours[voxel as usize] {
                 let n = next as usize;
                 if patch_of[n] == NONE
+                    && !thin[n]
+                    && !thin[seed as usize]
                     && (voxels.centres[n] - origin).norm() < PATCH_REACH_M
                     && voxels.normals[n].dot(&normal) > PATCH_COS
                 {
@@ -100,12 +133,12 @@ fn describe(voxels: &Voxels, patch_of: &[u32]) -> Vec<Patch> {
 }
 
 /// Pairs of neighbouring patches (lower number first) with the number of voxel pairs along their border and its middle.
-fn borders(voxels: &Voxels, patch_of: &[u32]) -> BTreeMap<(u32, u32), Border> {
+fn borders(voxels: &Voxels, patch_of: &[u32], thin: &[bool]) -> BTreeMap<(u32, u32), Border> {
     let mut borders: BTreeMap<(u32, u32), Border> = BTreeMap::new();
     for (i, near) in voxels.neighbours.iter().enumerate() {
         for &j in near.iter().filter(|&&j| j as usize > i) {
             let (a, b) = (patch_of[i], patch_of[j as usize]);
-            if a != b {
+            if a != b && !thin[i] && !thin[j as usize] {
                 borders.entry((a.min(b), a.max(b))).or_default().length += 1;
             }
         }

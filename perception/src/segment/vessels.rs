@@ -71,7 +71,8 @@ fn round_body(segment: &Segment, top: f64, viewpoints: &[Point3<f64>]) -> Option
     let sigma_m = range_sigma_m(near).min(0.012);
     let body = round::fit(&segment.points, low, top, sigma_m, 3)?;
     let box_residual = outline::fit(&segment.points)?.residual_m;
-    let tight = body.spread_m < 2.0 * sigma_m + 0.0015 && body.spread_m < 0.6 * box_residual;
+    // Judged by what lies on it: a handle does not.
+    let tight = body.residual_m < 2.0 * sigma_m + 0.0015 && body.residual_m < 0.6 * box_residual;
     (tight && body.radius_m < WIDEST_M && body.inliers >= ON_BODY).then_some(body)
 }
 

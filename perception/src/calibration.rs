@@ -1,0 +1,87 @@
+//! Does a stated probability mean what it says? Brier score and reliability.
+
+use serde::Serialize;
+
+/// A stated probability and whether it came true.
+pub type Claim = (f64, bool);
+
+/// One bin of a reliability plot.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Bin {
+    /// Least stated probability (inclusive).
+    pub low: f64,
+    /// Greatest stated probability (exclusive, but for the last bin).
+    pub high: f64,
+    /// Claims in it.
+    pub count: usize,
+    /// Their mean stated probability.
+    pub stated: f64,
+    /// The share that came true.
+    pub came_true: f64,
+}
+
+/// Reliability of a set of claims.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reliability {
+    /// Mean squared difference between statement and truth (Brier 1950): 0 is perfect, always saying the base rate gives `base × (1 − base)`.
+    pub brier: f64,
+    /// The Brier score of always saying the base rate.
+    pub brier_of_base_rate: f64,
+    /// Expected calibration error: mean gap between stated and true share, weighted by the bins' counts.
+    pub expected_error: f64,
+    /// Number of claims.
+    pub count: usize,
+    /// Bins of equal width.
+    pub bins: Vec<Bin>,
+}
+
+/// Scores claims in `bins` bins of equal width (at least one). Claims whose probability is not finite are left out; others are held within 0 and 1.
+pub fn reliability(claims: &[Claim], bins: usize) -> Reliability {
+    let bins = bins.max(1);
+    let sound: Vec<Claim> =
+        claims.iter().filter(|(p, _)| p.is_finite()).map(|&(p, t)| (p.clamp(0.0, 1.0), t)).collect();
+    let n = sound.len().max(1) as f64;
+    let hit = |t: bool| f64::from(u8::from(t));
+    let brier = sound.iter().map(|&(p, t)| (p - hit(t)).powi(2)).sum::<f64>() / n;
+    let base = sound.iter().map(|&(_, t)| hit(t)).sum::<f64>() / n;
+    let mut sums = vec![(0_usize, 0.0, 0.0); bins];
+    for &(p, t) in &sound {
+        let bin = &mut sums[((p * bins as f64) as usize).min(bins - 1)];
+        *bin = (bin.0 + 1, bin.1 + p, bin.2 + hit(t));
+    }
+    let bins: Vec<Bin> = sums
+        .iter()
+        .enumerate()
+        .map(|(i, &(count, stated, came_true))| Bin {
+            low: i as f64 / bins as f64,
+            high: (i + 1) as f64 / bins as f64,
+            count,
+            stated: stated / count.max(1) as f64,
+            came_true: came_true / count.max(1) as f64,
+        })
+        .collect();
+    let expected_error =
+        bins.iter().map(|b| b.count as f64 * (b.stated - b.came_true).abs()).sum::<f64>() / n;
+    Reliability { brier, brier_of_base_rate: base * (1.0 - base), expected_error, count: sound.len(), bins }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scores_of_known_claims() {
+        let cases: [(&str, Vec<Claim>, f64, f64); 4] = [
+            ("perfect", vec![(1.0, true), (0.0, false)], 0.0, 0.0),
+            ("always wrong", vec![(1.0, false), (0.0, true)], 1.0, 1.0),
+            ("honest doubt", vec![(0.5, true), (0.5, false)], 0.25, 0.0),
+            ("not a number is left out", vec![(f64::NAN, true), (1.0, true)], 0.0, 0.0),
+        ];
+        for (name, claims, brier, error) in cases {
+            let found = reliability(&claims, 10);
+            assert!((found.brier - brier).abs() < 1e-12, "{name}: {found:?}");
+            assert!((found.expected_error - error).abs() < 1e-12, "{name}: {found:?}");
+        }
+        assert_eq!(reliability(&[], 0).count, 0);
+    }
+}

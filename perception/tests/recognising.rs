@@ -1,0 +1,158 @@
+//! Single things on a table: what they are, and what must stay in doubt.
+
+mod tabletop;
+
+use descry_perception::nalgebra::{Point3, Unit, Vector3};
+use descry_perception::recognise::{Descry, Handle, Published, Range, Top, check_models};
+use descry_perception::segment::{SceneOptions, segment};
+use descry_perception::surface::{SurfaceError, SurfaceOptions};
+use descry_perception::{Cloud, ObjectModel, Percept, Recogniser, Sighting, View, Visibility};
+use tabletop::{Draws, TABLE_M, Thing, look, on_ring};
+
+fn cup_a() -> ObjectModel {
+    let exactly = |x: f64| Range { low: x, high: x };
+    ObjectModel {
+        name: "cup A".into(),
+        kind: "cup".into(),
+        phrases: Vec::new(),
+        shape: Default::default(),
+        height_m: exactly(0.104),
+        diameter_m: Some(exactly(0.070)),
+        width_m: None,
+        depth_m: None,
+        taper: Range { low: 0.95, high: 1.05 },
+        top: Top::Open,
+        handle: Handle::None,
+    }
+}
+
+fn options() -> SceneOptions {
+    let surface = SurfaceOptions {
+        up: Some(Unit::new_normalize(Vector3::z())),
+        height_band_m: Some((0.6, 0.9)),
+        ..SurfaceOptions::default()
+    };
+    SceneOptions { surface, ..SceneOptions::default() }
+}
+
+/// One view from true poses, as a cloud in the world.
+fn seen_from(things: &[Thing], angle_rad: f64) -> (Cloud, Visibility) {
+    let pose = on_ring(angle_rad, 1.2, 1.4);
+    let view: View = look(things, &pose, &pose, &mut Draws(11));
+    (view.cloud.transformed(&pose), Visibility::from_views(&[view]))
+}
+
+fn percepts(things: &[Thing], angle_rad: f64, recogniser: &dyn Recogniser) -> Vec<Percept> {
+    let (cloud, seen) = seen_from(things, angle_rad);
+    let scene = segment(&cloud, &seen, &options()).expect("there is a table");
+    recogniser.recognise(&scene, &seen, &[cup_a()])
+}
+
+const CUP: Thing = Thing::Cup { x: 0.05, y: 0.02, radius: 0.035, height: 0.104, handle_rad: None };
+
+#[test]
+fn one_thing_from_one_view() {
+    // (what, thing, probability of cup A at least, at most)
+    let mug = |angle| Thing::Cup { x: 0.05, y: 0.02, radius: 0.035, height: 0.104, handle_rad: Some(angle) };
+    let cases = [
+        ("the cup itself", CUP, 0.7, 1.0),
+        ("a mug like it, its handle in view", mug(1.4), 0.0, 0.3),
+        ("a mug like it, its handle behind", mug(std::f64::consts::PI), 0.3, 0.98),
+        ("a tin of its size", Thing::Tin { x: 0.05, y: 0.02, radius: 0.035, height: 0.104 }, 0.0, 0.4),
+        (
+            "a box of its size",
+            Thing::Block { x: 0.05, y: 0.02, half: [0.035, 0.035], height: 0.104, turn_rad: 0.4 },
+            0.0,
+            0.2,
+        ),
+        (
+            "a larger cup",
+            Thing::Cup { x: 0.05, y: 0.02, radius: 0.044, height: 0.155, handle_rad: None },
+            0.0,
+            0.05,
+        ),
+    ];
+    for (name, thing, least, most) in cases {
+        let found = percepts(&[thing], 0.0, &Descry::default());
+        assert_eq!(found.len(), 1, "{name}: in one piece");
+        let p = found[0].probability_of("cup A");
+        assert!((least..=most).contains(&p), "{name}: {p} {:?}", found[0].evidence);
+        let sum: f64 = found[0].probabilities.iter().map(|p| p.1).sum::<f64>() + found[0].unknown;
+        assert!((sum - 1.0).abs() < 1e-9, "{name}: probabilities sum to {sum}");
+    }
+}
+
+#[test]
+fn place_and_size_come_back() {
+    let found = percepts(&[CUP], 0.7, &Descry::default());
+    let off = (found[0].position_m - Point3::new(0.05, 0.02, TABLE_M)).norm();
+    assert!(off < 0.006, "{off} m off");
+    assert!(
+        (found[0].size_m[2] - 0.104).abs() < 0.006,
+        "what the plane cuts off is added again: {:?}",
+        found[0].size_m
+    );
+    assert_eq!(found[0].evidence.inside, Sighting::Seen);
+}
+
+#[test]
+fn neighbours_two_centimetres_apart_are_two() {
+    let beside = Thing::Cup { x: 0.05, y: 0.02 + 0.09, radius: 0.035, height: 0.104, handle_rad: None };
+    for angle in [0.0, 0.8, 2.5] {
+        assert_eq!(percepts(&[CUP, beside], angle, &Descry::default()).len(), 2, "from {angle}");
+    }
+}
+
+#[test]
+fn the_published_score_cannot_reject_the_mug() {
+    let mug =
+        Thing::Cup { x: 0.05, y: 0.02, radius: 0.035, height: 0.104, handle_rad: Some(std::f64::consts::PI) };
+    let found = percepts(&[mug], 0.0, &Published::default());
+    assert_eq!(found[0].label.as_deref(), Some("cup A"));
+}
+
+#[test]
+fn the_same_cloud_gives_the_same_percepts_whatever_the_threads() {
+    let things = [CUP, Thing::Tin { x: -0.2, y: 0.1, radius: 0.05, height: 0.2 }];
+    let one = percepts(&things, 0.3, &Descry::default());
+    assert_eq!(one, percepts(&things, 0.3, &Descry::default()));
+}
+
+#[test]
+fn clouds_without_a_table_are_refused_in_words() {
+    let same = vec![Point3::new(0.1_f32, 0.2, 0.7); 500];
+    let line: Vec<Point3<f32>> = (0..500).map(|i| Point3::new(i as f32 * 0.001, 0.0, 0.7)).collect();
+    let cases = [
+        ("nothing", Vec::new()),
+        ("one point", vec![Point3::new(0.0, 0.0, 0.7)]),
+        ("all points equal", same),
+        ("a line", line),
+        ("no returns", vec![Point3::new(f32::NAN, f32::INFINITY, 0.0); 1000]),
+    ];
+    for (name, points) in cases {
+        let cloud = Cloud::from_points(points);
+        let found = segment(&cloud, &Visibility::default(), &options());
+        assert!(
+            matches!(found, Err(SurfaceError::TooFew { .. } | SurfaceError::NotFound { .. })),
+            "{name}: {found:?}"
+        );
+    }
+}
+
+#[test]
+fn models_that_mean_nothing_are_refused_in_words() {
+    let mut huge = cup_a();
+    huge.height_m = Range { low: 104.0, high: 104.0 };
+    let mut bare = cup_a();
+    bare.diameter_m = None;
+    let cases = [
+        (vec![huge], "not millimetres"),
+        (vec![bare], "needs `diameter_m`"),
+        (vec![cup_a(), cup_a()], "two objects are called `cup A`"),
+    ];
+    for (models, words) in cases {
+        let why = check_models(&models).map_err(|e| e.to_string()).err().unwrap_or_default();
+        assert!(why.contains(words), "{why}");
+    }
+    assert!(check_models(&[cup_a()]).is_ok());
+}

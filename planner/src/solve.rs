@@ -231,7 +231,7 @@ pub fn plan(
             Outcome::Solved { plan, statistics }
         }
         (None, Reason::Exhausted | Reason::Enough) => {
-            Outcome::Unsolvable { why: Explanation::default(), statistics }
+            Outcome::Unsolvable { why: Explanation::of_obstacles(task, &grounded), statistics }
         }
         (best, Reason::Stopped) => Outcome::OutOfTime { best, statistics },
         (best, Reason::Memory) => Outcome::OutOfMemory { best, statistics },

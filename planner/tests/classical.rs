@@ -73,6 +73,17 @@ fn a_goal_that_nothing_reaches_is_unsolvable() {
 }
 
 #[test]
+fn what_nobody_achieves_is_named() {
+    let problem = SHUTTLE_PROBLEM.replace("(road c b)", "").replace("(box-at x a)", "");
+    let task = Task::read(&source("domain", SHUTTLE), &source("problem", &problem)).expect("legal");
+    let outcome = plan(&task, &Attachments::default(), &Options::default(), &|| false, &mut |_| {});
+    let Ok(Outcome::Unsolvable { why, .. }) = outcome else { panic!("{outcome:?}") };
+    let text = why.to_string();
+    assert!(text.contains("`(box-at x c)` never holds"), "{text}");
+    assert!(text.contains("`(in x)` never holds"), "{text}");
+}
+
+#[test]
 fn a_dead_end_that_only_search_shows_is_unsolvable() {
     let domain = "(define (domain keys) (:predicates (key) (left) (right))
       (:action open-left :parameters () :precondition (key) :effect (and (left) (not (key))))

@@ -93,6 +93,7 @@ pub(super) fn assemble(
         metric,
         mutex_groups,
         goal_reachable: !unreachable,
+        obstacles: Vec::new(),
     };
     compact(&mut ground, !task.modules.is_empty());
     derive_initial(&mut ground);

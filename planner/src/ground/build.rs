@@ -11,6 +11,7 @@ use super::atoms::{Atoms, NONE};
 use super::instantiate::{Clauses, Deed, Instantiate};
 use super::metric;
 use super::normal::{self, Action_, Change_, Effect_, Formula, Normal, Number, Target};
+use super::obstacles;
 use super::raw::{Later, RawAction, RawAxiom, RawTask, Resolve};
 use super::reach::Reach;
 use super::relaxed;
@@ -83,6 +84,12 @@ pub fn ground(
     for action in &mut raw.actions {
         action.cost = costs.of(action);
     }
+    let lacks = |&literal: &u32| literal & 1 == 0 && !reached.atoms[(literal >> 1) as usize];
+    let out_of_reach = !goal_possible || raw.goal.literals.iter().any(lacks);
+    let found = match out_of_reach {
+        true => obstacles::obstacles(&normal, &make.atoms, &reached.atoms),
+        false => Vec::new(),
+    };
     let groups = groups(&raw, &make, &reached, &rules, &normal, task);
     let everything = |wanted: bool| vec![wanted; raw.init.len()];
     let relevant = if keep {
@@ -91,7 +98,9 @@ pub fn ground(
     } else {
         relevant::prune(&mut raw, &make.comparisons, &make.calls, make.numerics.len(), &costs.read)
     };
-    Ok(assemble(task, raw, make, reached, relevant, groups, costs.metric, goal_possible))
+    let mut ground = assemble(task, raw, make, reached, relevant, groups, costs.metric, goal_possible);
+    ground.obstacles = found;
+    Ok(ground)
 }
 
 fn widths(task: &Task) -> Result<(), GroundError> {

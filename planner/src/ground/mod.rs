@@ -6,6 +6,7 @@ mod build;
 mod instantiate;
 mod metric;
 mod normal;
+mod obstacles;
 mod raw;
 mod reach;
 mod relaxed;
@@ -16,4 +17,5 @@ mod task;
 mod variables;
 
 pub use build::{GroundError, ground};
+pub use obstacles::{MissingAtom, Obstacle};
 pub use task::*;

@@ -351,4 +351,6 @@ pub struct GroundTask {
     pub mutex_groups: Vec<Vec<Fact>>,
     /// False where the goal is out of reach even when nothing is ever taken away.
     pub goal_reachable: bool,
+    /// Where it is out of reach: which atoms nobody achieves, the goal's first.
+    pub obstacles: Vec<super::obstacles::Obstacle>,
 }

@@ -13,7 +13,7 @@ use descry_memory::belief::Belief;
 use descry_memory::space::Space;
 use descry_memory::{Record, RecordId};
 use descry_perception::recognise::Recogniser;
-use descry_planner::{Attachments, Outcome as Planned, Plan, Task};
+use descry_planner::{Attachments, Outcome as Planned, Plan, Statistics, Task};
 use descry_robots::{CancellationToken, Robot};
 use descry_skills::{Call, Context, Outcome, SkillFailure, Symbols};
 
@@ -22,6 +22,9 @@ use crate::report::{Event, Verdict};
 
 mod ground;
 mod look;
+
+/// A planning call ends after so many evaluated states; then the best plan so far, or one good look, has to do.
+const MOST_EVALUATED: u64 = 20_000;
 
 /// An agent at work on one goal.
 pub struct Agent<'a> {
@@ -147,8 +150,10 @@ impl<'a> Agent<'a> {
         self.begin().await?;
         loop {
             let round = self.estimate()?;
+            if self.reached(&round) {
+                return Ok(self.achieved(&round));
+            }
             match self.monitor(&round) {
-                Ok(()) if self.rest().steps.is_empty() => return Ok(self.achieved(&round)),
                 Ok(()) => self.keep()?,
                 Err(because) => {
                     if let Some(why) = self.replan(&round, because)? {
@@ -168,6 +173,11 @@ impl<'a> Agent<'a> {
         }
     }
 
+    /// Does the goal hold now, with nothing more to do?
+    fn reached(&self, round: &Round) -> bool {
+        descry_planner::monitor(&round.task, &round.attachments, &Plan::default()).is_ok()
+    }
+
     /// Does the rest of the plan, applied to the current state, still reach the goal? If not, the condition that broke.
     fn monitor(&self, round: &Round) -> Result<(), String> {
         match (&self.state.plan, descry_planner::monitor(&round.task, &round.attachments, &self.rest())) {
@@ -180,39 +190,37 @@ impl<'a> Agent<'a> {
     /// Makes a new plan. Returns the reason if there can be none.
     fn replan(&mut self, round: &Round, because: String) -> Result<Option<String>, CommandError> {
         let started = Instant::now();
-        let options = descry_planner::Options::default();
+        let options =
+            descry_planner::Options { evaluation_limit: Some(MOST_EVALUATED), ..descry_planner::Options::default() };
         let planned = descry_planner::plan(&round.task, &round.attachments, &options, &|| false, &mut |_| {})
             .map_err(ground::planning_failed)?;
         let took_s = started.elapsed().as_secs_f64();
         self.state.totals.planning_s = self.state.totals.planning_s.max(took_s);
         match planned {
-            Planned::Solved { plan, statistics } => {
-                self.state.totals.plans += 1;
-                let calls = statistics
-                    .attachments
-                    .iter()
-                    .map(|(name, c)| (name.clone(), c.calls + c.relaxed))
-                    .collect();
-                self.say(&Event::Planned {
-                    round: self.state.totals.plans,
-                    because,
-                    steps: plan
-                        .to_string()
-                        .lines()
-                        .filter(|l| !l.starts_with(';'))
-                        .map(str::to_string)
-                        .collect(),
-                    makespan_s: plan.makespan_s().unwrap_or(0.0),
-                    calls,
-                })?;
-                self.state.plan = Some(plan);
-                Ok(None)
-            }
-            Planned::Unsolvable { why, .. } => Ok(Some(why.to_string())),
-            Planned::OutOfTime { .. } | Planned::OutOfMemory { .. } => {
-                Err(CommandError::Bug("planning ended without an answer although nothing limited it".into()))
+            Planned::Unsolvable { why, .. } => return Ok(Some(why.to_string())),
+            Planned::Solved { plan, statistics } => self.adopt(plan, &statistics, because)?,
+            Planned::OutOfTime { best, statistics } | Planned::OutOfMemory { best, statistics } => {
+                let because = format!("{because}; the search ended after {MOST_EVALUATED} states");
+                let plan = best.or_else(|| ground::one_look(&round.situation));
+                let Some(plan) = plan else { return Ok(Some(String::new())) };
+                self.adopt(plan, &statistics, because)?;
             }
         }
+        Ok(None)
+    }
+
+    fn adopt(&mut self, plan: Plan, statistics: &Statistics, because: String) -> Result<(), CommandError> {
+        self.state.totals.plans += 1;
+        let calls = statistics.attachments.iter().map(|(name, c)| (name.clone(), c.calls + c.relaxed)).collect();
+        self.say(&Event::Planned {
+            round: self.state.totals.plans,
+            because,
+            steps: plan.to_string().lines().filter(|l| !l.starts_with(';')).map(str::to_string).collect(),
+            makespan_s: plan.makespan_s().unwrap_or(0.0),
+            calls,
+        })?;
+        self.state.plan = Some(plan);
+        Ok(())
     }
 
     fn keep(&mut self) -> Result<(), CommandError> {
@@ -224,7 +232,7 @@ impl<'a> Agent<'a> {
         self.state.plan.clone().unwrap_or_default()
     }
 
-    /// Takes the next step off the plan. There is one: a plan without steps that reaches the goal ends the loop.
+    /// Takes the next step off the plan. There is one: where nothing is left to do, the goal holds.
     fn next_call(&mut self) -> Call {
         let plan = self.state.plan.get_or_insert_with(Plan::default);
         let step = plan.steps.remove(0);

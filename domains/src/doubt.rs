@@ -54,6 +54,7 @@ pub struct Doubt {
     /// Probability below which what is left is not worth a look.
     negligible: f64,
     shown: Vec<OnceLock<Vec<bool>>>,
+    within_reach: OnceLock<f64>,
     surfaces: usize,
 }
 
@@ -83,12 +84,13 @@ impl Doubt {
         doubt
     }
 
-    /// The share of the doubt that a look at `from` would settle beyond what the planned looks settle, 0 to 1.
+    /// The share of the doubt that a look at `from` would settle beyond what the planned looks settle, 0 to 1. Doubt that
+    /// no look can settle does not count; none is worth a look where what can be settled is negligible.
     pub fn share_settled(&self, situation: &Situation, from: usize, planned: &[(usize, usize)]) -> f64 {
         if self.anywhere {
             return if planned.is_empty() { 1.0 } else { 0.0 };
         }
-        let total = self.remaining();
+        let total = *self.within_reach.get_or_init(|| self.settled_by_all(situation));
         if total < self.negligible {
             return 0.0;
         }
@@ -99,6 +101,17 @@ impl Doubt {
             (0..self.hypotheses.len()).filter(fresh).map(|i| self.hypotheses[i].weight).sum()
         };
         (0..self.surfaces).map(settled).sum::<f64>() / total
+    }
+
+    /// The probability that hangs on what some look could settle that has not been taken and can be.
+    fn settled_by_all(&self, situation: &Situation) -> f64 {
+        let open = |&(from, on): &(usize, usize)| {
+            !situation.observed.contains(&(from, on)) && situation.can_reach(from) && situation.sees(from, on)
+        };
+        let looks = (0..situation.candidates.len()).flat_map(|from| (0..self.surfaces).map(move |on| (from, on)));
+        let looks: Vec<&Vec<bool>> = looks.filter(open).map(|(from, on)| self.shown(situation, from, on)).collect();
+        let settled = |(n, _): &(usize, &Hypothesis)| looks.iter().any(|shown| shown[*n]);
+        self.hypotheses.iter().enumerate().filter(settled).map(|(_, h)| h.weight).sum()
     }
 
     /// The probability that hangs on all that is in doubt.
@@ -138,6 +151,7 @@ impl Doubt {
             anywhere: places == 0,
             negligible: situation.thresholds.remaining,
             shown,
+            within_reach: OnceLock::new(),
             surfaces: situation.surfaces.len(),
         }
     }

@@ -176,6 +176,18 @@ impl Situation {
         row[to]
     }
 
+    /// Whether the body can get to a candidate from where it stands.
+    pub fn can_reach(&self, to: usize) -> bool {
+        to == self.at || (!self.out_of_reach.contains(&to) && self.travel_s(self.at, to).is_finite())
+    }
+
+    /// Whether a look from a candidate may settle anything that is in doubt about what is asked for.
+    pub fn worth_a_look(&self, from: usize, on: usize) -> bool {
+        let things = (0..self.things.len()).map(|what| self.doubt_about(what));
+        let doubts: Vec<&Doubt> = if self.things.is_empty() { vec![self.doubt_on(on)] } else { things.collect() };
+        doubts.iter().any(|doubt| doubt.share_settled(self, from, &[]) > 0.0)
+    }
+
     /// Where the camera would be if the body stood at a candidate and looked at a surface.
     pub fn camera(&self, from: usize, on: usize) -> Option<Isometry3<f64>> {
         *self.derived.cameras[from * self.surfaces.len() + on].get_or_init(|| {

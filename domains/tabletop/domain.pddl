@@ -16,6 +16,7 @@
   (:modules
     (path-cost ?from ?to - pose                 cost             path_cost@descry)
     (can-see ?from - pose ?on - surface         conditionchecker can_see@descry)
+    (worth-a-look ?from - pose ?on - surface    conditionchecker worth_a_look@descry)
     (expected-gain ?from - pose ?what - thing   cost             expected_gain@descry)
     (expected-clarity ?from - pose ?on - surface cost            expected_clarity@descry))
 
@@ -48,7 +49,8 @@
       (at start (at ?from))
       (over all (at ?from))
       (at start (not (observed ?from ?on)))
-      (at start ([can-see ?from ?on])))
+      (at start ([can-see ?from ?on]))
+      (at start ([worth-a-look ?from ?on])))
     :effect (and
       (at end (observed ?from ?on))
       (at end (increase (clarity ?on) [expected-clarity ?from ?on]))

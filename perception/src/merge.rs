@@ -97,6 +97,21 @@ pub struct Merged {
     pub steps: Vec<Step>,
 }
 
+impl Merged {
+    /// The same in another frame: cloud, poses and what was seen.
+    pub fn moved(mut self, there_from_world: &Isometry3<f64>) -> Merged {
+        self.cloud = self.cloud.transformed(there_from_world);
+        for fit in &mut self.fits {
+            fit.world_from_camera = there_from_world * fit.world_from_camera;
+        }
+        let world_from_there = there_from_world.inverse();
+        for map in &mut self.visibility.maps {
+            map.camera_from_world *= world_from_there;
+        }
+        self
+    }
+}
+
 /// Views that cannot be merged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MergeError {

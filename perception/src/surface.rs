@@ -78,6 +78,15 @@ impl Surface {
         self.up.dot(&p.coords) - self.offset_m
     }
 
+    /// The same in another frame.
+    pub fn moved(&self, there_from_world: &Isometry3<f64>) -> Surface {
+        let up = there_from_world.rotation * self.up;
+        let hull: Vec<Point3<f64>> = self.hull.iter().map(|p| there_from_world * p).collect();
+        let shift = up.dot(&there_from_world.translation.vector);
+        let surface_from_world = self.surface_from_world * there_from_world.inverse();
+        Surface { up, hull, offset_m: self.offset_m + shift, surface_from_world, ..self.clone() }
+    }
+
     /// True if the point lies above or below the outline widened by `margin_m`.
     pub fn covers(&self, p: &Point3<f64>, margin_m: f64) -> bool {
         let n = self.hull.len();

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use descry_domains::situation::{Known, Situation};
 use descry_domains::{attachments, candidates};
-use descry_planner::{Diagnostic, Findings, PlanError, Source, Task};
+use descry_planner::{Diagnostic, Findings, Plan, PlanError, Source, Step, Task};
 use descry_skills::Call;
 
 use super::{Agent, Round};
@@ -133,6 +133,37 @@ pub(super) fn reason(round: &Round, call: &Call) -> String {
         _ => String::new(),
     }
 }
+
+/// The single look that settles most a second; none if no look settles anything.
+pub(super) fn one_look(s: &Situation) -> Option<Plan> {
+    let looks = (0..s.candidates.len()).flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));
+    let open = looks.filter(|look| !s.observed.contains(look) && s.can_reach(look.0) && s.sees(look.0, look.1));
+    let rate = |&(from, on): &(usize, usize)| {
+        let share: f64 = match s.things.is_empty() {
+            true => s.doubt_on(on).share_settled(s, from, &[]),
+            false => (0..s.things.len()).map(|what| s.doubt_about(what).share_settled(s, from, &[])).sum(),
+        };
+        share / (s.travel_s(s.at, from) + LOOK_S)
+    };
+    let (from, on) = open.filter(|look| rate(look) > 0.0).max_by(|a, b| rate(a).total_cmp(&rate(b)))?;
+    let symbol = |n: usize| s.candidates[n].symbol.clone();
+    let step = |start_s: f64, action: &str, arguments: Vec<String>, duration_s: f64| Step {
+        start_s: Some(start_s),
+        action: action.into(),
+        arguments,
+        duration_s,
+    };
+    let drive_s = if from == s.at { 0.0 } else { s.travel_s(s.at, from) };
+    let mut steps = Vec::new();
+    if from != s.at {
+        steps.push(step(0.0, "move", vec![symbol(s.at), symbol(from)], drive_s));
+    }
+    steps.push(step(drive_s, "observe", vec![symbol(from), s.surfaces[on].symbol.clone()], LOOK_S));
+    Some(Plan { steps, ..Plan::default() })
+}
+
+/// What a look takes, as in the domain.
+const LOOK_S: f64 = 2.0;
 
 /// What a look is expected to settle.
 fn hope(s: &Situation, from: usize) -> String {

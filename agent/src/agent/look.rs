@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use descry_memory::belief::Sighted;
 use descry_memory::{Draft, Meta, RecordId, Sensing};
+use descry_perception::View;
+use descry_perception::locate::locate;
 use descry_perception::merge::{MergeOptions, Merged, merge};
 use descry_perception::nalgebra::{Point3, Unit, Vector3};
 use descry_perception::recognise::Percept;
-use descry_perception::segment::{Scene, SceneOptions, segment};
-use descry_perception::surface::SurfaceOptions;
+use descry_perception::segment::{Scene, SceneOptions, segment_on};
+use descry_perception::surface::{Surface, SurfaceOptions, find_surface};
 use descry_perception::visibility::{DepthMap, Seen, Visibility};
 use descry_planner::Source;
 use descry_robots::Sensed;
@@ -57,22 +59,40 @@ impl Agent<'_> {
             Ok(merged) => merged,
             Err(nothing) => return self.saw_nothing(nothing.to_string()),
         };
-        if let (Some(fit), Some(view)) = (merged.fits.last(), views.last()) {
-            if let Some(map) = DepthMap::from_view(view, &fit.world_from_camera).filter(|_| fit.used) {
-                Arc::make_mut(&mut self.state.space).integrate(&map);
-            }
-        }
-        let scene = match segment(&merged.cloud, &merged.visibility, &self.scene_options()) {
-            Ok(scene) => scene,
+        let surface = match find_surface(&merged.cloud, &merged.visibility, &self.scene_options().surface) {
+            Ok(surface) => surface,
             Err(nothing) => return self.saw_nothing(nothing.to_string()),
         };
+        let (merged, surface) = self.lay_on_map(on, merged, surface);
+        self.note_space(&views, &merged);
+        let scene = segment_on(&merged.cloud, &merged.visibility, surface, &self.scene_options());
         let percepts = self.recogniser.recognise(&scene, &merged.visibility, &self.domain.objects);
         self.note_surface(on, &scene);
         self.believe(&merged, &percepts)
     }
 
+    /// Lays the surface on the outline that the map has of it: that mends what is left of localisation's error.
+    fn lay_on_map(&self, on: usize, merged: Merged, surface: Surface) -> (Merged, Surface) {
+        let known = &self.state.surfaces[on];
+        if !known.whole {
+            return (merged, surface);
+        }
+        let body = self.robot.description();
+        let located = locate(&surface.hull, &surface.up, &known.outline, body.pose_sigma_m, body.pose_sigma_rad);
+        if std::env::var("DBG").is_ok() { eprintln!("LOCATED {located:?} hull {:?}", surface.hull); }
+        (merged.moved(&located.map_from_world), surface.moved(&located.map_from_world))
+    }
+
+    /// Takes the newest view, if it could be aligned, into the map of seen space.
+    fn note_space(&mut self, views: &[View], merged: &Merged) {
+        let newest = merged.fits.last().filter(|fit| fit.used).zip(views.last());
+        if let Some(map) = newest.and_then(|(fit, view)| DepthMap::from_view(view, &fit.world_from_camera)) {
+            Arc::make_mut(&mut self.state.space).integrate(&map);
+        }
+    }
+
     /// Reads the views back from the record by their timestamps, with the transforms of those times.
-    fn restore(&self) -> Result<Vec<descry_perception::View>, CommandError> {
+    fn restore(&self) -> Result<Vec<View>, CommandError> {
         let map = &self.robot.description().frames.map;
         let view = |look: &Look| self.record.view_at(look.stamp_ns, map);
         self.state.looks.iter().map(view).collect::<Result<_, _>>().map_err(CommandError::broken)

@@ -5,6 +5,7 @@ mod expected_clarity;
 mod expected_gain;
 mod path_cost;
 mod program;
+mod worth_a_look;
 
 use std::sync::Arc;
 
@@ -24,6 +25,7 @@ const ALL: &[(&str, &[&str], Answers)] = &[
     ("expected-clarity", &["observed"], expected_clarity::answer),
     ("expected-gain", &["observed"], expected_gain::answer),
     ("path-cost", &[], path_cost::answer),
+    ("worth-a-look", &[], worth_a_look::answer),
 ];
 
 /// An attachment of the list above, bound to a situation.

@@ -12,6 +12,7 @@ use descry_domains::situation::{self, Candidate, KnownSurface, Situation, Thing}
 use descry_memory::belief::Belief;
 use descry_memory::space::Space;
 use descry_memory::{Record, RecordId};
+use descry_perception::nalgebra::Vector3;
 use descry_perception::recognise::Recogniser;
 use descry_planner::{Attachments, Outcome as Planned, Plan, Statistics, Task};
 use descry_robots::{CancellationToken, Robot};
@@ -93,6 +94,8 @@ pub struct Conclusion {
     pub remaining: Option<f64>,
     /// What is believed.
     pub belief: Belief,
+    /// Up, away from the surface.
+    pub up: Vector3<f64>,
     /// What it took.
     pub totals: Totals,
 }
@@ -348,6 +351,7 @@ impl<'a> Agent<'a> {
         };
         let remaining = (!situation.things.is_empty()).then(|| situation.doubt_about(0).remaining());
         let (belief, totals) = (self.state.belief.clone(), self.state.totals);
-        Conclusion { verdict, why, confidence, remaining, belief, totals }
+        let up = situation.surfaces.first().map_or_else(Vector3::z, |s| s.up);
+        Conclusion { verdict, why, confidence, remaining, belief, up, totals }
     }
 }

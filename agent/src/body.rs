@@ -22,7 +22,7 @@ impl Body {
         Self { robot: robot.clone(), simulated: Some(robot) }
     }
 
-    /// Where an object of that name or kind stands in truth (the centre of its base), the one nearest to where it is
+    /// Where an object of that name or kind stands in truth (the middle of its body), the one nearest to where it is
     /// believed to stand if there are several. None without a simulation, or if it is not there.
     pub fn true_position_m(&self, name: &str, believed_m: Option<[f64; 3]>) -> Option<[f64; 3]> {
         let truth = self.simulated.as_ref()?.truth();
@@ -34,7 +34,7 @@ impl Body {
             .objects
             .iter()
             .filter(|o| o.present && (o.name == name || o.kind == name))
-            .map(|o| o.map_from_object.translation.vector.into())
+            .map(|o| o.centre_m.coords.into())
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 

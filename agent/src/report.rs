@@ -149,7 +149,7 @@ pub struct Believed {
     pub kind: Option<String>,
     /// Probability of that.
     pub confidence: f64,
-    /// Where it stands, in the map.
+    /// The middle of its body, in the map.
     pub position_m: [f64; 3],
     /// Sides of its footprint and height.
     pub size_m: [f64; 3],
@@ -174,9 +174,9 @@ pub struct Report {
     pub threshold: f64,
     /// Probability that what was looked for is there after all.
     pub remaining: Option<f64>,
-    /// Where it is believed to stand, in the map.
+    /// Where it is believed to be: the middle of its body, in the map.
     pub position_m: Option<[f64; 3]>,
-    /// Where it stands; simulation only.
+    /// Where it is; simulation only.
     pub true_position_m: Option<[f64; 3]>,
     /// Everything that was seen on the surface.
     pub objects: Vec<Believed>,

@@ -5,6 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use descry_domains::goal::{Goal, symbol};
 use descry_domains::load::Domain;
+use descry_memory::belief::Track;
 use descry_memory::{Options, Query, Record};
 use descry_robots::CancellationToken;
 use serde::{Deserialize, Serialize};
@@ -126,19 +127,20 @@ fn fill(report: &mut Report, conclusion: &Conclusion) {
     report.replans = conclusion.totals.plans.saturating_sub(1);
     report.distance_m = conclusion.totals.distance_m;
     let tracks = &conclusion.belief.tracks;
+    let middle = |t: &Track| (t.position_m + conclusion.up * (t.size_m[2] / 2.0)).coords.into();
     report.objects = tracks
         .iter()
         .map(|t| Believed {
             label: t.label().map(str::to_string),
             kind: t.kind().map(str::to_string),
             confidence: t.certainty(),
-            position_m: t.position_m.coords.into(),
+            position_m: middle(t),
             size_m: t.size_m,
         })
         .collect();
     if let Some(name) = &report.object {
         let best = tracks.iter().max_by(|a, b| a.probability_of(name).total_cmp(&b.probability_of(name)));
-        report.position_m = best.map(|t| t.position_m.coords.into());
+        report.position_m = best.map(middle);
     }
 }
 

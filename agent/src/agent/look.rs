@@ -26,6 +26,10 @@ use crate::report::Event;
 const SIDE_TOLERANCE_M: f64 = 0.03;
 /// How far a surface may be from the height at which the map has it.
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
+/// Points this near to a surface lie on it.
+const ON_SURFACE_M: f64 = 0.012;
+/// How far beyond the hull of a surface points of it are looked for.
+const HULL_MARGIN_M: f64 = 0.02;
 
 impl Agent<'_> {
     /// Puts a view into the record: its transforms, then its cloud. When this returns it survives a crash.
@@ -78,8 +82,9 @@ impl Agent<'_> {
             return (merged, surface);
         }
         let body = self.robot.description();
-        let located = locate(&surface.hull, &surface.up, &known.outline, body.pose_sigma_m, body.pose_sigma_rad);
-        if std::env::var("DBG").is_ok() { eprintln!("LOCATED {located:?} hull {:?}", surface.hull); }
+        let on_it = |p: &Point3<f64>| surface.height_m(p).abs() < ON_SURFACE_M && surface.covers(p, HULL_MARGIN_M);
+        let points: Vec<Point3<f64>> = merged.cloud.points.iter().map(|p| p.cast()).filter(on_it).collect();
+        let located = locate(&points, &surface.up, &known.outline, body.pose_sigma_m, body.pose_sigma_rad);
         (merged.moved(&located.map_from_world), surface.moved(&located.map_from_world))
     }
 

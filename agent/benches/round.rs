@@ -43,7 +43,8 @@ fn looked() -> Looked {
     let spec = body::scene_spec(None, &domain).expect("the default scene is there");
     let body = body::simulate(&spec, 1, Default::default()).expect("it can be arranged");
     let folder = TempDir::new().expect("a folder can be made");
-    let record = Record::create(&folder.path().join("record"), Options::default()).expect("a record can be made");
+    let record =
+        Record::create(&folder.path().join("record"), Options::default()).expect("a record can be made");
     let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
     let robot = Arc::clone(&body.robot);
     let stamps_ns = runtime.block_on(async {
@@ -57,14 +58,18 @@ fn looked() -> Looked {
             robot.look_at(&Point3::new(0.0, 0.0, 0.72), &watch).await.expect("the head turns");
             let seen = robot.sense(&watch).await.expect("a frame comes");
             for t in &seen.transforms {
-                record.put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child).expect("recorded");
+                record
+                    .put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)
+                    .expect("recorded");
             }
             let sensing = Sensing {
                 intrinsics: Some(seen.intrinsics),
                 pose_sigma_m: seen.pose_sigma_m,
                 pose_sigma_rad: seen.pose_sigma_rad,
             };
-            record.put_cloud(seen.stamp_ns, "camera", &seen.cloud, &sensing, Meta::default()).expect("recorded");
+            record
+                .put_cloud(seen.stamp_ns, "camera", &seen.cloud, &sensing, Meta::default())
+                .expect("recorded");
             stamps.push(seen.stamp_ns);
         }
         stamps
@@ -142,7 +147,8 @@ fn recognise_the_merged_cloud(bencher: Bencher) {
     let looked = looked();
     let merged = looked.merged();
     bencher.bench(|| {
-        let scene = segment(&merged.cloud, &merged.visibility, &SceneOptions::default()).expect("there is a table");
+        let scene =
+            segment(&merged.cloud, &merged.visibility, &SceneOptions::default()).expect("there is a table");
         Descry::default().recognise(&scene, &merged.visibility, &looked.domain.objects)
     });
 }

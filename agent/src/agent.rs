@@ -193,8 +193,10 @@ impl<'a> Agent<'a> {
     /// Makes a new plan. Returns the reason if there can be none.
     fn replan(&mut self, round: &Round, because: String) -> Result<Option<String>, CommandError> {
         let started = Instant::now();
-        let options =
-            descry_planner::Options { evaluation_limit: Some(MOST_EVALUATED), ..descry_planner::Options::default() };
+        let options = descry_planner::Options {
+            evaluation_limit: Some(MOST_EVALUATED),
+            ..descry_planner::Options::default()
+        };
         let planned = descry_planner::plan(&round.task, &round.attachments, &options, &|| false, &mut |_| {})
             .map_err(ground::planning_failed)?;
         let took_s = started.elapsed().as_secs_f64();
@@ -214,7 +216,8 @@ impl<'a> Agent<'a> {
 
     fn adopt(&mut self, plan: Plan, statistics: &Statistics, because: String) -> Result<(), CommandError> {
         self.state.totals.plans += 1;
-        let calls = statistics.attachments.iter().map(|(name, c)| (name.clone(), c.calls + c.relaxed)).collect();
+        let calls =
+            statistics.attachments.iter().map(|(name, c)| (name.clone(), c.calls + c.relaxed)).collect();
         self.say(&Event::Planned {
             round: self.state.totals.plans,
             because,

@@ -108,8 +108,10 @@ impl Doubt {
         let open = |&(from, on): &(usize, usize)| {
             !situation.observed.contains(&(from, on)) && situation.can_reach(from) && situation.sees(from, on)
         };
-        let looks = (0..situation.candidates.len()).flat_map(|from| (0..self.surfaces).map(move |on| (from, on)));
-        let looks: Vec<&Vec<bool>> = looks.filter(open).map(|(from, on)| self.shown(situation, from, on)).collect();
+        let looks =
+            (0..situation.candidates.len()).flat_map(|from| (0..self.surfaces).map(move |on| (from, on)));
+        let looks: Vec<&Vec<bool>> =
+            looks.filter(open).map(|(from, on)| self.shown(situation, from, on)).collect();
         let settled = |(n, _): &(usize, &Hypothesis)| looks.iter().any(|shown| shown[*n]);
         self.hypotheses.iter().enumerate().filter(settled).map(|(_, h)| h.weight).sum()
     }

@@ -184,7 +184,8 @@ impl Situation {
     /// Whether a look from a candidate may settle anything that is in doubt about what is asked for.
     pub fn worth_a_look(&self, from: usize, on: usize) -> bool {
         let things = (0..self.things.len()).map(|what| self.doubt_about(what));
-        let doubts: Vec<&Doubt> = if self.things.is_empty() { vec![self.doubt_on(on)] } else { things.collect() };
+        let doubts: Vec<&Doubt> =
+            if self.things.is_empty() { vec![self.doubt_on(on)] } else { things.collect() };
         doubts.iter().any(|doubt| doubt.share_settled(self, from, &[]) > 0.0)
     }
 

@@ -3,7 +3,9 @@
 //! Localisation errs by centimetres and degrees, and so does a merged cloud as a whole. A table whose outline the map
 //! knows tells by how much: the edges that were seen are laid on the edges of the outline.
 
-use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, Point3, Translation3, Unit, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{
+    Isometry2, Isometry3, Matrix3, Point2, Point3, Translation3, Unit, UnitQuaternion, Vector2, Vector3,
+};
 
 /// Length of an edge that gives one sample.
 const BIN_M: f64 = 0.02;
@@ -48,7 +50,8 @@ pub fn locate(
     let edges = edges(&outline);
     let mut moved = Isometry2::identity();
     for gate_m in GATES_M {
-        let matches: Vec<Match> = edges.iter().flat_map(|edge| samples(edge, &points, &moved, gate_m)).collect();
+        let matches: Vec<Match> =
+            edges.iter().flat_map(|edge| samples(edge, &points, &moved, gate_m)).collect();
         located.matched = matches.len();
         let square: f64 = matches.iter().map(|m| m.distance_m.powi(2)).sum();
         located.residual_m = if matches.is_empty() { 0.0 } else { (square / matches.len() as f64).sqrt() };
@@ -173,7 +176,8 @@ mod tests {
 
     /// Points of the table every 4 mm, where `seen` says so.
     fn points(seen: impl Fn(f64, f64) -> bool) -> Vec<Point3<f64>> {
-        let grid = (-200..=200).flat_map(|i| (-100..=100).map(move |j| [f64::from(i) * 0.004, f64::from(j) * 0.004]));
+        let grid = (-200..=200)
+            .flat_map(|i| (-100..=100).map(move |j| [f64::from(i) * 0.004, f64::from(j) * 0.004]));
         raised(&grid.filter(|&[x, y]| seen(x, y)).collect::<Vec<_>>())
     }
 

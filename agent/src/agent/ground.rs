@@ -137,7 +137,8 @@ pub(super) fn reason(round: &Round, call: &Call) -> String {
 /// The single look that settles most a second; none if no look settles anything.
 pub(super) fn one_look(s: &Situation) -> Option<Plan> {
     let looks = (0..s.candidates.len()).flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));
-    let open = looks.filter(|look| !s.observed.contains(look) && s.can_reach(look.0) && s.sees(look.0, look.1));
+    let open =
+        looks.filter(|look| !s.observed.contains(look) && s.can_reach(look.0) && s.sees(look.0, look.1));
     let rate = |&(from, on): &(usize, usize)| {
         let share: f64 = match s.things.is_empty() {
             true => s.doubt_on(on).share_settled(s, from, &[]),

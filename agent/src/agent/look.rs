@@ -82,7 +82,8 @@ impl Agent<'_> {
             return (merged, surface);
         }
         let body = self.robot.description();
-        let on_it = |p: &Point3<f64>| surface.height_m(p).abs() < ON_SURFACE_M && surface.covers(p, HULL_MARGIN_M);
+        let on_it =
+            |p: &Point3<f64>| surface.height_m(p).abs() < ON_SURFACE_M && surface.covers(p, HULL_MARGIN_M);
         let points: Vec<Point3<f64>> = merged.cloud.points.iter().map(|p| p.cast()).filter(on_it).collect();
         let located = locate(&points, &surface.up, &known.outline, body.pose_sigma_m, body.pose_sigma_rad);
         (merged.moved(&located.map_from_world), surface.moved(&located.map_from_world))

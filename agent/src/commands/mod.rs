@@ -4,6 +4,7 @@ mod check;
 mod find;
 mod goals;
 mod input;
+mod memory;
 mod plan;
 mod recognise;
 mod runs;
@@ -37,6 +38,11 @@ pub enum Command {
     Show(show::Arguments),
     /// List the runs
     Runs(runs::Arguments),
+    /// A record by itself: show, query, verify, export
+    #[command(subcommand)]
+    Memory(memory::Arguments),
+    /// Write a record into one MCAP file: short for `memory export`
+    Export(memory::ExportArguments),
 }
 
 /// Carries a command out.
@@ -54,5 +60,7 @@ pub fn run(command: &Command) -> Result<Exit, CommandError> {
         Command::Recognise(arguments) => recognise::run(arguments),
         Command::Show(arguments) => show::run(arguments),
         Command::Runs(arguments) => runs::run(arguments),
+        Command::Memory(arguments) => memory::run(arguments),
+        Command::Export(arguments) => memory::export(arguments),
     }
 }

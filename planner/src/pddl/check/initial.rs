@@ -159,34 +159,33 @@ impl Checker<'_> {
         }
     }
 
-    /// What no declaration knows cannot matter to any action: only a likely misspelling is a fault.
+    /// What no declaration knows cannot matter to any action; it is left out, and said so.
     fn unknown_initial(&mut self, name: Name, predicate: bool) {
-        let task = &self.task;
-        let known: Vec<&str> = if predicate {
-            task.predicates.iter().map(|own| own.name.as_str()).collect()
-        } else {
-            task.functions.iter().map(|own| own.name.as_str()).collect()
-        };
-        let written = self.name(name.symbol);
-        if nearest(written, known).is_some() {
-            if predicate {
-                self.find_predicate(name);
-            } else {
-                self.find_function(name);
-            }
-            return;
-        }
         let code = if predicate { "undeclared-predicate" } else { "undeclared-function" };
         if self.reported.contains_key(&(code, name.symbol)) {
             return;
         }
         self.reported.insert((code, name.symbol), self.findings.len());
         let kind = if predicate { "predicate" } else { "function" };
+        let task = &self.task;
+        let known: Vec<(&str, Span)> = if predicate {
+            task.predicates.iter().map(|own| (own.name.as_str(), own.span)).collect()
+        } else {
+            task.functions.iter().map(|own| (own.name.as_str(), own.span)).collect()
+        };
+        let written = self.name(name.symbol);
         let message = format!("{kind} `{written}` is not declared in the domain");
-        let finding = Diagnostic::warning(code, message, name.span, "nothing can depend on this");
-        self.push(
-            finding.with_help(format!("declare it in `(:{kind}s …)` of the domain, or remove it here")),
-        );
+        let finding = Diagnostic::warning(code, message, name.span, "what is said with it is left out");
+        let near = nearest(written, known.iter().map(|(own, _)| *own));
+        let finding = match near.and_then(|near| known.iter().find(|(own, _)| *own == near)) {
+            Some((near, declared)) => finding
+                .with_label(*declared, format!("`{near}` is declared here"))
+                .with_help(format!("did you mean `{near}`?")),
+            None => {
+                finding.with_help(format!("declare it in `(:{kind}s …)` of the domain, or remove it here"))
+            }
+        };
+        self.push(finding);
     }
 
     fn ground_arguments(

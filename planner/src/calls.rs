@@ -10,6 +10,7 @@ use crate::attachment::{
     Reading,
 };
 use crate::diagnostic::{Diagnostic, Findings};
+use crate::explain::Refusals;
 use crate::ground::{CallId, GroundTask, Meaning, NumericId, Place, Values, VariableId};
 use crate::solve::PlanError;
 use crate::task::{FunctionId, ObjectId, PredicateId, Task};
@@ -49,6 +50,8 @@ pub(crate) struct Calls<'a> {
     /// Answers of calls that read nothing and take no proposed parameter, exact and relaxed.
     settled: RefCell<Vec<[Option<Answer>; 2]>>,
     terms: Terms,
+    /// What condition modules denied and cost modules called impossible.
+    refusals: RefCell<Refusals>,
 }
 
 impl<'a> Calls<'a> {
@@ -84,6 +87,7 @@ impl<'a> Calls<'a> {
             bound: Vec::new(),
             settled: RefCell::new(vec![[None, None]; ground.calls.len()]),
             terms: Terms::default(),
+            refusals: RefCell::default(),
         };
         if attachments.names().any(|name| !attachments.reads(name).is_empty()) {
             calls.terms = Terms::new(ground);
@@ -92,14 +96,13 @@ impl<'a> Calls<'a> {
             .calls
             .iter()
             .map(|call| {
-                calls.bind_one(call.origin.schema as usize, &call.origin.arguments, &[], call.writes.clone())
+                calls.bind_one(call.origin.schema as usize, &call.origin.arguments, call.writes.clone())
             })
             .collect();
         Ok(calls)
     }
 
-    /// A call that is no part of the ground task (a grounding call), with further argument names at its end.
-    fn bind_one(&self, module: usize, arguments: &[u32], more: &[u32], writes: Vec<Place>) -> Bound {
+    fn bind_one(&self, module: usize, arguments: &[u32], writes: Vec<Place>) -> Bound {
         let declared = &self.task.modules[module];
         let attachment =
             self.attachments.resolve(&declared.function, &declared.name).unwrap_or_default().to_string();
@@ -113,7 +116,7 @@ impl<'a> Calls<'a> {
         let question = Question {
             module: declared.name.as_str().into(),
             kind: declared.kind,
-            arguments: arguments.iter().chain(more).map(name).collect(),
+            arguments: arguments.iter().map(name).collect(),
             readings: Vec::new(),
         };
         Bound { attachment, question, readings, writes }
@@ -199,16 +202,14 @@ impl<'a> Calls<'a> {
         values.iter().position(means).map(|value| value as u32)
     }
 
-    /// The parameters that a grounding module of the lifted task proposes for an action with these arguments. The
-    /// module is given its own arguments, then those of the action.
+    /// The parameters that a grounding module of the lifted task proposes.
     pub fn proposals(
         &self,
         module: usize,
         arguments: &[u32],
-        action_arguments: &[u32],
         state: &Values,
     ) -> Result<Vec<Arc<str>>, Failure> {
-        let bound = self.bind_one(module, arguments, action_arguments, Vec::new());
+        let bound = self.bind_one(module, arguments, Vec::new());
         let question = self.question(&bound, None, state);
         match self.attachments.call(&bound.attachment, &question, Level::Exact)? {
             Answer::Proposals(names) => Ok(names),
@@ -229,6 +230,11 @@ impl<'a> Calls<'a> {
         variables.sort_unstable();
         variables.dedup();
         (variables, numbers)
+    }
+
+    /// What has been refused so far.
+    pub fn refusals(&self) -> Refusals {
+        self.refusals.borrow().clone()
     }
 
     /// What kind of module is called.
@@ -254,6 +260,16 @@ impl<'a> Calls<'a> {
             let question = self.question(bound, proposal, state);
             self.attachments.call(&bound.attachment, &question, level)?
         };
+        if matches!(answer, Answer::Truth(false))
+            || matches!(answer, Answer::Number(cost) if cost.is_infinite())
+        {
+            let mut refusals = self.refusals.borrow_mut();
+            let known = refusals.entry(self.ground.calls[call as usize].origin.schema).or_default();
+            let text = bound.question.to_string();
+            if known.len() < 1000 && !known.contains(&text) {
+                known.push(text);
+            }
+        }
         if settles {
             self.settled.borrow_mut()[call as usize][level as usize] = Some(answer.clone());
         }

@@ -7,13 +7,14 @@ use serde::Serialize;
 use crate::attachment::{AttachmentError, Attachments, CallStatistics};
 use crate::calls::{Calls, report};
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::explain::Explanation;
+use crate::explain::{Explanation, explain};
 use crate::ground::{Expression, GroundError, GroundTask, ground};
 use crate::plan::Plan;
 use crate::search::classical::plan_classical;
 use crate::search::compiled::is_classical;
 use crate::task::Task;
 use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans};
+use crate::validate::validate;
 
 /// The least time between two happenings of which one disturbs the other, in seconds.
 pub const EPSILON_S: f64 = 0.001;
@@ -199,6 +200,7 @@ pub fn plan(
         bound: options.bound.unwrap_or(f64::INFINITY),
         evaluations: options.evaluation_limit.unwrap_or(u64::MAX),
         memory_bytes,
+        seed: options.seed,
     };
     let mut best: Option<Plan> = None;
     let mut invalid: Option<PlanError> = None;
@@ -214,8 +216,8 @@ pub fn plan(
         Ok(())
     };
     let found = match grounded.goal_reachable {
-        true => search_plans(&world, measure(&grounded), limits, &|| stop(), &mut hear),
-        false => Ok(Progress { best: None, reason: Reason::Exhausted, counts: Counts::default(), plans: 0 }),
+        true => search_plans(&world, &measure(&grounded), limits, stop, &mut hear),
+        false => Ok(Progress { reason: Reason::Exhausted, counts: Counts::default(), plans: 0 }),
     };
     let progress = found.map_err(|failure| world.calls.report(failure))?;
     if let Some(error) = invalid {
@@ -231,7 +233,10 @@ pub fn plan(
             Outcome::Solved { plan, statistics }
         }
         (None, Reason::Exhausted | Reason::Enough) => {
-            Outcome::Unsolvable { why: Explanation::of_obstacles(task, &grounded), statistics }
+            let mut why = explain(task, &world.calls.refusals());
+            // What grounding found out is exact: it comes after what stands in the goal itself.
+            why.findings.list.extend(Explanation::of_obstacles(task, &grounded).findings.list);
+            Outcome::Unsolvable { why, statistics }
         }
         (best, Reason::Stopped) => Outcome::OutOfTime { best, statistics },
         (best, Reason::Memory) => Outcome::OutOfMemory { best, statistics },
@@ -264,6 +269,7 @@ fn configure(task: &Task, attachments: &Attachments) -> Result<(), PlanError> {
 fn measure(grounded: &GroundTask) -> Measure {
     match &grounded.metric {
         None => Measure::Makespan,
+        Some(metric) if metric.minimise && metric.expression == Expression::TotalTime => Measure::Makespan,
         Some(metric) if metric.additive && metric.minimise => {
             Measure::Additive { time_weight: metric.time_weight }
         }
@@ -289,8 +295,11 @@ fn to_plan(task: &Task, grounded: &GroundTask, world: &World, timed: &[Timed]) -
 
 /// Every plan that leaves this crate has passed the validator.
 fn checked(task: &Task, attachments: &Attachments, plan: Plan) -> Result<Plan, PlanError> {
-    let _ = (task, attachments);
-    Ok(plan)
+    let verdict = validate(task, attachments, &plan);
+    if verdict.valid {
+        return Ok(Plan { cost: verdict.cost, ..plan });
+    }
+    Err(PlanError::Internal { reason: verdict.reason.unwrap_or_default(), plan })
 }
 
 fn since(

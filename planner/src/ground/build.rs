@@ -96,7 +96,11 @@ pub fn ground(
         let unwanted = absences(&raw);
         Relevant { wanted: everything(true), unwanted, numerics: vec![true; make.numerics.len()] }
     } else {
-        relevant::prune(&mut raw, &make.comparisons, &make.calls, make.numerics.len(), &costs.read)
+        let functions = task.predicates.len()..task.predicates.len() + task.functions.len();
+        let valued: Vec<u32> = (0..make.atoms.len() as u32)
+            .filter(|&atom| functions.contains(&(make.atoms.predicate(atom) as usize)))
+            .collect();
+        relevant::prune(&mut raw, &make.comparisons, &make.calls, make.numerics.len(), &costs.read, &valued)
     };
     let mut ground = assemble(task, raw, make, reached, relevant, groups, costs.metric, goal_possible);
     ground.obstacles = found;

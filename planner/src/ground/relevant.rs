@@ -123,13 +123,15 @@ impl Work<'_> {
 }
 
 /// Removes actions that bring nothing about that matters, and effects that nothing asks about. `metric` lists numeric
-/// fluents that the metric depends on beyond the actions' costs.
+/// fluents that the metric depends on beyond the actions' costs; `valued` the atoms of object functions, where giving one
+/// value takes the others away.
 pub(super) fn prune(
     task: &mut RawTask,
     comparisons: &[Comparison],
     calls: &[RawCall],
     numerics: usize,
     metric: &[u32],
+    valued: &[u32],
 ) -> Relevant {
     let count = task.init.len();
     let relevant = Relevant {
@@ -140,6 +142,7 @@ pub(super) fn prune(
     let mut work = Work { relevant, comparisons, calls, changed: true };
     work.clauses(&task.goal);
     metric.iter().for_each(|&id| work.relevant.numerics[id as usize] = true);
+    valued.iter().for_each(|&atom| work.relevant.wanted[atom as usize] = true);
     let mut kept = vec![false; task.actions.len()];
     while std::mem::take(&mut work.changed) {
         for (index, action) in task.actions.iter().enumerate() {

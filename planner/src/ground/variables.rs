@@ -164,6 +164,13 @@ impl Encoding {
             match &effect.deed {
                 Deed::Delete(atom) => self.delete(*atom, effect, effects, before, &mut away),
                 Deed::Add(atom) => {
+                    // One value replaces the others: an assignment names no deletion.
+                    let others = self.fact(*atom).map_or(&[][..], |fact| &self.atoms[fact.variable as usize]);
+                    for other in others.iter().filter(|&other| other != atom) {
+                        if let Some(variable) = self.doubles[*other as usize] {
+                            self.push(effect, None, Outcome::Set(Fact { variable, value: 1 }), &mut away);
+                        }
+                    }
                     let double = self.doubles[*atom as usize].map(|variable| Fact { variable, value: 0 });
                     for fact in self.fact(*atom).into_iter().chain(double) {
                         self.push(effect, None, Outcome::Set(fact), &mut rest);

@@ -1,5 +1,6 @@
 //! From a grounded classical task to an outcome.
 
+use crate::explain::{Refusals, explain};
 use crate::ground::GroundTask;
 use crate::plan::{Plan, Step};
 use crate::solve::{Options, Outcome, PlanError, Statistics};
@@ -49,7 +50,7 @@ pub(crate) fn plan_classical(
             Outcome::Solved { plan, statistics }
         }
         (None, ClassicalEnd::Done | ClassicalEnd::Exhausted) => {
-            Outcome::Unsolvable { why: crate::explain::Explanation::default(), statistics }
+            Outcome::Unsolvable { why: explain(task, &Refusals::new()), statistics }
         }
         (best, ClassicalEnd::Stopped) => Outcome::OutOfTime { best, statistics },
         (best, ClassicalEnd::Memory) => Outcome::OutOfMemory { best, statistics },

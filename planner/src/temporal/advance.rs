@@ -123,7 +123,7 @@ impl World<'_> {
             proposal: step.proposal.as_ref(),
             level: Level::Exact,
         };
-        if !self.holds(&act.at_start, &moment)? {
+        if !self.holds(act.at_start, &moment)? {
             return Ok(None);
         }
         let span = match act.durative {
@@ -133,11 +133,11 @@ impl World<'_> {
         let Some(span) = span else { return Ok(None) };
         moment.duration_s = span.least_s;
         let mut after = from.state.clone();
-        if !self.apply(&act.start_effects, &moment, &|_, _| true, &mut after)? {
+        if !self.apply(act.start_effects, &moment, &|_, _| true, &mut after)? {
             return Ok(None);
         }
         let inside = Moment { state: &after, ..moment };
-        Ok(self.holds(&act.over_all, &inside)?.then_some((after, span)))
+        Ok(self.holds(act.over_all, &inside)?.then_some((after, span)))
     }
 
     fn start_gates(&self, act: &Act, before: &Values, step: &Step) -> Result<u64, Failure> {
@@ -170,24 +170,24 @@ impl World<'_> {
         if !act.flow_effects.is_empty() {
             let before = state.clone();
             let moment = Moment { state: &before, duration_s, proposal, level: Level::Exact };
-            if !self.apply(&act.flow_effects, &moment, &|_, _| true, state)? {
+            if !self.apply(act.flow_effects, &moment, &|_, _| true, state)? {
                 return Ok(false);
             }
-            if !self.holds(&act.over_all, &Moment { state, ..moment })? {
+            if !self.holds(act.over_all, &Moment { state, ..moment })? {
                 return Ok(false);
             }
         }
         let before = state.clone();
         let moment = Moment { state: &before, duration_s, proposal, level: Level::Exact };
-        if !self.holds(&act.at_end, &moment)? || !self.end_allows(act, &moment)? {
+        if !self.holds(act.at_end, &moment)? || !self.end_allows(act, &moment)? {
             return Ok(false);
         }
         let mut inside = Vec::with_capacity(act.end_effects.len());
-        for effect in &act.end_effects {
+        for effect in act.end_effects {
             inside.push(effect.when.as_ref().map_or(Ok(true), |when| self.holds(&when.over_all, &moment))?);
         }
         let gate = |index: usize, _: &Effect| inside[index] && (index >= 64 || gates & (1 << index) != 0);
-        self.apply(&act.end_effects, &moment, &gate, state)
+        self.apply(act.end_effects, &moment, &gate, state)
     }
 
     fn invariants_hold(&self, situation: &Situation) -> Result<bool, Failure> {
@@ -198,7 +198,7 @@ impl World<'_> {
                 proposal: open.proposal.as_ref(),
                 level: Level::Exact,
             };
-            if !self.holds(&self.acts[open.act as usize].over_all, &moment)? {
+            if !self.holds(self.acts[open.act as usize].over_all, &moment)? {
                 return Ok(false);
             }
         }
@@ -229,19 +229,19 @@ impl Accesses {
         let roots = derived_roots(world);
         let acts = world.acts.iter().map(|act| {
             let mut start = Touched::default();
-            start.condition(world, &act.at_start);
-            start.condition(world, &act.over_all);
+            start.condition(world, act.at_start);
+            start.condition(world, act.over_all);
             act.bounds.iter().for_each(|bound| expression_touches(world, &bound.seconds, &mut start));
             for when in act.end_effects.iter().filter_map(|effect| effect.when.as_ref()) {
                 start.condition(world, &when.at_start);
                 start.condition(world, &when.over_all);
             }
-            let at_start = access(world, &roots, start, &act.start_effects);
+            let at_start = access(world, &roots, start, act.start_effects);
             let at_end = act.durative.then(|| {
                 let mut end = Touched::default();
-                end.condition(world, &act.over_all);
-                end.condition(world, &act.at_end);
-                let effects: Vec<Effect> = act.flow_effects.iter().chain(&act.end_effects).cloned().collect();
+                end.condition(world, act.over_all);
+                end.condition(world, act.at_end);
+                let effects: Vec<Effect> = act.flow_effects.iter().chain(act.end_effects).cloned().collect();
                 access(world, &roots, end, &effects)
             });
             (at_start, at_end)

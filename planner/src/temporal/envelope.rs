@@ -38,11 +38,11 @@ impl Wanted {
             touched.condition(world, condition);
         };
         for act in &world.acts {
-            want(&act.at_start);
-            want(&act.over_all);
-            want(&act.at_end);
+            want(act.at_start);
+            want(act.over_all);
+            want(act.at_end);
             for when in
-                act.start_effects.iter().chain(&act.end_effects).filter_map(|effect| effect.when.as_ref())
+                act.start_effects.iter().chain(act.end_effects).filter_map(|effect| effect.when.as_ref())
             {
                 want(&when.here);
                 want(&when.at_start);
@@ -56,7 +56,7 @@ impl Wanted {
 
     fn inside(&self, _index: u32, act: &Act) -> bool {
         act.start_effects.iter().any(|effect| match &effect.outcome {
-            Outcome::Set(fact) => self.facts.contains(fact) && undone(*fact, &act.end_effects),
+            Outcome::Set(fact) => self.facts.contains(fact) && undone(*fact, act.end_effects),
             Outcome::Change { fluent, change: Change::Increase, .. } => {
                 self.numbers.contains(fluent)
                     && act.end_effects.iter().any(|end| {

@@ -1,11 +1,18 @@
 //! From no plan to a first one, and from there to better ones.
+//!
+//! The first search is greedy. Then come searches from the start that weigh what a plan costs ever more against how far
+//! the goal seems (restarting weighted A*, Richter, Thayer and Ruml 2010), and then a large neighbourhood search: a part
+//! of the plan is taken out, what is left is kept, and the goal is reached again from there within the bound.
 
 use crate::calls::Failure;
 
-use super::advance::Step;
+use super::advance::{Situation, Step};
+use super::compress::classical_plan;
+use super::destroy::{Chance, keep_for, taken_apart};
 use super::envelope::{all_apart, envelopes};
 use super::relaxed::{Part, Relaxed};
-use super::search::{Counts, End, Manner, Measure, Search, Space};
+use super::search::{Counts, End, Manner, Search};
+use super::space::{Base, Measure, Space};
 use super::world::World;
 
 /// How far to go.
@@ -19,6 +26,8 @@ pub(crate) struct Limits {
     pub evaluations: u64,
     /// Memory at most.
     pub memory_bytes: usize,
+    /// Decides every choice that is left open.
+    pub seed: u64,
 }
 
 /// An action of a plan with its times.
@@ -35,8 +44,6 @@ pub(crate) struct Timed {
 /// How the search for plans ended.
 #[derive(Debug, Clone)]
 pub(crate) struct Progress {
-    /// The best plan, in order of time.
-    pub best: Option<Vec<Timed>>,
     /// What stopped it.
     pub reason: Reason,
     /// What it took.
@@ -58,134 +65,271 @@ pub(crate) enum Reason {
     Memory,
 }
 
-/// After a first plan without `anytime`: evaluations to spend on better ones, at least.
-const SHORT_IMPROVEMENT: u64 = 2000;
-/// Weights of the heuristic in the searches that improve a plan (as in Richter and Westphal 2010).
-const WEIGHTS: [f64; 4] = [5.0, 3.0, 2.0, 1.0];
+/// After a first plan without `anytime`: evaluated states times operators to spend on better plans, at least, and
+/// evaluations as a multiple of those that the first plan took.
+const IMPROVEMENT_WORK: u64 = 2_000_000;
+const IMPROVEMENT_FACTOR: u64 = 20;
+/// Evaluations to spend on a plan that nothing seen is better than.
+const AFTERTHOUGHT: u64 = 100;
+/// Weights of the heuristic in the searches that improve a plan.
+const WEIGHTS: [f64; 2] = [3.0, 1.0];
+/// Evaluations of the first, short search for a plan.
+const FIRST_TRY: u64 = 500;
+/// Evaluations of one repair in the large neighbourhood search, at least.
+const REPAIR: u64 = 200;
 
 /// Searches for plans; `on_plan` hears of each that is better than the one before.
 pub(crate) fn search_plans(
     world: &World,
-    measure: Measure,
+    measure: &Measure,
     limits: Limits,
-    stop: &dyn Fn() -> bool,
+    stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
 ) -> Result<Progress, Failure> {
-    let apart = envelopes(world);
+    let mut splits = vec![envelopes(world)];
     let all = all_apart(world);
-    let mut progress =
-        Progress { best: None, reason: Reason::Exhausted, counts: Counts::default(), plans: 0 };
-    let mut splits = vec![apart];
     if splits[0] != all {
         splits.push(all);
     }
+    let mut progress = Progress { reason: Reason::Exhausted, counts: Counts::default(), plans: 0 };
     for split in splits {
         let space = Space::new(world, split, measure.clone());
-        let mut relaxed = Relaxed::new(world, &space.open_act);
-        let mut bound = limits.bound;
-        let end = phase(&space, &mut relaxed, None, bound, limits.evaluations, &limits, stop, &mut progress)?;
-        match end {
-            End::Found(mut steps) => {
-                let Some((mut measured, _)) = space.replay(&mut steps)? else { continue };
-                report(&space, &steps, &mut progress, on_plan)?;
-                bound = measured;
-                let mut left = match limits.anytime {
-                    true => limits.evaluations,
-                    false => SHORT_IMPROVEMENT.max(2 * progress.counts.evaluated),
-                };
-                progress.reason = Reason::Enough;
-                let mut weights = WEIGHTS.iter().peekable();
-                while let Some(&&weight) = weights.peek() {
-                    let before = progress.counts.evaluated;
-                    let end =
-                        phase(&space, &mut relaxed, Some(weight), bound, left, &limits, stop, &mut progress)?;
-                    left = left.saturating_sub(progress.counts.evaluated - before);
-                    match end {
-                        End::Found(mut steps) => {
-                            if let Some((better, _)) = space.replay(&mut steps)? {
-                                report(&space, &steps, &mut progress, on_plan)?;
-                                measured = better;
-                                bound = measured;
-                            }
-                            weights.next();
-                            if weights.peek().is_none() {
-                                weights = WEIGHTS[3..].iter().peekable();
-                            }
-                        }
-                        End::Exhausted => {
-                            progress.reason = Reason::Exhausted;
-                            break;
-                        }
-                        End::Budget => break,
-                        End::Stopped => {
-                            progress.reason = Reason::Stopped;
-                            break;
-                        }
-                        End::Memory => {
-                            progress.reason = Reason::Memory;
-                            break;
-                        }
-                    }
-                }
-                return Ok(progress);
-            }
-            End::Exhausted => progress.reason = Reason::Exhausted,
-            End::Budget | End::Stopped => {
-                progress.reason = Reason::Stopped;
-                return Ok(progress);
-            }
-            End::Memory => {
-                progress.reason = Reason::Memory;
-                return Ok(progress);
-            }
+        let relaxed = Relaxed::new(world, &space.open_act);
+        let begin = Situation { state: world.initial()?, open: Vec::new(), timed: 0 };
+        let base = Base { situation: begin, costs: 0.0, track: space.begin(), clock: space.clock(&[]) };
+        let mut run = Run { space: &space, relaxed, base, limits, stop, progress, on_plan, best: None };
+        run.first()?;
+        if run.best.is_some() {
+            run.improve()?;
+            return Ok(run.progress);
+        }
+        progress = run.progress;
+        if progress.reason != Reason::Exhausted {
+            break;
         }
     }
     Ok(progress)
 }
 
-#[allow(clippy::too_many_arguments)]
-fn phase(
-    space: &Space,
-    relaxed: &mut Relaxed,
-    weight: Option<f64>,
-    bound: f64,
-    evaluations: u64,
-    limits: &Limits,
-    stop: &dyn Fn() -> bool,
-    progress: &mut Progress,
-) -> Result<End, Failure> {
-    let manner = Manner { weight, bound, evaluations, memory_bytes: limits.memory_bytes };
-    let (end, counts) = Search::new(space, relaxed, manner).run(stop)?;
-    progress.counts.evaluated += counts.evaluated;
-    progress.counts.expanded += counts.expanded;
-    Ok(end)
+struct Run<'r, 'w, 'a> {
+    space: &'r Space<'w, 'a>,
+    relaxed: Relaxed,
+    base: Base,
+    limits: Limits,
+    stop: &'r (dyn Fn() -> bool + Sync),
+    progress: Progress,
+    on_plan: &'r mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
+    best: Option<Best>,
 }
 
-fn report(
-    space: &Space,
-    steps: &[Step],
-    progress: &mut Progress,
-    on_plan: &mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    let Ok(ordered) = space.order(steps) else { return Ok(()) };
-    let mut plan: Vec<Timed> = ordered
-        .starts
-        .iter()
-        .map(|&(index, start, end)| {
-            let start_s = ordered.order.earliest_s(start);
+/// The best plan so far.
+struct Best {
+    measured: f64,
+    /// Sum of the times at which its goals are fulfilled.
+    slowness_s: f64,
+    steps: Vec<Step>,
+}
+
+impl Run<'_, '_, '_> {
+    fn manner(&self, weight: Option<f64>, timed: bool, evaluations: u64) -> Manner {
+        let strictly = |best: &Best| best.measured - tolerance(best.measured);
+        let bound = self.best.as_ref().map_or(self.limits.bound, strictly);
+        let left = self.limits.evaluations.saturating_sub(self.progress.counts.evaluated);
+        let evaluations = evaluations.min(left);
+        Manner { weight, timed, bound, evaluations, memory_bytes: self.limits.memory_bytes, shuffle: 0 }
+    }
+
+    fn search(&mut self, base: Option<&Base>, manner: Manner) -> Result<End, Failure> {
+        let base = base.unwrap_or(&self.base);
+        let (end, counts) =
+            Search::new(self.space, &mut self.relaxed, base, manner).run(&|| (self.stop)())?;
+        self.progress.counts.evaluated += counts.evaluated;
+        self.progress.counts.expanded += counts.expanded;
+        Ok(end)
+    }
+
+    fn first(&mut self) -> Result<(), Failure> {
+        // A short try that follows relaxed plans; then the classical search, where the task allows it; then at length.
+        if let End::Found(steps) =
+            self.search(None, self.manner(None, self.space.is_makespan(), FIRST_TRY))?
+            && self.take(steps)?
+        {
+            return Ok(());
+        }
+        if let Some((steps, evaluated)) = classical_plan(self.space, self.limits.memory_bytes, self.stop) {
+            self.progress.counts.evaluated += evaluated;
+            if self.take(steps)? {
+                return Ok(());
+            }
+        }
+        let end = self.search(None, self.manner(None, false, u64::MAX))?;
+        match end {
+            End::Found(steps) => {
+                self.take(steps)?;
+            }
+            End::Exhausted => self.progress.reason = Reason::Exhausted,
+            End::Budget | End::Stopped => self.progress.reason = Reason::Stopped,
+            End::Memory => self.progress.reason = Reason::Memory,
+        }
+        Ok(())
+    }
+
+    /// Keeps a plan if it is better than the best so far, without the steps that it does not need. Between plans that are
+    /// equally good, the one whose goals are fulfilled earlier in sum is nearer to a better one.
+    fn take(&mut self, mut steps: Vec<Step>) -> Result<bool, Failure> {
+        let Some((mut measured, mut base)) = self.space.replay(&mut steps)? else { return Ok(false) };
+        let mut lean = keep_for(self.space.world, &steps, &self.space.world.ground.goal);
+        if lean.len() < steps.len()
+            && let Some((leaner, lean_base)) = self.space.replay(&mut lean)?
+            && leaner <= measured
+            && self.space.world.is_goal(&lean_base.situation)?
+        {
+            (measured, steps, base) = (leaner, lean, lean_base);
+        }
+        let ready_s = base.track.order.ready_s();
+        let goal = &self.space.world.ground.goal.facts;
+        let slowness_s: f64 = goal.iter().map(|fact| ready_s[fact.variable as usize]).sum();
+        let better = match &self.best {
+            None => true,
+            Some(best) => measured < best.measured - tolerance(best.measured),
+        };
+        let nearer = |best: &Best| measured <= best.measured && slowness_s < best.slowness_s - 1e-6;
+        if !better && !self.best.as_ref().is_some_and(nearer) {
+            return Ok(false);
+        }
+        let plan = better.then(|| schedule(self.space, &steps));
+        self.best = Some(Best { measured, slowness_s, steps });
+        if let Some(plan) = plan {
+            self.progress.plans += 1;
+            (self.on_plan)(&plan)?;
+        }
+        Ok(better)
+    }
+
+    fn improve(&mut self) -> Result<(), Failure> {
+        let spent = self.progress.counts.evaluated;
+        let least = IMPROVEMENT_WORK / (self.space.world.acts.len() as u64).max(1);
+        let budget = match self.limits.anytime {
+            true => u64::MAX,
+            false => spent + least.clamp(100, 10_000).max(IMPROVEMENT_FACTOR * spent),
+        };
+        self.progress.reason = Reason::Enough;
+        let timed = self.space.is_makespan();
+        // A greedy plan that watches the time, then restarts with falling weights, each with a share of the budget.
+        let share = (least / 3).clamp(50, 3000);
+        let mut proven = false;
+        for weight in WEIGHTS.map(Some) {
+            if self.progress.counts.evaluated >= budget {
+                return Ok(());
+            }
+            loop {
+                let end = self.search(None, self.manner(weight, timed, share))?;
+                match end {
+                    End::Found(steps) => {
+                        if !self.take(steps)? {
+                            break;
+                        }
+                    }
+                    End::Budget => break,
+                    End::Exhausted => {
+                        proven = true;
+                        break;
+                    }
+                    End::Stopped => return self.ended(Reason::Stopped),
+                    End::Memory => break,
+                }
+            }
+            if proven {
+                break;
+            }
+        }
+        if proven && !timed {
+            return self.ended(Reason::Exhausted);
+        }
+        // Equal states at different times were taken for one, so a little may be left to gain.
+        let last = self.progress.counts.evaluated.saturating_add(AFTERTHOUGHT);
+        self.neighbourhoods(if proven && !self.limits.anytime { budget.min(last) } else { budget })
+    }
+
+    fn ended(&mut self, reason: Reason) -> Result<(), Failure> {
+        self.progress.reason = reason;
+        Ok(())
+    }
+
+    /// Takes the plan apart at random and mends it, until the budget is spent.
+    fn neighbourhoods(&mut self, budget: u64) -> Result<(), Failure> {
+        let mut chance = Chance::new(self.limits.seed);
+        let mut idle = 0;
+        let mut tries: u64 = 0;
+        while self.progress.counts.evaluated < budget {
+            if (self.stop)() {
+                return self.ended(Reason::Stopped);
+            }
+            let Some(Best { steps, measured, .. }) = &self.best else { return Ok(()) };
+            let as_good = measured + tolerance(*measured);
+            tries += 1;
+            let mut kept = taken_apart(self.space, steps, &mut chance);
+            let Some((_, base)) = self.space.replay(&mut kept)? else {
+                idle += 1;
+                if idle > 1000 {
+                    return Ok(());
+                }
+                continue;
+            };
+            let timed = self.space.is_makespan() && !tries.is_multiple_of(3);
+            let mut manner = self.manner(None, timed, REPAIR.max(4 * steps.len() as u64));
+            manner.shuffle = tries;
+            manner.bound = as_good;
+            let before = self.progress.counts.evaluated;
+            let end = self.search(Some(&base), manner)?;
+            // A repair that fails at once costs no evaluation, but must not go on for ever.
+            idle = if self.progress.counts.evaluated == before { idle + 1 } else { 0 };
+            if idle > 1000 {
+                return Ok(());
+            }
+            match end {
+                End::Found(more) => {
+                    kept.extend(more);
+                    self.take(kept)?;
+                }
+                End::Exhausted | End::Budget => {}
+                End::Stopped => return self.ended(Reason::Stopped),
+                End::Memory => return self.ended(Reason::Memory),
+            }
+        }
+        if self.limits.evaluations <= self.progress.counts.evaluated {
+            return self.ended(Reason::Stopped);
+        }
+        Ok(())
+    }
+}
+
+/// What counts as better: above the rounding of sums of times.
+fn tolerance(measured: f64) -> f64 {
+    1e-6 * measured.abs().max(1.0)
+}
+
+/// The earliest schedule of a plan.
+fn schedule(space: &Space, steps: &[Step]) -> Vec<Timed> {
+    let Ok(track) = space.track(steps) else { return Vec::new() };
+    let actions =
+        track.actions.iter().zip(steps).filter_map(|(action, step)| action.map(|action| (action, step)));
+    let mut plan: Vec<Timed> = actions
+        .map(|((start, end), step)| {
+            let start_s = track.order.earliest_s(start);
             let duration_s = end.map_or(0.0, |end| {
-                let span = steps[index].span;
-                let taken_s = ordered.order.earliest_s(end) - start_s;
+                let taken_s = track.order.earliest_s(end) - start_s;
                 // Exact where the duration is fixed: differences of times carry rounding.
-                if span.least_s == span.most_s { span.least_s } else { taken_s.max(span.least_s) }
+                if step.span.least_s == step.span.most_s {
+                    step.span.least_s
+                } else {
+                    taken_s.max(step.span.least_s)
+                }
             });
-            Timed { step: steps[index].clone(), start_s, duration_s }
+            Timed { step: step.clone(), start_s, duration_s }
         })
         .collect();
     plan.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     debug_assert!(plan.iter().all(|timed| matches!(timed.step.part, Part::Whole | Part::Start)));
-    progress.plans += 1;
-    on_plan(&plan)?;
-    progress.best = Some(plan);
-    Ok(())
+    plan
 }

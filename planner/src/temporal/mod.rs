@@ -1,15 +1,20 @@
 //! Search for timed plans.
 
 mod advance;
+mod compress;
+mod destroy;
 mod envelope;
+mod estimate;
 mod improve;
 mod order;
 mod relaxed;
 mod search;
+mod space;
 mod store;
 mod touch;
 mod world;
 
 pub(crate) use improve::{Limits, Progress, Reason, Timed, search_plans};
-pub(crate) use search::{Counts, Measure};
+pub(crate) use search::Counts;
+pub(crate) use space::Measure;
 pub(crate) use world::World;

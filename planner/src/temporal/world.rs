@@ -8,35 +8,38 @@ use crate::ground::{
     Axiom, Change, ComparisonId, Conjunction, DurationBound, Effect, Expression, GroundTask, Origin, Outcome,
     Relation, Values,
 };
+use crate::semantics::compare;
 use crate::solve::EPSILON_S;
-use crate::task::{Task, Term};
+use crate::task::{Comparison, Task, Term};
 
 /// An action of the temporal search; an instantaneous one has everything at its start.
 #[derive(Debug, Clone)]
-pub(crate) struct Act {
+pub(crate) struct Act<'a> {
     /// The lifted action and its arguments.
-    pub origin: Origin,
+    pub origin: &'a Origin,
     /// Whether it takes time.
     pub durative: bool,
     /// Bounds on the duration.
-    pub bounds: Vec<DurationBound>,
+    pub bounds: &'a [DurationBound],
     /// Holds right before the start.
-    pub at_start: Conjunction,
+    pub at_start: &'a Conjunction,
     /// Holds strictly between start and end.
-    pub over_all: Conjunction,
+    pub over_all: &'a Conjunction,
     /// Holds right before the end.
-    pub at_end: Conjunction,
+    pub at_end: &'a Conjunction,
     /// Happens at the start.
-    pub start_effects: Vec<Effect>,
+    pub start_effects: &'a [Effect],
     /// Changes at a rate while it runs.
-    pub flow_effects: Vec<Effect>,
+    pub flow_effects: &'a [Effect],
     /// Happens at the end.
-    pub end_effects: Vec<Effect>,
+    pub end_effects: &'a [Effect],
     /// What it adds to an additive metric.
-    pub cost: Expression,
+    pub cost: &'a Expression,
     /// Grounding calls: module and arguments.
     pub grounding: Vec<(usize, Vec<u32>)>,
 }
+
+static NOTHING: Conjunction = Conjunction { facts: Vec::new(), comparisons: Vec::new(), calls: Vec::new() };
 
 /// A state, with what expressions may refer to besides it.
 #[derive(Clone, Copy)]
@@ -67,7 +70,7 @@ pub(crate) struct World<'a> {
     /// Its calls.
     pub calls: Calls<'a>,
     /// Durative actions first, in the ground task's order, then instantaneous ones.
-    pub acts: Vec<Act>,
+    pub acts: Vec<Act<'a>>,
     /// Axioms by stratum.
     strata: Vec<Vec<&'a Axiom>>,
     /// Variables that axioms set.
@@ -78,29 +81,29 @@ impl<'a> World<'a> {
     /// From a ground task and its bound calls.
     pub fn new(task: &'a Task, ground: &'a GroundTask, calls: Calls<'a>) -> World<'a> {
         let durative = ground.durative.iter().map(|action| Act {
-            origin: action.origin.clone(),
+            origin: &action.origin,
             durative: true,
-            bounds: action.duration.clone(),
-            at_start: action.at_start.clone(),
-            over_all: action.over_all.clone(),
-            at_end: action.at_end.clone(),
-            start_effects: action.start_effects.clone(),
-            flow_effects: action.flow_effects.clone(),
-            end_effects: action.end_effects.clone(),
-            cost: action.cost.clone(),
+            bounds: &action.duration,
+            at_start: &action.at_start,
+            over_all: &action.over_all,
+            at_end: &action.at_end,
+            start_effects: &action.start_effects,
+            flow_effects: &action.flow_effects,
+            end_effects: &action.end_effects,
+            cost: &action.cost,
             grounding: grounding(task, &action.origin),
         });
         let instantaneous = ground.actions.iter().map(|action| Act {
-            origin: action.origin.clone(),
+            origin: &action.origin,
             durative: false,
-            bounds: Vec::new(),
-            at_start: action.condition.clone(),
-            over_all: Conjunction::default(),
-            at_end: Conjunction::default(),
-            start_effects: action.effects.clone(),
-            flow_effects: Vec::new(),
-            end_effects: Vec::new(),
-            cost: action.cost.clone(),
+            bounds: &[],
+            at_start: &action.condition,
+            over_all: &NOTHING,
+            at_end: &NOTHING,
+            start_effects: &action.effects,
+            flow_effects: &[],
+            end_effects: &[],
+            cost: &action.cost,
             grounding: grounding(task, &action.origin),
         });
         let acts = durative.chain(instantaneous).collect();
@@ -290,16 +293,20 @@ impl<'a> World<'a> {
     }
 }
 
-/// Whether two numbers relate so; never if one is undefined.
+/// Whether two numbers relate so, with the validator's slack; never if one is undefined.
 pub(crate) fn relates(left: f64, relation: Relation, right: f64) -> bool {
-    match relation {
-        Relation::Less => left < right,
-        Relation::AtMost => left <= right,
-        Relation::Equal => left == right,
-        Relation::AtLeast => left >= right,
-        Relation::Greater => left > right,
-        Relation::Unequal => left.partial_cmp(&right).is_some_and(std::cmp::Ordering::is_ne),
+    if left.is_nan() || right.is_nan() {
+        return false;
     }
+    let comparison = match relation {
+        Relation::Less => Comparison::Less,
+        Relation::AtMost => Comparison::LessOrEqual,
+        Relation::Equal => Comparison::Equal,
+        Relation::AtLeast => Comparison::GreaterOrEqual,
+        Relation::Greater => Comparison::Greater,
+        Relation::Unequal => return !compare(Comparison::Equal, left, right),
+    };
+    compare(comparison, left, right)
 }
 
 /// Changes a number.

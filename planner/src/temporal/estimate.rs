@@ -1,0 +1,361 @@
+//! The relaxed plan heuristic of the temporal search.
+//!
+//! Labels spread from what holds to what operators give. They add up what is needed (the additive heuristic of Bonet
+//! and Geffner 2001), or they are times: the latest of what is needed, counted from when the resources of the plan so
+//! far are free again, so that idle resources are preferred to busy ones. A relaxed plan is read off the best supporters
+//! (Keyder and Geffner 2008). An operator supports a test if, done alone from the state at hand, it makes it true, or
+//! brings a comparison closer; then it counts as often as it must be repeated (compare Hoffmann 2003, Scala et al. 2016).
+
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+use std::sync::Arc;
+
+use crate::attachment::Level;
+use crate::calls::Failure;
+use crate::ground::{Change, Expression, Outcome, Values};
+
+use super::relaxed::{NOBODY, Operator, Part, Relaxed, Test};
+use super::world::{Moment, World};
+
+/// What the heuristic says of a state.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Estimate {
+    /// Sum of the costs of the relaxed plan's operators.
+    pub cost: f64,
+    /// With times: the earliest that the goal could hold, in seconds from the beginning of the plan.
+    pub finish_s: f64,
+    /// Operators of the relaxed plan that could be applied at once.
+    pub preferred: Vec<(u32, Part)>,
+    /// Operators of the relaxed plan, in the order in which they could be applied.
+    pub plan: Vec<(u32, Part)>,
+}
+
+/// The state to estimate from.
+pub(crate) struct From<'f> {
+    /// Facts and numbers.
+    pub state: &'f Values,
+    /// Actions in progress.
+    pub open: &'f [u32],
+    /// By resource, when it is free; `None` to add costs up instead of counting time.
+    pub ready_s: Option<&'f [f64]>,
+}
+
+/// Working memory of an evaluation.
+#[derive(Debug, Default)]
+pub(super) struct Work {
+    labels: Vec<f64>,
+    supporters: Vec<(u32, f32)>,
+    wanted: Vec<bool>,
+    open_needs: Vec<u32>,
+    /// Label of what the operator needs, then what it costs itself.
+    bases: Vec<f64>,
+    own: Vec<f64>,
+    queue: BinaryHeap<Reverse<(Key, u32)>>,
+}
+
+impl Work {
+    pub(super) fn new(propositions: usize, operators: usize) -> Work {
+        Work {
+            labels: vec![f64::INFINITY; propositions],
+            supporters: vec![(NOBODY, 1.0); propositions],
+            wanted: vec![false; propositions],
+            open_needs: vec![0; operators],
+            bases: vec![0.0; operators],
+            own: vec![0.0; operators],
+            queue: BinaryHeap::new(),
+        }
+    }
+
+    fn reach(&mut self, proposition: u32, label: f64, supporter: u32, times: f64) {
+        if label < self.labels[proposition as usize] {
+            self.labels[proposition as usize] = label;
+            self.supporters[proposition as usize] = (supporter, times as f32);
+            self.queue.push(Reverse((Key(label), proposition)));
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Key(f64);
+
+impl Eq for Key {}
+impl PartialOrd for Key {
+    fn partial_cmp(&self, other: &Key) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Key {
+    fn cmp(&self, other: &Key) -> Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
+
+/// Stands for "perhaps, after other changes": how much dearer such support counts.
+const UNSURE: f64 = 3.0;
+
+impl Relaxed {
+    /// Estimates what is missing to the goal; `None` if it is out of reach.
+    pub fn estimate(&mut self, world: &World, from: &From) -> Result<Option<Estimate>, Failure> {
+        for &(call, wanted) in &self.goal_gates {
+            if world.calls.truth(call, None, from.state, Level::Relaxed)? != wanted {
+                return Ok(None);
+            }
+        }
+        let closed_base = self.token_base + world.acts.len() as u32;
+        let goal: Vec<u32> =
+            self.goal.iter().copied().chain(from.open.iter().map(|&act| closed_base + act)).collect();
+        self.seed(world, from)?;
+        goal.iter().for_each(|&need| self.work.wanted[need as usize] = true);
+        let spread = self.spread(world, from, goal.len());
+        goal.iter().for_each(|&need| self.work.wanted[need as usize] = false);
+        spread?;
+        if goal.iter().any(|&need| self.work.labels[need as usize].is_infinite()) {
+            return Ok(None);
+        }
+        Ok(Some(self.extract(&goal)))
+    }
+
+    fn spread(&mut self, world: &World, from: &From, mut missing: usize) -> Result<(), Failure> {
+        for position in 0..self.free.len() {
+            self.fire(world, from, self.free[position])?;
+        }
+        while let Some(Reverse((Key(label), proposition))) = self.work.queue.pop() {
+            if label > self.work.labels[proposition as usize] {
+                continue;
+            }
+            if self.work.wanted[proposition as usize] {
+                missing -= 1;
+                if missing == 0 {
+                    break;
+                }
+            }
+            let own = self.needed_from[proposition as usize]..self.needed_from[proposition as usize + 1];
+            for position in own {
+                let operator = self.needed_by[position as usize] as usize;
+                let base = &mut self.work.bases[operator];
+                *base = if from.ready_s.is_some() { base.max(label) } else { *base + label };
+                self.work.open_needs[operator] -= 1;
+                if self.work.open_needs[operator] == 0 {
+                    self.fire(world, from, operator as u32)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn seed(&mut self, world: &World, from: &From) -> Result<(), Failure> {
+        let work = &mut self.work;
+        work.labels.fill(f64::INFINITY);
+        work.queue.clear();
+        work.bases.fill(0.0);
+        work.open_needs.copy_from_slice(&self.need_counts);
+        let ready_s = |resource: usize| from.ready_s.map_or(0.0, |ready_s| ready_s[resource]);
+        for (variable, &value) in from.state.values.iter().enumerate() {
+            work.reach(self.offsets[variable] + value, ready_s(variable), NOBODY, 1.0);
+        }
+        let moment = Moment { state: from.state, duration_s: 0.0, proposal: None, level: Level::Relaxed };
+        for (index, test) in self.tests.iter().enumerate() {
+            let holds = match *test {
+                Test::Comparison(comparison) => world.compare(comparison, &moment)?,
+                Test::Call(call, wanted) => {
+                    world.calls.truth(call, None, from.state, Level::Relaxed)? == wanted
+                }
+            };
+            if holds {
+                let label = self.test_reads[index].iter().fold(0.0, |l: f64, &r| l.max(ready_s(r as usize)));
+                work.reach(self.test_base + index as u32, label, NOBODY, 1.0);
+            }
+        }
+        for &act in from.open {
+            work.reach(self.token_base + act, 0.0, NOBODY, 1.0);
+        }
+        Ok(())
+    }
+
+    /// Everything that the operator needs is reached.
+    fn fire(&mut self, world: &World, from: &From, index: u32) -> Result<(), Failure> {
+        let base = self.work.bases[index as usize];
+        let operator = &self.operators[index as usize];
+        let labels = &self.work.labels;
+        if !operator.gives.iter().chain(&operator.moves).any(|&given| labels[given as usize] > base) {
+            return Ok(());
+        }
+        let Some(proposal) = suiting(world, from.state, operator)? else { return Ok(()) };
+        let Some(seconds) = self.seconds(world, from.state, index, proposal.as_ref())? else { return Ok(()) };
+        let step = match self.operators[index as usize].part {
+            Part::Whole => self.unit,
+            Part::Start | Part::End => self.unit * 0.5,
+            Part::Free => 0.0,
+        };
+        let cost = seconds + step;
+        self.work.own[index as usize] = cost;
+        let timed = from.ready_s.is_some();
+        let given = base + if timed { seconds } else { cost };
+        let work = &mut self.work;
+        for &proposition in &self.operators[index as usize].gives {
+            work.reach(proposition, given, index, 1.0);
+        }
+        for position in 0..self.operators[index as usize].moves.len() {
+            let test = self.operators[index as usize].moves[position];
+            if self.work.labels[test as usize] > given
+                && let Some(times) = self.repetitions(world, from.state, index, test)?
+            {
+                let label = if timed { given } else { base + cost * times };
+                self.work.reach(test, label, index, times);
+            }
+        }
+        Ok(())
+    }
+
+    /// Seconds that the operator takes at least; `None` if it cannot be applied.
+    fn seconds(
+        &self,
+        world: &World,
+        state: &Values,
+        index: u32,
+        proposal: Option<&Arc<str>>,
+    ) -> Result<Option<f64>, Failure> {
+        let operator = &self.operators[index as usize];
+        if let Some(seconds) = operator.cost {
+            return Ok(Some(seconds));
+        }
+        let act = &world.acts[operator.act as usize];
+        let moment = Moment { state, duration_s: 0.0, proposal, level: Level::Relaxed };
+        let share = match operator.part {
+            Part::Start => 0.0,
+            _ => 1.0,
+        };
+        Ok(world.span(act, &moment)?.map(|span| span.least_s * share))
+    }
+
+    /// How often the operator must be repeated from the state to make a test true; `None` if it cannot help.
+    fn repetitions(
+        &self,
+        world: &World,
+        state: &Values,
+        index: u32,
+        test: u32,
+    ) -> Result<Option<f64>, Failure> {
+        let operator = &self.operators[index as usize];
+        let Some(after) = effects_alone(world, state, operator)? else { return Ok(None) };
+        let moment = Moment { state: &after, duration_s: 0.0, proposal: None, level: Level::Relaxed };
+        let comparison = match self.tests[(test - self.test_base) as usize] {
+            Test::Call(call, wanted) => {
+                let holds = world.calls.truth(call, None, &after, Level::Relaxed)? == wanted;
+                return Ok(Some(if holds { 1.0 } else { UNSURE }));
+            }
+            Test::Comparison(comparison) => comparison,
+        };
+        if world.compare(comparison, &moment)? {
+            return Ok(Some(1.0));
+        }
+        let comparison = &world.ground.comparisons[comparison as usize];
+        let gap = |moment: &Moment| -> Result<f64, Failure> {
+            Ok((world.evaluate(&comparison.left, moment)? - world.evaluate(&comparison.right, moment)?).abs())
+        };
+        let (before, after) = (gap(&Moment { state, ..moment })?, gap(&moment)?);
+        if before.is_nan() {
+            return Ok((!after.is_nan()).then_some(UNSURE));
+        }
+        if after < before {
+            return Ok(Some((before / (before - after)).ceil().clamp(1.0, 1e6)));
+        }
+        Ok((!changes_by_constants(world, operator)).then_some(UNSURE))
+    }
+
+    fn extract(&mut self, goal: &[u32]) -> Estimate {
+        let work = &mut self.work;
+        let finish_s = goal.iter().fold(0.0, |latest: f64, &need| latest.max(work.labels[need as usize]));
+        let mut estimate = Estimate { finish_s, ..Estimate::default() };
+        let mut chosen: Vec<(u32, f32)> = Vec::new();
+        let mut agenda: Vec<u32> = goal.to_vec();
+        let mut seen: Vec<u32> = Vec::new();
+        while let Some(proposition) = agenda.pop() {
+            if std::mem::replace(&mut work.wanted[proposition as usize], true) {
+                continue;
+            }
+            seen.push(proposition);
+            let (supporter, times) = work.supporters[proposition as usize];
+            if supporter != NOBODY {
+                chosen.push((supporter, times));
+                agenda.extend(&self.operators[supporter as usize].needs);
+            }
+        }
+        seen.iter().for_each(|&proposition| work.wanted[proposition as usize] = false);
+        let own = |index: u32| (self.operators[index as usize].act, self.operators[index as usize].part);
+        // One entry an action and part, with the most repetitions: conditional effects are operators of their own.
+        chosen.sort_by(|a, b| own(a.0).cmp(&own(b.0)).then(b.1.total_cmp(&a.1)));
+        chosen.dedup_by_key(|(index, _)| own(*index));
+        let mut plan: Vec<(f64, (u32, Part))> = Vec::with_capacity(chosen.len());
+        for &(index, times) in &chosen {
+            let operator = &self.operators[index as usize];
+            if operator.part == Part::Free {
+                continue;
+            }
+            estimate.cost += work.own[index as usize] * f64::from(times);
+            plan.push((work.bases[index as usize], own(index)));
+            if operator.needs.iter().all(|&need| work.supporters[need as usize].0 == NOBODY) {
+                estimate.preferred.push((operator.act, operator.part));
+            }
+        }
+        plan.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        estimate.plan = plan.into_iter().map(|(_, own)| own).collect();
+        estimate
+    }
+}
+
+/// Whether the operator does to numbers the same in every state.
+fn changes_by_constants(world: &World, operator: &Operator) -> bool {
+    let Some(act) = world.acts.get(operator.act as usize) else { return false };
+    let mut effects = act.start_effects.iter().chain(act.end_effects);
+    act.flow_effects.is_empty()
+        && effects.all(|effect| match &effect.outcome {
+            Outcome::Set(_) => true,
+            Outcome::Change { amount: Expression::Constant(_), change, .. } => {
+                matches!(change, Change::Increase | Change::Decrease)
+            }
+            Outcome::Change { .. } | Outcome::Flow { .. } | Outcome::Call(_) => false,
+        })
+}
+
+/// The parameter with which the operator's own calls agree, `Some(None)` if it takes none; `None` if nothing suits.
+fn suiting(world: &World, state: &Values, operator: &Operator) -> Result<Option<Option<Arc<str>>>, Failure> {
+    let agree = |proposal: Option<&Arc<str>>| -> Result<bool, Failure> {
+        for &(call, wanted) in &operator.gates {
+            if world.calls.truth(call, proposal, state, Level::Relaxed)? != wanted {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    };
+    let grounding = world.acts.get(operator.act as usize).and_then(|act| act.grounding.first());
+    let Some((module, arguments)) = grounding else { return Ok(agree(None)?.then_some(None)) };
+    for proposal in world.calls.proposals(*module, arguments, state)? {
+        if agree(Some(&proposal))? {
+            return Ok(Some(Some(proposal)));
+        }
+    }
+    Ok(None)
+}
+
+/// The state after the operator's effects, whatever it needs.
+fn effects_alone(world: &World, state: &Values, operator: &Operator) -> Result<Option<Values>, Failure> {
+    let Some(act) = world.acts.get(operator.act as usize) else { return Ok(Some(state.clone())) };
+    let Some(proposal) = suiting(world, state, operator)? else { return Ok(None) };
+    let before = Moment { state, duration_s: 0.0, proposal: proposal.as_ref(), level: Level::Relaxed };
+    let duration_s = world.span(act, &before)?.map_or(0.0, |span| span.least_s);
+    let mut after = state.clone();
+    let lists = match operator.part {
+        Part::Whole => vec![act.start_effects, act.flow_effects, act.end_effects],
+        Part::Start => vec![act.start_effects],
+        Part::End | Part::Free => vec![act.flow_effects, act.end_effects],
+    };
+    for effects in lists {
+        let from = after.clone();
+        let moment = Moment { state: &from, duration_s, proposal: proposal.as_ref(), level: Level::Relaxed };
+        if !world.apply(effects, &moment, &|_, _| true, &mut after)? {
+            return Ok(None);
+        }
+    }
+    Ok(Some(after))
+}

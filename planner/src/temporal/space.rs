@@ -1,0 +1,292 @@
+//! What several searches on one task share: the steps that are possible, what they touch, what plans are measured by.
+
+use std::sync::Arc;
+
+use crate::attachment::Level;
+use crate::calls::Failure;
+use crate::ground::{Expression, Values};
+
+use super::advance::{Accesses, Situation, Step};
+use super::order::{Clock, Inconsistent, Order};
+use super::relaxed::Part;
+use super::world::{Moment, Span, World};
+
+/// What plans are measured by.
+#[derive(Debug, Clone)]
+pub(crate) enum Measure {
+    /// When the last action ends.
+    Makespan,
+    /// Costs of the actions, plus a weight times the makespan.
+    Additive {
+        /// Weight of the makespan.
+        time_weight: f64,
+    },
+    /// An expression over the last state and the makespan, to be made small.
+    Expression(Expression),
+}
+
+/// A search space with everything that several searches on it share.
+pub(crate) struct Space<'w, 'a> {
+    /// The task.
+    pub world: &'w World<'a>,
+    /// By action, whether its start and end are apart.
+    pub open_act: Vec<bool>,
+    /// What plans are measured by.
+    pub measure: Measure,
+    /// What happenings touch.
+    pub accesses: Accesses,
+    /// By variable and value, the actions that are looked at where the fact holds.
+    pivots: Vec<Vec<Vec<u32>>>,
+    /// Actions that are looked at everywhere.
+    everywhere: Vec<u32>,
+    /// Whether times can make a sequence impossible.
+    pub tight: bool,
+}
+
+impl<'w, 'a> Space<'w, 'a> {
+    /// The space in which the given actions have start and end apart.
+    pub fn new(world: &'w World<'a>, open_act: Vec<bool>, measure: Measure) -> Space<'w, 'a> {
+        let ground = world.ground;
+        let mut pivots: Vec<Vec<Vec<u32>>> =
+            ground.variables.iter().map(|variable| vec![Vec::new(); variable.values.len()]).collect();
+        let mut asked: Vec<Vec<u32>> =
+            ground.variables.iter().map(|variable| vec![0; variable.values.len()]).collect();
+        for fact in world.acts.iter().flat_map(|act| &act.at_start.facts) {
+            asked[fact.variable as usize][fact.value as usize] += 1;
+        }
+        let mut everywhere = Vec::new();
+        for (index, act) in world.acts.iter().enumerate() {
+            let rarest = act
+                .at_start
+                .facts
+                .iter()
+                .min_by_key(|fact| asked[fact.variable as usize][fact.value as usize]);
+            match rarest {
+                Some(fact) => pivots[fact.variable as usize][fact.value as usize].push(index as u32),
+                None => everywhere.push(index as u32),
+            }
+        }
+        let accesses = Accesses::new(world);
+        let tight = open_act.contains(&true) || !ground.timed.is_empty();
+        Space { world, open_act, measure, accesses, pivots, everywhere, tight }
+    }
+
+    /// Actions whose facts at start hold, in order.
+    pub fn candidates(&self, state: &Values) -> Vec<u32> {
+        let pivots = &self.pivots;
+        let by_fact =
+            state.values.iter().enumerate().flat_map(|(variable, &value)| &pivots[variable][value as usize]);
+        let fits = |act: &&u32| {
+            let facts = &self.world.acts[**act as usize].at_start.facts;
+            facts.iter().all(|fact| state.values[fact.variable as usize] == fact.value)
+        };
+        let mut found: Vec<u32> = by_fact.chain(&self.everywhere).filter(fits).copied().collect();
+        found.sort_unstable();
+        found
+    }
+
+    /// Whether plans are measured by their makespan alone, up to a factor.
+    pub fn is_makespan(&self) -> bool {
+        matches!(self.measure, Measure::Makespan)
+    }
+
+    /// The clock after steps that are all done in one go.
+    pub fn clock(&self, steps: &[Step]) -> Clock {
+        let mut clock = Clock::new(self.accesses.resources);
+        steps.iter().filter(|step| step.part == Part::Whole).for_each(|step| self.tick(&mut clock, step));
+        clock
+    }
+
+    /// Lets a step that is done in one go happen on a clock.
+    pub fn tick(&self, clock: &mut Clock, step: &Step) {
+        let (start, end) = &self.accesses.acts[step.act as usize];
+        clock.push(start, end.as_ref().map(|end| (end, step.span)));
+    }
+
+    /// The track on which nothing has happened yet.
+    pub fn begin(&self) -> Track {
+        Track::new(self.accesses.resources)
+    }
+
+    /// Whether the measure of a partial plan needs its times.
+    pub fn timed_measure(&self) -> bool {
+        match &self.measure {
+            Measure::Makespan => true,
+            Measure::Additive { time_weight } => *time_weight != 0.0,
+            Measure::Expression(_) => true,
+        }
+    }
+
+    /// The track of a sequence of steps.
+    pub fn track(&self, steps: &[Step]) -> Result<Track, Inconsistent> {
+        let mut track = self.begin();
+        steps.iter().try_for_each(|step| track.push(self, step))?;
+        Ok(track)
+    }
+
+    /// What an action adds to an additive metric.
+    pub fn step_cost(&self, before: &Values, step: &Step) -> Result<f64, Failure> {
+        let Measure::Additive { .. } = self.measure else { return Ok(0.0) };
+        if matches!(step.part, Part::End | Part::Free) {
+            return Ok(0.0);
+        }
+        let moment = Moment {
+            state: before,
+            duration_s: step.span.least_s,
+            proposal: step.proposal.as_ref(),
+            level: Level::Exact,
+        };
+        self.world.evaluate(self.world.acts[step.act as usize].cost, &moment)
+    }
+
+    /// The measure of a plan or a beginning of one, from its additive costs, its last state and its makespan.
+    pub fn measured(&self, costs: f64, state: &Values, makespan_s: f64) -> Result<f64, Failure> {
+        match &self.measure {
+            Measure::Makespan => Ok(makespan_s),
+            Measure::Additive { time_weight } => Ok(costs + time_weight * makespan_s),
+            Measure::Expression(expression) => {
+                let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Exact };
+                let timed = with_total_time(expression, makespan_s);
+                self.world.evaluate(&timed, &moment)
+            }
+        }
+    }
+
+    /// Where a sequence of steps from the first state leads, and its measure; `None` if it does not work out.
+    pub fn replay(&self, steps: &mut [Step]) -> Result<Option<(f64, Base)>, Failure> {
+        let mut situation = Situation { state: self.world.initial()?, open: Vec::new(), timed: 0 };
+        let mut costs = 0.0;
+        for step in steps.iter_mut() {
+            let Some(next) = self.world.advance(&situation, step)? else { return Ok(None) };
+            costs += self.step_cost(&situation.state, step)?;
+            situation = next;
+        }
+        let Ok(track) = self.track(steps) else { return Ok(None) };
+        let measured = self.measured(costs, &situation.state, track.order.makespan_s())?;
+        let clock = self.clock(steps);
+        Ok(Some((measured, Base { situation, costs, track, clock })))
+    }
+}
+
+/// Where a search begins: after some steps.
+#[derive(Debug, Clone)]
+pub(crate) struct Base {
+    /// The situation.
+    pub situation: Situation,
+    /// Additive costs so far.
+    pub costs: f64,
+    /// The steps so far, in time.
+    pub track: Track,
+    /// The same where times never shift.
+    pub clock: Clock,
+}
+
+/// The order that a sequence of steps stands for, with where its actions start and end.
+#[derive(Debug, Clone)]
+pub(crate) struct Track {
+    /// The order.
+    pub order: Order,
+    /// By step, its start, and its end if it has one by now; `None` for ends and timed effects.
+    pub actions: Vec<Option<(u32, Option<u32>)>>,
+    open: Vec<Started>,
+    timed: usize,
+}
+
+/// An action in progress on a track.
+#[derive(Debug, Clone)]
+struct Started {
+    step: usize,
+    act: u32,
+    proposal: Option<Arc<str>>,
+    start: u32,
+    span: Span,
+}
+
+impl Track {
+    fn new(resources: usize) -> Track {
+        Track { order: Order::new(resources), actions: Vec::new(), open: Vec::new(), timed: 0 }
+    }
+
+    /// Adds a step.
+    pub fn push(&mut self, space: &Space, step: &Step) -> Result<(), Inconsistent> {
+        let mut action = None;
+        match step.part {
+            Part::Free => {
+                self.order.push_fixed(
+                    &space.accesses.timed[self.timed],
+                    space.world.ground.timed[self.timed].time_s,
+                )?;
+                self.timed += 1;
+            }
+            Part::Whole => {
+                let (start, end) = &space.accesses.acts[step.act as usize];
+                let node = self.order.push(start);
+                let end = end.as_ref().map(|end| self.order.push_end(node, end, step.span)).transpose()?;
+                action = Some((node, end));
+            }
+            Part::Start => {
+                let start = self.order.push(&space.accesses.acts[step.act as usize].0);
+                let (act, proposal, span) = (step.act, step.proposal.clone(), step.span);
+                self.open.push(Started { step: self.actions.len(), act, proposal, start, span });
+                action = Some((start, None));
+            }
+            Part::End => {
+                let same = |open: &Started| open.act == step.act && open.proposal == step.proposal;
+                if let Some(position) = self.open.iter().position(same) {
+                    let open = self.open.remove(position);
+                    self.end(space, &open)?;
+                }
+            }
+        }
+        self.actions.push(action);
+        Ok(())
+    }
+
+    /// Ends what is in progress as soon as possible.
+    pub fn close(&mut self, space: &Space) -> Result<(), Inconsistent> {
+        let open = std::mem::take(&mut self.open);
+        open.iter().try_for_each(|open| self.end(space, open))
+    }
+
+    fn end(&mut self, space: &Space, open: &Started) -> Result<(), Inconsistent> {
+        let Some(access) = &space.accesses.acts[open.act as usize].1 else { return Ok(()) };
+        let end = self.order.push_end(open.start, access, open.span)?;
+        self.actions[open.step] = Some((open.start, Some(end)));
+        Ok(())
+    }
+
+    /// When the next timed effect happens that is not on the track yet.
+    pub fn next_timed_s(&self, space: &Space) -> Option<f64> {
+        space.world.ground.timed.get(self.timed).map(|timed| timed.time_s)
+    }
+
+    /// Lets every timed effect that is left happen.
+    pub fn pass_timed(&mut self, space: &Space) -> Result<(), Inconsistent> {
+        for (access, timed) in space.accesses.timed.iter().zip(&space.world.ground.timed).skip(self.timed) {
+            self.order.push_fixed(access, timed.time_s)?;
+        }
+        Ok(())
+    }
+
+    /// When the action in progress that started last did so.
+    pub fn latest_open_s(&self) -> Option<f64> {
+        self.open.iter().map(|open| self.order.earliest_s(open.start)).max_by(f64::total_cmp)
+    }
+}
+
+fn with_total_time(expression: &Expression, makespan_s: f64) -> Expression {
+    let inner = |inner: &Expression| with_total_time(inner, makespan_s);
+    match expression {
+        Expression::TotalTime => Expression::Constant(makespan_s),
+        Expression::Sum(parts) => Expression::Sum(parts.iter().map(inner).collect()),
+        Expression::Product(parts) => Expression::Product(parts.iter().map(inner).collect()),
+        Expression::Difference(left, right) => {
+            Expression::Difference(Box::new(inner(left)), Box::new(inner(right)))
+        }
+        Expression::Quotient(left, right) => {
+            Expression::Quotient(Box::new(inner(left)), Box::new(inner(right)))
+        }
+        Expression::Negative(operand) => Expression::Negative(Box::new(inner(operand))),
+        other => other.clone(),
+    }
+}

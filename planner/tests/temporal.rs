@@ -1,0 +1,157 @@
+//! Timed plans: required concurrency, deadlines, durations, and why there is none.
+
+use std::path::Path;
+
+use descry_planner::{Attachments, Options, Outcome, Source, Task, plan};
+
+fn outcome(domain: Source, problem: Source) -> Outcome {
+    let task = match Task::read(&domain, &problem) {
+        Ok(task) => task,
+        Err(findings) => panic!("{}", findings.render(false)),
+    };
+    let options = Options { evaluation_limit: Some(4_000), ..Options::default() };
+    match plan(&task, &Attachments::new(), &options, &|| false, &mut |_| {}) {
+        Ok(outcome) => outcome,
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// Solves a small task and compares its makespan (every plan has passed the validator); `None`: proven unsolvable.
+fn check(domain: &str, problem: &str, expected_s: Option<f64>) {
+    let domain =
+        Source::new("domain.pddl", format!("(define (domain d) (:requirements :durative-actions) {domain})"));
+    let problem = Source::new("problem.pddl", format!("(define (problem p) (:domain d) {problem})"));
+    let found = outcome(domain, problem);
+    match (found.plan(), expected_s) {
+        (Some(plan), Some(expected_s)) => {
+            let end_s = plan.makespan_s().unwrap_or(0.0);
+            assert!((end_s - expected_s).abs() < 0.02, "ends at {end_s}, not at {expected_s}:\n{plan}");
+        }
+        (None, None) => assert!(matches!(found, Outcome::Unsolvable { .. }), "{found:?}"),
+        _ => panic!("expected {expected_s:?}: {found:?}"),
+    }
+}
+
+const MATCH: &str = "(:predicates (light) (match) (mended) (free) (fixed))
+  (:durative-action strike :parameters () :duration (= ?duration 5) :condition (at start (match))
+    :effect (and (at start (not (match))) (at start (light)) (at end (not (light)))))
+  (:durative-action mend :parameters () :duration (= ?duration 3) :condition (over all (light))
+    :effect (at end (mended)))
+  (:durative-action fix :parameters () :duration (= ?duration 6) :condition (over all (light))
+    :effect (at end (fixed)))";
+
+#[test]
+fn what_must_happen_inside_another_action_does() {
+    check(MATCH, "(:init (match)) (:goal (mended))", Some(5.0));
+    check(MATCH, "(:init (match)) (:goal (fixed))", None);
+}
+
+#[test]
+fn independent_actions_overlap() {
+    let domain = "(:predicates (a) (b) (c))
+      (:durative-action one :parameters () :duration (= ?duration 4) :effect (at end (a)))
+      (:durative-action two :parameters () :duration (= ?duration 7) :effect (at end (b)))
+      (:durative-action three :parameters () :duration (= ?duration 2) :condition (at start (a)) :effect (at end (c)))";
+    check(domain, "(:init) (:goal (and (a) (b) (c)))", Some(7.0));
+}
+
+#[test]
+fn an_action_starts_late_to_end_after_another() {
+    // `late` must end after `hold` has ended, yet start while it holds: neither can start at an end of the other.
+    let domain = "(:predicates (held) (kept) (done) (idle))
+      (:durative-action hold :parameters () :duration (= ?duration 5) :condition (at start (idle))
+        :effect (and (at start (not (idle))) (at start (held)) (at end (not (held))) (at end (not (done))) (at end (kept))))
+      (:durative-action late :parameters () :duration (= ?duration 4) :condition (at start (held))
+        :effect (at end (done)))";
+    check(domain, "(:init (idle)) (:goal (and (kept) (done)))", Some(5.0));
+}
+
+const SHOP: &str = "(:predicates (open) (bought) (there) (home))
+  (:durative-action go :parameters () :duration (= ?duration 4) :condition (at start (home))
+    :effect (and (at start (not (home))) (at end (there))))
+  (:durative-action buy :parameters () :duration (= ?duration 3)
+    :condition (and (over all (open)) (at start (there))) :effect (at end (bought)))";
+
+#[test]
+fn timed_literals_open_and_close() {
+    check(SHOP, "(:init (home) (at 6 (open)) (at 12 (not (open)))) (:goal (bought))", Some(9.0));
+    check(SHOP, "(:init (home) (open) (at 9 (not (open)))) (:goal (bought))", Some(7.0));
+    check(SHOP, "(:init (home) (open) (at 6 (not (open)))) (:goal (bought))", None);
+}
+
+#[test]
+fn durations_depend_on_the_state_and_stretch() {
+    let filled = "(:requirements :numeric-fluents) (:predicates (full)) (:functions (missing) (rate))
+      (:durative-action fill :parameters () :duration (= ?duration (/ (missing) (rate))) :effect (at end (full)))";
+    check(filled, "(:init (= (missing) 9) (= (rate) 2)) (:goal (full))", Some(4.5));
+    let stretched = "(:predicates (on) (idle) (cooked))
+      (:durative-action heat :parameters () :duration (and (>= ?duration 2) (<= ?duration 8))
+        :condition (at start (idle))
+        :effect (and (at start (not (idle))) (at start (on)) (at end (not (on)))))
+      (:durative-action cook :parameters () :duration (= ?duration 6) :condition (over all (on))
+        :effect (at end (cooked)))";
+    check(stretched, "(:init (idle)) (:goal (cooked))", Some(6.0));
+}
+
+#[test]
+fn numbers_limit_what_runs_at_once() {
+    let domain = "(:requirements :numeric-fluents) (:types job) (:predicates (done ?j - job)) (:functions (hands))
+      (:durative-action work :parameters (?j - job) :duration (= ?duration 10) :condition (at start (>= (hands) 1))
+        :effect (and (at start (decrease (hands) 1)) (at end (increase (hands) 1)) (at end (done ?j))))";
+    let goal = "(:goal (and (done a) (done b) (done c)))";
+    check(domain, &format!("(:objects a b c - job) (:init (= (hands) 1)) {goal}"), Some(30.0));
+}
+
+#[test]
+fn an_unreachable_goal_is_explained_down_to_what_nobody_adds() {
+    let domain = "(define (domain d) (:predicates (rich) (known) (famous) (lucky))
+      (:action invest :parameters () :precondition (known) :effect (rich))
+      (:action shine :parameters () :precondition (lucky) :effect (known)))";
+    let problem = "(define (problem p) (:domain d) (:init (famous)) (:goal (and (famous) (rich))))";
+    let found = outcome(Source::new("domain.pddl", domain), Source::new("problem.pddl", problem));
+    let Outcome::Unsolvable { why, .. } = found else { panic!("{found:?}") };
+    let drawn = why.findings.render(false);
+    for wanted in [
+        "(rich) can never be reached",
+        "`invest` needs `known`",
+        "`shine` needs `lucky`",
+        "nothing ever makes `lucky` true",
+    ] {
+        assert!(drawn.contains(wanted), "{wanted} is not in\n{drawn}");
+    }
+}
+
+#[test]
+#[ignore = "nine searches up to their limit: some minutes on a busy machine"]
+fn published_tasks_that_need_concurrency() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/pddl/concurrency");
+    if !folder.is_dir() {
+        println!("skipped: {} is not there", folder.display());
+        return;
+    }
+    let read = |path: &Path| {
+        Source::new(path.display().to_string(), std::fs::read_to_string(path).unwrap_or_default())
+    };
+    for (domain, problems, solvable) in [
+        ("Cushing", ["pfile0", "pfile1", "pfile2"], true),
+        ("DriverlogShift", ["pfile0", "pfile1", "pfile2"], true),
+        // Its one action adds `started` and `ended`; the goals ask for relations such as `before`, which nothing adds.
+        ("AllenAlgebra", ["pfile10", "pfile11", "pfile12"], false),
+    ] {
+        for problem in problems {
+            let folder = folder.join(domain);
+            let found =
+                outcome(read(&folder.join("domain.pddl")), read(&folder.join(format!("{problem}.pddl"))));
+            match found {
+                found if found.plan().is_some() => assert!(solvable, "{domain} {problem}"),
+                Outcome::Unsolvable { why, .. } => {
+                    assert!(
+                        !solvable && why.to_string().contains("(before i1 i2)"),
+                        "{domain} {problem}: {why}"
+                    );
+                }
+                other => panic!("{domain} {problem}: {other:?}"),
+            }
+        }
+    }
+}

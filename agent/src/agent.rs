@@ -19,6 +19,7 @@ use descry_robots::{CancellationToken, Robot};
 use descry_skills::{Call, Context, Outcome, SkillFailure, Symbols};
 
 use crate::exit::CommandError;
+use crate::policies::{self, Chooser};
 use crate::report::{Event, Verdict};
 
 mod ground;
@@ -41,6 +42,8 @@ pub struct Agent<'a> {
     pub goal: &'a Goal,
     /// Stops the run.
     pub cancel: CancellationToken,
+    /// Who chooses where to look next.
+    pub chooser: Chooser,
     tell: &'a mut dyn FnMut(&Event),
     state: State,
 }
@@ -121,12 +124,14 @@ pub struct Setup<'a> {
     pub goal: &'a Goal,
     /// See [`Agent::cancel`].
     pub cancel: CancellationToken,
+    /// See [`Agent::chooser`].
+    pub chooser: Chooser,
 }
 
 impl<'a> Agent<'a> {
     /// An agent that knows nothing yet. `tell` hears of everything that happens.
     pub fn new(setup: Setup<'a>, tell: &'a mut dyn FnMut(&Event)) -> Self {
-        let Setup { domain, robot, record, recogniser, goal, cancel } = setup;
+        let Setup { domain, robot, record, recogniser, goal, cancel, chooser } = setup;
         let state = State {
             programs: attachments::programs(domain),
             things: situation::things(domain, &goal.things),
@@ -142,7 +147,7 @@ impl<'a> Agent<'a> {
             plan: None,
             totals: Totals::default(),
         };
-        Self { domain, robot, record, recogniser, goal, cancel, tell, state }
+        Self { domain, robot, record, recogniser, goal, cancel, chooser, tell, state }
     }
 
     /// Pursues the goal until it is achieved, until no look can help any more, or until a limit is reached.
@@ -182,7 +187,11 @@ impl<'a> Agent<'a> {
     }
 
     /// Does the rest of the plan, applied to the current state, still reach the goal? If not, the condition that broke.
+    /// A policy chooses one look at a time and does not say that it will be enough: its look is taken whatever it promises.
     fn monitor(&self, round: &Round) -> Result<(), String> {
+        if matches!(self.chooser, Chooser::Policy(_)) && !self.rest().steps.is_empty() {
+            return Ok(());
+        }
         match (&self.state.plan, descry_planner::monitor(&round.task, &round.attachments, &self.rest())) {
             (_, Ok(())) => Ok(()),
             (None, Err(_)) => Err("there is no plan yet".into()),
@@ -192,6 +201,12 @@ impl<'a> Agent<'a> {
 
     /// Makes a new plan. Returns the reason if there can be none.
     fn replan(&mut self, round: &Round, because: String) -> Result<Option<String>, CommandError> {
+        if let Chooser::Policy(policy) = &mut self.chooser {
+            let Some(look) = policies::next(&mut **policy, &round.situation) else {
+                return Ok(Some("no look that is left promises to settle anything".into()));
+            };
+            return self.intend(policies::plan(&round.situation, look), because, Vec::new()).map(|()| None);
+        }
         let started = Instant::now();
         let options = descry_planner::Options {
             evaluation_limit: Some(MOST_EVALUATED),
@@ -215,9 +230,14 @@ impl<'a> Agent<'a> {
     }
 
     fn adopt(&mut self, plan: Plan, statistics: &Statistics, because: String) -> Result<(), CommandError> {
+        let calls = statistics.attachments.iter();
+        let calls = calls.map(|(name, c)| (name.clone(), c.calls + c.relaxed)).collect();
+        self.intend(plan, because, calls)
+    }
+
+    /// Takes a plan up and says so.
+    fn intend(&mut self, plan: Plan, because: String, calls: Vec<(String, u64)>) -> Result<(), CommandError> {
         self.state.totals.plans += 1;
-        let calls =
-            statistics.attachments.iter().map(|(name, c)| (name.clone(), c.calls + c.relaxed)).collect();
         self.say(&Event::Planned {
             round: self.state.totals.plans,
             because,

@@ -5,5 +5,6 @@ pub mod body;
 pub mod commands;
 pub mod exit;
 pub mod experiment;
+pub mod policies;
 pub mod report;
 pub mod run;

@@ -14,6 +14,7 @@ use serde_json::Value;
 use crate::agent::{Agent, Conclusion, Setup};
 use crate::body::Body;
 use crate::exit::CommandError;
+use crate::policies::Chooser;
 use crate::report::{Believed, Event, Report};
 
 /// What a run was started with: enough to start it again.
@@ -27,6 +28,8 @@ pub struct Settings {
     pub seed: u64,
     /// The domain, as on the command line.
     pub domain: String,
+    /// Who chooses where to look next, by name.
+    pub policy: String,
 }
 
 /// `run.json` in a run's folder.
@@ -78,6 +81,7 @@ pub fn pursue(
     body: &Body,
     folder: &Path,
     settings: &Settings,
+    chooser: Chooser,
     tell: &mut dyn FnMut(&Event),
 ) -> Result<Report, CommandError> {
     let header = Header {
@@ -104,7 +108,7 @@ pub fn pursue(
             }
         });
         let robot = std::sync::Arc::clone(&body.robot);
-        let setup = Setup { domain, robot, record: &record, recogniser: &recogniser, goal, cancel };
+        let setup = Setup { domain, robot, record: &record, recogniser: &recogniser, goal, cancel, chooser };
         Agent::new(setup, tell).pursue().await
     })?;
     record.sync().map_err(CommandError::broken)?;

@@ -9,6 +9,7 @@ use descry_domains::load::{DEFAULT, Domain};
 use crate::body;
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
+use crate::policies;
 use crate::report::Verdict;
 use crate::run::{self, Settings};
 
@@ -47,6 +48,10 @@ pub struct With {
     /// Fixes the arrangement, the noise and every choice
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Who chooses where to look next: plan (weighs gain against cost over several looks), sweep, nearest, random,
+    /// most-unknown, rear-side or gain-per-second
+    #[arg(long, default_value = policies::PLAN)]
+    policy: String,
     /// Folder of this run [default: a new one under runs/]
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
@@ -68,15 +73,17 @@ fn run_goal(said: &str, with: &With) -> Result<Exit, CommandError> {
     let domain = Domain::load(&with.domain).map_err(CommandError::bad_input)?;
     let goal = goal::read(said, &domain).map_err(CommandError::bad_input)?;
     let body = body::open(&with.robot, with.scene.as_deref(), with.seed, &domain)?;
+    let chooser = policies::named(&with.policy, with.seed, None).map_err(CommandError::bad_input)?;
     let folder = run::folder(with.run.as_deref(), &goal)?;
     let settings = Settings {
         robot: with.robot.clone(),
         scene: with.scene.clone(),
         seed: with.seed,
         domain: with.domain.clone(),
+        policy: with.policy.clone(),
     };
     let mut tell = |event: &crate::report::Event| eprintln!("{event}");
-    let mut report = run::pursue(&domain, &goal, &body, &folder, &settings, &mut tell)?;
+    let mut report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, &mut tell)?;
     report.wall_s = started.elapsed().as_secs_f64();
     run::finish(&folder, &report)?;
     eprintln!("{report}");

@@ -1,6 +1,7 @@
 //! The commands: one file each, and the list of them.
 
 mod check;
+mod experiment;
 mod find;
 mod goals;
 mod input;
@@ -34,6 +35,8 @@ pub enum Command {
     Check(check::Arguments),
     /// Find the table and the objects in point clouds (PCD, PLY)
     Recognise(recognise::Arguments),
+    /// Carry out a batch of runs: tables with intervals, plots and a page; goes on where it was cut off
+    Experiment(experiment::Arguments),
     /// Show what happened in a run
     Show(show::Arguments),
     /// List the runs
@@ -58,6 +61,7 @@ pub fn run(command: &Command) -> Result<Exit, CommandError> {
         Command::Validate(arguments) => validate::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Recognise(arguments) => recognise::run(arguments),
+        Command::Experiment(arguments) => experiment::run(arguments),
         Command::Show(arguments) => show::run(arguments),
         Command::Runs(arguments) => runs::run(arguments),
         Command::Memory(arguments) => memory::run(arguments),

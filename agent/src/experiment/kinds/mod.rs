@@ -1,5 +1,10 @@
 //! What can be varied and measured: one file each, and the list of them.
 
+mod faults;
+mod figure_4;
+mod trial;
+mod where_to_look;
+
 use std::path::Path;
 
 use descry_robots::input::{self, Objection, Step};
@@ -55,7 +60,8 @@ pub struct Summary {
 type Reader = fn(&Source) -> Result<Box<dyn Kind>, ExperimentError>;
 
 /// Every kind by its name in experiment files.
-pub const ALL: &[(&str, Reader)] = &[];
+pub const ALL: &[(&str, Reader)] =
+    &[("figure-4", figure_4::read), ("where-to-look", where_to_look::read), ("faults", faults::read)];
 
 /// The kind of an experiment file, with everything that the file says checked.
 ///
@@ -93,3 +99,6 @@ fn refuse(
         input::draw(&source.path.display().to_string(), &source.text, objection).to_string(),
     )
 }
+
+#[cfg(test)]
+mod tests;

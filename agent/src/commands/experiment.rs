@@ -1,0 +1,66 @@
+//! `descry experiment FILE`: a batch of runs, and what they say together.
+
+use std::path::PathBuf;
+
+use crate::commands::input;
+use crate::exit::{CommandError, Exit};
+use crate::experiment::{self, Ended, ExperimentError, Options, Shard, Source};
+
+/// Arguments of `descry experiment`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Experiment file (TOML): what is varied and measured
+    file: PathBuf,
+    /// Folder of the results; what it holds of this experiment is not done again [default: results/ and the file's name]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Do only every N-th job, such as 3/8; run again without --shard to put shards in one folder together
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Run nothing: put the shards of these folders together in --out
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
+    merge: Vec<PathBuf>,
+    /// Jobs at a time [default: one a core]
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Print the summary as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    let source = Source::read(&arguments.file).map_err(CommandError::bad_input)?;
+    let stem = arguments.file.file_stem().map_or_else(|| "experiment".into(), |stem| stem.to_os_string());
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let options = Options {
+        out: arguments.out.clone().unwrap_or_else(|| PathBuf::from("results").join(stem)),
+        shard: arguments.shard,
+        merge: arguments.merge.clone(),
+        threads: arguments.jobs.unwrap_or(cores).max(1),
+    };
+    match experiment::run(&source, &options).map_err(failed)? {
+        Ended::Part { done, all, folder } => {
+            eprintln!("{done} of {all} jobs are done; this shard's are in {}", folder.display());
+            if arguments.json {
+                input::print_json(&serde_json::json!({ "done": done, "jobs": all, "shard": folder }))?;
+            }
+            Ok(Exit::Done)
+        }
+        Ended::Whole(results) => {
+            eprintln!("{}\n{}", results.tables, results.clock);
+            eprintln!("results: {}", options.out.join("index.html").display());
+            if arguments.json {
+                input::print_json(&results.summary)?;
+            }
+            Ok(if results.failed == 0 { Exit::Done } else { Exit::No })
+        }
+    }
+}
+
+/// What went wrong is the input's fault, or the disk's.
+fn failed(error: ExperimentError) -> CommandError {
+    match error {
+        ExperimentError::File { .. } | ExperimentError::Threads { .. } => CommandError::broken(error),
+        _ => CommandError::bad_input(error),
+    }
+}

@@ -1,0 +1,95 @@
+//! Experiment files as people write them, and each kind on a small scale.
+
+use super::*;
+
+fn shipped(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../domains/tabletop/experiments").join(name);
+    std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+fn source(text: String) -> Source {
+    Source { path: "e.toml".into(), text }
+}
+
+#[test]
+fn shipped_files_are_read() {
+    for (name, jobs) in [("where-to-look.toml", 200 * 3 * 8), ("figure-4.toml", 104), ("faults.toml", 1000)] {
+        let kind = read(&source(shipped(name))).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let ids: std::collections::BTreeSet<String> = kind.jobs().into_iter().map(|job| job.id).collect();
+        assert_eq!(ids.len(), jobs, "{name}");
+    }
+}
+
+#[test]
+fn mistakes_are_drawn_under_the_text() {
+    let check = |file: &str, from: &str, to: &str, expected: &[&str]| {
+        let text = shipped(file);
+        assert!(text.contains(from), "{from} is not in {file}");
+        let error =
+            read(&source(text.replacen(from, to, 1))).err().map(|e| e.to_string()).unwrap_or_default();
+        for part in expected {
+            assert!(error.contains(part), "\"{part}\" is not in\n{error}");
+        }
+    };
+    let look = "where-to-look.toml";
+    check(
+        look,
+        "kind = \"where-to-look\"",
+        "kind = \"dance\"",
+        &["e.toml:5", "\"dance\"", "figure-4, where-to-look, faults"],
+    );
+    check(look, "scenes = 200", "scenes = 0", &["scenes = 0", "1 to 1000000"]);
+    check(look, "scenes = 200", "scenes = \"many\"", &["scenes = \"many\"", "^"]);
+    check(look, "scenes = 200", "scene_count = 200", &["scene_count"]);
+    check(look, "\"nearest\"", "\"next\"", &["no policy is called \"next\"", "gain-per-second"]);
+    check(look, "ours = \"plan\"", "ours = \"plans\"", &["ours = \"plans\"", "one of: plan"]);
+    check(look, "goal = \"find cup A\"", "goal = \"find cup Q\"", &["cup Q", "cup A"]);
+    check(look, "[0.25, 0.6]", "[0.6, 0.25]", &["no range of shares"]);
+    check(
+        "figure-4.toml",
+        "\"published\"",
+        "\"neural\"",
+        &["no recogniser is called \"neural\"", "descry, published"],
+    );
+    check("figure-4.toml", "\"mug\"]", "\"jug\"]", &["no object is called \"jug\"", "cup B"]);
+    check("faults.toml", "chance = 0.3", "chance = 3", &["case \"blocked path\"", "between 0 and 1"]);
+}
+
+#[test]
+fn every_fourth_scene_of_each_level_is_without_the_target() {
+    let text = shipped("where-to-look.toml").replace("scenes = 200", "scenes = 24");
+    let text = text.replace("poses = [5, 8, 16]", "poses = [5]");
+    let kind = read(&source(text)).unwrap_or_else(|e| panic!("{e}"));
+    let jobs = kind.jobs();
+    assert_eq!(jobs.len(), 24 * 8);
+    let levels: Vec<&str> =
+        jobs.iter().step_by(8).filter_map(|job| job.factors["occlusion"].as_str()).collect();
+    assert_eq!(levels[..4], ["hidden", "below a quarter", "up to 0.6", "hidden"]);
+}
+
+/// One job of a shipped file; its only row.
+fn one_job(text: String, number: usize) -> Row {
+    let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
+    let kind = read(&source(text)).unwrap_or_else(|e| panic!("{e}"));
+    let once = kind.run(number, &folder.path().join("a")).unwrap_or_else(|e| panic!("{e}"));
+    let again = kind.run(number, &folder.path().join("b")).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(once.rows, again.rows, "a job gives the same again");
+    once.rows.into_iter().last().unwrap_or_default()
+}
+
+#[test]
+fn a_run_is_held_against_the_truth() {
+    let row = one_job(shipped("where-to-look.toml"), 0);
+    let measured = trial::Measured::read(0, &row);
+    assert!(measured.is_some_and(|m| m.present && m.views >= 1.0 && m.seconds > 0.0), "{row:?}");
+}
+
+#[test]
+fn two_views_are_scored() {
+    let row = one_job(shipped("figure-4.toml").replace("poses = 5", "poses = 2"), 0);
+    assert_eq!(
+        (row["mode"].as_str(), row["views"].as_u64(), row["things"].as_u64()),
+        (Some("merged"), Some(2), Some(4))
+    );
+    assert!(row["handled"].as_array().is_some_and(|handled| handled.len() == 1), "{row:?}");
+}

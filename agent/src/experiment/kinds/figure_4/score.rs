@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use descry_perception::merge::{MergeOptions, Merged, merge};
-use descry_perception::nalgebra::{Unit, Vector3};
+use descry_perception::nalgebra::{Isometry3, Unit, Vector3};
 use descry_perception::recognise::Percept;
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::surface::SurfaceOptions;
@@ -28,6 +28,9 @@ pub(super) fn rows(experiment: &Figure4, taken: &Taken) -> Vec<Row> {
         for (mode, from) in [("single", k - 1), ("merged", 0)] {
             // One view is both.
             let seen = perceive(&taken.views[from..k]);
+            let map_from_seen = seen
+                .as_ref()
+                .map_or(Isometry3::identity(), |(_, m)| aligned(m, &taken.map_from_camera[from..k]));
             for recogniser in &experiment.recognisers {
                 let percepts = match &seen {
                     Ok((scene, merged)) => {
@@ -35,7 +38,7 @@ pub(super) fn rows(experiment: &Figure4, taken: &Taken) -> Vec<Row> {
                     }
                     Err(_) => Vec::new(),
                 };
-                let mut said = score(experiment, taken, &percepts, from..k);
+                let mut said = score(experiment, taken, &percepts, from..k, &map_from_seen);
                 let about = json!({ "recogniser": recogniser.name(), "mode": mode, "views": k });
                 let used =
                     seen.as_ref().map_or(0, |(_, merged)| merged.fits.iter().filter(|fit| fit.used).count());
@@ -51,6 +54,13 @@ pub(super) fn rows(experiment: &Figure4, taken: &Taken) -> Vec<Row> {
     rows
 }
 
+/// From where the views have it to where it is: errors of localisation are no errors of recognition. The first view that
+/// was merged tells.
+fn aligned(merged: &Merged, map_from_camera: &[Isometry3<f64>]) -> Isometry3<f64> {
+    let used = merged.fits.iter().zip(map_from_camera).find(|(fit, _)| fit.used);
+    used.map_or(Isometry3::identity(), |(fit, truth)| truth * fit.world_from_camera.inverse())
+}
+
 fn perceive(views: &[View]) -> Result<(Scene, Merged), String> {
     let up = Some(Unit::new_normalize(Vector3::z()));
     let merged = merge(views, &MergeOptions { up, ..MergeOptions::default() }).map_err(|e| e.to_string())?;
@@ -60,13 +70,19 @@ fn perceive(views: &[View]) -> Result<(Scene, Merged), String> {
     Ok((scene, merged))
 }
 
-fn score(experiment: &Figure4, taken: &Taken, percepts: &[Percept], views: std::ops::Range<usize>) -> Row {
+fn score(
+    experiment: &Figure4,
+    taken: &Taken,
+    percepts: &[Percept],
+    views: std::ops::Range<usize>,
+    map_from_seen: &Isometry3<f64>,
+) -> Row {
     let kind = &experiment.text.of_kind;
     let of_kind = |o: &TrueObject| {
         o.kind == *kind
             || experiment.models.iter().any(|m| m.kind == *kind && (m.name == o.kind || m.name == o.name))
     };
-    let owners = owners(percepts, &taken.truth.objects);
+    let owners = owners(percepts, &taken.truth.objects, map_from_seen);
     let is_right = |n: usize| owners[n].is_some_and(|o| of_kind(&taken.truth.objects[o]));
     let called: Vec<usize> =
         (0..percepts.len()).filter(|&n| percepts[n].kind.as_ref() == Some(kind)).collect();
@@ -75,7 +91,8 @@ fn score(experiment: &Figure4, taken: &Taken, percepts: &[Percept], views: std::
         let names = owners[n].map(|o| &taken.truth.objects[o]).map(|o| [&o.name, &o.kind]);
         names.zip(percepts[n].label.as_ref()).is_some_and(|(names, label)| names.contains(&label))
     });
-    let probability = |p: &Percept| p.kinds.iter().find(|(name, _)| name == kind).map_or(0.0, |(_, p)| *p);
+    let probability =
+        |p: &Percept| p.kinds.iter().find(|(name, _)| name == kind).map_or(0.0, |(_, p)| p.min(1.0));
     let forecasts: Vec<Value> =
         percepts.iter().zip(0..).map(|(p, n)| json!([probability(p), is_right(n)])).collect();
     let handled: Vec<Value> = taken
@@ -98,9 +115,13 @@ fn score(experiment: &Figure4, taken: &Taken, percepts: &[Percept], views: std::
 }
 
 /// Which object each percept is, the nearest pairs first, each object once.
-fn owners(percepts: &[Percept], objects: &[TrueObject]) -> Vec<Option<usize>> {
+fn owners(
+    percepts: &[Percept],
+    objects: &[TrueObject],
+    map_from_seen: &Isometry3<f64>,
+) -> Vec<Option<usize>> {
     let distance = |p: &Percept, o: &TrueObject| {
-        (p.position_m.coords.xy() - o.map_from_object.translation.vector.xy()).norm()
+        ((map_from_seen * p.position_m).coords.xy() - o.map_from_object.translation.vector.xy()).norm()
     };
     let mut pairs: Vec<(f64, usize, usize)> = (0..percepts.len())
         .flat_map(|p| (0..objects.len()).map(move |o| (p, o)))

@@ -17,6 +17,8 @@ const BEYOND_WALL_M: f64 = 0.003;
 pub(super) struct Taken {
     /// In the order in which they were taken.
     pub views: Vec<View>,
+    /// Where the camera was in truth for each view.
+    pub map_from_camera: Vec<Isometry3<f64>>,
     /// Pixels of the handle of each object in each view, as an ideal camera sees them; no entry for what has no handle.
     pub handles: BTreeMap<String, Vec<usize>>,
     /// How everything stands.
@@ -37,6 +39,7 @@ pub(super) fn take(spec: &SceneSpec, seed: u64, poses: usize, distance_m: f64) -
         tokio::runtime::Builder::new_current_thread().enable_time().build().map_err(|e| e.to_string())?;
     let mut taken = Taken {
         views: Vec::new(),
+        map_from_camera: Vec::new(),
         handles: handled.iter().map(|(_, name)| (name.clone(), Vec::new())).collect(),
         truth: robot.truth(),
     };
@@ -55,6 +58,7 @@ pub(super) fn take(spec: &SceneSpec, seed: u64, poses: usize, distance_m: f64) -
                 let pixels = handle_pixels(&robot, &truth, *index, &map_from_camera);
                 taken.handles.entry(name.clone()).or_default().push(pixels);
             }
+            taken.map_from_camera.push(map_from_camera);
             taken.views.push(sensed.view());
         }
         taken.truth = robot.truth();

@@ -197,7 +197,7 @@ fn a_plan_is_validated() {
     check(&["plan", &domain, &problem, "--attach", &attach, "--out", &plan], 0, &["2 steps"]);
     let verdict = json(&["validate", &domain, &problem, &plan, "--attach", &attach, "--json"], 0);
     assert_eq!(verdict["valid"], true, "{verdict}");
-    std::fs::write(&plan, "0.000: (drive van home market) [90.000]\n").expect("writable");
+    std::fs::write(&plan, "0.000: (drive van home market) [9.000]\n").expect("writable");
     let verdict = json(&["validate", &domain, &problem, &plan, "--attach", &attach, "--json"], 1);
     assert_eq!(verdict["valid"], false, "{verdict}");
 }
@@ -239,7 +239,7 @@ fn a_cloud_that_is_none_points_at_the_place() {
         "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 9\nHEIGHT 1\nPOINTS 9\nDATA ascii\n1 2\n",
     )
     .expect("writable");
-    check(&["recognise", &path.display().to_string()], 2, &["cut.pcd", "line 9"]);
+    check(&["recognise", &path.display().to_string()], 2, &["cut.pcd", "byte 87", "9 points"]);
     check(&["recognise", "nowhere.pcd"], 2, &["nowhere.pcd"]);
 }
 

@@ -112,9 +112,11 @@ impl Descry {
                 each.ln() + log_sum(&[up, down])
             })
             .collect();
-        let families =
-            FAMILIES.iter().map(|f| ((1.0 - self.known) * f.share).ln() + self.family_log(f, &measured));
-        let alike = models.iter().map(|m| (each * self.look_alikes).ln() + self.look_alike_log(m, &measured));
+        let families = FAMILIES.iter().map(|f| {
+            ((1.0 - self.known) * f.share).ln() + stranger_log(f, models, &measured) + self.family_log(f, &measured)
+        });
+        let alike = |m: &ObjectModel| (each * self.look_alikes).ln() + self.look_alike_log(m, models, &measured);
+        let alike = models.iter().map(alike);
         let rest: Vec<f64> = families.chain(alike).collect();
         let unknown_log = log_sum(&rest);
         let total = log_sum(&[logs.as_slice(), &[unknown_log]].concat());
@@ -144,13 +146,14 @@ impl Descry {
     }
 
     /// The things made like a model but for one feature; sizes are like the model's within a tenth.
-    fn look_alike_log(&self, model: &ObjectModel, m: &Measured) -> f64 {
+    fn look_alike_log(&self, model: &ObjectModel, models: &[ObjectModel], m: &Measured) -> f64 {
         const ALIKE: f64 = 0.1;
         let near = |r: Range| (r.middle(), ALIKE.hypot((r.high / r.low).ln() / 3.46));
         let height = near(model.height_m);
         let width = model.diameter_m.or(model.width_m).map_or(WIDTHS, near);
         let family = |share: f64, shape: Shape, top: Top, handle: Handle| {
-            share.ln() + self.family_log(&Family { share, shape: Some(shape), top, handle, height, width }, m)
+            let family = Family { share, shape: Some(shape), top, handle, height, width };
+            share.ln() + stranger_log(&family, models, m) + self.family_log(&family, m)
         };
         let mut logs = Vec::new();
         if model.handle == Handle::None {
@@ -173,6 +176,31 @@ impl Descry {
         let metric = height_log(None, family.height, m) + wide + form_log(family.shape, m);
         self.temper * metric + top_log(family.top, m) + handle_log(family.handle, m)
     }
+}
+
+/// Share of a family's things of the measured size that are of a known kind all the same, at the least.
+const STRANGER: f64 = 0.05;
+
+/// Log of the chance that a thing of a family, as measured, is of none of the known kinds.
+fn stranger_log(family: &Family, models: &[ObjectModel], m: &Measured) -> f64 {
+    let known = models.iter().map(|model| covers(model, family, m)).fold(0.0, f64::max);
+    (1.0 - known).max(STRANGER).ln()
+}
+
+/// The chance that a thing of a family, as measured, is just what a model of a kind describes, so that it is no stranger:
+/// of the same make, and its sizes within the model's ranges. A single object, without ranges, describes no others.
+fn covers(model: &ObjectModel, family: &Family, m: &Measured) -> f64 {
+    let same_make =
+        family.shape == Some(model.shape) && model.top == family.top && model.handle == family.handle;
+    let Some(width) = model.diameter_m.filter(|_| same_make && m.round.is_some() && !m.top_hidden) else {
+        return 0.0;
+    };
+    let inside = |value: f64, sigma: f64, r: Range| {
+        if r.high > r.low { normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma) } else { 0.0 }
+    };
+    let diameter_sigma = (2.0 * m.evidence.radius_sigma_m).hypot(0.003);
+    inside(m.height_m, m.height_sigma_m, model.height_m)
+        * inside(2.0 * m.evidence.radius_m, diameter_sigma, width)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -296,7 +324,9 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     const IRREGULAR_M: f64 = 0.006;
     /// The miss of what no circle fits at all.
     const NONE_M: f64 = 0.02;
-    let floor = 0.0015_f64.hypot(0.7 * m.sigma_m);
+    // No form is measured more sharply than merged views of one surface lie apart.
+    let apart = if m.evidence.views > 1 { m.blur_m } else { 0.0 };
+    let floor = 0.0015_f64.hypot(0.7 * m.sigma_m).hypot(apart);
     let miss = match shape {
         Some(Shape::Round) => m.round.map_or(NONE_M, |r| r.spread_m),
         Some(Shape::Box) => m.rectangle.map_or(NONE_M, |r| r.residual_m),

@@ -25,6 +25,8 @@ const INSIDE_M: f64 = 0.014;
 #[derive(Clone, Debug)]
 pub(super) struct Measured {
     pub evidence: Evidence,
+    /// How thick the surface is in the same cloud, metres: noise and what merging left.
+    pub blur_m: f64,
     pub round: Option<Round>,
     pub rectangle: Option<Rectangle>,
     /// Height above what it stands on, metres.
@@ -77,6 +79,7 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
         .copied()
         .collect();
     let mut measured = Measured {
+        blur_m: scene.surface.residual_m,
         evidence: Evidence { taper: 1.0, ..Evidence::default() },
         round: round::fit(&segment.points, base_m, top, sigma_m, 7),
         rectangle: outline::fit(&side),

@@ -113,9 +113,12 @@ impl Descry {
             })
             .collect();
         let families = FAMILIES.iter().map(|f| {
-            ((1.0 - self.known) * f.share).ln() + stranger_log(f, models, &measured) + self.family_log(f, &measured)
+            ((1.0 - self.known) * f.share).ln()
+                + stranger_log(f, models, &measured)
+                + self.family_log(f, &measured)
         });
-        let alike = |m: &ObjectModel| (each * self.look_alikes).ln() + self.look_alike_log(m, models, &measured);
+        let alike =
+            |m: &ObjectModel| (each * self.look_alikes).ln() + self.look_alike_log(m, models, &measured);
         let alike = models.iter().map(alike);
         let rest: Vec<f64> = families.chain(alike).collect();
         let unknown_log = log_sum(&rest);
@@ -196,7 +199,11 @@ fn covers(model: &ObjectModel, family: &Family, m: &Measured) -> f64 {
         return 0.0;
     };
     let inside = |value: f64, sigma: f64, r: Range| {
-        if r.high > r.low { normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma) } else { 0.0 }
+        if r.high > r.low {
+            normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma)
+        } else {
+            0.0
+        }
     };
     let diameter_sigma = (2.0 * m.evidence.radius_sigma_m).hypot(0.003);
     inside(m.height_m, m.height_sigma_m, model.height_m)

@@ -7,7 +7,7 @@ use crate::cloud::{Cloud, Grid};
 use header::{Encoding as Stored, Field, Header};
 use nalgebra::{Point3, Vector3};
 
-/// How [`write`] stores the points.
+/// How [`write()`] stores the points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// Text, one point a line.

@@ -4,7 +4,7 @@ use super::{FileError, Loaded, Place, finish};
 use crate::cloud::Cloud;
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// How [`write`] stores the vertices.
+/// How [`write()`] stores the vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// Text, one vertex a line.

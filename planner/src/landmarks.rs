@@ -26,6 +26,8 @@ struct Landmark {
     before: Vec<u32>,
     /// Landmarks for whose first achievement this one must be true.
     enables: Vec<u32>,
+    /// Facts that come about whenever it first becomes true.
+    beside: Vec<u32>,
 }
 
 /// The landmarks of a task.
@@ -117,7 +119,8 @@ impl<'a> Find<'a> {
         let next = self.all.len() as u32;
         let id = *self.by_facts.entry(facts.clone()).or_insert(next);
         if id == next {
-            self.all.push(Landmark { facts, goal: false, before: Vec::new(), enables: Vec::new() });
+            let (before, enables, beside) = (Vec::new(), Vec::new(), Vec::new());
+            self.all.push(Landmark { facts, goal: false, before, enables, beside });
             self.queue.push(id);
         }
         id
@@ -127,7 +130,8 @@ impl<'a> Find<'a> {
     fn backchain(&mut self, id: u32) {
         let task = self.task;
         let facts = self.all[id as usize].facts.clone();
-        if facts.iter().any(|&f| self.initial[f as usize]) {
+        let compared = |f: u32| task.variables[f as usize] as usize >= task.numbers.first;
+        if facts.iter().any(|&f| self.initial[f as usize] || compared(f)) {
             return;
         }
         let reached = (self.work < EXPLORATION_WORK).then(|| self.reach_without(&facts));
@@ -148,6 +152,9 @@ impl<'a> Find<'a> {
             return;
         }
         self.work += first.len();
+        if facts.len() == 1 {
+            self.all[id as usize].beside = self.brought_about(&first);
+        }
         for facts in self.shared(&first) {
             let before = self.landmark(facts);
             if before != id && !self.all[id as usize].before.contains(&before) {
@@ -155,6 +162,23 @@ impl<'a> Find<'a> {
                 self.all[before as usize].enables.push(id);
             }
         }
+    }
+
+    /// Facts that every one of some operators brings about without condition.
+    fn brought_about(&self, operators: &[u32]) -> Vec<u32> {
+        let task = self.task;
+        let effects = |op: u32| {
+            let all = if (op as usize) < task.operators() { task.effects.get(op as usize) } else { &[] };
+            all.iter().filter(|e| e.from == e.to).map(|e| task.id(e.fact))
+        };
+        let mut facts: Vec<u32> = operators.first().map_or_else(Vec::new, |&op| effects(op).collect());
+        for &op in &operators[1..] {
+            facts.retain(|&fact| effects(op).any(|other| other == fact));
+            if facts.is_empty() {
+                break;
+            }
+        }
+        facts
     }
 
     /// Facts that all operators need, and small sets of facts over one predicate of which each operator needs one.
@@ -205,6 +229,10 @@ impl<'a> Find<'a> {
         for variable in task.basic..task.domains.len() {
             reached[task.offsets[variable] as usize + 1] = true;
         }
+        // What numbers can become is left open.
+        for variable in task.numbers.first..task.domains.len() {
+            reached[task.offsets[variable] as usize] = true;
+        }
         let mut queue: Vec<u32> = (0..task.facts as u32).filter(|&f| reached[f as usize]).collect();
         let fire = |op: usize, reached: &mut Vec<bool>, queue: &mut Vec<u32>| {
             let mut reach = |fact: u32| {
@@ -240,54 +268,93 @@ impl<'a> Find<'a> {
 /// Most steps of looking for cycles among orderings.
 const ORDERING_WORK: usize = 5_000_000;
 
-/// Orders a landmark before a goal that would have to be given up again for it (Hoffmann et al. 2004, reasonable
-/// orders): the goal excludes the landmark, or what must hold right before it. Orders that would close a cycle are left
-/// out.
+/// Orders a landmark before others that would have to be given up again for it: goals, and what must hold together with
+/// it for a later landmark (Hoffmann et al. 2004, reasonable orders; Richter and Westphal 2010, section 4.3). Orders that
+/// would close a cycle are left out.
 fn order_reasonably(task: &Compiled, mutex_groups: &[Vec<Fact>], all: &mut [Landmark]) {
-    let members = || {
-        mutex_groups
-            .iter()
-            .enumerate()
-            .flat_map(|(g, facts)| facts.iter().map(move |&f| (task.id(f), g as u32)))
-    };
-    let groups_of = Lists::group(task.facts, members());
-    let mut goal_of_fact = vec![u32::MAX; task.facts];
-    let mut goal_of_variable = vec![u32::MAX; task.domains.len()];
-    for (id, landmark) in all.iter().enumerate().filter(|(_, l)| l.goal) {
-        let fact = landmark.facts[0] as usize;
-        goal_of_fact[fact] = id as u32;
-        goal_of_variable[task.variables[fact] as usize] = id as u32;
-    }
-    // Goals that exclude a fact.
-    let excluded_by = |fact: u32, out: &mut Vec<u32>| {
-        let same = goal_of_variable[task.variables[fact as usize] as usize];
-        out.extend((same != u32::MAX && goal_of_fact[fact as usize] != same).then_some(same));
-        for &group in groups_of.get(fact as usize) {
-            let others = mutex_groups[group as usize].iter().map(|&f| task.id(f)).filter(|&f| f != fact);
-            out.extend(others.map(|f| goal_of_fact[f as usize]).filter(|&g| g != u32::MAX));
-        }
-    };
+    let exclusions = Exclusions::new(task, mutex_groups, all);
     let initial = |l: &Landmark| l.facts.iter().any(|&f| task.holds(f, &task.initial));
     let mut work = 0;
+    let needed: Vec<Vec<u32>> = all.iter().map(|l| l.before.clone()).collect();
     for id in 0..all.len() {
         if all[id].facts.len() > 1 || initial(&all[id]) {
             continue;
         }
+        // What is true when the landmark becomes true, or right before.
+        let mut threats = vec![all[id].facts[0]];
+        threats.extend(needed[id].iter().filter_map(|&b| match all[b as usize].facts[..] {
+            [fact] => Some(fact),
+            _ => None,
+        }));
+        threats.extend(&all[id].beside);
         let mut later = Vec::new();
-        excluded_by(all[id].facts[0], &mut later);
-        for &b in &all[id].before {
-            if let [fact] = all[b as usize].facts[..] {
-                excluded_by(fact, &mut later);
+        threats.iter().for_each(|&fact| exclusions.goals(task, fact, &mut later));
+        for &together in all[id].enables.iter().flat_map(|&e| &needed[e as usize]) {
+            work += threats.len();
+            if let [other] = all[together as usize].facts[..]
+                && threats.iter().any(|&threat| exclusions.exclude(task, threat, other))
+            {
+                later.push(together);
             }
         }
         later.sort_unstable();
         later.dedup();
-        for goal in later {
-            let known = goal as usize == id || all[goal as usize].before.contains(&(id as u32));
-            if !known && work < ORDERING_WORK && !precedes(all, goal, id as u32, &mut work) {
-                all[goal as usize].before.push(id as u32);
+        for other in later {
+            let known = other as usize == id || all[other as usize].before.contains(&(id as u32));
+            if !known && work < ORDERING_WORK && !precedes(all, other, id as u32, &mut work) {
+                all[other as usize].before.push(id as u32);
             }
         }
+    }
+}
+
+/// Which facts exclude each other.
+struct Exclusions<'a> {
+    mutex_groups: &'a [Vec<Fact>],
+    /// By fact: its mutex groups.
+    groups_of: Lists<u32>,
+    /// By fact, and by variable: the landmark of a goal; `u32::MAX` for none.
+    goal_of_fact: Vec<u32>,
+    goal_of_variable: Vec<u32>,
+}
+
+impl<'a> Exclusions<'a> {
+    fn new(task: &Compiled, mutex_groups: &'a [Vec<Fact>], all: &[Landmark]) -> Self {
+        let members = mutex_groups
+            .iter()
+            .enumerate()
+            .flat_map(|(g, facts)| facts.iter().map(move |&f| (task.id(f), g as u32)));
+        let mut goal_of_fact = vec![u32::MAX; task.facts];
+        let mut goal_of_variable = vec![u32::MAX; task.domains.len()];
+        for (id, landmark) in all.iter().enumerate().filter(|(_, l)| l.goal) {
+            let fact = landmark.facts[0] as usize;
+            goal_of_fact[fact] = id as u32;
+            goal_of_variable[task.variables[fact] as usize] = id as u32;
+        }
+        Exclusions {
+            mutex_groups,
+            groups_of: Lists::group(task.facts, members),
+            goal_of_fact,
+            goal_of_variable,
+        }
+    }
+
+    /// Appends the goals' landmarks that exclude a fact.
+    fn goals(&self, task: &Compiled, fact: u32, out: &mut Vec<u32>) {
+        let same = self.goal_of_variable[task.variables[fact as usize] as usize];
+        out.extend((same != u32::MAX && self.goal_of_fact[fact as usize] != same).then_some(same));
+        for &group in self.groups_of.get(fact as usize) {
+            let others = self.mutex_groups[group as usize].iter().map(|&f| task.id(f)).filter(|&f| f != fact);
+            out.extend(others.map(|f| self.goal_of_fact[f as usize]).filter(|&g| g != u32::MAX));
+        }
+    }
+
+    /// Whether two facts never hold together.
+    fn exclude(&self, task: &Compiled, one: u32, other: u32) -> bool {
+        let groups = self.groups_of.get(other as usize);
+        one != other
+            && (task.variables[one as usize] == task.variables[other as usize]
+                || self.groups_of.get(one as usize).iter().any(|g| groups.contains(g)))
     }
 }
 

@@ -20,34 +20,19 @@ use crate::validate::validate;
 pub const EPSILON_S: f64 = 0.001;
 
 /// How to plan.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Options {
     /// Keep improving until stopped, or until the best plan is proven best. Otherwise stop after the first plan and a
     /// short improvement whose length is fixed by the task alone.
     pub anytime: bool,
     /// Accept only plans whose metric (makespan or cost where there is none) is below this.
     pub bound: Option<f64>,
-    /// Decides every choice that is left open.
+    /// Decides every choice that is left to chance; the search for plans without times leaves none.
     pub seed: u64,
     /// Give up beyond this much memory for the search.
     pub memory_limit_bytes: Option<u64>,
-    /// Worker threads; the result does not depend on it.
-    pub threads: usize,
     /// Give up, or stop improving, after this many evaluated states.
     pub evaluation_limit: Option<u64>,
-}
-
-impl Default for Options {
-    fn default() -> Options {
-        Options {
-            anytime: false,
-            bound: None,
-            seed: 0,
-            memory_limit_bytes: None,
-            threads: 1,
-            evaluation_limit: None,
-        }
-    }
 }
 
 /// What planning took.

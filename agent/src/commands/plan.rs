@@ -29,9 +29,6 @@ pub struct Arguments {
     /// Decides every choice that is left open
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Threads that race; the plan does not depend on them
-    #[arg(long, default_value_t = 1)]
-    threads: usize,
     /// Write the plan to a file (with --anytime, each better one replaces it)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -65,7 +62,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let options = descry_planner::Options {
         anytime: arguments.anytime,
         seed: arguments.seed,
-        threads: arguments.threads.max(1),
         memory_limit_bytes: arguments.memory_limit.map(|mb| mb << 20),
         ..descry_planner::Options::default()
     };

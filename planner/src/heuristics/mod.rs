@@ -1,4 +1,5 @@
 //! Estimates of the cost to the goal.
 
+mod intervals;
 pub(crate) mod queue;
 pub(crate) mod relaxed;

@@ -3,11 +3,16 @@
 
 use crate::ground::Fact;
 use crate::search::compiled::{Compiled, Lists};
+use crate::search::numbers::NumberChange;
 
+use super::intervals::Intervals;
 use super::queue::RadixHeap;
 
 /// No node, no operator, no cost.
 const NONE: u32 = u32::MAX;
+
+/// Repetitions of an operator that gives back what is used up, at most.
+const MOST_REFILLS: f64 = 1000.0;
 
 /// How many steps weigh as much as a unit of cost where operators without cost exist.
 const COST_OVER_STEPS: u32 = 64;
@@ -45,7 +50,15 @@ pub(crate) struct Relevant {
     pub at: u32,
     /// The operator.
     pub operator: u32,
+    /// How often it is applied for the number that it is to move.
+    pub times: u32,
+    /// The fact of the numeric condition that it is repeated for; `u32::MAX` for none, [`REFILL`] for a number that the
+    /// relaxed plan uses up.
+    pub until: u32,
 }
+
+/// What an operator is there for that gives back what others of the relaxed plan use up.
+pub(crate) const REFILL: u32 = u32::MAX - 1;
 
 /// The heuristic with its working memory.
 #[derive(Clone)]
@@ -74,6 +87,10 @@ pub(crate) struct Relaxed {
     marked: Vec<u32>,
     mark: u32,
     stack: Vec<u32>,
+    /// By place of an operator: where it stands in the relaxed plan at hand.
+    slots: Vec<u32>,
+    /// What numbers can become.
+    intervals: Intervals,
     /// Operators of the last relaxed plan, by rising cost.
     pub plan: Vec<Relevant>,
     /// Those of them that can be applied right away.
@@ -108,6 +125,7 @@ impl Relaxed {
             needed,
             preconditions: Lists::new(),
             effects: Lists::new(),
+            changes: Lists::new(),
             operators: Vec::new(),
             base_costs: Vec::new(),
         };
@@ -116,7 +134,7 @@ impl Relaxed {
         }
         for (axiom, &head) in task.axiom_heads.iter().enumerate() {
             let body: Vec<u32> = task.axiom_bodies.get(axiom).iter().map(|&f| task.id(f)).collect();
-            build.node(body, vec![task.id(head)], NONE, 0);
+            build.node(body, vec![task.id(head)], Vec::new(), (NONE, 0));
         }
         build.finish(operators)
     }
@@ -149,6 +167,7 @@ impl Relaxed {
                 self.heap.push(0, fact);
             }
         }
+        self.intervals.start(task, state);
         for i in 0..self.free.len() {
             self.trigger(self.free[i] as usize);
         }
@@ -187,42 +206,113 @@ impl Relaxed {
                 self.heap.push(cost, fact);
             }
         }
+        if !self.intervals.is_empty() {
+            self.move_numbers(node);
+        }
+    }
+
+    /// Lets a node move its numbers, and again all nodes whose amounts depend on numbers that moved.
+    fn move_numbers(&mut self, node: usize) {
+        let now = self.node_costs[node];
+        let mut waiting = vec![node as u32];
+        while let Some(node) = waiting.pop() {
+            let at = self.node_costs[node as usize].max(now);
+            let missing = &self.missing;
+            self.intervals.fire(node, &|n| missing[n as usize] == 0, &mut waiting);
+            self.work += self.intervals.found.len() as u64 + 1;
+            for i in 0..self.intervals.found.len() {
+                let (fact, times) = self.intervals.found[i];
+                let more = self.base_costs[node as usize].saturating_mul(times - 1);
+                let cost = at.saturating_add(more);
+                if cost < self.fact_costs[fact as usize] {
+                    self.fact_costs[fact as usize] = cost;
+                    self.supporters[fact as usize] = node;
+                    self.intervals.support(fact, times);
+                    self.heap.push(cost, fact);
+                }
+            }
+        }
     }
 
     fn extract(&mut self, task: &Compiled, state: &[u32]) -> u32 {
         self.plan.clear();
         self.preferred.clear();
         self.mark += 1;
-        let facts = self.fact_costs.len();
         self.stack.clear();
         self.stack.extend_from_slice(&self.goal);
         let mut total = 0u32;
+        self.follow_back(&mut total);
+        if !self.intervals.is_empty() {
+            self.refill(task, state, &mut total);
+        }
+        self.plan.sort_unstable();
+        self.preferred.retain(|&operator| task.applicable(operator, state));
+        self.preferred.sort_unstable();
+        total
+    }
+
+    /// Adds what gives back the numbers that the relaxed plan uses up.
+    fn refill(&mut self, task: &Compiled, state: &[u32], total: &mut u32) {
+        for (number, missing) in self.intervals.shortages(task, state, &self.plan) {
+            let givers = self.intervals.givers(number).iter();
+            let open = givers.filter(|giver| self.missing[giver.0 as usize] == 0);
+            let Some(&(node, gain)) = open.min_by_key(|giver| (self.node_costs[giver.0 as usize], giver.0))
+            else {
+                continue;
+            };
+            let times = (missing / gain).ceil().clamp(1.0, MOST_REFILLS) as u32;
+            self.take(node, (times, REFILL), total);
+            self.follow_back(total);
+        }
+    }
+
+    /// Takes the supporters of all facts asked for into the relaxed plan.
+    fn follow_back(&mut self, total: &mut u32) {
         while let Some(fact) = self.stack.pop() {
             if self.marked[fact as usize] == self.mark || self.supporters[fact as usize] == NONE {
                 continue;
             }
             self.marked[fact as usize] = self.mark;
-            let node = self.supporters[fact as usize] as usize;
-            let preconditions = self.preconditions.get(node);
-            self.stack.extend_from_slice(preconditions);
-            let place = self.operators[node];
-            if place == NONE {
-                continue;
-            }
-            let operator = self.names[place as usize];
-            let place = facts + place as usize;
-            if self.marked[place] != self.mark {
-                self.marked[place] = self.mark;
-                total = total.saturating_add(self.base_costs[node]);
-                self.plan.push(Relevant { at: self.node_costs[node], operator });
-                if self.node_costs[node] == self.base_costs[node] && task.applicable(operator, state) {
-                    self.preferred.push(operator);
+            let node = self.supporters[fact as usize];
+            match self.intervals.repeats(fact) {
+                None => self.take(node, (1, NONE), total),
+                Some(times) => {
+                    self.take(node, (times, fact), total);
+                    let mut movers = std::mem::take(&mut self.intervals.movers);
+                    self.intervals.collect_movers(fact, &mut movers);
+                    movers.drain(..).for_each(|mover| self.take(mover, (1, NONE), total));
+                    self.intervals.movers = movers;
                 }
             }
         }
-        self.plan.sort_unstable();
-        self.preferred.sort_unstable();
-        total
+    }
+
+    /// Takes a node into the relaxed plan, repeated so often until a fact holds, and asks for what it needs.
+    fn take(&mut self, node: u32, (times, until): (u32, u32), total: &mut u32) {
+        let preconditions = self.preconditions.get(node as usize);
+        self.stack.extend_from_slice(preconditions);
+        let place = self.operators[node as usize];
+        if place == NONE {
+            return;
+        }
+        let base = self.base_costs[node as usize];
+        let mark = self.fact_costs.len() + place as usize;
+        if self.marked[mark] != self.mark {
+            self.marked[mark] = self.mark;
+            self.slots[place as usize] = self.plan.len() as u32;
+            let (at, operator) = (self.node_costs[node as usize], self.names[place as usize]);
+            self.plan.push(Relevant { at, operator, times, until });
+            if at == base {
+                self.preferred.push(operator);
+            }
+            *total = total.saturating_add(base.saturating_mul(times));
+            return;
+        }
+        let known = &mut self.plan[self.slots[place as usize] as usize];
+        if times > known.times {
+            *total = total.saturating_add(base.saturating_mul(times - known.times));
+            (known.times, known.until) = (times, until);
+        }
     }
 
     /// Bytes taken.
@@ -238,17 +328,26 @@ struct Build<'a> {
     needed: Vec<bool>,
     preconditions: Lists<u32>,
     effects: Lists<u32>,
+    /// By node: its operator's changes of numbers.
+    changes: Lists<NumberChange>,
     operators: Vec<u32>,
     base_costs: Vec<u32>,
 }
 
 impl Build<'_> {
-    fn node(&mut self, mut preconditions: Vec<u32>, effects: Vec<u32>, operator: u32, cost: u32) {
+    fn node(
+        &mut self,
+        mut preconditions: Vec<u32>,
+        effects: Vec<u32>,
+        changes: Vec<NumberChange>,
+        (operator, cost): (u32, u32),
+    ) {
         let effects: Vec<u32> =
             effects.into_iter().filter(|&f| self.needed[f as usize] && !preconditions.contains(&f)).collect();
-        if effects.is_empty() {
+        if effects.is_empty() && changes.is_empty() {
             return;
         }
+        self.changes.push(changes);
         preconditions.sort_unstable();
         preconditions.dedup();
         self.preconditions.push(preconditions);
@@ -269,9 +368,14 @@ impl Build<'_> {
             let mut needs = own.clone();
             let conditions = &task.conditions[effect.from as usize..effect.to as usize];
             needs.extend(conditions.iter().map(|&f| task.id(f)));
-            self.node(needs, vec![task.id(effect.fact)], place, cost);
+            self.node(needs, vec![task.id(effect.fact)], Vec::new(), (place, cost));
         }
-        self.node(own, plain, place, cost);
+        let mut changes = task.numbers.changes.get(op).cloned().unwrap_or_default();
+        for change in changes.extract_if(.., |change| !change.conditions.is_empty()) {
+            let needs = own.iter().copied().chain(change.conditions.iter().map(|&f| task.id(f))).collect();
+            self.node(needs, Vec::new(), vec![change], (place, cost));
+        }
+        self.node(own, plain, changes, (place, cost));
     }
 
     fn finish(self, names: Vec<u32>) -> Relaxed {
@@ -285,7 +389,10 @@ impl Build<'_> {
         let goal = self.goal;
         let mut is_goal = vec![false; task.facts];
         goal.iter().for_each(|&f| is_goal[f as usize] = true);
+        let intervals = Intervals::new(task, &self.needed, self.changes);
         Relaxed {
+            intervals,
+            slots: vec![0; names.len()],
             free: (0..nodes as u32).filter(|&n| open[n as usize] == 0).collect(),
             node_costs: vec![0; nodes],
             missing: vec![0; nodes],

@@ -1,6 +1,11 @@
-//! A ground task of instantaneous actions over finite-domain variables, in flat arrays.
+//! A ground task of instantaneous actions over finite-domain variables and numbers, in flat arrays.
 
-use crate::ground::{Effect, Expression, Fact, GroundTask, Meaning, Outcome};
+use std::sync::Arc;
+
+use crate::ground::{Conjunction, Effect, Fact, GroundTask, Meaning, Outcome};
+
+use super::measure::Measure;
+use super::numbers::{Numbers, is_plain};
 
 /// Costs that are not whole numbers are multiplied by this and rounded for the search; plans report exact costs.
 const COST_SCALE: f64 = 1000.0;
@@ -73,7 +78,7 @@ pub(crate) struct Achieve {
 /// The task.
 #[derive(Clone, Debug)]
 pub(crate) struct Compiled {
-    /// By variable; derived variables last.
+    /// By variable; derived variables after the others, numeric conditions last.
     pub domains: Vec<u32>,
     /// Number of variables that are not derived.
     pub basic: usize,
@@ -89,8 +94,8 @@ pub(crate) struct Compiled {
     pub conditions: Vec<Fact>,
     /// By operator: for the search.
     pub costs: Vec<u32>,
-    /// By operator: as the metric counts.
-    pub exact_costs: Vec<f64>,
+    /// What a plan costs.
+    pub measure: Measure,
     /// What exact costs were multiplied by.
     pub cost_scale: f64,
     /// Whether all costs are one.
@@ -113,29 +118,39 @@ pub(crate) struct Compiled {
     pub symbols: Vec<u32>,
     /// By fact: its variable.
     pub variables: Vec<u32>,
+    /// The numbers and what changes them.
+    pub numbers: Arc<Numbers>,
 }
 
-/// Whether the search over finite-domain variables alone can plan for the task.
+/// Whether the search over instantaneous actions alone can plan for the task.
 pub(crate) fn is_classical(task: &GroundTask) -> bool {
-    let plain = |c: &crate::ground::Conjunction| c.comparisons.is_empty() && c.calls.is_empty();
-    let plain_effect =
-        |e: &Effect| matches!(e.outcome, Outcome::Set(_)) && e.when.as_ref().is_none_or(|w| plain(&w.here));
+    let plain = |c: &Conjunction| c.calls.is_empty();
+    let plain_effect = |e: &Effect| {
+        let outcome = match &e.outcome {
+            Outcome::Set(_) => true,
+            Outcome::Change { amount, .. } => is_plain(amount),
+            Outcome::Flow { .. } | Outcome::Call(_) => false,
+        };
+        outcome && e.when.as_ref().is_none_or(|w| plain(&w.here))
+    };
     task.durative.is_empty()
         && task.timed.is_empty()
         && plain(&task.goal)
+        && task.comparisons.iter().all(|c| is_plain(&c.left) && is_plain(&c.right))
         && task.axioms.iter().all(|a| plain(&a.body))
-        && task.metric.as_ref().is_none_or(|m| m.additive)
-        && task.actions.iter().all(|a| {
-            plain(&a.condition)
-                && matches!(a.cost, Expression::Constant(_))
-                && a.effects.iter().all(plain_effect)
-        })
+        && task.metric.as_ref().is_none_or(|m| m.additive || is_plain(&m.expression))
+        && task
+            .actions
+            .iter()
+            .all(|a| plain(&a.condition) && is_plain(&a.cost) && a.effects.iter().all(plain_effect))
 }
 
 impl Compiled {
     /// The task in flat arrays, for tasks that [`is_classical`].
     pub(crate) fn new(task: &GroundTask) -> Compiled {
-        let domains: Vec<u32> = task.variables.iter().map(|v| v.domain_size()).collect();
+        let compared = std::iter::repeat_n(2, task.comparisons.len());
+        let domains: Vec<u32> = task.variables.iter().map(|v| v.domain_size()).chain(compared).collect();
+        let numbers = Numbers::new(task, task.variables.len());
         let basic = task.variables.iter().filter(|v| v.stratum.is_none()).count();
         let mut offsets = Vec::with_capacity(domains.len());
         let mut facts = 0;
@@ -147,17 +162,18 @@ impl Compiled {
         let mut effects = Lists::new();
         let mut conditions = Vec::new();
         for action in &task.actions {
-            preconditions.push(action.condition.facts.iter().copied());
+            preconditions.push(numbers.facts(&action.condition));
             let mut list = Vec::with_capacity(action.effects.len());
             for effect in &action.effects {
                 let Outcome::Set(fact) = effect.outcome else { continue };
                 let from = conditions.len() as u32;
-                conditions.extend(effect.when.iter().flat_map(|w| w.here.facts.iter().copied()));
+                conditions.extend(effect.when.iter().flat_map(|w| numbers.facts(&w.here)));
                 list.push(Achieve { from, to: conditions.len() as u32, fact });
             }
             effects.push(list);
         }
-        let (costs, exact_costs, cost_scale) = costs(task);
+        let measure = Measure::new(task, &numbers);
+        let (costs, cost_scale) = costs(&measure.estimates);
         let mut axiom_bodies = Lists::new();
         let mut strata = Vec::new();
         let mut last = None;
@@ -167,37 +183,47 @@ impl Compiled {
                 strata.push(index);
                 last = Some(stratum);
             }
-            axiom_bodies.push(axiom.body.facts.iter().copied());
+            axiom_bodies.push(numbers.facts(&axiom.body));
         }
         strata.push(task.axioms.len());
         let fact_id = |f: &Fact| offsets[f.variable as usize] + f.value;
         let pairs = (0..axiom_bodies.len())
             .flat_map(|i| axiom_bodies.get(i).iter().map(move |f: &Fact| (fact_id(f), i as u32)));
         let axioms_with = Lists::group(facts as usize, pairs);
-        Compiled {
+        let of_variables = task.variables.iter().flat_map(|v| v.values.iter().map(symbol));
+        let of_comparisons = std::iter::repeat_n(u32::MAX, 2 * task.comparisons.len());
+        let mut compiled = Compiled {
             basic,
             facts: facts as usize,
             preconditions,
             effects,
             conditions,
-            unit_cost: exact_costs.iter().all(|&c| c == 1.0),
+            unit_cost: measure.estimates.iter().all(|&c| c == 1.0),
             cost_scale,
             free_operators: costs.contains(&0),
             costs,
-            exact_costs,
+            measure,
             axiom_heads: task.axioms.iter().map(|a| a.head).collect(),
             axiom_bodies,
             strata,
             axioms_with,
-            goal: task.goal.facts.clone(),
+            goal: numbers.facts(&task.goal),
             initial: task.initial.values.clone(),
-            symbols: task.variables.iter().flat_map(|v| v.values.iter().map(symbol)).collect(),
+            symbols: of_variables.chain(of_comparisons).collect(),
             variables: (0..domains.len() as u32)
                 .flat_map(|v| std::iter::repeat_n(v, domains[v as usize] as usize))
                 .collect(),
             domains,
             offsets,
+            numbers: Arc::new(numbers),
+        };
+        if !compiled.numbers.is_empty() {
+            let mut state = std::mem::take(&mut compiled.initial);
+            compiled.numbers.append_initial(&mut state);
+            compiled.derive(&mut state);
+            compiled.initial = state;
         }
+        compiled
     }
 
     /// Number of a fact.
@@ -213,6 +239,29 @@ impl Compiled {
         self.offsets[variable] + state[variable] == fact
     }
 
+    /// Variables that an operator writes, and behind all variables the numbers.
+    pub(crate) fn written(&self, operator: u32) -> impl Iterator<Item = u32> + '_ {
+        let base = self.domains.len() as u32;
+        let numbers = self.numbers.writes(operator).map(move |n| base + n);
+        self.effects.get(operator as usize).iter().map(|e| e.fact.variable).chain(numbers)
+    }
+
+    /// Variables that an operator reads, and behind all variables the numbers.
+    pub(crate) fn read(&self, operator: u32) -> Vec<u32> {
+        let effects = self.effects.get(operator as usize);
+        let conditions = effects.iter().flat_map(|e| &self.conditions[e.from as usize..e.to as usize]);
+        let (variables, mut numbers) = self.numbers.change_reads(operator);
+        let own = self.preconditions.get(operator as usize).iter().chain(conditions).map(|f| f.variable);
+        let mut read: Vec<u32> = own.chain(variables).collect();
+        let first = self.numbers.first;
+        let compared = read.iter().filter(|&&v| v as usize >= first);
+        numbers.extend(compared.flat_map(|&v| self.numbers.reads[v as usize - first].iter().copied()));
+        read.extend(numbers.into_iter().map(|n| self.domains.len() as u32 + n));
+        read.sort_unstable();
+        read.dedup();
+        read
+    }
+
     /// Number of operators.
     pub(crate) fn operators(&self) -> usize {
         self.costs.len()
@@ -222,6 +271,13 @@ impl Compiled {
     #[inline]
     pub(crate) fn applicable(&self, operator: u32, state: &[u32]) -> bool {
         self.preconditions.get(operator as usize).iter().all(|f| state[f.variable as usize] == f.value)
+            && self.possible(operator, state)
+    }
+
+    /// Whether an operator of which the preconditions hold leaves all numbers defined and finite.
+    #[inline]
+    pub(crate) fn possible(&self, operator: u32, state: &[u32]) -> bool {
+        self.numbers.is_empty() || self.numbers.possible(operator, state)
     }
 
     /// Whether the goal holds.
@@ -239,6 +295,9 @@ impl Compiled {
                 next[effect.fact.variable as usize] = effect.fact.value;
             }
         }
+        if !self.numbers.is_empty() {
+            self.numbers.apply(operator, state, next);
+        }
         self.derive(next);
     }
 
@@ -246,7 +305,7 @@ impl Compiled {
     pub(crate) fn advance(&self, operator: u32, state: &mut [u32]) {
         let effects = self.effects.get(operator as usize);
         let conditional = effects.iter().any(|e| e.from != e.to);
-        if conditional {
+        if conditional || !self.numbers.is_empty() {
             let mut next = Vec::with_capacity(state.len());
             self.apply(operator, state, &mut next);
             state.copy_from_slice(&next);
@@ -263,7 +322,7 @@ impl Compiled {
         if self.axiom_heads.is_empty() {
             return;
         }
-        state[self.basic..].fill(1);
+        state[self.basic..self.numbers.first].fill(1);
         let mut queue: Vec<u32> = Vec::new();
         for bounds in self.strata.windows(2) {
             let holds = |axiom: usize, state: &[u32]| {
@@ -294,7 +353,8 @@ impl Compiled {
 
     /// Whether the search counts costs as the metric does.
     pub(crate) fn has_exact_costs(&self) -> bool {
-        self.costs.iter().zip(&self.exact_costs).all(|(&counted, &exact)| f64::from(counted) == exact)
+        let exact = |(&counted, &exact): (&u32, &f64)| f64::from(counted) == exact;
+        self.measure.is_sum() && self.costs.iter().zip(&self.measure.estimates).all(exact)
     }
 
     /// The cost of a plan as the search counts.
@@ -309,7 +369,7 @@ impl Compiled {
 
     /// The exact cost of a plan.
     pub(crate) fn plan_cost(&self, plan: &[u32]) -> f64 {
-        plan.iter().map(|&op| self.exact_costs[op as usize]).sum()
+        self.measure.of(self, plan)
     }
 }
 
@@ -321,13 +381,10 @@ fn symbol(meaning: &Meaning) -> u32 {
     }
 }
 
-fn costs(task: &GroundTask) -> (Vec<u32>, Vec<f64>, f64) {
-    let sign = if task.metric.as_ref().is_none_or(|m| m.minimise) { 1.0 } else { -1.0 };
-    let value = |e: &Expression| if let Expression::Constant(v) = e { sign * v } else { 1.0 };
-    let exact: Vec<f64> = task.actions.iter().map(|a| value(&a.cost)).collect();
+fn costs(exact: &[f64]) -> (Vec<u32>, f64) {
     let largest = exact.iter().copied().fold(0.0, f64::max);
     let whole = exact.iter().all(|c| c.fract() == 0.0);
     let scale = if whole { 1.0 } else { COST_SCALE }.min(LARGEST_COST / largest.max(1.0));
     let costs = exact.iter().map(|c| (c * scale).round().clamp(0.0, LARGEST_COST) as u32).collect();
-    (costs, exact, scale)
+    (costs, scale)
 }

@@ -55,8 +55,8 @@ impl<'a> Improve<'a> {
             task,
             successors,
             stop,
-            writers: Lists::group(task.domains.len(), writes(task)),
-            touched: vec![false; task.domains.len()],
+            writers: Lists::group(task.domains.len() + task.numbers.len(), writes(task)),
+            touched: vec![false; task.domains.len() + task.numbers.len()],
             lookahead: Lookahead::new(task),
             store: Store::new(task),
             costs: (0..task.operators()).map(|op| counting.of(task, op)).collect(),
@@ -211,13 +211,31 @@ impl<'a> Improve<'a> {
             }
             let end = (start + size).min(plan.len());
             let goal = needs.at(task, plan, end);
-            if let Some(better) = self.replan(&state, &goal, &plan[start..end], evaluations, all) {
+            let better = self.replan(&state, &goal, &plan[start..end], evaluations, all);
+            if let Some(better) = better.filter(|better| self.fits(&state, better, &plan[end..])) {
                 plan.splice(start..end, better);
                 needs = Needs::new(task, plan);
                 continue;
             }
             start += (size / 2).max(1);
         }
+    }
+
+    /// Whether the rest of a plan still reaches the goal after a window planned again. That is sure without numbers: of
+    /// them, a window's goal says nothing.
+    fn fits(&mut self, from: &[u32], window: &[u32], rest: &[u32]) -> bool {
+        let task = self.task;
+        if task.numbers.is_empty() {
+            return true;
+        }
+        self.work += (window.len() + rest.len()) as u64 * 4;
+        let mut state = from.to_vec();
+        let works = window.iter().chain(rest).all(|&operator| {
+            let applicable = task.applicable(operator, &state);
+            task.advance(operator, &mut state);
+            applicable
+        });
+        works && task.is_goal(&state)
     }
 
     /// A way from the state to the goal facts that costs less than `budget`, if a short search finds one.
@@ -281,10 +299,7 @@ impl<'a> Improve<'a> {
     fn restricted(&mut self, window: &[u32], goal: &[u32]) -> Relaxed {
         let task = self.task;
         self.touched.fill(false);
-        let mut variables: Vec<u32> = window
-            .iter()
-            .flat_map(|&op| task.effects.get(op as usize).iter().map(|e| e.fact.variable))
-            .collect();
+        let mut variables: Vec<u32> = window.iter().flat_map(|&op| task.written(op)).collect();
         variables.sort_unstable();
         variables.dedup();
         variables.iter().for_each(|&v| self.touched[v as usize] = true);
@@ -294,8 +309,7 @@ impl<'a> Improve<'a> {
             self.work += writers.len() as u64;
             // An operator is taken with the first variable that it writes.
             operators.extend(writers.iter().filter(|&&op| {
-                let first = task.effects.get(op as usize).iter().map(|e| e.fact.variable).min();
-                first == Some(variable) && writes_only(task, op, &self.touched)
+                task.written(op).min() == Some(variable) && writes_only(task, op, &self.touched)
             }));
         }
         operators.sort_unstable();
@@ -336,7 +350,7 @@ impl<'a> Improve<'a> {
     ) {
         self.applicable.clear();
         if all {
-            self.successors.applicable(&self.state, &mut self.applicable);
+            self.successors.applicable(self.task, &self.state, &mut self.applicable);
             let (task, touched) = (self.task, &self.touched);
             self.applicable.retain(|&op| writes_only(task, op, touched));
         }
@@ -386,7 +400,7 @@ impl<'a> Improve<'a> {
 /// Pairs of variable and operator that writes it.
 fn writes(task: &Compiled) -> impl Iterator<Item = (u32, u32)> + Clone + '_ {
     (0..task.operators() as u32).flat_map(move |op| {
-        let mut variables: Vec<u32> = task.effects.get(op as usize).iter().map(|e| e.fact.variable).collect();
+        let mut variables: Vec<u32> = task.written(op).collect();
         variables.sort_unstable();
         variables.dedup();
         variables.into_iter().map(move |v| (v, op))
@@ -394,27 +408,24 @@ fn writes(task: &Compiled) -> impl Iterator<Item = (u32, u32)> + Clone + '_ {
 }
 
 fn writes_only(task: &Compiled, operator: u32, touched: &[bool]) -> bool {
-    task.effects.get(operator as usize).iter().all(|e| touched[e.fact.variable as usize])
+    task.written(operator).all(|v| touched[v as usize])
 }
 
 /// For each step: the later steps that must stay behind it; and how many steps each waits for.
 fn dependencies(task: &Compiled, plan: &[u32]) -> (Vec<Vec<u32>>, Vec<u32>) {
     let mut after: Vec<Vec<u32>> = vec![Vec::new(); plan.len()];
     let mut waits = vec![0u32; plan.len()];
-    let variables = task.domains.len();
+    let variables = task.domains.len() + task.numbers.len();
     let mut writer: Vec<u32> = vec![u32::MAX; variables];
     let mut readers: Vec<Vec<u32>> = vec![Vec::new(); variables];
     for (step, &operator) in plan.iter().enumerate() {
         let step = step as u32;
         let mut before: Vec<u32> = Vec::new();
-        let effects = task.effects.get(operator as usize);
-        let conditions = effects.iter().flat_map(|e| &task.conditions[e.from as usize..e.to as usize]);
-        let reads = task.preconditions.get(operator as usize).iter().chain(conditions);
-        for variable in reads.map(|f| f.variable as usize) {
+        for variable in task.read(operator).into_iter().map(|v| v as usize) {
             before.push(writer[variable]);
             readers[variable].push(step);
         }
-        for variable in effects.iter().map(|e| e.fact.variable as usize) {
+        for variable in task.written(operator).map(|v| v as usize) {
             before.push(writer[variable]);
             before.append(&mut readers[variable]);
             writer[variable] = step;
@@ -443,7 +454,8 @@ impl Needs {
             return Needs { events: Vec::new() };
         }
         for (step, &operator) in plan.iter().enumerate() {
-            for fact in task.preconditions.get(operator as usize) {
+            let compared = |f: &&crate::ground::Fact| (f.variable as usize) < task.numbers.first;
+            for fact in task.preconditions.get(operator as usize).iter().filter(compared) {
                 events[fact.variable as usize].push((step as u32, fact.value));
             }
             for effect in task.effects.get(operator as usize) {

@@ -82,6 +82,8 @@ struct Search<'a, 's> {
     next: Vec<u32>,
     applicable: Vec<u32>,
     preferred: Vec<u32>,
+    /// States on the way of the last lookahead.
+    trail: Vec<u32>,
 }
 
 /// Runs one search.
@@ -101,6 +103,7 @@ pub(crate) fn search(shared: &Shared<'_>, strategy: Strategy, counts: &mut Count
         next: Vec::new(),
         applicable: Vec::new(),
         preferred: Vec::new(),
+        trail: Vec::new(),
     };
     let end = search.run();
     counts.evaluated += search.counts.evaluated;
@@ -184,17 +187,22 @@ impl Search<'_, '_> {
         !self.store.is_expanded(id)
     }
 
-    /// Evaluates and expands the state in `self.state`, then its lookahead states as long as they are better.
+    /// Evaluates and expands the state in `self.state`, then its lookahead states as long as they are better. Where a
+    /// lookahead ran into a dead end, half of its way is tried.
     fn visit(&mut self, mut id: u32) -> Option<Vec<u32>> {
         let task = self.shared.task;
         let mut last = u32::MAX;
+        self.trail.clear();
         loop {
             if task.is_goal(&self.state) {
                 return Some(self.store.plan_to(id));
             }
             self.store.set_expanded(id, true);
             self.counts.evaluated += 1;
-            let estimate = self.relaxed.evaluate(task, &self.state)?;
+            let Some(estimate) = self.relaxed.evaluate(task, &self.state) else {
+                id = self.step_back()?;
+                continue;
+            };
             let left = self.status.left(self.shared.landmarks, task, id, &self.state);
             self.progress([estimate, left]);
             self.expand(id, estimate, left);
@@ -204,6 +212,14 @@ impl Search<'_, '_> {
             last = estimate;
             id = self.look_ahead(id)?;
         }
+    }
+
+    /// Moves `self.state` to the middle of the last lookahead; `None` if that was expanded before.
+    fn step_back(&mut self) -> Option<u32> {
+        self.trail.truncate(self.trail.len() / 2);
+        let id = self.trail.last().copied().filter(|&id| !self.store.is_expanded(id))?;
+        self.store.load(self.shared.task, id, &mut self.state);
+        Some(id)
     }
 
     fn progress(&mut self, estimates: [u32; 2]) {
@@ -224,7 +240,7 @@ impl Search<'_, '_> {
         let task = self.shared.task;
         self.counts.expanded += 1;
         self.applicable.clear();
-        self.shared.successors.applicable(&self.state, &mut self.applicable);
+        self.shared.successors.applicable(task, &self.state, &mut self.applicable);
         self.preferred.clear();
         self.preferred.extend_from_slice(&self.relaxed.preferred);
         if self.strategy.landmarks {
@@ -255,6 +271,7 @@ impl Search<'_, '_> {
         self.lookahead.run(task, &self.state, &self.relaxed.plan);
         let plan = std::mem::take(&mut self.lookahead.plan);
         let mut fresh = None;
+        self.trail.clear();
         if plan.len() > 1 {
             for &operator in &plan {
                 let cost = self.store.cost(id).saturating_add(task.costs[operator as usize]);
@@ -270,6 +287,7 @@ impl Search<'_, '_> {
                 }
                 self.status.follow(self.shared.landmarks, task, (id, next), &self.state, new);
                 id = next;
+                self.trail.push(id);
                 fresh = (new || !self.store.is_expanded(id)).then_some(id);
             }
         }

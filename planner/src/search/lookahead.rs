@@ -1,9 +1,10 @@
 //! Lookahead states: as much of a relaxed plan as can really be applied, mended where an operator no longer fits
 //! (Vidal 2004, "A lookahead strategy for heuristic search planning").
 
-use crate::heuristics::relaxed::Relevant;
+use crate::heuristics::relaxed::{REFILL, Relevant};
 
 use super::compiled::{Compiled, Lists};
+use super::steer::movers;
 
 /// Working memory of the lookahead.
 pub(crate) struct Lookahead {
@@ -11,12 +12,19 @@ pub(crate) struct Lookahead {
     achievers: Lists<u32>,
     /// By fact: how many operators of the rest (and goals) need it.
     needed: Vec<i32>,
-    rest: Vec<u32>,
-    state: Vec<u32>,
+    pub(super) rest: Vec<Relevant>,
+    /// Operators of the relaxed plan that give back what others use up.
+    refills: Vec<Relevant>,
+    pub(super) state: Vec<u32>,
     next: Vec<u32>,
+    /// By comparison: what each operator adds to left minus right.
+    pub(super) movers: Lists<(u32, f64)>,
     /// The operators applied, in order.
     pub plan: Vec<u32>,
 }
+
+/// Steps of a lookahead at most.
+pub(super) const MOST_STEPS: usize = 20_000;
 
 impl Lookahead {
     /// For a task.
@@ -29,8 +37,10 @@ impl Lookahead {
             achievers: Lists::group(task.facts, pairs),
             needed,
             rest: Vec::new(),
+            refills: Vec::new(),
             state: Vec::new(),
             next: Vec::new(),
+            movers: movers(task),
             plan: Vec::new(),
         }
     }
@@ -39,7 +49,11 @@ impl Lookahead {
     pub(crate) fn run(&mut self, task: &Compiled, from: &[u32], relaxed: &[Relevant]) {
         self.plan.clear();
         self.rest.clear();
-        self.rest.extend(relaxed.iter().map(|r| r.operator));
+        self.refills.clear();
+        for entry in relaxed {
+            let list = if entry.until == REFILL { &mut self.refills } else { &mut self.rest };
+            list.push(*entry);
+        }
         self.state.clear();
         self.state.extend_from_slice(from);
         for r in relaxed {
@@ -47,39 +61,60 @@ impl Lookahead {
         }
         loop {
             while self.pass(task) {}
-            if self.rest.is_empty() || !self.mend(task) {
+            if self.rest.is_empty() || !(self.mend(task) || self.steer(task)) {
                 break;
             }
         }
-        for operator in std::mem::take(&mut self.rest) {
-            self.need(task, operator, -1);
+        let (rest, refills) = (std::mem::take(&mut self.rest), std::mem::take(&mut self.refills));
+        for left in rest.iter().chain(&refills) {
+            self.need(task, left.operator, -1);
         }
+        (self.rest, self.refills) = (rest, refills);
+        self.rest.clear();
+        self.steer_to_goal(task);
     }
 
     /// Counts an operator's preconditions among those that the rest of the plan needs.
-    fn need(&mut self, task: &Compiled, operator: u32, by: i32) {
+    pub(super) fn need(&mut self, task: &Compiled, operator: u32, by: i32) {
         for &fact in task.preconditions.get(operator as usize) {
             self.needed[task.id(fact) as usize] += by;
         }
     }
 
-    /// Applies every operator that can be applied, in order; tells whether there was one.
+    /// Applies every operator that can be applied, in order, but those that are there to move a number; tells whether
+    /// there was one.
     fn pass(&mut self, task: &Compiled) -> bool {
         let before = self.plan.len();
         let mut rest = std::mem::take(&mut self.rest);
-        rest.retain(|&operator| {
-            if !task.applicable(operator, &self.state) {
+        rest.retain(|entry| {
+            if entry.until != u32::MAX || !task.applicable(entry.operator, &self.state) {
                 return true;
             }
-            self.need(task, operator, -1);
-            self.step(task, operator);
+            if self.fill(task) && !task.applicable(entry.operator, &self.state) {
+                return true;
+            }
+            self.need(task, entry.operator, -1);
+            self.step(task, entry.operator);
             false
         });
         self.rest = rest;
         self.plan.len() > before
     }
 
-    fn step(&mut self, task: &Compiled, operator: u32) {
+    /// Applies what gives back numbers that the rest uses up, wherever that is possible; tells whether there was any.
+    fn fill(&mut self, task: &Compiled) -> bool {
+        let before = self.plan.len();
+        for place in 0..self.refills.len() {
+            while self.refills[place].times > 0 && task.applicable(self.refills[place].operator, &self.state)
+            {
+                self.refills[place].times -= 1;
+                self.step(task, self.refills[place].operator);
+            }
+        }
+        self.plan.len() > before
+    }
+
+    pub(super) fn step(&mut self, task: &Compiled, operator: u32) {
         task.apply(operator, &self.state, &mut self.next);
         std::mem::swap(&mut self.state, &mut self.next);
         self.plan.push(operator);
@@ -89,16 +124,16 @@ impl Lookahead {
     /// can be applied now; puts that in the first one's place.
     fn mend(&mut self, task: &Compiled) -> bool {
         for i in 0..self.rest.len() {
-            for effect in task.effects.get(self.rest[i] as usize) {
+            for effect in task.effects.get(self.rest[i].operator as usize) {
                 let fact = task.id(effect.fact);
                 if task.holds(fact, &self.state) || self.needed[fact as usize] == 0 {
                     continue;
                 }
-                let fits = |&&op: &&u32| op != self.rest[i] && task.applicable(op, &self.state);
+                let fits = |&&op: &&u32| op != self.rest[i].operator && task.applicable(op, &self.state);
                 let achievers = self.achievers.get(fact as usize).iter();
                 if let Some(&operator) = achievers.filter(fits).min_by_key(|&&op| task.costs[op as usize]) {
                     let gone = self.rest.remove(i);
-                    self.need(task, gone, -1);
+                    self.need(task, gone.operator, -1);
                     self.step(task, operator);
                     return true;
                 }

@@ -152,7 +152,7 @@ impl Search<'_, '_> {
             self.store.load(task, id, &mut state);
             self.counts.expanded += 1;
             applicable.clear();
-            self.shared.successors.applicable(&state, &mut applicable);
+            self.shared.successors.applicable(task, &state, &mut applicable);
             for &operator in &applicable {
                 let cost = self.store.cost(id).saturating_add(task.costs[operator as usize]);
                 if cost >= bound {

@@ -67,7 +67,7 @@ pub(crate) fn solve(
         memory_limit: options.memory_limit_bytes.unwrap_or(usize::MAX),
         stop,
     };
-    let bound = options.bound.map_or(u32::MAX, |bound| task.scaled(bound));
+    let bound = options.bound.filter(|_| task.measure.is_sum()).map_or(u32::MAX, |bound| task.scaled(bound));
     let mut run =
         Run { task: &task, shared: &shared, options, counts: Counts::default(), bound, best: None, on_plan };
     let end = run.all();
@@ -125,6 +125,9 @@ impl Run<'_, '_> {
         }
         let first = if self.options.anytime { u64::MAX } else { budget };
         self.improve(plan, first);
+        if self.best.is_none() {
+            return ClassicalEnd::Stopped;
+        }
         if self.limited() || (self.shared.stop)() {
             return if self.options.anytime { ClassicalEnd::Stopped } else { ClassicalEnd::Done };
         }
@@ -143,6 +146,12 @@ impl Run<'_, '_> {
                 1 => novelty::search(self.shared, self.bound, work_limit, &mut self.counts),
                 _ => self.search(Strategy { lookahead: false, ..strategy }),
             };
+            tracing::debug!(
+                turn,
+                self.counts.evaluated,
+                self.counts.work,
+                plan = matches!(end, End::Plan(_))
+            );
             match end {
                 End::Plan(plan) => {
                     return Ok((plan, turn == 0));
@@ -195,8 +204,14 @@ impl Run<'_, '_> {
 
     fn take(&mut self, plan: &[u32]) {
         let cost = self.task.plan_cost(plan);
+        if self.options.bound.is_some_and(|bound| cost >= bound) {
+            return;
+        }
         if self.best.as_ref().is_none_or(|best| cost < self.task.plan_cost(best)) {
-            self.bound = self.bound.min(self.task.search_cost(plan));
+            // What operators are taken to cost bounds nothing where the metric is no sum of it.
+            if self.task.measure.is_sum() {
+                self.bound = self.bound.min(self.task.search_cost(plan));
+            }
             self.best = Some(plan.to_vec());
             (self.on_plan)(plan, cost);
         }
@@ -223,7 +238,9 @@ impl Run<'_, '_> {
             match self.search(strategy) {
                 End::Plan(plan) => {
                     self.improve(plan, work_limit);
-                    continue;
+                    if self.task.measure.is_sum() {
+                        continue;
+                    }
                 }
                 End::Exhausted if !strategy.lookahead && self.task.has_exact_costs() => {
                     return ClassicalEnd::Exhausted;

@@ -16,7 +16,11 @@ struct Place {
 /// Packed states with what led to each.
 pub(crate) struct Store {
     places: Vec<Place>,
+    /// Words of the packed variables; the numbers follow, one word each.
+    packed_words: usize,
     words: usize,
+    /// Where the numbers begin in an unpacked state.
+    numbers: usize,
     packed: Vec<u64>,
     /// Open addressing: state numbers, `NO_STATE` for free.
     table: Vec<u32>,
@@ -57,10 +61,13 @@ impl Store {
             places[v] = Place { word: word as u32, shift: 64 - free[word], mask: (1u64 << need) - 1 };
             free[word] -= need;
         }
-        let words = free.len().max(1);
+        let packed_words = free.len().max(1);
+        let words = packed_words + task.numbers.len();
         Store {
             places,
+            packed_words,
             words,
+            numbers: task.domains.len(),
             packed: Vec::new(),
             table: vec![NO_STATE; 1024],
             parents: Vec::new(),
@@ -95,6 +102,10 @@ impl Store {
         self.scratch.fill(0);
         for (place, &value) in self.places.iter().zip(state) {
             self.scratch[place.word as usize] |= u64::from(value) << place.shift;
+        }
+        let numbers = state[self.numbers..].chunks_exact(2);
+        for (word, halves) in self.scratch[self.packed_words..].iter_mut().zip(numbers) {
+            *word = u64::from(halves[0]) | u64::from(halves[1]) << 32;
         }
         let mask = self.table.len() - 1;
         let mut slot = hash(&self.scratch) as usize & mask;
@@ -137,6 +148,10 @@ impl Store {
         state.clear();
         state.extend(self.places.iter().map(|p| (words[p.word as usize] >> p.shift & p.mask) as u32));
         state.resize(task.domains.len(), 1);
+        if !task.numbers.is_empty() {
+            state.extend(words[self.packed_words..].iter().flat_map(|&w| [w as u32, (w >> 32) as u32]));
+            task.numbers.compare_all(state);
+        }
         task.derive(state);
     }
 

@@ -67,8 +67,11 @@ impl Successors {
     }
 
     /// Appends the applicable operators.
-    pub(crate) fn applicable(&self, state: &[u32], out: &mut Vec<u32>) {
+    pub(crate) fn applicable(&self, task: &Compiled, state: &[u32], out: &mut Vec<u32>) {
         self.collect(self.root, state, out);
+        if !task.numbers.is_empty() {
+            out.retain(|&operator| task.possible(operator, state));
+        }
     }
 
     fn collect(&self, mut node: u32, state: &[u32], out: &mut Vec<u32>) {

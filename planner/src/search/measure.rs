@@ -1,0 +1,86 @@
+//! What a plan costs: a sum over its operators where the metric is one, else what the metric makes of its states.
+
+use crate::ground::{Expression, GroundTask};
+
+use super::compiled::Compiled;
+use super::numbers::{Linear, Numbers, add_linear};
+
+/// How plans are measured.
+#[derive(Clone, Debug)]
+pub(crate) struct Measure {
+    kind: Kind,
+    /// By operator: what it costs, or what it is taken to cost where that depends on the state.
+    pub estimates: Vec<f64>,
+}
+
+#[derive(Clone, Debug)]
+enum Kind {
+    /// The estimates are exact.
+    Sum,
+    /// By operator: what it adds in the state before it, times the sign.
+    Adding(Vec<Expression>, f64),
+    /// What the last state makes of the metric, times the sign.
+    Last(Expression, f64),
+}
+
+impl Measure {
+    /// How plans of a task are measured.
+    pub(crate) fn new(task: &GroundTask, numbers: &Numbers) -> Measure {
+        let sign = if task.metric.as_ref().is_none_or(|m| m.minimise) { 1.0 } else { -1.0 };
+        if let Some(metric) = task.metric.as_ref().filter(|m| !m.additive) {
+            return of_last(&metric.expression, sign, numbers);
+        }
+        let constant = |e: &Expression| if let Expression::Constant(v) = e { Some(sign * v) } else { None };
+        let costs: Option<Vec<f64>> = task.actions.iter().map(|a| constant(&a.cost)).collect();
+        if let Some(estimates) = costs {
+            return Measure { kind: Kind::Sum, estimates };
+        }
+        let first = |e: &Expression| {
+            let value = sign * super::numbers::evaluate(e, &|n| numbers.initial[n as usize]);
+            if value.is_finite() { value.max(0.0) } else { 1.0 }
+        };
+        let estimates = task.actions.iter().map(|a| first(&a.cost)).collect();
+        let kind = Kind::Adding(task.actions.iter().map(|a| a.cost.clone()).collect(), sign);
+        Measure { kind, estimates }
+    }
+
+    /// Whether a plan costs the sum of what its operators cost.
+    pub(crate) fn is_sum(&self) -> bool {
+        matches!(self.kind, Kind::Sum)
+    }
+
+    /// The cost of a plan from the first state.
+    pub(crate) fn of(&self, task: &Compiled, plan: &[u32]) -> f64 {
+        let (mut state, mut sum) = (task.initial.clone(), 0.0);
+        match &self.kind {
+            Kind::Sum => plan.iter().map(|&op| self.estimates[op as usize]).sum(),
+            Kind::Adding(costs, sign) => {
+                for &op in plan {
+                    sum += sign * task.numbers.value(&costs[op as usize], &state);
+                    task.advance(op, &mut state);
+                }
+                sum
+            }
+            Kind::Last(expression, sign) => {
+                plan.iter().for_each(|&op| task.advance(op, &mut state));
+                sign * task.numbers.value(expression, &state)
+            }
+        }
+    }
+}
+
+/// Where the metric is a weighted sum of numbers, an operator costs what its changes add to it as far as that is known
+/// beforehand; else each counts one.
+fn of_last(expression: &Expression, sign: f64, numbers: &Numbers) -> Measure {
+    let kind = Kind::Last(expression.clone(), sign);
+    let mut linear = Linear::default();
+    if !add_linear(expression, sign, &mut linear) {
+        return Measure { kind, estimates: vec![1.0; numbers.changes.len()] };
+    }
+    let weight = |number: u32| linear.weights.iter().find(|(n, _)| *n == number).map_or(0.0, |(_, w)| *w);
+    let adds = |change: &super::numbers::NumberChange| {
+        change.constant_gain().map_or(0.0, |gain| gain * weight(change.number))
+    };
+    let cost = |changes: &Vec<_>| changes.iter().map(adds).sum::<f64>().max(0.0);
+    Measure { kind, estimates: numbers.changes.iter().map(cost).collect() }
+}

@@ -1,0 +1,369 @@
+//! The numbers of a task: what changes them, which conditions read them, and what the metric makes of them.
+//!
+//! A state carries its numbers behind its variables, two words each. Every numeric condition is a variable of its own
+//! (value 0 where it holds), looked up after each change, so that all searches treat it like any other fact.
+
+use crate::ground::{Change, Comparison, Conjunction, Expression, Fact, GroundTask, Outcome, Relation};
+use crate::temporal::{change_number, relates};
+
+use super::compiled::Lists;
+
+/// One effect on a number.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct NumberChange {
+    /// Facts (those of comparisons included) under which it happens.
+    pub conditions: Vec<Fact>,
+    /// Which number.
+    pub number: u32,
+    /// How it changes.
+    pub change: Option<Change>,
+    /// By or to how much.
+    pub amount: Option<Expression>,
+}
+
+impl NumberChange {
+    /// How much it adds, if that is the same in every state.
+    pub(crate) fn constant_gain(&self) -> Option<f64> {
+        match (self.change, &self.amount) {
+            (Some(Change::Increase), Some(Expression::Constant(by))) => Some(*by),
+            (Some(Change::Decrease), Some(Expression::Constant(by))) => Some(-by),
+            _ => None,
+        }
+    }
+}
+
+/// A sum of weighted numbers and a constant.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Linear {
+    /// Numbers with their weights, each number once.
+    pub weights: Vec<(u32, f64)>,
+    /// The constant.
+    pub constant: f64,
+}
+
+/// The numbers of a task; none for a task without them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Numbers {
+    /// Variable of the first comparison.
+    pub first: usize,
+    /// Words of a state before its numbers.
+    base: usize,
+    /// Numeric conditions.
+    pub comparisons: Vec<Comparison>,
+    /// By comparison: left minus right as a sum, if it is one.
+    pub linear: Vec<Option<Linear>>,
+    /// By comparison: the numbers that it reads.
+    pub reads: Vec<Vec<u32>>,
+    /// By number: the comparisons that read it.
+    pub read_by: Lists<u32>,
+    /// First values; NaN where undefined.
+    pub initial: Vec<f64>,
+    /// By operator.
+    pub changes: Vec<Vec<NumberChange>>,
+    /// By operator: comparisons that it may turn.
+    turned: Lists<u32>,
+    /// By operator: whether a number may become undefined or infinite, which forbids the operator.
+    risky: Vec<bool>,
+}
+
+impl Numbers {
+    /// The numbers of a ground task whose comparisons begin at variable `first`.
+    pub(crate) fn new(task: &GroundTask, first: usize) -> Numbers {
+        let count = task.numerics.len();
+        let comparisons = task.comparisons.clone();
+        let reads: Vec<Vec<u32>> = comparisons.iter().map(|c| reads(&[&c.left, &c.right])).collect();
+        let pairs = (0..reads.len()).flat_map(|c| reads[c].iter().map(move |&n| (n, c as u32)));
+        let read_by = Lists::group(count, pairs);
+        let difference = |c: &Comparison| {
+            let mut linear = Linear::default();
+            let is = add_linear(&c.left, 1.0, &mut linear) && add_linear(&c.right, -1.0, &mut linear);
+            is.then_some(linear)
+        };
+        let initial = task.initial.numbers.clone();
+        let mut numbers = Numbers {
+            first,
+            base: first + comparisons.len(),
+            linear: comparisons.iter().map(difference).collect(),
+            reads,
+            read_by,
+            comparisons,
+            changes: Vec::with_capacity(task.actions.len()),
+            turned: Lists::new(),
+            risky: Vec::with_capacity(task.actions.len()),
+            initial,
+        };
+        for action in &task.actions {
+            numbers.operator(action);
+        }
+        numbers
+    }
+
+    fn operator(&mut self, action: &crate::ground::Action) {
+        let mut changes = Vec::new();
+        for effect in &action.effects {
+            if let Outcome::Change { fluent, change, amount } = &effect.outcome {
+                let conditions = effect.when.as_ref().map_or_else(Vec::new, |w| self.facts(&w.here));
+                let (change, amount) = (Some(*change), Some(amount.clone()));
+                changes.push(NumberChange { conditions, number: *fluent, change, amount });
+            }
+        }
+        let mut turned: Vec<u32> =
+            changes.iter().flat_map(|c| self.read_by.get(c.number as usize).iter().copied()).collect();
+        turned.sort_unstable();
+        turned.dedup();
+        self.turned.push(turned);
+        let safe =
+            |c: &NumberChange| c.constant_gain().is_some() && self.initial[c.number as usize].is_finite();
+        self.risky.push(!changes.iter().all(safe));
+        self.changes.push(changes);
+    }
+
+    /// The facts of a conjunction, those that stand for its comparisons included.
+    pub(crate) fn facts(&self, conjunction: &Conjunction) -> Vec<Fact> {
+        let comparisons = conjunction.comparisons.iter().map(|&c| self.fact(c));
+        conjunction.facts.iter().copied().chain(comparisons).collect()
+    }
+
+    fn fact(&self, comparison: u32) -> Fact {
+        Fact { variable: self.first as u32 + comparison, value: 0 }
+    }
+
+    /// Whether the task has none.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.initial.is_empty() && self.comparisons.is_empty()
+    }
+
+    /// How many there are.
+    pub(crate) fn len(&self) -> usize {
+        self.initial.len()
+    }
+
+    /// A number of a state.
+    #[inline]
+    pub(crate) fn get(&self, state: &[u32], number: u32) -> f64 {
+        let at = self.base + 2 * number as usize;
+        f64::from_bits(u64::from(state[at]) | u64::from(state[at + 1]) << 32)
+    }
+
+    fn set(&self, state: &mut [u32], number: u32, value: f64) {
+        let at = self.base + 2 * number as usize;
+        let bits = if value == 0.0 { 0 } else { value.to_bits() };
+        state[at] = bits as u32;
+        state[at + 1] = (bits >> 32) as u32;
+    }
+
+    /// Completes a first state of which the variables are there, derived ones and comparisons excepted.
+    pub(crate) fn append_initial(&self, state: &mut Vec<u32>) {
+        state.resize(self.base + 2 * self.initial.len(), 1);
+        for (number, &value) in self.initial.iter().enumerate() {
+            self.set(state, number as u32, value);
+        }
+        self.compare_all(state);
+    }
+
+    /// Looks up every comparison.
+    pub(crate) fn compare_all(&self, state: &mut [u32]) {
+        for comparison in 0..self.comparisons.len() {
+            self.compare(comparison, state);
+        }
+    }
+
+    fn compare(&self, comparison: usize, state: &mut [u32]) {
+        let Comparison { left, relation, right } = &self.comparisons[comparison];
+        let holds = relates(self.value(left, state), *relation, self.value(right, state));
+        state[self.first + comparison] = u32::from(!holds);
+    }
+
+    /// Left minus right of a comparison.
+    pub(crate) fn gap(&self, comparison: usize, state: &[u32]) -> f64 {
+        let Comparison { left, right, .. } = &self.comparisons[comparison];
+        self.value(left, state) - self.value(right, state)
+    }
+
+    /// What changes add to left minus right of a comparison; NaN where that is not the same in every state.
+    pub(crate) fn gain(&self, comparison: u32, changes: &[NumberChange]) -> f64 {
+        let Some(linear) = &self.linear[comparison as usize] else { return f64::NAN };
+        let weight = |n: u32| linear.weights.iter().find(|(number, _)| *number == n).map_or(0.0, |w| w.1);
+        let gains = changes.iter().map(|c| (weight(c.number), c.constant_gain().unwrap_or(f64::NAN)));
+        gains.filter(|(weight, _)| *weight != 0.0).map(|(weight, gain)| weight * gain).sum()
+    }
+
+    /// The least value of a number with which a comparison that reads nothing else holds.
+    pub(crate) fn least(&self, comparison: usize, number: u32) -> Option<f64> {
+        let linear = self.linear[comparison].as_ref()?;
+        let [(read, weight)] = linear.weights[..] else { return None };
+        let bounds = match self.comparisons[comparison].relation {
+            Relation::AtLeast | Relation::Greater => weight > 0.0,
+            Relation::AtMost | Relation::Less => weight < 0.0,
+            Relation::Equal | Relation::Unequal => false,
+        };
+        (read == number && bounds).then(|| -linear.constant / weight)
+    }
+
+    /// Comparisons that an operator may turn.
+    pub(crate) fn turned(&self, operator: u32) -> &[u32] {
+        self.turned.get(operator as usize)
+    }
+
+    /// The value of an expression; NaN where it is undefined.
+    pub(crate) fn value(&self, expression: &Expression, state: &[u32]) -> f64 {
+        evaluate(expression, &|number| self.get(state, number))
+    }
+
+    /// Applies an operator's changes to `next`, a copy of `state` with the operator's other effects.
+    pub(crate) fn apply(&self, operator: u32, state: &[u32], next: &mut [u32]) {
+        for change in &self.changes[operator as usize] {
+            let (Some(how), Some(amount)) = (change.change, &change.amount) else { continue };
+            if change.conditions.iter().all(|f| state[f.variable as usize] == f.value) {
+                let mut number = self.get(next, change.number);
+                change_number(&mut number, how, self.value(amount, state));
+                self.set(next, change.number, number);
+            }
+        }
+        for &comparison in self.turned.get(operator as usize) {
+            self.compare(comparison as usize, next);
+        }
+    }
+
+    /// Whether all numbers that an operator changes stay defined and finite.
+    pub(crate) fn possible(&self, operator: u32, state: &[u32]) -> bool {
+        if !self.risky[operator as usize] {
+            return true;
+        }
+        let mut next = state.to_vec();
+        self.apply(operator, state, &mut next);
+        self.changes[operator as usize].iter().all(|c| {
+            let happens = c.conditions.iter().all(|f| state[f.variable as usize] == f.value);
+            !happens || self.get(&next, c.number).is_finite()
+        })
+    }
+
+    /// Numbers that an operator writes.
+    pub(crate) fn writes(&self, operator: u32) -> impl Iterator<Item = u32> + '_ {
+        self.changes.get(operator as usize).into_iter().flatten().map(|c| c.number)
+    }
+
+    /// Variables and numbers that an operator's changes read.
+    pub(crate) fn change_reads(&self, operator: u32) -> (Vec<u32>, Vec<u32>) {
+        let changes = self.changes.get(operator as usize).map_or(&[][..], |c| c);
+        let variables = changes.iter().flat_map(|c| c.conditions.iter().map(|f| f.variable)).collect();
+        let amounts: Vec<&Expression> = changes.iter().filter_map(|c| c.amount.as_ref()).collect();
+        (variables, reads(&amounts))
+    }
+}
+
+/// More repetitions than this are not told apart.
+const MOST_TIMES: f64 = 1.0e6;
+/// Part of a repetition that is left to rounding.
+const SLACK: f64 = 1.0e-9;
+
+/// How often something must be added to a gap (left minus right) until it stands in the relation to zero; `None` if
+/// adding does not help.
+pub(crate) fn repetitions(gap: f64, relation: Relation, gain: f64) -> Option<u32> {
+    let (missing, gain) = match relation {
+        Relation::AtLeast | Relation::Greater => (-gap, gain),
+        Relation::AtMost | Relation::Less => (gap, -gain),
+        Relation::Equal => (gap.abs(), if gap > 0.0 { -gain } else { gain }),
+        Relation::Unequal => return (gain != 0.0 && !gap.is_nan()).then_some(1),
+    };
+    if gain.is_nan() || missing.is_nan() || gain <= 0.0 {
+        return None;
+    }
+    let times = match relation {
+        Relation::Greater | Relation::Less => (missing / gain).floor() + 1.0,
+        _ => (missing / gain - SLACK).ceil(),
+    };
+    Some(times.clamp(1.0, MOST_TIMES) as u32)
+}
+
+/// The value of an expression over numbers; NaN where it is undefined.
+pub(crate) fn evaluate(expression: &Expression, number: &impl Fn(u32) -> f64) -> f64 {
+    match expression {
+        Expression::Constant(value) => *value,
+        Expression::Fluent(id) => number(*id),
+        Expression::Sum(parts) => parts.iter().map(|p| evaluate(p, number)).sum(),
+        Expression::Product(parts) => parts.iter().map(|p| evaluate(p, number)).product(),
+        Expression::Difference(left, right) => evaluate(left, number) - evaluate(right, number),
+        Expression::Quotient(left, right) => evaluate(left, number) / evaluate(right, number),
+        Expression::Negative(inner) => -evaluate(inner, number),
+        Expression::Call(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {
+            f64::NAN
+        }
+    }
+}
+
+/// Whether an expression is made of numbers alone.
+pub(crate) fn is_plain(expression: &Expression) -> bool {
+    match expression {
+        Expression::Constant(_) | Expression::Fluent(_) => true,
+        Expression::Sum(parts) | Expression::Product(parts) => parts.iter().all(is_plain),
+        Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+            is_plain(left) && is_plain(right)
+        }
+        Expression::Negative(inner) => is_plain(inner),
+        Expression::Call(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => false,
+    }
+}
+
+/// The numbers that expressions read, each once.
+pub(crate) fn reads(expressions: &[&Expression]) -> Vec<u32> {
+    fn collect(expression: &Expression, out: &mut Vec<u32>) {
+        match expression {
+            Expression::Fluent(id) => out.push(*id),
+            Expression::Sum(parts) | Expression::Product(parts) => {
+                parts.iter().for_each(|p| collect(p, out));
+            }
+            Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+                collect(left, out);
+                collect(right, out);
+            }
+            Expression::Negative(inner) => collect(inner, out),
+            _ => {}
+        }
+    }
+    let mut out = Vec::new();
+    expressions.iter().for_each(|e| collect(e, &mut out));
+    out.sort_unstable();
+    out.dedup();
+    out
+}
+
+/// Adds a weighted expression to a sum; `false` if it is not linear.
+pub(crate) fn add_linear(expression: &Expression, factor: f64, sum: &mut Linear) -> bool {
+    match expression {
+        Expression::Constant(value) => {
+            sum.constant += factor * value;
+            true
+        }
+        Expression::Fluent(id) => {
+            match sum.weights.iter_mut().find(|(number, _)| number == id) {
+                Some((_, weight)) => *weight += factor,
+                None => sum.weights.push((*id, factor)),
+            }
+            true
+        }
+        Expression::Sum(parts) => parts.iter().all(|p| add_linear(p, factor, sum)),
+        Expression::Difference(left, right) => {
+            add_linear(left, factor, sum) && add_linear(right, -factor, sum)
+        }
+        Expression::Negative(inner) => add_linear(inner, -factor, sum),
+        Expression::Product(parts) => {
+            let constant = |p: &Expression| if let Expression::Constant(v) = p { Some(*v) } else { None };
+            let by: f64 = parts.iter().filter_map(constant).product();
+            let mut rest = parts.iter().filter(|p| constant(p).is_none());
+            match (rest.next(), rest.next()) {
+                (None, _) => {
+                    sum.constant += factor * by;
+                    true
+                }
+                (Some(only), None) => add_linear(only, factor * by, sum),
+                _ => false,
+            }
+        }
+        Expression::Quotient(left, right) => match **right {
+            Expression::Constant(by) if by != 0.0 => add_linear(left, factor / by, sum),
+            _ => false,
+        },
+        _ => false,
+    }
+}

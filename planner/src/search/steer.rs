@@ -1,0 +1,164 @@
+//! Lookahead over numbers: what a relaxed plan wants next is made applicable by moving numbers towards its conditions,
+//! in whatever direction they lie by then.
+
+use crate::temporal::relates;
+
+use super::compiled::{Compiled, Lists};
+use super::lookahead::{Lookahead, MOST_STEPS};
+use super::numbers::repetitions;
+
+/// How many operators may be made applicable one for another.
+const DEPTH: u32 = 4;
+/// How often all conditions of an operator are looked at again.
+const ROUNDS: usize = 4;
+
+/// By comparison: the operators that always add the same to left minus right, with what they add.
+pub(super) fn movers(task: &Compiled) -> Lists<(u32, f64)> {
+    let numbers = &task.numbers;
+    let mut pairs = Vec::new();
+    for (operator, changes) in numbers.changes.iter().enumerate() {
+        if changes.iter().all(|c| c.conditions.is_empty()) {
+            for &comparison in numbers.turned(operator as u32) {
+                let gain = numbers.gain(comparison, changes);
+                if gain != 0.0 && !gain.is_nan() {
+                    pairs.push((comparison, (operator as u32, gain)));
+                }
+            }
+        }
+    }
+    Lists::group(numbers.comparisons.len(), pairs.iter().copied())
+}
+
+impl Lookahead {
+    /// Makes the first operator of the rest that lacks nothing but numbers applicable, and applies it.
+    pub(super) fn steer(&mut self, task: &Compiled) -> bool {
+        if task.numbers.is_empty() || self.plan.len() >= MOST_STEPS {
+            return false;
+        }
+        for place in 0..self.rest.len() {
+            let entry = self.rest[place];
+            if entry.until == u32::MAX && self.enable(task, entry.operator, DEPTH) {
+                self.rest.remove(place);
+                self.need(task, entry.operator, -1);
+                self.step(task, entry.operator);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Moves numbers towards the goal.
+    pub(super) fn steer_to_goal(&mut self, task: &Compiled) {
+        if !task.numbers.is_empty() {
+            let mut goal: Vec<u32> = task.goal.iter().map(|&f| task.id(f)).collect();
+            for _ in 0..ROUNDS {
+                if !self.approach_all(task, &goal, DEPTH) {
+                    break;
+                }
+                goal.reverse();
+            }
+        }
+    }
+
+    /// Moves numbers towards conditions one after another, each keeping what was settled before it.
+    fn approach_all(&mut self, task: &Compiled, wanted: &[u32], depth: u32) -> bool {
+        let mut moved = false;
+        for place in 0..wanted.len() {
+            moved |= self.approach(task, wanted[place], &wanted[..place], depth);
+        }
+        moved
+    }
+
+    /// Makes an operator applicable that lacks nothing but numbers; `false` if that fails.
+    fn enable(&mut self, task: &Compiled, operator: u32, depth: u32) -> bool {
+        let mut wanted: Vec<u32> =
+            task.preconditions.get(operator as usize).iter().map(|&f| task.id(f)).collect();
+        let compared = |f: u32| task.variables[f as usize] as usize >= task.numbers.first;
+        if depth == 0 || wanted.iter().any(|&f| !compared(f) && !task.holds(f, &self.state)) {
+            return false;
+        }
+        for _ in 0..ROUNDS {
+            if task.applicable(operator, &self.state) {
+                return true;
+            }
+            if !self.approach_all(task, &wanted, depth) {
+                return false;
+            }
+            wanted.reverse();
+        }
+        task.applicable(operator, &self.state)
+    }
+
+    /// Moves numbers until a numeric condition holds, if possible without breaking others of `keep`; tells whether
+    /// anything moved.
+    fn approach(&mut self, task: &Compiled, fact: u32, keep: &[u32], depth: u32) -> bool {
+        let variable = task.variables[fact as usize] as usize;
+        if variable < task.numbers.first || task.holds(fact, &self.state) {
+            return false;
+        }
+        let before = self.plan.len();
+        let comparison = (variable - task.numbers.first) as u32;
+        while !task.holds(fact, &self.state) && self.plan.len() < MOST_STEPS {
+            let Some((operator, times)) = self.best_mover(task, comparison, keep) else { break };
+            for _ in 0..times {
+                if !task.applicable(operator, &self.state) {
+                    break;
+                }
+                self.step(task, operator);
+            }
+        }
+        if !task.holds(fact, &self.state) {
+            self.support(task, fact, depth);
+        }
+        self.plan.len() > before
+    }
+
+    /// The applicable operator that brings a comparison about at least cost, with how often it must be applied; one that
+    /// breaks nothing of `keep` first.
+    fn best_mover(&self, task: &Compiled, comparison: u32, keep: &[u32]) -> Option<(u32, u32)> {
+        let gap = task.numbers.gap(comparison as usize, &self.state);
+        let relation = task.numbers.comparisons[comparison as usize].relation;
+        let mut best: Option<((bool, u64), (u32, u32))> = None;
+        for &(operator, gain) in self.movers.get(comparison as usize) {
+            let Some(times) = repetitions(gap, relation, gain) else { continue };
+            let after = gap + f64::from(times) * gain;
+            if !relates(after, relation, 0.0) || !task.applicable(operator, &self.state) {
+                continue;
+            }
+            let cost = u64::from(times) * (u64::from(task.costs[operator as usize]) + 1);
+            let breaks = || keep.iter().any(|&other| self.breaks(task, operator, times, other));
+            if best.is_none_or(|(known, _)| known > (false, cost)) {
+                let key = (breaks(), cost);
+                if best.is_none_or(|(known, _)| known > key) {
+                    best = Some((key, (operator, times)));
+                }
+            }
+        }
+        best.map(|(_, mover)| mover)
+    }
+
+    /// Whether so many applications of an operator turn a condition that holds.
+    fn breaks(&self, task: &Compiled, operator: u32, times: u32, fact: u32) -> bool {
+        let variable = task.variables[fact as usize] as usize;
+        if variable < task.numbers.first || !task.holds(fact, &self.state) {
+            return false;
+        }
+        let comparison = variable - task.numbers.first;
+        let gain = task.numbers.gain(comparison as u32, &task.numbers.changes[operator as usize]);
+        let gap = task.numbers.gap(comparison, &self.state) + f64::from(times) * gain;
+        !relates(gap, task.numbers.comparisons[comparison].relation, 0.0)
+    }
+
+    /// Applies what the relaxed plan brings a condition about with, made applicable first.
+    fn support(&mut self, task: &Compiled, fact: u32, depth: u32) {
+        let Some(entry) = self.rest.iter().find(|r| r.until == fact).copied() else { return };
+        if self.enable(task, entry.operator, depth - 1) {
+            for _ in 0..entry.times {
+                if task.holds(fact, &self.state) || !task.applicable(entry.operator, &self.state) {
+                    break;
+                }
+                self.step(task, entry.operator);
+            }
+        }
+    }
+}

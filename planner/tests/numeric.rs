@@ -1,0 +1,153 @@
+//! Planning with numbers and without times, from text to a validated plan.
+
+use descry_planner::{Attachments, Options, Outcome, Source, Task, plan, validate};
+
+/// What must come out.
+enum Expect {
+    /// A plan.
+    Plan,
+    /// With time to improve, a plan whose metric is at most this.
+    MetricAtMost(f64),
+    /// Proven to have no plan.
+    Unsolvable,
+}
+
+fn source(name: &str, text: &str) -> Source {
+    Source { name: name.into(), text: text.into() }
+}
+
+fn check(domain: &str, problem: &str, expect: Expect) {
+    let task = Task::read(&source("domain", domain), &source("problem", problem));
+    let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
+    let attachments = Attachments::default();
+    let anytime = matches!(expect, Expect::MetricAtMost(_));
+    let options = Options { anytime, evaluation_limit: Some(20_000), ..Options::default() };
+    let run =
+        || plan(&task, &attachments, &options, &|| false, &mut |_| {}).expect("no attachment, no refusal");
+    let outcome = run();
+    assert_eq!(outcome.plan(), run().plan(), "the same task twice");
+    if let Expect::Unsolvable = expect {
+        assert!(matches!(outcome, Outcome::Unsolvable { .. }), "{outcome:?}");
+        return;
+    }
+    let Some(plan) = outcome.plan() else { panic!("no plan: {outcome:?}") };
+    let verdict = validate(&task, &attachments, plan);
+    assert!(verdict.valid, "{verdict:?}");
+    if let Expect::MetricAtMost(most) = expect {
+        let metric = verdict.metric.or(verdict.cost).expect("the problem has a metric");
+        assert!(metric <= most + 1e-9, "metric {metric} above {most}: {plan:?}");
+    }
+}
+
+const LADDER: &str = "(define (domain ladder) (:requirements :typing :fluents) (:types rung)
+  (:functions (height ?r - rung) (top))
+  (:action raise :parameters (?r - rung) :precondition (<= (+ (height ?r) 1) (top))
+    :effect (increase (height ?r) 1))
+  (:action lower :parameters (?r - rung) :precondition (>= (height ?r) 1) :effect (decrease (height ?r) 1)))";
+
+/// Rungs in rising order: what settles one pair unsettles the next, and there is room for one order only.
+fn ladder(rungs: usize) -> String {
+    let names: Vec<String> = (0..rungs).map(|r| format!("r{r}")).collect();
+    let heights = (0..rungs).map(|r| format!("(= (height r{r}) {})", (rungs - 1 - r) * 7 % rungs));
+    let pairs = (1..rungs).map(|r| format!("(<= (+ (height r{}) 1) (height r{r}))", r - 1));
+    format!(
+        "(define (problem p) (:domain ladder) (:objects {} - rung) (:init (= (top) {}) {}) (:goal (and {})))",
+        names.join(" "),
+        rungs - 1,
+        heights.collect::<String>(),
+        pairs.collect::<String>()
+    )
+}
+
+#[test]
+fn conditions_over_two_numbers() {
+    for rungs in [2, 5, 16] {
+        check(LADDER, &ladder(rungs), Expect::Plan);
+    }
+}
+
+#[test]
+fn a_number_that_only_grows_never_falls() {
+    let domain = LADDER.replace("(decrease (height ?r) 1)", "(increase (height ?r) 2)");
+    let problem =
+        "(define (problem p) (:domain ladder) (:objects a - rung) (:init (= (top) 9) (= (height a) 3))
+      (:goal (< (height a) 2)))";
+    check(&domain, problem, Expect::Unsolvable);
+    check(LADDER, problem, Expect::Plan);
+}
+
+const VAN: &str = "(define (domain van) (:requirements :typing :fluents) (:types place)
+  (:predicates (at ?p - place) (road ?a ?b - place) (pump ?p - place) (seen ?p - place))
+  (:functions (fuel) (used) (need ?a ?b - place))
+  (:action go :parameters (?a ?b - place)
+    :precondition (and (at ?a) (road ?a ?b) (>= (fuel) (need ?a ?b)))
+    :effect (and (not (at ?a)) (at ?b) (seen ?b) (decrease (fuel) (need ?a ?b)) (increase (used) (need ?a ?b))))
+  (:action fill :parameters (?p - place) :precondition (and (at ?p) (pump ?p) (<= (fuel) 8))
+    :effect (increase (fuel) 4)))";
+
+/// A star of places around a pump: every way out must be paid for twice.
+fn van(arms: usize, metric: &str) -> String {
+    let arm = |i: usize| {
+        format!("(road hub p{i}) (road p{i} hub) (= (need hub p{i}) {0}) (= (need p{i} hub) {0})", 2 + i % 3)
+    };
+    let names: Vec<String> = (0..arms).map(|i| format!("p{i}")).collect();
+    let seen: String = (0..arms).map(|i| format!("(seen p{i})")).collect();
+    format!(
+        "(define (problem p) (:domain van) (:objects hub {} - place)
+          (:init (at hub) (pump hub) (= (fuel) 3) (= (used) 0) {}) (:goal (and (at hub) {seen})) {metric})",
+        names.join(" "),
+        (0..arms).map(arm).collect::<String>()
+    )
+}
+
+#[test]
+fn what_is_used_up_is_filled_up() {
+    check(VAN, &van(3, ""), Expect::Plan);
+    check(VAN, &van(14, ""), Expect::Plan);
+}
+
+#[test]
+fn metrics_are_made_small() {
+    // Two, three and four units out, and back.
+    check(VAN, &van(3, "(:metric minimize (used))"), Expect::MetricAtMost(18.0));
+    // A metric over a number that conditions read.
+    check(VAN, &van(3, "(:metric minimize (+ (used) (fuel)))"), Expect::MetricAtMost(22.0));
+}
+
+const SHOP: &str = "(define (domain shop) (:requirements :fluents :adl)
+  (:predicates (open) (happy) (rich))
+  (:functions (money) (wage) (stock) (price))
+  (:derived (rich) (> (money) 50))
+  (:action learn :parameters () :precondition (< (wage) 20) :effect (scale-up (wage) 2))
+  (:action work :parameters () :precondition (> (wage) 0) :effect (increase (money) (wage)))
+  (:action ask :parameters () :precondition () :effect (and (open) (assign (price) (* 2 (wage)))))
+  (:action buy :parameters () :precondition (and (open) (>= (money) (price)))
+    :effect (and (decrease (money) (price)) (increase (stock) 1) (when (rich) (happy))))
+  (:action give :parameters () :precondition (>= (stock) 2) :effect (and (assign (stock) 0) (happy))))";
+
+fn shop(goal: &str) -> String {
+    format!(
+        "(define (problem p) (:domain shop) (:init (= (money) 0) (= (wage) 3) (= (stock) 0)) (:goal (and {goal})))"
+    )
+}
+
+#[test]
+fn assignments_products_and_amounts_that_depend_on_the_state() {
+    check(SHOP, &shop("(>= (money) 40)"), Expect::Plan);
+    check(SHOP, &shop("(>= (* (money) (stock)) 100) (happy)"), Expect::Plan);
+    check(SHOP, &shop("(>= (/ (money) (wage)) 4) (= (wage) 24)"), Expect::Plan);
+    check(SHOP, &shop("(< (wage) 3)"), Expect::Unsolvable);
+}
+
+#[test]
+fn an_undefined_number_is_asked_for_in_vain() {
+    // Nothing can be bought before the price is known.
+    check(SHOP, &shop("(>= (stock) 1)"), Expect::Plan);
+    let mute = SHOP.replace("(assign (price) (* 2 (wage)))", "(increase (price) 1)");
+    check(&mute, &shop("(>= (stock) 1)"), Expect::Unsolvable);
+}
+
+#[test]
+fn derived_predicates_and_conditional_effects_over_numbers() {
+    check(SHOP, &shop("(rich) (happy) (<= (stock) 1) (>= (stock) 1)"), Expect::Plan);
+}

@@ -57,7 +57,7 @@ impl Intrinsics {
 
     /// Index of the pixel nearest to (column, row) in row order; `None` outside the image.
     pub fn pixel(&self, column: f64, row: f64) -> Option<usize> {
-        let (u, v) = (column.round(), row.round());
+        let (u, v) = (column + 0.5, row + 0.5);
         let inside = u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64;
         inside.then(|| v as usize * self.width + u as usize)
     }

@@ -8,6 +8,7 @@ pub mod cylinder;
 mod draw;
 pub mod files;
 pub mod hull;
+mod lattice;
 pub mod locate;
 pub mod merge;
 pub mod neighbours;

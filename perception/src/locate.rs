@@ -48,10 +48,11 @@ pub fn locate(
     let frame = Frame::of(outline, up);
     let [points, outline] = [points, outline].map(|p| p.iter().map(|p| frame.flat(p)).collect::<Vec<_>>());
     let edges = edges(&outline);
+    let around: Vec<Vec<Point2<f64>>> = edges.iter().map(|edge| around(edge, &points).collect()).collect();
     let mut moved = Isometry2::identity();
     for gate_m in GATES_M {
         let matches: Vec<Match> =
-            edges.iter().flat_map(|edge| samples(edge, &points, &moved, gate_m)).collect();
+            edges.iter().zip(&around).flat_map(|(edge, near)| samples(edge, near, &moved, gate_m)).collect();
         located.matched = matches.len();
         let square: f64 = matches.iter().map(|m| m.distance_m.powi(2)).sum();
         located.residual_m = if matches.is_empty() { 0.0 } else { (square / matches.len() as f64).sqrt() };
@@ -121,25 +122,43 @@ fn edges(outline: &[Point2<f64>]) -> Vec<Edge> {
     (0..outline.len()).filter_map(edge).collect()
 }
 
+/// Points that can come near an edge while the estimate moves: those that now lie no farther from its line than twice the widest gate.
+fn around<'a>(edge: &'a Edge, points: &'a [Point2<f64>]) -> impl Iterator<Item = Point2<f64>> + 'a {
+    let reach_m = 2.0 * GATES_M[0] + DEPTH_M;
+    points.iter().copied().filter(move |p| edge.outward.dot(&(p - edge.from)).abs() < reach_m)
+}
+
 /// Where the seen surface ends along an edge, a sample every [`BIN_M`].
 fn samples(edge: &Edge, points: &[Point2<f64>], moved: &Isometry2<f64>, gate_m: f64) -> Vec<Match> {
     let bins = (edge.length_m / BIN_M) as usize;
-    let mut reached: Vec<Vec<f64>> = vec![Vec::new(); bins];
+    // The farthest of each bin, farthest first.
+    let mut farthest = vec![[f64::NEG_INFINITY; STRAY + 1]; bins];
+    let mut near: Vec<(usize, f64)> = Vec::with_capacity(points.len());
+    let (turn, shift) = (moved.rotation.to_rotation_matrix(), moved.translation.vector - edge.from.coords);
     for p in points {
-        let d = moved * p - edge.from;
+        let d = turn * p.coords + shift;
         let (reach, out) = (edge.along.dot(&d), edge.outward.dot(&d));
-        let bin = (reach / BIN_M) as usize;
-        if reach >= 0.0 && bin < bins && out < gate_m && out > -gate_m - DEPTH_M {
-            reached[bin].push(out);
+        if reach < 0.0 || out >= gate_m || out <= -gate_m - DEPTH_M {
+            continue;
+        }
+        let Some(ends) = farthest.get_mut((reach / BIN_M) as usize) else { continue };
+        near.push(((reach / BIN_M) as usize, out));
+        let mut next = out;
+        for end in ends {
+            if next > *end {
+                std::mem::swap(end, &mut next);
+            }
         }
     }
-    let ends = reached.into_iter().enumerate().filter_map(|(bin, mut outs)| {
-        outs.sort_by(|a, b| b.total_cmp(a));
-        let end = *outs.get(STRAY)?;
-        let behind = outs.iter().filter(|&&out| out > end - DEPTH_M).count();
+    let mut behind = vec![0_usize; bins];
+    for &(bin, out) in &near {
+        behind[bin] += usize::from(out > farthest[bin][STRAY] - DEPTH_M);
+    }
+    let ends = farthest.into_iter().zip(behind).enumerate().filter_map(|(bin, (ends, behind))| {
+        let end = ends[STRAY];
         let at = edge.from + edge.along * ((bin as f64 + 0.5) * BIN_M) + edge.outward * end;
         let sample = Match { at, normal: edge.outward, distance_m: end };
-        (behind >= FEWEST && end.abs() < gate_m).then_some(sample)
+        (end.is_finite() && behind >= FEWEST && end.abs() < gate_m).then_some(sample)
     });
     ends.collect()
 }

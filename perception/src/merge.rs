@@ -17,6 +17,7 @@ use joint::{Found, Round, in_world};
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use prepare::Prepared;
 use rayon::prelude::*;
+use search::Oriented;
 use serde::{Deserialize, Serialize};
 
 /// How to merge.
@@ -149,11 +150,11 @@ pub enum MergeError {
 }
 
 /// First alignment: everything, from far to near (the table weighs most; paper step 3).
-const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 400, plane_weight: 1.0 };
+const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 200, plane_weight: 1.0 };
 /// Second alignment: planes weigh little, the objects decide (paper step 4).
-const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 600, plane_weight: 0.2 };
+const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 300, plane_weight: 0.2 };
 /// After a view was left out, the rest settles again.
-const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 600, plane_weight: 0.2 };
+const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 300, plane_weight: 0.2 };
 /// A plane is dominant from this share of all points.
 const DOMINANT: f64 = 0.06;
 
@@ -176,8 +177,10 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
 
     align_everything(&prepared, &used, &mut poses, &mut steps);
     let (on_plane, up) = remove_planes(&prepared, &used, &poses, options, &mut steps);
-    let found = align_objects(&prepared, &mut used, &mut whys, &on_plane, up, &mut poses, views, &mut steps);
-    let seen = visibility(views, &used, &poses);
+    let maps: Vec<Option<DepthMap>> =
+        views.par_iter().map(|v| DepthMap::from_view(v, &v.world_from_camera)).collect();
+    let found = align_objects(&prepared, &mut used, &mut whys, &on_plane, up, &mut poses, &maps, &mut steps);
+    let seen = visibility(maps, &used, &poses);
     let fused = fuse::fuse(views, &used, &poses, &seen, options);
     steps.push(Step {
         name: "fuse".to_owned(),
@@ -305,20 +308,18 @@ fn align_objects(
     on_plane: &[Vec<bool>],
     up: Option<Unit<Vector3<f64>>>,
     poses: &mut [Isometry3<f64>],
-    views: &[View],
+    maps: &[Option<DepthMap>],
     steps: &mut Vec<Step>,
 ) -> Vec<Found> {
-    let levelled: Vec<Isometry3<f64>> = (0..views.len())
+    let levelled: Vec<Isometry3<f64>> = (0..prepared.len())
         .map(|i| up.map_or(poses[i], |up| only_levelled(&prepared[i], &poses[i], &up)))
         .collect();
-    let mut retried = vec![false; views.len()];
+    let mut retried = vec![false; prepared.len()];
     if let Some(up) = up {
         place_objects(prepared, used, on_plane, &up, &levelled, poses);
     }
     let mut found = joint::align(prepared, used, on_plane, poses, &SECOND);
-    let maps: Vec<Option<DepthMap>> =
-        views.iter().map(|v| DepthMap::from_view(v, &v.world_from_camera)).collect();
-    while let Some((worst, why)) = check::misfit(prepared, used, on_plane, poses, &maps, &found) {
+    while let Some((worst, why)) = check::misfit(prepared, used, on_plane, poses, maps, &found) {
         if let Some(up) = up.filter(|_| !retried[worst]) {
             // The others have settled since: a better model to be placed on than a single view was.
             retried[worst] = true;
@@ -399,7 +400,7 @@ fn place_on(
     prepared: &[Prepared],
     on_plane: &[Vec<bool>],
     up: &Unit<Vector3<f64>>,
-    placed: &[(Point3<f64>, Vector3<f64>)],
+    placed: &[Oriented],
     levelled: &[Isometry3<f64>],
     poses: &mut [Isometry3<f64>],
     view: usize,
@@ -415,13 +416,13 @@ fn place_on(
 }
 
 /// Points and normals of a view off the planes, in the world.
-fn objects(view: &Prepared, on_plane: &[bool], pose: &Isometry3<f64>) -> Vec<(Point3<f64>, Vector3<f64>)> {
+fn objects(view: &Prepared, on_plane: &[bool], pose: &Isometry3<f64>) -> Vec<Oriented> {
     let off = (0..view.points.len()).filter(|&k| !on_plane[k]);
     off.map(|k| (pose * view.points[k], pose.rotation * view.normals[k])).collect()
 }
 
 /// How far off two views may be from each other at the distance of the objects: three spreads, at least the 10 cm and 6° of a poor localisation.
-fn window(view: &Prepared, objects: &[(Point3<f64>, Vector3<f64>)], pose: &Isometry3<f64>) -> search::Window {
+fn window(view: &Prepared, objects: &[Oriented], pose: &Isometry3<f64>) -> search::Window {
     let sum = objects.iter().fold(Vector3::zeros(), |s, (p, _)| s + p.coords);
     let distance = (sum / objects.len().max(1) as f64 - pose.translation.vector).norm().min(3.0);
     let turn_rad = (3.0 * view.sigma_rad).clamp(0.105, 0.14);
@@ -429,9 +430,12 @@ fn window(view: &Prepared, objects: &[(Point3<f64>, Vector3<f64>)], pose: &Isome
     search::Window { shift_m: shift_m.min(0.3), turn_rad: 1.2 * turn_rad }
 }
 
-fn visibility(views: &[View], used: &[bool], poses: &[Isometry3<f64>]) -> Visibility {
-    let of = |i: usize| if used[i] { DepthMap::from_view(&views[i], &poses[i]) } else { None };
-    Visibility { maps: (0..views.len()).filter_map(of).collect() }
+/// What the used views saw from their corrected poses.
+fn visibility(maps: Vec<Option<DepthMap>>, used: &[bool], poses: &[Isometry3<f64>]) -> Visibility {
+    let placed = |((map, used), pose): ((Option<DepthMap>, &bool), &Isometry3<f64>)| {
+        map.filter(|_| *used).map(|map| DepthMap { camera_from_world: pose.inverse(), ..map })
+    };
+    Visibility { maps: maps.into_iter().zip(used).zip(poses).filter_map(placed).collect() }
 }
 
 fn fit(

@@ -64,8 +64,14 @@ impl Round {
 
     /// Distance of a point from the side, positive outside, metres.
     pub fn outside_m(&self, p: &Point3<f64>) -> f64 {
-        (p.x - self.x).hypot(p.y - self.y) - self.radius_at(p.z)
+        distance(p.x - self.x, p.y - self.y) - self.radius_at(p.z)
     }
+}
+
+/// Length of a vector of metres: no overflow to guard against, so no need for `hypot`, which is a slow call.
+#[inline(always)]
+fn distance(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }
 
 /// Fits the side of a round body to the points between `base_m` and `top_m`; `sigma_m` is the spread of a measurement.
@@ -139,7 +145,7 @@ fn propose(side: &[Point3<f64>], tolerance: f64, seed: u64) -> Option<[f64; 3]> 
             .iter()
             .step_by(stride)
             .map(|p| {
-                let d = (p.x - x).hypot(p.y - y) - r;
+                let d = distance(p.x - x, p.y - y) - r;
                 // Inside may be the inside of a vessel; outside can only be a handle or another body.
                 if d.abs() < tolerance {
                     1.0 - (d / tolerance).powi(2)
@@ -175,7 +181,7 @@ fn improve(round: &Round, side: &[Point3<f64>], edges: &[Edge], gate: f64, sigma
     let (mut squares, mut count, mut outside, mut spread) = (0.0, 0.0, 0.0, 0.0);
     for p in side {
         let (dx, dy) = (p.x - round.x, p.y - round.y);
-        let d = dx.hypot(dy).max(1e-9);
+        let d = distance(dx, dy).max(1e-9);
         let rise = p.z - round.middle_m;
         let residual = d - round.radius_m - round.slope * rise;
         if residual > -gate {

@@ -112,12 +112,13 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>,
     let up = surface.up.cast::<f32>();
     let offset = surface.offset_m as f32;
     let band = clearance_m as f32..options.tallest_m as f32;
+    let outline = surface.outline();
     let mut indices = Vec::new();
     let mut points = Vec::new();
     for (i, p) in (0u32..).zip(&cloud.points) {
         if is_finite(p) && band.contains(&(up.dot(&p.coords) - offset)) {
             let world = p.cast::<f64>();
-            if surface.covers(&world, 0.0) {
+            if outline.covers(&world, 0.0) {
                 indices.push(i);
                 points.push(surface.surface_from_world * world);
             }

@@ -87,15 +87,34 @@ impl Surface {
         Surface { up, hull, offset_m: self.offset_m + shift, surface_from_world, ..self.clone() }
     }
 
-    /// True if the point lies above or below the outline widened by `margin_m`.
+    /// True if the point lies above or below the outline widened by `margin_m`. For many points see [`Surface::outline`].
     pub fn covers(&self, p: &Point3<f64>, margin_m: f64) -> bool {
+        self.outline().covers(p, margin_m)
+    }
+
+    /// The outline made ready to be asked about many points.
+    pub fn outline(&self) -> Outline {
         let n = self.hull.len();
-        n >= 3
-            && (0..n).all(|i| {
-                let (a, b) = (self.hull[i], self.hull[(i + 1) % n]);
-                let inward = self.up.cross(&(b - a));
-                inward.dot(&(p - a)) >= -margin_m * inward.norm()
-            })
+        let edge = |i: usize| {
+            let (a, b) = (self.hull[i], self.hull[(i + 1) % n]);
+            let inward = self.up.cross(&(b - a)).try_normalize(0.0)?;
+            Some((inward, inward.dot(&a.coords)))
+        };
+        Outline { edges: if n < 3 { Vec::new() } else { (0..n).filter_map(edge).collect() } }
+    }
+}
+
+/// The half spaces whose common part is above and below a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// Unit normals into the surface, and how far along them the edges lie, metres.
+    edges: Vec<(Vector3<f64>, f64)>,
+}
+
+impl Outline {
+    /// True if the point (frame of the surface's hull) lies above or below the outline widened by `margin_m`.
+    pub fn covers(&self, p: &Point3<f64>, margin_m: f64) -> bool {
+        self.edges.len() >= 3 && self.edges.iter().all(|(n, edge)| n.dot(&p.coords) - edge >= -margin_m)
     }
 }
 
@@ -164,11 +183,12 @@ pub fn find_surface(
         if surface.area_m2 < options.least_area_m2 {
             continue;
         }
+        let hull = surface.outline();
         let things = samples
             .iter()
             .filter(|s| {
                 let height = surface.height_m(&s.point);
-                height > THINGS_M.0 && height < THINGS_M.1 && surface.covers(&s.point, -0.02)
+                height > THINGS_M.0 && height < THINGS_M.1 && hull.covers(&s.point, -0.02)
             })
             .count();
         // Something on it doubles the claim of a plane: an empty table must still beat a wall behind it.
@@ -425,6 +445,7 @@ fn largest_part(cells: &FxHashMap<[i32; 2], u32>) -> Vec<[i32; 2]> {
 
 /// Corners of the convex hull, anticlockwise (Andrew's monotone chain).
 pub(crate) fn convex_hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    drop_inner(&mut points);
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();
     if points.len() < 3 {
@@ -448,4 +469,68 @@ pub(crate) fn convex_hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let mut hull = half(&mut points.iter());
     hull.extend(half(&mut points.iter().rev()));
     hull
+}
+
+/// Drops what lies well inside the octagon of the extreme points, which is no corner of the hull (Akl and Toussaint 1978).
+fn drop_inner(points: &mut Vec<[f64; 2]>) {
+    const WORTH_IT: usize = 64;
+    const WAYS: [[f64; 2]; 8] = [
+        [1.0, 0.0],
+        [1.0, 1.0],
+        [0.0, 1.0],
+        [-1.0, 1.0],
+        [-1.0, 0.0],
+        [-1.0, -1.0],
+        [0.0, -1.0],
+        [1.0, -1.0],
+    ];
+    if points.len() < WORTH_IT {
+        return;
+    }
+    let mut extreme = [(f64::NEG_INFINITY, points[0]); 8];
+    for p in points.iter() {
+        for (far, way) in extreme.iter_mut().zip(&WAYS) {
+            let reach = way[0] * p[0] + way[1] * p[1];
+            if reach > far.0 {
+                *far = (reach, *p);
+            }
+        }
+    }
+    let mut octagon: Vec<[f64; 2]> = extreme.iter().map(|(_, p)| *p).collect();
+    octagon.dedup();
+    if octagon.len() < 3 {
+        return;
+    }
+    points.retain(|p| {
+        !(0..octagon.len()).all(|i| {
+            let (a, b) = (octagon[i], octagon[(i + 1) % octagon.len()]);
+            a == b || (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) > 1e-12
+        })
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A corner between every two neighbours and nothing outside.
+    fn check(points: Vec<[f64; 2]>, corners: usize) {
+        let hull = convex_hull(points.clone());
+        assert_eq!(hull.len(), corners, "{hull:?}");
+        for i in 0..hull.len() {
+            let (a, b) = (hull[i], hull[(i + 1) % hull.len()]);
+            let left = |p: &[f64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+            assert!(points.iter().all(|p| left(p) >= -1e-9), "{a:?} to {b:?}");
+        }
+    }
+
+    #[test]
+    fn hulls_of_many_points_of_one_place_and_of_a_line() {
+        let circle = |i: i32| [(f64::from(i) * 0.1).cos(), (f64::from(i) * 0.1).sin()];
+        let inside = (0..1000).map(|i| circle(i).map(|c| c * f64::from(i % 97) / 100.0));
+        check((0..62).map(circle).chain(inside).collect(), 62);
+        check((0..400).map(|i| [f64::from(i % 20), f64::from(i / 20)]).collect(), 4);
+        check(vec![[0.3, 0.4]; 100], 1);
+        check((0..100).map(|i| [f64::from(i), 2.0 * f64::from(i)]).collect(), 2);
+    }
 }

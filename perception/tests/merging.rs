@@ -126,3 +126,28 @@ fn what_cannot_be_merged_is_said() {
         assert!(error.as_ref().is_some_and(expected), "{error:?}");
     }
 }
+
+#[test]
+fn the_same_merged_cloud_for_every_number_of_threads() {
+    let (views, _) = views(&RING[..3], 0.03, 0.035, 7);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let merged = pool.install(|| merge(&views, &options())).expect("the views are sound");
+        (format!("{:?} {:?}", merged.fits, merged.cloud.normals), merged.cloud.points, merged.views_per_point)
+    };
+    let one = run(1);
+    assert!(one == run(2) && one == run(5));
+}
+
+#[test]
+fn the_merged_cloud_stays_within_its_bound() {
+    let (views, _) = views(&RING[..2], 0.0, 0.0, 8);
+    let whole = merge(&views, &options()).expect("the views are sound").cloud;
+    for most_points in [whole.len() / 3, 1000] {
+        let merged = merge(&views, &MergeOptions { most_points, ..options() }).expect("the views are sound");
+        assert!(merged.cloud.len() <= most_points && merged.cloud.len() > most_points / 4);
+        let (low, high) = merged.cloud.bounds().expect("points");
+        let (all_low, all_high) = whole.bounds().expect("points");
+        assert!((low - all_low).norm() < 0.2 && (high - all_high).norm() < 0.2, "{low} {high}");
+    }
+}

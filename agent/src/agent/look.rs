@@ -82,8 +82,9 @@ impl Agent<'_> {
             return (merged, surface);
         }
         let body = self.robot.description();
+        let outline = surface.outline();
         let on_it =
-            |p: &Point3<f64>| surface.height_m(p).abs() < ON_SURFACE_M && surface.covers(p, HULL_MARGIN_M);
+            |p: &Point3<f64>| surface.height_m(p).abs() < ON_SURFACE_M && outline.covers(p, HULL_MARGIN_M);
         let points: Vec<Point3<f64>> = merged.cloud.points.iter().map(|p| p.cast()).filter(on_it).collect();
         let located = locate(&points, &surface.up, &known.outline, body.pose_sigma_m, body.pose_sigma_rad);
         (merged.moved(&located.map_from_world), surface.moved(&located.map_from_world))
@@ -169,9 +170,12 @@ impl Agent<'_> {
         self.say(&Event::Nothing { because })
     }
 
+    /// What can stand on the surfaces that the map has, and they themselves, is merged; without any, all that is in range.
     fn merge_options(&self) -> MergeOptions {
-        let up = self.robot.description().up.map(Unit::new_normalize);
-        MergeOptions { up, ..MergeOptions::default() }
+        let SceneOptions { surface: SurfaceOptions { up, height_band_m, .. }, tallest_m, .. } =
+            self.scene_options();
+        let height_band_m = height_band_m.map(|(low, high)| (low, high + tallest_m));
+        MergeOptions { up, height_band_m, ..MergeOptions::default() }
     }
 
     /// The surface is looked for where the map has it, if it has one.

@@ -5,32 +5,53 @@
 //! view claims and another looked through is left out.
 
 use super::MergeOptions;
-use super::prepare::{coarser, keeps};
+use super::prepare::{coarser, in_band, in_range};
 use crate::cloud::{Cloud, Grid, is_finite};
+use crate::lattice::{Around, Lattice};
 use crate::normals;
 use crate::surface::range_sigma_m;
 use crate::view::View;
-use crate::visibility::{Seen, Visibility};
+use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
-use rustc_hash::FxHashMap;
 
 /// A return between two neighbours this far before and behind it belongs to neither, as a share of its depth.
 const FLYING_SHARE: f32 = 0.02;
 /// How far along its normal a voxel may be moved by its neighbours, in spreads of its own.
-const TUBE_SPREADS: f64 = 2.5;
+const TUBE_SPREADS: f32 = 2.5;
+/// The spread of a voxel: that of a point at arm's length, metres. A voxel of many points is no narrower a tube.
+const VOXEL_SPREAD_M: f32 = 0.003;
 /// Looks through a place this far off the surface say that nothing is there, metres.
 const CARVE_M: f64 = 0.03;
 
-/// A voxel's running sums. 32-bit offsets from the voxel's first point keep them small and exact.
+/// A voxel's running sums, weighted.
 #[derive(Clone, Copy)]
 struct Cell {
-    weight: f64,
-    sum: Vector3<f64>,
-    normal: Vector3<f64>,
-    colour: [f64; 3],
+    weight: f32,
+    /// From the voxel's low corner, metres.
+    sum: Vector3<f32>,
+    /// World frame.
+    normal: Vector3<f32>,
+    colour: Vector3<f32>,
     views: u16,
-    last_view: u32,
+}
+
+impl Cell {
+    const EMPTY: Cell = Cell {
+        weight: 0.0,
+        sum: Vector3::new(0.0, 0.0, 0.0),
+        normal: Vector3::new(0.0, 0.0, 0.0),
+        colour: Vector3::new(0.0, 0.0, 0.0),
+        views: 1,
+    };
+}
+
+/// Occupied voxels by ascending key.
+#[derive(Default)]
+struct Cells {
+    keys: Vec<u64>,
+    cells: Vec<Cell>,
+    returns: usize,
 }
 
 pub(super) struct Fused {
@@ -40,8 +61,6 @@ pub(super) struct Fused {
     pub voxel_m: f64,
 }
 
-type Cells = FxHashMap<[i32; 3], Cell>;
-
 /// Fuses the used views at their corrected poses.
 pub(super) fn fuse(
     views: &[View],
@@ -50,137 +69,211 @@ pub(super) fn fuse(
     seen: &Visibility,
     options: &MergeOptions,
 ) -> Fused {
+    let _span = tracing::debug_span!("fuse", views = views.len()).entered();
+    let of: Vec<(&View, &Isometry3<f64>)> =
+        views.iter().zip(poses).zip(used).filter(|(_, used)| **used).map(|(of, _)| of).collect();
+    let facings: Vec<Facing> = of.par_iter().map(|(view, pose)| facing(view, pose, options)).collect();
+    let coloured = of.iter().all(|(view, _)| view.cloud.colours.is_some());
     let mut voxel_m = options.fuse_voxel_m;
     loop {
-        let (order, cells, returns) = gather(views, used, poses, voxel_m, options);
-        if order.len() > options.most_points {
+        let lattice = lattice(&of, voxel_m, options);
+        let cells = gather(&of, &facings, &lattice, options);
+        if cells.keys.len() > options.most_points {
             // Surfaces: points fall with the square of the side.
-            voxel_m *= (order.len() as f64 / options.most_points as f64).sqrt().max(1.2);
+            voxel_m =
+                lattice.voxel_m * (cells.keys.len() as f64 / options.most_points as f64).sqrt().max(1.2);
             continue;
         }
-        let coloured = views.iter().zip(used).all(|(v, u)| !u || v.cloud.colours.is_some());
-        return settle(&order, &cells, seen, voxel_m, coloured, returns);
+        return settle(&cells, &lattice, seen, coloured);
     }
 }
 
+/// The lattice over all that is in range of a camera.
+fn lattice(of: &[(&View, &Isometry3<f64>)], voxel_m: f64, options: &MergeOptions) -> Lattice {
+    let mut places = of.iter().map(|(_, pose)| Point3::from(pose.translation.vector));
+    let first = places.next().unwrap_or_else(Point3::origin);
+    let (low, high) = places.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)));
+    let reach = Vector3::repeat(options.range_m + voxel_m);
+    Lattice::over(&(low - reach), &(high + reach), voxel_m)
+}
+
+/// The cells of all views. Halves are gathered apart and united, so that few lists of cells are alive at a time.
 fn gather(
-    views: &[View],
-    used: &[bool],
-    poses: &[Isometry3<f64>],
-    voxel_m: f64,
+    of: &[(&View, &Isometry3<f64>)],
+    facings: &[Facing],
+    lattice: &Lattice,
     options: &MergeOptions,
-) -> (Vec<[i32; 3]>, Cells, usize) {
-    let parts: Vec<(Vec<[i32; 3]>, Cells, usize)> = (0..views.len())
-        .into_par_iter()
-        .map(
-            |i| if used[i] { of_view(&views[i], &poses[i], i, voxel_m, options) } else { Default::default() },
-        )
-        .collect();
-    let mut parts = parts.into_iter();
-    let Some((mut order, mut cells, mut returns)) = parts.next() else { return Default::default() };
-    for (keys, theirs, count) in parts {
-        returns += count;
-        for key in keys {
-            let cell = theirs[&key];
-            match cells.get_mut(&key) {
-                Some(own) => {
-                    own.weight += cell.weight;
-                    own.sum += cell.sum;
-                    own.normal += cell.normal;
-                    (0..3).for_each(|k| own.colour[k] += cell.colour[k]);
-                    own.views += u16::from(own.last_view != cell.last_view);
-                    own.last_view = cell.last_view;
-                }
-                None => {
-                    cells.insert(key, cell);
-                    order.push(key);
-                }
-            }
+) -> Cells {
+    match (of, facings) {
+        ([], _) | (_, []) => Cells::default(),
+        ([(view, pose)], [facing, ..]) => of_view(view, pose, facing, lattice, options),
+        _ => {
+            let middle = of.len() / 2;
+            let (a, b) = rayon::join(
+                || gather(&of[..middle], &facings[..middle], lattice, options),
+                || gather(&of[middle..], &facings[middle..], lattice, options),
+            );
+            unite(&a, &b)
         }
     }
-    (order, cells, returns)
 }
 
+/// The cells of two sets of views together.
+fn unite(a: &Cells, b: &Cells) -> Cells {
+    let most = a.keys.len() + b.keys.len();
+    let mut both = Cells {
+        keys: Vec::with_capacity(most),
+        cells: Vec::with_capacity(most),
+        returns: a.returns + b.returns,
+    };
+    let (mut i, mut j) = (0, 0);
+    while i < a.keys.len() && j < b.keys.len() {
+        let (p, q) = (a.keys[i], b.keys[j]);
+        both.keys.push(p.min(q));
+        both.cells.push(match p.cmp(&q) {
+            std::cmp::Ordering::Less => a.cells[i],
+            std::cmp::Ordering::Greater => b.cells[j],
+            std::cmp::Ordering::Equal => {
+                let (c, d) = (&a.cells[i], &b.cells[j]);
+                Cell {
+                    weight: c.weight + d.weight,
+                    sum: c.sum + d.sum,
+                    normal: c.normal + d.normal,
+                    colour: c.colour + d.colour,
+                    views: c.views.saturating_add(d.views),
+                }
+            }
+        });
+        i += usize::from(p <= q);
+        j += usize::from(q <= p);
+    }
+    both.keys.extend_from_slice(&a.keys[i..]);
+    both.cells.extend_from_slice(&a.cells[i..]);
+    both.keys.extend_from_slice(&b.keys[j..]);
+    both.cells.extend_from_slice(&b.cells[j..]);
+    both
+}
+
+/// A return that is kept.
+struct Return {
+    /// In its voxel, metres from the low corner.
+    at: [f32; 3],
+    weight: f32,
+    pixel: u32,
+    /// Where its normal stands.
+    facing: u32,
+}
+
+/// The cells of one view.
 fn of_view(
     view: &View,
     pose: &Isometry3<f64>,
-    number: usize,
-    voxel_m: f64,
+    facing: &Facing,
+    lattice: &Lattice,
     options: &MergeOptions,
-) -> (Vec<[i32; 3]>, Cells, usize) {
-    let facing = facing(view);
-    let turn = pose.rotation.to_rotation_matrix();
-    let shift = pose.translation.vector;
+) -> Cells {
+    let (mut entries, returns) = kept(view, pose, facing, lattice, options);
+    lattice.sort(&mut entries);
+    let turn = pose.rotation.to_rotation_matrix().cast::<f32>();
     let colours = view.cloud.colours.as_deref();
-    let (mut order, mut cells, mut returns) = (Vec::new(), Cells::default(), 0);
-    for (i, p) in view.cloud.points.iter().enumerate() {
-        if !keeps(p, pose, options, 0.0) || is_flying(&view.cloud, i) {
-            continue;
-        }
-        returns += 1;
-        let at = turn * p.coords.cast::<f64>() + shift;
-        let sigma = range_sigma_m(f64::from(p.z.abs().max(p.coords.norm() * 0.5)));
-        let weight = 1.0 / (sigma * sigma);
-        let normal = turn * facing.at(i).cast::<f64>();
-        let key = [at.x, at.y, at.z].map(|c| (c / voxel_m).floor() as i32);
-        let cell = cells.entry(key).or_insert_with(|| {
-            order.push(key);
-            Cell {
-                weight: 0.0,
-                sum: Vector3::zeros(),
-                normal: Vector3::zeros(),
-                colour: [0.0; 3],
-                views: 1,
-                last_view: number as u32,
+    let mut cells = Cells { returns: returns.len(), ..Cells::default() };
+    for same in entries.chunk_by(|a, b| a.0 == b.0) {
+        let mut cell = Cell::EMPTY;
+        for &(_, number) in same {
+            let r = &returns[number as usize];
+            cell.weight += r.weight;
+            cell.sum += Vector3::from(r.at) * r.weight;
+            if let Some(n) = facing.normals.get(r.facing as usize).filter(|n| n.x.is_finite()) {
+                cell.normal += n * r.weight;
             }
-        });
-        cell.weight += weight;
-        cell.sum += at * weight;
-        if normal.x.is_finite() {
-            cell.normal += normal * weight;
+            if let Some(c) = colours.and_then(|c| c.get(r.pixel as usize)) {
+                cell.colour += Vector3::from(c.map(f32::from)) * r.weight;
+            }
         }
-        if let Some(colour) = colours.and_then(|c| c.get(i)) {
-            (0..3).for_each(|k| cell.colour[k] += weight * f64::from(colour[k]));
-        }
+        cell.normal = turn * cell.normal;
+        cells.keys.push(same[0].0);
+        cells.cells.push(cell);
     }
-    (order, cells, returns)
+    cells
 }
 
-/// Normals of a view's points by pixel, coarser than its pixels.
+/// The returns of a view that are in range and band and do not fly, with the keys of their voxels.
+fn kept(
+    view: &View,
+    pose: &Isometry3<f64>,
+    facing: &Facing,
+    lattice: &Lattice,
+    options: &MergeOptions,
+) -> (Vec<(u64, u32)>, Vec<Return>) {
+    let turn = pose.rotation.to_rotation_matrix();
+    let shift = pose.translation.vector;
+    let points = &view.cloud.points;
+    let width = view.cloud.grid.map_or(points.len(), |g| g.width).max(1);
+    let (mut entries, mut returns) = (Vec::new(), Vec::new());
+    for (row, line) in points.chunks(width).enumerate() {
+        for (column, p) in line.iter().enumerate() {
+            if !in_range(p, options) {
+                continue;
+            }
+            let at = turn * p.coords.cast::<f64>() + shift;
+            if !in_band(&at, options, 0.0) || is_flying(&view.cloud, row, column) {
+                continue;
+            }
+            let sigma = range_sigma_m(f64::from(p.z.abs().max(p.coords.norm() * 0.5)));
+            let (key, rest) = lattice.locate(&at);
+            entries.push((key, returns.len() as u32));
+            returns.push(Return {
+                at: rest,
+                weight: (1.0 / (sigma * sigma)) as f32,
+                pixel: (row * width + column) as u32,
+                facing: facing.index(row, column),
+            });
+        }
+    }
+    (entries, returns)
+}
+
+/// Normals of a view's points, camera frame; of an organised cloud coarser than its pixels.
 struct Facing {
     normals: Vec<Vector3<f32>>,
-    width: usize,
     stride: usize,
-    coarse: (usize, usize),
+    /// Columns and rows of the normals; none if there is one a point.
+    coarse: Option<Grid>,
 }
 
 impl Facing {
-    fn at(&self, i: usize) -> Vector3<f32> {
-        let none = Vector3::repeat(f32::NAN);
-        if self.coarse.0 == 0 {
-            return self.normals.get(i).copied().unwrap_or(none);
-        }
-        let (row, column) = (i / self.width / self.stride, i % self.width / self.stride);
-        let at = row.min(self.coarse.1 - 1) * self.coarse.0 + column.min(self.coarse.0 - 1);
-        self.normals.get(at).copied().unwrap_or(none)
+    #[inline(always)]
+    fn index(&self, row: usize, column: usize) -> u32 {
+        let at = match self.coarse {
+            Some(Grid { width, height }) => {
+                (row / self.stride).min(height.saturating_sub(1)) * width
+                    + (column / self.stride).min(width.saturating_sub(1))
+            }
+            None => column,
+        };
+        at as u32
     }
 }
 
-fn facing(view: &View) -> Facing {
+fn facing(view: &View, pose: &Isometry3<f64>, options: &MergeOptions) -> Facing {
     let own = || view.cloud.normals.clone().unwrap_or_default();
-    let Some((coarse, grid)) = coarser(&view.cloud).zip(view.cloud.grid) else {
-        return Facing { normals: own(), width: 1, stride: 1, coarse: (0, 0) };
+    let Some((coarse, grid)) = coarser(view, pose, options, 0.05).zip(view.cloud.grid) else {
+        return Facing { normals: own(), stride: 1, coarse: None };
     };
     let wide = normals::OrganisedOptions { reach: 1, depth_step_share: 0.02, base_m: 0.006, least: 5 };
-    let normals = normals::organised(&coarse, &wide).map_or_else(own, |n| n.normals);
-    let size = coarse.grid.map_or((0, 0), |g: Grid| (g.width, g.height));
-    Facing { normals, width: grid.width, stride: (grid.width / size.0.max(1)).max(1), coarse: size }
+    let size = coarse.grid.unwrap_or(grid);
+    let stride = (grid.width / size.width.max(1)).max(1);
+    match normals::organised(&coarse, &wide) {
+        Some(found) => Facing { normals: found.normals, stride, coarse: Some(size) },
+        None => Facing { normals: Vec::new(), stride, coarse: Some(size) },
+    }
 }
 
 /// True if the pixel hangs in the air: before one neighbour and behind the opposite one.
-fn is_flying(cloud: &Cloud, i: usize) -> bool {
+#[inline(always)]
+fn is_flying(cloud: &Cloud, row: usize, column: usize) -> bool {
     let Some(Grid { width, height }) = cloud.grid else { return false };
-    let (row, column) = (i / width, i % width);
+    let i = row * width + column;
     let depth = cloud.points[i].z;
     let step = FLYING_SHARE * depth;
     let beyond = |j: usize| cloud.points[j].z - depth;
@@ -190,32 +283,58 @@ fn is_flying(cloud: &Cloud, i: usize) -> bool {
     across || down
 }
 
+/// A voxel as its neighbours see it.
+#[derive(Clone, Copy)]
+struct Mean {
+    /// Metres from the lattice's lowest corner.
+    at: Vector3<f32>,
+    weight: f32,
+    /// Unit normal, or zero if there is none.
+    normal: Vector3<f32>,
+}
+
 /// Position, normal, colour and number of views of a fused point.
 type Settled = (Point3<f32>, Vector3<f32>, [u8; 3], u16);
 
 /// Moves the voxels onto their common surface and drops what was looked through.
-fn settle(
-    order: &[[i32; 3]],
-    cells: &Cells,
-    seen: &Visibility,
-    voxel_m: f64,
-    coloured: bool,
-    returns: usize,
-) -> Fused {
-    let points: Vec<Option<Settled>> = order
-        .par_iter()
-        .map(|key| {
-            let cell = &cells[key];
-            let (at, normal) = smoothed(key, cell, cells);
+fn settle(cells: &Cells, lattice: &Lattice, seen: &Visibility, coloured: bool) -> Fused {
+    /// Voxels that one thread settles in a row.
+    const TOGETHER: usize = 1 << 13;
+    let mean = |(&key, cell): (&u64, &Cell)| Mean {
+        at: Vector3::from(lattice.corner_m(key)) + cell.sum / cell.weight,
+        weight: cell.weight,
+        normal: cell.normal.try_normalize(1e-6).unwrap_or_else(Vector3::zeros),
+    };
+    let means: Vec<Mean> = cells.keys.par_iter().zip(&cells.cells).map(mean).collect();
+    let origin = lattice.origin_m();
+    let settled = |(number, keys): (usize, &[u64])| -> Vec<Settled> {
+        let first = number * TOGETHER;
+        let mut around = Around::from(lattice, &cells.keys, first);
+        let mut kept = Vec::with_capacity(keys.len());
+        for (i, key) in (first..).zip(keys) {
+            let cell = &cells.cells[i];
+            let at = Point3::from(origin + smoothed(*key, &means[i], &means, &mut around).cast::<f64>());
             // One view's word against another's look through the place.
-            let through = cell.views < 2 && seen.maps.len() > 1 && seen.look(&at, CARVE_M) == Seen::Free;
-            let colour = cell.colour.map(|c| (c / cell.weight).round().clamp(0.0, 255.0) as u8);
-            (!through && is_finite(&at.cast())).then_some((at.cast(), normal.cast(), colour, cell.views))
-        })
-        .collect();
-    let mut fused = Fused { cloud: Cloud::default(), views_per_point: Vec::new(), returns, voxel_m };
+            let through = cell.views < 2 && seen.maps.len() > 1 && seen.looked_through(&at, CARVE_M);
+            let (at, normal) = (at.cast::<f32>(), means[i].normal);
+            if through || !is_finite(&at) {
+                continue;
+            }
+            let normal = if normal == Vector3::zeros() { Vector3::repeat(f32::NAN) } else { normal };
+            let colour = (cell.colour / cell.weight).map(|c| c.round().clamp(0.0, 255.0) as u8);
+            kept.push((at, normal, colour.into(), cell.views));
+        }
+        kept
+    };
+    let parts: Vec<Vec<Settled>> = cells.keys.par_chunks(TOGETHER).enumerate().map(settled).collect();
+    let mut fused = Fused {
+        cloud: Cloud::default(),
+        views_per_point: Vec::new(),
+        returns: cells.returns,
+        voxel_m: lattice.voxel_m,
+    };
     let (mut normals, mut colours) = (Vec::new(), Vec::new());
-    for (at, normal, colour, views) in points.into_iter().flatten() {
+    for (at, normal, colour, views) in parts.into_iter().flatten() {
         fused.cloud.points.push(at);
         normals.push(normal);
         colours.push(colour);
@@ -226,26 +345,18 @@ fn settle(
     fused
 }
 
-fn smoothed(key: &[i32; 3], cell: &Cell, cells: &Cells) -> (Point3<f64>, Vector3<f64>) {
-    let own = cell.sum / cell.weight;
-    let Some(normal) = cell.normal.try_normalize(1e-9) else {
-        return (Point3::from(own), Vector3::repeat(f64::NAN));
-    };
-    // The mean weight of a point tells its spread; a voxel of many points is no narrower a tube.
-    let tube = TUBE_SPREADS * 0.003;
+/// The voxel's mean, moved along its normal onto the mean of the like-facing voxels around it.
+#[inline(always)]
+fn smoothed(key: u64, own: &Mean, means: &[Mean], around: &mut Around) -> Vector3<f32> {
+    let tube = TUBE_SPREADS * VOXEL_SPREAD_M;
     let (mut weight, mut offset) = (0.0, 0.0);
-    for dx in -1..=1 {
-        for dy in -1..=1 {
-            for dz in -1..=1 {
-                let Some(near) = cells.get(&[key[0] + dx, key[1] + dy, key[2] + dz]) else { continue };
-                let gap = normal.dot(&(near.sum / near.weight - own));
-                if gap.abs() < tube && near.normal.dot(&normal) > 0.7 * near.normal.norm() {
-                    weight += near.weight;
-                    offset += near.weight * gap;
-                }
-            }
+    around.visit(key, |i| {
+        let near = &means[i];
+        let gap = own.normal.dot(&(near.at - own.at));
+        if gap.abs() < tube && near.normal.dot(&own.normal) > 0.7 {
+            weight += near.weight;
+            offset += near.weight * gap;
         }
-    }
-    let moved = if weight > 0.0 { own + normal * (offset / weight) } else { own };
-    (Point3::from(moved), normal)
+    });
+    if weight > 0.0 { own.at + own.normal * (offset / weight) } else { own.at }
 }

@@ -55,13 +55,15 @@ pub(super) fn align(
     poses: &mut [Isometry3<f64>],
     round: &Round,
 ) -> Vec<Found> {
+    let _span = tracing::debug_span!("align", views = views.len(), passes = round.passes).entered();
     let pairs = pairs(views, used, poses);
+    let askers: Vec<Askers> = on_plane.iter().map(|flags| Askers::of(flags)).collect();
     let mut found = vec![Found::default(); views.len()];
     for pass in 0..round.passes {
         let share = pass as f64 / (round.passes.max(2) - 1) as f64;
         let radius = round.from_m * (round.to_m / round.from_m).powf(share);
         let links: Vec<Link> =
-            pairs.par_iter().map(|&(i, j)| link(views, on_plane, poses, (i, j), radius, round)).collect();
+            pairs.par_iter().map(|&(i, j)| link(views, &askers[i], poses, (i, j), radius, round)).collect();
         let moved = step(views, used, poses, &links);
         for (i, f) in found.iter_mut().enumerate() {
             let own = links.iter().filter(|l| l.from == i || l.to == i);
@@ -77,6 +79,29 @@ pub(super) fn align(
         }
     }
     found
+}
+
+/// The points of a view that ask for partners: those on dominant planes, and the others.
+struct Askers {
+    planes: Vec<u32>,
+    free: Vec<u32>,
+}
+
+impl Askers {
+    fn of(on_plane: &[bool]) -> Askers {
+        let (planes, free) = (0..on_plane.len() as u32).partition(|&k| on_plane[k as usize]);
+        Askers { planes, free }
+    }
+
+    /// At most about as many of each sort as are asked, evenly spread, others for each partner; and whether they lie on a plane.
+    fn some(&self, round: &Round, partner: usize) -> impl Iterator<Item = (usize, bool)> {
+        let spread = move |of: &'_ [u32]| {
+            let stride = (of.len() / round.asked).max(1);
+            (partner % stride..of.len()).step_by(stride)
+        };
+        let planes = spread(&self.planes).map(|at| (self.planes[at] as usize, true));
+        planes.chain(spread(&self.free).map(|at| (self.free[at] as usize, false)))
+    }
 }
 
 /// Pairs of views to match: all if they are few, else each with those whose cameras are nearest.
@@ -107,7 +132,7 @@ fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(us
 /// Partners of view i's points in view j and what they ask of both poses.
 fn link(
     views: &[Prepared],
-    on_plane: &[Vec<bool>],
+    askers: &Askers,
     poses: &[Isometry3<f64>],
     (i, j): (usize, usize),
     radius: f64,
@@ -125,17 +150,8 @@ fn link(
         squares: 0.0,
     };
     let Some(tree) = &b.tree else { return link };
-    let planes = on_plane[i].iter().filter(|p| **p).count();
-    let stride_of = |count: usize| (count / round.asked).max(1);
-    let (plane_stride, free_stride) = (stride_of(planes), stride_of(a.points.len() - planes));
-    let (mut seen_plane, mut seen_free) = (0, 0);
-    for (k, p) in a.points.iter().enumerate() {
-        let (seen, stride) =
-            if on_plane[i][k] { (&mut seen_plane, plane_stride) } else { (&mut seen_free, free_stride) };
-        *seen += 1;
-        if (*seen + j) % stride != 0 {
-            continue;
-        }
+    for (k, plane) in askers.some(round, j) {
+        let p = &a.points[k];
         let in_j = j_from_i * p;
         let Some(near) = tree.nearest(&in_j.cast(), radius as f32) else { continue };
         let partner = near.index as usize;
@@ -151,8 +167,8 @@ fn link(
         // Geman-McClure: what does not fit within the radius loses its say smoothly.
         let scale = (0.5 * radius).max(2.0 * sigma);
         let robust = (1.0 / (1.0 + (residual / scale).powi(2))).powi(2);
-        let plane = if on_plane[i][k] { round.plane_weight } else { 1.0 };
-        let weight = plane * robust / (sigma * sigma);
+        let plane_weight = if plane { round.plane_weight } else { 1.0 };
+        let weight = plane_weight * robust / (sigma * sigma);
         let own = jacobian(&from_i, &normal);
         let other = -jacobian(&from_j, &normal);
         link.blocks[0] += own * own.transpose() * weight;

@@ -30,19 +30,18 @@ pub(super) struct Prepared {
     pub sigma_rad: f64,
 }
 
-/// True if the view's point may be merged: in range and, where it is known which way is up, within the band widened by `slack_m`.
-pub(super) fn keeps(
-    p: &Point3<f32>,
-    world_from_camera: &Isometry3<f64>,
-    options: &MergeOptions,
-    slack_m: f64,
-) -> bool {
-    if !is_finite(p) || f64::from(p.coords.norm()) > options.range_m {
-        return false;
-    }
+/// True if the return (camera frame) is one, and in range.
+#[inline(always)]
+pub(super) fn in_range(p: &Point3<f32>, options: &MergeOptions) -> bool {
+    is_finite(p) && f64::from(p.coords.norm()) <= options.range_m
+}
+
+/// True if the place (world frame) lies in the height band widened by `slack_m`, or there is none.
+#[inline(always)]
+pub(super) fn in_band(p: &Vector3<f64>, options: &MergeOptions, slack_m: f64) -> bool {
     match (options.up, options.height_band_m) {
         (Some(up), Some((low, high))) => {
-            let height = up.dot(&(world_from_camera * p.cast::<f64>()).coords);
+            let height = up.dot(p);
             height >= low - slack_m && height <= high + slack_m
         }
         _ => true,
@@ -55,12 +54,12 @@ pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
     let sigma_m = if view.pose_sigma_m > 0.0 { view.pose_sigma_m } else { 0.03 };
     let sigma_rad = if view.pose_sigma_rad > 0.0 { view.pose_sigma_rad } else { 0.035 };
     let slack_m = 3.0 * sigma_m + 0.05;
-    let (cloud, normals) = with_normals(view, options);
+    let (cloud, normals) = with_normals(view, options, slack_m);
     let mut points = Vec::new();
     let mut kept_normals = Vec::new();
     let mut seen = rustc_hash::FxHashSet::default();
     for (p, n) in cloud.points.iter().zip(&normals) {
-        if !n.x.is_finite() || !keeps(p, &view.world_from_camera, options, slack_m) {
+        if !n.x.is_finite() {
             continue;
         }
         let key = [p.x, p.y, p.z].map(|c| (f64::from(c) / options.align_voxel_m).floor() as i32);
@@ -82,16 +81,19 @@ pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
     }
 }
 
-/// A coarser copy of the cloud with its normals: from the grid if it has one, else from the nearest points of a thinned cloud.
-fn with_normals(view: &View, options: &MergeOptions) -> (Cloud, Vec<Vector3<f32>>) {
-    if let Some(coarse) = coarser(&view.cloud) {
+/// A coarser copy of what is to be merged with its normals: from the grid if it has one, else from the nearest points of a thinned cloud.
+fn with_normals(view: &View, options: &MergeOptions, slack_m: f64) -> (Cloud, Vec<Vector3<f32>>) {
+    let pose = &view.world_from_camera;
+    if let Some(coarse) = coarser(view, pose, options, slack_m) {
         let wide = normals::OrganisedOptions { reach: 2, depth_step_share: 0.025, base_m: 0.008, least: 8 };
         if let Some(found) = normals::organised(&coarse, &wide) {
             return (coarse, found.normals);
         }
     }
-    let finite = view.cloud.finite();
-    let thin = voxel::downsample(&finite, options.align_voxel_m as f32).unwrap_or(finite);
+    let kept = view
+        .cloud
+        .filter(|p| in_range(p, options) && in_band(&(pose * p.cast::<f64>()).coords, options, slack_m));
+    let thin = voxel::downsample(&kept, options.align_voxel_m as f32).unwrap_or(kept);
     match Neighbours::new(&thin.points) {
         Ok(tree) => {
             let found = normals::estimate(&tree, 15, &Point3::origin());
@@ -101,14 +103,25 @@ fn with_normals(view: &View, options: &MergeOptions) -> (Cloud, Vec<Vector3<f32>
     }
 }
 
-/// Every nth row and column of an organised cloud.
-pub(super) fn coarser(cloud: &Cloud) -> Option<Cloud> {
-    let Grid { width, height } = cloud.grid?;
+/// Every nth row and column of an organised cloud; what is out of range, or out of the band widened by `slack_m`, is no return.
+pub(super) fn coarser(
+    view: &View,
+    pose: &Isometry3<f64>,
+    options: &MergeOptions,
+    slack_m: f64,
+) -> Option<Cloud> {
+    let Grid { width, height } = view.cloud.grid?;
     let stride = (width / COLUMNS).max(1);
     let (columns, rows) = (width / stride, height / stride);
     let pixels = (0..rows).flat_map(|r| (0..columns).map(move |c| r * stride * width + c * stride));
+    let turn = pose.rotation.to_rotation_matrix();
+    let point = |i: usize| {
+        let p = view.cloud.points[i];
+        let keeps = || in_band(&(turn * p.coords.cast::<f64>() + pose.translation.vector), options, slack_m);
+        if in_range(&p, options) && keeps() { p } else { Point3::new(f32::NAN, f32::NAN, f32::NAN) }
+    };
     Some(Cloud {
-        points: pixels.map(|i| cloud.points[i]).collect(),
+        points: pixels.map(point).collect(),
         grid: Some(Grid { width: columns, height: rows }),
         ..Cloud::default()
     })

@@ -4,12 +4,16 @@
 //! give many wrong valleys to a local method; so the few degrees of freedom are searched on a grid, coarse to fine.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
-use rustc_hash::FxHashMap;
+
+/// A place on a surface with its unit normal.
+pub(super) type Oriented = (Point3<f64>, Vector3<f64>);
 
 /// Fewest points off the planes for a search to mean something.
 const FEWEST: usize = 60;
 /// Points of the view that are tried against the others.
 const TRIED: usize = 350;
+/// Surfaces farther than this from the middle of a view, along the table and in height, are nothing to fall onto, metres.
+const FARTHEST_M: [f64; 2] = [3.0, 1.5];
 /// Side of the coarse and fine cells, metres.
 const CELLS_M: [f64; 2] = [0.03, 0.012];
 /// Smallest share of points that must fall on the others' surfaces.
@@ -18,52 +22,96 @@ const LEAST_SHARE: f64 = 0.25;
 /// What a correction at the edge of the window (three spreads of localisation) costs, as a share of the points.
 const PRIOR: f64 = 0.15;
 
-/// Surfaces of placed views in cells, with the sides they face.
+/// What a point in a cell of a surface that faces its way is worth, and what one beside such a cell is: units of the score.
+const HIT: u8 = 20;
+const BESIDE: u8 = 7;
+
+/// Surfaces of placed views in cells: for each side that a surface can face, what a point in a cell is worth.
 struct Cells {
     side_m: f64,
-    /// For each cell the sides present in it (low 6 bits) and in the cells around (next 6 bits).
-    sides: FxHashMap<[i32; 3], u16>,
+    low: [i32; 3],
+    size: [usize; 3],
+    /// Six tables of cells in the order z, x, y: shifts along y are next to each other.
+    worth: Vec<u8>,
 }
 
 /// Sides that a normal faces: ±x, ±y, ±z.
-fn sides(normal: &Vector3<f64>, least: f64) -> u16 {
-    (0..3).fold(0, |bits, k| {
-        bits | u16::from(normal[k] > least) << (2 * k) | u16::from(normal[k] < -least) << (2 * k + 1)
-    })
+fn sides(normal: &Vector3<f64>, least: f64) -> impl Iterator<Item = usize> {
+    (0..6)
+        .filter(move |side| if side % 2 == 0 { normal[side / 2] > least } else { normal[side / 2] < -least })
 }
 
 impl Cells {
-    fn new(points: &[(Point3<f64>, Vector3<f64>)], side_m: f64) -> Cells {
-        let mut cells = Cells { side_m, sides: FxHashMap::default() };
-        for (p, n) in points {
-            let bits = sides(n, 0.3);
-            *cells.sides.entry(cells.key(p)).or_default() |= bits;
-        }
-        let present: Vec<([i32; 3], u16)> = cells.sides.iter().map(|(k, b)| (*k, *b)).collect();
-        for (key, bits) in present {
-            for dx in -1..=1 {
-                for dy in -1..=1 {
-                    for dz in -1..=1 {
-                        *cells.sides.entry([key[0] + dx, key[1] + dy, key[2] + dz]).or_default() |=
-                            (bits & 0x3f) << 6;
-                    }
-                }
+    /// Cells around points, with room for `reach` cells to each side.
+    fn new(points: &[Oriented], side_m: f64, reach: i32) -> Cells {
+        let key = |p: &Point3<f64>| [p.x, p.y, p.z].map(|c| (c / side_m).floor() as i32);
+        let keys: Vec<[i32; 3]> = points.iter().map(|(p, _)| key(p)).collect();
+        let (low, high) = keys.iter().fold(([i32::MAX; 3], [i32::MIN; 3]), |(low, high), k| {
+            (std::array::from_fn(|c| low[c].min(k[c])), std::array::from_fn(|c| high[c].max(k[c])))
+        });
+        let margin = [reach + 1, reach + 1, 1];
+        let low: [i32; 3] = std::array::from_fn(|c| low[c] - margin[c]);
+        let size: [usize; 3] = std::array::from_fn(|c| (high[c] + margin[c] - low[c]) as usize + 1);
+        let mut cells = Cells { side_m, low, size, worth: vec![0; 6 * size.iter().product::<usize>()] };
+        for ((_, normal), key) in points.iter().zip(&keys) {
+            let Some(at) = cells.index(*key) else { continue };
+            for side in sides(normal, 0.3) {
+                cells.mark(side, at);
             }
         }
         cells
     }
 
-    fn key(&self, p: &Point3<f64>) -> [i32; 3] {
-        [p.x, p.y, p.z].map(|c| (c / self.side_m).floor() as i32)
+    /// Number of a cell, `None` outside.
+    fn index(&self, key: [i32; 3]) -> Option<usize> {
+        let at: [usize; 3] = std::array::from_fn(|c| key[c].wrapping_sub(self.low[c]) as usize);
+        (0..3).all(|c| at[c] < self.size[c]).then(|| (at[2] * self.size[0] + at[0]) * self.size[1] + at[1])
     }
 
-    /// 1 for a surface of that side in the cell, less beside it, 0 for none.
-    fn hit(&self, p: &Point3<f64>, side: u16) -> f64 {
-        match self.sides.get(&self.key(p)) {
-            Some(bits) if bits & side != 0 => 1.0,
-            Some(bits) if (bits >> 6) & side != 0 => 0.35,
-            _ => 0.0,
+    /// A surface of that side in the cell, which the margin keeps off the edge.
+    fn mark(&mut self, side: usize, at: usize) {
+        let table = side * self.size.iter().product::<usize>();
+        if self.worth[table + at] == HIT {
+            return;
         }
+        let plane = self.size[0] * self.size[1];
+        for z in [at - plane, at, at + plane] {
+            for x in [z - self.size[1], z, z + self.size[1]] {
+                for y in [x - 1, x, x + 1] {
+                    let worth = &mut self.worth[table + y];
+                    *worth = (*worth).max(BESIDE);
+                }
+            }
+        }
+        self.worth[table + at] = HIT;
+    }
+
+    /// Mean worth (1 for a hit) of points over all shifts of up to `reach` cells along x and y, row by row of x.
+    fn scores(&self, points: &[(Point3<f64>, usize)], reach: i32) -> Vec<f64> {
+        let across = (2 * reach + 1) as usize;
+        let mut sums = vec![0_u32; across * across];
+        let table = self.size.iter().product::<usize>();
+        for (p, side) in points {
+            let key = [p.x, p.y, p.z].map(|c| (c / self.side_m).floor() as i32);
+            for (i, sums) in (-reach..=reach).zip(sums.chunks_exact_mut(across)) {
+                // A row that sticks out of the cells on one side is met shift by shift.
+                let shifted =
+                    |j: i32| self.index([key[0].saturating_add(i), key[1].saturating_add(j), key[2]]);
+                match (shifted(-reach), shifted(reach)) {
+                    (Some(from), Some(to)) => {
+                        let row = &self.worth[side * table + from..=side * table + to];
+                        sums.iter_mut().zip(row).for_each(|(sum, &worth)| *sum += u32::from(worth));
+                    }
+                    _ => {
+                        for (j, sum) in (-reach..=reach).zip(sums) {
+                            *sum += shifted(j).map_or(0, |at| u32::from(self.worth[side * table + at]));
+                        }
+                    }
+                }
+            }
+        }
+        let whole = f64::from(HIT) * points.len().max(1) as f64;
+        sums.into_iter().map(|s| f64::from(s) / whole).collect()
     }
 }
 
@@ -84,29 +132,37 @@ pub(super) struct Placed {
 }
 
 /// Share of the view's points that fall on the placed surfaces as they are.
-pub(super) fn fits(
-    view: &[(Point3<f64>, Vector3<f64>)],
-    placed: &[(Point3<f64>, Vector3<f64>)],
-    up: &Unit<Vector3<f64>>,
-) -> f64 {
-    let level = frame(up);
-    let flat = |of: &[(Point3<f64>, Vector3<f64>)]| {
-        of.iter().map(|(p, n)| (level * p, level * n)).collect::<Vec<_>>()
-    };
-    let (view, placed) = (flat(view), flat(placed));
+pub(super) fn fits(view: &[Oriented], placed: &[Oriented], up: &Unit<Vector3<f64>>) -> f64 {
+    let Some(Levelled { tried, placed, .. }) = levelled(view, placed, &frame(up)) else { return 0.0 };
+    Cells::new(&placed, CELLS_M[1], 0).scores(&turned(&tried, 0.0), 0)[0]
+}
+
+/// A view and what it is to fall onto, turned level, metres from the middle of the view.
+struct Levelled {
+    /// At most about `TRIED` of the view's points.
+    tried: Vec<Oriented>,
+    /// What is near enough to be fallen onto.
+    placed: Vec<Oriented>,
+    middle: Vector3<f64>,
+}
+
+/// `None` if nothing of either is left.
+fn levelled(view: &[Oriented], placed: &[Oriented], level: &Isometry3<f64>) -> Option<Levelled> {
     let stride = (view.len() / TRIED).max(1);
-    let tried: Vec<_> = view.into_iter().step_by(stride).collect();
-    if tried.is_empty() {
-        return 0.0;
-    }
-    score(&Cells::new(&placed, CELLS_M[1]), &turned(&tried, &Vector3::zeros(), 0.0), 0.0, 0.0)
+    let mut tried: Vec<Oriented> = view.iter().step_by(stride).map(|(p, n)| (level * p, level * n)).collect();
+    let middle = tried.iter().fold(Vector3::zeros(), |m, (p, _)| m + p.coords) / tried.len().max(1) as f64;
+    tried.iter_mut().for_each(|(p, _)| *p -= middle);
+    let near = |(p, _): &Oriented| p.x.abs().max(p.y.abs()) < FARTHEST_M[0] && p.z.abs() < FARTHEST_M[1];
+    let placed: Vec<Oriented> =
+        placed.iter().map(|(p, n)| (level * p - middle, level * n)).filter(near).collect();
+    (!tried.is_empty() && !placed.is_empty()).then_some(Levelled { tried, placed, middle })
 }
 
 /// The correction (world from world) that puts `view` (points and normals off the planes, world frame) best onto `placed`.
 /// `None` if there is too little to go by or nothing falls together.
 pub(super) fn place(
-    view: &[(Point3<f64>, Vector3<f64>)],
-    placed: &[(Point3<f64>, Vector3<f64>)],
+    view: &[Oriented],
+    placed: &[Oriented],
     up: &Unit<Vector3<f64>>,
     window: Window,
 ) -> Option<Placed> {
@@ -114,31 +170,26 @@ pub(super) fn place(
         return None;
     }
     let level = frame(up);
-    let flat = |of: &[(Point3<f64>, Vector3<f64>)]| -> Vec<(Point3<f64>, Vector3<f64>)> {
-        of.iter().map(|(p, n)| (level * p, level * n)).collect()
-    };
-    let placed = flat(placed);
-    let stride = (view.len() / TRIED).max(1);
-    let tried: Vec<(Point3<f64>, Vector3<f64>)> = flat(view).into_iter().step_by(stride).collect();
-    let middle = tried.iter().fold(Vector3::zeros(), |m, (p, _)| m + p.coords) / tried.len() as f64;
+    let Levelled { tried, placed, middle } = levelled(view, placed, &level)?;
     let mut best = [Candidate { x: 0.0, y: 0.0, turn: 0.0, score: 0.0 }; 3];
     for (stage, side_m) in CELLS_M.into_iter().enumerate() {
-        let cells = Cells::new(&placed, side_m);
         let (shift, turn) = if stage == 0 { (window.shift_m, window.turn_rad) } else { (0.03, 0.027) };
         let turn_step = if stage == 0 { 0.03 } else { 0.009 };
+        let (turns, shifts) = ((turn / turn_step).ceil() as i32, (shift / side_m).ceil() as i32);
+        let cells = Cells::new(&placed, side_m, shifts);
         let mut found: Vec<Candidate> = Vec::new();
         let starts: &[Candidate] = if stage == 0 { &best[..1] } else { &best };
         for start in starts {
-            let turns = (turn / turn_step).ceil() as i32;
-            let shifts = (shift / side_m).ceil() as i32;
             for t in -turns..=turns {
                 let angle = start.turn + f64::from(t) * turn_step;
-                let turned = turned(&tried, &middle, angle);
+                let mut turned = turned(&tried, angle);
+                turned.iter_mut().for_each(|(p, _)| *p += Vector3::new(start.x, start.y, 0.0));
+                let mut scores = cells.scores(&turned, shifts).into_iter();
                 for i in -shifts..=shifts {
-                    for j in -shifts..=shifts {
+                    for (j, score) in (-shifts..=shifts).zip(scores.by_ref()) {
                         let (x, y) = (start.x + f64::from(i) * side_m, start.y + f64::from(j) * side_m);
-                        let score = score(&cells, &turned, x, y)
-                            - PRIOR * (x.hypot(y) / window.shift_m).powi(2)
+                        let score = score
+                            - PRIOR * (x * x + y * y) / window.shift_m.powi(2)
                             - PRIOR * (angle / window.turn_rad).powi(2);
                         found.push(Candidate { x, y, turn: angle, score });
                     }
@@ -183,25 +234,11 @@ fn distinct(sorted: &[Candidate], apart: f64) -> [Candidate; 3] {
     [kept[0], kept[1], kept[2]]
 }
 
-fn turned(
-    points: &[(Point3<f64>, Vector3<f64>)],
-    middle: &Vector3<f64>,
-    angle: f64,
-) -> Vec<(Point3<f64>, u16)> {
+/// The points turned about the vertical, each with the side that it faces most.
+fn turned(points: &[Oriented], angle: f64) -> Vec<(Point3<f64>, usize)> {
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), angle);
-    points
-        .iter()
-        .map(|(p, n)| {
-            let n = turn * n;
-            let side = sides(&n, n.amax() - 1e-9);
-            (Point3::from(turn * (p.coords - middle) + middle), side)
-        })
-        .collect()
-}
-
-fn score(cells: &Cells, points: &[(Point3<f64>, u16)], x: f64, y: f64) -> f64 {
-    let shift = Vector3::new(x, y, 0.0);
-    points.iter().map(|(p, side)| cells.hit(&(p + shift), *side)).sum::<f64>() / points.len() as f64
+    let most = |n: Vector3<f64>| sides(&n, n.amax() - 1e-9).next().unwrap_or(0);
+    points.iter().map(|(p, n)| (turn * p, most(turn * n))).collect()
 }
 
 /// World to a frame with z up.

@@ -4,7 +4,7 @@ use super::patches::Voxels;
 use super::{SceneOptions, holds, quantile};
 use crate::surface::convex_hull;
 use nalgebra::{Point3, Vector3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Greatest distance of a patch's voxels from its seed, metres.
 const PATCH_REACH_M: f64 = 0.02;
@@ -22,8 +22,9 @@ pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
     if !options.part_touching {
         let thin = thin(voxels);
         let mut whole = Union::new(voxels.len());
-        for (i, near) in voxels.neighbours.iter().enumerate().filter(|(i, _)| !thin[*i]) {
-            near.iter().filter(|&&j| !thin[j as usize]).for_each(|&j| whole.join(i as u32, j));
+        for i in (0..voxels.len()).filter(|&i| !thin[i]) {
+            let near = voxels.neighbours(i).iter().filter(|&&j| !thin[j as usize]);
+            near.for_each(|&j| whole.join(i as u32, j));
         }
         let mut parts: Vec<u32> = (0..voxels.len() as u32).map(|i| whole.root(i)).collect();
         adopt(voxels, &thin, &mut parts);
@@ -39,7 +40,7 @@ pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
             joined.join(a, b);
         }
     }
-    mend(&mut joined, &patches, &borders, voxels, &patch_of);
+    mend(&mut joined, &borders, voxels, &patch_of);
     let root_voxel = first_voxels(&patch_of, &mut joined, patches.len());
     let mut parts: Vec<u32> = patch_of.iter().map(|&p| root_voxel[joined.root(p) as usize]).collect();
     adopt(voxels, &thin, &mut parts);
@@ -49,10 +50,11 @@ pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
 /// Voxels with far fewer points than those around them: frayed edges, which hang between objects and connect nothing.
 fn thin(voxels: &Voxels) -> Vec<bool> {
     const SHARE: f64 = 0.25;
+    let mut around: Vec<f64> = Vec::new();
     (0..voxels.len())
         .map(|i| {
-            let mut around: Vec<f64> =
-                voxels.neighbours[i].iter().map(|&j| f64::from(voxels.counts[j as usize])).collect();
+            around.clear();
+            around.extend(voxels.neighbours(i).iter().map(|&j| f64::from(voxels.counts[j as usize])));
             around.is_empty() || f64::from(voxels.counts[i]) < SHARE * quantile(&mut around, 0.75)
         })
         .collect()
@@ -61,7 +63,7 @@ fn thin(voxels: &Voxels) -> Vec<bool> {
 /// Gives each thin voxel to the part of its fullest neighbour that is not thin.
 fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
     let full = |i: usize| {
-        let near = voxels.neighbours[i].iter().map(|&j| j as usize).filter(|&j| !thin[j]);
+        let near = voxels.neighbours(i).iter().map(|&j| j as usize).filter(|&j| !thin[j]);
         near.max_by_key(|&j| (voxels.counts[j], usize::MAX - j))
     };
     for i in (0..voxels.len()).filter(|&i| thin[i]) {
@@ -88,7 +90,7 @@ fn grow_patches(voxels: &Voxels, thin: &[bool]) -> Vec<u32> {
         let mut open = vec![seed];
         patch_of[seed as usize] = patches;
         while let Some(voxel) = open.pop() {
-            for &next in &voxels.neighbours[voxel as usize] {
+            for &next in voxels.neighbours(voxel as usize) {
                 let n = next as usize;
                 if patch_of[n] == NONE
                     && !thin[n]
@@ -135,8 +137,8 @@ fn describe(voxels: &Voxels, patch_of: &[u32]) -> Vec<Patch> {
 /// Pairs of neighbouring patches (lower number first) with the number of voxel pairs along their border and its middle.
 fn borders(voxels: &Voxels, patch_of: &[u32], thin: &[bool]) -> BTreeMap<(u32, u32), Border> {
     let mut borders: BTreeMap<(u32, u32), Border> = BTreeMap::new();
-    for (i, near) in voxels.neighbours.iter().enumerate() {
-        for &j in near.iter().filter(|&&j| j as usize > i) {
+    for i in 0..voxels.len() {
+        for &j in voxels.neighbours(i).iter().filter(|&&j| j as usize > i) {
             let (a, b) = (patch_of[i], patch_of[j as usize]);
             if a != b && !thin[i] && !thin[j as usize] {
                 borders.entry((a.min(b), a.max(b))).or_default().length += 1;
@@ -172,61 +174,120 @@ fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
 }
 
 /// Joins what the creases wrongly parted: insides of vessels, handles, crumbs.
-fn mend(
-    joined: &mut Union,
-    patches: &[Patch],
-    borders: &BTreeMap<(u32, u32), Border>,
-    voxels: &Voxels,
-    patch_of: &[u32],
-) {
-    loop {
-        let parts = gather(joined, patches, voxels, patch_of);
-        let mut links: BTreeMap<(u32, u32), u32> = BTreeMap::new();
-        for (&(a, b), border) in borders {
-            let (a, b) = (joined.root(a), joined.root(b));
-            if a != b {
-                *links.entry((a, b)).or_default() += border.length;
-                *links.entry((b, a)).or_default() += border.length;
+///
+/// The smallest part that belongs to a neighbour goes first; then what touches the joined part is looked at anew.
+fn mend(joined: &mut Union, borders: &BTreeMap<(u32, u32), Border>, voxels: &Voxels, patch_of: &[u32]) {
+    let mut parts = gather(joined, voxels, patch_of);
+    for (&(a, b), border) in borders {
+        let (a, b) = (joined.root(a), joined.root(b));
+        if a != b {
+            link(&mut parts, a, b, border.length);
+        }
+    }
+    let mut belonging: BTreeSet<Belonging> = BTreeSet::new();
+    for (&root, part) in &parts {
+        belonging.extend(part.links.keys().filter_map(|&other| belongs(&parts, root, other)));
+    }
+    while let Some(Belonging { small, large, .. }) = belonging.pop_first() {
+        let touched: BTreeSet<u32> =
+            [small, large].iter().flat_map(|root| parts[root].links.keys().copied()).collect();
+        belonging.retain(|b| ![b.small, b.large].iter().any(|root| *root == small || *root == large));
+        joined.join(small, large);
+        let root = joined.root(small);
+        let (Some(a), Some(b)) = (parts.remove(&small), parts.remove(&large)) else { return };
+        let links = [&a.links, &b.links].map(Clone::clone);
+        parts.insert(root, a.with(b));
+        for other in &touched {
+            if let Some(part) = parts.get_mut(other) {
+                part.links.retain(|to, _| *to != small && *to != large);
             }
         }
-        // The smallest part that belongs to a neighbour goes first; then everything is looked at anew.
-        let belongs = |small: &Part, large: &Part| {
-            small.points <= large.points
-                && (is_crumb(small, large) || is_inside(small, large) || hangs_on(small, large))
-        };
-        let next = links
-            .iter()
-            .filter(|((s, l), _)| belongs(&parts[s], &parts[l]))
-            .min_by_key(|((s, _), length)| (parts[s].points, *s, u32::MAX - **length));
-        let Some((&(small, large), _)) = next else { return };
-        joined.join(small, large);
+        for (other, length) in links.into_iter().flatten().filter(|(o, _)| *o != small && *o != large) {
+            link(&mut parts, root, other, length);
+        }
+        for &other in touched.iter().filter(|&&o| o != small && o != large) {
+            belonging
+                .extend([belongs(&parts, root, other), belongs(&parts, other, root)].into_iter().flatten());
+        }
     }
+}
+
+fn link(parts: &mut BTreeMap<u32, Part>, a: u32, b: u32, length: u32) {
+    for (from, to) in [(a, b), (b, a)] {
+        if let Some(part) = parts.get_mut(&from) {
+            *part.links.entry(to).or_default() += length;
+        }
+    }
+}
+
+/// A part that belongs to a neighbour, in the order in which they are joined: few points first, then long borders.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Belonging {
+    points: u32,
+    small: u32,
+    /// The border's length below the greatest number.
+    shortness: u32,
+    large: u32,
+}
+
+fn belongs(parts: &BTreeMap<u32, Part>, small: u32, large: u32) -> Option<Belonging> {
+    let (s, l) = (parts.get(&small)?, parts.get(&large)?);
+    let length = *s.links.get(&large)?;
+    let own = s.points <= l.points && (is_crumb(s, l) || is_inside(s, l) || hangs_on(s, l));
+    own.then_some(Belonging { points: s.points, small, shortness: u32::MAX - length, large })
 }
 
 struct Part {
     points: u32,
-    low_m: f64,
-    top_m: f64,
+    /// Of its voxels, ascending, metres.
+    heights_m: Vec<f64>,
     hull: Vec<[f64; 2]>,
     places: Vec<[f64; 2]>,
+    /// Lengths of the borders with other parts.
+    links: BTreeMap<u32, u32>,
 }
 
-fn gather(joined: &mut Union, patches: &[Patch], voxels: &Voxels, patch_of: &[u32]) -> BTreeMap<u32, Part> {
+impl Part {
+    fn height_m(&self, share: f64) -> f64 {
+        let at = (self.heights_m.len().saturating_sub(1) as f64 * share).round() as usize;
+        self.heights_m.get(at).copied().unwrap_or(0.0)
+    }
+
+    fn low_m(&self) -> f64 {
+        self.height_m(0.03)
+    }
+
+    fn top_m(&self) -> f64 {
+        self.height_m(0.97)
+    }
+
+    /// Both in one; the links are left to the caller.
+    fn with(self, other: Part) -> Part {
+        let (mut large, small) =
+            if self.places.len() >= other.places.len() { (self, other) } else { (other, self) };
+        large.points += small.points;
+        large.places.extend(&small.places);
+        // Two ascending runs: the sort joins them in one pass.
+        large.heights_m.extend(&small.heights_m);
+        large.heights_m.sort_by(f64::total_cmp);
+        large.hull.extend(&small.hull);
+        large.hull = convex_hull(large.hull);
+        large.links = BTreeMap::new();
+        large
+    }
+}
+
+fn gather(joined: &mut Union, voxels: &Voxels, patch_of: &[u32]) -> BTreeMap<u32, Part> {
     let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (i, &p) in patch_of.iter().enumerate() {
         members.entry(joined.root(p)).or_default().push(i);
     }
-    debug_assert!(patches.len() >= members.len());
     let part = |of: Vec<usize>| {
         let places: Vec<[f64; 2]> = of.iter().map(|&i| [voxels.centres[i].x, voxels.centres[i].y]).collect();
-        let mut heights: Vec<f64> = of.iter().map(|&i| voxels.centres[i].z).collect();
-        Part {
-            points: of.iter().map(|&i| voxels.counts[i]).sum(),
-            low_m: quantile(&mut heights, 0.03),
-            top_m: quantile(&mut heights, 0.97),
-            hull: convex_hull(places.clone()),
-            places,
-        }
+        let mut heights_m: Vec<f64> = of.iter().map(|&i| voxels.centres[i].z).collect();
+        heights_m.sort_by(f64::total_cmp);
+        let points = of.iter().map(|&i| voxels.counts[i]).sum();
+        Part { points, heights_m, hull: convex_hull(places.clone()), places, links: BTreeMap::new() }
     };
     members.into_iter().map(|(root, of)| (root, part(of))).collect()
 }
@@ -238,14 +299,14 @@ fn is_crumb(small: &Part, large: &Part) -> bool {
 /// The inside of a vessel: within the outline of the body and no higher than its rim.
 fn is_inside(small: &Part, large: &Part) -> bool {
     let within = small.places.iter().filter(|&&p| holds(&large.hull, p)).count();
-    within * 10 >= small.places.len() * 7 && small.top_m < large.top_m + 0.01
+    within * 10 >= small.places.len() * 7 && small.top_m() < large.top_m() + 0.01
 }
 
 /// A handle: small, lifted off the surface, not above the body.
 fn hangs_on(small: &Part, large: &Part) -> bool {
     f64::from(small.points) < HANGING_SHARE * f64::from(large.points)
-        && small.low_m > large.low_m + 0.01
-        && small.top_m < large.top_m + 0.005
+        && small.low_m() > large.low_m() + 0.01
+        && small.top_m() < large.top_m() + 0.005
 }
 
 /// A voxel of each root patch, to name parts by.

@@ -1,9 +1,10 @@
 //! Points in voxels, with normals and neighbours.
 
-use nalgebra::{Matrix3, Point3, Vector3};
-use rustc_hash::FxHashMap;
+use crate::lattice::{Around, Lattice};
+use crate::spread;
+use nalgebra::{Point3, Vector3};
 
-/// Occupied voxels of a set of points, in order of their first point.
+/// Occupied voxels of a set of points, in order of their place.
 pub(super) struct Voxels {
     /// Mean of the voxel's points, metres.
     pub centres: Vec<Point3<f64>>,
@@ -13,8 +14,9 @@ pub(super) struct Voxels {
     pub curvatures: Vec<f64>,
     /// Number of points.
     pub counts: Vec<u32>,
-    /// Occupied voxels among the 26 around.
-    pub neighbours: Vec<Vec<u32>>,
+    /// Where in `near` the neighbours of each voxel begin, and where the last ones end.
+    starts: Vec<u32>,
+    near: Vec<u32>,
     /// The voxel of each point.
     pub of_point: Vec<u32>,
 }
@@ -23,103 +25,110 @@ impl Voxels {
     pub fn len(&self) -> usize {
         self.centres.len()
     }
+
+    /// Occupied voxels among the 26 around, in order.
+    pub fn neighbours(&self, voxel: usize) -> &[u32] {
+        &self.near[self.starts[voxel] as usize..self.starts[voxel + 1] as usize]
+    }
 }
 
+/// Sums over the points of a voxel, about the surface frame's origin.
 #[derive(Clone, Copy)]
 struct Moments {
     count: f64,
     sum: Vector3<f64>,
-    squares: Matrix3<f64>,
+    /// xx xy xz yy yz zz.
+    products: [f64; 6],
+}
+
+impl Moments {
+    const NONE: Moments = Moments { count: 0.0, sum: Vector3::new(0.0, 0.0, 0.0), products: [0.0; 6] };
+
+    fn add(&mut self, p: &Point3<f64>) {
+        self.count += 1.0;
+        self.sum += p.coords;
+        let terms = [p.x * p.x, p.x * p.y, p.x * p.z, p.y * p.y, p.y * p.z, p.z * p.z];
+        self.products.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+    }
+
+    fn join(&mut self, other: &Moments) {
+        self.count += other.count;
+        self.sum += other.sum;
+        self.products.iter_mut().zip(other.products).for_each(|(sum, term)| *sum += term);
+    }
 }
 
 /// Gathers points into voxels of a side and estimates a normal for each from its surroundings.
 pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f64>]) -> Voxels {
-    let mut index: FxHashMap<[i32; 3], u32> = FxHashMap::default();
-    let mut keys: Vec<[i32; 3]> = Vec::new();
-    let mut moments: Vec<Moments> = Vec::new();
-    let mut of_point = Vec::with_capacity(points.len());
-    let mut last = ([i32::MIN; 3], 0);
-    for p in points {
-        let key = [p.x, p.y, p.z].map(|c| (c / side_m).floor() as i32);
-        if key != last.0 {
-            let slot = *index.entry(key).or_insert_with(|| {
-                keys.push(key);
-                moments.push(Moments { count: 0.0, sum: Vector3::zeros(), squares: Matrix3::zeros() });
-                keys.len() as u32 - 1
-            });
-            last = (key, slot);
+    let first = points.first().copied().unwrap_or_else(Point3::origin);
+    let (low, high) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+    let lattice = Lattice::over(&low, &high, side_m);
+    let mut entries: Vec<(u64, u32)> =
+        (0..).zip(points).map(|(i, p)| (lattice.locate(&p.coords).0, i)).collect();
+    lattice.sort(&mut entries);
+    let mut of_point = vec![0; points.len()];
+    let (mut keys, mut moments) = (Vec::new(), Vec::new());
+    for same in entries.chunk_by(|a, b| a.0 == b.0) {
+        let mut own = Moments::NONE;
+        for &(_, point) in same {
+            own.add(&points[point as usize]);
+            of_point[point as usize] = keys.len() as u32;
         }
-        of_point.push(last.1);
-        let m = &mut moments[last.1 as usize];
-        // Moments about a near corner keep the digits that moments about a far origin lose.
-        let v = p.coords;
-        m.count += 1.0;
-        m.sum += v;
-        m.squares += v * v.transpose();
+        keys.push(same[0].0);
+        moments.push(own);
     }
-    let neighbours: Vec<Vec<u32>> = keys.iter().map(|key| around(key, &index)).collect();
-    let centres: Vec<Point3<f64>> = moments.iter().map(|m| Point3::from(m.sum / m.count)).collect();
-    let (normals, curvatures) = normals(&moments, &neighbours, &centres, viewpoints);
-    Voxels {
-        centres,
-        normals,
-        curvatures,
+    let (starts, near) = neighbours(&lattice, &keys);
+    let mut voxels = Voxels {
+        centres: moments.iter().map(|m| Point3::from(m.sum / m.count)).collect(),
+        normals: Vec::with_capacity(keys.len()),
+        curvatures: Vec::with_capacity(keys.len()),
         counts: moments.iter().map(|m| m.count as u32).collect(),
-        neighbours,
+        starts,
+        near,
         of_point,
+    };
+    for i in 0..keys.len() {
+        let (normal, curvature) = surface(&voxels, &moments, i, viewpoints);
+        voxels.normals.push(normal);
+        voxels.curvatures.push(curvature);
     }
+    voxels
 }
 
-fn around(key: &[i32; 3], index: &FxHashMap<[i32; 3], u32>) -> Vec<u32> {
-    let mut found = Vec::with_capacity(12);
-    for dz in -1..=1 {
-        for dy in -1..=1 {
-            for dx in -1..=1 {
-                if (dx, dy, dz) != (0, 0, 0)
-                    && let Some(&i) = index.get(&[key[0] + dx, key[1] + dy, key[2] + dz])
-                {
-                    found.push(i);
-                }
+/// For each voxel where its neighbours begin, and all of them in a row.
+fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
+    let (mut starts, mut near) = (Vec::with_capacity(keys.len() + 1), Vec::new());
+    let mut around = Around::from(lattice, keys, 0);
+    for (i, key) in keys.iter().enumerate() {
+        starts.push(near.len() as u32);
+        around.visit(*key, |j| {
+            if j != i {
+                near.push(j as u32);
             }
-        }
+        });
     }
-    found
+    starts.push(near.len() as u32);
+    (starts, near)
 }
 
-fn normals(
+/// Normal and curvature of a voxel, from its own and its neighbours' points.
+fn surface(
+    voxels: &Voxels,
     moments: &[Moments],
-    neighbours: &[Vec<u32>],
-    centres: &[Point3<f64>],
+    voxel: usize,
     viewpoints: &[Point3<f64>],
-) -> (Vec<Vector3<f64>>, Vec<f64>) {
-    let mut normals = Vec::with_capacity(moments.len());
-    let mut curvatures = Vec::with_capacity(moments.len());
-    for (i, own) in moments.iter().enumerate() {
-        let mut total = *own;
-        for &n in &neighbours[i] {
-            let m = &moments[n as usize];
-            total.count += m.count;
-            total.sum += m.sum;
-            total.squares += m.squares;
-        }
-        let mean = total.sum / total.count;
-        let spread = total.squares / total.count - mean * mean.transpose();
-        let eigen = spread.symmetric_eigen();
-        let least = eigen.eigenvalues.imin();
-        let trace = eigen.eigenvalues.sum();
-        let known = total.count >= 5.0 && trace > 0.0 && eigen.eigenvalues.iter().all(|e| e.is_finite());
-        let mut normal: Vector3<f64> =
-            if known { eigen.eigenvectors.column(least).into_owned() } else { Vector3::zeros() };
-        let nearest = viewpoints
-            .iter()
-            .map(|v| v - centres[i])
-            .min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
-            .unwrap_or_else(Vector3::z);
-        if normal.dot(&nearest) < 0.0 {
-            normal = -normal;
-        }
-        normals.push(normal);
-        curvatures.push(if known { eigen.eigenvalues[least].max(0.0) / trace } else { 1.0 });
-    }
-    (normals, curvatures)
+) -> (Vector3<f64>, f64) {
+    let mut total = moments[voxel];
+    voxels.neighbours(voxel).iter().for_each(|&n| total.join(&moments[n as usize]));
+    let covariance = spread::covariance(total.count, total.sum.into(), total.products);
+    let Some(least) = spread::least(&covariance).filter(|_| total.count >= 5.0) else {
+        return (Vector3::zeros(), 1.0);
+    };
+    let nearest = viewpoints
+        .iter()
+        .map(|v| v - voxels.centres[voxel])
+        .min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+        .unwrap_or_else(Vector3::z);
+    let normal = Vector3::from(least.normal);
+    (if normal.dot(&nearest) < 0.0 { -normal } else { normal }, least.share)
 }

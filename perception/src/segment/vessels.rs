@@ -5,6 +5,7 @@ use crate::outline;
 use crate::round::{self, Round};
 use crate::surface::{convex_hull, range_sigma_m};
 use nalgebra::Point3;
+use std::cell::OnceCell;
 
 /// Parts this far apart can be one vessel, metres.
 const APART_M: f64 = 0.015;
@@ -17,9 +18,40 @@ const ON_BODY: f64 = 0.85;
 /// The smaller part has at least this share of the points.
 const LEAST_SHARE: f64 = 0.08;
 
+/// A part with what the pairs ask of it again and again.
+struct Candidate {
+    segment: Segment,
+    low: Point3<f64>,
+    high: Point3<f64>,
+    top_m: f64,
+    /// Seen from above.
+    hull: OnceCell<Vec<[f64; 2]>>,
+    body: OnceCell<Option<Round>>,
+}
+
+impl Candidate {
+    fn new(segment: Segment) -> Candidate {
+        let first = segment.points.first().copied().unwrap_or_else(Point3::origin);
+        let (low, high) =
+            segment.points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+        let top_m = top_m(&segment);
+        Candidate { segment, low, high, top_m, hull: OnceCell::new(), body: OnceCell::new() }
+    }
+
+    /// The round body that nearly all of its side lies on, if it is one.
+    fn body(&self, viewpoints: &[Point3<f64>]) -> Option<&Round> {
+        self.body.get_or_init(|| round_body(&self.segment, self.low.z, self.top_m, viewpoints)).as_ref()
+    }
+
+    fn hull(&self) -> &[[f64; 2]] {
+        self.hull.get_or_init(|| convex_hull(self.segment.points.iter().map(|p| [p.x, p.y]).collect()))
+    }
+}
+
 /// Joins parts that lie on one upright round body, and what lies inside it.
 pub(super) fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<Segment> {
     parts.sort_by(|a, b| b.indices.len().cmp(&a.indices.len()).then(a.indices.cmp(&b.indices)));
+    let mut parts: Vec<Candidate> = parts.into_iter().map(Candidate::new).collect();
     let mut first = 0;
     while first < parts.len() {
         let found =
@@ -27,12 +59,12 @@ pub(super) fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<
         match found {
             Some(second) => {
                 let other = parts.remove(second);
-                parts[first] = union(&parts[first], &other);
+                parts[first] = Candidate::new(union(&parts[first].segment, &other.segment));
             }
             None => first += 1,
         }
     }
-    parts
+    parts.into_iter().map(|c| c.segment).collect()
 }
 
 fn union(a: &Segment, b: &Segment) -> Segment {
@@ -43,33 +75,32 @@ fn union(a: &Segment, b: &Segment) -> Segment {
     Segment { indices, points, base_m: 0.0 }
 }
 
-fn one_vessel(large: &Segment, small: &Segment, viewpoints: &[Point3<f64>]) -> bool {
-    let (n, m) = (large.indices.len(), small.indices.len());
+fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
+    let (n, m) = (large.segment.indices.len(), small.segment.indices.len());
     if m < 12 || !near(large, small) {
         return false;
     }
-    let (top, other_top) = (top_m(large), top_m(small));
-    let inside = other_top < top + 0.005 && footprint_inside(large, small);
-    if inside && round_body(large, top, viewpoints).is_some() {
+    let inside = small.top_m < large.top_m + 0.005 && footprint_inside(large, small);
+    if inside && large.body(viewpoints).is_some() {
         return true;
     }
-    if (top - other_top).abs() > LEVEL_M || (m as f64) < LEAST_SHARE * n as f64 {
+    if (large.top_m - small.top_m).abs() > LEVEL_M || (m as f64) < LEAST_SHARE * n as f64 {
         return false;
     }
-    let both = union(large, small);
-    round_body(&both, top.max(other_top), viewpoints).is_some_and(|body| {
+    let both = union(&large.segment, &small.segment);
+    let top = large.top_m.max(small.top_m);
+    round_body(&both, large.low.z.min(small.low.z), top, viewpoints).is_some_and(|body| {
         // Each part on its own must keep to the common body: one alone may carry the fit.
-        [large, small].iter().all(|part| share_on(&body, part) >= ON_BODY - 0.1)
+        [large, small].iter().all(|part| share_on(&body, &part.segment) >= ON_BODY - 0.1)
     })
 }
 
 /// The round body that nearly all of the segment's side lies on, if it is one rather than a box.
-fn round_body(segment: &Segment, top: f64, viewpoints: &[Point3<f64>]) -> Option<Round> {
-    let low = segment.points.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+fn round_body(segment: &Segment, low_m: f64, top_m: f64, viewpoints: &[Point3<f64>]) -> Option<Round> {
     let near =
         viewpoints.iter().map(|v| (segment.points[0] - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
     let sigma_m = range_sigma_m(near).min(0.012);
-    let body = round::fit(&segment.points, low, top, sigma_m, 3)?;
+    let body = round::fit(&segment.points, low_m, top_m, sigma_m, 3)?;
     let box_residual = outline::fit(&segment.points)?.residual_m;
     // Judged by what lies on it: a handle does not.
     let tight = body.residual_m < 2.0 * sigma_m + 0.0015 && body.residual_m < 0.6 * box_residual;
@@ -81,18 +112,13 @@ fn share_on(body: &Round, part: &Segment) -> f64 {
     on as f64 / part.points.len().max(1) as f64
 }
 
-/// True if some points of the two are near each other, judged by boxes around slices of them.
-fn near(a: &Segment, b: &Segment) -> bool {
-    let bounds = |s: &Segment| {
-        let first = s.points[0];
-        s.points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)))
-    };
-    let ((a0, a1), (b0, b1)) = (bounds(a), bounds(b));
-    (0..3).all(|k| a0[k] - APART_M < b1[k] && b0[k] - APART_M < a1[k])
+/// True if the boxes around the two come near each other.
+fn near(a: &Candidate, b: &Candidate) -> bool {
+    (0..3).all(|k| a.low[k] - APART_M < b.high[k] && b.low[k] - APART_M < a.high[k])
 }
 
-fn footprint_inside(large: &Segment, small: &Segment) -> bool {
-    let hull = convex_hull(large.points.iter().map(|p| [p.x, p.y]).collect());
-    let within = small.points.iter().filter(|p| holds(&hull, [p.x, p.y])).count();
-    within * 10 >= small.points.len() * 7
+fn footprint_inside(large: &Candidate, small: &Candidate) -> bool {
+    let points = &small.segment.points;
+    let within = points.iter().filter(|p| holds(large.hull(), [p.x, p.y])).count();
+    within * 10 >= points.len() * 7
 }

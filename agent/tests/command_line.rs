@@ -222,6 +222,37 @@ fn the_published_cost_test_is_solved_with_a_program() {
 }
 
 #[test]
+fn a_room_is_tidied_with_a_program_that_answers_every_module() {
+    let Some(folder) = shared("pddl/modules/tidyup") else { return };
+    let file = |name: &str| folder.join(name).display().to_string();
+    let attach = |module: &str| format!("{module}=sh {}", data("tidyup.sh"));
+    let modules = ["costDrive", "canPutdown", "updatePutdownPose", "wipePointFree"].map(attach);
+    let (domain, problem) = (file("domain_modules.pddl"), file("problem.pddl"));
+    let mut arguments: Vec<&str> = vec!["plan", domain.as_str(), problem.as_str(), "--json"];
+    modules.iter().for_each(|module| arguments.extend(["--attach", module.as_str()]));
+    let said = json(&arguments, 0);
+    assert_eq!(said["status"], "solved", "{said}");
+    let plan = said["plan"].as_array().cloned().unwrap_or_default();
+    let put_down = plan.iter().filter(|step| step["action"] == "putdown-object").count();
+    assert!(put_down > 0, "{said}");
+    for module in ["costDrive", "canPutdown", "updatePutdownPose"] {
+        let calls = &said["attachments"][module];
+        assert!(calls["calls"].as_u64() > Some(0) && calls["hits"].as_u64() > Some(0), "{module}: {said}");
+    }
+}
+
+#[test]
+fn a_program_may_say_no_to_a_negated_call() {
+    let Some(folder) = shared("pddl/modules/negated-modules") else { return };
+    let file = |name: &str| folder.join(name).display().to_string();
+    let (yes, no) = (format!("checkTrue=sh {} true", data("always.sh")), data("always.sh"));
+    let no = format!("checkFalse=sh {no} false");
+    let (domain, problem) = (file("domain-negated.pddl"), file("p01.pddl"));
+    let said = json(&["plan", &domain, &problem, "--attach", &yes, "--attach", &no, "--json"], 0);
+    assert_eq!(said["steps"], 5, "{said}");
+}
+
+#[test]
 fn real_clouds_are_recognised() {
     let Some(cloud) = shared("data/mosd/learn33.pcd") else { return };
     let said = json(&["recognise", &cloud.display().to_string(), "--json"], 0);

@@ -1,44 +1,42 @@
 //! Ground calls bound to attachments: what the searches ask, and from which variables an answer is made.
 
+mod terms;
+
 use std::cell::RefCell;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::attachment::{
     Answer, AttachmentError, Attachments, Call as Question, CallError, CallKind, FactValue, Level, Read,
     Reading,
 };
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::explain::Refusals;
+use crate::explain::{Refusals, sites};
 use crate::ground::{CallId, GroundTask, Meaning, NumericId, Place, Values, VariableId};
 use crate::solve::PlanError;
-use crate::task::{FunctionId, ObjectId, PredicateId, Task};
+use crate::task::{ModuleId, Task};
+
+use self::terms::{Origin, Sources, Terms};
 
 /// A failed call on its way up to [`crate::plan`].
 pub(crate) type Failure = Box<AttachmentError>;
-
-/// Where a reading comes from.
-#[derive(Debug, Clone)]
-enum Origin {
-    /// True where the variable has the value.
-    Fact(VariableId, u32),
-    /// The number.
-    Number(NumericId),
-    /// The object that the variable's value means.
-    Object(VariableId),
-    /// The same in every state.
-    Constant(FactValue),
-}
 
 /// A ground call: the question without its readings, and how to make those.
 #[derive(Debug, Clone)]
 struct Bound {
     attachment: String,
     question: Question,
-    readings: Vec<(Arc<str>, Vec<Arc<str>>, Origin)>,
+    sources: Arc<Sources>,
     writes: Vec<Place>,
 }
+
+/// Answers known already, by what stands where the call reads.
+type Known = FxHashMap<Box<[u64]>, Answer>;
+
+/// A call, what was needed of it, and the proposed parameter.
+type Refusal = (CallId, bool, Option<Arc<str>>);
 
 /// Every call of a ground task, bound to its attachment.
 pub(crate) struct Calls<'a> {
@@ -47,11 +45,15 @@ pub(crate) struct Calls<'a> {
     attachments: &'a Attachments,
     names: Vec<Arc<str>>,
     bound: Vec<Bound>,
+    /// By call, counts of answers that were known already, for the statistics of its attachment.
+    hits: Vec<Option<&'a AtomicU64>>,
     /// Answers of calls that read nothing and take no proposed parameter, exact and relaxed.
     settled: RefCell<Vec<[Option<Answer>; 2]>>,
+    /// Answers of calls that read something, without a proposed parameter, by call and level.
+    known: RefCell<FxHashMap<(CallId, Level), Known>>,
     terms: Terms,
-    /// What condition modules denied and cost modules called impossible.
-    refusals: RefCell<Refusals>,
+    /// Calls that were answered otherwise than needed: what was needed, and the proposed parameter.
+    refused: RefCell<FxHashSet<Refusal>>,
 }
 
 impl<'a> Calls<'a> {
@@ -85,41 +87,53 @@ impl<'a> Calls<'a> {
             attachments,
             names,
             bound: Vec::new(),
+            hits: Vec::new(),
             settled: RefCell::new(vec![[None, None]; ground.calls.len()]),
+            known: RefCell::default(),
             terms: Terms::default(),
-            refusals: RefCell::default(),
+            refused: RefCell::default(),
         };
         if attachments.names().any(|name| !attachments.reads(name).is_empty()) {
             calls.terms = Terms::new(ground);
         }
-        calls.bound = ground
-            .calls
-            .iter()
-            .map(|call| {
-                calls.bind_one(call.origin.schema as usize, &call.origin.arguments, call.writes.clone())
-            })
-            .collect();
+        // Where the arguments make no difference, all calls of a module read the same.
+        let mut shared: FxHashMap<u32, Arc<Sources>> = FxHashMap::default();
+        for call in &ground.calls {
+            let (module, arguments) = (call.origin.schema, &call.origin.arguments);
+            let known = shared.get(&module).cloned();
+            let bound = calls.bind_one(module as usize, arguments, call.writes.clone(), known);
+            if !attachments.reads(&bound.attachment).iter().any(|read| matches!(read, Read::At(..))) {
+                shared.entry(module).or_insert_with(|| bound.sources.clone());
+            }
+            calls.hits.push(attachments.hits(&bound.attachment));
+            calls.bound.push(bound);
+        }
         Ok(calls)
     }
 
-    fn bind_one(&self, module: usize, arguments: &[u32], writes: Vec<Place>) -> Bound {
+    fn bind_one(
+        &self,
+        module: usize,
+        arguments: &[u32],
+        writes: Vec<Place>,
+        known: Option<Arc<Sources>>,
+    ) -> Bound {
         let declared = &self.task.modules[module];
         let attachment =
             self.attachments.resolve(&declared.function, &declared.name).unwrap_or_default().to_string();
         let name = |&object: &u32| self.names[object as usize].clone();
-        let readings = self
-            .attachments
-            .reads(&attachment)
-            .iter()
-            .flat_map(|read| self.terms.readings(self.task, &self.names, read, arguments))
-            .collect();
+        let sources = known.unwrap_or_else(|| {
+            let reads = self.attachments.reads(&attachment).iter();
+            let list = reads.flat_map(|read| self.terms.readings(self.task, &self.names, read, arguments));
+            Arc::new(Sources::new(list.collect()))
+        });
         let question = Question {
             module: declared.name.as_str().into(),
             kind: declared.kind,
             arguments: arguments.iter().map(name).collect(),
             readings: Vec::new(),
         };
-        Bound { attachment, question, readings, writes }
+        Bound { attachment, question, sources, writes }
     }
 
     /// Whether a condition module says yes.
@@ -136,6 +150,21 @@ impl<'a> Calls<'a> {
         }
     }
 
+    /// Whether a condition module says what is needed; what it denies is remembered.
+    pub fn agrees(
+        &self,
+        (call, wanted): (CallId, bool),
+        proposal: Option<&Arc<str>>,
+        state: &Values,
+        level: Level,
+    ) -> Result<bool, Failure> {
+        let agrees = self.truth(call, proposal, state, level)? == wanted;
+        if !agrees {
+            self.refused.borrow_mut().insert((call, wanted, proposal.cloned()));
+        }
+        Ok(agrees)
+    }
+
     /// The cost that a cost module answers.
     pub fn cost(
         &self,
@@ -145,7 +174,12 @@ impl<'a> Calls<'a> {
         level: Level,
     ) -> Result<f64, Failure> {
         match self.answer(call, proposal, state, level)? {
-            Answer::Number(cost) => Ok(cost),
+            Answer::Number(cost) => {
+                if cost.is_infinite() {
+                    self.refused.borrow_mut().insert((call, true, proposal.cloned()));
+                }
+                Ok(cost)
+            }
             other => Err(self.misfit(call, &other)),
         }
     }
@@ -209,7 +243,7 @@ impl<'a> Calls<'a> {
         arguments: &[u32],
         state: &Values,
     ) -> Result<Vec<Arc<str>>, Failure> {
-        let bound = self.bind_one(module, arguments, Vec::new());
+        let bound = self.bind_one(module, arguments, Vec::new(), None);
         let question = self.question(&bound, None, state);
         match self.attachments.call(&bound.attachment, &question, Level::Exact)? {
             Answer::Proposals(names) => Ok(names),
@@ -218,23 +252,30 @@ impl<'a> Calls<'a> {
     }
 
     /// What the answer depends on: variables, then numbers.
-    pub fn reads(&self, call: CallId) -> (Vec<VariableId>, Vec<NumericId>) {
-        let (mut variables, mut numbers) = (Vec::new(), Vec::new());
-        for (_, _, origin) in &self.bound[call as usize].readings {
-            match origin {
-                Origin::Fact(variable, _) | Origin::Object(variable) => variables.push(*variable),
-                Origin::Number(number) => numbers.push(*number),
-                Origin::Constant(_) => {}
-            }
-        }
-        variables.sort_unstable();
-        variables.dedup();
-        (variables, numbers)
+    pub fn reads(&self, call: CallId) -> (&[VariableId], &[NumericId]) {
+        let sources = &self.bound[call as usize].sources;
+        (&sources.variables, &sources.numbers)
     }
 
-    /// What has been refused so far.
+    /// Whether the answer, without a proposed parameter, is the same in every state.
+    pub fn settles(&self, call: CallId) -> bool {
+        let (variables, numbers) = self.reads(call);
+        variables.is_empty() && numbers.is_empty()
+    }
+
+    /// What has been answered otherwise than needed so far.
     pub fn refusals(&self) -> Refusals {
-        self.refusals.borrow().clone()
+        let mut refusals = Refusals::default();
+        let refused = self.refused.borrow();
+        let mut refused: Vec<_> = refused.iter().collect();
+        refused.sort_unstable();
+        for (call, wanted, proposal) in refused {
+            let mut question = self.bound[*call as usize].question.clone();
+            question.arguments.extend(proposal.clone());
+            let module = self.ground.calls[*call as usize].origin.schema;
+            refusals.entry((module, *wanted)).or_default().push(question.to_string());
+        }
+        refusals
     }
 
     /// What kind of module is called.
@@ -250,29 +291,43 @@ impl<'a> Calls<'a> {
         level: Level,
     ) -> Result<Answer, Failure> {
         let bound = &self.bound[call as usize];
-        let settles = bound.readings.is_empty() && proposal.is_none();
-        if settles && let Some(answer) = &self.settled.borrow()[call as usize][level as usize] {
+        if proposal.is_some() {
+            let question = self.question(bound, proposal, state);
+            return Ok(self.attachments.call(&bound.attachment, &question, level)?);
+        }
+        let hit = || {
+            self.hits[call as usize].into_iter().for_each(|hits| {
+                hits.fetch_add(1, Ordering::Relaxed);
+            });
+        };
+        if self.settles(call) {
+            if let Some(answer) = &self.settled.borrow()[call as usize][level as usize] {
+                hit();
+                return Ok(answer.clone());
+            }
+            let answer = match bound.sources.list.is_empty() {
+                true => self.attachments.call(&bound.attachment, &bound.question, level)?,
+                false => {
+                    let question = self.question(bound, None, state);
+                    self.attachments.call(&bound.attachment, &question, level)?
+                }
+            };
+            self.settled.borrow_mut()[call as usize][level as usize] = Some(answer.clone());
+            return Ok(answer);
+        }
+        let values =
+            bound.sources.variables.iter().map(|&variable| u64::from(state.values[variable as usize]));
+        // Adding zero makes -0.0 and 0.0 one key.
+        let numbers =
+            bound.sources.numbers.iter().map(|&number| (state.numbers[number as usize] + 0.0).to_bits());
+        let key: Box<[u64]> = values.chain(numbers).collect();
+        if let Some(answer) = self.known.borrow().get(&(call, level)).and_then(|known| known.get(&key)) {
+            hit();
             return Ok(answer.clone());
         }
-        let answer = if settles {
-            self.attachments.call(&bound.attachment, &bound.question, level)?
-        } else {
-            let question = self.question(bound, proposal, state);
-            self.attachments.call(&bound.attachment, &question, level)?
-        };
-        if matches!(answer, Answer::Truth(false))
-            || matches!(answer, Answer::Number(cost) if cost.is_infinite())
-        {
-            let mut refusals = self.refusals.borrow_mut();
-            let known = refusals.entry(self.ground.calls[call as usize].origin.schema).or_default();
-            let text = bound.question.to_string();
-            if known.len() < 1000 && !known.contains(&text) {
-                known.push(text);
-            }
-        }
-        if settles {
-            self.settled.borrow_mut()[call as usize][level as usize] = Some(answer.clone());
-        }
+        let question = self.question(bound, None, state);
+        let answer = self.attachments.call(&bound.attachment, &question, level)?;
+        self.known.borrow_mut().entry((call, level)).or_default().insert(key, answer.clone());
         Ok(answer)
     }
 
@@ -280,7 +335,8 @@ impl<'a> Calls<'a> {
         let mut question = bound.question.clone();
         question.arguments.extend(proposal.cloned());
         question.readings = bound
-            .readings
+            .sources
+            .list
             .iter()
             .map(|(symbol, arguments, origin)| Reading {
                 symbol: symbol.clone(),
@@ -318,13 +374,22 @@ impl<'a> Calls<'a> {
     }
 }
 
-/// A failed call as an error of the whole planning call, pointing at the module's declaration and its first use.
+/// A failed call as an error of the whole planning call, pointing at where the domain asks it.
 pub(crate) fn report(task: &Task, failure: Failure) -> PlanError {
-    let module = task.modules.iter().find(|module| module.name == failure.module);
+    let module = task.modules.iter().position(|module| module.name == failure.module);
     let list = module
-        .map(|module| {
-            let message = failure.to_string();
-            Diagnostic::error("attachment-failed", message, module.span, "the module declared here")
+        .map(|index| {
+            let (message, declared) = (failure.to_string(), task.modules[index].span);
+            let mut sites = sites(task, ModuleId(index as u32)).into_iter();
+            let Some((who, span)) = sites.next() else {
+                return Diagnostic::error("attachment-failed", message, declared, "the module declared here");
+            };
+            let asked = |who: &str| format!("asked here, by {who}");
+            let mut finding = Diagnostic::error("attachment-failed", message, span, asked(&who));
+            for (who, span) in sites {
+                finding = finding.with_label(span, asked(&who));
+            }
+            finding.with_label(declared, format!("answered by the attachment `{}`", failure.attachment))
         })
         .into_iter()
         .collect();
@@ -364,158 +429,4 @@ fn misfit(bound: &Bound, answer: &Answer) -> AttachmentError {
 
 fn number_value(number: f64) -> FactValue {
     if number.is_nan() { FactValue::Undefined } else { FactValue::Number(number) }
-}
-
-/// Ground terms by name, to where their values stand.
-#[derive(Default)]
-struct Terms {
-    facts: FxHashMap<(u32, Vec<u32>), (VariableId, u32)>,
-    objects: FxHashMap<(u32, Vec<u32>), VariableId>,
-    numbers: FxHashMap<(u32, Vec<u32>), NumericId>,
-}
-
-impl Terms {
-    fn new(ground: &GroundTask) -> Terms {
-        let mut terms = Terms::default();
-        for (variable, declared) in ground.variables.iter().enumerate() {
-            for (value, meaning) in declared.values.iter().enumerate() {
-                match meaning {
-                    Meaning::Atom { predicate, arguments } => {
-                        terms.facts.insert((*predicate, arguments.clone()), (variable as u32, value as u32));
-                    }
-                    Meaning::Object { fluent, arguments, .. } => {
-                        terms.objects.insert((*fluent, arguments.clone()), variable as u32);
-                    }
-                    Meaning::Inner | Meaning::NoneOfThose => {}
-                }
-            }
-        }
-        for (number, fluent) in ground.numerics.iter().enumerate() {
-            terms.numbers.insert((fluent.function, fluent.arguments.clone()), number as u32);
-        }
-        terms
-    }
-
-    /// The ground readings of one declared read, in the order of the task's objects.
-    fn readings(
-        &self,
-        task: &Task,
-        names: &[Arc<str>],
-        read: &Read,
-        arguments: &[u32],
-    ) -> Vec<(Arc<str>, Vec<Arc<str>>, Origin)> {
-        let mut found = Vec::new();
-        let mut add = |symbol: Symbol, arguments: Vec<u32>| {
-            let (name, origin) = self.origin(task, names, symbol, &arguments);
-            found.push((
-                Arc::from(name),
-                arguments.iter().map(|&a| names[a as usize].clone()).collect(),
-                origin,
-            ));
-        };
-        match read {
-            Read::At(name, positions) => {
-                let picked: Option<Vec<u32>> =
-                    positions.iter().map(|&position| arguments.get(position).copied()).collect();
-                if let (Some(symbol), Some(picked)) = (symbol_named(task, name), picked) {
-                    add(symbol, picked);
-                }
-            }
-            Read::All(name) => {
-                if let Some(symbol) = symbol_named(task, name) {
-                    instances(task, symbol).into_iter().for_each(|instance| add(symbol, instance));
-                }
-            }
-            Read::Everything => {
-                for symbol in every_symbol(task) {
-                    instances(task, symbol).into_iter().for_each(|instance| add(symbol, instance));
-                }
-            }
-        }
-        found
-    }
-
-    fn origin<'t>(
-        &self,
-        task: &'t Task,
-        names: &[Arc<str>],
-        symbol: Symbol,
-        arguments: &[u32],
-    ) -> (&'t str, Origin) {
-        let key = |id: u32| (id, arguments.to_vec());
-        let same = |objects: &[ObjectId]| objects.iter().map(|object| object.0).eq(arguments.iter().copied());
-        match symbol {
-            Symbol::Predicate(id) => {
-                let origin = match self.facts.get(&key(id.0)) {
-                    Some(&(variable, value)) => Origin::Fact(variable, value),
-                    None => {
-                        let holds =
-                            task.init.facts.iter().any(|fact| fact.predicate == id && same(&fact.arguments));
-                        Origin::Constant(FactValue::Truth(holds))
-                    }
-                };
-                (&task.predicate(id).name, origin)
-            }
-            Symbol::Function(id) => {
-                let numeric = || {
-                    let start =
-                        task.init.numbers.iter().find(|(f, _)| f.function == id && same(&f.arguments));
-                    start.map_or(FactValue::Undefined, |(_, number)| FactValue::Number(*number))
-                };
-                let object = || {
-                    let start =
-                        task.init.objects.iter().find(|(f, _)| f.function == id && same(&f.arguments));
-                    start.map_or(FactValue::Undefined, |(_, o)| FactValue::Object(names[o.index()].clone()))
-                };
-                let declared = task.function(id);
-                let origin = match (self.numbers.get(&key(id.0)), self.objects.get(&key(id.0))) {
-                    (Some(&number), _) if declared.result.is_none() => Origin::Number(number),
-                    (_, Some(&variable)) if declared.result.is_some() => Origin::Object(variable),
-                    _ if declared.result.is_none() => Origin::Constant(numeric()),
-                    _ => Origin::Constant(object()),
-                };
-                (&declared.name, origin)
-            }
-        }
-    }
-}
-
-#[derive(Clone, Copy)]
-enum Symbol {
-    Predicate(PredicateId),
-    Function(FunctionId),
-}
-
-fn symbol_named(task: &Task, name: &str) -> Option<Symbol> {
-    let predicate = task.predicates.iter().position(|p| p.name.eq_ignore_ascii_case(name));
-    let function = task.functions.iter().position(|f| f.name.eq_ignore_ascii_case(name));
-    predicate
-        .map(|index| Symbol::Predicate(PredicateId(index as u32)))
-        .or(function.map(|index| Symbol::Function(FunctionId(index as u32))))
-}
-
-fn every_symbol(task: &Task) -> Vec<Symbol> {
-    let predicates = (0..task.predicates.len()).map(|index| Symbol::Predicate(PredicateId(index as u32)));
-    predicates
-        .chain((0..task.functions.len()).map(|index| Symbol::Function(FunctionId(index as u32))))
-        .collect()
-}
-
-fn instances(task: &Task, symbol: Symbol) -> Vec<Vec<u32>> {
-    let parameters = match symbol {
-        Symbol::Predicate(id) => &task.predicate(id).parameters,
-        Symbol::Function(id) => &task.function(id).parameters,
-    };
-    parameters.iter().fold(vec![Vec::new()], |instances, parameter| {
-        instances
-            .iter()
-            .flat_map(|instance| {
-                parameter.objects.iter().map(|object| {
-                    let mut longer: Vec<u32> = instance.clone();
-                    longer.push(object.0);
-                    longer
-                })
-            })
-            .collect()
-    })
 }

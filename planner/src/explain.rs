@@ -1,16 +1,20 @@
 //! Why there is no plan.
 
+mod sites;
+
 use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
 
+use crate::attachment::CallKind;
 use crate::diagnostic::{Diagnostic, Findings, Span};
 use crate::ground::{GroundTask, MissingAtom, Obstacle};
 use crate::task::{
-    Action, Atom, Call, Change, Condition, Expression, FunctionId, GroundChange, ModuleId, PredicateId, Task,
-    Term,
+    Action, Atom, Change, Condition, Expression, FunctionId, GroundChange, ModuleId, PredicateId, Task, Term,
 };
+
+pub(crate) use self::sites::sites;
 
 /// Why a task has no plan: findings that point at the goal, at what nobody achieves, and at who said no.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -34,32 +38,73 @@ impl fmt::Display for Explanation {
     }
 }
 
-/// Calls that an attachment refused, by module: no, or an infinite cost.
-pub(crate) type Refusals = BTreeMap<u32, Vec<String>>;
+/// Calls that were not answered as needed, by module and whether yes was needed (of a cost: a finite one).
+pub(crate) type Refusals = BTreeMap<(u32, bool), Vec<String>>;
 
 /// How many refused calls of one module are shown.
 const SHOWN: usize = 8;
 
-/// The reasons why a task has no plan.
-pub(crate) fn explain(task: &Task, refusals: &Refusals) -> Explanation {
+/// The reasons why a task has no plan: what stands in the goal itself, what grounding found out, who said no; and where
+/// each part of the goal could be had by itself, what that leaves.
+pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> Explanation {
     let reach = Reach::new(task);
     let mut list = Vec::new();
+    let mut told = Vec::new();
     let mut parts = Vec::new();
     conjuncts(&task.goal.body, &mut parts);
-    for part in parts {
-        list.extend(goal_part(task, &reach, part));
+    for &part in &parts {
+        list.extend(goal_part(task, &reach, part, &mut told));
     }
-    for (&module, calls) in refusals {
-        list.extend(refused(task, ModuleId(module), calls));
+    let untold = |obstacle: &&Obstacle| !told.iter().any(|predicate| predicate.0 == obstacle.predicate);
+    list.extend(ground.obstacles.iter().filter(untold).map(|obstacle| finding(task, obstacle, &parts)));
+    for (&(module, wanted), calls) in refusals {
+        list.extend(refused(task, ModuleId(module), wanted, calls));
     }
     if list.is_empty() {
-        let message = "every state that can be reached was seen, and none fulfils the whole goal";
-        let span = first_span(&task.goal.body).unwrap_or_default();
-        let help =
-            "each part of the goal can be had if nothing is ever taken away: some parts exclude each other";
-        list.push(Diagnostic::error("unsolvable", message, span, "this goal").with_help(help));
+        list.push(together(task, parts.len()));
     }
     Explanation { findings: Findings { sources: task.sources.to_vec(), list } }
+}
+
+/// Each part of the goal can be had if nothing is ever taken away: what may be in the way of all.
+fn together(task: &Task, parts: usize) -> Diagnostic {
+    let message = "every state that can be reached was seen, and none fulfils the whole goal";
+    let span = first_span(&task.goal.body).unwrap_or_default();
+    let mut finding = Diagnostic::error("unsolvable", message, span, "this goal");
+    let mut reasons = vec![match parts {
+        0 | 1 => "some of what it needs excludes the rest",
+        _ => "some parts of the goal exclude each other",
+    }];
+    let ends = |change: &GroundChange| matches!(change, GroundChange::Delete(_));
+    for timed in task.init.timed.iter().filter(|timed| ends(&timed.change)).take(SHOWN) {
+        finding = finding.with_label(timed.span, format!("only until {} s", timed.time_s));
+    }
+    if !task.init.timed.is_empty() {
+        reasons.push("what is given only until some time ends too early");
+    }
+    for (action, span, end) in task.actions.iter().filter_map(given_while_running).take(SHOWN) {
+        let name = &task.predicate(end).name;
+        finding = finding.with_label(span, format!("`{}` gives `{name}` only while it runs", action.name));
+        if !reasons.contains(&LASTS) {
+            reasons.push(LASTS);
+        }
+    }
+    let help = format!(
+        "with nothing ever taken away and all the time in the world it could be had: {}",
+        reasons.join(", or ")
+    );
+    finding.with_help(help)
+}
+
+const LASTS: &str = "what an action gives only while it runs does not last long enough";
+
+/// A predicate that an action makes true at its start and false at its end.
+fn given_while_running(action: &Action) -> Option<(&Action, Span, PredicateId)> {
+    action.effects.start.iter().find_map(|effect| {
+        let Change::Add(atom) = &effect.change else { return None };
+        let ends = |end: &crate::task::Effect| matches!(&end.change, Change::Delete(gone) if gone.predicate == atom.predicate && gone.arguments == atom.arguments);
+        action.effects.end.iter().any(ends).then_some((action, atom.span, atom.predicate))
+    })
 }
 
 fn conjuncts<'t>(condition: &'t Condition, parts: &mut Vec<&'t Condition>) {
@@ -164,9 +209,16 @@ fn added<'t>(task: &'t Task, action: &'t Action) -> impl Iterator<Item = (Predic
     })
 }
 
-fn goal_part(task: &Task, reach: &Reach, part: &Condition) -> Option<Diagnostic> {
+fn goal_part(
+    task: &Task,
+    reach: &Reach,
+    part: &Condition,
+    told: &mut Vec<PredicateId>,
+) -> Option<Diagnostic> {
     match part {
-        Condition::Atom(atom) if !reach.predicates[atom.predicate.index()] => Some(nobody(task, reach, atom)),
+        Condition::Atom(atom) if !reach.predicates[atom.predicate.index()] => {
+            Some(nobody(task, reach, atom, told))
+        }
         Condition::Compare(_, sides, span) => {
             let mut functions = Vec::new();
             sides.iter().for_each(|side| fluents(side, &mut functions));
@@ -188,7 +240,7 @@ fn goal_part(task: &Task, reach: &Reach, part: &Condition) -> Option<Diagnostic>
 }
 
 /// A goal atom out of reach: who could add it, and what those lack, down to what nobody adds at all.
-fn nobody(task: &Task, reach: &Reach, goal: &Atom) -> Diagnostic {
+fn nobody(task: &Task, reach: &Reach, goal: &Atom, told: &mut Vec<PredicateId>) -> Diagnostic {
     let name = |predicate: PredicateId| task.predicate(predicate).name.as_str();
     let mut finding = Diagnostic::error(
         "unsolvable",
@@ -226,6 +278,7 @@ fn nobody(task: &Task, reach: &Reach, goal: &Atom) -> Diagnostic {
         seen.push(lacks.predicate);
         wanted = lacks.predicate;
     }
+    told.extend(seen);
     let declared = task.predicate(wanted).span;
     finding.with_label(declared, format!("nothing ever makes `{}` true", name(wanted))).with_help(format!(
         "add {} to `:init`, or give some action the effect `({} …)`",
@@ -238,65 +291,29 @@ fn nobody(task: &Task, reach: &Reach, goal: &Atom) -> Diagnostic {
     ))
 }
 
-/// What an attachment refused, under the call in the domain.
-fn refused(task: &Task, module: ModuleId, calls: &[String]) -> Option<Diagnostic> {
-    let (action, call) = task.actions.iter().find_map(|action| Some((action, call_of(action, module)?)))?;
+/// What an attachment refused, under the calls in the domain.
+fn refused(task: &Task, module: ModuleId, wanted: bool, calls: &[String]) -> Option<Diagnostic> {
+    let mut sites = sites(task, module).into_iter();
+    let (who, span) = sites.next()?;
     let more = calls.len().saturating_sub(SHOWN);
     let mut shown = calls.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
     if more > 0 {
         shown.push_str(&format!(" and {more} more"));
     }
-    let message = format!("the attachment of `{}` said no: {shown}", task.module(module).name);
-    Some(
-        Diagnostic::error(
-            "attachment-refused",
-            message,
-            call.span,
-            format!("`{}` depends on it here", action.name),
-        )
-        .with_help("with any of these answered otherwise there might be a plan"),
-    )
-}
-
-/// The first call of a module in an action.
-fn call_of(action: &Action, module: ModuleId) -> Option<&Call> {
-    let bounds = action.duration.iter().flatten().find_map(|bound| in_expression(&bound.value, module));
-    let condition = &action.condition;
-    bounds
-        .or_else(|| {
-            [&condition.start, &condition.over_all, &condition.end]
-                .into_iter()
-                .find_map(|c| in_condition(c, module))
-        })
-        .or_else(|| action.grounding.iter().find(|call| call.module == module))
-}
-
-fn in_condition(condition: &Condition, module: ModuleId) -> Option<&Call> {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            parts.iter().find_map(|part| in_condition(part, module))
-        }
-        Condition::Not(inner) | Condition::Forall(_, inner) | Condition::Exists(_, inner) => {
-            in_condition(inner, module)
-        }
-        Condition::Call(call) => (call.module == module).then_some(call),
-        Condition::Compare(_, sides, _) => sides.iter().find_map(|side| in_expression(side, module)),
-        Condition::Atom(_) | Condition::Same(..) => None,
+    let declared = task.module(module);
+    let answer = match declared.kind {
+        CallKind::Cost => "called impossible (an infinite cost)",
+        _ if wanted => "said no to",
+        _ => "said yes, where no is needed, to",
+    };
+    let message = format!("the attachment of `{}` {answer}: {shown}", declared.name);
+    let mut finding =
+        Diagnostic::error("attachment-refused", message, span, format!("{who} depends on it here"));
+    for (who, span) in sites {
+        finding = finding.with_label(span, format!("{who} depends on it here"));
     }
-}
-
-fn in_expression(expression: &Expression, module: ModuleId) -> Option<&Call> {
-    match expression {
-        Expression::Call(call) => (call.module == module).then_some(call),
-        Expression::Add(parts) | Expression::Multiply(parts) => {
-            parts.iter().find_map(|part| in_expression(part, module))
-        }
-        Expression::Subtract(sides) | Expression::Divide(sides) => {
-            sides.iter().find_map(|side| in_expression(side, module))
-        }
-        Expression::Negative(inner) => in_expression(inner, module),
-        _ => None,
-    }
+    let help = "with any of these answered otherwise there might be a plan";
+    Some(finding.with_help(help))
 }
 
 fn fluents(expression: &Expression, functions: &mut Vec<FunctionId>) {
@@ -354,19 +371,26 @@ fn first_span(condition: &Condition) -> Option<Span> {
     }
 }
 
-impl Explanation {
-    /// From what grounding found out: one finding an atom that nobody achieves, the goal's first. Empty where only the
-    /// search could tell that there is no plan.
-    pub fn of_obstacles(task: &Task, ground: &GroundTask) -> Explanation {
-        let list = ground.obstacles.iter().map(|obstacle| finding(task, obstacle)).collect();
-        Explanation { findings: Findings { sources: task.sources.to_vec(), list } }
-    }
+/// The part of the goal that asks for an atom.
+fn asked(parts: &[&Condition], obstacle: &Obstacle) -> Option<Span> {
+    let same = |term: &Term, object: &Option<u32>| match term {
+        Term::Object(own) => Some(own.0) == *object,
+        Term::Variable(_) | Term::Function(_) => true,
+    };
+    parts.iter().find_map(|part| match part {
+        Condition::Atom(atom) => {
+            let own = atom.predicate.0 == obstacle.predicate
+                && atom.arguments.iter().zip(&obstacle.arguments).all(|(term, object)| same(term, object));
+            own.then_some(atom.span)
+        }
+        _ => None,
+    })
 }
 
-fn finding(task: &Task, obstacle: &Obstacle) -> Diagnostic {
+fn finding(task: &Task, obstacle: &Obstacle, goal: &[&Condition]) -> Diagnostic {
     let atom = named(task, &(obstacle.predicate, obstacle.arguments.clone()));
     let predicates = task.predicates.len();
-    let span = match (obstacle.predicate as usize).checked_sub(predicates) {
+    let declared = match (obstacle.predicate as usize).checked_sub(predicates) {
         None => task.predicates[obstacle.predicate as usize].span,
         Some(function) => task.functions[function].span,
     };
@@ -376,7 +400,10 @@ fn finding(task: &Task, obstacle: &Obstacle) -> Diagnostic {
     } else {
         format!("{atom} never holds: nothing that could bring it about can ever be applied")
     };
-    let mut finding = Diagnostic::error("out-of-reach", message, span, "declared here");
+    let mut finding = match asked(goal, obstacle) {
+        Some(span) => Diagnostic::error("out-of-reach", message, span, "the goal asks for it"),
+        None => Diagnostic::error("out-of-reach", message, declared, "declared here"),
+    };
     let actions = obstacle.achievers.iter().map(|(schema, missing)| {
         let action = &task.actions[*schema as usize];
         (action.span, format!("`{}`", action.name), missing)

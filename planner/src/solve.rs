@@ -218,12 +218,10 @@ pub fn plan(
             Outcome::Solved { plan, statistics }
         }
         (None, Reason::Exhausted | Reason::Enough) => {
-            let mut why = explain(task, &world.calls.refusals());
-            // What grounding found out is exact: it comes after what stands in the goal itself.
-            why.findings.list.extend(Explanation::of_obstacles(task, &grounded).findings.list);
+            let why = explain(task, &grounded, &world.calls.refusals());
             Outcome::Unsolvable { why, statistics }
         }
-        (best, Reason::Stopped) => Outcome::OutOfTime { best, statistics },
+        (best, Reason::Stopped | Reason::Unproven) => Outcome::OutOfTime { best, statistics },
         (best, Reason::Memory) => Outcome::OutOfMemory { best, statistics },
     })
 }

@@ -114,7 +114,7 @@ fn an_infinite_cost_means_that_the_way_is_closed() {
 }
 
 #[test]
-fn missing_and_failing_attachments_are_errors_at_their_module() {
+fn missing_and_failing_attachments_are_errors_at_their_place() {
     let task = look(3, 0.5);
     let run =
         |attachments: &Attachments| plan(&task, attachments, &Options::default(), &|| false, &mut |_| {});
@@ -128,5 +128,7 @@ fn missing_and_failing_attachments_are_errors_at_their_module() {
     let failed = run(&failing);
     let Err(error @ PlanError::Attachment { .. }) = failed else { panic!("{failed:?}") };
     assert!(error.to_string().contains("the map is not there yet"), "{error}");
-    assert!(error.findings().is_some_and(|findings| findings.render(false).contains("look.pddl:5")));
+    // Drawn where it is asked, and where it is declared.
+    let drawn = error.findings().map(|findings| findings.render(false)).unwrap_or_default();
+    assert!(drawn.contains("asked here, by `move`") && drawn.contains("(path-cost ?from ?to"), "{drawn}");
 }

@@ -94,6 +94,22 @@ fn durations_depend_on_the_state_and_stretch() {
 }
 
 #[test]
+fn what_never_matters_disturbs_nobody() {
+    // The parts of an order are asked for all at once; those of another order are no part of it.
+    let domain = "(:requirements :adl) (:types order part) (:predicates (of ?p - part ?o - order) (made ?p - part)
+        (shipped ?o - order)) (:functions (needed ?p - part))
+      (:durative-action make :parameters (?p - part) :duration (= ?duration (needed ?p)) :condition (at start (not (made ?p)))
+        :effect (at end (made ?p)))
+      (:durative-action ship :parameters (?o - order) :duration (= ?duration 1)
+        :condition (at start (forall (?p - part) (imply (of ?p ?o) (made ?p)))) :effect (at end (shipped ?o)))";
+    let problem =
+        "(:objects a b - order p q - part) (:init (of p a) (of q b) (= (needed p) 2) (= (needed q) 2.001))
+      (:goal (and (shipped a) (shipped b)))";
+    // The first order goes out at the moment when the part of the second is ready.
+    check(domain, problem, Some(3.002));
+}
+
+#[test]
 fn numbers_limit_what_runs_at_once() {
     let domain = "(:requirements :numeric-fluents) (:types job) (:predicates (done ?j - job)) (:functions (hands))
       (:durative-action work :parameters (?j - job) :duration (= ?duration 10) :condition (at start (>= (hands) 1))

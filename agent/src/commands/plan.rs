@@ -92,7 +92,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     if arguments.json {
         print_json(status, &outcome, started)?;
     } else {
-        show(&status, &outcome, arguments.out.is_some(), started)?;
+        show(&status, &outcome, arguments.out.is_some(), started, stop())?;
     }
     Ok(exit)
 }
@@ -121,14 +121,22 @@ fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(),
     }))
 }
 
-fn show(status: &Status, outcome: &Outcome, written: bool, started: Instant) -> Result<(), CommandError> {
+fn show(
+    status: &Status,
+    outcome: &Outcome,
+    written: bool,
+    started: Instant,
+    cut_short: bool,
+) -> Result<(), CommandError> {
     let time = format!(
         "{:.3} s, {} states evaluated",
         started.elapsed().as_secs_f64(),
         outcome.statistics().evaluated
     );
     match (outcome, outcome.plan()) {
-        (Outcome::Unsolvable { why, .. }, _) => eprintln!("proven unsolvable ({time})\n{why}"),
+        (Outcome::Unsolvable { why, .. }, _) => {
+            eprintln!("proven unsolvable ({time})\n{}", input::drawn(&why.findings));
+        }
         (_, Some(plan)) => {
             if !written {
                 input::print_text(plan.to_string().trim_end())?;
@@ -136,7 +144,10 @@ fn show(status: &Status, outcome: &Outcome, written: bool, started: Instant) -> 
             eprintln!("{} ({time})", summary(plan));
         }
         _ if matches!(status, Status::OutOfMemory) => eprintln!("out of memory, no plan yet ({time})"),
-        _ => eprintln!("out of time, no plan yet ({time})"),
+        _ if cut_short => eprintln!("out of time, no plan yet ({time})"),
+        _ => eprintln!(
+            "no plan was found, and none is ruled out: the search has left possibilities out ({time})"
+        ),
     }
     for (name, calls) in &outcome.statistics().attachments {
         eprintln!(

@@ -114,6 +114,62 @@ pub enum Relation {
     Unequal,
 }
 
+impl Relation {
+    /// Whether everything on one side of a bound will do.
+    pub fn is_bound(self) -> bool {
+        !matches!(self, Relation::Equal | Relation::Unequal)
+    }
+}
+
+impl Expression {
+    /// Whether the value is a weighted sum of numbers.
+    pub fn is_linear(&self) -> bool {
+        match self {
+            Expression::Constant(_) | Expression::Fluent(_) => true,
+            Expression::Sum(parts) => parts.iter().all(Expression::is_linear),
+            Expression::Difference(left, right) => left.is_linear() && right.is_linear(),
+            Expression::Negative(inner) => inner.is_linear(),
+            Expression::Product(parts) => {
+                let factors = parts.iter().filter(|part| !matches!(part, Expression::Constant(_)));
+                factors.clone().count() <= 1 && factors.into_iter().all(Expression::is_linear)
+            }
+            Expression::Quotient(left, right) => {
+                left.is_linear() && matches!(**right, Expression::Constant(_))
+            }
+            Expression::Call(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {
+                false
+            }
+        }
+    }
+}
+
+impl Expression {
+    /// By how much a sum ([`Expression::is_linear`]) changes with a number.
+    pub fn weight_of(&self, fluent: NumericId) -> f64 {
+        match self {
+            Expression::Fluent(own) => f64::from(u8::from(*own == fluent)),
+            Expression::Sum(parts) => parts.iter().map(|part| part.weight_of(fluent)).sum(),
+            Expression::Difference(left, right) => left.weight_of(fluent) - right.weight_of(fluent),
+            Expression::Negative(inner) => -inner.weight_of(fluent),
+            Expression::Product(parts) => {
+                let factor = |part: &Expression| match part {
+                    Expression::Constant(number) => *number,
+                    other => other.weight_of(fluent),
+                };
+                if parts.iter().all(|part| matches!(part, Expression::Constant(_))) {
+                    return 0.0;
+                }
+                parts.iter().map(factor).product()
+            }
+            Expression::Quotient(left, right) => match **right {
+                Expression::Constant(number) => left.weight_of(fluent) / number,
+                _ => 0.0,
+            },
+            _ => 0.0,
+        }
+    }
+}
+
 /// A numeric condition. False where a side is NaN.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {

@@ -50,7 +50,7 @@ pub(crate) fn plan_classical(
             Outcome::Solved { plan, statistics }
         }
         (None, ClassicalEnd::Done | ClassicalEnd::Exhausted) => {
-            Outcome::Unsolvable { why: explain(task, &Refusals::new()), statistics }
+            Outcome::Unsolvable { why: explain(task, grounded, &Refusals::new()), statistics }
         }
         (best, ClassicalEnd::Stopped) => Outcome::OutOfTime { best, statistics },
         (best, ClassicalEnd::Memory) => Outcome::OutOfMemory { best, statistics },

@@ -92,6 +92,8 @@ pub struct Semantics<'a> {
     bound: Vec<String>,
     object_names: Vec<Arc<str>>,
     module_names: Vec<Arc<str>>,
+    /// By predicate, whether something may change it.
+    changing: Vec<bool>,
 }
 
 impl<'a> Semantics<'a> {
@@ -106,6 +108,7 @@ impl<'a> Semantics<'a> {
             bound: bound.collect(),
             object_names: task.objects.iter().map(|object| object.name.as_str().into()).collect(),
             module_names: task.modules.iter().map(|module| module.name.as_str().into()).collect(),
+            changing: reads::changing(task),
         }
     }
 

@@ -10,7 +10,8 @@ use super::effects::Changes;
 use super::{Binding, CallFailure, Semantics};
 use crate::state::State;
 use crate::task::{
-    Assignment, Call, Change, Condition, Effect, Expression, Fact, GroundFluent, ObjectId, PredicateId, Term,
+    Assignment, Call, Change, Condition, Effect, Expression, Fact, GroundChange, GroundFluent, ObjectId,
+    PredicateId, Task, Term, Written,
 };
 
 /// What one participant of a happening reads and writes.
@@ -68,6 +69,10 @@ impl Semantics<'_> {
         binding: &mut Binding,
         touched: &mut Touched,
     ) -> Result<(), CallFailure> {
+        // What decides a condition once and for all leaves the rest of it without a meaning.
+        if self.constant(state, condition, binding).is_some() {
+            return Ok(());
+        }
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
                 for part in parts {
@@ -94,6 +99,34 @@ impl Semantics<'_> {
             Condition::Call(call) => self.call_reads(state, call, binding, touched),
         }
         Ok(())
+    }
+
+    /// The truth of a condition that nothing ever changes; `None` if something may.
+    fn constant(&self, state: &State, condition: &Condition, binding: &Binding) -> Option<bool> {
+        match condition {
+            Condition::And(parts) => {
+                let mut truths = parts.iter().map(|part| self.constant(state, part, binding));
+                let all = truths.clone().all(|truth| truth == Some(true));
+                if all { Some(true) } else { truths.any(|truth| truth == Some(false)).then_some(false) }
+            }
+            Condition::Or(parts) => {
+                let mut truths = parts.iter().map(|part| self.constant(state, part, binding));
+                let none = truths.clone().all(|truth| truth == Some(false));
+                if none { Some(false) } else { truths.any(|truth| truth == Some(true)).then_some(true) }
+            }
+            Condition::Not(inner) => self.constant(state, inner, binding).map(|truth| !truth),
+            Condition::Atom(atom) => {
+                let fixed = atom.arguments.iter().all(|term| !matches!(term, Term::Function(_)));
+                let arguments = (fixed && !self.changing[atom.predicate.index()])
+                    .then(|| self.objects(state, &atom.arguments, binding))??;
+                Some(state.holds(atom.predicate, &arguments))
+            }
+            Condition::Same(..)
+            | Condition::Compare(..)
+            | Condition::Call(_)
+            | Condition::Forall(..)
+            | Condition::Exists(..) => None,
+        }
     }
 
     /// Notes what effects read: their conditions and values.
@@ -214,4 +247,28 @@ impl Semantics<'_> {
             }
         }
     }
+}
+
+/// By predicate, whether an action, a rule, a module or a timed literal may change it.
+pub(super) fn changing(task: &Task) -> Vec<bool> {
+    let mut changing: Vec<bool> =
+        task.predicates.iter().map(|predicate| predicate.stratum.is_some()).collect();
+    for action in &task.actions {
+        for effect in action.effects.start.iter().chain(&action.effects.end) {
+            if let Change::Add(atom) | Change::Delete(atom) = &effect.change {
+                changing[atom.predicate.index()] = true;
+            }
+        }
+    }
+    for written in task.modules.iter().flat_map(|module| &module.writes) {
+        if let Written::Truth(atom) = written {
+            changing[atom.predicate.index()] = true;
+        }
+    }
+    for timed in &task.init.timed {
+        if let GroundChange::Add(fact) | GroundChange::Delete(fact) = &timed.change {
+            changing[fact.predicate.index()] = true;
+        }
+    }
+    changing
 }

@@ -1,27 +1,29 @@
-//! Durative actions done in one go, as instantaneous ones for the classical search.
+//! Durative actions as instantaneous ones for the classical search: done in one go, or as a start and an end.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::ground::{Action, Conjunction, Effect, Expression, Fact, GroundTask, Metric, Outcome};
+use rustc_hash::FxHashMap;
+
+use crate::ground::{
+    Action, Conjunction, Effect, Expression, Fact, GroundTask, Meaning, Metric, Outcome, Variable,
+};
 use crate::search::compiled::is_classical;
 use crate::search::run::{ClassicalOptions, solve};
 
 use super::advance::Step;
 use super::relaxed::Part;
 use super::space::Space;
-use super::world::{Act, Span};
+use super::world::{Act, NOTHING, Span, World};
 
-/// A first plan by the classical search on actions done in one go; `None` where the task does not allow it, or where
-/// that search finds none.
+/// A first plan by the classical search, with actions in one go, or with start and end apart where the space has them
+/// so; `None` where the task does not allow it, or where that search finds none. Durations are left out of it: what it
+/// finds may not fit in time.
 pub(crate) fn classical_plan(
     space: &Space,
     memory_bytes: usize,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<(Vec<Step>, u64)> {
-    if space.tight {
-        return None;
-    }
-    let (task, acts) = compressed(space)?;
+    let (task, parts) = compressed(space)?;
     if !is_classical(&task) {
         return None;
     }
@@ -29,7 +31,7 @@ pub(crate) fn classical_plan(
         anytime: false,
         bound: None,
         memory_limit_bytes: Some(memory_bytes),
-        evaluation_limit: None,
+        evaluation_limit: space.tight.then_some(MOST_EVALUATED),
     };
     // The first plan is enough: what is cheap one after the other need not be quick side by side.
     let found = AtomicBool::new(false);
@@ -41,24 +43,103 @@ pub(crate) fn classical_plan(
     });
     let actions = actions?;
     let nothing = Span { least_s: 0.0, most_s: 0.0 };
-    let step =
-        |&action: &u32| Step { act: acts[action as usize], part: Part::Whole, proposal: None, span: nothing };
+    let step = |&action: &u32| {
+        let (act, part) = parts[action as usize];
+        Step { act, part, proposal: None, span: nothing }
+    };
     Some((actions.iter().map(step).collect(), outcome.evaluated))
 }
 
-/// The task with every action in one go, and by its actions the space's.
-fn compressed(space: &Space) -> Option<(GroundTask, Vec<u32>)> {
+/// States that the classical search evaluates at most where its plan may not fit in time.
+const MOST_EVALUATED: u64 = 20_000;
+/// Actions with start and end apart, and conditions that keep what they hold while they run, at most.
+const MOST_APART: usize = 5_000;
+const MOST_GUARDS: usize = 2_000_000;
+
+/// The task with every action in one go, or as its start and its end; and by its actions the space's.
+fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
     let world = space.world;
+    let apart: Vec<u32> = (0..world.acts.len() as u32).filter(|&act| space.open_act[act as usize]).collect();
+    let derived = world.ground.variables.iter().any(|variable| variable.stratum.is_some());
+    if !world.ground.timed.is_empty() || apart.len() > MOST_APART || derived && !apart.is_empty() {
+        return None;
+    }
     let mut task = GroundTask { durative: Vec::new(), actions: Vec::new(), ..world.ground.clone() };
-    let mut origins = Vec::new();
-    for (index, act) in world.acts.iter().enumerate() {
+    let mut parts = Vec::new();
+    for (index, act) in world.acts.iter().enumerate().filter(|(index, _)| !space.open_act[*index]) {
         let Some(action) = in_one_go(act, seconds(act)?) else { continue };
         task.actions.push(action);
-        origins.push(index as u32);
+        parts.push((index as u32, Part::Whole));
     }
+    for &index in &apart {
+        let act = &world.acts[index as usize];
+        let running = Fact { variable: task.variables.len() as u32, value: 0 };
+        let Some(halves) = halves(act, seconds(act)?, running) else { continue };
+        task.variables.push(Variable { values: vec![Meaning::Inner, Meaning::NoneOfThose], stratum: None });
+        task.initial.values.push(IDLE);
+        task.goal.facts.push(Fact { value: IDLE, ..running });
+        task.actions.extend(halves);
+        parts.extend([(index, Part::Start), (index, Part::End)]);
+    }
+    guard(world, &mut task, &parts)?;
     let expression = Expression::Constant(0.0);
     task.metric = Some(Metric { minimise: true, expression, additive: true, time_weight: 0.0 });
-    Some((task, origins))
+    Some((task, parts))
+}
+
+/// The value of an action's own variable while it does not run.
+const IDLE: u32 = 1;
+
+/// Start and end of an action as actions; `running` is true in between. `None` if it can never run.
+fn halves(act: &Act, seconds: f64, running: Fact) -> Option<[Action; 2]> {
+    let mut inside =
+        in_one_go(&Act { at_end: &NOTHING, end_effects: &[], flow_effects: &[], ..act.clone() }, 0.0)?;
+    inside.condition.facts.push(Fact { value: IDLE, ..running });
+    let always = |fact: Fact| Effect { when: None, outcome: Outcome::Set(fact) };
+    inside.effects.push(always(running));
+    let nobody = Act { start_effects: &[], at_start: act.over_all, ..act.clone() };
+    let mut end = in_one_go(&nobody, seconds)?;
+    end.condition.facts.push(running);
+    end.effects.push(always(Fact { value: IDLE, ..running }));
+    Some([inside, end])
+}
+
+/// Lets no action take away what another one needs while it runs; `None` where that would be too many conditions.
+fn guard(world: &World, task: &mut GroundTask, parts: &[(u32, Part)]) -> Option<()> {
+    let mut kept: FxHashMap<u32, Vec<(u32, u32, Fact)>> = FxHashMap::default();
+    for (action, &(act, _)) in parts.iter().enumerate().filter(|(_, (_, part))| *part == Part::Start) {
+        let running = task.actions[action].condition.facts.last().copied()?;
+        for fact in &world.acts[act as usize].over_all.facts {
+            kept.entry(fact.variable).or_default().push((fact.value, act, running));
+        }
+    }
+    let mut guards = 0;
+    for (action, &(act, _)) in task.actions.iter_mut().zip(parts) {
+        let own = &world.acts[act as usize];
+        let changes = own.start_effects.iter().chain(own.end_effects).filter_map(set);
+        let mut idle: Vec<Fact> = changes
+            .flat_map(|fact| kept.get(&fact.variable).into_iter().flatten().map(move |kept| (fact, kept)))
+            .filter(|(fact, (value, other, _))| fact.value != *value && *other != act)
+            .map(|(_, &(_, _, running))| running)
+            .collect();
+        idle.sort_unstable();
+        idle.dedup();
+        guards += idle.len();
+        action.condition.facts.extend(idle);
+        action.condition.facts.sort_unstable();
+        action.condition.facts.dedup();
+        if guards > MOST_GUARDS {
+            return None;
+        }
+    }
+    Some(())
+}
+
+fn set(effect: &Effect) -> Option<Fact> {
+    match effect.outcome {
+        Outcome::Set(fact) => Some(fact),
+        _ => None,
+    }
 }
 
 fn seconds(act: &Act) -> Option<f64> {
@@ -72,10 +153,6 @@ fn seconds(act: &Act) -> Option<f64> {
 
 /// `None` if the action needs something inside that its own start takes away.
 fn in_one_go(act: &Act, seconds: f64) -> Option<Action> {
-    let set = |effect: &Effect| match effect.outcome {
-        Outcome::Set(fact) => Some(fact),
-        _ => None,
-    };
     let after_start =
         |variable: u32| act.start_effects.iter().rev().filter_map(set).find(|fact| fact.variable == variable);
     let mut condition = act.at_start.clone();

@@ -206,8 +206,15 @@ pub(crate) fn taken_apart(space: &Space, steps: &[Step], chance: &mut Chance) ->
     // One goal, a few, or up to half of them are given up.
     let most = [1, 1, 2, 3, parts.div_ceil(3), parts.div_ceil(2)][chance.below(6)].min(parts);
     let mut kept = goal.clone();
+    // What is fulfilled last decides when the plan ends: it is given up more often.
+    if let Ok(track) = space.track(steps) {
+        let ready_s = track.order.ready_s();
+        let done_s = |fact: &Fact| ready_s[fact.variable as usize];
+        kept.facts.sort_by(|one, other| done_s(other).total_cmp(&done_s(one)).then(one.cmp(other)));
+    }
     for _ in 0..most {
-        let at = chance.below(kept.facts.len() + kept.comparisons.len());
+        let within = 1 + chance.below(kept.facts.len() + kept.comparisons.len());
+        let at = chance.below(within);
         if at < kept.facts.len() {
             kept.facts.remove(at);
         } else if at - kept.facts.len() < kept.comparisons.len() {

@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashSet;
 
-use crate::ground::{Change, Conjunction, Effect, Fact, NumericId, Outcome};
+use crate::ground::{Change, Conjunction, Effect, Expression, Fact, NumericId, Outcome};
 
 use super::touch::Touched;
 use super::world::{Act, World};
@@ -24,9 +24,109 @@ pub(crate) fn all_apart(world: &World) -> Vec<bool> {
     world.acts.iter().map(|act| act.durative).collect()
 }
 
+/// Whether every plan can be rearranged into one whose actions are done in one go, one after the other: with nothing
+/// given from outside, and every action such that its start can wait until its end, or its end follow its start at
+/// once, whatever happens in between (compare the compression-safe actions of Coles et al. 2009).
+pub(crate) fn in_one_go_suffices(world: &World) -> bool {
+    let wanted = Wanted::new(world);
+    let mut written = vec![Vec::new(); world.ground.variables.len()];
+    for (index, act) in world.acts.iter().enumerate() {
+        for effect in act.start_effects.iter().chain(act.end_effects) {
+            let mut touched = Touched::default();
+            touched.outcome(world, &effect.outcome);
+            touched.variables.iter().for_each(|&variable| written[variable as usize].push(index as u32));
+        }
+    }
+    let locked: Vec<bool> = written
+        .iter()
+        .enumerate()
+        .map(|(variable, writers)| is_locked(world, &wanted, variable as u32, writers))
+        .collect();
+    let alone: Vec<Option<u32>> = written
+        .iter()
+        .map(|writers| writers.first().copied().filter(|first| writers.iter().all(|writer| writer == first)))
+        .collect();
+    let mut durative = world.acts.iter().enumerate().filter(|(_, act)| act.durative);
+    world.ground.timed.is_empty()
+        && durative.all(|(index, act)| {
+            let kept = |variable: u32| {
+                written[variable as usize].is_empty() || alone[variable as usize] == Some(index as u32)
+            };
+            starts_late(world, kept, act) || ends_early(&locked, act)
+        })
+}
+
+/// Whether an action that can start can also start right before its end; `kept` says which variables nobody else changes.
+fn starts_late(world: &World, kept: impl Fn(u32) -> bool, act: &Act) -> bool {
+    let kept = |fact: &Fact| act.over_all.facts.contains(fact) || kept(fact.variable);
+    act.start_effects.is_empty()
+        && act.flow_effects.is_empty()
+        && act.at_start.facts.iter().all(kept)
+        && act.at_start.comparisons.is_empty()
+        && act.at_start.calls.iter().all(|&(call, _)| world.calls.settles(call))
+        && act.bounds.iter().all(|bound| settled(world, &bound.seconds))
+        && act
+            .end_effects
+            .iter()
+            .filter_map(|effect| effect.when.as_ref())
+            .all(|when| when.at_start.is_empty() && when.over_all.is_empty())
+}
+
+/// Whether the end of an action may as well follow its start at once: it only moves locked variables on.
+fn ends_early(locked: &[bool], act: &Act) -> bool {
+    act.at_end.comparisons.is_empty()
+        && act.at_end.calls.is_empty()
+        && act.at_end.facts.iter().all(|fact| act.over_all.facts.contains(fact))
+        && act.flow_effects.is_empty()
+        && act
+            .end_effects
+            .iter()
+            .all(|effect| plain(effect).is_some_and(|fact| locked[fact.variable as usize]))
+}
+
+fn plain(effect: &Effect) -> Option<Fact> {
+    match (&effect.when, &effect.outcome) {
+        (None, Outcome::Set(fact)) => Some(*fact),
+        _ => None,
+    }
+}
+
+/// Of a variable, whether every action that changes it gives it the same value at its start, which nobody asks for and
+/// from which no such action can start: then one at a time changes it.
+fn is_locked(world: &World, wanted: &Wanted, variable: u32, writers: &[u32]) -> bool {
+    let between = |writer: &u32| {
+        let act = &world.acts[*writer as usize];
+        let given = act.start_effects.iter().filter_map(plain).rfind(|fact| fact.variable == variable)?;
+        let free = act.at_start.facts.iter().find(|fact| fact.variable == variable)?;
+        (free.value != given.value && !wanted.facts.contains(&given)).then_some(given.value)
+    };
+    let first = writers.first().and_then(between);
+    first.is_some()
+        && !wanted.read[variable as usize]
+        && writers.iter().all(|writer| between(writer) == first)
+}
+
+/// Whether an expression is the same in every state.
+pub(crate) fn settled(world: &World, expression: &Expression) -> bool {
+    match expression {
+        Expression::Constant(_) => true,
+        Expression::Call(call) => world.calls.settles(*call),
+        Expression::Sum(parts) | Expression::Product(parts) => parts.iter().all(|part| settled(world, part)),
+        Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+            settled(world, left) && settled(world, right)
+        }
+        Expression::Negative(inner) => settled(world, inner),
+        Expression::Fluent(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {
+            false
+        }
+    }
+}
+
 struct Wanted {
     facts: FxHashSet<Fact>,
     numbers: FxHashSet<NumericId>,
+    /// By variable, whether a call reads it.
+    read: Vec<bool>,
 }
 
 impl Wanted {
@@ -51,7 +151,11 @@ impl Wanted {
         }
         world.ground.axioms.iter().for_each(|axiom| want(&axiom.body));
         want(&world.ground.goal);
-        Wanted { facts, numbers: touched.numbers.iter().copied().collect() }
+        let mut read = vec![false; world.ground.variables.len()];
+        for call in 0..world.ground.calls.len() as u32 {
+            world.calls.reads(call).0.iter().for_each(|&variable| read[variable as usize] = true);
+        }
+        Wanted { facts, numbers: touched.numbers.iter().copied().collect(), read }
     }
 
     fn inside(&self, _index: u32, act: &Act) -> bool {

@@ -14,7 +14,7 @@ use crate::attachment::Level;
 use crate::calls::Failure;
 use crate::ground::{Change, Expression, Outcome, Values};
 
-use super::relaxed::{NOBODY, Operator, Part, Relaxed, Test};
+use super::relaxed::{NOBODY, Operator, Part, Relaxed, Seconds, Test};
 use super::world::{Moment, World};
 
 /// What the heuristic says of a state.
@@ -96,8 +96,8 @@ const UNSURE: f64 = 3.0;
 impl Relaxed {
     /// Estimates what is missing to the goal; `None` if it is out of reach.
     pub fn estimate(&mut self, world: &World, from: &From) -> Result<Option<Estimate>, Failure> {
-        for &(call, wanted) in &self.goal_gates {
-            if world.calls.truth(call, None, from.state, Level::Relaxed)? != wanted {
+        for &call in &self.goal_gates {
+            if !world.calls.agrees(call, None, from.state, Level::Relaxed)? {
                 return Ok(None);
             }
         }
@@ -154,11 +154,11 @@ impl Relaxed {
             work.reach(self.offsets[variable] + value, ready_s(variable), NOBODY, 1.0);
         }
         let moment = Moment { state: from.state, duration_s: 0.0, proposal: None, level: Level::Relaxed };
-        for (index, test) in self.tests.iter().enumerate() {
+        for (index, test) in self.tests.iter().enumerate().filter(|&(index, _)| self.asked[index]) {
             let holds = match *test {
                 Test::Comparison(comparison) => world.compare(comparison, &moment)?,
                 Test::Call(call, wanted) => {
-                    world.calls.truth(call, None, from.state, Level::Relaxed)? == wanted
+                    world.calls.agrees((call, wanted), None, from.state, Level::Relaxed)?
                 }
             };
             if holds {
@@ -175,32 +175,41 @@ impl Relaxed {
     /// Everything that the operator needs is reached.
     fn fire(&mut self, world: &World, from: &From, index: u32) -> Result<(), Failure> {
         let base = self.work.bases[index as usize];
-        let operator = &self.operators[index as usize];
+        let hot = self.hot[index as usize];
         let labels = &self.work.labels;
-        if !operator.gives.iter().chain(&operator.moves).any(|&given| labels[given as usize] > base) {
+        let given = &self.given[hot.gives as usize..hot.end as usize];
+        if !given.iter().any(|&given| labels[given as usize] > base) {
             return Ok(());
         }
-        let Some(proposal) = suiting(world, from.state, operator)? else { return Ok(()) };
-        let Some(seconds) = self.seconds(world, from.state, index, proposal.as_ref())? else { return Ok(()) };
-        let step = match self.operators[index as usize].part {
-            Part::Whole => self.unit,
-            Part::Start | Part::End => self.unit * 0.5,
-            Part::Free => 0.0,
-        };
-        let cost = seconds + step;
+        let mut seconds = hot.seconds;
+        if !hot.plain || seconds.is_nan() {
+            let proposal = suiting(world, from.state, &self.operators[index as usize])?;
+            let Some(proposal) = proposal else { return Ok(()) };
+            let asked = self.seconds(world, from.state, index, proposal.as_ref())?;
+            seconds = asked.unwrap_or(f64::INFINITY);
+        }
+        if seconds.is_infinite() {
+            return Ok(());
+        }
+        let cost = seconds + hot.step;
         self.work.own[index as usize] = cost;
         let timed = from.ready_s.is_some();
-        let given = base + if timed { seconds } else { cost };
-        let work = &mut self.work;
-        for &proposition in &self.operators[index as usize].gives {
-            work.reach(proposition, given, index, 1.0);
+        let label = base + if timed { seconds } else { cost };
+        for &proposition in &self.given[hot.gives as usize..hot.moves as usize] {
+            self.work.reach(proposition, label, index, 1.0);
         }
-        for position in 0..self.operators[index as usize].moves.len() {
-            let test = self.operators[index as usize].moves[position];
-            if self.work.labels[test as usize] > given
-                && let Some(times) = self.repetitions(world, from.state, index, test)?
-            {
-                let label = if timed { given } else { base + cost * times };
+        let mut after: Option<Values> = None;
+        for position in hot.moves..hot.end {
+            let test = self.given[position as usize];
+            if self.work.labels[test as usize] <= label {
+                continue;
+            }
+            if after.is_none() {
+                after = effects_alone(world, from.state, &self.operators[index as usize])?;
+            }
+            let Some(after) = &after else { break };
+            if let Some(times) = self.repetitions(world, (from.state, after), index, test)? {
+                let label = if timed { label } else { base + cost * times };
                 self.work.reach(test, label, index, times);
             }
         }
@@ -209,15 +218,16 @@ impl Relaxed {
 
     /// Seconds that the operator takes at least; `None` if it cannot be applied.
     fn seconds(
-        &self,
+        &mut self,
         world: &World,
         state: &Values,
         index: u32,
         proposal: Option<&Arc<str>>,
     ) -> Result<Option<f64>, Failure> {
         let operator = &self.operators[index as usize];
-        if let Some(seconds) = operator.cost {
-            return Ok(Some(seconds));
+        let known = self.hot[index as usize].seconds;
+        if !known.is_nan() {
+            return Ok(Some(known));
         }
         let act = &world.acts[operator.act as usize];
         let moment = Moment { state, duration_s: 0.0, proposal, level: Level::Relaxed };
@@ -225,23 +235,27 @@ impl Relaxed {
             Part::Start => 0.0,
             _ => 1.0,
         };
-        Ok(world.span(act, &moment)?.map(|span| span.least_s * share))
+        let seconds = world.span(act, &moment)?.map(|span| span.least_s * share);
+        if operator.seconds == Seconds::Settled {
+            self.hot[index as usize].seconds = seconds.unwrap_or(f64::INFINITY);
+        }
+        Ok(seconds)
     }
 
-    /// How often the operator must be repeated from the state to make a test true; `None` if it cannot help.
+    /// How often the operator must be repeated from the state to make a test true, from what it does alone; `None` if it
+    /// cannot help.
     fn repetitions(
         &self,
         world: &World,
-        state: &Values,
+        (state, after): (&Values, &Values),
         index: u32,
         test: u32,
     ) -> Result<Option<f64>, Failure> {
         let operator = &self.operators[index as usize];
-        let Some(after) = effects_alone(world, state, operator)? else { return Ok(None) };
-        let moment = Moment { state: &after, duration_s: 0.0, proposal: None, level: Level::Relaxed };
+        let moment = Moment { state: after, duration_s: 0.0, proposal: None, level: Level::Relaxed };
         let comparison = match self.tests[(test - self.test_base) as usize] {
             Test::Call(call, wanted) => {
-                let holds = world.calls.truth(call, None, &after, Level::Relaxed)? == wanted;
+                let holds = world.calls.truth(call, None, after, Level::Relaxed)? == wanted;
                 return Ok(Some(if holds { 1.0 } else { UNSURE }));
             }
             Test::Comparison(comparison) => comparison,
@@ -260,7 +274,12 @@ impl Relaxed {
         if after < before {
             return Ok(Some((before / (before - after)).ceil().clamp(1.0, 1e6)));
         }
-        Ok((!changes_by_constants(world, operator)).then_some(UNSURE))
+        // Steps of a fixed length away from a bound of a sum never help; around a point, or in a product, they may.
+        let hopeless = comparison.relation.is_bound()
+            && comparison.left.is_linear()
+            && comparison.right.is_linear()
+            && changes_by_constants(world, operator);
+        Ok((!hopeless).then_some(UNSURE))
     }
 
     fn extract(&mut self, goal: &[u32]) -> Estimate {
@@ -321,8 +340,8 @@ fn changes_by_constants(world: &World, operator: &Operator) -> bool {
 /// The parameter with which the operator's own calls agree, `Some(None)` if it takes none; `None` if nothing suits.
 fn suiting(world: &World, state: &Values, operator: &Operator) -> Result<Option<Option<Arc<str>>>, Failure> {
     let agree = |proposal: Option<&Arc<str>>| -> Result<bool, Failure> {
-        for &(call, wanted) in &operator.gates {
-            if world.calls.truth(call, proposal, state, Level::Relaxed)? != wanted {
+        for &call in &operator.gates {
+            if !world.calls.agrees(call, proposal, state, Level::Relaxed)? {
                 return Ok(false);
             }
         }

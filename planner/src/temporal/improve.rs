@@ -9,7 +9,7 @@ use crate::calls::Failure;
 use super::advance::{Situation, Step};
 use super::compress::classical_plan;
 use super::destroy::{Chance, keep_for, taken_apart};
-use super::envelope::{all_apart, envelopes};
+use super::envelope::{all_apart, envelopes, in_one_go_suffices};
 use super::relaxed::{Part, Relaxed};
 use super::search::{Counts, End, Manner, Search};
 use super::space::{Base, Measure, Space};
@@ -57,6 +57,8 @@ pub(crate) struct Progress {
 pub(crate) enum Reason {
     /// Every possibility was seen: without a plan, there is none.
     Exhausted,
+    /// Nothing is left to look at, but not every possibility was seen: nothing is proven.
+    Unproven,
     /// The effort that was meant to be spent is spent.
     Enough,
     /// Asked to stop, or the limit of evaluations is reached.
@@ -69,12 +71,13 @@ pub(crate) enum Reason {
 /// evaluations as a multiple of those that the first plan took.
 const IMPROVEMENT_WORK: u64 = 2_000_000;
 const IMPROVEMENT_FACTOR: u64 = 20;
-/// Evaluations to spend on a plan that nothing seen is better than.
-const AFTERTHOUGHT: u64 = 100;
+/// Without `anytime`: repairs in a row that come to nothing before the plan is left as it is, for each of its steps.
+const PATIENCE: u64 = 10;
 /// Weights of the heuristic in the searches that improve a plan.
 const WEIGHTS: [f64; 2] = [3.0, 1.0];
-/// Evaluations of the first, short search for a plan.
-const FIRST_TRY: u64 = 500;
+/// Evaluations of the first, short search for a plan, at least and at most, and evaluated states times operators.
+const FIRST_TRY: (u64, u64) = (50, 500);
+const FIRST_WORK: u64 = 2_000_000;
 /// Evaluations of one repair in the large neighbourhood search, at least.
 const REPAIR: u64 = 200;
 
@@ -86,26 +89,42 @@ pub(crate) fn search_plans(
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
 ) -> Result<Progress, Failure> {
-    let mut splits = vec![envelopes(world)];
-    let all = all_apart(world);
-    if splits[0] != all {
-        splits.push(all);
+    let (inside, all) = (envelopes(world), all_apart(world));
+    // What the searches before leave out, the last one looks at.
+    let mut passes = vec![(all.clone(), false), (all.clone(), true)];
+    if inside != all {
+        passes.insert(0, (inside, false));
     }
-    let mut progress = Progress { reason: Reason::Exhausted, counts: Counts::default(), plans: 0 };
-    for split in splits {
+    let all_in_one_go = passes[0].0.iter().all(|apart| !apart) && in_one_go_suffices(world);
+    let mut progress = Progress { reason: Reason::Unproven, counts: Counts::default(), plans: 0 };
+    for (split, exact) in passes {
+        let whole = split == all || all_in_one_go;
         let space = Space::new(world, split, measure.clone());
         let relaxed = Relaxed::new(world, &space.open_act);
         let begin = Situation { state: world.initial()?, open: Vec::new(), timed: 0 };
         let base = Base { situation: begin, costs: 0.0, track: space.begin(), clock: space.clock(&[]) };
-        let mut run = Run { space: &space, relaxed, base, limits, stop, progress, on_plan, best: None };
+        let mut run = Run {
+            space: &space,
+            relaxed,
+            base,
+            exact,
+            elsewhere: 0,
+            limits,
+            stop,
+            progress,
+            on_plan,
+            best: None,
+        };
         run.first()?;
         if run.best.is_some() {
             run.improve()?;
             return Ok(run.progress);
         }
         progress = run.progress;
-        if progress.reason != Reason::Exhausted {
-            break;
+        match progress.reason {
+            Reason::Exhausted if !whole => progress.reason = Reason::Unproven,
+            Reason::Unproven => {}
+            _ => break,
         }
     }
     Ok(progress)
@@ -115,6 +134,9 @@ struct Run<'r, 'w, 'a> {
     space: &'r Space<'w, 'a>,
     relaxed: Relaxed,
     base: Base,
+    exact: bool,
+    /// States that the classical search evaluated.
+    elsewhere: u64,
     limits: Limits,
     stop: &'r (dyn Fn() -> bool + Sync),
     progress: Progress,
@@ -136,7 +158,16 @@ impl Run<'_, '_, '_> {
         let bound = self.best.as_ref().map_or(self.limits.bound, strictly);
         let left = self.limits.evaluations.saturating_sub(self.progress.counts.evaluated);
         let evaluations = evaluations.min(left);
-        Manner { weight, timed, bound, evaluations, memory_bytes: self.limits.memory_bytes, shuffle: 0 }
+        Manner {
+            weight,
+            timed,
+            eager: true,
+            bound,
+            evaluations,
+            memory_bytes: self.limits.memory_bytes,
+            shuffle: 0,
+            exact: self.exact,
+        }
     }
 
     fn search(&mut self, base: Option<&Base>, manner: Manner) -> Result<End, Failure> {
@@ -149,29 +180,43 @@ impl Run<'_, '_, '_> {
     }
 
     fn first(&mut self) -> Result<(), Failure> {
-        // A short try that follows relaxed plans; then the classical search, where the task allows it; then at length.
-        if let End::Found(steps) =
-            self.search(None, self.manner(None, self.space.is_makespan(), FIRST_TRY))?
-            && self.take(steps)?
-        {
-            return Ok(());
+        // Short tries that follow some relaxed plans, or all; then the classical search, where the task allows it; then at
+        // length.
+        let short =
+            (FIRST_WORK / (self.space.world.acts.len() as u64).max(1)).clamp(FIRST_TRY.0, FIRST_TRY.1);
+        for eager in [false, true] {
+            let manner = Manner { eager, ..self.manner(None, self.space.is_makespan(), short) };
+            let end = self.search(None, manner)?;
+            if self.took(end)? {
+                return Ok(());
+            }
         }
         if let Some((steps, evaluated)) = classical_plan(self.space, self.limits.memory_bytes, self.stop) {
             self.progress.counts.evaluated += evaluated;
+            self.elsewhere += evaluated;
             if self.take(steps)? {
                 return Ok(());
             }
         }
         let end = self.search(None, self.manner(None, false, u64::MAX))?;
-        match end {
-            End::Found(steps) => {
-                self.take(steps)?;
-            }
-            End::Exhausted => self.progress.reason = Reason::Exhausted,
-            End::Budget | End::Stopped => self.progress.reason = Reason::Stopped,
-            End::Memory => self.progress.reason = Reason::Memory,
+        if !self.took(end)? && self.progress.reason == Reason::Enough {
+            self.progress.reason = Reason::Stopped;
         }
         Ok(())
+    }
+
+    /// Whether the end of a search is the end of searching for a first plan.
+    fn took(&mut self, end: End) -> Result<bool, Failure> {
+        let (reason, over) = match end {
+            End::Found(steps) => (Reason::Unproven, self.take(steps)?),
+            End::Exhausted { proven: true } => (Reason::Exhausted, true),
+            End::Exhausted { proven: false } => (Reason::Unproven, false),
+            End::Budget => (Reason::Enough, false),
+            End::Stopped => (Reason::Stopped, true),
+            End::Memory => (Reason::Memory, true),
+        };
+        self.progress.reason = reason;
+        Ok(over)
     }
 
     /// Keeps a plan if it is better than the best so far, without the steps that it does not need. Between plans that are
@@ -189,6 +234,12 @@ impl Run<'_, '_, '_> {
         let ready_s = base.track.order.ready_s();
         let goal = &self.space.world.ground.goal.facts;
         let slowness_s: f64 = goal.iter().map(|fact| ready_s[fact.variable as usize]).sum();
+        let mut ordered = in_time_order(self.space, &steps);
+        if let Some((again, _)) = self.space.replay(&mut ordered)?
+            && again <= measured
+        {
+            steps = ordered;
+        }
         let better = match &self.best {
             None => true,
             Some(best) => measured < best.measured - tolerance(best.measured),
@@ -207,11 +258,12 @@ impl Run<'_, '_, '_> {
     }
 
     fn improve(&mut self) -> Result<(), Failure> {
-        let spent = self.progress.counts.evaluated;
+        let before = self.progress.counts.evaluated;
+        let spent = before - self.elsewhere;
         let least = IMPROVEMENT_WORK / (self.space.world.acts.len() as u64).max(1);
         let budget = match self.limits.anytime {
             true => u64::MAX,
-            false => spent + least.clamp(100, 10_000).max(IMPROVEMENT_FACTOR * spent),
+            false => before + least.clamp(100, 10_000).max(IMPROVEMENT_FACTOR * spent),
         };
         self.progress.reason = Reason::Enough;
         let timed = self.space.is_makespan();
@@ -231,8 +283,8 @@ impl Run<'_, '_, '_> {
                         }
                     }
                     End::Budget => break,
-                    End::Exhausted => {
-                        proven = true;
+                    End::Exhausted { proven: all } => {
+                        proven = all;
                         break;
                     }
                     End::Stopped => return self.ended(Reason::Stopped),
@@ -243,12 +295,10 @@ impl Run<'_, '_, '_> {
                 break;
             }
         }
-        if proven && !timed {
+        if proven {
             return self.ended(Reason::Exhausted);
         }
-        // Equal states at different times were taken for one, so a little may be left to gain.
-        let last = self.progress.counts.evaluated.saturating_add(AFTERTHOUGHT);
-        self.neighbourhoods(if proven && !self.limits.anytime { budget.min(last) } else { budget })
+        self.neighbourhoods(budget)
     }
 
     fn ended(&mut self, reason: Reason) -> Result<(), Failure> {
@@ -261,6 +311,7 @@ impl Run<'_, '_, '_> {
         let mut chance = Chance::new(self.limits.seed);
         let mut idle = 0;
         let mut tries: u64 = 0;
+        let mut fruitless: u64 = 0;
         while self.progress.counts.evaluated < budget {
             if (self.stop)() {
                 return self.ended(Reason::Stopped);
@@ -268,6 +319,10 @@ impl Run<'_, '_, '_> {
             let Some(Best { steps, measured, .. }) = &self.best else { return Ok(()) };
             let as_good = measured + tolerance(*measured);
             tries += 1;
+            fruitless += 1;
+            if !self.limits.anytime && fruitless > PATIENCE * steps.len() as u64 {
+                return Ok(());
+            }
             let mut kept = taken_apart(self.space, steps, &mut chance);
             let Some((_, base)) = self.space.replay(&mut kept)? else {
                 idle += 1;
@@ -279,6 +334,7 @@ impl Run<'_, '_, '_> {
             let timed = self.space.is_makespan() && !tries.is_multiple_of(3);
             let mut manner = self.manner(None, timed, REPAIR.max(4 * steps.len() as u64));
             manner.shuffle = tries;
+            manner.eager = tries.is_multiple_of(2);
             manner.bound = as_good;
             let before = self.progress.counts.evaluated;
             let end = self.search(Some(&base), manner)?;
@@ -290,9 +346,11 @@ impl Run<'_, '_, '_> {
             match end {
                 End::Found(more) => {
                     kept.extend(more);
-                    self.take(kept)?;
+                    if self.take(kept)? {
+                        fruitless = 0;
+                    }
                 }
-                End::Exhausted | End::Budget => {}
+                End::Exhausted { .. } | End::Budget => {}
                 End::Stopped => return self.ended(Reason::Stopped),
                 End::Memory => return self.ended(Reason::Memory),
             }
@@ -307,6 +365,32 @@ impl Run<'_, '_, '_> {
 /// What counts as better: above the rounding of sums of times.
 fn tolerance(measured: f64) -> f64 {
     1e-6 * measured.abs().max(1.0)
+}
+
+/// The steps in the order of their times, so that a beginning of them is what happens until some time.
+fn in_time_order(space: &Space, steps: &[Step]) -> Vec<Step> {
+    let Ok(track) = space.track(steps) else { return steps.to_vec() };
+    let mut starts: Vec<(u32, usize)> = Vec::new();
+    let mut timed: Vec<(f64, &Step)> = Vec::with_capacity(steps.len());
+    let mut given = space.world.ground.timed.iter();
+    for (index, step) in steps.iter().enumerate() {
+        let own = track.actions[index];
+        let time_s = match step.part {
+            Part::Free => given.next().map_or(0.0, |timed| timed.time_s),
+            Part::Whole | Part::Start => {
+                starts.push((step.act, index));
+                own.map_or(0.0, |(start, _)| track.order.earliest_s(start))
+            }
+            Part::End => {
+                let start = starts.iter().rev().find(|(act, _)| *act == step.act);
+                let end = start.and_then(|&(_, start)| track.actions[start]).and_then(|(_, end)| end);
+                end.map_or(0.0, |end| track.order.earliest_s(end))
+            }
+        };
+        timed.push((time_s, step));
+    }
+    timed.sort_by(|one, other| one.0.total_cmp(&other.0));
+    timed.into_iter().map(|(_, step)| step.clone()).collect()
 }
 
 /// The earliest schedule of a plan.

@@ -3,6 +3,7 @@
 mod advance;
 mod compress;
 mod destroy;
+mod direction;
 mod envelope;
 mod estimate;
 mod improve;

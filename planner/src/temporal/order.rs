@@ -67,6 +67,59 @@ impl Order {
         self.earliest_s[happening as usize]
     }
 
+    /// How many happenings there are.
+    pub fn len(&self) -> usize {
+        self.earliest_s.len()
+    }
+
+    /// By resource, the latest of what was done to it last, by a value of happenings: write, read since, addition since;
+    /// -1 for none.
+    pub fn touched(&self, value: impl Fn(u32) -> f64) -> impl Iterator<Item = [f64; 3]> {
+        let latest =
+            move |nodes: &[u32]| nodes.iter().fold(NEVER, |latest: f64, &node| latest.max(value(node)));
+        self.resources.iter().map(move |resource| {
+            [latest(resource.writer.as_slice()), latest(&resource.readers), latest(&resource.adders)]
+        })
+    }
+
+    /// How long after one happening each from `first` on comes at least; minus infinity where it is free to come before.
+    pub fn after_s(&self, start: u32, first: usize) -> Vec<f64> {
+        let mut after_s = vec![f64::NEG_INFINITY; self.len() - first];
+        after_s[start as usize - first] = 0.0;
+        let inner = |node: u32| (node as usize).checked_sub(first);
+        for _ in 0..self.ties.len() + 2 {
+            let mut raised = false;
+            let mut raise = |after_s: &mut Vec<f64>, node: u32, from: u32, gap_s: f64| {
+                if let (Some(node), Some(from)) = (inner(node), inner(from))
+                    && after_s[from] + gap_s > after_s[node] + 1e-9
+                {
+                    after_s[node] = after_s[from] + gap_s;
+                    raised = true;
+                }
+            };
+            for node in first..self.len() {
+                for &(other, gap_s) in &self.after[node] {
+                    raise(&mut after_s, node as u32, other, gap_s);
+                }
+            }
+            for tie in &self.ties {
+                raise(&mut after_s, tie.end, tie.start, tie.span.least_s);
+                raise(&mut after_s, tie.start, tie.end, -tie.span.most_s);
+            }
+            if !raised {
+                break;
+            }
+        }
+        after_s
+    }
+
+    /// When the happening of which these are the distances can be at the latest, for what is given from outside.
+    pub fn latest_s(&self, after_s: &[f64], first: usize) -> f64 {
+        let bound =
+            |&(node, time_s): &(u32, f64)| Some(time_s - after_s[(node as usize).checked_sub(first)?]);
+        self.fixed.iter().filter_map(bound).fold(f64::INFINITY, f64::min)
+    }
+
     /// The time of the last happening that is not given from outside.
     pub fn makespan_s(&self) -> f64 {
         let given = |index: usize| self.fixed.iter().any(|&(node, _)| node as usize == index);

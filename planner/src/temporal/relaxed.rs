@@ -8,6 +8,8 @@ use rustc_hash::FxHashMap;
 use crate::attachment::CallKind;
 use crate::ground::{CallId, ComparisonId, Conjunction, Effect, Expression, Fact, Outcome, Place, Relation};
 
+use super::direction::may_help;
+use super::envelope::settled;
 use super::estimate::Work;
 use super::touch::Touched;
 use super::world::{Act, World};
@@ -42,8 +44,41 @@ pub(super) struct Operator {
     pub(super) moves: Vec<u32>,
     /// Calls that never change: asked once the rest is reached.
     pub(super) gates: Vec<(CallId, bool)>,
-    /// Cost if it is the same in every state.
-    pub(super) cost: Option<f64>,
+    /// Seconds that it takes at least, as far as known without a state.
+    pub(super) seconds: Seconds,
+}
+
+/// What an evaluation looks at first in an operator, side by side in memory.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hot {
+    /// What it gives begins here in [`Relaxed::given`], then what it moves, up to the end.
+    pub(super) gives: u32,
+    pub(super) moves: u32,
+    pub(super) end: u32,
+    /// Whether nobody else need be asked whether it can be applied.
+    pub(super) plain: bool,
+    /// Seconds that it takes, infinite where it can never be applied; NaN where that must be asked.
+    pub(super) seconds: f64,
+    /// What being a step counts.
+    pub(super) step: f64,
+}
+
+/// How long an operator takes at least.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Seconds {
+    /// The same in every state; infinite where it can never be applied.
+    Known(f64),
+    /// The same in every state: once an attachment has been asked.
+    Settled,
+    /// Depends on the state.
+    Depends,
+}
+
+impl Seconds {
+    /// Nothing for an instantaneous part of an action.
+    fn or_zero(self, zero: bool) -> Seconds {
+        if zero && self != Seconds::Depends { Seconds::Known(0.0) } else { self }
+    }
 }
 
 /// The relaxed task and the working memory of its evaluation.
@@ -52,6 +87,8 @@ pub(crate) struct Relaxed {
     pub(super) tests: Vec<Test>,
     /// Number of a test's proposition.
     test_index: FxHashMap<Test, u32>,
+    /// By test, whether an operator or the goal needs it.
+    pub(super) asked: Vec<bool>,
     /// By test, the resources that it reads.
     pub(super) test_reads: Vec<Vec<u32>>,
     /// By resource, the tests that read it.
@@ -60,6 +97,9 @@ pub(crate) struct Relaxed {
     /// Propositions from here on say that an action is open; after those of all actions, that it is closed.
     pub(super) token_base: u32,
     pub(super) operators: Vec<Operator>,
+    pub(super) hot: Vec<Hot>,
+    /// What operators give and move, one after the other.
+    pub(super) given: Vec<u32>,
     /// By proposition, where its operators begin in `needed_by`.
     pub(super) needed_from: Vec<u32>,
     pub(super) needed_by: Vec<u32>,
@@ -83,18 +123,25 @@ impl Relaxed {
         let acts = world.acts.len() as u32;
         for (index, act) in world.acts.iter().enumerate() {
             let act_index = index as u32;
-            let cost = constant_seconds(world, index);
+            let seconds = seconds_of(world, index);
             if open_act[index] {
                 let token = relaxed.token_base + act_index;
                 let before = needs_at_start(act, act.start_effects);
-                relaxed.operator(world, act_index, Part::Start, &before, &[], cost.map(|_| 0.0));
+                relaxed.operator(
+                    world,
+                    act_index,
+                    Part::Start,
+                    &before,
+                    &[],
+                    seconds.or_zero(matches!(seconds, Seconds::Known(_))),
+                );
                 relaxed.tokens(act_index, Part::Start, token);
                 let before = Merged::of(&[act.at_end]);
-                relaxed.operator(world, act_index, Part::End, &before, &[token], cost);
+                relaxed.operator(world, act_index, Part::End, &before, &[token], seconds);
                 relaxed.tokens(act_index, Part::End, token + acts);
             } else {
                 let before = needs_of_whole(act);
-                relaxed.operator(world, act_index, Part::Whole, &before, &[], cost);
+                relaxed.operator(world, act_index, Part::Whole, &before, &[], seconds);
             }
         }
         relaxed.axioms_and_timed(world);
@@ -145,11 +192,14 @@ impl Relaxed {
             offsets,
             test_base: next,
             token_base,
-            tests,
             test_index,
             tests_on,
+            asked: vec![false; tests.len()],
             test_reads,
+            tests,
             operators: Vec::new(),
+            hot: Vec::new(),
+            given: Vec::new(),
             needed_from: Vec::new(),
             needed_by: Vec::new(),
             goal: Vec::new(),
@@ -202,7 +252,7 @@ impl Relaxed {
         part: Part,
         before: &Merged,
         tokens: &[u32],
-        cost: Option<f64>,
+        seconds: Seconds,
     ) {
         let action = &world.acts[act as usize];
         let effects: Vec<_> = match part {
@@ -240,8 +290,12 @@ impl Relaxed {
             let gives = outcomes.iter().flat_map(|outcome| self.given(world, outcome)).collect();
             let mut touched = Touched::default();
             outcomes.iter().for_each(|outcome| touched.outcome(world, outcome));
-            let moves = self.tests_touched(&touched);
-            self.operators.push(Operator { act, part, needs, gives, moves, gates, cost });
+            let mut moves = self.tests_touched(&touched);
+            moves.retain(|&test| match self.tests[(test - self.test_base) as usize] {
+                Test::Comparison(comparison) => may_help(world, &outcomes, comparison),
+                Test::Call(..) => true,
+            });
+            self.operators.push(Operator { act, part, needs, gives, moves, gates, seconds });
         }
     }
 
@@ -279,17 +333,23 @@ impl Relaxed {
                 gives,
                 moves: vec![],
                 gates,
-                cost: Some(0.0),
+                seconds: Seconds::Known(0.0),
             });
         }
         // Anything not derived may be absent: negated conditions on derived facts count as reachable.
         for (variable, declared) in world.ground.variables.iter().enumerate() {
             if declared.stratum.is_some() {
                 let gives = vec![self.fact(Fact { variable: variable as u32, value: 1 })];
-                let cost = Some(0.0);
-                let part = Part::Free;
-                let nothing =
-                    Operator { act: NOBODY, part, needs: vec![], gives, moves: vec![], gates: vec![], cost };
+                let (part, seconds) = (Part::Free, Seconds::Known(0.0));
+                let nothing = Operator {
+                    act: NOBODY,
+                    part,
+                    needs: vec![],
+                    gives,
+                    moves: vec![],
+                    gates: vec![],
+                    seconds,
+                };
                 self.operators.push(nothing);
             }
         }
@@ -306,7 +366,7 @@ impl Relaxed {
                 gives,
                 moves,
                 gates: vec![],
-                cost: Some(0.0),
+                seconds: Seconds::Known(0.0),
             });
         }
     }
@@ -324,10 +384,36 @@ impl Relaxed {
             self.needed_by.extend(list);
         }
         self.needed_from.push(self.needed_by.len() as u32);
-        let known: Vec<f64> =
-            self.operators.iter().filter_map(|operator| operator.cost).filter(|&c| c > 0.0).collect();
+        let needs = self.operators.iter().flat_map(|operator| &operator.needs).chain(&self.goal);
+        for &need in needs.filter(|&&need| (self.test_base..self.token_base).contains(&need)) {
+            self.asked[(need - self.test_base) as usize] = true;
+        }
+        let known = self.operators.iter().filter_map(|operator| match operator.seconds {
+            Seconds::Known(seconds) if seconds > 0.0 => Some(seconds),
+            _ => None,
+        });
+        let known: Vec<f64> = known.collect();
         let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
         self.unit = if mean.is_finite() && mean > 0.0 { mean } else { 1.0 };
+        for operator in &self.operators {
+            let gives = self.given.len() as u32;
+            self.given.extend(&operator.gives);
+            let moves = self.given.len() as u32;
+            self.given.extend(&operator.moves);
+            let grounding =
+                world.acts.get(operator.act as usize).is_some_and(|act| !act.grounding.is_empty());
+            let seconds = match operator.seconds {
+                Seconds::Known(seconds) => seconds,
+                Seconds::Settled | Seconds::Depends => f64::NAN,
+            };
+            let step = match operator.part {
+                Part::Whole => self.unit,
+                Part::Start | Part::End => self.unit * 0.5,
+                Part::Free => 0.0,
+            };
+            let plain = operator.gates.is_empty() && !grounding;
+            self.hot.push(Hot { gives, moves, end: self.given.len() as u32, plain, seconds, step });
+        }
         self.need_counts = self.operators.iter().map(|operator| operator.needs.len() as u32).collect();
         let free = self.operators.iter().enumerate().filter(|(_, operator)| operator.needs.is_empty());
         self.free = free.map(|(index, _)| index as u32).collect();
@@ -395,18 +481,22 @@ fn needs_of_whole(act: &Act) -> Merged {
     merged
 }
 
-/// The duration of an action if it is the same in every state, in seconds.
-fn constant_seconds(world: &World, act: usize) -> Option<f64> {
+/// The duration of an action as far as known without a state, in seconds.
+fn seconds_of(world: &World, act: usize) -> Seconds {
     let act = &world.acts[act];
     if !act.durative {
-        return Some(0.0);
+        return Seconds::Known(0.0);
     }
-    let mut least_s: Option<f64> = None;
-    for bound in act.bounds.iter().filter(|bound| !bound.at_end) {
-        let Expression::Constant(seconds) = bound.seconds else { return None };
+    let bounds = act.bounds.iter().filter(|bound| !bound.at_end);
+    if !bounds.clone().all(|bound| settled(world, &bound.seconds)) || !act.grounding.is_empty() {
+        return Seconds::Depends;
+    }
+    let mut least_s: f64 = 0.0;
+    for bound in bounds {
+        let Expression::Constant(seconds) = bound.seconds else { return Seconds::Settled };
         if matches!(bound.relation, Relation::Equal | Relation::AtLeast | Relation::Greater) {
-            least_s = Some(least_s.unwrap_or(0.0).max(seconds));
+            least_s = least_s.max(seconds);
         }
     }
-    Some(least_s.unwrap_or(0.0))
+    Seconds::Known(least_s)
 }

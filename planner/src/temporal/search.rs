@@ -28,6 +28,8 @@ pub(crate) struct Manner {
     pub weight: Option<f64>,
     /// Whether the heuristic counts time from when resources are free, instead of adding costs up.
     pub timed: bool,
+    /// Whether to follow the relaxed plan of every state, instead of those alone that are nearer to the goal than any before.
+    pub eager: bool,
     /// Only plans that cost less than this.
     pub bound: f64,
     /// Stop after this many evaluated states.
@@ -36,6 +38,9 @@ pub(crate) struct Manner {
     pub memory_bytes: usize,
     /// Decides between entries that rank the same; 0 for the order of their making.
     pub shuffle: u64,
+    /// Whether equal states are told apart wherever their times leave different possibilities: then nothing is lost,
+    /// and a search that comes to its end proves something.
+    pub exact: bool,
 }
 
 /// How a search ended.
@@ -43,8 +48,11 @@ pub(crate) struct Manner {
 pub(crate) enum End {
     /// Steps from the base to the goal.
     Found(Vec<Step>),
-    /// Every state within the bound was seen.
-    Exhausted,
+    /// Nothing within the bound is left to look at.
+    Exhausted {
+        /// Whether that proves that there is no plan within the bound: nothing was left out on the way.
+        proven: bool,
+    },
     /// The budget of evaluations is used up.
     Budget,
     /// Asked to stop.
@@ -101,6 +109,9 @@ pub(crate) struct Counts {
 /// An action in progress as a key: action, proposal, bits of its duration, gates of its end.
 type OpenKey = (u32, Option<Arc<str>>, u64, u64);
 
+/// What is in progress, and how many timed effects have happened.
+type Phase = (Vec<Open>, usize);
+
 /// One search from a base.
 pub(crate) struct Search<'s, 'w, 'a> {
     space: &'s Space<'w, 'a>,
@@ -111,14 +122,17 @@ pub(crate) struct Search<'s, 'w, 'a> {
     nodes: Vec<Node>,
     steps: Vec<Step>,
     costs: Vec<f64>,
-    opens: Vec<Vec<Open>>,
-    open_ids: FxHashMap<Vec<OpenKey>, u32>,
+    phases: Vec<Phase>,
+    phase_ids: FxHashMap<(Vec<OpenKey>, usize), u32>,
+    mark_ids: FxHashMap<u64, u32>,
     proposals: Vec<Arc<str>>,
     queues: [BinaryHeap<Reverse<(Rank, Entry)>>; 2],
     lead: [i64; 2],
     sequence: u64,
     best_heuristic: f64,
     counts: Counts,
+    /// Whether something was left out that might have led to a plan.
+    lossy: bool,
     /// What the relaxed plan of the state evaluated last leads to, to be looked at next.
     ahead: Option<Ahead>,
 }
@@ -127,8 +141,9 @@ pub(crate) struct Search<'s, 'w, 'a> {
 #[derive(Debug, Default)]
 struct Times {
     makespan_s: f64,
-    /// From the start of the action in progress that started last to the end of everything.
-    slack_s: f64,
+    /// What tells equal states apart: in exact searches everything that future times depend on, else the time from the
+    /// start of the action in progress that started last to the end of everything.
+    mark: u64,
     /// Whether a timed effect happens before the end that has not been taken in yet.
     due: bool,
     /// By resource, when it is free.
@@ -158,14 +173,16 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             nodes: Vec::new(),
             steps: Vec::new(),
             costs: Vec::new(),
-            opens: Vec::new(),
-            open_ids: FxHashMap::default(),
+            phases: Vec::new(),
+            phase_ids: FxHashMap::default(),
+            mark_ids: FxHashMap::default(),
             proposals: Vec::new(),
             queues: Default::default(),
             lead: [0, 0],
             sequence: 0,
             best_heuristic: f64::INFINITY,
             counts: Counts::default(),
+            lossy: !space.world.complete,
             ahead: None,
         }
     }
@@ -195,7 +212,9 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
                 }
                 continue;
             }
-            let Some(entry) = self.take() else { return Ok((End::Exhausted, self.counts)) };
+            let Some(entry) = self.take() else {
+                return Ok((End::Exhausted { proven: !self.lossy }, self.counts));
+            };
             if let Some(end) = self.follow(entry)? {
                 return Ok((end, self.counts));
             }
@@ -223,8 +242,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
     fn situation(&self, node: u32) -> Situation {
         let mut state = Values { values: Vec::new(), numbers: Vec::new() };
         let extra = self.store.get(node, &mut state);
-        let (open, timed) = (((extra & !PASSED) >> 40) as usize, (extra >> 32) & 0xff);
-        Situation { state, open: self.opens[open].clone(), timed: timed as usize }
+        let (open, timed) = self.phases[((extra & !PASSED) >> 32) as usize].clone();
+        Situation { state, open, timed }
     }
 
     fn path(&self, mut node: u32) -> Vec<Step> {
@@ -270,6 +289,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             track.push(self.space, step)?;
         }
         let latest_s = track.latest_open_s();
+        let exact = self.manner.exact.then(|| track.mark(self.space));
         let mut due = false;
         if open {
             track.close(self.space)?;
@@ -280,7 +300,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         }
         let makespan_s = track.order.makespan_s();
         let slack_s = latest_s.map_or(0.0, |start_s| makespan_s - start_s);
-        Ok(Times { makespan_s, slack_s, due, ready_s: self.manner.timed.then(|| track.order.ready_s()) })
+        let mark = exact.unwrap_or_else(|| u64::from((slack_s as f32).to_bits()));
+        Ok(Times { makespan_s, mark, due, ready_s: self.manner.timed.then(|| track.order.ready_s()) })
     }
 
     /// Takes a situation in: forgets it if it is known or too dear, else evaluates and expands it.
@@ -296,13 +317,14 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         if measured >= self.manner.bound {
             return Ok(None);
         }
-        let extra = self.extra(&situation, times.slack_s);
+        let extra = self.extra(&situation, times.mark);
         let (node, new) = self.store.insert(&situation.state, extra);
         if new {
             self.nodes.push(Node { parent, cost: measured });
             self.steps.push(step);
             self.costs.push(costs);
         } else {
+            self.lossy |= self.depends_on_times(&situation);
             let dearer = measured >= self.nodes[node as usize].cost - 1e-9;
             if !self.bounded() || dearer || self.is_ancestor(node, parent) {
                 return Ok(None);
@@ -360,7 +382,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
     /// A node on the way of a lookahead, which is not evaluated; `None` if it is known already or its times do not fit.
     fn pass(&mut self, parent: u32, step: Step, situation: &Situation, costs: f64) -> Option<u32> {
         let times = self.times(parent, &step, !situation.open.is_empty()).ok()?;
-        let extra = self.extra(situation, times.slack_s) | PASSED;
+        let extra = self.extra(situation, times.mark) | PASSED;
         let (node, new) = self.store.insert(&situation.state, extra);
         if new {
             let cost = self.space.measured(costs, &situation.state, times.makespan_s).ok()?;
@@ -382,38 +404,64 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         false
     }
 
-    fn extra(&mut self, situation: &Situation, slack_s: f64) -> u64 {
-        let key: Vec<OpenKey> = situation
+    /// Whether what can still be done from a state depends on when things happened on the way to it, beyond what tells
+    /// the states of this search apart.
+    fn depends_on_times(&self, situation: &Situation) -> bool {
+        let fits =
+            !self.manner.exact && (!situation.open.is_empty() || !self.space.world.ground.timed.is_empty());
+        fits || self.bounded() && self.space.timed_measure()
+    }
+
+    fn extra(&mut self, situation: &Situation, mark: u64) -> u64 {
+        let key = situation
             .open
             .iter()
             .map(|open| (open.act, open.proposal.clone(), open.span.least_s.to_bits(), open.gates))
             .collect();
-        let next = self.opens.len() as u32;
-        let id = *self.open_ids.entry(key).or_insert(next);
-        if id == next {
-            self.opens.push(situation.open.clone());
+        let next = self.phases.len() as u32;
+        let phase = *self.phase_ids.entry((key, situation.timed)).or_insert(next);
+        if phase == next {
+            self.phases.push((situation.open.clone(), situation.timed));
         }
-        u64::from(id) << 40 | (situation.timed as u64 & 0xff) << 32 | u64::from((slack_s as f32).to_bits())
+        let mark = match self.manner.exact {
+            true => {
+                let next = self.mark_ids.len() as u32;
+                *self.mark_ids.entry(mark).or_insert(next)
+            }
+            false => mark as u32,
+        };
+        u64::from(phase) << 32 | u64::from(mark)
     }
 
     fn expand(&mut self, node: u32, situation: &Situation, ready_s: Option<&[f64]>) -> Result<(), Failure> {
         self.counts.evaluated += 1;
         let open: Vec<u32> = situation.open.iter().map(|open| open.act).collect();
         let from = From { state: &situation.state, open: &open, ready_s };
-        let Some(estimate) = self.relaxed.estimate(self.space.world, &from)? else { return Ok(()) };
+        let estimate = match self.relaxed.estimate(self.space.world, &from)? {
+            Some(estimate) => estimate,
+            // What a module will propose in later states is not known: an exact search looks there all the same.
+            None if self.manner.exact && self.space.world.proposes => {
+                Estimate { cost: f64::MAX, ..Estimate::default() }
+            }
+            None => {
+                self.lossy |= self.space.world.proposes;
+                return Ok(());
+            }
+        };
         let cost = self.nodes[node as usize].cost;
         let reachable = if self.space.is_makespan() { cost.max(estimate.finish_s) } else { cost };
         if reachable >= self.manner.bound {
             return Ok(());
         }
         self.counts.expanded += 1;
-        if estimate.cost < self.best_heuristic {
+        let progress = estimate.cost < self.best_heuristic;
+        if progress {
             self.best_heuristic = estimate.cost;
             self.lead[1] -= BOOST;
-            // Following a relaxed plan pays where its end was better than its beginning.
-            if self.manner.weight.is_none() && estimate.plan.len() > 1 {
-                self.ahead = Some(Ahead { from: node, plan: estimate.plan.clone() });
-            }
+        }
+        let follow = progress || self.manner.eager;
+        if follow && self.manner.weight.is_none() && estimate.plan.len() > 1 {
+            self.ahead = Some(Ahead { from: node, plan: estimate.plan.clone() });
         }
         let key = match self.manner.weight {
             None => estimate.cost,

@@ -1,6 +1,9 @@
 //! What several searches on one task share: the steps that are possible, what they touch, what plans are measured by.
 
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
+
+use rustc_hash::FxHasher;
 
 use crate::attachment::Level;
 use crate::calls::Failure;
@@ -188,6 +191,8 @@ pub(crate) struct Track {
     pub order: Order,
     /// By step, its start, and its end if it has one by now; `None` for ends and timed effects.
     pub actions: Vec<Option<(u32, Option<u32>)>>,
+    /// The first happening since something was in progress without interruption.
+    epoch: usize,
     open: Vec<Started>,
     timed: usize,
 }
@@ -204,7 +209,7 @@ struct Started {
 
 impl Track {
     fn new(resources: usize) -> Track {
-        Track { order: Order::new(resources), actions: Vec::new(), open: Vec::new(), timed: 0 }
+        Track { order: Order::new(resources), actions: Vec::new(), epoch: 0, open: Vec::new(), timed: 0 }
     }
 
     /// Adds a step.
@@ -239,7 +244,44 @@ impl Track {
             }
         }
         self.actions.push(action);
+        if self.open.is_empty() {
+            self.epoch = self.order.len();
+        }
         Ok(())
+    }
+
+    /// A hash of everything about the times so far that what comes next can depend on.
+    ///
+    /// With nothing in progress and no timed effect to come there is nothing: all that follows can be shifted. An action
+    /// in progress must end in time after all that its end will follow: that depends on how long after its start,
+    /// at least, everything is over that was done to each resource, as far as its duration reaches. With timed effects
+    /// to come, times matter as they are, those behind the last timed effect being all the same.
+    pub fn mark(&self, space: &Space) -> u64 {
+        let last_s =
+            space.world.ground.timed.get(self.timed..).and_then(<[_]>::last).map(|timed| timed.time_s);
+        if self.open.is_empty() && last_s.is_none() {
+            return 0;
+        }
+        let mut hasher = FxHasher::default();
+        for open in &self.open {
+            let after_s = self.order.after_s(open.start, self.epoch);
+            let within =
+                |time_s: f64| if open.span.most_s.is_finite() { time_s.min(open.span.most_s) } else { 0.0 };
+            let since = |node: u32| {
+                let inner = (node as usize).checked_sub(self.epoch);
+                inner.map_or(f64::NEG_INFINITY, |inner| within(after_s[inner]))
+            };
+            self.order.touched(since).for_each(|times_s| times_s.map(f64::to_bits).hash(&mut hasher));
+            self.open.iter().for_each(|other| since(other.start).to_bits().hash(&mut hasher));
+            let latest_s = self.order.latest_s(&after_s, self.epoch);
+            latest_s.to_bits().hash(&mut hasher);
+        }
+        if let Some(last_s) = last_s {
+            let clamped = |node: u32| self.order.earliest_s(node).min(last_s);
+            self.order.touched(clamped).for_each(|times_s| times_s.map(f64::to_bits).hash(&mut hasher));
+            self.open.iter().for_each(|open| clamped(open.start).to_bits().hash(&mut hasher));
+        }
+        hasher.finish() | 1
     }
 
     /// Ends what is in progress as soon as possible.

@@ -39,7 +39,8 @@ pub(crate) struct Act<'a> {
     pub grounding: Vec<(usize, Vec<u32>)>,
 }
 
-static NOTHING: Conjunction = Conjunction { facts: Vec::new(), comparisons: Vec::new(), calls: Vec::new() };
+pub(super) static NOTHING: Conjunction =
+    Conjunction { facts: Vec::new(), comparisons: Vec::new(), calls: Vec::new() };
 
 /// A state, with what expressions may refer to besides it.
 #[derive(Clone, Copy)]
@@ -71,6 +72,11 @@ pub(crate) struct World<'a> {
     pub calls: Calls<'a>,
     /// Durative actions first, in the ground task's order, then instantaneous ones.
     pub acts: Vec<Act<'a>>,
+    /// Whether the steps of the search can make every plan: none needs a duration that is chosen for its effects, or looks
+    /// at a number while it flows.
+    pub complete: bool,
+    /// Whether grounding modules propose parameters.
+    pub proposes: bool,
     /// Axioms by stratum.
     strata: Vec<Vec<&'a Axiom>>,
     /// Variables that axioms set.
@@ -106,7 +112,9 @@ impl<'a> World<'a> {
             cost: &action.cost,
             grounding: grounding(task, &action.origin),
         });
-        let acts = durative.chain(instantaneous).collect();
+        let acts: Vec<Act> = durative.chain(instantaneous).collect();
+        let complete = acts.iter().all(|act| act.flow_effects.is_empty() && !chooses_effects(act));
+        let proposes = acts.iter().any(|act| !act.grounding.is_empty());
         let stratum_of =
             |axiom: &Axiom| ground.variables[axiom.head.variable as usize].stratum.unwrap_or(0) as usize;
         let mut strata: Vec<Vec<&Axiom>> = Vec::new();
@@ -118,7 +126,7 @@ impl<'a> World<'a> {
         let derived = (0..ground.variables.len())
             .filter(|&variable| ground.variables[variable].stratum.is_some())
             .collect();
-        World { ground, calls, acts, strata, derived }
+        World { ground, calls, acts, complete, proposes, strata, derived }
     }
 
     /// The first state, with derived variables up to date.
@@ -180,8 +188,8 @@ impl<'a> World<'a> {
                 return Ok(false);
             }
         }
-        for &(call, wanted) in &condition.calls {
-            if self.calls.truth(call, moment.proposal, moment.state, moment.level)? != wanted {
+        for &call in &condition.calls {
+            if !self.calls.agrees(call, moment.proposal, moment.state, moment.level)? {
                 return Ok(false);
             }
         }
@@ -290,6 +298,30 @@ impl<'a> World<'a> {
             }
         }
         Ok(())
+    }
+}
+
+/// Whether an action has effects or bounds at its end that depend on how long it is chosen to take.
+fn chooses_effects(act: &Act) -> bool {
+    let fixed = act.bounds.iter().any(|bound| bound.relation == Relation::Equal && !bound.at_end);
+    let timed = |effect: &Effect| match &effect.outcome {
+        Outcome::Change { amount, .. } => mentions_duration(amount),
+        Outcome::Flow { .. } => true,
+        Outcome::Set(_) | Outcome::Call(_) => false,
+    };
+    let ends = act.bounds.iter().any(|bound| bound.at_end);
+    !fixed && (ends || act.start_effects.iter().chain(act.end_effects).any(timed))
+}
+
+fn mentions_duration(expression: &Expression) -> bool {
+    match expression {
+        Expression::Duration => true,
+        Expression::Sum(parts) | Expression::Product(parts) => parts.iter().any(mentions_duration),
+        Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+            mentions_duration(left) || mentions_duration(right)
+        }
+        Expression::Negative(inner) => mentions_duration(inner),
+        _ => false,
     }
 }
 

@@ -1,0 +1,403 @@
+//! Attachments by name: who is asked, what is known already, and how often that was.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rustc_hash::FxHashMap;
+use serde::{Deserialize, Serialize};
+
+use super::{Answer, Attachment, AttachmentError, Call, CallError, CallKind, FactValue, Level, Read};
+
+/// How often an attachment was asked.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct CallStatistics {
+    /// Exact calls that reached the attachment.
+    pub calls: u64,
+    /// Relaxed calls that reached the attachment.
+    pub relaxed: u64,
+    /// Questions that the cache answered.
+    pub hits: u64,
+    /// Seconds inside the attachment by the clock given to [`Attachments::with_clock`], else zero.
+    pub time_s: f64,
+}
+
+/// Attachments by name, with their caches and counts.
+#[derive(Default)]
+pub struct Attachments {
+    registered: BTreeMap<String, Registered>,
+    clock_s: Option<Box<dyn Fn() -> f64 + Send + Sync>>,
+}
+
+struct Registered {
+    attachment: Arc<dyn Attachment>,
+    reads: Vec<Read>,
+    cache: Mutex<FxHashMap<CacheKey, Answer>>,
+    exact: AtomicU64,
+    relaxed: AtomicU64,
+    hits: AtomicU64,
+    time_ns: AtomicU64,
+}
+
+#[derive(PartialEq, Eq, Hash)]
+struct CacheKey {
+    level: Level,
+    module: Arc<str>,
+    arguments: Vec<Arc<str>>,
+    readings: Vec<KeyValue>,
+}
+
+#[derive(PartialEq, Eq, Hash)]
+enum KeyValue {
+    Truth(bool),
+    Number(u64),
+    Object(Arc<str>),
+    Undefined,
+}
+
+impl CacheKey {
+    fn new(call: &Call, level: Level) -> CacheKey {
+        let readings = call.readings.iter().map(|reading| match &reading.value {
+            FactValue::Truth(truth) => KeyValue::Truth(*truth),
+            // Adding zero makes -0.0 and 0.0 one key.
+            FactValue::Number(number) => KeyValue::Number((number + 0.0).to_bits()),
+            FactValue::Object(name) => KeyValue::Object(name.clone()),
+            FactValue::Undefined => KeyValue::Undefined,
+        });
+        CacheKey {
+            level,
+            module: call.module.clone(),
+            arguments: call.arguments.clone(),
+            readings: readings.collect(),
+        }
+    }
+}
+
+impl fmt::Debug for Attachments {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(self.registered.keys()).finish()
+    }
+}
+
+impl Attachments {
+    /// No attachments.
+    pub fn new() -> Attachments {
+        Attachments::default()
+    }
+
+    /// The same, timing calls with `clock_s` (seconds since any moment, never running backwards).
+    pub fn with_clock(self, clock_s: impl Fn() -> f64 + Send + Sync + 'static) -> Attachments {
+        Attachments { clock_s: Some(Box::new(clock_s)), ..self }
+    }
+
+    /// Registers `attachment` under `name`, replacing an earlier one.
+    ///
+    /// The name is what stands before the `@` in the domain (`fn` of `fn@lib.so`), or the module's PDDL name.
+    pub fn insert(&mut self, name: impl Into<String>, attachment: impl Attachment + 'static) {
+        self.insert_shared(name, Arc::new(attachment));
+    }
+
+    /// Like [`Attachments::insert`] for an attachment that others hold too.
+    pub fn insert_shared(&mut self, name: impl Into<String>, attachment: Arc<dyn Attachment>) {
+        let registered = Registered {
+            reads: attachment.reads(),
+            attachment,
+            cache: Mutex::default(),
+            exact: AtomicU64::new(0),
+            relaxed: AtomicU64::new(0),
+            hits: AtomicU64::new(0),
+            time_ns: AtomicU64::new(0),
+        };
+        self.registered.insert(name.into(), registered);
+    }
+
+    /// The registered name for a module, from its binding (`fn@lib.so` or `fn`) and its PDDL name.
+    ///
+    /// The exact spelling of the binding is preferred, then its part before the `@`, then the PDDL name, then either
+    /// without regard to case.
+    pub fn resolve(&self, binding: &str, module: &str) -> Option<&str> {
+        let function = binding.split('@').next().unwrap_or(binding);
+        let exact =
+            [binding, function, module].into_iter().find_map(|name| self.registered.get_key_value(name));
+        let found = exact.or_else(|| {
+            self.registered
+                .iter()
+                .find(|(name, _)| name.eq_ignore_ascii_case(function) || name.eq_ignore_ascii_case(module))
+        });
+        found.map(|(name, _)| name.as_str())
+    }
+
+    /// Registered names in order.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.registered.keys().map(String::as_str)
+    }
+
+    /// The declared read-set of a registered attachment (empty for an unknown name).
+    pub fn reads(&self, name: &str) -> &[Read] {
+        self.registered.get(name).map_or(&[], |registered| &registered.reads)
+    }
+
+    /// Where answers are counted that a caller remembered by itself.
+    pub(crate) fn hits(&self, name: &str) -> Option<&AtomicU64> {
+        self.registered.get(name).map(|registered| &registered.hits)
+    }
+
+    /// Hands one entry of `:moduleoptions` to the attachment of that name. `Ok(false)` if there is none.
+    pub fn configure(&self, name: &str, options: &[String]) -> Result<bool, AttachmentError> {
+        let Some(found) = self.resolve(name, name) else { return Ok(false) };
+        let Some(registered) = self.registered.get(found) else { return Ok(false) };
+        registered.attachment.configure(options).map(|()| true).map_err(|cause| AttachmentError {
+            call: format!("({name} {})", options.join(" ")),
+            module: name.to_string(),
+            attachment: found.to_string(),
+            cause,
+        })
+    }
+
+    /// Asks the attachment `name`, or its cache.
+    ///
+    /// Errors are not cached. An answer that does not fit the module's kind is a [`CallError::WrongAnswer`].
+    pub fn call(&self, name: &str, call: &Call, level: Level) -> Result<Answer, AttachmentError> {
+        let registered = self.registered(name, call)?;
+        let key = CacheKey::new(call, level);
+        if let Some(answer) = registered.lookup(&key) {
+            return Ok(answer);
+        }
+        let before = self.now_s();
+        let (answer, asked) = match level {
+            Level::Relaxed => match registered.attachment.relaxed(call) {
+                Some(answer) => {
+                    registered.relaxed.fetch_add(1, Ordering::Relaxed);
+                    (answer, Level::Relaxed)
+                }
+                None => return self.call(name, call, Level::Exact),
+            },
+            Level::Exact => {
+                registered.exact.fetch_add(1, Ordering::Relaxed);
+                (registered.attachment.evaluate(call), Level::Exact)
+            }
+        };
+        registered.add_time(self.now_s() - before);
+        debug_assert_eq!(asked, level);
+        let answer = checked(answer, call).map_err(|cause| failure(name, call, cause))?;
+        registered.store(key, &answer);
+        Ok(answer)
+    }
+
+    /// Asks for the exact answers of many calls, in one batch those that the cache does not know.
+    pub fn call_all(&self, name: &str, calls: &[Call]) -> Vec<Result<Answer, AttachmentError>> {
+        let Some(registered) = self.registered.get(name) else {
+            return calls.iter().map(|call| Err(missing(name, call))).collect();
+        };
+        let keys: Vec<CacheKey> = calls.iter().map(|call| CacheKey::new(call, Level::Exact)).collect();
+        let mut answers: Vec<Option<Result<Answer, AttachmentError>>> =
+            keys.iter().map(|key| registered.lookup(key).map(Ok)).collect();
+        let open: Vec<usize> = (0..calls.len()).filter(|&index| answers[index].is_none()).collect();
+        if !open.is_empty() {
+            let batch: Vec<Call> = open.iter().map(|&index| calls[index].clone()).collect();
+            let before = self.now_s();
+            registered.exact.fetch_add(batch.len() as u64, Ordering::Relaxed);
+            let mut given = registered.attachment.evaluate_all(&batch).into_iter();
+            registered.add_time(self.now_s() - before);
+            for (&index, call) in open.iter().zip(&batch) {
+                let answer = given.next().unwrap_or_else(|| {
+                    Err(CallError::WrongAnswer {
+                        expected: format!("{} answers", batch.len()),
+                        got: "fewer".to_string(),
+                    })
+                });
+                answers[index] = Some(checked(answer, call).map_err(|cause| failure(name, call, cause)));
+            }
+        }
+        for (key, answer) in keys.into_iter().zip(&answers) {
+            if let Some(Ok(answer)) = answer {
+                registered.store(key, answer);
+            }
+        }
+        answers
+            .into_iter()
+            .zip(calls)
+            .map(|(answer, call)| answer.unwrap_or_else(|| Err(missing(name, call))))
+            .collect()
+    }
+
+    /// Counts since registration, by attachment.
+    pub fn statistics(&self) -> BTreeMap<String, CallStatistics> {
+        let counts = self.registered.iter().map(|(name, registered)| (name.clone(), registered.statistics()));
+        counts.collect()
+    }
+
+    /// Forgets every cached answer (the counts stay): for when what the attachments are bound to has changed.
+    pub fn forget(&self) {
+        for registered in self.registered.values() {
+            registered.cache.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        }
+    }
+
+    fn registered(&self, name: &str, call: &Call) -> Result<&Registered, AttachmentError> {
+        self.registered.get(name).ok_or_else(|| missing(name, call))
+    }
+
+    fn now_s(&self) -> f64 {
+        self.clock_s.as_ref().map_or(0.0, |clock_s| clock_s())
+    }
+}
+
+impl Registered {
+    fn lookup(&self, key: &CacheKey) -> Option<Answer> {
+        let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = cache.get(key).cloned();
+        if found.is_some() {
+            self.hits.fetch_add(1, Ordering::Relaxed);
+        }
+        found
+    }
+
+    fn store(&self, key: CacheKey, answer: &Answer) {
+        self.cache.lock().unwrap_or_else(PoisonError::into_inner).insert(key, answer.clone());
+    }
+
+    fn add_time(&self, elapsed_s: f64) {
+        self.time_ns.fetch_add((elapsed_s.max(0.0) * 1e9) as u64, Ordering::Relaxed);
+    }
+
+    fn statistics(&self) -> CallStatistics {
+        CallStatistics {
+            calls: self.exact.load(Ordering::Relaxed),
+            relaxed: self.relaxed.load(Ordering::Relaxed),
+            hits: self.hits.load(Ordering::Relaxed),
+            time_s: self.time_ns.load(Ordering::Relaxed) as f64 * 1e-9,
+        }
+    }
+}
+
+fn checked(answer: Result<Answer, CallError>, call: &Call) -> Result<Answer, CallError> {
+    let answer = answer?;
+    if answer.fits(call.kind) {
+        return Ok(answer);
+    }
+    let expected = match call.kind {
+        CallKind::Cost => "a number from 0 to infinity",
+        CallKind::Condition => "true or false",
+        CallKind::Effect => "a list of finite numbers, truths or object names",
+        CallKind::Grounding => "a list of names",
+    };
+    Err(CallError::WrongAnswer { expected: expected.to_string(), got: format!("{answer:?}") })
+}
+
+fn failure(name: &str, call: &Call, cause: CallError) -> AttachmentError {
+    AttachmentError {
+        call: call.to_string(),
+        module: call.module.to_string(),
+        attachment: name.to_string(),
+        cause,
+    }
+}
+
+fn missing(name: &str, call: &Call) -> AttachmentError {
+    failure(name, call, CallError::Failed("no attachment of this name is registered".to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Reading;
+    use super::*;
+
+    fn call(kind: CallKind, arguments: &[&str], readings: &[(&str, FactValue)]) -> Call {
+        Call {
+            module: "m".into(),
+            kind,
+            arguments: arguments.iter().map(|&name| name.into()).collect(),
+            readings: readings
+                .iter()
+                .map(|(symbol, value)| Reading {
+                    symbol: (*symbol).into(),
+                    arguments: vec![],
+                    value: value.clone(),
+                })
+                .collect(),
+        }
+    }
+
+    struct Half;
+    impl Attachment for Half {
+        fn reads(&self) -> Vec<Read> {
+            vec![Read::All("x".to_string())]
+        }
+        fn evaluate(&self, call: &Call) -> Result<Answer, CallError> {
+            Ok(Answer::Number(call.number("x", &[])? / 2.0))
+        }
+        fn relaxed(&self, _: &Call) -> Option<Result<Answer, CallError>> {
+            Some(Ok(Answer::Number(0.0)))
+        }
+    }
+
+    #[test]
+    fn the_cache_distinguishes_arguments_readings_and_level() {
+        let mut attachments = Attachments::new();
+        attachments.insert("half", Half);
+        let ask = |arguments: &[&str], x: f64, level| {
+            let readings = [("x", FactValue::Number(x))];
+            attachments.call("half", &call(CallKind::Cost, arguments, &readings), level)
+        };
+        for (arguments, x, level, expected) in [
+            (["a"], 4.0, Level::Exact, 2.0),
+            (["a"], 4.0, Level::Exact, 2.0),
+            (["b"], 4.0, Level::Exact, 2.0),
+            (["a"], 6.0, Level::Exact, 3.0),
+            (["a"], 6.0, Level::Relaxed, 0.0),
+            (["a"], 6.0, Level::Relaxed, 0.0),
+        ] {
+            assert_eq!(ask(&arguments, x, level), Ok(Answer::Number(expected)));
+        }
+        let counts = attachments.statistics()["half"];
+        assert_eq!((counts.calls, counts.relaxed, counts.hits), (3, 1, 2));
+    }
+
+    #[test]
+    fn names_resolve_by_binding_then_by_module() {
+        let mut attachments = Attachments::new();
+        let truth = |_: &Call| Ok(Answer::Truth(true));
+        attachments.insert("pathCost", truth);
+        attachments.insert("can-see", truth);
+        for (binding, module, expected) in [
+            ("pathCost@libnav.so", "path-cost", Some("pathCost")),
+            ("other@libnav.so", "can-see", Some("can-see")),
+            ("PATHCOST@libnav.so", "x", Some("pathCost")),
+            ("other@libnav.so", "x", None),
+        ] {
+            assert_eq!(attachments.resolve(binding, module), expected, "{binding}");
+        }
+    }
+
+    #[test]
+    fn answers_that_do_not_fit_are_errors_with_the_call() {
+        let mut attachments = Attachments::new();
+        attachments.insert("nan", |_: &Call| Ok(Answer::Number(f64::NAN)));
+        attachments.insert("curious", |call: &Call| call.truth("door-open", &["d"]).map(Answer::Truth));
+        let nan = attachments.call("nan", &call(CallKind::Cost, &["a", "b"], &[]), Level::Exact);
+        assert_eq!(
+            nan.map_err(|error| error.to_string()),
+            Err("module [m a b] (attachment `nan`) failed: answered Number(NaN), expected a number from 0 to infinity"
+                .to_string())
+        );
+        let undeclared = attachments.call("curious", &call(CallKind::Condition, &[], &[]), Level::Exact);
+        let error = undeclared.expect_err("the fact was not declared").to_string();
+        assert!(error.contains("(door-open d) is not among the facts"), "{error}");
+        let unknown = attachments.call("gone", &call(CallKind::Condition, &[], &[]), Level::Exact);
+        assert!(unknown.is_err_and(|error| error.to_string().contains("no attachment of this name")));
+    }
+
+    #[test]
+    fn a_batch_asks_only_what_the_cache_does_not_know() {
+        let mut attachments = Attachments::new();
+        attachments.insert("same", |call: &Call| Ok(Answer::Truth(&*call.arguments[0] == "a")));
+        let calls = ["a", "b", "a"].map(|name| call(CallKind::Condition, &[name], &[]));
+        assert_eq!(attachments.call("same", &calls[0], Level::Exact), Ok(Answer::Truth(true)));
+        let answers = attachments.call_all("same", &calls);
+        assert_eq!(answers, [true, false, true].map(|truth| Ok(Answer::Truth(truth))));
+        let counts = attachments.statistics()["same"];
+        assert_eq!((counts.calls, counts.hits), (2, 2));
+    }
+}

@@ -1,0 +1,208 @@
+//! Where the facts stand that a call reads.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use crate::attachment::{FactValue, Read};
+use crate::ground::{GroundTask, Meaning, NumericId, VariableId};
+use crate::task::{FunctionId, ObjectId, PredicateId, Task};
+
+/// Where a reading comes from.
+#[derive(Debug, Clone)]
+pub(super) enum Origin {
+    /// True where the variable has the value.
+    Fact(VariableId, u32),
+    /// The number.
+    Number(NumericId),
+    /// The object that the variable's value means.
+    Object(VariableId),
+    /// The same in every state.
+    Constant(FactValue),
+}
+
+/// A reading without its value: symbol, arguments, and where its value stands.
+pub(super) type Source = (Arc<str>, Vec<Arc<str>>, Origin);
+
+/// Everything that a call reads.
+#[derive(Debug, Default)]
+pub(super) struct Sources {
+    /// In the order of the declaration.
+    pub list: Vec<Source>,
+    /// The variables among them, in order, each once.
+    pub variables: Vec<VariableId>,
+    /// The numbers among them, in order, each once.
+    pub numbers: Vec<NumericId>,
+}
+
+impl Sources {
+    pub(super) fn new(list: Vec<Source>) -> Sources {
+        let (mut variables, mut numbers) = (Vec::new(), Vec::new());
+        for (_, _, origin) in &list {
+            match origin {
+                Origin::Fact(variable, _) | Origin::Object(variable) => variables.push(*variable),
+                Origin::Number(number) => numbers.push(*number),
+                Origin::Constant(_) => {}
+            }
+        }
+        for ids in [&mut variables, &mut numbers] {
+            ids.sort_unstable();
+            ids.dedup();
+        }
+        Sources { list, variables, numbers }
+    }
+}
+
+/// Ground terms by name, to where their values stand.
+#[derive(Default)]
+pub(super) struct Terms {
+    facts: FxHashMap<(u32, Vec<u32>), (VariableId, u32)>,
+    objects: FxHashMap<(u32, Vec<u32>), VariableId>,
+    numbers: FxHashMap<(u32, Vec<u32>), NumericId>,
+}
+
+impl Terms {
+    pub(super) fn new(ground: &GroundTask) -> Terms {
+        let mut terms = Terms::default();
+        for (variable, declared) in ground.variables.iter().enumerate() {
+            for (value, meaning) in declared.values.iter().enumerate() {
+                match meaning {
+                    Meaning::Atom { predicate, arguments } => {
+                        terms.facts.insert((*predicate, arguments.clone()), (variable as u32, value as u32));
+                    }
+                    Meaning::Object { fluent, arguments, .. } => {
+                        terms.objects.insert((*fluent, arguments.clone()), variable as u32);
+                    }
+                    Meaning::Inner | Meaning::NoneOfThose => {}
+                }
+            }
+        }
+        for (number, fluent) in ground.numerics.iter().enumerate() {
+            terms.numbers.insert((fluent.function, fluent.arguments.clone()), number as u32);
+        }
+        terms
+    }
+
+    /// The ground readings of one declared read, in the order of the task's objects.
+    pub(super) fn readings(
+        &self,
+        task: &Task,
+        names: &[Arc<str>],
+        read: &Read,
+        arguments: &[u32],
+    ) -> Vec<Source> {
+        let mut found = Vec::new();
+        let mut add = |symbol: Symbol, arguments: Vec<u32>| {
+            let (name, origin) = self.origin(task, names, symbol, &arguments);
+            found.push((
+                Arc::from(name),
+                arguments.iter().map(|&a| names[a as usize].clone()).collect(),
+                origin,
+            ));
+        };
+        match read {
+            Read::At(name, positions) => {
+                let picked: Option<Vec<u32>> =
+                    positions.iter().map(|&position| arguments.get(position).copied()).collect();
+                if let (Some(symbol), Some(picked)) = (symbol_named(task, name), picked) {
+                    add(symbol, picked);
+                }
+            }
+            Read::All(name) => {
+                if let Some(symbol) = symbol_named(task, name) {
+                    instances(task, symbol).into_iter().for_each(|instance| add(symbol, instance));
+                }
+            }
+            Read::Everything => {
+                for symbol in every_symbol(task) {
+                    instances(task, symbol).into_iter().for_each(|instance| add(symbol, instance));
+                }
+            }
+        }
+        found
+    }
+
+    fn origin<'t>(
+        &self,
+        task: &'t Task,
+        names: &[Arc<str>],
+        symbol: Symbol,
+        arguments: &[u32],
+    ) -> (&'t str, Origin) {
+        let key = |id: u32| (id, arguments.to_vec());
+        let same = |objects: &[ObjectId]| objects.iter().map(|object| object.0).eq(arguments.iter().copied());
+        match symbol {
+            Symbol::Predicate(id) => {
+                let origin = match self.facts.get(&key(id.0)) {
+                    Some(&(variable, value)) => Origin::Fact(variable, value),
+                    None => {
+                        let holds =
+                            task.init.facts.iter().any(|fact| fact.predicate == id && same(&fact.arguments));
+                        Origin::Constant(FactValue::Truth(holds))
+                    }
+                };
+                (&task.predicate(id).name, origin)
+            }
+            Symbol::Function(id) => {
+                let numeric = || {
+                    let start =
+                        task.init.numbers.iter().find(|(f, _)| f.function == id && same(&f.arguments));
+                    start.map_or(FactValue::Undefined, |(_, number)| FactValue::Number(*number))
+                };
+                let object = || {
+                    let start =
+                        task.init.objects.iter().find(|(f, _)| f.function == id && same(&f.arguments));
+                    start.map_or(FactValue::Undefined, |(_, o)| FactValue::Object(names[o.index()].clone()))
+                };
+                let declared = task.function(id);
+                let origin = match (self.numbers.get(&key(id.0)), self.objects.get(&key(id.0))) {
+                    (Some(&number), _) if declared.result.is_none() => Origin::Number(number),
+                    (_, Some(&variable)) if declared.result.is_some() => Origin::Object(variable),
+                    _ if declared.result.is_none() => Origin::Constant(numeric()),
+                    _ => Origin::Constant(object()),
+                };
+                (&declared.name, origin)
+            }
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Symbol {
+    Predicate(PredicateId),
+    Function(FunctionId),
+}
+
+fn symbol_named(task: &Task, name: &str) -> Option<Symbol> {
+    let predicate = task.predicates.iter().position(|p| p.name.eq_ignore_ascii_case(name));
+    let function = task.functions.iter().position(|f| f.name.eq_ignore_ascii_case(name));
+    predicate
+        .map(|index| Symbol::Predicate(PredicateId(index as u32)))
+        .or(function.map(|index| Symbol::Function(FunctionId(index as u32))))
+}
+
+fn every_symbol(task: &Task) -> Vec<Symbol> {
+    let predicates = (0..task.predicates.len()).map(|index| Symbol::Predicate(PredicateId(index as u32)));
+    predicates
+        .chain((0..task.functions.len()).map(|index| Symbol::Function(FunctionId(index as u32))))
+        .collect()
+}
+
+fn instances(task: &Task, symbol: Symbol) -> Vec<Vec<u32>> {
+    let parameters = match symbol {
+        Symbol::Predicate(id) => &task.predicate(id).parameters,
+        Symbol::Function(id) => &task.function(id).parameters,
+    };
+    parameters.iter().fold(vec![Vec::new()], |instances, parameter| {
+        instances
+            .iter()
+            .flat_map(|instance| {
+                parameter.objects.iter().map(|object| {
+                    let mut longer: Vec<u32> = instance.clone();
+                    longer.push(object.0);
+                    longer
+                })
+            })
+            .collect()
+    })
+}

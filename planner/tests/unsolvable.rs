@@ -1,0 +1,157 @@
+//! Tasks that are in order and have no plan: what a reader is told, and that nothing is called proven that is not.
+
+use descry_planner::{Answer, Attachments, Call, Options, Outcome, PlanError, Source, Task, plan};
+
+fn read(domain: &str, problem: &str) -> Task {
+    let domain = Source::new("domain.pddl", format!("(define (domain d)\n{domain})"));
+    let problem = Source::new("problem.pddl", format!("(define (problem p) (:domain d)\n{problem})"));
+    Task::read(&domain, &problem).unwrap_or_else(|findings| panic!("{}", findings.render(false)))
+}
+
+fn solve(domain: &str, problem: &str) -> Result<Outcome, PlanError> {
+    let mut attachments = Attachments::new();
+    attachments.insert("fits", |call: &Call| Ok(Answer::Truth(&*call.arguments[0] == "cup")));
+    attachments.insert("drive", |call: &Call| {
+        Ok(Answer::Number(if &*call.arguments[1] == "attic" { f64::INFINITY } else { 3.0 }))
+    });
+    attachments.insert("broken", |_: &Call| {
+        Err(descry_planner::CallError::Failed("the map is not there".to_string()))
+    });
+    let options = Options { evaluation_limit: Some(20_000), ..Options::default() };
+    plan(&read(domain, problem), &attachments, &options, &|| false, &mut |_| {})
+}
+
+/// The findings of a task that is proven to have no plan, as they are drawn.
+fn why(domain: &str, problem: &str) -> String {
+    match solve(domain, problem) {
+        Ok(Outcome::Unsolvable { why, .. }) => why.findings.render(false),
+        other => panic!("{other:?}"),
+    }
+}
+
+const HOUSE: &str = "  (:requirements :typing :negative-preconditions)
+  (:types thing room)
+  (:predicates (in ?t - thing ?r - room) (door ?a ?b - room) (carried ?t - thing) (robot-in ?r - room)
+    (clean ?t - thing) (brush ?t - thing))
+  (:action go :parameters (?a ?b - room) :precondition (and (robot-in ?a) (door ?a ?b))
+    :effect (and (not (robot-in ?a)) (robot-in ?b)))
+  (:action take :parameters (?t - thing ?r - room) :precondition (and (robot-in ?r) (in ?t ?r))
+    :effect (and (not (in ?t ?r)) (carried ?t)))
+  (:action put :parameters (?t - thing ?r - room) :precondition (and (robot-in ?r) (carried ?t))
+    :effect (and (in ?t ?r) (not (carried ?t))))
+  (:action scrub :parameters (?t ?b - thing) :precondition (and (carried ?t) (brush ?b) (carried ?b))
+    :effect (clean ?t))
+";
+
+const HOUSE_PROBLEM: &str = "  (:objects cup - thing hall kitchen attic - room) (:init (robot-in hall) (door hall kitchen) (in cup kitchen))\n";
+
+const LIGHT: &str = "  (:requirements :durative-actions)
+  (:predicates (match) (light) (mended))
+  (:durative-action strike :parameters () :duration (= ?duration 5) :condition (at start (match))
+    :effect (and (at start (not (match))) (at start (light)) (at end (not (light)))))
+  (:durative-action mend :parameters () :duration (= ?duration 6) :condition (over all (light))
+    :effect (at end (mended)))
+";
+
+const SHOP: &str = "  (:requirements :durative-actions :timed-initial-literals)
+  (:predicates (open) (there) (home) (bought))
+  (:durative-action go :parameters () :duration (= ?duration 4) :condition (at start (home))
+    :effect (and (at start (not (home))) (at end (there))))
+  (:durative-action back :parameters () :duration (= ?duration 4) :condition (at start (there))
+    :effect (and (at start (not (there))) (at end (home))))
+  (:durative-action buy :parameters () :duration (= ?duration 3)
+    :condition (and (at start (there)) (over all (open))) :effect (at end (bought)))
+";
+
+const MODULES: &str = "  (:requirements :typing :durative-actions :modules)
+  (:types thing room)
+  (:modules (fits ?t - thing ?r - room conditionchecker fits@house) (drive ?a ?b - room cost drive@house))
+  (:predicates (at ?r - room) (stored ?t - thing))
+  (:durative-action move :parameters (?a ?b - room) :duration (= ?duration [drive ?a ?b])
+    :condition (at start (at ?a)) :effect (and (at start (not (at ?a))) (at end (at ?b))))
+  (:durative-action store :parameters (?t - thing ?r - room) :duration (= ?duration 1)
+    :condition (and (at start (at ?r)) (over all ([fits ?t ?r]))) :effect (at end (stored ?t)))
+";
+
+const FAILING: &str = "  (:requirements :typing :durative-actions :modules)
+  (:types thing)
+  (:modules (broken ?t - thing conditionchecker broken@house))
+  (:predicates (seen ?t - thing))
+  (:durative-action look :parameters (?t - thing) :duration (= ?duration 1)
+    :condition (at start ([broken ?t])) :effect (at end (seen ?t)))
+";
+
+#[test]
+fn each_reason_is_drawn_where_it_stands() {
+    for (name, domain, problem) in [
+        ("no-door", HOUSE, format!("{HOUSE_PROBLEM}  (:goal (in cup attic))")),
+        ("nothing-to-scrub-with", HOUSE, format!("{HOUSE_PROBLEM}  (:goal (clean cup))")),
+        ("excluding-each-other", HOUSE, format!("{HOUSE_PROBLEM}  (:goal (and (carried cup) (in cup hall)))")),
+        ("too-short-a-light", LIGHT, "  (:init (match)) (:goal (mended))".to_string()),
+        ("too-early-a-deadline", SHOP, "  (:init (home) (open) (at 6 (not (open)))) (:goal (bought))".to_string()),
+        (
+            "a-condition-said-no",
+            MODULES,
+            "  (:objects cup bowl - thing hall - room) (:init (at hall)) (:goal (and (stored cup) (stored bowl)))"
+                .to_string(),
+        ),
+        (
+            "a-cost-said-never",
+            MODULES,
+            "  (:objects hall attic - room) (:init (at hall)) (:goal (at attic))".to_string(),
+        ),
+    ] {
+        insta::assert_snapshot!(name, why(domain, &problem));
+    }
+}
+
+#[test]
+fn a_failing_attachment_is_drawn_where_it_is_asked() {
+    let problem = "  (:objects cup - thing) (:init) (:goal (seen cup))";
+    let Err(PlanError::Attachment { findings, .. }) = solve(FAILING, problem) else { panic!("it fails") };
+    insta::assert_snapshot!("a-failing-attachment", findings.render(false));
+}
+
+#[test]
+fn deadlines_are_met_where_they_can_be_and_else_proven_too_early() {
+    for (init, goal, solvable) in [
+        ("(open) (at 8 (not (open)))", "(bought)", true),
+        ("(open) (at 6 (not (open)))", "(bought)", false),
+        // Going back and forth first never helps.
+        ("(at 9 (open)) (at 11 (not (open)))", "(bought)", false),
+        ("(at 9 (open)) (at 13 (not (open)))", "(and (bought) (home))", true),
+        ("(open) (at 3 (not (open))) (at 20 (open)) (at 22 (not (open)))", "(bought)", false),
+        ("(open) (at 3 (not (open))) (at 20 (open)) (at 24 (not (open)))", "(bought)", true),
+    ] {
+        let outcome = solve(SHOP, &format!("(:init (home) {init}) (:goal {goal})"));
+        match outcome {
+            Ok(Outcome::Solved { .. }) => assert!(solvable, "{init}"),
+            Ok(Outcome::Unsolvable { .. }) => assert!(!solvable, "{init}"),
+            other => panic!("{init}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn what_only_chosen_durations_could_reach_is_not_called_impossible() {
+    // The level rises with the duration chosen; the search takes the shortest, so it finds no plan, and proves nothing.
+    let domain = "(:requirements :durative-actions :numeric-fluents :duration-inequalities)
+      (:predicates (idle)) (:functions (level))
+      (:durative-action fill :parameters () :duration (and (>= ?duration 1) (<= ?duration 9))
+        :condition (at start (idle)) :effect (and (at start (not (idle))) (at end (increase (level) ?duration))))";
+    let outcome = solve(domain, "(:init (idle) (= (level) 0)) (:goal (>= (level) 5))");
+    assert!(
+        matches!(outcome, Ok(Outcome::OutOfTime { best: None, .. } | Outcome::Solved { .. })),
+        "{outcome:?}"
+    );
+}
+
+#[test]
+fn numbers_that_pass_a_point_by_may_come_back_to_it() {
+    // 3 + 8 - 3 - 3 = 5: the first step leads away from the goal.
+    let domain = "(:requirements :numeric-fluents :durative-actions) (:functions (x))
+      (:durative-action up :parameters () :duration (= ?duration 1) :effect (at end (increase (x) 8)))
+      (:durative-action down :parameters () :duration (= ?duration 1) :effect (at end (decrease (x) 3)))";
+    let outcome = solve(domain, "(:init (= (x) 3)) (:goal (= (x) 5))");
+    assert!(matches!(outcome, Ok(Outcome::Solved { .. })), "{outcome:?}");
+}

@@ -61,6 +61,8 @@ struct State {
     belief: Belief,
     space: Arc<Space>,
     looks: Vec<Look>,
+    /// The problem of this round in the record.
+    problem: Option<RecordId>,
     plan: Option<Plan>,
     totals: Totals,
 }
@@ -144,6 +146,7 @@ impl<'a> Agent<'a> {
             belief: Belief::default(),
             space: Arc::default(),
             looks: Vec::new(),
+            problem: None,
             plan: None,
             totals: Totals::default(),
         };
@@ -238,19 +241,21 @@ impl<'a> Agent<'a> {
     /// Takes a plan up and says so.
     fn intend(&mut self, plan: Plan, because: String, calls: Vec<(String, u64)>) -> Result<(), CommandError> {
         self.state.totals.plans += 1;
-        self.say(&Event::Planned {
+        let said = self.say(&Event::Planned {
             round: self.state.totals.plans,
             because,
             steps: plan.to_string().lines().filter(|l| !l.starts_with(';')).map(str::to_string).collect(),
             makespan_s: plan.makespan_s().unwrap_or(0.0),
             calls,
         })?;
+        let held: Vec<RecordId> = self.state.problem.into_iter().chain([said]).collect();
+        self.record.hold(&held, "plan").map_err(CommandError::broken)?;
         self.state.plan = Some(plan);
         Ok(())
     }
 
     fn keep(&mut self) -> Result<(), CommandError> {
-        self.say(&Event::Kept { left: self.rest().steps.len() })
+        self.say(&Event::Kept { left: self.rest().steps.len() }).map(|_| ())
     }
 
     /// The steps of the plan that are still to be done.

@@ -8,6 +8,9 @@ use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
 
 use crate::exit::CommandError;
 
+mod recorded;
+pub mod tape;
+
 /// A body that was opened.
 pub struct Body {
     /// What the agent sees of it.
@@ -44,7 +47,7 @@ impl Body {
     }
 }
 
-/// Opens the body of `--robot`: `sim`, or `recorded:DIR`.
+/// Opens the body of `--robot`: `sim`, or `recorded:DIR` with a folder of frames or the record of a run.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] names the place and what was expected.
@@ -58,8 +61,12 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
                 );
                 return Err(CommandError::BadInput(text));
             }
-            let robot = descry_robots::recorded::RecordedRobot::open(std::path::Path::new(folder))
-                .map_err(CommandError::bad_input)?;
+            let path = std::path::Path::new(folder);
+            let robot = if recorded::is_record(path) {
+                recorded::open(crate::keeping::open(path)?, folder)?
+            } else {
+                descry_robots::recorded::RecordedRobot::open(path).map_err(CommandError::bad_input)?
+            };
             Ok(Body { robot: Arc::new(robot), simulated: None })
         }
         _ => Err(CommandError::BadInput(format!("--robot {robot}\n  expected: sim, or recorded:DIR"))),

@@ -5,6 +5,7 @@ pub mod body;
 pub mod commands;
 pub mod exit;
 pub mod experiment;
+pub mod keeping;
 pub mod policies;
 pub mod report;
 pub mod run;

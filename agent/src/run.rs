@@ -1,19 +1,23 @@
 //! One run from beginning to end: its folder, its record, its report.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use descry_domains::goal::{Goal, symbol};
 use descry_domains::load::Domain;
 use descry_memory::belief::Track;
-use descry_memory::{Options, Query, Record};
-use descry_robots::CancellationToken;
+use descry_memory::{Query, Record};
+use descry_robots::recorded::TapedRobot;
+use descry_robots::{CancellationToken, Robot};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::agent::{Agent, Conclusion, Setup};
 use crate::body::Body;
+use crate::body::tape::{self, RecordTape};
 use crate::exit::CommandError;
+use crate::keeping::Keeping;
 use crate::policies::Chooser;
 use crate::report::{Believed, Event, Report};
 
@@ -30,6 +34,9 @@ pub struct Settings {
     pub domain: String,
     /// Who chooses where to look next, by name.
     pub policy: String,
+    /// How the record is kept.
+    #[serde(default)]
+    pub keeping: Keeping,
 }
 
 /// `run.json` in a run's folder.
@@ -71,6 +78,15 @@ fn unused(stem: &Path) -> PathBuf {
     (1..).map(numbered).find(|path| !path.exists()).unwrap_or_else(|| stem.to_path_buf())
 }
 
+/// What a run is about.
+#[derive(Clone, Copy)]
+pub struct Task<'a> {
+    /// What may be said and what it means.
+    pub domain: &'a Domain,
+    /// What is pursued.
+    pub goal: &'a Goal,
+}
+
 /// Pursues a goal and reports.
 ///
 /// # Errors
@@ -91,14 +107,56 @@ pub fn pursue(
         started_unix_s: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
         settings: settings.clone(),
     };
-    write_json(&folder.join("run.json"), &header)?;
-    let record = Record::create(&folder.join("record"), Options::default()).map_err(CommandError::broken)?;
+    keep_header(folder, &header)?;
+    let record = Arc::new(settings.keeping.create(folder)?);
+    let tape = Arc::new(RecordTape { into: Arc::clone(&record), from: Arc::clone(&record) });
+    let robot = Arc::new(TapedRobot::begin(Arc::clone(&body.robot), tape));
+    let mut report = live_through(Task { domain, goal }, &robot, &record, chooser, folder, tell)?;
+    know_the_truth(&mut report, body);
+    Ok(report)
+}
+
+/// Goes on with a run that was cut off: its agent lives through what the record holds once more, and then goes on with the body.
+///
+/// # Errors
+/// [`CommandError`] as for [`pursue`], or if the body is not the one of that run.
+pub fn go_on(
+    task: Task<'_>,
+    body: &Body,
+    folder: &Path,
+    keeping: &Keeping,
+    chooser: Chooser,
+    tell: &mut dyn FnMut(&Event),
+) -> Result<Report, CommandError> {
+    let record = Arc::new(keeping.resume(folder)?);
+    let entries = tape::entries(&record)?;
+    let tape = Arc::new(RecordTape { into: Arc::clone(&record), from: Arc::clone(&record) });
+    let robot = Arc::new(TapedRobot::go_on(Arc::clone(&body.robot), tape, entries));
+    let mut report = live_through(task, &robot, &record, chooser, folder, tell)?;
+    know_the_truth(&mut report, body);
+    Ok(report)
+}
+
+/// Lets an agent pursue a goal with a body on tape, into a record.
+///
+/// # Errors
+/// [`CommandError`] if the body or the record fails for good, or the domain cannot be used.
+pub fn live_through(
+    task: Task<'_>,
+    robot: &Arc<TapedRobot>,
+    record: &Record,
+    chooser: Chooser,
+    folder: &Path,
+    tell: &mut dyn FnMut(&Event),
+) -> Result<Report, CommandError> {
+    let Task { domain, goal } = task;
+    tape::put_known(record, robot.known())?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
         .map_err(|e| CommandError::broken(format!("the runtime could not be started: {e}")))?;
     let recogniser = descry_perception::recognise::Descry::default();
-    let start_ns = body.robot.now_ns();
+    let start_ns = robot.now_ns();
     let cancel = CancellationToken::new();
     let conclusion = runtime.block_on(async {
         let stop = cancel.clone();
@@ -107,19 +165,51 @@ pub fn pursue(
                 stop.cancel();
             }
         });
-        let robot = std::sync::Arc::clone(&body.robot);
-        let setup = Setup { domain, robot, record: &record, recogniser: &recogniser, goal, cancel, chooser };
+        let body: Arc<dyn Robot> = Arc::clone(robot) as _;
+        let setup = Setup { domain, robot: body, record, recogniser: &recogniser, goal, cancel, chooser };
         Agent::new(setup, tell).pursue().await
     })?;
+    robot.finish().map_err(CommandError::broken)?;
     record.sync().map_err(CommandError::broken)?;
     let things = descry_domains::situation::things(domain, &goal.things);
     let object = things.first().map(|t| t.name.clone());
     let mut report = Report::begin(goal, object, folder.display().to_string());
     fill(&mut report, &conclusion);
-    report.sim_time_s = (body.robot.now_ns() - start_ns) as f64 * 1e-9;
-    report.true_position_m =
-        report.object.as_deref().and_then(|name| body.true_position_m(name, report.position_m));
+    report.sim_time_s = (robot.now_ns() - start_ns) as f64 * 1e-9;
     Ok(report)
+}
+
+/// Where the thing is; simulation only.
+fn know_the_truth(report: &mut Report, body: &Body) {
+    let object = report.object.as_deref();
+    report.true_position_m = object.and_then(|name| body.true_position_m(name, report.position_m));
+}
+
+/// What a run was started with.
+///
+/// # Errors
+/// [`CommandError::BadInput`] if the folder holds no run.
+pub fn header(folder: &Path) -> Result<Header, CommandError> {
+    let path = folder.join(HEADER);
+    let text = std::fs::read_to_string(&path).map_err(|e| {
+        let text =
+            format!("{}: {e}\n  expected the folder of a run; `descry runs` lists them", path.display());
+        CommandError::BadInput(text)
+    })?;
+    serde_json::from_str(&text).map_err(|e| CommandError::BadInput(format!("{}: {e}", path.display())))
+}
+
+/// Writes what a run was started with into its folder.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the folder cannot be written.
+pub fn keep_header(folder: &Path, header: &Header) -> Result<(), CommandError> {
+    write_json(&folder.join(HEADER), header)
+}
+
+/// The report of a run; none while it has not finished.
+pub fn report(folder: &Path) -> Option<Report> {
+    serde_json::from_str(&std::fs::read_to_string(folder.join(REPORT)).ok()?).ok()
 }
 
 fn fill(report: &mut Report, conclusion: &Conclusion) {
@@ -162,10 +252,18 @@ pub fn events(record: &Record) -> Result<Vec<Value>, CommandError> {
 /// # Errors
 /// [`CommandError::Broken`] if the folder cannot be written.
 pub fn finish(folder: &Path, report: &Report) -> Result<(), CommandError> {
-    write_json(&folder.join("report.json"), report)
+    write_json(&folder.join(REPORT), report)
 }
 
+/// Writes a file whole or not at all, however the process ends.
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
     let text = serde_json::to_string_pretty(value).map_err(|e| CommandError::Bug(e.to_string()))?;
-    std::fs::write(path, text + "\n").map_err(|e| CommandError::broken(format!("{}: {e}", path.display())))
+    let fresh = path.with_extension("json.new");
+    let written = std::fs::write(&fresh, text + "\n").and_then(|()| std::fs::rename(&fresh, path));
+    written.map_err(|e| CommandError::broken(format!("{}: {e}", path.display())))
 }
+
+/// What a run was started with, in its folder.
+const HEADER: &str = "run.json";
+/// How it ended.
+const REPORT: &str = "report.json";

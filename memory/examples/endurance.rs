@@ -432,6 +432,9 @@ fn full(dir: &Path, rounds: u64) -> Outcome {
         // Every second time the process ends here, and the record is opened on the full disk.
         if round % 2 == 1 {
             drop(record);
+            let reader = Record::open_shared(&place)?;
+            lost += acknowledged.iter().filter(|(i, id)| !is_there(&reader, *i, *id)).count();
+            drop(reader);
             fs::remove_file(&ballast)?;
             record = Record::open(&place, small_segments())?;
         } else {

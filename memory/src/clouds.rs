@@ -97,6 +97,15 @@ fn pack(cloud: &Cloud, stride: usize) -> Vec<u8> {
     out
 }
 
+/// The sensor behind a cloud.
+///
+/// # Errors
+/// What of the layout does not fit, in words.
+pub(crate) fn sensing(info: &BlobInfo) -> Result<Sensing, String> {
+    let layout = Layout::deserialize(&info.layout);
+    layout.map(|l| l.sensing).map_err(|e| format!("its layout cannot be read: {e}"))
+}
+
 /// A cloud from its blob.
 ///
 /// # Errors

@@ -8,6 +8,7 @@ mod export;
 mod flusher;
 mod foxglove;
 mod record;
+mod retrace;
 pub mod space;
 pub mod stores;
 pub mod transforms;

@@ -1,15 +1,19 @@
 //! What was seen: the handle by which the rest of descry records and recalls.
 
-use crate::clouds::{self, CLOUD, Sensing};
+mod recall;
+
+use crate::clouds::{self, Sensing};
 use crate::document::{Blob, Document, Draft, Form, Meta, Query, RecordId};
 use crate::error::Error;
 use crate::flusher::{Flusher, Group};
 use crate::foxglove::{self, LogLevel};
+use crate::retrace::Retrace;
 use crate::stores::local::{Durability, LocalOptions, LocalStore, Recovery};
 use crate::stores::{Report, Retention, Stats, Store};
-use crate::transforms::{self, Reach, Sample, Transforms};
-use descry_perception::{Cloud, View};
+use crate::transforms::{self, Reach, Sample};
+use descry_perception::Cloud;
 use nalgebra::Isometry3;
+use recall::named;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -107,6 +111,7 @@ pub struct Record {
     options: Options,
     groups: Mutex<Groups>,
     flusher: Flusher,
+    retrace: Option<Retrace>,
 }
 
 /// Transforms on their way into a document, by child and parent.
@@ -134,6 +139,24 @@ impl Record {
         Ok(Self::local(LocalStore::open(dir, &options.robot, options.local())?, options))
     }
 
+    /// Opens a record so that its maker lives through it again and goes on where it was cut off: a single document, cloud, image or
+    /// transform that is put as it stands in the record, in the order of its kind, is taken for the one there and not written twice.
+    ///
+    /// # Errors
+    /// As [`Record::open`].
+    pub fn resume(dir: &Path, options: Options) -> Result<Self, Error> {
+        Self::open(dir, options)?.retracing()
+    }
+
+    /// The same on any store; see [`Record::resume`].
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub fn retracing(mut self) -> Result<Self, Error> {
+        self.retrace = Some(Retrace::of(&*self.store, &self.options.robot)?);
+        Ok(self)
+    }
+
     /// Opens a record to read it, beside a process that may be writing.
     ///
     /// # Errors
@@ -157,6 +180,7 @@ impl Record {
             recovery: Recovery::default(),
             options,
             groups: Mutex::default(),
+            retrace: None,
         }
     }
 
@@ -238,6 +262,9 @@ impl Record {
         if self.flusher.has_failed() {
             self.flusher.drain()?;
         }
+        if self.is_measured(stamp_ns, parent, child)? {
+            return Ok(());
+        }
         let span = stamp_ns / self.options.group_ns.max(1);
         let mut groups = self.groups.lock().unwrap_or_else(PoisonError::into_inner);
         // Stamps of several sources interleave; only a later span closes the open one.
@@ -306,6 +333,11 @@ impl Record {
     /// # Errors
     /// As [`Store::append`].
     pub fn put(&self, draft: Draft) -> Result<RecordId, Error> {
+        if let Some(retrace) = &self.retrace
+            && let Some(id) = retrace.next(&*self.store, &draft)?
+        {
+            return Ok(id);
+        }
         let ids = self.store.append(std::slice::from_ref(&draft))?;
         ids.first().copied().ok_or(Error::Missing { id: 0 })
     }
@@ -340,7 +372,7 @@ impl Record {
     /// # Errors
     /// If the store cannot be read.
     pub fn newest(&self, kind: &str) -> Result<Option<Document>, Error> {
-        let query = Query { order: crate::document::Order::Newest, limit: Some(1), ..Query::of_kind(kind) };
+        let query = Query { order: crate::document::Order::Newest, limit: Some(1), ..self.own(kind) };
         Ok(self.store.find(&query)?.pop())
     }
 
@@ -349,7 +381,7 @@ impl Record {
     /// # Errors
     /// [`Error::NotNear`] with the nearest there is.
     pub fn nearest(&self, kind: &str, stamp_ns: i64, tolerance_ns: i64) -> Result<Document, Error> {
-        self.nearest_of(&Query::of_kind(kind), stamp_ns, tolerance_ns)
+        self.nearest_of(&self.own(kind), stamp_ns, tolerance_ns)
     }
 
     /// Of what meets a query the record nearest in time, within a tolerance.
@@ -366,133 +398,25 @@ impl Record {
         })
     }
 
-    /// A cloud that was recorded, and its sensor.
-    ///
-    /// # Errors
-    /// [`Error::Missing`], [`Error::NoBlob`], [`Error::Damaged`].
-    pub fn cloud(&self, document: &Document) -> Result<(Cloud, Sensing), Error> {
-        let info = document.blobs.iter().find(|b| b.name == CLOUD && b.form == Form::PointCloud);
-        let info = info.ok_or_else(|| crate::stores::local::no_blob(document, CLOUD))?;
-        let data = self.store.blob(document.id, CLOUD)?;
-        clouds::decode(info, &data).map_err(|what| Error::Damaged {
-            place: format!("record {}", document.id).into(),
-            at: 0,
-            what,
-        })
-    }
-
-    /// What a camera saw nearest to a time, and where it stood in `world` at the stamp of that cloud (paper 004, section V, step 0).
-    ///
-    /// # Errors
-    /// [`Error::NotNear`] without a cloud within [`Options::view_tolerance_ns`]; a missing link or gap of the transforms of that time.
-    pub fn view_at(&self, stamp_ns: i64, world: &str) -> Result<View, Error> {
-        let document = self.nearest(kind::CLOUD, stamp_ns, self.options.view_tolerance_ns)?;
-        self.view(&document, world)
-    }
-
-    /// The view that a recorded cloud is, with the transforms of its time.
-    ///
-    /// # Errors
-    /// As [`Record::view_at`].
-    pub fn view(&self, document: &Document, world: &str) -> Result<View, Error> {
-        let (cloud, sensing) = self.cloud(document)?;
-        let world_from_camera = self.transform(world, &document.frame, document.stamp_ns)?;
-        Ok(View {
-            stamp_ns: document.stamp_ns,
-            cloud,
-            intrinsics: sensing.intrinsics,
-            world_from_camera,
-            pose_sigma_m: sensing.pose_sigma_m,
-            pose_sigma_rad: sensing.pose_sigma_rad,
-        })
-    }
-
-    /// `target_from_origin` at a time, interpolated through the tree of that time.
-    ///
-    /// # Errors
-    /// An error that names the missing link, or the gap.
-    pub fn transform(&self, target: &str, origin: &str, stamp_ns: i64) -> Result<Isometry3<f64>, Error> {
-        Ok(self.transforms_around(stamp_ns)?.lookup(target, origin, stamp_ns, self.options.reach)?)
-    }
-
-    /// The transforms that say something about a time: what was measured around it and what holds always.
-    ///
-    /// # Errors
-    /// If the store cannot be read.
-    pub fn transforms_around(&self, stamp_ns: i64) -> Result<Transforms, Error> {
-        self.flusher.drain()?;
-        let mut around = Transforms::default();
-        for document in self.store.find(&Query::of_kind(kind::STATIC_TRANSFORM))? {
-            let (parent, samples) = self.samples(&document)?;
-            for sample in samples {
-                around.insert_static(&parent, &document.frame, &sample.parent_from_child)?;
-            }
-        }
-        let reach_ns = self.options.reach.max_gap_ns.max(self.options.reach.hold_ns);
-        for child in self.store.frames(kind::TRANSFORMS)? {
-            let of_child = Query { frame: Some(child), ..Query::of_kind(kind::TRANSFORMS) };
-            let near = Query {
-                from_ns: Some(stamp_ns.saturating_sub(reach_ns)),
-                to_ns: Some(stamp_ns.saturating_add(reach_ns)),
-                ..of_child.clone()
-            };
-            let mut groups = self.store.find(&near)?;
-            if groups.is_empty() {
-                // Not to be used, but to say how far off it is.
-                groups.extend(self.store.nearest(&of_child, stamp_ns)?);
-            }
-            for document in groups {
-                let (parent, samples) = self.samples(&document)?;
-                for sample in samples {
-                    around.insert(sample.stamp_ns, &parent, &document.frame, &sample.parent_from_child)?;
-                }
-            }
-        }
-        let groups = self.groups.lock().unwrap_or_else(PoisonError::into_inner);
-        for ((child, parent), samples) in &groups.open {
-            for sample in samples {
-                around.insert(sample.stamp_ns, parent, child, &sample.parent_from_child)?;
-            }
-        }
-        Ok(around)
-    }
-
-    /// Parent frame and samples of recorded transforms.
-    fn samples(&self, document: &Document) -> Result<(String, Vec<Sample>), Error> {
-        let damaged = |what: &str| Error::Damaged {
-            place: format!("record {}", document.id).into(),
-            at: 0,
-            what: what.into(),
-        };
-        let parent = document
-            .body
-            .get("parent")
-            .and_then(Value::as_str)
-            .ok_or_else(|| damaged("transforms without a parent"))?;
-        let bytes = self.store.blob(document.id, "tf")?;
-        let samples =
-            foxglove::read_frame_transforms(&bytes).ok_or_else(|| damaged("these are no transforms"))?;
-        Ok((parent.to_owned(), samples))
-    }
-
-    /// Keeps records from being pruned, in the name of `by` (a belief, a model, a plan).
+    /// Keeps records from being pruned, in the name of `by` (a belief, a model, a plan); clouds with the transforms of their time.
     ///
     /// # Errors
     /// [`Error::Missing`] if one is not there; then none is pinned.
     pub fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
-        self.store.pin(ids, by)
+        self.store.pin(&self.with_their_place(ids)?, by)
     }
 
-    /// Pins these records, and no others, in the name of `by`: what it cites now, in place of what it cited before.
+    /// Pins these records as [`Record::pin`] does, and no others, in the name of `by`: what it cites now, in place of what it cited
+    /// before.
     ///
     /// # Errors
     /// [`Error::Missing`] if one is not there; then what it held before stays pinned.
     pub fn hold(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
-        for id in ids {
-            self.store.get(*id)?;
+        let ids = self.with_their_place(ids)?;
+        match &self.retrace {
+            Some(retrace) if retrace.next_pins(&*self.store, &ids, by)? => Ok(()),
+            _ => self.store.hold(&ids, by),
         }
-        self.store.unpin(by)?;
-        if ids.is_empty() { Ok(()) } else { self.store.pin(ids, by) }
     }
 
     /// Takes back every pin in the name of `by`.
@@ -545,6 +469,11 @@ impl Drop for Record {
 }
 
 impl Record {
+    /// What this robot recorded of a kind: all of it, where robots have no names.
+    pub fn own(&self, kind: &str) -> Query {
+        Query { robot: named(&self.options.robot), ..Query::of_kind(kind) }
+    }
+
     fn flush_open(&self) -> Result<(), Error> {
         let open = self.groups.lock().unwrap_or_else(PoisonError::into_inner).take();
         if !open.is_empty() {

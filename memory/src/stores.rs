@@ -7,6 +7,10 @@ use crate::error::Error;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
+/// The kinds under which pins are recorded.
+pub(crate) const PIN: &str = "pin";
+pub(crate) const UNPIN: &str = "unpin";
+
 /// How much is kept; what is over goes oldest first, pinned records excepted. The default keeps everything.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Retention {
@@ -121,6 +125,13 @@ pub trait Store: Send + Sync {
     /// [`Error::Missing`] if one of them is not there; then none is pinned.
     fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error>;
 
+    /// Pins these records, and no others, in the name of `by`: at no moment is less held than before or after. Durable when it
+    /// returns.
+    ///
+    /// # Errors
+    /// [`Error::Missing`] if one of them is not there; then nothing changes.
+    fn hold(&self, ids: &[RecordId], by: &str) -> Result<(), Error>;
+
     /// Takes back every pin in the name of `by`.
     ///
     /// # Errors
@@ -156,4 +167,15 @@ pub trait Store: Send + Sync {
     /// # Errors
     /// If the store itself cannot be read; what is not whole is no error but a fault in the report.
     fn verify(&self) -> Result<Report, Error>;
+}
+
+/// A record has no blob of that name.
+pub(crate) fn no_blob(document: &Document, name: &str) -> Error {
+    let has: Vec<_> = document.blobs.iter().map(|b| format!("`{}`", b.name)).collect();
+    Error::NoBlob {
+        id: document.id.0,
+        kind: document.kind.clone(),
+        name: name.into(),
+        has: if has.is_empty() { "none".into() } else { has.join(", ") },
+    }
 }

@@ -2,7 +2,9 @@
 
 use descry_memory::perception::{Cloud, Grid, Intrinsics};
 use descry_memory::transforms::TransformError;
-use descry_memory::{Draft, Error, Image, LogLevel, Meta, Options, Query, Record, Sensing, kind};
+use descry_memory::{
+    Blob, Draft, Error, Form, Image, LogLevel, Meta, Options, Query, Record, Retention, Sensing, kind,
+};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde_json::json;
 use std::path::Path;
@@ -230,6 +232,38 @@ fn what_is_held_follows_what_is_cited() {
     assert!(record.hold(&[ids[0], descry_memory::RecordId(1 << 40)], "belief").is_err());
     let held: Vec<_> = record.store().pins().unwrap().into_keys().filter(|id| ids.contains(id)).collect();
     assert_eq!(held, ids[1..]);
+}
+
+/// A bound that forgets everything else: a cloud that is held can still be placed.
+#[test]
+fn a_cloud_that_is_held_keeps_its_place() {
+    let dir = tempfile::tempdir().unwrap();
+    let retention = Retention { max_bytes: Some(1 << 20), ..Retention::default() };
+    let record = Record::create(dir.path(), Options { retention, ..Options::default() }).unwrap();
+    record.put_static_transform("base", "camera", &turn(0.2, 0.0)).unwrap();
+    let clouds: Vec<_> = (1..=2)
+        .map(|i| {
+            record.put_transform(i * 10 * S, "map", "base", &turn(i as f64, 0.1)).unwrap();
+            record.sync().unwrap();
+            record
+                .put_cloud(i * 10 * S, "camera", &cloud(i as f32), &Sensing::default(), Meta::default())
+                .unwrap()
+        })
+        .collect();
+    record.hold(&clouds[1..], "belief").unwrap();
+    let data = vec![7_u8; 64 << 10];
+    for i in 0..100 {
+        let ballast =
+            Blob { name: "b".into(), form: Form::Bytes, layout: json!(null), data: data.as_slice().into() };
+        record.put_document("ballast", 30 * S + i, json!(i), vec![ballast]).unwrap();
+    }
+    assert!(record.view_at(10 * S, "map").is_err(), "what nobody holds goes");
+    let view = record.view_at(20 * S, "map").unwrap();
+    assert_eq!(bits(&view.cloud), bits(&cloud(2.0)));
+    assert!(
+        (view.world_from_camera.inverse() * turn(2.0, 0.1) * turn(0.2, 0.0)).translation.vector.norm()
+            < 1e-12
+    );
 }
 
 /// Reads every message with the packages `mcap` and `mcap-protobuf-support` of a Python that has them, if there is one:

@@ -172,6 +172,11 @@ fn check_pins(store: &dyn Store, ids: &[RecordId]) {
     store.unpin("belief 1").unwrap();
     assert_eq!(held(ids[4]), ["model"]);
     assert!(held(ids[3]).is_empty());
+    store.hold(&ids[5..8], "model").unwrap();
+    assert!(matches!(store.hold(&[ids[9], RecordId(1 << 40)], "model"), Err(Error::Missing { .. })));
+    assert_eq!([4, 5, 7, 9].map(|i| held(ids[i]).len()), [0, 1, 1, 0]);
+    store.hold(&[], "model").unwrap();
+    assert!(store.pins().unwrap().is_empty());
 }
 
 /// Pruned by age: what is old goes, what is pinned stays, and the counts stay true.

@@ -1,9 +1,11 @@
 //! How a body says that something did not work. A failure is news for the belief: each kind is another thing to learn.
 
 use crate::body::Stamp;
+use serde::{Deserialize, Serialize};
 
 /// Why a body did not do what it was asked to. `because` is one plain sentence for people and logs.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
 pub enum Failure {
     /// By the map, no route leads there: trying again is useless until the map changes.
     #[error("unreachable: {because}")]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use descry_memory::belief::Sighted;
-use descry_memory::{Draft, Meta, RecordId, Sensing};
+use descry_memory::{Bounds, Draft, Meta, RecordId, Sensing, Sighting};
 use descry_perception::View;
 use descry_perception::locate::locate;
 use descry_perception::merge::{MergeOptions, Merged, merge};
@@ -19,6 +19,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{Agent, Look};
+use crate::body::tape;
 use crate::exit::CommandError;
 use crate::report::Event;
 
@@ -32,28 +33,38 @@ const ON_SURFACE_M: f64 = 0.012;
 const HULL_MARGIN_M: f64 = 0.02;
 
 impl Agent<'_> {
-    /// Puts a view into the record: its transforms, then its cloud. When this returns it survives a crash.
+    /// Puts a view into the record: its transforms and colours, then its cloud, so that a cloud is never without its place. When
+    /// this returns it survives a crash.
     pub(super) fn remember(&mut self, sensed: &Sensed) -> Result<(), CommandError> {
         for t in &sensed.transforms {
             self.record
                 .put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)
                 .map_err(CommandError::broken)?;
         }
+        self.record.sync().map_err(CommandError::broken)?;
+        let frame = &self.robot.description().frames.camera;
+        tape::put_colour(self.record, frame, sensed)?;
         let eye = sensed.map_from_camera.translation.vector;
         let sensing = Sensing {
             intrinsics: Some(sensed.intrinsics),
             pose_sigma_m: sensed.pose_sigma_m,
             pose_sigma_rad: sensed.pose_sigma_rad,
         };
-        let meta = Meta { seen_from_m: Some(eye.into()), ..Meta::default() };
-        let frame = &self.robot.description().frames.camera;
+        let from = &self.state.candidates[self.state.at].symbol;
+        let meta = Meta {
+            seen_from_m: Some(eye.into()),
+            covers_m: extent(sensed),
+            body: json!({ "from": from }),
+            ..Meta::default()
+        };
         let id = self
             .record
             .put_cloud(sensed.stamp_ns, frame, &sensed.cloud, &sensing, meta)
             .map_err(CommandError::broken)?;
-        self.record.sync().map_err(CommandError::broken)?;
         self.state.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id });
-        Ok(())
+        // Every merge reads all views again.
+        let views: Vec<RecordId> = self.state.looks.iter().map(|look| look.record).collect();
+        self.record.hold(&views, "views").map_err(CommandError::broken)
     }
 
     /// The multi-view perception of paper 004, section V: restore the views by their timestamps, merge, recognise, believe.
@@ -151,13 +162,19 @@ impl Agent<'_> {
             objects: percepts.iter().map(crate::report::percept).collect(),
             changed,
         };
-        let percepts = serde_json::to_value(percepts).map_err(|e| CommandError::Bug(e.to_string()))?;
-        self.record_document(
-            "percepts",
-            &json!({ "percepts": percepts, "fits": merged.fits, "steps": merged.steps }),
-        )?;
-        self.record_document("belief", &self.state.belief)?;
-        self.say(&event)
+        let seen = serde_json::to_value(percepts).map_err(|e| CommandError::Bug(e.to_string()))?;
+        let seen = json!({ "percepts": seen, "fits": merged.fits, "steps": merged.steps });
+        let mut held = cites;
+        held.push(
+            self.record_meta(
+                "percepts",
+                Meta { objects: sightings(percepts), body: seen, ..Meta::default() },
+            )?,
+        );
+        held.push(self.record_document("belief", &self.state.belief)?);
+        // What the belief rests on outlasts any limit of the record.
+        self.record.hold(&held, "belief").map_err(CommandError::broken)?;
+        self.say(&event).map(|_| ())
     }
 
     fn confidences(&self) -> Vec<f64> {
@@ -167,7 +184,7 @@ impl Agent<'_> {
     }
 
     fn saw_nothing(&mut self, because: String) -> Result<(), CommandError> {
-        self.say(&Event::Nothing { because })
+        self.say(&Event::Nothing { because }).map(|_| ())
     }
 
     /// What can stand on the surfaces that the map has, and they themselves, is merged; without any, all that is in range.
@@ -199,29 +216,58 @@ impl Agent<'_> {
             Outcome::Seen(s) => json!({ "stamp_ns": s.stamp_ns }),
             Outcome::Pushed(p) => json!({ "moved_m": p.moved_m, "duration_s": p.duration_s }),
         };
-        self.record_document("skill", &json!({ "call": call.to_string(), "outcome": said }))
+        self.record_document("skill", &json!({ "call": call.to_string(), "outcome": said })).map(|_| ())
     }
 
     pub(super) fn record_failure(&mut self, call: &Call, failure: &SkillFailure) -> Result<(), CommandError> {
-        self.record_document("skill", &json!({ "call": call.to_string(), "failure": failure.to_string() }))
+        let said = json!({ "call": call.to_string(), "failure": failure.to_string() });
+        self.record_document("skill", &said).map(|_| ())
     }
 
     pub(super) fn record_problem(&mut self, problem: &Source) -> Result<(), CommandError> {
-        self.record_document("problem", &json!({ "name": problem.name, "pddl": problem.text }))
+        let said = json!({ "name": problem.name, "pddl": problem.text });
+        self.state.problem = Some(self.record_document("problem", &said)?);
+        Ok(())
     }
 
     /// Tells of an event, and records it.
-    pub(super) fn say(&mut self, event: &Event) -> Result<(), CommandError> {
+    pub(super) fn say(&mut self, event: &Event) -> Result<RecordId, CommandError> {
         (self.tell)(event);
         self.record_document("event", event)
     }
 
-    pub(super) fn record_document(&self, kind: &str, body: &impl Serialize) -> Result<(), CommandError> {
+    pub(super) fn record_document(
+        &self,
+        kind: &str,
+        body: &impl Serialize,
+    ) -> Result<RecordId, CommandError> {
         let body = serde_json::to_value(body).map_err(|e| CommandError::Bug(e.to_string()))?;
-        let mut draft = Draft::new(kind, self.robot.now_ns());
-        draft.meta.body = body;
-        self.record.put(draft).map(|_| ()).map_err(CommandError::broken)
+        self.record_meta(kind, Meta { body, ..Meta::default() })
     }
+
+    fn record_meta(&self, kind: &str, meta: Meta) -> Result<RecordId, CommandError> {
+        let draft = Draft { meta, ..Draft::new(kind, self.robot.now_ns()) };
+        self.record.put(draft).map_err(CommandError::broken)
+    }
+}
+
+/// The part of the map that a frame shows; none if nothing returned.
+fn extent(sensed: &Sensed) -> Option<Bounds> {
+    let points =
+        sensed.cloud.points.iter().map(|p| p.cast::<f64>()).filter(|p| p.iter().all(|x| x.is_finite()));
+    points.map(|p| sensed.map_from_camera * p).fold(None, |bounds: Option<Bounds>, p| {
+        let at: [f64; 3] = p.coords.into();
+        let bounds = bounds.unwrap_or(Bounds { min_m: at, max_m: at });
+        let with = |side: [f64; 3], of: fn(f64, f64) -> f64| std::array::from_fn(|i| of(side[i], at[i]));
+        Some(Bounds { min_m: with(bounds.min_m, f64::min), max_m: with(bounds.max_m, f64::max) })
+    })
+}
+
+/// By which names percepts are found again: what each may be, and how sure that is.
+fn sightings(percepts: &[Percept]) -> Vec<Sighting> {
+    let of = |p: &Percept| p.label.clone().map(|label| (p.probability_of(&label), label));
+    let named = percepts.iter().filter_map(of);
+    named.map(|(p, object)| Sighting { object, confidence: p.clamp(0.0, 1.0) }).collect()
 }
 
 /// The cameras that saw an object: those that measured the side of its body which faces them.

@@ -1,6 +1,6 @@
 //! `descry find` and `descry do`: pursues a goal with a body.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use descry_domains::goal;
@@ -9,15 +9,16 @@ use descry_domains::load::{DEFAULT, Domain};
 use crate::body;
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
+use crate::keeping::Keeping;
 use crate::policies;
-use crate::report::Verdict;
-use crate::run::{self, Settings};
+use crate::report::{Event, Report, Verdict};
+use crate::run::{self, Settings, Task};
 
 /// Arguments of `descry find`.
 #[derive(clap::Args)]
 pub struct FindArguments {
     /// What to find, such as "cup A"
-    #[arg(required = true)]
+    #[arg(required_unless_present = "resume")]
     thing: Vec<String>,
     #[command(flatten)]
     with: With,
@@ -27,7 +28,7 @@ pub struct FindArguments {
 #[derive(clap::Args)]
 pub struct DoArguments {
     /// The goal, such as "identify all objects on the table"
-    #[arg(required = true)]
+    #[arg(required_unless_present = "resume")]
     goal: Vec<String>,
     #[command(flatten)]
     with: With,
@@ -42,7 +43,7 @@ pub struct With {
     /// Scene of the simulated robot: a name of the domain or a TOML file
     #[arg(long)]
     scene: Option<String>,
-    /// The body: sim, or recorded:DIR for a folder of depth frames
+    /// The body: sim, or recorded:DIR for a folder of depth frames or of an earlier run
     #[arg(long, default_value = "sim")]
     robot: String,
     /// Fixes the arrangement, the noise and every choice
@@ -55,35 +56,31 @@ pub struct With {
     /// Folder of this run [default: a new one under runs/]
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
+    /// Go on with a run that was cut off, from its record: goal and settings are those of that run
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["run", "domain", "scene", "robot", "seed", "policy", "Keeping"])]
+    resume: Option<PathBuf>,
+    #[command(flatten)]
+    keeping: Keeping,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn find(arguments: &FindArguments) -> Result<Exit, CommandError> {
-    run_goal(&format!("find {}", arguments.thing.join(" ")), &arguments.with)
+    carry_out(&arguments.thing, "find ", &arguments.with)
 }
 
 pub(super) fn pursue(arguments: &DoArguments) -> Result<Exit, CommandError> {
-    run_goal(&arguments.goal.join(" "), &arguments.with)
+    carry_out(&arguments.goal, "", &arguments.with)
 }
 
-fn run_goal(said: &str, with: &With) -> Result<Exit, CommandError> {
+fn carry_out(words: &[String], verb: &str, with: &With) -> Result<Exit, CommandError> {
     let started = Instant::now();
-    let domain = Domain::load(&with.domain).map_err(CommandError::bad_input)?;
-    let goal = goal::read(said, &domain).map_err(CommandError::bad_input)?;
-    let body = body::open(&with.robot, with.scene.as_deref(), with.seed, &domain)?;
-    let chooser = policies::named(&with.policy, with.seed, None).map_err(CommandError::bad_input)?;
-    let folder = run::folder(with.run.as_deref(), &goal)?;
-    let settings = Settings {
-        robot: with.robot.clone(),
-        scene: with.scene.clone(),
-        seed: with.seed,
-        domain: with.domain.clone(),
-        policy: with.policy.clone(),
+    let said = format!("{verb}{}", words.join(" "));
+    let (mut report, folder) = match &with.resume {
+        Some(folder) => (go_on(folder, (!words.is_empty()).then_some(&said))?, folder.clone()),
+        None => begin(&said, with)?,
     };
-    let mut tell = |event: &crate::report::Event| eprintln!("{event}");
-    let mut report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, &mut tell)?;
     report.wall_s = started.elapsed().as_secs_f64();
     run::finish(&folder, &report)?;
     eprintln!("{report}");
@@ -95,4 +92,45 @@ fn run_goal(said: &str, with: &With) -> Result<Exit, CommandError> {
         Verdict::NotFound => Exit::No,
         Verdict::Failed => Exit::Broken,
     })
+}
+
+fn tell(event: &Event) {
+    eprintln!("{event}");
+}
+
+fn begin(said: &str, with: &With) -> Result<(Report, PathBuf), CommandError> {
+    let domain = Domain::load(&with.domain).map_err(CommandError::bad_input)?;
+    let goal = goal::read(said, &domain).map_err(CommandError::bad_input)?;
+    let body = body::open(&with.robot, with.scene.as_deref(), with.seed, &domain)?;
+    let chooser = policies::named(&with.policy, with.seed, None).map_err(CommandError::bad_input)?;
+    let folder = run::folder(with.run.as_deref(), &goal)?;
+    let settings = Settings {
+        robot: with.robot.clone(),
+        scene: with.scene.clone(),
+        seed: with.seed,
+        domain: with.domain.clone(),
+        policy: with.policy.clone(),
+        keeping: with.keeping.clone(),
+    };
+    let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, &mut tell)?;
+    Ok((report, folder))
+}
+
+fn go_on(folder: &Path, said: Option<&String>) -> Result<Report, CommandError> {
+    let header = run::header(folder)?;
+    if let Some(said) = said.filter(|said| **said != header.goal) {
+        let text = format!(
+            "{said}: the run in {} has the goal \"{}\"\n  leave the goal out",
+            folder.display(),
+            header.goal
+        );
+        return Err(CommandError::BadInput(text));
+    }
+    let settings = &header.settings;
+    let domain = Domain::load(&settings.domain).map_err(CommandError::bad_input)?;
+    let goal = goal::read(&header.goal, &domain).map_err(CommandError::bad_input)?;
+    let body = body::open(&settings.robot, settings.scene.as_deref(), settings.seed, &domain)?;
+    let chooser = policies::named(&settings.policy, settings.seed, None).map_err(CommandError::bad_input)?;
+    let task = Task { domain: &domain, goal: &goal };
+    run::go_on(task, &body, folder, &settings.keeping, chooser, &mut tell)
 }

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
+use crate::keeping;
 
 /// What can be asked of a record.
 #[derive(clap::Subcommand)]
@@ -108,10 +109,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
 }
 
 fn open(place: &Place) -> Result<Record, CommandError> {
-    Record::open_shared(&place.record).map_err(|e| match e {
-        descry_memory::Error::NoRecord { .. } => CommandError::bad_input(e),
-        other => CommandError::broken(other),
-    })
+    keeping::open(&place.record)
 }
 
 fn show(place: &Place) -> Result<Exit, CommandError> {

@@ -8,6 +8,7 @@ mod input;
 mod memory;
 mod plan;
 mod recognise;
+mod replay;
 mod runs;
 mod show;
 mod validate;
@@ -39,6 +40,8 @@ pub enum Command {
     Experiment(experiment::Arguments),
     /// Show what happened in a run
     Show(show::Arguments),
+    /// Live through a run again from its record: the same percepts, beliefs and verdict, or where they part
+    Replay(replay::Arguments),
     /// List the runs
     Runs(runs::Arguments),
     /// A record by itself: show, query, verify, export
@@ -63,6 +66,7 @@ pub fn run(command: &Command) -> Result<Exit, CommandError> {
         Command::Recognise(arguments) => recognise::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments),
         Command::Show(arguments) => show::run(arguments),
+        Command::Replay(arguments) => replay::run(arguments),
         Command::Runs(arguments) => runs::run(arguments),
         Command::Memory(arguments) => memory::run(arguments),
         Command::Export(arguments) => memory::export(arguments),

@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use descry_memory::Record;
 use serde_json::{Value, json};
 
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
-use crate::report::{Event, Report};
+use crate::report::Event;
 
 /// Arguments of `descry show`.
 #[derive(clap::Args)]
@@ -21,18 +20,10 @@ pub struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let folder = &arguments.run;
-    if !folder.join("run.json").exists() {
-        let text = format!(
-            "{}: no run.json there\n  expected the folder of a run; `descry runs` lists them",
-            folder.display()
-        );
-        return Err(CommandError::BadInput(text));
-    }
-    let record = Record::open_shared(&folder.join("record")).map_err(CommandError::broken)?;
+    crate::run::header(folder)?;
+    let record = crate::keeping::open(folder)?;
     let events = crate::run::events(&record)?;
-    let report: Option<Report> = std::fs::read_to_string(folder.join("report.json"))
-        .ok()
-        .and_then(|text| serde_json::from_str(&text).ok());
+    let report = crate::run::report(folder);
     if arguments.json {
         input::print_json(
             &json!({ "run": folder.display().to_string(), "events": events, "report": report }),

@@ -5,6 +5,7 @@
 //! what was not acknowledged and nothing else.
 
 mod index;
+pub(crate) mod pins;
 mod prune;
 mod recover;
 mod scan;
@@ -13,10 +14,9 @@ mod verify;
 
 use crate::document::{Document, Draft, Query, RecordId};
 use crate::error::Error;
-use crate::stores::{Report, Retention, Stats, Store};
+use crate::stores::{Report, Retention, Stats, Store, no_blob};
 use index::{INDEX, Index, Place};
 use segment::{Encoded, Segment};
-use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File, TryLockError};
 use std::os::unix::fs::FileExt;
@@ -128,6 +128,8 @@ impl LocalStore {
             Err(Error::InUse { .. }) => Recovery::default(),
             // A folder that may not be written has nobody writing it: what its index says is what there is.
             Err(Error::File { because, .. }) if is_refusal(&because) => Recovery::default(),
+            // On a full disk nothing can be mended, and what was acknowledged is there all the same.
+            Err(e) if e.is_full() => Recovery::default(),
             Err(e) => return Err(e),
         };
         Ok(LocalStore {
@@ -282,6 +284,17 @@ impl LocalStore {
         Ok(document)
     }
 
+    /// Pins records, beside those that `by` holds or instead of them.
+    fn pin_records(&self, ids: &[RecordId], by: &str, instead: bool) -> Result<(), Error> {
+        let mut writer = self.writer()?;
+        for id in ids {
+            self.place(*id)?;
+        }
+        let draft = pins::pinned(writer.newest_ns.max(0), ids, by, instead);
+        self.record(&mut writer, &[draft])?;
+        writer.segment.sync()
+    }
+
     fn place(&self, id: RecordId) -> Result<Place, Error> {
         self.index().place(id)?.ok_or(Error::Missing { id: id.0 })
     }
@@ -368,25 +381,18 @@ impl Store for LocalStore {
     }
 
     fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
-        let mut writer = self.writer()?;
-        for id in ids {
-            self.place(*id)?;
-        }
-        let mut draft = Draft::new(PIN, writer.newest_ns.max(0));
-        draft.meta.body = json!({ "records": ids, "by": by });
-        let written = self.record(&mut writer, &[draft])?;
-        writer.segment.sync()?;
-        // What says that they are pinned is pinned with them.
-        self.index().pin(&[ids, written.as_slice()].concat(), by)
+        self.pin_records(ids, by, false)
+    }
+
+    fn hold(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
+        self.pin_records(ids, by, true)
     }
 
     fn unpin(&self, by: &str) -> Result<(), Error> {
         let mut writer = self.writer()?;
-        let mut draft = Draft::new(UNPIN, writer.newest_ns.max(0));
-        draft.meta.body = json!({ "by": by });
+        let draft = pins::unpinned(writer.newest_ns.max(0), by);
         self.record(&mut writer, &[draft])?;
-        writer.segment.sync()?;
-        self.index().unpin(by)
+        writer.segment.sync()
     }
 
     fn pins(&self) -> Result<BTreeMap<RecordId, BTreeSet<String>>, Error> {
@@ -438,23 +444,9 @@ impl Drop for LocalStore {
     }
 }
 
-/// The kinds under which pins are recorded.
-const PIN: &str = "pin";
-const UNPIN: &str = "unpin";
-
 /// A lock whose holder panicked guards data that is checked on the disk anyway.
 fn unpoisoned<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-pub(crate) fn no_blob(document: &Document, name: &str) -> Error {
-    let has: Vec<_> = document.blobs.iter().map(|b| format!("`{}`", b.name)).collect();
-    Error::NoBlob {
-        id: document.id.0,
-        kind: document.kind.clone(),
-        name: name.into(),
-        has: if has.is_empty() { "none".into() } else { has.join(", ") },
-    }
 }
 
 fn segment_dir(dir: &Path) -> PathBuf {

@@ -1,4 +1,7 @@
-//! A folder of depth frames with poses is a robot too: it can stand where a frame was taken, and looking returns that frame.
+//! What was recorded is a robot too: frames of a folder or of a record ([`RecordedRobot`]), and a run with all that its body was
+//! asked and answered ([`TapedRobot`]).
+//!
+//! A folder of depth frames with poses is a robot: it can stand where a frame was taken, and looking returns that frame.
 //!
 //! Two layouts are known:
 //!
@@ -35,7 +38,11 @@ mod folder;
 mod pose;
 mod robot;
 mod settings;
+mod tape;
+mod taped;
 
 pub use folder::{Recording, StoredFrame};
-pub use robot::RecordedRobot;
+pub use robot::{Footage, RecordedRobot};
 pub use settings::{CameraSettings, Settings};
+pub use tape::{Answer, Entry, Exposure, Known, Pixels, Question, Reply, Request, Tape};
+pub use taped::TapedRobot;

@@ -8,6 +8,7 @@ use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
 use crate::input::InputError;
 use crate::recorded::folder::Recording;
+use crate::recorded::tape::{Exposure, Known, Pixels};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -15,10 +16,20 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// From asking to having a frame, on the body's clock, seconds.
 const FRAME_S: f64 = 0.1;
 
+/// Frames that somebody took, one at each station.
+pub trait Footage: Send + Sync {
+    /// What the camera measured there.
+    ///
+    /// # Errors
+    /// Why the frame cannot be read.
+    fn pixels(&self, station: usize) -> Result<Pixels, String>;
+}
+
 /// A recording as a robot. Its base is the camera; it stands at one of its frames and knows no map.
 pub struct RecordedRobot {
-    recording: Recording,
+    frames: Box<dyn Footage>,
     description: Description,
+    surfaces: Vec<SurfaceHint>,
     stations: Vec<Station>,
     state: Mutex<State>,
 }
@@ -62,13 +73,18 @@ impl RecordedRobot {
             map_from_base: f.world_from_camera,
         };
         let stations = recording.frames.iter().map(station).collect();
-        let state = Mutex::new(State { at: recording.start, now_ns: 0 });
-        RecordedRobot { description, stations, state, recording }
+        let (start, surfaces) = (recording.start, Vec::new());
+        let known = Known { description, surfaces, stations: Some(stations), map: None, now_ns: 0 };
+        Self::of(known, start, Box::new(recording))
     }
 
-    /// What it plays.
-    pub fn recording(&self) -> &Recording {
-        &self.recording
+    /// The body that stands where frames were taken, at the station of number `start` first. There is at least one station; a head,
+    /// an arm or a map that is known does not count.
+    pub fn of(known: Known, start: usize, frames: Box<dyn Footage>) -> RecordedRobot {
+        let description = Description { head: None, can_manipulate: false, ..known.description };
+        let stations = known.stations.unwrap_or_default();
+        let state = State { at: start.min(stations.len().saturating_sub(1)), now_ns: known.now_ns };
+        RecordedRobot { description, surfaces: known.surfaces, stations, frames, state: Mutex::new(state) }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -108,19 +124,10 @@ impl RecordedRobot {
 
     fn play(&self) -> Result<Sensed, Failure> {
         let stamp_ns = self.pass(FRAME_S);
-        let frame = &self.recording.frames[self.lock().at];
-        let dropped = |e: InputError| Failure::SensorDropped { because: e.to_string(), stamp_ns };
-        let depth_m = self.recording.depth_m(frame).map_err(dropped)?;
-        let intrinsics = self.recording.intrinsics;
-        let mut cloud = intrinsics.cloud_from_depth(&depth_m).map_err(|e| Failure::SensorDropped {
-            because: format!("{}: {e}", frame.depth.display()),
-            stamp_ns,
-        })?;
-        let image = self.recording.colour(frame).map_err(dropped)?;
-        let registered = self.recording.settings.registered;
-        if let Some(image) = image.as_ref().filter(|i| registered && i.pixels().len() == depth_m.len()) {
-            cloud.colours = Some(image.pixels().map(|p| p.0).collect());
-        }
+        let at = self.lock().at;
+        let pixels =
+            self.frames.pixels(at).map_err(|because| Failure::SensorDropped { because, stamp_ns })?;
+        let map_from_camera = self.stations[at].map_from_base;
         let frames = &self.description.frames;
         let link = |parent: &str, child: &str, parent_from_child| StampedTransform {
             stamp_ns,
@@ -128,20 +135,33 @@ impl RecordedRobot {
             child: child.into(),
             parent_from_child,
         };
-        Ok(Sensed {
+        let exposure = Exposure {
             stamp_ns,
-            cloud,
-            depth_m,
-            colour: image.map(|image| Colour { image, registered }),
-            intrinsics,
+            intrinsics: self.description.camera,
             transforms: vec![
-                link(&frames.map, &frames.base, frame.world_from_camera),
+                link(&frames.map, &frames.base, map_from_camera),
                 link(&frames.base, &frames.camera, Isometry3::identity()),
             ],
-            map_from_camera: frame.world_from_camera,
+            map_from_camera,
             pose_sigma_m: self.description.pose_sigma_m,
             pose_sigma_rad: self.description.pose_sigma_rad,
-        })
+        };
+        Ok(exposure.with(pixels))
+    }
+}
+
+impl Footage for Recording {
+    fn pixels(&self, station: usize) -> Result<Pixels, String> {
+        let frame = &self.frames[station];
+        let depth_m = self.depth_m(frame).map_err(|e| e.to_string())?;
+        let cloud = self.intrinsics.cloud_from_depth(&depth_m);
+        let mut cloud = cloud.map_err(|e| format!("{}: {e}", frame.depth.display()))?;
+        let image = self.colour(frame).map_err(|e| e.to_string())?;
+        let registered = self.settings.registered;
+        if let Some(image) = image.as_ref().filter(|i| registered && i.pixels().len() == depth_m.len()) {
+            cloud.colours = Some(image.pixels().map(|p| p.0).collect());
+        }
+        Ok(Pixels { cloud, colour: image.map(|image| Colour { image, registered }) })
     }
 }
 
@@ -167,7 +187,7 @@ impl Robot for RecordedRobot {
     }
 
     fn surfaces(&self) -> &[SurfaceHint] {
-        &[]
+        &self.surfaces
     }
 
     fn stations(&self) -> Option<&[Station]> {

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use crate::body::Body;
 use crate::experiment::{Outcome, Row};
+use crate::keeping::{Keeping, Kept};
 use crate::policies::{self, Foresight};
 use crate::report::{Report, Verdict};
 use crate::run::{self, Settings};
@@ -65,6 +66,8 @@ pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path) -> Result<Outcome, St
         seed: trial.seed,
         domain: trial.domain.config.name.clone(),
         policy: trial.policy.into(),
+        // What a batch has done is in its journal; a power cut costs a run at most.
+        keeping: Keeping { durability: Some(Kept::Process), ..Keeping::default() },
     };
     let report = run::pursue(trial.domain, trial.goal, &body, scratch, &settings, chooser, &mut |_| {});
     let report = report.map_err(|e| e.to_string())?;

@@ -1,6 +1,7 @@
 //! The index: where each record lies and by what it is found. Everything in it follows from the segments, so that it
 //! need not be synced with every record and can be made again from nothing.
 
+use super::pins;
 use super::segment::Located;
 use crate::document::{Document, Near, Order, Query, RecordId};
 use crate::error::Error;
@@ -145,6 +146,7 @@ impl Index {
                 .execute(params![segment as i64, end as i64])?;
             for (document, located) in records {
                 insert_one(&tx, &self.names, &mut fresh, segment, document, located)?;
+                pins::apply(&tx, document)?;
             }
             tx.commit()
         })();
@@ -378,25 +380,6 @@ impl Index {
             tx.commit()
         })();
         result.map_err(|e| Error::index(&dir, e))
-    }
-
-    /// Holds records in the name of a holder. The caller has made that durable.
-    pub fn pin(&mut self, ids: &[RecordId], holder: &str) -> Result<(), Error> {
-        let dir = self.dir.clone();
-        let result = (|| -> rusqlite::Result<()> {
-            let tx = self.db.transaction()?;
-            for id in ids {
-                tx.prepare_cached("INSERT OR IGNORE INTO pins SELECT id, ?2 FROM records WHERE id = ?1")?
-                    .execute(params![id.0 as i64, holder])?;
-            }
-            tx.commit()
-        })();
-        result.map_err(|e| Error::index(&dir, e))
-    }
-
-    /// Lets go what a holder held.
-    pub fn unpin(&mut self, holder: &str) -> Result<(), Error> {
-        self.db.execute("DELETE FROM pins WHERE holder = ?1", [holder]).map(|_| ()).map_err(|e| self.err(e))
     }
 
     /// What is held, and by whom.

@@ -2,8 +2,8 @@
 
 use super::index::{INDEX, Index};
 use super::segment::{Located, Segment};
-use super::{PIN, Recovery, UNPIN, scan, segment_dir, segment_path};
-use crate::document::{Document, RecordId};
+use super::{Recovery, scan, segment_dir, segment_path};
+use crate::document::Document;
 use crate::error::Error;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -69,9 +69,6 @@ fn recover_segment(
         }
         let rows: Vec<_> = records.iter().map(|(d, l)| (d, l)).collect();
         index.insert(number, end, &rows)?;
-        for (document, _) in &records {
-            replay_pin(index, document)?;
-        }
         recovery.regained += records.len() as u64;
         Ok(())
     };
@@ -93,18 +90,4 @@ fn recover_segment(
     };
     index.seal(number, bytes)?;
     Ok(bytes)
-}
-
-fn replay_pin(index: &mut Index, document: &Document) -> Result<(), Error> {
-    let by = document.body.get("by").and_then(|v| v.as_str()).unwrap_or("");
-    match document.kind.as_str() {
-        PIN => {
-            let listed = document.body.get("records").and_then(|v| v.as_array()).into_iter().flatten();
-            let ids: Vec<_> =
-                listed.filter_map(|v| v.as_u64()).chain([document.id.0]).map(RecordId).collect();
-            index.pin(&ids, by)
-        }
-        UNPIN => index.unpin(by),
-        _ => Ok(()),
-    }
 }

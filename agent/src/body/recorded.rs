@@ -1,0 +1,102 @@
+//! The record of a run as a body: it can stand where a cloud was taken, and looking returns that cloud.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use descry_memory::{Document, Record, Sensing, kind};
+use descry_perception::Intrinsics;
+use descry_robots::recorded::{Footage, Known, Pixels, RecordedRobot, Settings};
+use descry_robots::{Description, Footprint, Frames, Speeds, Station};
+
+use super::tape;
+use crate::exit::CommandError;
+
+/// The clouds of a record, one a station.
+struct Clouds {
+    record: Record,
+    documents: Vec<Document>,
+}
+
+impl Footage for Clouds {
+    fn pixels(&self, station: usize) -> Result<Pixels, String> {
+        tape::pixels(&self.record, &self.documents[station])
+    }
+}
+
+/// Opens a record as a body. Clouds of another camera than the first one's, and those whose place is not known, are no stations.
+///
+/// # Errors
+/// [`CommandError::BadInput`] if no cloud has a place; [`CommandError::Broken`] if the record cannot be read.
+pub fn open(record: Record, place: &str) -> Result<RecordedRobot, CommandError> {
+    let known = tape::known(&record)?;
+    let frames = known.as_ref().map(|k| k.description.frames.clone()).unwrap_or_default();
+    let (mut stations, mut documents, mut camera) = (Vec::new(), Vec::new(), None);
+    let mut names = BTreeSet::new();
+    for document in record.find(&record.own(kind::CLOUD)).map_err(CommandError::broken)? {
+        let sensing = record.sensing(&document).map_err(CommandError::broken)?;
+        let first = camera.as_ref().map(|(intrinsics, _)| *intrinsics);
+        let Some(intrinsics) = sensing.intrinsics.filter(|c| first.is_none_or(|f| f == *c)) else {
+            tracing::warn!("record {}: a cloud of another camera is no station", document.id);
+            continue;
+        };
+        match record.pose_of(&document, &frames.map) {
+            Ok(map_from_base) => {
+                stations.push(Station { name: name(&document, &mut names), map_from_base });
+                documents.push(document);
+                camera.get_or_insert((intrinsics, sensing));
+            }
+            Err(e) => tracing::warn!("record {} is no station: {e}", document.id),
+        }
+    }
+    let Some((intrinsics, sensing)) = camera else {
+        let text = format!(
+            "{place}: no cloud in this record has a camera and a place\n  expected the record of a run, or a folder of depth frames"
+        );
+        return Err(CommandError::BadInput(text));
+    };
+    let known = Known {
+        description: description(known.as_ref(), intrinsics, &sensing, place),
+        surfaces: known.map(|k| k.surfaces).unwrap_or_default(),
+        stations: Some(stations),
+        map: None,
+        now_ns: 0,
+    };
+    Ok(RecordedRobot::of(known, 0, Box::new(Clouds { record, documents })))
+}
+
+/// Whether a folder is that of a run, or holds a record.
+pub fn is_record(folder: &Path) -> bool {
+    crate::run::header(folder).is_ok()
+        || [folder.to_owned(), folder.join("record")].iter().any(|f| f.join("segments").is_dir())
+}
+
+/// A station is called after the pose that the agent looked from; where it looked twice, with a number.
+fn name(document: &Document, taken: &mut BTreeSet<String>) -> String {
+    let from = document.body.get("from").and_then(|v| v.as_str()).unwrap_or("view");
+    let numbered = (2..).map(|n| format!("{from}-{n}"));
+    let free = std::iter::once(from.to_owned()).chain(numbered).find(|name| !taken.contains(name));
+    let name = free.unwrap_or_default();
+    taken.insert(name.clone());
+    name
+}
+
+/// What the record says of the body that made it, or what is usual.
+fn description(known: Option<&Known>, camera: Intrinsics, sensing: &Sensing, place: &str) -> Description {
+    let usual = Settings::default();
+    let unknown = || Description {
+        name: String::new(),
+        simulated: false,
+        footprint: Footprint::Disc { radius_m: 0.0 },
+        speeds: Speeds { linear_m_s: usual.linear_m_s, angular_rad_s: usual.angular_deg_s.to_radians() },
+        camera,
+        range_m: (usual.range_m[0], usual.range_m[1]),
+        head: None,
+        frames: Frames::default(),
+        can_manipulate: false,
+        up: None,
+        pose_sigma_m: sensing.pose_sigma_m,
+        pose_sigma_rad: sensing.pose_sigma_rad,
+    };
+    let own = known.map_or_else(unknown, |k| k.description.clone());
+    Description { name: format!("record {place}"), simulated: false, camera, ..own }
+}

@@ -1,0 +1,135 @@
+//! The tape of a body in the record of its run.
+
+use std::sync::Arc;
+
+use descry_memory::{Blob, Draft, Form, Image, Meta, Query, Record, kind};
+use descry_robots::image::RgbImage;
+use descry_robots::recorded::{Answer, Entry, Known, Pixels, Tape};
+use descry_robots::{Colour, OccupancyGrid, Sensed, Stamp};
+use serde_json::{Value, json};
+
+use crate::exit::CommandError;
+
+/// The kind under which a body's answers are recorded.
+pub const ANSWER: &str = "answer";
+/// The kind under which it is recorded what a body is.
+pub const BODY: &str = "body";
+/// The blob that holds the map of the room.
+const MAP: &str = "map";
+
+/// Keeps a body's answers in a record, and has the frames of those that were kept.
+pub struct RecordTape {
+    /// Where answers are kept.
+    pub into: Arc<Record>,
+    /// Where the frames of earlier answers are.
+    pub from: Arc<Record>,
+}
+
+impl Tape for RecordTape {
+    fn keep(&self, entry: &Entry) -> Result<(), String> {
+        let body = serde_json::to_value(entry).map_err(|e| e.to_string())?;
+        let kept = self.into.put_document(ANSWER, entry.now_ns, body, Vec::new());
+        kept.map(|_| ()).map_err(|e| e.to_string())
+    }
+
+    fn pixels(&self, stamp_ns: Stamp) -> Result<Pixels, String> {
+        let document = self.from.nearest(kind::CLOUD, stamp_ns, 0).map_err(|e| e.to_string())?;
+        pixels(&self.from, &document)
+    }
+}
+
+/// What a recorded cloud's camera measured, colours of its time included.
+///
+/// # Errors
+/// Why it cannot be read.
+pub fn pixels(record: &Record, cloud: &descry_memory::Document) -> Result<Pixels, String> {
+    let (points, _) = record.cloud(cloud).map_err(|e| e.to_string())?;
+    let at = Query {
+        robot: (!cloud.robot.is_empty()).then(|| cloud.robot.clone()),
+        frame: Some(cloud.frame.clone()),
+        from_ns: Some(cloud.stamp_ns),
+        to_ns: Some(cloud.stamp_ns),
+        ..Query::of_kind(kind::IMAGE)
+    };
+    let image = record.find(&at).map_err(|e| e.to_string())?.pop();
+    let colour = image.map(|image| colour(record, &image)).transpose()?.flatten();
+    Ok(Pixels { cloud: points, colour })
+}
+
+/// A colour image that was recorded by [`put_colour`]; none if it is another kind of image.
+fn colour(record: &Record, document: &descry_memory::Document) -> Result<Option<Colour>, String> {
+    let Some(info) = document.blobs.iter().find(|b| b.form == Form::RawImage) else { return Ok(None) };
+    let number = |key: &str| info.layout.get(key).and_then(Value::as_u64).and_then(|n| u32::try_from(n).ok());
+    let (Some(width), Some(height)) = (number("width"), number("height")) else { return Ok(None) };
+    let data = record.store().blob(document.id, &info.name).map_err(|e| e.to_string())?;
+    let registered = document.body.get("registered").and_then(Value::as_bool).unwrap_or(false);
+    Ok(RgbImage::from_raw(width, height, data).map(|image| Colour { image, registered }))
+}
+
+/// Records the colours of a frame, if it has some.
+///
+/// # Errors
+/// [`CommandError::Broken`] if they cannot be kept.
+pub fn put_colour(record: &Record, frame: &str, sensed: &Sensed) -> Result<(), CommandError> {
+    let Some(colour) = &sensed.colour else { return Ok(()) };
+    let image = Image::Raw {
+        width: colour.image.width(),
+        height: colour.image.height(),
+        encoding: "rgb8",
+        data: colour.image.as_raw(),
+    };
+    let meta = Meta { body: json!({ "registered": colour.registered }), ..Meta::default() };
+    record.put_image(sensed.stamp_ns, frame, image, meta).map(|_| ()).map_err(CommandError::broken)
+}
+
+/// Records what a body is.
+///
+/// # Errors
+/// [`CommandError::Broken`] if it cannot be kept.
+pub fn put_known(record: &Record, known: &Known) -> Result<(), CommandError> {
+    let text = |e: serde_json::Error| CommandError::Bug(e.to_string());
+    let map = known.map.as_ref().map(serde_json::to_vec).transpose().map_err(text)?;
+    let body = serde_json::to_value(Known { map: None, ..known.clone() }).map_err(text)?;
+    let blob =
+        |data: Vec<u8>| Blob { name: MAP.into(), form: Form::Bytes, layout: Value::Null, data: data.into() };
+    let mut draft =
+        Draft { blobs: map.map(blob).into_iter().collect(), ..Draft::new(BODY, known.now_ns.max(0)) };
+    draft.meta.body = body;
+    record.put(draft).map(|_| ()).map_err(CommandError::broken)
+}
+
+/// What the body of a record is; none if the record does not say.
+///
+/// # Errors
+/// [`CommandError::Broken`] if it cannot be read.
+pub fn known(record: &Record) -> Result<Option<Known>, CommandError> {
+    let document =
+        record.find(&Query { limit: Some(1), ..record.own(BODY) }).map_err(CommandError::broken)?.pop();
+    let Some(document) = document else { return Ok(None) };
+    let damaged = |e: serde_json::Error| CommandError::broken(format!("record {}: {e}", document.id));
+    let mut known: Known = serde_json::from_value(document.body.clone()).map_err(damaged)?;
+    if document.blobs.iter().any(|b| b.name == MAP) {
+        let bytes = record.store().blob(document.id, MAP).map_err(CommandError::broken)?;
+        known.map = Some(serde_json::from_slice::<OccupancyGrid>(&bytes).map_err(damaged)?);
+    }
+    Ok(Some(known))
+}
+
+/// The answers in a record, in their order; none behind a frame whose pixels did not make it to the disk.
+///
+/// # Errors
+/// [`CommandError::Broken`] if they cannot be read.
+pub fn entries(record: &Record) -> Result<Vec<Entry>, CommandError> {
+    let mut entries = Vec::new();
+    for document in record.find(&record.own(ANSWER)).map_err(CommandError::broken)? {
+        let entry: Entry = serde_json::from_value(document.body)
+            .map_err(|e| CommandError::broken(format!("record {}: no answer of a body: {e}", document.id)))?;
+        if let Some((_, Answer::Sensed(exposure))) = &entry.done
+            && record.nearest(kind::CLOUD, exposure.stamp_ns, 0).is_err()
+        {
+            break;
+        }
+        entries.push(entry);
+    }
+    Ok(entries)
+}

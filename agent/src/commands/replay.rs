@@ -1,0 +1,208 @@
+//! `descry replay RUN`: lives through a run again from its record, and says whether it comes out the same.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use descry_domains::goal;
+use descry_domains::load::Domain;
+use descry_memory::{Document, Durability, Options, Query, Record};
+use descry_robots::recorded::TapedRobot;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::body::tape::{self, RecordTape};
+use crate::commands::input;
+use crate::exit::{CommandError, Exit};
+use crate::keeping;
+use crate::policies;
+use crate::report::{Event, Report};
+use crate::run::{self, Task};
+
+/// Arguments of `descry replay`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The run's folder
+    run: PathBuf,
+    /// Seconds of the body's clock that pass in one second [default: as fast as it goes]
+    #[arg(long, value_name = "X", value_parser = speed)]
+    speed: Option<f64>,
+    /// Keep what came about as a run in this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Of these kinds, what comes about again must be what was recorded, byte for byte.
+const COMPARED: [&str; 5] = ["percepts", "belief", "problem", "skill", "event"];
+/// What a report says of this run alone, or knows from a simulator.
+const OWN: [&str; 3] = ["wall_s", "run", "true_position_m"];
+
+/// The outcome of a replay.
+#[derive(Serialize)]
+struct Replayed {
+    run: String,
+    /// Whether everything that was recorded came about again.
+    same: bool,
+    /// Documents that are the same, by kind.
+    compared: Vec<(&'static str, usize)>,
+    verdict: Option<Value>,
+    /// Where the run was cut off.
+    cut_off: Option<String>,
+    /// What is not the same, one line each.
+    differences: Vec<String>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    let header = run::header(&arguments.run)?;
+    let scratch = Scratch::new(arguments.out.as_deref())?;
+    let source = Arc::new(keeping::open(&arguments.run)?);
+    let options = Options { durability: Durability::Process, ..Options::default() };
+    let record = Record::create(&scratch.folder.join("record"), options).map_err(CommandError::broken)?;
+    let record = Arc::new(record);
+    let robot = Arc::new(robot(&source, &record, arguments)?);
+    let domain = Domain::load(&header.settings.domain).map_err(CommandError::bad_input)?;
+    let goal = goal::read(&header.goal, &domain).map_err(CommandError::bad_input)?;
+    let chooser = policies::named(&header.settings.policy, header.settings.seed, None);
+    let chooser = chooser.map_err(CommandError::bad_input)?;
+    let mut tell = |event: &Event| eprintln!("{event}");
+    let task = Task { domain: &domain, goal: &goal };
+    let lived = run::live_through(task, &robot, &record, chooser, &scratch.folder, &mut tell);
+    let report = match (lived, robot.ended()) {
+        (_, Some(_)) => None,
+        (Ok(report), None) => Some(report),
+        (Err(e), None) => return Err(e),
+    };
+    let recorded = run::report(&arguments.run);
+    let mut replayed = compare(&source, &record, robot.ended())?;
+    replayed.run = arguments.run.display().to_string();
+    replayed.verdict = report.as_ref().map(|r| json!(r.verdict));
+    replayed.differences.extend(compare_reports(recorded.as_ref(), report.as_ref()));
+    replayed.same = replayed.differences.is_empty();
+    if let (Some(report), true) = (&report, arguments.out.is_some()) {
+        run::keep_header(&scratch.folder, &header)?;
+        run::finish(&scratch.folder, report)?;
+    }
+    say(&replayed, arguments.json)?;
+    Ok(if replayed.same { Exit::Done } else { Exit::No })
+}
+
+/// The body of the run, as its record has it.
+fn robot(
+    source: &Arc<Record>,
+    into: &Arc<Record>,
+    arguments: &Arguments,
+) -> Result<TapedRobot, CommandError> {
+    let Some(known) = tape::known(source)? else {
+        let text = format!(
+            "{}: the record does not say what the body was\n  it is empty, of an older version, or its beginning was pruned",
+            arguments.run.display()
+        );
+        return Err(CommandError::BadInput(text));
+    };
+    let entries = tape::entries(source)?;
+    let tape = Arc::new(RecordTape { into: Arc::clone(into), from: Arc::clone(source) });
+    Ok(TapedRobot::replay(known, tape, entries, arguments.speed))
+}
+
+/// Holds what came about again against what was recorded: all of it, or up to where the record ends.
+fn compare(source: &Record, again: &Record, ended: Option<String>) -> Result<Replayed, CommandError> {
+    let mut replayed = Replayed {
+        run: String::new(),
+        same: false,
+        compared: Vec::new(),
+        verdict: None,
+        cut_off: ended,
+        differences: Vec::new(),
+    };
+    let cut = match replayed.cut_off {
+        Some(_) => again.newest(tape::ANSWER).map_err(CommandError::broken)?.map(|d| d.id),
+        None => None,
+    };
+    for kind in COMPARED {
+        let recorded = source.find(&source.own(kind)).map_err(CommandError::broken)?;
+        let mut found = again.find(&Query::of_kind(kind)).map_err(CommandError::broken)?;
+        found.retain(|d| cut.is_none_or(|cut| d.id < cut));
+        let text = |d: &Document| format!("{} {}", d.stamp_ns, d.body);
+        let pairs = recorded.iter().zip(&found);
+        let same = pairs.take_while(|(a, b)| text(a) == text(b)).count();
+        replayed.compared.push((kind, same));
+        let whole = recorded.len().min(found.len());
+        if same < whole {
+            let (a, b) = (text(&recorded[same]), text(&found[same]));
+            replayed.differences.push(difference(kind, same + 1, &a, &b));
+        } else if cut.is_none() && recorded.len() != found.len() {
+            let line = format!("{kind}: {} were recorded, {} came about", recorded.len(), found.len());
+            replayed.differences.push(line);
+        }
+    }
+    Ok(replayed)
+}
+
+/// The place where two texts part, with a little of what stands there.
+fn difference(kind: &str, number: usize, recorded: &str, found: &str) -> String {
+    const SHOWN: usize = 60;
+    let common = recorded.chars().zip(found.chars()).take_while(|(a, b)| a == b).count();
+    let from = common.saturating_sub(SHOWN / 2);
+    let part = |text: &str| text.chars().skip(from).take(SHOWN).collect::<String>();
+    format!("{kind} {number}: recorded …{}…, now …{}…", part(recorded), part(found))
+}
+
+fn compare_reports(recorded: Option<&Report>, found: Option<&Report>) -> Vec<String> {
+    let (Some(recorded), Some(found)) = (recorded, found) else {
+        let only = recorded.is_some() && found.is_none();
+        return only.then(|| "the run had come to an end, the replay did not".into()).into_iter().collect();
+    };
+    let [recorded, found] = [recorded, found].map(|r| json!(r));
+    let text = |report: &Value, key: &str| report[key].to_string();
+    let keys = recorded.as_object().into_iter().flat_map(|o| o.keys());
+    keys.filter(|key| !OWN.contains(&key.as_str()))
+        .map(|key| (key, text(&recorded, key), text(&found, key)))
+        .filter(|(_, recorded, found)| recorded != found)
+        .map(|(key, recorded, found)| format!("{key}: recorded {recorded}, now {found}"))
+        .collect()
+}
+
+fn say(replayed: &Replayed, json: bool) -> Result<(), CommandError> {
+    if json {
+        return input::print_json(replayed);
+    }
+    let counts: Vec<String> = replayed.compared.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
+    if let Some(why) = &replayed.cut_off {
+        input::print_text(&format!("the run was cut off: {why}"))?;
+    }
+    input::print_text(&format!("the same, byte for byte: {}", counts.join(", ")))?;
+    replayed.differences.iter().try_for_each(|line| input::print_text(&format!("not the same: {line}")))
+}
+
+/// Where the replay records: the folder that was asked for, or one that goes with the command.
+struct Scratch {
+    folder: PathBuf,
+    goes: bool,
+}
+
+impl Scratch {
+    fn new(asked: Option<&Path>) -> Result<Self, CommandError> {
+        let own = || std::env::temp_dir().join(format!("descry-replay-{}", std::process::id()));
+        let folder = asked.map_or_else(own, Path::to_path_buf);
+        std::fs::create_dir_all(&folder)
+            .map_err(|e| CommandError::BadInput(format!("{}: {e}", folder.display())))?;
+        Ok(Scratch { folder, goes: asked.is_none() })
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        if self.goes
+            && let Err(e) = std::fs::remove_dir_all(&self.folder)
+        {
+            tracing::warn!("{}: {e}", self.folder.display());
+        }
+    }
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|x| x.is_finite() && *x > 0.0);
+    number.ok_or_else(|| format!("`{text}` is no speed: give a number above zero, such as 1 or 10"))
+}

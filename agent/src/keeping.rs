@@ -1,0 +1,115 @@
+//! How the record of a run is kept.
+
+use std::path::Path;
+
+use descry_memory::{Durability, Options, Record, Retention};
+use serde::{Deserialize, Serialize};
+
+use crate::exit::CommandError;
+
+/// How a record is kept: options of the command line, and part of what a run was started with.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, clap::Args)]
+#[serde(default)]
+pub struct Keeping {
+    /// When something counts as recorded: disk (it survives a power cut) or process (it survives any end of descry; a power cut
+    /// costs at most the last segment) [default: disk]
+    #[arg(long, value_name = "disk|process")]
+    pub durability: Option<Kept>,
+    /// Greatest size of the record, such as 500MB; what is over goes oldest first, unless a belief or a plan rests on it
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub max_bytes: Option<u64>,
+    /// Greatest age of what is recorded, seconds on the body's clock
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub max_age: Option<f64>,
+    /// Least room to be left on the disk, such as 2GB
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub min_free: Option<u64>,
+}
+
+/// When something counts as recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Kept {
+    /// When it is on the disk.
+    Disk,
+    /// When the system has it.
+    Process,
+}
+
+impl Keeping {
+    fn options(&self) -> Options {
+        Options {
+            durability: match self.durability {
+                Some(Kept::Process) => Durability::Process,
+                Some(Kept::Disk) | None => Durability::Disk,
+            },
+            retention: Retention {
+                max_age_ns: self.max_age.map(|s| (s * 1e9) as i64),
+                max_bytes: self.max_bytes,
+                min_free_bytes: self.min_free,
+            },
+            ..Options::default()
+        }
+    }
+
+    /// A new record for a run.
+    ///
+    /// # Errors
+    /// [`CommandError::Broken`] if it cannot be made.
+    pub fn create(&self, run: &Path) -> Result<Record, CommandError> {
+        Record::create(&run.join(RECORD), self.options()).map_err(CommandError::broken)
+    }
+
+    /// The record of a run that is to go on; a new one if the run was cut off before it had one.
+    ///
+    /// # Errors
+    /// [`CommandError::Broken`] if it cannot be opened, or is being written.
+    pub fn resume(&self, run: &Path) -> Result<Record, CommandError> {
+        match Record::resume(&run.join(RECORD), self.options()) {
+            Err(descry_memory::Error::NoRecord { .. }) => self.create(run),
+            opened => opened.map_err(CommandError::broken),
+        }
+    }
+}
+
+/// Opens a record to be read: that of a run, or a folder by itself.
+///
+/// # Errors
+/// [`CommandError::BadInput`] if there is none; [`CommandError::Broken`] if it cannot be opened.
+pub fn open(place: &Path) -> Result<Record, CommandError> {
+    Record::open_shared(place).map_err(|e| match e {
+        descry_memory::Error::NoRecord { .. } => CommandError::bad_input(e),
+        other => CommandError::broken(other),
+    })
+}
+
+/// The folder of the record in that of its run.
+const RECORD: &str = "record";
+
+fn size(text: &str) -> Result<u64, String> {
+    let units = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("TB", 1e12), ("B", 1.0), ("", 1.0)];
+    let read = |(unit, factor): (&str, f64)| {
+        let number: f64 = text.trim().strip_suffix(unit)?.trim().parse().ok()?;
+        (number.is_finite() && number >= 0.0).then_some((number * factor) as u64)
+    };
+    units.into_iter().find_map(read).ok_or_else(|| format!("`{text}` is no size: write 500MB or 2GB"))
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|s| s.is_finite() && *s >= 0.0);
+    number.ok_or_else(|| format!("`{text}` is no number of seconds"))
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn sizes_are_read_with_their_units() {
+        let cases = [("12", 12), ("500MB", 500_000_000), ("1.5 GB", 1_500_000_000), ("3kB", 3000), ("7B", 7)];
+        for (text, bytes) in cases {
+            assert_eq!(super::size(text), Ok(bytes), "{text}");
+        }
+        for text in ["", "much", "-1MB", "1 mile"] {
+            assert!(super::size(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! What the messages are made of, as every MCAP file declares it (`descriptor.proto`).
+
+use super::wire::Wire;
+
+/// Messages and their fields, in the words of `.proto` files. A field of another message needs that message's file.
+const MESSAGES: [(&str, &str); 12] = [
+    ("google.protobuf.Timestamp", "int64 seconds = 1; int32 nanos = 2"),
+    ("foxglove.Vector3", "double x = 1; double y = 2; double z = 3"),
+    ("foxglove.Quaternion", "double x = 1; double y = 2; double z = 3; double w = 4"),
+    ("foxglove.Pose", "foxglove.Vector3 position = 1; foxglove.Quaternion orientation = 2"),
+    (
+        "foxglove.PackedElementField",
+        "string name = 1; fixed32 offset = 2; enum foxglove.PackedElementField.NumericType type = 3",
+    ),
+    (
+        "foxglove.PointCloud",
+        "google.protobuf.Timestamp timestamp = 1; string frame_id = 2; foxglove.Pose pose = 3; fixed32 point_stride = 4; \
+         repeated foxglove.PackedElementField fields = 5; bytes data = 6",
+    ),
+    (
+        "foxglove.CompressedImage",
+        "google.protobuf.Timestamp timestamp = 1; string frame_id = 4; bytes data = 2; string format = 3",
+    ),
+    (
+        "foxglove.RawImage",
+        "google.protobuf.Timestamp timestamp = 1; string frame_id = 7; fixed32 width = 2; fixed32 height = 3; \
+         string encoding = 4; fixed32 step = 5; bytes data = 6",
+    ),
+    (
+        "foxglove.FrameTransform",
+        "google.protobuf.Timestamp timestamp = 1; string parent_frame_id = 2; string child_frame_id = 3; \
+         foxglove.Vector3 translation = 4; foxglove.Quaternion rotation = 5",
+    ),
+    ("foxglove.FrameTransforms", "repeated foxglove.FrameTransform transforms = 1"),
+    (
+        "foxglove.Log",
+        "google.protobuf.Timestamp timestamp = 1; enum foxglove.LogLevel level = 2; string message = 3; string name = 4; \
+         string file = 5; fixed32 line = 6",
+    ),
+    ("descry.Blob", "google.protobuf.Timestamp timestamp = 1; string name = 2; bytes data = 3"),
+];
+
+const NUMERIC_TYPES: [&str; 9] =
+    ["UNKNOWN", "UINT8", "INT8", "UINT16", "INT16", "UINT32", "INT32", "FLOAT32", "FLOAT64"];
+const LOG_LEVELS: [&str; 6] = ["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"];
+
+/// Scalar types by their numbers in `descriptor.proto`.
+const SCALARS: [(&str, u64); 6] =
+    [("double", 1), ("int64", 3), ("int32", 5), ("fixed32", 7), ("string", 9), ("bytes", 12)];
+const MESSAGE: u64 = 11;
+const ENUM: u64 = 14;
+
+/// A field of a message.
+struct Field {
+    number: u64,
+    name: &'static str,
+    kind: u64,
+    repeated: bool,
+    /// The message or enumeration that it is of; none for scalars.
+    of: Option<&'static str>,
+}
+
+fn fields(message: &str) -> Vec<Field> {
+    let listed = MESSAGES.iter().find(|(name, _)| *name == message).map_or("", |(_, fields)| fields);
+    listed.split(';').filter_map(field).collect()
+}
+
+/// Reads a field as `repeated TYPE NAME = NUMBER`, with `enum` before the type of an enumeration.
+fn field(text: &'static str) -> Option<Field> {
+    let (before, number) = text.split_once('=')?;
+    let words: Vec<&'static str> = before.split_whitespace().collect();
+    let [.., of, name] = words[..] else { return None };
+    let scalar = SCALARS.iter().find(|(scalar, _)| *scalar == of).map(|(_, kind)| *kind);
+    let kind = scalar.unwrap_or(if words.contains(&"enum") { ENUM } else { MESSAGE });
+    Some(Field {
+        number: number.trim().parse().ok()?,
+        name,
+        kind,
+        repeated: words.contains(&"repeated"),
+        of: scalar.is_none().then_some(of),
+    })
+}
+
+/// The messages that a message has fields of.
+fn needs(message: &str) -> Vec<&'static str> {
+    fields(message).into_iter().filter(|f| f.kind == MESSAGE).filter_map(|f| f.of).collect()
+}
+
+fn file_name(message: &str) -> String {
+    match message {
+        "google.protobuf.Timestamp" => "google/protobuf/timestamp.proto".into(),
+        other => format!("{}.proto", other.replace('.', "/")),
+    }
+}
+
+/// The `FileDescriptorSet` of a message and all that it needs, what is needed first.
+pub(super) fn set(message: &'static str) -> Vec<u8> {
+    fn visit(message: &'static str, done: &mut Vec<&'static str>) {
+        for needed in needs(message) {
+            visit(needed, done);
+        }
+        if !done.contains(&message) {
+            done.push(message);
+        }
+    }
+    let mut order = Vec::new();
+    visit(message, &mut order);
+    let mut out = Wire::default();
+    for name in order {
+        out.message(1, |file| write_file(file, name));
+    }
+    out.0
+}
+
+/// A `FileDescriptorProto` with one message.
+fn write_file(file: &mut Wire, name: &str) {
+    let (package, short) = name.rsplit_once('.').unwrap_or(("", name));
+    file.text(1, &file_name(name));
+    file.text(2, package);
+    for needed in needs(name) {
+        file.text(3, &file_name(needed));
+    }
+    file.message(4, |m| {
+        m.text(1, short);
+        for field in fields(name) {
+            m.message(2, |f| write_field(f, &field));
+        }
+        if name == "foxglove.PackedElementField" {
+            m.message(4, |e| write_enum(e, "NumericType", &NUMERIC_TYPES));
+        }
+    });
+    if name == "foxglove.Log" {
+        file.message(5, |e| write_enum(e, "LogLevel", &LOG_LEVELS));
+    }
+    file.text(12, "proto3");
+}
+
+/// A `FieldDescriptorProto`.
+fn write_field(out: &mut Wire, field: &Field) {
+    const OPTIONAL: u64 = 1;
+    const REPEATED: u64 = 3;
+    out.text(1, field.name);
+    out.varint(3, field.number);
+    out.varint(4, if field.repeated { REPEATED } else { OPTIONAL });
+    out.varint(5, field.kind);
+    if let Some(of) = field.of {
+        out.text(6, &format!(".{of}"));
+    }
+}
+
+fn write_enum(out: &mut Wire, name: &str, values: &[&str]) {
+    out.text(1, name);
+    for (i, value) in values.iter().enumerate() {
+        out.message(2, |v| {
+            v.text(1, value);
+            v.varint(2, i as u64);
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    /// Segments of an earlier format go on with the schemas that they declare.
+    #[test]
+    fn schemas_are_those_of_earlier_segments() {
+        let segment = include_bytes!("../../tests/formats/1.mcap");
+        let summary = mcap::Summary::read(segment).unwrap().unwrap();
+        let mut same = 0;
+        for schema in summary.schemas.values().filter(|s| s.encoding == super::super::PROTOBUF) {
+            let name = super::MESSAGES.iter().find(|(name, _)| *name == schema.name).unwrap().0;
+            assert_eq!(super::set(name), schema.data.as_ref(), "{name}");
+            same += 1;
+        }
+        assert!(same >= 2, "{same}");
+        let fields: usize = super::MESSAGES.iter().map(|(name, _)| super::fields(name).len()).sum();
+        let listed: usize = super::MESSAGES.iter().map(|(_, text)| text.matches('=').count()).sum();
+        assert_eq!(fields, listed, "every field is read");
+    }
+}

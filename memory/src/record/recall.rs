@@ -1,0 +1,201 @@
+//! Reading back what was sensed: clouds, and where everything stood at their time.
+
+use super::{Record, kind};
+use crate::clouds::{self, CLOUD, Sensing};
+use crate::document::{Document, Form, Query, RecordId};
+use crate::error::Error;
+use crate::foxglove;
+use crate::stores::no_blob;
+use crate::transforms::{Sample, Transforms};
+use descry_perception::{Cloud, View};
+use nalgebra::Isometry3;
+use serde_json::Value;
+use std::sync::PoisonError;
+
+impl Record {
+    /// A cloud that was recorded, and its sensor.
+    ///
+    /// # Errors
+    /// [`Error::Missing`], [`Error::NoBlob`], [`Error::Damaged`].
+    pub fn cloud(&self, document: &Document) -> Result<(Cloud, Sensing), Error> {
+        let info = document.blobs.iter().find(|b| b.name == CLOUD && b.form == Form::PointCloud);
+        let info = info.ok_or_else(|| no_blob(document, CLOUD))?;
+        let data = self.store.blob(document.id, CLOUD)?;
+        clouds::decode(info, &data).map_err(|what| Error::Damaged {
+            place: format!("record {}", document.id).into(),
+            at: 0,
+            what,
+        })
+    }
+
+    /// The sensor behind a cloud that was recorded, without reading the cloud.
+    ///
+    /// # Errors
+    /// [`Error::NoBlob`], [`Error::Damaged`].
+    pub fn sensing(&self, document: &Document) -> Result<Sensing, Error> {
+        let info = document.blobs.iter().find(|b| b.name == CLOUD && b.form == Form::PointCloud);
+        let info = info.ok_or_else(|| no_blob(document, CLOUD))?;
+        clouds::sensing(info).map_err(|what| Error::Damaged {
+            place: format!("record {}", document.id).into(),
+            at: 0,
+            what,
+        })
+    }
+
+    /// What a camera saw nearest to a time, and where it stood in `world` at the stamp of that cloud (paper 004, section V, step 0).
+    ///
+    /// # Errors
+    /// [`Error::NotNear`] without a cloud within [`Options::view_tolerance_ns`]; a missing link or gap of the transforms of that time.
+    pub fn view_at(&self, stamp_ns: i64, world: &str) -> Result<View, Error> {
+        let document = self.nearest(kind::CLOUD, stamp_ns, self.options.view_tolerance_ns)?;
+        self.view(&document, world)
+    }
+
+    /// The view that a recorded cloud is, with the transforms of its time.
+    ///
+    /// # Errors
+    /// As [`Record::view_at`].
+    pub fn view(&self, document: &Document, world: &str) -> Result<View, Error> {
+        let (cloud, sensing) = self.cloud(document)?;
+        let world_from_camera = self.pose_of(document, world)?;
+        Ok(View {
+            stamp_ns: document.stamp_ns,
+            cloud,
+            intrinsics: sensing.intrinsics,
+            world_from_camera,
+            pose_sigma_m: sensing.pose_sigma_m,
+            pose_sigma_rad: sensing.pose_sigma_rad,
+        })
+    }
+
+    /// Where the frame of a document stood in `world` at its time, by the transforms of the robot that recorded it.
+    ///
+    /// # Errors
+    /// An error that names the missing link, or the gap.
+    pub fn pose_of(&self, document: &Document, world: &str) -> Result<Isometry3<f64>, Error> {
+        let around = self.transforms_of(&document.robot, document.stamp_ns)?;
+        Ok(around.lookup(world, &document.frame, document.stamp_ns, self.options.reach)?)
+    }
+
+    /// `target_from_origin` at a time, interpolated through the tree of that time.
+    ///
+    /// # Errors
+    /// An error that names the missing link, or the gap.
+    pub fn transform(&self, target: &str, origin: &str, stamp_ns: i64) -> Result<Isometry3<f64>, Error> {
+        Ok(self.transforms_around(stamp_ns)?.lookup(target, origin, stamp_ns, self.options.reach)?)
+    }
+
+    /// The transforms that say something about a time: what was measured around it and what holds always.
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub fn transforms_around(&self, stamp_ns: i64) -> Result<Transforms, Error> {
+        self.transforms_of(&self.options.robot, stamp_ns)
+    }
+
+    /// The transforms of a robot, of whichever if it has no name.
+    fn transforms_of(&self, robot: &str, stamp_ns: i64) -> Result<Transforms, Error> {
+        self.flusher.drain()?;
+        let of = |kind: &str| Query { robot: named(robot), ..Query::of_kind(kind) };
+        let mut around = Transforms::default();
+        for document in self.store.find(&of(kind::STATIC_TRANSFORM))? {
+            let (parent, samples) = self.samples(&document)?;
+            for sample in samples {
+                around.insert_static(&parent, &document.frame, &sample.parent_from_child)?;
+            }
+        }
+        let reach_ns = self.options.reach.max_gap_ns.max(self.options.reach.hold_ns);
+        for child in self.store.frames(kind::TRANSFORMS)? {
+            let of_child = Query { frame: Some(child), ..of(kind::TRANSFORMS) };
+            let near = Query {
+                from_ns: Some(stamp_ns.saturating_sub(reach_ns)),
+                to_ns: Some(stamp_ns.saturating_add(reach_ns)),
+                ..of_child.clone()
+            };
+            let mut groups = self.store.find(&near)?;
+            if groups.is_empty() {
+                // Not to be used, but to say how far off it is.
+                groups.extend(self.store.nearest(&of_child, stamp_ns)?);
+            }
+            for document in groups {
+                let (parent, samples) = self.samples(&document)?;
+                for sample in samples {
+                    around.insert(sample.stamp_ns, &parent, &document.frame, &sample.parent_from_child)?;
+                }
+            }
+        }
+        let groups = self.groups.lock().unwrap_or_else(PoisonError::into_inner);
+        for ((child, parent), samples) in &groups.open {
+            for sample in samples {
+                around.insert(sample.stamp_ns, parent, child, &sample.parent_from_child)?;
+            }
+        }
+        Ok(around)
+    }
+
+    /// These records, and for clouds among them the transforms up to their time: what it takes to place them again.
+    pub(super) fn with_their_place(&self, ids: &[RecordId]) -> Result<Vec<RecordId>, Error> {
+        let mut all = ids.to_vec();
+        for id in ids {
+            let document = self.store.get(*id)?;
+            if document.kind != kind::CLOUD {
+                continue;
+            }
+            let of = |kind: &str| Query { robot: named(&document.robot), ..Query::of_kind(kind) };
+            let near = Query {
+                from_ns: Some(document.stamp_ns.saturating_sub(self.options.group_ns)),
+                to_ns: Some(document.stamp_ns),
+                ..of(kind::TRANSFORMS)
+            };
+            let placing =
+                self.store.find(&near)?.into_iter().chain(self.store.find(&of(kind::STATIC_TRANSFORM))?);
+            all.extend(placing.map(|d| d.id));
+        }
+        all.sort_unstable();
+        all.dedup();
+        Ok(all)
+    }
+
+    /// Parent frame and samples of recorded transforms.
+    fn samples(&self, document: &Document) -> Result<(String, Vec<Sample>), Error> {
+        let damaged = |what: &str| Error::Damaged {
+            place: format!("record {}", document.id).into(),
+            at: 0,
+            what: what.into(),
+        };
+        let parent = document
+            .body
+            .get("parent")
+            .and_then(Value::as_str)
+            .ok_or_else(|| damaged("transforms without a parent"))?;
+        let bytes = self.store.blob(document.id, "tf")?;
+        let samples =
+            foxglove::read_frame_transforms(&bytes).ok_or_else(|| damaged("these are no transforms"))?;
+        Ok((parent.to_owned(), samples))
+    }
+
+    /// Whether a record that is retraced holds a transform already.
+    pub(super) fn is_measured(&self, stamp_ns: i64, parent: &str, child: &str) -> Result<bool, Error> {
+        if self.retrace.as_ref().is_none_or(|r| stamp_ns > r.newest_ns) {
+            return Ok(false);
+        }
+        let at = Query {
+            frame: Some(child.into()),
+            from_ns: Some(stamp_ns),
+            to_ns: Some(stamp_ns),
+            ..self.own(kind::TRANSFORMS)
+        };
+        for document in self.store.find(&at)? {
+            let (of, samples) = self.samples(&document)?;
+            if of == parent && samples.iter().any(|s| s.stamp_ns == stamp_ns) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
+/// The robot that a query asks for: none if it has no name.
+pub(super) fn named(robot: &str) -> Option<String> {
+    (!robot.is_empty()).then(|| robot.to_owned())
+}

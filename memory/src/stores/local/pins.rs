@@ -1,0 +1,40 @@
+//! What is held, and by whom: said by records of their own, and known to the index with them.
+
+use crate::document::{Document, Draft, RecordId};
+use crate::stores::{PIN, UNPIN};
+use rusqlite::{Transaction, params};
+use serde_json::json;
+
+/// A record that says that `by` holds records, beside those that it holds or instead of them.
+pub(crate) fn pinned(stamp_ns: i64, ids: &[RecordId], by: &str, instead: bool) -> Draft<'static> {
+    let mut draft = Draft::new(PIN, stamp_ns);
+    draft.meta.body = json!({ "records": ids, "by": by, "instead": instead });
+    draft
+}
+
+/// A record that says that `by` holds nothing any more.
+pub(super) fn unpinned(stamp_ns: i64, by: &str) -> Draft<'static> {
+    let mut draft = Draft::new(UNPIN, stamp_ns);
+    draft.meta.body = json!({ "by": by });
+    draft
+}
+
+/// Takes into the index what a record says of pins. What says that records are pinned is pinned with them.
+pub(super) fn apply(tx: &Transaction, document: &Document) -> rusqlite::Result<()> {
+    let says = |key: &str| document.body.get(key);
+    let by = says("by").and_then(|v| v.as_str()).unwrap_or("");
+    let instead = says("instead").and_then(|v| v.as_bool()).unwrap_or(false);
+    if document.kind == UNPIN || (document.kind == PIN && instead) {
+        tx.prepare_cached("DELETE FROM pins WHERE holder = ?1")?.execute([by])?;
+    }
+    let listed = says("records").and_then(|v| v.as_array()).into_iter().flatten().filter_map(|v| v.as_u64());
+    let ids: Vec<u64> = listed.collect();
+    // Who holds nothing keeps no record of it either.
+    if document.kind == PIN && !ids.is_empty() {
+        for id in ids.into_iter().chain([document.id.0]) {
+            tx.prepare_cached("INSERT OR IGNORE INTO pins SELECT id, ?2 FROM records WHERE id = ?1")?
+                .execute(params![id as i64, by])?;
+        }
+    }
+    Ok(())
+}

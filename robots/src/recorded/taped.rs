@@ -1,0 +1,339 @@
+//! A body whose every answer is kept on a tape, and which first gives the answers that are on it already.
+
+use super::tape::{Answer, Entry, Exposure, Known, Question, Reply, Request, Tape};
+use crate::body::{
+    Description, Driven, Looked, Place, PoseEstimate, Push, Pushed, Robot, Sensed, Stamp, Station,
+    SurfaceHint, Travel, Watch,
+};
+use crate::failure::Failure;
+use crate::grid::OccupancyGrid;
+use nalgebra::{Isometry3, Point3};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// A body on tape. Its clock stands still between two answers, so that who asks it the same again finds the same again.
+///
+/// | a run | answers on the tape | live body |
+/// |---|---|---|
+/// | begins | none | there |
+/// | is played again | all | none |
+/// | goes on | those before it was cut off | there, and does again what the tape says that it did |
+pub struct TapedRobot {
+    known: Known,
+    live: Option<Arc<dyn Robot>>,
+    tape: Arc<dyn Tape>,
+    /// Seconds of the body's clock that pass in one second; none: as fast as it goes.
+    speed: Option<f64>,
+    state: Mutex<State>,
+}
+
+struct State {
+    now_ns: Stamp,
+    played: VecDeque<Entry>,
+    /// What the map says, by question (as JSON), as far as the tape has it by now.
+    replies: BTreeMap<String, Reply>,
+    /// Questions with news since the last answer.
+    pending: Vec<(Question, Reply)>,
+    ended: Option<String>,
+}
+
+impl TapedRobot {
+    /// A body whose answers are kept.
+    pub fn begin(live: Arc<dyn Robot>, tape: Arc<dyn Tape>) -> Self {
+        Self::go_on(live, tape, Vec::new())
+    }
+
+    /// A body that goes on where the tape ends. `live` stands where it stood when the tape began.
+    pub fn go_on(live: Arc<dyn Robot>, tape: Arc<dyn Tape>, entries: Vec<Entry>) -> Self {
+        Self::new(Known::of(&*live), Some(live), tape, entries)
+    }
+
+    /// A body that there is on the tape alone. It is broken where the tape ends.
+    pub fn replay(known: Known, tape: Arc<dyn Tape>, entries: Vec<Entry>, speed: Option<f64>) -> Self {
+        Self { speed, ..Self::new(known, None, tape, entries) }
+    }
+
+    fn new(known: Known, live: Option<Arc<dyn Robot>>, tape: Arc<dyn Tape>, entries: Vec<Entry>) -> Self {
+        let mut state = State {
+            now_ns: known.now_ns,
+            played: entries.into(),
+            replies: BTreeMap::new(),
+            pending: Vec::new(),
+            ended: None,
+        };
+        state.hear_replies();
+        TapedRobot { known, live, tape, speed: None, state: Mutex::new(state) }
+    }
+
+    /// What it is and knew when the run began.
+    pub fn known(&self) -> &Known {
+        &self.known
+    }
+
+    /// Why it could play no further: the tape ends there, or says something else than what was asked. None if it could.
+    pub fn ended(&self) -> Option<String> {
+        self.lock().ended.clone()
+    }
+
+    /// Keeps what was asked since the last answer: the end of a run.
+    ///
+    /// # Errors
+    /// [`Failure::Broken`] if it cannot be kept.
+    pub fn finish(&self) -> Result<(), Failure> {
+        let entry = {
+            let mut state = self.lock();
+            if state.ended.is_some() {
+                return Ok(());
+            }
+            // What the tape has of the end is kept again as it is.
+            let played = state.played.pop_front().filter(|e| e.done.is_none());
+            let replies = std::mem::take(&mut state.pending);
+            played.unwrap_or(Entry { replies, done: None, now_ns: state.now_ns })
+        };
+        self.keep(&entry)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn keep(&self, entry: &Entry) -> Result<(), Failure> {
+        self.tape.keep(entry).map_err(|because| Failure::Broken { because })
+    }
+
+    /// The next answer on the tape, if it has one to this request.
+    fn next(&self, request: &Request) -> Result<Option<Entry>, Failure> {
+        let mut state = self.lock();
+        let on_tape = state.played.front().map(|entry| entry.done.clone());
+        let because = match (on_tape, &self.live) {
+            (Some(Some((asked, _))), _) if asked == *request => {
+                let entry = state.played.pop_front();
+                state.hear_replies();
+                return Ok(entry);
+            }
+            // The end of a run that goes on after all.
+            (None | Some(None), Some(_)) => {
+                state.played.clear();
+                return Ok(None);
+            }
+            (None | Some(None), None) => {
+                format!("the record ends before the body was asked to {request}")
+            }
+            (Some(Some((asked, _))), _) => {
+                format!("the record has \"{asked}\" where the body is now asked to {request}")
+            }
+        };
+        drop(state);
+        Err(self.end(because))
+    }
+
+    /// The tape cannot be played further. What is kept behind that says where it was.
+    fn end(&self, because: String) -> Failure {
+        let mut state = self.lock();
+        let entry = Entry { replies: Vec::new(), done: None, now_ns: state.now_ns };
+        let first = state.ended.is_none();
+        state.ended.get_or_insert(because.clone());
+        drop(state);
+        if first && let Err(failure) = self.keep(&entry) {
+            return failure;
+        }
+        Failure::Broken { because }
+    }
+
+    /// Answers from the tape or, beyond its end, from the live body; either way the answer is kept.
+    async fn ask(&self, request: Request, watch: &Watch<'_>) -> Result<(Answer, Option<Sensed>), Failure> {
+        if watch.cancel.is_cancelled() {
+            return Err(Failure::Cancelled { because: format!("it was asked to {request}") });
+        }
+        let (entry, sensed) = match self.next(&request)? {
+            Some(entry) => (self.follow(&request, entry, watch).await?, None),
+            None => self.live_answer(request, watch).await?,
+        };
+        self.keep(&entry)?;
+        self.wait_until(entry.now_ns).await;
+        self.lock().now_ns = entry.now_ns;
+        match entry.done {
+            Some((_, answer)) => Ok((answer, sensed)),
+            None => Err(Failure::Broken { because: "an answer without its request".into() }),
+        }
+    }
+
+    async fn live_answer(
+        &self,
+        request: Request,
+        watch: &Watch<'_>,
+    ) -> Result<(Entry, Option<Sensed>), Failure> {
+        let Some(live) = &self.live else {
+            return Err(Failure::Broken { because: "there is no live body".into() });
+        };
+        let (answer, sensed) = perform(&**live, &request, watch).await;
+        // Where somebody stopped the run, it goes on as if that had not been asked.
+        if let Answer::Failed(failure @ Failure::Cancelled { .. }) = answer {
+            return Err(failure);
+        }
+        let replies = std::mem::take(&mut self.lock().pending);
+        Ok((Entry { replies, done: Some((request, answer)), now_ns: live.now_ns() }, sensed))
+    }
+
+    /// The live body does again what the tape says that it did.
+    async fn follow(&self, request: &Request, entry: Entry, watch: &Watch<'_>) -> Result<Entry, Failure> {
+        let Some(live) = &self.live else { return Ok(entry) };
+        perform(&**live, request, watch).await;
+        if live.now_ns() == entry.now_ns {
+            return Ok(entry);
+        }
+        let because = format!(
+            "asked to {request} again, the body took until {} ns where the record has {} ns: it is not the body of that run",
+            live.now_ns(),
+            entry.now_ns
+        );
+        Err(Failure::Broken { because })
+    }
+
+    async fn wait_until(&self, now_ns: Stamp) {
+        let Some(speed) = self.speed else { return };
+        let passes_s = (now_ns - self.lock().now_ns).max(0) as f64 * 1e-9 / speed;
+        if let Ok(passes) = Duration::try_from_secs_f64(passes_s) {
+            tokio::time::sleep(passes).await;
+        }
+    }
+
+    /// Answers a question from the live body if there is one, else from the tape.
+    fn reply(&self, question: Question, live: impl FnOnce(&dyn Robot) -> Reply) -> Option<Reply> {
+        let mut state = self.lock();
+        let key = serde_json::to_string(&question).unwrap_or_default();
+        let on_tape = state.replies.get(&key).cloned();
+        let Some(body) = &self.live else {
+            drop(state);
+            if on_tape.is_none() {
+                self.end("the record ends before the body was asked about its map".into());
+            }
+            return on_tape;
+        };
+        if !state.played.is_empty() && on_tape.is_some() {
+            return on_tape;
+        }
+        let said = live(&**body);
+        if on_tape.as_ref() != Some(&said) {
+            state.replies.insert(key, said.clone());
+            state.pending.push((question, said.clone()));
+        }
+        Some(said)
+    }
+}
+
+impl State {
+    /// Takes in what the tape has up to the next answer.
+    fn hear_replies(&mut self) {
+        let Some(next) = self.played.front() else { return };
+        for (question, reply) in &next.replies {
+            self.replies.insert(serde_json::to_string(question).unwrap_or_default(), reply.clone());
+        }
+    }
+}
+
+/// Asks a body to do something.
+async fn perform(body: &dyn Robot, request: &Request, watch: &Watch<'_>) -> (Answer, Option<Sensed>) {
+    let answer = match request {
+        Request::Pose => body.pose().await.map(Answer::Pose),
+        Request::DriveTo(place) => body.drive_to(place, watch).await.map(Answer::Driven),
+        Request::LookAt(point) => body.look_at(point, watch).await.map(Answer::Looked),
+        Request::PushAside(push) => body.push_aside(push, watch).await.map(Answer::Pushed),
+        Request::Sense => match body.sense(watch).await {
+            Ok(sensed) => return (Answer::Sensed(Exposure::of(&sensed)), Some(sensed)),
+            Err(failure) => Err(failure),
+        },
+    };
+    (answer.unwrap_or_else(Answer::Failed), None)
+}
+
+/// What the tape has is no answer to what was asked: only a damaged record can say so.
+fn mixed_up<T>(answer: Answer) -> Result<T, Failure> {
+    match answer {
+        Answer::Failed(failure) => Err(failure),
+        other => Err(Failure::Broken { because: format!("the record answers with {other:?}") }),
+    }
+}
+
+#[async_trait::async_trait]
+impl Robot for TapedRobot {
+    fn description(&self) -> &Description {
+        &self.known.description
+    }
+
+    fn now_ns(&self) -> Stamp {
+        self.lock().now_ns
+    }
+
+    fn map(&self) -> Option<&OccupancyGrid> {
+        self.known.map.as_ref()
+    }
+
+    fn surfaces(&self) -> &[SurfaceHint] {
+        &self.known.surfaces
+    }
+
+    fn stations(&self) -> Option<&[Station]> {
+        self.known.stations.as_deref()
+    }
+
+    fn travel(&self, from: &Place, to: &[Place]) -> Vec<Result<Travel, Failure>> {
+        let question = Question::Travel { from: from.clone(), to: to.to_vec() };
+        match self.reply(question, |live| Reply::Travel(live.travel(from, to))) {
+            Some(Reply::Travel(said)) => said,
+            _ => vec![Err(not_on_tape()); to.len()],
+        }
+    }
+
+    fn camera_at(&self, place: &Place, look_at: Option<&Point3<f64>>) -> Result<Isometry3<f64>, Failure> {
+        let question = Question::CameraAt { place: place.clone(), look_at: look_at.copied() };
+        match self.reply(question, |live| Reply::CameraAt(live.camera_at(place, look_at))) {
+            Some(Reply::CameraAt(said)) => said,
+            _ => Err(not_on_tape()),
+        }
+    }
+
+    async fn pose(&self) -> Result<PoseEstimate, Failure> {
+        match self.ask(Request::Pose, &Watch::default()).await? {
+            (Answer::Pose(pose), _) => Ok(pose),
+            (other, _) => mixed_up(other),
+        }
+    }
+
+    async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure> {
+        match self.ask(Request::DriveTo(to.clone()), watch).await? {
+            (Answer::Driven(driven), _) => Ok(driven),
+            (other, _) => mixed_up(other),
+        }
+    }
+
+    async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
+        match self.ask(Request::LookAt(*point), watch).await? {
+            (Answer::Looked(looked), _) => Ok(looked),
+            (other, _) => mixed_up(other),
+        }
+    }
+
+    async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure> {
+        match self.ask(Request::Sense, watch).await? {
+            (Answer::Sensed(_), Some(sensed)) => Ok(sensed),
+            (Answer::Sensed(exposure), None) => {
+                let pixels = self.tape.pixels(exposure.stamp_ns);
+                Ok(exposure.with(pixels.map_err(|because| Failure::Broken { because })?))
+            }
+            (other, _) => mixed_up(other),
+        }
+    }
+
+    async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
+        match self.ask(Request::PushAside(*push), watch).await? {
+            (Answer::Pushed(pushed), _) => Ok(pushed),
+            (other, _) => mixed_up(other),
+        }
+    }
+}
+
+fn not_on_tape() -> Failure {
+    Failure::Unreachable { because: "the record does not say".into() }
+}

@@ -137,7 +137,7 @@ impl Space {
     }
 
     fn voxel(&self, p: &Point3<f64>) -> [i32; 3] {
-        [p.x, p.y, p.z].map(|c| (c / self.voxel_m).floor().clamp(-1e9, 1e9) as i32)
+        [p.x, p.y, p.z].map(|c| floor((c / self.voxel_m).clamp(-1e9, 1e9)))
     }
 
     fn level(&self, voxel: [i32; 3]) -> i8 {
@@ -220,6 +220,14 @@ impl Space {
         }
         any
     }
+}
+
+/// The whole number below, of what 32 bits can hold. The standard one is a call where the processor's oldest instruction set is aimed at,
+/// and lines of sight ask for little else.
+#[inline(always)]
+fn floor(value: f64) -> i32 {
+    let toward_zero = value as i32;
+    toward_zero - i32::from(f64::from(toward_zero) > value)
 }
 
 /// Number of a voxel within its block.

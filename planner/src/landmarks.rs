@@ -53,15 +53,19 @@ struct Find<'a> {
 }
 
 impl Landmarks {
-    /// Finds the landmarks of a task.
-    pub(crate) fn new(task: &Compiled, mutex_groups: &[Vec<Fact>]) -> Landmarks {
+    /// Finds the landmarks of a task; those found so far once `stop` says true.
+    pub(crate) fn new(
+        task: &Compiled,
+        mutex_groups: &[Vec<Fact>],
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Landmarks {
         let mut find = Find::new(task);
         for &fact in &task.goal {
             let id = find.landmark(vec![task.id(fact)]);
             find.all[id as usize].goal = true;
         }
         let mut next = 0;
-        while next < find.queue.len() && find.all.len() < MOST_LANDMARKS {
+        while next < find.queue.len() && find.all.len() < MOST_LANDMARKS && !stop() {
             let id = find.queue[next];
             next += 1;
             find.backchain(id);

@@ -4,7 +4,7 @@ use rustc_hash::FxHashMap;
 
 use crate::task::Task;
 
-use super::build::Groups;
+use super::groups::Groups;
 use super::instantiate::{Deed, GroundEffect, Instantiate, RawCall, RawPlace};
 use super::raw::{RawAction, RawTask};
 use super::relaxed::Reached;

@@ -1,13 +1,13 @@
 //! From the lifted task to the grounded one, step by step.
 
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashSet;
 use tracing::debug_span;
 
-use crate::invariants::{AtomNames, Transition, mutex_groups};
 use crate::task::{GroundChange, Task};
 
 use super::assemble::assemble;
 use super::atoms::{Atoms, NONE};
+use super::groups::groups;
 use super::instantiate::{Clauses, Deed, Instantiate};
 use super::metric;
 use super::normal::{self, Action_, Change_, Effect_, Formula, Normal, Number, Target};
@@ -461,143 +461,4 @@ fn absences(raw: &RawTask) -> Vec<bool> {
         }
     }
     unwanted
-}
-
-/// Names of atoms, and of the tokens that say that a durative action runs.
-struct Names<'a> {
-    atoms: &'a Atoms,
-    /// Atoms at and beyond this one are tokens.
-    first: u32,
-    first_token: u32,
-    tokens: Vec<(u32, &'a [u32])>,
-}
-
-impl AtomNames for Names<'_> {
-    fn predicate(&self, atom: u32) -> u32 {
-        if atom < self.first {
-            return self.atoms.predicate(atom);
-        }
-        self.first_token + self.tokens[(atom - self.first) as usize].0
-    }
-
-    fn arguments(&self, atom: u32) -> &[u32] {
-        if atom < self.first {
-            return self.atoms.arguments(atom);
-        }
-        self.tokens[(atom - self.first) as usize].1
-    }
-}
-
-/// Mutex groups by synthesis, and those of object functions, which must share a variable.
-pub(super) struct Groups {
-    pub found: Vec<Vec<u32>>,
-    pub fixed: Vec<Vec<u32>>,
-}
-
-fn groups(
-    raw: &RawTask,
-    make: &Instantiate<'_>,
-    reached: &relaxed::Reached,
-    rules: &Rules,
-    normal: &Normal,
-    task: &Task,
-) -> Groups {
-    let _span = debug_span!("invariants").entered();
-    let functions = task.predicates.len() as u32;
-    let live: Vec<u32> = (0..raw.inner)
-        .filter(|&a| reached.atoms[a as usize] && rules.fluent[make.atoms.predicate(a) as usize])
-        .filter(|&a| (make.atoms.predicate(a) as usize) < normal.predicate_count)
-        .collect();
-    let mut fixed: FxHashMap<Vec<u32>, usize> = FxHashMap::default();
-    let mut fixed_groups: Vec<Vec<u32>> = Vec::new();
-    for &atom in live.iter().filter(|&&a| make.atoms.predicate(a) >= functions) {
-        let arguments = make.atoms.arguments(atom);
-        let mut key = vec![make.atoms.predicate(atom)];
-        key.extend(&arguments[..arguments.len() - 1]);
-        let place = *fixed.entry(key).or_insert_with(|| {
-            fixed_groups.push(Vec::new());
-            fixed_groups.len() - 1
-        });
-        fixed_groups[place].push(atom);
-    }
-    let first = raw.init.len() as u32;
-    let first_token = rules.fluent.len() as u32;
-    let durative: Vec<usize> = (0..raw.actions.len()).filter(|&i| raw.actions[i].later.is_some()).collect();
-    let tokens = durative.iter().map(|&i| (raw.actions[i].schema, &raw.actions[i].arguments[..])).collect();
-    let names = Names { atoms: &make.atoms, first, first_token, tokens };
-    let mut transitions = Vec::with_capacity(raw.actions.len());
-    let mut token = first;
-    for action in &raw.actions {
-        let mut start = transition(&[&action.start], &action.effects, raw.inner);
-        let Some(later) = &action.later else {
-            transitions.push(start);
-            continue;
-        };
-        start.adds.push((token, Vec::new()));
-        let mut end = transition(&[&later.over_all, &later.end], &later.end_effects, raw.inner);
-        end.before.push(token);
-        end.deletes.push((token, Vec::new()));
-        token += 1;
-        transitions.extend([start, end]);
-    }
-    for (_, deeds) in &raw.timed {
-        let adds =
-            deeds.iter().filter_map(|d| if let Deed::Add(a) = d { Some((*a, Vec::new())) } else { None });
-        transitions.push(Transition { adds: adds.collect(), ..Transition::default() });
-    }
-    let by_module: Vec<u32> = (0..task.modules.len() as u32)
-        .flat_map(|module| normal::module_writes(task, module))
-        .filter_map(|target| if let Target::Truth(pattern) = target { Some(pattern.predicate) } else { None })
-        .collect();
-    let plain: Vec<u32> = live
-        .iter()
-        .copied()
-        .filter(|&a| {
-            let predicate = make.atoms.predicate(a);
-            !by_module.contains(&predicate)
-                && predicate < functions
-                && task.predicates[predicate as usize].stratum.is_none()
-        })
-        .collect();
-    let mut predicates: Vec<(u32, usize)> =
-        plain.iter().map(|&a| (make.atoms.predicate(a), make.atoms.arguments(a).len())).collect();
-    predicates.sort_unstable();
-    predicates.dedup();
-    let initial: Vec<u32> = plain.iter().copied().filter(|&a| raw.init[a as usize]).collect();
-    let found = mutex_groups(&names, &plain, &initial, &transitions, &predicates, first_token);
-    Groups { found, fixed: fixed_groups }
-}
-
-/// A start or an end as a transition; conditions that are not atoms make a deletion unreliable.
-fn transition(before: &[&Clauses], effects: &[super::instantiate::GroundEffect], inner: u32) -> Transition {
-    let positive =
-        |c: &Clauses| c.literals.iter().filter(|&&l| l & 1 == 0).map(|&l| l >> 1).collect::<Vec<_>>();
-    let mut made =
-        Transition { before: before.iter().flat_map(|c| positive(c)).collect(), ..Transition::default() };
-    made.before.sort_unstable();
-    made.before.dedup();
-    for effect in effects {
-        let when = effect.when.as_deref();
-        match effect.deed {
-            Deed::Add(atom) => {
-                made.adds.push((atom, when.map_or_else(Vec::new, |w| positive(&w[0]))));
-            }
-            Deed::Delete(atom) => {
-                let plain = |c: &Clauses| {
-                    c.comparisons.is_empty()
-                        && c.calls.is_empty()
-                        && c.literals.iter().all(|l| l & 1 == 0 && l >> 1 < inner)
-                };
-                match when {
-                    None => made.deletes.push((atom, Vec::new())),
-                    Some(w) if plain(&w[0]) && w[1].is_true() && w[2].is_true() => {
-                        made.deletes.push((atom, positive(&w[0])));
-                    }
-                    Some(_) => {}
-                }
-            }
-            Deed::Change(..) | Deed::Call(_) => {}
-        }
-    }
-    made
 }

@@ -3,6 +3,7 @@
 mod assemble;
 mod atoms;
 mod build;
+mod groups;
 mod instantiate;
 mod metric;
 mod normal;

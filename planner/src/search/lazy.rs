@@ -66,9 +66,24 @@ pub(crate) struct Shared<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-struct Search<'a, 's> {
+/// How far a search may go, all its runs together.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Allowed {
+    /// See [`Relaxed::work`].
+    pub work: u64,
+    /// States evaluated.
+    pub evaluations: u64,
+    /// Bytes taken.
+    pub memory: usize,
+}
+
+/// A search, which can be gone on with after it ended with [`End::Limit`].
+pub(crate) struct Search<'a, 's> {
     shared: &'s Shared<'a>,
     strategy: Strategy,
+    started: bool,
+    /// The stop signal came within a visit.
+    stopped: bool,
     store: Store,
     relaxed: Relaxed,
     lookahead: Lookahead,
@@ -88,58 +103,88 @@ struct Search<'a, 's> {
 
 /// Runs one search.
 pub(crate) fn search(shared: &Shared<'_>, strategy: Strategy, counts: &mut Counts) -> End {
-    let task = shared.task;
-    let mut search = Search {
-        shared,
-        strategy,
-        store: Store::new(task),
-        relaxed: Relaxed::new(task, strategy.counting),
-        lookahead: Lookahead::new(task),
-        lists: Default::default(),
-        best: [u32::MAX; 2],
-        status: Status::new(shared.landmarks),
-        counts: Counts::default(),
-        state: Vec::new(),
-        next: Vec::new(),
-        applicable: Vec::new(),
-        preferred: Vec::new(),
-        trail: Vec::new(),
-    };
-    let end = search.run();
-    counts.evaluated += search.counts.evaluated;
-    counts.expanded += search.counts.expanded;
-    counts.work += search.work();
+    let mut search = Search::new(shared, strategy);
+    let (work, evaluations) = (strategy.work_limit, strategy.evaluation_limit);
+    let end = search.run(Allowed { work, evaluations, memory: shared.memory_limit });
+    counts.add(search.counts());
     end
+}
+
+impl Counts {
+    /// Adds what another search took.
+    pub(crate) fn add(&mut self, other: Counts) {
+        self.evaluated += other.evaluated;
+        self.expanded += other.expanded;
+        self.work += other.work;
+    }
+
+    /// What was added since earlier counts.
+    pub(crate) fn since(self, before: Counts) -> Counts {
+        Counts {
+            evaluated: self.evaluated - before.evaluated,
+            expanded: self.expanded - before.expanded,
+            work: self.work - before.work,
+        }
+    }
 }
 
 /// A fixed price of making and storing a state, in units of [`Relaxed::work`].
 const STATE_WORK: u64 = 20;
 
-impl Search<'_, '_> {
+impl<'a, 's> Search<'a, 's> {
+    /// A search that has not begun.
+    pub(crate) fn new(shared: &'s Shared<'a>, strategy: Strategy) -> Search<'a, 's> {
+        let task = shared.task;
+        Search {
+            shared,
+            strategy,
+            started: false,
+            stopped: false,
+            store: Store::new(task),
+            relaxed: Relaxed::new(task, strategy.counting),
+            lookahead: Lookahead::new(task),
+            lists: Default::default(),
+            best: [u32::MAX; 2],
+            status: Status::new(shared.landmarks),
+            counts: Counts::default(),
+            state: Vec::new(),
+            next: Vec::new(),
+            applicable: Vec::new(),
+            preferred: Vec::new(),
+            trail: Vec::new(),
+        }
+    }
+
     fn work(&self) -> u64 {
         self.relaxed.work + (self.counts.evaluated + self.counts.expanded) * STATE_WORK
     }
 
-    fn run(&mut self) -> End {
-        let task = self.shared.task;
-        let (first, _) = self.store.insert(&task.initial, NO_STATE, 0, 0);
-        self.status.initial(self.shared.landmarks, task, &task.initial);
-        self.state = task.initial.clone();
-        if let Some(plan) = self.visit(first) {
-            return End::Plan(plan);
+    /// What the search took so far.
+    pub(crate) fn counts(&self) -> Counts {
+        Counts { work: self.work(), ..self.counts }
+    }
+
+    /// Searches on as far as is allowed.
+    pub(crate) fn run(&mut self, allowed: Allowed) -> End {
+        if !std::mem::replace(&mut self.started, true) {
+            let task = self.shared.task;
+            let (first, _) = self.store.insert(&task.initial, NO_STATE, 0, 0);
+            self.status.initial(self.shared.landmarks, task, &task.initial);
+            self.state = task.initial.clone();
+            if let Some(plan) = self.visit(first) {
+                return End::Plan(plan);
+            }
         }
         let mut round = 0u64;
         loop {
             round += 1;
-            if round.is_multiple_of(64) && (self.shared.stop)() {
+            if self.stopped || (round.is_multiple_of(64) && (self.shared.stop)()) {
                 return End::Stopped;
             }
-            if round.is_multiple_of(256) && self.bytes() > self.shared.memory_limit {
+            if round.is_multiple_of(256) && self.bytes() > allowed.memory {
                 return End::Memory;
             }
-            if self.work() > self.strategy.work_limit
-                || self.counts.evaluated >= self.strategy.evaluation_limit
-            {
+            if self.work() > allowed.work || self.counts.evaluated >= allowed.evaluations {
                 return End::Limit;
             }
             let list = (0..4).filter(|&i| self.lists[i].len() > 0).min_by_key(|&i| self.lists[i].priority);
@@ -152,7 +197,8 @@ impl Search<'_, '_> {
         }
     }
 
-    fn bytes(&self) -> usize {
+    /// Bytes taken.
+    pub(crate) fn bytes(&self) -> usize {
         let entries: usize = self.lists.iter().map(OpenList::len).sum();
         self.store.bytes() + entries * 12 + self.status.bytes() + self.relaxed.bytes()
     }
@@ -196,6 +242,10 @@ impl Search<'_, '_> {
         loop {
             if task.is_goal(&self.state) {
                 return Some(self.store.plan_to(id));
+            }
+            if (self.shared.stop)() {
+                self.stopped = true;
+                return None;
             }
             self.store.set_expanded(id, true);
             self.counts.evaluated += 1;

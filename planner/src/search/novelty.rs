@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 use crate::heuristics::relaxed::{Counting, Relaxed};
 use crate::landmarks::Status;
 
-use super::lazy::{Counts, End, Shared};
+use super::lazy::{Allowed, Counts, End, Shared};
 use super::open::OpenList;
 use super::store::{NO_STATE, Store};
 
@@ -83,8 +83,12 @@ impl Novelty {
     }
 }
 
-struct Search<'a, 's> {
+/// The search, which can be gone on with after it ended with [`End::Limit`].
+pub(crate) struct Search<'a, 's> {
     shared: &'s Shared<'a>,
+    /// Only cheaper plans (in the search's costs) are of interest.
+    bound: u32,
+    started: bool,
     store: Store,
     status: Status,
     memory: Vec<Memory>,
@@ -97,84 +101,105 @@ struct Search<'a, 's> {
     counts: Counts,
 }
 
-/// Runs the search until its work is done.
-pub(crate) fn search(shared: &Shared<'_>, bound: u32, work_limit: u64, counts: &mut Counts) -> End {
-    let task = shared.task;
-    let mut search = Search {
-        shared,
-        store: Store::new(task),
-        status: Status::new(shared.landmarks),
-        memory: Vec::new(),
-        anchors: Vec::new(),
-        relaxed: Relaxed::new(task, Counting::Steps),
-        novelty: Novelty { facts: task.facts, pairs: true, seen: FxHashMap::default(), bytes: 0 },
-        open: OpenList::default(),
-        facts: Vec::new(),
-        counts: Counts::default(),
-    };
-    let end = search.run(bound, work_limit);
-    counts.evaluated += search.counts.evaluated;
-    counts.expanded += search.counts.expanded;
-    counts.work += search.work();
-    end
-}
+impl<'a, 's> Search<'a, 's> {
+    /// A search that has not begun.
+    pub(crate) fn new(shared: &'s Shared<'a>, bound: u32) -> Search<'a, 's> {
+        let task = shared.task;
+        Search {
+            shared,
+            bound,
+            started: false,
+            store: Store::new(task),
+            status: Status::new(shared.landmarks),
+            memory: Vec::new(),
+            anchors: Vec::new(),
+            relaxed: Relaxed::new(task, Counting::Steps),
+            novelty: Novelty { facts: task.facts, pairs: true, seen: FxHashMap::default(), bytes: 0 },
+            open: OpenList::default(),
+            facts: Vec::new(),
+            counts: Counts::default(),
+        }
+    }
 
-impl Search<'_, '_> {
+    /// What the search took so far.
+    pub(crate) fn counts(&self) -> Counts {
+        Counts { work: self.work(), ..self.counts }
+    }
+
     fn work(&self) -> u64 {
         self.relaxed.work + self.counts.work
     }
 
-    fn run(&mut self, bound: u32, work_limit: u64) -> End {
+    /// Whether the first state may lead to the goal at all.
+    fn start(&mut self) -> bool {
         let task = self.shared.task;
         let (first, _) = self.store.insert(&task.initial, NO_STATE, 0, 0);
         self.status.initial(self.shared.landmarks, task, &task.initial);
         let left = self.status.left(self.shared.landmarks, task, first, &task.initial);
         self.memory.push(Memory { anchor: 0, done: 0, left });
-        if self.anchor(&task.initial).is_none() {
+        self.open.push(0, (first, 0));
+        self.anchor(&task.initial).is_some()
+    }
+
+    /// Searches on as far as is allowed.
+    pub(crate) fn run(&mut self, allowed: Allowed) -> End {
+        if !std::mem::replace(&mut self.started, true) && !self.start() {
             return End::Exhausted;
         }
-        self.open.push(0, (first, 0));
-        let mut state = Vec::new();
-        let mut next = Vec::new();
-        let mut applicable = Vec::new();
+        let mut buffers = (Vec::new(), Vec::new(), Vec::new());
         let mut round = 0u64;
-        while let Some((id, _)) = self.open.pop(false) {
+        loop {
             round += 1;
             if round.is_multiple_of(64) && (self.shared.stop)() {
                 return End::Stopped;
             }
-            if round.is_multiple_of(256) && self.bytes() > self.shared.memory_limit {
+            if round.is_multiple_of(256) && self.bytes() > allowed.memory {
                 return End::Memory;
             }
-            if self.work() > work_limit {
+            if self.work() > allowed.work || self.counts.evaluated >= allowed.evaluations {
                 return End::Limit;
             }
-            self.store.load(task, id, &mut state);
-            self.counts.expanded += 1;
-            applicable.clear();
-            self.shared.successors.applicable(task, &state, &mut applicable);
-            for &operator in &applicable {
-                let cost = self.store.cost(id).saturating_add(task.costs[operator as usize]);
-                if cost >= bound {
-                    continue;
-                }
-                task.apply(operator, &state, &mut next);
-                self.counts.work += STATE_WORK;
-                let (child, new) = self.store.insert(&next, id, operator, cost);
-                if !new {
-                    continue;
-                }
-                self.status.follow(self.shared.landmarks, task, (id, child), &next, true);
-                if task.is_goal(&next) {
-                    return End::Plan(self.store.plan_to(child));
-                }
-                self.evaluate(id, operator, child, &next);
+            let Some((id, _)) = self.open.pop(false) else { return End::Exhausted };
+            if let Some(plan) = self.expand(id, &mut buffers) {
+                return End::Plan(plan);
             }
         }
-        End::Exhausted
     }
 
-    fn bytes(&self) -> usize {
+    /// Makes the successors of a state; the plan if one of them is a goal. The buffers hold the state, a successor and
+    /// the applicable operators.
+    fn expand(
+        &mut self,
+        id: u32,
+        (state, next, applicable): &mut (Vec<u32>, Vec<u32>, Vec<u32>),
+    ) -> Option<Vec<u32>> {
+        let task = self.shared.task;
+        self.store.load(task, id, state);
+        self.counts.expanded += 1;
+        applicable.clear();
+        self.shared.successors.applicable(task, state, applicable);
+        for &operator in applicable.iter() {
+            let cost = self.store.cost(id).saturating_add(task.costs[operator as usize]);
+            if cost >= self.bound {
+                continue;
+            }
+            task.apply(operator, state, next);
+            self.counts.work += STATE_WORK;
+            let (child, new) = self.store.insert(next, id, operator, cost);
+            if !new {
+                continue;
+            }
+            self.status.follow(self.shared.landmarks, task, (id, child), next, true);
+            if task.is_goal(next) {
+                return Some(self.store.plan_to(child));
+            }
+            self.evaluate(id, operator, child, next);
+        }
+        None
+    }
+
+    /// Bytes taken.
+    pub(crate) fn bytes(&self) -> usize {
         self.store.bytes()
             + self.status.bytes()
             + self.novelty.bytes

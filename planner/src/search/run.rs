@@ -8,7 +8,7 @@ use crate::landmarks::Landmarks;
 
 use super::compiled::Compiled;
 use super::improve::Improve;
-use super::lazy::{Counts, End, Shared, Strategy, search};
+use super::lazy::{self, Allowed, Counts, End, Shared, Strategy, search};
 use super::novelty;
 use super::successor::Successors;
 
@@ -59,7 +59,7 @@ pub(crate) fn solve(
     let _span = debug_span!("classical").entered();
     let task = Compiled::new(ground);
     let successors = Successors::new(&task);
-    let landmarks = debug_span!("landmarks").in_scope(|| Landmarks::new(&task, &ground.mutex_groups));
+    let landmarks = debug_span!("landmarks").in_scope(|| Landmarks::new(&task, &ground.mutex_groups, stop));
     let shared = Shared {
         task: &task,
         successors: &successors,
@@ -97,6 +97,51 @@ const GREEDY: Strategy = Strategy {
     evaluation_limit: u64::MAX,
 };
 
+/// The searches for a first plan in the order of their turns, two rounds: with lookahead, by novelty, plainly; every other
+/// round those that order states by estimates take the newest of equally good ones first.
+const ORDER: [usize; 6] = [0, NOVELTY, PLAIN, 1, NOVELTY, PLAIN + 1];
+/// Place of the search by novelty.
+const NOVELTY: usize = 2;
+/// Places of the searches without lookahead begin here.
+const PLAIN: usize = 3;
+
+/// A search for a first plan that can be gone on with.
+enum Kept<'a, 's> {
+    Lazy(Box<lazy::Search<'a, 's>>),
+    Novelty(Box<novelty::Search<'a, 's>>),
+}
+
+impl<'a, 's> Kept<'a, 's> {
+    fn new(shared: &'s Shared<'a>, place: usize, bound: u32) -> Self {
+        if place == NOVELTY {
+            return Kept::Novelty(Box::new(novelty::Search::new(shared, bound)));
+        }
+        let (lookahead, newest) = (place < NOVELTY, matches!(place, 1 | 4));
+        Kept::Lazy(Box::new(lazy::Search::new(shared, Strategy { bound, lookahead, newest, ..GREEDY })))
+    }
+
+    fn run(&mut self, allowed: Allowed) -> End {
+        match self {
+            Kept::Lazy(search) => search.run(allowed),
+            Kept::Novelty(search) => search.run(allowed),
+        }
+    }
+
+    fn counts(&self) -> Counts {
+        match self {
+            Kept::Lazy(search) => search.counts(),
+            Kept::Novelty(search) => search.counts(),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        match self {
+            Kept::Lazy(search) => search.bytes(),
+            Kept::Novelty(search) => search.bytes(),
+        }
+    }
+}
+
 struct Run<'a, 's> {
     task: &'a Compiled,
     shared: &'s Shared<'a>,
@@ -108,7 +153,7 @@ struct Run<'a, 's> {
     on_plan: &'s mut dyn FnMut(&[u32], f64),
 }
 
-impl Run<'_, '_> {
+impl<'a, 's> Run<'a, 's> {
     fn all(&mut self) -> ClassicalEnd {
         let (plan, plain_too) = match self.first() {
             Ok(found) => found,
@@ -135,29 +180,25 @@ impl Run<'_, '_> {
     }
 
     /// The first plan, and whether a search without lookahead may still find a shorter one quickly.
+    ///
+    /// Several searches take turns, each going on where it stopped, with more and more work each round.
     fn first(&mut self) -> Result<(Vec<u32>, bool), ClassicalEnd> {
+        let mut kept: [Option<Kept<'a, 's>>; 5] = Default::default();
         let mut work_limit = FIRST_WORK;
         let mut turn = 0usize;
         loop {
-            let newest = turn / 3 % 2 == 1;
-            let strategy = Strategy { bound: self.bound, work_limit, newest, ..GREEDY };
-            let end = match turn % 3 {
-                0 => self.search(strategy),
-                1 => novelty::search(self.shared, self.bound, work_limit, &mut self.counts),
-                _ => self.search(Strategy { lookahead: false, ..strategy }),
-            };
-            tracing::debug!(
-                turn,
-                self.counts.evaluated,
-                self.counts.work,
-                plan = matches!(end, End::Plan(_))
-            );
+            let place = ORDER[turn % ORDER.len()];
+            let end = self.take_turn(&mut kept, place, work_limit);
+            tracing::debug!(turn, self.counts.evaluated, self.counts.work);
+            if matches!(end, End::Memory | End::Exhausted) {
+                kept[place] = None;
+            }
             match end {
                 End::Plan(plan) => {
                     return Ok((plan, turn == 0));
                 }
                 // With a bound, only a search that follows cheaper ways to known states proves anything.
-                End::Exhausted if turn % 3 == 2 || self.bound == u32::MAX => {
+                End::Exhausted if place >= PLAIN || self.bound == u32::MAX => {
                     return Err(ClassicalEnd::Exhausted);
                 }
                 End::Stopped => return Err(ClassicalEnd::Stopped),
@@ -171,6 +212,25 @@ impl Run<'_, '_> {
                 work_limit = work_limit.saturating_mul(ROUND_FACTOR);
             }
         }
+    }
+
+    /// Lets one of the searches for a first plan go on for so much work.
+    fn take_turn(&mut self, kept: &mut [Option<Kept<'a, 's>>; 5], place: usize, work: u64) -> End {
+        let others: usize = kept.iter().flatten().map(Kept::bytes).sum();
+        let evaluations = self
+            .options
+            .evaluation_limit
+            .map_or(u64::MAX, |limit| limit.saturating_sub(self.counts.evaluated));
+        let search = kept[place].get_or_insert_with(|| Kept::new(self.shared, place, self.bound));
+        let (before, own) = (search.counts(), search.bytes());
+        let memory = self.shared.memory_limit.saturating_sub(others - own.min(others));
+        let end = search.run(Allowed {
+            work: before.work.saturating_add(work),
+            evaluations: before.evaluated.saturating_add(evaluations),
+            memory,
+        });
+        self.counts.add(search.counts().since(before));
+        end
     }
 
     fn limited(&self) -> bool {

@@ -58,6 +58,9 @@ struct State {
     observed: BTreeSet<(usize, usize)>,
     out_of_reach: BTreeSet<usize>,
     failures: BTreeMap<String, usize>,
+    stuck: BTreeSet<u64>,
+    pushes: usize,
+    changes: Vec<look::Change>,
     belief: Belief,
     space: Arc<Space>,
     looks: Vec<Look>,
@@ -143,6 +146,9 @@ impl<'a> Agent<'a> {
             observed: BTreeSet::new(),
             out_of_reach: BTreeSet::new(),
             failures: BTreeMap::new(),
+            stuck: BTreeSet::new(),
+            pushes: 0,
+            changes: Vec::new(),
             belief: Belief::default(),
             space: Arc::default(),
             looks: Vec::new(),
@@ -168,7 +174,7 @@ impl<'a> Agent<'a> {
                 Ok(()) => self.keep()?,
                 Err(because) => {
                     if let Some(why) = self.replan(&round, because)? {
-                        return Ok(self.not_found(&round, &why));
+                        return Ok(self.gave_up(&round, &why));
                     }
                 }
             }
@@ -177,9 +183,9 @@ impl<'a> Agent<'a> {
             }
             let call = self.next_call();
             self.say(&Event::Acting { call: call.to_string(), because: ground::reason(&round, &call) })?;
-            match self.execute(&call).await {
-                Ok(outcome) => self.learn(&call, outcome)?,
-                Err(failure) => self.learn_from_failure(&call, &failure).await?,
+            match self.execute(&round, &call).await {
+                Ok(outcome) => self.learn(&round, &call, outcome)?,
+                Err(failure) => self.learn_from_failure(&round, &call, &failure).await?,
             }
         }
     }
@@ -270,7 +276,7 @@ impl<'a> Agent<'a> {
         Call { action: step.action, arguments: step.arguments }
     }
 
-    async fn execute(&self, call: &Call) -> Result<Outcome, SkillFailure> {
+    async fn execute(&self, round: &Round, call: &Call) -> Result<Outcome, SkillFailure> {
         let skill = descry_skills::named(&call.action).ok_or_else(|| SkillFailure::Unknown {
             name: call.action.clone(),
             expected: "an action with a skill",
@@ -278,9 +284,14 @@ impl<'a> Agent<'a> {
         let symbols = Symbols {
             places: self.state.candidates.iter().map(|c| (c.symbol.clone(), c.place.clone())).collect(),
             surfaces: self.state.surfaces.iter().map(|s| (s.symbol.clone(), s.centre())).collect(),
+            pushes: ground::pushes(&round.situation, self.state.at),
         };
         let limits = &self.domain.config.limits;
-        let time_limit_s = if call.action == "move" { limits.drive_s } else { limits.look_s };
+        let time_limit_s = match call.action.as_str() {
+            "move" => limits.drive_s,
+            "push-aside" => limits.push_s,
+            _ => limits.look_s,
+        };
         let context = Context {
             robot: &*self.robot,
             symbols: &symbols,
@@ -292,7 +303,7 @@ impl<'a> Agent<'a> {
     }
 
     /// What a step brought about: record it, and believe what it showed.
-    fn learn(&mut self, call: &Call, outcome: Outcome) -> Result<(), CommandError> {
+    fn learn(&mut self, round: &Round, call: &Call, outcome: Outcome) -> Result<(), CommandError> {
         self.record_outcome(call, &outcome)?;
         match outcome {
             Outcome::Driven(driven) => {
@@ -309,13 +320,22 @@ impl<'a> Agent<'a> {
                 self.state.observed.insert((from, on));
                 self.perceive(on)?;
             }
-            Outcome::Pushed(_) => {}
+            Outcome::Pushed(pushed) => {
+                self.something_moved(&round.situation, &call.arguments[1])?;
+                let outcome = format!("the hand moved {:.2} m with it", pushed.moved_m);
+                self.say(&Event::Acted { call: call.to_string(), outcome })?;
+            }
         }
         Ok(())
     }
 
     /// What a failure teaches: where the body now is, and which pose is worth no further try.
-    async fn learn_from_failure(&mut self, call: &Call, failure: &SkillFailure) -> Result<(), CommandError> {
+    async fn learn_from_failure(
+        &mut self,
+        round: &Round,
+        call: &Call,
+        failure: &SkillFailure,
+    ) -> Result<(), CommandError> {
         self.record_failure(call, failure)?;
         self.state.plan = None;
         let SkillFailure::Body(body) = failure else {
@@ -323,6 +343,9 @@ impl<'a> Agent<'a> {
         };
         if matches!(body, descry_robots::Failure::Broken { .. } | descry_robots::Failure::Cancelled { .. }) {
             return Err(CommandError::broken(body));
+        }
+        if call.action == "push-aside" {
+            return self.push_failed(round, call, body);
         }
         let about = call.arguments.get(usize::from(call.action == "move")).cloned().unwrap_or_default();
         let tries = self.state.failures.entry(format!("{} {about}", call.action)).or_insert(0);
@@ -359,16 +382,39 @@ impl<'a> Agent<'a> {
         self.conclude(round, Verdict::Achieved, why)
     }
 
-    fn not_found(&self, round: &Round, planner_says: &str) -> Conclusion {
-        let looked = self.state.observed.len();
+    /// What a push that failed teaches: something may have moved nevertheless, and pushing that again leads to nothing.
+    fn push_failed(
+        &mut self,
+        round: &Round,
+        call: &Call,
+        body: &descry_robots::Failure,
+    ) -> Result<(), CommandError> {
+        let what = &call.arguments[1];
+        let therefore = format!("{what} is not pushed again");
+        self.say(&Event::Failed { call: call.to_string(), because: body.to_string(), therefore })?;
+        let obstacle = round.situation.obstacle(what).map(|n| round.situation.obstacles()[n].track);
+        self.state.stuck.extend(obstacle);
+        self.something_moved(&round.situation, what)
+    }
+
+    /// No look and no push can bring the goal nearer: it is not there, or it cannot be told.
+    fn gave_up(&self, round: &Round, planner_says: &str) -> Conclusion {
+        let looked = self.state.totals.views;
         let poses = self.state.candidates.len() - self.state.out_of_reach.len();
-        let what = match round.situation.things.first() {
-            Some(thing) => format!("{} was not found with enough confidence", thing.name),
-            None => "not everything could be identified".into(),
+        let doubt = ground::what_is_left(&round.situation);
+        let (verdict, what) = match (round.situation.things.first(), doubt) {
+            (Some(thing), Some(doubt)) => {
+                (Verdict::CannotTell, format!("it cannot be told whether {} is there, {doubt}", thing.name))
+            }
+            (Some(thing), None) => (Verdict::NotFound, format!("{} is not there", thing.name)),
+            (None, doubt) => {
+                let doubt = doubt.map(|d| format!(", {d}")).unwrap_or_default();
+                (Verdict::CannotTell, format!("not everything could be identified{doubt}"))
+            }
         };
-        let why =
-            format!("{what} after {looked} looks from {poses} poses that can be reached: {planner_says}");
-        self.conclude(round, Verdict::NotFound, why)
+        let says = if planner_says.is_empty() { String::new() } else { format!(": {planner_says}") };
+        let why = format!("{what}; after {looked} looks, with {poses} poses that can be reached{says}");
+        self.conclude(round, verdict, why)
     }
 
     fn conclude(&self, round: &Round, verdict: Verdict, why: String) -> Conclusion {
@@ -377,7 +423,7 @@ impl<'a> Agent<'a> {
             true => situation.clarity(0),
             false => situation.confidence(0),
         };
-        let remaining = (!situation.things.is_empty()).then(|| situation.doubt_about(0).remaining());
+        let remaining = (!situation.things.is_empty()).then(|| situation.chance_there(0));
         let (belief, totals) = (self.state.belief.clone(), self.state.totals);
         let up = situation.surfaces.first().map_or_else(Vector3::z, |s| s.up);
         Conclusion { verdict, why, confidence, remaining, belief, up, totals }

@@ -134,8 +134,10 @@ fn lines(f: &mut fmt::Formatter<'_>, texts: &[String]) -> fmt::Result {
 pub enum Verdict {
     /// The goal is reached with the confidence that was asked for.
     Achieved,
-    /// Every useful pose has been tried.
+    /// Every useful pose has been tried: it is not there.
     NotFound,
+    /// Nothing that the body can do would settle it.
+    CannotTell,
     /// The body or the store failed, or a limit was reached.
     Failed,
 }
@@ -224,6 +226,7 @@ impl fmt::Display for Report {
         let verdict = match self.verdict {
             Verdict::Achieved => "achieved",
             Verdict::NotFound => "not found",
+            Verdict::CannotTell => "cannot tell",
             Verdict::Failed => "failed",
         };
         writeln!(f, "\n{verdict}: {}", self.why)?;

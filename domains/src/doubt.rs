@@ -20,6 +20,8 @@ const BEYOND_M: f64 = 0.3;
 const UNSEEN_SHARE: f64 = 0.6;
 /// Share of an object's volume that may have been seen free, for noise, if it stands there.
 const FREE_SHARE: f64 = 0.15;
+/// How far above an unseen place the top of a body that fills it is looked for, metres.
+const ROOF_M: f64 = 0.5;
 /// Sides from which an object is looked at.
 const SECTORS: usize = 8;
 /// An object that is believed less than this to be the thing is no longer asked about.
@@ -51,11 +53,21 @@ pub struct Doubt {
     pub hidden: f64,
     /// No surface is known yet: every look may settle everything.
     pub anywhere: bool,
-    /// Probability below which what is left is not worth a look.
-    negligible: f64,
+    /// Which hypotheses a look shows, by obstacle moved (0: none), candidate and surface.
     shown: Vec<OnceLock<Vec<bool>>>,
-    within_reach: OnceLock<f64>,
+    /// What all looks together can settle, by obstacle moved (0: none).
+    within_reach: Vec<OnceLock<f64>>,
+    looks: usize,
     surfaces: usize,
+}
+
+/// What a plan does before a look.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Taken<'a> {
+    /// Looks: candidate and surface.
+    pub looks: &'a [(usize, usize)],
+    /// The obstacle that is pushed aside.
+    pub moved: Option<usize>,
 }
 
 impl Doubt {
@@ -84,36 +96,45 @@ impl Doubt {
         doubt
     }
 
-    /// The share of the doubt that a look at `from` would settle beyond what the planned looks settle, 0 to 1. Doubt that
-    /// no look can settle does not count; none is worth a look where what can be settled is negligible.
-    pub fn share_settled(&self, situation: &Situation, from: usize, planned: &[(usize, usize)]) -> f64 {
+    /// The share of the doubt that a look at `from` would settle beyond what the plan does before it, 0 to 1. Doubt that no
+    /// look can settle does not count; none is worth a look where what can be settled is negligible.
+    pub fn share_settled(&self, situation: &Situation, from: usize, before: Taken<'_>) -> f64 {
         if self.anywhere {
-            return if planned.is_empty() { 1.0 } else { 0.0 };
+            return if before.looks.is_empty() { 1.0 } else { 0.0 };
         }
-        let total = *self.within_reach.get_or_init(|| self.settled_by_all(situation));
-        if total < self.negligible {
+        let total = self.within_reach(situation, before.moved);
+        if total < negligible(situation, before.moved) {
             return 0.0;
         }
-        let earlier: Vec<&Vec<bool>> = planned.iter().map(|&(p, on)| self.shown(situation, p, on)).collect();
+        let shown = |from: usize, on: usize| self.shown(situation, from, on, before.moved);
+        let earlier: Vec<&Vec<bool>> = before.looks.iter().map(|&(p, on)| shown(p, on)).collect();
         let settled = |on: usize| -> f64 {
-            let now = self.shown(situation, from, on);
+            let now = shown(from, on);
             let fresh = |i: &usize| now[*i] && !earlier.iter().any(|e| e[*i]);
             (0..self.hypotheses.len()).filter(fresh).map(|i| self.hypotheses[i].weight).sum()
         };
         (0..self.surfaces).map(settled).sum::<f64>() / total
     }
 
-    /// The probability that hangs on what some look could settle that has not been taken and can be.
-    fn settled_by_all(&self, situation: &Situation) -> f64 {
-        let open = |&(from, on): &(usize, usize)| {
-            !situation.observed.contains(&(from, on)) && situation.can_reach(from) && situation.sees(from, on)
-        };
-        let looks =
-            (0..situation.candidates.len()).flat_map(|from| (0..self.surfaces).map(move |on| (from, on)));
-        let looks: Vec<&Vec<bool>> =
-            looks.filter(open).map(|(from, on)| self.shown(situation, from, on)).collect();
-        let settled = |(n, _): &(usize, &Hypothesis)| looks.iter().any(|shown| shown[*n]);
-        self.hypotheses.iter().enumerate().filter(settled).map(|(_, h)| h.weight).sum()
+    /// The probability that hangs on what some look could settle that can be taken and, as long as nothing is moved, has not
+    /// been taken.
+    pub(crate) fn within_reach(&self, situation: &Situation, moved: Option<usize>) -> f64 {
+        *self.within_reach[moved.map_or(0, |o| o + 1)].get_or_init(|| {
+            let open = |look: &(usize, usize)| moved.is_some() || !situation.observed.contains(look);
+            let looks = self.all_looks(situation, open, moved);
+            let settled = |(n, _): &(usize, &Hypothesis)| looks.iter().any(|shown| shown[*n]);
+            self.hypotheses.iter().enumerate().filter(settled).map(|(_, h)| h.weight).sum()
+        })
+    }
+
+    /// Whether looking alone can settle anything that matters.
+    pub(crate) fn can_be_settled(&self, situation: &Situation) -> bool {
+        self.anywhere || self.within_reach(situation, None) >= negligible(situation, None)
+    }
+
+    /// Whether looking can settle enough once an obstacle is moved that matters.
+    pub(crate) fn can_be_settled_without(&self, situation: &Situation, what: usize) -> bool {
+        self.within_reach(situation, Some(what)) >= negligible(situation, Some(what))
     }
 
     /// The probability that hangs on all that is in doubt.
@@ -121,10 +142,36 @@ impl Doubt {
         if self.anywhere { self.hidden } else { self.hypotheses.iter().map(|h| h.weight).sum() }
     }
 
+    /// The probability that hangs on hidden places that no look shows, and those places.
+    pub fn out_of_sight(&self, situation: &Situation) -> (f64, Vec<Point3<f64>>) {
+        let looks = self.all_looks(situation, |_| true, None);
+        let hidden = self.hypotheses.iter().enumerate().filter(|(_, h)| h.facing.is_none());
+        let unseeable = hidden.filter(|(n, _)| !looks.iter().any(|shown| shown[*n]));
+        let unseeable: Vec<&Hypothesis> = unseeable.map(|(_, h)| h).collect();
+        (unseeable.iter().map(|h| h.weight).sum(), unseeable.iter().map(|h| h.centre).collect())
+    }
+
+    /// What each look shows that is open, can be reached and sees the surface.
+    fn all_looks(
+        &self,
+        situation: &Situation,
+        open: impl Fn(&(usize, usize)) -> bool,
+        moved: Option<usize>,
+    ) -> Vec<&Vec<bool>> {
+        (0..situation.candidates.len())
+            .flat_map(|from| (0..self.surfaces).map(move |on| (from, on)))
+            .filter(|look| open(look) && situation.can_reach(look.0) && situation.sees(look.0, look.1))
+            .map(|(from, on)| self.shown(situation, from, on, moved))
+            .collect()
+    }
+
     /// Which hypotheses a look from a candidate at a surface shows.
-    fn shown(&self, situation: &Situation, from: usize, on: usize) -> &Vec<bool> {
-        self.shown[from * self.surfaces + on].get_or_init(|| {
-            self.hypotheses.iter().map(|h| h.on == on && situation.would_settle(from, on, h)).collect()
+    fn shown(&self, situation: &Situation, from: usize, on: usize, moved: Option<usize>) -> &Vec<bool> {
+        let at = moved.map_or(0, |o| o + 1) * self.looks + from * self.surfaces + on;
+        self.shown[at].get_or_init(|| {
+            let obstacle = moved.map(|o| &situation.obstacles()[o]);
+            let shows = |h: &Hypothesis| h.on == on && situation.would_settle(from, on, h, obstacle);
+            self.hypotheses.iter().map(shows).collect()
         })
     }
 
@@ -145,15 +192,15 @@ impl Doubt {
         let hidden = prior * open / (prior * open + 1.0 - prior);
         let each = hidden / hypotheses.len().max(1) as f64;
         hypotheses.iter_mut().for_each(|h| h.weight = each);
-        let shown =
-            (0..situation.candidates.len() * situation.surfaces.len()).map(|_| OnceLock::new()).collect();
+        let looks = situation.candidates.len() * situation.surfaces.len();
+        let moves = 1 + situation.belief.tracks.len();
         Self {
             hypotheses,
             hidden,
             anywhere: places == 0,
-            negligible: situation.thresholds.remaining,
-            shown,
-            within_reach: OnceLock::new(),
+            shown: (0..moves * looks).map(|_| OnceLock::new()).collect(),
+            within_reach: (0..moves).map(|_| OnceLock::new()).collect(),
+            looks,
             surfaces: situation.surfaces.len(),
         }
     }
@@ -162,6 +209,12 @@ impl Doubt {
         self.hidden *= factor;
         self.hypotheses.iter_mut().for_each(|h| h.weight *= factor);
     }
+}
+
+/// Probability below which what can be settled is not worth a look; what can be seen only by moving something asks for less,
+/// since it can be settled in no other way.
+fn negligible(situation: &Situation, moved: Option<usize>) -> f64 {
+    if moved.is_some() { situation.thresholds.out_of_sight } else { situation.thresholds.remaining }
 }
 
 /// Height and diameter of a model, metres.
@@ -188,19 +241,8 @@ fn grid(surface: &KnownSurface, diameter_m: f64) -> Vec<Point3<f64>> {
     (-steps..=steps)
         .flat_map(|i| (-steps..=steps).map(move |j| (i, j)))
         .map(|(i, j)| place(i, j))
-        .filter(|p| covers(surface, p, margin))
+        .filter(|p| surface.covers(p, margin))
         .collect()
-}
-
-/// Whether a point lies within the outline widened by a margin.
-fn covers(surface: &KnownSurface, point: &Point3<f64>, margin_m: f64) -> bool {
-    let n = surface.outline.len();
-    n >= 3
-        && (0..n).all(|i| {
-            let (a, b) = (surface.outline[i], surface.outline[(i + 1) % n]);
-            let inward = surface.up.cross(&(b - a));
-            inward.dot(&(point - a)) >= -margin_m * inward.norm()
-        })
 }
 
 /// The unseen points of an object that stood at a place, if it could stand there unnoticed.
@@ -210,11 +252,12 @@ fn unseen_volume(
     centre: &Point3<f64>,
     (height_m, diameter_m): (f64, f64),
 ) -> Option<Vec<Point3<f64>>> {
+    const COLUMNS: [(f64, f64); 5] = [(0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.0, 0.35), (0.0, -0.35)];
     let (e1, e2) = across(surface);
     let mut unseen = Vec::new();
     let (mut all, mut free) = (0.0, 0.0);
     for level in [0.25, 0.6, 0.95] {
-        for (a, b) in [(0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.0, 0.35), (0.0, -0.35)] {
+        for (a, b) in COLUMNS {
             let point = centre + surface.up * (height_m * level) + (e1 * a + e2 * b) * diameter_m;
             all += 1.0;
             match situation.space.cell(&point) {
@@ -224,7 +267,21 @@ fn unseen_volume(
             }
         }
     }
-    (free <= FREE_SHARE * all && unseen.len() as f64 >= UNSEEN_SHARE * all).then_some(unseen)
+    if free > FREE_SHARE * all || (unseen.len() as f64) < UNSEEN_SHARE * all {
+        return None;
+    }
+    let inside = |&&(a, b): &&(f64, f64)| {
+        let top = centre + surface.up * height_m + (e1 * a + e2 * b) * diameter_m;
+        is_roofed(situation, &top, &surface.up)
+    };
+    (2 * COLUMNS.iter().filter(inside).count() <= COLUMNS.len()).then_some(unseen)
+}
+
+/// Whether a measured surface lies over an unseen point, with nothing seen free between: it is within a solid body.
+fn is_roofed(situation: &Situation, point: &Point3<f64>, up: &Vector3<f64>) -> bool {
+    let step_m = situation.space.voxel_m();
+    let above = (0..(ROOF_M / step_m) as usize).map(|k| situation.space.cell(&(point + up * (k as f64 * step_m))));
+    above.into_iter().find(|cell| *cell != Cell::Unseen) == Some(Cell::Occupied)
 }
 
 /// The sides of an object that no view has shown, each with its part of what hangs on the object.

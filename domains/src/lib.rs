@@ -6,6 +6,7 @@ pub mod doubt;
 mod facts;
 pub mod goal;
 pub mod load;
+pub mod obstacle;
 pub mod situation;
 
 pub use descry_planner;

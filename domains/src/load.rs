@@ -80,13 +80,15 @@ pub struct Thresholds {
     pub confidence: f64,
     /// An object is given up when no more is left that it is there.
     pub remaining: f64,
+    /// No more than this may hang on places that can be seen from nowhere, for an object to be called not there.
+    pub out_of_sight: f64,
     /// That a sought object is there, before the first look.
     pub prior: f64,
 }
 
 impl Default for Thresholds {
     fn default() -> Self {
-        Self { confidence: 0.8, remaining: 0.05, prior: 0.5 }
+        Self { confidence: 0.8, remaining: 0.05, out_of_sight: 0.01, prior: 0.5 }
     }
 }
 
@@ -116,15 +118,19 @@ pub struct Limits {
     pub drive_retries: usize,
     /// Failed looks from a pose before it is given up.
     pub look_retries: usize,
+    /// Pushes in a run.
+    pub pushes: usize,
     /// Time for one drive.
     pub drive_s: f64,
     /// Time for one look.
     pub look_s: f64,
+    /// Time for one push.
+    pub push_s: f64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { views: 40, drive_retries: 2, look_retries: 2, drive_s: 120.0, look_s: 10.0 }
+        Self { views: 40, drive_retries: 2, look_retries: 2, pushes: 6, drive_s: 120.0, look_s: 10.0, push_s: 30.0 }
     }
 }
 

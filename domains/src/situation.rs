@@ -10,9 +10,10 @@ use descry_perception::recognise::ObjectModel;
 use descry_planner::{Call, CallError, FactValue};
 use descry_robots::{Place, Robot};
 
-use crate::doubt::{Doubt, Hypothesis};
+use crate::doubt::{Doubt, Hypothesis, Taken};
 use crate::goal::symbol;
 use crate::load::{Domain, Thresholds};
+use crate::obstacle::{self, Obstacle};
 
 /// Somewhere to stand and look from.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +46,17 @@ impl KnownSurface {
         let sum = self.outline.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords);
         Some(Point3::from(sum / self.outline.len() as f64))
     }
+
+    /// Whether a point lies over the outline widened by a margin in metres.
+    pub(crate) fn covers(&self, point: &Point3<f64>, margin_m: f64) -> bool {
+        let n = self.outline.len();
+        n >= 3
+            && (0..n).all(|i| {
+                let (a, b) = (self.outline[i], self.outline[(i + 1) % n]);
+                let inward = self.up.cross(&(b - a));
+                inward.dot(&(point - a)) >= -margin_m * inward.norm()
+            })
+    }
 }
 
 /// Something that is looked for: a known object, or a kind of them.
@@ -58,8 +70,8 @@ pub struct Thing {
     pub models: Vec<ObjectModel>,
 }
 
-/// What grounds the symbols of one planning round. Nothing in it moves anything.
-pub struct Situation {
+/// What an agent knows when a round begins.
+pub struct Known {
     /// The body, which is only asked.
     pub robot: Arc<dyn Robot>,
     /// What is believed.
@@ -78,6 +90,15 @@ pub struct Situation {
     pub observed: BTreeSet<(usize, usize)>,
     /// Candidates that have been given up.
     pub out_of_reach: BTreeSet<usize>,
+    /// Objects, by the number of their track, that a push has failed to move.
+    pub stuck: BTreeSet<u64>,
+    /// Pushes that may still be tried.
+    pub pushes_left: usize,
+}
+
+/// What grounds the symbols of one planning round: all that is [`Known`], and what follows from it. Nothing in it moves anything.
+pub struct Situation {
+    known: Known,
     /// What counts as sure.
     pub thresholds: Thresholds,
     derived: Derived,
@@ -90,28 +111,15 @@ struct Derived {
     cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
     about: Vec<OnceLock<Doubt>>,
     on: Vec<OnceLock<Doubt>>,
+    obstacles: OnceLock<Vec<Obstacle>>,
 }
 
-/// What an agent knows when a round begins.
-pub struct Known {
-    /// See [`Situation::robot`].
-    pub robot: Arc<dyn Robot>,
-    /// See [`Situation::belief`].
-    pub belief: Arc<Belief>,
-    /// See [`Situation::space`].
-    pub space: Arc<Space>,
-    /// See [`Situation::candidates`].
-    pub candidates: Vec<Candidate>,
-    /// See [`Situation::at`].
-    pub at: usize,
-    /// See [`Situation::surfaces`].
-    pub surfaces: Vec<KnownSurface>,
-    /// See [`Situation::things`].
-    pub things: Vec<Thing>,
-    /// See [`Situation::observed`].
-    pub observed: BTreeSet<(usize, usize)>,
-    /// See [`Situation::out_of_reach`].
-    pub out_of_reach: BTreeSet<usize>,
+impl std::ops::Deref for Situation {
+    type Target = Known;
+
+    fn deref(&self) -> &Known {
+        &self.known
+    }
 }
 
 impl Situation {
@@ -125,21 +133,9 @@ impl Situation {
             cameras: cells(known.candidates.len() * known.surfaces.len()),
             about: cells(known.things.len()),
             on: cells(known.surfaces.len()),
+            obstacles: OnceLock::new(),
         };
-        let Known { robot, belief, space, candidates, at, surfaces, things, observed, out_of_reach } = known;
-        Self {
-            robot,
-            belief,
-            space,
-            candidates,
-            at,
-            surfaces,
-            things,
-            observed,
-            out_of_reach,
-            thresholds,
-            derived,
-        }
+        Self { known, thresholds, derived }
     }
 
     /// The candidate of a symbol.
@@ -181,12 +177,37 @@ impl Situation {
         to == self.at || (!self.out_of_reach.contains(&to) && self.travel_s(self.at, to).is_finite())
     }
 
-    /// Whether a look from a candidate may settle anything that is in doubt about what is asked for.
-    pub fn worth_a_look(&self, from: usize, on: usize) -> bool {
-        let things = (0..self.things.len()).map(|what| self.doubt_about(what));
-        let doubts: Vec<&Doubt> =
-            if self.things.is_empty() { vec![self.doubt_on(on)] } else { things.collect() };
-        doubts.iter().any(|doubt| doubt.share_settled(self, from, &[]) > 0.0)
+    /// Whether a look from a candidate may settle anything that is in doubt about what is asked for, once an obstacle has
+    /// been moved out of the way.
+    pub fn worth_a_look(&self, from: usize, on: usize, moved: Option<usize>) -> bool {
+        let taken = Taken { looks: &[], moved };
+        self.doubts(on).iter().any(|doubt| doubt.share_settled(self, from, taken) > 0.0)
+    }
+
+    /// Everything that is in doubt about what is asked for: about the things, or where none is asked for on a surface.
+    pub fn doubts(&self, on: usize) -> Vec<&Doubt> {
+        match self.things.is_empty() {
+            true => vec![self.doubt_on(on)],
+            false => (0..self.things.len()).map(|what| self.doubt_about(what)).collect(),
+        }
+    }
+
+    /// The objects that may be pushed aside to see what they hide; none while looking alone can settle anything.
+    pub fn obstacles(&self) -> &[Obstacle] {
+        self.derived.obstacles.get_or_init(|| obstacle::all(self))
+    }
+
+    /// Whether looks would settle enough that is in doubt once an obstacle were out of the way.
+    pub(crate) fn would_uncover(&self, what: usize, on: usize) -> bool {
+        self.doubts(on).iter().any(|doubt| doubt.can_be_settled_without(self, what))
+    }
+
+    /// The obstacle of a symbol.
+    ///
+    /// # Errors
+    /// [`CallError::Failed`] if there is none.
+    pub fn obstacle(&self, name: &str) -> Result<usize, CallError> {
+        find(self.obstacles().iter().map(|o| &o.symbol), name, "something that may be pushed aside")
     }
 
     /// Where the camera would be if the body stood at a candidate and looked at a surface.
@@ -222,8 +243,14 @@ impl Situation {
     }
 
     /// Whether a look from a candidate at a surface would show a hypothesis: most of its points in view and not behind
-    /// what has been seen.
-    pub(crate) fn would_settle(&self, from: usize, on: usize, hypothesis: &Hypothesis) -> bool {
+    /// what has been seen, but for an obstacle that is moved before.
+    pub(crate) fn would_settle(
+        &self,
+        from: usize,
+        on: usize,
+        hypothesis: &Hypothesis,
+        moved: Option<&Obstacle>,
+    ) -> bool {
         let Some(camera) = self.camera(from, on) else { return false };
         let eye = Point3::from(camera.translation.vector);
         if let Some(facing) = &hypothesis.facing {
@@ -232,7 +259,9 @@ impl Situation {
                 return false;
             }
         }
-        let visible = |p: &&Point3<f64>| self.in_view(&camera, p) && self.space.line_of_sight(&eye, p);
+        let gone = |p: &Point3<f64>| moved.is_some_and(|o| o.covers(p));
+        let visible =
+            |p: &&Point3<f64>| self.in_view(&camera, p) && self.space.line_of_sight(&eye, p, &gone);
         2 * hypothesis.points.iter().filter(visible).count() > hypothesis.points.len()
     }
 
@@ -240,6 +269,13 @@ impl Situation {
     pub fn confidence(&self, what: usize) -> f64 {
         let name = &self.things[what].name;
         self.belief.tracks.iter().map(|t| t.probability_of(name)).fold(0.0, f64::max)
+    }
+
+    /// The probability that a thing is there: as one of the objects that were seen, or hidden.
+    pub fn chance_there(&self, what: usize) -> f64 {
+        let name = &self.things[what].name;
+        let none_is = self.belief.tracks.iter().map(|t| 1.0 - t.probability_of(name)).product::<f64>();
+        1.0 - none_is * (1.0 - self.doubt_about(what).hidden)
     }
 
     /// How sure it is what each object on a surface is and that none is hidden, 0 to 1.
@@ -260,17 +296,17 @@ impl Situation {
 
     /// The looks that the plan takes before a call, by the `observed` facts that the call reads.
     pub(crate) fn planned_looks(&self, call: &Call) -> Vec<(usize, usize)> {
-        let taken =
-            |r: &&descry_planner::Reading| &*r.symbol == "observed" && r.value == FactValue::Truth(true);
-        call.readings
-            .iter()
-            .filter(taken)
-            .filter_map(|r| {
-                let from = self.candidate(r.arguments.first()?).ok()?;
-                let on = self.surface(r.arguments.get(1)?).ok()?;
-                (!self.observed.contains(&(from, on))).then_some((from, on))
-            })
-            .collect()
+        let look = |r: &descry_planner::Reading| {
+            let from = self.candidate(r.arguments.first()?).ok()?;
+            let on = self.surface(r.arguments.get(1)?).ok()?;
+            (!self.observed.contains(&(from, on))).then_some((from, on))
+        };
+        holding(call, "observed").filter_map(look).collect()
+    }
+
+    /// The obstacle that the plan pushes aside before a call, by the `pushed` facts that the call reads.
+    pub(crate) fn planned_push(&self, call: &Call) -> Option<usize> {
+        holding(call, "pushed").find_map(|r| self.obstacle(r.arguments.first()?).ok())
     }
 
     /// The problem of this round in PDDL.
@@ -283,6 +319,7 @@ impl Situation {
         text += &names(self.candidates.iter().map(|c| &c.symbol).collect(), "pose");
         text += &names(self.surfaces.iter().map(|s| &s.symbol).collect(), "surface");
         text += &names(self.things.iter().map(|t| &t.symbol).collect(), "thing");
+        text += &names(self.obstacles().iter().map(|o| &o.symbol).collect(), "obstacle");
         text += "  )\n  (:init\n";
         for (_, states) in crate::facts::ALL {
             for line in states(self) {
@@ -298,6 +335,11 @@ const SECTOR_COSINE: f64 = 0.5;
 
 fn nalgebra_middle(a: &Point3<f64>, b: &Point3<f64>) -> Point3<f64> {
     Point3::from((a.coords + b.coords) / 2.0)
+}
+
+/// The atoms of a predicate that hold among the facts that a call reads.
+fn holding<'a>(call: &'a Call, predicate: &'a str) -> impl Iterator<Item = &'a descry_planner::Reading> {
+    call.readings.iter().filter(move |r| &*r.symbol == predicate && r.value == FactValue::Truth(true))
 }
 
 fn find<'a>(

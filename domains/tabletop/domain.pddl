@@ -1,8 +1,9 @@
 ; A robot that looks at what stands on surfaces.
 ;
-; Two actions are enough to search a room: drive somewhere, and look from there. What geometry knows is asked of it
-; through calls in square brackets: how long a drive takes, whether a pose sees a surface at all, and how much of what
-; is still in doubt a look from there would settle.
+; Two actions are enough to search a room: drive somewhere, and look from there. Where no look can settle what is asked,
+; a third moves out of the way what hides it. What geometry knows is asked of it through calls in square brackets: how
+; long a drive takes, whether a pose sees a surface at all, how much of what is still in doubt a look from there would
+; settle, and whether a push would uncover any of it.
 
 (define (domain tabletop)
   (:requirements :typing :equality :negative-preconditions :universal-preconditions
@@ -11,19 +12,22 @@
   (:types
     pose        ; somewhere to stand and look from
     surface     ; a table top, a shelf
+    obstacle    ; an object on a surface that may be pushed aside; there are none while looking alone can help
     thing)      ; a known object, or a kind of object, that is being looked for
 
   (:modules
     (path-cost ?from ?to - pose                 cost             path_cost@descry)
     (can-see ?from - pose ?on - surface         conditionchecker can_see@descry)
     (worth-a-look ?from - pose ?on - surface    conditionchecker worth_a_look@descry)
+    (worth-a-push ?from - pose ?what - obstacle conditionchecker worth_a_push@descry)
     (expected-gain ?from - pose ?what - thing   cost             expected_gain@descry)
     (expected-clarity ?from - pose ?on - surface cost            expected_clarity@descry))
 
   (:predicates
     (at ?where - pose)                          ; where the robot stands
     (out-of-reach ?where - pose)                ; a drive there has failed for good
-    (observed ?from - pose ?on - surface))      ; this look has been taken
+    (pushed ?what - obstacle)                   ; it is out of the way
+    (observed ?from - pose ?on - surface))      ; this look has been taken, and nothing has been moved since
 
   (:functions
     (confidence ?what - thing)                  ; how sure we are that it stands where we believe it does, 0 to 1
@@ -55,4 +59,18 @@
       (at end (observed ?from ?on))
       (at end (increase (clarity ?on) [expected-clarity ?from ?on]))
       (forall (?what - thing)
-        (at end (increase (confidence ?what) [expected-gain ?from ?what]))))))
+        (at end (increase (confidence ?what) [expected-gain ?from ?what])))))
+
+  ; What a push uncovers is seen by the looks after it, also from where the robot has looked before.
+  (:durative-action push-aside
+    :parameters (?from - pose ?what - obstacle)
+    :duration (= ?duration 12)
+    :condition (and
+      (at start (at ?from))
+      (over all (at ?from))
+      (at start (not (pushed ?what)))
+      (at start ([worth-a-push ?from ?what])))
+    :effect (and
+      (at end (pushed ?what))
+      (forall (?pose - pose ?on - surface)
+        (at end (not (observed ?pose ?on)))))))

@@ -73,9 +73,14 @@ impl Space {
         }
     }
 
-    /// Whether nothing that was seen stands between two points. The last two voxels before `to` do not count, so that a
-    /// surface does not hide itself.
-    pub fn line_of_sight(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
+    /// Whether nothing that was seen stands between two points, but where something is taken to be `gone`. The last two voxels
+    /// before `to` do not count, so that a surface does not hide itself.
+    pub fn line_of_sight(
+        &self,
+        from: &Point3<f64>,
+        to: &Point3<f64>,
+        gone: &dyn Fn(&Point3<f64>) -> bool,
+    ) -> bool {
         let way = to - from;
         let length = way.norm() - 2.0 * self.voxel_m;
         if length <= 0.0 {
@@ -86,13 +91,32 @@ impl Space {
         let mut block = None;
         // Nothing is measured right before a camera; the far end, where things stand, is looked at first.
         (0..=steps).rev().all(|k| {
-            let voxel = self.voxel(&(from + step * k as f64));
+            let place = from + step * k as f64;
+            let voxel = self.voxel(&place);
             let key = voxel.map(|v| v.div_euclid(SIDE));
             if block.is_none_or(|(known, _)| known != key) {
                 block = Some((key, self.blocks.get(&key)));
             }
-            block.and_then(|(_, b)| b).is_none_or(|b| b[index(voxel)] <= 0)
+            block.and_then(|(_, b)| b).is_none_or(|b| b[index(voxel)] <= 0) || gone(&place)
         })
+    }
+
+    /// Forgets what was seen in an upright cylinder, where something may have changed: the foot of its axis, the unit vector
+    /// up, its radius and its height in metres.
+    pub fn forget(&mut self, foot: &Point3<f64>, up: &Vector3<f64>, radius_m: f64, height_m: f64) {
+        let voxel_m = self.voxel_m;
+        for (key, block) in &mut self.blocks {
+            let first = Vector3::from(key.map(|k| f64::from(k * SIDE) + 0.5)) * voxel_m;
+            for (at, level) in block.iter_mut().enumerate() {
+                let side = SIDE as usize;
+                let (x, y, z) = (at / (side * side), at / side % side, at % side);
+                let d = first + Vector3::new(x as f64, y as f64, z as f64) * voxel_m - foot.coords;
+                let above = d.dot(up);
+                if above > 0.0 && above < height_m && (d - up * above).norm() < radius_m {
+                    *level = UNSEEN;
+                }
+            }
+        }
     }
 
     /// Takes in what a camera saw.
@@ -288,7 +312,7 @@ mod tests {
     fn sight_ends_at_what_was_seen() {
         let space = seen();
         let sight =
-            |from: [f64; 3], to: [f64; 3]| space.line_of_sight(&Point3::from(from), &Point3::from(to));
+            |from: [f64; 3], to: [f64; 3]| space.line_of_sight(&Point3::from(from), &Point3::from(to), &|_| false);
         assert!(sight([0.0; 3], [-0.2, 0.0, 0.9]));
         assert!(sight([0.0; 3], [-0.2, 0.0, 1.0]), "a surface does not hide itself");
         assert!(!sight([0.0; 3], [-0.2, 0.0, 1.3]));

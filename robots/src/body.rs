@@ -168,8 +168,8 @@ pub struct Description {
     pub head: Option<Head>,
     /// Names of frames.
     pub frames: Frames,
-    /// True if [`Robot::push_aside`] can work.
-    pub can_manipulate: bool,
+    /// How far from the base's middle the arm reaches, metres; `None` if there is no arm for [`Robot::push_aside`].
+    pub reach_m: Option<f64>,
     /// Direction of "up" in the map, if it is known.
     pub up: Option<Vector3<f64>>,
     /// Standard deviation of localisation along each axis, metres.
@@ -414,7 +414,7 @@ pub trait Robot: Send + Sync {
     /// Pushes an object aside.
     ///
     /// # Errors
-    /// [`Failure::Unable`] unless [`Description::can_manipulate`]; [`Failure::Unreachable`] if it is out of the arm's reach;
+    /// [`Failure::Unable`] without [`Description::reach_m`]; [`Failure::Unreachable`] if it is out of the arm's reach;
     /// [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
     async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
         let _ = (push, watch);

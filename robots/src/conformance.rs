@@ -292,7 +292,7 @@ async fn check_refusals(robot: &dyn Robot) -> Result<(), Breach> {
     ensure(before.map_from_base == after.map_from_base, "a body that refuses does not move", || {
         format!("{} off", gap(&before.map_from_base, &after.map_from_base))
     })?;
-    if !robot.description().can_manipulate {
+    if robot.description().reach_m.is_none() {
         let push = Push { object: Point3::origin(), direction: Vector2::x(), distance_m: 0.1 };
         let answer = robot.push_aside(&push, &watch).await;
         ensure(matches!(answer, Err(Failure::Unable { .. })), "who has no arm says so", || {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use async_trait::async_trait;
 use descry_robots::nalgebra::Point3;
-use descry_robots::{CancellationToken, Driven, Failure, Place, Progress, Pushed, Robot, Sensed, Watch};
+use descry_robots::{CancellationToken, Driven, Failure, Place, Progress, Push, Pushed, Robot, Sensed, Watch};
 
 /// One action of a plan, with the names of its objects.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,6 +32,8 @@ pub struct Symbols {
     pub places: BTreeMap<String, Place>,
     /// The point of each surface that a look is directed at, in the map; none while nothing is known of it.
     pub surfaces: BTreeMap<String, Option<Point3<f64>>>,
+    /// How each object that may be pushed is pushed from where the body stands.
+    pub pushes: BTreeMap<String, Push>,
 }
 
 /// What a skill works with.
@@ -63,6 +65,17 @@ impl Context<'_> {
             .places
             .get(name)
             .ok_or_else(|| SkillFailure::Unknown { name: name.into(), expected: "a pose" })
+    }
+
+    /// How an object is pushed.
+    ///
+    /// # Errors
+    /// [`SkillFailure::Unknown`] if nothing of that name can be pushed from here.
+    pub fn push(&self, name: &str) -> Result<&Push, SkillFailure> {
+        self.symbols
+            .pushes
+            .get(name)
+            .ok_or_else(|| SkillFailure::Unknown { name: name.into(), expected: "something to push from here" })
     }
 
     /// The point of a surface that a look is directed at.
@@ -130,7 +143,7 @@ pub trait Skill: Send + Sync {
 }
 
 /// Every skill there is.
-pub const ALL: &[&dyn Skill] = &[&crate::Move, &crate::Observe];
+pub const ALL: &[&dyn Skill] = &[&crate::Move, &crate::Observe, &crate::PushAside];
 
 /// The skill that carries out an action.
 pub fn named(action: &str) -> Option<&'static dyn Skill> {

@@ -1,11 +1,17 @@
 //! The estimate of a round: from what the agent knows to a planning problem with its calls bound.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
+use descry_domains::doubt::Taken;
+use descry_domains::obstacle::{self, Obstacle};
 use descry_domains::situation::{Known, Situation};
 use descry_domains::{attachments, candidates};
 use descry_planner::{Diagnostic, Findings, Plan, PlanError, Source, Step, Task};
+use descry_memory::belief::Track;
+use descry_perception::nalgebra::{self, Point3, Vector3};
+use descry_robots::Push;
 use descry_skills::Call;
 
 use super::{Agent, Round};
@@ -42,6 +48,8 @@ impl Agent<'_> {
             things: s.things.clone(),
             observed: s.observed.clone(),
             out_of_reach: s.out_of_reach.clone(),
+            stuck: s.stuck.clone(),
+            pushes_left: self.domain.config.limits.pushes.saturating_sub(s.pushes),
         };
         let situation = Arc::new(Situation::new(known, self.domain.config.thresholds));
         let name = format!("round-{}", s.totals.views + 1);
@@ -130,6 +138,13 @@ pub(super) fn reason(round: &Round, call: &Call) -> String {
             Ok(from) => hope(s, from),
             Err(_) => String::new(),
         },
+        "push-aside" => match s.obstacle(argument(1)) {
+            Ok(what) => {
+                let [x, y, z] = s.obstacles()[what].at.into();
+                format!("no look can settle what is left; it hides it, at ({x:.2}, {y:.2}, {z:.2}) m")
+            }
+            Err(_) => String::new(),
+        },
         _ => String::new(),
     }
 }
@@ -141,8 +156,8 @@ pub(super) fn one_look(s: &Situation) -> Option<Plan> {
         looks.filter(|look| !s.observed.contains(look) && s.can_reach(look.0) && s.sees(look.0, look.1));
     let rate = |&(from, on): &(usize, usize)| {
         let share: f64 = match s.things.is_empty() {
-            true => s.doubt_on(on).share_settled(s, from, &[]),
-            false => (0..s.things.len()).map(|what| s.doubt_about(what).share_settled(s, from, &[])).sum(),
+            true => s.doubt_on(on).share_settled(s, from, Taken::default()),
+            false => (0..s.things.len()).map(|what| s.doubt_about(what).share_settled(s, from, Taken::default())).sum(),
         };
         share / (s.travel_s(s.at, from) + LOOK_S)
     };
@@ -178,8 +193,43 @@ fn hope(s: &Situation, from: usize) -> String {
         if doubt.anywhere {
             return format!("nothing is known yet of where {name} could be");
         }
-        let share = doubt.share_settled(s, from, &[]) * 100.0;
+        let share = doubt.share_settled(s, from, Taken::default()) * 100.0;
         format!("shows {share:.0} % of where {name} is in doubt ({:.2} left)", doubt.remaining())
     };
     doubts.iter().map(said).collect::<Vec<_>>().join(", ")
+}
+
+/// How each object that may be pushed aside is pushed from a candidate.
+pub(super) fn pushes(s: &Situation, from: usize) -> BTreeMap<String, Push> {
+    let push = |o: &Obstacle| Some((o.symbol.clone(), obstacle::push(s, from, o)?));
+    s.obstacles().iter().filter_map(push).collect()
+}
+
+/// What keeps the agent from saying that what is looked for is not there; none if nothing does.
+pub(super) fn what_is_left(s: &Situation) -> Option<String> {
+    let Some(thing) = s.things.first() else {
+        let unsure = |t: &&Track| t.certainty() < s.thresholds.confidence;
+        let places = s.belief.tracks.iter().filter(unsure).map(|t| place(&t.position_m));
+        let places: Vec<String> = places.collect();
+        return (!places.is_empty())
+            .then(|| format!("what stands at {} looks the same from every side", places.join(" and at ")));
+    };
+    let best = s.belief.tracks.iter().max_by(|a, b| {
+        a.probability_of(&thing.name).total_cmp(&b.probability_of(&thing.name))
+    });
+    if let Some(track) = best.filter(|t| t.probability_of(&thing.name) > s.thresholds.remaining) {
+        let p = track.probability_of(&thing.name);
+        return Some(format!("what stands at {} may be it ({p:.2})", place(&track.position_m)));
+    }
+    let (hidden, places) = s.doubt_about(0).out_of_sight(s);
+    let middle = Point3::from(places.iter().map(|p| p.coords).sum::<Vector3<f64>>() / places.len().max(1) as f64);
+    let first = places.iter().min_by(|a, b| {
+        nalgebra::distance(a, &middle).total_cmp(&nalgebra::distance(b, &middle))
+    })?;
+    (hidden > s.thresholds.out_of_sight)
+        .then(|| format!("there is room for it out of sight, near {} ({hidden:.2})", place(first)))
+}
+
+fn place(p: &Point3<f64>) -> String {
+    format!("({:.2}, {:.2}) m", p.x, p.y)
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use descry_domains::situation::Situation;
 use descry_memory::belief::Sighted;
 use descry_memory::{Bounds, Draft, Meta, RecordId, Sensing, Sighting};
 use descry_perception::View;
@@ -29,8 +30,35 @@ const SIDE_TOLERANCE_M: f64 = 0.03;
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
 /// Points this near to a surface lie on it.
 const ON_SURFACE_M: f64 = 0.012;
+/// What lies lower than this above the foot of something that moved is the surface, which stays, metres.
+const CHANGE_FLOOR_M: f64 = 0.01;
 /// How far beyond the hull of a surface points of it are looked for.
 const HULL_MARGIN_M: f64 = 0.02;
+
+/// A place where something has moved: an upright cylinder.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Change {
+    /// Until when what was seen there is void.
+    stamp_ns: i64,
+    foot: Point3<f64>,
+    up: Vector3<f64>,
+    radius_m: f64,
+    height_m: f64,
+}
+
+impl Change {
+    /// Takes what a view shows of the place out of it, as if the camera had no return there.
+    fn blank(&self, view: &mut View) {
+        for p in &mut view.cloud.points {
+            let d = view.world_from_camera * p.cast::<f64>() - self.foot;
+            let above = d.dot(&self.up);
+            let aside_m = (d - self.up * above).norm();
+            if aside_m < self.radius_m && above > CHANGE_FLOOR_M && above < self.height_m + CHANGE_FLOOR_M {
+                *p = Point3::new(f32::NAN, f32::NAN, f32::NAN);
+            }
+        }
+    }
+}
 
 impl Agent<'_> {
     /// Puts a view into the record: its transforms and colours, then its cloud, so that a cloud is never without its place. When
@@ -109,11 +137,31 @@ impl Agent<'_> {
         }
     }
 
-    /// Reads the views back from the record by their timestamps, with the transforms of those times.
+    /// Reads the views back from the record by their timestamps, with the transforms of those times. What a view shows of a
+    /// place where something has moved since is left out.
     fn restore(&self) -> Result<Vec<View>, CommandError> {
         let map = &self.robot.description().frames.map;
-        let view = |look: &Look| self.record.view_at(look.stamp_ns, map);
-        self.state.looks.iter().map(view).collect::<Result<_, _>>().map_err(CommandError::broken)
+        let restored = |look: &Look| -> Result<View, CommandError> {
+            let mut view = self.record.view_at(look.stamp_ns, map).map_err(CommandError::broken)?;
+            let since = self.state.changes.iter().filter(|c| c.stamp_ns >= look.stamp_ns);
+            since.for_each(|change| change.blank(&mut view));
+            Ok(view)
+        };
+        self.state.looks.iter().map(restored).collect()
+    }
+
+    /// Something on the surface was pushed: what was seen there holds no longer, and looks may be taken again.
+    pub(super) fn something_moved(&mut self, situation: &Situation, what: &str) -> Result<(), CommandError> {
+        let obstacle = situation.obstacle(what).map_err(|e| CommandError::Bug(e.to_string()))?;
+        let obstacle = &situation.obstacles()[obstacle];
+        let (foot, radius_m, height_m) = obstacle.reach_of_push();
+        let change = Change { stamp_ns: self.robot.now_ns(), foot, up: obstacle.up, radius_m, height_m };
+        Arc::make_mut(&mut self.state.space).forget(&foot, &obstacle.up, radius_m, height_m);
+        self.record_document("change", &change)?;
+        self.state.changes.push(change);
+        self.state.observed.clear();
+        self.state.pushes += 1;
+        Ok(())
     }
 
     /// What the surface turned out to be: its height and tilt, and where the map knows none its outline.

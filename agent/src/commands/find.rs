@@ -89,7 +89,7 @@ fn carry_out(words: &[String], verb: &str, with: &With) -> Result<Exit, CommandE
     }
     Ok(match report.verdict {
         Verdict::Achieved => Exit::Done,
-        Verdict::NotFound => Exit::No,
+        Verdict::NotFound | Verdict::CannotTell => Exit::No,
         Verdict::Failed => Exit::Broken,
     })
 }

@@ -13,6 +13,7 @@ mod rear_side;
 mod sweep;
 mod unseen;
 
+use descry_domains::doubt::Taken;
 use descry_domains::situation::Situation;
 use descry_planner::{Plan, Step};
 use descry_robots::Place;
@@ -158,9 +159,9 @@ fn open(situation: &Situation) -> Vec<Look> {
 /// The share of what the goal leaves in doubt that a look would settle.
 fn gain(situation: &Situation, from: usize, on: usize) -> f64 {
     match situation.things.len() {
-        0 => situation.doubt_on(on).share_settled(situation, from, &[]),
+        0 => situation.doubt_on(on).share_settled(situation, from, Taken::default()),
         n => {
-            (0..n).map(|what| situation.doubt_about(what).share_settled(situation, from, &[])).sum::<f64>()
+            (0..n).map(|what| situation.doubt_about(what).share_settled(situation, from, Taken::default())).sum::<f64>()
                 / n as f64
         }
     }

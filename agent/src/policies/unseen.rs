@@ -20,7 +20,7 @@ pub(super) fn visible(situation: &Situation, look: &Look, counts: impl Fn(&Point
         situation.space.cell(p) == Cell::Unseen
             && counts(p)
             && in_view(situation, &map_from_camera, p)
-            && situation.space.line_of_sight(&eye, p)
+            && situation.space.line_of_sight(&eye, p, &|_| false)
     };
     above(&situation.surfaces[look.on]).iter().filter(|p| shown(p)).count() as f64
 }

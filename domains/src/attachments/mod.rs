@@ -6,6 +6,7 @@ mod expected_gain;
 mod path_cost;
 mod program;
 mod worth_a_look;
+mod worth_a_push;
 
 use std::sync::Arc;
 
@@ -22,10 +23,11 @@ type Answers = fn(&Situation, &Call) -> Result<Answer, CallError>;
 /// Every attachment that is built in: its name, the facts that its answer depends on, and what answers.
 const ALL: &[(&str, &[&str], Answers)] = &[
     ("can-see", &[], can_see::answer),
-    ("expected-clarity", &["observed"], expected_clarity::answer),
-    ("expected-gain", &["observed"], expected_gain::answer),
+    ("expected-clarity", &["observed", "pushed"], expected_clarity::answer),
+    ("expected-gain", &["observed", "pushed"], expected_gain::answer),
     ("path-cost", &[], path_cost::answer),
-    ("worth-a-look", &[], worth_a_look::answer),
+    ("worth-a-look", &["pushed"], worth_a_look::answer),
+    ("worth-a-push", &[], worth_a_push::answer),
 ];
 
 /// An attachment of the list above, bound to a situation.

@@ -9,5 +9,5 @@ use crate::situation::Situation;
 pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
     let from = situation.candidate(argument(call, 0)?)?;
     let on = situation.surface(argument(call, 1)?)?;
-    Ok(Answer::Truth(situation.worth_a_look(from, on)))
+    Ok(Answer::Truth(situation.worth_a_look(from, on, situation.planned_push(call))))
 }

@@ -16,6 +16,8 @@ const HANDLE_REACHES_M: [f64; 3] = [0.010, 0.018, 0.026];
 const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
 /// Least and greatest reach of a handle out of the body, metres.
 const HANDLE_M: (f64, f64) = (0.014, 0.06);
+/// What is this far out of the body is no longer the body itself, metres.
+const CLEAR_M: f64 = 0.007;
 /// Greatest width of a handle across, metres.
 const HANDLE_WIDTH_M: f64 = 0.035;
 /// How far below the rim a look must reach to be a look inside, metres.
@@ -58,6 +60,27 @@ struct Asker<'a> {
 impl Asker<'_> {
     fn look(&self, x: f64, y: f64, z: f64) -> Seen {
         self.seen.look(&(self.world_from_surface * Point3::new(x, y, z)), self.tolerance_m)
+    }
+
+    /// Standard deviation of the best measurement of a point of the surface, metres; `None` if cameras that measure better look
+    /// through it: it is noise, or a mixed pixel of a depth edge.
+    fn support(&self, p: &Point3<f64>) -> Option<f64> {
+        let place = self.world_from_surface * p;
+        let (mut through, mut here) = (0.0, 0.0);
+        let mut best_m = f64::INFINITY;
+        for map in &self.seen.maps {
+            let seen = map.look(&place, self.tolerance_m);
+            let sigma_m = range_sigma_m((place - map.viewpoint()).norm());
+            match seen {
+                Seen::Free => through += sigma_m.powi(-2),
+                Seen::Surface => {
+                    here += sigma_m.powi(-2);
+                    best_m = best_m.min(sigma_m);
+                }
+                Seen::Hidden | Seen::Never => {}
+            }
+        }
+        (through <= here).then_some(if here > 0.0 { best_m } else { 0.0 })
     }
 }
 
@@ -182,7 +205,7 @@ fn measure_round(
     let sectors = Sectors::measure(round, segment, asker, base_m, height);
     evidence.arc = sectors.measured_share();
     measured.looked_through = sectors.looked_through_share();
-    let handle = Protrusion::find(round, segment, base_m, height, measured.sigma_m);
+    let handle = Protrusion::find(round, segment, asker, base_m, height);
     evidence.protrusion_m = handle.as_ref().map_or(0.0, |h| h.reach_m);
     evidence.handle_unseen = sectors.unseen_share();
     evidence.handle = match handle.filter(Protrusion::is_handle) {
@@ -283,14 +306,23 @@ pub(super) struct Protrusion {
 }
 
 impl Protrusion {
-    fn find(round: &Round, segment: &Segment, base_m: f64, height: f64, sigma_m: f64) -> Option<Protrusion> {
-        let clear = (3.0 * sigma_m).clamp(0.007, 0.012);
+    fn find(
+        round: &Round,
+        segment: &Segment,
+        asker: &Asker,
+        base_m: f64,
+        height: f64,
+    ) -> Option<Protrusion> {
+        let beside = |p: &&Point3<f64>| {
+            let outside_m = round.outside_m(p);
+            let clear = |sigma_m: f64| outside_m > 3.0 * sigma_m;
+            outside_m > CLEAR_M && asker.support(p).is_some_and(clear)
+        };
         let out: Vec<&Point3<f64>> = segment
             .points
             .iter()
-            .filter(|p| {
-                p.z > base_m + 0.08 * height && p.z < base_m + 1.02 * height && round.outside_m(p) > clear
-            })
+            .filter(|p| p.z > base_m + 0.08 * height && p.z < base_m + 1.02 * height)
+            .filter(beside)
             .collect();
         let mut counts = [0_usize; SECTORS];
         out.iter().for_each(|p| counts[sector_of(round, p)] += 1);

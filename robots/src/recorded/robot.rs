@@ -63,7 +63,7 @@ impl RecordedRobot {
             range_m: (settings.range_m[0], settings.range_m[1]),
             head: None,
             frames: Frames::default(),
-            can_manipulate: false,
+            reach_m: None,
             up: settings.up.map(|[x, y, z]| Vector3::new(x, y, z).normalize()),
             pose_sigma_m: settings.pose_sigma_m,
             pose_sigma_rad: settings.pose_sigma_deg.to_radians(),

@@ -45,7 +45,7 @@ pub fn description() -> Description {
             tilt_up_rad: 0.8,
         }),
         frames: Frames::default(),
-        can_manipulate: true,
+        reach_m: Some(REACH_M),
         up: Some(Vector3::z()),
         pose_sigma_m: 0.03,
         pose_sigma_rad: 2f64.to_radians(),

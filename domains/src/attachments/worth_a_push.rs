@@ -1,0 +1,15 @@
+//! `[worth-a-push ?from ?what]`: whether a push from a pose would move an object out of the way of looks that settle what no
+//! look can settle now.
+
+use descry_planner::{Answer, Call, CallError};
+
+use super::argument;
+use crate::obstacle;
+use crate::situation::Situation;
+
+pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let from = situation.candidate(argument(call, 0)?)?;
+    let what = situation.obstacle(argument(call, 1)?)?;
+    let uncovers = || (0..situation.surfaces.len()).any(|on| situation.would_uncover(what, on));
+    Ok(Answer::Truth(obstacle::push(situation, from, &situation.obstacles()[what]).is_some() && uncovers()))
+}

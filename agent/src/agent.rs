@@ -52,13 +52,15 @@ pub struct Agent<'a> {
 struct State {
     programs: Vec<(String, Arc<ProgramAttachment>)>,
     things: Vec<Thing>,
+    kinds: Vec<Thing>,
+    began_ns: i64,
     candidates: Vec<Candidate>,
     at: usize,
     surfaces: Vec<KnownSurface>,
     observed: BTreeSet<(usize, usize)>,
     out_of_reach: BTreeSet<usize>,
     failures: BTreeMap<String, usize>,
-    stuck: BTreeSet<u64>,
+    stuck: BTreeSet<(u64, usize)>,
     pushes: usize,
     changes: Vec<look::Change>,
     belief: Belief,
@@ -140,6 +142,8 @@ impl<'a> Agent<'a> {
         let state = State {
             programs: attachments::programs(domain),
             things: situation::things(domain, &goal.things),
+            kinds: situation::things(domain, &goal.kinds),
+            began_ns: robot.now_ns(),
             candidates: Vec::new(),
             at: 0,
             surfaces: Vec::new(),
@@ -321,7 +325,7 @@ impl<'a> Agent<'a> {
                 self.perceive(on)?;
             }
             Outcome::Pushed(pushed) => {
-                self.something_moved(&round.situation, &call.arguments[1])?;
+                self.something_moved(&round.situation, &call.arguments[1], pushed.moved_m)?;
                 let outcome = format!("the hand moved {:.2} m with it", pushed.moved_m);
                 self.say(&Event::Acted { call: call.to_string(), outcome })?;
             }
@@ -367,6 +371,12 @@ impl<'a> Agent<'a> {
         self.find_itself().await
     }
 
+    /// Seconds until the deadline, if there is one.
+    fn time_left_s(&self) -> Option<f64> {
+        let gone_s = (self.robot.now_ns() - self.state.began_ns) as f64 * 1e-9;
+        self.goal.deadline_s.map(|deadline_s| deadline_s - gone_s)
+    }
+
     /// The limit that the run has reached, if it has.
     fn exhausted(&self) -> Option<String> {
         let most = self.domain.config.limits.views;
@@ -375,11 +385,19 @@ impl<'a> Agent<'a> {
 
     fn achieved(&self, round: &Round) -> Conclusion {
         let on = self.goal.surfaces.first().map_or("the table", String::as_str);
-        let why = match round.situation.things.first() {
-            Some(thing) => format!("{} stands on the table", thing.name),
-            None => format!("everything on {on} is identified"),
+        let situation = &round.situation;
+        let (verdict, why) = match (situation.things.first(), situation.kinds.first()) {
+            (Some(thing), _) => (Verdict::Achieved, format!("{} stands on {on}", thing.name)),
+            (None, Some(kind)) => {
+                let is = |t: &&descry_memory::belief::Track| t.probability_of(&kind.name) > 0.5;
+                match self.state.belief.tracks.iter().filter(is).count() {
+                    0 => (Verdict::NotFound, format!("there is no {}", kind.name)),
+                    n => (Verdict::Achieved, format!("all of {} are found: {n}", kind.name)),
+                }
+            }
+            (None, None) => (Verdict::Achieved, format!("everything on {on} is identified")),
         };
-        self.conclude(round, Verdict::Achieved, why)
+        self.conclude(round, verdict, why)
     }
 
     /// What a push that failed teaches: something may have moved nevertheless, and pushing that again leads to nothing.
@@ -390,11 +408,16 @@ impl<'a> Agent<'a> {
         body: &descry_robots::Failure,
     ) -> Result<(), CommandError> {
         let what = &call.arguments[1];
-        let therefore = format!("{what} is not pushed again");
+        let therefore = format!("{what} is not pushed from there again");
         self.say(&Event::Failed { call: call.to_string(), because: body.to_string(), therefore })?;
         let obstacle = round.situation.obstacle(what).map(|n| round.situation.obstacles()[n].track);
-        self.state.stuck.extend(obstacle);
-        self.something_moved(&round.situation, what)
+        self.state.stuck.extend(obstacle.map(|track| (track, self.state.at)));
+        match body {
+            descry_robots::Failure::Slipped { moved_m, .. } => {
+                self.something_moved(&round.situation, what, *moved_m)
+            }
+            _ => Ok(()),
+        }
     }
 
     /// No look and no push can bring the goal nearer: it is not there, or it cannot be told.
@@ -419,9 +442,10 @@ impl<'a> Agent<'a> {
 
     fn conclude(&self, round: &Round, verdict: Verdict, why: String) -> Conclusion {
         let situation = &round.situation;
-        let confidence = match situation.things.is_empty() {
-            true => situation.clarity(0),
-            false => situation.confidence(0),
+        let confidence = match (situation.things.is_empty(), situation.kinds.is_empty()) {
+            (false, _) => situation.confidence(0),
+            (true, false) => situation.completeness(0),
+            (true, true) => situation.clarity(0),
         };
         let remaining = (!situation.things.is_empty()).then(|| situation.chance_there(0));
         let (belief, totals) = (self.state.belief.clone(), self.state.totals);

@@ -166,6 +166,8 @@ pub struct Report {
     pub pddl_goal: String,
     /// How it ended.
     pub verdict: Verdict,
+    /// "yes", "no" or "cannot tell", if the goal was a question.
+    pub answer: Option<String>,
     /// Why, in a sentence.
     pub why: String,
     /// What was looked for, if it was one thing.
@@ -203,6 +205,7 @@ impl Report {
             goal: goal.said.clone(),
             pddl_goal: goal.pddl.clone(),
             verdict: Verdict::Failed,
+            answer: None,
             why: String::new(),
             object,
             confidence: 0.0,
@@ -229,7 +232,8 @@ impl fmt::Display for Report {
             Verdict::CannotTell => "cannot tell",
             Verdict::Failed => "failed",
         };
-        writeln!(f, "\n{verdict}: {}", self.why)?;
+        let answer = self.answer.as_ref().map(|a| format!("{a}; ")).unwrap_or_default();
+        writeln!(f, "\n{answer}{verdict}: {}", self.why)?;
         if let (Some(object), Some([x, y, z])) = (&self.object, self.position_m) {
             writeln!(f, "  {object} at ({x:.3}, {y:.3}, {z:.3}) m, confidence {:.2}", self.confidence)?;
         }

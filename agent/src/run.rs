@@ -19,7 +19,7 @@ use crate::body::tape::{self, RecordTape};
 use crate::exit::CommandError;
 use crate::keeping::Keeping;
 use crate::policies::Chooser;
-use crate::report::{Believed, Event, Report};
+use crate::report::{Believed, Event, Report, Verdict};
 
 /// What a run was started with: enough to start it again.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -175,6 +175,7 @@ pub fn live_through(
     let object = things.first().map(|t| t.name.clone());
     let mut report = Report::begin(goal, object, folder.display().to_string());
     fill(&mut report, &conclusion);
+    report.answer = goal.question.then(|| answer(conclusion.verdict).to_string());
     report.sim_time_s = (robot.now_ns() - start_ns) as f64 * 1e-9;
     Ok(report)
 }
@@ -210,6 +211,15 @@ pub fn keep_header(folder: &Path, header: &Header) -> Result<(), CommandError> {
 /// The report of a run; none while it has not finished.
 pub fn report(folder: &Path) -> Option<Report> {
     serde_json::from_str(&std::fs::read_to_string(folder.join(REPORT)).ok()?).ok()
+}
+
+/// What a verdict says to a question.
+fn answer(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Achieved => "yes",
+        Verdict::NotFound => "no",
+        Verdict::CannotTell | Verdict::Failed => "cannot tell",
+    }
 }
 
 fn fill(report: &mut Report, conclusion: &Conclusion) {

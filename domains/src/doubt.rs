@@ -87,6 +87,18 @@ impl Doubt {
         doubt
     }
 
+    /// What is in doubt about which objects are of a kind: where more of it may be hidden, and which objects may be of it.
+    pub(crate) fn of(situation: &Situation, of: usize) -> Self {
+        let kind = &situation.kinds[of];
+        let size = kind.models.first().map_or(SMALL_M, size_m);
+        let mut doubt = Self::hidden_on(situation, 0..situation.surfaces.len(), size);
+        for track in &situation.belief.tracks {
+            let p = track.probability_of(&kind.name);
+            doubt.hypotheses.extend(unseen_sides(situation, track, p.min(1.0 - p)));
+        }
+        doubt
+    }
+
     /// What is in doubt on a surface: what may be hidden there, and what the objects on it are.
     pub(crate) fn on(situation: &Situation, on: usize) -> Self {
         let mut doubt = Self::hidden_on(situation, on..on + 1, SMALL_M);
@@ -128,13 +140,20 @@ impl Doubt {
     }
 
     /// Whether looking alone can settle anything that matters.
-    pub(crate) fn can_be_settled(&self, situation: &Situation) -> bool {
+    pub fn can_be_settled(&self, situation: &Situation) -> bool {
         self.anywhere || self.within_reach(situation, None) >= negligible(situation, None)
     }
 
-    /// Whether looking can settle enough once an obstacle is moved that matters.
+    /// Whether looks would settle enough once an obstacle is moved, of what no look shows now.
     pub(crate) fn can_be_settled_without(&self, situation: &Situation, what: usize) -> bool {
-        self.within_reach(situation, Some(what)) >= negligible(situation, Some(what))
+        let [before, after] = [None, Some(what)].map(|moved| self.all_looks(situation, |_| true, moved));
+        let only_after = |n: &usize| {
+            let shown = |looks: &[&Vec<bool>]| looks.iter().any(|shown| shown[*n]);
+            shown(&after) && !shown(&before)
+        };
+        let uncovered: f64 =
+            (0..self.hypotheses.len()).filter(only_after).map(|n| self.hypotheses[n].weight).sum();
+        uncovered >= negligible(situation, Some(what))
     }
 
     /// The probability that hangs on all that is in doubt.
@@ -280,7 +299,8 @@ fn unseen_volume(
 /// Whether a measured surface lies over an unseen point, with nothing seen free between: it is within a solid body.
 fn is_roofed(situation: &Situation, point: &Point3<f64>, up: &Vector3<f64>) -> bool {
     let step_m = situation.space.voxel_m();
-    let above = (0..(ROOF_M / step_m) as usize).map(|k| situation.space.cell(&(point + up * (k as f64 * step_m))));
+    let above =
+        (0..(ROOF_M / step_m) as usize).map(|k| situation.space.cell(&(point + up * (k as f64 * step_m))));
     above.into_iter().find(|cell| *cell != Cell::Unseen) == Some(Cell::Occupied)
 }
 

@@ -15,8 +15,14 @@ pub struct Goal {
     pub things: Vec<String>,
     /// The surfaces that are asked about, by PDDL symbol.
     pub surfaces: Vec<String>,
+    /// The kinds of which all are asked for, by PDDL symbol.
+    pub kinds: Vec<String>,
+    /// Whether the answer is yes or no.
+    pub question: bool,
     /// The confidence that ends the search, 0 to 1.
     pub threshold: f64,
+    /// Seconds on the body's clock after which it must be over.
+    pub deadline_s: Option<f64>,
 }
 
 /// Why a goal was not understood, with what could have been said.
@@ -50,6 +56,14 @@ pub enum GoalError {
         /// What followed "with confidence".
         found: String,
     },
+    /// The deadline that was asked for is no time.
+    #[error(
+        "\"within {found}\" asks for no time\n  a number of seconds or minutes was expected, as in \"within 60 seconds\""
+    )]
+    BadDeadline {
+        /// What followed "within".
+        found: String,
+    },
 }
 
 /// The PDDL symbol of a name: lower case, with hyphens for everything that is no letter or digit.
@@ -67,12 +81,12 @@ pub fn symbol(name: &str) -> String {
 /// # Errors
 /// [`GoalError`] names what could have been said instead.
 pub fn read(said: &str, domain: &Domain) -> Result<Goal, GoalError> {
-    let (words, threshold) = split_confidence(said, domain.config.thresholds.confidence)?;
+    let (words, asked) = conditions(said, domain.config.thresholds.confidence)?;
     let mut nearest_miss = None;
     for phrase in &domain.config.goal {
         let Some(slots) = match_phrase(&phrase.say, &words) else { continue };
         match fill(domain, &slots) {
-            Ok(filled) => return Ok(goal_of(said, phrase, filled, threshold)),
+            Ok(filled) => return Ok(goal_of(said, phrase, filled, asked)),
             Err(found) => nearest_miss = nearest_miss.or(Some(found)),
         }
     }
@@ -103,8 +117,8 @@ struct Miss {
     found: String,
 }
 
-fn goal_of(said: &str, phrase: &crate::load::GoalPhrase, filled: Vec<Filled>, threshold: f64) -> Goal {
-    let mut pddl = phrase.means.replace("<threshold>", &threshold.to_string());
+fn goal_of(said: &str, phrase: &crate::load::GoalPhrase, filled: Vec<Filled>, asked: Asked) -> Goal {
+    let mut pddl = phrase.means.replace("<threshold>", &asked.confidence.to_string());
     for f in &filled {
         pddl = pddl.replace(&format!("<{}>", f.slot), &f.symbol);
     }
@@ -115,24 +129,55 @@ fn goal_of(said: &str, phrase: &crate::load::GoalPhrase, filled: Vec<Filled>, th
         pddl,
         things: of("thing"),
         surfaces: of("surface"),
-        threshold,
+        kinds: of("kind"),
+        question: phrase.question,
+        threshold: asked.confidence,
+        deadline_s: asked.deadline_s,
     }
 }
 
-fn split_confidence(said: &str, default: f64) -> Result<(Vec<String>, f64), GoalError> {
-    let words: Vec<String> = said
+/// How sure, and how soon.
+#[derive(Clone, Copy)]
+struct Asked {
+    confidence: f64,
+    deadline_s: Option<f64>,
+}
+
+/// Takes "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.
+fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Asked), GoalError> {
+    let mut words: Vec<String> = said
         .split_whitespace()
         .map(|w| w.trim_matches(|c: char| "\"'.,!?".contains(c)).to_lowercase())
         .filter(|w| !w.is_empty())
         .collect();
-    let Some(at) = words.windows(2).position(|w| w[0] == "with" && w[1] == "confidence") else {
-        return Ok((words, default));
-    };
-    let number = words[at + 2..].join(" ");
-    match number.parse::<f64>() {
-        Ok(c) if c > 0.0 && c < 1.0 => Ok((words[..at].to_vec(), c)),
-        _ => Err(GoalError::BadConfidence { found: number }),
+    let mut asked = Asked { confidence: default, deadline_s: None };
+    loop {
+        let confidence = words.windows(2).rposition(|w| w[0] == "with" && w[1] == "confidence");
+        let within = words.iter().rposition(|w| w == "within");
+        match (confidence, within) {
+            (Some(at), within) if within.is_none_or(|w| w < at) => {
+                let found = words.split_off(at)[2..].join(" ");
+                let probability = found.parse::<f64>().ok().filter(|c| *c > 0.0 && *c < 1.0);
+                asked.confidence = probability.ok_or(GoalError::BadConfidence { found })?;
+            }
+            (_, Some(at)) => {
+                let found = words.split_off(at)[1..].join(" ");
+                asked.deadline_s = Some(seconds(&found).ok_or(GoalError::BadDeadline { found })?);
+            }
+            _ => return Ok((words, asked)),
+        }
     }
+}
+
+/// "60", "60 s", "60 seconds", "1.5 minutes".
+fn seconds(said: &str) -> Option<f64> {
+    let (number, unit) = said.split_once(' ').unwrap_or((said, "s"));
+    let factor = match unit {
+        "s" | "second" | "seconds" => 1.0,
+        "min" | "minute" | "minutes" => 60.0,
+        _ => return None,
+    };
+    number.parse::<f64>().ok().map(|n| n * factor).filter(|s| *s > 0.0 && s.is_finite())
 }
 
 /// Matches words against a phrase with slots; a slot takes one word or more.
@@ -167,7 +212,7 @@ fn fill(domain: &Domain, slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> 
 }
 
 fn without_article(name: &str) -> &str {
-    ["the ", "a ", "an "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
+    ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 
 fn phrase_suggestions(domain: &Domain) -> String {

@@ -67,6 +67,9 @@ pub struct GoalPhrase {
     pub say: String,
     /// The goal condition in PDDL, with the same slots.
     pub means: String,
+    /// Whether the answer is yes or no.
+    #[serde(default)]
+    pub question: bool,
     /// What the agent will do, in a line.
     #[serde(default)]
     pub about: String,
@@ -88,7 +91,7 @@ pub struct Thresholds {
 
 impl Default for Thresholds {
     fn default() -> Self {
-        Self { confidence: 0.8, remaining: 0.05, out_of_sight: 0.01, prior: 0.5 }
+        Self { confidence: 0.8, remaining: 0.05, out_of_sight: 0.005, prior: 0.5 }
     }
 }
 
@@ -130,7 +133,15 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { views: 40, drive_retries: 2, look_retries: 2, pushes: 6, drive_s: 120.0, look_s: 10.0, push_s: 30.0 }
+        Self {
+            views: 40,
+            drive_retries: 2,
+            look_retries: 2,
+            pushes: 6,
+            drive_s: 120.0,
+            look_s: 10.0,
+            push_s: 30.0,
+        }
     }
 }
 
@@ -221,6 +232,7 @@ impl Domain {
     pub fn names(&self, slot: &str) -> Vec<(String, Vec<String>)> {
         match slot {
             "thing" => self.things(),
+            "kind" => self.things().into_iter().map(in_plural).collect(),
             "surface" => self.config.surfaces.iter().map(|s| (symbol(s), vec![s.clone()])).collect(),
             _ => Vec::new(),
         }
@@ -240,6 +252,12 @@ impl Domain {
         }
         things
     }
+}
+
+/// The names of a thing, each with an s too.
+fn in_plural((symbol, names): (String, Vec<String>)) -> (String, Vec<String>) {
+    let plural = names.iter().map(|name| format!("{name}s"));
+    (symbol, plural.chain(names.iter().cloned()).collect())
 }
 
 /// The object files (`*.toml`) of a folder, in the order of their names.
@@ -357,6 +375,7 @@ fn check_config(path: &str, config: &Config) -> Result<(), LoadError> {
     };
     probability("thresholds.confidence", t.confidence)?;
     probability("thresholds.remaining", t.remaining)?;
+    probability("thresholds.out_of_sight", t.out_of_sight)?;
     probability("thresholds.prior", t.prior)?;
     let c = &config.candidates;
     check(path, "candidates.poses", c.poses as f64, (1..=1000).contains(&c.poses), "1 to 1000 poses")?;
@@ -370,7 +389,8 @@ fn check_config(path: &str, config: &Config) -> Result<(), LoadError> {
     let l = &config.limits;
     check(path, "limits.views", l.views as f64, l.views > 0, "at least one look")?;
     check(path, "limits.drive_s", l.drive_s, l.drive_s > 0.0, "seconds, above 0")?;
-    check(path, "limits.look_s", l.look_s, l.look_s > 0.0, "seconds, above 0")
+    check(path, "limits.look_s", l.look_s, l.look_s > 0.0, "seconds, above 0")?;
+    check(path, "limits.push_s", l.push_s, l.push_s > 0.0, "seconds, above 0")
 }
 
 fn check(path: &str, key: &str, value: f64, holds: bool, expected: &'static str) -> Result<(), LoadError> {

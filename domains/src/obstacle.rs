@@ -47,9 +47,9 @@ impl Obstacle {
             && (d - self.up * above).norm() < self.radius_m + MARGIN_M
     }
 
-    /// The cylinder in which a push may change anything: its axis' foot, its radius and its height, metres.
-    pub fn reach_of_push(&self) -> (Point3<f64>, f64, f64) {
-        (self.at, self.radius_m + DISTANCE_M + MARGIN_M, self.height_m + MARGIN_M)
+    /// The radius and the height of the upright cylinder around it in which a push over a distance may change anything, metres.
+    pub fn reach_of_push(&self, distance_m: f64) -> (f64, f64) {
+        (self.radius_m + distance_m + MARGIN_M, self.height_m + MARGIN_M)
     }
 }
 
@@ -63,7 +63,7 @@ pub(crate) fn all(situation: &Situation) -> Vec<Obstacle> {
         return Vec::new();
     }
     let Some(surface) = situation.surfaces.iter().find(|s| !s.outline.is_empty()) else { return Vec::new() };
-    let small = |t: &&Track| t.size_m.iter().all(|&m| m < MOST_M) && !situation.stuck.contains(&t.id);
+    let small = |t: &&Track| t.size_m.iter().all(|&m| m < MOST_M);
     let known = |t: &Track| Obstacle {
         symbol: format!("object-{}", t.id),
         track: t.id,
@@ -79,8 +79,12 @@ pub(crate) fn all(situation: &Situation) -> Vec<Obstacle> {
 /// across its line of sight and a little towards itself, to the side that is freer. None where the arm does not reach.
 pub fn push(situation: &Situation, from: usize, obstacle: &Obstacle) -> Option<Push> {
     let Place::Pose(base) = &situation.candidates[from].place else { return None };
+    if situation.stuck.contains(&(obstacle.track, from)) {
+        return None;
+    }
     let surface = situation.surfaces.iter().find(|s| !s.outline.is_empty())?;
-    let towards = Vector3::new(base.x_m - obstacle.at.x, base.y_m - obstacle.at.y, 0.0).try_normalize(1e-9)?;
+    let towards =
+        Vector3::new(base.x_m - obstacle.at.x, base.y_m - obstacle.at.y, 0.0).try_normalize(1e-9)?;
     let touched = obstacle.at + towards * (obstacle.radius_m - GRIP_M).max(0.0);
     let object = touched + obstacle.up * (0.5 * obstacle.height_m);
     let reach_m = situation.robot.description().reach_m?;

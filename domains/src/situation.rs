@@ -86,12 +86,16 @@ pub struct Known {
     pub surfaces: Vec<KnownSurface>,
     /// What is looked for.
     pub things: Vec<Thing>,
+    /// Of what all are looked for.
+    pub kinds: Vec<Thing>,
+    /// Seconds until the deadline, if there is one.
+    pub time_left_s: Option<f64>,
     /// Looks that have been taken: candidate and surface.
     pub observed: BTreeSet<(usize, usize)>,
     /// Candidates that have been given up.
     pub out_of_reach: BTreeSet<usize>,
-    /// Objects, by the number of their track, that a push has failed to move.
-    pub stuck: BTreeSet<u64>,
+    /// Objects, by the number of their track, that a push from a candidate has failed to move.
+    pub stuck: BTreeSet<(u64, usize)>,
     /// Pushes that may still be tried.
     pub pushes_left: usize,
 }
@@ -111,6 +115,7 @@ struct Derived {
     cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
     about: Vec<OnceLock<Doubt>>,
     on: Vec<OnceLock<Doubt>>,
+    of: Vec<OnceLock<Doubt>>,
     obstacles: OnceLock<Vec<Obstacle>>,
 }
 
@@ -133,6 +138,7 @@ impl Situation {
             cameras: cells(known.candidates.len() * known.surfaces.len()),
             about: cells(known.things.len()),
             on: cells(known.surfaces.len()),
+            of: cells(known.kinds.len()),
             obstacles: OnceLock::new(),
         };
         Self { known, thresholds, derived }
@@ -184,12 +190,11 @@ impl Situation {
         self.doubts(on).iter().any(|doubt| doubt.share_settled(self, from, taken) > 0.0)
     }
 
-    /// Everything that is in doubt about what is asked for: about the things, or where none is asked for on a surface.
+    /// Everything that is in doubt about what is asked for: things, kinds, or where none is asked for a surface.
     pub fn doubts(&self, on: usize) -> Vec<&Doubt> {
-        match self.things.is_empty() {
-            true => vec![self.doubt_on(on)],
-            false => (0..self.things.len()).map(|what| self.doubt_about(what)).collect(),
-        }
+        let things = (0..self.things.len()).map(|what| self.doubt_about(what));
+        let doubts: Vec<&Doubt> = things.chain((0..self.kinds.len()).map(|of| self.doubt_of(of))).collect();
+        if doubts.is_empty() { vec![self.doubt_on(on)] } else { doubts }
     }
 
     /// The objects that may be pushed aside to see what they hide; none while looking alone can settle anything.
@@ -200,6 +205,14 @@ impl Situation {
     /// Whether looks would settle enough that is in doubt once an obstacle were out of the way.
     pub(crate) fn would_uncover(&self, what: usize, on: usize) -> bool {
         self.doubts(on).iter().any(|doubt| doubt.can_be_settled_without(self, what))
+    }
+
+    /// The kind of a symbol.
+    ///
+    /// # Errors
+    /// [`CallError::Failed`] if there is none.
+    pub fn kind(&self, name: &str) -> Result<usize, CallError> {
+        find(self.kinds.iter().map(|t| &t.symbol), name, "a kind of which all are looked for")
     }
 
     /// The obstacle of a symbol.
@@ -260,8 +273,7 @@ impl Situation {
             }
         }
         let gone = |p: &Point3<f64>| moved.is_some_and(|o| o.covers(p));
-        let visible =
-            |p: &&Point3<f64>| self.in_view(&camera, p) && self.space.line_of_sight(&eye, p, &gone);
+        let visible = |p: &&Point3<f64>| self.in_view(&camera, p) && self.space.line_of_sight(&eye, p, &gone);
         2 * hypothesis.points.iter().filter(visible).count() > hypothesis.points.len()
     }
 
@@ -282,6 +294,21 @@ impl Situation {
     pub fn clarity(&self, on: usize) -> f64 {
         let sure = self.belief.tracks.iter().map(|t| t.certainty()).fold(1.0, f64::min);
         sure * (1.0 - self.doubt_on(on).hidden)
+    }
+
+    /// How sure it is which objects are of a kind and that no other is hidden, 0 to 1.
+    pub fn completeness(&self, of: usize) -> f64 {
+        let name = &self.kinds[of].name;
+        let sure = |t: &descry_memory::belief::Track| {
+            let p = t.probability_of(name);
+            p.max(1.0 - p)
+        };
+        self.belief.tracks.iter().map(sure).product::<f64>() * (1.0 - self.doubt_of(of).hidden)
+    }
+
+    /// What is in doubt about which objects are of a kind.
+    pub fn doubt_of(&self, of: usize) -> &Doubt {
+        self.derived.of[of].get_or_init(|| Doubt::of(self, of))
     }
 
     /// What is in doubt about a thing.
@@ -319,6 +346,7 @@ impl Situation {
         text += &names(self.candidates.iter().map(|c| &c.symbol).collect(), "pose");
         text += &names(self.surfaces.iter().map(|s| &s.symbol).collect(), "surface");
         text += &names(self.things.iter().map(|t| &t.symbol).collect(), "thing");
+        text += &names(self.kinds.iter().map(|t| &t.symbol).collect(), "kind");
         text += &names(self.obstacles().iter().map(|o| &o.symbol).collect(), "obstacle");
         text += "  )\n  (:init\n";
         for (_, states) in crate::facts::ALL {

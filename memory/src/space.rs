@@ -311,8 +311,9 @@ mod tests {
     #[test]
     fn sight_ends_at_what_was_seen() {
         let space = seen();
-        let sight =
-            |from: [f64; 3], to: [f64; 3]| space.line_of_sight(&Point3::from(from), &Point3::from(to), &|_| false);
+        let sight = |from: [f64; 3], to: [f64; 3]| {
+            space.line_of_sight(&Point3::from(from), &Point3::from(to), &|_| false)
+        };
         assert!(sight([0.0; 3], [-0.2, 0.0, 0.9]));
         assert!(sight([0.0; 3], [-0.2, 0.0, 1.0]), "a surface does not hide itself");
         assert!(!sight([0.0; 3], [-0.2, 0.0, 1.3]));

@@ -50,6 +50,8 @@ pub enum Failure {
     Slipped {
         /// What happened, as far as the body felt it.
         because: String,
+        /// How far the hand moved while it felt the object, metres.
+        moved_m: f64,
     },
     /// This body cannot do that at all (see [`Description`](crate::Description)).
     #[error("not able to: {because}")]
@@ -75,7 +77,7 @@ impl Failure {
             | Failure::Cancelled { because }
             | Failure::SensorDropped { because, .. }
             | Failure::Lost { because }
-            | Failure::Slipped { because }
+            | Failure::Slipped { because, .. }
             | Failure::Unable { because }
             | Failure::Broken { because } => because,
         }

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use async_trait::async_trait;
 use descry_robots::nalgebra::Point3;
-use descry_robots::{CancellationToken, Driven, Failure, Place, Progress, Push, Pushed, Robot, Sensed, Watch};
+use descry_robots::{
+    CancellationToken, Driven, Failure, Place, Progress, Push, Pushed, Robot, Sensed, Watch,
+};
 
 /// One action of a plan, with the names of its objects.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -72,10 +74,10 @@ impl Context<'_> {
     /// # Errors
     /// [`SkillFailure::Unknown`] if nothing of that name can be pushed from here.
     pub fn push(&self, name: &str) -> Result<&Push, SkillFailure> {
-        self.symbols
-            .pushes
-            .get(name)
-            .ok_or_else(|| SkillFailure::Unknown { name: name.into(), expected: "something to push from here" })
+        self.symbols.pushes.get(name).ok_or_else(|| SkillFailure::Unknown {
+            name: name.into(),
+            expected: "something to push from here",
+        })
     }
 
     /// The point of a surface that a look is directed at.

@@ -8,9 +8,9 @@ use descry_domains::doubt::Taken;
 use descry_domains::obstacle::{self, Obstacle};
 use descry_domains::situation::{Known, Situation};
 use descry_domains::{attachments, candidates};
-use descry_planner::{Diagnostic, Findings, Plan, PlanError, Source, Step, Task};
 use descry_memory::belief::Track;
 use descry_perception::nalgebra::{self, Point3, Vector3};
+use descry_planner::{Diagnostic, Findings, Plan, PlanError, Source, Step, Task};
 use descry_robots::Push;
 use descry_skills::Call;
 
@@ -46,6 +46,8 @@ impl Agent<'_> {
             at: s.at,
             surfaces: s.surfaces.clone(),
             things: s.things.clone(),
+            kinds: s.kinds.clone(),
+            time_left_s: self.time_left_s(),
             observed: s.observed.clone(),
             out_of_reach: s.out_of_reach.clone(),
             stuck: s.stuck.clone(),
@@ -155,10 +157,7 @@ pub(super) fn one_look(s: &Situation) -> Option<Plan> {
     let open =
         looks.filter(|look| !s.observed.contains(look) && s.can_reach(look.0) && s.sees(look.0, look.1));
     let rate = |&(from, on): &(usize, usize)| {
-        let share: f64 = match s.things.is_empty() {
-            true => s.doubt_on(on).share_settled(s, from, Taken::default()),
-            false => (0..s.things.len()).map(|what| s.doubt_about(what).share_settled(s, from, Taken::default())).sum(),
-        };
+        let share: f64 = s.doubts(on).iter().map(|d| d.share_settled(s, from, Taken::default())).sum();
         share / (s.travel_s(s.at, from) + LOOK_S)
     };
     let (from, on) = open.filter(|look| rate(look) > 0.0).max_by(|a, b| rate(a).total_cmp(&rate(b)))?;
@@ -183,20 +182,21 @@ const LOOK_S: f64 = 2.0;
 
 /// What a look is expected to settle.
 fn hope(s: &Situation, from: usize) -> String {
-    let doubts = match s.things.is_empty() {
-        true => (0..s.surfaces.len())
-            .map(|on| (s.surfaces[on].symbol.clone(), s.doubt_on(on)))
-            .collect::<Vec<_>>(),
-        false => (0..s.things.len()).map(|what| (s.things[what].name.clone(), s.doubt_about(what))).collect(),
+    let things = s.things.iter().chain(&s.kinds).map(|t| &t.name);
+    let names: Vec<&String> = if s.things.len() + s.kinds.len() > 0 {
+        things.collect()
+    } else {
+        s.surfaces.iter().map(|on| &on.symbol).collect()
     };
-    let said = |(name, doubt): &(String, &descry_domains::doubt::Doubt)| {
+    let doubts = names.into_iter().zip(s.doubts(0));
+    let said = |(name, doubt): (&String, &descry_domains::doubt::Doubt)| {
         if doubt.anywhere {
             return format!("nothing is known yet of where {name} could be");
         }
         let share = doubt.share_settled(s, from, Taken::default()) * 100.0;
         format!("shows {share:.0} % of where {name} is in doubt ({:.2} left)", doubt.remaining())
     };
-    doubts.iter().map(said).collect::<Vec<_>>().join(", ")
+    doubts.map(said).collect::<Vec<_>>().join(", ")
 }
 
 /// How each object that may be pushed aside is pushed from a candidate.
@@ -207,6 +207,9 @@ pub(super) fn pushes(s: &Situation, from: usize) -> BTreeMap<String, Push> {
 
 /// What keeps the agent from saying that what is looked for is not there; none if nothing does.
 pub(super) fn what_is_left(s: &Situation) -> Option<String> {
+    if s.time_left_s.is_some() && s.doubts(0).iter().any(|doubt| doubt.can_be_settled(s)) {
+        return Some("there is no time left for the looks that would settle it".into());
+    }
     let Some(thing) = s.things.first() else {
         let unsure = |t: &&Track| t.certainty() < s.thresholds.confidence;
         let places = s.belief.tracks.iter().filter(unsure).map(|t| place(&t.position_m));
@@ -214,18 +217,21 @@ pub(super) fn what_is_left(s: &Situation) -> Option<String> {
         return (!places.is_empty())
             .then(|| format!("what stands at {} looks the same from every side", places.join(" and at ")));
     };
-    let best = s.belief.tracks.iter().max_by(|a, b| {
-        a.probability_of(&thing.name).total_cmp(&b.probability_of(&thing.name))
-    });
+    let best = s
+        .belief
+        .tracks
+        .iter()
+        .max_by(|a, b| a.probability_of(&thing.name).total_cmp(&b.probability_of(&thing.name)));
     if let Some(track) = best.filter(|t| t.probability_of(&thing.name) > s.thresholds.remaining) {
         let p = track.probability_of(&thing.name);
         return Some(format!("what stands at {} may be it ({p:.2})", place(&track.position_m)));
     }
     let (hidden, places) = s.doubt_about(0).out_of_sight(s);
-    let middle = Point3::from(places.iter().map(|p| p.coords).sum::<Vector3<f64>>() / places.len().max(1) as f64);
-    let first = places.iter().min_by(|a, b| {
-        nalgebra::distance(a, &middle).total_cmp(&nalgebra::distance(b, &middle))
-    })?;
+    let middle =
+        Point3::from(places.iter().map(|p| p.coords).sum::<Vector3<f64>>() / places.len().max(1) as f64);
+    let first = places
+        .iter()
+        .min_by(|a, b| nalgebra::distance(a, &middle).total_cmp(&nalgebra::distance(b, &middle)))?;
     (hidden > s.thresholds.out_of_sight)
         .then(|| format!("there is room for it out of sight, near {} ({hidden:.2})", place(first)))
 }

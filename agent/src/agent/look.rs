@@ -150,17 +150,25 @@ impl Agent<'_> {
         self.state.looks.iter().map(restored).collect()
     }
 
-    /// Something on the surface was pushed: what was seen there holds no longer, and looks may be taken again.
-    pub(super) fn something_moved(&mut self, situation: &Situation, what: &str) -> Result<(), CommandError> {
+    /// Something on the surface was pushed: if it moved, what was seen there holds no longer, and looks may be taken again.
+    pub(super) fn something_moved(
+        &mut self,
+        situation: &Situation,
+        what: &str,
+        moved_m: f64,
+    ) -> Result<(), CommandError> {
+        self.state.pushes += 1;
+        if moved_m < self.state.space.voxel_m() {
+            return Ok(());
+        }
         let obstacle = situation.obstacle(what).map_err(|e| CommandError::Bug(e.to_string()))?;
         let obstacle = &situation.obstacles()[obstacle];
-        let (foot, radius_m, height_m) = obstacle.reach_of_push();
+        let (foot, (radius_m, height_m)) = (obstacle.at, obstacle.reach_of_push(moved_m));
         let change = Change { stamp_ns: self.robot.now_ns(), foot, up: obstacle.up, radius_m, height_m };
         Arc::make_mut(&mut self.state.space).forget(&foot, &obstacle.up, radius_m, height_m);
         self.record_document("change", &change)?;
         self.state.changes.push(change);
         self.state.observed.clear();
-        self.state.pushes += 1;
         Ok(())
     }
 

@@ -158,13 +158,9 @@ fn open(situation: &Situation) -> Vec<Look> {
 
 /// The share of what the goal leaves in doubt that a look would settle.
 fn gain(situation: &Situation, from: usize, on: usize) -> f64 {
-    match situation.things.len() {
-        0 => situation.doubt_on(on).share_settled(situation, from, Taken::default()),
-        n => {
-            (0..n).map(|what| situation.doubt_about(what).share_settled(situation, from, Taken::default())).sum::<f64>()
-                / n as f64
-        }
-    }
+    let doubts = situation.doubts(on);
+    let shares = doubts.iter().map(|doubt| doubt.share_settled(situation, from, Taken::default()));
+    shares.sum::<f64>() / doubts.len() as f64
 }
 
 /// The look of the greatest value; among equals the nearest, then the first.

@@ -2,6 +2,7 @@
 
 mod can_see;
 mod expected_clarity;
+mod expected_completeness;
 mod expected_gain;
 mod path_cost;
 mod program;
@@ -24,6 +25,7 @@ type Answers = fn(&Situation, &Call) -> Result<Answer, CallError>;
 const ALL: &[(&str, &[&str], Answers)] = &[
     ("can-see", &[], can_see::answer),
     ("expected-clarity", &["observed", "pushed"], expected_clarity::answer),
+    ("expected-completeness", &["observed", "pushed"], expected_completeness::answer),
     ("expected-gain", &["observed", "pushed"], expected_gain::answer),
     ("path-cost", &[], path_cost::answer),
     ("worth-a-look", &["pushed"], worth_a_look::answer),

@@ -2,9 +2,11 @@
 
 mod at;
 mod clarity;
+mod completeness;
 mod confidence;
 mod observed;
 mod out_of_reach;
+mod time_left;
 
 use crate::situation::Situation;
 
@@ -15,7 +17,9 @@ type States = fn(&Situation) -> Vec<String>;
 pub(crate) const ALL: &[(&str, States)] = &[
     ("at", at::state),
     ("clarity", clarity::state),
+    ("completeness", completeness::state),
     ("confidence", confidence::state),
     ("observed", observed::state),
     ("out-of-reach", out_of_reach::state),
+    ("time-left", time_left::state),
 ];

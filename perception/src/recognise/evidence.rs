@@ -306,13 +306,7 @@ pub(super) struct Protrusion {
 }
 
 impl Protrusion {
-    fn find(
-        round: &Round,
-        segment: &Segment,
-        asker: &Asker,
-        base_m: f64,
-        height: f64,
-    ) -> Option<Protrusion> {
+    fn find(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Option<Protrusion> {
         let beside = |p: &&Point3<f64>| {
             let outside_m = round.outside_m(p);
             let clear = |sigma_m: f64| outside_m > 3.0 * sigma_m;

@@ -333,7 +333,7 @@ impl SimRobot {
         let effect = push::push(scene, &at, &direction, push.distance_m, rng);
         let Effect::Moved { object, moved_m, stopped } = effect else {
             state.pass(PUSH_S);
-            return Err(Failure::Slipped { because: "the hand met nothing there".into() });
+            return Err(Failure::Slipped { because: "the hand met nothing there".into(), moved_m: 0.0 });
         };
         let duration_s = PUSH_S + moved_m / HAND_M_S;
         state.pass(duration_s);
@@ -341,7 +341,7 @@ impl SimRobot {
         state.note(format!("the hand pushes \"{name}\" by {moved_m:.3} m"));
         match stopped {
             Some(why) if moved_m < SLIPPED_SHARE * push.distance_m => {
-                Err(Failure::Slipped { because: format!("{why} after {moved_m:.2} m") })
+                Err(Failure::Slipped { because: format!("{why} after {moved_m:.2} m"), moved_m })
             }
             _ => Ok(Pushed { moved_m, duration_s }),
         }

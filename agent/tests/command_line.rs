@@ -109,7 +109,38 @@ fn the_same_seed_gives_the_same_run() {
 fn what_is_not_there_is_not_found() {
     let said = json(&["find", "cup A", "--scene", "no-cup-a", "--json"], 1);
     assert_eq!(said["verdict"], "not_found", "{said}");
-    assert!(said["why"].as_str().is_some_and(|why| why.contains("not found")), "{said}");
+    assert!(said["why"].as_str().is_some_and(|why| why.contains("not there")), "{said}");
+}
+
+#[test]
+fn what_hides_the_goal_is_pushed_aside() {
+    let (_, err) = check(&["find", "cup A", "--scene", "ring-of-boxes"], 0, &["achieved"]);
+    assert!(err.contains("(push-aside "), "a push was planned: {err}");
+}
+
+#[test]
+fn without_a_push_what_is_hidden_cannot_be_told() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let domain = with_domain(folder.path(), |name, text| match name {
+        "domain.toml" => text.replace("pushes = 6", "pushes = 0"),
+        _ => text,
+    });
+    let said = json(&["find", "cup A", "--scene", "ring-of-boxes", "--domain", &domain, "--json"], 1);
+    assert_eq!(said["verdict"], "cannot_tell", "{said}");
+    assert!(said["why"].as_str().is_some_and(|why| why.contains("out of sight")), "{said}");
+}
+
+#[test]
+fn every_goal_of_the_domain_can_be_pursued() {
+    let question = json(&["do", "is cup A on the table?", "--json"], 0);
+    assert_eq!((question["answer"].as_str(), question["verdict"].as_str()), (Some("yes"), Some("achieved")));
+    let question = json(&["do", "is cup A on the table", "--scene", "no-cup-a", "--json"], 1);
+    assert_eq!(question["answer"], "no", "{question}");
+    let all = json(&["do", "find all cups with confidence 0.7", "--scene", "four-cups", "--json"], 0);
+    assert_eq!(all["pddl_goal"], "(>= (completeness cup) 0.7)", "{all}");
+    let soon = json(&["find", "cup A within 3 seconds", "--json"], 1);
+    assert_eq!(soon["verdict"], "cannot_tell", "{soon}");
+    assert!(soon["why"].as_str().is_some_and(|why| why.contains("no time left")), "{soon}");
 }
 
 #[test]
@@ -125,6 +156,7 @@ fn a_goal_that_is_not_understood_names_what_could_be_said() {
         &["\"dance\" is not a goal", "find <thing>", "identify all objects on <surface>"],
     );
     check(&["do", "find cup A with confidence 2"], 2, &["no probability", "with confidence 0.9"]);
+    check(&["do", "find cup A within a whiff"], 2, &["no time", "within 60 seconds"]);
     check(&["find", "cup A", "--scene", "attic"], 2, &["attic", "default", "no-cup-a"]);
     check(&["find", "cup A", "--robot", "hoover"], 2, &["expected: sim, or recorded:DIR"]);
     check(&["find", "cup A", "--domain", "attic"], 2, &["attic", "tabletop"]);
@@ -140,8 +172,7 @@ fn goals_lists_what_may_be_said() {
 #[test]
 fn a_broken_domain_is_drawn_with_place_reason_and_mend() {
     let folder = TempDir::new().expect("a folder can be made");
-    let built_in = Path::new(env!("CARGO_MANIFEST_DIR")).join("../domains/tabletop");
-    copy(&built_in, folder.path());
+    with_domain(folder.path(), |_, text| text);
     let pddl = folder.path().join("domain.pddl");
     let text = std::fs::read_to_string(&pddl).expect("the domain is text");
     std::fs::write(&pddl, text.replace("(at end (at ?to))", "(at end (att ?to))"))
@@ -155,7 +186,7 @@ fn a_broken_domain_is_drawn_with_place_reason_and_mend() {
     check(
         &["find", "cup A", "--domain", &domain],
         2,
-        &["no skill carries out the action `squint`", "move, observe"],
+        &["no skill carries out the action `squint`", "move, observe, push-aside"],
     );
 
     std::fs::write(&pddl, text).expect("the folder is writable");
@@ -164,16 +195,23 @@ fn a_broken_domain_is_drawn_with_place_reason_and_mend() {
     check(&["find", "cup A", "--domain", &domain], 2, &["cup-a.toml", "height"]);
 }
 
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).expect("a folder can be made");
-    for entry in std::fs::read_dir(from).expect("the domain is a folder").flatten() {
-        let target = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            copy(&entry.path(), &target);
-        } else {
-            std::fs::copy(entry.path(), target).expect("a file can be copied");
+/// Copies the built-in domain to a folder, each file changed as asked.
+fn with_domain(to: &Path, change: fn(&str, String) -> String) -> String {
+    fn copy(from: &Path, to: &Path, change: fn(&str, String) -> String) {
+        std::fs::create_dir_all(to).expect("a folder can be made");
+        for entry in std::fs::read_dir(from).expect("the domain is a folder").flatten() {
+            let target = to.join(entry.file_name());
+            if entry.path().is_dir() {
+                copy(&entry.path(), &target, change);
+            } else {
+                let text = std::fs::read_to_string(entry.path()).expect("a domain is text");
+                let text = change(&entry.file_name().to_string_lossy(), text);
+                std::fs::write(target, text).expect("the folder is writable");
+            }
         }
     }
+    copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../domains/tabletop"), to, change);
+    to.display().to_string()
 }
 
 #[test]

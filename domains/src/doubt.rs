@@ -293,7 +293,7 @@ fn unseen_volume(
         let top = centre + surface.up * height_m + (e1 * a + e2 * b) * diameter_m;
         is_roofed(situation, &top, &surface.up)
     };
-    (2 * COLUMNS.iter().filter(inside).count() <= COLUMNS.len()).then_some(unseen)
+    (!COLUMNS.iter().all(|column| inside(&column))).then_some(unseen)
 }
 
 /// Whether a measured surface lies over an unseen point, with nothing seen free between: it is within a solid body.

@@ -10,6 +10,8 @@ use crate::document::RecordId;
 
 /// A percept farther from an object than this is another object.
 const GATE_M: f64 = 0.10;
+/// An unknown thing of this many times the volume of a known object is not that object.
+const MUCH_LARGER: f64 = 3.0;
 
 /// An object that is believed to be there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -91,7 +93,8 @@ impl Belief {
     /// Takes in what the merge of all views shows. A percept is the object that was believed nearest to it, at the least
     /// sum of distances; what no percept is taken for is gone.
     ///
-    /// The percepts rest on every view so far, so that their probabilities replace the earlier ones.
+    /// The percepts rest on every view so far, so that their probabilities replace the earlier ones. A known object that a
+    /// larger unknown thing has swallowed, since the last view blurs the two, is still believed in as before.
     pub fn update(&mut self, sighted: &[Sighted<'_>], stamp_ns: i64, cites: &[RecordId]) {
         let partner = self.associate(sighted);
         let mut kept: Vec<Track> = Vec::with_capacity(sighted.len());
@@ -102,6 +105,7 @@ impl Belief {
                     first_ns: track.first_ns,
                     ..seen(&sighted[n], stamp_ns, cites)
                 }),
+                None if sighted.iter().any(|s| swallows(s.percept, &track)) => kept.push(track),
                 None => self.gone.push(track),
             }
         }
@@ -121,8 +125,10 @@ impl Belief {
             let gate = (GATE_M * 1e4) as i64;
             let weights = Matrix::from_fn(rows, columns + rows, |(r, c)| match sighted.get(c) {
                 Some(s) => {
-                    let distance = (self.tracks[r].position_m - s.percept.position_m).norm();
-                    if distance < GATE_M { (distance * 1e4) as i64 } else { 4 * gate }
+                    let track = &self.tracks[r];
+                    let distance = (track.position_m - s.percept.position_m).norm();
+                    let other = distance >= GATE_M || swallows(s.percept, track);
+                    if other { 4 * gate } else { (distance * 1e4) as i64 }
                 }
                 None => gate,
             });
@@ -137,6 +143,16 @@ impl Belief {
 struct Association {
     tracks: Vec<Option<usize>>,
     new: Vec<usize>,
+}
+
+/// Whether a percept is an unknown thing, much larger than a known object, that stands over its place.
+fn swallows(percept: &Percept, track: &Track) -> bool {
+    let volume = |size_m: &[f64; 3]| size_m.iter().product::<f64>();
+    let reach_m = percept.size_m[0].max(percept.size_m[1]) / 2.0;
+    track.label().is_some()
+        && percept.label.is_none()
+        && volume(&percept.size_m) > MUCH_LARGER * volume(&track.size_m)
+        && (track.position_m - percept.position_m).norm() < reach_m
 }
 
 fn seen(sighted: &Sighted<'_>, stamp_ns: i64, cites: &[RecordId]) -> Track {
@@ -205,6 +221,20 @@ mod tests {
         check(&[&[0.0], &[0.2]], &[1], &[0]);
         check(&[&[0.0, 0.08], &[0.06, 0.14]], &[0, 1], &[]);
         check(&[&[], &[0.0], &[]], &[], &[0]);
+    }
+
+    #[test]
+    fn a_known_object_outlives_the_blur_that_swallows_it() {
+        let mut belief = Belief::default();
+        let cup = percept(0.0, 0.7);
+        let mut blur = percept(0.03, 0.0);
+        blur.size_m = [0.2, 0.15, 0.34];
+        for (seen, stamp_ns) in [&cup, &blur, &cup].into_iter().zip(1..) {
+            belief.update(&[Sighted { percept: seen, viewpoints_m: &[] }], stamp_ns, &[]);
+            let best = belief.tracks.iter().map(|t| t.probability_of("cup A")).fold(0.0, f64::max);
+            assert_eq!((best, belief.tracks[0].id), (0.7, 0), "after merge {stamp_ns}");
+        }
+        assert_eq!((belief.tracks.len(), belief.gone.len()), (1, 1), "the blur is gone again");
     }
 
     #[test]

@@ -92,7 +92,7 @@ fn description(known: Option<&Known>, camera: Intrinsics, sensing: &Sensing, pla
         range_m: (usual.range_m[0], usual.range_m[1]),
         head: None,
         frames: Frames::default(),
-        can_manipulate: false,
+        reach_m: None,
         up: None,
         pose_sigma_m: sensing.pose_sigma_m,
         pose_sigma_rad: sensing.pose_sigma_rad,

@@ -81,7 +81,7 @@ impl RecordedRobot {
     /// The body that stands where frames were taken, at the station of number `start` first. There is at least one station; a head,
     /// an arm or a map that is known does not count.
     pub fn of(known: Known, start: usize, frames: Box<dyn Footage>) -> RecordedRobot {
-        let description = Description { head: None, can_manipulate: false, ..known.description };
+        let description = Description { head: None, reach_m: None, ..known.description };
         let stations = known.stations.unwrap_or_default();
         let state = State { at: start.min(stations.len().saturating_sub(1)), now_ns: known.now_ns };
         RecordedRobot { description, surfaces: known.surfaces, stations, frames, state: Mutex::new(state) }

@@ -14,7 +14,7 @@ use descry_perception::segment::{Scene, SceneOptions, segment_on};
 use descry_perception::surface::{Surface, SurfaceOptions, find_surface};
 use descry_perception::visibility::{DepthMap, Seen, Visibility};
 use descry_planner::Source;
-use descry_robots::Sensed;
+use descry_robots::{Robot, Sensed};
 use descry_skills::{Call, Outcome, SkillFailure};
 use serde::Serialize;
 use serde_json::json;
@@ -110,17 +110,18 @@ impl Agent<'_> {
     /// The multi-view perception of paper 004, section V: restore the views by their timestamps, merge, recognise, believe.
     pub(super) fn perceive(&mut self, on: usize) -> Result<(), CommandError> {
         let views = self.restore()?;
-        let merged = match merge(&views, &self.merge_options()) {
+        let (merging, seeking) = options(&*self.robot);
+        let merged = match merge(&views, &merging) {
             Ok(merged) => merged,
             Err(nothing) => return self.saw_nothing(nothing.to_string()),
         };
-        let surface = match find_surface(&merged.cloud, &merged.visibility, &self.scene_options().surface) {
+        let surface = match find_surface(&merged.cloud, &merged.visibility, &seeking.surface) {
             Ok(surface) => surface,
             Err(nothing) => return self.saw_nothing(nothing.to_string()),
         };
         let (merged, surface) = self.lay_on_map(on, merged, surface);
         self.note_space(&views, &merged);
-        let scene = segment_on(&merged.cloud, &merged.visibility, surface, &self.scene_options());
+        let scene = segment_on(&merged.cloud, &merged.visibility, surface, &seeking);
         let percepts = self.recogniser.recognise(&scene, &merged.visibility, &self.domain.objects);
         self.note_surface(on, &scene);
         self.believe(&merged, &percepts)
@@ -255,29 +256,6 @@ impl Agent<'_> {
         self.say(&Event::Nothing { because }).map(|_| ())
     }
 
-    /// What can stand on the surfaces that the map has, and they themselves, is merged; without any, all that is in range.
-    fn merge_options(&self) -> MergeOptions {
-        let SceneOptions { surface: SurfaceOptions { up, height_band_m, .. }, tallest_m, .. } =
-            self.scene_options();
-        let height_band_m = height_band_m.map(|(low, high)| (low, high + tallest_m));
-        MergeOptions { up, height_band_m, ..MergeOptions::default() }
-    }
-
-    /// The surface is looked for where the map has it, if it has one.
-    fn scene_options(&self) -> SceneOptions {
-        let up = self.robot.description().up.map(Unit::new_normalize);
-        let heights = self.robot.surfaces().iter().map(|s| s.height_m);
-        let band = heights.fold(None, |band: Option<(f64, f64)>, h| {
-            let (low, high) = band.unwrap_or((h, h));
-            Some((low.min(h), high.max(h)))
-        });
-        let height_band_m = band.map(|(low, high)| (low - HEIGHT_TOLERANCE_M, high + HEIGHT_TOLERANCE_M));
-        SceneOptions {
-            surface: SurfaceOptions { up, height_band_m, ..SurfaceOptions::default() },
-            ..SceneOptions::default()
-        }
-    }
-
     pub(super) fn record_outcome(&mut self, call: &Call, outcome: &Outcome) -> Result<(), CommandError> {
         let said = match outcome {
             Outcome::Driven(d) => json!({ "distance_m": d.distance_m, "duration_s": d.duration_s }),
@@ -317,6 +295,22 @@ impl Agent<'_> {
         let draft = Draft { meta, ..Draft::new(kind, self.robot.now_ns()) };
         self.record.put(draft).map_err(CommandError::broken)
     }
+}
+
+/// How a body's views are merged and looked through. The surface is looked for where the map has it, if it has one; what can
+/// stand on it, and it itself, is merged; without any, all that is in range.
+pub(crate) fn options(robot: &dyn Robot) -> (MergeOptions, SceneOptions) {
+    let up = robot.description().up.map(Unit::new_normalize);
+    let heights = robot.surfaces().iter().map(|s| s.height_m);
+    let band = heights.fold(None, |band: Option<(f64, f64)>, h| {
+        let (low, high) = band.unwrap_or((h, h));
+        Some((low.min(h), high.max(h)))
+    });
+    let height_band_m = band.map(|(low, high)| (low - HEIGHT_TOLERANCE_M, high + HEIGHT_TOLERANCE_M));
+    let surface = SurfaceOptions { up, height_band_m, ..SurfaceOptions::default() };
+    let scene = SceneOptions { surface, ..SceneOptions::default() };
+    let height_band_m = height_band_m.map(|(low, high)| (low, high + scene.tallest_m));
+    (MergeOptions { up, height_band_m, ..MergeOptions::default() }, scene)
 }
 
 /// The part of the map that a frame shows; none if nothing returned.

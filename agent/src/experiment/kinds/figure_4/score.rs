@@ -3,10 +3,9 @@
 use std::collections::BTreeSet;
 
 use descry_perception::merge::{MergeOptions, Merged, merge};
-use descry_perception::nalgebra::{Isometry3, Unit, Vector3};
+use descry_perception::nalgebra::Isometry3;
 use descry_perception::recognise::Percept;
 use descry_perception::segment::{SceneOptions, segment};
-use descry_perception::surface::SurfaceOptions;
 use descry_perception::{Scene, View};
 use descry_robots::sim::TrueObject;
 use serde_json::{Value, json};
@@ -27,7 +26,7 @@ pub(super) fn rows(experiment: &Figure4, taken: &Taken) -> Vec<Row> {
     for k in 1..=taken.views.len() {
         for (mode, from) in [("single", k - 1), ("merged", 0)] {
             // One view is both.
-            let seen = perceive(&taken.views[from..k]);
+            let seen = perceive(&taken.views[from..k], &taken.options);
             let map_from_seen = seen
                 .as_ref()
                 .map_or(Isometry3::identity(), |(_, m)| aligned(m, &taken.map_from_camera[from..k]));
@@ -61,12 +60,12 @@ fn aligned(merged: &Merged, map_from_camera: &[Isometry3<f64>]) -> Isometry3<f64
     used.map_or(Isometry3::identity(), |(fit, truth)| truth * fit.world_from_camera.inverse())
 }
 
-fn perceive(views: &[View]) -> Result<(Scene, Merged), String> {
-    let up = Some(Unit::new_normalize(Vector3::z()));
-    let merged = merge(views, &MergeOptions { up, ..MergeOptions::default() }).map_err(|e| e.to_string())?;
-    let surface = SurfaceOptions { up, ..SurfaceOptions::default() };
-    let options = SceneOptions { surface, ..SceneOptions::default() };
-    let scene = segment(&merged.cloud, &merged.visibility, &options).map_err(|e| e.to_string())?;
+fn perceive(
+    views: &[View],
+    (merging, seeking): &(MergeOptions, SceneOptions),
+) -> Result<(Scene, Merged), String> {
+    let merged = merge(views, merging).map_err(|e| e.to_string())?;
+    let scene = segment(&merged.cloud, &merged.visibility, seeking).map_err(|e| e.to_string())?;
     Ok((scene, merged))
 }
 

@@ -3,10 +3,14 @@
 use std::collections::BTreeMap;
 
 use descry_perception::View;
+use descry_perception::merge::MergeOptions;
 use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::segment::SceneOptions;
 use descry_robots::sim::world::LABEL_OBJECT;
 use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, Truth, arrange};
 use descry_robots::{Place, Pose2, Robot, SurfaceHint, Watch};
+
+use crate::agent::look;
 
 /// Tried in turn where the footprint does not fit.
 const OUTWARDS_M: [f64; 6] = [0.0, 0.1, 0.2, -0.1, 0.3, 0.4];
@@ -23,6 +27,8 @@ pub(super) struct Taken {
     pub handles: BTreeMap<String, Vec<usize>>,
     /// How everything stands.
     pub truth: Truth,
+    /// How the views are merged and looked through, as the agent does it.
+    pub options: (MergeOptions, SceneOptions),
 }
 
 /// Drives around the first surface of an arrangement and looks at its middle from every pose.
@@ -42,6 +48,7 @@ pub(super) fn take(spec: &SceneSpec, seed: u64, poses: usize, distance_m: f64) -
         map_from_camera: Vec::new(),
         handles: handled.iter().map(|(_, name)| (name.clone(), Vec::new())).collect(),
         truth: robot.truth(),
+        options: look::options(&robot),
     };
     runtime.block_on(async {
         let watch = Watch::default();

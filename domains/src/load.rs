@@ -91,7 +91,7 @@ pub struct Thresholds {
 
 impl Default for Thresholds {
     fn default() -> Self {
-        Self { confidence: 0.8, remaining: 0.02, out_of_sight: 0.005, prior: 0.5 }
+        Self { confidence: 0.8, remaining: 0.04, out_of_sight: 0.01, prior: 0.75 }
     }
 }
 

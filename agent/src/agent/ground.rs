@@ -222,7 +222,7 @@ pub(super) fn what_is_left(s: &Situation) -> Option<String> {
         .tracks
         .iter()
         .max_by(|a, b| a.probability_of(&thing.name).total_cmp(&b.probability_of(&thing.name)));
-    if let Some(track) = best.filter(|t| t.probability_of(&thing.name) > s.thresholds.remaining) {
+    if let Some(track) = best.filter(|t| t.probability_of(&thing.name) > 1.0 - s.thresholds.confidence) {
         let p = track.probability_of(&thing.name);
         return Some(format!("what stands at {} may be it ({p:.2})", place(&track.position_m)));
     }

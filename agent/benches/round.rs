@@ -115,6 +115,10 @@ impl Looked {
             things: things(&self.domain, &["cup-a".into()]),
             observed,
             out_of_reach: BTreeSet::new(),
+            kinds: Vec::new(),
+            time_left_s: None,
+            stuck: BTreeSet::new(),
+            pushes_left: 0,
         };
         Arc::new(Situation::new(known, self.domain.config.thresholds))
     }

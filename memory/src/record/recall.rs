@@ -45,7 +45,7 @@ impl Record {
     /// What a camera saw nearest to a time, and where it stood in `world` at the stamp of that cloud (paper 004, section V, step 0).
     ///
     /// # Errors
-    /// [`Error::NotNear`] without a cloud within [`Options::view_tolerance_ns`]; a missing link or gap of the transforms of that time.
+    /// [`Error::NotNear`] without a cloud within [`view_tolerance_ns`](crate::Options::view_tolerance_ns); a missing link or gap of the transforms of that time.
     pub fn view_at(&self, stamp_ns: i64, world: &str) -> Result<View, Error> {
         let document = self.nearest(kind::CLOUD, stamp_ns, self.options.view_tolerance_ns)?;
         self.view(&document, world)

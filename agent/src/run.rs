@@ -112,7 +112,7 @@ pub fn pursue(
     let tape = Arc::new(RecordTape { into: Arc::clone(&record), from: Arc::clone(&record) });
     let robot = Arc::new(TapedRobot::begin(Arc::clone(&body.robot), tape));
     let mut report = live_through(Task { domain, goal }, &robot, &record, chooser, folder, tell)?;
-    know_the_truth(&mut report, body);
+    show_true_position(&mut report, body);
     Ok(report)
 }
 
@@ -133,7 +133,7 @@ pub fn go_on(
     let tape = Arc::new(RecordTape { into: Arc::clone(&record), from: Arc::clone(&record) });
     let robot = Arc::new(TapedRobot::go_on(Arc::clone(&body.robot), tape, entries));
     let mut report = live_through(task, &robot, &record, chooser, folder, tell)?;
-    know_the_truth(&mut report, body);
+    show_true_position(&mut report, body);
     Ok(report)
 }
 
@@ -181,7 +181,7 @@ pub fn live_through(
 }
 
 /// Where the thing is; simulation only.
-fn know_the_truth(report: &mut Report, body: &Body) {
+fn show_true_position(report: &mut Report, body: &Body) {
     let object = report.object.as_deref();
     report.true_position_m = object.and_then(|name| body.true_position_m(name, report.position_m));
 }

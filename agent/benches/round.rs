@@ -5,6 +5,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use descry_agent::agent::look;
 use descry_agent::body::{self, Body};
 use descry_domains::load::{DEFAULT, Domain};
 use descry_domains::situation::{Known, Situation, things};
@@ -13,10 +14,10 @@ use descry_memory::belief::Belief;
 use descry_memory::space::Space;
 use descry_memory::{Meta, Options, Record, Sensing};
 use descry_perception::View;
-use descry_perception::merge::{MergeOptions, Merged, merge};
-use descry_perception::nalgebra::{Point3, Unit, Vector3};
+use descry_perception::merge::{Merged, merge};
+use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::{Descry, Recogniser};
-use descry_perception::segment::{SceneOptions, segment};
+use descry_perception::segment::segment;
 use descry_perception::visibility::DepthMap;
 use descry_planner::{Source, Task};
 use descry_robots::{Robot, Watch};
@@ -84,8 +85,7 @@ impl Looked {
     }
 
     fn merged(&self) -> Merged {
-        let up = Some(Unit::new_unchecked(Vector3::z()));
-        merge(&self.views(), &MergeOptions { up, ..MergeOptions::default() }).expect("the views merge")
+        merge(&self.views(), &look::options(&*self.body.robot).0).expect("the views merge")
     }
 
     /// The situation of a planning round; after the first look if `seen`.
@@ -150,9 +150,10 @@ fn merge_five_views_from_the_record(bencher: Bencher) {
 fn recognise_the_merged_cloud(bencher: Bencher) {
     let looked = looked();
     let merged = looked.merged();
+    let (_, seeking) = look::options(&*looked.body.robot);
     bencher.bench(|| {
         let scene =
-            segment(&merged.cloud, &merged.visibility, &SceneOptions::default()).expect("there is a table");
+            segment(&merged.cloud, &merged.visibility, &seeking).expect("there is a table");
         Descry::default().recognise(&scene, &merged.visibility, &looked.domain.objects)
     });
 }

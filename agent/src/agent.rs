@@ -23,7 +23,7 @@ use crate::policies::{self, Chooser};
 use crate::report::{Event, Verdict};
 
 mod ground;
-pub(crate) mod look;
+pub mod look;
 
 /// A planning call ends after so many evaluated states; then the best plan so far, or one good look, has to do.
 const MOST_EVALUATED: u64 = 20_000;

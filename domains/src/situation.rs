@@ -273,8 +273,17 @@ impl Situation {
             }
         }
         let gone = |p: &Point3<f64>| moved.is_some_and(|o| o.covers(p));
-        let visible = |p: &&Point3<f64>| self.in_view(&camera, p) && self.space.line_of_sight(&eye, p, &gone);
-        2 * hypothesis.points.iter().filter(visible).count() > hypothesis.points.len()
+        let visible = |p: &Point3<f64>| self.in_view(&camera, p) && self.space.line_of_sight(&eye, p, &gone);
+        let most = hypothesis.points.len() / 2;
+        let mut counts = [0, 0];
+        for point in &hypothesis.points {
+            let seen = visible(point);
+            counts[usize::from(seen)] += 1;
+            if counts[1] > most || counts[0] >= hypothesis.points.len() - most {
+                return seen;
+            }
+        }
+        false
     }
 
     /// How sure it is where a thing stands, 0 to 1: the most probable object that it may be.

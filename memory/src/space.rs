@@ -11,6 +11,8 @@ use rustc_hash::FxHashMap;
 /// Voxels along the side of a block.
 const SIDE: i32 = 16;
 const BLOCK: usize = (SIDE * SIDE * SIDE) as usize;
+/// Voxels along the side of a brick, of which a block has 64.
+const BRICK: i32 = 4;
 /// A voxel of which nothing is known.
 const UNSEEN: i8 = i8::MIN;
 /// What one look adds to a voxel on a surface, what it takes from one before it, and how far either goes.
@@ -34,7 +36,91 @@ pub enum Cell {
 pub struct Space {
     voxel_m: f64,
     range_m: f64,
-    blocks: FxHashMap<[i32; 3], Box<[i8; BLOCK]>>,
+    blocks: FxHashMap<[i32; 3], Box<Block>>,
+    opaque: Opaque,
+}
+
+/// Where nothing can be seen through, for lines of sight: the bricks with an occupied voxel, by block, over the box that holds them all.
+#[derive(Debug, Clone, Default)]
+struct Opaque {
+    low: [i32; 3],
+    size: [i32; 3],
+    bricks: Vec<u64>,
+}
+
+impl Opaque {
+    fn of(blocks: &FxHashMap<[i32; 3], Box<Block>>) -> Self {
+        let full = || blocks.iter().filter(|(_, b)| b.occupied_bricks != 0);
+        let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
+        for (key, _) in full() {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(key[axis]);
+                high[axis] = high[axis].max(key[axis] + 1);
+            }
+        }
+        if low[0] > high[0] {
+            return Self::default();
+        }
+        let size: [i32; 3] = std::array::from_fn(|axis| high[axis] - low[axis]);
+        let mut opaque = Self { low, size, bricks: vec![0; size.iter().product::<i32>() as usize] };
+        for (key, block) in full() {
+            if let Some(at) = opaque.index(*key) {
+                opaque.bricks[at] = block.occupied_bricks;
+            }
+        }
+        opaque
+    }
+
+    fn index(&self, key: [i32; 3]) -> Option<usize> {
+        let [x, y, z] = std::array::from_fn(|axis| key[axis] - self.low[axis]);
+        let within = |at: i32, size: i32| (0..size).contains(&at);
+        let [sx, sy, sz] = self.size;
+        (within(x, sx) && within(y, sy) && within(z, sz)).then(|| ((x * sy + y) * sz + z) as usize)
+    }
+
+    /// The steps from `first` to `last` of a way at which it is within the box; none if it passes by. In voxels.
+    fn clip(&self, from: &Vector3<f64>, step: &Vector3<f64>, last: f64) -> Option<(i64, i64)> {
+        let (mut enters, mut leaves) = (0.0_f64, last);
+        for axis in 0..3 {
+            let low = f64::from(self.low[axis] * SIDE);
+            let high = low + f64::from(self.size[axis] * SIDE);
+            let [a, b] = [low, high].map(|wall| (wall - from[axis]) / step[axis]);
+            if step[axis] == 0.0 {
+                if from[axis] < low || from[axis] >= high {
+                    return None;
+                }
+                continue;
+            }
+            (enters, leaves) = (enters.max(a.min(b)), leaves.min(a.max(b)));
+        }
+        // A step more on either side, for what rounding takes.
+        (enters <= leaves + 1.0).then(|| ((enters - 1.0).max(0.0) as i64, (leaves + 1.0).min(last) as i64))
+    }
+}
+
+/// What is known of a cube of voxels, and which of its bricks hold an occupied one: lines of sight pass through the others at once.
+#[derive(Debug, Clone)]
+struct Block {
+    levels: [i8; BLOCK],
+    occupied_bricks: u64,
+}
+
+impl Block {
+    const UNSEEN: Self = Self { levels: [UNSEEN; BLOCK], occupied_bricks: 0 };
+
+    /// Finds the bricks that hold an occupied voxel; to be called after levels have changed.
+    fn find_bricks(&mut self) {
+        let mut bricks = 0;
+        for (row, levels) in self.levels.chunks_exact(BRICK as usize).enumerate() {
+            if levels.iter().any(|&level| level > 0) {
+                let side = SIDE as usize;
+                let first = row * BRICK as usize;
+                let voxel = [first / (side * side), first / side % side, first % side];
+                bricks |= 1 << brick(voxel.map(|v| v as i32));
+            }
+        }
+        self.occupied_bricks = bricks;
+    }
 }
 
 /// How many voxels are known.
@@ -56,7 +142,7 @@ impl Default for Space {
 impl Space {
     /// A map of which nothing is known: the side of its voxels, and how far from a camera a view counts, metres.
     pub fn new(voxel_m: f64, range_m: f64) -> Self {
-        Self { voxel_m, range_m, blocks: FxHashMap::default() }
+        Self { voxel_m, range_m, blocks: FxHashMap::default(), opaque: Opaque::default() }
     }
 
     /// Side of a voxel, metres.
@@ -86,19 +172,31 @@ impl Space {
         if length <= 0.0 {
             return true;
         }
-        let step = way.normalize() * self.voxel_m;
-        let steps = (length / self.voxel_m) as usize;
-        let mut block = None;
+        let step = way.normalize();
+        let start = from.coords / self.voxel_m;
+        let last = (length / self.voxel_m).floor();
+        let Some((first, last)) = self.opaque.clip(&start, &step, last) else { return true };
+        let steps_a_voxel = step.map(|s| 1.0 / s.abs());
         // Nothing is measured right before a camera; the far end, where things stand, is looked at first.
-        (0..=steps).rev().all(|k| {
-            let place = from + step * k as f64;
-            let voxel = self.voxel(&place);
+        let mut k = last;
+        while k >= first {
+            let place = start + step * k as f64;
+            let voxel: [i32; 3] = place.map(floor).into();
             let key = voxel.map(|v| v.div_euclid(SIDE));
-            if block.is_none_or(|(known, _)| known != key) {
-                block = Some((key, self.blocks.get(&key)));
-            }
-            block.and_then(|(_, b)| b).is_none_or(|b| b[index(voxel)] <= 0) || gone(&place)
-        })
+            let bricks = self.opaque.index(key).map_or(0, |at| self.opaque.bricks[at]);
+            let empty = if bricks == 0 {
+                SIDE
+            } else if bricks >> brick(voxel) & 1 == 0 {
+                BRICK
+            } else {
+                if self.level(voxel) > 0 && !gone(&Point3::from(place * self.voxel_m)) {
+                    return false;
+                }
+                1
+            };
+            k -= steps_out_of(empty, voxel, &place, &step, &steps_a_voxel);
+        }
+        true
     }
 
     /// Forgets what was seen in an upright cylinder, where something may have changed: the foot of its axis, the unit vector
@@ -107,7 +205,7 @@ impl Space {
         let voxel_m = self.voxel_m;
         for (key, block) in &mut self.blocks {
             let first = Vector3::from(key.map(|k| f64::from(k * SIDE) + 0.5)) * voxel_m;
-            for (at, level) in block.iter_mut().enumerate() {
+            for (at, level) in block.levels.iter_mut().enumerate() {
                 let side = SIDE as usize;
                 let (x, y, z) = (at / (side * side), at / side % side, at % side);
                 let d = first + Vector3::new(x as f64, y as f64, z as f64) * voxel_m - foot.coords;
@@ -116,7 +214,9 @@ impl Space {
                     *level = UNSEEN;
                 }
             }
+            block.find_bricks();
         }
+        self.opaque = Opaque::of(&self.blocks);
     }
 
     /// Takes in what a camera saw.
@@ -125,17 +225,24 @@ impl Space {
         let reach_m = f64::from(reach_m).min(self.range_m) + self.voxel_m;
         let world_from_camera = map.camera_from_world.inverse();
         for key in self.blocks_in_view(map, &world_from_camera, reach_m) {
-            let mut levels = self.blocks.get(&key).map_or_else(|| Box::new([UNSEEN; BLOCK]), Clone::clone);
-            if self.look_at_block(map, key, &mut levels) {
-                self.blocks.insert(key, levels);
+            let before = self.blocks.remove(&key);
+            let known = before.is_some();
+            let mut block = before.unwrap_or_else(|| Box::new(Block::UNSEEN));
+            let seen = self.look_at_block(map, key, &mut block.levels);
+            if seen {
+                block.find_bricks();
+            }
+            if seen || known {
+                self.blocks.insert(key, block);
             }
         }
+        self.opaque = Opaque::of(&self.blocks);
     }
 
     /// How many voxels are known.
     pub fn extent(&self) -> Extent {
         let mut extent = Extent::default();
-        for level in self.blocks.values().flat_map(|b| b.iter()) {
+        for level in self.blocks.values().flat_map(|b| b.levels.iter()) {
             match level {
                 &UNSEEN => {}
                 level if *level > 0 => extent.occupied += 1,
@@ -166,7 +273,7 @@ impl Space {
 
     fn level(&self, voxel: [i32; 3]) -> i8 {
         let key = voxel.map(|v| v.div_euclid(SIDE));
-        self.blocks.get(&key).map_or(UNSEEN, |block| block[index(voxel)])
+        self.blocks.get(&key).map_or(UNSEEN, |block| block.levels[index(voxel)])
     }
 
     /// The blocks that touch the camera's field of view, in a fixed order.
@@ -254,6 +361,33 @@ fn floor(value: f64) -> i32 {
     toward_zero - i32::from(f64::from(toward_zero) > value)
 }
 
+/// How many steps back along a line of sight leave the cube of so many voxels around a voxel, of which all samples within are skipped.
+fn steps_out_of(
+    side: i32,
+    voxel: [i32; 3],
+    place: &Vector3<f64>,
+    step: &Vector3<f64>,
+    steps_a_voxel: &Vector3<f64>,
+) -> i64 {
+    if side == 1 {
+        return 1;
+    }
+    let mut least = f64::INFINITY;
+    for axis in 0..3 {
+        let low = f64::from(voxel[axis].div_euclid(side) * side);
+        let room = if step[axis] > 0.0 { place[axis] - low } else { low + f64::from(side) - place[axis] };
+        least = least.min(room * steps_a_voxel[axis]);
+    }
+    // A sample on the very border is looked at again rather than passed.
+    (least - 1e-6).clamp(0.0, 1e9) as i64 + 1
+}
+
+/// Number of a voxel's brick within its block.
+fn brick(voxel: [i32; 3]) -> u32 {
+    let [x, y, z] = voxel.map(|v| (v.rem_euclid(SIDE) / BRICK) as u32);
+    (x * 4 + y) * 4 + z
+}
+
 /// Number of a voxel within its block.
 fn index(voxel: [i32; 3]) -> usize {
     let [x, y, z] = voxel.map(|v| v.rem_euclid(SIDE) as usize);
@@ -321,6 +455,26 @@ mod tests {
             sight([0.5, 0.0, 1.6], [-0.2, 0.0, 1.5]),
             "from the side, what is behind the wall can be seen"
         );
+    }
+
+    #[test]
+    fn skipping_what_is_empty_changes_no_line_of_sight() {
+        let space = seen();
+        let at = |n: i32, side: i32| f64::from(n % side) / f64::from(side) - 0.5;
+        let sample_by_sample = |from: &Point3<f64>, to: &Point3<f64>| {
+            let steps = ((to - from).norm() / space.voxel_m - 2.0) as i64;
+            let step = (to - from).normalize() * space.voxel_m;
+            (0..=steps).all(|k| space.cell(&(from + step * k as f64)) != Cell::Occupied)
+        };
+        let (mut open, mut closed) = (0, 0);
+        for n in 0..2000 {
+            let from = Point3::new(at(n, 7), at(n, 11), at(n, 13));
+            let to = Point3::new(1.5 * at(n, 17), 1.2 * at(n, 19), 2.5 + at(n, 23));
+            let sight = space.line_of_sight(&from, &to, &|_| false);
+            assert_eq!(sight, sample_by_sample(&from, &to), "from {from} to {to}");
+            if sight { open += 1 } else { closed += 1 }
+        }
+        assert!(open > 100 && closed > 100, "{open} open, {closed} closed");
     }
 
     #[test]

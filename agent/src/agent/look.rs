@@ -299,7 +299,7 @@ impl Agent<'_> {
 
 /// How a body's views are merged and looked through. The surface is looked for where the map has it, if it has one; what can
 /// stand on it, and it itself, is merged; without any, all that is in range.
-pub(crate) fn options(robot: &dyn Robot) -> (MergeOptions, SceneOptions) {
+pub fn options(robot: &dyn Robot) -> (MergeOptions, SceneOptions) {
     let up = robot.description().up.map(Unit::new_normalize);
     let heights = robot.surfaces().iter().map(|s| s.height_m);
     let band = heights.fold(None, |band: Option<(f64, f64)>, h| {

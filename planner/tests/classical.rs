@@ -1,8 +1,12 @@
 //! Classical planning from text to a validated plan: small domains of our own, and (slow) the competition's.
 
+mod solving;
+
 use std::path::Path;
 
-use descry_planner::{Attachments, Options, Outcome, Source, Task, plan, validate};
+use descry_planner::{Options, Outcome};
+
+use solving::{read, solve, solve_twice};
 
 /// What must come out.
 enum Expect {
@@ -14,34 +18,21 @@ enum Expect {
     Unsolvable,
 }
 
-fn source(name: &str, text: &str) -> Source {
-    Source { name: name.into(), text: text.into() }
-}
-
 fn check(domain: &str, problem: &str, expect: Expect) {
-    let task = Task::read(&source("domain", domain), &source("problem", problem));
-    let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
-    let attachments = Attachments::default();
     let options = Options { anytime: matches!(expect, Expect::Best(_)), ..Options::default() };
-    let run =
-        || plan(&task, &attachments, &options, &|| false, &mut |_| {}).expect("no attachment, no refusal");
-    let outcome = run();
-    assert_eq!(outcome.plan(), run().plan(), "the same task twice");
-    match (expect, &outcome) {
-        (Expect::Unsolvable, Outcome::Unsolvable { .. }) => return,
-        (Expect::CostAtMost(most), Outcome::Solved { plan, .. }) => {
-            let cost = validate(&task, &attachments, plan).cost.unwrap_or(plan.steps.len() as f64);
+    let (outcome, verdict) = solve_twice(domain, problem, &options);
+    match (expect, &outcome, verdict) {
+        (Expect::Unsolvable, Outcome::Unsolvable { .. }, _) => {}
+        (Expect::CostAtMost(most), Outcome::Solved { plan, .. }, Some(verdict)) => {
+            let cost = verdict.cost.unwrap_or(plan.steps.len() as f64);
             assert!(cost <= most, "cost {cost} above {most}: {plan:?}");
         }
-        (Expect::Best(cost), Outcome::Solved { plan, statistics }) => {
+        (Expect::Best(cost), Outcome::Solved { plan, statistics }, Some(verdict)) => {
             assert!(statistics.optimal);
-            assert_eq!(validate(&task, &attachments, plan).cost.unwrap_or(plan.steps.len() as f64), cost);
+            assert_eq!(verdict.cost.unwrap_or(plan.steps.len() as f64), cost);
         }
-        (_, other) => panic!("unexpected outcome {other:?}"),
+        (_, other, _) => panic!("unexpected outcome {other:?}"),
     }
-    let plan = outcome.plan().expect("solved");
-    let verdict = validate(&task, &attachments, plan);
-    assert!(verdict.valid, "{verdict:?}");
 }
 
 const SHUTTLE: &str = "(define (domain shuttle) (:requirements :typing :action-costs)
@@ -75,9 +66,8 @@ fn a_goal_that_nothing_reaches_is_unsolvable() {
 #[test]
 fn what_nobody_achieves_is_named() {
     let problem = SHUTTLE_PROBLEM.replace("(road c b)", "").replace("(box-at x a)", "");
-    let task = Task::read(&source("domain", SHUTTLE), &source("problem", &problem)).expect("legal");
-    let outcome = plan(&task, &Attachments::default(), &Options::default(), &|| false, &mut |_| {});
-    let Ok(Outcome::Unsolvable { why, .. }) = outcome else { panic!("{outcome:?}") };
+    let (outcome, _) = solve(&read(SHUTTLE, &problem), &Options::default());
+    let Outcome::Unsolvable { why, .. } = outcome else { panic!("{outcome:?}") };
     let text = why.to_string();
     assert!(text.contains("`(box-at x c)` never holds"), "{text}");
     assert!(text.contains("`(in x)` never holds"), "{text}");
@@ -149,19 +139,13 @@ fn competition_tasks() {
     folders.sort();
     for folder in folders {
         for size in ["S", "M", "L"] {
-            let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("readable");
-            let (domain, problem) = (read("domain.pddl"), read(&format!("{size}.pddl")));
-            let task = Task::read(&source("domain", &domain), &source("problem", &problem));
-            let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
-            let attachments = Attachments::default();
+            let text = |name: &str| std::fs::read_to_string(folder.join(name)).expect("readable");
+            let task = read(&text("domain.pddl"), &text(&format!("{size}.pddl")));
             let options = Options { evaluation_limit: Some(100_000), ..Options::default() };
-            let outcome = plan(&task, &attachments, &options, &|| false, &mut |_| {}).expect("no refusal");
-            let Some(plan) = outcome.plan() else {
+            let Some(verdict) = solve(&task, &options).1 else {
                 println!("{} {size}: no plan", folder.display());
                 continue;
             };
-            let verdict = validate(&task, &attachments, plan);
-            assert!(verdict.valid, "{} {size}: {verdict:?}", folder.display());
             println!("{} {size}: cost {:?}", folder.display(), verdict.cost);
             solved += 1;
         }

@@ -7,9 +7,10 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::attachment::CallKind;
+use crate::attachment::{Attachments, CallKind};
 use crate::diagnostic::{Diagnostic, Findings, Span};
 use crate::ground::{GroundTask, MissingAtom, Obstacle};
+use crate::semantics::{Binding, Semantics};
 use crate::task::{
     Action, Atom, Change, Condition, Expression, FunctionId, GroundChange, ModuleId, PredicateId, Task, Term,
 };
@@ -52,8 +53,17 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
     let mut told = Vec::new();
     let mut parts = Vec::new();
     conjuncts(&task.goal.body, &mut parts);
+    let nobody = Attachments::new();
+    let semantics = Semantics::new(task, &nobody);
+    let start = semantics.initial().ok();
+    let mut binding = Binding::new(task.goal.slots);
+    let mut holds_at_first = |part: &Condition| {
+        start.as_ref().is_some_and(|state| semantics.holds(state, part, &mut binding).unwrap_or(false))
+    };
     for &part in &parts {
-        list.extend(goal_part(task, &reach, part, &mut told));
+        if !holds_at_first(part) {
+            list.extend(goal_part(task, &reach, part, &mut told));
+        }
     }
     let untold = |obstacle: &&Obstacle| !told.iter().any(|predicate| predicate.0 == obstacle.predicate);
     list.extend(ground.obstacles.iter().filter(untold).map(|obstacle| finding(task, obstacle, &parts)));
@@ -222,13 +232,32 @@ fn goal_part(
         Condition::Compare(_, sides, span) => {
             let mut functions = Vec::new();
             sides.iter().for_each(|side| fluents(side, &mut functions));
-            let changed =
-                |function: &FunctionId| task.actions.iter().any(|action| changes(task, action, *function));
-            if functions.is_empty() || functions.iter().any(changed) {
+            let changes = |action: &&Action| functions.iter().any(|&f| changes(task, action, f));
+            let changing: Vec<&Action> = task.actions.iter().filter(changes).collect();
+            if functions.is_empty() || changing.iter().any(|action| reach.lacks(action).is_none()) {
                 return None;
             }
             let names: Vec<&str> =
                 functions.iter().map(|&function| task.function(function).name.as_str()).collect();
+            if let Some((action, lacks)) = changing.iter().find_map(|a| Some((a, reach.lacks(a)?))) {
+                let message = format!(
+                    "the goal compares `{}`, which only actions change that can never be taken",
+                    names.join("`, `")
+                );
+                let finding = Diagnostic::error("unsolvable", message, *span, "asked for here");
+                let needs = format!(
+                    "`{}` changes it, but needs `{}`",
+                    action.name,
+                    task.predicate(lacks.predicate).name
+                );
+                return Some(trace(
+                    task,
+                    reach,
+                    finding.with_label(lacks.span, needs),
+                    lacks.predicate,
+                    told,
+                ));
+            }
             let message = format!("the goal compares `{}`, which no action changes", names.join("`, `"));
             Some(
                 Diagnostic::error("unsolvable", message, *span, "false at the beginning, and for ever")
@@ -241,14 +270,21 @@ fn goal_part(
 
 /// A goal atom out of reach: who could add it, and what those lack, down to what nobody adds at all.
 fn nobody(task: &Task, reach: &Reach, goal: &Atom, told: &mut Vec<PredicateId>) -> Diagnostic {
+    let message = format!("the goal {} can never be reached", atom_text(task, goal));
+    let finding = Diagnostic::error("unsolvable", message, goal.span, "asked for here");
+    trace(task, reach, finding, goal.predicate, told)
+}
+
+/// Follows what stands in the way of a predicate, down to what nobody adds at all.
+fn trace(
+    task: &Task,
+    reach: &Reach,
+    mut finding: Diagnostic,
+    first: PredicateId,
+    told: &mut Vec<PredicateId>,
+) -> Diagnostic {
     let name = |predicate: PredicateId| task.predicate(predicate).name.as_str();
-    let mut finding = Diagnostic::error(
-        "unsolvable",
-        format!("the goal {} can never be reached", atom_text(task, goal)),
-        goal.span,
-        "asked for here",
-    );
-    let (mut wanted, mut seen) = (goal.predicate, vec![goal.predicate]);
+    let (mut wanted, mut seen) = (first, vec![first]);
     loop {
         let who = task.actions.iter().find_map(|action| {
             let gives = added(task, action).find(|(predicate, _)| *predicate == wanted)?;
@@ -282,11 +318,7 @@ fn nobody(task: &Task, reach: &Reach, goal: &Atom, told: &mut Vec<PredicateId>) 
     let declared = task.predicate(wanted).span;
     finding.with_label(declared, format!("nothing ever makes `{}` true", name(wanted))).with_help(format!(
         "add {} to `:init`, or give some action the effect `({} …)`",
-        if wanted == goal.predicate {
-            "it".to_string()
-        } else {
-            format!("what is needed of `{}`", name(wanted))
-        },
+        if wanted == first { "it".to_string() } else { format!("what is needed of `{}`", name(wanted)) },
         name(wanted)
     ))
 }

@@ -73,6 +73,12 @@ const MODULES: &str = "  (:requirements :typing :durative-actions :modules)
     :condition (and (at start (at ?r)) (over all ([fits ?t ?r]))) :effect (at end (stored ?t)))
 ";
 
+const GAUGE: &str = "  (:requirements :durative-actions :numeric-fluents)
+  (:predicates (valve)) (:functions (level) (room))
+  (:durative-action fill :parameters () :duration (= ?duration 1) :condition (over all (valve))
+    :effect (at end (increase (level) 1)))
+";
+
 const FAILING: &str = "  (:requirements :typing :durative-actions :modules)
   (:types thing)
   (:modules (broken ?t - thing conditionchecker broken@house))
@@ -99,6 +105,11 @@ fn each_reason_is_drawn_where_it_stands() {
             "a-cost-said-never",
             MODULES,
             "  (:objects hall attic - room) (:init (at hall)) (:goal (at attic))".to_string(),
+        ),
+        (
+            "a-number-that-stays",
+            GAUGE,
+            "  (:init (= (level) 0) (= (room) 9)) (:goal (and (>= (level) 3) (>= (room) 1)))".to_string(),
         ),
     ] {
         insta::assert_snapshot!(name, why(domain, &problem));

@@ -11,6 +11,7 @@ use super::compress::classical_plan;
 use super::destroy::{Chance, keep_for, taken_apart};
 use super::envelope::{all_apart, envelopes, in_one_go_suffices};
 use super::relaxed::{Part, Relaxed};
+use super::schedule::tightened;
 use super::search::{Counts, End, Manner, Search};
 use super::space::{Base, Measure, Space};
 use super::world::World;
@@ -67,9 +68,10 @@ pub(crate) enum Reason {
     Memory,
 }
 
-/// After a first plan without `anytime`: evaluated states times operators to spend on better plans, at least, and
-/// evaluations as a multiple of those that the first plan took.
+/// After a first plan without `anytime`: evaluated states times operators to spend on better plans, at least, as often
+/// again as the plan has so many steps, and evaluations as a multiple of those that the first plan took.
 const IMPROVEMENT_WORK: u64 = 2_000_000;
+const STEPS_PER_SHARE: u64 = 16;
 const IMPROVEMENT_FACTOR: u64 = 20;
 /// Without `anytime`: repairs in a row that come to nothing before the plan is left as it is, for each of its steps.
 const PATIENCE: u64 = 10;
@@ -231,6 +233,7 @@ impl Run<'_, '_, '_> {
         {
             (measured, steps, base) = (leaner, lean, lean_base);
         }
+        (measured, steps, base) = tightened(self.space, (measured, steps, base), self.stop)?;
         let ready_s = base.track.order.ready_s();
         let goal = &self.space.world.ground.goal.facts;
         let slowness_s: f64 = goal.iter().map(|fact| ready_s[fact.variable as usize]).sum();
@@ -261,9 +264,10 @@ impl Run<'_, '_, '_> {
         let before = self.progress.counts.evaluated;
         let spent = before - self.elsewhere;
         let least = IMPROVEMENT_WORK / (self.space.world.acts.len() as u64).max(1);
+        let shares = 1 + self.best.as_ref().map_or(0, |best| best.steps.len()) as u64 / STEPS_PER_SHARE;
         let budget = match self.limits.anytime {
             true => u64::MAX,
-            false => before + least.clamp(100, 10_000).max(IMPROVEMENT_FACTOR * spent),
+            false => before + (shares * least.clamp(100, 10_000)).max(IMPROVEMENT_FACTOR * spent),
         };
         self.progress.reason = Reason::Enough;
         let timed = self.space.is_makespan();
@@ -332,7 +336,8 @@ impl Run<'_, '_, '_> {
                 continue;
             };
             let timed = self.space.is_makespan() && !tries.is_multiple_of(3);
-            let mut manner = self.manner(None, timed, REPAIR.max(4 * steps.len() as u64));
+            let left = budget - self.progress.counts.evaluated;
+            let mut manner = self.manner(None, timed, REPAIR.max(4 * steps.len() as u64).min(left));
             manner.shuffle = tries;
             manner.eager = tries.is_multiple_of(2);
             manner.bound = as_good;

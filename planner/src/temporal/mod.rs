@@ -9,6 +9,7 @@ mod estimate;
 mod improve;
 mod order;
 mod relaxed;
+mod schedule;
 mod search;
 mod space;
 mod store;

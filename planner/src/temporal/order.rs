@@ -120,6 +120,24 @@ impl Order {
         self.fixed.iter().filter_map(bound).fold(f64::INFINITY, f64::min)
     }
 
+    /// Tells every distance of the network: from a happening to another (`None` for the beginning of the plan), in
+    /// seconds at least.
+    pub fn distances(&self, mut tell: impl FnMut(Option<u32>, Option<u32>, f64)) {
+        for (node, after) in self.after.iter().enumerate() {
+            after.iter().for_each(|&(other, gap_s)| tell(Some(other), Some(node as u32), gap_s));
+        }
+        for tie in &self.ties {
+            tell(Some(tie.start), Some(tie.end), tie.span.least_s);
+            if tie.span.most_s.is_finite() {
+                tell(Some(tie.end), Some(tie.start), -tie.span.most_s);
+            }
+        }
+        for &(node, time_s) in &self.fixed {
+            tell(None, Some(node), time_s);
+            tell(Some(node), None, -time_s);
+        }
+    }
+
     /// The time of the last happening that is not given from outside.
     pub fn makespan_s(&self) -> f64 {
         let given = |index: usize| self.fixed.iter().any(|&(node, _)| node as usize == index);

@@ -1,0 +1,124 @@
+//! Tightening a plan's schedule after the search.
+//!
+//! A sequence of steps leaves free what does not matter, but it does fix who comes first where two steps disturb each
+//! other. The happenings are nodes of a simple temporal network (Dechter, Meiri and Pearl 1991), with edges for
+//! durations, for the order of what disturbs each other, and for what is given from outside. Its longest path says when
+//! the plan ends, and why: only a step that changes place with a neighbour on that path can end the plan earlier (as in
+//! the neighbourhoods of van Laarhoven, Aarts and Lenstra 1992).
+
+use petgraph::algo::bellman_ford;
+use petgraph::graph::{DiGraph, NodeIndex};
+
+use crate::calls::Failure;
+
+use super::advance::Step;
+use super::order::Order;
+use super::relaxed::Part;
+use super::space::{Base, Space, Track};
+
+/// Steps that are replayed at most for one plan.
+const MOST_REPLAYED: usize = 50_000;
+
+/// A plan with what replaying it says.
+pub(crate) type Replayed = (f64, Vec<Step>, Base);
+
+/// The plan with steps on its longest path exchanged as long as that makes it better; never worse, and always replayed.
+pub(crate) fn tightened(
+    space: &Space,
+    mut plan: Replayed,
+    stop: &dyn Fn() -> bool,
+) -> Result<Replayed, Failure> {
+    if !space.timed_measure() {
+        return Ok(plan);
+    }
+    let mut left = MOST_REPLAYED;
+    'improved: loop {
+        for (before, after) in critical_pairs(&plan.1, &plan.2.track) {
+            for (from, to) in [(after, before), (before, after)] {
+                left = left.saturating_sub(plan.1.len());
+                if left == 0 || stop() {
+                    return Ok(plan);
+                }
+                let mut steps = plan.1.clone();
+                let moved = steps.remove(from);
+                steps.insert(to, moved);
+                if let Some((measured, base)) = space.replay(&mut steps)?
+                    && measured < plan.0 - 1e-6
+                    && space.world.is_goal(&base.situation)?
+                {
+                    plan = (measured, steps, base);
+                    continue 'improved;
+                }
+            }
+        }
+        return Ok(plan);
+    }
+}
+
+/// Pairs of different steps that follow each other on the longest path of the network, the last first.
+fn critical_pairs(steps: &[Step], track: &Track) -> Vec<(usize, usize)> {
+    let path = longest_path(&track.order);
+    let step_of = steps_of(steps, track);
+    let mut pairs: Vec<(usize, usize)> = Vec::new();
+    for pair in path.windows(2) {
+        let (Some(after), Some(before)) = (step_of[pair[0]], step_of[pair[1]]) else { continue };
+        if before < after && !pairs.contains(&(before, after)) {
+            pairs.push((before, after));
+        }
+    }
+    pairs
+}
+
+/// The happenings on a longest path of the network, from the end of the plan back to its beginning.
+fn longest_path(order: &Order) -> Vec<usize> {
+    let mut network: DiGraph<(), f64> = DiGraph::with_capacity(order.len() + 1, 4 * order.len());
+    let begin = network.add_node(());
+    let happenings: Vec<NodeIndex> = (0..order.len()).map(|_| network.add_node(())).collect();
+    // The shortest path over distances with their signs turned is the longest.
+    happenings.iter().for_each(|&happening| {
+        network.add_edge(begin, happening, 0.0);
+    });
+    order.distances(|from, to, gap_s| {
+        let node = |happening: Option<u32>| happening.map_or(begin, |index| happenings[index as usize]);
+        network.add_edge(node(from), node(to), -gap_s);
+    });
+    let Ok(paths) = bellman_ford(&network, begin) else { return Vec::new() };
+    let ends = happenings.iter().copied();
+    let last = ends.min_by(|a, b| paths.distances[a.index()].total_cmp(&paths.distances[b.index()]));
+    let mut path = Vec::new();
+    let mut node = last;
+    while let Some(happening) = node.filter(|&node| node != begin && path.len() <= happenings.len()) {
+        path.push(happening.index() - 1);
+        node = paths.predecessors[happening.index()];
+    }
+    path
+}
+
+/// By happening, the step that it belongs to; `None` for what is given from outside.
+fn steps_of(steps: &[Step], track: &Track) -> Vec<Option<usize>> {
+    let mut step_of = vec![None; track.order.len()];
+    let mut open: Vec<usize> = Vec::new();
+    for (index, step) in steps.iter().enumerate() {
+        match step.part {
+            Part::Whole | Part::Start => {
+                let Some((start, end)) = track.actions[index] else { continue };
+                step_of[start as usize] = Some(index);
+                match end {
+                    Some(end) if step.part == Part::Whole => step_of[end as usize] = Some(index),
+                    _ => open.push(index),
+                }
+            }
+            Part::End => {
+                let same =
+                    |&start: &usize| steps[start].act == step.act && steps[start].proposal == step.proposal;
+                let started = open.iter().position(same).map(|position| open.remove(position));
+                let end = started.and_then(|start| track.actions[start]).and_then(|(_, end)| end);
+                if let Some(end) = end {
+                    step_of[end as usize] = Some(index);
+                }
+            }
+            Part::Free => {}
+        }
+    }
+    step_of
+}

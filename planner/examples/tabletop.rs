@@ -111,7 +111,7 @@ fn problem(poses: usize, goal: &str) -> Source {
     let names: Vec<String> = (0..poses).map(|n| format!("p{n}")).collect();
     let text = format!(
         "(define (problem round) (:domain tabletop) (:objects {} - pose table - surface cup - thing)
-         (:init (at p0) (= (confidence cup) 0) (= (clarity table) 0)) (:goal {goal}) (:metric minimize (total-time)))",
+         (:init (at p0) (time-left) (= (confidence cup) 0) (= (clarity table) 0)) (:goal {goal}) (:metric minimize (total-time)))",
         names.join(" ")
     );
     Source::new("problem", text)

@@ -16,20 +16,33 @@ use crate::diagnostic::{Diagnostic, Findings};
 use crate::explain::{Refusals, sites};
 use crate::ground::{CallId, GroundTask, Meaning, NumericId, Place, Values, VariableId};
 use crate::solve::PlanError;
-use crate::task::{ModuleId, Task};
+use crate::task::{Module, ModuleId, Task};
 
 use self::terms::{Origin, Sources, Terms};
 
 /// A failed call on its way up to [`crate::plan`].
 pub(crate) type Failure = Box<AttachmentError>;
 
-/// A ground call: the question without its readings, and how to make those.
-#[derive(Debug, Clone)]
-struct Bound {
+/// What all calls of a module share.
+struct Asked<'a> {
+    /// The name of the attachment; empty for a module that is never called.
     attachment: String,
-    question: Question,
-    sources: Arc<Sources>,
-    writes: Vec<Place>,
+    module: Arc<str>,
+    kind: CallKind,
+    /// How many terms it writes.
+    writes: usize,
+    /// Counts answers that were known already, for the statistics of the attachment.
+    hits: Option<&'a AtomicU64>,
+    /// What its calls read, where their arguments make no difference to that.
+    sources: Option<Arc<Sources>>,
+}
+
+/// A ground call: who is asked, about which objects, and where the readings come from.
+#[derive(Clone, Copy)]
+struct Bound<'b> {
+    asked: &'b Asked<'b>,
+    arguments: &'b [u32],
+    sources: &'b Sources,
 }
 
 /// Answers known already, by what stands where the call reads.
@@ -44,9 +57,10 @@ pub(crate) struct Calls<'a> {
     ground: &'a GroundTask,
     attachments: &'a Attachments,
     names: Vec<Arc<str>>,
-    bound: Vec<Bound>,
-    /// By call, counts of answers that were known already, for the statistics of its attachment.
-    hits: Vec<Option<&'a AtomicU64>>,
+    /// By module.
+    asked: Vec<Asked<'a>>,
+    /// By call.
+    sources: Vec<Arc<Sources>>,
     /// Answers of calls that read nothing and take no proposed parameter, exact and relaxed.
     settled: RefCell<Vec<[Option<Answer>; 2]>>,
     /// Answers of calls that read something, without a proposed parameter, by call and level.
@@ -86,8 +100,8 @@ impl<'a> Calls<'a> {
             ground,
             attachments,
             names,
-            bound: Vec::new(),
-            hits: Vec::new(),
+            asked: Vec::new(),
+            sources: Vec::with_capacity(ground.calls.len()),
             settled: RefCell::new(vec![[None, None]; ground.calls.len()]),
             known: RefCell::default(),
             terms: Terms::default(),
@@ -96,44 +110,43 @@ impl<'a> Calls<'a> {
         if attachments.names().any(|name| !attachments.reads(name).is_empty()) {
             calls.terms = Terms::new(ground);
         }
-        // Where the arguments make no difference, all calls of a module read the same.
-        let mut shared: FxHashMap<u32, Arc<Sources>> = FxHashMap::default();
+        calls.asked = task.modules.iter().map(|module| calls.asked(module)).collect();
         for call in &ground.calls {
-            let (module, arguments) = (call.origin.schema, &call.origin.arguments);
-            let known = shared.get(&module).cloned();
-            let bound = calls.bind_one(module as usize, arguments, call.writes.clone(), known);
-            if !attachments.reads(&bound.attachment).iter().any(|read| matches!(read, Read::At(..))) {
-                shared.entry(module).or_insert_with(|| bound.sources.clone());
-            }
-            calls.hits.push(attachments.hits(&bound.attachment));
-            calls.bound.push(bound);
+            calls.sources.push(calls.sources_of(call.origin.schema as usize, &call.origin.arguments));
         }
         Ok(calls)
     }
 
-    fn bind_one(
-        &self,
-        module: usize,
-        arguments: &[u32],
-        writes: Vec<Place>,
-        known: Option<Arc<Sources>>,
-    ) -> Bound {
-        let declared = &self.task.modules[module];
+    fn asked(&self, declared: &Module) -> Asked<'a> {
         let attachment =
             self.attachments.resolve(&declared.function, &declared.name).unwrap_or_default().to_string();
-        let name = |&object: &u32| self.names[object as usize].clone();
-        let sources = known.unwrap_or_else(|| {
-            let reads = self.attachments.reads(&attachment).iter();
-            let list = reads.flat_map(|read| self.terms.readings(self.task, &self.names, read, arguments));
-            Arc::new(Sources::new(list.collect()))
-        });
-        let question = Question {
+        let reads = self.attachments.reads(&attachment);
+        let apart = reads.iter().any(|read| matches!(read, Read::At(..)));
+        Asked {
             module: declared.name.as_str().into(),
             kind: declared.kind,
-            arguments: arguments.iter().map(name).collect(),
-            readings: Vec::new(),
-        };
-        Bound { attachment, question, sources, writes }
+            writes: declared.writes.len(),
+            hits: self.attachments.hits(&attachment),
+            sources: (!apart).then(|| Arc::new(self.read_by(&attachment, &[]))),
+            attachment,
+        }
+    }
+
+    fn read_by(&self, attachment: &str, arguments: &[u32]) -> Sources {
+        let reads = self.attachments.reads(attachment).iter();
+        let list = reads.flat_map(|read| self.terms.readings(self.task, &self.names, read, arguments));
+        Sources::new(list.collect())
+    }
+
+    fn sources_of(&self, module: usize, arguments: &[u32]) -> Arc<Sources> {
+        let asked = &self.asked[module];
+        asked.sources.clone().unwrap_or_else(|| Arc::new(self.read_by(&asked.attachment, arguments)))
+    }
+
+    fn bound(&self, call: CallId) -> Bound<'_> {
+        let origin = &self.ground.calls[call as usize].origin;
+        let asked = &self.asked[origin.schema as usize];
+        Bound { asked, arguments: &origin.arguments, sources: &self.sources[call as usize] }
     }
 
     /// Whether a condition module says yes.
@@ -193,7 +206,7 @@ impl<'a> Calls<'a> {
         level: Level,
         into: &mut Values,
     ) -> Result<(), Failure> {
-        let places = &self.bound[call as usize].writes;
+        let places = &self.ground.calls[call as usize].writes;
         let answer = self.answer(call, proposal, state, level)?;
         let Answer::Writes(values) = &answer else { return Err(self.misfit(call, &answer)) };
         if values.len() != places.len() {
@@ -243,17 +256,17 @@ impl<'a> Calls<'a> {
         arguments: &[u32],
         state: &Values,
     ) -> Result<Vec<Arc<str>>, Failure> {
-        let bound = self.bind_one(module, arguments, Vec::new(), None);
-        let question = self.question(&bound, None, state);
-        match self.attachments.call(&bound.attachment, &question, Level::Exact)? {
+        let sources = self.sources_of(module, arguments);
+        let bound = Bound { asked: &self.asked[module], arguments, sources: &sources };
+        match self.ask(bound, None, state, Level::Exact)? {
             Answer::Proposals(names) => Ok(names),
-            other => Err(Box::new(misfit(&bound, &other))),
+            other => Err(self.unfit(bound, &other)),
         }
     }
 
     /// What the answer depends on: variables, then numbers.
     pub fn reads(&self, call: CallId) -> (&[VariableId], &[NumericId]) {
-        let sources = &self.bound[call as usize].sources;
+        let sources = &self.sources[call as usize];
         (&sources.variables, &sources.numbers)
     }
 
@@ -270,8 +283,7 @@ impl<'a> Calls<'a> {
         let mut refused: Vec<_> = refused.iter().collect();
         refused.sort_unstable();
         for (call, wanted, proposal) in refused {
-            let mut question = self.bound[*call as usize].question.clone();
-            question.arguments.extend(proposal.clone());
+            let question = self.unread(self.bound(*call), proposal.as_ref());
             let module = self.ground.calls[*call as usize].origin.schema;
             refusals.entry((module, *wanted)).or_default().push(question.to_string());
         }
@@ -280,7 +292,7 @@ impl<'a> Calls<'a> {
 
     /// What kind of module is called.
     pub fn kind(&self, call: CallId) -> CallKind {
-        self.bound[call as usize].question.kind
+        self.bound(call).asked.kind
     }
 
     fn answer(
@@ -290,13 +302,12 @@ impl<'a> Calls<'a> {
         state: &Values,
         level: Level,
     ) -> Result<Answer, Failure> {
-        let bound = &self.bound[call as usize];
+        let bound = self.bound(call);
         if proposal.is_some() {
-            let question = self.question(bound, proposal, state);
-            return Ok(self.attachments.call(&bound.attachment, &question, level)?);
+            return self.ask(bound, proposal, state, level);
         }
         let hit = || {
-            self.hits[call as usize].into_iter().for_each(|hits| {
+            bound.asked.hits.into_iter().for_each(|hits| {
                 hits.fetch_add(1, Ordering::Relaxed);
             });
         };
@@ -305,13 +316,7 @@ impl<'a> Calls<'a> {
                 hit();
                 return Ok(answer.clone());
             }
-            let answer = match bound.sources.list.is_empty() {
-                true => self.attachments.call(&bound.attachment, &bound.question, level)?,
-                false => {
-                    let question = self.question(bound, None, state);
-                    self.attachments.call(&bound.attachment, &question, level)?
-                }
-            };
+            let answer = self.ask(bound, None, state, level)?;
             self.settled.borrow_mut()[call as usize][level as usize] = Some(answer.clone());
             return Ok(answer);
         }
@@ -325,26 +330,37 @@ impl<'a> Calls<'a> {
             hit();
             return Ok(answer.clone());
         }
-        let question = self.question(bound, None, state);
-        let answer = self.attachments.call(&bound.attachment, &question, level)?;
+        let answer = self.ask(bound, None, state, level)?;
         self.known.borrow_mut().entry((call, level)).or_default().insert(key, answer.clone());
         Ok(answer)
     }
 
-    fn question(&self, bound: &Bound, proposal: Option<&Arc<str>>, state: &Values) -> Question {
-        let mut question = bound.question.clone();
-        question.arguments.extend(proposal.cloned());
-        question.readings = bound
-            .sources
-            .list
-            .iter()
-            .map(|(symbol, arguments, origin)| Reading {
-                symbol: symbol.clone(),
-                arguments: arguments.clone(),
-                value: self.value(origin, state),
-            })
-            .collect();
-        question
+    fn ask(
+        &self,
+        bound: Bound,
+        proposal: Option<&Arc<str>>,
+        state: &Values,
+        level: Level,
+    ) -> Result<Answer, Failure> {
+        let mut question = self.unread(bound, proposal);
+        let readings = bound.sources.list.iter().map(|(symbol, arguments, origin)| Reading {
+            symbol: symbol.clone(),
+            arguments: arguments.clone(),
+            value: self.value(origin, state),
+        });
+        question.readings = readings.collect();
+        Ok(self.attachments.call(&bound.asked.attachment, &question, level)?)
+    }
+
+    /// The question without its readings.
+    fn unread(&self, bound: Bound, proposal: Option<&Arc<str>>) -> Question {
+        let arguments = bound.arguments.iter().map(|&object| &self.names[object as usize]);
+        Question {
+            module: bound.asked.module.clone(),
+            kind: bound.asked.kind,
+            arguments: arguments.chain(proposal).cloned().collect(),
+            readings: Vec::new(),
+        }
     }
 
     fn value(&self, origin: &Origin, state: &Values) -> FactValue {
@@ -365,7 +381,21 @@ impl<'a> Calls<'a> {
     }
 
     fn misfit(&self, call: CallId, answer: &Answer) -> Failure {
-        Box::new(misfit(&self.bound[call as usize], answer))
+        self.unfit(self.bound(call), answer)
+    }
+
+    fn unfit(&self, bound: Bound, answer: &Answer) -> Failure {
+        let question = self.unread(bound, None);
+        let expected = match question.kind {
+            CallKind::Effect => format!("{} values that fit the terms of the module", bound.asked.writes),
+            kind => format!("an answer of a {kind} module"),
+        };
+        Box::new(AttachmentError {
+            call: question.to_string(),
+            module: question.module.to_string(),
+            attachment: bound.asked.attachment.clone(),
+            cause: CallError::WrongAnswer { expected, got: format!("{answer:?}") },
+        })
     }
 
     /// A failure as an error of the whole planning call, drawn under the domain.
@@ -412,19 +442,6 @@ fn unbound(module: &crate::task::Module, attachments: &Attachments) -> Diagnosti
     let message =
         format!("module `{}` has no attachment: neither `{function}` nor `{}`", module.name, module.name);
     Diagnostic::error("missing-attachment", message, module.span, "nothing computes this").with_help(help)
-}
-
-fn misfit(bound: &Bound, answer: &Answer) -> AttachmentError {
-    let expected = match bound.question.kind {
-        CallKind::Effect => format!("{} values that fit the terms of the module", bound.writes.len()),
-        kind => format!("an answer of a {kind} module"),
-    };
-    AttachmentError {
-        call: bound.question.to_string(),
-        module: bound.question.module.to_string(),
-        attachment: bound.attachment.clone(),
-        cause: CallError::WrongAnswer { expected, got: format!("{answer:?}") },
-    }
 }
 
 fn number_value(number: f64) -> FactValue {

@@ -7,15 +7,68 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
+/// An atom that is added or taken away, with the atoms that this depends on.
+pub(crate) type Changed = (u32, Vec<u32>);
+
 /// A transition of the task, in atoms.
-#[derive(Debug, Default)]
-pub(crate) struct Transition {
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Transition<'t> {
     /// Atoms that hold before it, sorted.
-    pub before: Vec<u32>,
+    pub before: &'t [u32],
     /// Atoms that it adds, with further atoms that then held before it (of conditional effects).
-    pub adds: Vec<(u32, Vec<u32>)>,
+    pub adds: &'t [Changed],
     /// Atoms that it takes away, with all that this depends on; what it depends on otherwise must be left out.
-    pub deletes: Vec<(u32, Vec<u32>)>,
+    pub deletes: &'t [Changed],
+}
+
+/// Every transition of a task, side by side in memory.
+#[derive(Debug, Default)]
+pub(crate) struct Transitions {
+    before: Vec<u32>,
+    adds: Vec<Changed>,
+    deletes: Vec<Changed>,
+    /// By transition, where its parts end.
+    ends: Vec<[u32; 3]>,
+}
+
+impl Transitions {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// One of them.
+    pub fn get(&self, index: usize) -> Transition<'_> {
+        let end = self.ends[index].map(|end| end as usize);
+        let from = index.checked_sub(1).map_or([0; 3], |before| self.ends[before].map(|end| end as usize));
+        Transition {
+            before: &self.before[from[0]..end[0]],
+            adds: &self.adds[from[1]..end[1]],
+            deletes: &self.deletes[from[2]..end[2]],
+        }
+    }
+
+    /// Another atom that holds before the transition at hand.
+    pub fn before(&mut self, atom: u32) {
+        self.before.push(atom);
+    }
+
+    /// Another atom that the transition at hand adds.
+    pub fn adds(&mut self, atom: u32, after: Vec<u32>) {
+        self.adds.push((atom, after));
+    }
+
+    /// Another atom that the transition at hand takes away.
+    pub fn deletes(&mut self, atom: u32, after: Vec<u32>) {
+        self.deletes.push((atom, after));
+    }
+
+    /// The transition at hand is complete.
+    pub fn close(&mut self) {
+        let from = self.ends.last().map_or(0, |ends| ends[0] as usize);
+        self.before[from..].sort_unstable();
+        self.ends.push([self.before.len() as u32, self.adds.len() as u32, self.deletes.len() as u32]);
+    }
 }
 
 /// The atoms whose groups are asked for.
@@ -40,7 +93,7 @@ const MOST_WORK: usize = 30_000_000;
 
 struct Synthesis<'a, N: AtomNames> {
     names: &'a N,
-    transitions: &'a [Transition],
+    transitions: &'a Transitions,
     /// By predicate: transitions that add an atom of it.
     adders: FxHashMap<u32, Vec<u32>>,
     /// Predicates at and beyond this one are tokens, of which any number of arguments may be counted.
@@ -56,18 +109,19 @@ struct Unbalanced {
 }
 
 /// Finds mutex groups among `atoms`. `predicates` are the ones to start from, with their arities; `initial` are the
-/// atoms that hold at first. Deterministic: the order of everything is the order of the input.
+/// atoms that hold at first. Those found so far once `stop` says true. Deterministic: the order of everything is the order of the input.
 pub(crate) fn mutex_groups<N: AtomNames>(
     names: &N,
     atoms: &[u32],
     initial: &[u32],
-    transitions: &[Transition],
+    transitions: &Transitions,
     predicates: &[(u32, usize)],
     first_token: u32,
+    stop: &dyn Fn() -> bool,
 ) -> Vec<Vec<u32>> {
     let mut adders: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
-    for (index, transition) in transitions.iter().enumerate() {
-        for (atom, _) in &transition.adds {
+    for index in 0..transitions.len() {
+        for (atom, _) in transitions.get(index).adds {
             let list = adders.entry(names.predicate(*atom)).or_default();
             if list.last() != Some(&(index as u32)) {
                 list.push(index as u32);
@@ -75,7 +129,7 @@ pub(crate) fn mutex_groups<N: AtomNames>(
         }
     }
     let mut synthesis = Synthesis { names, transitions, adders, first_token, work: 0 };
-    let invariants = synthesis.run(predicates);
+    let invariants = synthesis.run(predicates, stop);
     let mut groups: FxHashSet<Vec<u32>> = FxHashSet::default();
     let mut ordered = Vec::new();
     for invariant in &invariants {
@@ -89,7 +143,7 @@ pub(crate) fn mutex_groups<N: AtomNames>(
 }
 
 impl<N: AtomNames> Synthesis<'_, N> {
-    fn run(&mut self, predicates: &[(u32, usize)]) -> Vec<Vec<Part>> {
+    fn run(&mut self, predicates: &[(u32, usize)], stop: &dyn Fn() -> bool) -> Vec<Vec<Part>> {
         let mut queue: Vec<Vec<Part>> = Vec::new();
         let mut seen = FxHashSet::default();
         for &(predicate, arity) in predicates {
@@ -103,7 +157,7 @@ impl<N: AtomNames> Synthesis<'_, N> {
         seen.extend(queue.iter().cloned());
         let mut valid = Vec::new();
         let mut next = 0;
-        while next < queue.len() && next < MOST_CANDIDATES && self.work < MOST_WORK {
+        while next < queue.len() && next < MOST_CANDIDATES && self.work < MOST_WORK && !stop() {
             let candidate = queue[next].clone();
             next += 1;
             match self.test(&candidate) {
@@ -127,7 +181,7 @@ impl<N: AtomNames> Synthesis<'_, N> {
             let list = self.adders.get(&part.predicate).map_or(&[][..], |l| l);
             for &index in list {
                 self.work += 1;
-                let transition = &self.transitions[index as usize];
+                let transition = self.transitions.get(index as usize);
                 if let Some(reason) = self.test_one(candidate, index, transition) {
                     return Some(reason);
                 }
@@ -136,12 +190,7 @@ impl<N: AtomNames> Synthesis<'_, N> {
         None
     }
 
-    fn test_one(
-        &self,
-        candidate: &[Part],
-        index: u32,
-        transition: &Transition,
-    ) -> Option<Option<Unbalanced>> {
+    fn test_one(&self, candidate: &[Part], index: u32, transition: Transition) -> Option<Option<Unbalanced>> {
         for (i, (atom, extra)) in transition.adds.iter().enumerate() {
             let held = |a: &u32| transition.before.binary_search(a).is_ok() || extra.contains(a);
             let Some(part) = self.part(candidate, *atom) else { continue };
@@ -183,11 +232,11 @@ impl<N: AtomNames> Synthesis<'_, N> {
 
     /// Adds a predicate that the unbalanced transition takes away, its key placed wherever the objects fit.
     fn refine(&self, candidate: &[Part], unbalanced: &Unbalanced) -> Vec<Vec<Part>> {
-        let transition = &self.transitions[unbalanced.transition as usize];
+        let transition = self.transitions.get(unbalanced.transition as usize);
         let extra = &transition.adds[unbalanced.add].1;
         let held = |a: &u32| transition.before.binary_search(a).is_ok() || extra.contains(a);
         let mut refined = Vec::new();
-        for (gone, needs) in &transition.deletes {
+        for (gone, needs) in transition.deletes {
             let predicate = self.names.predicate(*gone);
             let known = candidate.iter().any(|part| part.predicate == predicate);
             if known || !held(gone) || !needs.iter().all(held) {

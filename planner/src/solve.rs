@@ -29,7 +29,7 @@ pub struct Options {
     pub bound: Option<f64>,
     /// Decides every choice that is left to chance; the search for plans without times leaves none.
     pub seed: u64,
-    /// Give up beyond this much memory for the search.
+    /// Give up beyond this much memory for the grounded task and the search.
     pub memory_limit_bytes: Option<u64>,
     /// Give up, or stop improving, after this many evaluated states.
     pub evaluation_limit: Option<u64>,
@@ -169,9 +169,12 @@ pub fn plan(
         Ok(grounded) => grounded,
         Err(error) => return grounding_ended(task, error),
     };
+    let memory_bytes = memory_bytes.saturating_sub(grounded.bytes());
     if grounded.goal_reachable && is_classical(&grounded) {
         let check = |plan| checked(task, attachments, plan);
-        return plan_classical(task, &grounded, options, stop, &check, on_plan);
+        let left = options.memory_limit_bytes.map(|_| memory_bytes as u64);
+        let options = Options { memory_limit_bytes: left, ..options.clone() };
+        return plan_classical(task, &grounded, &options, stop, &check, on_plan);
     }
     let calls = Calls::bind(task, &grounded, attachments)?;
     configure(task, attachments)?;

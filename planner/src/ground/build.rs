@@ -74,8 +74,8 @@ pub fn ground(
     let (atoms, instances) = (reach.atoms, reach.instances);
     let mut make = Instantiate::new(&statics, atoms);
     let _span = debug_span!("instantiate").entered();
-    mark_always(task, &normal, &instances, &mut make);
-    let (mut raw, goal_possible) = instantiate(task, &normal, &rules, instances, &mut make);
+    mark_always(task, &normal, &instances, &mut make, stop)?;
+    let (mut raw, goal_possible) = instantiate(task, &normal, &rules, instances, &mut make, stop)?;
     let expression = normal.metric.as_ref().map(|m| make.expression(m, &[]));
     let reached = relaxed::prune(&mut raw, &make.calls);
     let keep = !task.modules.is_empty() || !task.preferences.is_empty() || !task.constraints.is_empty();
@@ -85,12 +85,17 @@ pub fn ground(
         action.cost = costs.of(action);
     }
     let lacks = |&literal: &u32| literal & 1 == 0 && !reached.atoms[(literal >> 1) as usize];
-    let out_of_reach = !goal_possible || raw.goal.literals.iter().any(lacks);
+    let out_of_reach = !goal_possible
+        || raw.goal.literals.iter().any(lacks)
+        || raw.actions.is_empty() && raw.timed.is_empty();
     let found = match out_of_reach {
         true => obstacles::obstacles(&normal, &make.atoms, &reached.atoms),
         false => Vec::new(),
     };
-    let groups = groups(&raw, &make, &reached, &rules, &normal, task);
+    let groups = groups(&raw, &make, &reached, &rules, &normal, task, stop);
+    if stop() {
+        return Err(GroundError::Stopped);
+    }
     let everything = |wanted: bool| vec![wanted; raw.init.len()];
     let relevant = if keep {
         let unwanted = absences(&raw);
@@ -178,7 +183,13 @@ fn insert_initial(task: &Task, atoms: &mut Atoms) {
 }
 
 /// Atoms that hold at first and that no instance can take away hold always.
-fn mark_always(task: &Task, normal: &Normal, instances: &[Vec<u32>], make: &mut Instantiate<'_>) {
+fn mark_always(
+    task: &Task,
+    normal: &Normal,
+    instances: &[Vec<u32>],
+    make: &mut Instantiate<'_>,
+    stop: &dyn Fn() -> bool,
+) -> Result<(), GroundError> {
     let mut always = vec![false; make.atoms.len()];
     for fact in &task.init.facts {
         let (predicate, arguments) = fact_atom(fact);
@@ -187,32 +198,20 @@ fn mark_always(task: &Task, normal: &Normal, instances: &[Vec<u32>], make: &mut 
         }
     }
     for (action, list) in normal.actions.iter().zip(instances) {
-        let deletes: Vec<&Effect_> = action
-            .start_effects
-            .iter()
-            .chain(&action.end_effects)
-            .filter(|e| matches!(e.change, Change_::Delete(_)))
-            .collect();
-        for_instances(action, list, |binding| {
+        let effects = action.start_effects.iter().chain(&action.end_effects);
+        let deletes = effects.filter(|effect| matches!(effect.change, Change_::Delete(_)));
+        let deletes: Vec<Effect_> = deletes.map(unconditional).collect();
+        let mut gone = Vec::new();
+        for_instances(action, list, stop, |binding| {
             for effect in &deletes {
-                let mut out = Vec::new();
-                let bare = Effect_ {
-                    forall: effect.forall.clone(),
-                    when: normal::Timed3 {
-                        start: Formula::And(Vec::new()),
-                        over_all: Formula::And(Vec::new()),
-                        end: Formula::And(Vec::new()),
-                    },
-                    change: effect.change.clone(),
-                };
-                make.effect(&bare, false, binding, &action.domains, &mut out);
-                for gone in out {
-                    if let Deed::Delete(atom) = gone.deed {
-                        always[atom as usize] = false;
-                    }
+                make.effect(effect, false, binding, &action.domains, &mut gone);
+            }
+            for effect in gone.drain(..) {
+                if let Deed::Delete(atom) = effect.deed {
+                    always[atom as usize] = false;
                 }
             }
-        });
+        })?;
     }
     for module in 0..task.modules.len() as u32 {
         for target in normal::module_writes(task, module) {
@@ -230,15 +229,34 @@ fn mark_always(task: &Task, normal: &Normal, instances: &[Vec<u32>], make: &mut 
         }
     }
     make.always = always;
+    Ok(())
 }
 
-fn for_instances(action: &Action_, list: &[u32], mut body: impl FnMut(&mut Vec<u32>)) {
+/// The same effect whatever holds.
+fn unconditional(effect: &Effect_) -> Effect_ {
+    let nothing = || Formula::And(Vec::new());
+    Effect_ {
+        forall: effect.forall.clone(),
+        when: normal::Timed3 { start: nothing(), over_all: nothing(), end: nothing() },
+        change: effect.change.clone(),
+    }
+}
+
+fn for_instances(
+    action: &Action_,
+    list: &[u32],
+    stop: &dyn Fn() -> bool,
+    mut body: impl FnMut(&mut Vec<u32>),
+) -> Result<(), GroundError> {
     let width = action.arity + action.extra.len();
     let mut binding = vec![NONE; action.domains.len()];
     // Instances without arguments leave no trace: such an action is always made, and goes in the relaxed fixpoint
     // where it cannot be applied.
     let count = list.len().checked_div(width).unwrap_or(1);
     for i in 0..count {
+        if i % 1024 == 0 && stop() {
+            return Err(GroundError::Stopped);
+        }
         let arguments = &list[i * width..(i + 1) * width];
         binding[..action.arity].copy_from_slice(&arguments[..action.arity]);
         for (&slot, &value) in action.extra.iter().zip(&arguments[action.arity..]) {
@@ -246,6 +264,7 @@ fn for_instances(action: &Action_, list: &[u32], mut body: impl FnMut(&mut Vec<u
         }
         body(&mut binding);
     }
+    Ok(())
 }
 
 fn distinct(list: Vec<u32>, width: usize) -> Vec<u32> {
@@ -263,7 +282,8 @@ fn instantiate(
     rules: &Rules,
     mut instances: Vec<Vec<u32>>,
     make: &mut Instantiate<'_>,
-) -> (RawTask, bool) {
+    stop: &dyn Fn() -> bool,
+) -> Result<(RawTask, bool), GroundError> {
     let top = normal.rules.iter().map(|r| r.stratum + 1).max().unwrap_or(0);
     let mut resolve = Resolve::new(make.atoms.len() as u32);
     let mut axioms = Vec::new();
@@ -277,9 +297,9 @@ fn instantiate(
         if rules.repeats[index] {
             list = distinct(list, action.arity + action.extra.len());
         }
-        for_instances(action, &list, |binding| {
+        for_instances(action, &list, stop, |binding| {
             raw_actions(action, binding, make, &mut resolve, top, &mut actions);
-        });
+        })?;
     }
     let mut goal = Clauses::default();
     let mut binding = vec![NONE; normal.goal_domains.len()];
@@ -296,7 +316,7 @@ fn instantiate(
             init[atom as usize] = true;
         }
     }
-    (RawTask { actions, axioms, goal, init, inner: make.atoms.len() as u32, timed }, possible)
+    Ok((RawTask { actions, axioms, goal, init, inner: make.atoms.len() as u32, timed }, possible))
 }
 
 fn axioms_of(

@@ -3,7 +3,7 @@
 use rustc_hash::FxHashMap;
 use tracing::debug_span;
 
-use crate::invariants::{AtomNames, Transition, mutex_groups};
+use crate::invariants::{AtomNames, Transitions, mutex_groups};
 use crate::task::Task;
 
 use super::atoms::Atoms;
@@ -51,6 +51,7 @@ pub(super) fn groups(
     rules: &Rules,
     normal: &Normal,
     task: &Task,
+    stop: &dyn Fn() -> bool,
 ) -> Groups {
     let _span = debug_span!("invariants").entered();
     let functions = task.predicates.len() as u32;
@@ -75,26 +76,7 @@ pub(super) fn groups(
     let durative: Vec<usize> = (0..raw.actions.len()).filter(|&i| raw.actions[i].later.is_some()).collect();
     let tokens = durative.iter().map(|&i| (raw.actions[i].schema, &raw.actions[i].arguments[..])).collect();
     let names = Names { atoms: &make.atoms, first, first_token, tokens };
-    let mut transitions = Vec::with_capacity(raw.actions.len());
-    let mut token = first;
-    for action in &raw.actions {
-        let mut start = transition(&[&action.start], &action.effects, raw.inner);
-        let Some(later) = &action.later else {
-            transitions.push(start);
-            continue;
-        };
-        start.adds.push((token, Vec::new()));
-        let mut end = transition(&[&later.over_all, &later.end], &later.end_effects, raw.inner);
-        end.before.push(token);
-        end.deletes.push((token, Vec::new()));
-        token += 1;
-        transitions.extend([start, end]);
-    }
-    for (_, deeds) in &raw.timed {
-        let adds =
-            deeds.iter().filter_map(|d| if let Deed::Add(a) = d { Some((*a, Vec::new())) } else { None });
-        transitions.push(Transition { adds: adds.collect(), ..Transition::default() });
-    }
+    let transitions = transitions(raw, first);
     let by_module: Vec<u32> = (0..task.modules.len() as u32)
         .flat_map(|module| normal::module_writes(task, module))
         .filter_map(|target| if let Target::Truth(pattern) = target { Some(pattern.predicate) } else { None })
@@ -114,24 +96,49 @@ pub(super) fn groups(
     predicates.sort_unstable();
     predicates.dedup();
     let initial: Vec<u32> = plain.iter().copied().filter(|&a| raw.init[a as usize]).collect();
-    let found = mutex_groups(&names, &plain, &initial, &transitions, &predicates, first_token);
+    let found = mutex_groups(&names, &plain, &initial, &transitions, &predicates, first_token, stop);
     Groups { found, fixed: fixed_groups }
 }
 
+/// Every action, start, end and timed effect as a transition; tokens are numbered from `token` on.
+fn transitions(raw: &RawTask, mut token: u32) -> Transitions {
+    let mut all = Transitions::default();
+    for action in &raw.actions {
+        transition(&[&action.start], &action.effects, raw.inner, &mut all);
+        if let Some(later) = &action.later {
+            all.adds(token, Vec::new());
+            all.close();
+            transition(&[&later.over_all, &later.end], &later.end_effects, raw.inner, &mut all);
+            all.before(token);
+            all.deletes(token, Vec::new());
+            token += 1;
+        }
+        all.close();
+    }
+    for (_, deeds) in &raw.timed {
+        for deed in deeds {
+            if let Deed::Add(atom) = deed {
+                all.adds(*atom, Vec::new());
+            }
+        }
+        all.close();
+    }
+    all
+}
+
 /// A start or an end as a transition; conditions that are not atoms make a deletion unreliable.
-fn transition(before: &[&Clauses], effects: &[GroundEffect], inner: u32) -> Transition {
-    let positive =
-        |c: &Clauses| c.literals.iter().filter(|&&l| l & 1 == 0).map(|&l| l >> 1).collect::<Vec<_>>();
-    let mut made =
-        Transition { before: before.iter().flat_map(|c| positive(c)).collect(), ..Transition::default() };
-    made.before.sort_unstable();
-    made.before.dedup();
+fn transition(before: &[&Clauses], effects: &[GroundEffect], inner: u32, into: &mut Transitions) {
+    let positive = |c: &Clauses| {
+        let literals = c.literals.iter().filter(|&&l| l & 1 == 0);
+        literals.map(|&l| l >> 1).collect::<Vec<_>>()
+    };
+    for clauses in before {
+        clauses.literals.iter().filter(|&&l| l & 1 == 0).for_each(|&l| into.before(l >> 1));
+    }
     for effect in effects {
         let when = effect.when.as_deref();
         match effect.deed {
-            Deed::Add(atom) => {
-                made.adds.push((atom, when.map_or_else(Vec::new, |w| positive(&w[0]))));
-            }
+            Deed::Add(atom) => into.adds(atom, when.map_or_else(Vec::new, |w| positive(&w[0]))),
             Deed::Delete(atom) => {
                 let plain = |c: &Clauses| {
                     c.comparisons.is_empty()
@@ -139,9 +146,9 @@ fn transition(before: &[&Clauses], effects: &[GroundEffect], inner: u32) -> Tran
                         && c.literals.iter().all(|l| l & 1 == 0 && l >> 1 < inner)
                 };
                 match when {
-                    None => made.deletes.push((atom, Vec::new())),
+                    None => into.deletes(atom, Vec::new()),
                     Some(w) if plain(&w[0]) && w[1].is_true() && w[2].is_true() => {
-                        made.deletes.push((atom, positive(&w[0])));
+                        into.deletes(atom, positive(&w[0]));
                     }
                     Some(_) => {}
                 }
@@ -149,5 +156,4 @@ fn transition(before: &[&Clauses], effects: &[GroundEffect], inner: u32) -> Tran
             Deed::Change(..) | Deed::Call(_) => {}
         }
     }
-    made
 }

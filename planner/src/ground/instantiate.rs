@@ -100,6 +100,9 @@ pub(super) struct GroundEffect {
     pub deed: Deed,
 }
 
+/// A condition that cannot hold.
+struct Never;
+
 /// Makes ground things and numbers numeric fluents, comparisons and calls.
 pub(super) struct Instantiate<'a> {
     pub statics: &'a Statics<'a>,
@@ -301,7 +304,11 @@ impl<'a> Instantiate<'a> {
             return id;
         }
         let mut writes = Vec::new();
-        for target in module_writes(self.statics.task, call.index) {
+        let written = match self.statics.task.modules[call.index as usize].writes.is_empty() {
+            true => Vec::new(),
+            false => module_writes(self.statics.task, call.index),
+        };
+        for target in written {
             writes.push(match target {
                 Target::Number(named) => RawPlace::Number(self.numeric(&named, &origin.arguments)),
                 Target::Truth(pattern) => RawPlace::Truth(found(&self.atoms, &pattern, &origin.arguments)),
@@ -343,18 +350,7 @@ impl<'a> Instantiate<'a> {
         domains: &[Arc<[ObjectId]>],
         into: &mut Vec<GroundEffect>,
     ) {
-        let mut parts = [Clauses::default(), Clauses::default(), Clauses::default()];
-        let formulas = [&effect.when.start, &effect.when.over_all, &effect.when.end];
-        for (formula, part) in formulas.into_iter().zip(&mut parts) {
-            if !self.conjoin(formula, binding, domains, part) {
-                return;
-            }
-            part.tidy();
-        }
-        let [start, over_all, end] = parts;
-        let (here, at_start) = if at_end { (end, start) } else { (start, Clauses::default()) };
-        let always = here.is_true() && at_start.is_true() && over_all.is_true();
-        let when = if always { None } else { Some(Box::new([here, at_start, over_all])) };
+        let Ok(when) = self.when(effect, at_end, binding, domains) else { return };
         let mut push = |deed| into.push(GroundEffect { when: when.clone(), deed });
         match &effect.change {
             Change_::Add(pattern) => {
@@ -381,6 +377,31 @@ impl<'a> Instantiate<'a> {
             }
             Change_::Call(call) => push(Deed::Call(self.call(call, binding))),
         }
+    }
+
+    /// The condition of an effect, `None` for always; `Err` if it can never hold.
+    fn when(
+        &mut self,
+        effect: &Effect_,
+        at_end: bool,
+        binding: &mut Vec<u32>,
+        domains: &[Arc<[ObjectId]>],
+    ) -> Result<Option<Box<[Clauses; 3]>>, Never> {
+        let formulas = [&effect.when.start, &effect.when.over_all, &effect.when.end];
+        if formulas.iter().all(|formula| matches!(formula, Formula::And(parts) if parts.is_empty())) {
+            return Ok(None);
+        }
+        let mut parts = [Clauses::default(), Clauses::default(), Clauses::default()];
+        for (formula, part) in formulas.into_iter().zip(&mut parts) {
+            if !self.conjoin(formula, binding, domains, part) {
+                return Err(Never);
+            }
+            part.tidy();
+        }
+        let [start, over_all, end] = parts;
+        let (here, at_start) = if at_end { (end, start) } else { (start, Clauses::default()) };
+        let always = here.is_true() && at_start.is_true() && over_all.is_true();
+        Ok(if always { None } else { Some(Box::new([here, at_start, over_all])) })
     }
 
     /// The reached atoms of an object function's instance, one a value.

@@ -91,6 +91,10 @@ impl Resolve {
 
     /// The condition as few alternatives without disjunctions.
     pub(super) fn split(&mut self, mut clauses: Clauses, stratum: u32) -> Vec<Clauses> {
+        if clauses.ors.is_empty() {
+            clauses.tidy();
+            return if contradictory(&clauses) { Vec::new() } else { vec![clauses] };
+        }
         let mut all = vec![Clauses::default()];
         for or in std::mem::take(&mut clauses.ors) {
             if all.len() * or.len() > MOST_COPIES {

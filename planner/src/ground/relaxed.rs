@@ -19,21 +19,22 @@ struct Unary {
 
 struct Fixpoint {
     unary: Vec<Unary>,
-    /// By atom (those beyond the task's stand for "the action was started"): operators that wait for it.
-    waiting: Vec<Vec<u32>>,
+    /// Atoms (those beyond the task's stand for "the action was started") with operators that wait for them.
+    waits: Vec<(u32, u32)>,
+    /// What the operator at hand waits for.
+    wanted: Vec<u32>,
 }
 
 impl Fixpoint {
     fn add<'c>(&mut self, conditions: impl Iterator<Item = &'c Clauses>, extra: Option<u32>, reaches: u32) {
-        let mut wanted: Vec<u32> =
-            conditions.flat_map(|c| &c.literals).filter(|&&l| l & 1 == 0).map(|l| l >> 1).collect();
-        wanted.extend(extra);
+        let positive = conditions.flat_map(|c| &c.literals).filter(|&&l| l & 1 == 0).map(|l| l >> 1);
+        let wanted = &mut self.wanted;
+        wanted.clear();
+        wanted.extend(positive.chain(extra));
         wanted.sort_unstable();
         wanted.dedup();
         let id = self.unary.len() as u32;
-        for &atom in &wanted {
-            self.waiting[atom as usize].push(id);
-        }
+        self.waits.extend(wanted.iter().map(|&atom| (atom, id)));
         self.unary.push(Unary { missing: wanted.len() as u32, reaches });
     }
 
@@ -49,8 +50,9 @@ impl Fixpoint {
         }
     }
 
-    fn run(mut self, init: &[bool]) -> Vec<bool> {
-        let mut reached = vec![false; self.waiting.len()];
+    fn run(mut self, init: &[bool], count: usize) -> Vec<bool> {
+        let mut reached = vec![false; count];
+        let (from, waiting) = self.by_atom(count);
         let mut queue: Vec<u32> = Vec::new();
         let reach = |atom: u32, queue: &mut Vec<u32>, reached: &mut Vec<bool>| {
             if !std::mem::replace(&mut reached[atom as usize], true) {
@@ -66,7 +68,8 @@ impl Fixpoint {
             }
         }
         while let Some(atom) = queue.pop() {
-            for id in std::mem::take(&mut self.waiting[atom as usize]) {
+            let own = from[atom as usize] as usize..from[atom as usize + 1] as usize;
+            for &id in &waiting[own] {
                 let unary = &mut self.unary[id as usize];
                 unary.missing -= 1;
                 if unary.missing == 0 {
@@ -76,13 +79,29 @@ impl Fixpoint {
         }
         reached
     }
+
+    /// The operators that wait for each atom one after the other, and where those of an atom begin.
+    fn by_atom(&self, count: usize) -> (Vec<u32>, Vec<u32>) {
+        let mut from = vec![0; count + 2];
+        self.waits.iter().for_each(|&(atom, _)| from[atom as usize + 2] += 1);
+        for atom in 2..from.len() {
+            from[atom] += from[atom - 1];
+        }
+        let mut waiting = vec![0; self.waits.len()];
+        for &(atom, id) in &self.waits {
+            let place = &mut from[atom as usize + 1];
+            waiting[*place as usize] = id;
+            *place += 1;
+        }
+        (from, waiting)
+    }
 }
 
 /// Removes actions, effects and axioms that need what cannot be reached, and conditions that always hold. Returns
 /// what is reachable.
 pub(super) fn prune(task: &mut RawTask, calls: &[RawCall]) -> Reached {
     let count = task.init.len();
-    let mut fixpoint = Fixpoint { unary: Vec::new(), waiting: vec![Vec::new(); count + task.actions.len()] };
+    let mut fixpoint = Fixpoint { unary: Vec::new(), waits: Vec::new(), wanted: Vec::new() };
     for (index, action) in task.actions.iter().enumerate() {
         let started = (count + index) as u32;
         fixpoint.add(std::iter::once(&action.start), None, started);
@@ -106,7 +125,7 @@ pub(super) fn prune(task: &mut RawTask, calls: &[RawCall]) -> Reached {
             }
         }
     }
-    let mut atoms = fixpoint.run(&init);
+    let mut atoms = fixpoint.run(&init, count + task.actions.len());
     task.actions.retain({
         let mut index = 0;
         let atoms = &atoms;

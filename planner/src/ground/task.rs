@@ -410,3 +410,38 @@ pub struct GroundTask {
     /// Where it is out of reach: which atoms nobody achieves, the goal's first.
     pub obstacles: Vec<super::obstacles::Obstacle>,
 }
+
+impl GroundTask {
+    /// Bytes that its actions take, which are nearly all of it.
+    pub(crate) fn bytes(&self) -> usize {
+        let condition = |condition: &Conjunction| {
+            condition.facts.len() * size_of::<Fact>()
+                + condition.comparisons.len() * size_of::<ComparisonId>()
+                + condition.calls.len() * size_of::<(CallId, bool)>()
+        };
+        let effects = |effects: &[Effect]| {
+            let when = |when: &When| {
+                let parts = [&when.here, &when.at_start, &when.over_all];
+                size_of::<When>() + parts.into_iter().map(condition).sum::<usize>()
+            };
+            let conditional = effects.iter().filter_map(|effect| effect.when.as_deref());
+            size_of_val(effects) + conditional.map(when).sum::<usize>()
+        };
+        let actions = self
+            .actions
+            .iter()
+            .map(|action| size_of_val(action) + condition(&action.condition) + effects(&action.effects));
+        let durative = self.durative.iter().map(|action| {
+            let conditions = [&action.at_start, &action.over_all, &action.at_end];
+            let lists = [&action.start_effects, &action.flow_effects, &action.end_effects];
+            size_of_val(action)
+                + size_of_val(&action.duration[..])
+                + conditions.into_iter().map(condition).sum::<usize>()
+                + lists.into_iter().map(|list| effects(list)).sum::<usize>()
+        });
+        let origins = self.actions.iter().map(|action| &action.origin);
+        let origins = origins.chain(self.durative.iter().map(|action| &action.origin));
+        let named: usize = origins.map(|origin| size_of_val(&origin.arguments[..])).sum();
+        actions.sum::<usize>() + durative.sum::<usize>() + named
+    }
+}

@@ -14,6 +14,8 @@ pub(super) struct Encoding {
     absent: Vec<Option<Fact>>,
     /// By atom: a two-valued variable of its own besides the one that it shares.
     doubles: Vec<Option<u32>>,
+    /// By variable: whether one of its atoms has a double.
+    doubled: Vec<bool>,
     /// By variable: the value for "none of those".
     none: Vec<Option<u32>>,
     /// By atom: holds in every reachable state.
@@ -93,6 +95,7 @@ fn place(choice: Choice<'_>, mut chosen: Vec<Vec<u32>>, plain: usize) -> Encodin
         facts: vec![NOWHERE; count],
         absent: vec![None; count],
         doubles: vec![None; count],
+        doubled: Vec::new(),
         none: Vec::new(),
         always: choice.always,
         atoms: Vec::new(),
@@ -106,6 +109,9 @@ fn place(choice: Choice<'_>, mut chosen: Vec<Vec<u32>>, plain: usize) -> Encodin
         encoding.atoms.push(vec![atom]);
         encoding.none.push(Some(1));
         encoding.doubles[atom as usize] = Some(variable);
+        encoding.doubled.push(false);
+        let shared = encoding.facts[atom as usize].variable as usize;
+        encoding.doubled[shared] = true;
         encoding.absent[atom as usize] = Some(Fact { variable, value: 1 });
     }
     for group in derived {
@@ -125,6 +131,7 @@ impl Encoding {
             self.absent[atom as usize] = Some(Fact { variable, value: 1 });
         }
         self.none.push(Some(none));
+        self.doubled.push(false);
         self.atoms.push(group);
     }
 
@@ -159,33 +166,43 @@ impl Encoding {
 
     /// The effects over variables, given what holds before them. What takes away comes first.
     pub(super) fn effects(&self, effects: &[GroundEffect], before: &[&Conjunction]) -> Vec<Effect> {
-        let (mut away, mut rest) = (Vec::new(), Vec::new());
+        let mut all = Vec::with_capacity(effects.len());
         for effect in effects {
             match &effect.deed {
-                Deed::Delete(atom) => self.delete(*atom, effect, effects, before, &mut away),
+                Deed::Delete(atom) => self.delete(*atom, effect, effects, before, &mut all),
+                Deed::Add(atom) => self.replace(*atom, effect, &mut all),
+                Deed::Change(..) | Deed::Call(_) => {}
+            }
+        }
+        for effect in effects {
+            match &effect.deed {
+                Deed::Delete(_) => {}
                 Deed::Add(atom) => {
-                    // One value replaces the others: an assignment names no deletion.
-                    let others = self.fact(*atom).map_or(&[][..], |fact| &self.atoms[fact.variable as usize]);
-                    for other in others.iter().filter(|&other| other != atom) {
-                        if let Some(variable) = self.doubles[*other as usize] {
-                            self.push(effect, None, Outcome::Set(Fact { variable, value: 1 }), &mut away);
-                        }
-                    }
                     let double = self.doubles[*atom as usize].map(|variable| Fact { variable, value: 0 });
                     for fact in self.fact(*atom).into_iter().chain(double) {
-                        self.push(effect, None, Outcome::Set(fact), &mut rest);
+                        self.push(effect, None, Outcome::Set(fact), &mut all);
                     }
                 }
                 Deed::Change(fluent, change, amount) => {
                     let amount = (**amount).clone();
                     let outcome = Outcome::Change { fluent: *fluent, change: *change, amount };
-                    self.push(effect, None, outcome, &mut rest);
+                    self.push(effect, None, outcome, &mut all);
                 }
-                Deed::Call(call) => self.push(effect, None, Outcome::Call(*call), &mut rest),
+                Deed::Call(call) => self.push(effect, None, Outcome::Call(*call), &mut all),
             }
         }
-        away.append(&mut rest);
-        away
+        all
+    }
+
+    /// One value replaces the others: an assignment names no deletion, but their doubles must hear of it.
+    fn replace(&self, atom: u32, effect: &GroundEffect, out: &mut Vec<Effect>) {
+        let variable = self.fact(atom).map(|fact| fact.variable as usize);
+        let Some(variable) = variable.filter(|&variable| self.doubled[variable]) else { return };
+        for &other in self.atoms[variable].iter().filter(|&&other| other != atom) {
+            if let Some(variable) = self.doubles[other as usize] {
+                self.push(effect, None, Outcome::Set(Fact { variable, value: 1 }), out);
+            }
+        }
     }
 
     fn delete(

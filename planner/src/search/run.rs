@@ -57,8 +57,15 @@ pub(crate) fn solve(
     on_plan: &mut dyn FnMut(&[u32], f64),
 ) -> ClassicalOutcome {
     let _span = debug_span!("classical").entered();
+    let stopped = ClassicalOutcome { end: ClassicalEnd::Stopped, evaluated: 0, expanded: 0 };
     let task = Compiled::new(ground);
+    if stop() {
+        return stopped;
+    }
     let successors = Successors::new(&task);
+    if stop() {
+        return stopped;
+    }
     let landmarks = debug_span!("landmarks").in_scope(|| Landmarks::new(&task, &ground.mutex_groups, stop));
     let shared = Shared {
         task: &task,

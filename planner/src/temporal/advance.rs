@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::attachment::Level;
 use crate::calls::Failure;
-use crate::ground::{Effect, Outcome, Values};
+use crate::ground::{Change, Effect, Outcome, Values};
 
 use super::order::Access;
 use super::relaxed::Part;
@@ -225,76 +225,100 @@ pub(crate) struct Accesses {
 impl Accesses {
     /// Of all actions and timed effects.
     pub fn new(world: &World) -> Accesses {
-        let variables = world.ground.variables.len();
-        let roots = derived_roots(world);
-        let acts = world.acts.iter().map(|act| {
-            let mut start = Touched::default();
-            start.condition(world, act.at_start);
-            start.condition(world, act.over_all);
-            act.bounds.iter().for_each(|bound| expression_touches(world, &bound.seconds, &mut start));
-            for when in act.end_effects.iter().filter_map(|effect| effect.when.as_ref()) {
-                start.condition(world, &when.at_start);
-                start.condition(world, &when.over_all);
-            }
-            let at_start = access(world, &roots, start, act.start_effects);
-            let at_end = act.durative.then(|| {
-                let mut end = Touched::default();
-                end.condition(world, act.over_all);
-                end.condition(world, act.at_end);
-                let effects: Vec<Effect> = act.flow_effects.iter().chain(act.end_effects).cloned().collect();
-                access(world, &roots, end, &effects)
-            });
-            (at_start, at_end)
-        });
+        let resources = world.ground.variables.len() + world.ground.numerics.len();
+        let mut watch = Watch::new(world);
+        let acts = world.acts.iter().map(|act| (watch.start(act), act.durative.then(|| watch.end(act))));
         let acts = acts.collect();
         let timed = world.ground.timed.iter().map(|timed| {
             let effects = always(&timed.outcomes);
-            access(world, &roots, Touched::default(), &effects)
+            watch.access(effects.iter())
         });
         let timed = timed.collect();
-        Accesses { acts, timed, resources: variables + world.ground.numerics.len() }
+        Accesses { acts, timed, resources }
     }
 }
 
-fn access(world: &World, roots: &[Vec<u32>], mut reads: Touched, effects: &[Effect]) -> Access {
-    use crate::ground::Change;
-    let variables = world.ground.variables.len();
-    let (mut written, mut added) = (Touched::default(), Touched::default());
-    for effect in effects {
-        if let Some(when) = &effect.when {
-            reads.condition(world, &when.here);
-            reads.condition(world, &when.over_all);
-        }
-        match &effect.outcome {
-            Outcome::Change { fluent, change: Change::Increase | Change::Decrease, amount } => {
-                expression_touches(world, amount, &mut reads);
-                added.numbers.push(*fluent);
-            }
-            Outcome::Change { amount, .. } => {
-                expression_touches(world, amount, &mut reads);
-                written.outcome(world, &effect.outcome);
-            }
-            Outcome::Flow { rate, .. } => {
-                expression_touches(world, rate, &mut reads);
-                written.outcome(world, &effect.outcome);
-            }
-            Outcome::Call(call) => {
-                reads.call(world, *call);
-                written.outcome(world, &effect.outcome);
-            }
-            Outcome::Set(_) => written.outcome(world, &effect.outcome),
-        }
+/// Notes what happenings touch, one after the other.
+struct Watch<'w, 'a> {
+    world: &'w World<'a>,
+    /// By derived variable, what it is derived from.
+    roots: Vec<Vec<u32>>,
+    read: Touched,
+    written: Touched,
+    added: Touched,
+}
+
+impl<'w, 'a> Watch<'w, 'a> {
+    fn new(world: &'w World<'a>) -> Watch<'w, 'a> {
+        let [read, written, added] = [(); 3].map(|()| Touched::default());
+        Watch { world, roots: derived_roots(world), read, written, added }
     }
-    let mut read: Vec<u32> = Vec::new();
-    for resource in reads.resources(variables) {
-        match roots.get(resource as usize).filter(|roots| !roots.is_empty()) {
-            Some(roots) => read.extend(roots),
-            None => read.push(resource),
+
+    fn start(&mut self, act: &Act) -> Access {
+        let (world, read) = (self.world, &mut self.read);
+        read.condition(world, act.at_start);
+        read.condition(world, act.over_all);
+        act.bounds.iter().for_each(|bound| expression_touches(world, &bound.seconds, read));
+        for when in act.end_effects.iter().filter_map(|effect| effect.when.as_ref()) {
+            read.condition(world, &when.at_start);
+            read.condition(world, &when.over_all);
         }
+        self.access(act.start_effects.iter())
     }
-    read.sort_unstable();
-    read.dedup();
-    Access { reads: read, writes: written.resources(variables), adds: added.resources(variables) }
+
+    fn end(&mut self, act: &Act) -> Access {
+        self.read.condition(self.world, act.over_all);
+        self.read.condition(self.world, act.at_end);
+        self.access(act.flow_effects.iter().chain(act.end_effects))
+    }
+
+    /// What has been noted as read, and what these effects touch.
+    fn access<'e>(&mut self, effects: impl Iterator<Item = &'e Effect>) -> Access {
+        let (world, read) = (self.world, &mut self.read);
+        for effect in effects {
+            if let Some(when) = &effect.when {
+                read.condition(world, &when.here);
+                read.condition(world, &when.over_all);
+            }
+            match &effect.outcome {
+                Outcome::Change { fluent, change: Change::Increase | Change::Decrease, amount } => {
+                    expression_touches(world, amount, read);
+                    self.added.numbers.push(*fluent);
+                }
+                Outcome::Change { amount, .. } => {
+                    expression_touches(world, amount, read);
+                    self.written.outcome(world, &effect.outcome);
+                }
+                Outcome::Flow { rate, .. } => {
+                    expression_touches(world, rate, read);
+                    self.written.outcome(world, &effect.outcome);
+                }
+                Outcome::Call(call) => {
+                    read.call(world, *call);
+                    self.written.outcome(world, &effect.outcome);
+                }
+                Outcome::Set(_) => self.written.outcome(world, &effect.outcome),
+            }
+        }
+        let variables = world.ground.variables.len();
+        let mut reads = self.read.resources(variables);
+        if reads.iter().any(|&resource| self.roots_of(resource).is_some()) {
+            let traced = |&resource: &u32| match self.roots_of(resource) {
+                Some(roots) => roots.to_vec(),
+                None => vec![resource],
+            };
+            reads = reads.iter().flat_map(traced).collect();
+            reads.sort_unstable();
+            reads.dedup();
+        }
+        let (writes, adds) = (self.written.resources(variables), self.added.resources(variables));
+        [&mut self.read, &mut self.written, &mut self.added].into_iter().for_each(Touched::clear);
+        Access { reads, writes, adds }
+    }
+
+    fn roots_of(&self, resource: u32) -> Option<&[u32]> {
+        self.roots.get(resource as usize).filter(|roots| !roots.is_empty()).map(Vec::as_slice)
+    }
 }
 
 /// By derived variable, the resources that its axioms read in the end; empty for others.

@@ -30,9 +30,10 @@ pub(crate) fn all_apart(world: &World) -> Vec<bool> {
 pub(crate) fn in_one_go_suffices(world: &World) -> bool {
     let wanted = Wanted::new(world);
     let mut written = vec![Vec::new(); world.ground.variables.len()];
+    let mut touched = Touched::default();
     for (index, act) in world.acts.iter().enumerate() {
         for effect in act.start_effects.iter().chain(act.end_effects) {
-            let mut touched = Touched::default();
+            touched.clear();
             touched.outcome(world, &effect.outcome);
             touched.variables.iter().for_each(|&variable| written[variable as usize].push(index as u32));
         }

@@ -14,7 +14,7 @@ use crate::attachment::Level;
 use crate::calls::Failure;
 use crate::ground::{Change, Expression, Outcome, Values};
 
-use super::relaxed::{NOBODY, Operator, Part, Relaxed, Seconds, Test};
+use super::relaxed::{NOBODY, Operator, Part, Relaxed, Seconds, Test, Waiter};
 use super::world::{Moment, World};
 
 /// What the heuristic says of a state.
@@ -46,11 +46,21 @@ pub(super) struct Work {
     labels: Vec<f64>,
     supporters: Vec<(u32, f32)>,
     wanted: Vec<bool>,
-    open_needs: Vec<u32>,
-    /// Label of what the operator needs, then what it costs itself.
-    bases: Vec<f64>,
-    own: Vec<f64>,
+    /// By operator that needs more than one thing.
+    waiting: Vec<Waiting>,
+    /// By operator: the label of what it needs, and what it costs itself; of operators that were of use.
+    fired: Vec<(f64, f64)>,
     queue: BinaryHeap<Reverse<(Key, u32)>>,
+    evaluation: u32,
+}
+
+/// How far what an operator needs is reached.
+#[derive(Debug, Clone, Copy, Default)]
+struct Waiting {
+    /// The evaluation that this is about.
+    evaluation: u32,
+    missing: u32,
+    base: f64,
 }
 
 impl Work {
@@ -59,10 +69,34 @@ impl Work {
             labels: vec![f64::INFINITY; propositions],
             supporters: vec![(NOBODY, 1.0); propositions],
             wanted: vec![false; propositions],
-            open_needs: vec![0; operators],
-            bases: vec![0.0; operators],
-            own: vec![0.0; operators],
+            waiting: vec![Waiting::default(); operators],
+            fired: vec![(0.0, 0.0); operators],
             queue: BinaryHeap::new(),
+            evaluation: 0,
+        }
+    }
+
+    /// Notes that one of the `needs` of an operator has this label; the label of all of them once that was the last.
+    fn meet(&mut self, operator: u32, needs: u32, label: f64, timed: bool) -> Option<f64> {
+        if needs == 1 {
+            return Some(label);
+        }
+        let waiting = &mut self.waiting[operator as usize];
+        if waiting.evaluation != self.evaluation {
+            *waiting = Waiting { evaluation: self.evaluation, missing: needs, base: 0.0 };
+        }
+        waiting.base = if timed { waiting.base.max(label) } else { waiting.base + label };
+        waiting.missing -= 1;
+        (waiting.missing == 0).then_some(waiting.base)
+    }
+
+    fn begin(&mut self) {
+        self.labels.fill(f64::INFINITY);
+        self.queue.clear();
+        self.evaluation = self.evaluation.wrapping_add(1);
+        if self.evaluation == 0 {
+            self.waiting.fill(Waiting::default());
+            self.evaluation = 1;
         }
     }
 
@@ -101,9 +135,8 @@ impl Relaxed {
                 return Ok(None);
             }
         }
-        let closed_base = self.token_base + world.acts.len() as u32;
-        let goal: Vec<u32> =
-            self.goal.iter().copied().chain(from.open.iter().map(|&act| closed_base + act)).collect();
+        let closed = from.open.iter().map(|act| self.tokens[act].1);
+        let goal: Vec<u32> = self.goal.iter().copied().chain(closed).collect();
         self.seed(world, from)?;
         goal.iter().for_each(|&need| self.work.wanted[need as usize] = true);
         let spread = self.spread(world, from, goal.len());
@@ -116,8 +149,9 @@ impl Relaxed {
     }
 
     fn spread(&mut self, world: &World, from: &From, mut missing: usize) -> Result<(), Failure> {
+        let timed = from.ready_s.is_some();
         for position in 0..self.free.len() {
-            self.fire(world, from, self.free[position])?;
+            self.fire(world, from, self.free[position], 0.0)?;
         }
         while let Some(Reverse((Key(label), proposition))) = self.work.queue.pop() {
             if label > self.work.labels[proposition as usize] {
@@ -131,12 +165,16 @@ impl Relaxed {
             }
             let own = self.needed_from[proposition as usize]..self.needed_from[proposition as usize + 1];
             for position in own {
-                let operator = self.needed_by[position as usize] as usize;
-                let base = &mut self.work.bases[operator];
-                *base = if from.ready_s.is_some() { base.max(label) } else { *base + label };
-                self.work.open_needs[operator] -= 1;
-                if self.work.open_needs[operator] == 0 {
-                    self.fire(world, from, operator as u32)?;
+                let Waiter { operator, target, seconds, step } = self.needed_by[position as usize];
+                let least = if timed { seconds } else { seconds + step };
+                // Whatever else it needs, it comes too late.
+                if target != NOBODY && self.work.labels[target as usize] <= label + least {
+                    continue;
+                }
+                let needs = self.hot[operator as usize].needs;
+                if let Some(base) = self.work.meet(operator, needs, label, timed) {
+                    self.fire(world, from, operator, base)?;
+                    self.needed_by[position as usize].seconds = self.hot[operator as usize].seconds.max(0.0);
                 }
             }
         }
@@ -145,10 +183,7 @@ impl Relaxed {
 
     fn seed(&mut self, world: &World, from: &From) -> Result<(), Failure> {
         let work = &mut self.work;
-        work.labels.fill(f64::INFINITY);
-        work.queue.clear();
-        work.bases.fill(0.0);
-        work.open_needs.copy_from_slice(&self.need_counts);
+        work.begin();
         let ready_s = |resource: usize| from.ready_s.map_or(0.0, |ready_s| ready_s[resource]);
         for (variable, &value) in from.state.values.iter().enumerate() {
             work.reach(self.offsets[variable] + value, ready_s(variable), NOBODY, 1.0);
@@ -167,18 +202,20 @@ impl Relaxed {
             }
         }
         for &act in from.open {
-            work.reach(self.token_base + act, 0.0, NOBODY, 1.0);
+            work.reach(self.tokens[&act].0, 0.0, NOBODY, 1.0);
         }
         Ok(())
     }
 
-    /// Everything that the operator needs is reached.
-    fn fire(&mut self, world: &World, from: &From, index: u32) -> Result<(), Failure> {
-        let base = self.work.bases[index as usize];
+    /// Everything that the operator needs is reached, at this label.
+    fn fire(&mut self, world: &World, from: &From, index: u32, base: f64) -> Result<(), Failure> {
         let hot = self.hot[index as usize];
+        let timed = from.ready_s.is_some();
+        // What it takes in any case; nothing where that is not known yet.
+        let least = hot.seconds.max(0.0) + if timed { 0.0 } else { hot.step };
         let labels = &self.work.labels;
         let given = &self.given[hot.gives as usize..hot.end as usize];
-        if !given.iter().any(|&given| labels[given as usize] > base) {
+        if !given.iter().any(|&given| labels[given as usize] > base + least) {
             return Ok(());
         }
         let mut seconds = hot.seconds;
@@ -192,8 +229,7 @@ impl Relaxed {
             return Ok(());
         }
         let cost = seconds + hot.step;
-        self.work.own[index as usize] = cost;
-        let timed = from.ready_s.is_some();
+        self.work.fired[index as usize] = (base, cost);
         let label = base + if timed { seconds } else { cost };
         for &proposition in &self.given[hot.gives as usize..hot.moves as usize] {
             self.work.reach(proposition, label, index, 1.0);
@@ -311,8 +347,9 @@ impl Relaxed {
             if operator.part == Part::Free {
                 continue;
             }
-            estimate.cost += work.own[index as usize] * f64::from(times);
-            plan.push((work.bases[index as usize], own(index)));
+            let (base, cost) = work.fired[index as usize];
+            estimate.cost += cost * f64::from(times);
+            plan.push((base, own(index)));
             if operator.needs.iter().all(|&need| work.supporters[need as usize].0 == NOBODY) {
                 estimate.preferred.push((operator.act, operator.part));
             }

@@ -55,9 +55,23 @@ pub(super) struct Hot {
     pub(super) gives: u32,
     pub(super) moves: u32,
     pub(super) end: u32,
+    /// How much it needs.
+    pub(super) needs: u32,
     /// Whether nobody else need be asked whether it can be applied.
     pub(super) plain: bool,
     /// Seconds that it takes, infinite where it can never be applied; NaN where that must be asked.
+    pub(super) seconds: f64,
+    /// What being a step counts.
+    pub(super) step: f64,
+}
+
+/// An operator that needs a proposition.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Waiter {
+    pub(super) operator: u32,
+    /// The only thing that it gives or moves; [`NOBODY`] where there are more.
+    pub(super) target: u32,
+    /// Seconds that it takes, as far as known by now.
     pub(super) seconds: f64,
     /// What being a step counts.
     pub(super) step: f64,
@@ -94,7 +108,9 @@ pub(crate) struct Relaxed {
     /// By resource, the tests that read it.
     tests_on: Vec<Vec<u32>>,
     pub(super) test_base: u32,
-    /// Propositions from here on say that an action is open; after those of all actions, that it is closed.
+    /// By action whose start and end are apart: the propositions that say that it is open, and that it is closed.
+    pub(super) tokens: FxHashMap<u32, (u32, u32)>,
+    /// First of those.
     pub(super) token_base: u32,
     pub(super) operators: Vec<Operator>,
     pub(super) hot: Vec<Hot>,
@@ -102,16 +118,16 @@ pub(crate) struct Relaxed {
     pub(super) given: Vec<u32>,
     /// By proposition, where its operators begin in `needed_by`.
     pub(super) needed_from: Vec<u32>,
-    pub(super) needed_by: Vec<u32>,
+    pub(super) needed_by: Vec<Waiter>,
     pub(super) goal: Vec<u32>,
     pub(super) goal_gates: Vec<(CallId, bool)>,
     /// Mean duration: what being a step at all counts.
     pub(super) unit: f64,
-    /// By operator, how much it needs.
-    pub(super) need_counts: Vec<u32>,
     /// Operators that need nothing.
     pub(super) free: Vec<u32>,
     pub(super) work: Work,
+    /// Memory for what an operator being made changes.
+    touched: Touched,
 }
 
 pub(super) const NOBODY: u32 = u32::MAX;
@@ -120,12 +136,14 @@ impl Relaxed {
     /// The relaxed task; `open_act` says of each action whether its start and end are apart in the search.
     pub fn new(world: &World, open_act: &[bool]) -> Relaxed {
         let mut relaxed = Relaxed::empty(world);
-        let acts = world.acts.len() as u32;
+        let apart = (0..world.acts.len() as u32).filter(|&act| open_act[act as usize]);
+        let base = relaxed.token_base;
+        relaxed.tokens =
+            apart.zip(0..).map(|(act, rank)| (act, (base + 2 * rank, base + 2 * rank + 1))).collect();
         for (index, act) in world.acts.iter().enumerate() {
             let act_index = index as u32;
             let seconds = seconds_of(world, index);
-            if open_act[index] {
-                let token = relaxed.token_base + act_index;
+            if let Some(&(open, closed)) = relaxed.tokens.get(&act_index) {
                 let before = needs_at_start(act, act.start_effects);
                 relaxed.operator(
                     world,
@@ -135,10 +153,10 @@ impl Relaxed {
                     &[],
                     seconds.or_zero(matches!(seconds, Seconds::Known(_))),
                 );
-                relaxed.tokens(act_index, Part::Start, token);
+                relaxed.give(act_index, Part::Start, open);
                 let before = Merged::of(&[act.at_end]);
-                relaxed.operator(world, act_index, Part::End, &before, &[token], seconds);
-                relaxed.tokens(act_index, Part::End, token + acts);
+                relaxed.operator(world, act_index, Part::End, &before, &[open], seconds);
+                relaxed.give(act_index, Part::End, closed);
             } else {
                 let before = needs_of_whole(act);
                 relaxed.operator(world, act_index, Part::Whole, &before, &[], seconds);
@@ -191,6 +209,7 @@ impl Relaxed {
         Relaxed {
             offsets,
             test_base: next,
+            tokens: FxHashMap::default(),
             token_base,
             test_index,
             tests_on,
@@ -205,9 +224,9 @@ impl Relaxed {
             goal: Vec::new(),
             goal_gates: Vec::new(),
             unit: 1.0,
-            need_counts: Vec::new(),
             free: Vec::new(),
             work: Work::default(),
+            touched: Touched::default(),
         }
     }
 
@@ -219,23 +238,20 @@ impl Relaxed {
         self.offsets[fact.variable as usize] + fact.value
     }
 
-    /// The facts that an outcome may make true; of an effect module every value of what it writes.
-    fn given(&self, world: &World, outcome: &Outcome) -> Vec<u32> {
+    /// Adds the facts that an outcome may make true; of an effect module every value of what it writes.
+    fn given(&self, world: &World, outcome: &Outcome, into: &mut Vec<u32>) {
         match outcome {
-            Outcome::Set(fact) => vec![self.fact(*fact)],
+            Outcome::Set(fact) => into.push(self.fact(*fact)),
             Outcome::Call(call) => {
-                let places = world.ground.calls[*call as usize].writes.iter();
-                let variables = places.filter_map(|place| match place {
-                    Place::Truth(variable) | Place::Object(variable) => Some(*variable),
-                    Place::Number(_) | Place::Nowhere => None,
-                });
-                let every = |variable: u32| 0..world.ground.variables[variable as usize].domain_size();
-                variables
-                    .flat_map(|v| every(v).map(move |value| (v, value)))
-                    .map(|(v, value)| self.offsets[v as usize] + value)
-                    .collect()
+                for place in &world.ground.calls[*call as usize].writes {
+                    if let Place::Truth(variable) | Place::Object(variable) = place {
+                        let values = world.ground.variables[*variable as usize].domain_size();
+                        let first = self.offsets[*variable as usize];
+                        into.extend(first..first + values);
+                    }
+                }
             }
-            Outcome::Change { .. } | Outcome::Flow { .. } => Vec::new(),
+            Outcome::Change { .. } | Outcome::Flow { .. } => {}
         }
     }
 
@@ -262,11 +278,12 @@ impl Relaxed {
             Part::Start => action.start_effects.iter().collect(),
             Part::End | Part::Free => action.flow_effects.iter().chain(action.end_effects).collect(),
         };
-        let mut groups: Vec<(Merged, Vec<&Outcome>)> = vec![(Merged::default(), Vec::new())];
+        let plain = effects.iter().filter(|effect| effect.when.is_none());
+        let plain: Vec<&Outcome> = plain.map(|effect| &effect.outcome).collect();
+        let mut groups: Vec<(Merged, Vec<&Outcome>)> = vec![(Merged::default(), plain)];
         for effect in effects {
-            let extra = effect.when.as_ref().map_or_else(Merged::default, |when| {
-                Merged::of(&[&when.here, &when.at_start, &when.over_all])
-            });
+            let Some(when) = &effect.when else { continue };
+            let extra = Merged::of(&[&when.here, &when.at_start, &when.over_all]);
             match groups.iter_mut().find(|(known, _)| *known == extra) {
                 Some((_, outcomes)) => outcomes.push(&effect.outcome),
                 None => groups.push((extra, vec![&effect.outcome])),
@@ -287,10 +304,9 @@ impl Relaxed {
             }
             needs.sort_unstable();
             needs.dedup();
-            let gives = outcomes.iter().flat_map(|outcome| self.given(world, outcome)).collect();
-            let mut touched = Touched::default();
-            outcomes.iter().for_each(|outcome| touched.outcome(world, outcome));
-            let mut moves = self.tests_touched(&touched);
+            let mut gives = Vec::with_capacity(outcomes.len());
+            outcomes.iter().for_each(|outcome| self.given(world, outcome, &mut gives));
+            let mut moves = self.tests_touched(world, &outcomes);
             moves.retain(|&test| match self.tests[(test - self.test_base) as usize] {
                 Test::Comparison(comparison) => may_help(world, &outcomes, comparison),
                 Test::Call(..) => true,
@@ -300,15 +316,19 @@ impl Relaxed {
     }
 
     /// Lets the operators just made for a part of an action give the token that it is open, or closed.
-    fn tokens(&mut self, act: u32, part: Part, token: u32) {
+    fn give(&mut self, act: u32, part: Part, token: u32) {
         let own = self.operators.iter_mut().rev().take_while(|operator| operator.act == act);
         own.filter(|operator| operator.part == part).for_each(|operator| operator.gives.push(token));
     }
 
-    fn tests_touched(&self, touched: &Touched) -> Vec<u32> {
-        let resources = touched.resources(self.offsets.len());
+    fn tests_touched(&mut self, world: &World, outcomes: &[&Outcome]) -> Vec<u32> {
+        let touched = &mut self.touched;
+        touched.clear();
+        outcomes.iter().for_each(|outcome| touched.outcome(world, outcome));
+        let numbers = touched.numbers.iter().map(|&number| self.offsets.len() + number as usize);
+        let resources = touched.variables.iter().map(|&variable| variable as usize).chain(numbers);
         let mut tests: Vec<u32> =
-            resources.iter().flat_map(|&resource| self.tests_on[resource as usize].iter().copied()).collect();
+            resources.flat_map(|resource| self.tests_on[resource].iter().copied()).collect();
         tests.sort_unstable();
         tests.dedup();
         tests
@@ -354,10 +374,9 @@ impl Relaxed {
             }
         }
         for timed in &world.ground.timed {
-            let mut touched = Touched::default();
-            timed.outcomes.iter().for_each(|outcome| touched.outcome(world, outcome));
-            let moves = self.tests_touched(&touched);
-            let gives = timed.outcomes.iter().flat_map(|outcome| self.given(world, outcome)).collect();
+            let moves = self.tests_touched(world, &timed.outcomes.iter().collect::<Vec<_>>());
+            let mut gives = Vec::new();
+            timed.outcomes.iter().for_each(|outcome| self.given(world, outcome, &mut gives));
             let part = Part::Free;
             self.operators.push(Operator {
                 act: NOBODY,
@@ -372,18 +391,7 @@ impl Relaxed {
     }
 
     fn finish(&mut self, world: &World) {
-        let acts = world.acts.len() as u32;
-        let count = (self.token_base + 2 * acts) as usize;
-        let mut needed_by: Vec<Vec<u32>> = vec![Vec::new(); count];
-        for (index, operator) in self.operators.iter().enumerate() {
-            operator.needs.iter().for_each(|&need| needed_by[need as usize].push(index as u32));
-        }
-        self.needed_from = Vec::with_capacity(count + 1);
-        for list in needed_by {
-            self.needed_from.push(self.needed_by.len() as u32);
-            self.needed_by.extend(list);
-        }
-        self.needed_from.push(self.needed_by.len() as u32);
+        let count = self.token_base as usize + 2 * self.tokens.len();
         let needs = self.operators.iter().flat_map(|operator| &operator.needs).chain(&self.goal);
         for &need in needs.filter(|&&need| (self.test_base..self.token_base).contains(&need)) {
             self.asked[(need - self.test_base) as usize] = true;
@@ -395,11 +403,16 @@ impl Relaxed {
         let known: Vec<f64> = known.collect();
         let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
         self.unit = if mean.is_finite() && mean > 0.0 { mean } else { 1.0 };
+        // What nobody needs does not count as given.
+        let mut needed = vec![false; count];
+        let needs = self.operators.iter().flat_map(|operator| &operator.needs).chain(&self.goal);
+        needs.for_each(|&need| needed[need as usize] = true);
+        self.tokens.values().for_each(|&(_, closed)| needed[closed as usize] = true);
         for operator in &self.operators {
             let gives = self.given.len() as u32;
-            self.given.extend(&operator.gives);
+            self.given.extend(operator.gives.iter().filter(|&&given| needed[given as usize]));
             let moves = self.given.len() as u32;
-            self.given.extend(&operator.moves);
+            self.given.extend(operator.moves.iter().filter(|&&moved| needed[moved as usize]));
             let grounding =
                 world.acts.get(operator.act as usize).is_some_and(|act| !act.grounding.is_empty());
             let seconds = match operator.seconds {
@@ -412,12 +425,41 @@ impl Relaxed {
                 Part::Free => 0.0,
             };
             let plain = operator.gates.is_empty() && !grounding;
-            self.hot.push(Hot { gives, moves, end: self.given.len() as u32, plain, seconds, step });
+            let needs = operator.needs.len() as u32;
+            let end = self.given.len() as u32;
+            self.hot.push(Hot { gives, moves, end, needs, plain, seconds, step });
         }
-        self.need_counts = self.operators.iter().map(|operator| operator.needs.len() as u32).collect();
+        self.index_needs(count);
         let free = self.operators.iter().enumerate().filter(|(_, operator)| operator.needs.is_empty());
         self.free = free.map(|(index, _)| index as u32).collect();
         self.work = Work::new(count, self.operators.len());
+    }
+
+    /// Lists by proposition the operators that need it, in their order.
+    fn index_needs(&mut self, propositions: usize) {
+        let mut from = vec![0; propositions + 2];
+        for &need in self.operators.iter().flat_map(|operator| &operator.needs) {
+            from[need as usize + 2] += 1;
+        }
+        for proposition in 2..from.len() {
+            from[proposition] += from[proposition - 1];
+        }
+        self.needed_by = vec![Waiter::default(); from[propositions + 1] as usize];
+        for (index, (operator, hot)) in self.operators.iter().zip(&self.hot).enumerate() {
+            let target = match self.given[hot.gives as usize..hot.end as usize] {
+                [only] => only,
+                _ => NOBODY,
+            };
+            let seconds = hot.seconds.max(0.0);
+            for &need in &operator.needs {
+                let place = &mut from[need as usize + 1];
+                self.needed_by[*place as usize] =
+                    Waiter { operator: index as u32, target, seconds, step: hot.step };
+                *place += 1;
+            }
+        }
+        from.pop();
+        self.needed_from = from;
     }
 }
 

@@ -23,6 +23,12 @@ impl Touched {
         resources
     }
 
+    /// Nothing, with the memory kept.
+    pub fn clear(&mut self) {
+        self.variables.clear();
+        self.numbers.clear();
+    }
+
     /// What the answer of a call depends on.
     pub fn call(&mut self, world: &World, call: CallId) {
         let (variables, numbers) = world.calls.reads(call);

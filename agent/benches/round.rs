@@ -152,8 +152,7 @@ fn recognise_the_merged_cloud(bencher: Bencher) {
     let merged = looked.merged();
     let (_, seeking) = look::options(&*looked.body.robot);
     bencher.bench(|| {
-        let scene =
-            segment(&merged.cloud, &merged.visibility, &seeking).expect("there is a table");
+        let scene = segment(&merged.cloud, &merged.visibility, &seeking).expect("there is a table");
         Descry::default().recognise(&scene, &merged.visibility, &looked.domain.objects)
     });
 }

@@ -6,15 +6,16 @@
 mod check;
 mod fuse;
 mod joint;
+mod parts;
 mod prepare;
 mod search;
 
 use crate::cloud::Cloud;
-use crate::surface;
 use crate::view::View;
 use crate::visibility::{DepthMap, Visibility};
-use joint::{Found, Round, in_world};
+use joint::{Found, Round};
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
+use parts::Part;
 use prepare::Prepared;
 use rayon::prelude::*;
 use search::Oriented;
@@ -150,14 +151,11 @@ pub enum MergeError {
 }
 
 /// First alignment: everything, from far to near (the table weighs most; paper step 3).
-const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 200, plane_weight: 1.0 };
-/// Second alignment: planes weigh little, the objects decide (paper step 4).
-const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 300, plane_weight: 0.2 };
+const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 200, rest_weight: 1.0 };
+/// Second alignment: planes and what is far weigh little, the objects decide (paper step 4).
+const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 300, rest_weight: 0.2 };
 /// After a view was left out, the rest settles again.
-const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 300, plane_weight: 0.2 };
-/// A plane is dominant from this share of all points.
-const DOMINANT: f64 = 0.06;
-
+const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 300, rest_weight: 0.2 };
 /// Merges views into one cloud in the world frame. One view is filtered and fused only.
 ///
 /// # Errors
@@ -176,10 +174,10 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
     let mut used: Vec<bool> = whys.iter().map(Option::is_none).collect();
 
     align_everything(&prepared, &used, &mut poses, &mut steps);
-    let (on_plane, up) = remove_planes(&prepared, &used, &poses, options, &mut steps);
+    let (parts, up) = parts::find(&prepared, &used, &poses, options.up, &mut steps);
     let maps: Vec<Option<DepthMap>> =
         views.par_iter().map(|v| DepthMap::from_view(v, &v.world_from_camera)).collect();
-    let found = align_objects(&prepared, &mut used, &mut whys, &on_plane, up, &mut poses, &maps, &mut steps);
+    let found = align_objects(&prepared, &mut used, &mut whys, &parts, up, &mut poses, &maps, &mut steps);
     let seen = visibility(maps, &used, &poses);
     let fused = fuse::fuse(views, &used, &poses, &seen, options);
     steps.push(Step {
@@ -243,8 +241,8 @@ fn align_everything(
     poses: &mut [Isometry3<f64>],
     steps: &mut Vec<Step>,
 ) {
-    let nothing: Vec<Vec<bool>> = prepared.iter().map(|p| vec![false; p.points.len()]).collect();
-    let found = joint::align(prepared, used, &nothing, poses, &FIRST);
+    let all: Vec<Vec<Part>> = prepared.iter().map(|p| vec![Part::Standing; p.points.len()]).collect();
+    let found = joint::align(prepared, used, &all, poses, &FIRST);
     steps.push(aligned("first alignment", &found));
 }
 
@@ -259,53 +257,13 @@ fn aligned(name: &str, found: &[Found]) -> Step {
     }
 }
 
-/// Step 4, first half: which points lie on dominant planes, and which way is up.
-fn remove_planes(
-    prepared: &[Prepared],
-    used: &[bool],
-    poses: &[Isometry3<f64>],
-    options: &MergeOptions,
-    steps: &mut Vec<Step>,
-) -> (Vec<Vec<bool>>, Option<Unit<Vector3<f64>>>) {
-    let places: Vec<Vec<Point3<f64>>> = (0..prepared.len())
-        .map(|i| if used[i] { in_world(&prepared[i], &poses[i]) } else { Vec::new() })
-        .collect();
-    let planes = surface::dominant_planes(&places, prepared.iter().map(|p| p.sigmas_m.as_slice()), DOMINANT);
-    let held: Vector3<f64> =
-        poses.iter().zip(used).filter(|(_, u)| **u).map(|(p, _)| p.rotation * -Vector3::y()).sum();
-    let held = options.up.or_else(|| Unit::try_new(held, 1e-6));
-    let upright = planes.iter().find(|n| held.is_none_or(|up| n.0.dot(&up).abs() > 0.5));
-    let up = upright.map(|(normal, _)| match held {
-        Some(held) if held.dot(normal) < 0.0 => Unit::new_normalize(-normal),
-        _ => Unit::new_normalize(*normal),
-    });
-    let mut left = 0;
-    let on_plane: Vec<Vec<bool>> = (0..prepared.len())
-        .map(|i| {
-            let mut flags = vec![false; prepared[i].points.len()];
-            for (k, place) in places[i].iter().enumerate() {
-                let normal = poses[i].rotation * prepared[i].normals[k];
-                flags[k] = planes.iter().any(|(n, offset)| {
-                    let near = (n.dot(&place.coords) - offset).abs() < 3.0 * prepared[i].sigmas_m[k] + 0.006;
-                    near && n.dot(&normal).abs() > 0.8
-                });
-                left += usize::from(!flags[k]);
-            }
-            flags
-        })
-        .collect();
-    let result = format!("{} dominant planes removed", planes.len());
-    steps.push(Step { name: "plane removal".to_owned(), points: left, result });
-    (on_plane, up)
-}
-
 /// Step 4, second half: the objects decide; views that contradict the others are left out one by one.
 #[allow(clippy::too_many_arguments)]
 fn align_objects(
     prepared: &[Prepared],
     used: &mut [bool],
     whys: &mut [Option<String>],
-    on_plane: &[Vec<bool>],
+    parts: &[Vec<Part>],
     up: Option<Unit<Vector3<f64>>>,
     poses: &mut [Isometry3<f64>],
     maps: &[Option<DepthMap>],
@@ -316,25 +274,24 @@ fn align_objects(
         .collect();
     let mut retried = vec![false; prepared.len()];
     if let Some(up) = up {
-        place_objects(prepared, used, on_plane, &up, &levelled, poses);
+        place_objects(prepared, used, parts, &up, &levelled, poses);
     }
-    let mut found = joint::align(prepared, used, on_plane, poses, &SECOND);
-    while let Some((worst, why)) = check::misfit(prepared, used, on_plane, poses, maps, &found) {
+    let mut found = joint::align(prepared, used, parts, poses, &SECOND);
+    while let Some((worst, why)) = check::misfit(prepared, used, parts, poses, maps, &found) {
         if let Some(up) = up.filter(|_| !retried[worst]) {
             // The others have settled since: a better model to be placed on than a single view was.
             retried[worst] = true;
             let others = (0..prepared.len()).filter(|&i| used[i] && i != worst);
-            let placed: Vec<_> =
-                others.flat_map(|i| objects(&prepared[i], &on_plane[i], &poses[i])).collect();
+            let placed: Vec<_> = others.flat_map(|i| objects(&prepared[i], &parts[i], &poses[i])).collect();
             poses[worst] = levelled[worst];
-            place_on(prepared, on_plane, &up, &placed, &levelled, poses, worst);
-            found = joint::align(prepared, used, on_plane, poses, &SECOND);
+            place_on(prepared, parts, &up, &placed, &levelled, poses, worst);
+            found = joint::align(prepared, used, parts, poses, &SECOND);
             continue;
         }
         used[worst] = false;
         whys[worst] = Some(why);
         poses[worst] = prepared[worst].prior;
-        let settled = joint::align(prepared, used, on_plane, poses, &SETTLE);
+        let settled = joint::align(prepared, used, parts, poses, &SETTLE);
         found.iter_mut().zip(settled).zip(used.iter()).for_each(|((f, s), u)| {
             if *u {
                 *f = s;
@@ -367,17 +324,17 @@ fn only_levelled(view: &Prepared, pose: &Isometry3<f64>, up: &Unit<Vector3<f64>>
 fn place_objects(
     prepared: &[Prepared],
     used: &[bool],
-    on_plane: &[Vec<bool>],
+    parts: &[Vec<Part>],
     up: &Unit<Vector3<f64>>,
     levelled: &[Isometry3<f64>],
     poses: &mut [Isometry3<f64>],
 ) {
     let mut left: Vec<usize> = (0..prepared.len()).filter(|&i| used[i]).collect();
-    let count = |i: usize| on_plane[i].iter().filter(|p| !**p).count();
+    let count = |i: usize| parts[i].iter().filter(|p| **p == Part::Standing).count();
     let Some(first) = left.iter().copied().max_by_key(|&i| (count(i), usize::MAX - i)) else { return };
     left.retain(|&i| i != first);
     poses[first] = levelled[first];
-    let mut placed = objects(&prepared[first], &on_plane[first], &poses[first]);
+    let mut placed = objects(&prepared[first], &parts[first], &poses[first]);
     let mut done = vec![first];
     while !left.is_empty() {
         let apart = |i: usize| {
@@ -389,8 +346,8 @@ fn place_objects(
             return;
         };
         left.retain(|&i| i != next);
-        place_on(prepared, on_plane, up, &placed, levelled, poses, next);
-        placed.extend(objects(&prepared[next], &on_plane[next], &poses[next]));
+        place_on(prepared, parts, up, &placed, levelled, poses, next);
+        placed.extend(objects(&prepared[next], &parts[next], &poses[next]));
         done.push(next);
     }
 }
@@ -398,14 +355,14 @@ fn place_objects(
 /// Puts the objects of one view onto placed ones: by search from its levelled pose, unless the pose it has fits them better already.
 fn place_on(
     prepared: &[Prepared],
-    on_plane: &[Vec<bool>],
+    parts: &[Vec<Part>],
     up: &Unit<Vector3<f64>>,
     placed: &[Oriented],
     levelled: &[Isometry3<f64>],
     poses: &mut [Isometry3<f64>],
     view: usize,
 ) {
-    let from = |pose: &Isometry3<f64>| objects(&prepared[view], &on_plane[view], pose);
+    let from = |pose: &Isometry3<f64>| objects(&prepared[view], &parts[view], pose);
     let own = from(&levelled[view]);
     let window = window(&prepared[view], &own, &levelled[view]);
     let Some(found) = search::place(&own, placed, up, window) else { return };
@@ -415,10 +372,10 @@ fn place_on(
     }
 }
 
-/// Points and normals of a view off the planes, in the world.
-fn objects(view: &Prepared, on_plane: &[bool], pose: &Isometry3<f64>) -> Vec<Oriented> {
-    let off = (0..view.points.len()).filter(|&k| !on_plane[k]);
-    off.map(|k| (pose * view.points[k], pose.rotation * view.normals[k])).collect()
+/// Points and normals of what stands on the surface in a view, in the world.
+fn objects(view: &Prepared, parts: &[Part], pose: &Isometry3<f64>) -> Vec<Oriented> {
+    let standing = (0..view.points.len()).filter(|&k| parts[k] == Part::Standing);
+    standing.map(|k| (pose * view.points[k], pose.rotation * view.normals[k])).collect()
 }
 
 /// How far off two views may be from each other at the distance of the objects: three spreads, at least the 10 cm and 6° of a poor localisation.

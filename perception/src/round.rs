@@ -53,6 +53,8 @@ const EDGE_SIGMA_M: f64 = 0.0025;
 /// Depths of one body share systematic errors (a structured-light camera flattens what is round): however many points, they weigh no more than so many.
 const MOST_INDEPENDENT: f64 = 25.0;
 
+/// A point is taken for one of the side up to so many tolerances from it, once the fit is near.
+const LAST_GATE: f64 = 1.5;
 /// A point farther out than this tells no more by being still farther, metres.
 const OUTSIDE_M: f64 = 0.02;
 
@@ -83,7 +85,7 @@ pub(crate) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64,
     if side.len() < 20 {
         return None;
     }
-    let tolerance = (2.0 * sigma_m).clamp(0.004, 0.008);
+    let tolerance = tolerance(sigma_m);
     let circle = propose(&side, tolerance, seed)?;
     let middle_m = base_m + 0.5 * height;
     let mut round = Round {
@@ -99,7 +101,7 @@ pub(crate) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64,
         spread_m: 0.0,
         inliers: 0.0,
     };
-    for gate in [3.0, 2.0, 1.5, 1.5, 1.5] {
+    for gate in [3.0, 2.0, LAST_GATE, LAST_GATE, LAST_GATE] {
         round = improve(&round, &side, &[], gate * tolerance, sigma_m)?;
     }
     (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * 1.2).then_some(round)
@@ -115,12 +117,34 @@ pub(crate) fn refit(
     sigma_m: f64,
 ) -> Option<Round> {
     let side = side_points(points, base_m, top_m);
-    let tolerance = (2.0 * sigma_m).clamp(0.004, 0.008);
+    let tolerance = tolerance(sigma_m);
     let mut round = *round;
     for _ in 0..4 {
-        round = improve(&round, &side, edges, 1.5 * tolerance, sigma_m)?;
+        round = improve(&round, &side, edges, LAST_GATE * tolerance, sigma_m)?;
     }
     (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * 1.2).then_some(round)
+}
+
+impl Round {
+    /// [`Round::spread_m`] of the side points that count.
+    pub fn spread_of(
+        &self,
+        points: &[Point3<f64>],
+        (base_m, top_m): (f64, f64),
+        sigma_m: f64,
+        counts: impl Fn(&Point3<f64>) -> bool,
+    ) -> f64 {
+        let gate = LAST_GATE * tolerance(sigma_m);
+        let side = side_points(points, base_m, top_m);
+        let misses = side.iter().filter(|p| counts(p)).map(|p| self.outside_m(p)).filter(|&d| d > -gate);
+        let (n, squares) = misses.fold((0.0, 0.0), |(n, s), d| (n + 1.0, s + d.min(OUTSIDE_M).powi(2)));
+        (squares / f64::max(n, 1.0)).sqrt()
+    }
+}
+
+/// How far from the side a point of it may be measured, metres.
+fn tolerance(sigma_m: f64) -> f64 {
+    (2.0 * sigma_m).clamp(0.004, 0.008)
 }
 
 /// The points between base and top that can lie on the side.

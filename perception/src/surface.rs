@@ -94,13 +94,7 @@ impl Surface {
 
     /// The outline made ready to be asked about many points.
     pub fn outline(&self) -> Outline {
-        let n = self.hull.len();
-        let edge = |i: usize| {
-            let (a, b) = (self.hull[i], self.hull[(i + 1) % n]);
-            let inward = self.up.cross(&(b - a)).try_normalize(0.0)?;
-            Some((inward, inward.dot(&a.coords)))
-        };
-        Outline { edges: if n < 3 { Vec::new() } else { (0..n).filter_map(edge).collect() } }
+        Outline::of(&self.hull, &self.up)
     }
 }
 
@@ -112,6 +106,17 @@ pub struct Outline {
 }
 
 impl Outline {
+    /// Of the corners of a convex region, anticlockwise seen from above.
+    pub(crate) fn of(hull: &[Point3<f64>], up: &Vector3<f64>) -> Outline {
+        let n = hull.len();
+        let edge = |i: usize| {
+            let (a, b) = (hull[i], hull[(i + 1) % n]);
+            let inward = up.cross(&(b - a)).try_normalize(0.0)?;
+            Some((inward, inward.dot(&a.coords)))
+        };
+        Outline { edges: if n < 3 { Vec::new() } else { (0..n).filter_map(edge).collect() } }
+    }
+
     /// True if the point (frame of the surface's hull) lies above or below the outline widened by `margin_m`.
     pub fn covers(&self, p: &Point3<f64>, margin_m: f64) -> bool {
         self.edges.len() >= 3 && self.edges.iter().all(|(n, edge)| n.dot(&p.coords) - edge >= -margin_m)
@@ -413,7 +418,7 @@ fn outline(plane: &Plane, samples: &[Sample], cloud: &Cloud, viewpoints: &[Point
 }
 
 /// The largest set of cells that hang together over gaps of up to two cells (shadows of objects); ties go to the first in order.
-fn largest_part(cells: &FxHashMap<[i32; 2], u32>) -> Vec<[i32; 2]> {
+pub(crate) fn largest_part(cells: &FxHashMap<[i32; 2], u32>) -> Vec<[i32; 2]> {
     let mut order: Vec<[i32; 2]> = cells.keys().copied().collect();
     order.sort_unstable();
     let mut seen: FxHashMap<[i32; 2], ()> = FxHashMap::default();

@@ -75,40 +75,52 @@ fn mug() -> ObjectModel {
     }
 }
 
+/// What is known of the table and of what stands on it.
+struct Table {
+    up: Unit<Vector3<f64>>,
+    /// Along `up`, metres.
+    height: f64,
+    objects: Vec<Reference>,
+}
+
+impl Table {
+    fn read(dir: &Path) -> Result<Table, String> {
+        let text = std::fs::read_to_string(dir.join("objects.json")).map_err(|e| e.to_string())?;
+        let json: serde_json::Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
+        let three = |v: &serde_json::Value| Vector3::from([0, 1, 2].map(|k| v[k].as_f64().unwrap_or(0.0)));
+        let up = Unit::new_normalize(three(&json["table_plane_up"]));
+        let reference = |o: &serde_json::Value| {
+            let name = o["name"].as_str().unwrap_or("").to_owned();
+            Reference { is_mug: name.contains("mug"), name, place: Point3::from(three(&o["centroid"])) }
+        };
+        let objects = json["objects"].as_array().into_iter().flatten().map(reference).collect();
+        Ok(Table { up, height: up.dot(&three(&json["table_point"])), objects })
+    }
+
+    fn is_seen_by(&self, view: &View) -> bool {
+        let height = |p: &Point3<f32>| self.up.dot(&(view.world_from_camera * p.cast::<f64>()).coords);
+        let on = |p: &&Point3<f32>| p.x.is_finite() && (height(p) - self.height).abs() < 0.02;
+        view.cloud.points.iter().filter(on).count() > 60_000
+    }
+
+    /// Distance along the table, metres.
+    fn distance(&self, reference: &Reference, place: &Point3<f64>) -> f64 {
+        let gap = reference.place - place;
+        (gap - self.up.scale(self.up.dot(&gap))).norm()
+    }
+
+    fn nearest(&self, place: &Point3<f64>) -> Option<usize> {
+        let distance = |n: &usize| self.distance(&self.objects[*n], place);
+        let nearest = (0..self.objects.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.filter(|n| distance(n) < SAME_M)
+    }
+}
+
 /// Scores random draws of 1, 2, 3, 5 and 8 frames that see the table.
 pub fn run(dir: &Path) -> Result<(), String> {
     let frames = frames(dir)?;
-    let text = std::fs::read_to_string(dir.join("objects.json")).map_err(|e| e.to_string())?;
-    let json: serde_json::Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
-    let three = |v: &serde_json::Value| {
-        Vector3::new(v[0].as_f64().unwrap_or(0.0), v[1].as_f64().unwrap_or(0.0), v[2].as_f64().unwrap_or(0.0))
-    };
-    let up = Unit::new_normalize(three(&json["table_plane_up"]));
-    let table = Point3::from(three(&json["table_point"]));
-    let references: Vec<Reference> = json["objects"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .map(|o| {
-            let name = o["name"].as_str().unwrap_or("").to_owned();
-            Reference { is_mug: name.contains("mug"), name, place: Point3::from(three(&o["centroid"])) }
-        })
-        .collect();
-    let height = up.dot(&table.coords);
-    let on_table: Vec<usize> = (0..frames.len())
-        .filter(|&i| {
-            let v = &frames[i].1;
-            v.cloud
-                .points
-                .iter()
-                .filter(|p| {
-                    p.x.is_finite()
-                        && (up.dot(&(v.world_from_camera * p.cast::<f64>()).coords) - height).abs() < 0.02
-                })
-                .count()
-                > 60_000
-        })
-        .collect();
+    let table = Table::read(dir)?;
+    let on_table: Vec<usize> = (0..frames.len()).filter(|&i| table.is_seen_by(&frames[i].1)).collect();
     println!("frames that see the table: {:?}", on_table.iter().map(|&i| &frames[i].0).collect::<Vec<_>>());
     println!(
         "{:>5} {:>8} {:>10} {:>10} {:>8} {:>8} {:>10} {:>9}",
@@ -116,7 +128,7 @@ pub fn run(dir: &Path) -> Result<(), String> {
     );
     let recognisers: [&dyn Recogniser; 2] = [&Published::default(), &Descry::default()];
     for views in [1, 2, 3, 5, 8] {
-        let mut tallies = vec![Tally::default(); 2 * recognisers.len()];
+        let mut tallies = [[Tally::default(), Tally::default()], [Tally::default(), Tally::default()]];
         let mut state = views as u64;
         for _ in 0..DRAWS {
             let mut chosen = on_table.clone();
@@ -126,94 +138,59 @@ pub fn run(dir: &Path) -> Result<(), String> {
                 chosen.swap(i, j);
             }
             let drawn: Vec<View> = chosen[..views].iter().map(|&i| frames[i].1.clone()).collect();
-            for (mode, sets) in
-                [vec![drawn.clone()], drawn.iter().map(|v| vec![v.clone()]).collect()].into_iter().enumerate()
-            {
-                for set in sets {
-                    let options = MergeOptions {
-                        up: Some(up),
-                        height_band_m: Some((height - 0.3, height + 0.5)),
-                        ..Default::default()
-                    };
-                    let merged = merge(&set, &options).map_err(|e| e.to_string())?;
-                    let left = merged.fits.iter().filter(|f| !f.used).count();
-                    let scene_options = SceneOptions {
-                        surface: SurfaceOptions {
-                            up: Some(up),
-                            height_band_m: Some((height - 0.1, height + 0.1)),
-                            ..Default::default()
-                        },
-                        ..Default::default()
-                    };
-                    let Ok(scene) = segment(&merged.cloud, &merged.visibility, &scene_options) else {
-                        continue;
-                    };
-                    for (r, recogniser) in recognisers.iter().enumerate() {
-                        let percepts = recogniser.recognise(&scene, &merged.visibility, &[mug()]);
-                        let tally = &mut tallies[2 * r + mode];
-                        tally.left += left;
-                        let mut found = vec![false; references.len()];
-                        for p in &percepts {
-                            let distance = |q: &Reference| {
-                                let gap = q.place - p.position_m;
-                                (gap - up.scale(up.dot(&gap))).norm()
-                            };
-                            let near = (0..references.len()).min_by(|&a, &b| {
-                                distance(&references[a]).total_cmp(&distance(&references[b]))
-                            });
-                            let Some(near) = near.filter(|&n| distance(&references[n]) < SAME_M) else {
-                                if p.label.is_some() {
-                                    tally.wrong += 1;
-                                    println!("   wrong: nothing there, {}", super::mosd::words(p));
-                                }
-                                continue;
-                            };
-                            if std::env::args().any(|a| a == "all") && r == 1 {
-                                println!(
-                                    "   {} views {}: {} at {:.0} mm, {}",
-                                    views,
-                                    ["merged", "single"][mode],
-                                    references[near].name,
-                                    1e3 * distance(&references[near]),
-                                    super::mosd::words(p)
-                                );
-                            }
-                            match (p.label.is_some(), references[near].is_mug) {
-                                (true, true) if !found[near] => {
-                                    found[near] = true;
-                                    tally.right += 1;
-                                    tally.errors.push(distance(&references[near]));
-                                }
-                                (true, _) => tally.wrong += 1,
-                                _ => {}
-                            }
-                        }
-                        // A mug counts where some view of the set has it in its image.
-                        tally.mugs += references
-                            .iter()
-                            .filter(|q| q.is_mug && set.iter().any(|v| in_view(v, &q.place)))
-                            .count();
-                    }
-                }
+            score(&drawn, &table, &recognisers, &mut tallies[0])?;
+            for view in drawn {
+                score(&[view], &table, &recognisers, &mut tallies[1])?;
             }
         }
         for (r, recogniser) in recognisers.iter().enumerate() {
             for (mode, name) in ["merged", "single"].into_iter().enumerate() {
-                let t = &mut tallies[2 * r + mode];
-                t.errors.sort_by(f64::total_cmp);
-                let median = t.errors.get(t.errors.len() / 2).copied().unwrap_or(f64::NAN);
-                let worst = t.errors.last().copied().unwrap_or(f64::NAN);
-                println!(
-                    "{views:>5} {name:>8} {:>10} {:>10.3} {:>8.3} {:>8.1} {:>10.1} {:>9}",
-                    recogniser.name(),
-                    t.right as f64 / (t.right + t.wrong).max(1) as f64,
-                    t.right as f64 / t.mugs.max(1) as f64,
-                    1e2 * median,
-                    1e2 * worst,
-                    t.left
-                );
+                let row = tallies[mode][r].row();
+                println!("{views:>5} {name:>8} {:>10} {row}", recogniser.name());
             }
         }
+    }
+    Ok(())
+}
+
+/// Merges a set of views and counts what each recogniser finds in it.
+fn score(
+    set: &[View],
+    table: &Table,
+    recognisers: &[&dyn Recogniser],
+    tallies: &mut [Tally],
+) -> Result<(), String> {
+    let (up, height) = (Some(table.up), table.height);
+    let band = |below: f64, above: f64| Some((height - below, height + above));
+    let options = MergeOptions { up, height_band_m: band(0.3, 0.5), ..Default::default() };
+    let merged = merge(set, &options).map_err(|e| e.to_string())?;
+    let surface = SurfaceOptions { up, height_band_m: band(0.1, 0.1), ..Default::default() };
+    let scene_options = SceneOptions { surface, ..Default::default() };
+    let Ok(scene) = segment(&merged.cloud, &merged.visibility, &scene_options) else { return Ok(()) };
+    for (recogniser, tally) in recognisers.iter().zip(tallies) {
+        tally.left += merged.fits.iter().filter(|f| !f.used).count();
+        let mut found = vec![false; table.objects.len()];
+        for p in recogniser.recognise(&scene, &merged.visibility, &[mug()]) {
+            let near = table.nearest(&p.position_m);
+            if std::env::args().any(|a| a == "all") {
+                let name = near.map_or("nothing there", |n| table.objects[n].name.as_str());
+                println!("   {} views, {}: {name}, {}", set.len(), recogniser.name(), super::mosd::words(&p));
+            }
+            match near.filter(|&n| table.objects[n].is_mug && !found[n]) {
+                _ if p.label.is_none() => {}
+                Some(n) => {
+                    found[n] = true;
+                    tally.right += 1;
+                    tally.errors.push(table.distance(&table.objects[n], &p.position_m));
+                }
+                None => tally.wrong += 1,
+            }
+        }
+        // A mug counts where some view of the set has it well in its image, and where it was found.
+        let counts = |(q, found): &(&Reference, &bool)| {
+            q.is_mug && (**found || set.iter().any(|v| in_view(v, &q.place)))
+        };
+        tally.mugs += table.objects.iter().zip(&found).filter(counts).count();
     }
     Ok(())
 }
@@ -225,6 +202,22 @@ struct Tally {
     mugs: usize,
     left: usize,
     errors: Vec<f64>,
+}
+
+impl Tally {
+    fn row(&mut self) -> String {
+        self.errors.sort_by(f64::total_cmp);
+        let median = self.errors.get(self.errors.len() / 2).copied().unwrap_or(f64::NAN);
+        let worst = self.errors.last().copied().unwrap_or(f64::NAN);
+        format!(
+            "{:>10.3} {:>8.3} {:>8.1} {:>10.1} {:>9}",
+            self.right as f64 / (self.right + self.wrong).max(1) as f64,
+            self.right as f64 / self.mugs.max(1) as f64,
+            1e2 * median,
+            1e2 * worst,
+            self.left
+        )
+    }
 }
 
 /// True if the place with some room around it lies in the image and a return is near it.

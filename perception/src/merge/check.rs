@@ -1,6 +1,7 @@
 //! Which views belong together, and which contradict the others.
 
 use super::joint::Found;
+use super::parts::Part;
 use super::prepare::Prepared;
 use crate::visibility::{DepthMap, Seen};
 use nalgebra::Isometry3;
@@ -16,7 +17,7 @@ const MOST_CONTRADICTED: f64 = 0.22;
 pub(super) fn misfit(
     views: &[Prepared],
     used: &[bool],
-    on_plane: &[Vec<bool>],
+    parts: &[Vec<Part>],
     poses: &[Isometry3<f64>],
     maps: &[Option<DepthMap>],
     found: &[Found],
@@ -37,11 +38,12 @@ pub(super) fn misfit(
         .iter()
         .map(|&i| {
             let others = active.iter().copied().filter(|&j| j != i);
-            let worst = others.map(|j| {
-                contradiction(&views[i], &on_plane[i], &poses[i], maps[j].as_ref(), &poses[j])
-                    .max(contradiction(&views[j], &on_plane[j], &poses[j], maps[i].as_ref(), &poses[i]))
+            let worst = others.filter_map(|j| {
+                let own = contradiction(&views[i], &parts[i], &poses[i], maps[j].as_ref(), &poses[j]);
+                let theirs = contradiction(&views[j], &parts[j], &poses[j], maps[i].as_ref(), &poses[i]);
+                own.into_iter().chain(theirs).max_by(f64::total_cmp)
             });
-            // With one other view there is nobody to ask who is wrong: the mean over partners blames who disagrees with most.
+            // With one other view there is nobody to ask who is wrong: the mean over those that can judge blames who disagrees with most.
             let (n, sum) = worst.fold((0, 0.0), |(n, s), c| (n + 1, s + c));
             (sum / f64::from(n.max(1)), i)
         })
@@ -72,26 +74,27 @@ fn too_far(view: &Prepared, pose: &Isometry3<f64>) -> Option<(f64, String)> {
     })
 }
 
-/// Share of a view's points off the planes, among those another camera can judge, through which that camera looked.
+/// Share of what stands on the surface in a view, of what another camera can judge, through which that camera looked; none if it
+/// can judge too little.
 fn contradiction(
     view: &Prepared,
-    on_plane: &[bool],
+    parts: &[Part],
     pose: &Isometry3<f64>,
     map: Option<&DepthMap>,
     map_pose: &Isometry3<f64>,
-) -> f64 {
+) -> Option<f64> {
     const ASKED: usize = 300;
-    let Some(map) = map else { return 0.0 };
+    let map = map?;
     let map_from_view = map_pose.inv_mul(pose);
-    let off: Vec<usize> = (0..view.points.len()).filter(|&k| !on_plane[k]).collect();
-    let stride = (off.len() / ASKED).max(1);
+    let standing: Vec<usize> = (0..view.points.len()).filter(|&k| parts[k] == Part::Standing).collect();
+    let stride = (standing.len() / ASKED).max(1);
     let (mut judged, mut through) = (0_u32, 0_u32);
-    for &k in off.iter().step_by(stride) {
+    for &k in standing.iter().step_by(stride) {
         match map.look_from(&(map_from_view * view.points[k]), CLEAR_M) {
             Seen::Free => (judged, through) = (judged + 1, through + 1),
             Seen::Surface => judged += 1,
             Seen::Hidden | Seen::Never => {}
         }
     }
-    if judged < 25 { 0.0 } else { f64::from(through) / f64::from(judged) }
+    (judged >= 25).then(|| f64::from(through) / f64::from(judged))
 }

@@ -3,6 +3,7 @@
 //! One least-squares problem over all poses: point-to-plane distances between every two views that overlap, and each pose's distance
 //! from where localisation had it. The second part fixes the common frame: it is the robust average of what localisation said.
 
+use super::parts::Part;
 use super::prepare::Prepared;
 use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6,
@@ -20,8 +21,8 @@ pub(super) struct Round {
     pub passes: usize,
     /// Points of each view and pair that are asked for a partner at most.
     pub asked: usize,
-    /// Weight of points on planes against the others.
-    pub plane_weight: f64,
+    /// Weight of points on planes, and of what stands on no surface, against the objects.
+    pub rest_weight: f64,
 }
 
 /// What a round found of one view.
@@ -47,17 +48,17 @@ const SAME_SIDE: f64 = 0.75;
 /// A pass that moves no camera farther than this, metres and radians, ends the round.
 const SETTLED: (f64, f64) = (2e-4, 2e-4);
 
-/// Aligns the views that are `used` among each other. `on_plane` tells for each view which points lie on dominant planes.
+/// Aligns the views that are `used` among each other. `parts` tells for each view what its points belong to.
 pub(super) fn align(
     views: &[Prepared],
     used: &[bool],
-    on_plane: &[Vec<bool>],
+    parts: &[Vec<Part>],
     poses: &mut [Isometry3<f64>],
     round: &Round,
 ) -> Vec<Found> {
     let _span = tracing::debug_span!("align", views = views.len(), passes = round.passes).entered();
     let pairs = pairs(views, used, poses);
-    let askers: Vec<Askers> = on_plane.iter().map(|flags| Askers::of(flags)).collect();
+    let askers: Vec<Askers> = parts.iter().map(|parts| Askers::of(parts)).collect();
     let mut found = vec![Found::default(); views.len()];
     for pass in 0..round.passes {
         let share = pass as f64 / (round.passes.max(2) - 1) as f64;
@@ -81,26 +82,24 @@ pub(super) fn align(
     found
 }
 
-/// The points of a view that ask for partners: those on dominant planes, and the others.
-struct Askers {
-    planes: Vec<u32>,
-    free: Vec<u32>,
-}
+/// The points of a view that ask for partners, by what they belong to.
+struct Askers([Vec<u32>; 3]);
 
 impl Askers {
-    fn of(on_plane: &[bool]) -> Askers {
-        let (planes, free) = (0..on_plane.len() as u32).partition(|&k| on_plane[k as usize]);
-        Askers { planes, free }
+    fn of(parts: &[Part]) -> Askers {
+        let of = |part| (0..parts.len() as u32).filter(|&k| parts[k as usize] == part).collect();
+        Askers([Part::Plane, Part::Standing, Part::Around].map(of))
     }
 
-    /// At most about as many of each sort as are asked, evenly spread, others for each partner; and whether they lie on a plane.
-    fn some(&self, round: &Round, partner: usize) -> impl Iterator<Item = (usize, bool)> {
+    /// At most about as many of each sort as are asked, evenly spread, others for each partner; and their weights.
+    fn some(&self, round: &Round, partner: usize) -> impl Iterator<Item = (usize, f64)> {
         let spread = move |of: &'_ [u32]| {
             let stride = (of.len() / round.asked).max(1);
             (partner % stride..of.len()).step_by(stride)
         };
-        let planes = spread(&self.planes).map(|at| (self.planes[at] as usize, true));
-        planes.chain(spread(&self.free).map(|at| (self.free[at] as usize, false)))
+        let weights = [round.rest_weight, 1.0, round.rest_weight];
+        let sorts = self.0.iter().zip(weights);
+        sorts.flat_map(move |(sort, weight)| spread(sort).map(move |at| (sort[at] as usize, weight)))
     }
 }
 
@@ -150,7 +149,7 @@ fn link(
         squares: 0.0,
     };
     let Some(tree) = &b.tree else { return link };
-    for (k, plane) in askers.some(round, j) {
+    for (k, part_weight) in askers.some(round, j) {
         let p = &a.points[k];
         let in_j = j_from_i * p;
         let Some(near) = tree.nearest(&in_j.cast(), radius as f32) else { continue };
@@ -167,8 +166,7 @@ fn link(
         // Geman-McClure: what does not fit within the radius loses its say smoothly.
         let scale = (0.5 * radius).max(2.0 * sigma);
         let robust = (1.0 / (1.0 + (residual / scale).powi(2))).powi(2);
-        let plane_weight = if plane { round.plane_weight } else { 1.0 };
-        let weight = plane_weight * robust / (sigma * sigma);
+        let weight = part_weight * robust / (sigma * sigma);
         let own = jacobian(&from_i, &normal);
         let other = -jacobian(&from_j, &normal);
         link.blocks[0] += own * own.transpose() * weight;

@@ -4,6 +4,7 @@
 //! give many wrong valleys to a local method; so the few degrees of freedom are searched on a grid, coarse to fine.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use rustc_hash::FxHashSet;
 
 /// A place on a surface with its unit normal.
 pub(super) type Oriented = (Point3<f64>, Vector3<f64>);
@@ -137,6 +138,18 @@ pub(super) fn fits(view: &[Oriented], placed: &[Oriented], up: &Unit<Vector3<f64
     Cells::new(&placed, CELLS_M[1], 0).scores(&turned(&tried, 0.0), 0)[0]
 }
 
+/// The points of a view that have something of the placed ones within a shift: the others can fall onto nothing.
+fn within_reach(view: &[Oriented], placed: &[Oriented], shift_m: f64) -> Vec<Oriented> {
+    let cell = |p: &Point3<f64>| [p.x, p.y, p.z].map(|c| (c / shift_m).floor() as i32);
+    let taken: FxHashSet<[i32; 3]> = placed.iter().map(|(p, _)| cell(p)).collect();
+    let near = |(p, _): &&Oriented| {
+        let [x, y, z] = cell(p);
+        let step = || -1..=1;
+        step().any(|i| step().any(|j| step().any(|k| taken.contains(&[x + i, y + j, z + k]))))
+    };
+    view.iter().filter(near).copied().collect()
+}
+
 /// A view and what it is to fall onto, turned level, metres from the middle of the view.
 struct Levelled {
     /// At most about `TRIED` of the view's points.
@@ -170,7 +183,8 @@ pub(super) fn place(
         return None;
     }
     let level = frame(up);
-    let Levelled { tried, placed, middle } = levelled(view, placed, &level)?;
+    let Levelled { tried, placed, middle } =
+        levelled(&within_reach(view, placed, window.shift_m), placed, &level)?;
     let mut best = [Candidate { x: 0.0, y: 0.0, turn: 0.0, score: 0.0 }; 3];
     for (stage, side_m) in CELLS_M.into_iter().enumerate() {
         let (shift, turn) = if stage == 0 { (window.shift_m, window.turn_rad) } else { (0.03, 0.027) };

@@ -205,10 +205,18 @@ fn measure_round(
     let sectors = Sectors::measure(round, segment, asker, base_m, height);
     evidence.arc = sectors.measured_share();
     measured.looked_through = sectors.looked_through_share();
-    let handle = Protrusion::find(round, segment, asker, base_m, height);
-    evidence.protrusion_m = handle.as_ref().map_or(0.0, |h| h.reach_m);
+    let protrusion = Protrusion::find(round, segment, asker, base_m, height);
+    evidence.protrusion_m = protrusion.as_ref().map_or(0.0, |h| h.reach_m);
     evidence.handle_unseen = sectors.unseen_share();
-    evidence.handle = match handle.filter(Protrusion::is_handle) {
+    let handle = protrusion.filter(Protrusion::is_handle);
+    if let Some(handle) = &handle {
+        // What is a handle says nothing against the roundness of what it is the handle of.
+        let body = |p: &Point3<f64>| !handle.has(round, p);
+        let spread_m = round.spread_of(&segment.points, (base_m, top), measured.sigma_m, body);
+        evidence.round_residual_m = spread_m;
+        measured.round = Some(Round { spread_m, ..*round });
+    }
+    evidence.handle = match handle {
         Some(_) => Sighting::Seen,
         None if evidence.handle_unseen < 0.08 => Sighting::Absent,
         None => Sighting::Unseen,
@@ -299,6 +307,8 @@ fn sector_of(round: &Round, p: &Point3<f64>) -> usize {
 /// The largest thing that sticks out of the body in one direction.
 pub(super) struct Protrusion {
     pub reach_m: f64,
+    /// Where it sticks out to: sine and cosine.
+    direction: (f64, f64),
     width_m: f64,
     points: usize,
     least: usize,
@@ -328,11 +338,8 @@ impl Protrusion {
         let local: Vec<(f64, f64, f64)> = out
             .iter()
             .map(|p| {
-                (
-                    (p.x - round.x) * cos + (p.y - round.y) * sin,
-                    (p.y - round.y) * cos - (p.x - round.x) * sin,
-                    p.z,
-                )
+                let (along, across) = along_and_across(round, p, (sin, cos));
+                (along, across, p.z)
             })
             .filter(|&(along, across, _)| along > 0.6 * round.radius_m && across.abs() < 0.06)
             .collect();
@@ -348,11 +355,18 @@ impl Protrusion {
         let (low, high) = ends(&mut heights);
         Some(Protrusion {
             reach_m: crate::segment::quantile(&mut reaches, 0.95),
+            direction: (sin, cos),
             width_m: right - left,
             points: local.len(),
             least: (segment.points.len() / 150).clamp(6, 60),
             inside_height: high - low > 0.012 && low > base_m + 0.05 * height,
         })
+    }
+
+    /// Whether a point lies where it sticks out.
+    fn has(&self, round: &Round, p: &Point3<f64>) -> bool {
+        let (along, across) = along_and_across(round, p, self.direction);
+        round.outside_m(p) > CLEAR_M && along > 0.0 && across.abs() < HANDLE_WIDTH_M
     }
 
     fn is_handle(&self) -> bool {
@@ -361,6 +375,12 @@ impl Protrusion {
             && self.width_m < HANDLE_WIDTH_M
             && self.inside_height
     }
+}
+
+/// A point's place from the axis, along a direction (sine and cosine) and across it, metres.
+fn along_and_across(round: &Round, p: &Point3<f64>, (sin, cos): (f64, f64)) -> (f64, f64) {
+    let (x, y) = (p.x - round.x, p.y - round.y);
+    (x * cos + y * sin, y * cos - x * sin)
 }
 
 /// What was seen of the upper end: the share of it that was looked into, and the share that is a face.

@@ -143,3 +143,12 @@ fn an_undefined_number_is_asked_for_in_vain() {
 fn derived_predicates_and_conditional_effects_over_numbers() {
     check(SHOP, &shop("(rich) (happy) (<= (stock) 1) (>= (stock) 1)"), Expect::Plan);
 }
+
+#[test]
+fn what_steps_undo_of_one_another_goes() {
+    // There is room for one order only, so that every rung has one height to come to.
+    for (rungs, away) in [(16, 86), (24, 206)] {
+        let (outcome, _) = solve_twice(LADDER, &ladder(rungs), &Options::default());
+        assert_eq!(outcome.plan().map(|plan| plan.steps.len()), Some(away), "{rungs} rungs");
+    }
+}

@@ -1,6 +1,8 @@
 //! Making a plan cheaper: useless steps go, steps that belong together move together, and windows of the plan are
 //! planned again (in the spirit of Nakhost and Müller 2010 and of Siddiqui and Haslum 2015).
 
+mod undo;
+
 use std::collections::BinaryHeap;
 
 use crate::heuristics::relaxed::{Counting, Relaxed};
@@ -94,6 +96,7 @@ impl<'a> Improve<'a> {
             }
         };
         self.eliminate(plan);
+        self.undo(plan);
         tell(self, plan);
         let mut evaluations = FIRST_EVALUATIONS;
         let mut idle = 0;
@@ -110,6 +113,9 @@ impl<'a> Improve<'a> {
                 size *= 2;
             }
             self.eliminate(plan);
+            if self.cost(plan) < before {
+                self.undo(plan);
+            }
             tell(self, plan);
             let better = self.cost(plan) < before;
             idle = if better { 0 } else { idle + 1 };

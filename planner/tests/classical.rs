@@ -3,8 +3,9 @@
 mod solving;
 
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use descry_planner::{Options, Outcome};
+use descry_planner::{Attachments, Options, Outcome, plan};
 
 use solving::{read, solve, solve_twice};
 
@@ -123,6 +124,33 @@ fn object_fluents() {
       (:init (= (where r) a) (= (where s) d) (road a b) (road b c) (road c d))
       (:goal (and (= (where r) d) (= (where s) d))))";
     check(domain, problem, Expect::Best(1.0));
+}
+
+#[test]
+fn the_stop_signal_is_asked_all_the_while_instances_are_made() {
+    let domain = "(define (domain relay) (:predicates (held) (warm ?a ?b ?c))
+      (:action pass :parameters (?a ?b ?c) :precondition (held) :effect (warm ?a ?b ?c)))";
+    let names: Vec<String> = (0..32).map(|n| format!("o{n}")).collect();
+    let names = names.join(" ");
+    let problem = format!(
+        "(define (problem p) (:domain relay) (:objects {names}) (:init (held)) (:goal (warm o1 o2 o3)))"
+    );
+    let task = read(domain, &problem);
+    let asked = AtomicUsize::new(0);
+    let never = || {
+        asked.fetch_add(1, Ordering::Relaxed);
+        false
+    };
+    let run = |stop: &(dyn Fn() -> bool + Sync)| {
+        plan(&task, &Attachments::default(), &Options::default(), stop, &mut |_| {}).expect("no refusal")
+    };
+    assert!(run(&never).plan().is_some());
+    // Every 1024 of the 32^3 atoms, and again of the instances.
+    let asked_in_all = asked.swap(0, Ordering::Relaxed);
+    assert!(asked_in_all >= 64, "asked {asked_in_all} times");
+    let soon = || asked.fetch_add(1, Ordering::Relaxed) >= 40;
+    assert!(matches!(run(&soon), Outcome::OutOfTime { best: None, .. }));
+    assert!(asked.load(Ordering::Relaxed) < 50, "not heard at once");
 }
 
 /// Every classical task of the competition files, with a limit on evaluated states.

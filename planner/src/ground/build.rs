@@ -201,6 +201,9 @@ fn mark_always(
         let effects = action.start_effects.iter().chain(&action.end_effects);
         let deletes = effects.filter(|effect| matches!(effect.change, Change_::Delete(_)));
         let deletes: Vec<Effect_> = deletes.map(unconditional).collect();
+        if deletes.is_empty() {
+            continue;
+        }
         let mut gone = Vec::new();
         for_instances(action, list, stop, |binding| {
             for effect in &deletes {

@@ -1,11 +1,15 @@
 //! What the record of a run is good for: it is played again, serves as a body, and lets a run that was killed go on.
 
+mod beside;
+
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 use tempfile::TempDir;
+
+use beside::shared;
 
 fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_descry"));
@@ -88,16 +92,6 @@ fn a_run_on_real_views_is_played_again_and_goes_on_after_kills() {
     let Some(kitchen) = shared("data/kitchen") else { return };
     let robot = format!("recorded:{}", kitchen.display());
     check_goal(&["find", "mug", "--robot", &robot], &[&[1], &[12, 20]]);
-}
-
-/// A folder beside the checkout; without it a test says that it is skipped.
-fn shared(path: &str) -> Option<PathBuf> {
-    let found = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared").join(path);
-    if !found.exists() {
-        eprintln!("skipped: {} is not there", found.display());
-        return None;
-    }
-    Some(found)
 }
 
 /// A run whose body is the record of another finds what that one found, where that one found it.

@@ -69,17 +69,19 @@
       (forall (?of - kind)
         (at end (increase (completeness ?of) [expected-completeness ?from ?of])))))
 
-  ; What a push uncovers is seen by the looks after it, also from where the robot has looked before.
+  ; What a push uncovers is seen by the looks after it, also from where the robot has looked before. While it pushes, the
+  ; robot stands nowhere in particular: it neither looks nor leaves.
   (:durative-action push-aside
     :parameters (?from - pose ?what - obstacle)
     :duration (= ?duration 12)
     :condition (and
       (over all (time-left))
       (at start (at ?from))
-      (over all (at ?from))
       (at start (not (pushed ?what)))
       (at start ([worth-a-push ?from ?what])))
     :effect (and
+      (at start (not (at ?from)))
+      (at end (at ?from))
       (at end (pushed ?what))
       (forall (?pose - pose ?on - surface)
         (at end (not (observed ?pose ?on)))))))

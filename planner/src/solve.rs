@@ -123,7 +123,7 @@ pub enum PlanError {
         findings: Findings,
     },
     /// The search's plan does not pass validation: a fault of this crate.
-    #[error("internal error: a plan that was found is not valid: {reason}")]
+    #[error("internal error: a plan that was found is not valid: {reason}\n{plan}")]
     Internal {
         /// What the validator said.
         reason: String,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use descry_domains::doubt::Taken;
+use descry_domains::doubt::{Doubt, Taken};
 use descry_domains::obstacle::{self, Obstacle};
 use descry_domains::situation::{Known, Situation};
 use descry_domains::{attachments, candidates};
@@ -189,7 +189,7 @@ fn hope(s: &Situation, from: usize) -> String {
         s.surfaces.iter().map(|on| &on.symbol).collect()
     };
     let doubts = names.into_iter().zip(s.doubts(0));
-    let said = |(name, doubt): (&String, &descry_domains::doubt::Doubt)| {
+    let said = |(name, doubt): (&String, &Doubt)| {
         if doubt.anywhere {
             return format!("nothing is known yet of where {name} could be");
         }
@@ -214,8 +214,13 @@ pub(super) fn what_is_left(s: &Situation) -> Option<String> {
         let unsure = |t: &&Track| t.certainty() < s.thresholds.confidence;
         let places = s.belief.tracks.iter().filter(unsure).map(|t| place(&t.position_m));
         let places: Vec<String> = places.collect();
-        return (!places.is_empty())
-            .then(|| format!("what stands at {} looks the same from every side", places.join(" and at ")));
+        if !places.is_empty() {
+            return Some(format!(
+                "what stands at {} looks the same from every side",
+                places.join(" and at ")
+            ));
+        }
+        return s.doubts(0).into_iter().find_map(|doubt| out_of_sight(s, doubt, "more"));
     };
     let best = s
         .belief
@@ -226,14 +231,19 @@ pub(super) fn what_is_left(s: &Situation) -> Option<String> {
         let p = track.probability_of(&thing.name);
         return Some(format!("what stands at {} may be it ({p:.2})", place(&track.position_m)));
     }
-    let (hidden, places) = s.doubt_about(0).out_of_sight(s);
+    out_of_sight(s, s.doubt_about(0), "it")
+}
+
+/// Where there is room for something that no look can show; none if too little hangs on it.
+fn out_of_sight(s: &Situation, doubt: &Doubt, what: &str) -> Option<String> {
+    let (hidden, places) = doubt.out_of_sight(s);
     let middle =
         Point3::from(places.iter().map(|p| p.coords).sum::<Vector3<f64>>() / places.len().max(1) as f64);
     let first = places
         .iter()
         .min_by(|a, b| nalgebra::distance(a, &middle).total_cmp(&nalgebra::distance(b, &middle)))?;
     (hidden > s.thresholds.out_of_sight)
-        .then(|| format!("there is room for it out of sight, near {} ({hidden:.2})", place(first)))
+        .then(|| format!("there is room for {what} out of sight, near {} ({hidden:.2})", place(first)))
 }
 
 fn place(p: &Point3<f64>) -> String {

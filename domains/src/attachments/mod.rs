@@ -29,7 +29,7 @@ const ALL: &[(&str, &[&str], Answers)] = &[
     ("expected-gain", &["observed", "pushed"], expected_gain::answer),
     ("path-cost", &[], path_cost::answer),
     ("worth-a-look", &["pushed"], worth_a_look::answer),
-    ("worth-a-push", &[], worth_a_push::answer),
+    ("worth-a-push", &["pushed"], worth_a_push::answer),
 ];
 
 /// An attachment of the list above, bound to a situation.

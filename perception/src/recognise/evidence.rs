@@ -16,6 +16,10 @@ const HANDLE_REACHES_M: [f64; 3] = [0.010, 0.018, 0.026];
 const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
 /// Least and greatest reach of a handle out of the body, metres.
 const HANDLE_M: (f64, f64) = (0.014, 0.06);
+/// A handle reaches out by at least so many spreads of the body's side.
+const HANDLE_SPREADS: f64 = 4.0;
+/// A circle whose radius is known no better than this is no circle to go by, metres.
+const VAGUE_M: f64 = 0.015;
 /// What is this far out of the body is no longer the body itself, metres.
 const CLEAR_M: f64 = 0.007;
 /// Greatest width of a handle across, metres.
@@ -205,19 +209,21 @@ fn measure_round(
     let sectors = Sectors::measure(round, segment, asker, base_m, height);
     evidence.arc = sectors.measured_share();
     measured.looked_through = sectors.looked_through_share();
-    let protrusion = Protrusion::find(round, segment, asker, base_m, height);
-    evidence.protrusion_m = protrusion.as_ref().map_or(0.0, |h| h.reach_m);
     evidence.handle_unseen = sectors.unseen_share();
-    let handle = protrusion.filter(Protrusion::is_handle);
-    if let Some(handle) = &handle {
-        // What is a handle says nothing against the roundness of what it is the handle of.
-        let body = |p: &Point3<f64>| !handle.has(round, p);
-        let spread_m = round.spread_of(&segment.points, (base_m, top), measured.sigma_m, body);
-        evidence.round_residual_m = spread_m;
-        measured.round = Some(Round { spread_m, ..*round });
+    let mut spread_m = round.spread_m;
+    let protrusion = Protrusion::find(round, segment, asker, base_m, height);
+    if let Some(protrusion) = &protrusion {
+        evidence.protrusion_m = protrusion.reach_m;
+        // What may be a handle says nothing against the roundness of what it is the handle of.
+        let body = |p: &Point3<f64>| !protrusion.has(round, p);
+        spread_m = round.spread_of(&segment.points, (base_m, top), measured.sigma_m, body);
     }
-    evidence.handle = match handle {
-        Some(_) => Sighting::Seen,
+    evidence.handle = match protrusion.filter(|p| p.is_handle(spread_m)) {
+        Some(_) => {
+            evidence.round_residual_m = spread_m;
+            measured.round = Some(Round { spread_m, ..*round });
+            Sighting::Seen
+        }
         None if evidence.handle_unseen < 0.08 => Sighting::Absent,
         None => Sighting::Unseen,
     };
@@ -230,6 +236,12 @@ fn measure_round(
         _ => Sighting::Unseen,
     };
     measured.seen_fraction = 0.75 * sectors.covered_share() + 0.25 * (top_face.open + top_face.lid).min(1.0);
+    if evidence.radius_sigma_m > VAGUE_M {
+        // Beside and above a circle that may as well be another, nothing was looked at.
+        (evidence.handle, evidence.handle_unseen, evidence.inside) =
+            (Sighting::Unseen, 1.0, Sighting::Unseen);
+        measured.looked_through = 0.0;
+    }
 }
 
 /// What is known around the body, direction by direction.
@@ -369,9 +381,10 @@ impl Protrusion {
         round.outside_m(p) > CLEAR_M && along > 0.0 && across.abs() < HANDLE_WIDTH_M
     }
 
-    fn is_handle(&self) -> bool {
+    /// Whether it is a handle, and not what is left of misaligned views of a side that spreads so much about its form, metres.
+    fn is_handle(&self, spread_m: f64) -> bool {
         self.points >= self.least
-            && (HANDLE_M.0..HANDLE_M.1).contains(&self.reach_m)
+            && (HANDLE_M.0.max(HANDLE_SPREADS * spread_m)..HANDLE_M.1).contains(&self.reach_m)
             && self.width_m < HANDLE_WIDTH_M
             && self.inside_height
     }

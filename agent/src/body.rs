@@ -7,6 +7,7 @@ use descry_robots::Robot;
 use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
 
 use crate::exit::CommandError;
+use crate::keeping;
 
 mod recorded;
 pub mod tape;
@@ -62,8 +63,14 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
                 return Err(CommandError::BadInput(text));
             }
             let path = std::path::Path::new(folder);
-            let robot = if recorded::is_record(path) {
-                recorded::open(crate::keeping::open(path)?, folder)?
+            if keeping::is_address(path) && keeping::Address::read(folder)?.run.is_none() {
+                let text = format!(
+                    "--robot {robot}: one run is one body\n  name it behind a #; `descry memory show {folder}` lists the runs"
+                );
+                return Err(CommandError::BadInput(text));
+            }
+            let robot = if keeping::is_address(path) || recorded::is_record(path) {
+                recorded::open(keeping::open(path)?, folder)?
             } else {
                 descry_robots::recorded::RecordedRobot::open(path).map_err(CommandError::bad_input)?
             };

@@ -1,4 +1,6 @@
-//! How the record of a run is kept.
+//! Where and how the record of a run is kept.
+
+mod remote;
 
 use std::path::Path;
 
@@ -6,11 +8,16 @@ use descry_memory::{Durability, Options, Record, Retention};
 use serde::{Deserialize, Serialize};
 
 use crate::exit::CommandError;
+pub use remote::{Address, is_address};
 
-/// How a record is kept: options of the command line, and part of what a run was started with.
+/// Where and how a record is kept: options of the command line, and part of what a run was started with.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default)]
 pub struct Keeping {
+    /// Where the record is kept: mongodb://HOST[:PORT]/DATABASE[#RUN], for a descry that was built with the feature mongodb
+    /// [default: in the run's folder]
+    #[arg(long, value_name = "ADDRESS")]
+    pub memory: Option<String>,
     /// When something counts as recorded: disk (it survives a power cut) or process (it survives any end of descry; a power cut
     /// costs at most the last segment) [default: disk]
     #[arg(long, value_name = "disk|process")]
@@ -52,12 +59,30 @@ impl Keeping {
         }
     }
 
+    fn address(&self) -> Result<Option<Address>, CommandError> {
+        self.memory.as_deref().map(Address::read).transpose()
+    }
+
+    /// The same with the name under which a new run is in its store, which must be free there.
+    ///
+    /// # Errors
+    /// [`CommandError::BadInput`] for an address that cannot be used; [`CommandError::Broken`] if no server answers there.
+    pub fn of_new_run(&self, run: &Path) -> Result<Self, CommandError> {
+        let Some(address) = self.address()? else { return Ok(self.clone()) };
+        let address = address.of_run(run);
+        address.check_free(self.options())?;
+        Ok(Keeping { memory: Some(address.to_string()), ..self.clone() })
+    }
+
     /// A new record for a run.
     ///
     /// # Errors
     /// [`CommandError::Broken`] if it cannot be made.
     pub fn create(&self, run: &Path) -> Result<Record, CommandError> {
-        Record::create(&run.join(RECORD), self.options()).map_err(CommandError::broken)
+        match self.address()? {
+            Some(address) => address.write(self.options()),
+            None => Record::create(&run.join(RECORD), self.options()).map_err(CommandError::broken),
+        }
     }
 
     /// The record of a run that is to go on; a new one if the run was cut off before it had one.
@@ -65,6 +90,9 @@ impl Keeping {
     /// # Errors
     /// [`CommandError::Broken`] if it cannot be opened, or is being written.
     pub fn resume(&self, run: &Path) -> Result<Record, CommandError> {
+        if let Some(address) = self.address()? {
+            return address.write(self.options())?.retracing().map_err(CommandError::broken);
+        }
         match Record::resume(&run.join(RECORD), self.options()) {
             Err(descry_memory::Error::NoRecord { .. }) => self.create(run),
             opened => opened.map_err(CommandError::broken),
@@ -72,11 +100,19 @@ impl Keeping {
     }
 }
 
-/// Opens a record to be read: that of a run, or a folder by itself.
+/// Opens a record to be read: that of a run, a folder by itself, or what is at an address.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if there is none; [`CommandError::Broken`] if it cannot be opened.
 pub fn open(place: &Path) -> Result<Record, CommandError> {
+    if let Some(text) = place.to_str().filter(|_| is_address(place)) {
+        return Address::read(text)?.read_only();
+    }
+    if let Ok(header) = crate::run::header(place)
+        && let Some(address) = header.settings.keeping.address()?
+    {
+        return address.read_only();
+    }
     Record::open_shared(place).map_err(|e| match e {
         descry_memory::Error::NoRecord { .. } => CommandError::bad_input(e),
         other => CommandError::broken(other),

@@ -17,7 +17,7 @@ use crate::agent::{Agent, Conclusion, Setup};
 use crate::body::Body;
 use crate::body::tape::{self, RecordTape};
 use crate::exit::CommandError;
-use crate::keeping::Keeping;
+use crate::keeping::{self, Keeping};
 use crate::policies::Chooser;
 use crate::report::{Believed, Event, Report, Verdict};
 
@@ -191,6 +191,13 @@ fn show_true_position(report: &mut Report, body: &Body) {
 /// # Errors
 /// [`CommandError::BadInput`] if the folder holds no run.
 pub fn header(folder: &Path) -> Result<Header, CommandError> {
+    if keeping::is_address(folder) {
+        let text = format!(
+            "{}: a store does not hold what a run was started with\n  name the run's folder, which says where its record is",
+            folder.display()
+        );
+        return Err(CommandError::BadInput(text));
+    }
     let path = folder.join(HEADER);
     let text = std::fs::read_to_string(&path).map_err(|e| {
         let text =

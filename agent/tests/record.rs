@@ -140,6 +140,11 @@ fn what_cannot_be_played_or_go_on_is_said() {
     check_refused(folder, &["do", "--resume", "nothing"], 2, &["run.json"]);
     check_refused(folder, &["find", "cup A", "--max-bytes", "much"], 2, &["no size", "500MB"]);
     check_refused(folder, &["replay", "nothing", "--speed", "0"], 2, &["no speed"]);
+    if cfg!(not(feature = "mongodb")) {
+        let words = ["built without MongoDB", "cargo build --release --features mongodb"];
+        check_refused(folder, &["find", "cup A", "--memory", "mongodb://host/runs"], 2, &words);
+        check_refused(folder, &["memory", "show", "mongodb://host/runs"], 2, &words);
+    }
     std::fs::create_dir_all(folder.join("empty/segments")).expect("a folder can be made");
     check_refused(
         folder,

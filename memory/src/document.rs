@@ -166,6 +166,16 @@ impl Draft<'_> {
         }
     }
 
+    /// Its end, for what lasts; otherwise its stamp.
+    pub(crate) fn until_ns(&self) -> i64 {
+        self.end_ns.unwrap_or(self.stamp_ns)
+    }
+
+    /// Whether it says what is pinned: that is recorded however little room there is, since it may make room.
+    pub(crate) fn is_of_pins(&self) -> bool {
+        [crate::stores::PIN, crate::stores::UNPIN].contains(&self.kind.as_str())
+    }
+
     /// The document under which it will be kept.
     ///
     /// # Errors

@@ -13,6 +13,23 @@ pub enum Error {
         /// The file that was being written.
         place: PathBuf,
     },
+    /// What is to be recorded does not fit into the bound of the record: what is there cannot go. Nothing of it was recorded.
+    #[error(
+        "{place} is bounded to {}, and {} more do not fit: {} are pinned{} or of this very moment; allow {} or more (`--max-bytes`), or pin less",
+        megabytes(*bound), megabytes(*coming), megabytes(*staying), held_text(held), megabytes(staying + coming)
+    )]
+    Bounded {
+        /// The folder or address of the record.
+        place: String,
+        /// The bound, bytes.
+        bound: u64,
+        /// What was to be recorded, bytes.
+        coming: u64,
+        /// What cannot go, bytes.
+        staying: u64,
+        /// Who pins it: name, records, bytes.
+        held: Vec<(String, u64, u64)>,
+    },
     /// The system refused a file.
     #[error("{what} {place}: {because}")]
     File {
@@ -118,6 +135,21 @@ pub enum Error {
         /// That failure.
         because: String,
     },
+}
+
+/// Megabytes, rounded up to a tenth.
+fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MB", (bytes as f64 / 1e5).ceil() / 10.0)
+}
+
+fn held_text(held: &[(String, u64, u64)]) -> String {
+    let one = |(by, records, bytes): &(String, u64, u64)| {
+        format!("{} in {records} records by `{by}`", megabytes(*bytes))
+    };
+    match held {
+        [] => String::new(),
+        held => format!(" ({})", held.iter().map(one).collect::<Vec<_>>().join(", ")),
+    }
 }
 
 fn nearest_text(nearest_ns: Option<i64>, stamp_ns: i64) -> String {

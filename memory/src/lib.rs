@@ -24,4 +24,6 @@ pub use foxglove::LogLevel;
 pub use nalgebra;
 pub use record::{Image, Options, Record, kind};
 pub use stores::local::{Durability, LocalOptions, LocalStore, Recovery};
+#[cfg(feature = "mongodb")]
+pub use stores::mongo::{MongoOptions, MongoStore};
 pub use stores::{Count, Fault, Report, Retention, Stats, Store};

@@ -1,6 +1,8 @@
-//! Where records are kept: one interface, and the store on this machine's disk.
+//! Where records are kept: one interface, the store on this machine's disk, and one in MongoDB (feature `mongodb`).
 
 pub mod local;
+#[cfg(feature = "mongodb")]
+pub mod mongo;
 
 use crate::document::{Document, Draft, Query, RecordId};
 use crate::error::Error;

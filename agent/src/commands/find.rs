@@ -43,7 +43,7 @@ pub struct With {
     /// Scene of the simulated robot: a name of the domain or a TOML file
     #[arg(long)]
     scene: Option<String>,
-    /// The body: sim, or recorded:DIR for a folder of depth frames or of an earlier run
+    /// The body: sim, or recorded:DIR for a folder of depth frames or of an earlier run (also recorded:mongodb://HOST/DATABASE#RUN)
     #[arg(long, default_value = "sim")]
     robot: String,
     /// Fixes the arrangement, the noise and every choice
@@ -110,7 +110,7 @@ fn begin(said: &str, with: &With) -> Result<(Report, PathBuf), CommandError> {
         seed: with.seed,
         domain: with.domain.clone(),
         policy: with.policy.clone(),
-        keeping: with.keeping.clone(),
+        keeping: with.keeping.of_new_run(&folder)?,
     };
     let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, &mut tell)?;
     Ok((report, folder))

@@ -22,10 +22,10 @@ pub enum Arguments {
     Export(ExportArguments),
 }
 
-/// A record's folder.
+/// Where a record is.
 #[derive(clap::Args)]
 pub struct Place {
-    /// Folder of a run or of its record
+    /// Folder of a run or of its record, or mongodb://HOST/DATABASE[#RUN]
     record: PathBuf,
     /// Print one JSON object
     #[arg(long)]
@@ -114,8 +114,16 @@ fn open(place: &Place) -> Result<Record, CommandError> {
 
 fn show(place: &Place) -> Result<Exit, CommandError> {
     let stats = open(place)?.stats().map_err(CommandError::broken)?;
+    let runs = match place.record.to_str().filter(|_| keeping::is_address(&place.record)) {
+        Some(address) => keeping::Address::read(address)?.runs()?,
+        None => Vec::new(),
+    };
     if place.json {
-        input::print_json(&json!({ "record": place.record.display().to_string(), "stats": stats }))?;
+        let mut shown = json!({ "record": place.record.display().to_string(), "stats": stats });
+        if !runs.is_empty() {
+            shown["runs"] = json!(runs);
+        }
+        input::print_json(&shown)?;
         return Ok(Exit::Done);
     }
     let time = |ns: Option<i64>| ns.map_or("-".into(), |ns| format!("{:.3} s", seconds(ns)));
@@ -129,6 +137,9 @@ fn show(place: &Place) -> Result<Exit, CommandError> {
     ))?;
     for (kind, count) in &stats.kinds {
         input::print_text(&format!("{kind:20} {:8} {:10.1} MB", count.records, count.bytes as f64 / 1e6))?;
+    }
+    if !runs.is_empty() {
+        input::print_text(&format!("runs: {}", runs.join(", ")))?;
     }
     Ok(Exit::Done)
 }

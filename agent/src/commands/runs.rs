@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
+use crate::keeping;
 
 /// Arguments of `descry runs`.
 #[derive(clap::Args)]
@@ -43,6 +44,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
 
 fn list(arguments: &Arguments) -> Result<Vec<Value>, CommandError> {
     let folder = &arguments.folder;
+    if keeping::is_address(folder) {
+        let text = format!(
+            "{0}: a store, not a folder of runs\n  `descry memory show {0}` names the runs whose records are there",
+            folder.display()
+        );
+        return Err(CommandError::BadInput(text));
+    }
     if !folder.exists() {
         return Ok(Vec::new());
     }

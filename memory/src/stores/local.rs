@@ -322,12 +322,14 @@ impl LocalStore {
             let blobs = draft.blobs.iter().map(|b| b.data.as_ref()).collect();
             batch.push(Encoded { document: draft.document(RecordId(id), &self.robot)?, blobs });
         }
+        let now_ns = drafts.iter().map(Draft::until_ns).max().unwrap_or(i64::MAX);
+        self.make_room(writer, drafts, now_ns)?;
         loop {
             match self.write(writer, &batch) {
                 Ok(()) => break,
                 // What may be pruned makes room for what is new.
                 Err(e) if e.is_full() && self.options.retention != Retention::default() => {
-                    if self.drop_oldest(writer)?.is_none() {
+                    if self.drop_oldest(writer, now_ns)?.is_none() {
                         return Err(e);
                     }
                 }
@@ -335,10 +337,9 @@ impl LocalStore {
             }
         }
         writer.next_id.0 += batch.len() as u64;
-        let newest = batch.iter().map(|r| r.document.end_ns.unwrap_or(r.document.stamp_ns)).max();
-        writer.newest_ns = newest.map_or(writer.newest_ns, |n| n.max(writer.newest_ns));
+        writer.newest_ns = writer.newest_ns.max(now_ns);
         let retention = self.options.retention;
-        self.keep_within(writer, &retention)?;
+        self.keep_within(writer, &retention, now_ns)?;
         Ok(batch.iter().map(|r| r.document.id).collect())
     }
 }
@@ -413,7 +414,7 @@ impl Store for LocalStore {
         if !writer.segment.chunks.is_empty() && !retention.eq(&Retention::default()) {
             self.roll(&mut writer)?;
         }
-        self.keep_within(&mut writer, retention)
+        self.keep_within(&mut writer, retention, i64::MAX)
     }
 
     fn stats(&self) -> Result<Stats, Error> {

@@ -184,6 +184,12 @@ impl Index {
         statement.query_row([], |r| Ok((unsigned(r, 0)?, r.get(1)?))).optional().map_err(|e| self.err(e))
     }
 
+    /// Until when the records of a segment last.
+    pub fn lasts_until(&self, segment: u64) -> Result<Option<i64>, Error> {
+        let sql = "SELECT max(coalesce(ends, stamp)) FROM records WHERE segment = ?1";
+        self.db.query_row(sql, [segment as i64], |r| r.get(0)).map_err(|e| self.err(e))
+    }
+
     /// Says, durably, that a segment is about to be deleted.
     pub fn mark_going(&mut self, segment: u64) -> Result<(), Error> {
         self.durably(|db| {
@@ -395,6 +401,18 @@ impl Index {
         };
         read().map_err(|e| self.err(e))?;
         Ok(pins)
+    }
+
+    /// Who holds how many records of how many bytes, the most first.
+    pub fn holders(&self) -> Result<Vec<(String, u64, u64)>, Error> {
+        let sql = "SELECT holder, count(*), sum(bytes) FROM pins JOIN records ON id = record GROUP BY holder ORDER BY 3 DESC, 1";
+        self.rows(sql, [], |r| Ok((r.get(0)?, unsigned(r, 1)?, unsigned(r, 2)?)))
+    }
+
+    /// The bytes of everything that is pinned.
+    pub fn pinned_bytes(&self) -> Result<u64, Error> {
+        let sql = "SELECT coalesce(sum(bytes), 0) FROM records WHERE id IN (SELECT record FROM pins)";
+        self.db.query_row(sql, [], |r| unsigned(r, 0)).map_err(|e| self.err(e))
     }
 
     /// Counts; sizes on the disk are the caller's to add.

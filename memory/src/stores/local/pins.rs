@@ -13,7 +13,7 @@ pub(crate) fn pinned(stamp_ns: i64, ids: &[RecordId], by: &str, instead: bool) -
 }
 
 /// A record that says that `by` holds nothing any more.
-pub(super) fn unpinned(stamp_ns: i64, by: &str) -> Draft<'static> {
+pub(crate) fn unpinned(stamp_ns: i64, by: &str) -> Draft<'static> {
     let mut draft = Draft::new(UNPIN, stamp_ns);
     draft.meta.body = json!({ "by": by });
     draft

@@ -2,20 +2,63 @@
 
 use super::segment::Encoded;
 use super::{INDEX, LocalStore, WriteState, new_segment, segment_path, unpoisoned};
+use crate::document::Draft;
 use crate::error::Error;
 use crate::stores::Retention;
 use std::fs;
 
 impl LocalStore {
-    /// Drops segments until the limits hold or nothing is left to drop. Returns the number of records that went.
-    pub(super) fn keep_within(&self, writer: &mut WriteState, retention: &Retention) -> Result<u64, Error> {
+    /// Makes room for what is coming, where there is a bound in bytes.
+    ///
+    /// # Errors
+    /// [`Error::Bounded`] if what is pinned, and what is of the same moment, leaves too little.
+    pub(super) fn make_room(
+        &self,
+        writer: &mut WriteState,
+        drafts: &[Draft],
+        now_ns: i64,
+    ) -> Result<(), Error> {
+        let Some(bound) = self.options.retention.max_bytes else { return Ok(()) };
+        if writer.segment.is_long(self.options.segment_bytes) {
+            self.roll(writer)?;
+        }
+        let coming: u64 = drafts.iter().flat_map(|d| &d.blobs).map(|b| b.data.len() as u64).sum();
+        if self.bytes(writer) + coming <= bound {
+            return Ok(());
+        }
+        self.index().empty_log()?;
+        let refused = |staying: u64| {
+            let place = self.dir.display().to_string();
+            Err(Error::Bounded { place, bound, coming, staying, held: self.index().holders()? })
+        };
+        let must_fit = !drafts.iter().all(Draft::is_of_pins);
+        let pinned = self.index().pinned_bytes()? + self.index_bytes();
+        if must_fit && pinned + coming > bound {
+            return refused(pinned);
+        }
+        while self.bytes(writer) + coming > bound {
+            if self.drop_oldest(writer, now_ns)?.is_none() {
+                return if must_fit { refused(self.bytes(writer)) } else { Ok(()) };
+            }
+        }
+        Ok(())
+    }
+
+    /// Drops segments until the limits hold or nothing is left to drop; what lasts until `now_ns` stays. Returns the number of
+    /// records that went.
+    pub(super) fn keep_within(
+        &self,
+        writer: &mut WriteState,
+        retention: &Retention,
+        now_ns: i64,
+    ) -> Result<u64, Error> {
         let mut gone = 0;
         if self.is_over(writer, retention)? && retention.max_bytes.is_some() {
             // What the index has yet to take in is no record: it goes first.
             self.index().empty_log()?;
         }
         while self.is_over(writer, retention)? {
-            match self.drop_oldest(writer)? {
+            match self.drop_oldest(writer, now_ns)? {
                 Some(records) => gone += records,
                 None => break,
             }
@@ -24,13 +67,7 @@ impl LocalStore {
     }
 
     fn is_over(&self, writer: &WriteState, retention: &Retention) -> Result<bool, Error> {
-        if let Some(most) = retention.max_bytes
-            && writer.sealed_bytes
-                + writer.segment.end
-                + writer.kept.as_ref().map_or(0, |k| k.end)
-                + self.index_bytes()
-                > most
-        {
+        if retention.max_bytes.is_some_and(|most| self.bytes(writer) > most) {
             return Ok(true);
         }
         if let Some(least) = retention.min_free_bytes {
@@ -48,9 +85,19 @@ impl LocalStore {
         Ok(false)
     }
 
-    /// Drops the oldest segment that holds anything not pinned; `None` if there is none.
-    pub(super) fn drop_oldest(&self, writer: &mut WriteState) -> Result<Option<u64>, Error> {
+    /// The size of everything, the index included.
+    fn bytes(&self, writer: &WriteState) -> u64 {
+        let kept = writer.kept.as_ref().map_or(0, |k| k.end);
+        writer.sealed_bytes + writer.segment.end + kept + self.index_bytes()
+    }
+
+    /// Drops the oldest segment that holds anything not pinned; `None` if there is none, or if it lasts until `now_ns`: a cloud must
+    /// not push out the transforms of its own time before it can be pinned with them.
+    pub(super) fn drop_oldest(&self, writer: &mut WriteState, now_ns: i64) -> Result<Option<u64>, Error> {
         let Some((number, _)) = self.index().oldest_segment()? else { return Ok(None) };
+        if self.index().lasts_until(number)?.is_some_and(|until| until >= now_ns) {
+            return Ok(None);
+        }
         self.carry_pinned(writer, number)?;
         self.index().mark_going(number)?;
         let path = segment_path(&self.dir, number);

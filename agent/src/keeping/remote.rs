@@ -1,0 +1,202 @@
+//! Records in MongoDB, where descry was built with the feature `mongodb`; otherwise the words that say how to build it.
+
+use std::path::Path;
+
+use crate::exit::CommandError;
+
+/// How the address of a store in MongoDB begins.
+const SCHEME: &str = "mongodb://";
+/// The environment variable that holds name and password for a server, as `NAME:PASSWORD`.
+const LOGIN: &str = "DESCRY_MONGODB_LOGIN";
+
+/// A store in MongoDB, and whose records in it are meant.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Address {
+    /// As the driver takes it.
+    server: String,
+    /// The run's name in the store; none for everything there.
+    pub run: Option<String>,
+}
+
+impl Address {
+    /// Reads `mongodb://HOST[:PORT][/DATABASE][?OPTIONS][#RUN]`.
+    ///
+    /// # Errors
+    /// [`CommandError::BadInput`] for anything else, and for an address with a password.
+    pub fn read(text: &str) -> Result<Self, CommandError> {
+        let bad = |why: &str| Err(CommandError::BadInput(format!("{}\n  {why}", without_login(text))));
+        let Some(rest) = text.strip_prefix(SCHEME) else {
+            return bad("expected: mongodb://HOST[:PORT]/DATABASE[#RUN]");
+        };
+        if rest.contains('@') {
+            return bad(&format!(
+                "an address is kept in run.json, a password must not be: leave NAME:PASSWORD out and set {LOGIN} to it"
+            ));
+        }
+        let (server, run) = text.split_once('#').map_or((text, None), |(server, run)| (server, Some(run)));
+        Ok(Address { server: server.into(), run: run.filter(|run| !run.is_empty()).map(str::to_owned) })
+    }
+
+    /// This address in the name of a run: the one that it says, or that of the run's folder.
+    pub fn of_run(self, folder: &Path) -> Self {
+        let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        let name = whole.file_name().map(|n| n.to_string_lossy().into_owned());
+        Address { run: self.run.or(name), ..self }
+    }
+}
+
+impl std::fmt::Display for Address {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.server)?;
+        self.run.as_ref().map_or(Ok(()), |run| write!(f, "#{run}"))
+    }
+}
+
+/// Whether a place is the address of a store, and no folder.
+pub fn is_address(place: &Path) -> bool {
+    place.to_str().is_some_and(|text| text.starts_with("mongodb"))
+}
+
+fn without_login(text: &str) -> String {
+    text.rsplit_once('@').map_or(text.to_owned(), |(_, host)| format!("{SCHEME}…@{host}"))
+}
+
+#[cfg(feature = "mongodb")]
+mod driver {
+    use std::sync::Arc;
+
+    use descry_memory::{Error, MongoOptions, MongoStore, Options, Query, Record};
+
+    use super::{Address, LOGIN};
+    use crate::exit::CommandError;
+
+    impl Address {
+        /// Opens the record of a run to write it.
+        ///
+        /// # Errors
+        /// [`CommandError::Broken`] if no server answers; [`CommandError::BadInput`] for a limit that it cannot keep.
+        pub fn write(&self, mut options: Options) -> Result<Record, CommandError> {
+            options.robot = self.run.clone().unwrap_or_default();
+            let store = MongoStore::open(&self.server, &self.options(&options)).map_err(refused)?;
+            Ok(Record::on(Arc::new(store), options))
+        }
+
+        /// Opens the record of a run, or everything in the store, to read it.
+        ///
+        /// # Errors
+        /// [`CommandError::Broken`] if no server answers; [`CommandError::BadInput`] if there is no such run.
+        pub fn read_only(&self) -> Result<Record, CommandError> {
+            let options = Options { robot: self.run.clone().unwrap_or_default(), ..Options::default() };
+            let store = MongoStore::open_shared(&self.server, &self.options(&options)).map_err(refused)?;
+            let record = Record::on(Arc::new(store), options);
+            if self.run.is_some() && is_empty(&record)? {
+                let runs = self.runs()?.join(", ");
+                let text = format!("{self}: there is no run of that name\n  there are: {runs}");
+                return Err(CommandError::BadInput(text));
+            }
+            Ok(record)
+        }
+
+        /// Checks that the store answers and has no run of this name yet.
+        ///
+        /// # Errors
+        /// [`CommandError::Broken`] if no server answers; [`CommandError::BadInput`] if the name is taken.
+        pub fn check_free(&self, options: Options) -> Result<(), CommandError> {
+            if is_empty(&self.write(options)?)? {
+                return Ok(());
+            }
+            let text = format!(
+                "{self}: it holds a run of that name already\n  name another folder with --run, or another name behind the #"
+            );
+            Err(CommandError::BadInput(text))
+        }
+
+        /// The names of the runs in the store.
+        ///
+        /// # Errors
+        /// [`CommandError::Broken`] if no server answers.
+        pub fn runs(&self) -> Result<Vec<String>, CommandError> {
+            let store = MongoStore::open_shared(&self.server, &self.options(&Options::default()));
+            store.and_then(|store| store.robots()).map_err(refused)
+        }
+
+        fn options(&self, options: &Options) -> MongoOptions {
+            let login = std::env::var(LOGIN).ok();
+            let login = login.as_deref().and_then(|l| l.split_once(':'));
+            MongoOptions {
+                robot: options.robot.clone(),
+                durability: options.durability,
+                retention: options.retention,
+                login: login.map(|(name, password)| (name.to_owned(), password.to_owned())),
+            }
+        }
+    }
+
+    fn is_empty(record: &Record) -> Result<bool, CommandError> {
+        let one = record.find(&Query { limit: Some(1), ..Query::default() });
+        one.map(|found| found.is_empty()).map_err(CommandError::broken)
+    }
+
+    fn refused(e: Error) -> CommandError {
+        match e {
+            Error::Input { .. } => CommandError::bad_input(e),
+            other => CommandError::broken(other),
+        }
+    }
+}
+
+#[cfg(not(feature = "mongodb"))]
+mod driver {
+    use descry_memory::{Options, Record};
+
+    use super::Address;
+    use crate::exit::CommandError;
+
+    impl Address {
+        /// Says that this descry has no driver.
+        pub fn write(&self, _options: Options) -> Result<Record, CommandError> {
+            self.read_only()
+        }
+
+        /// Says that this descry has no driver.
+        pub fn check_free(&self, _options: Options) -> Result<(), CommandError> {
+            self.read_only().map(|_| ())
+        }
+
+        /// Says that this descry has no driver.
+        pub fn runs(&self) -> Result<Vec<String>, CommandError> {
+            self.read_only().map(|_| Vec::new())
+        }
+
+        /// Says that this descry has no driver.
+        pub fn read_only(&self) -> Result<Record, CommandError> {
+            let text = format!(
+                "{self}: this descry was built without MongoDB\n  build it with: cargo build --release --features mongodb"
+            );
+            Err(CommandError::BadInput(text))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Address, is_address};
+    use std::path::Path;
+
+    #[test]
+    fn addresses_are_read() {
+        let run = |text: &str| Address::read(text).unwrap().of_run(Path::new("runs/find-1")).to_string();
+        assert_eq!(run("mongodb://host/db"), "mongodb://host/db#find-1");
+        assert_eq!(run("mongodb://a,b:3/db?w=1#mine"), "mongodb://a,b:3/db?w=1#mine");
+        assert_eq!(Address::read("mongodb://host#").unwrap().to_string(), "mongodb://host");
+        for (text, word) in [
+            ("mongo://host/db", "expected: mongodb://HOST"),
+            ("mongodb+srv://host/db", "expected: mongodb://HOST"),
+            ("mongodb://me:secret@host/db", "DESCRY_MONGODB_LOGIN"),
+        ] {
+            let error = Address::read(text).unwrap_err().to_string();
+            assert!(error.contains(word) && !error.contains("secret"), "{error}");
+        }
+        assert!(is_address(Path::new("mongodb+srv://x")) && !is_address(Path::new("runs/mongodb")));
+    }
+}

@@ -1,0 +1,120 @@
+//! Runs whose records are in MongoDB: what a record on the disk is good for, these are good for, too.
+
+#[path = "../../memory/tests/server/process.rs"]
+mod process;
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use process::{Process, skipped};
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_descry"));
+    command.args(arguments).current_dir(folder);
+    command
+}
+
+/// Runs descry and returns what it printed as JSON.
+fn check(folder: &Path, arguments: &[&str], exit: i32) -> Value {
+    let output = command(folder, arguments).output().expect("the binary runs");
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(exit), "{arguments:?}\n{err}");
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{arguments:?}: {e}\n{err}"))
+}
+
+/// Runs descry where it cannot do what it is asked, and expects words and no password.
+fn check_refused(folder: &Path, arguments: &[&str], exit: i32, word: &str) {
+    let output = command(folder, arguments).output().expect("the binary runs");
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(exit), "{arguments:?}\n{err}");
+    assert!(err.contains(word) && !err.contains("secret"), "{arguments:?} does not say {word:?}: {err}");
+}
+
+/// Every document of a record, without the name of who recorded it.
+fn documents(folder: &Path, place: &str) -> Vec<String> {
+    let mut found = check(folder, &["memory", "query", place, "--json"], 0);
+    let records = found["records"].as_array_mut().expect("a list");
+    let nameless = |record: &mut Value| {
+        record.as_object_mut().map(|fields| fields.remove("robot"));
+        record["id"] = Value::Null;
+        record.to_string()
+    };
+    let mut all: Vec<String> = records.iter_mut().map(nameless).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn a_run_is_recorded_played_again_and_gone_on_with() {
+    let server = match Process::start() {
+        Ok(server) => server,
+        Err(why) => return skipped(&why),
+    };
+    let folder = TempDir::new().expect("a folder can be made");
+    let folder = folder.path();
+    let store = format!("{}/runs", server.address());
+    let find = ["find", "cup A", "--json"];
+    let here = check(folder, &[&find[..], &["--run", "here"]].concat(), 0);
+    let there = check(folder, &[&find[..], &["--run", "there", "--memory", &store]].concat(), 0);
+    for key in ["verdict", "position_m", "confidence", "views", "sim_time_s"] {
+        assert_eq!(here[key], there[key], "{key}");
+    }
+    let all = documents(folder, "here");
+    assert_eq!(documents(folder, "there"), all);
+    assert!(!folder.join("there/record").exists());
+    let again = check(folder, &["replay", "there", "--json"], 0);
+    assert_eq!((&again["same"], &again["verdict"]), (&true.into(), &"achieved".into()), "{again}");
+
+    kill_after(folder, &["find", "cup A", "--run", "cut", "--memory", &store], 12);
+    check(folder, &["do", "--resume", "cut", "--json"], 0);
+    assert_eq!(documents(folder, "cut"), all);
+
+    let name = format!("{store}#there");
+    assert_eq!(check(folder, &["memory", "verify", &store, "--json"], 0)["whole"], true);
+    let shown = check(folder, &["memory", "show", &store, "--json"], 0);
+    assert_eq!(shown["runs"], serde_json::json!(["cut", "there"]));
+    assert_eq!(shown["stats"]["records"], 2 * all.len());
+    assert_eq!(check(folder, &["memory", "show", &name, "--json"], 0)["stats"]["records"], all.len());
+    let exported = check(folder, &["export", &name, "there.mcap", "--json"], 0);
+    assert_eq!(exported["records"], all.len());
+    let body = format!("recorded:{name}");
+    let second = check(folder, &["find", "cup A", "--robot", &body, "--run", "second", "--json"], 0);
+    assert_eq!(second["verdict"], "achieved");
+    check_refusals(folder, &store);
+}
+
+/// Kills a run after it has said so many lines.
+fn kill_after(folder: &Path, arguments: &[&str], lines: usize) {
+    let mut child =
+        command(folder, arguments).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it starts");
+    let said = BufReader::new(child.stderr.take().expect("it speaks"));
+    let heard = said.lines().take(lines).filter_map(Result::ok).count();
+    assert_eq!(heard, lines, "{arguments:?} ended by itself");
+    child.kill().expect("it can be killed");
+    child.wait().expect("it is gone");
+}
+
+fn check_refusals(folder: &Path, store: &str) {
+    let find = |more: &[&'static str], store: &str| {
+        let words = [&["find", "cup A", "--memory", store], more].concat();
+        words.iter().map(|w| (*w).to_owned()).collect::<Vec<_>>()
+    };
+    let named = |name: &str| format!("{store}#{name}");
+    let cases = [
+        (find(&[], &named("there")), 2, "holds a run of that name already"),
+        (find(&["--min-free", "1GB"], store), 2, "bound the record by bytes or by age"),
+        (find(&[], "mongodb://127.0.0.1:1/runs"), 5, "no server answers"),
+        (find(&[], "mongodb://me:secret@127.0.0.1:1/runs"), 2, "DESCRY_MONGODB_LOGIN"),
+        (find(&["--robot", "recorded:mongodb://127.0.0.1:1/runs"], store), 2, "name it behind a #"),
+    ];
+    for (arguments, exit, word) in cases {
+        check_refused(folder, &arguments.iter().map(String::as_str).collect::<Vec<_>>(), exit, word);
+    }
+    check_refused(folder, &["replay", store], 2, "name the run's folder");
+    check_refused(folder, &["show", store], 2, "name the run's folder");
+    check_refused(folder, &["runs", store], 2, "descry memory show");
+    check_refused(folder, &["memory", "show", &named("nobody")], 2, "there are: cut, there");
+}

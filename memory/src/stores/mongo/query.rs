@@ -1,0 +1,62 @@
+//! Queries in the words of MongoDB.
+
+use crate::document::{Document, Near, Order, Query};
+use mongodb::bson::{Document as Fields, doc};
+
+/// The conditions of a query that the server decides, and for places boxes around what is meant. What is pending is never found;
+/// `own` is whose records are meant where the query names nobody, "" for everybody's.
+pub(super) fn filter(query: &Query, own: &str) -> Fields {
+    let mut all = vec![doc! { "pending": { "$exists": false } }];
+    let own = Some(own.to_owned()).filter(|own| !own.is_empty());
+    let robot = query.robot.clone().or(own);
+    for (field, value) in [("kind", &query.kind), ("frame", &query.frame), ("robot", &robot)] {
+        all.extend(value.as_ref().map(|value| doc! { field: value.clone() }));
+    }
+    if let Some(from) = query.from_ns {
+        all.push(doc! { "$or": [{ "stamp_ns": { "$gte": from } }, { "end_ns": { "$gte": from } }] });
+    }
+    if let Some(to) = query.to_ns {
+        all.push(doc! { "stamp_ns": { "$lte": to } });
+    }
+    if let Some((stamp_ns, id)) = query.after {
+        let beyond = if query.order == Order::Oldest { "$gt" } else { "$lt" };
+        let same = doc! { "stamp_ns": stamp_ns, "_id": { beyond: id.0 as i64 } };
+        all.push(doc! { "$or": [{ "stamp_ns": { beyond: stamp_ns } }, same] });
+    }
+    if query.object.is_some() || query.min_confidence.is_some() {
+        let mut sighting = doc! { "confidence": { "$gte": query.min_confidence.unwrap_or(0.0) } };
+        if let Some(object) = &query.object {
+            sighting.insert("object", object.clone());
+        }
+        all.push(doc! { "objects": { "$elemMatch": sighting } });
+    }
+    all.extend(query.seen_from.iter().flat_map(|near| within(near, ["seen_from_m", "seen_from_m"])));
+    all.extend(query.covers.iter().flat_map(|near| within(near, ["covers_m.max_m", "covers_m.min_m"])));
+    doc! { "$and": all }
+}
+
+/// What reaches into the box around a ball: each coordinate of the greater corner above it, of the lesser below.
+fn within<'a>(near: &'a Near, [greater, lesser]: [&'a str; 2]) -> impl Iterator<Item = Fields> + 'a {
+    (0..3).map(move |i| {
+        let (low, high) = (near.place_m[i] - near.radius_m, near.place_m[i] + near.radius_m);
+        let (greater, lesser) = (format!("{greater}.{i}"), format!("{lesser}.{i}"));
+        doc! { "$and": [{ greater: { "$gte": low } }, { lesser: { "$lte": high } }] }
+    })
+}
+
+/// Whether a query asks for places: then what the server finds has to be looked at.
+pub(super) fn is_of_places(query: &Query) -> bool {
+    query.seen_from.is_some() || query.covers.is_some()
+}
+
+/// Whether a document lies where a query asks for.
+pub(super) fn is_there(query: &Query, document: &Document) -> bool {
+    let seen = |near: &Near| {
+        document.seen_from_m.is_some_and(|p| {
+            (0..3).map(|i| (p[i] - near.place_m[i]).powi(2)).sum::<f64>().sqrt() <= near.radius_m
+        })
+    };
+    let covered =
+        |near: &Near| document.covers_m.is_some_and(|b| b.distance_m(near.place_m) <= near.radius_m);
+    query.seen_from.as_ref().is_none_or(seen) && query.covers.as_ref().is_none_or(covered)
+}

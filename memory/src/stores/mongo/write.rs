@@ -1,0 +1,150 @@
+//! Recording: a document is kept as pending until its files are there, so that nobody ever finds a part of a record.
+
+use super::{COUNTER, MongoStore, numbers};
+use crate::document::{Document, Draft, RecordId};
+use crate::error::Error;
+use crate::stores::local::pins;
+use mongodb::bson::{self, Document as Fields, doc, oid::ObjectId};
+use mongodb::options::ReturnDocument;
+use std::io::Write;
+
+/// A record on its way: what will be found of it, and the files of its blobs.
+struct Row {
+    fields: Fields,
+    files: Vec<ObjectId>,
+}
+
+impl MongoStore {
+    /// Keeps within the limits and records a batch. What cannot be recorded whole is taken back.
+    pub(super) fn record(&self, drafts: &[Draft]) -> Result<Vec<RecordId>, Error> {
+        if drafts.is_empty() {
+            return Ok(Vec::new());
+        }
+        // Nothing is sent of a batch that holds something that cannot be recorded.
+        let mut rows = drafts.iter().map(|draft| self.row(draft)).collect::<Result<Vec<_>, _>>()?;
+        let coming = rows.iter().filter_map(|row| row.fields.get_i64("bytes").ok()).sum::<i64>();
+        self.make_room(coming.max(0) as u64, drafts)?;
+        let first = self.numbers(rows.len())?;
+        let ids: Vec<RecordId> = (first..).take(rows.len()).map(RecordId).collect();
+        for (row, id) in rows.iter_mut().zip(&ids) {
+            row.fields.insert("_id", id.0 as i64);
+        }
+        if let Err(e) = self.write(&ids, &rows, drafts) {
+            // What cannot be taken back now is removed when the store is next opened in that name.
+            let _ = self.remove(&ids);
+            return Err(e);
+        }
+        Ok(ids)
+    }
+
+    fn write(&self, ids: &[RecordId], rows: &[Row], drafts: &[Draft]) -> Result<(), Error> {
+        let at_once = rows.len() == 1 && rows[0].files.is_empty();
+        let documents = rows.iter().map(|row| {
+            let mut fields = row.fields.clone();
+            if !at_once {
+                fields.insert("pending", self.robot.clone());
+            }
+            fields
+        });
+        self.said(self.records.insert_many(documents).run())?;
+        if at_once {
+            return Ok(());
+        }
+        for ((id, row), draft) in ids.iter().zip(rows).zip(drafts) {
+            self.upload(*id, draft, &row.files)?;
+        }
+        let these = doc! { "_id": { "$in": numbers(ids) }, "pending": self.robot.clone() };
+        let done = self.said(self.records.update_many(these, doc! { "$unset": { "pending": "" } }).run())?;
+        if done.matched_count != ids.len() as u64 {
+            return Err(self.remote(format!(
+                "another process writes under the name `{}`: give each a name of its own",
+                self.robot
+            )));
+        }
+        Ok(())
+    }
+
+    /// The first of so many numbers that nobody else has.
+    fn numbers(&self, count: usize) -> Result<u64, Error> {
+        let take = doc! { "$inc": { "last": count as i64 } };
+        let answer = self
+            .counters
+            .find_one_and_update(doc! { "_id": COUNTER }, take)
+            .upsert(true)
+            .return_document(ReturnDocument::After)
+            .run();
+        let last = self.said(answer)?.and_then(|d| d.get_i64("last").ok());
+        let first = last.and_then(|last| u64::try_from(last - count as i64 + 1).ok());
+        first.ok_or_else(|| self.remote("the counter of records is no number"))
+    }
+
+    /// A draft as it will be kept, its number still open.
+    fn row(&self, draft: &Draft) -> Result<Row, Error> {
+        let document = draft.document(RecordId(0), &self.robot)?;
+        let files: Vec<ObjectId> = draft.blobs.iter().map(|_| ObjectId::new()).collect();
+        let mut fields = fields(&document)?;
+        if let Ok(blobs) = fields.get_array_mut("blobs") {
+            for ((blob, file), given) in blobs.iter_mut().zip(&files).zip(&draft.blobs) {
+                if let Some(blob) = blob.as_document_mut() {
+                    blob.insert("file", *file);
+                    blob.insert("crc32", i64::from(crc32fast::hash(&given.data)));
+                }
+            }
+        }
+        let own = bson::serialize_to_vec(&fields).map_or(0, |bytes| bytes.len() as u64);
+        fields.insert("bytes", (own + document.blobs.iter().map(|b| b.bytes).sum::<u64>()) as i64);
+        Ok(Row { fields, files })
+    }
+
+    /// Puts the blobs of a record into GridFS.
+    fn upload(&self, id: RecordId, draft: &Draft, files: &[ObjectId]) -> Result<(), Error> {
+        for (blob, file) in draft.blobs.iter().zip(files) {
+            let name = format!("{}/{id}/{}", draft.kind, blob.name);
+            let about =
+                doc! { "robot": self.robot.clone(), "record": id.0 as i64, "blob": blob.name.clone() };
+            let stream = self.files.open_upload_stream(name).id((*file).into()).metadata(about).run();
+            let mut stream = self.said(stream)?;
+            stream.write_all(&blob.data).and_then(|()| stream.close()).map_err(|e| self.remote(e))?;
+        }
+        Ok(())
+    }
+
+    /// Pins records, beside those that `by` holds or instead of them; a record of its own says so.
+    pub(super) fn pin_records(&self, ids: &[RecordId], by: &str, instead: bool) -> Result<(), Error> {
+        ids.iter().try_for_each(|id| self.one(*id).map(|_| ()))?;
+        let now_ns = self.newest_ns()?.unwrap_or(0).max(0);
+        let mut held = self.record(&[pins::pinned(now_ns, ids, by, instead)])?;
+        if ids.is_empty() {
+            held.clear();
+        }
+        held.extend_from_slice(ids);
+        let these = doc! { "_id": { "$in": numbers(&held) } };
+        self.said(self.records.update_many(these, doc! { "$addToSet": { "pins": by } }).run())?;
+        if instead { self.drop_pins(by, &held) } else { Ok(()) }
+    }
+
+    /// Takes back every pin in the name of `by`; a record of its own says so.
+    pub(super) fn unpin_records(&self, by: &str) -> Result<(), Error> {
+        let now_ns = self.newest_ns()?.unwrap_or(0).max(0);
+        self.record(&[pins::unpinned(now_ns, by)])?;
+        self.drop_pins(by, &[])
+    }
+
+    fn drop_pins(&self, by: &str, but: &[RecordId]) -> Result<(), Error> {
+        let others = doc! { "$and": [self.own(), { "pins": by, "_id": { "$nin": numbers(but) } }] };
+        self.said(self.records.update_many(others, doc! { "$pull": { "pins": by } }).run()).map(|_| ())
+    }
+}
+
+/// The fields under which a document is kept.
+fn fields(document: &Document) -> Result<Fields, Error> {
+    let mut fields = bson::serialize_to_document(document).map_err(|e| Error::Input {
+        what: format!("what is to be recorded is no document of MongoDB: {e}"),
+        mend: "keep whole numbers below 2^63".into(),
+    })?;
+    fields.remove("id");
+    // What is searched for is there even where it is empty.
+    let mut kept = doc! { "_id": 0_i64, "frame": document.frame.clone(), "robot": document.robot.clone() };
+    kept.extend(fields);
+    Ok(kept)
+}

@@ -1,37 +1,15 @@
 //! Runs whose records are in MongoDB: what a record on the disk is good for, these are good for, too.
 
+mod binary;
 #[path = "../../memory/tests/server/process.rs"]
 mod process;
 
-use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Command, Stdio};
 
+use binary::{check, check_refused, kill_after};
 use process::{Process, skipped};
 use serde_json::Value;
 use tempfile::TempDir;
-
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_descry"));
-    command.args(arguments).current_dir(folder);
-    command
-}
-
-/// Runs descry and returns what it printed as JSON.
-fn check(folder: &Path, arguments: &[&str], exit: i32) -> Value {
-    let output = command(folder, arguments).output().expect("the binary runs");
-    let err = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(exit), "{arguments:?}\n{err}");
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{arguments:?}: {e}\n{err}"))
-}
-
-/// Runs descry where it cannot do what it is asked, and expects words and no password.
-fn check_refused(folder: &Path, arguments: &[&str], exit: i32, word: &str) {
-    let output = command(folder, arguments).output().expect("the binary runs");
-    let err = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(exit), "{arguments:?}\n{err}");
-    assert!(err.contains(word) && !err.contains("secret"), "{arguments:?} does not say {word:?}: {err}");
-}
 
 /// Every document of a record, without the name of who recorded it.
 fn documents(folder: &Path, place: &str) -> Vec<String> {
@@ -86,17 +64,6 @@ fn a_run_is_recorded_played_again_and_gone_on_with() {
     check_refusals(folder, &store);
 }
 
-/// Kills a run after it has said so many lines.
-fn kill_after(folder: &Path, arguments: &[&str], lines: usize) {
-    let mut child =
-        command(folder, arguments).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it starts");
-    let said = BufReader::new(child.stderr.take().expect("it speaks"));
-    let heard = said.lines().take(lines).filter_map(Result::ok).count();
-    assert_eq!(heard, lines, "{arguments:?} ended by itself");
-    child.kill().expect("it can be killed");
-    child.wait().expect("it is gone");
-}
-
 fn check_refusals(folder: &Path, store: &str) {
     let find = |more: &[&'static str], store: &str| {
         let words = [&["find", "cup A", "--memory", store], more].concat();
@@ -111,10 +78,10 @@ fn check_refusals(folder: &Path, store: &str) {
         (find(&["--robot", "recorded:mongodb://127.0.0.1:1/runs"], store), 2, "name it behind a #"),
     ];
     for (arguments, exit, word) in cases {
-        check_refused(folder, &arguments.iter().map(String::as_str).collect::<Vec<_>>(), exit, word);
+        check_refused(folder, &arguments.iter().map(String::as_str).collect::<Vec<_>>(), exit, &[word]);
     }
-    check_refused(folder, &["replay", store], 2, "name the run's folder");
-    check_refused(folder, &["show", store], 2, "name the run's folder");
-    check_refused(folder, &["runs", store], 2, "descry memory show");
-    check_refused(folder, &["memory", "show", &named("nobody")], 2, "there are: cut, there");
+    check_refused(folder, &["replay", store], 2, &["name the run's folder"]);
+    check_refused(folder, &["show", store], 2, &["name the run's folder"]);
+    check_refused(folder, &["runs", store], 2, &["descry memory show"]);
+    check_refused(folder, &["memory", "show", &named("nobody")], 2, &["there are: cut, there"]);
 }

@@ -1,40 +1,14 @@
 //! What the record of a run is good for: it is played again, serves as a body, and lets a run that was killed go on.
 
 mod beside;
+mod binary;
 
-use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-
-use serde_json::Value;
-use tempfile::TempDir;
+use std::path::Path;
 
 use beside::shared;
-
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_descry"));
-    command.args(arguments).current_dir(folder);
-    command
-}
-
-/// Runs descry and returns what it printed as JSON.
-fn check(folder: &Path, arguments: &[&str], exit: i32) -> Value {
-    let output: Output = command(folder, arguments).output().expect("the binary runs");
-    let err = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(exit), "{arguments:?}\n{err}");
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{arguments:?}: {e}\n{err}"))
-}
-
-/// Kills a run after it has said so many lines.
-fn kill_after(folder: &Path, arguments: &[&str], lines: usize) {
-    let mut child =
-        command(folder, arguments).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it starts");
-    let said = BufReader::new(child.stderr.take().expect("it speaks"));
-    let heard = said.lines().take(lines).filter_map(Result::ok).count();
-    assert_eq!(heard, lines, "{arguments:?} ended by itself");
-    child.kill().expect("it can be killed");
-    child.wait().expect("it is gone");
-}
+use binary::{check, check_refused, kill_after};
+use serde_json::Value;
+use tempfile::TempDir;
 
 /// Everything in a record but the bytes of blobs.
 fn documents(folder: &Path, run: &str) -> Vec<String> {
@@ -122,16 +96,6 @@ fn a_record_of_real_views_is_a_body() {
     check_as_body("mug", &["--robot", &format!("recorded:{}", kitchen.display())]);
 }
 
-/// Runs descry where it cannot do what it is asked, and expects an exit code and words.
-fn check_refused(folder: &Path, arguments: &[&str], exit: i32, words: &[&str]) {
-    let output = command(folder, arguments).output().expect("the binary runs");
-    let err = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(exit), "{arguments:?}\n{err}");
-    for word in words {
-        assert!(err.contains(word), "{arguments:?} does not say {word:?}: {err}");
-    }
-}
-
 #[test]
 fn what_cannot_be_played_or_go_on_is_said() {
     let folder = TempDir::new().expect("a folder can be made");
@@ -209,6 +173,21 @@ fn a_record_is_queried_verified_and_exported() {
     assert!(spoilt["report"]["faults"].as_array().is_some_and(|f| !f.is_empty()), "{spoilt}");
     assert_eq!(spoilt["whole"], false);
     check_refused(folder, &["memory", "show", "nothing"], 2, &["holds no record"]);
+}
+
+/// A bound that cannot hold what is sensed, or what the belief rests on, ends a run with words that say how much would do.
+#[test]
+fn a_bound_that_is_too_small_is_said() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let folder = folder.path();
+    let cases: [(&str, &[&str]); 2] = [
+        ("1MB", &["bounded to 1.0 MB", "more do not fit", "--max-bytes"]),
+        ("8MB", &["bounded to 8.0 MB", "records by `views`", "--max-bytes"]),
+    ];
+    for (bound, words) in cases {
+        check_refused(folder, &["find", "cup A", "--run", bound, "--max-bytes", bound], 5, words);
+        check(folder, &["memory", "verify", bound, "--json"], 0);
+    }
 }
 
 /// Old records go while a run is recorded; what its belief and plan rest on stays.

@@ -1,29 +1,18 @@
 //! Every body of this crate keeps the promises of bodies, and a body that does not is found out.
 
 mod folders;
+mod scenes;
 
 use descry_robots::conformance;
 use descry_robots::recorded::RecordedRobot;
-use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};
+use descry_robots::sim::{SimOptions, SimRobot};
 use descry_robots::{
     Description, Driven, Failure, Looked, OccupancyGrid, Place, PoseEstimate, Robot, Sensed, Stamp, Station,
     SurfaceHint, Travel, Watch, async_trait, nalgebra,
 };
 
-const SCENE: &str = r#"
-[[surface]]
-name = "table"
-size_m = [1.6, 0.8]
-height_m = 0.72
-[start]
-position_m = [-2.0, 0.3]
-[[object]]
-name = "cup"
-shape.cup = { diameter_m = 0.07, height_m = 0.1 }
-"#;
-
 fn simulated(seed: u64) -> SimRobot {
-    let scene = arrange(&SceneSpec::parse("scene.toml", SCENE).unwrap(), seed).unwrap();
+    let scene = scenes::cup_on_a_table(seed);
     SimRobot::new(scene, SimOptions { seed, ..SimOptions::default() })
 }
 

@@ -1,10 +1,11 @@
 //! A body on tape answers again what it answered, goes on where the tape ends, and says where it cannot.
 
 mod folders;
+mod scenes;
 
 use descry_robots::nalgebra::Point3;
 use descry_robots::recorded::{Entry, Known, Pixels, RecordedRobot, Tape, TapedRobot};
-use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
+use descry_robots::sim::{FaultPlan, SimOptions, SimRobot};
 use descry_robots::{Failure, Place, Pose2, Robot, Sensed, Stamp, Watch, conformance};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -44,21 +45,9 @@ impl Tape for Memory {
     }
 }
 
-const SCENE: &str = r#"
-[[surface]]
-name = "table"
-size_m = [1.6, 0.8]
-height_m = 0.72
-[start]
-position_m = [-2.0, 0.3]
-[[object]]
-name = "cup"
-shape.cup = { diameter_m = 0.07, height_m = 0.1 }
-"#;
-
 /// The second frame does not come: failures are answers, too.
 fn simulated(seed: u64) -> Arc<dyn Robot> {
-    let scene = arrange(&SceneSpec::parse("scene.toml", SCENE).unwrap(), 5).unwrap();
+    let scene = scenes::cup_on_a_table(5);
     let text = "[[fault]]\nkind = \"dropped_frame\"\nat = 2\n";
     let faults = FaultPlan::parse("faults.toml", text).unwrap();
     Arc::new(SimRobot::new(scene, SimOptions { seed, faults, ..SimOptions::default() }))
@@ -175,7 +164,7 @@ async fn what_is_not_on_the_tape_ends_it() {
 
 #[tokio::test]
 async fn a_body_on_tape_conforms() {
-    let scene = arrange(&SceneSpec::parse("scene.toml", SCENE).unwrap(), 5).unwrap();
+    let scene = scenes::cup_on_a_table(5);
     let live = Arc::new(SimRobot::new(scene, SimOptions { seed: 5, ..SimOptions::default() }));
     conformance::check(&TapedRobot::begin(live, Arc::new(Memory::default()))).await.unwrap();
 }

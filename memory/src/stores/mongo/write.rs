@@ -1,11 +1,12 @@
 //! Recording: a document is kept as pending until its files are there, so that nobody ever finds a part of a record.
 
-use super::{COUNTER, MongoStore, numbers};
+use super::{COUNTER, MongoStore, number_of, numbers};
 use crate::document::{Document, Draft, RecordId};
 use crate::error::Error;
 use crate::stores::local::pins;
 use mongodb::bson::{self, Document as Fields, doc, oid::ObjectId};
 use mongodb::options::ReturnDocument;
+use std::collections::BTreeSet;
 use std::io::Write;
 
 /// A record on its way: what will be found of it, and the files of its blobs.
@@ -109,18 +110,34 @@ impl MongoStore {
         Ok(())
     }
 
-    /// Pins records, beside those that `by` holds or instead of them; a record of its own says so.
+    /// Pins records, beside those that `by` holds or instead of them; a record of its own says so. Whenever it is cut off, more is
+    /// held than should be and never less.
     pub(super) fn pin_records(&self, ids: &[RecordId], by: &str, instead: bool) -> Result<(), Error> {
-        ids.iter().try_for_each(|id| self.one(*id).map(|_| ()))?;
+        self.check_there(ids)?;
         let now_ns = self.newest_ns()?.unwrap_or(0).max(0);
+        self.add_pins(ids, by)?;
         let mut held = self.record(&[pins::pinned(now_ns, ids, by, instead)])?;
         if ids.is_empty() {
             held.clear();
         }
+        self.add_pins(&held, by)?;
         held.extend_from_slice(ids);
-        let these = doc! { "_id": { "$in": numbers(&held) } };
-        self.said(self.records.update_many(these, doc! { "$addToSet": { "pins": by } }).run())?;
         if instead { self.drop_pins(by, &held) } else { Ok(()) }
+    }
+
+    fn check_there(&self, ids: &[RecordId]) -> Result<(), Error> {
+        let these = doc! { "_id": { "$in": numbers(ids) }, "pending": { "$exists": false } };
+        let mut there = BTreeSet::new();
+        for fields in self.said(self.records.find(these).projection(doc! { "_id": 1 }).run())? {
+            there.extend(number_of(&self.said(fields)?));
+        }
+        let missing = ids.iter().find(|id| !there.contains(id));
+        missing.map_or(Ok(()), |id| Err(Error::Missing { id: id.0 }))
+    }
+
+    fn add_pins(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
+        let these = doc! { "_id": { "$in": numbers(ids) } };
+        self.said(self.records.update_many(these, doc! { "$addToSet": { "pins": by } }).run()).map(|_| ())
     }
 
     /// Takes back every pin in the name of `by`; a record of its own says so.

@@ -48,12 +48,25 @@ fn one_name_does_not_touch_another() {
     let other = open(&server, "apart", "other");
     fill(&other);
     let before = other.find(&Query::default()).unwrap();
-    suite::check(&open(&server, "apart", "robot"));
+    let robot = open(&server, "apart", "robot");
+    suite::check(&robot);
     suite::check_prune(&open(&server, "apart", "third"));
     assert_eq!(other.find(&Query::default()).unwrap(), before);
+    assert_eq!(robot.robots().unwrap(), ["robot"]);
     let all = open(&server, "apart", "");
+    assert_eq!(all.robots().unwrap(), ["other", "robot", "third"]);
+    // Each counts its records from 1; those of another have numbers by which they are read all the same.
     let of_other = Query { robot: Some("other".into()), ..Query::default() };
-    assert_eq!(all.find(&of_other).unwrap(), before);
+    for reader in [&robot, &all] {
+        let found = reader.find(&of_other).unwrap();
+        assert_eq!(found.len(), before.len());
+        for (found, own) in found.iter().zip(&before) {
+            assert!(found.id > own.id && found.body == own.body);
+            assert_eq!(reader.get(found.id).unwrap(), *found);
+            assert_eq!(reader.blob(found.id, "points").unwrap(), other.blob(own.id, "points").unwrap());
+        }
+    }
+    assert_eq!([&before[0], &robot.find(&Query::default()).unwrap()[0]].map(|d| d.id), [RecordId(1); 2]);
     assert!(all.stats().unwrap().kinds["scan"].records > 80 && all.verify().unwrap().is_whole());
 }
 
@@ -187,6 +200,11 @@ fn a_kill_loses_nothing_and_leaves_nothing() {
         check_no_remains(&server, "killed", store.stats().unwrap().records);
     }
     assert_eq!(acknowledged.len(), 3 + 4 + 5 + 6 + 7 + 8);
+    // Numbers that no record got are given to others: a record that was cut off counts on as if it had not been.
+    let all = open(&server, "killed", "robot").find(&Query::default()).unwrap();
+    let mut numbers: Vec<u64> = all.iter().map(|d| d.id.0).collect();
+    numbers.sort_unstable();
+    assert!(numbers.iter().copied().eq(1..=numbers.len() as u64), "{numbers:?}");
 }
 
 fn record_until_killed(address: &str) {
@@ -219,7 +237,8 @@ fn files_are_those_that_anyone_reads() {
     let Some(read) = server.python(READ_FILES, &[&server.address("files")]) else { return };
     let line = |i: usize, name: &str, data: &[u8]| {
         let id = ids[i];
-        format!("{id} {name} scan/{id}/{name} {} {} {}", data.len(), crc32fast::hash(data), i * 1000)
+        let number = (1 << 32) + id.0;
+        format!("{number} {name} scan/{id}/{name} {} {} {}", data.len(), crc32fast::hash(data), i * 1000)
     };
     let expected = (0..ids.len())
         .flat_map(|i| [line(i, "points", &bytes(i as u64, 1 << (i % 18))), line(i, "none", &[])]);

@@ -3,11 +3,12 @@
 //!
 //! | collection | holds |
 //! |---|---|
-//! | `records` | a document for each record: `_id` its number, the fields of [`Document`], `blobs[].file` and `blobs[].crc32` of its files, `pins`, `bytes`; `pending` while it is being written or removed, and by whom |
+//! | `records` | a document for each record: `_id` (see [`number`]), the fields of [`Document`], `blobs[].file` and `blobs[].crc32` of its files, `pins`, `bytes`; `pending` while it is being written or removed, and by whom |
 //! | `fs.files`, `fs.chunks` | blobs (GridFS), named `kind/number/blob` |
-//! | `counters` | the last number that was given away |
+//! | `names` | a document for each name: its place among them (`index`), the last number it gave to a record (`last`) |
 
 mod keep;
+mod number;
 mod query;
 mod write;
 
@@ -23,6 +24,7 @@ use mongodb::options::{
 };
 use mongodb::sync::gridfs::GridFsBucket;
 use mongodb::sync::{Client, Collection, Database};
+use number::Name;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::sync::atomic::AtomicU64;
@@ -32,8 +34,6 @@ use std::time::Duration;
 const SERVER_WAIT: Duration = Duration::from_secs(5);
 /// The database, where the address names none.
 const DATABASE: &str = "descry";
-/// The one document of `counters`.
-const COUNTER: &str = "records";
 
 /// In whose name a store in MongoDB is opened, and how it keeps.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,11 +52,11 @@ pub struct MongoOptions {
 /// A store in a MongoDB server.
 pub struct MongoStore {
     place: String,
-    robot: String,
+    name: Name,
     retention: Retention,
     database: Database,
     records: Collection<Fields>,
-    counters: Collection<Fields>,
+    names: Collection<Fields>,
     files: GridFsBucket,
     /// Bytes written since the limits were looked at.
     unchecked: AtomicU64,
@@ -76,10 +76,12 @@ impl MongoStore {
             });
         }
         apart(|| {
-            let store = Self::connect(address, options)?;
+            let mut store = Self::connect(address, options)?;
             store.make_indexes()?;
-            if !store.robot.is_empty() {
+            store.name.index = Some(store.take_index()?);
+            if !store.name.robot.is_empty() {
                 store.remove_pending()?;
+                store.free_numbers()?;
             }
             Ok(store)
         })
@@ -91,8 +93,8 @@ impl MongoStore {
     /// [`Error::Remote`] if no server answers there.
     pub fn open_shared(address: &str, options: &MongoOptions) -> Result<Self, Error> {
         apart(|| {
-            let store = Self::connect(address, options)?;
-            store.said(store.database.run_command(doc! { "ping": 1 }).run())?;
+            let mut store = Self::connect(address, options)?;
+            store.name.index = store.index()?;
             Ok(store)
         })
     }
@@ -133,10 +135,10 @@ impl MongoStore {
         let kept = CollectionOptions::builder().write_concern(concern.clone()).build();
         let files = GridFsBucketOptions::builder().write_concern(concern).build();
         Ok(MongoStore {
-            robot: with.robot.clone(),
+            name: Name { robot: with.robot.clone(), index: None },
             retention: with.retention,
             records: database.collection_with_options("records", kept.clone()),
-            counters: database.collection_with_options("counters", kept),
+            names: database.collection_with_options("names", kept),
             files: database.gridfs_bucket(files),
             database,
             place,
@@ -184,11 +186,12 @@ impl MongoStore {
 
     /// The records that this store is about, and that are whole.
     fn own(&self) -> Fields {
-        query::filter(&Query::default(), &self.robot)
+        query::filter(&Query::default(), &self.name)
     }
 
     fn document(&self, mut fields: Fields) -> Result<Document, Error> {
-        let id = fields.remove("_id").unwrap_or(Bson::Null);
+        let id = number_of(&fields).map(|id| self.name.outward(id));
+        let id = id.map_or(Bson::Null, |id| Bson::Int64(id.0 as i64));
         fields.insert("id", id.clone());
         bson::deserialize_from_document(fields).map_err(|e| Error::Damaged {
             place: format!("{}, record {id}", self.place).into(),
@@ -198,7 +201,7 @@ impl MongoStore {
     }
 
     fn one(&self, id: RecordId) -> Result<Fields, Error> {
-        let this = doc! { "_id": id.0 as i64, "pending": { "$exists": false } };
+        let this = doc! { "_id": self.name.inward(id), "pending": { "$exists": false } };
         self.said(self.records.find_one(this).run())?.ok_or(Error::Missing { id: id.0 })
     }
 
@@ -211,7 +214,7 @@ impl MongoStore {
 
     /// The first in an order of time of what meets a query and a further condition.
     fn first(&self, query: &Query, side: Fields, sign: i32) -> Result<Option<Document>, Error> {
-        let filter = doc! { "$and": [query::filter(query, &self.robot), side] };
+        let filter = doc! { "$and": [query::filter(query, &self.name), side] };
         let mut find = self.records.find(filter).sort(doc! { "stamp_ns": sign, "_id": sign });
         if !query::is_of_places(query) {
             find = find.limit(1);
@@ -226,7 +229,7 @@ impl MongoStore {
     }
 
     fn verify_one(&self, fields: Fields, report: &mut Report) {
-        let record = number_of(&fields);
+        let record = number_of(&fields).map(|id| self.name.outward(id));
         let bytes = fields.get_i64("bytes").unwrap_or(0);
         let whole = self.document(fields.clone()).and_then(|document| {
             for (n, info) in document.blobs.iter().enumerate() {
@@ -255,12 +258,8 @@ fn journalled() -> WriteConcern {
     WriteConcern::builder().w(Acknowledgment::Majority).journal(true).build()
 }
 
-fn numbers(ids: &[RecordId]) -> Vec<i64> {
-    ids.iter().map(|id| id.0 as i64).collect()
-}
-
-fn number_of(fields: &Fields) -> Option<RecordId> {
-    fields.get_i64("_id").ok().and_then(|n| u64::try_from(n).ok()).map(RecordId)
+fn number_of(fields: &Fields) -> Option<i64> {
+    fields.get_i64("_id").ok()
 }
 
 /// The file of a record's blob of that place, and its checksum.
@@ -313,7 +312,7 @@ impl Store for MongoStore {
             return Ok(Vec::new());
         }
         apart(|| {
-            let filter = query::filter(query, &self.robot);
+            let filter = query::filter(query, &self.name);
             let mut find = self.records.find(filter).sort(doc! { "stamp_ns": sign, "_id": sign });
             if let (Ok(limit), false) = (i64::try_from(most), query::is_of_places(query)) {
                 find = find.limit(limit);
@@ -350,7 +349,7 @@ impl Store for MongoStore {
     }
 
     fn frames(&self, kind: &str) -> Result<Vec<String>, Error> {
-        apart(|| self.distinct("frame", query::filter(&Query::of_kind(kind), &self.robot)))
+        apart(|| self.distinct("frame", query::filter(&Query::of_kind(kind), &self.name)))
     }
 
     fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
@@ -372,7 +371,10 @@ impl Store for MongoStore {
             for fields in self.said(self.records.find(pinned).run())? {
                 let fields = self.said(fields)?;
                 let (Some(id), Ok(by)) = (number_of(&fields), fields.get_array("pins")) else { continue };
-                pins.insert(id, by.iter().filter_map(|b| b.as_str().map(str::to_owned)).collect());
+                pins.insert(
+                    self.name.outward(id),
+                    by.iter().filter_map(|b| b.as_str().map(str::to_owned)).collect(),
+                );
             }
             Ok(pins)
         })
@@ -381,8 +383,9 @@ impl Store for MongoStore {
     /// What was written before a write that has reached the journal has reached it, too.
     fn sync(&self) -> Result<(), Error> {
         apart(|| {
-            let touch = self.counters.update_one(doc! { "_id": COUNTER }, doc! { "$inc": { "last": 0_i64 } });
-            self.said(touch.upsert(true).write_concern(journalled()).run()).map(|_| ())
+            let touch = doc! { "$inc": { "synced": 1_i64 } };
+            let own = self.names.update_one(doc! { "_id": &self.name.robot }, touch);
+            self.said(own.write_concern(journalled()).run()).map(|_| ())
         })
     }
 

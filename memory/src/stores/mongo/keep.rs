@@ -1,7 +1,7 @@
 //! Keeping within limits: what goes, goes oldest first and with its files.
 
-use super::{MongoStore, number_of, numbers, whole};
-use crate::document::{Draft, RecordId};
+use super::{MongoStore, number_of, whole};
+use crate::document::Draft;
 use crate::error::Error;
 use crate::stores::Retention;
 use mongodb::bson::{Bson, Document as Fields, doc, oid::ObjectId};
@@ -120,28 +120,29 @@ impl MongoStore {
                 break;
             }
         }
+        self.remember_numbers(&ids)?;
         self.remove(&ids)?;
         Ok((ids.len() as u64, bytes))
     }
 
     /// Removes records with their files. They are pending before their files go: never is a part of a record found.
-    pub(super) fn remove(&self, ids: &[RecordId]) -> Result<(), Error> {
+    pub(super) fn remove(&self, ids: &[i64]) -> Result<(), Error> {
         if ids.is_empty() {
             return Ok(());
         }
-        let these = doc! { "_id": { "$in": numbers(ids) } };
-        let going = doc! { "$set": { "pending": self.robot.clone() } };
+        let these = doc! { "_id": { "$in": ids.to_vec() } };
+        let going = doc! { "$set": { "pending": self.name.robot.clone() } };
         self.said(self.records.update_many(these.clone(), going).run())?;
         self.remove_marked(these)
     }
 
     /// Removes what a killed process of this name left half written or half removed.
     pub(super) fn remove_pending(&self) -> Result<(), Error> {
-        self.remove_marked(doc! { "pending": self.robot.clone() })
+        self.remove_marked(doc! { "pending": self.name.robot.clone() })
     }
 
     fn remove_marked(&self, which: Fields) -> Result<(), Error> {
-        let (mut ids, mut files): (Vec<RecordId>, Vec<ObjectId>) = Default::default();
+        let (mut ids, mut files): (Vec<i64>, Vec<ObjectId>) = Default::default();
         for fields in self.said(self.records.find(which).run())? {
             let fields = self.said(fields)?;
             ids.extend(number_of(&fields));
@@ -155,6 +156,6 @@ impl MongoStore {
             let collection = self.database.collection::<Fields>(collection);
             self.said(collection.delete_many(doc! { key: { "$in": files.clone() } }).run())?;
         }
-        self.said(self.records.delete_many(doc! { "_id": { "$in": numbers(&ids) } }).run()).map(|_| ())
+        self.said(self.records.delete_many(doc! { "_id": { "$in": ids } }).run()).map(|_| ())
     }
 }

@@ -1,14 +1,15 @@
 //! Queries in the words of MongoDB.
 
+use super::number::Name;
 use crate::document::{Document, Near, Order, Query};
 use mongodb::bson::{Document as Fields, doc};
 
 /// The conditions of a query that the server decides, and for places boxes around what is meant. What is pending is never found;
-/// `own` is whose records are meant where the query names nobody, "" for everybody's.
-pub(super) fn filter(query: &Query, own: &str) -> Fields {
+/// `own` says whose records are meant where the query names nobody; without a name everybody's.
+pub(super) fn filter(query: &Query, own: &Name) -> Fields {
     let mut all = vec![doc! { "pending": { "$exists": false } }];
-    let own = Some(own.to_owned()).filter(|own| !own.is_empty());
-    let robot = query.robot.clone().or(own);
+    let whose = Some(own.robot.clone()).filter(|robot| !robot.is_empty());
+    let robot = query.robot.clone().or(whose);
     for (field, value) in [("kind", &query.kind), ("frame", &query.frame), ("robot", &robot)] {
         all.extend(value.as_ref().map(|value| doc! { field: value.clone() }));
     }
@@ -20,7 +21,7 @@ pub(super) fn filter(query: &Query, own: &str) -> Fields {
     }
     if let Some((stamp_ns, id)) = query.after {
         let beyond = if query.order == Order::Oldest { "$gt" } else { "$lt" };
-        let same = doc! { "stamp_ns": stamp_ns, "_id": { beyond: id.0 as i64 } };
+        let same = doc! { "stamp_ns": stamp_ns, "_id": { beyond: own.inward(id) } };
         all.push(doc! { "$or": [{ "stamp_ns": { beyond: stamp_ns } }, same] });
     }
     if query.object.is_some() || query.min_confidence.is_some() {

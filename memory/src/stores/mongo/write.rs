@@ -1,11 +1,10 @@
 //! Recording: a document is kept as pending until its files are there, so that nobody ever finds a part of a record.
 
-use super::{COUNTER, MongoStore, number_of, numbers};
+use super::{MongoStore, number_of};
 use crate::document::{Document, Draft, RecordId};
 use crate::error::Error;
 use crate::stores::local::pins;
 use mongodb::bson::{self, Document as Fields, doc, oid::ObjectId};
-use mongodb::options::ReturnDocument;
 use std::collections::BTreeSet;
 use std::io::Write;
 
@@ -28,11 +27,11 @@ impl MongoStore {
         let first = self.numbers(rows.len())?;
         let ids: Vec<RecordId> = (first..).take(rows.len()).map(RecordId).collect();
         for (row, id) in rows.iter_mut().zip(&ids) {
-            row.fields.insert("_id", id.0 as i64);
+            row.fields.insert("_id", self.name.inward(*id));
         }
         if let Err(e) = self.write(&ids, &rows, drafts) {
             // What cannot be taken back now is removed when the store is next opened in that name.
-            let _ = self.remove(&ids);
+            let _ = self.remove(&self.name.all_inward(&ids));
             return Err(e);
         }
         Ok(ids)
@@ -43,7 +42,7 @@ impl MongoStore {
         let documents = rows.iter().map(|row| {
             let mut fields = row.fields.clone();
             if !at_once {
-                fields.insert("pending", self.robot.clone());
+                fields.insert("pending", self.name.robot.clone());
             }
             fields
         });
@@ -54,34 +53,20 @@ impl MongoStore {
         for ((id, row), draft) in ids.iter().zip(rows).zip(drafts) {
             self.upload(*id, draft, &row.files)?;
         }
-        let these = doc! { "_id": { "$in": numbers(ids) }, "pending": self.robot.clone() };
+        let these = doc! { "_id": { "$in": self.name.all_inward(ids) }, "pending": self.name.robot.clone() };
         let done = self.said(self.records.update_many(these, doc! { "$unset": { "pending": "" } }).run())?;
         if done.matched_count != ids.len() as u64 {
             return Err(self.remote(format!(
                 "another process writes under the name `{}`: give each a name of its own",
-                self.robot
+                self.name.robot
             )));
         }
         Ok(())
     }
 
-    /// The first of so many numbers that nobody else has.
-    fn numbers(&self, count: usize) -> Result<u64, Error> {
-        let take = doc! { "$inc": { "last": count as i64 } };
-        let answer = self
-            .counters
-            .find_one_and_update(doc! { "_id": COUNTER }, take)
-            .upsert(true)
-            .return_document(ReturnDocument::After)
-            .run();
-        let last = self.said(answer)?.and_then(|d| d.get_i64("last").ok());
-        let first = last.and_then(|last| u64::try_from(last - count as i64 + 1).ok());
-        first.ok_or_else(|| self.remote("the counter of records is no number"))
-    }
-
     /// A draft as it will be kept, its number still open.
     fn row(&self, draft: &Draft) -> Result<Row, Error> {
-        let document = draft.document(RecordId(0), &self.robot)?;
+        let document = draft.document(RecordId(0), &self.name.robot)?;
         let files: Vec<ObjectId> = draft.blobs.iter().map(|_| ObjectId::new()).collect();
         let mut fields = fields(&document)?;
         if let Ok(blobs) = fields.get_array_mut("blobs") {
@@ -101,8 +86,7 @@ impl MongoStore {
     fn upload(&self, id: RecordId, draft: &Draft, files: &[ObjectId]) -> Result<(), Error> {
         for (blob, file) in draft.blobs.iter().zip(files) {
             let name = format!("{}/{id}/{}", draft.kind, blob.name);
-            let about =
-                doc! { "robot": self.robot.clone(), "record": id.0 as i64, "blob": blob.name.clone() };
+            let about = doc! { "robot": self.name.robot.clone(), "record": self.name.inward(id), "blob": blob.name.clone() };
             let stream = self.files.open_upload_stream(name).id((*file).into()).metadata(about).run();
             let mut stream = self.said(stream)?;
             stream.write_all(&blob.data).and_then(|()| stream.close()).map_err(|e| self.remote(e))?;
@@ -126,17 +110,17 @@ impl MongoStore {
     }
 
     fn check_there(&self, ids: &[RecordId]) -> Result<(), Error> {
-        let these = doc! { "_id": { "$in": numbers(ids) }, "pending": { "$exists": false } };
+        let these = doc! { "_id": { "$in": self.name.all_inward(ids) }, "pending": { "$exists": false } };
         let mut there = BTreeSet::new();
         for fields in self.said(self.records.find(these).projection(doc! { "_id": 1 }).run())? {
             there.extend(number_of(&self.said(fields)?));
         }
-        let missing = ids.iter().find(|id| !there.contains(id));
+        let missing = ids.iter().find(|id| !there.contains(&self.name.inward(**id)));
         missing.map_or(Ok(()), |id| Err(Error::Missing { id: id.0 }))
     }
 
     fn add_pins(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
-        let these = doc! { "_id": { "$in": numbers(ids) } };
+        let these = doc! { "_id": { "$in": self.name.all_inward(ids) } };
         self.said(self.records.update_many(these, doc! { "$addToSet": { "pins": by } }).run()).map(|_| ())
     }
 
@@ -148,7 +132,8 @@ impl MongoStore {
     }
 
     fn drop_pins(&self, by: &str, but: &[RecordId]) -> Result<(), Error> {
-        let others = doc! { "$and": [self.own(), { "pins": by, "_id": { "$nin": numbers(but) } }] };
+        let others =
+            doc! { "$and": [self.own(), { "pins": by, "_id": { "$nin": self.name.all_inward(but) } }] };
         self.said(self.records.update_many(others, doc! { "$pull": { "pins": by } }).run()).map(|_| ())
     }
 }

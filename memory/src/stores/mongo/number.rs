@@ -1,0 +1,116 @@
+//! The numbers of records where several write into one store: each name counts from 1, as if it were alone, so that what one robot
+//! records, and what its documents say of other records, does not depend on the others.
+//!
+//! In the database a number stands above the index of its name: `_id = (index << 32) + number`. Without a name the index is 0.
+
+use super::{MongoStore, number_of};
+use crate::document::RecordId;
+use crate::error::Error;
+use mongodb::bson::{Document as Fields, doc};
+use mongodb::options::ReturnDocument;
+
+const BITS: u32 = 32;
+/// The document of `names` that counts them; no robot is called so.
+const ALL: i64 = 0;
+
+/// Whose records a store is about.
+pub(super) struct Name {
+    pub robot: String,
+    /// Its place among the names of the store; none if nothing was ever recorded under it.
+    pub index: Option<i64>,
+}
+
+impl Name {
+    /// The number in the database of a record as it is known outside.
+    pub fn inward(&self, id: RecordId) -> i64 {
+        let number = i64::try_from(id.0).unwrap_or(i64::MAX);
+        if number >> BITS == 0 { (self.index.unwrap_or(0) << BITS) | number } else { number }
+    }
+
+    /// The numbers in the database of records as they are known outside.
+    pub fn all_inward(&self, ids: &[RecordId]) -> Vec<i64> {
+        ids.iter().map(|id| self.inward(*id)).collect()
+    }
+
+    /// A record as it is known outside: an own one by its number alone.
+    pub fn outward(&self, number: i64) -> RecordId {
+        let own = self.index == Some(number >> BITS);
+        RecordId(if own { number & ((1 << BITS) - 1) } else { number }.unsigned_abs())
+    }
+}
+
+impl MongoStore {
+    /// The index of this store's name, if it has one.
+    pub(super) fn index(&self) -> Result<Option<i64>, Error> {
+        let own = self.said(self.names.find_one(doc! { "_id": &self.name.robot }).run())?;
+        Ok(own.and_then(|own| own.get_i64("index").ok()))
+    }
+
+    /// The index of this store's name; the next free one if it has none yet.
+    pub(super) fn take_index(&self) -> Result<i64, Error> {
+        if let Some(index) = self.index()? {
+            return Ok(index);
+        }
+        let index = match self.name.robot.is_empty() {
+            true => 0,
+            false => self.count(doc! { "_id": ALL }, 1)?,
+        };
+        let own = doc! { "_id": &self.name.robot, "index": index, "last": 0_i64 };
+        let made = self.said(self.names.insert_one(own).run());
+        // Another may have been faster.
+        self.index()?.map_or_else(|| made.and(Err(self.remote("its names cannot be read"))), Ok)
+    }
+
+    /// The first of so many numbers, as they are known outside.
+    pub(super) fn numbers(&self, count: usize) -> Result<u64, Error> {
+        let last = self.count(doc! { "_id": &self.name.robot }, count as i64)?;
+        if last >> BITS != 0 {
+            let what = format!("`{}` has given away all of its numbers", self.name.robot);
+            return Err(Error::Input { what, mend: "go on under another name".into() });
+        }
+        Ok((last - count as i64 + 1).unsigned_abs())
+    }
+
+    fn count(&self, which: Fields, more: i64) -> Result<i64, Error> {
+        let take = self.names.find_one_and_update(which, doc! { "$inc": { "last": more } });
+        let after = self.said(take.upsert(true).return_document(ReturnDocument::After).run())?;
+        let last = after.and_then(|after| after.get_i64("last").ok());
+        last.ok_or_else(|| self.remote("the last number of a name is no number"))
+    }
+
+    /// Takes back the numbers that a killed process of this name took and gave to no record that anyone knows.
+    pub(super) fn free_numbers(&self) -> Result<(), Error> {
+        let newest = self.records.find_one(self.own()).sort(doc! { "_id": -1 });
+        let newest = self.said(newest.run())?.and_then(|fields| number_of(&fields)).unwrap_or(0);
+        let own = self.said(self.names.find_one(doc! { "_id": &self.name.robot }).run())?;
+        let pruned = own.and_then(|own| own.get_i64("pruned").ok()).unwrap_or(0);
+        let known = newest.max(pruned) & ((1 << BITS) - 1);
+        let back = doc! { "$min": { "last": known } };
+        self.said(self.names.update_one(doc! { "_id": &self.name.robot }, back).run()).map(|_| ())
+    }
+
+    /// Remembers which numbers were given to records that are about to go.
+    pub(super) fn remember_numbers(&self, numbers: &[i64]) -> Result<(), Error> {
+        let newest = numbers.iter().max().copied().unwrap_or(0);
+        let keep = doc! { "$max": { "pruned": newest } };
+        self.said(self.names.update_one(doc! { "_id": &self.name.robot }, keep).run()).map(|_| ())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Name, RecordId};
+
+    #[test]
+    fn own_numbers_are_short_and_all_are_told_apart() {
+        let [a, b] = [1, 2].map(|index| Name { robot: "x".into(), index: Some(index) });
+        let nobody = Name { robot: String::new(), index: Some(0) };
+        for name in [&a, &b, &nobody] {
+            assert_eq!(name.outward(name.inward(RecordId(7))), RecordId(7));
+        }
+        let seen_by_a = a.outward(b.inward(RecordId(7)));
+        assert_ne!(seen_by_a, RecordId(7));
+        assert_eq!(a.inward(seen_by_a), b.inward(RecordId(7)));
+        assert_eq!(nobody.inward(nobody.outward(b.inward(RecordId(7)))), b.inward(RecordId(7)));
+    }
+}

@@ -3,7 +3,7 @@
 //!
 //! | collection | holds |
 //! |---|---|
-//! | `records` | a document for each record: `_id` (see [`number`]), the fields of [`Document`], `blobs[].file` and `blobs[].crc32` of its files, `pins`, `bytes`; `pending` while it is being written or removed, and by whom |
+//! | `records` | a document for each record: `_id` its number above the index of its name, the fields of [`Document`], `blobs[].file` and `blobs[].crc32` of its files, `pins`, `bytes`; `pending` while it is being written or removed, and by whom |
 //! | `fs.files`, `fs.chunks` | blobs (GridFS), named `kind/number/blob` |
 //! | `names` | a document for each name: its place among them (`index`), the last number it gave to a record (`last`) |
 

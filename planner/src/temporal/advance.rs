@@ -1,5 +1,6 @@
 //! From one situation of the search to the next: an action done in one go, started, ended, or a timed effect.
 
+use std::cell::{OnceCell, RefCell};
 use std::sync::Arc;
 
 use crate::attachment::Level;
@@ -212,29 +213,37 @@ impl World<'_> {
     }
 }
 
+/// What an action touches at its start; and if it takes time at its end.
+pub(crate) type Touches = (Access, Option<Access>);
+
 /// What the happenings of every action touch, derived variables traced back to what they are derived from.
-pub(crate) struct Accesses {
-    /// At the start; and for durative actions at the end.
-    pub acts: Vec<(Access, Option<Access>)>,
+pub(crate) struct Accesses<'w, 'a> {
+    /// By action, once it was asked for: most actions of a large task never happen.
+    acts: Vec<OnceCell<Touches>>,
+    watch: RefCell<Watch<'w, 'a>>,
     /// Of timed effects.
     pub timed: Vec<Access>,
     /// Number of resources.
     pub resources: usize,
 }
 
-impl Accesses {
+impl<'w, 'a> Accesses<'w, 'a> {
     /// Of all actions and timed effects.
-    pub fn new(world: &World) -> Accesses {
+    pub fn new(world: &'w World<'a>) -> Accesses<'w, 'a> {
         let resources = world.ground.variables.len() + world.ground.numerics.len();
         let mut watch = Watch::new(world);
-        let acts = world.acts.iter().map(|act| (watch.start(act), act.durative.then(|| watch.end(act))));
-        let acts = acts.collect();
         let timed = world.ground.timed.iter().map(|timed| {
             let effects = always(&timed.outcomes);
             watch.access(effects.iter())
         });
         let timed = timed.collect();
-        Accesses { acts, timed, resources }
+        let acts = vec![OnceCell::new(); world.acts.len()];
+        Accesses { acts, watch: RefCell::new(watch), timed, resources }
+    }
+
+    /// Of one action.
+    pub fn of(&self, act: u32) -> &Touches {
+        self.acts[act as usize].get_or_init(|| self.watch.borrow_mut().both(act))
     }
 }
 
@@ -252,6 +261,11 @@ impl<'w, 'a> Watch<'w, 'a> {
     fn new(world: &'w World<'a>) -> Watch<'w, 'a> {
         let [read, written, added] = [(); 3].map(|()| Touched::default());
         Watch { world, roots: derived_roots(world), read, written, added }
+    }
+
+    fn both(&mut self, act: u32) -> Touches {
+        let act = &self.world.acts[act as usize];
+        (self.start(act), act.durative.then(|| self.end(act)))
     }
 
     fn start(&mut self, act: &Act) -> Access {

@@ -97,10 +97,10 @@ pub(crate) fn search_plans(
     if inside != all {
         passes.insert(0, (inside, false));
     }
-    let all_in_one_go = passes[0].0.iter().all(|apart| !apart) && in_one_go_suffices(world);
+    let in_one_go = passes[0].0.iter().all(|apart| !apart);
     let mut progress = Progress { reason: Reason::Unproven, counts: Counts::default(), plans: 0 };
     for (split, exact) in passes {
-        let whole = split == all || all_in_one_go;
+        let every_apart = split == all;
         let space = Space::new(world, split, measure.clone());
         let relaxed = Relaxed::new(world, &space.open_act);
         let begin = Situation { state: world.initial()?, open: Vec::new(), timed: 0 };
@@ -124,7 +124,9 @@ pub(crate) fn search_plans(
         }
         progress = run.progress;
         match progress.reason {
-            Reason::Exhausted if !whole => progress.reason = Reason::Unproven,
+            Reason::Exhausted if !(every_apart || in_one_go && in_one_go_suffices(world)) => {
+                progress.reason = Reason::Unproven;
+            }
             Reason::Unproven => {}
             _ => break,
         }

@@ -271,16 +271,16 @@ impl Relaxed {
         seconds: Seconds,
     ) {
         let action = &world.acts[act as usize];
-        let effects: Vec<_> = match part {
-            Part::Whole => {
-                action.start_effects.iter().chain(action.flow_effects).chain(action.end_effects).collect()
-            }
-            Part::Start => action.start_effects.iter().collect(),
-            Part::End | Part::Free => action.flow_effects.iter().chain(action.end_effects).collect(),
+        let lists: [&[Effect]; 3] = match part {
+            Part::Whole => [action.start_effects, action.flow_effects, action.end_effects],
+            Part::Start => [action.start_effects, &[], &[]],
+            Part::End | Part::Free => [action.flow_effects, action.end_effects, &[]],
         };
-        let plain = effects.iter().filter(|effect| effect.when.is_none());
+        let effects = lists.into_iter().flatten();
+        let plain = effects.clone().filter(|effect| effect.when.is_none());
         let plain: Vec<&Outcome> = plain.map(|effect| &effect.outcome).collect();
-        let mut groups: Vec<(Merged, Vec<&Outcome>)> = vec![(Merged::default(), plain)];
+        self.under(world, (act, part), (before, &Merged::default()), tokens, seconds, &plain);
+        let mut groups: Vec<(Merged, Vec<&Outcome>)> = Vec::new();
         for effect in effects {
             let Some(when) = &effect.when else { continue };
             let extra = Merged::of(&[&when.here, &when.at_start, &when.over_all]);
@@ -289,30 +289,44 @@ impl Relaxed {
                 None => groups.push((extra, vec![&effect.outcome])),
             }
         }
-        for (extra, outcomes) in groups {
-            let mut needs = self.propositions(&before.facts, &before.comparisons);
-            needs.extend(self.propositions(&extra.facts, &extra.comparisons));
-            needs.extend(tokens);
-            let mut gates = Vec::new();
-            for &(call, wanted) in before.calls.iter().chain(&extra.calls) {
-                // Calls that get a proposed parameter are asked with it, when all else is reached.
-                let test = self.test_of(Test::Call(call, wanted)).filter(|_| action.grounding.is_empty());
-                match test {
-                    Some(test) => needs.push(test),
-                    None => gates.push((call, wanted)),
-                }
-            }
-            needs.sort_unstable();
-            needs.dedup();
-            let mut gives = Vec::with_capacity(outcomes.len());
-            outcomes.iter().for_each(|outcome| self.given(world, outcome, &mut gives));
-            let mut moves = self.tests_touched(world, &outcomes);
-            moves.retain(|&test| match self.tests[(test - self.test_base) as usize] {
-                Test::Comparison(comparison) => may_help(world, &outcomes, comparison),
-                Test::Call(..) => true,
-            });
-            self.operators.push(Operator { act, part, needs, gives, moves, gates, seconds });
+        for (extra, outcomes) in &groups {
+            self.under(world, (act, part), (before, extra), tokens, seconds, outcomes);
         }
+    }
+
+    /// The operator of what happens under a further condition.
+    fn under(
+        &mut self,
+        world: &World,
+        (act, part): (u32, Part),
+        (before, extra): (&Merged, &Merged),
+        tokens: &[u32],
+        seconds: Seconds,
+        outcomes: &[&Outcome],
+    ) {
+        let action = &world.acts[act as usize];
+        let mut needs = self.propositions(&before.facts, &before.comparisons);
+        needs.extend(self.propositions(&extra.facts, &extra.comparisons));
+        needs.extend(tokens);
+        let mut gates = Vec::new();
+        for &(call, wanted) in before.calls.iter().chain(&extra.calls) {
+            // Calls that get a proposed parameter are asked with it, when all else is reached.
+            let test = self.test_of(Test::Call(call, wanted)).filter(|_| action.grounding.is_empty());
+            match test {
+                Some(test) => needs.push(test),
+                None => gates.push((call, wanted)),
+            }
+        }
+        needs.sort_unstable();
+        needs.dedup();
+        let mut gives = Vec::with_capacity(outcomes.len());
+        outcomes.iter().for_each(|outcome| self.given(world, outcome, &mut gives));
+        let mut moves = self.tests_touched(world, outcomes);
+        moves.retain(|&test| match self.tests[(test - self.test_base) as usize] {
+            Test::Comparison(comparison) => may_help(world, outcomes, comparison),
+            Test::Call(..) => true,
+        });
+        self.operators.push(Operator { act, part, needs, gives, moves, gates, seconds });
     }
 
     /// Lets the operators just made for a part of an action give the token that it is open, or closed.

@@ -37,7 +37,7 @@ pub(crate) struct Space<'w, 'a> {
     /// What plans are measured by.
     pub measure: Measure,
     /// What happenings touch.
-    pub accesses: Accesses,
+    pub accesses: Accesses<'w, 'a>,
     /// By variable and value, the actions that are looked at where the fact holds.
     pivots: Vec<Vec<Vec<u32>>>,
     /// Actions that are looked at everywhere.
@@ -102,7 +102,7 @@ impl<'w, 'a> Space<'w, 'a> {
 
     /// Lets a step that is done in one go happen on a clock.
     pub fn tick(&self, clock: &mut Clock, step: &Step) {
-        let (start, end) = &self.accesses.acts[step.act as usize];
+        let (start, end) = self.accesses.of(step.act);
         clock.push(start, end.as_ref().map(|end| (end, step.span)));
     }
 
@@ -224,13 +224,13 @@ impl Track {
                 self.timed += 1;
             }
             Part::Whole => {
-                let (start, end) = &space.accesses.acts[step.act as usize];
+                let (start, end) = space.accesses.of(step.act);
                 let node = self.order.push(start);
                 let end = end.as_ref().map(|end| self.order.push_end(node, end, step.span)).transpose()?;
                 action = Some((node, end));
             }
             Part::Start => {
-                let start = self.order.push(&space.accesses.acts[step.act as usize].0);
+                let start = self.order.push(&space.accesses.of(step.act).0);
                 let (act, proposal, span) = (step.act, step.proposal.clone(), step.span);
                 self.open.push(Started { step: self.actions.len(), act, proposal, start, span });
                 action = Some((start, None));
@@ -291,7 +291,7 @@ impl Track {
     }
 
     fn end(&mut self, space: &Space, open: &Started) -> Result<(), Inconsistent> {
-        let Some(access) = &space.accesses.acts[open.act as usize].1 else { return Ok(()) };
+        let Some(access) = &space.accesses.of(open.act).1 else { return Ok(()) };
         let end = self.order.push_end(open.start, access, open.span)?;
         self.actions[open.step] = Some((open.start, Some(end)));
         Ok(())

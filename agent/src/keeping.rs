@@ -14,7 +14,7 @@ pub use remote::{Address, is_address};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, clap::Args)]
 #[serde(default)]
 pub struct Keeping {
-    /// Where the record is kept: mongodb://HOST[:PORT]/DATABASE[#RUN], for a descry that was built with the feature mongodb
+    /// Where the record is kept: `mongodb://HOST[:PORT]/DATABASE[#RUN]`, for a descry that was built with the feature mongodb
     /// [default: in the run's folder]
     #[arg(long, value_name = "ADDRESS")]
     pub memory: Option<String>,

@@ -66,6 +66,19 @@ fn an_action_starts_late_to_end_after_another() {
     check(domain, "(:init (idle)) (:goal (and (kept) (done)))", Some(5.0));
 }
 
+#[test]
+fn what_an_end_builds_on_comes_before_it_though_it_starts_later() {
+    // Watching starts first, and shows at its end what an action has uncovered that starts after it.
+    let domain = "(:requirements :conditional-effects) (:predicates (ready) (uncovered) (seen) (cooked))
+      (:durative-action prepare :parameters () :duration (= ?duration 2) :effect (at end (ready)))
+      (:durative-action uncover :parameters () :duration (= ?duration 3) :condition (at start (ready))
+        :effect (at end (uncovered)))
+      (:durative-action watch :parameters () :duration (= ?duration 10)
+        :effect (when (at end (uncovered)) (at end (seen))))
+      (:durative-action cook :parameters () :duration (= ?duration 20) :effect (at end (cooked)))";
+    check(domain, "(:init) (:goal (and (seen) (cooked)))", Some(20.0));
+}
+
 const SHOP: &str = "(:predicates (open) (bought) (there) (home))
   (:durative-action go :parameters () :duration (= ?duration 4) :condition (at start (home))
     :effect (and (at start (not (home))) (at end (there))))

@@ -42,9 +42,8 @@ pub(crate) fn tightened(
                 let mut steps = plan.1.clone();
                 let moved = steps.remove(from);
                 steps.insert(to, moved);
-                if let Some((measured, base)) = space.replay(&mut steps)?
+                if let Some((measured, base)) = space.replay_to_goal(&mut steps)?
                     && measured < plan.0 - 1e-6
-                    && space.world.is_goal(&base.situation)?
                 {
                     plan = (measured, steps, base);
                     continue 'improved;

@@ -169,6 +169,12 @@ impl<'w, 'a> Space<'w, 'a> {
         let clock = self.clock(steps);
         Ok(Some((measured, Base { situation, costs, track, clock })))
     }
+
+    /// The same of a whole plan: `None` also if the goal is not fulfilled after it.
+    pub fn replay_to_goal(&self, steps: &mut [Step]) -> Result<Option<(f64, Base)>, Failure> {
+        let Some((measured, base)) = self.replay(steps)? else { return Ok(None) };
+        Ok(self.world.is_goal(&base.situation)?.then_some((measured, base)))
+    }
 }
 
 /// Where a search begins: after some steps.

@@ -79,6 +79,22 @@ fn what_an_end_builds_on_comes_before_it_though_it_starts_later() {
     check(domain, "(:init) (:goal (and (seen) (cooked)))", Some(20.0));
 }
 
+#[test]
+fn what_flows_is_read_before_it_begins_to_flow_or_after_it_ends() {
+    let domain = "(:requirements :numeric-fluents) (:predicates (ready) (dry) (wet) (known)) (:functions (level) (reading) (rate))
+      (:durative-action prepare :parameters () :duration (= ?duration 2) :effect (at end (ready)))
+      (:durative-action fill :parameters () :duration (= ?duration 5) :condition (and (at start (ready)) (at start (dry)))
+        :effect (and (at start (not (dry))) (increase (level) (* #t (rate))) (at end (wet))))
+      (:durative-action read :parameters () :duration (= ?duration 4)
+        :effect (and (at end (assign (reading) (level))) (at end (known))))
+      (:durative-action open :parameters () :duration (= ?duration 3) :effect (at end (assign (rate) 2)))";
+    let init = "(:init (dry) (= (level) 0) (= (rate) 1) (= (reading) 9))";
+    check(domain, &format!("{init} (:goal (and (wet) (known) (<= (reading) 0)))"), Some(9.0));
+    check(domain, &format!("{init} (:goal (and (wet) (known) (= (reading) 5)))"), Some(7.0));
+    // Filling begins when its rate is set.
+    check(domain, &format!("{init} (:goal (= (level) 10))"), Some(8.0));
+}
+
 const SHOP: &str = "(:predicates (open) (bought) (there) (home))
   (:durative-action go :parameters () :duration (= ?duration 4) :condition (at start (home))
     :effect (and (at start (not (home))) (at end (there))))

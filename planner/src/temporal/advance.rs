@@ -277,7 +277,8 @@ impl<'w, 'a> Watch<'w, 'a> {
             read.condition(world, &when.at_start);
             read.condition(world, &when.over_all);
         }
-        self.access(act.start_effects.iter())
+        // What changes while the action runs changes from its start on.
+        self.access(act.start_effects.iter().chain(act.flow_effects))
     }
 
     fn end(&mut self, act: &Act) -> Access {
@@ -303,9 +304,9 @@ impl<'w, 'a> Watch<'w, 'a> {
                     expression_touches(world, amount, read);
                     self.written.outcome(world, &effect.outcome);
                 }
-                Outcome::Flow { rate, .. } => {
+                Outcome::Flow { fluent, rate } => {
                     expression_touches(world, rate, read);
-                    self.written.outcome(world, &effect.outcome);
+                    self.added.numbers.push(*fluent);
                 }
                 Outcome::Call(call) => {
                     read.call(world, *call);

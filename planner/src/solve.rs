@@ -208,7 +208,8 @@ pub fn plan(
         false => Ok(Progress { reason: Reason::Exhausted, counts: Counts::default(), plans: 0 }),
     };
     let progress = found.map_err(|failure| world.calls.report(failure))?;
-    if let Some(error) = invalid {
+    if let Some(error) = invalid.filter(|error| best.is_none() || matches!(error, PlanError::Internal { .. }))
+    {
         return Err(error);
     }
     statistics.evaluated = progress.counts.evaluated;
@@ -217,7 +218,8 @@ pub fn plan(
     statistics.attachments = since(&before, attachments.statistics());
     Ok(match (best, progress.reason) {
         (Some(plan), reason @ (Reason::Exhausted | Reason::Enough)) => {
-            statistics.optimal = reason == Reason::Exhausted;
+            // What preferences cost, only the validator knows.
+            statistics.optimal = reason == Reason::Exhausted && task.preferences.is_empty();
             Outcome::Solved { plan, statistics }
         }
         (None, Reason::Exhausted | Reason::Enough) => {
@@ -279,11 +281,23 @@ fn to_plan(task: &Task, grounded: &GroundTask, world: &World, timed: &[Timed]) -
     Plan { steps: steps.collect(), ..Plan::default() }
 }
 
-/// Every plan that leaves this crate has passed the validator.
+/// Every plan that leaves this crate has passed the validator. The searches do not look at constraints on the way to the
+/// goal: a plan that breaks nothing else is refused.
 fn checked(task: &Task, attachments: &Attachments, plan: Plan) -> Result<Plan, PlanError> {
     let verdict = validate(task, attachments, &plan);
     if verdict.valid {
         return Ok(Plan { cost: verdict.cost, ..plan });
+    }
+    if task.constraints.iter().any(|constraint| constraint.preference.is_none()) {
+        let mut free = task.clone();
+        free.constraints.retain(|constraint| constraint.preference.is_some());
+        if validate(&free, attachments, &plan).valid {
+            let help =
+                "constraints are checked, but not planned for: ask for the same in conditions and the goal";
+            let explained = |finding: Diagnostic| finding.with_help(help);
+            let list = verdict.findings.list.into_iter().map(explained).collect();
+            return Err(PlanError::Refused(Findings { list, ..verdict.findings }));
+        }
     }
     Err(PlanError::Internal { reason: verdict.reason.unwrap_or_default(), plan })
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use descry_planner::{Attachments, Options, Outcome, Source, Task, plan};
+use descry_planner::{Attachments, Options, Outcome, PlanError, Source, Task, plan};
 
 fn outcome(domain: Source, problem: Source) -> Outcome {
     let task = match Task::read(&domain, &problem) {
@@ -120,6 +120,48 @@ fn durations_depend_on_the_state_and_stretch() {
       (:durative-action cook :parameters () :duration (= ?duration 6) :condition (over all (on))
         :effect (at end (cooked)))";
     check(stretched, "(:init (idle)) (:goal (cooked))", Some(6.0));
+}
+
+#[test]
+fn durations_may_be_nothing_at_first_or_at_all() {
+    // What there is to load decides how long loading takes: at first there is nothing.
+    let domain = "(:requirements :numeric-fluents) (:predicates (chosen)) (:functions (ready) (loaded))
+      (:durative-action choose :parameters () :duration (= ?duration 0) :condition (at start (not (chosen)))
+        :effect (and (at start (chosen)) (at end (increase (ready) 3))))
+      (:durative-action load :parameters () :duration (= ?duration (* 2 (ready))) :condition (at start (> (ready) 0))
+        :effect (and (at start (increase (loaded) (ready))) (at start (assign (ready) 0))))";
+    check(domain, "(:init (= (ready) 0) (= (loaded) 0)) (:goal (>= (loaded) 3))", Some(6.0));
+    check(domain, "(:init (= (ready) 0) (= (loaded) 0)) (:goal (>= (loaded) 4))", None);
+}
+
+#[test]
+fn numbers_change_under_conditions_that_come_later() {
+    let domain =
+        "(:requirements :numeric-fluents :conditional-effects) (:predicates (ready)) (:functions (level))
+      (:durative-action prepare :parameters () :duration (= ?duration 2) :effect (at end (ready)))
+      (:durative-action fill :parameters () :duration (= ?duration 5)
+        :effect (when (at end (ready)) (at end (increase (level) 1))))";
+    check(domain, "(:init (= (level) 0)) (:goal (>= (level) 1))", Some(5.0));
+}
+
+#[test]
+fn a_plan_that_breaks_a_constraint_on_the_way_is_refused_under_the_text() {
+    let domain = "(define (domain d) (:requirements :constraints) (:predicates (a) (b) (c))
+      (:action one :parameters () :effect (a)) (:action two :parameters () :precondition (a) :effect (b)))";
+    for (constraint, kept) in [("(sometime-before (b) (a))", true), ("(sometime (c))", false)] {
+        let problem =
+            format!("(define (problem p) (:domain d) (:init) (:goal (b)) (:constraints (and {constraint})))");
+        let task = Task::read(&Source::new("domain.pddl", domain), &Source::new("problem.pddl", problem));
+        let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
+        let found = plan(&task, &Attachments::new(), &Options::default(), &|| false, &mut |_| {});
+        match found {
+            Ok(Outcome::Solved { .. }) => assert!(kept, "{constraint}"),
+            Err(PlanError::Refused(findings)) => {
+                assert!(!kept && findings.render(false).contains("the constraint on (c) is broken"));
+            }
+            other => panic!("{constraint}: {other:?}"),
+        }
+    }
 }
 
 #[test]

@@ -37,7 +37,8 @@ pub(crate) fn plan_classical(
         }
         Err(error) => invalid = Some(error),
     });
-    if let Some(error) = invalid {
+    if let Some(error) = invalid.filter(|error| best.is_none() || matches!(error, PlanError::Internal { .. }))
+    {
         return Err(error);
     }
     statistics.plans = plans;

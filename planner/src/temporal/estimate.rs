@@ -234,17 +234,20 @@ impl Relaxed {
         for &proposition in &self.given[hot.gives as usize..hot.moves as usize] {
             self.work.reach(proposition, label, index, 1.0);
         }
-        let mut after: Option<Values> = None;
+        let mut after: Option<Option<Values>> = None;
         for position in hot.moves..hot.end {
             let test = self.given[position as usize];
             if self.work.labels[test as usize] <= label {
                 continue;
             }
             if after.is_none() {
-                after = effects_alone(world, from.state, &self.operators[index as usize])?;
+                after = Some(effects_alone(world, from.state, &self.operators[index as usize])?);
             }
-            let Some(after) = &after else { break };
-            if let Some(times) = self.repetitions(world, (from.state, after), index, test)? {
+            let times = match &after {
+                Some(Some(after)) => self.repetitions(world, (from.state, after), index, test)?,
+                _ => Some(UNSURE),
+            };
+            if let Some(times) = times {
                 let label = if timed { label } else { base + cost * times };
                 self.work.reach(test, label, index, times);
             }
@@ -252,7 +255,7 @@ impl Relaxed {
         Ok(())
     }
 
-    /// Seconds that the operator takes at least; `None` if it cannot be applied.
+    /// Seconds that the operator takes at least; `None` if it can never be applied.
     fn seconds(
         &mut self,
         world: &World,
@@ -274,8 +277,10 @@ impl Relaxed {
         let seconds = world.span(act, &moment)?.map(|span| span.least_s * share);
         if operator.seconds == Seconds::Settled {
             self.hot[index as usize].seconds = seconds.unwrap_or(f64::INFINITY);
+            return Ok(seconds);
         }
-        Ok(seconds)
+        // No duration now does not mean that there will be none once other numbers have changed.
+        Ok(seconds.or(Some(0.0)))
     }
 
     /// How often the operator must be repeated from the state to make a test true, from what it does alone; `None` if it
@@ -360,7 +365,7 @@ impl Relaxed {
     }
 }
 
-/// Whether the operator does to numbers the same in every state.
+/// Whether the operator's action does to numbers the same in every state.
 fn changes_by_constants(world: &World, operator: &Operator) -> bool {
     let Some(act) = world.acts.get(operator.act as usize) else { return false };
     let mut effects = act.start_effects.iter().chain(act.end_effects);
@@ -368,7 +373,7 @@ fn changes_by_constants(world: &World, operator: &Operator) -> bool {
         && effects.all(|effect| match &effect.outcome {
             Outcome::Set(_) => true,
             Outcome::Change { amount: Expression::Constant(_), change, .. } => {
-                matches!(change, Change::Increase | Change::Decrease)
+                effect.when.is_none() && matches!(change, Change::Increase | Change::Decrease)
             }
             Outcome::Change { .. } | Outcome::Flow { .. } | Outcome::Call(_) => false,
         })
@@ -394,7 +399,7 @@ fn suiting(world: &World, state: &Values, operator: &Operator) -> Result<Option<
     Ok(None)
 }
 
-/// The state after the operator's effects, whatever it needs.
+/// The state after the operator's effects, whatever it needs; `None` if they cannot be told from this state.
 fn effects_alone(world: &World, state: &Values, operator: &Operator) -> Result<Option<Values>, Failure> {
     let Some(act) = world.acts.get(operator.act as usize) else { return Ok(Some(state.clone())) };
     let Some(proposal) = suiting(world, state, operator)? else { return Ok(None) };

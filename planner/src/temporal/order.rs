@@ -191,6 +191,9 @@ impl Order {
     /// The end of the action whose start is `start`.
     pub fn push_end(&mut self, start: u32, access: &Access, span: Span) -> Result<u32, Inconsistent> {
         let end = self.push(access);
+        // An action without duration ends when it starts.
+        let own = self.after[end as usize].iter_mut().filter(|(other, _)| *other == start);
+        own.for_each(|(_, gap_s)| *gap_s = gap_s.min(span.most_s));
         let tie = Tie { start, end, span };
         self.ties.push(tie);
         let end_s = self.earliest_s(end).max(self.earliest_s(start) + span.least_s);

@@ -198,9 +198,9 @@ impl<'a> World<'a> {
 
     /// The durations that the bounds at the start allow, or `None` if there is none.
     ///
-    /// A durative action takes at least [`EPSILON_S`].
+    /// A durative action takes at least [`EPSILON_S`], unless it must take less.
     pub fn span(&self, act: &Act, moment: &Moment) -> Result<Option<Span>, Failure> {
-        let mut span = Span { least_s: EPSILON_S, most_s: f64::INFINITY };
+        let mut span = Span { least_s: 0.0, most_s: f64::INFINITY };
         for bound in act.bounds.iter().filter(|bound| !bound.at_end) {
             let seconds = self.evaluate(&bound.seconds, moment)?;
             if seconds.is_nan() {
@@ -218,6 +218,7 @@ impl<'a> World<'a> {
                 Relation::Unequal => {}
             }
         }
+        span.least_s = span.least_s.max(EPSILON_S.min(span.most_s));
         Ok((span.least_s <= span.most_s && span.least_s.is_finite()).then_some(span))
     }
 

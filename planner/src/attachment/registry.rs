@@ -160,26 +160,33 @@ impl Attachments {
     /// Errors are not cached. An answer that does not fit the module's kind is a [`CallError::WrongAnswer`].
     pub fn call(&self, name: &str, call: &Call, level: Level) -> Result<Answer, AttachmentError> {
         let registered = self.registered(name, call)?;
-        let key = CacheKey::new(call, level);
+        let mut key = CacheKey::new(call, level);
         if let Some(answer) = registered.lookup(&key) {
             return Ok(answer);
         }
-        let before = self.now_s();
-        let (answer, asked) = match level {
-            Level::Relaxed => match registered.attachment.relaxed(call) {
-                Some(answer) => {
-                    registered.relaxed.fetch_add(1, Ordering::Relaxed);
-                    (answer, Level::Relaxed)
+        let mut before = self.now_s();
+        let relaxed = match level {
+            Level::Relaxed => registered.attachment.relaxed(call),
+            Level::Exact => None,
+        };
+        let answer = match relaxed {
+            Some(answer) => {
+                registered.relaxed.fetch_add(1, Ordering::Relaxed);
+                answer
+            }
+            None => {
+                if level == Level::Relaxed {
+                    key.level = Level::Exact;
+                    if let Some(answer) = registered.lookup(&key) {
+                        return Ok(answer);
+                    }
+                    before = self.now_s();
                 }
-                None => return self.call(name, call, Level::Exact),
-            },
-            Level::Exact => {
                 registered.exact.fetch_add(1, Ordering::Relaxed);
-                (registered.attachment.evaluate(call), Level::Exact)
+                registered.attachment.evaluate(call)
             }
         };
         registered.add_time(self.now_s() - before);
-        debug_assert_eq!(asked, level);
         let answer = checked(answer, call).map_err(|cause| failure(name, call, cause))?;
         registered.store(key, &answer);
         Ok(answer)

@@ -6,6 +6,7 @@
 
 mod join;
 mod patches;
+mod rounds;
 mod vessels;
 
 use crate::cloud::{Cloud, is_finite};
@@ -84,7 +85,10 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
     let (indices, points) = above(cloud, &surface, options);
     let viewpoints: Vec<_> = seen.viewpoints().iter().map(|v| surface.surface_from_world * v).collect();
     let voxels = patches::voxels(&points, options.voxel_m, &viewpoints);
-    let part_of_voxel = join::parts(&voxels, options);
+    let mut part_of_voxel = join::parts(&voxels, options);
+    if options.part_touching {
+        rounds::part(&voxels, &points, &mut part_of_voxel, &viewpoints);
+    }
     let mut parts: Vec<Segment> = Vec::new();
     let mut slots: Vec<Option<usize>> = vec![None; voxels.len()];
     for ((&index, &point), &voxel) in indices.iter().zip(&points).zip(&voxels.of_point) {

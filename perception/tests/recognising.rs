@@ -2,6 +2,7 @@
 
 mod tabletop;
 
+use descry_perception::merge::{MergeOptions, merge};
 use descry_perception::nalgebra::{Point3, Unit, Vector3};
 use descry_perception::recognise::{Descry, Handle, Published, Range, Top, check_models};
 use descry_perception::segment::{SceneOptions, segment};
@@ -100,6 +101,45 @@ fn neighbours_two_centimetres_apart_are_two() {
     let beside = Thing::Cup { x: 0.05, y: 0.02 + 0.09, radius: 0.035, height: 0.104, handle_rad: None };
     for angle in [0.0, 0.8, 2.5] {
         assert_eq!(percepts(&[CUP, beside], angle, &Descry::default()).len(), 2, "from {angle}");
+    }
+}
+
+#[test]
+fn what_stands_level_with_a_box_is_parted_from_it() {
+    // The side of the box that faces -y lies at y = 0.07; what is beside it has a side there, too.
+    let carton = |gap_m: f64| Thing::Block {
+        x: 0.05 + 0.035 + gap_m + 0.08,
+        y: 0.10,
+        half: [0.08, 0.05],
+        height: 0.22,
+        turn_rad: 0.0,
+    };
+    let beside = |handle_rad| Thing::Cup { x: 0.05, y: 0.085, radius: 0.035, height: 0.104, handle_rad };
+    // (what, things, cup A among them)
+    let cases = [
+        ("a cup 10 mm beside a carton", vec![beside(None), carton(0.010)], true),
+        ("a cup 5 mm beside a carton", vec![beside(None), carton(0.005)], true),
+        ("a mug beside a carton keeps its handle", vec![beside(Some(-2.0)), carton(0.008)], false),
+        ("a cup between two cartons", vec![beside(None), carton(0.008), carton(-0.086 - 0.16)], true),
+        ("a carton alone stays whole", vec![carton(0.0)], false),
+    ];
+    for (what, things, cup) in cases {
+        let angles = [-2.4, -1.6, -0.8, 0.8, 2.0];
+        let mut draws = Draws(5);
+        let views: Vec<View> = angles
+            .iter()
+            .map(|&angle| {
+                let pose = on_ring(angle, 1.2, 1.4);
+                look(&things, &pose, &pose, &mut draws)
+            })
+            .collect();
+        let merged = merge(&views, &MergeOptions::default()).expect("views of one table");
+        let scene = segment(&merged.cloud, &merged.visibility, &options()).expect("there is a table");
+        let found = Descry::default().recognise(&scene, &merged.visibility, &[cup_a()]);
+        let sizes: Vec<_> = found.iter().map(|p| (p.label.clone(), p.size_m)).collect();
+        assert_eq!(found.len(), things.len(), "{what}: {sizes:?}");
+        let sure = found.iter().any(|p| p.probability_of("cup A") > 0.6);
+        assert_eq!(sure, cup, "{what}: {sizes:?}");
     }
 }
 

@@ -31,7 +31,7 @@ pub struct Descry {
 
 impl Default for Descry {
     fn default() -> Self {
-        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.03, least: 0.5, temper: 0.7 }
+        Descry { known: 0.6, look_alikes: 1.5, upside_down: 0.03, least: 0.5, temper: 0.7 }
     }
 }
 
@@ -360,9 +360,9 @@ fn top_log(top: Top, m: &Measured) -> f64 {
 fn handle_log(handle: Handle, m: &Measured) -> f64 {
     let unseen = m.evidence.handle_unseen.clamp(0.0, 1.0);
     let (with, without) = match m.evidence.handle {
-        Sighting::Seen => (0.9 * (1.0 - unseen) + 0.02, 0.02_f64),
+        Sighting::Seen => (0.9 * (1.0 - unseen) + 0.02, 0.01_f64),
         // A handle that is there is missed in view now and then; out of view always.
-        _ => (unseen + (1.0 - unseen) * 0.04, 0.98),
+        _ => (unseen + (1.0 - unseen) * 0.04, 0.99),
     };
     match handle {
         Handle::One => with.ln(),

@@ -24,6 +24,10 @@ const VAGUE_M: f64 = 0.015;
 const CLEAR_M: f64 = 0.007;
 /// Greatest width of a handle across, metres.
 const HANDLE_WIDTH_M: f64 = 0.035;
+/// What is left of the error of a height however good the camera, metres.
+const HEIGHT_M: f64 = 0.002;
+/// How far the top of so little may be from that of the object, metres.
+const SLIVER_M: f64 = 0.01;
 /// How far below the rim a look must reach to be a look inside, metres.
 const INSIDE_M: f64 = 0.014;
 
@@ -111,7 +115,7 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
         round: round::fit(&segment.points, base_m, top, sigma_m, 7),
         rectangle: outline::fit(&side),
         height_m,
-        height_sigma_m: 0.003 + sigma_m + 0.5 * scene.surface.residual_m.min(0.004),
+        height_sigma_m: HEIGHT_M.hypot(0.5 * sigma_m).hypot(0.5 * scene.surface.residual_m.min(0.008)),
         top_hidden: top_hidden(&asker, middle, footprint_m, top),
         footprint_m,
         middle,
@@ -231,7 +235,7 @@ fn measure_round(
     let top_face = TopFace::measure(round, segment, asker, top);
     (evidence.open, evidence.lid) = (top_face.open, top_face.lid);
     evidence.inside = match (top_face.open, top_face.lid) {
-        (open, lid) if open > 0.15 && open > 1.5 * lid => Sighting::Seen,
+        (open, lid) if open > 0.08 && open > lid => Sighting::Seen,
         (open, lid) if lid > 0.3 && lid > 2.0 * open => Sighting::Absent,
         _ => Sighting::Unseen,
     };
@@ -241,6 +245,8 @@ fn measure_round(
         (evidence.handle, evidence.handle_unseen, evidence.inside) =
             (Sighting::Unseen, 1.0, Sighting::Unseen);
         measured.looked_through = 0.0;
+        // A sliver may be cut off above, too.
+        measured.height_sigma_m = measured.height_sigma_m.hypot(SLIVER_M);
     }
 }
 

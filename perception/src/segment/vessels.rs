@@ -40,7 +40,9 @@ impl Candidate {
 
     /// The round body that nearly all of its side lies on, if it is one.
     fn body(&self, viewpoints: &[Point3<f64>]) -> Option<&Round> {
-        self.body.get_or_init(|| round_body(&self.segment, self.low.z, self.top_m, viewpoints)).as_ref()
+        self.body
+            .get_or_init(|| round_body(&self.segment.points, self.low.z, self.top_m, viewpoints))
+            .as_ref()
     }
 
     fn hull(&self) -> &[[f64; 2]] {
@@ -89,19 +91,24 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
     }
     let both = union(&large.segment, &small.segment);
     let top = large.top_m.max(small.top_m);
-    round_body(&both, large.low.z.min(small.low.z), top, viewpoints).is_some_and(|body| {
+    round_body(&both.points, large.low.z.min(small.low.z), top, viewpoints).is_some_and(|body| {
         // Each part on its own must keep to the common body: one alone may carry the fit.
         [large, small].iter().all(|part| share_on(&body, &part.segment) >= ON_BODY - 0.1)
     })
 }
 
-/// The round body that nearly all of the segment's side lies on, if it is one rather than a box.
-fn round_body(segment: &Segment, low_m: f64, top_m: f64, viewpoints: &[Point3<f64>]) -> Option<Round> {
-    let near =
-        viewpoints.iter().map(|v| (segment.points[0] - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
+/// The round body that nearly all of the side of the points lies on, if it is one rather than a box.
+pub(super) fn round_body(
+    points: &[Point3<f64>],
+    low_m: f64,
+    top_m: f64,
+    viewpoints: &[Point3<f64>],
+) -> Option<Round> {
+    let first = points.first()?;
+    let near = viewpoints.iter().map(|v| (first - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
     let sigma_m = range_sigma_m(near).min(0.012);
-    let body = round::fit(&segment.points, low_m, top_m, sigma_m, 3)?;
-    let box_residual = outline::fit(&segment.points)?.residual_m;
+    let body = round::fit(points, low_m, top_m, sigma_m, 3)?;
+    let box_residual = outline::fit(points)?.residual_m;
     // Judged by what lies on it: a handle does not.
     let tight = body.residual_m < 2.0 * sigma_m + 0.0015 && body.residual_m < 0.6 * box_residual;
     (tight && body.radius_m < WIDEST_M && body.inliers >= ON_BODY).then_some(body)

@@ -1,0 +1,257 @@
+//! Upright round bodies in parts that are more than that: a cup beside a box, whose sides run level where they meet.
+//!
+//! The normals of a round body's side point away from its axis. Each voxel of a side votes for the axes that it may belong to; where many
+//! agree, a body is fitted, and parted off if what is left is more than a handle.
+
+use super::patches::Voxels;
+use super::quantile;
+use super::vessels::round_body;
+use crate::outline;
+use nalgebra::{Point3, Vector2};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
+
+/// Radii that are sought, metres, and their step.
+const RADII_M: (f64, f64) = (0.025, 0.085);
+const STEP_M: f64 = 0.006;
+/// Fewest voxels of a side.
+const FEWEST: usize = 25;
+/// What is this far out of the body is no longer the body itself, metres.
+const CLEAR_M: f64 = 0.009;
+/// How far a handle reaches out, metres.
+const HANDLE_M: f64 = 0.06;
+/// Cosine of the greatest angle between a normal of the side and the direction away from the axis: the faces of a box turn by 45° about theirs.
+const FACING: f64 = 0.9;
+/// Share of what stands at the radius that must face so.
+const ROUND_SHARE: f64 = 0.75;
+/// Directions around an axis, and how many of them must show the side: a third.
+const SECTORS: usize = 36;
+const LEAST_SECTORS: usize = 12;
+/// How well the normals of a box stand at right angles (1: all of them), and how well a rectangle fits it, metres.
+const SQUARE: f64 = 0.55;
+const BOX_M: f64 = 0.008;
+/// Least share of what is left against the body for it to be an object too.
+const LEFT_SHARE: f64 = 0.15;
+
+/// Parts round bodies off, and joins what of them creases parted. Parts are named by one of their voxels.
+pub(super) fn part(
+    voxels: &Voxels,
+    points: &[Point3<f64>],
+    part_of_voxel: &mut [u32],
+    viewpoints: &[Point3<f64>],
+) {
+    let mut points_of: Vec<Vec<Point3<f64>>> = vec![Vec::new(); voxels.len()];
+    for (point, &voxel) in points.iter().zip(&voxels.of_point) {
+        points_of[voxel as usize].push(*point);
+    }
+    let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (voxel, part) in part_of_voxel.iter().enumerate() {
+        members.entry(*part).or_default().push(voxel);
+    }
+    members.retain(|_, of| !is_box(voxels, of, &points_of) && !is_round(voxels, of, &points_of, viewpoints));
+    let all: Vec<usize> = members.values().flatten().copied().collect();
+    for mut pool in together(voxels, &all) {
+        while let Some(cut) = Axis::sought(voxels, &pool).iter().find_map(|axis| {
+            let body = axis.body(voxels, &pool)?;
+            let is_round = is_round(voxels, &body, &points_of, viewpoints);
+            is_round.then(|| Cut::around(voxels, body, axis, part_of_voxel, &members))?
+        }) {
+            cut.body.iter().for_each(|v| {
+                members.remove(&part_of_voxel[*v]);
+            });
+            pool.retain(|v| cut.body.binary_search(v).is_err());
+            cut.body.iter().for_each(|&v| part_of_voxel[v] = cut.body[0] as u32);
+            for left in cut.left {
+                left.iter().for_each(|&v| part_of_voxel[v] = left[0] as u32);
+                members.insert(left[0] as u32, left);
+            }
+        }
+    }
+}
+
+/// True if the side of a part is that of a box: its normals stand at right angles, and a rectangle fits it.
+fn is_box(voxels: &Voxels, of: &[usize], points_of: &[Vec<Point3<f64>>]) -> bool {
+    let side: Vec<usize> = of.iter().copied().filter(|&v| is_side(voxels, v)).collect();
+    let turned = side.iter().map(|&v| {
+        let quarter = 4.0 * voxels.normals[v].y.atan2(voxels.normals[v].x);
+        Vector2::new(quarter.cos(), quarter.sin())
+    });
+    let square = turned.sum::<Vector2<f64>>().norm() / side.len().max(1) as f64;
+    let points = || side.iter().flat_map(|&v| points_of[v].iter().copied()).collect::<Vec<_>>();
+    square > SQUARE && outline::fit(&points()).is_some_and(|fit| fit.residual_m < BOX_M)
+}
+
+/// The voxels in sets that hang together, each ascending.
+fn together(voxels: &Voxels, of: &[usize]) -> Vec<Vec<usize>> {
+    let mut open: FxHashSet<usize> = of.iter().copied().collect();
+    let mut sets = Vec::new();
+    for &first in of {
+        if !open.remove(&first) {
+            continue;
+        }
+        let mut set = vec![first];
+        let mut next = 0;
+        while let Some(&voxel) = set.get(next) {
+            set.extend(voxels.neighbours(voxel).iter().map(|&n| n as usize).filter(|n| open.remove(n)));
+            next += 1;
+        }
+        set.sort_unstable();
+        sets.push(set);
+    }
+    sets
+}
+
+/// A round body, and what is left of the parts that it takes voxels from.
+struct Cut {
+    /// With its handle and frayed edge. Ascending.
+    body: Vec<usize>,
+    /// What is apart from it, in pieces that hang together, each ascending.
+    left: Vec<Vec<usize>>,
+}
+
+impl Cut {
+    /// None if the body is just one of the parts.
+    fn around(
+        voxels: &Voxels,
+        body: Vec<usize>,
+        axis: &Axis,
+        part_of_voxel: &[u32],
+        members: &BTreeMap<u32, Vec<usize>>,
+    ) -> Option<Cut> {
+        let touched: BTreeSet<u32> = body.iter().map(|&v| part_of_voxel[v]).collect();
+        let rest = touched.iter().filter_map(|part| members.get(part)).flatten().copied();
+        let rest: Vec<usize> = rest.filter(|v| body.binary_search(v).is_err()).collect();
+        let (left, own): (Vec<_>, Vec<_>) =
+            together(voxels, &rest).into_iter().partition(|piece| is_apart(voxels, piece, &body, axis));
+        if touched.len() == 1 && left.is_empty() {
+            return None;
+        }
+        let mut body = body;
+        body.extend(own.into_iter().flatten());
+        body.sort_unstable();
+        Some(Cut { body, left })
+    }
+}
+
+/// Whether what is left beside a body is more than its handle or frayed edge, or rises above it.
+fn is_apart(voxels: &Voxels, rest: &[usize], body: &[usize], axis: &Axis) -> bool {
+    let count = |of: &[usize]| of.iter().map(|&v| f64::from(voxels.counts[v])).sum::<f64>();
+    let heights = |of: &[usize]| {
+        let mut heights: Vec<f64> = of.iter().map(|&v| voxels.centres[v].z).collect();
+        (quantile(&mut heights, 0.03), quantile(&mut heights, 0.97))
+    };
+    let ((low_m, top_m), (base_m, rim_m)) = (heights(rest), heights(body));
+    let hangs = low_m > base_m + 0.015 && top_m < rim_m;
+    let beyond = |v: &&usize| axis.distance_m(&voxels.centres[**v]) > axis.radius_m + HANDLE_M;
+    let reaches = rest.iter().filter(beyond).count() >= FEWEST;
+    let is_object = rest.len() >= FEWEST && !hangs && (reaches || count(rest) > LEFT_SHARE * count(body));
+    is_object || top_m > rim_m + 0.02
+}
+
+/// Whether the side of the voxels is that of an upright round body.
+fn is_round(
+    voxels: &Voxels,
+    body: &[usize],
+    points_of: &[Vec<Point3<f64>>],
+    viewpoints: &[Point3<f64>],
+) -> bool {
+    // A face on top would speak against a box as well as against a cup.
+    let side = body.iter().filter(|&&v| is_side(voxels, v));
+    let points: Vec<Point3<f64>> = side.flat_map(|&v| points_of[v].iter().copied()).collect();
+    let heights = points.iter().map(|p| p.z).fold((f64::INFINITY, 0.0_f64), |(l, h), z| (l.min(z), h.max(z)));
+    round_body(&points, heights.0, heights.1, viewpoints).is_some()
+}
+
+/// An upright axis that the side of a body may have.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    x: f64,
+    y: f64,
+    radius_m: f64,
+}
+
+impl Axis {
+    /// The axes on which most normals of a part agree, best first.
+    fn sought(voxels: &Voxels, of: &[usize]) -> Vec<Axis> {
+        const MOST: usize = 8;
+        let mut votes: FxHashMap<[i32; 3], u32> = FxHashMap::default();
+        let steps = ((RADII_M.1 - RADII_M.0) / STEP_M) as i32;
+        for &v in of.iter().filter(|&&v| is_side(voxels, v)) {
+            let (place, normal) = (&voxels.centres[v], &voxels.normals[v]);
+            let across = normal.xy().normalize();
+            for k in 0..=steps {
+                let r = RADII_M.0 + f64::from(k) * STEP_M;
+                let cell =
+                    [place.x - across.x * r, place.y - across.y * r].map(|c| (c / STEP_M).round() as i32);
+                *votes.entry([cell[0], cell[1], k]).or_default() += 1;
+            }
+        }
+        let around = |&[i, j, k]: &[i32; 3]| -> u32 {
+            let near = (-1..=1)
+                .flat_map(|a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [i + a, j + b, k + c])));
+            near.filter_map(|cell| votes.get(&cell)).sum()
+        };
+        let mut cells: Vec<(u32, [i32; 3])> =
+            votes.iter().filter(|(_, n)| **n > 3).map(|(cell, _)| (around(cell), *cell)).collect();
+        cells.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut axes: Vec<Axis> = Vec::new();
+        for (n, [i, j, k]) in cells {
+            let axis = Axis {
+                x: f64::from(i) * STEP_M,
+                y: f64::from(j) * STEP_M,
+                radius_m: RADII_M.0 + f64::from(k) * STEP_M,
+            };
+            let is_new = axes.iter().all(|a| (a.x - axis.x).hypot(a.y - axis.y) > 3.0 * STEP_M);
+            if (n as usize) < FEWEST || axes.len() == MOST {
+                break;
+            }
+            if is_new {
+                axes.push(axis);
+            }
+        }
+        axes
+    }
+
+    fn distance_m(&self, p: &Point3<f64>) -> f64 {
+        (p.x - self.x).hypot(p.y - self.y)
+    }
+
+    /// The voxels, ascending, of the body about the axis: its side, from enough directions, and what is within.
+    fn body(&self, voxels: &Voxels, of: &[usize]) -> Option<Vec<usize>> {
+        let near = |v: &usize| {
+            is_side(voxels, *v) && (self.distance_m(&voxels.centres[*v]) - self.radius_m).abs() < CLEAR_M
+        };
+        let faces = |v: &usize| {
+            let (place, normal) = (&voxels.centres[*v], &voxels.normals[*v]);
+            let away = Vector2::new(place.x - self.x, place.y - self.y);
+            normal.xy().dot(&away).abs() > FACING * normal.xy().norm() * away.norm()
+        };
+        let (side, other): (Vec<usize>, Vec<usize>) = of.iter().copied().filter(near).partition(faces);
+        if (side.len() as f64) < ROUND_SHARE * (side.len() + other.len()) as f64 {
+            return None;
+        }
+        let mut tops = [f64::NEG_INFINITY; SECTORS];
+        for &v in &side {
+            let place = &voxels.centres[v];
+            let turn = (place.y - self.y).atan2(place.x - self.x).rem_euclid(TAU) / TAU;
+            let top = &mut tops[((turn * SECTORS as f64) as usize).min(SECTORS - 1)];
+            *top = top.max(place.z);
+        }
+        let mut seen: Vec<f64> = tops.into_iter().filter(|top| top.is_finite()).collect();
+        let wide = side.len() >= FEWEST && seen.len() >= LEAST_SECTORS;
+        // What it touches may be taller.
+        let top_m = quantile(&mut seen, 0.5);
+        let belongs = |v: &usize| {
+            let place = &voxels.centres[*v];
+            self.distance_m(place) < self.radius_m + CLEAR_M && place.z < top_m + CLEAR_M
+        };
+        wide.then(|| of.iter().copied().filter(belongs).collect())
+    }
+}
+
+/// True if the voxel lies on something upright.
+fn is_side(voxels: &Voxels, voxel: usize) -> bool {
+    let normal = &voxels.normals[voxel];
+    normal.z.abs() < 0.5 && normal.xy().norm() > 0.5
+}

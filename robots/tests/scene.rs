@@ -1,17 +1,15 @@
 //! Scenes: mistakes in them, and what seeds make of them.
 
+mod scenes;
+
 use descry_robots::Pose2;
 use descry_robots::nalgebra::Point3;
 use descry_robots::sim::shape::Shape;
 use descry_robots::sim::{Object, Scene, SceneSpec, SimOptions, SimRobot, arrange};
 use std::path::Path;
 
-const GOOD: &str = r#"
-[[surface]]
-name = "table"
-size_m = [1.6, 0.8]
-height_m = 0.72
-[start]
+const GOOD: &str = on_a_table!(
+    r#"[start]
 position_m = [-2.0, 0.0]
 [[object]]
 name = "cup"
@@ -21,7 +19,8 @@ name = "mug"
 shape.mug = { diameter_m = 0.08, height_m = 0.095 }
 [target]
 object = "cup"
-"#;
+"#
+);
 
 #[test]
 fn mistakes_are_drawn_at_their_place() {

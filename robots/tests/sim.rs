@@ -1,15 +1,13 @@
 //! The simulated body: driving and its errors, mishaps, pushing, and that a seed fixes it all.
 
+mod scenes;
+
 use descry_robots::nalgebra::{Isometry3, Point3, Vector2};
 use descry_robots::sim::{DepthNoise, FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::{CancellationToken, Failure, Place, Pose2, Progress, Push, Robot, Watch};
 
-const SCENE: &str = r#"
-[[surface]]
-name = "table"
-size_m = [1.6, 0.8]
-height_m = 0.72
-[start]
+const SCENE: &str = on_a_table!(
+    r#"[start]
 position_m = [-2.0, 0.0]
 [[object]]
 name = "cup"
@@ -19,7 +17,8 @@ position_m = [0.1, 0.05]
 name = "box"
 shape.box = { size_m = [0.1, 0.1, 0.1] }
 position_m = [-0.4, 0.1]
-"#;
+"#
+);
 
 fn robot_in(text: &str, seed: u64, faults: &str) -> SimRobot {
     let spec = SceneSpec::parse("scene.toml", text).unwrap_or_else(|e| panic!("{e}"));

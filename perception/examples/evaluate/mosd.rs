@@ -46,21 +46,11 @@ pub fn run(dir: &Path) -> Result<(), String> {
         .collect();
     scenes.sort();
     let recognisers: [&dyn Recogniser; 2] = [&Published::default(), &Descry::default()];
-    let mut hits = vec![[0_usize; 3]; recognisers.len()];
+    let mut hits = vec![Hits::default(); recognisers.len()];
     let mut tally = Tally::default();
     for path in scenes {
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-        let bytes = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-        let cloud = read_cloud(&bytes).map_err(|e| format!("{}: {e}", path.display()))?.cloud;
-        let labels = cloud.labels.clone().ok_or_else(|| format!("{name}: no labels"))?;
-        let view = View {
-            stamp_ns: 0,
-            cloud,
-            intrinsics: None,
-            world_from_camera: Isometry3::identity(),
-            pose_sigma_m: 0.0,
-            pose_sigma_rad: 0.0,
-        };
+        let (view, labels) = labelled(&path, &name)?;
         let start = std::time::Instant::now();
         let seen = Visibility::from_views(std::slice::from_ref(&view));
         let scene = match segment(&view.cloud, &seen, &SceneOptions::default()) {
@@ -77,33 +67,14 @@ pub fn run(dir: &Path) -> Result<(), String> {
             scene.surface.residual_m * 1e3,
             scene.segments.len()
         );
-        let truth: Vec<u32> =
-            objects.iter().filter(|r| r[0] == name).filter_map(|r| r[1].parse().ok()).collect();
-        let owner = overlap(&scene, &view.cloud, &labels, &truth, &mut tally);
-        for (r, recogniser) in recognisers.iter().enumerate() {
+        let of_scene = |rows: &[Vec<String>]| -> Vec<u32> {
+            rows.iter().filter(|r| r[0] == name).filter_map(|r| r[1].parse().ok()).collect()
+        };
+        let owner = overlap(&scene, &view.cloud, &labels, &of_scene(&objects), &mut tally);
+        let cups: Vec<Vec<String>> = cups.iter().filter(|c| c[2] == "cup").cloned().collect();
+        for (recogniser, hits) in recognisers.iter().zip(&mut hits) {
             let percepts = recogniser.recognise(&scene, &seen, &[cup()]);
-            let mut called = Vec::new();
-            for (percept, owner) in percepts.iter().zip(&owner) {
-                let is_cup = owner.is_some_and(|o| {
-                    cups.iter().any(|c| c[0] == name && c[1] == o.to_string() && c[2] == "cup")
-                });
-                match (percept.label.is_some(), is_cup) {
-                    (true, true) => called.extend(*owner),
-                    (true, false) => hits[r][1] += 1,
-                    _ => {}
-                }
-                if r == 1 || percept.label.is_some() {
-                    println!(
-                        "   {:>10} object {owner:?} cup {is_cup}: {}",
-                        recogniser.name(),
-                        words(percept)
-                    );
-                }
-            }
-            called.sort_unstable();
-            called.dedup();
-            hits[r][0] += called.len();
-            hits[r][2] += cups.iter().filter(|c| c[0] == name && c[2] == "cup").count();
+            hits.count(*recogniser, &percepts, &owner, &of_scene(&cups));
         }
     }
     println!(
@@ -111,7 +82,7 @@ pub fn run(dir: &Path) -> Result<(), String> {
         tally.found, tally.objects, tally.split, tally.merged, tally.extra
     );
     println!("\n{:12} {:>9} {:>9}   (cups found, false cups, cups)", "recogniser", "precision", "recall");
-    for (recogniser, [right, wrong, all]) in recognisers.iter().zip(hits) {
+    for (recogniser, Hits { right, wrong, all }) in recognisers.iter().zip(hits) {
         let precision = right as f64 / (right + wrong).max(1) as f64;
         println!(
             "{:12} {precision:9.2} {:9.2}   {right} {wrong} {all}",
@@ -120,6 +91,58 @@ pub fn run(dir: &Path) -> Result<(), String> {
         );
     }
     Ok(())
+}
+
+/// A scene as one view, and the labels of its points.
+fn labelled(path: &Path, name: &str) -> Result<(View, Vec<u32>), String> {
+    let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let cloud = read_cloud(&bytes).map_err(|e| format!("{}: {e}", path.display()))?.cloud;
+    let labels = cloud.labels.clone().ok_or_else(|| format!("{name}: no labels"))?;
+    let view = View {
+        stamp_ns: 0,
+        cloud,
+        intrinsics: None,
+        world_from_camera: Isometry3::identity(),
+        pose_sigma_m: 0.0,
+        pose_sigma_rad: 0.0,
+    };
+    Ok((view, labels))
+}
+
+/// How a recogniser does on cups.
+#[derive(Clone, Default)]
+struct Hits {
+    right: usize,
+    wrong: usize,
+    all: usize,
+}
+
+impl Hits {
+    /// Counts the percepts of a scene: the object that each mostly is, and which objects are cups.
+    fn count(
+        &mut self,
+        recogniser: &dyn Recogniser,
+        percepts: &[Percept],
+        owner: &[Option<u32>],
+        cups: &[u32],
+    ) {
+        let mut called = Vec::new();
+        for (percept, owner) in percepts.iter().zip(owner) {
+            let is_cup = owner.is_some_and(|o| cups.contains(&o));
+            match (percept.label.is_some(), is_cup) {
+                (true, true) => called.extend(*owner),
+                (true, false) => self.wrong += 1,
+                _ => {}
+            }
+            if recogniser.name() == "descry" || percept.label.is_some() {
+                println!("   {:>10} object {owner:?} cup {is_cup}: {}", recogniser.name(), words(percept));
+            }
+        }
+        called.sort_unstable();
+        called.dedup();
+        self.right += called.len();
+        self.all += cups.len();
+    }
 }
 
 pub fn words(p: &Percept) -> String {

@@ -1,18 +1,25 @@
 //! Scenes that several tests stand in.
 
+#![allow(dead_code)]
+
 use descry_robots::sim::{Scene, SceneSpec, arrange};
 
-const CUP: &str = r#"
-[[surface]]
-name = "table"
-size_m = [1.6, 0.8]
-height_m = 0.72
-[start]
+/// A scene on a table; what is given begins in its sixth line.
+#[macro_export]
+macro_rules! on_a_table {
+    ($rest:literal) => {
+        concat!("\n[[surface]]\nname = \"table\"\nsize_m = [1.6, 0.8]\nheight_m = 0.72\n", $rest)
+    };
+}
+
+const CUP: &str = on_a_table!(
+    r#"[start]
 position_m = [-2.0, 0.3]
 [[object]]
 name = "cup"
 shape.cup = { diameter_m = 0.07, height_m = 0.1 }
-"#;
+"#
+);
 
 /// A table, a body before it, and a cup where the seed puts it.
 pub fn cup_on_a_table(seed: u64) -> Scene {

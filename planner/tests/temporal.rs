@@ -165,19 +165,23 @@ fn a_plan_that_breaks_a_constraint_on_the_way_is_refused_under_the_text() {
 }
 
 #[test]
-fn what_never_matters_disturbs_nobody() {
-    // The parts of an order are asked for all at once; those of another order are no part of it.
-    let domain = "(:requirements :adl) (:types order part) (:predicates (of ?p - part ?o - order) (made ?p - part)
-        (shipped ?o - order)) (:functions (needed ?p - part))
+fn what_a_condition_mentions_is_kept_apart_even_where_it_never_matters() {
+    // The parts of an order are asked for all at once; those of another order are mentioned with them.
+    let domain = "(define (domain d) (:requirements :adl :durative-actions :numeric-fluents) (:types order part)
+      (:predicates (of ?p - part ?o - order) (made ?p - part) (shipped ?o - order)) (:functions (needed ?p - part))
       (:durative-action make :parameters (?p - part) :duration (= ?duration (needed ?p)) :condition (at start (not (made ?p)))
         :effect (at end (made ?p)))
       (:durative-action ship :parameters (?o - order) :duration (= ?duration 1)
-        :condition (at start (forall (?p - part) (imply (of ?p ?o) (made ?p)))) :effect (at end (shipped ?o)))";
-    let problem =
-        "(:objects a b - order p q - part) (:init (of p a) (of q b) (= (needed p) 2) (= (needed q) 2.001))
-      (:goal (and (shipped a) (shipped b)))";
-    // The first order goes out at the moment when the part of the second is ready.
-    check(domain, problem, Some(3.002));
+        :condition (at start (forall (?p - part) (imply (of ?p ?o) (made ?p)))) :effect (at end (shipped ?o))))";
+    let problem = "(define (problem p) (:domain d) (:objects a b - order p q - part)
+      (:init (of p a) (of q b) (= (needed p) 2) (= (needed q) 2.001)) (:goal (and (shipped a) (shipped b))))";
+    let found = outcome(Source::new("domain.pddl", domain), Source::new("problem.pddl", problem));
+    let Some(plan) = found.plan() else { panic!("{found:?}") };
+    let step = |name: &str| plan.steps.iter().find(|step| step.arguments == [name]);
+    let (Some(made), Some(shipped)) = (step("q"), step("a")) else { panic!("{plan}") };
+    let (Some(start_s), Some(shipped_s)) = (made.start_s, shipped.start_s) else { panic!("{plan}") };
+    assert!((start_s + made.duration_s - shipped_s).abs() > 0.0005, "{plan}");
+    assert!(plan.makespan_s().is_some_and(|end_s| end_s < 3.01), "{plan}");
 }
 
 #[test]

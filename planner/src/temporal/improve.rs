@@ -10,6 +10,7 @@ use super::advance::{Situation, Step};
 use super::compress::classical_plan;
 use super::destroy::{Chance, keep_for, taken_apart};
 use super::envelope::{all_apart, envelopes, in_one_go_suffices};
+use super::mentions::keep_apart;
 use super::relaxed::{Part, Relaxed};
 use super::schedule::tightened;
 use super::search::{Counts, End, Manner, Search};
@@ -402,7 +403,12 @@ fn in_time_order(space: &Space, steps: &[Step]) -> Vec<Step> {
 
 /// The earliest schedule of a plan.
 fn schedule(space: &Space, steps: &[Step]) -> Vec<Timed> {
-    let Ok(track) = space.track(steps) else { return Vec::new() };
+    let Ok(mut track) = space.track(steps) else { return Vec::new() };
+    // A schedule that has no room for more distance is as good as the search took it for.
+    let mut apart = track.clone();
+    if keep_apart(space, steps, &mut apart).is_ok() {
+        track = apart;
+    }
     let actions =
         track.actions.iter().zip(steps).filter_map(|(action, step)| action.map(|action| (action, step)));
     let mut plan: Vec<Timed> = actions

@@ -220,6 +220,12 @@ impl Order {
         Ok(node)
     }
 
+    /// Lets the second of each pair of happenings, the later in the sequence, follow the first.
+    pub fn separate(&mut self, pairs: &[(u32, u32)]) -> Result<(), Inconsistent> {
+        pairs.iter().for_each(|&(first, second)| self.after[second as usize].push((first, EPSILON_S)));
+        self.propagate()
+    }
+
     fn record(&mut self, node: u32, access: &Access) {
         for &resource in &access.reads {
             self.resources[resource as usize].readers.push(node);

@@ -66,6 +66,8 @@ pub(crate) struct Span {
 
 /// The ground task in the form that the temporal search applies.
 pub(crate) struct World<'a> {
+    /// The lifted task.
+    pub task: &'a Task,
     /// The ground task.
     pub ground: &'a GroundTask,
     /// Its calls.
@@ -126,7 +128,7 @@ impl<'a> World<'a> {
         let derived = (0..ground.variables.len())
             .filter(|&variable| ground.variables[variable].stratum.is_some())
             .collect();
-        World { ground, calls, acts, complete, proposes, strata, derived }
+        World { task, ground, calls, acts, complete, proposes, strata, derived }
     }
 
     /// The first state, with derived variables up to date.

@@ -19,8 +19,8 @@ const STEP_M: f64 = 0.006;
 const FEWEST: usize = 25;
 /// What is this far out of the body is no longer the body itself, metres.
 const CLEAR_M: f64 = 0.009;
-/// How far a handle reaches out, metres.
-const HANDLE_M: f64 = 0.06;
+/// What is this far out is no image of the body itself in a view that is misplaced, metres.
+const BESIDE_M: f64 = 0.035;
 /// Cosine of the greatest angle between a normal of the side and the direction away from the axis: the faces of a box turn by 45° about theirs.
 const FACING: f64 = 0.9;
 /// Share of what stands at the radius that must face so.
@@ -31,8 +31,6 @@ const LEAST_SECTORS: usize = 12;
 /// How well the normals of a box stand at right angles (1: all of them), and how well a rectangle fits it, metres.
 const SQUARE: f64 = 0.55;
 const BOX_M: f64 = 0.008;
-/// Least share of what is left against the body for it to be an object too.
-const LEFT_SHARE: f64 = 0.15;
 
 /// Parts round bodies off, and joins what of them creases parted. Parts are named by one of their voxels.
 pub(super) fn part(
@@ -134,18 +132,17 @@ impl Cut {
     }
 }
 
-/// Whether what is left beside a body is more than its handle or frayed edge, or rises above it.
+/// Whether what is left beside a body is more than its handle, its frayed edge or its image in a view that lies beside the others, or
+/// rises above it.
 fn is_apart(voxels: &Voxels, rest: &[usize], body: &[usize], axis: &Axis) -> bool {
-    let count = |of: &[usize]| of.iter().map(|&v| f64::from(voxels.counts[v])).sum::<f64>();
     let heights = |of: &[usize]| {
         let mut heights: Vec<f64> = of.iter().map(|&v| voxels.centres[v].z).collect();
         (quantile(&mut heights, 0.03), quantile(&mut heights, 0.97))
     };
     let ((low_m, top_m), (base_m, rim_m)) = (heights(rest), heights(body));
     let hangs = low_m > base_m + 0.015 && top_m < rim_m;
-    let beyond = |v: &&usize| axis.distance_m(&voxels.centres[**v]) > axis.radius_m + HANDLE_M;
-    let reaches = rest.iter().filter(beyond).count() >= FEWEST;
-    let is_object = rest.len() >= FEWEST && !hangs && (reaches || count(rest) > LEFT_SHARE * count(body));
+    let beyond = |v: &&usize| axis.distance_m(&voxels.centres[**v]) > axis.radius_m + BESIDE_M;
+    let is_object = !hangs && rest.iter().filter(beyond).count() >= FEWEST;
     is_object || top_m > rim_m + 0.02
 }
 

@@ -90,6 +90,9 @@ struct Tally {
 
 /// Scores arrangements with seeds 1 to `count`; pictures of the first three go to `out`.
 pub fn run(count: u64, out: Option<&Path>) -> Result<(), String> {
+    if let Some(dir) = out {
+        std::fs::create_dir_all(dir).map_err(|e| format!("{}: {e}", dir.display()))?;
+    }
     let recognisers: [&dyn Recogniser; 2] = [&Published::default(), &Descry::default()];
     // By recogniser, mode (merged, single), number of views.
     let mut tallies = vec![vec![vec![Tally::default(); POSES]; 2]; recognisers.len()];

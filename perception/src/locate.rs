@@ -14,6 +14,8 @@ const STRAY: usize = 3;
 /// A sample wants this many points within [`DEPTH_M`] behind it.
 const FEWEST: usize = 8;
 const DEPTH_M: f64 = 0.04;
+/// A camera must have looked past the place this far beyond a sample.
+const BEYOND_M: f64 = 0.03;
 /// How far a sample may be off, round by round: what a view cuts off or an object hides lies farther in than the edge.
 const GATES_M: [f64; 7] = [0.15, 0.12, 0.08, 0.05, 0.03, 0.02, 0.02];
 /// Standard deviation of one sample; neighbours err together, which is why it is no millimetre.
@@ -33,13 +35,15 @@ pub struct Located {
 /// Lays the seen points of a surface on the outline that the map has of it (in order around, metres).
 ///
 /// `sigma_m` and `sigma_rad` say how well the cloud's place in the map is known before: where no edge tells otherwise, it
-/// stays. Moves along the surface and turns about `up`; heights are left as they are.
+/// stays. Moves along the surface and turns about `up`; heights are left as they are. The surface ends only where `is_past`
+/// says of a place (cloud's frame) just beyond the last points that a camera looked past it: elsewhere only the image ends.
 pub fn locate(
     points: &[Point3<f64>],
     up: &Unit<Vector3<f64>>,
     outline: &[Point3<f64>],
     sigma_m: f64,
     sigma_rad: f64,
+    is_past: impl Fn(&Point3<f64>) -> bool,
 ) -> Located {
     let mut located = Located { map_from_world: Isometry3::identity(), matched: 0, residual_m: 0.0 };
     if outline.len() < 3 {
@@ -51,8 +55,16 @@ pub fn locate(
     let around: Vec<Vec<Point2<f64>>> = edges.iter().map(|edge| around(edge, &points).collect()).collect();
     let mut moved = Isometry2::identity();
     for gate_m in GATES_M {
-        let matches: Vec<Match> =
-            edges.iter().zip(&around).flat_map(|(edge, near)| samples(edge, near, &moved, gate_m)).collect();
+        let is_end = |m: &Match| {
+            let beyond = moved.inverse() * (m.at + m.normal * BEYOND_M);
+            is_past(&(frame.origin + frame.right * beyond.x + frame.ahead * beyond.y))
+        };
+        let matches: Vec<Match> = edges
+            .iter()
+            .zip(&around)
+            .flat_map(|(edge, near)| samples(edge, near, &moved, gate_m))
+            .filter(is_end)
+            .collect();
         located.matched = matches.len();
         let square: f64 = matches.iter().map(|m| m.distance_m.powi(2)).sum();
         located.residual_m = if matches.is_empty() { 0.0 } else { (square / matches.len() as f64).sqrt() };
@@ -204,7 +216,7 @@ mod tests {
     fn check(seen: impl Fn(f64, f64) -> bool, x_m: f64, y_m: f64, yaw_deg: f64, within_m: f64) {
         let truth = Isometry3::new(Vector3::new(x_m, y_m, 0.0), Vector3::z() * yaw_deg.to_radians());
         let seen: Vec<Point3<f64>> = points(seen).iter().map(|p| truth.inverse() * p).collect();
-        let found = locate(&seen, &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05);
+        let found = locate(&seen, &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05, |_| true);
         let middle = Point3::new(0.0, 0.0, 0.72);
         let off_m = (found.map_from_world * (truth.inverse() * middle) - middle).norm();
         assert!(off_m < within_m, "moved by {x_m}, {y_m}, {yaw_deg}: {off_m} m off, {found:?}");
@@ -224,11 +236,19 @@ mod tests {
     }
 
     #[test]
+    fn where_the_image_ends_the_table_goes_on() {
+        let seen = points(|x, _| x > -0.4 && x < 0.72);
+        let found = locate(&seen, &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05, |p| p.x < 0.7);
+        let off_m = (found.map_from_world * Point3::origin()).coords.norm();
+        assert!(off_m < 0.002, "{off_m} m off, {found:?}");
+    }
+
+    #[test]
     fn what_no_edge_tells_stays() {
         let inner = points(|x, y| x.abs() < 0.3 && y.abs() < 0.2);
-        let found = locate(&inner, &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05);
+        let found = locate(&inner, &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05, |_| true);
         assert_eq!((found.map_from_world.translation.vector.norm(), found.matched), (0.0, 0));
-        let none = locate(&[], &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05);
+        let none = locate(&[], &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05, |_| true);
         assert_eq!((none.map_from_world, none.matched), (Isometry3::identity(), 0));
     }
 }

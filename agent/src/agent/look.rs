@@ -138,7 +138,9 @@ impl Agent<'_> {
         let on_it =
             |p: &Point3<f64>| surface.height_m(p).abs() < ON_SURFACE_M && outline.covers(p, HULL_MARGIN_M);
         let points: Vec<Point3<f64>> = merged.cloud.points.iter().map(|p| p.cast()).filter(on_it).collect();
-        let located = locate(&points, &surface.up, &known.outline, body.pose_sigma_m, body.pose_sigma_rad);
+        let (sigma_m, sigma_rad) = (body.pose_sigma_m, body.pose_sigma_rad);
+        let is_past = |p: &Point3<f64>| merged.visibility.looked_past(p, ON_SURFACE_M);
+        let located = locate(&points, &surface.up, &known.outline, sigma_m, sigma_rad, is_past);
         (merged.moved(&located.map_from_world), surface.moved(&located.map_from_world))
     }
 

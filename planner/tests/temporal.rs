@@ -132,6 +132,11 @@ fn durations_may_be_nothing_at_first_or_at_all() {
         :effect (and (at start (increase (loaded) (ready))) (at start (assign (ready) 0))))";
     check(domain, "(:init (= (ready) 0) (= (loaded) 0)) (:goal (>= (loaded) 3))", Some(6.0));
     check(domain, "(:init (= (ready) 0) (= (loaded) 0)) (:goal (>= (loaded) 4))", None);
+    // An end that disturbs its own start cannot come with it.
+    let flash = "(:predicates (idle) (lit))
+      (:durative-action flash :parameters () :duration (= ?duration 0) :condition (at start (idle))
+        :effect (and (at start (not (idle))) (at end (idle)) (at end (lit))))";
+    check(flash, "(:init (idle)) (:goal (lit))", None);
 }
 
 #[test]

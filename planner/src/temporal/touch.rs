@@ -23,6 +23,12 @@ impl Touched {
         resources
     }
 
+    /// Whether both hold a variable or a number.
+    pub fn meets(&self, other: &Touched) -> bool {
+        self.variables.iter().any(|variable| other.variables.contains(variable))
+            || self.numbers.iter().any(|number| other.numbers.contains(number))
+    }
+
     /// Nothing, with the memory kept.
     pub fn clear(&mut self) {
         self.variables.clear();

@@ -12,6 +12,8 @@ use crate::semantics::compare;
 use crate::solve::EPSILON_S;
 use crate::task::{Comparison, Task, Term};
 
+use super::touch::{Touched, expression_touches};
+
 /// An action of the temporal search; an instantaneous one has everything at its start.
 #[derive(Debug, Clone)]
 pub(crate) struct Act<'a> {
@@ -200,7 +202,7 @@ impl<'a> World<'a> {
 
     /// The durations that the bounds at the start allow, or `None` if there is none.
     ///
-    /// A durative action takes at least [`EPSILON_S`], unless it must take less.
+    /// A durative action takes at least [`EPSILON_S`], unless it must take less and its end is free of its start.
     pub fn span(&self, act: &Act, moment: &Moment) -> Result<Option<Span>, Failure> {
         let mut span = Span { least_s: 0.0, most_s: f64::INFINITY };
         for bound in act.bounds.iter().filter(|bound| !bound.at_end) {
@@ -220,8 +222,29 @@ impl<'a> World<'a> {
                 Relation::Unequal => {}
             }
         }
+        if span.most_s < EPSILON_S && !self.ends_freely(act) {
+            return Ok(None);
+        }
         span.least_s = span.least_s.max(EPSILON_S.min(span.most_s));
         Ok((span.least_s <= span.most_s && span.least_s.is_finite()).then_some(span))
+    }
+
+    /// Whether the end of an action may happen together with its start: neither changes what the other touches.
+    fn ends_freely(&self, act: &Act) -> bool {
+        let [mut read, mut written, mut end_read, mut end_written] = [(); 4].map(|()| Touched::default());
+        read.condition(self, act.at_start);
+        act.start_effects.iter().for_each(|effect| written.outcome(self, &effect.outcome));
+        [act.over_all, act.at_end].into_iter().for_each(|condition| end_read.condition(self, condition));
+        for effect in act.end_effects {
+            end_written.outcome(self, &effect.outcome);
+            if let Outcome::Change { amount, .. } = &effect.outcome {
+                expression_touches(self, amount, &mut end_read);
+            }
+        }
+        act.flow_effects.is_empty()
+            && !written.meets(&end_read)
+            && !written.meets(&end_written)
+            && !read.meets(&end_written)
     }
 
     /// Whether the bounds that are evaluated at the end allow this duration.

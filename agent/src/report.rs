@@ -194,6 +194,9 @@ pub struct Report {
     pub sim_time_s: f64,
     /// On the wall.
     pub wall_s: f64,
+    /// The longest that one planning call took, geometry included. Not in the JSON: it differs from run to run.
+    #[serde(skip)]
+    pub planning_s: f64,
     /// The run's folder.
     pub run: String,
 }
@@ -219,6 +222,7 @@ impl Report {
             distance_m: 0.0,
             sim_time_s: 0.0,
             wall_s: 0.0,
+            planning_s: 0.0,
             run,
         }
     }
@@ -247,8 +251,8 @@ impl fmt::Display for Report {
         }
         writeln!(
             f,
-            "  {} views, {} replans, {:.1} m and {:.0} s on the body's clock, {:.1} s on the wall",
-            self.views, self.replans, self.distance_m, self.sim_time_s, self.wall_s
+            "  {} views, {} replans, {:.1} m and {:.0} s on the body's clock, {:.1} s on the wall, at most {:.3} s for a plan",
+            self.views, self.replans, self.distance_m, self.sim_time_s, self.wall_s, self.planning_s
         )?;
         write!(f, "  record: {}", self.run)
     }

@@ -75,7 +75,8 @@ pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path) -> Result<Outcome, St
     row.insert("visible_from_start".into(), json!(share.map(|s| (s * 1e4).round() / 1e4)));
     let events = body.simulator().map_or(0, |robot| robot.truth().events.len());
     row.insert("mishaps".into(), json!(events));
-    let clock = json!({ "arrange_s": arranged_s, "run_s": started.elapsed().as_secs_f64() - arranged_s });
+    let run_s = started.elapsed().as_secs_f64() - arranged_s;
+    let clock = json!({ "arrange_s": arranged_s, "run_s": run_s, "longest_planning_s": report.planning_s });
     Ok(Outcome { rows: vec![row], clock: clock.as_object().cloned().unwrap_or_default() })
 }
 

@@ -2,6 +2,7 @@
 
 use crate::draw::Draws;
 use nalgebra::{Matrix4, Point3, Vector4};
+use std::f64::consts::TAU;
 
 /// Radii that are tried, metres.
 const RADII_M: (f64, f64) = (0.012, 0.20);
@@ -68,6 +69,12 @@ impl Round {
     pub fn outside_m(&self, p: &Point3<f64>) -> f64 {
         distance(p.x - self.x, p.y - self.y) - self.radius_at(p.z)
     }
+}
+
+/// In which of so many directions around an axis a place lies that is `x` and `y` from it.
+pub(crate) fn sector(x: f64, y: f64, sectors: usize) -> usize {
+    let turn = y.atan2(x).rem_euclid(TAU) / TAU;
+    ((turn * sectors as f64) as usize).min(sectors - 1)
 }
 
 /// Length of a vector of metres: no overflow to guard against, so no need for `hypot`, which is a slow call.

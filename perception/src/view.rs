@@ -21,3 +21,17 @@ pub struct View {
     /// Standard deviation of that orientation about each axis, radians.
     pub pose_sigma_rad: f64,
 }
+
+impl View {
+    /// A cloud by itself: the world is the frame of its camera.
+    pub fn alone(cloud: Cloud) -> View {
+        View {
+            stamp_ns: 0,
+            cloud,
+            intrinsics: None,
+            world_from_camera: Isometry3::identity(),
+            pose_sigma_m: 0.0,
+            pose_sigma_rad: 0.0,
+        }
+    }
+}

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use descry_domains::load::{DEFAULT, Domain};
 use descry_perception::files::read_cloud;
-use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::{Descry, ObjectModel, Percept, Published, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment};
 use descry_perception::{View, Visibility};
@@ -68,14 +68,7 @@ fn look(path: &Path, recogniser: &dyn Recogniser, objects: &[ObjectModel]) -> Re
     let cloud = loaded.cloud;
     let points = cloud.points.len();
     // The sensor stands where the file says; an organised cloud tells by its pixels what it looked through.
-    let view = View {
-        stamp_ns: 0,
-        cloud,
-        intrinsics: None,
-        world_from_camera: Isometry3::identity(),
-        pose_sigma_m: 0.0,
-        pose_sigma_rad: 0.0,
-    };
+    let view = View::alone(cloud);
     let organised = Visibility::from_views(std::slice::from_ref(&view));
     let visibility = match organised.maps.is_empty() {
         false => organised,

@@ -2,7 +2,6 @@
 
 use descry_perception::cloud::is_finite;
 use descry_perception::files::read_cloud;
-use descry_perception::nalgebra::Isometry3;
 use descry_perception::recognise::{Descry, Published, Range, Top};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::{ObjectModel, Percept, Recogniser, Scene, View, Visibility};
@@ -98,15 +97,7 @@ fn labelled(path: &Path, name: &str) -> Result<(View, Vec<u32>), String> {
     let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let cloud = read_cloud(&bytes).map_err(|e| format!("{}: {e}", path.display()))?.cloud;
     let labels = cloud.labels.clone().ok_or_else(|| format!("{name}: no labels"))?;
-    let view = View {
-        stamp_ns: 0,
-        cloud,
-        intrinsics: None,
-        world_from_camera: Isometry3::identity(),
-        pose_sigma_m: 0.0,
-        pose_sigma_rad: 0.0,
-    };
-    Ok((view, labels))
+    Ok((View::alone(cloud), labels))
 }
 
 /// How a recogniser does on cups.

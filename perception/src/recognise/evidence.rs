@@ -26,7 +26,7 @@ const CLEAR_M: f64 = 0.007;
 const HANDLE_WIDTH_M: f64 = 0.035;
 /// What is left of the error of a height however good the camera, metres.
 const HEIGHT_M: f64 = 0.002;
-/// How far the top of so little may be from that of the object, metres.
+/// How far the top of a sliver may be from that of the object, metres.
 const SLIVER_M: f64 = 0.01;
 /// How far below the rim a look must reach to be a look inside, metres.
 const INSIDE_M: f64 = 0.014;
@@ -318,8 +318,7 @@ fn share(flags: &[bool; SECTORS]) -> f64 {
 }
 
 fn sector_of(round: &Round, p: &Point3<f64>) -> usize {
-    let angle = (p.y - round.y).atan2(p.x - round.x).rem_euclid(std::f64::consts::TAU);
-    ((angle / std::f64::consts::TAU * SECTORS as f64) as usize).min(SECTORS - 1)
+    round::sector(p.x - round.x, p.y - round.y, SECTORS)
 }
 
 /// The largest thing that sticks out of the body in one direction.

@@ -7,10 +7,10 @@ use super::patches::Voxels;
 use super::quantile;
 use super::vessels::round_body;
 use crate::outline;
+use crate::round::sector;
 use nalgebra::{Point3, Vector2};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::TAU;
 
 /// Radii that are sought, metres, and their step.
 const RADII_M: (f64, f64) = (0.025, 0.085);
@@ -76,8 +76,11 @@ fn is_box(voxels: &Voxels, of: &[usize], points_of: &[Vec<Point3<f64>>]) -> bool
         Vector2::new(quarter.cos(), quarter.sin())
     });
     let square = turned.sum::<Vector2<f64>>().norm() / side.len().max(1) as f64;
-    let points = || side.iter().flat_map(|&v| points_of[v].iter().copied()).collect::<Vec<_>>();
-    square > SQUARE && outline::fit(&points()).is_some_and(|fit| fit.residual_m < BOX_M)
+    if square <= SQUARE {
+        return false;
+    }
+    let points: Vec<Point3<f64>> = side.iter().flat_map(|&v| points_of[v].iter().copied()).collect();
+    outline::fit(&points).is_some_and(|fit| fit.residual_m < BOX_M)
 }
 
 /// The voxels in sets that hang together, each ascending.
@@ -231,8 +234,7 @@ impl Axis {
         let mut tops = [f64::NEG_INFINITY; SECTORS];
         for &v in &side {
             let place = &voxels.centres[v];
-            let turn = (place.y - self.y).atan2(place.x - self.x).rem_euclid(TAU) / TAU;
-            let top = &mut tops[((turn * SECTORS as f64) as usize).min(SECTORS - 1)];
+            let top = &mut tops[sector(place.x - self.x, place.y - self.y, SECTORS)];
             *top = top.max(place.z);
         }
         let mut seen: Vec<f64> = tops.into_iter().filter(|top| top.is_finite()).collect();

@@ -5,6 +5,7 @@ mod calls;
 pub mod diagnostic;
 mod explain;
 pub mod ground;
+mod grouped;
 mod heuristics;
 mod invariants;
 mod landmarks;

@@ -86,6 +86,15 @@ fn the_shortest_tour_of_views_is_found() {
 }
 
 #[test]
+fn ways_that_come_too_late_for_the_goal_are_not_asked_for() {
+    let attachments = attachments();
+    let plan = solved(&look(30, 0.5), &attachments);
+    assert_eq!(names(&plan), ["move start p3", "observe p3 table cup"]);
+    let asked = attachments.statistics()["path_cost"].calls;
+    assert!(asked < 31 * 30 / 2, "{asked} of {} ways", 31 * 30);
+}
+
+#[test]
 fn the_same_seed_gives_the_same_plan_and_counts() {
     let task = look(12, 0.9);
     let first = solve(&task, &attachments());

@@ -1,5 +1,7 @@
 //! Relaxed reachability of the ground task: what no sequence of actions can bring about goes.
 
+use crate::grouped::Grouped;
+
 use super::instantiate::{Clauses, Deed, GroundEffect, RawCall};
 use super::raw::{RawAction, RawTask};
 
@@ -52,7 +54,7 @@ impl Fixpoint {
 
     fn run(mut self, init: &[bool], count: usize) -> Vec<bool> {
         let mut reached = vec![false; count];
-        let (from, waiting) = self.by_atom(count);
+        let waits = Grouped::new(count, self.waits.iter().copied());
         let mut queue: Vec<u32> = Vec::new();
         let reach = |atom: u32, queue: &mut Vec<u32>, reached: &mut Vec<bool>| {
             if !std::mem::replace(&mut reached[atom as usize], true) {
@@ -68,8 +70,7 @@ impl Fixpoint {
             }
         }
         while let Some(atom) = queue.pop() {
-            let own = from[atom as usize] as usize..from[atom as usize + 1] as usize;
-            for &id in &waiting[own] {
+            for &id in waits.of(atom) {
                 let unary = &mut self.unary[id as usize];
                 unary.missing -= 1;
                 if unary.missing == 0 {
@@ -78,22 +79,6 @@ impl Fixpoint {
             }
         }
         reached
-    }
-
-    /// The operators that wait for each atom one after the other, and where those of an atom begin.
-    fn by_atom(&self, count: usize) -> (Vec<u32>, Vec<u32>) {
-        let mut from = vec![0; count + 2];
-        self.waits.iter().for_each(|&(atom, _)| from[atom as usize + 2] += 1);
-        for atom in 2..from.len() {
-            from[atom] += from[atom - 1];
-        }
-        let mut waiting = vec![0; self.waits.len()];
-        for &(atom, id) in &self.waits {
-            let place = &mut from[atom as usize + 1];
-            waiting[*place as usize] = id;
-            *place += 1;
-        }
-        (from, waiting)
     }
 }
 

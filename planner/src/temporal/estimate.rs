@@ -52,6 +52,12 @@ pub(super) struct Work {
     fired: Vec<(f64, f64)>,
     queue: BinaryHeap<Reverse<(Key, u32)>>,
     evaluation: u32,
+    goal: Vec<u32>,
+    /// The greatest label of the goal; to be computed again once one of them is `nearer`.
+    latest: f64,
+    nearer: bool,
+    /// By proposition, what is left at least to the goal: in costs, and in time; empty until it is asked for.
+    remaining: [Vec<f64>; 2],
 }
 
 /// How far what an operator needs is reached.
@@ -73,6 +79,10 @@ impl Work {
             fired: vec![(0.0, 0.0); operators],
             queue: BinaryHeap::new(),
             evaluation: 0,
+            goal: Vec::new(),
+            latest: f64::INFINITY,
+            nearer: false,
+            remaining: [Vec::new(), Vec::new()],
         }
     }
 
@@ -90,9 +100,19 @@ impl Work {
         (waiting.missing == 0).then_some(waiting.base)
     }
 
+    /// The greatest label of the goal: what comes later is of no use.
+    fn latest(&mut self) -> f64 {
+        if std::mem::take(&mut self.nearer) {
+            let labels = self.goal.iter().map(|&need| self.labels[need as usize]);
+            self.latest = labels.fold(0.0, f64::max);
+        }
+        self.latest
+    }
+
     fn begin(&mut self) {
         self.labels.fill(f64::INFINITY);
         self.queue.clear();
+        self.nearer = true;
         self.evaluation = self.evaluation.wrapping_add(1);
         if self.evaluation == 0 {
             self.waiting.fill(Waiting::default());
@@ -104,13 +124,15 @@ impl Work {
         if label < self.labels[proposition as usize] {
             self.labels[proposition as usize] = label;
             self.supporters[proposition as usize] = (supporter, times as f32);
+            self.nearer |= self.wanted[proposition as usize];
             self.queue.push(Reverse((Key(label), proposition)));
         }
     }
 }
 
+/// A label in a queue, or what is left.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Key(f64);
+pub(super) struct Key(pub(super) f64);
 
 impl Eq for Key {}
 impl PartialOrd for Key {
@@ -135,21 +157,25 @@ impl Relaxed {
                 return Ok(None);
             }
         }
-        let closed = from.open.iter().map(|act| self.tokens[act].1);
-        let goal: Vec<u32> = self.goal.iter().copied().chain(closed).collect();
-        self.seed(world, from)?;
-        goal.iter().for_each(|&need| self.work.wanted[need as usize] = true);
-        let spread = self.spread(world, from, goal.len());
-        goal.iter().for_each(|&need| self.work.wanted[need as usize] = false);
-        spread?;
-        if goal.iter().any(|&need| self.work.labels[need as usize].is_infinite()) {
-            return Ok(None);
+        let timed = from.ready_s.is_some();
+        if self.work.remaining[usize::from(timed)].is_empty() {
+            self.work.remaining[usize::from(timed)] = self.remaining(timed);
         }
-        Ok(Some(self.extract(&goal)))
+        let closed = from.open.iter().map(|act| self.tokens[act].1);
+        self.work.goal = self.goal.iter().copied().chain(closed).collect();
+        let mark = |work: &mut Work, wanted: bool| {
+            work.goal.iter().for_each(|&need| work.wanted[need as usize] = wanted);
+        };
+        mark(&mut self.work, true);
+        let spread = self.seed(world, from).and_then(|()| self.spread(world, from));
+        mark(&mut self.work, false);
+        spread?;
+        Ok(self.work.latest().is_finite().then(|| self.extract()))
     }
 
-    fn spread(&mut self, world: &World, from: &From, mut missing: usize) -> Result<(), Failure> {
+    fn spread(&mut self, world: &World, from: &From) -> Result<(), Failure> {
         let timed = from.ready_s.is_some();
+        let mut missing = self.work.goal.len();
         for position in 0..self.free.len() {
             self.fire(world, from, self.free[position], 0.0)?;
         }
@@ -163,9 +189,11 @@ impl Relaxed {
                     break;
                 }
             }
-            let own = self.needed_from[proposition as usize]..self.needed_from[proposition as usize + 1];
-            for position in own {
-                let Waiter { operator, target, seconds, step } = self.needed_by[position as usize];
+            if label + self.work.remaining[usize::from(timed)][proposition as usize] >= self.work.latest() {
+                continue;
+            }
+            for position in self.needed_by.range(proposition) {
+                let Waiter { operator, target, seconds, step } = self.needed_by.values[position];
                 let least = if timed { seconds } else { seconds + step };
                 // Whatever else it needs, it comes too late.
                 if target != NOBODY && self.work.labels[target as usize] <= label + least {
@@ -174,7 +202,7 @@ impl Relaxed {
                 let needs = self.hot[operator as usize].needs;
                 if let Some(base) = self.work.meet(operator, needs, label, timed) {
                     self.fire(world, from, operator, base)?;
-                    self.needed_by[position as usize].seconds = self.hot[operator as usize].seconds.max(0.0);
+                    self.needed_by.values[position].seconds = self.hot[operator as usize].seconds.max(0.0);
                 }
             }
         }
@@ -211,15 +239,17 @@ impl Relaxed {
     fn fire(&mut self, world: &World, from: &From, index: u32, base: f64) -> Result<(), Failure> {
         let hot = self.hot[index as usize];
         let timed = from.ready_s.is_some();
-        // What it takes in any case; nothing where that is not known yet.
-        let least = hot.seconds.max(0.0) + if timed { 0.0 } else { hot.step };
-        let labels = &self.work.labels;
-        let given = &self.given[hot.gives as usize..hot.end as usize];
-        if !given.iter().any(|&given| labels[given as usize] > base + least) {
+        let label = base + hot.least(timed);
+        let latest = self.work.latest();
+        let (labels, remaining) = (&self.work.labels, &self.work.remaining[usize::from(timed)]);
+        // Nobody is asked about what would come too late for the goal anyway.
+        let in_time = |given: u32| hot.is_known() || label + remaining[given as usize] < latest;
+        let helps = |&given: &u32| labels[given as usize] > label && in_time(given);
+        if !self.given[hot.gives as usize..hot.end as usize].iter().any(helps) {
             return Ok(());
         }
         let mut seconds = hot.seconds;
-        if !hot.plain || seconds.is_nan() {
+        if !hot.is_known() {
             let proposal = suiting(world, from.state, &self.operators[index as usize])?;
             let Some(proposal) = proposal else { return Ok(()) };
             let asked = self.seconds(world, from.state, index, proposal.as_ref())?;
@@ -323,12 +353,11 @@ impl Relaxed {
         Ok((!hopeless).then_some(UNSURE))
     }
 
-    fn extract(&mut self, goal: &[u32]) -> Estimate {
+    fn extract(&mut self) -> Estimate {
         let work = &mut self.work;
-        let finish_s = goal.iter().fold(0.0, |latest: f64, &need| latest.max(work.labels[need as usize]));
-        let mut estimate = Estimate { finish_s, ..Estimate::default() };
+        let mut estimate = Estimate { finish_s: work.latest(), ..Estimate::default() };
         let mut chosen: Vec<(u32, f32)> = Vec::new();
-        let mut agenda: Vec<u32> = goal.to_vec();
+        let mut agenda = work.goal.clone();
         let mut seen: Vec<u32> = Vec::new();
         while let Some(proposition) = agenda.pop() {
             if std::mem::replace(&mut work.wanted[proposition as usize], true) {

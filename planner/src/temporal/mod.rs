@@ -10,6 +10,7 @@ mod improve;
 mod mentions;
 mod order;
 mod relaxed;
+mod remaining;
 mod schedule;
 mod search;
 mod space;

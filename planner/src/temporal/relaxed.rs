@@ -7,6 +7,7 @@ use rustc_hash::FxHashMap;
 
 use crate::attachment::CallKind;
 use crate::ground::{CallId, ComparisonId, Conjunction, Effect, Expression, Fact, Outcome, Place, Relation};
+use crate::grouped::Grouped;
 
 use super::direction::may_help;
 use super::envelope::settled;
@@ -65,6 +66,18 @@ pub(super) struct Hot {
     pub(super) step: f64,
 }
 
+impl Hot {
+    /// Whether nobody need be asked whether it can be applied, and how long it takes.
+    pub(super) fn is_known(&self) -> bool {
+        self.plain && !self.seconds.is_nan()
+    }
+
+    /// What it costs in any case, in time or in costs; nothing where that is not known yet.
+    pub(super) fn least(&self, timed: bool) -> f64 {
+        self.seconds.max(0.0) + if timed { 0.0 } else { self.step }
+    }
+}
+
 /// An operator that needs a proposition.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Waiter {
@@ -116,9 +129,8 @@ pub(crate) struct Relaxed {
     pub(super) hot: Vec<Hot>,
     /// What operators give and move, one after the other.
     pub(super) given: Vec<u32>,
-    /// By proposition, where its operators begin in `needed_by`.
-    pub(super) needed_from: Vec<u32>,
-    pub(super) needed_by: Vec<Waiter>,
+    /// By proposition, the operators that need it.
+    pub(super) needed_by: Grouped<Waiter>,
     pub(super) goal: Vec<u32>,
     pub(super) goal_gates: Vec<(CallId, bool)>,
     /// Mean duration: what being a step at all counts.
@@ -219,8 +231,7 @@ impl Relaxed {
             operators: Vec::new(),
             hot: Vec::new(),
             given: Vec::new(),
-            needed_from: Vec::new(),
-            needed_by: Vec::new(),
+            needed_by: Grouped::default(),
             goal: Vec::new(),
             goal_gates: Vec::new(),
             unit: 1.0,
@@ -449,31 +460,24 @@ impl Relaxed {
         self.work = Work::new(count, self.operators.len());
     }
 
-    /// Lists by proposition the operators that need it, in their order.
+    /// Lists by proposition the operators that need it. Those of which somebody else must be asked come last: by then,
+    /// what they give may be of no use any more.
     fn index_needs(&mut self, propositions: usize) {
-        let mut from = vec![0; propositions + 2];
-        for &need in self.operators.iter().flat_map(|operator| &operator.needs) {
-            from[need as usize + 2] += 1;
-        }
-        for proposition in 2..from.len() {
-            from[proposition] += from[proposition - 1];
-        }
-        self.needed_by = vec![Waiter::default(); from[propositions + 1] as usize];
-        for (index, (operator, hot)) in self.operators.iter().zip(&self.hot).enumerate() {
+        let waiter = |hot: &Hot, operator: usize| {
             let target = match self.given[hot.gives as usize..hot.end as usize] {
                 [only] => only,
                 _ => NOBODY,
             };
-            let seconds = hot.seconds.max(0.0);
-            for &need in &operator.needs {
-                let place = &mut from[need as usize + 1];
-                self.needed_by[*place as usize] =
-                    Waiter { operator: index as u32, target, seconds, step: hot.step };
-                *place += 1;
-            }
-        }
-        from.pop();
-        self.needed_from = from;
+            Waiter { operator: operator as u32, target, seconds: hot.seconds.max(0.0), step: hot.step }
+        };
+        let waiters = [true, false].into_iter().flat_map(|known| {
+            let all = self.hot.iter().enumerate().filter(move |(_, hot)| hot.is_known() == known);
+            all.flat_map(|(index, hot)| {
+                let waiter = waiter(hot, index);
+                self.operators[index].needs.iter().map(move |&need| (need, waiter))
+            })
+        });
+        self.needed_by = Grouped::new(propositions, waiters);
     }
 }
 

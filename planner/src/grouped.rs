@@ -1,0 +1,45 @@
+//! Values side by side in memory, grouped by a small number.
+
+use std::ops::Range;
+
+/// Values grouped by key, in their order.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Grouped<T> {
+    /// By key, where its values begin; one more for the end.
+    from: Vec<u32>,
+    pub(crate) values: Vec<T>,
+}
+
+impl<T: Copy + Default> Grouped<T> {
+    /// Groups pairs of a key below `keys` and a value.
+    pub(crate) fn new(keys: usize, pairs: impl Iterator<Item = (u32, T)> + Clone) -> Grouped<T> {
+        let mut from = vec![0; keys + 2];
+        pairs.clone().for_each(|(key, _)| from[key as usize + 2] += 1);
+        for key in 2..from.len() {
+            from[key] += from[key - 1];
+        }
+        let mut values = vec![T::default(); from[keys + 1] as usize];
+        for (key, value) in pairs {
+            let place = &mut from[key as usize + 1];
+            values[*place as usize] = value;
+            *place += 1;
+        }
+        from.pop();
+        Grouped { from, values }
+    }
+
+    /// Where the values of a key stand.
+    pub(crate) fn range(&self, key: u32) -> Range<usize> {
+        self.from[key as usize] as usize..self.from[key as usize + 1] as usize
+    }
+
+    /// The values of a key.
+    pub(crate) fn of(&self, key: u32) -> &[T] {
+        &self.values[self.range(key)]
+    }
+
+    /// How many keys there are.
+    pub(crate) fn keys(&self) -> usize {
+        self.from.len() - 1
+    }
+}

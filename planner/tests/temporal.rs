@@ -109,6 +109,40 @@ fn timed_literals_open_and_close() {
 }
 
 #[test]
+fn what_holds_over_all_may_fill_a_window_to_its_very_ends() {
+    // What is asked for over all of an action is given with its start and taken with its end.
+    let domain = |landing_s: f64| {
+        format!(
+            "(:predicates (idle) (open) (begun) (waited) (landed))
+          (:durative-action window :parameters () :duration (= ?duration 6.5) :condition (at start (idle))
+            :effect (and (at start (not (idle))) (at start (begun)) (at start (open)) (at end (not (open)))))
+          (:durative-action wait :parameters () :duration (= ?duration 3.5) :condition (and (over all (begun)) (over all (open)))
+            :effect (and (at end (waited)) (at end (not (begun)))))
+          (:durative-action land :parameters () :duration (= ?duration {landing_s})
+            :condition (and (over all (waited)) (over all (open)))
+            :effect (and (at end (landed)) (at end (not (waited)))))"
+        )
+    };
+    check(&domain(3.0), "(:init (idle)) (:goal (landed))", Some(6.5));
+    check(&domain(3.1), "(:init (idle)) (:goal (landed))", None);
+    let given = "(:init (begun) (at 0.1 (open)) (at 6.6 (not (open)))) (:goal (landed))";
+    check(&domain(3.0), given, Some(6.6));
+    check(&domain(3.1), given, None);
+}
+
+#[test]
+fn what_can_only_start_at_one_time_is_not_proven_to_be_impossible() {
+    let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (left) (right) (up))
+      (:durative-action lift-left :parameters () :duration (= ?duration 2) :condition (over all (right))
+        :effect (and (at start (left)) (at end (not (left)))))
+      (:durative-action lift-right :parameters () :duration (= ?duration 2) :condition (over all (left))
+        :effect (and (at start (right)) (at end (not (right))) (at end (up)))))";
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (up)))";
+    let found = outcome(Source::new("domain.pddl", domain), Source::new("problem.pddl", problem));
+    assert!(!matches!(found, Outcome::Unsolvable { .. }), "{found:?}");
+}
+
+#[test]
 fn durations_depend_on_the_state_and_stretch() {
     let filled = "(:requirements :numeric-fluents) (:predicates (full)) (:functions (missing) (rate))
       (:durative-action fill :parameters () :duration (= ?duration (/ (missing) (rate))) :effect (at end (full)))";

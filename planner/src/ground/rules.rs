@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use petgraph::algo::tarjan_scc;
+use petgraph::graph::{DiGraph, NodeIndex};
+
 use crate::task::{ObjectId, Task};
 
 use super::normal::{
@@ -183,8 +186,9 @@ pub(super) fn make(task: &Task, normal: &Normal, fresh: &mut dyn FnMut() -> u32)
     for axiom in &normal.rules {
         all.derived[axiom.head.predicate as usize] = true;
     }
-    for (index, action) in normal.actions.iter().enumerate() {
-        all.action(task, index, action, fresh);
+    let companions = companions(&normal.actions);
+    for (action, companions) in normal.actions.iter().enumerate().zip(&companions) {
+        all.action(task, action, companions, fresh);
     }
     for (index, axiom) in normal.rules.iter().enumerate() {
         all.axiom(index, axiom, normal.actions.len());
@@ -205,10 +209,16 @@ impl Rules {
         }
     }
 
-    fn action(&mut self, task: &Task, index: usize, action: &Action_, fresh: &mut dyn FnMut() -> u32) {
+    fn action(
+        &mut self,
+        task: &Task,
+        (index, action): (usize, &Action_),
+        companions: &[&Action_],
+        fresh: &mut dyn FnMut() -> u32,
+    ) {
         let mut own: Vec<u32> = (0..action.arity as u32).collect();
         own.extend(&action.extra);
-        let (start, later) = self.split(action);
+        let (start, later) = self.split(action, companions);
         let mut domains = action.domains.clone();
         let (mut at_once, mut conditional) = (Vec::new(), Vec::new());
         let ends = action.end_effects.iter().map(|e| (e, true));
@@ -277,17 +287,11 @@ impl Rules {
     }
 
     /// What must hold for the action to start, and what may still be brought about while it runs. A condition over
-    /// all must hold at the start already unless the start itself brings it about.
-    fn split(&self, action: &Action_) -> (Vec<Formula>, Vec<Formula>) {
+    /// all must hold at the start already unless the start itself, or that of a companion, brings it about.
+    fn split(&self, action: &Action_, companions: &[&Action_]) -> (Vec<Formula>, Vec<Formula>) {
         let mut start = vec![action.condition.start.clone()];
         let mut later = Vec::new();
-        let adds = |predicate: u32| {
-            action.start_effects.iter().any(|e| match &e.change {
-                Change_::Add(p) => p.predicate == predicate,
-                Change_::Call(_) => true,
-                _ => false,
-            })
-        };
+        let adds = |predicate: u32| companions.iter().any(|companion| starts_with(companion, predicate));
         for leaf in leaves(&action.condition.over_all) {
             let changing = mentions(leaf, &|p| self.derived[p as usize] || adds(p));
             if changing { later.push(leaf.clone()) } else { start.push(leaf.clone()) }
@@ -298,6 +302,37 @@ impl Rules {
         }
         (start, later)
     }
+}
+
+/// By action, those that may have to start together with it, itself included: in a circle, each holds over all what
+/// the next one gives at its start.
+fn companions(actions: &[Action_]) -> Vec<Vec<&Action_>> {
+    let holds = |action: &Action_, giver: &Action_| {
+        mentions(&action.condition.over_all, &|predicate| starts_with(giver, predicate))
+    };
+    let mut graph: DiGraph<(), ()> = DiGraph::new();
+    let nodes: Vec<NodeIndex> = actions.iter().map(|_| graph.add_node(())).collect();
+    for (action, &node) in actions.iter().zip(&nodes) {
+        let givers = actions.iter().zip(&nodes).filter(|(giver, _)| holds(action, giver));
+        givers.for_each(|(_, &giver)| {
+            graph.add_edge(giver, node, ());
+        });
+    }
+    let mut companions = vec![Vec::new(); actions.len()];
+    for circle in tarjan_scc(&graph) {
+        let members: Vec<&Action_> = circle.iter().map(|node| &actions[node.index()]).collect();
+        circle.iter().for_each(|node| companions[node.index()] = members.clone());
+    }
+    companions
+}
+
+/// Whether the start of an action may bring about atoms of a predicate.
+fn starts_with(action: &Action_, predicate: u32) -> bool {
+    action.start_effects.iter().any(|effect| match &effect.change {
+        Change_::Add(atom) => atom.predicate == predicate,
+        Change_::Call(_) => true,
+        _ => false,
+    })
 }
 
 fn leaves(formula: &Formula) -> Vec<&Formula> {

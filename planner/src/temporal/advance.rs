@@ -253,14 +253,15 @@ struct Watch<'w, 'a> {
     /// By derived variable, what it is derived from.
     roots: Vec<Vec<u32>>,
     read: Touched,
+    held: Touched,
     written: Touched,
     added: Touched,
 }
 
 impl<'w, 'a> Watch<'w, 'a> {
     fn new(world: &'w World<'a>) -> Watch<'w, 'a> {
-        let [read, written, added] = [(); 3].map(|()| Touched::default());
-        Watch { world, roots: derived_roots(world), read, written, added }
+        let [read, held, written, added] = [(); 4].map(|()| Touched::default());
+        Watch { world, roots: derived_roots(world), read, held, written, added }
     }
 
     fn both(&mut self, act: u32) -> Touches {
@@ -271,7 +272,7 @@ impl<'w, 'a> Watch<'w, 'a> {
     fn start(&mut self, act: &Act) -> Access {
         let (world, read) = (self.world, &mut self.read);
         read.condition(world, act.at_start);
-        read.condition(world, act.over_all);
+        self.held.condition(world, act.over_all);
         act.bounds.iter().for_each(|bound| expression_touches(world, &bound.seconds, read));
         for when in act.end_effects.iter().filter_map(|effect| effect.when.as_ref()) {
             read.condition(world, &when.at_start);
@@ -282,7 +283,7 @@ impl<'w, 'a> Watch<'w, 'a> {
     }
 
     fn end(&mut self, act: &Act) -> Access {
-        self.read.condition(self.world, act.over_all);
+        self.held.condition(self.world, act.over_all);
         self.read.condition(self.world, act.at_end);
         self.access(act.flow_effects.iter().chain(act.end_effects))
     }
@@ -316,19 +317,29 @@ impl<'w, 'a> Watch<'w, 'a> {
             }
         }
         let variables = world.ground.variables.len();
-        let mut reads = self.read.resources(variables);
-        if reads.iter().any(|&resource| self.roots_of(resource).is_some()) {
-            let traced = |&resource: &u32| match self.roots_of(resource) {
-                Some(roots) => roots.to_vec(),
-                None => vec![resource],
-            };
-            reads = reads.iter().flat_map(traced).collect();
-            reads.sort_unstable();
-            reads.dedup();
-        }
+        let reads = self.traced(self.read.resources(variables));
+        let mut holds = self.traced(self.held.resources(variables));
+        holds.retain(|resource| reads.binary_search(resource).is_err());
         let (writes, adds) = (self.written.resources(variables), self.added.resources(variables));
-        [&mut self.read, &mut self.written, &mut self.added].into_iter().for_each(Touched::clear);
-        Access { reads, writes, adds }
+        [&mut self.read, &mut self.held, &mut self.written, &mut self.added]
+            .into_iter()
+            .for_each(Touched::clear);
+        Access { reads, holds, writes, adds }
+    }
+
+    /// The same with derived variables traced back.
+    fn traced(&self, resources: Vec<u32>) -> Vec<u32> {
+        if resources.iter().all(|&resource| self.roots_of(resource).is_none()) {
+            return resources;
+        }
+        let traced = |&resource: &u32| match self.roots_of(resource) {
+            Some(roots) => roots.to_vec(),
+            None => vec![resource],
+        };
+        let mut traced: Vec<u32> = resources.iter().flat_map(traced).collect();
+        traced.sort_unstable();
+        traced.dedup();
+        traced
     }
 
     fn roots_of(&self, resource: u32) -> Option<&[u32]> {
@@ -337,7 +348,7 @@ impl<'w, 'a> Watch<'w, 'a> {
 }
 
 /// By derived variable, the resources that its axioms read in the end; empty for others.
-fn derived_roots(world: &World) -> Vec<Vec<u32>> {
+pub(super) fn derived_roots(world: &World) -> Vec<Vec<u32>> {
     let variables = world.ground.variables.len();
     let mut direct: Vec<Vec<u32>> = vec![Vec::new(); variables];
     for axiom in &world.ground.axioms {

@@ -15,6 +15,7 @@ mod schedule;
 mod search;
 mod space;
 mod store;
+mod together;
 mod touch;
 mod world;
 

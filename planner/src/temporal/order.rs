@@ -1,19 +1,25 @@
 //! The partial order that a sequence of happenings stands for, and its earliest schedule.
 //!
 //! A happening reads and writes resources (variables and numbers). Two happenings that could disturb each other keep
-//! the order of the sequence, [`EPSILON_S`] apart; others are free, so the sequence only fixes what matters. Durations
-//! and timed effects bound the distance from above; the whole is a simple temporal network whose earliest solution
-//! is kept up to date by propagation.
+//! the order of the sequence, [`EPSILON_S`] apart; others are free, so the sequence only fixes what matters. What must
+//! hold over all of an action must do so strictly between its start and its end: what brings it about or ends it
+//! keeps the order too, but may happen at the same time. Durations and timed effects bound the distance from above;
+//! the whole is a simple temporal network whose earliest solution is kept up to date by propagation.
 
 use crate::solve::EPSILON_S;
 
 use super::world::Span;
+
+/// A shift below this is rounding.
+const ROUNDING_S: f64 = 1e-9;
 
 /// What one happening touches; indices of resources.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Access {
     /// Must not change between the happening before and this one.
     pub reads: Vec<u32>,
+    /// Must not change right after this one (a start), or right before it (an end), but may with it.
+    pub holds: Vec<u32>,
     /// Get a new value.
     pub writes: Vec<u32>,
     /// Numbers that are increased or decreased by an amount: these commute with one another.
@@ -25,6 +31,7 @@ struct Resource {
     writer: Option<u32>,
     readers: Vec<u32>,
     adders: Vec<u32>,
+    holders: Vec<u32>,
 }
 
 /// Start and end of an action in progress or done.
@@ -72,13 +79,14 @@ impl Order {
         self.earliest_s.len()
     }
 
-    /// By resource, the latest of what was done to it last, by a value of happenings: write, read since, addition since;
-    /// -1 for none.
-    pub fn touched(&self, value: impl Fn(u32) -> f64) -> impl Iterator<Item = [f64; 3]> {
+    /// By resource, the latest of what was done to it last, by a value of happenings: write, read since, addition
+    /// since, hold since; -1 for none.
+    pub fn touched(&self, value: impl Fn(u32) -> f64) -> impl Iterator<Item = [f64; 4]> {
         let latest =
             move |nodes: &[u32]| nodes.iter().fold(NEVER, |latest: f64, &node| latest.max(value(node)));
         self.resources.iter().map(move |resource| {
-            [latest(resource.writer.as_slice()), latest(&resource.readers), latest(&resource.adders)]
+            let Resource { writer, readers, adders, holders } = resource;
+            [latest(writer.as_slice()), latest(readers), latest(adders), latest(holders)]
         })
     }
 
@@ -91,7 +99,7 @@ impl Order {
             let mut raised = false;
             let mut raise = |after_s: &mut Vec<f64>, node: u32, from: u32, gap_s: f64| {
                 if let (Some(node), Some(from)) = (inner(node), inner(from))
-                    && after_s[from] + gap_s > after_s[node] + 1e-9
+                    && after_s[from] + gap_s > after_s[node] + ROUNDING_S
                 {
                     after_s[node] = after_s[from] + gap_s;
                     raised = true;
@@ -158,28 +166,34 @@ impl Order {
     /// An instantaneous happening, or the start of an action that stays open.
     pub fn push(&mut self, access: &Access) -> u32 {
         let node = self.earliest_s.len() as u32;
-        let mut after = Vec::new();
-        let mut follow = |other: u32| after.push((other, EPSILON_S));
-        for &resource in access.reads.iter().chain(&access.adds).chain(&access.writes) {
-            let resource = &self.resources[resource as usize];
-            if resource.readers.is_empty() && resource.adders.is_empty() {
-                resource.writer.iter().for_each(|&writer| follow(writer));
-            }
+        let mut after: Vec<(u32, f64)> = Vec::new();
+        let mut follow =
+            |others: &[u32], gap_s: f64| after.extend(others.iter().map(|&other| (other, gap_s)));
+        let resource = |&resource: &u32| &self.resources[resource as usize];
+        let strict = access.reads.iter().chain(&access.adds).chain(&access.writes).map(resource);
+        for resource in strict.filter(|resource| resource.readers.is_empty() && resource.adders.is_empty()) {
+            follow(resource.writer.as_slice(), EPSILON_S);
         }
-        for &resource in &access.reads {
-            let resource = &self.resources[resource as usize];
-            resource.writer.iter().chain(&resource.adders).for_each(|&other| follow(other));
+        for resource in access.reads.iter().map(resource) {
+            follow(resource.writer.as_slice(), EPSILON_S);
+            follow(&resource.adders, EPSILON_S);
         }
-        for &resource in &access.adds {
-            let resource = &self.resources[resource as usize];
-            resource.writer.iter().chain(&resource.readers).for_each(|&other| follow(other));
+        for resource in access.holds.iter().map(resource) {
+            follow(resource.writer.as_slice(), 0.0);
+            follow(&resource.adders, 0.0);
         }
-        for &resource in &access.writes {
-            let resource = &self.resources[resource as usize];
-            resource.readers.iter().chain(&resource.adders).for_each(|&other| follow(other));
+        for resource in access.adds.iter().map(resource) {
+            follow(resource.writer.as_slice(), EPSILON_S);
+            follow(&resource.readers, EPSILON_S);
+            follow(&resource.holders, 0.0);
         }
-        after.sort_unstable_by_key(|&(other, _)| other);
-        after.dedup();
+        for resource in access.writes.iter().map(resource) {
+            follow(&resource.readers, EPSILON_S);
+            follow(&resource.adders, EPSILON_S);
+            follow(&resource.holders, 0.0);
+        }
+        after.sort_unstable_by(|one, other| one.0.cmp(&other.0).then(other.1.total_cmp(&one.1)));
+        after.dedup_by_key(|&mut (other, _)| other);
         let time_s =
             after.iter().fold(0.0, |time_s: f64, &(other, gap_s)| time_s.max(self.earliest_s(other) + gap_s));
         self.earliest_s.push(time_s);
@@ -199,8 +213,7 @@ impl Order {
         let end_s = self.earliest_s(end).max(self.earliest_s(start) + span.least_s);
         self.earliest_s[end as usize] = end_s;
         let start_s = end_s - span.most_s;
-        // A shift below a billionth of a second is rounding.
-        if start_s > self.earliest_s(start) + 1e-9 {
+        if start_s > self.earliest_s(start) + ROUNDING_S {
             self.earliest_s[start as usize] = start_s;
             if end != start + 1 {
                 self.propagate()?;
@@ -213,7 +226,7 @@ impl Order {
     pub fn push_fixed(&mut self, access: &Access, time_s: f64) -> Result<u32, Inconsistent> {
         let node = self.push(access);
         self.fixed.push((node, time_s));
-        if self.earliest_s(node) > time_s {
+        if self.earliest_s(node) > time_s + ROUNDING_S {
             return Err(Inconsistent);
         }
         self.earliest_s[node as usize] = time_s;
@@ -233,11 +246,11 @@ impl Order {
         for &resource in &access.adds {
             self.resources[resource as usize].adders.push(node);
         }
+        for &resource in &access.holds {
+            self.resources[resource as usize].holders.push(node);
+        }
         for &resource in &access.writes {
-            let resource = &mut self.resources[resource as usize];
-            resource.readers.clear();
-            resource.adders.clear();
-            resource.writer = Some(node);
+            self.resources[resource as usize] = Resource { writer: Some(node), ..Resource::default() };
         }
     }
 
@@ -260,13 +273,12 @@ impl Order {
                 }
                 self.earliest_s[node] = time_s;
             }
-            if self.fixed.iter().any(|&(node, time_s)| self.earliest_s(node) > time_s) {
+            if self.fixed.iter().any(|&(node, time_s)| self.earliest_s(node) > time_s + ROUNDING_S) {
                 return Err(Inconsistent);
             }
             for tie in &self.ties {
                 let start_s = self.earliest_s[tie.end as usize] - tie.span.most_s;
-                // A shift below a billionth of a second is rounding.
-                if start_s > self.earliest_s[tie.start as usize] + 1e-9 {
+                if start_s > self.earliest_s[tie.start as usize] + ROUNDING_S {
                     self.earliest_s[tie.start as usize] = start_s;
                     pushed = true;
                 }
@@ -280,11 +292,11 @@ impl Order {
 }
 
 /// The earliest schedule of actions that are done in one go, one after the other: what [`Order`] comes to where no upper
-/// bound ever shifts what was placed before, kept as three times a resource.
+/// bound ever shifts what was placed before, kept as four times a resource.
 #[derive(Debug, Clone)]
 pub(crate) struct Clock {
-    /// Last write, last read since, last addition since; negative for none.
-    last_s: Vec<[f64; 3]>,
+    /// Last write, last read since, last addition since, last hold since; negative for none.
+    last_s: Vec<[f64; 4]>,
     latest_s: f64,
 }
 
@@ -293,7 +305,7 @@ const NEVER: f64 = -1.0;
 impl Clock {
     /// Nothing has happened yet.
     pub fn new(resources: usize) -> Clock {
-        Clock { last_s: vec![[NEVER; 3]; resources], latest_s: 0.0 }
+        Clock { last_s: vec![[NEVER; 4]; resources], latest_s: 0.0 }
     }
 
     /// When the last action ends.
@@ -303,7 +315,7 @@ impl Clock {
 
     /// By resource, when what was done to it last is over: 0 for one that nothing has touched.
     pub fn ready_s(&self) -> Vec<f64> {
-        self.last_s.iter().map(|&[write_s, _, add_s]| write_s.max(add_s).max(0.0)).collect()
+        self.last_s.iter().map(|&[write_s, _, add_s, _]| write_s.max(add_s).max(0.0)).collect()
     }
 
     /// The next action: its start, and its end if it takes time.
@@ -320,27 +332,41 @@ impl Clock {
     }
 
     fn after(&self, access: &Access) -> f64 {
+        let mut after_s: f64 = 0.0;
+        let mut follow = |times_s: &[f64], gap_s: f64| {
+            let last_s = times_s.iter().fold(NEVER, |last_s, &time_s| last_s.max(time_s));
+            if last_s >= 0.0 {
+                after_s = after_s.max(last_s + gap_s);
+            }
+        };
         let last = |resource: &u32| self.last_s[*resource as usize];
-        let reads = access.reads.iter().map(last).map(|[write_s, _, add_s]| write_s.max(add_s));
-        let adds = access.adds.iter().map(last).map(|[write_s, read_s, _]| write_s.max(read_s));
-        let writes =
-            access.writes.iter().map(last).map(|[write_s, read_s, add_s]| write_s.max(read_s).max(add_s));
-        let last_s = reads.chain(adds).chain(writes).fold(NEVER, f64::max);
-        if last_s < 0.0 { 0.0 } else { last_s + EPSILON_S }
+        for [write_s, _, add_s, _] in access.reads.iter().map(last) {
+            follow(&[write_s, add_s], EPSILON_S);
+        }
+        for [write_s, _, add_s, _] in access.holds.iter().map(last) {
+            follow(&[write_s, add_s], 0.0);
+        }
+        for [write_s, read_s, _, hold_s] in access.adds.iter().map(last) {
+            follow(&[write_s, read_s], EPSILON_S);
+            follow(&[hold_s], 0.0);
+        }
+        for [write_s, read_s, add_s, hold_s] in access.writes.iter().map(last) {
+            follow(&[write_s, read_s, add_s], EPSILON_S);
+            follow(&[hold_s], 0.0);
+        }
+        after_s
     }
 
     fn record(&mut self, access: &Access, time_s: f64) {
         self.latest_s = self.latest_s.max(time_s);
-        for &resource in &access.reads {
-            let read_s = &mut self.last_s[resource as usize][1];
-            *read_s = read_s.max(time_s);
-        }
-        for &resource in &access.adds {
-            let add_s = &mut self.last_s[resource as usize][2];
-            *add_s = add_s.max(time_s);
+        for (list, kind) in [(&access.reads, 1), (&access.adds, 2), (&access.holds, 3)] {
+            for &resource in list {
+                let last_s = &mut self.last_s[resource as usize][kind];
+                *last_s = last_s.max(time_s);
+            }
         }
         for &resource in &access.writes {
-            self.last_s[resource as usize] = [time_s, NEVER, NEVER];
+            self.last_s[resource as usize] = [time_s, NEVER, NEVER, NEVER];
         }
     }
 }
@@ -350,7 +376,11 @@ mod tests {
     use super::*;
 
     fn access(reads: &[u32], writes: &[u32]) -> Access {
-        Access { reads: reads.to_vec(), writes: writes.to_vec(), adds: Vec::new() }
+        Access { reads: reads.to_vec(), writes: writes.to_vec(), ..Access::default() }
+    }
+
+    fn holding(holds: &[u32]) -> Access {
+        Access { holds: holds.to_vec(), ..Access::default() }
     }
 
     fn exactly(seconds: f64) -> Span {
@@ -394,11 +424,27 @@ mod tests {
     }
 
     #[test]
+    fn what_holds_over_all_fills_a_window_to_its_very_ends() {
+        for (last_s, fits) in [(4.0, true), (4.001, false)] {
+            let mut order = Order::new(2);
+            let window = order.push(&access(&[], &[0]));
+            for seconds in [3.0, last_s] {
+                let start = order.push(&holding(&[0, 1]));
+                let end = Access { writes: vec![1], ..holding(&[0]) };
+                order.push_end(start, &end, exactly(seconds)).expect("fits");
+            }
+            assert_eq!(order.push_end(window, &access(&[], &[0]), exactly(7.0)).is_ok(), fits);
+        }
+    }
+
+    #[test]
     fn the_clock_tells_what_the_order_tells() {
-        let actions = [([0], [0], 3.0), ([1], [1], 5.0), ([0], [1], 2.0), ([2], [0], 1.0), ([1], [2], 4.0)];
+        let actions =
+            [(0, 0, 0, 3.0), (1, 2, 1, 5.0), (0, 1, 1, 2.0), (2, 0, 0, 1.0), (1, 1, 2, 4.0), (2, 2, 1, 2.0)];
         let (mut order, mut clock) = (Order::new(3), Clock::new(3));
-        for (reads, writes, seconds) in actions {
-            let (start, end) = (access(&reads, &[]), access(&reads, &writes));
+        for (reads, holds, writes, seconds) in actions {
+            let start = Access { reads: vec![reads], ..holding(&[holds]) };
+            let end = Access { writes: vec![writes], ..start.clone() };
             let node = order.push(&start);
             order.push_end(node, &end, exactly(seconds)).expect("fits");
             clock.push(&start, Some((&end, exactly(seconds))));

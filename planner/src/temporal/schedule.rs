@@ -133,7 +133,7 @@ mod tests {
         let access = |reads: &[u32], writes: &[u32]| Access {
             reads: reads.to_vec(),
             writes: writes.to_vec(),
-            adds: Vec::new(),
+            ..Access::default()
         };
         // An action of 3 s and after it one of 4 s, beside one of 5 s: the first two decide.
         let mut order = Order::new(3);

@@ -182,7 +182,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             sequence: 0,
             best_heuristic: f64::INFINITY,
             counts: Counts::default(),
-            lossy: !space.world.complete,
+            lossy: false,
             ahead: None,
         }
     }
@@ -213,7 +213,10 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
                 continue;
             }
             let Some(entry) = self.take() else {
-                return Ok((End::Exhausted { proven: !self.lossy }, self.counts));
+                return Ok((
+                    End::Exhausted { proven: !self.lossy && self.space.world.is_complete() },
+                    self.counts,
+                ));
             };
             if let Some(end) = self.follow(entry)? {
                 return Ok((end, self.counts));

@@ -1,5 +1,6 @@
 //! What happens when an action starts, runs and ends: conditions and effects on packed-free states.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use crate::attachment::Level;
@@ -12,6 +13,7 @@ use crate::semantics::compare;
 use crate::solve::EPSILON_S;
 use crate::task::{Comparison, Task, Term};
 
+use super::together::some_only_together;
 use super::touch::{Touched, expression_touches};
 
 /// An action of the temporal search; an instantaneous one has everything at its start.
@@ -76,9 +78,8 @@ pub(crate) struct World<'a> {
     pub calls: Calls<'a>,
     /// Durative actions first, in the ground task's order, then instantaneous ones.
     pub acts: Vec<Act<'a>>,
-    /// Whether the steps of the search can make every plan: none needs a duration that is chosen for its effects, or looks
-    /// at a number while it flows.
-    pub complete: bool,
+    /// Whether the steps of the search can make every plan, once it was asked for.
+    complete: OnceCell<bool>,
     /// Whether grounding modules propose parameters.
     pub proposes: bool,
     /// Axioms by stratum.
@@ -117,7 +118,6 @@ impl<'a> World<'a> {
             grounding: grounding(task, &action.origin),
         });
         let acts: Vec<Act> = durative.chain(instantaneous).collect();
-        let complete = acts.iter().all(|act| act.flow_effects.is_empty() && !chooses_effects(act));
         let proposes = acts.iter().any(|act| !act.grounding.is_empty());
         let stratum_of =
             |axiom: &Axiom| ground.variables[axiom.head.variable as usize].stratum.unwrap_or(0) as usize;
@@ -130,7 +130,14 @@ impl<'a> World<'a> {
         let derived = (0..ground.variables.len())
             .filter(|&variable| ground.variables[variable].stratum.is_some())
             .collect();
-        World { task, ground, calls, acts, complete, proposes, strata, derived }
+        World { task, ground, calls, acts, complete: OnceCell::new(), proposes, strata, derived }
+    }
+
+    /// Whether the steps of the search can make every plan: no action needs a duration that is chosen for its effects, or
+    /// looks at a number while it flows, and none need start or end at the very same time.
+    pub fn is_complete(&self) -> bool {
+        let plain = |act: &Act| act.flow_effects.is_empty() && !chooses_effects(act);
+        *self.complete.get_or_init(|| self.acts.iter().all(plain) && !some_only_together(self))
     }
 
     /// The first state, with derived variables up to date.

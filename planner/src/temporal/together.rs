@@ -1,0 +1,91 @@
+//! Whether actions may have to start, or to end, at the very same time.
+//!
+//! What holds over all of an action holds strictly between its start and its end. So two actions may start at one time
+//! of which each gives what the other holds, and two may end at one time of which each takes that away. The search lets
+//! one happen after the other, and sees neither: where there may be such actions, it proves nothing.
+
+use petgraph::algo::tarjan_scc;
+use petgraph::graph::DiGraph;
+use rustc_hash::FxHashMap;
+
+use crate::ground::{Effect, Outcome};
+
+use super::advance::derived_roots;
+use super::touch::Touched;
+use super::world::{Act, World};
+
+/// What is held or set: a value of a variable; or a variable or number whatever its value.
+type Place = (u32, Option<u32>);
+
+/// Whether some actions can, as far as can be told without a search, only start or only end together.
+pub(super) fn some_only_together(world: &World) -> bool {
+    let roots = derived_roots(world);
+    let held: Vec<Vec<Place>> = world.acts.iter().map(|act| held(world, &roots, act)).collect();
+    let mut given = held.clone();
+    for (act, held) in world.acts.iter().zip(&mut given) {
+        let own: Vec<Place> = act.start_effects.iter().flat_map(|effect| set(world, effect)).collect();
+        let asked = |variable: u32| act.at_start.facts.iter().any(|fact| fact.variable == variable);
+        held.retain(|place| !asked(place.0) && !own.contains(place));
+    }
+    let gives = |held: Option<u32>, value: Option<u32>| held.is_none() || value.is_none() || held == value;
+    let mut taken = held;
+    for (act, held) in world.acts.iter().zip(&mut taken) {
+        held.retain(|place| !act.at_end.facts.iter().any(|fact| fact.variable == place.0));
+    }
+    let takes = |held: Option<u32>, value: Option<u32>| held.is_none() || value.is_none() || held != value;
+    in_a_circle(world, &given, |act| act.start_effects, gives)
+        || in_a_circle(world, &taken, |act| act.end_effects, takes)
+}
+
+/// Whether actions hold in a circle what effects of the next one meet.
+fn in_a_circle<'w>(
+    world: &World<'w>,
+    held: &[Vec<Place>],
+    effects: impl Fn(&Act<'w>) -> &'w [Effect],
+    meets: impl Fn(Option<u32>, Option<u32>) -> bool,
+) -> bool {
+    let mut holders: FxHashMap<u32, Vec<(usize, Option<u32>)>> = FxHashMap::default();
+    for (act, places) in held.iter().enumerate() {
+        places.iter().for_each(|&(resource, value)| holders.entry(resource).or_default().push((act, value)));
+    }
+    let mut follows: Vec<(u32, u32)> = Vec::new();
+    for (index, act) in world.acts.iter().enumerate() {
+        for (resource, value) in effects(act).iter().flat_map(|effect| set(world, effect)) {
+            let holders = holders.get(&resource).map_or(&[][..], Vec::as_slice);
+            let met = holders.iter().filter(|&&(holder, held)| holder != index && meets(held, value));
+            follows.extend(met.map(|&(holder, _)| (index as u32, holder as u32)));
+        }
+    }
+    tarjan_scc(&DiGraph::<(), ()>::from_edges(follows)).iter().any(|circle| circle.len() > 1)
+}
+
+/// What must hold over all of an action. A bound on a number is left out: of changes that come together, those that
+/// keep it can come first.
+fn held(world: &World, roots: &[Vec<u32>], act: &Act) -> Vec<Place> {
+    let mut places = Vec::new();
+    for fact in &act.over_all.facts {
+        match roots[fact.variable as usize].as_slice() {
+            [] => places.push((fact.variable, Some(fact.value))),
+            roots => places.extend(roots.iter().map(|&root| (root, None))),
+        }
+    }
+    let mut touched = Touched::default();
+    for &comparison in &act.over_all.comparisons {
+        if !world.ground.comparisons[comparison as usize].relation.is_bound() {
+            touched.comparison(world, comparison);
+        }
+    }
+    act.over_all.calls.iter().for_each(|&(call, _)| touched.call(world, call));
+    places.extend(touched.resources(roots.len()).into_iter().map(|resource| (resource, None)));
+    places
+}
+
+/// What an effect sets.
+fn set(world: &World, effect: &Effect) -> Vec<Place> {
+    if let Outcome::Set(fact) = &effect.outcome {
+        return vec![(fact.variable, Some(fact.value))];
+    }
+    let mut touched = Touched::default();
+    touched.outcome(world, &effect.outcome);
+    touched.resources(world.ground.variables.len()).into_iter().map(|resource| (resource, None)).collect()
+}

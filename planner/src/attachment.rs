@@ -60,7 +60,7 @@ pub struct Reading {
     /// Predicate or function, lower case.
     pub symbol: Arc<str>,
     /// Names of objects.
-    pub arguments: Vec<Arc<str>>,
+    pub arguments: Arc<[Arc<str>]>,
     /// The value in the state in which the call is made.
     pub value: FactValue,
 }

@@ -320,7 +320,7 @@ mod tests {
                 .iter()
                 .map(|(symbol, value)| Reading {
                     symbol: (*symbol).into(),
-                    arguments: vec![],
+                    arguments: [].into(),
                     value: value.clone(),
                 })
                 .collect(),

@@ -22,7 +22,7 @@ pub(super) enum Origin {
 }
 
 /// A reading without its value: symbol, arguments, and where its value stands.
-pub(super) type Source = (Arc<str>, Vec<Arc<str>>, Origin);
+pub(super) type Source = (Arc<str>, Arc<[Arc<str>]>, Origin);
 
 /// Everything that a call reads.
 #[derive(Debug, Default)]

@@ -57,7 +57,9 @@ pub(super) fn assemble(
     let goal = encoding.conjunction(&raw.goal);
     let missing = raw.goal.literals.iter().any(|&l| l & 1 == 0 && !reached.atoms[(l >> 1) as usize]);
     let unreachable = !goal_possible || goal.is_none() || missing;
-    let (mut actions, mut durative) = (Vec::with_capacity(raw.actions.len()), Vec::new());
+    let lasting = raw.actions.iter().filter(|action| action.later.is_some()).count();
+    let mut actions = Vec::with_capacity(raw.actions.len() - lasting);
+    let mut durative = Vec::with_capacity(lasting);
     for action in std::mem::take(&mut raw.actions) {
         encode_action(&encoding, action, &mut actions, &mut durative);
     }
@@ -78,7 +80,7 @@ pub(super) fn assemble(
         .filter(|g| g.windows(2).any(|pair| pair[0].variable != pair[1].variable))
         .collect();
     let numbers = numbers(&make);
-    let calls = make.calls.iter().map(|c| call(c, &encoding)).collect();
+    let calls = make.calls.into_iter().map(|c| call(c, &encoding)).collect();
     let mut ground = GroundTask {
         variables,
         numerics: make.numerics,
@@ -108,14 +110,14 @@ fn strata(raw: &RawTask) -> Vec<Option<u32>> {
     strata
 }
 
-fn call(raw: &RawCall, encoding: &Encoding) -> Call {
+fn call(raw: RawCall, encoding: &Encoding) -> Call {
     let variable = |atom: Option<&u32>| atom.and_then(|&a| encoding.fact(a)).map(|fact| fact.variable);
     let place = |place: &RawPlace| match place {
         RawPlace::Number(id) => Place::Number(*id),
         RawPlace::Truth(atom) => variable(atom.as_ref()).map_or(Place::Nowhere, Place::Truth),
         RawPlace::Object(atoms) => variable(atoms.first()).map_or(Place::Nowhere, Place::Object),
     };
-    Call { origin: raw.origin.clone(), writes: raw.writes.iter().map(place).collect() }
+    Call { writes: raw.writes.iter().map(place).collect(), origin: raw.origin }
 }
 
 fn drop_unused_none_timed(

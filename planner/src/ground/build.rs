@@ -300,6 +300,7 @@ fn instantiate(
         if rules.repeats[index] {
             list = distinct(list, action.arity + action.extra.len());
         }
+        actions.reserve(list.len().checked_div(action.arity + action.extra.len()).unwrap_or(1));
         for_instances(action, &list, stop, |binding| {
             raw_actions(action, binding, make, &mut resolve, top, &mut actions);
         })?;

@@ -114,7 +114,8 @@ pub(super) struct Instantiate<'a> {
     pub calls: Vec<RawCall>,
     numeric_ids: FxHashMap<NumericFluent, u32>,
     comparison_ids: FxHashMap<Vec<u64>, u32>,
-    call_ids: FxHashMap<Origin, u32>,
+    /// Numbers of calls, as atoms of their module.
+    call_ids: Atoms,
 }
 
 impl<'a> Instantiate<'a> {
@@ -129,7 +130,7 @@ impl<'a> Instantiate<'a> {
             calls: Vec::new(),
             numeric_ids: FxHashMap::default(),
             comparison_ids: FxHashMap::default(),
-            call_ids: FxHashMap::default(),
+            call_ids: Atoms::new(statics.task.modules.len(), statics.task.objects.len()),
         }
     }
 
@@ -299,10 +300,11 @@ impl<'a> Instantiate<'a> {
 
     fn call(&mut self, call: &Named, binding: &[u32]) -> u32 {
         let arguments: Vec<u32> = call.terms.iter().map(|t| t.bound(binding)).collect();
-        let origin = Origin { schema: call.index, arguments };
-        if let Some(&id) = self.call_ids.get(&origin) {
+        let (id, new) = self.call_ids.insert(call.index, &arguments);
+        if !new {
             return id;
         }
+        let origin = Origin { schema: call.index, arguments };
         let mut writes = Vec::new();
         let written = match self.statics.task.modules[call.index as usize].writes.is_empty() {
             true => Vec::new(),
@@ -318,8 +320,6 @@ impl<'a> Instantiate<'a> {
                 }
             });
         }
-        let id = self.calls.len() as u32;
-        self.call_ids.insert(origin.clone(), id);
         self.calls.push(RawCall { origin, writes });
         id
     }

@@ -85,9 +85,8 @@ impl Semantics<'_> {
                 (&self.task.function(id).name, value.unwrap_or(FactValue::Undefined))
             }
         };
-        let names: Vec<Arc<str>> =
-            arguments.iter().map(|&id| self.object_names[id.index()].clone()).collect();
-        Reading { symbol: name.as_str().into(), arguments: names, value }
+        let names = arguments.iter().map(|&id| self.object_names[id.index()].clone());
+        Reading { symbol: name.as_str().into(), arguments: names.collect(), value }
     }
 }
 

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use crate::attachment::Level;
 use crate::calls::Failure;
-use crate::ground::{Change, Expression, Outcome, Values};
+use crate::ground::{Change, Effect, Expression, Outcome, Values};
 
 use super::relaxed::{NOBODY, Operator, Part, Relaxed, Seconds, Test, Waiter};
 use super::world::{Moment, World};
@@ -271,7 +271,7 @@ impl Relaxed {
                 continue;
             }
             if after.is_none() {
-                after = Some(effects_alone(world, from.state, &self.operators[index as usize])?);
+                after = Some(self.effects_alone(world, from.state, &self.operators[index as usize])?);
             }
             let times = match &after {
                 Some(Some(after)) => self.repetitions(world, (from.state, after), index, test)?,
@@ -353,6 +353,41 @@ impl Relaxed {
         Ok((!hopeless).then_some(UNSURE))
     }
 
+    /// The state after what an operator does to what tests read, whatever it needs; `None` if that cannot be told from
+    /// this state.
+    fn effects_alone(
+        &self,
+        world: &World,
+        state: &Values,
+        operator: &Operator,
+    ) -> Result<Option<Values>, Failure> {
+        let Some(act) = world.acts.get(operator.act as usize) else { return Ok(Some(state.clone())) };
+        let Some(proposal) = suiting(world, state, operator)? else { return Ok(None) };
+        let before = Moment { state, duration_s: 0.0, proposal: proposal.as_ref(), level: Level::Relaxed };
+        let duration_s = world.span(act, &before)?.map_or(0.0, |span| span.least_s);
+        let mut after = state.clone();
+        let lists = match operator.part {
+            Part::Whole => [act.start_effects, act.flow_effects, act.end_effects],
+            Part::Start => [act.start_effects, &[], &[]],
+            Part::End | Part::Free => [act.flow_effects, act.end_effects, &[]],
+        };
+        let mut lists = lists.into_iter().filter(|effects| !effects.is_empty()).peekable();
+        while let Some(effects) = lists.next() {
+            let is_last = lists.peek().is_none();
+            let matters = |_: usize, effect: &Effect| match effect.outcome {
+                Outcome::Change { fluent, .. } => !is_last || self.is_tested(fluent),
+                _ => true,
+            };
+            let from = after.clone();
+            let moment =
+                Moment { state: &from, duration_s, proposal: proposal.as_ref(), level: Level::Relaxed };
+            if !world.apply(effects, &moment, &matters, &mut after)? {
+                return Ok(None);
+            }
+        }
+        Ok(Some(after))
+    }
+
     fn extract(&mut self) -> Estimate {
         let work = &mut self.work;
         let mut estimate = Estimate { finish_s: work.latest(), ..Estimate::default() };
@@ -426,26 +461,4 @@ fn suiting(world: &World, state: &Values, operator: &Operator) -> Result<Option<
         }
     }
     Ok(None)
-}
-
-/// The state after the operator's effects, whatever it needs; `None` if they cannot be told from this state.
-fn effects_alone(world: &World, state: &Values, operator: &Operator) -> Result<Option<Values>, Failure> {
-    let Some(act) = world.acts.get(operator.act as usize) else { return Ok(Some(state.clone())) };
-    let Some(proposal) = suiting(world, state, operator)? else { return Ok(None) };
-    let before = Moment { state, duration_s: 0.0, proposal: proposal.as_ref(), level: Level::Relaxed };
-    let duration_s = world.span(act, &before)?.map_or(0.0, |span| span.least_s);
-    let mut after = state.clone();
-    let lists = match operator.part {
-        Part::Whole => vec![act.start_effects, act.flow_effects, act.end_effects],
-        Part::Start => vec![act.start_effects],
-        Part::End | Part::Free => vec![act.flow_effects, act.end_effects],
-    };
-    for effects in lists {
-        let from = after.clone();
-        let moment = Moment { state: &from, duration_s, proposal: proposal.as_ref(), level: Level::Relaxed };
-        if !world.apply(effects, &moment, &|_, _| true, &mut after)? {
-            return Ok(None);
-        }
-    }
-    Ok(Some(after))
 }

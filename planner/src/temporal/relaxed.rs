@@ -6,7 +6,9 @@
 use rustc_hash::FxHashMap;
 
 use crate::attachment::CallKind;
-use crate::ground::{CallId, ComparisonId, Conjunction, Effect, Expression, Fact, Outcome, Place, Relation};
+use crate::ground::{
+    CallId, ComparisonId, Conjunction, Effect, Expression, Fact, NumericId, Outcome, Place, Relation,
+};
 use crate::grouped::Grouped;
 
 use super::direction::may_help;
@@ -175,7 +177,8 @@ impl Relaxed {
             }
         }
         relaxed.axioms_and_timed(world);
-        relaxed.goal = relaxed.propositions(&world.ground.goal.facts, &world.ground.goal.comparisons);
+        relaxed.goal =
+            relaxed.propositions(&world.ground.goal.facts, &world.ground.goal.comparisons).collect();
         let goal_calls = world.ground.goal.calls.clone();
         for (call, wanted) in goal_calls {
             match relaxed.test_of(Test::Call(call, wanted)) {
@@ -245,6 +248,11 @@ impl Relaxed {
         self.test_index.get(&wanted).copied()
     }
 
+    /// Whether a test reads the number.
+    pub(super) fn is_tested(&self, number: NumericId) -> bool {
+        !self.tests_on[self.offsets.len() + number as usize].is_empty()
+    }
+
     fn fact(&self, fact: Fact) -> u32 {
         self.offsets[fact.variable as usize] + fact.value
     }
@@ -266,9 +274,9 @@ impl Relaxed {
         }
     }
 
-    fn propositions(&self, facts: &[Fact], comparisons: &[ComparisonId]) -> Vec<u32> {
+    fn propositions(&self, facts: &[Fact], comparisons: &[ComparisonId]) -> impl Iterator<Item = u32> {
         let facts = facts.iter().map(|&fact| self.fact(fact));
-        facts.chain(comparisons.iter().map(|&comparison| self.test_base + comparison)).collect()
+        facts.chain(comparisons.iter().map(|&comparison| self.test_base + comparison))
     }
 
     /// One operator for what happens always, and one for each condition under which more happens.
@@ -316,8 +324,10 @@ impl Relaxed {
         outcomes: &[&Outcome],
     ) {
         let action = &world.acts[act as usize];
-        let mut needs = self.propositions(&before.facts, &before.comparisons);
-        needs.extend(self.propositions(&extra.facts, &extra.comparisons));
+        let mut needs = Vec::with_capacity(before.facts.len() + before.calls.len() + tokens.len());
+        for part in [before, extra] {
+            needs.extend(self.propositions(&part.facts, &part.comparisons));
+        }
         needs.extend(tokens);
         let mut gates = Vec::new();
         for &(call, wanted) in before.calls.iter().chain(&extra.calls) {
@@ -361,7 +371,7 @@ impl Relaxed {
 
     fn axioms_and_timed(&mut self, world: &World) {
         for axiom in &world.ground.axioms {
-            let mut needs = self.propositions(&axiom.body.facts, &axiom.body.comparisons);
+            let mut needs: Vec<u32> = self.propositions(&axiom.body.facts, &axiom.body.comparisons).collect();
             let mut gates = Vec::new();
             for &(call, wanted) in &axiom.body.calls {
                 match self.test_of(Test::Call(call, wanted)) {

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use petgraph::algo::tarjan_scc;
-use petgraph::graph::{DiGraph, NodeIndex};
+use petgraph::graph::DiGraph;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::task::{ObjectId, Task};
 
@@ -186,9 +187,9 @@ pub(super) fn make(task: &Task, normal: &Normal, fresh: &mut dyn FnMut() -> u32)
     for axiom in &normal.rules {
         all.derived[axiom.head.predicate as usize] = true;
     }
-    let companions = companions(&normal.actions);
-    for (action, companions) in normal.actions.iter().enumerate().zip(&companions) {
-        all.action(task, action, companions, fresh);
+    let (circle_of, given) = circles(&normal.actions);
+    for (index, action) in normal.actions.iter().enumerate() {
+        all.action(task, (index, action), &given[circle_of[index]], fresh);
     }
     for (index, axiom) in normal.rules.iter().enumerate() {
         all.axiom(index, axiom, normal.actions.len());
@@ -213,12 +214,12 @@ impl Rules {
         &mut self,
         task: &Task,
         (index, action): (usize, &Action_),
-        companions: &[&Action_],
+        given: &Given,
         fresh: &mut dyn FnMut() -> u32,
     ) {
         let mut own: Vec<u32> = (0..action.arity as u32).collect();
         own.extend(&action.extra);
-        let (start, later) = self.split(action, companions);
+        let (start, later) = self.split(action, given);
         let mut domains = action.domains.clone();
         let (mut at_once, mut conditional) = (Vec::new(), Vec::new());
         let ends = action.end_effects.iter().map(|e| (e, true));
@@ -287,52 +288,76 @@ impl Rules {
     }
 
     /// What must hold for the action to start, and what may still be brought about while it runs. A condition over
-    /// all must hold at the start already unless the start itself, or that of a companion, brings it about.
-    fn split(&self, action: &Action_, companions: &[&Action_]) -> (Vec<Formula>, Vec<Formula>) {
+    /// all must hold at the start already unless the start itself, or one that comes with it, brings it about.
+    fn split(&self, action: &Action_, given: &Given) -> (Vec<Formula>, Vec<Formula>) {
         let mut start = vec![action.condition.start.clone()];
         let mut later = Vec::new();
-        let adds = |predicate: u32| companions.iter().any(|companion| starts_with(companion, predicate));
         for leaf in leaves(&action.condition.over_all) {
-            let changing = mentions(leaf, &|p| self.derived[p as usize] || adds(p));
+            let changing = predicates(leaf).iter().any(|&p| self.derived[p as usize] || given.has(p));
             if changing { later.push(leaf.clone()) } else { start.push(leaf.clone()) }
         }
         for leaf in leaves(&action.condition.end) {
-            let changing = mentions(leaf, &|p| self.fluent[p as usize]);
+            let changing = predicates(leaf).iter().any(|&p| self.fluent[p as usize]);
             if changing { later.push(leaf.clone()) } else { start.push(leaf.clone()) }
         }
         (start, later)
     }
 }
 
-/// By action, those that may have to start together with it, itself included: in a circle, each holds over all what
-/// the next one gives at its start.
-fn companions(actions: &[Action_]) -> Vec<Vec<&Action_>> {
-    let holds = |action: &Action_, giver: &Action_| {
-        mentions(&action.condition.over_all, &|predicate| starts_with(giver, predicate))
-    };
-    let mut graph: DiGraph<(), ()> = DiGraph::new();
-    let nodes: Vec<NodeIndex> = actions.iter().map(|_| graph.add_node(())).collect();
-    for (action, &node) in actions.iter().zip(&nodes) {
-        let givers = actions.iter().zip(&nodes).filter(|(giver, _)| holds(action, giver));
-        givers.for_each(|(_, &giver)| {
-            graph.add_edge(giver, node, ());
-        });
-    }
-    let mut companions = vec![Vec::new(); actions.len()];
-    for circle in tarjan_scc(&graph) {
-        let members: Vec<&Action_> = circle.iter().map(|node| &actions[node.index()]).collect();
-        circle.iter().for_each(|node| companions[node.index()] = members.clone());
-    }
-    companions
+/// What starts bring about.
+#[derive(Default)]
+struct Given {
+    predicates: FxHashSet<u32>,
+    /// A module may bring about anything.
+    anything: bool,
 }
 
-/// Whether the start of an action may bring about atoms of a predicate.
-fn starts_with(action: &Action_, predicate: u32) -> bool {
-    action.start_effects.iter().any(|effect| match &effect.change {
-        Change_::Add(atom) => atom.predicate == predicate,
-        Change_::Call(_) => true,
-        _ => false,
-    })
+impl Given {
+    fn by(actions: &[&Action_]) -> Given {
+        let mut given = Given::default();
+        for effect in actions.iter().flat_map(|action| &action.start_effects) {
+            match &effect.change {
+                Change_::Add(atom) => given.predicates.extend([atom.predicate]),
+                Change_::Call(_) => given.anything = true,
+                _ => {}
+            }
+        }
+        given
+    }
+
+    fn has(&self, predicate: u32) -> bool {
+        self.anything || self.predicates.contains(&predicate)
+    }
+}
+
+/// Actions that may have to start together: in a circle, each holds over all what the next one gives at its start. By
+/// action, the number of its circle; by circle, what the starts in it give.
+fn circles(actions: &[Action_]) -> (Vec<usize>, Vec<Given>) {
+    let mut givers: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
+    let mut of_anything: Vec<u32> = Vec::new();
+    for (action, index) in actions.iter().zip(0..) {
+        let given = Given::by(&[action]);
+        given.predicates.iter().for_each(|&predicate| givers.entry(predicate).or_default().push(index));
+        of_anything.extend(given.anything.then_some(index));
+    }
+    let mut edges: Vec<(u32, u32)> = Vec::new();
+    for (action, index) in actions.iter().zip(0..) {
+        for predicate in predicates(&action.condition.over_all) {
+            let own = givers.get(&predicate).into_iter().flatten().chain(&of_anything);
+            edges.extend(own.map(|&giver| (giver, index)));
+        }
+    }
+    let mut graph: DiGraph<(), ()> = DiGraph::new();
+    actions.iter().for_each(|_| {
+        graph.add_node(());
+    });
+    graph.extend_with_edges(edges);
+    let (mut circle_of, mut given) = (vec![0; actions.len()], Vec::new());
+    for (number, circle) in tarjan_scc(&graph).iter().enumerate() {
+        circle.iter().for_each(|node| circle_of[node.index()] = number);
+        given.push(Given::by(&circle.iter().map(|node| &actions[node.index()]).collect::<Vec<_>>()));
+    }
+    (circle_of, given)
 }
 
 fn leaves(formula: &Formula) -> Vec<&Formula> {
@@ -342,11 +367,12 @@ fn leaves(formula: &Formula) -> Vec<&Formula> {
     }
 }
 
-fn mentions(formula: &Formula, test: &dyn Fn(u32) -> bool) -> bool {
+/// The predicates that a formula mentions.
+fn predicates(formula: &Formula) -> Vec<u32> {
     match formula {
-        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(|p| mentions(p, test)),
-        Formula::Literal(pattern, _) => test(pattern.predicate),
-        Formula::Forall(_, body) | Formula::Exists(_, body) => mentions(body, test),
-        Formula::Same(..) | Formula::Compare(..) | Formula::Call(..) => false,
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().flat_map(predicates).collect(),
+        Formula::Literal(pattern, _) => vec![pattern.predicate],
+        Formula::Forall(_, body) | Formula::Exists(_, body) => predicates(body),
+        Formula::Same(..) | Formula::Compare(..) | Formula::Call(..) => Vec::new(),
     }
 }

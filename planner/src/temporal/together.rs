@@ -44,19 +44,32 @@ fn in_a_circle<'w>(
     effects: impl Fn(&Act<'w>) -> &'w [Effect],
     meets: impl Fn(Option<u32>, Option<u32>) -> bool,
 ) -> bool {
-    let mut holders: FxHashMap<u32, Vec<(usize, Option<u32>)>> = FxHashMap::default();
-    for (act, places) in held.iter().enumerate() {
-        places.iter().for_each(|&(resource, value)| holders.entry(resource).or_default().push((act, value)));
+    // Actions are the first nodes, then the places that some of them hold.
+    let acts = held.len() as u32;
+    let mut nodes: FxHashMap<u32, Vec<(Option<u32>, u32)>> = FxHashMap::default();
+    let mut edges: Vec<(u32, u32)> = Vec::new();
+    let mut next = acts;
+    for (act, &(resource, value)) in
+        (0..acts).zip(held).flat_map(|(act, held)| held.iter().map(move |place| (act, place)))
+    {
+        let values = nodes.entry(resource).or_default();
+        let node = values.iter().find(|(known, _)| *known == value).map_or(next, |&(_, node)| node);
+        if node == next {
+            values.push((value, node));
+            next += 1;
+        }
+        edges.push((node, act));
     }
-    let mut follows: Vec<(u32, u32)> = Vec::new();
-    for (index, act) in world.acts.iter().enumerate() {
-        for (resource, value) in effects(act).iter().flat_map(|effect| set(world, effect)) {
-            let holders = holders.get(&resource).map_or(&[][..], Vec::as_slice);
-            let met = holders.iter().filter(|&&(holder, held)| holder != index && meets(held, value));
-            follows.extend(met.map(|&(holder, _)| (index as u32, holder as u32)));
+    for (act, effect) in
+        (0..acts).zip(&world.acts).flat_map(|(act, own)| effects(own).iter().map(move |effect| (act, effect)))
+    {
+        for (resource, value) in set(world, effect) {
+            let values = nodes.get(&resource).map_or(&[][..], Vec::as_slice);
+            edges.extend(values.iter().filter(|(held, _)| meets(*held, value)).map(|&(_, node)| (act, node)));
         }
     }
-    tarjan_scc(&DiGraph::<(), ()>::from_edges(follows)).iter().any(|circle| circle.len() > 1)
+    let circles = tarjan_scc(&DiGraph::<(), ()>::from_edges(edges));
+    circles.iter().any(|circle| circle.iter().filter(|node| node.index() < acts as usize).count() > 1)
 }
 
 /// What must hold over all of an action. A bound on a number is left out: of changes that come together, those that

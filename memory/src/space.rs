@@ -5,6 +5,7 @@
 //! measured surface is free, what lies on it is occupied, what lies behind it stays as it was.
 
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
+use descry_perception::noise::axial_sigma_m;
 use descry_perception::visibility::DepthMap;
 use rustc_hash::FxHashMap;
 
@@ -199,6 +200,15 @@ impl Space {
         true
     }
 
+    /// How much of the last part of the way between two points no view has shown, metres; how long that part is, metres.
+    pub fn unseen_m(&self, from: &Point3<f64>, to: &Point3<f64>, last_m: f64) -> f64 {
+        let way = to - from;
+        let steps = (last_m.min(way.norm()) / self.voxel_m).floor();
+        let back = way.normalize() * self.voxel_m;
+        let unseen = |k: &u32| self.cell(&(to - back * f64::from(*k))) == Cell::Unseen;
+        (0..steps.max(0.0) as u32).filter(unseen).count() as f64 * self.voxel_m
+    }
+
     /// Forgets what was seen in an upright cylinder, where something may have changed: the foot of its axis, the unit vector
     /// up, its radius and its height in metres.
     pub fn forget(&mut self, foot: &Point3<f64>, up: &Vector3<f64>, radius_m: f64, height_m: f64) {
@@ -224,11 +234,12 @@ impl Space {
         let reach_m = map.depths_m.iter().filter(|d| d.is_finite()).fold(0.0_f32, |most, &d| most.max(d));
         let reach_m = f64::from(reach_m).min(self.range_m) + self.voxel_m;
         let world_from_camera = map.camera_from_world.inverse();
+        let measured = self.measured(map, &world_from_camera);
         for key in self.blocks_in_view(map, &world_from_camera, reach_m) {
             let before = self.blocks.remove(&key);
             let known = before.is_some();
             let mut block = before.unwrap_or_else(|| Box::new(Block::UNSEEN));
-            let seen = self.look_at_block(map, key, &mut block.levels);
+            let seen = self.look_at_block(map, key, measured.get(&key), &mut block.levels);
             if seen {
                 block.find_bricks();
             }
@@ -313,8 +324,40 @@ impl Space {
         keys
     }
 
-    /// Compares the voxels of a block with a depth image. True if any was seen.
-    fn look_at_block(&self, map: &DepthMap, key: [i32; 3], levels: &mut [i8; BLOCK]) -> bool {
+    /// The voxels in which a depth image has a surface, by block, where depth is surer than a voxel. A camera that looks along a
+    /// surface is far behind the middle of its voxels, and would else take them for free.
+    fn measured(
+        &self,
+        map: &DepthMap,
+        world_from_camera: &Isometry3<f64>,
+    ) -> FxHashMap<[i32; 3], Box<[bool; BLOCK]>> {
+        let c = &map.intrinsics;
+        let sure = |z: f64| axial_sigma_m(z, 0.0).is_some_and(|sigma_m| sigma_m < self.voxel_m / 2.0);
+        let mut blocks: FxHashMap<[i32; 3], Box<[bool; BLOCK]>> = FxHashMap::default();
+        for (row, depths) in map.depths_m.chunks_exact(c.width).enumerate() {
+            let y = (row as f64 - c.cy) / c.fy;
+            for (column, depth) in depths.iter().enumerate() {
+                let z = f64::from(*depth);
+                if z.is_nan() || z > self.range_m || !sure(z) {
+                    continue;
+                }
+                let x = (column as f64 - c.cx) / c.fx;
+                let voxel = self.voxel(&(world_from_camera * Point3::new(x * z, y * z, z)));
+                let block = blocks.entry(voxel.map(|v| v.div_euclid(SIDE)));
+                block.or_insert_with(|| Box::new([false; BLOCK]))[index(voxel)] = true;
+            }
+        }
+        blocks
+    }
+
+    /// Compares the voxels of a block with a depth image, and with the voxels in which that has a surface. True if any was seen.
+    fn look_at_block(
+        &self,
+        map: &DepthMap,
+        key: [i32; 3],
+        measured: Option<&Box<[bool; BLOCK]>>,
+        levels: &mut [i8; BLOCK],
+    ) -> bool {
         let c = &map.intrinsics;
         let first = Point3::from(Vector3::from(key.map(|k| f64::from(k * SIDE) + 0.5)) * self.voxel_m);
         let origin = map.camera_from_world * first;
@@ -328,6 +371,7 @@ impl Space {
                 for z in 0..SIDE {
                     let p = row + dz * f64::from(z);
                     let level = &mut levels[at];
+                    let on_surface = measured.is_some_and(|measured| measured[at]);
                     at += 1;
                     if p.z < 0.1 || p.z > self.range_m {
                         continue;
@@ -339,10 +383,10 @@ impl Space {
                     let depth = f64::from(map.depths_m[v as usize * c.width + u as usize]);
                     // Noise grows with the square of the distance (Nguyen et al.): so does what counts as on the surface.
                     let band = self.voxel_m * 0.75 + 0.003 * depth * depth;
-                    if depth > p.z + band {
+                    if depth > p.z + band && !on_surface {
                         *level = if *level == UNSEEN { -MISS } else { (*level - MISS).max(-SURE) };
                         any = true;
-                    } else if depth >= p.z - self.voxel_m * 0.75 {
+                    } else if on_surface || depth >= p.z - self.voxel_m * 0.75 {
                         *level = if *level == UNSEEN { HIT } else { (*level + HIT).min(SURE) };
                         any = true;
                     }
@@ -455,6 +499,37 @@ mod tests {
             sight([0.5, 0.0, 1.6], [-0.2, 0.0, 1.5]),
             "from the side, what is behind the wall can be seen"
         );
+    }
+
+    #[test]
+    fn a_surface_seen_at_a_grazing_angle_is_no_free_space() {
+        let intrinsics = Intrinsics { width: 64, height: 480, fx: 525.0, fy: 525.0, cx: 32.0, cy: 240.0 };
+        // A level top 14 cm below a camera that looks along it; y is down.
+        for below_m in (0..10).map(|mm| 0.141 + 0.002 * f64::from(mm)) {
+            let depth =
+                |row: usize| if row > 280 { below_m * 525.0 / (row as f64 - 240.0) } else { f64::NAN };
+            let depths_m = (0..64 * 480).map(|at| depth(at / 64) as f32).collect();
+            let map = DepthMap { intrinsics, camera_from_world: Isometry3::identity(), depths_m };
+            let mut space = Space::default();
+            space.integrate(&map);
+            for z in [0.6, 0.7, 0.8] {
+                let cell = space.cell(&Point3::new(0.0, below_m, z));
+                assert_eq!(cell, Cell::Occupied, "{below_m} m below, {z} m ahead");
+            }
+        }
+    }
+
+    #[test]
+    fn the_unseen_end_of_a_way_is_measured() {
+        let space = seen();
+        for (to, last_m, least, most) in [
+            ([-0.2, 0.0, 0.9], 0.4, 0.0, 0.001),
+            ([-0.2, 0.0, 1.4], 0.3, 0.25, 0.301),
+            ([-0.2, 0.0, 1.4], 9.0, 0.4, 0.5),
+        ] {
+            let unseen_m = space.unseen_m(&Point3::origin(), &Point3::from(to), last_m);
+            assert!((least..=most).contains(&unseen_m), "{unseen_m} m before {to:?}");
+        }
     }
 
     #[test]

@@ -31,7 +31,7 @@ pub struct Descry {
 
 impl Default for Descry {
     fn default() -> Self {
-        Descry { known: 0.5, look_alikes: 1.5, upside_down: 0.03, least: 0.5, temper: 0.7 }
+        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.02, least: 0.5, temper: 0.7 }
     }
 }
 

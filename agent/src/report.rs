@@ -77,6 +77,11 @@ pub enum Event {
         /// What the last view changed in the belief.
         changed: Vec<String>,
     },
+    /// Somebody has moved something: what was seen before the last view no longer holds.
+    Changed {
+        /// What shows it.
+        because: String,
+    },
     /// Nothing could be made of what has been seen so far.
     Nothing {
         /// Why.
@@ -119,6 +124,7 @@ impl fmt::Display for Event {
                 lines(f, objects)?;
                 lines(f, changed)
             }
+            Event::Changed { because } => write!(f, "changed   {because}; only the last view still holds"),
             Event::Nothing { because } => write!(f, "see       nothing yet: {because}"),
         }
     }

@@ -1,9 +1,10 @@
 //! What happens with a view: recorded, read back with the others by timestamp, merged, recognised, believed.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use descry_domains::situation::Situation;
-use descry_memory::belief::Sighted;
+use descry_memory::belief::{Sighted, Track};
 use descry_memory::{Bounds, Draft, Meta, RecordId, Sensing, Sighting};
 use descry_perception::View;
 use descry_perception::locate::locate;
@@ -26,6 +27,8 @@ use crate::report::Event;
 
 /// A side counts as seen if a surface was measured this near to where it should be.
 const SIDE_TOLERANCE_M: f64 = 0.03;
+/// What is sought and was at least so probable is missed when it is gone.
+const PERHAPS: f64 = 0.2;
 /// How far a surface may be from the height at which the map has it.
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
 /// Points this near to a surface lie on it.
@@ -124,7 +127,37 @@ impl Agent<'_> {
         let scene = segment_on(&merged.cloud, &merged.visibility, surface, &seeking);
         let percepts = self.recogniser.recognise(&scene, &merged.visibility, &self.domain.objects);
         self.note_surface(on, &scene);
-        self.believe(&merged, &percepts)
+        let gone_before = self.state.belief.gone.len();
+        self.believe(&merged, &percepts)?;
+        match self.taken_away(gone_before, &newest(&views, &merged)) {
+            Some(what) => self.begin_again(on, what),
+            None => Ok(()),
+        }
+    }
+
+    /// What was sought and believed to stand where the newest view looks through: somebody has moved it. In words; none if nothing.
+    fn taken_away(&self, gone_before: usize, newest: &Option<DepthMap>) -> Option<String> {
+        let newest = newest.as_ref()?;
+        let up = self.state.surfaces.first().map_or_else(Vector3::z, |s| s.up);
+        let sought = || self.state.things.iter().chain(&self.state.kinds);
+        self.state.belief.gone[gone_before..].iter().find_map(|track| {
+            let (p, name) = sought()
+                .map(|thing| (track.probability_of(&thing.name), &thing.name))
+                .max_by(|a, b| a.0.total_cmp(&b.0))?;
+            let [x, y, z] = track.position_m.into();
+            (p > PERHAPS && looked_through(track, &up, newest))
+                .then(|| format!("{name} ({p:.2}) stood at ({x:.2}, {y:.2}, {z:.2}) m and is gone"))
+        })
+    }
+
+    /// Things were moved while nobody looked: only the newest view still holds, and looks may be taken again.
+    fn begin_again(&mut self, on: usize, what: String) -> Result<(), CommandError> {
+        self.say(&Event::Changed { because: what })?;
+        let last = self.state.looks.len().saturating_sub(1);
+        self.state.looks.drain(..last);
+        self.state.space = Arc::default();
+        self.state.observed = BTreeSet::from([(self.state.at, on)]);
+        self.perceive(on)
     }
 
     /// Lays the surface on the outline that the map has of it: that mends what is left of localisation's error.
@@ -146,8 +179,7 @@ impl Agent<'_> {
 
     /// Takes the newest view, if it could be aligned, into the map of seen space.
     fn note_space(&mut self, views: &[View], merged: &Merged) {
-        let newest = merged.fits.last().filter(|fit| fit.used).zip(views.last());
-        if let Some(map) = newest.and_then(|(fit, view)| DepthMap::from_view(view, &fit.world_from_camera)) {
+        if let Some(map) = newest(views, merged) {
             Arc::make_mut(&mut self.state.space).integrate(&map);
         }
     }
@@ -297,6 +329,22 @@ impl Agent<'_> {
         let draft = Draft { meta, ..Draft::new(kind, self.robot.now_ns()) };
         self.record.put(draft).map_err(CommandError::broken)
     }
+}
+
+/// What the newest view measured, from where it was placed; none if it could not be aligned.
+fn newest(views: &[View], merged: &Merged) -> Option<DepthMap> {
+    let (fit, view) = merged.fits.last().filter(|fit| fit.used).zip(views.last())?;
+    DepthMap::from_view(view, &fit.world_from_camera)
+}
+
+/// Whether a camera saw through most of the place of an object.
+fn looked_through(track: &Track, up: &Vector3<f64>, map: &DepthMap) -> bool {
+    const SHARES: [f64; 3] = [0.3, 0.5, 0.7];
+    let free = |share: &&f64| {
+        let place = track.position_m + up * (track.size_m[2] * **share);
+        map.look(&place, SIDE_TOLERANCE_M) == Seen::Free
+    };
+    SHARES.iter().filter(free).count() == SHARES.len()
 }
 
 /// How a body's views are merged and looked through. The surface is looked for where the map has it, if it has one; what can

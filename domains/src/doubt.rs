@@ -20,6 +20,8 @@ const BEYOND_M: f64 = 0.3;
 const UNSEEN_SHARE: f64 = 0.6;
 /// Share of an object's volume that may have been seen free, for noise, if it stands there.
 const FREE_SHARE: f64 = 0.15;
+/// So many of the five columns of an object may seem to lie within a solid body where it only stands close to it.
+const GRAZED: usize = 2;
 /// How far above an unseen place the top of a body that fills it is looked for, metres.
 const ROOF_M: f64 = 0.5;
 /// Sides from which an object is looked at.
@@ -53,10 +55,10 @@ pub struct Doubt {
     pub hidden: f64,
     /// No surface is known yet: every look may settle everything.
     pub anywhere: bool,
-    /// Which hypotheses a look shows, by obstacle moved (0: none), candidate and surface.
-    shown: Vec<OnceLock<Vec<bool>>>,
+    /// How far a look settles each hypothesis, 0 to 1, by obstacle moved (0: none), candidate and surface.
+    told: Vec<OnceLock<Vec<f64>>>,
     /// What all looks together can settle, by obstacle moved (0: none).
-    within_reach: Vec<OnceLock<f64>>,
+    within_reach: Vec<OnceLock<Reach>>,
     looks: usize,
     surfaces: usize,
 }
@@ -68,6 +70,14 @@ pub struct Taken<'a> {
     pub looks: &'a [(usize, usize)],
     /// The obstacle that is pushed aside.
     pub moved: Option<usize>,
+}
+
+/// The probability that hangs on what looks can settle.
+#[derive(Debug, Clone, Copy, Default)]
+struct Reach {
+    weight: f64,
+    /// Each possibility counted only as far as the look tells it that shows it most clearly.
+    as_told: f64,
 }
 
 impl Doubt {
@@ -115,40 +125,45 @@ impl Doubt {
             return if before.looks.is_empty() { 1.0 } else { 0.0 };
         }
         let total = self.within_reach(situation, before.moved);
-        if total < negligible(situation, before.moved) {
+        if total.weight < negligible(situation, before.moved) {
             return 0.0;
         }
-        let shown = |from: usize, on: usize| self.shown(situation, from, on, before.moved);
-        let earlier: Vec<&Vec<bool>> = before.looks.iter().map(|&(p, on)| shown(p, on)).collect();
+        let told = |look: (usize, usize)| self.told(situation, look, before.moved);
+        let earlier: Vec<&[f64]> = before.looks.iter().map(|&look| told(look)).collect();
         let settled = |on: usize| -> f64 {
-            let now = shown(from, on);
-            let fresh = |i: &usize| now[*i] && !earlier.iter().any(|e| e[*i]);
-            (0..self.hypotheses.len()).filter(fresh).map(|i| self.hypotheses[i].weight).sum()
+            let now = told((from, on));
+            let fresh = |i: usize| (now[i] - earlier.iter().map(|e| e[i]).fold(0.0, f64::max)).max(0.0);
+            (0..self.hypotheses.len()).map(|i| self.hypotheses[i].weight * fresh(i)).sum()
         };
-        (0..self.surfaces).map(settled).sum::<f64>() / total
+        (0..self.surfaces).map(settled).sum::<f64>() / total.as_told
     }
 
-    /// The probability that hangs on what some look could settle that can be taken and, as long as nothing is moved, has not
-    /// been taken.
-    pub(crate) fn within_reach(&self, situation: &Situation, moved: Option<usize>) -> f64 {
+    /// What hangs on all that some look could settle that can be taken and, as long as nothing is moved, has not been taken.
+    fn within_reach(&self, situation: &Situation, moved: Option<usize>) -> Reach {
         *self.within_reach[moved.map_or(0, |o| o + 1)].get_or_init(|| {
             let open = |look: &(usize, usize)| moved.is_some() || !situation.observed.contains(look);
             let looks = self.all_looks(situation, open, moved);
-            let settled = |(n, _): &(usize, &Hypothesis)| looks.iter().any(|shown| shown[*n]);
-            self.hypotheses.iter().enumerate().filter(settled).map(|(_, h)| h.weight).sum()
+            let best = |n: usize| looks.iter().map(|told| told[n]).fold(0.0, f64::max);
+            let mut reach = Reach::default();
+            for (n, hypothesis) in self.hypotheses.iter().enumerate() {
+                let best = best(n);
+                reach.as_told += hypothesis.weight * best;
+                reach.weight += if best > 0.0 { hypothesis.weight } else { 0.0 };
+            }
+            reach
         })
     }
 
     /// Whether looking alone can settle anything that matters.
     pub fn can_be_settled(&self, situation: &Situation) -> bool {
-        self.anywhere || self.within_reach(situation, None) >= negligible(situation, None)
+        self.anywhere || self.within_reach(situation, None).weight >= negligible(situation, None)
     }
 
     /// Whether looks would settle enough once an obstacle is moved, of what no look shows now.
     pub(crate) fn can_be_settled_without(&self, situation: &Situation, what: usize) -> bool {
         let [before, after] = [None, Some(what)].map(|moved| self.all_looks(situation, |_| true, moved));
         let only_after = |n: &usize| {
-            let shown = |looks: &[&Vec<bool>]| looks.iter().any(|shown| shown[*n]);
+            let shown = |looks: &[&[f64]]| looks.iter().any(|told| told[*n] > 0.0);
             shown(&after) && !shown(&before)
         };
         let uncovered: f64 =
@@ -165,32 +180,34 @@ impl Doubt {
     pub fn out_of_sight(&self, situation: &Situation) -> (f64, Vec<Point3<f64>>) {
         let looks = self.all_looks(situation, |_| true, None);
         let hidden = self.hypotheses.iter().enumerate().filter(|(_, h)| h.facing.is_none());
-        let unseeable = hidden.filter(|(n, _)| !looks.iter().any(|shown| shown[*n]));
+        let unseeable = hidden.filter(|(n, _)| !looks.iter().any(|told| told[*n] > 0.0));
         let unseeable: Vec<&Hypothesis> = unseeable.map(|(_, h)| h).collect();
         (unseeable.iter().map(|h| h.weight).sum(), unseeable.iter().map(|h| h.centre).collect())
     }
 
-    /// What each look shows that is open, can be reached and sees the surface.
+    /// What each look tells that is open, can be reached and sees the surface.
     fn all_looks(
         &self,
         situation: &Situation,
         open: impl Fn(&(usize, usize)) -> bool,
         moved: Option<usize>,
-    ) -> Vec<&Vec<bool>> {
+    ) -> Vec<&[f64]> {
         (0..situation.candidates.len())
             .flat_map(|from| (0..self.surfaces).map(move |on| (from, on)))
             .filter(|look| open(look) && situation.can_reach(look.0) && situation.sees(look.0, look.1))
-            .map(|(from, on)| self.shown(situation, from, on, moved))
+            .map(|look| self.told(situation, look, moved))
             .collect()
     }
 
-    /// Which hypotheses a look from a candidate at a surface shows.
-    fn shown(&self, situation: &Situation, from: usize, on: usize, moved: Option<usize>) -> &Vec<bool> {
+    /// How far a look, a candidate and a surface, settles each hypothesis.
+    fn told(&self, situation: &Situation, (from, on): (usize, usize), moved: Option<usize>) -> &[f64] {
         let at = moved.map_or(0, |o| o + 1) * self.looks + from * self.surfaces + on;
-        self.shown[at].get_or_init(|| {
+        self.told[at].get_or_init(|| {
             let obstacle = moved.map(|o| &situation.obstacles()[o]);
-            let shows = |h: &Hypothesis| h.on == on && situation.would_settle(from, on, h, obstacle);
-            self.hypotheses.iter().map(shows).collect()
+            let settled = |h: &Hypothesis| {
+                if h.on == on { situation.would_settle(from, on, h, obstacle) } else { 0.0 }
+            };
+            self.hypotheses.iter().map(settled).collect()
         })
     }
 
@@ -201,9 +218,11 @@ impl Doubt {
             let surface = &situation.surfaces[on];
             for centre in grid(surface, size_m.1) {
                 places += 1;
-                if let Some(points) = unseen_volume(situation, surface, &centre, size_m) {
-                    hypotheses.push(Hypothesis { weight: 1.0, on, centre, points, facing: None });
-                }
+                let hidden = around(surface, &centre).find_map(|centre| {
+                    let points = unseen_volume(situation, surface, &centre, size_m)?;
+                    Some(Hypothesis { weight: 1.0, on, centre, points, facing: None })
+                });
+                hypotheses.extend(hidden);
             }
         }
         let open = if places == 0 { 1.0 } else { hypotheses.len() as f64 / places as f64 };
@@ -217,7 +236,7 @@ impl Doubt {
             hypotheses,
             hidden,
             anywhere: places == 0,
-            shown: (0..moves * looks).map(|_| OnceLock::new()).collect(),
+            told: (0..moves * looks).map(|_| OnceLock::new()).collect(),
             within_reach: (0..moves).map(|_| OnceLock::new()).collect(),
             looks,
             surfaces: situation.surfaces.len(),
@@ -264,6 +283,15 @@ fn grid(surface: &KnownSurface, diameter_m: f64) -> Vec<Point3<f64>> {
         .collect()
 }
 
+/// A place of the grid, and the places around it that stand for the rest of its square.
+fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterator<Item = Point3<f64>> {
+    let (e1, e2) = across(surface);
+    let (place, quarter) = (*place, GRID_M / 4.0);
+    [(0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
+        .into_iter()
+        .map(move |(a, b)| place + (e1 * a + e2 * b) * quarter)
+}
+
 /// The unseen points of an object that stood at a place, if it could stand there unnoticed.
 fn unseen_volume(
     situation: &Situation,
@@ -293,7 +321,7 @@ fn unseen_volume(
         let top = centre + surface.up * height_m + (e1 * a + e2 * b) * diameter_m;
         is_roofed(situation, &top, &surface.up)
     };
-    (!COLUMNS.iter().all(|column| inside(&column))).then_some(unseen)
+    (COLUMNS.iter().filter(inside).count() <= GRAZED).then_some(unseen)
 }
 
 /// Whether a measured surface lies over an unseen point, with nothing seen free between: it is within a solid body.

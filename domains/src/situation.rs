@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 use descry_memory::belief::Belief;
 use descry_memory::space::Space;
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
+use descry_perception::noise::axial_sigma_m;
 use descry_perception::recognise::ObjectModel;
 use descry_planner::{Call, CallError, FactValue};
 use descry_robots::{Place, Robot};
@@ -243,6 +244,16 @@ impl Situation {
             .any(|p| self.in_view(&camera, &p))
     }
 
+    /// How clearly a look from a candidate shows what stands on a surface, 0 to 1: the weight that a depth of its noise has
+    /// (a Kalman gain) where it must tell half of the smallest thing that tells objects apart.
+    pub(crate) fn clearness(&self, from: usize, on: usize) -> f64 {
+        let middle = self.camera(from, on).zip(self.surfaces[on].centre());
+        let Some((camera, centre)) = middle else { return 1.0 };
+        let distance_m = (centre - Point3::from(camera.translation.vector)).norm();
+        let sigma_m = axial_sigma_m(distance_m, 0.0).unwrap_or_default();
+        1.0 / (1.0 + (sigma_m / (SMALLEST_M / 2.0)).powi(2))
+    }
+
     /// Whether a point lies in the camera's field of view and range.
     pub(crate) fn in_view(&self, map_from_camera: &Isometry3<f64>, point: &Point3<f64>) -> bool {
         let body = self.robot.description();
@@ -255,35 +266,34 @@ impl Situation {
         u >= 0.0 && v >= 0.0 && u < c.width as f64 && v < c.height as f64
     }
 
-    /// Whether a look from a candidate at a surface would show a hypothesis: most of its points in view and not behind
-    /// what has been seen, but for an obstacle that is moved before.
+    /// How far a look from a candidate at a surface would settle a hypothesis, 0 to 1: not at all unless most of its points are
+    /// in view and not behind what has been seen (but for an obstacle that is moved before); else as clearly as that look
+    /// shows things, and as likely as nothing stands in the way where nothing has been seen yet.
     pub(crate) fn would_settle(
         &self,
         from: usize,
         on: usize,
         hypothesis: &Hypothesis,
         moved: Option<&Obstacle>,
-    ) -> bool {
-        let Some(camera) = self.camera(from, on) else { return false };
+    ) -> f64 {
+        let Some(camera) = self.camera(from, on) else { return 0.0 };
         let eye = Point3::from(camera.translation.vector);
         if let Some(facing) = &hypothesis.facing {
             let towards = (eye - hypothesis.centre).normalize();
             if facing.dot(&towards) < SECTOR_COSINE {
-                return false;
+                return 0.0;
             }
         }
         let gone = |p: &Point3<f64>| moved.is_some_and(|o| o.covers(p));
-        let visible = |p: &Point3<f64>| self.in_view(&camera, p) && self.space.line_of_sight(&eye, p, &gone);
-        let most = hypothesis.points.len() / 2;
-        let mut counts = [0, 0];
-        for point in &hypothesis.points {
-            let seen = visible(point);
-            counts[usize::from(seen)] += 1;
-            if counts[1] > most || counts[0] >= hypothesis.points.len() - most {
-                return seen;
-            }
+        let visible = |p: &&Point3<f64>| self.in_view(&camera, p) && self.space.line_of_sight(&eye, p, &gone);
+        if hypothesis.points.iter().filter(visible).count() * 2 <= hypothesis.points.len() {
+            return 0.0;
         }
-        false
+        let sum = hypothesis.points.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords);
+        let middle = Point3::from(sum / hypothesis.points.len() as f64);
+        let before = middle + (eye - middle).normalize() * BEFORE_M;
+        let unseen_m = self.space.unseen_m(&eye, &before, UNSEEN_WITHIN_M);
+        self.clearness(from, on) * (-unseen_m / FREE_PATH_M).exp()
     }
 
     /// How sure it is where a thing stands, 0 to 1: the most probable object that it may be.
@@ -367,6 +377,14 @@ impl Situation {
     }
 }
 
+/// How far before the middle of a place that may hold something the way to it begins, metres.
+const BEFORE_M: f64 = 0.05;
+/// How far before it something unseen may stand in the way, and how far one sees on average through what has not been seen
+/// among the things on a surface, metres.
+const UNSEEN_WITHIN_M: f64 = 0.4;
+const FREE_PATH_M: f64 = 0.5;
+/// Size of the smallest thing that tells objects apart, the wall of a cup's handle, metres.
+const SMALLEST_M: f64 = 0.01;
 /// Cosine of the widest angle between the normal of a sector and the line of sight at which the sector still counts as seen.
 const SECTOR_COSINE: f64 = 0.5;
 

@@ -19,7 +19,7 @@ use descry_robots::{CancellationToken, Robot};
 use descry_skills::{Call, Context, Outcome, SkillFailure, Symbols};
 
 use crate::exit::CommandError;
-use crate::policies::{self, Chooser};
+use crate::policies::{self, By, Chooser};
 use crate::report::{Event, Verdict};
 
 mod ground;
@@ -202,7 +202,7 @@ impl<'a> Agent<'a> {
     /// Does the rest of the plan, applied to the current state, still reach the goal? If not, the condition that broke.
     /// A policy chooses one look at a time and does not say that it will be enough: its look is taken whatever it promises.
     fn monitor(&self, round: &Round) -> Result<(), String> {
-        if matches!(self.chooser, Chooser::Policy(_)) && !self.rest().steps.is_empty() {
+        if matches!(self.chooser.by, By::Policy(_)) && !self.rest().steps.is_empty() {
             return Ok(());
         }
         match (&self.state.plan, descry_planner::monitor(&round.task, &round.attachments, &self.rest())) {
@@ -214,7 +214,13 @@ impl<'a> Agent<'a> {
 
     /// Makes a new plan. Returns the reason if there can be none.
     fn replan(&mut self, round: &Round, because: String) -> Result<Option<String>, CommandError> {
-        if let Chooser::Policy(policy) = &mut self.chooser {
+        if self.chooser.first_look_here
+            && self.state.totals.views == 0
+            && let Some(look) = policies::here(&round.situation)
+        {
+            return self.intend(policies::plan(&round.situation, look), because, Vec::new()).map(|()| None);
+        }
+        if let By::Policy(policy) = &mut self.chooser.by {
             let Some(look) = policies::next(&mut **policy, &round.situation) else {
                 return Ok(Some("no look that is left promises to settle anything".into()));
             };

@@ -53,11 +53,25 @@ pub trait Policy: Send {
 pub type Foresight = Box<dyn Fn(&Place) -> f64 + Send>;
 
 /// Who chooses in a run.
-pub enum Chooser {
+pub struct Chooser {
+    /// Who it is.
+    pub by: By,
+    /// Whether the first look is nobody's choice: it is taken from where the body stands.
+    pub first_look_here: bool,
+}
+
+/// Who chooses where to look next.
+pub enum By {
     /// The planner.
     Planner,
     /// A policy.
     Policy(Box<dyn Policy>),
+}
+
+impl From<By> for Chooser {
+    fn from(by: By) -> Self {
+        Self { by, first_look_here: false }
+    }
 }
 
 /// Makes a policy for a run: the seed of the run, and foresight where there is any.
@@ -106,13 +120,13 @@ pub fn names() -> Vec<&'static str> {
 /// [`PolicyError`] says what there is.
 pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Chooser, PolicyError> {
     if name == PLAN {
-        return Ok(Chooser::Planner);
+        return Ok(By::Planner.into());
     }
     let Some((_, make)) = ALL.iter().find(|(known, _)| *known == name) else {
         return Err(PolicyError::Unknown { name: name.into(), known: names().join(", ") });
     };
     make(seed, foresight)
-        .map(Chooser::Policy)
+        .map(|policy| By::Policy(policy).into())
         .ok_or_else(|| PolicyError::NeedsForesight { name: name.into() })
 }
 
@@ -121,6 +135,12 @@ pub fn next(policy: &mut dyn Policy, situation: &Situation) -> Option<Look> {
     let all = policy.looks_at_all();
     let looks: Vec<Look> = open(situation).into_iter().filter(|look| all || look.gain > 0.0).collect();
     if looks.is_empty() { None } else { policy.choose(situation, &looks) }
+}
+
+/// The look from where the body stands that is expected to settle most; none if it can take none there.
+pub fn here(situation: &Situation) -> Option<Look> {
+    let looks: Vec<Look> = open(situation).into_iter().filter(|look| look.from == situation.at).collect();
+    best(&looks, |look| look.gain)
 }
 
 /// A look as a plan in the words of the domain: a drive if one is needed, then the look.

@@ -166,6 +166,7 @@ impl Kind for Faults {
             seed: self.text.first_seed.wrapping_add(run as u64),
             faults: FaultPlan { faults: case.faults.clone() },
             policy: &self.text.policy,
+            first_look_here: false,
             tolerance_m: self.text.position_tolerance_m,
         };
         trial::carry_out(&trial, scratch)

@@ -36,7 +36,7 @@ fn mistakes_are_drawn_under_the_text() {
         look,
         "kind = \"where-to-look\"",
         "kind = \"dance\"",
-        &["e.toml:5", "\"dance\"", "figure-4, where-to-look, faults"],
+        &["e.toml:6", "\"dance\"", "figure-4, where-to-look, faults"],
     );
     check(look, "scenes = 200", "scenes = 0", &["scenes = 0", "1 to 1000000"]);
     check(look, "scenes = 200", "scenes = \"many\"", &["scenes = \"many\"", "^"]);
@@ -82,6 +82,28 @@ fn a_run_is_held_against_the_truth() {
     let row = one_job(shipped("where-to-look.toml"), 0);
     let measured = trial::Measured::read(0, &row);
     assert!(measured.is_some_and(|m| m.present && m.views >= 1.0 && m.seconds > 0.0), "{row:?}");
+}
+
+#[test]
+fn the_first_look_is_given_to_the_oracle_too() {
+    let once =
+        shipped("where-to-look.toml").replace("scenes = 200", "scenes = 1").replace("[5, 8, 16]", "[8]");
+    let views = |text: String| one_job(text, 7)["views"].as_u64();
+    assert_eq!(
+        views(once.replace("first_look_from_start = true", "")),
+        Some(1),
+        "it goes where the cup is seen"
+    );
+    assert_eq!(views(once), Some(2));
+}
+
+#[test]
+fn what_somebody_took_away_is_missed() {
+    let text = shipped("faults.toml").replace("first_seed = 1", "first_seed = 9001");
+    let kind = read(&source(text.clone())).unwrap_or_else(|e| panic!("{e}"));
+    let of = |id: &str| kind.jobs().iter().position(|job| job.id == id);
+    let number = of("case=object moved run=11").unwrap_or_else(|| panic!("{:?}", kind.jobs()[0].id));
+    assert_eq!(one_job(text, number)["verdict"], "achieved", "found where it stands now");
 }
 
 #[test]

@@ -38,6 +38,8 @@ pub(super) struct Trial<'a> {
     pub faults: FaultPlan,
     /// Who chooses.
     pub policy: &'a str,
+    /// Whether the first look is taken from the start, whoever chooses.
+    pub first_look_here: bool,
     /// A thing is found where it is if it stands no farther from there, metres.
     pub tolerance_m: f64,
 }
@@ -57,8 +59,9 @@ pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path) -> Result<Outcome, St
     let options = SimOptions { seed: trial.seed, faults: trial.faults.clone(), ..SimOptions::default() };
     let body = Body::simulated(SimRobot::new(scene, options));
     let arranged_s = started.elapsed().as_secs_f64();
-    let chooser = policies::named(trial.policy, trial.seed, foresight(&body, trial.target))
+    let mut chooser = policies::named(trial.policy, trial.seed, foresight(&body, trial.target))
         .map_err(|e| e.to_string())?;
+    chooser.first_look_here = trial.first_look_here;
     std::fs::create_dir_all(scratch).map_err(|e| format!("{}: {e}", scratch.display()))?;
     let settings = Settings {
         robot: "sim".into(),

@@ -41,6 +41,9 @@ struct Text {
     /// Share of the scenes of each level from which the target is removed.
     #[serde(default)]
     absent_share: f64,
+    /// Whether every policy, the oracle too, has its first look from the start, by which the levels of occlusion are defined.
+    #[serde(default)]
+    first_look_from_start: bool,
     /// Numbers of poses around the surface.
     poses: Vec<usize>,
     /// By name.
@@ -240,6 +243,7 @@ impl Kind for WhereToLook {
             seed: self.text.first_seed.wrapping_add(setting.scene as u64),
             faults: FaultPlan::default(),
             policy: &setting.policy,
+            first_look_here: self.text.first_look_from_start,
             tolerance_m: self.text.position_tolerance_m,
         };
         trial::carry_out(&trial, scratch)

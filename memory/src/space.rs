@@ -200,7 +200,7 @@ impl Space {
         true
     }
 
-    /// How much of the last part of the way between two points no view has shown, metres; how long that part is, metres.
+    /// How much of the last part of the way between two points no view has shown, metres. That part is `last_m` long at the most.
     pub fn unseen_m(&self, from: &Point3<f64>, to: &Point3<f64>, last_m: f64) -> f64 {
         let way = to - from;
         let steps = (last_m.min(way.norm()) / self.voxel_m).floor();
@@ -239,7 +239,8 @@ impl Space {
             let before = self.blocks.remove(&key);
             let known = before.is_some();
             let mut block = before.unwrap_or_else(|| Box::new(Block::UNSEEN));
-            let seen = self.look_at_block(map, key, measured.get(&key), &mut block.levels);
+            let seen =
+                self.look_at_block(map, key, measured.get(&key).map(|block| &**block), &mut block.levels);
             if seen {
                 block.find_bricks();
             }
@@ -355,7 +356,7 @@ impl Space {
         &self,
         map: &DepthMap,
         key: [i32; 3],
-        measured: Option<&Box<[bool; BLOCK]>>,
+        measured: Option<&[bool; BLOCK]>,
         levels: &mut [i8; BLOCK],
     ) -> bool {
         let c = &map.intrinsics;

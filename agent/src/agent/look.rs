@@ -123,21 +123,21 @@ impl Agent<'_> {
             Err(nothing) => return self.saw_nothing(nothing.to_string()),
         };
         let (merged, surface) = self.lay_on_map(on, merged, surface);
-        self.note_space(&views, &merged);
+        let newest = newest(&views, &merged);
+        self.note_space(newest.as_ref());
         let scene = segment_on(&merged.cloud, &merged.visibility, surface, &seeking);
         let percepts = self.recogniser.recognise(&scene, &merged.visibility, &self.domain.objects);
         self.note_surface(on, &scene);
         let gone_before = self.state.belief.gone.len();
         self.believe(&merged, &percepts)?;
-        match self.taken_away(gone_before, &newest(&views, &merged)) {
+        match newest.and_then(|newest| self.taken_away(gone_before, &newest)) {
             Some(what) => self.begin_again(on, what),
             None => Ok(()),
         }
     }
 
     /// What was sought and believed to stand where the newest view looks through: somebody has moved it. In words; none if nothing.
-    fn taken_away(&self, gone_before: usize, newest: &Option<DepthMap>) -> Option<String> {
-        let newest = newest.as_ref()?;
+    fn taken_away(&self, gone_before: usize, newest: &DepthMap) -> Option<String> {
         let up = self.state.surfaces.first().map_or_else(Vector3::z, |s| s.up);
         let sought = || self.state.things.iter().chain(&self.state.kinds);
         self.state.belief.gone[gone_before..].iter().find_map(|track| {
@@ -178,9 +178,9 @@ impl Agent<'_> {
     }
 
     /// Takes the newest view, if it could be aligned, into the map of seen space.
-    fn note_space(&mut self, views: &[View], merged: &Merged) {
-        if let Some(map) = newest(views, merged) {
-            Arc::make_mut(&mut self.state.space).integrate(&map);
+    fn note_space(&mut self, newest: Option<&DepthMap>) {
+        if let Some(map) = newest {
+            Arc::make_mut(&mut self.state.space).integrate(map);
         }
     }
 
@@ -337,14 +337,13 @@ fn newest(views: &[View], merged: &Merged) -> Option<DepthMap> {
     DepthMap::from_view(view, &fit.world_from_camera)
 }
 
-/// Whether a camera saw through most of the place of an object.
+/// Whether a camera saw through the middle of an object's place, low and high.
 fn looked_through(track: &Track, up: &Vector3<f64>, map: &DepthMap) -> bool {
-    const SHARES: [f64; 3] = [0.3, 0.5, 0.7];
-    let free = |share: &&f64| {
-        let place = track.position_m + up * (track.size_m[2] * **share);
+    let free = |share: f64| {
+        let place = track.position_m + up * (track.size_m[2] * share);
         map.look(&place, SIDE_TOLERANCE_M) == Seen::Free
     };
-    SHARES.iter().filter(free).count() == SHARES.len()
+    [0.3, 0.5, 0.7].into_iter().all(free)
 }
 
 /// How a body's views are merged and looked through. The surface is looked for where the map has it, if it has one; what can

@@ -102,7 +102,7 @@ fn what_somebody_took_away_is_missed() {
     let text = shipped("faults.toml").replace("first_seed = 1", "first_seed = 9001");
     let kind = read(&source(text.clone())).unwrap_or_else(|e| panic!("{e}"));
     let of = |id: &str| kind.jobs().iter().position(|job| job.id == id);
-    let number = of("case=object moved run=11").unwrap_or_else(|| panic!("{:?}", kind.jobs()[0].id));
+    let number = of("case=object moved run=12").unwrap_or_else(|| panic!("{:?}", kind.jobs()[0].id));
     assert_eq!(one_job(text, number)["verdict"], "achieved", "found where it stands now");
 }
 

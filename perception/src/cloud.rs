@@ -182,18 +182,17 @@ impl Cloud {
     /// Mend with [`Cloud::scaled`]`(0.001)`.
     pub fn unit_warning(&self) -> Option<String> {
         const FARTHEST_TYPICAL_M: f32 = 100.0;
-        let mut ranges: Vec<f32> =
-            self.points.iter().filter(|p| is_finite(p)).map(|p| p.coords.norm()).collect();
-        if ranges.is_empty() {
+        let ranges = || self.points.iter().filter(|p| is_finite(p)).map(|p| p.coords.norm());
+        let (near, all) =
+            ranges().fold((0, 0), |(near, all), r| (near + usize::from(r <= FARTHEST_TYPICAL_M), all + 1));
+        if near > all / 2 || all == 0 {
             return None;
         }
-        let middle = ranges.len() / 2;
-        let (_, &mut median, _) = ranges.select_nth_unstable_by(middle, f32::total_cmp);
-        (median > FARTHEST_TYPICAL_M).then(|| {
-            format!(
-                "half of the points lie more than {median:.0} m from the sensor: this looks like millimetres; scale by 0.001"
-            )
-        })
+        let mut ranges: Vec<f32> = ranges().collect();
+        let (_, median, _) = ranges.select_nth_unstable_by(all / 2, f32::total_cmp);
+        Some(format!(
+            "half of the points lie more than {median:.0} m from the sensor: this looks like millimetres; scale by 0.001"
+        ))
     }
 
     /// The cloud with every coordinate multiplied by `factor` (0.001 takes millimetres to metres).

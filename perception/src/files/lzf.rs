@@ -74,12 +74,11 @@ pub(super) fn unpack(packed: &[u8], expected: usize) -> Result<Vec<u8>, LzfError
 
 /// Appends `length` bytes from `from` on; source and copy may overlap, which repeats the bytes between.
 fn copy_within(out: &mut Vec<u8>, from: usize, length: usize) {
-    let period = out.len() - from;
     let mut left = length;
     while left > 0 {
-        let step = left.min(period);
-        let begin = out.len() - period;
-        out.extend_from_within(begin..begin + step);
+        // What was repeated once can be repeated as a whole.
+        let step = left.min(out.len() - from);
+        out.extend_from_within(from..from + step);
         left -= step;
     }
 }

@@ -6,6 +6,7 @@ use super::{FileError, Loaded, Place, finish, lzf};
 use crate::cloud::{Cloud, Grid};
 use header::{Encoding as Stored, Field, Header};
 use nalgebra::{Point3, Vector3};
+use std::borrow::Cow;
 
 /// How [`write()`] stores the points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,22 +38,22 @@ pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
 }
 
 /// The bytes of all points and where each field of point `i` begins: `offset + i * step`.
-struct Table {
-    bytes: Vec<u8>,
+struct Table<'a> {
+    bytes: Cow<'a, [u8]>,
     /// Per field: begin and step.
     layout: Vec<(usize, usize)>,
 }
 
-impl Table {
-    fn from_rows(header: &Header, data: &[u8]) -> Result<Table, FileError> {
+impl<'a> Table<'a> {
+    fn from_rows(header: &Header, data: &'a [u8]) -> Result<Table<'a>, FileError> {
         let stride = header.stride();
         let needed = header.points.saturating_mul(stride);
-        let bytes = data.get(..needed).ok_or_else(|| header.too_short(data.len(), needed))?.to_vec();
+        let bytes = data.get(..needed).ok_or_else(|| header.too_short(data.len(), needed))?;
         let layout = header.offsets().map(|offset| (offset, stride)).collect();
-        Ok(Table { bytes, layout })
+        Ok(Table { bytes: bytes.into(), layout })
     }
 
-    fn from_columns(header: &Header, data: &[u8]) -> Result<Table, FileError> {
+    fn from_columns(header: &Header, data: &[u8]) -> Result<Table<'a>, FileError> {
         let needed = header.points.saturating_mul(header.stride());
         let word = |at: usize| -> Option<usize> {
             Some(u32::from_le_bytes(data.get(at..at + 4)?.try_into().ok()?) as usize)
@@ -76,10 +77,10 @@ impl Table {
         })?;
         let layout =
             header.offsets().zip(&header.fields).map(|(o, f)| (o * header.points, f.bytes())).collect();
-        Ok(Table { bytes, layout })
+        Ok(Table { bytes: bytes.into(), layout })
     }
 
-    fn from_text(header: &Header, data: &[u8]) -> Result<Table, FileError> {
+    fn from_text(header: &Header, data: &[u8]) -> Result<Table<'a>, FileError> {
         let stride = header.stride();
         // Each point needs at least a line.
         if header.points > data.len() {
@@ -107,7 +108,7 @@ impl Table {
             ));
         }
         let layout = header.offsets().map(|offset| (offset, stride)).collect();
-        Ok(Table { bytes, layout })
+        Ok(Table { bytes: bytes.into(), layout })
     }
 
     /// Four (or fewer) raw bytes of field `field` of point `point`, zero-extended to eight.
@@ -134,6 +135,13 @@ impl Table {
         self.column(header, field, move |raw| kind.number(raw))
     }
 
+    /// The four bytes of a field that has them, point by point.
+    fn words(&self, header: &Header, field: usize) -> impl Iterator<Item = [u8; 4]> {
+        let (begin, step) = self.layout[field];
+        let of_points = self.bytes.get(begin..).unwrap_or_default().chunks(step).take(header.points);
+        of_points.map(|bytes| bytes.first_chunk().copied().unwrap_or_default())
+    }
+
     fn cloud(&self, header: &Header, notes: &mut Vec<String>) -> Result<Cloud, FileError> {
         let find = |name: &str| header.fields.iter().position(|f| f.name == name);
         let need = |name: &str| {
@@ -148,22 +156,20 @@ impl Table {
             })
         };
         let (x, y, z) = (need("x")?, need("y")?, need("z")?);
-        let points = self.triples(header, [x, y, z]).map(Point3::from).collect();
+        let points = self.triples(header, [x, y, z], Point3::from);
         let colour = find("rgb").or_else(|| find("rgba")).filter(|&c| header.fields[c].size == 4);
-        let colours = colour.map(|c| {
-            self.column(header, c, |raw| {
-                let [blue, green, red, ..] = raw;
-                [red, green, blue]
-            })
-            .collect()
-        });
+        let colours =
+            colour.map(|c| self.words(header, c).map(|[blue, green, red, _]| [red, green, blue]).collect());
         let normal = [find("normal_x"), find("normal_y"), find("normal_z")];
         let normals = match normal {
-            [Some(a), Some(b), Some(c)] => Some(self.triples(header, [a, b, c]).map(Vector3::from).collect()),
+            [Some(a), Some(b), Some(c)] => Some(self.triples(header, [a, b, c], Vector3::from)),
             _ => None,
         };
         let label = find("label");
-        let labels = label.map(|l| self.number(header, l).map(|v| v as u32).collect());
+        let labels = label.map(|l| match (header.fields[l].kind, header.fields[l].size) {
+            (b'U', 4) => self.words(header, l).map(u32::from_le_bytes).collect(),
+            _ => self.number(header, l).map(|v| v as u32).collect(),
+        });
         let used = [Some(x), Some(y), Some(z), colour, label];
         let left: Vec<&str> = header
             .fields
@@ -183,9 +189,15 @@ impl Table {
         Ok(Cloud { points, grid, colours, normals, labels })
     }
 
-    fn triples(&self, header: &Header, fields: [usize; 3]) -> impl Iterator<Item = [f32; 3]> {
+    /// Three fields of every point, made into one.
+    fn triples<T>(&self, header: &Header, fields: [usize; 3], make: impl Fn([f32; 3]) -> T) -> Vec<T> {
+        let single = |f: usize| header.fields[f].kind == b'F' && header.fields[f].size == 4;
+        if fields.into_iter().all(single) {
+            let [a, b, c] = fields.map(|f| self.words(header, f).map(f32::from_le_bytes));
+            return a.zip(b).zip(c).map(|((a, b), c)| make([a, b, c])).collect();
+        }
         let [a, b, c] = fields.map(|f| self.number(header, f));
-        a.zip(b).zip(c).map(|((a, b), c)| [a as f32, b as f32, c as f32])
+        a.zip(b).zip(c).map(|((a, b), c)| make([a as f32, b as f32, c as f32])).collect()
     }
 }
 

@@ -5,6 +5,7 @@
 
 use super::parts::Part;
 use super::prepare::Prepared;
+use crate::register::Partner;
 use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6,
 };
@@ -57,14 +58,14 @@ pub(super) fn align(
     round: &Round,
 ) -> Vec<Found> {
     let _span = tracing::debug_span!("align", views = views.len(), passes = round.passes).entered();
-    let pairs = pairs(views, used, poses);
     let askers: Vec<Askers> = parts.iter().map(|parts| Askers::of(parts)).collect();
+    let pairs = pairs(views, used, poses);
+    let mut asked: Vec<Asked> = pairs.iter().map(|&(i, j)| Asked::of(&askers[i], (i, j), round)).collect();
     let mut found = vec![Found::default(); views.len()];
     for pass in 0..round.passes {
         let share = pass as f64 / (round.passes.max(2) - 1) as f64;
         let radius = round.from_m * (round.to_m / round.from_m).powf(share);
-        let links: Vec<Link> =
-            pairs.par_iter().map(|&(i, j)| link(views, &askers[i], poses, (i, j), radius, round)).collect();
+        let links: Vec<Link> = asked.par_iter_mut().map(|asked| link(views, asked, poses, radius)).collect();
         let moved = step(views, used, poses, &links);
         for (i, f) in found.iter_mut().enumerate() {
             let own = links.iter().filter(|l| l.from == i || l.to == i);
@@ -103,6 +104,23 @@ impl Askers {
     }
 }
 
+/// What one view asks of another in the passes of a round.
+struct Asked {
+    from: usize,
+    to: usize,
+    /// Points of the first view with their weights.
+    points: Vec<(usize, f64)>,
+    /// What is known of the partner of each.
+    partners: Vec<Partner>,
+}
+
+impl Asked {
+    fn of(askers: &Askers, (from, to): (usize, usize), round: &Round) -> Asked {
+        let points: Vec<(usize, f64)> = askers.some(round, to).collect();
+        Asked { from, to, partners: vec![Partner::UNKNOWN; points.len()], points }
+    }
+}
+
 /// Pairs of views to match: all if they are few, else each with those whose cameras are nearest.
 fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
     const ALL_BELOW: usize = 7;
@@ -128,18 +146,10 @@ fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(us
     pairs
 }
 
-/// Partners of view i's points in view j and what they ask of both poses.
-fn link(
-    views: &[Prepared],
-    askers: &Askers,
-    poses: &[Isometry3<f64>],
-    (i, j): (usize, usize),
-    radius: f64,
-    round: &Round,
-) -> Link {
+/// Partners of the points that one view asks for in the other, and what they ask of both poses.
+fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius: f64) -> Link {
+    let (i, j) = (asked.from, asked.to);
     let (a, b) = (&views[i], &views[j]);
-    let j_from_i = poses[j].inv_mul(&poses[i]);
-    let turn_i = poses[i].rotation;
     let mut link = Link {
         from: i,
         to: j,
@@ -149,11 +159,13 @@ fn link(
         squares: 0.0,
     };
     let Some(tree) = &b.tree else { return link };
-    for (k, part_weight) in askers.some(round, j) {
+    let j_from_i = poses[j].inv_mul(&poses[i]);
+    let turn_i = poses[i].rotation;
+    for (&(k, part_weight), partner) in asked.points.iter().zip(&mut asked.partners) {
         let p = &a.points[k];
-        let in_j = j_from_i * p;
-        let Some(near) = tree.nearest(&in_j.cast(), radius as f32) else { continue };
-        let partner = near.index as usize;
+        let in_j = (j_from_i * p).cast::<f32>();
+        let Some(slot) = partner.update(tree, in_j.into(), radius as f32) else { continue };
+        let partner = tree.indices()[slot] as usize;
         let normal_j = b.normals[partner];
         if (j_from_i.rotation * a.normals[k]).dot(&normal_j) < SAME_SIDE {
             continue;

@@ -63,7 +63,7 @@ impl Place {
 
 /// What is known of one source point's partner since its last search.
 #[derive(Clone, Copy)]
-pub(super) struct Partner {
+pub(crate) struct Partner {
     /// Where the point was when it was searched for.
     searched_at: [f32; 3],
     /// Slot of the nearest point in the target's tree; `NONE` if none is near.
@@ -77,7 +77,7 @@ pub(super) struct Partner {
 const NONE: u32 = u32::MAX;
 
 impl Partner {
-    pub(super) const UNKNOWN: Partner = Partner {
+    pub(crate) const UNKNOWN: Partner = Partner {
         searched_at: [0.0; 3],
         slot: NONE,
         others_m: f32::NEG_INFINITY,
@@ -91,7 +91,7 @@ impl Partner {
 
     /// Brings the partner up to date for the point at `at`; its slot, if it is no farther than `within_m`.
     #[inline(always)]
-    pub(super) fn update(&mut self, tree: &Neighbours, at: [f32; 3], within_m: f32) -> Option<usize> {
+    pub(crate) fn update(&mut self, tree: &Neighbours, at: [f32; 3], within_m: f32) -> Option<usize> {
         let limit = within_m * within_m;
         let moved = distance_sq(&at, &self.searched_at).sqrt();
         let to_others = self.others_m - moved;

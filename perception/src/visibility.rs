@@ -111,9 +111,13 @@ impl DepthMap {
         let (width, height) = (self.intrinsics.width, self.intrinsics.height);
         let (column, row) = (pixel % width, pixel / width);
         let columns = column.saturating_sub(1)..(column + 2).min(width);
-        (row.saturating_sub(1)..(row + 2).min(height))
-            .flat_map(|r| &self.depths_m[r * width + columns.start..r * width + columns.end])
-            .fold(f32::INFINITY, |least, &depth| if depth < least { depth } else { least })
+        let mut nearest = f32::INFINITY;
+        for row in row.saturating_sub(1)..(row + 2).min(height) {
+            for &depth in &self.depths_m[row * width + columns.start..row * width + columns.end] {
+                nearest = if depth < nearest { depth } else { nearest };
+            }
+        }
+        nearest
     }
 
     /// True if the very pixel that a point (optical frame) falls on shows that it was not looked through.
@@ -160,8 +164,10 @@ impl Visibility {
 
     /// True if any camera looked through the point: [`Visibility::look`] says free. Quicker than that where most points are not.
     pub(crate) fn looked_through(&self, p: &Point3<f64>, tolerance_m: f64) -> bool {
-        let behind = |m: &&DepthMap| !m.stops_before(&(m.camera_from_world * p), tolerance_m);
-        self.maps.iter().filter(behind).any(|m| m.look(p, tolerance_m) == Seen::Free)
+        self.maps.iter().any(|map| {
+            let q = map.camera_from_world * p;
+            !map.stops_before(&q, tolerance_m) && map.look_from(&q, tolerance_m) == Seen::Free
+        })
     }
 
     /// Positions of the cameras in the world, metres.

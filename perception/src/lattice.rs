@@ -61,15 +61,15 @@ impl Lattice {
         std::array::from_fn(|c| (c as i64 / 3 - 1) * x + (c as i64 % 3 - 1) * y - 1)
     }
 
-    /// Sorts keys with their payload; equal keys stay in order.
-    pub fn sort(&self, entries: &mut Vec<(u64, u32)>) {
+    /// Sorts keys with their payload; equal keys stay in order. What `spare` holds is overwritten.
+    pub fn sort(&self, entries: &mut Vec<(u64, u32)>, spare: &mut Vec<(u64, u32)>) {
         const DIGIT: u32 = 11;
         const SMALL: usize = 2048;
         if entries.len() < SMALL {
             entries.sort_by_key(|e| e.0);
             return;
         }
-        let mut sorted = vec![(0, 0); entries.len()];
+        spare.resize(entries.len(), (0, 0));
         for shift in (0..self.bits).step_by(DIGIT as usize) {
             let digit = |key: u64| (key >> shift) as usize & ((1 << DIGIT) - 1);
             let mut ends = [0_u32; 1 << DIGIT];
@@ -83,10 +83,10 @@ impl Lattice {
             }
             for entry in entries.iter() {
                 let at = &mut ends[digit(entry.0)];
-                sorted[*at as usize] = *entry;
+                spare[*at as usize] = *entry;
                 *at += 1;
             }
-            std::mem::swap(entries, &mut sorted);
+            std::mem::swap(entries, spare);
         }
     }
 }
@@ -146,7 +146,7 @@ mod tests {
                 .collect();
             let mut expected = entries.clone();
             expected.sort();
-            lattice.sort(&mut entries);
+            lattice.sort(&mut entries, &mut Vec::new());
             prop_assert_eq!(&entries, &expected);
             entries.dedup_by_key(|e| e.0);
             let keys: Vec<u64> = entries.iter().map(|e| e.0).collect();

@@ -97,6 +97,9 @@ fn lattice(of: &[(&View, &Isometry3<f64>)], voxel_m: f64, options: &MergeOptions
     Lattice::over(&(low - reach), &(high + reach), voxel_m)
 }
 
+/// Views whose cells are gathered one after another; of more the halves are gathered apart.
+const TOGETHER: usize = 2;
+
 /// The cells of all views. Halves are gathered apart and united, so that few lists of cells are alive at a time.
 fn gather(
     of: &[(&View, &Isometry3<f64>)],
@@ -104,18 +107,20 @@ fn gather(
     lattice: &Lattice,
     options: &MergeOptions,
 ) -> Cells {
-    match (of, facings) {
-        ([], _) | (_, []) => Cells::default(),
-        ([(view, pose)], [facing, ..]) => of_view(view, pose, facing, lattice, options),
-        _ => {
-            let middle = of.len() / 2;
-            let (a, b) = rayon::join(
-                || gather(&of[..middle], &facings[..middle], lattice, options),
-                || gather(&of[middle..], &facings[middle..], lattice, options),
-            );
-            unite(&a, &b)
-        }
+    if of.len() > TOGETHER {
+        let middle = of.len() / 2;
+        let (a, b) = rayon::join(
+            || gather(&of[..middle], &facings[..middle], lattice, options),
+            || gather(&of[middle..], &facings[middle..], lattice, options),
+        );
+        return unite(&a, &b);
     }
+    let mut kept = Kept::default();
+    let views = of.iter().zip(facings).map(|((view, pose), facing)| {
+        kept.take(view, pose, facing, lattice, options);
+        of_view(view, pose, facing, &kept)
+    });
+    views.reduce(|a, b| unite(&a, &b)).unwrap_or_default()
 }
 
 /// The cells of two sets of views together.
@@ -164,23 +169,29 @@ struct Return {
     facing: u32,
 }
 
+/// The returns of a view that are kept, sorted by voxel. The room that one view took is used again by the next.
+#[derive(Default)]
+struct Kept {
+    returns: Vec<Return>,
+    /// Key of the voxel and number of each return.
+    entries: Vec<(u64, u32)>,
+    spare: Vec<(u64, u32)>,
+}
+
 /// The cells of one view.
-fn of_view(
-    view: &View,
-    pose: &Isometry3<f64>,
-    facing: &Facing,
-    lattice: &Lattice,
-    options: &MergeOptions,
-) -> Cells {
-    let (mut entries, returns) = kept(view, pose, facing, lattice, options);
-    lattice.sort(&mut entries);
+fn of_view(view: &View, pose: &Isometry3<f64>, facing: &Facing, kept: &Kept) -> Cells {
     let turn = pose.rotation.to_rotation_matrix().cast::<f32>();
     let colours = view.cloud.colours.as_deref();
-    let mut cells = Cells { returns: returns.len(), ..Cells::default() };
-    for same in entries.chunk_by(|a, b| a.0 == b.0) {
+    let voxels = kept.entries.chunk_by(|a, b| a.0 == b.0).count();
+    let mut cells = Cells {
+        keys: Vec::with_capacity(voxels),
+        cells: Vec::with_capacity(voxels),
+        returns: kept.returns.len(),
+    };
+    for same in kept.entries.chunk_by(|a, b| a.0 == b.0) {
         let mut cell = Cell::EMPTY;
         for &(_, number) in same {
-            let r = &returns[number as usize];
+            let r = &kept.returns[number as usize];
             cell.weight += r.weight;
             cell.sum += Vector3::from(r.at) * r.weight;
             if let Some(n) = facing.normals.get(r.facing as usize).filter(|n| n.x.is_finite()) {
@@ -197,40 +208,47 @@ fn of_view(
     cells
 }
 
-/// The returns of a view that are in range and band and do not fly, with the keys of their voxels.
-fn kept(
-    view: &View,
-    pose: &Isometry3<f64>,
-    facing: &Facing,
-    lattice: &Lattice,
-    options: &MergeOptions,
-) -> (Vec<(u64, u32)>, Vec<Return>) {
-    let turn = pose.rotation.to_rotation_matrix();
-    let shift = pose.translation.vector;
-    let points = &view.cloud.points;
-    let width = view.cloud.grid.map_or(points.len(), |g| g.width).max(1);
-    let (mut entries, mut returns) = (Vec::new(), Vec::new());
-    for (row, line) in points.chunks(width).enumerate() {
-        for (column, p) in line.iter().enumerate() {
-            if !in_range(p, options) {
-                continue;
+impl Kept {
+    /// Keeps the returns of a view that are in range and band and do not fly.
+    fn take(
+        &mut self,
+        view: &View,
+        pose: &Isometry3<f64>,
+        facing: &Facing,
+        lattice: &Lattice,
+        options: &MergeOptions,
+    ) {
+        let turn = pose.rotation.to_rotation_matrix();
+        let shift = pose.translation.vector;
+        let points = &view.cloud.points;
+        let width = view.cloud.grid.map_or(points.len(), |g| g.width).max(1);
+        let Kept { returns, entries, spare } = self;
+        returns.clear();
+        entries.clear();
+        returns.reserve(points.len());
+        entries.reserve(points.len());
+        for (row, line) in points.chunks(width).enumerate() {
+            for (column, p) in line.iter().enumerate() {
+                if !in_range(p, options) {
+                    continue;
+                }
+                let at = turn * p.coords.cast::<f64>() + shift;
+                if !in_band(&at, options, 0.0) || is_flying(&view.cloud, row, column) {
+                    continue;
+                }
+                let sigma = range_sigma_m(f64::from(p.z.abs().max(p.coords.norm() * 0.5)));
+                let (key, rest) = lattice.locate(&at);
+                entries.push((key, returns.len() as u32));
+                returns.push(Return {
+                    at: rest,
+                    weight: (1.0 / (sigma * sigma)) as f32,
+                    pixel: (row * width + column) as u32,
+                    facing: facing.index(row, column),
+                });
             }
-            let at = turn * p.coords.cast::<f64>() + shift;
-            if !in_band(&at, options, 0.0) || is_flying(&view.cloud, row, column) {
-                continue;
-            }
-            let sigma = range_sigma_m(f64::from(p.z.abs().max(p.coords.norm() * 0.5)));
-            let (key, rest) = lattice.locate(&at);
-            entries.push((key, returns.len() as u32));
-            returns.push(Return {
-                at: rest,
-                weight: (1.0 / (sigma * sigma)) as f32,
-                pixel: (row * width + column) as u32,
-                facing: facing.index(row, column),
-            });
         }
+        lattice.sort(entries, spare);
     }
-    (entries, returns)
 }
 
 /// Normals of a view's points, camera frame; of an organised cloud coarser than its pixels.
@@ -298,8 +316,9 @@ type Settled = (Point3<f32>, Vector3<f32>, [u8; 3], u16);
 
 /// Moves the voxels onto their common surface and drops what was looked through.
 fn settle(cells: &Cells, lattice: &Lattice, seen: &Visibility, coloured: bool) -> Fused {
-    /// Voxels that one thread settles in a row.
-    const TOGETHER: usize = 1 << 13;
+    /// Voxels that one thread settles in a row, and such rows at a time: what they fill is used again.
+    const ROW: usize = 1 << 12;
+    const ROWS: usize = 32;
     let mean = |(&key, cell): (&u64, &Cell)| Mean {
         at: Vector3::from(lattice.corner_m(key)) + cell.sum / cell.weight,
         weight: cell.weight,
@@ -307,11 +326,11 @@ fn settle(cells: &Cells, lattice: &Lattice, seen: &Visibility, coloured: bool) -
     };
     let means: Vec<Mean> = cells.keys.par_iter().zip(&cells.cells).map(mean).collect();
     let origin = lattice.origin_m();
-    let settled = |(number, keys): (usize, &[u64])| -> Vec<Settled> {
-        let first = number * TOGETHER;
+    let settle_row = |row: usize, kept: &mut Vec<Settled>| {
+        let first = row * ROW;
         let mut around = Around::from(lattice, &cells.keys, first);
-        let mut kept = Vec::with_capacity(keys.len());
-        for (i, key) in (first..).zip(keys) {
+        kept.clear();
+        for (i, key) in (first..).zip(cells.keys[first..].iter().take(ROW)) {
             let cell = &cells.cells[i];
             let at = Point3::from(origin + smoothed(*key, &means[i], &means, &mut around).cast::<f64>());
             // One view's word against another's look through the place.
@@ -321,27 +340,38 @@ fn settle(cells: &Cells, lattice: &Lattice, seen: &Visibility, coloured: bool) -
                 continue;
             }
             let normal = if normal == Vector3::zeros() { Vector3::repeat(f32::NAN) } else { normal };
-            let colour = (cell.colour / cell.weight).map(|c| c.round().clamp(0.0, 255.0) as u8);
+            let colour = if coloured {
+                (cell.colour / cell.weight).map(|c| c.round() as u8)
+            } else {
+                Vector3::zeros()
+            };
             kept.push((at, normal, colour.into(), cell.views));
         }
-        kept
     };
-    let parts: Vec<Vec<Settled>> = cells.keys.par_chunks(TOGETHER).enumerate().map(settled).collect();
+    let most = cells.keys.len();
     let mut fused = Fused {
-        cloud: Cloud::default(),
-        views_per_point: Vec::new(),
+        cloud: Cloud::from_points(Vec::with_capacity(most)),
+        views_per_point: Vec::with_capacity(most),
         returns: cells.returns,
         voxel_m: lattice.voxel_m,
     };
-    let (mut normals, mut colours) = (Vec::new(), Vec::new());
-    for (at, normal, colour, views) in parts.into_iter().flatten() {
-        fused.cloud.points.push(at);
-        normals.push(normal);
-        colours.push(colour);
-        fused.views_per_point.push(views);
+    let mut normals = Vec::with_capacity(most);
+    let mut colours = coloured.then(|| Vec::with_capacity(most));
+    let mut rows: Vec<Vec<Settled>> = vec![Vec::new(); ROWS];
+    for first in (0..most.div_ceil(ROW)).step_by(ROWS) {
+        let rows = &mut rows[..ROWS.min(most.div_ceil(ROW) - first)];
+        rows.par_iter_mut().enumerate().for_each(|(row, kept)| settle_row(first + row, kept));
+        for row in rows.iter() {
+            fused.cloud.points.extend(row.iter().map(|settled| settled.0));
+            normals.extend(row.iter().map(|settled| settled.1));
+            fused.views_per_point.extend(row.iter().map(|settled| settled.3));
+            if let Some(colours) = &mut colours {
+                colours.extend(row.iter().map(|settled| settled.2));
+            }
+        }
     }
     fused.cloud.normals = Some(normals);
-    fused.cloud.colours = coloured.then_some(colours);
+    fused.cloud.colours = colours;
     fused
 }
 

@@ -65,7 +65,7 @@ pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f
     let lattice = Lattice::over(&low, &high, side_m);
     let mut entries: Vec<(u64, u32)> =
         (0..).zip(points).map(|(i, p)| (lattice.locate(&p.coords).0, i)).collect();
-    lattice.sort(&mut entries);
+    lattice.sort(&mut entries, &mut Vec::new());
     let mut of_point = vec![0; points.len()];
     let (mut keys, mut moments) = (Vec::new(), Vec::new());
     for same in entries.chunk_by(|a, b| a.0 == b.0) {

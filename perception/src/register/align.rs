@@ -15,8 +15,10 @@ const FLAT: f64 = 1e-3;
 /// The first rounds look at one point in several only, as long as this many remain: far from the end, fewer points tell the way as well.
 const SAMPLE: usize = 2000;
 const WIDEST_STRIDE: usize = 16;
-/// The sample has done its work when a round moves less than this many times what counts as settled.
+/// The sample has done its work when a round moves less than this many times what counts as settled: many small steps of
+/// [`Method::PointToPoint`] are worth taking on it, but of the few large ones of the others the last would lead it into a valley of its own.
 const NEARLY: f64 = 10.0;
+const NEARLY_BY_PLANES: f64 = 100.0;
 
 /// Moves the source until its points lie on the target.
 ///
@@ -32,7 +34,8 @@ pub fn align(source: &Prepared, target: &Prepared, options: &RegisterOptions) ->
     let stride = (source.points.len() / SAMPLE).clamp(1, WIDEST_STRIDE);
     if stride > 1 {
         run.look_at_every(stride);
-        run.rounds(&mut at, options.rounds / 2, options.least.max(SAMPLE / 10), NEARLY);
+        let ease = if options.method == Method::PointToPoint { NEARLY } else { NEARLY_BY_PLANES };
+        run.rounds(&mut at, options.rounds / 2, options.least.max(SAMPLE / 10), ease);
         run.look_at_every(1);
     }
     let ending = run.rounds(&mut at, options.rounds, options.least.max(1), 1.0);

@@ -294,6 +294,32 @@ pub(crate) fn dominant_planes<'a>(
     planes.into_iter().filter(holds).map(|p| (p.normal, p.offset)).collect()
 }
 
+/// The points that proposals are judged by, each coordinate by itself.
+struct Judges {
+    coordinates: [Vec<f64>; 3],
+    /// How far each may be off a plane that it speaks for, metres.
+    bands_m: Vec<f64>,
+}
+
+impl Judges {
+    fn of<'a>(samples: impl Iterator<Item = &'a &'a Sample> + Clone) -> Judges {
+        let axis = |k: usize| samples.clone().map(|s| s.point[k]).collect();
+        let bands_m = samples.clone().map(|s| 2.0 * s.sigma_m + 0.004).collect();
+        Judges { coordinates: [axis(0), axis(1), axis(2)], bands_m }
+    }
+
+    /// How many speak for the plane.
+    fn near(&self, plane: &Plane) -> usize {
+        let [x, y, z] = &self.coordinates;
+        let points = x.iter().zip(y).zip(z).zip(&self.bands_m);
+        let near = points.map(|(((x, y), z), band_m)| {
+            let along = plane.normal.x * x + plane.normal.y * y + plane.normal.z * z;
+            u64::from((along - plane.offset).abs() < *band_m)
+        });
+        near.sum::<u64>() as usize
+    }
+}
+
 /// The best of planes through three neighbouring points.
 fn propose(left: &[&Sample], rng: &mut Draws, plausible: &impl Fn(&Plane) -> bool) -> Option<Plane> {
     const REACH_M: f64 = 0.3;
@@ -302,7 +328,7 @@ fn propose(left: &[&Sample], rng: &mut Draws, plausible: &impl Fn(&Plane) -> boo
     for (i, s) in left.iter().enumerate() {
         boxes.entry(key(&s.point)).or_default().push(i as u32);
     }
-    let judge = (left.len() / 1500).max(1);
+    let judges = Judges::of(left.iter().step_by((left.len() / 1500).max(1)));
     let mut best: Option<(usize, Plane)> = None;
     for _ in 0..PROPOSALS {
         let first = left[rng.below(left.len())];
@@ -314,11 +340,7 @@ fn propose(left: &[&Sample], rng: &mut Draws, plausible: &impl Fn(&Plane) -> boo
         if !plausible(&plane) {
             continue;
         }
-        let count = left
-            .iter()
-            .step_by(judge)
-            .filter(|s| plane.distance(&s.point).abs() < 2.0 * s.sigma_m + 0.004)
-            .count();
+        let count = judges.near(&plane);
         if best.as_ref().is_none_or(|(n, _)| count > *n) {
             best = Some((count, plane));
         }

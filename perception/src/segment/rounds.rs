@@ -39,10 +39,7 @@ pub(super) fn part(
     part_of_voxel: &mut [u32],
     viewpoints: &[Point3<f64>],
 ) {
-    let mut points_of: Vec<Vec<Point3<f64>>> = vec![Vec::new(); voxels.len()];
-    for (point, &voxel) in points.iter().zip(&voxels.of_point) {
-        points_of[voxel as usize].push(*point);
-    }
+    let points_of = PointsOf::new(voxels, points);
     let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (voxel, part) in part_of_voxel.iter().enumerate() {
         members.entry(*part).or_default().push(voxel);
@@ -68,8 +65,38 @@ pub(super) fn part(
     }
 }
 
+/// The points of each voxel, voxel by voxel.
+struct PointsOf {
+    /// Where those of each voxel end.
+    ends: Vec<u32>,
+    points: Vec<Point3<f64>>,
+}
+
+impl PointsOf {
+    fn new(voxels: &Voxels, points: &[Point3<f64>]) -> PointsOf {
+        let mut sum = 0;
+        let mut ends: Vec<u32> = Vec::with_capacity(voxels.len());
+        for count in &voxels.counts {
+            ends.push(sum);
+            sum += count;
+        }
+        let mut sorted = vec![Point3::origin(); points.len()];
+        for (point, &voxel) in points.iter().zip(&voxels.of_point) {
+            let at = &mut ends[voxel as usize];
+            sorted[*at as usize] = *point;
+            *at += 1;
+        }
+        PointsOf { ends, points: sorted }
+    }
+
+    fn voxel(&self, voxel: usize) -> &[Point3<f64>] {
+        let from = if voxel == 0 { 0 } else { self.ends[voxel - 1] };
+        &self.points[from as usize..self.ends[voxel] as usize]
+    }
+}
+
 /// True if the side of a part is that of a box: its normals stand at right angles, and a rectangle fits it.
-fn is_box(voxels: &Voxels, of: &[usize], points_of: &[Vec<Point3<f64>>]) -> bool {
+fn is_box(voxels: &Voxels, of: &[usize], points_of: &PointsOf) -> bool {
     let side: Vec<usize> = of.iter().copied().filter(|&v| is_side(voxels, v)).collect();
     let turned = side.iter().map(|&v| {
         let quarter = 4.0 * voxels.normals[v].y.atan2(voxels.normals[v].x);
@@ -79,7 +106,7 @@ fn is_box(voxels: &Voxels, of: &[usize], points_of: &[Vec<Point3<f64>>]) -> bool
     if square <= SQUARE {
         return false;
     }
-    let points: Vec<Point3<f64>> = side.iter().flat_map(|&v| points_of[v].iter().copied()).collect();
+    let points: Vec<Point3<f64>> = side.iter().flat_map(|&v| points_of.voxel(v).iter().copied()).collect();
     outline::fit(&points).is_some_and(|fit| fit.residual_m < BOX_M)
 }
 
@@ -150,15 +177,10 @@ fn is_apart(voxels: &Voxels, rest: &[usize], body: &[usize], axis: &Axis) -> boo
 }
 
 /// Whether the side of the voxels is that of an upright round body.
-fn is_round(
-    voxels: &Voxels,
-    body: &[usize],
-    points_of: &[Vec<Point3<f64>>],
-    viewpoints: &[Point3<f64>],
-) -> bool {
+fn is_round(voxels: &Voxels, body: &[usize], points_of: &PointsOf, viewpoints: &[Point3<f64>]) -> bool {
     // A face on top would speak against a box as well as against a cup.
     let side = body.iter().filter(|&&v| is_side(voxels, v));
-    let points: Vec<Point3<f64>> = side.flat_map(|&v| points_of[v].iter().copied()).collect();
+    let points: Vec<Point3<f64>> = side.flat_map(|&v| points_of.voxel(v).iter().copied()).collect();
     let heights = points.iter().map(|p| p.z).fold((f64::INFINITY, 0.0_f64), |(l, h), z| (l.min(z), h.max(z)));
     round_body(&points, heights.0, heights.1, viewpoints).is_some()
 }

@@ -15,6 +15,10 @@ const LEVEL_M: f64 = 0.015;
 const WIDEST_M: f64 = 0.14;
 /// Share of the points of both that lie on the common round body.
 const ON_BODY: f64 = 0.85;
+/// Share of the side of each of two parts that must lie on its own round body for both to be images of one.
+const ON_MOST: f64 = 0.55;
+/// Bodies are in one place if their axes are nearer than this share of the smaller radius.
+const ONE_PLACE: f64 = 0.5;
 /// The smaller part has at least this share of the points.
 const LEAST_SHARE: f64 = 0.08;
 
@@ -26,7 +30,7 @@ struct Candidate {
     top_m: f64,
     /// Seen from above.
     hull: OnceCell<Vec<[f64; 2]>>,
-    body: OnceCell<Option<Round>>,
+    fitted: OnceCell<Option<Fitted>>,
 }
 
 impl Candidate {
@@ -35,13 +39,12 @@ impl Candidate {
         let (low, high) =
             segment.points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
         let top_m = top_m(&segment);
-        Candidate { segment, low, high, top_m, hull: OnceCell::new(), body: OnceCell::new() }
+        Candidate { segment, low, high, top_m, hull: OnceCell::new(), fitted: OnceCell::new() }
     }
 
-    /// The round body that nearly all of its side lies on, if it is one.
-    fn body(&self, viewpoints: &[Point3<f64>]) -> Option<&Round> {
-        self.body
-            .get_or_init(|| round_body(&self.segment.points, self.low.z, self.top_m, viewpoints))
+    fn fitted(&self, viewpoints: &[Point3<f64>]) -> Option<&Fitted> {
+        self.fitted
+            .get_or_init(|| Fitted::to(&self.segment.points, self.low.z, self.top_m, viewpoints))
             .as_ref()
     }
 
@@ -83,11 +86,16 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
         return false;
     }
     let inside = small.top_m < large.top_m + 0.005 && footprint_inside(large, small);
-    if inside && large.body(viewpoints).is_some() {
+    if inside && large.fitted(viewpoints).is_some_and(Fitted::is_tight) {
         return true;
     }
     if (large.top_m - small.top_m).abs() > LEVEL_M || (m as f64) < LEAST_SHARE * n as f64 {
         return false;
+    }
+    if let (Some(a), Some(b)) = (large.fitted(viewpoints), small.fitted(viewpoints))
+        && a.stands_in(b)
+    {
+        return true;
     }
     let both = union(&large.segment, &small.segment);
     let top = large.top_m.max(small.top_m);
@@ -104,14 +112,46 @@ pub(super) fn round_body(
     top_m: f64,
     viewpoints: &[Point3<f64>],
 ) -> Option<Round> {
-    let first = points.first()?;
-    let near = viewpoints.iter().map(|v| (first - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
-    let sigma_m = range_sigma_m(near).min(0.012);
-    let body = round::fit(points, low_m, top_m, sigma_m, 3)?;
-    let box_residual = outline::fit(points)?.residual_m;
-    // Judged by what lies on it: a handle does not.
-    let tight = body.residual_m < 2.0 * sigma_m + 0.0015 && body.residual_m < 0.6 * box_residual;
-    (tight && body.radius_m < WIDEST_M && body.inliers >= ON_BODY).then_some(body)
+    Fitted::to(points, low_m, top_m, viewpoints).filter(Fitted::is_tight).map(|f| f.body)
+}
+
+/// The round body that comes nearest to a part, however badly.
+struct Fitted {
+    body: Round,
+    /// How far the part is from a box, metres.
+    box_residual_m: f64,
+    /// Spread of one measurement, metres.
+    sigma_m: f64,
+}
+
+impl Fitted {
+    fn to(points: &[Point3<f64>], low_m: f64, top_m: f64, viewpoints: &[Point3<f64>]) -> Option<Fitted> {
+        let first = points.first()?;
+        let near = viewpoints.iter().map(|v| (first - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
+        let sigma_m = range_sigma_m(near).min(0.012);
+        let body = round::fit(points, low_m, top_m, sigma_m, 3)?;
+        let box_residual_m = outline::fit(points)?.residual_m;
+        (body.radius_m < WIDEST_M).then_some(Fitted { body, box_residual_m, sigma_m })
+    }
+
+    /// Judged by what lies on it: a handle does not.
+    fn is_tight(&self) -> bool {
+        let residual_m = self.body.residual_m;
+        residual_m < 2.0 * self.sigma_m + 0.0015
+            && residual_m < 0.6 * self.box_residual_m
+            && self.body.inliers >= ON_BODY
+    }
+
+    /// Whether two parts are images of one body in views that lie a little beside each other: two bodies cannot stand in one place.
+    fn stands_in(&self, other: &Fitted) -> bool {
+        let is_round = |f: &Fitted| {
+            f.body.inliers >= ON_MOST
+                && f.body.residual_m < 0.8 * f.box_residual_m
+                && f.body.place_sigma_m < ONE_PLACE * f.body.radius_m
+        };
+        let apart_m = (self.body.x - other.body.x).hypot(self.body.y - other.body.y);
+        is_round(self) && is_round(other) && apart_m < ONE_PLACE * self.body.radius_m.min(other.body.radius_m)
+    }
 }
 
 fn share_on(body: &Round, part: &Segment) -> f64 {

@@ -72,6 +72,12 @@ fn one_thing_from_one_view() {
             0.0,
             0.05,
         ),
+        (
+            "the far side of such a cup and nothing before it",
+            Thing::Sherd { x: 0.05, y: 0.02, radius: 0.035, height: 0.104, towards_rad: 2.8, half_rad: 0.9 },
+            0.0,
+            0.1,
+        ),
     ];
     for (name, thing, least, most) in cases {
         let found = percepts(&[thing], 0.0, &Descry::default());
@@ -101,6 +107,29 @@ fn neighbours_two_centimetres_apart_are_two() {
     let beside = Thing::Cup { x: 0.05, y: 0.02 + 0.09, radius: 0.035, height: 0.104, handle_rad: None };
     for angle in [0.0, 0.8, 2.5] {
         assert_eq!(percepts(&[CUP, beside], angle, &Descry::default()).len(), 2, "from {angle}");
+    }
+}
+
+#[test]
+fn views_that_lie_beside_each_other_show_one_thing_with_its_handle() {
+    let mug = Thing::Cup { x: 0.0, y: 0.0, radius: 0.04, height: 0.1, handle_rad: Some(1.4) };
+    for off_m in [[0.010, 0.0], [-0.010, 0.0], [0.0, 0.010], [-0.014, 0.0], [0.0, 0.014], [0.0, -0.014]] {
+        let mut draws = Draws(3);
+        let views: Vec<View> = [(0.4, [0.0; 2]), (2.4, [0.0; 2]), (-2.0, off_m)]
+            .map(|(angle, [x, y])| {
+                let pose = on_ring(angle, 1.0, 1.3);
+                let mut stated = pose;
+                stated.translation.vector += Vector3::new(x, y, 0.0);
+                look(&[mug], &pose, &stated, &mut draws)
+            })
+            .into();
+        let clouds = views.iter().map(|v| v.cloud.transformed(&v.world_from_camera));
+        let cloud = Cloud::from_points(clouds.flat_map(|c| c.points).collect());
+        let seen = Visibility::from_views(&views);
+        let scene = segment(&cloud, &seen, &options()).expect("there is a table");
+        let found = Descry::default().recognise(&scene, &seen, &[cup_a()]);
+        let said: Vec<_> = found.iter().map(|p| (p.size_m, p.evidence.handle)).collect();
+        assert!(matches!(said[..], [(_, Sighting::Seen)]), "the last view {off_m:?} m off: {said:?}");
     }
 }
 

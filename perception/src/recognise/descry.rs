@@ -317,13 +317,16 @@ fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
     }
 }
 
-/// How well the side keeps to the form, against the form it keeps to best. `None` is a form that is neither round nor a box.
+/// How well the side keeps to the form, against the form it keeps to best, and whether it is there at all. `None` is a form that is
+/// neither round nor a box.
 fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     /// However many points: what the forms leave out (rounded boxes, bulging cups) bounds what they tell.
     const LEAST: f64 = -12.0;
     let all = [Some(Shape::Round), Some(Shape::Box), None].map(|s| raw_form_log(s, m));
     let best = all.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    (raw_form_log(shape, m) - best).max(LEAST)
+    // However round what is there: a camera that looked through the rest of the side says that it is not.
+    let through = if shape == Some(Shape::Round) { -60.0 * (m.looked_through - 0.15).max(0.0) } else { 0.0 };
+    (raw_form_log(shape, m) - best).max(LEAST) + through
 }
 
 fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
@@ -339,9 +342,7 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
         Some(Shape::Box) => m.rectangle.map_or(NONE_M, |r| r.residual_m),
         None => IRREGULAR_M,
     };
-    // A camera that looked through the side says that there is none.
-    let through = if shape == Some(Shape::Round) { -25.0 * (m.looked_through - 0.08).max(0.0) } else { 0.0 };
-    -m.independent * miss.hypot(floor).ln() + through
+    -m.independent * miss.hypot(floor).ln()
 }
 
 fn top_log(top: Top, m: &Measured) -> f64 {

@@ -14,6 +14,10 @@ const SECTORS: usize = 36;
 const HANDLE_REACHES_M: [f64; 3] = [0.010, 0.018, 0.026];
 /// Heights at which it has, as shares of the body's height.
 const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
+/// Heights at which a camera that looks through the side is asked for, as shares of the body's height, and at how many it must: the
+/// foot of a far side is often hidden by the near one.
+const SIDE_HEIGHTS: [f64; 4] = [0.35, 0.5, 0.65, 0.8];
+const THROUGH: usize = 3;
 /// Least and greatest reach of a handle out of the body, metres.
 const HANDLE_M: (f64, f64) = (0.014, 0.06);
 /// A handle reaches out by at least so many spreads of the body's side.
@@ -24,6 +28,8 @@ const VAGUE_M: f64 = 0.015;
 const CLEAR_M: f64 = 0.007;
 /// Greatest width of a handle across, metres.
 const HANDLE_WIDTH_M: f64 = 0.035;
+/// Share of its reach up to which what sticks out may be the body's own blurred side.
+const ROOT: f64 = 0.35;
 /// What is left of the error of a height however good the camera, metres.
 const HEIGHT_M: f64 = 0.002;
 /// How far the top of a sliver may be from that of the object, metres.
@@ -281,7 +287,8 @@ impl Sectors {
             };
             // Free, or another thing's surface: either way the body's own side is not there.
             sectors.looked_through[i] = !sectors.measured[i]
-                && [0.35, 0.5, 0.65].iter().all(|&share| look(-0.004, share) >= Seen::Surface);
+                && SIDE_HEIGHTS.iter().filter(|&&share| look(-0.004, share) >= Seen::Surface).count()
+                    >= THROUGH;
             let free = HANDLE_REACHES_M
                 .iter()
                 .flat_map(|&reach| HANDLE_HEIGHTS.map(|share| look(reach, share)))
@@ -363,15 +370,17 @@ impl Protrusion {
         if local.len() < 3 {
             return None;
         }
-        let mut reaches: Vec<f64> =
-            local.iter().map(|&(along, across, z)| along.hypot(across) - round.radius_at(z)).collect();
-        let mut across: Vec<f64> = local.iter().map(|l| l.1).collect();
-        let mut heights: Vec<f64> = local.iter().map(|l| l.2).collect();
+        let reach_of = |&(along, across, z): &(f64, f64, f64)| along.hypot(across) - round.radius_at(z);
+        let mut reaches: Vec<f64> = local.iter().map(reach_of).collect();
+        let reach_m = crate::segment::quantile(&mut reaches, 0.95);
+        // What hardly leaves the body is its blurred side, beside the handle or not.
+        let (mut across, mut heights): (Vec<f64>, Vec<f64>) =
+            local.iter().filter(|l| reach_of(l) > ROOT * reach_m).map(|l| (l.1, l.2)).unzip();
         let ends = |v: &mut Vec<f64>| (crate::segment::quantile(v, 0.1), crate::segment::quantile(v, 0.9));
         let (left, right) = ends(&mut across);
         let (low, high) = ends(&mut heights);
         Some(Protrusion {
-            reach_m: crate::segment::quantile(&mut reaches, 0.95),
+            reach_m,
             direction: (sin, cos),
             width_m: right - left,
             points: local.len(),

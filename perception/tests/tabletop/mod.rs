@@ -18,6 +18,8 @@ pub enum Thing {
     Cup { x: f64, y: f64, radius: f64, height: f64, handle_rad: Option<f64> },
     /// Closed round body.
     Tin { x: f64, y: f64, radius: f64, height: f64 },
+    /// What is left of a round side: so far to both sides of a direction.
+    Sherd { x: f64, y: f64, radius: f64, height: f64, towards_rad: f64, half_rad: f64 },
     /// Half sides along its own axes, turned.
     Block { x: f64, y: f64, half: [f64; 2], height: f64, turn_rad: f64 },
 }
@@ -116,6 +118,14 @@ fn nearest(things: &[Thing], eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f6
             Thing::Tin { x, y, radius, height } => {
                 tube(eye, ray, x, y, radius, height).for_each(&mut offer);
                 disc(eye, ray, x, y, radius, TABLE_M + height).for_each(&mut offer);
+            }
+            Thing::Sherd { x, y, radius, height, towards_rad, half_rad } => {
+                let is_left = |t: &f64| {
+                    let p = eye + ray * *t;
+                    let (sin, cos) = towards_rad.sin_cos();
+                    (p.x - x) * cos + (p.y - y) * sin > radius * half_rad.cos()
+                };
+                tube(eye, ray, x, y, radius, height).filter(is_left).for_each(&mut offer);
             }
             Thing::Block { x, y, half, height, turn_rad } => {
                 let low = Point3::new(-half[0], -half[1], TABLE_M);

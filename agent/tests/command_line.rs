@@ -320,7 +320,7 @@ fn everything_on_a_real_table_is_identified_where_it_stands() {
     let Some(folder) = shared("data/kitchen") else { return };
     let robot = format!("recorded:{}", folder.display());
     let goal = "identify all objects on the table";
-    let (out, _) = check(&["do", goal, "--robot", &robot, "--policy", "sweep", "--json"], 1, &[]);
+    let (out, _) = check(&["do", goal, "--robot", &robot, "--json"], 1, &[]);
     let said: Value = serde_json::from_str(&out).expect("the output is JSON");
     let text = std::fs::read_to_string(folder.join("objects.json")).expect("readable");
     let known: Value = serde_json::from_str(&text).expect("it is JSON");

@@ -71,7 +71,7 @@ fn gap(a: &Thing, b: &Thing) -> f64 {
         Thing::Cup { x, y, radius, handle_rad, .. } => {
             (x, y, radius + if handle_rad.is_some() { 0.03 } else { 0.0 })
         }
-        Thing::Tin { x, y, radius, .. } => (x, y, radius),
+        Thing::Tin { x, y, radius, .. } | Thing::Sherd { x, y, radius, .. } => (x, y, radius),
         Thing::Block { x, y, half, .. } => (x, y, half[0].hypot(half[1])),
     };
     let ((ax, ay, ar), (bx, by, br)) = (round(a), round(b));
@@ -170,7 +170,10 @@ fn judge(merged: &Merged, recogniser: &dyn Recogniser) -> Result<Vec<Percept>, S
 
 fn score(things: &[Known], percepts: &[Percept], tally: &mut Tally, seed: Option<u64>) {
     let place = |t: &Thing| match *t {
-        Thing::Cup { x, y, .. } | Thing::Tin { x, y, .. } | Thing::Block { x, y, .. } => (x, y),
+        Thing::Cup { x, y, .. }
+        | Thing::Tin { x, y, .. }
+        | Thing::Sherd { x, y, .. }
+        | Thing::Block { x, y, .. } => (x, y),
     };
     tally.cups += things.iter().filter(|t| t.1.is_some()).count();
     let mut found = vec![false; things.len()];

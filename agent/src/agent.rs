@@ -87,8 +87,10 @@ pub struct Totals {
     pub plans: usize,
     /// Driven, metres.
     pub distance_m: f64,
-    /// Longest time that one planning call took, seconds.
+    /// Longest time that one planning call took, what it asked of geometry apart, seconds.
     pub planning_s: f64,
+    /// Longest time that the attachments of one planning call took, seconds.
+    pub geometry_s: f64,
 }
 
 /// How a run ended, and why.
@@ -234,7 +236,10 @@ impl<'a> Agent<'a> {
         let planned = descry_planner::plan(&round.task, &round.attachments, &options, &|| false, &mut |_| {})
             .map_err(ground::planning_failed)?;
         let took_s = started.elapsed().as_secs_f64();
-        self.state.totals.planning_s = self.state.totals.planning_s.max(took_s);
+        let geometry_s = planned.statistics().attachments.values().map(|asked| asked.time_s).sum();
+        let totals = &mut self.state.totals;
+        totals.planning_s = totals.planning_s.max(took_s - geometry_s);
+        totals.geometry_s = totals.geometry_s.max(geometry_s);
         match planned {
             Planned::Unsolvable { why, .. } => return Ok(Some(why.to_string())),
             Planned::Solved { plan, statistics } => self.adopt(plan, &statistics, because)?,

@@ -200,9 +200,12 @@ pub struct Report {
     pub sim_time_s: f64,
     /// On the wall.
     pub wall_s: f64,
-    /// The longest that one planning call took, geometry included. Not in the JSON: it differs from run to run.
+    /// The longest that one planning call took, what it asked of geometry apart. Not in the JSON: it differs from run to run.
     #[serde(skip)]
     pub planning_s: f64,
+    /// The longest that one planning call waited for geometry. Not in the JSON either.
+    #[serde(skip)]
+    pub geometry_s: f64,
     /// The run's folder.
     pub run: String,
 }
@@ -229,6 +232,7 @@ impl Report {
             sim_time_s: 0.0,
             wall_s: 0.0,
             planning_s: 0.0,
+            geometry_s: 0.0,
             run,
         }
     }
@@ -257,8 +261,14 @@ impl fmt::Display for Report {
         }
         writeln!(
             f,
-            "  {} views, {} replans, {:.1} m and {:.0} s on the body's clock, {:.1} s on the wall, at most {:.3} s for a plan",
-            self.views, self.replans, self.distance_m, self.sim_time_s, self.wall_s, self.planning_s
+            "  {} views, {} replans, {:.1} m and {:.0} s on the body's clock, {:.1} s on the wall, at most {:.3} s to plan and {:.3} s for its questions to geometry",
+            self.views,
+            self.replans,
+            self.distance_m,
+            self.sim_time_s,
+            self.wall_s,
+            self.planning_s,
+            self.geometry_s
         )?;
         write!(f, "  record: {}", self.run)
     }

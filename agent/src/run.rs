@@ -238,6 +238,7 @@ fn fill(report: &mut Report, conclusion: &Conclusion) {
     report.replans = conclusion.totals.plans.saturating_sub(1);
     report.distance_m = conclusion.totals.distance_m;
     report.planning_s = conclusion.totals.planning_s;
+    report.geometry_s = conclusion.totals.geometry_s;
     let tracks = &conclusion.belief.tracks;
     let middle = |t: &Track| (t.position_m + conclusion.up * (t.size_m[2] / 2.0)).coords.into();
     report.objects = tracks

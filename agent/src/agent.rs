@@ -26,7 +26,7 @@ mod ground;
 pub mod look;
 
 /// A planning call ends after so many evaluated states; then the best plan so far, or one good look, has to do.
-const MOST_EVALUATED: u64 = 20_000;
+const MOST_EVALUATED: u64 = 2_500;
 
 /// An agent at work on one goal.
 pub struct Agent<'a> {

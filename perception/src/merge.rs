@@ -152,6 +152,8 @@ pub enum MergeError {
 
 /// First alignment: everything, from far to near (the table weighs most; paper step 3).
 const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 200, rest_weight: 1.0 };
+/// The same where a view was left out: localisation may have been worse than it said, or what is seen far off.
+const WIDE: Round = Round { from_m: 0.3, passes: 12, asked: 300, ..FIRST };
 /// Second alignment: planes and what is far weigh little, the objects decide (paper step 4).
 const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 300, rest_weight: 0.2 };
 /// After a view was left out, the rest settles again.
@@ -166,18 +168,17 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
     let mut steps = Vec::new();
 
     let prepared = filter_and_thin(views, options, &mut steps)?;
-    let mut poses: Vec<Isometry3<f64>> = views.iter().map(|v| v.world_from_camera).collect();
-    let mut whys: Vec<Option<String>> = prepared
-        .iter()
-        .map(|p| p.points.is_empty().then(|| "it has no usable point in range".to_owned()))
-        .collect();
-    let mut used: Vec<bool> = whys.iter().map(Option::is_none).collect();
-
-    align_everything(&prepared, &used, &mut poses, &mut steps);
-    let (parts, up) = parts::find(&prepared, &used, &poses, options.up, &mut steps);
     let maps: Vec<Option<DepthMap>> =
         views.par_iter().map(|v| DepthMap::from_view(v, &v.world_from_camera)).collect();
-    let found = align_objects(&prepared, &mut used, &mut whys, &parts, up, &mut poses, &maps, &mut steps);
+    let mut aligned = align(&prepared, &maps, options.up, &FIRST);
+    if aligned.left_out() > 0 {
+        let wide = align(&prepared, &maps, options.up, &WIDE);
+        if wide.left_out() < aligned.left_out() {
+            aligned = wide;
+        }
+    }
+    let Aligned { poses, used, mut whys, found, steps: alignments } = aligned;
+    steps.extend(alignments);
     let seen = visibility(maps, &used, &poses);
     let fused = fuse::fuse(views, &used, &poses, &seen, options);
     steps.push(Step {
@@ -189,6 +190,42 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
     let fits =
         (0..views.len()).map(|i| fit(&prepared[i], &poses[i], &found[i], used[i], whys[i].take())).collect();
     Ok(Merged { cloud: fused.cloud, views_per_point: fused.views_per_point, visibility: seen, fits, steps })
+}
+
+/// The views brought together: steps 3 and 4.
+struct Aligned {
+    poses: Vec<Isometry3<f64>>,
+    used: Vec<bool>,
+    /// Why a view is not used.
+    whys: Vec<Option<String>>,
+    found: Vec<Found>,
+    steps: Vec<Step>,
+}
+
+impl Aligned {
+    fn left_out(&self) -> usize {
+        self.used.iter().filter(|used| !**used).count()
+    }
+}
+
+/// Steps 3 and 4 from the stated poses.
+fn align(
+    prepared: &[Prepared],
+    maps: &[Option<DepthMap>],
+    up: Option<Unit<Vector3<f64>>>,
+    first: &Round,
+) -> Aligned {
+    let mut steps = Vec::new();
+    let mut poses: Vec<Isometry3<f64>> = prepared.iter().map(|p| p.prior).collect();
+    let mut whys: Vec<Option<String>> = prepared
+        .iter()
+        .map(|p| p.points.is_empty().then(|| "it has no usable point in range".to_owned()))
+        .collect();
+    let mut used: Vec<bool> = whys.iter().map(Option::is_none).collect();
+    align_everything(prepared, &used, &mut poses, first, &mut steps);
+    let (parts, up) = parts::find(prepared, &used, &poses, up, &mut steps);
+    let found = align_objects(prepared, &mut used, &mut whys, &parts, up, &mut poses, maps, &mut steps);
+    Aligned { poses, used, whys, found, steps }
 }
 
 fn check(views: &[View], options: &MergeOptions) -> Result<(), MergeError> {
@@ -239,10 +276,11 @@ fn align_everything(
     prepared: &[Prepared],
     used: &[bool],
     poses: &mut [Isometry3<f64>],
+    first: &Round,
     steps: &mut Vec<Step>,
 ) {
     let all: Vec<Vec<Part>> = prepared.iter().map(|p| vec![Part::Standing; p.points.len()]).collect();
-    let found = joint::align(prepared, used, &all, poses, &FIRST);
+    let found = joint::align(prepared, used, &all, poses, first);
     steps.push(aligned("first alignment", &found));
 }
 

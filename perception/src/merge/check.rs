@@ -3,13 +3,16 @@
 use super::joint::Found;
 use super::parts::Part;
 use super::prepare::Prepared;
+use crate::surface::range_sigma_m;
 use crate::visibility::{DepthMap, Seen};
 use nalgebra::Isometry3;
 
 /// Fewest matched points for a view to count as overlapping.
 const FEWEST_MATCHED: usize = 80;
-/// How far a surface may lie from where another camera looked through before it contradicts, metres.
+/// How far a surface may lie from where another camera looked through before it contradicts, metres ...
 const CLEAR_M: f64 = 0.03;
+/// ... and in spreads of both measurements: far off, depth is vague.
+const CLEAR_SPREADS: f64 = 5.0;
 /// Share of points that another camera looked through from which a view counts as wrongly placed.
 const MOST_CONTRADICTED: f64 = 0.22;
 
@@ -90,7 +93,9 @@ fn contradiction(
     let stride = (standing.len() / ASKED).max(1);
     let (mut judged, mut through) = (0_u32, 0_u32);
     for &k in standing.iter().step_by(stride) {
-        match map.look_from(&(map_from_view * view.points[k]), CLEAR_M) {
+        let place = map_from_view * view.points[k];
+        let sigma_m = range_sigma_m(place.coords.norm()).hypot(view.sigmas_m[k]);
+        match map.look_from(&place, CLEAR_M.max(CLEAR_SPREADS * sigma_m)) {
             Seen::Free => (judged, through) = (judged + 1, through + 1),
             Seen::Surface => judged += 1,
             Seen::Hidden | Seen::Never => {}

@@ -1,8 +1,9 @@
-//! Five real views of a room, their poses disturbed by 5 cm and 3 degrees, brought back pair by pair.
+//! Five real views of a room, their poses disturbed by 5 cm and 3 degrees, brought back pair by pair and all together.
 
+use descry_perception::merge::{MergeOptions, Merged, merge};
 use descry_perception::nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use descry_perception::register::{Fit, Method, Prepared, RegisterOptions, align};
-use descry_perception::{Intrinsics, files, voxel};
+use descry_perception::{Intrinsics, View, files, voxel};
 use std::path::PathBuf;
 
 fn folder() -> Option<PathBuf> {
@@ -10,8 +11,8 @@ fn folder() -> Option<PathBuf> {
     folder.is_dir().then_some(folder)
 }
 
-/// Every view, voxelled at 2 cm, with its recorded pose.
-fn views(folder: &std::path::Path) -> Vec<(Prepared, Isometry3<f64>)> {
+/// Every view at its recorded pose.
+fn views(folder: &std::path::Path) -> Vec<View> {
     let camera = Intrinsics { width: 640, height: 480, fx: 518.0, fy: 519.0, cx: 325.5, cy: 253.5 };
     let poses = std::fs::read_to_string(folder.join("pose.txt")).unwrap();
     let pose = |line: &str| {
@@ -22,11 +23,22 @@ fn views(folder: &std::path::Path) -> Vec<(Prepared, Isometry3<f64>)> {
     let load = |(i, line): (usize, &str)| {
         let bytes = std::fs::read(folder.join(format!("depth/{}.pgm", i + 1))).unwrap();
         let depth = files::depth::read(&bytes, 0.001).unwrap();
-        let near = camera.cloud_from_depth(&depth.depths_m).unwrap().filter(|p| p.z < 4.0);
-        let small = voxel::downsample(&near, 0.02).unwrap();
-        (Prepared::with_normals(&small.points, 20).unwrap(), pose(line))
+        View {
+            stamp_ns: 0,
+            cloud: camera.cloud_from_depth(&depth.depths_m).unwrap(),
+            intrinsics: Some(camera),
+            world_from_camera: pose(line),
+            pose_sigma_m: 0.03,
+            pose_sigma_rad: 0.03,
+        }
     };
     poses.lines().filter(|l| !l.trim().is_empty()).enumerate().map(load).collect()
+}
+
+/// What is nearer than 4 m, voxelled at 2 cm.
+fn prepared(view: &View) -> Prepared {
+    let small = voxel::downsample(&view.cloud.filter(|p| p.z < 4.0), 0.02).unwrap();
+    Prepared::with_normals(&small.points, 20).unwrap()
 }
 
 /// 5 cm and 3 degrees in directions that the number picks.
@@ -68,9 +80,10 @@ fn disturbed_poses_come_back() {
     };
     let views = views(&folder);
     assert_eq!(views.len(), 5);
+    let clouds: Vec<Prepared> = views.iter().map(prepared).collect();
     for i in 1..views.len() {
-        let ((target, world_from_target), (source, world_from_source)) = (&views[i - 1], &views[i]);
-        let recorded = world_from_target.inverse() * world_from_source;
+        let (target, source) = (&clouds[i - 1], &clouds[i]);
+        let recorded = views[i - 1].world_from_camera.inv_mul(&views[i].world_from_camera);
         // The recorded poses are good to about a centimetre themselves: what counts is where registration leads from there.
         let best = refine(source, target, recorded).target_from_source;
         let start = recorded * disturbance(i);
@@ -88,5 +101,35 @@ fn disturbed_poses_come_back() {
             fit.ending
         );
         assert!(before_mm > 40.0 && after_mm < 5.0 && recorded_mm < 60.0);
+    }
+}
+
+#[test]
+fn disturbed_poses_come_back_together() {
+    let Some(folder) = folder() else {
+        println!("skipped: no ../shared/data/dining_room beside the workspace");
+        return;
+    };
+    let views = views(&folder);
+    let from_first = |poses: &[Isometry3<f64>], i: usize| poses[0].inv_mul(&poses[i]);
+    let merged_poses = |m: &Merged| m.fits.iter().map(|f| f.world_from_camera).collect::<Vec<_>>();
+    let best = merged_poses(&merge(&views, &MergeOptions::default()).unwrap());
+    for draw in 0..3 {
+        let mut off = views.clone();
+        off.iter_mut()
+            .enumerate()
+            .skip(1)
+            .for_each(|(i, view)| view.world_from_camera *= disturbance(i + 7 * draw));
+        let merged = merge(&off, &MergeOptions::default()).unwrap();
+        let before: Vec<_> = off.iter().map(|v| v.world_from_camera).collect();
+        let after = merged_poses(&merged);
+        for i in 1..views.len() {
+            let near = views[i].cloud.filter(|p| p.z < 3.5).points;
+            let apart_mm = |poses| 1e3 * apart_m(&near, &from_first(poses, i), &from_first(&best, i));
+            let (before_mm, after_mm) = (apart_mm(&before), apart_mm(&after));
+            println!("draw {draw}, view {}: {before_mm:.0} mm before, {after_mm:.1} mm after", i + 1);
+            assert!(merged.fits[i].used, "draw {draw}, view {}: {}", i + 1, merged.fits[i].why);
+            assert!(before_mm > 70.0 && after_mm < 30.0);
+        }
     }
 }

@@ -2,11 +2,15 @@
 
 use descry_perception::cluster::{self, ClusterError};
 use descry_perception::cylinder::{self, CylinderError, CylinderOptions};
-use descry_perception::nalgebra::{Point3, Unit, Vector3};
+use descry_perception::merge::{MergeOptions, merge};
+use descry_perception::nalgebra::{Isometry3, Point3, Unit, Vector3};
 use descry_perception::normals::{self, OrganisedOptions};
 use descry_perception::plane::{self, PlaneError, PlaneOptions};
+use descry_perception::recognise::Published;
+use descry_perception::segment::{SceneOptions, segment};
+use descry_perception::surface::SurfaceOptions;
 use descry_perception::voxel::{self, VoxelError};
-use descry_perception::{Cloud, Grid, Hull, Neighbours, outliers};
+use descry_perception::{Cloud, Grid, Hull, Neighbours, Recogniser, View, outliers};
 
 const NAN: Point3<f32> = Point3::new(f32::NAN, f32::NAN, f32::NAN);
 
@@ -234,7 +238,7 @@ fn organised_normals_keep_apart_what_is_apart() {
 fn ten_million_points() {
     let points: Vec<Point3<f32>> = (0..10_000_000u32)
         .map(|i| {
-            Point3::new((i % 4000) as f32 * 0.001, (i / 4000) as f32 * 0.001, ((i * 7) % 13) as f32 * 0.0005)
+            Point3::new((i % 4000) as f32 * 0.001, (i / 4000) as f32 * 0.001, ((i * 7) % 13) as f32 * 0.00005)
         })
         .collect();
     let cloud = Cloud::from_points(points);
@@ -245,4 +249,41 @@ fn ten_million_points() {
     let found = normals::estimate(&tree, 20, &Point3::new(0.0, 0.0, 1.0));
     assert!(found.normals.iter().filter(|n| n.z > 0.5).count() > 9_000_000);
     assert_eq!(cluster::euclidean(&cloud.points, 0.02, 30).unwrap().len(), 1);
+    assert!(outliers::statistical(&tree, 20, 2.0).indices.len() > 9_000_000);
+}
+
+#[test]
+#[ignore = "ten million points take seconds"]
+fn ten_million_points_from_table_to_cup() {
+    // A table of 2.4 by 1.6 m, a cup with a floor, no grid; the camera stands 1 m beside and above.
+    let camera = Isometry3::translation(0.0, -1.0, 1.7);
+    let points: Vec<Point3<f32>> = (0..10_000_000u32)
+        .map(|i| {
+            let (turn, rise) = (i as f32 * 2.399_963, (i % 1013) as f32 / 1013.0);
+            match i % 10 {
+                0 => Point3::new(0.035 * turn.cos(), 0.035 * turn.sin(), 0.72 + 0.104 * rise),
+                1 if rise < 0.1 => Point3::new(0.34 * rise * turn.cos(), 0.34 * rise * turn.sin(), 0.724),
+                _ => {
+                    Point3::new((i % 2400) as f32 * 0.001 - 1.2, (i / 2400 % 1600) as f32 * 0.001 - 0.8, 0.72)
+                }
+            }
+        })
+        .map(|p| camera.cast::<f32>().inverse() * p)
+        .collect();
+    let view = View {
+        stamp_ns: 0,
+        cloud: Cloud::from_points(points),
+        intrinsics: None,
+        world_from_camera: camera,
+        pose_sigma_m: 0.0,
+        pose_sigma_rad: 0.0,
+    };
+    let up = Some(Unit::new_normalize(Vector3::z()));
+    let merged = merge(&[view], &MergeOptions { up, ..Default::default() }).unwrap();
+    let surface = SurfaceOptions { up, height_band_m: Some((0.6, 0.9)), ..Default::default() };
+    let options = SceneOptions { surface, ..Default::default() };
+    let scene = segment(&merged.cloud, &merged.visibility, &options).unwrap();
+    let found = Published::default().recognise(&scene, &merged.visibility, &[]);
+    assert_eq!(found.len(), 1);
+    assert!((found[0].size_m[2] - 0.104).abs() < 0.006, "{:?}", found[0].size_m);
 }

@@ -81,9 +81,10 @@ pub struct GoalPhrase {
 pub struct Thresholds {
     /// Ends a search.
     pub confidence: f64,
-    /// An object is given up when no more is left that it is there.
+    /// No look is worth it where no more than this could be settled.
     pub remaining: f64,
-    /// No more than this may hang on places that can be seen from nowhere, for an object to be called not there.
+    /// No more than this may hang on places that can be seen from nowhere, for an object to be called not there; and no more than both
+    /// on anything.
     pub out_of_sight: f64,
     /// That a sought object is there, before the first look.
     pub prior: f64,

@@ -231,7 +231,12 @@ pub(super) fn what_is_left(s: &Situation) -> Option<String> {
         let p = track.probability_of(&thing.name);
         return Some(format!("what stands at {} may be it ({p:.2})", place(&track.position_m)));
     }
-    out_of_sight(s, s.doubt_about(0), "it")
+    out_of_sight(s, s.doubt_about(0), "it").or_else(|| {
+        let (left, t) = (s.doubt_about(0).hidden, &s.thresholds);
+        (left > t.remaining + t.out_of_sight).then(|| {
+            format!("there is room for it where looks promised to settle that, and did not ({left:.2})")
+        })
+    })
 }
 
 /// Where there is room for something that no look can show; none if too little hangs on it.

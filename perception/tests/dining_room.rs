@@ -123,8 +123,8 @@ fn disturbed_poses_come_back_together() {
         let merged = merge(&off, &MergeOptions::default()).unwrap();
         let before: Vec<_> = off.iter().map(|v| v.world_from_camera).collect();
         let after = merged_poses(&merged);
-        for i in 1..views.len() {
-            let near = views[i].cloud.filter(|p| p.z < 3.5).points;
+        for (i, view) in views.iter().enumerate().skip(1) {
+            let near = view.cloud.filter(|p| p.z < 3.5).points;
             let apart_mm = |poses| 1e3 * apart_m(&near, &from_first(poses, i), &from_first(&best, i));
             let (before_mm, after_mm) = (apart_mm(&before), apart_mm(&after));
             println!("draw {draw}, view {}: {before_mm:.0} mm before, {after_mm:.1} mm after", i + 1);

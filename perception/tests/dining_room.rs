@@ -8,7 +8,11 @@ use std::path::PathBuf;
 
 fn folder() -> Option<PathBuf> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/dining_room");
-    folder.is_dir().then_some(folder)
+    if !folder.is_dir() {
+        println!("skipped: no ../shared/data/dining_room beside the workspace");
+        return None;
+    }
+    Some(folder)
 }
 
 /// Every view at its recorded pose.
@@ -74,10 +78,7 @@ fn refine(source: &Prepared, target: &Prepared, start: Isometry3<f64>) -> Fit {
 
 #[test]
 fn disturbed_poses_come_back() {
-    let Some(folder) = folder() else {
-        println!("skipped: no ../shared/data/dining_room beside the workspace");
-        return;
-    };
+    let Some(folder) = folder() else { return };
     let views = views(&folder);
     assert_eq!(views.len(), 5);
     let clouds: Vec<Prepared> = views.iter().map(prepared).collect();
@@ -106,10 +107,7 @@ fn disturbed_poses_come_back() {
 
 #[test]
 fn disturbed_poses_come_back_together() {
-    let Some(folder) = folder() else {
-        println!("skipped: no ../shared/data/dining_room beside the workspace");
-        return;
-    };
+    let Some(folder) = folder() else { return };
     let views = views(&folder);
     let from_first = |poses: &[Isometry3<f64>], i: usize| poses[0].inv_mul(&poses[i]);
     let merged_poses = |m: &Merged| m.fits.iter().map(|f| f.world_from_camera).collect::<Vec<_>>();

@@ -27,7 +27,7 @@ fn numbers(path: &Path) -> Result<Vec<f64>, String> {
     text.split_whitespace().map(|w| w.parse().map_err(|e| format!("{}: {e}", path.display()))).collect()
 }
 
-fn frames(dir: &Path) -> Result<Vec<(String, View)>, String> {
+pub fn frames(dir: &Path) -> Result<Vec<(String, View)>, String> {
     let k = numbers(&dir.join("camera-intrinsics.txt"))?;
     let mut names: Vec<String> = std::fs::read_dir(dir)
         .map_err(|e| format!("{}: {e}", dir.display()))?
@@ -65,7 +65,7 @@ fn frames(dir: &Path) -> Result<Vec<(String, View)>, String> {
 }
 
 /// Mugs of a real kitchen: with a handle, 9 to 11 cm high.
-fn mug() -> ObjectModel {
+pub fn mug() -> ObjectModel {
     ObjectModel {
         name: "mug".into(),
         kind: "mug".into(),
@@ -76,7 +76,7 @@ fn mug() -> ObjectModel {
 }
 
 /// What is known of the table and of what stands on it.
-struct Table {
+pub struct Table {
     up: Unit<Vector3<f64>>,
     /// Along `up`, metres.
     height: f64,
@@ -84,7 +84,7 @@ struct Table {
 }
 
 impl Table {
-    fn read(dir: &Path) -> Result<Table, String> {
+    pub fn read(dir: &Path) -> Result<Table, String> {
         let text = std::fs::read_to_string(dir.join("objects.json")).map_err(|e| e.to_string())?;
         let json: serde_json::Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
         let three = |v: &serde_json::Value| Vector3::from([0, 1, 2].map(|k| v[k].as_f64().unwrap_or(0.0)));
@@ -95,6 +95,12 @@ impl Table {
         };
         let objects = json["objects"].as_array().into_iter().flatten().map(reference).collect();
         Ok(Table { up, height: up.dot(&three(&json["table_point"])), objects })
+    }
+
+    /// A surface at the table's height, give or take a decimetre.
+    pub fn surface(&self) -> SurfaceOptions {
+        let height_band_m = Some((self.height - 0.1, self.height + 0.1));
+        SurfaceOptions { up: Some(self.up), height_band_m, ..SurfaceOptions::default() }
     }
 
     fn is_seen_by(&self, view: &View) -> bool {
@@ -160,12 +166,10 @@ fn score(
     recognisers: &[&dyn Recogniser],
     tallies: &mut [Tally],
 ) -> Result<(), String> {
-    let (up, height) = (Some(table.up), table.height);
-    let band = |below: f64, above: f64| Some((height - below, height + above));
-    let options = MergeOptions { up, height_band_m: band(0.3, 0.5), ..Default::default() };
+    let height_band_m = Some((table.height - 0.3, table.height + 0.5));
+    let options = MergeOptions { up: Some(table.up), height_band_m, ..Default::default() };
     let merged = merge(set, &options).map_err(|e| e.to_string())?;
-    let surface = SurfaceOptions { up, height_band_m: band(0.1, 0.1), ..Default::default() };
-    let scene_options = SceneOptions { surface, ..Default::default() };
+    let scene_options = SceneOptions { surface: table.surface(), ..Default::default() };
     let Ok(scene) = segment(&merged.cloud, &merged.visibility, &scene_options) else { return Ok(()) };
     for (recogniser, tally) in recognisers.iter().zip(tallies) {
         tally.left += merged.fits.iter().filter(|f| !f.used).count();

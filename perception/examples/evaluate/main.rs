@@ -1,11 +1,12 @@
-//! Segmentation, merging and recognition against what is known, as tables:
-//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | table COUNT [PICTURES]`.
+//! Segmentation, merging and recognition against what is known, and how long single views take, as tables:
+//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | table COUNT [PICTURES] | times REPETITIONS [made | DIR]...`.
 
 mod kitchen;
 mod mosd;
 mod table;
 #[path = "../../tests/tabletop/mod.rs"]
 mod tabletop;
+mod times;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -19,7 +20,14 @@ fn main() -> ExitCode {
             Ok(count) => table::run(count, out.first().map(Path::new)),
             Err(_) => Err(format!("`{count}` is no number of arrangements")),
         },
-        _ => Err("usage: evaluate mosd DIR | kitchen DIR | table COUNT [PICTURES]".to_owned()),
+        ["times", repetitions, views @ ..] => match repetitions.parse() {
+            Ok(repetitions) => times::run(repetitions, views),
+            Err(_) => Err(format!("`{repetitions}` is no number of repetitions")),
+        },
+        _ => Err(
+            "usage: evaluate mosd DIR | kitchen DIR | table COUNT [PICTURES] | times REPETITIONS [made | DIR]..."
+                .to_owned(),
+        ),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

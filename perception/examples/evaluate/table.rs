@@ -32,7 +32,7 @@ fn model(name: &str, kind: &str, diameter: f64, height: f64, top: Top, handle: H
 }
 
 /// The known objects of paper 004.
-fn models() -> Vec<ObjectModel> {
+pub fn models() -> Vec<ObjectModel> {
     vec![
         model("cup A", "cup", 0.070, 0.104, Top::Open, Handle::None),
         model("cup B", "cup", 0.088, 0.155, Top::Open, Handle::None),
@@ -155,13 +155,25 @@ fn options() -> MergeOptions {
     }
 }
 
-fn judge(merged: &Merged, recogniser: &dyn Recogniser) -> Result<Vec<Percept>, String> {
-    let surface = SurfaceOptions {
+/// One view of an arrangement.
+pub fn view(seed: u64) -> View {
+    let mut draws = Draws(seed);
+    let things: Vec<Thing> = arrangement(&mut draws).iter().map(|t| t.0).collect();
+    let pose = on_ring(std::f64::consts::TAU * draws.next(), 1.4, 1.4);
+    look(&things, &pose, &pose, &mut draws)
+}
+
+/// A level surface about as high as a table.
+pub fn surface() -> SurfaceOptions {
+    SurfaceOptions {
         up: Some(Unit::new_normalize(Vector3::z())),
         height_band_m: Some((0.5, 0.9)),
         ..SurfaceOptions::default()
-    };
-    let scene_options = SceneOptions { surface, ..SceneOptions::default() };
+    }
+}
+
+fn judge(merged: &Merged, recogniser: &dyn Recogniser) -> Result<Vec<Percept>, String> {
+    let scene_options = SceneOptions { surface: surface(), ..SceneOptions::default() };
     match segment(&merged.cloud, &merged.visibility, &scene_options) {
         Ok(scene) => Ok(recogniser.recognise(&scene, &merged.visibility, &models())),
         Err(_) => Ok(Vec::new()),

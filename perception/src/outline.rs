@@ -1,6 +1,6 @@
 //! The rectangle that best explains the outline of an object seen from above.
 
-use crate::segment::quantile;
+use crate::quantile::Ends;
 use nalgebra::Point3;
 
 /// An upright box in the surface's frame.
@@ -24,35 +24,18 @@ pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.len() < 8 {
         return None;
     }
-    let stride = (points.len() / 600).max(1);
-    let used: Vec<[f64; 2]> = points.iter().step_by(stride).map(|p| [p.x, p.y]).collect();
-    (0..TURNS)
-        .map(|i| turned(&used, std::f64::consts::FRAC_PI_2 * i as f64 / TURNS as f64))
-        .min_by(|a, b| a.residual_m.total_cmp(&b.residual_m))
-}
-
-fn turned(points: &[[f64; 2]], angle_rad: f64) -> Rectangle {
-    let (sin, cos) = angle_rad.sin_cos();
-    let mut us: Vec<f64> = points.iter().map(|p| cos * p[0] + sin * p[1]).collect();
-    let mut vs: Vec<f64> = points.iter().map(|p| -sin * p[0] + cos * p[1]).collect();
-    let pairs: Vec<(f64, f64)> = us.iter().copied().zip(vs.iter().copied()).collect();
-    let ends = |values: &mut Vec<f64>| (quantile(values, 0.02), quantile(values, 0.98));
-    let ((u0, u1), (v0, v1)) = (ends(&mut us), ends(&mut vs));
-    let squares: f64 = pairs
-        .iter()
-        .map(|&(u, v)| {
-            let edge = (u - u0).abs().min((u - u1).abs()).min((v - v0).abs()).min((v - v1).abs());
-            edge * edge
-        })
-        .sum();
-    let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
-    let (a, b) = (u1 - u0, v1 - v0);
-    Rectangle {
-        x: cos * u - sin * v,
-        y: sin * u + cos * v,
-        sides_m: [a.max(b), a.min(b)],
-        residual_m: (squares / pairs.len() as f64).sqrt(),
+    let mut turner = Turner::of(points);
+    let mut best: Option<(f64, Rectangle)> = None;
+    for turn in 0..TURNS {
+        let turned = turner.turned(turn);
+        let bound = best.map_or(f64::INFINITY, |(squares, _)| squares);
+        let Some(squares) = turner.squares_within(&turned, bound) else { continue };
+        let residual_m = (squares / turner.us.len() as f64).sqrt();
+        if best.is_none_or(|(_, rectangle)| residual_m < rectangle.residual_m) {
+            best = Some((squares, turned.rectangle(residual_m)));
+        }
     }
+    best.map(|(_, rectangle)| rectangle)
 }
 
 /// Sides of the rectangle of least area around nearly all points (longer, shorter), and its middle.
@@ -60,12 +43,80 @@ pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<([f64; 2], [f64; 2])> {
     if points.is_empty() {
         return None;
     }
-    let stride = (points.len() / 600).max(1);
-    let used: Vec<[f64; 2]> = points.iter().step_by(stride).map(|p| [p.x, p.y]).collect();
+    let mut turner = Turner::of(points);
     let least = (0..TURNS)
-        .map(|i| turned(&used, std::f64::consts::FRAC_PI_2 * i as f64 / TURNS as f64))
+        .map(|turn| turner.turned(turn).rectangle(0.0))
         .min_by(|a, b| (a.sides_m[0] * a.sides_m[1]).total_cmp(&(b.sides_m[0] * b.sides_m[1])))?;
     Some((least.sides_m, [least.x, least.y]))
+}
+
+/// Points seen from above, and their coordinates along the sides of the rectangle that was turned last.
+struct Turner {
+    points: Vec<[f64; 2]>,
+    us: Vec<f64>,
+    vs: Vec<f64>,
+    ends: Ends,
+}
+
+impl Turner {
+    fn of(points: &[Point3<f64>]) -> Turner {
+        let stride = (points.len() / 600).max(1);
+        let points: Vec<[f64; 2]> = points.iter().step_by(stride).map(|p| [p.x, p.y]).collect();
+        let coordinates = vec![0.0; points.len()];
+        Turner { us: coordinates.clone(), vs: coordinates, points, ends: Ends::default() }
+    }
+
+    fn turned(&mut self, turn: usize) -> Turned {
+        let (sin, cos) = (std::f64::consts::FRAC_PI_2 * turn as f64 / TURNS as f64).sin_cos();
+        for ((p, u), v) in self.points.iter().zip(&mut self.us).zip(&mut self.vs) {
+            (*u, *v) = (cos * p[0] + sin * p[1], -sin * p[0] + cos * p[1]);
+        }
+        let mut bounds = |values: &[f64]| [0.02, 0.98].map(|share| self.ends.at(values, share));
+        Turned { sin, cos, u: bounds(&self.us), v: bounds(&self.vs) }
+    }
+
+    /// Sum of the squared distances of the points from the nearest edge; `None` if it is more than the bound.
+    fn squares_within(&self, turned: &Turned, bound: f64) -> Option<f64> {
+        const BLOCK: usize = 32;
+        let ([u0, u1], [v0, v1]) = (turned.u, turned.v);
+        let lesser = |a: f64, b: f64| if a < b { a } else { b };
+        let mut sum = 0.0;
+        for (us, vs) in self.us.chunks(BLOCK).zip(self.vs.chunks(BLOCK)) {
+            let mut squares = [0.0; BLOCK];
+            for ((square, u), v) in squares.iter_mut().zip(us).zip(vs) {
+                let across = lesser((u - u0).abs(), (u - u1).abs());
+                let edge = lesser(across, lesser((v - v0).abs(), (v - v1).abs()));
+                *square = edge * edge;
+            }
+            squares.iter().for_each(|square| sum += square);
+            if sum > bound {
+                return None;
+            }
+        }
+        Some(sum)
+    }
+}
+
+/// The sides that bound nearly all points, the rectangle turned.
+struct Turned {
+    sin: f64,
+    cos: f64,
+    u: [f64; 2],
+    v: [f64; 2],
+}
+
+impl Turned {
+    fn rectangle(&self, residual_m: f64) -> Rectangle {
+        let ([u0, u1], [v0, v1]) = (self.u, self.v);
+        let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
+        let (a, b) = (u1 - u0, v1 - v0);
+        Rectangle {
+            x: self.cos * u - self.sin * v,
+            y: self.sin * u + self.cos * v,
+            sides_m: [a.max(b), a.min(b)],
+            residual_m,
+        }
+    }
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ mod rounds;
 mod vessels;
 
 use crate::cloud::{Cloud, is_finite};
+use crate::quantile::Ends;
 use crate::surface::{Surface, SurfaceError, SurfaceOptions, find_surface};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -133,17 +134,8 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>,
 
 /// Height of a segment's top above the surface, metres: its highest points but for a few that may be noise.
 pub(crate) fn top_m(segment: &Segment) -> f64 {
-    let mut heights: Vec<f64> = segment.points.iter().map(|p| p.z).collect();
-    quantile(&mut heights, 0.99)
-}
-
-/// The value below which a share of the values lies; 0 for none. Reorders them.
-pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let at = ((values.len() - 1) as f64 * share).round() as usize;
-    *values.select_nth_unstable_by(at, f64::total_cmp).1
+    let heights: Vec<f64> = segment.points.iter().map(|p| p.z).collect();
+    Ends::default().at(&heights, 0.99)
 }
 
 /// Tells for each segment what it stands on: the surface, or the top of another segment under its footprint.
@@ -155,8 +147,8 @@ fn stand(parts: &mut [Segment]) {
         .iter()
         .enumerate()
         .map(|(i, part)| {
-            let mut heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
-            let low = quantile(&mut heights, 0.01);
+            let heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
+            let low = Ends::default().at(&heights, 0.01);
             if low < LIFTED_M {
                 return 0.0;
             }

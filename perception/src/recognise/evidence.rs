@@ -2,6 +2,7 @@
 
 use super::percept::{Evidence, Sighting};
 use crate::outline::{self, Rectangle};
+use crate::quantile::quantile;
 use crate::round::{self, Edge, Round};
 use crate::segment::{Scene, Segment, top_m};
 use crate::surface::range_sigma_m;
@@ -171,7 +172,7 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
                 if reaches.len() < 25 {
                     continue;
                 }
-                let reach_m = crate::segment::quantile(&mut reaches, 0.985) + LOST_M;
+                let reach_m = quantile(&mut reaches, 0.985) + LOST_M;
                 let beyond = reach_m + 0.012 - (across[0] * round.x + across[1] * round.y);
                 let place = Point3::new(round.x + across[0] * beyond, round.y + across[1] * beyond, z);
                 if map.look(&(asker.world_from_surface * place), asker.tolerance_m) == Seen::Free {
@@ -372,11 +373,11 @@ impl Protrusion {
         }
         let reach_of = |&(along, across, z): &(f64, f64, f64)| along.hypot(across) - round.radius_at(z);
         let mut reaches: Vec<f64> = local.iter().map(reach_of).collect();
-        let reach_m = crate::segment::quantile(&mut reaches, 0.95);
+        let reach_m = quantile(&mut reaches, 0.95);
         // What hardly leaves the body is its blurred side, beside the handle or not.
         let (mut across, mut heights): (Vec<f64>, Vec<f64>) =
             local.iter().filter(|l| reach_of(l) > ROOT * reach_m).map(|l| (l.1, l.2)).unzip();
-        let ends = |v: &mut Vec<f64>| (crate::segment::quantile(v, 0.1), crate::segment::quantile(v, 0.9));
+        let ends = |v: &mut Vec<f64>| (quantile(v, 0.1), quantile(v, 0.9));
         let (left, right) = ends(&mut across);
         let (low, high) = ends(&mut heights);
         Some(Protrusion {

@@ -1,7 +1,8 @@
 //! Which voxels are one object: patches, the creases between them, and the mends for vessels and handles.
 
 use super::patches::Voxels;
-use super::{SceneOptions, holds, quantile};
+use super::{SceneOptions, holds};
+use crate::quantile::quantile;
 use crate::surface::convex_hull;
 use nalgebra::{Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};

@@ -4,9 +4,9 @@
 //! agree, a body is fitted, and parted off if what is left is more than a handle.
 
 use super::patches::Voxels;
-use super::quantile;
 use super::vessels::round_body;
 use crate::outline;
+use crate::quantile::quantile;
 use crate::round::sector;
 use nalgebra::{Point3, Vector2};
 use rustc_hash::{FxHashMap, FxHashSet};

@@ -86,15 +86,13 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
         return false;
     }
     let inside = small.top_m < large.top_m + 0.005 && footprint_inside(large, small);
-    if inside && large.fitted(viewpoints).is_some_and(Fitted::is_tight) {
+    if inside && large.fitted(viewpoints).is_some_and(|f| f.is_tight(&large.segment.points)) {
         return true;
     }
     if (large.top_m - small.top_m).abs() > LEVEL_M || (m as f64) < LEAST_SHARE * n as f64 {
         return false;
     }
-    if let (Some(a), Some(b)) = (large.fitted(viewpoints), small.fitted(viewpoints))
-        && a.stands_in(b)
-    {
+    if in_one_place(large, small, viewpoints) {
         return true;
     }
     let both = union(&large.segment, &small.segment);
@@ -112,14 +110,14 @@ pub(super) fn round_body(
     top_m: f64,
     viewpoints: &[Point3<f64>],
 ) -> Option<Round> {
-    Fitted::to(points, low_m, top_m, viewpoints).filter(Fitted::is_tight).map(|f| f.body)
+    Fitted::to(points, low_m, top_m, viewpoints).filter(|f| f.is_tight(points)).map(|f| f.body)
 }
 
-/// The round body that comes nearest to a part, however badly.
+/// The round body that comes nearest to points, however badly.
 struct Fitted {
     body: Round,
-    /// How far the part is from a box, metres.
-    box_residual_m: f64,
+    /// How far the points are from a box, metres; fitted when it matters.
+    box_residual_m: OnceCell<f64>,
     /// Spread of one measurement, metres.
     sigma_m: f64,
 }
@@ -130,28 +128,37 @@ impl Fitted {
         let near = viewpoints.iter().map(|v| (first - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
         let sigma_m = range_sigma_m(near).min(0.012);
         let body = round::fit(points, low_m, top_m, sigma_m, 3)?;
-        let box_residual_m = outline::fit(points)?.residual_m;
-        (body.radius_m < WIDEST_M).then_some(Fitted { body, box_residual_m, sigma_m })
+        (body.radius_m < WIDEST_M).then_some(Fitted { body, box_residual_m: OnceCell::new(), sigma_m })
+    }
+
+    /// Whether its points, the same as it was fitted to, are nearer to it than a share of how near they are to a box.
+    fn beats_box(&self, points: &[Point3<f64>], share: f64) -> bool {
+        let fit = || outline::fit(points).map_or(0.0, |fit| fit.residual_m);
+        self.body.residual_m < share * self.box_residual_m.get_or_init(fit)
     }
 
     /// Judged by what lies on it: a handle does not.
-    fn is_tight(&self) -> bool {
-        let residual_m = self.body.residual_m;
-        residual_m < 2.0 * self.sigma_m + 0.0015
-            && residual_m < 0.6 * self.box_residual_m
+    fn is_tight(&self, points: &[Point3<f64>]) -> bool {
+        self.body.residual_m < 2.0 * self.sigma_m + 0.0015
             && self.body.inliers >= ON_BODY
+            && self.beats_box(points, 0.6)
     }
 
-    /// Whether two parts are images of one body in views that lie a little beside each other: two bodies cannot stand in one place.
-    fn stands_in(&self, other: &Fitted) -> bool {
-        let is_round = |f: &Fitted| {
-            f.body.inliers >= ON_MOST
-                && f.body.residual_m < 0.8 * f.box_residual_m
-                && f.body.place_sigma_m < ONE_PLACE * f.body.radius_m
-        };
-        let apart_m = (self.body.x - other.body.x).hypot(self.body.y - other.body.y);
-        is_round(self) && is_round(other) && apart_m < ONE_PLACE * self.body.radius_m.min(other.body.radius_m)
+    /// Whether most of its points lie on it, nearer than to a box, and tell where it stands.
+    fn is_placed(&self, points: &[Point3<f64>]) -> bool {
+        self.body.inliers >= ON_MOST
+            && self.body.place_sigma_m < ONE_PLACE * self.body.radius_m
+            && self.beats_box(points, 0.8)
     }
+}
+
+/// Whether two parts are images of one body in views that lie a little beside each other: two bodies cannot stand in one place.
+fn in_one_place(a: &Candidate, b: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
+    let (Some(one), Some(other)) = (a.fitted(viewpoints), b.fitted(viewpoints)) else { return false };
+    let apart_m = (one.body.x - other.body.x).hypot(one.body.y - other.body.y);
+    apart_m < ONE_PLACE * one.body.radius_m.min(other.body.radius_m)
+        && one.is_placed(&a.segment.points)
+        && other.is_placed(&b.segment.points)
 }
 
 fn share_on(body: &Round, part: &Segment) -> f64 {

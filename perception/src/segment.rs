@@ -9,11 +9,12 @@ mod patches;
 mod rounds;
 mod vessels;
 
-use crate::cloud::{Cloud, is_finite};
+use crate::cloud::Cloud;
 use crate::quantile::Ends;
-use crate::surface::{Surface, SurfaceError, SurfaceOptions, find_surface};
+use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, find_surface};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
+use patches::Voxels;
 use serde::{Deserialize, Serialize};
 
 /// How to part a scene into objects.
@@ -90,17 +91,7 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
     if options.part_touching {
         rounds::part(&voxels, &points, &mut part_of_voxel, &viewpoints);
     }
-    let mut parts: Vec<Segment> = Vec::new();
-    let mut slots: Vec<Option<usize>> = vec![None; voxels.len()];
-    for ((&index, &point), &voxel) in indices.iter().zip(&points).zip(&voxels.of_point) {
-        let part = part_of_voxel[voxel as usize] as usize;
-        let slot = *slots[part].get_or_insert_with(|| {
-            parts.push(Segment { indices: Vec::new(), points: Vec::new(), base_m: 0.0 });
-            parts.len() - 1
-        });
-        parts[slot].indices.push(index);
-        parts[slot].points.push(point);
-    }
+    let mut parts = gather(&indices, &points, &voxels, &part_of_voxel);
     if options.part_touching {
         parts = vessels::whole(parts, &viewpoints);
     }
@@ -111,21 +102,44 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
     Scene { surface, segments: parts }
 }
 
+/// The points of each part, in order of its first point.
+fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxel: &[u32]) -> Vec<Segment> {
+    let mut counts = vec![0; voxels.len()];
+    for (&part, &count) in part_of_voxel.iter().zip(&voxels.counts) {
+        counts[part as usize] += count as usize;
+    }
+    let mut parts: Vec<Segment> = Vec::new();
+    let mut slots: Vec<Option<usize>> = vec![None; voxels.len()];
+    for ((&index, &point), &voxel) in indices.iter().zip(points).zip(&voxels.of_point) {
+        let part = part_of_voxel[voxel as usize] as usize;
+        let slot = *slots[part].get_or_insert_with(|| {
+            let (indices, points) = (Vec::with_capacity(counts[part]), Vec::with_capacity(counts[part]));
+            parts.push(Segment { indices, points, base_m: 0.0 });
+            parts.len() - 1
+        });
+        parts[slot].indices.push(index);
+        parts[slot].points.push(point);
+    }
+    parts
+}
+
 /// Indices and positions (surface frame) of the points that stand above the surface, inside its outline.
 fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>, Vec<Point3<f64>>) {
     let clearance_m = options.clearance_m.max(2.5 * surface.residual_m);
     let up = surface.up.cast::<f32>();
     let offset = surface.offset_m as f32;
     let band = clearance_m as f32..options.tallest_m as f32;
-    let outline = surface.outline();
+    let rows = Rows::of(surface);
     let mut indices = Vec::new();
     let mut points = Vec::new();
     for (i, p) in (0u32..).zip(&cloud.points) {
-        if is_finite(p) && band.contains(&(up.dot(&p.coords) - offset)) {
+        // What is not finite is in no band.
+        if band.contains(&(up.dot(&p.coords) - offset)) {
             let world = p.cast::<f64>();
-            if outline.covers(&world, 0.0) {
+            let flat = surface.surface_from_world * world;
+            if rows.covers(&flat, &world) {
                 indices.push(i);
-                points.push(surface.surface_from_world * world);
+                points.push(flat);
             }
         }
     }

@@ -1,5 +1,7 @@
 //! The surface that the objects stand on: its plane and its convex hull (paper 004, section V).
 
+mod outline;
+
 use crate::cloud::{Cloud, is_finite};
 use crate::draw::Draws;
 use crate::noise::axial_sigma_m;
@@ -7,6 +9,9 @@ use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
+
+pub use outline::Outline;
+pub(crate) use outline::Rows;
 
 /// How to look for the surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,31 +100,6 @@ impl Surface {
     /// The outline made ready to be asked about many points.
     pub fn outline(&self) -> Outline {
         Outline::of(&self.hull, &self.up)
-    }
-}
-
-/// The half spaces whose common part is above and below a surface.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Outline {
-    /// Unit normals into the surface, and how far along them the edges lie, metres.
-    edges: Vec<(Vector3<f64>, f64)>,
-}
-
-impl Outline {
-    /// Of the corners of a convex region, anticlockwise seen from above.
-    pub(crate) fn of(hull: &[Point3<f64>], up: &Vector3<f64>) -> Outline {
-        let n = hull.len();
-        let edge = |i: usize| {
-            let (a, b) = (hull[i], hull[(i + 1) % n]);
-            let inward = up.cross(&(b - a)).try_normalize(0.0)?;
-            Some((inward, inward.dot(&a.coords)))
-        };
-        Outline { edges: if n < 3 { Vec::new() } else { (0..n).filter_map(edge).collect() } }
-    }
-
-    /// True if the point (frame of the surface's hull) lies above or below the outline widened by `margin_m`.
-    pub fn covers(&self, p: &Point3<f64>, margin_m: f64) -> bool {
-        self.edges.len() >= 3 && self.edges.iter().all(|(n, edge)| n.dot(&p.coords) - edge >= -margin_m)
     }
 }
 

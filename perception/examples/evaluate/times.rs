@@ -52,7 +52,7 @@ pub fn run(repetitions: usize, views: &[&str]) -> Result<(), String> {
     Ok(())
 }
 
-/// Least times, and what came out in one number.
+/// Least times, and what came out, but for rounding, in one number.
 struct Row {
     /// None without a surface.
     segments: Option<usize>,
@@ -66,7 +66,7 @@ fn time(case: &Case, repetitions: usize) -> Row {
     let cloud = case.view.cloud.transformed(&case.view.world_from_camera);
     let (scene, percepts, _) = stages(case, &cloud, &seen);
     let mut hasher = DefaultHasher::new();
-    format!("{scene:?}{percepts:?}").hash(&mut hasher);
+    format!("{scene:.5?}{percepts:.5?}").hash(&mut hasher);
     let segments = scene.map(|s| s.segments.len());
     let (mut stages_ms, mut all_ms) = ([f64::INFINITY; 3], f64::INFINITY);
     for _ in 0..repetitions.max(1) {

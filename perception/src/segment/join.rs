@@ -2,9 +2,9 @@
 
 use super::patches::Voxels;
 use super::{SceneOptions, holds};
-use crate::quantile::quantile;
 use crate::surface::convex_hull;
 use nalgebra::{Point3, Vector3};
+use rustc_hash::FxHashMap;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Greatest distance of a patch's voxels from its seed, metres.
@@ -36,7 +36,8 @@ pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
     let patches = describe(voxels, &patch_of);
     let borders = borders(voxels, &patch_of, &thin);
     let mut joined = Union::new(patches.len());
-    for (&(a, b), border) in &borders {
+    for border in &borders {
+        let (a, b) = border.patches;
         if meets_convexly(&patches[a as usize], &patches[b as usize], border) {
             joined.join(a, b);
         }
@@ -50,15 +51,15 @@ pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
 
 /// Voxels with far fewer points than those around them: frayed edges, which hang between objects and connect nothing.
 fn thin(voxels: &Voxels) -> Vec<bool> {
+    /// Of the points of the voxel that three quarters of those around have no more than.
     const SHARE: f64 = 0.25;
-    let mut around: Vec<f64> = Vec::new();
-    (0..voxels.len())
-        .map(|i| {
-            around.clear();
-            around.extend(voxels.neighbours(i).iter().map(|&j| f64::from(voxels.counts[j as usize])));
-            around.is_empty() || f64::from(voxels.counts[i]) < SHARE * quantile(&mut around, 0.75)
-        })
-        .collect()
+    let is_thin = |i: usize| {
+        let own = f64::from(voxels.counts[i]);
+        let near = voxels.neighbours(i);
+        let fuller = near.iter().filter(|&&j| own < SHARE * f64::from(voxels.counts[j as usize])).count();
+        near.is_empty() || fuller >= near.len() - ((near.len() - 1) as f64 * 0.75).round() as usize
+    };
+    (0..voxels.len()).map(is_thin).collect()
 }
 
 /// Gives each thin voxel to the part of its fullest neighbour that is not thin.
@@ -77,13 +78,11 @@ fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
 /// Patches: voxels around a flat seed with like normals. Flattest seeds first.
 fn grow_patches(voxels: &Voxels, thin: &[bool]) -> Vec<u32> {
     const NONE: u32 = u32::MAX;
-    let mut order: Vec<u32> = (0..voxels.len() as u32).collect();
-    order.sort_by(|&a, &b| {
-        voxels.curvatures[a as usize].total_cmp(&voxels.curvatures[b as usize]).then(a.cmp(&b))
-    });
+    let mut order: Vec<(f64, u32)> = voxels.curvatures.iter().copied().zip(0..).collect();
+    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut patch_of = vec![NONE; voxels.len()];
     let mut patches = 0;
-    for seed in order {
+    for (_, seed) in order {
         if patch_of[seed as usize] != NONE {
             continue;
         }
@@ -135,23 +134,28 @@ fn describe(voxels: &Voxels, patch_of: &[u32]) -> Vec<Patch> {
     patches
 }
 
-/// Pairs of neighbouring patches (lower number first) with the number of voxel pairs along their border and its middle.
-fn borders(voxels: &Voxels, patch_of: &[u32], thin: &[bool]) -> BTreeMap<(u32, u32), Border> {
-    let mut borders: BTreeMap<(u32, u32), Border> = BTreeMap::new();
-    for i in 0..voxels.len() {
+/// Two neighbouring patches, the lower number first.
+struct Border {
+    patches: (u32, u32),
+    /// Pairs of voxels along it.
+    length: u32,
+}
+
+/// The borders of all patches, in order of the patches.
+fn borders(voxels: &Voxels, patch_of: &[u32], thin: &[bool]) -> Vec<Border> {
+    let mut lengths: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+    for i in (0..voxels.len()).filter(|&i| !thin[i]) {
         for &j in voxels.neighbours(i).iter().filter(|&&j| j as usize > i) {
             let (a, b) = (patch_of[i], patch_of[j as usize]);
-            if a != b && !thin[i] && !thin[j as usize] {
-                borders.entry((a.min(b), a.max(b))).or_default().length += 1;
+            if a != b && !thin[j as usize] {
+                *lengths.entry((a.min(b), a.max(b))).or_default() += 1;
             }
         }
     }
+    let mut borders: Vec<Border> =
+        lengths.into_iter().map(|(patches, length)| Border { patches, length }).collect();
+    borders.sort_unstable_by_key(|border| border.patches);
     borders
-}
-
-#[derive(Default)]
-struct Border {
-    length: u32,
 }
 
 /// True if the surface bends outwards from one patch to the other, or hardly bends.
@@ -177,10 +181,10 @@ fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
 /// Joins what the creases wrongly parted: insides of vessels, handles, crumbs.
 ///
 /// The smallest part that belongs to a neighbour goes first; then what touches the joined part is looked at anew.
-fn mend(joined: &mut Union, borders: &BTreeMap<(u32, u32), Border>, voxels: &Voxels, patch_of: &[u32]) {
+fn mend(joined: &mut Union, borders: &[Border], voxels: &Voxels, patch_of: &[u32]) {
     let mut parts = gather(joined, voxels, patch_of);
-    for (&(a, b), border) in borders {
-        let (a, b) = (joined.root(a), joined.root(b));
+    for border in borders {
+        let (a, b) = (joined.root(border.patches.0), joined.root(border.patches.1));
         if a != b {
             link(&mut parts, a, b, border.length);
         }
@@ -234,7 +238,7 @@ struct Belonging {
 fn belongs(parts: &BTreeMap<u32, Part>, small: u32, large: u32) -> Option<Belonging> {
     let (s, l) = (parts.get(&small)?, parts.get(&large)?);
     let length = *s.links.get(&large)?;
-    let own = s.points <= l.points && (is_crumb(s, l) || is_inside(s, l) || hangs_on(s, l));
+    let own = s.points <= l.points && (is_crumb(s, l) || hangs_on(s, l) || is_inside(s, l));
     own.then_some(Belonging { points: s.points, small, shortness: u32::MAX - length, large })
 }
 
@@ -299,8 +303,8 @@ fn is_crumb(small: &Part, large: &Part) -> bool {
 
 /// The inside of a vessel: within the outline of the body and no higher than its rim.
 fn is_inside(small: &Part, large: &Part) -> bool {
-    let within = small.places.iter().filter(|&&p| holds(&large.hull, p)).count();
-    within * 10 >= small.places.len() * 7 && small.top_m() < large.top_m() + 0.01
+    let within = || small.places.iter().filter(|&&p| holds(&large.hull, p)).count();
+    small.top_m() < large.top_m() + 0.01 && within() * 10 >= small.places.len() * 7
 }
 
 /// A handle: small, lifted off the surface, not above the body.

@@ -19,6 +19,9 @@ pub(super) struct Voxels {
     near: Vec<u32>,
     /// The voxel of each point.
     pub of_point: Vec<u32>,
+    /// Ranges of points that follow each other in one voxel, voxel by voxel, and where those of each voxel end.
+    runs: Vec<(u32, u32)>,
+    run_ends: Vec<u32>,
 }
 
 impl Voxels {
@@ -29,6 +32,19 @@ impl Voxels {
     /// Occupied voxels among the 26 around, in order.
     pub fn neighbours(&self, voxel: usize) -> &[u32] {
         &self.near[self.starts[voxel] as usize..self.starts[voxel + 1] as usize]
+    }
+
+    /// The points of some voxels, voxel by voxel, from those that the voxels were made of.
+    pub fn points_of(&self, of: &[usize], all: &[Point3<f64>]) -> Vec<Point3<f64>> {
+        let count: u32 = of.iter().map(|&v| self.counts[v]).sum();
+        let mut points = Vec::with_capacity(count as usize);
+        for &voxel in of {
+            let first = if voxel == 0 { 0 } else { self.run_ends[voxel - 1] };
+            for &(from, to) in &self.runs[first as usize..self.run_ends[voxel] as usize] {
+                points.extend_from_slice(&all[from as usize..to as usize]);
+            }
+        }
+        points
     }
 }
 
@@ -63,19 +79,23 @@ pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f
     let first = points.first().copied().unwrap_or_else(Point3::origin);
     let (low, high) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
     let lattice = Lattice::over(&low, &high, side_m);
-    let mut entries: Vec<(u64, u32)> =
-        (0..).zip(points).map(|(i, p)| (lattice.locate(&p.coords).0, i)).collect();
+    let (mut entries, starts) = runs(&lattice, points);
     lattice.sort(&mut entries, &mut Vec::new());
     let mut of_point = vec![0; points.len()];
-    let (mut keys, mut moments) = (Vec::new(), Vec::new());
+    let mut runs = Vec::with_capacity(entries.len());
+    let (mut keys, mut moments, mut run_ends) = (Vec::new(), Vec::new(), Vec::new());
     for same in entries.chunk_by(|a, b| a.0 == b.0) {
         let mut own = Moments::NONE;
-        for &(_, point) in same {
-            own.add(&points[point as usize]);
-            of_point[point as usize] = keys.len() as u32;
+        for &(_, run) in same {
+            let (from, to) = (starts[run as usize], starts[run as usize + 1]);
+            let range = from as usize..to as usize;
+            points[range.clone()].iter().for_each(|p| own.add(p));
+            of_point[range].fill(keys.len() as u32);
+            runs.push((from, to));
         }
         keys.push(same[0].0);
         moments.push(own);
+        run_ends.push(runs.len() as u32);
     }
     let (starts, near) = neighbours(&lattice, &keys);
     let mut voxels = Voxels {
@@ -86,6 +106,8 @@ pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f
         starts,
         near,
         of_point,
+        runs,
+        run_ends,
     };
     for i in 0..keys.len() {
         let (normal, curvature) = surface(&voxels, &moments, i, viewpoints);
@@ -93,6 +115,24 @@ pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f
         voxels.curvatures.push(curvature);
     }
     voxels
+}
+
+/// Points that follow each other in one voxel, as neighbours in an image do: the voxel and the number of each run, and where the runs begin
+/// and the last one ends.
+fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>) {
+    let mut entries: Vec<(u64, u32)> = Vec::with_capacity(points.len() / 2);
+    let mut starts: Vec<u32> = Vec::with_capacity(points.len() / 2);
+    let mut last = None;
+    for (i, p) in (0..).zip(points) {
+        let key = lattice.locate(&p.coords).0;
+        if last != Some(key) {
+            entries.push((key, starts.len() as u32));
+            starts.push(i);
+            last = Some(key);
+        }
+    }
+    starts.push(points.len() as u32);
+    (entries, starts)
 }
 
 /// For each voxel where its neighbours begin, and all of them in a row.

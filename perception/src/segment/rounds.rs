@@ -9,7 +9,7 @@ use crate::outline;
 use crate::quantile::quantile;
 use crate::round::sector;
 use nalgebra::{Point3, Vector2};
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Radii that are sought, metres, and their step.
@@ -39,17 +39,16 @@ pub(super) fn part(
     part_of_voxel: &mut [u32],
     viewpoints: &[Point3<f64>],
 ) {
-    let points_of = PointsOf::new(voxels, points);
     let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (voxel, part) in part_of_voxel.iter().enumerate() {
         members.entry(*part).or_default().push(voxel);
     }
-    members.retain(|_, of| !is_box(voxels, of, &points_of) && !is_round(voxels, of, &points_of, viewpoints));
+    members.retain(|_, of| !is_box(voxels, of, points) && !is_round(voxels, of, points, viewpoints));
     let all: Vec<usize> = members.values().flatten().copied().collect();
     for mut pool in together(voxels, &all) {
         while let Some(cut) = Axis::sought(voxels, &pool).iter().find_map(|axis| {
             let body = axis.body(voxels, &pool)?;
-            let is_round = is_round(voxels, &body, &points_of, viewpoints);
+            let is_round = is_round(voxels, &body, points, viewpoints);
             is_round.then(|| Cut::around(voxels, body, axis, part_of_voxel, &members))?
         }) {
             cut.body.iter().for_each(|v| {
@@ -65,38 +64,8 @@ pub(super) fn part(
     }
 }
 
-/// The points of each voxel, voxel by voxel.
-struct PointsOf {
-    /// Where those of each voxel end.
-    ends: Vec<u32>,
-    points: Vec<Point3<f64>>,
-}
-
-impl PointsOf {
-    fn new(voxels: &Voxels, points: &[Point3<f64>]) -> PointsOf {
-        let mut sum = 0;
-        let mut ends: Vec<u32> = Vec::with_capacity(voxels.len());
-        for count in &voxels.counts {
-            ends.push(sum);
-            sum += count;
-        }
-        let mut sorted = vec![Point3::origin(); points.len()];
-        for (point, &voxel) in points.iter().zip(&voxels.of_point) {
-            let at = &mut ends[voxel as usize];
-            sorted[*at as usize] = *point;
-            *at += 1;
-        }
-        PointsOf { ends, points: sorted }
-    }
-
-    fn voxel(&self, voxel: usize) -> &[Point3<f64>] {
-        let from = if voxel == 0 { 0 } else { self.ends[voxel - 1] };
-        &self.points[from as usize..self.ends[voxel] as usize]
-    }
-}
-
 /// True if the side of a part is that of a box: its normals stand at right angles, and a rectangle fits it.
-fn is_box(voxels: &Voxels, of: &[usize], points_of: &PointsOf) -> bool {
+fn is_box(voxels: &Voxels, of: &[usize], points: &[Point3<f64>]) -> bool {
     let side: Vec<usize> = of.iter().copied().filter(|&v| is_side(voxels, v)).collect();
     let turned = side.iter().map(|&v| {
         let quarter = 4.0 * voxels.normals[v].y.atan2(voxels.normals[v].x);
@@ -106,22 +75,23 @@ fn is_box(voxels: &Voxels, of: &[usize], points_of: &PointsOf) -> bool {
     if square <= SQUARE {
         return false;
     }
-    let points: Vec<Point3<f64>> = side.iter().flat_map(|&v| points_of.voxel(v).iter().copied()).collect();
-    outline::fit(&points).is_some_and(|fit| fit.residual_m < BOX_M)
+    outline::fit(&voxels.points_of(&side, points)).is_some_and(|fit| fit.residual_m < BOX_M)
 }
 
 /// The voxels in sets that hang together, each ascending.
 fn together(voxels: &Voxels, of: &[usize]) -> Vec<Vec<usize>> {
-    let mut open: FxHashSet<usize> = of.iter().copied().collect();
+    let mut open = vec![false; voxels.len()];
+    of.iter().for_each(|&v| open[v] = true);
     let mut sets = Vec::new();
     for &first in of {
-        if !open.remove(&first) {
+        if !std::mem::take(&mut open[first]) {
             continue;
         }
         let mut set = vec![first];
         let mut next = 0;
         while let Some(&voxel) = set.get(next) {
-            set.extend(voxels.neighbours(voxel).iter().map(|&n| n as usize).filter(|n| open.remove(n)));
+            let near = voxels.neighbours(voxel).iter().map(|&n| n as usize);
+            set.extend(near.filter(|&n| std::mem::take(&mut open[n])));
             next += 1;
         }
         set.sort_unstable();
@@ -177,10 +147,10 @@ fn is_apart(voxels: &Voxels, rest: &[usize], body: &[usize], axis: &Axis) -> boo
 }
 
 /// Whether the side of the voxels is that of an upright round body.
-fn is_round(voxels: &Voxels, body: &[usize], points_of: &PointsOf, viewpoints: &[Point3<f64>]) -> bool {
+fn is_round(voxels: &Voxels, body: &[usize], points: &[Point3<f64>], viewpoints: &[Point3<f64>]) -> bool {
     // A face on top would speak against a box as well as against a cup.
-    let side = body.iter().filter(|&&v| is_side(voxels, v));
-    let points: Vec<Point3<f64>> = side.flat_map(|&v| points_of.voxel(v).iter().copied()).collect();
+    let side: Vec<usize> = body.iter().copied().filter(|&v| is_side(voxels, v)).collect();
+    let points = voxels.points_of(&side, points);
     let heights = points.iter().map(|p| p.z).fold((f64::INFINITY, 0.0_f64), |(l, h), z| (l.min(z), h.max(z)));
     round_body(&points, heights.0, heights.1, viewpoints).is_some()
 }

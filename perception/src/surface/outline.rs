@@ -1,0 +1,130 @@
+//! What lies above or below a surface.
+
+use super::Surface;
+use nalgebra::{Point3, Vector3};
+
+/// The half spaces whose common part is above and below a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// Unit normals into the surface, and how far along them the edges lie, metres.
+    edges: Vec<(Vector3<f64>, f64)>,
+}
+
+impl Outline {
+    /// Of the corners of a convex region, anticlockwise seen from above.
+    pub(crate) fn of(hull: &[Point3<f64>], up: &Vector3<f64>) -> Outline {
+        let n = hull.len();
+        let edge = |i: usize| {
+            let (a, b) = (hull[i], hull[(i + 1) % n]);
+            let inward = up.cross(&(b - a)).try_normalize(0.0)?;
+            Some((inward, inward.dot(&a.coords)))
+        };
+        Outline { edges: if n < 3 { Vec::new() } else { (0..n).filter_map(edge).collect() } }
+    }
+
+    /// True if the point (frame of the surface's hull) lies above or below the outline widened by `margin_m`.
+    pub fn covers(&self, p: &Point3<f64>, margin_m: f64) -> bool {
+        self.edges.len() >= 3 && self.edges.iter().all(|(n, edge)| n.dot(&p.coords) - edge >= -margin_m)
+    }
+}
+
+/// An outline in rows across the surface's frame: of most places they tell without asking every edge.
+pub(crate) struct Rows {
+    outline: Outline,
+    low_m: f64,
+    rows: Vec<Row>,
+}
+
+/// Along x, metres: where places of the row are certainly covered, and where they may be.
+struct Row {
+    inside: (f64, f64),
+    around: (f64, f64),
+}
+
+/// Width of a row, metres.
+const ROW_M: f64 = 0.01;
+/// Nearer to an edge than this the edge itself is asked, metres.
+const ROUNDING_M: f64 = 1e-6;
+
+impl Rows {
+    pub fn of(surface: &Surface) -> Rows {
+        let outline = surface.outline();
+        let hull: Vec<Point3<f64>> = surface.hull.iter().map(|p| surface.surface_from_world * p).collect();
+        let flat = Outline::of(&hull, &Vector3::z());
+        let ys = || hull.iter().map(|p| p.y);
+        let low_m = ys().fold(f64::INFINITY, f64::min) - ROW_M;
+        let width_m = ys().fold(f64::NEG_INFINITY, f64::max) + ROW_M - low_m;
+        let count = if flat.edges.len() < 3 { 0 } else { (width_m / ROW_M).ceil() as usize };
+        let row = |i: usize| Row::of(&flat, [i, i + 1].map(|end| low_m + end as f64 * ROW_M));
+        Rows { outline, low_m, rows: (0..count).map(row).collect() }
+    }
+
+    /// [`Outline::covers`] without a margin, of a place given in the surface's frame and in the outline's.
+    #[inline(always)]
+    pub fn covers(&self, flat: &Point3<f64>, place: &Point3<f64>) -> bool {
+        let row = (flat.y - self.low_m) * (1.0 / ROW_M);
+        if row < 0.0 {
+            return false;
+        }
+        let Some(row) = self.rows.get(row as usize) else { return false };
+        let within = |(from, to): (f64, f64)| flat.x > from && flat.x < to;
+        within(row.inside) || within(row.around) && self.outline.covers(place, 0.0)
+    }
+}
+
+impl Row {
+    fn of(flat: &Outline, ends_m: [f64; 2]) -> Row {
+        let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
+        let mut row = Row { inside: everywhere, around: everywhere };
+        for (normal, edge) in &flat.edges {
+            let [one, other] = ends_m.map(|y| (edge - normal.y * y) / normal.x);
+            let (less, more) = (one.min(other), one.max(other));
+            if normal.x.abs() < 1e-9 {
+                // Along the row: what is nearer than the row's width is left to the edge itself.
+                let clear = ends_m.iter().all(|y| normal.y * y - edge > ROUNDING_M);
+                row.inside = if clear { row.inside } else { (0.0, 0.0) };
+            } else if normal.x > 0.0 {
+                row.inside.0 = row.inside.0.max(more + ROUNDING_M);
+                row.around.0 = row.around.0.max(less - ROUNDING_M);
+            } else {
+                row.inside.1 = row.inside.1.min(less - ROUNDING_M);
+                row.around.1 = row.around.1.min(more + ROUNDING_M);
+            }
+        }
+        row
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Isometry3, Unit};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn rows_tell_what_the_edges_tell(
+            corners in prop::collection::vec((-0.7..0.7_f64, -0.4..0.4_f64), 0..12),
+            places in prop::collection::vec((-0.9..0.9_f64, -0.6..0.6_f64), 1..400),
+            turn in prop::array::uniform3(-3.0..3.0_f64),
+        ) {
+            let hull = super::super::convex_hull(corners.iter().map(|c| [c.0, c.1]).collect());
+            let world_from_surface = Isometry3::new(Vector3::new(0.3, -0.2, 0.7), Vector3::from(turn));
+            let surface = Surface {
+                up: Unit::new_normalize(world_from_surface * Vector3::z()),
+                offset_m: 0.0,
+                hull: hull.iter().map(|c| world_from_surface * Point3::new(c[0], c[1], 0.0)).collect(),
+                area_m2: 0.0,
+                points: 0,
+                residual_m: 0.0,
+                surface_from_world: world_from_surface.inverse(),
+            };
+            let (rows, outline) = (Rows::of(&surface), surface.outline());
+            for (x, y) in places {
+                let flat = Point3::new(x, y, 0.1);
+                let place = world_from_surface * flat;
+                prop_assert_eq!(rows.covers(&flat, &place), outline.covers(&place, 0.0), "{} {}", x, y);
+            }
+        }
+    }
+}

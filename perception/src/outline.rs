@@ -1,6 +1,5 @@
 //! The rectangle that best explains the outline of an object seen from above.
 
-use crate::quantile::Ends;
 use nalgebra::Point3;
 
 /// An upright box in the surface's frame.
@@ -18,6 +17,8 @@ pub(crate) struct Rectangle {
 
 /// Orientations tried over a quarter turn.
 const TURNS: usize = 30;
+/// Points that are looked at together.
+const BLOCK: usize = 16;
 
 /// Fits a rectangle to points by turning it: the extents bound nearly all points, the residual tells how well they keep to its edges.
 pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
@@ -30,7 +31,7 @@ pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
         let turned = turner.turned(turn);
         let bound = best.map_or(f64::INFINITY, |(squares, _)| squares);
         let Some(squares) = turner.squares_within(&turned, bound) else { continue };
-        let residual_m = (squares / turner.us.len() as f64).sqrt();
+        let residual_m = (squares / turner.points.len() as f64).sqrt();
         if best.is_none_or(|(_, rectangle)| residual_m < rectangle.residual_m) {
             best = Some((squares, turned.rectangle(residual_m)));
         }
@@ -55,15 +56,22 @@ struct Turner {
     points: Vec<[f64; 2]>,
     us: Vec<f64>,
     vs: Vec<f64>,
-    ends: Ends,
+    /// Across the ends of `us`, then of `vs`.
+    sides: [Side; 4],
 }
 
 impl Turner {
     fn of(points: &[Point3<f64>]) -> Turner {
         let stride = (points.len() / 600).max(1);
         let points: Vec<[f64; 2]> = points.iter().step_by(stride).map(|p| [p.x, p.y]).collect();
-        let coordinates = vec![0.0; points.len()];
-        Turner { us: coordinates.clone(), vs: coordinates, points, ends: Ends::default() }
+        // Filled up to whole blocks with what lies outside of no side.
+        let coordinates = vec![f64::NAN; points.len().next_multiple_of(BLOCK)];
+        let last = points.len().saturating_sub(1);
+        let rank = |share: f64| (last as f64 * share).round() as usize;
+        let outside = [rank(0.02), last - rank(0.98)];
+        let sides =
+            [0, 1, 0, 1].map(|end| Side { outermost: (0..=outside[end]).collect(), found: Vec::new() });
+        Turner { us: coordinates.clone(), vs: coordinates, points, sides }
     }
 
     fn turned(&mut self, turn: usize) -> Turned {
@@ -71,17 +79,18 @@ impl Turner {
         for ((p, u), v) in self.points.iter().zip(&mut self.us).zip(&mut self.vs) {
             (*u, *v) = (cos * p[0] + sin * p[1], -sin * p[0] + cos * p[1]);
         }
-        let mut bounds = |values: &[f64]| [0.02, 0.98].map(|share| self.ends.at(values, share));
-        Turned { sin, cos, u: bounds(&self.us), v: bounds(&self.vs) }
+        let [left, right, front, back] = &mut self.sides;
+        let u = [left.turn(&self.us, |u| u), -right.turn(&self.us, |u| -u)];
+        let v = [front.turn(&self.vs, |v| v), -back.turn(&self.vs, |v| -v)];
+        Turned { sin, cos, u, v }
     }
 
     /// Sum of the squared distances of the points from the nearest edge; `None` if it is more than the bound.
     fn squares_within(&self, turned: &Turned, bound: f64) -> Option<f64> {
-        const BLOCK: usize = 32;
         let ([u0, u1], [v0, v1]) = (turned.u, turned.v);
         let lesser = |a: f64, b: f64| if a < b { a } else { b };
-        let mut sum = 0.0;
-        for (us, vs) in self.us.chunks(BLOCK).zip(self.vs.chunks(BLOCK)) {
+        let (n, mut sum) = (self.points.len(), 0.0);
+        for (us, vs) in self.us[..n].chunks(BLOCK).zip(self.vs[..n].chunks(BLOCK)) {
             let mut squares = [0.0; BLOCK];
             for ((square, u), v) in squares.iter_mut().zip(us).zip(vs) {
                 let across = lesser((u - u0).abs(), (u - u1).abs());
@@ -94,6 +103,35 @@ impl Turner {
             }
         }
         Some(sum)
+    }
+}
+
+/// A side of the rectangle, and the points that it leaves outside.
+struct Side {
+    /// Those and the one on the side: they were the farthest at the last turn.
+    outermost: Vec<usize>,
+    found: Vec<(f64, usize)>,
+}
+
+impl Side {
+    /// Where the side lies when turned, from where the points lie across it: less is farther out.
+    fn turn(&mut self, places: &[f64], way: impl Fn(f64) -> f64) -> f64 {
+        // The side lies no farther in than the points that were outermost before.
+        let before = self.outermost.iter().map(|&i| way(places[i]));
+        let limit = before.fold(f64::NEG_INFINITY, f64::max);
+        self.found.clear();
+        for (block, first) in places.as_chunks::<BLOCK>().0.iter().zip((0..).step_by(BLOCK)) {
+            // Neighbours in an image are near each other: most blocks have none so far out.
+            if block.iter().fold(false, |any, place| any | (way(*place) <= limit)) {
+                let places = block.iter().map(|place| way(*place)).zip(first..);
+                self.found.extend(places.filter(|(place, _)| *place <= limit));
+            }
+        }
+        let last = self.outermost.len() - 1;
+        let (farther, side, _) = self.found.select_nth_unstable_by(last, |a, b| a.0.total_cmp(&b.0));
+        self.outermost.clear();
+        self.outermost.extend(farther.iter().map(|f| f.1).chain([side.1]));
+        side.0
     }
 }
 

@@ -12,51 +12,37 @@ fn rank(count: usize, share: f64) -> usize {
     ((count - 1) as f64 * share).round() as usize
 }
 
-/// [`quantile`] for shares near 0 and 1: the same values, found without reordering all.
-#[derive(Default)]
-pub(crate) struct Ends {
-    /// Values that may be the one that is sought.
-    kept: Vec<f64>,
-}
-
 /// Values among which a limit is chosen, and how many values there must be to make that worthwhile.
 const SAMPLE: usize = 64;
 const WORTH_IT: usize = 4 * SAMPLE;
 
-impl Ends {
-    /// The value below which a share of the values lies; 0 for none.
-    pub fn at(&mut self, values: &[f64], share: f64) -> f64 {
-        if values.is_empty() {
-            return 0.0;
-        }
-        let rank = rank(values.len(), share);
-        if share < 0.5 {
-            self.lowest(values, rank, |v| v)
-        } else {
-            -self.lowest(values, values.len() - 1 - rank, |v| -v)
-        }
+/// [`quantile`] for shares near 0 and 1: the same value, found without reordering all.
+pub(crate) fn end(values: &[f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
     }
+    let rank = rank(values.len(), share);
+    if share < 0.5 { lowest(values, rank, |v| v) } else { -lowest(values, values.len() - 1 - rank, |v| -v) }
+}
 
-    /// The value of a rank (0 the least) among the values, each taken in a way. Only those up to a limit that a sample suggests are sorted.
-    fn lowest(&mut self, values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
-        const BLOCK: usize = 16;
-        let kept = &mut self.kept;
-        kept.clear();
-        if values.len() >= WORTH_IT {
-            let limit = limit(values, rank, &way);
-            // Neighbours in an image have like values: most blocks have none up to the limit.
-            for block in values.chunks(BLOCK) {
-                if block.iter().fold(false, |any, v| any | (way(*v) <= limit)) {
-                    kept.extend(block.iter().map(|v| way(*v)).filter(|v| *v <= limit));
-                }
+/// The value of a rank (0 the least) among the values, each taken in a way. Only those up to a limit that a sample suggests are sorted.
+fn lowest(values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
+    const BLOCK: usize = 16;
+    let mut kept: Vec<f64> = Vec::new();
+    if values.len() >= WORTH_IT {
+        let limit = limit(values, rank, &way);
+        // Neighbours in an image have like values: most blocks have none up to the limit.
+        for block in values.chunks(BLOCK) {
+            if block.iter().fold(false, |any, v| any | (way(*v) <= limit)) {
+                kept.extend(block.iter().map(|v| way(*v)).filter(|v| *v <= limit));
             }
         }
-        if kept.len() <= rank {
-            kept.clear();
-            kept.extend(values.iter().map(|v| way(*v)));
-        }
-        *kept.select_nth_unstable_by(rank, f64::total_cmp).1
     }
+    if kept.len() <= rank {
+        kept.clear();
+        kept.extend(values.iter().map(|v| way(*v)));
+    }
+    *kept.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
 /// What hardly fewer than `rank` of the values are below.
@@ -87,7 +73,7 @@ mod tests {
                 values.iter().map(|(whole, rest)| f64::from(*whole) * if coarse { 1.0 } else { *rest }).collect();
             for share in [0.0, 0.01, 0.02, 0.1, 0.9, 0.95, 0.98, 0.99, 1.0] {
                 let expected = quantile(&mut values.clone(), share);
-                prop_assert_eq!(Ends::default().at(&values, share).to_bits(), expected.to_bits());
+                prop_assert_eq!(end(&values, share).to_bits(), expected.to_bits());
             }
         }
     }

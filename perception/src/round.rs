@@ -1,8 +1,12 @@
 //! Fitting an upright body of revolution with straight sides (a cylinder, a cup) to one object.
 
+mod side;
+
 use crate::draw::Draws;
-use nalgebra::{Matrix4, Point3, Vector4};
+use nalgebra::{Point3, Vector4};
+use side::{Side, Sums};
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Radii that are tried, metres.
 const RADII_M: (f64, f64) = (0.012, 0.20);
@@ -88,7 +92,7 @@ fn distance(x: f64, y: f64) -> f64 {
 /// `None` if there are too few side points or they lie on no circle of a sensible size.
 pub(crate) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64, seed: u64) -> Option<Round> {
     let height = top_m - base_m;
-    let side = side_points(points, base_m, top_m);
+    let side = Side::between(points, base_m, top_m);
     if side.len() < 20 {
         return None;
     }
@@ -123,7 +127,7 @@ pub(crate) fn refit(
     top_m: f64,
     sigma_m: f64,
 ) -> Option<Round> {
-    let side = side_points(points, base_m, top_m);
+    let side = Side::between(points, base_m, top_m);
     let tolerance = tolerance(sigma_m);
     let mut round = *round;
     for _ in 0..4 {
@@ -142,8 +146,9 @@ impl Round {
         counts: impl Fn(&Point3<f64>) -> bool,
     ) -> f64 {
         let gate = LAST_GATE * tolerance(sigma_m);
-        let side = side_points(points, base_m, top_m);
-        let misses = side.iter().filter(|p| counts(p)).map(|p| self.outside_m(p)).filter(|&d| d > -gate);
+        let band = side_band(base_m, top_m);
+        let side = points.iter().filter(|p| band.contains(&p.z) && counts(p));
+        let misses = side.map(|p| self.outside_m(p)).filter(|&d| d > -gate);
         let (n, squares) = misses.fold((0.0, 0.0), |(n, s), d| (n + 1.0, s + d.min(OUTSIDE_M).powi(2)));
         (squares / f64::max(n, 1.0)).sqrt()
     }
@@ -154,80 +159,43 @@ fn tolerance(sigma_m: f64) -> f64 {
     (2.0 * sigma_m).clamp(0.004, 0.008)
 }
 
-/// The points between base and top that can lie on the side.
-fn side_points(points: &[Point3<f64>], base_m: f64, top_m: f64) -> Vec<Point3<f64>> {
+/// Heights between base and top at which what is seen can be the side.
+fn side_band(base_m: f64, top_m: f64) -> Range<f64> {
     let height = top_m - base_m;
-    let band = base_m + 0.15 * height..top_m - 0.1 * height;
-    points.iter().filter(|p| band.contains(&p.z)).copied().collect()
+    base_m + 0.15 * height..top_m - 0.1 * height
 }
 
 /// The circle through three points that most points lie on and fewest outside of, seen from above.
-fn propose(side: &[Point3<f64>], tolerance: f64, seed: u64) -> Option<[f64; 3]> {
+fn propose(side: &Side, tolerance: f64, seed: u64) -> Option<[f64; 3]> {
     let mut rng = Draws::new(seed);
-    let stride = (side.len() / JUDGES).max(1);
+    let judges = side.thinned(JUDGES);
     let mut best: Option<(f64, [f64; 3])> = None;
     for _ in 0..PROPOSALS {
-        let mut pick = || side[rng.below(side.len())];
-        let Some([x, y, r]) = circumcircle(&pick(), &pick(), &pick()) else { continue };
-        if r < RADII_M.0 || r > RADII_M.1 {
+        let mut pick = || side.place(rng.below(side.len()));
+        let Some(circle) = circumcircle(pick(), pick(), pick()) else { continue };
+        if circle[2] < RADII_M.0 || circle[2] > RADII_M.1 {
             continue;
         }
-        let score: f64 = side
-            .iter()
-            .step_by(stride)
-            .map(|p| {
-                let d = distance(p.x - x, p.y - y) - r;
-                // Inside may be the inside of a vessel; outside can only be a handle or another body.
-                if d.abs() < tolerance {
-                    1.0 - (d / tolerance).powi(2)
-                } else if d > 0.0 {
-                    -0.5
-                } else {
-                    -0.15
-                }
-            })
-            .sum();
-        if best.as_ref().is_none_or(|(s, _)| score > *s) {
-            best = Some((score, [x, y, r]));
-        }
+        let beaten = best.map_or(f64::NEG_INFINITY, |(score, _)| score);
+        best = judges.score(circle, tolerance, beaten).map(|score| (score, circle)).or(best);
     }
     best.map(|(_, circle)| circle)
 }
 
-fn circumcircle(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -> Option<[f64; 3]> {
-    let (bx, by, cx, cy) = (b.x - a.x, b.y - a.y, c.x - a.x, c.y - a.y);
+fn circumcircle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<[f64; 3]> {
+    let (bx, by, cx, cy) = (b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
     let twice = 2.0 * (bx * cy - by * cx);
     if twice.abs() < 1e-7 {
         return None;
     }
     let (b2, c2) = (bx * bx + by * by, cx * cx + cy * cy);
     let (ux, uy) = ((cy * b2 - by * c2) / twice, (bx * c2 - cx * b2) / twice);
-    Some([a.x + ux, a.y + uy, ux.hypot(uy)])
+    Some([a[0] + ux, a[1] + uy, ux.hypot(uy)])
 }
 
 /// One Gauss-Newton step on axis, radius and slope over the points within `gate` of the side.
-fn improve(round: &Round, side: &[Point3<f64>], edges: &[Edge], gate: f64, sigma_m: f64) -> Option<Round> {
-    let mut normal = Matrix4::<f64>::zeros();
-    let mut right = Vector4::<f64>::zeros();
-    let (mut squares, mut count, mut outside, mut spread) = (0.0, 0.0, 0.0, 0.0);
-    for p in side {
-        let (dx, dy) = (p.x - round.x, p.y - round.y);
-        let d = distance(dx, dy).max(1e-9);
-        let rise = p.z - round.middle_m;
-        let residual = d - round.radius_m - round.slope * rise;
-        if residual > -gate {
-            outside += 1.0;
-            spread += residual.min(OUTSIDE_M).powi(2);
-        }
-        if residual.abs() > gate {
-            continue;
-        }
-        let row = Vector4::new(-dx / d, -dy / d, -1.0, -rise);
-        normal += row * row.transpose();
-        right -= row * residual;
-        squares += residual * residual;
-        count += 1.0;
-    }
+fn improve(round: &Round, side: &Side, edges: &[Edge], gate: f64, sigma_m: f64) -> Option<Round> {
+    let Sums { normal, right, squares, count, outside, spread } = side.sums(round, gate);
     if count < 12.0 {
         return None;
     }

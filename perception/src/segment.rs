@@ -10,7 +10,7 @@ mod rounds;
 mod vessels;
 
 use crate::cloud::Cloud;
-use crate::quantile::Ends;
+use crate::quantile::end;
 use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, find_surface};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -149,7 +149,7 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>,
 /// Height of a segment's top above the surface, metres: its highest points but for a few that may be noise.
 pub(crate) fn top_m(segment: &Segment) -> f64 {
     let heights: Vec<f64> = segment.points.iter().map(|p| p.z).collect();
-    Ends::default().at(&heights, 0.99)
+    end(&heights, 0.99)
 }
 
 /// Tells for each segment what it stands on: the surface, or the top of another segment under its footprint.
@@ -162,7 +162,7 @@ fn stand(parts: &mut [Segment]) {
         .enumerate()
         .map(|(i, part)| {
             let heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
-            let low = Ends::default().at(&heights, 0.01);
+            let low = end(&heights, 0.01);
             if low < LIFTED_M {
                 return 0.0;
             }

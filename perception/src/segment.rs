@@ -5,17 +5,19 @@
 //! the outline of a body and below its top is the body's own inside.
 
 mod join;
+mod mend;
 mod patches;
 mod rounds;
 mod vessels;
 
 use crate::cloud::Cloud;
 use crate::quantile::end;
-use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, find_surface};
+use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, convex_hull, find_surface};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
 use patches::Voxels;
 use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
 
 /// How to part a scene into objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -157,6 +159,11 @@ fn stand(parts: &mut [Segment]) {
     /// A lower edge this high has been cut or hidden rather than set on something, unless something is below it.
     const LIFTED_M: f64 = 0.02;
     let tops: Vec<f64> = parts.iter().map(top_m).collect();
+    let hulls: Vec<OnceCell<_>> = parts.iter().map(|_| OnceCell::new()).collect();
+    let is_below = |other: usize, place: [f64; 2]| {
+        let hull = hulls[other].get_or_init(|| hull_from_above(&parts[other].points));
+        holds(hull, place)
+    };
     let bases: Vec<f64> = parts
         .iter()
         .enumerate()
@@ -166,11 +173,11 @@ fn stand(parts: &mut [Segment]) {
             if low < LIFTED_M {
                 return 0.0;
             }
-            let (cx, cy) = middle(&part.points);
-            let below = parts.iter().zip(&tops).enumerate().filter(|&(j, (other, &top))| {
-                j != i && top < low + 0.03 && top > low - 0.03 && footprint_holds(&other.points, cx, cy)
+            let place = middle(&part.points);
+            let below = tops.iter().enumerate().filter(|&(other, &top)| {
+                other != i && top < low + 0.03 && top > low - 0.03 && is_below(other, place)
             });
-            below.map(|(_, (_, &top))| top).max_by(f64::total_cmp).unwrap_or(0.0)
+            below.map(|(_, &top)| top).max_by(f64::total_cmp).unwrap_or(0.0)
         })
         .collect();
     for (part, base) in parts.iter_mut().zip(bases) {
@@ -178,20 +185,26 @@ fn stand(parts: &mut [Segment]) {
     }
 }
 
-fn middle(points: &[Point3<f64>]) -> (f64, f64) {
+fn middle(points: &[Point3<f64>]) -> [f64; 2] {
     let n = points.len().max(1) as f64;
     let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.x, y + p.y));
-    (x / n, y / n)
+    [x / n, y / n]
 }
 
-/// True if the convex outline of the points, seen from above, holds the place.
-fn footprint_holds(points: &[Point3<f64>], x: f64, y: f64) -> bool {
-    let hull = crate::surface::convex_hull(points.iter().map(|p| [p.x, p.y]).collect());
-    holds(&hull, [x, y])
+/// The convex outline of points.
+fn hull_from_above(points: &[Point3<f64>]) -> Vec<[f64; 2]> {
+    convex_hull(points.iter().map(|p| [p.x, p.y]).collect())
+}
+
+/// True if a convex anticlockwise outline holds most of the places: seven in ten or more.
+fn most_within<T>(hull: &[[f64; 2]], of: &[T], place: impl Fn(&T) -> [f64; 2]) -> bool {
+    let outside = of.iter().filter(|p| !holds(hull, place(p)));
+    // The first that is too many settles it.
+    outside.take(of.len() * 3 / 10 + 1).count() * 10 <= of.len() * 3
 }
 
 /// True if a convex anticlockwise outline holds the place.
-pub(crate) fn holds(hull: &[[f64; 2]], p: [f64; 2]) -> bool {
+fn holds(hull: &[[f64; 2]], p: [f64; 2]) -> bool {
     let n = hull.len();
     n >= 3
         && (0..n).all(|i| {

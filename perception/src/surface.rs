@@ -503,6 +503,11 @@ fn drop_inner(points: &mut Vec<[f64; 2]>) {
             }
         }
     }
+    // The box between the corners that reach farthest at a slant lies in the octagon, and holds most points.
+    let [_, (_, ne), _, (_, nw), _, (_, sw), _, (_, se)] = extreme;
+    let (west, east) = (nw[0].max(sw[0]), ne[0].min(se[0]));
+    let (south, north) = (sw[1].max(se[1]), nw[1].min(ne[1]));
+    points.retain(|p| !(p[0] > west && p[0] < east && p[1] > south && p[1] < north));
     let mut octagon: Vec<[f64; 2]> = extreme.iter().map(|(_, p)| *p).collect();
     octagon.dedup();
     if octagon.len() < 3 {

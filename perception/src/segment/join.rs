@@ -1,11 +1,10 @@
-//! Which voxels are one object: patches, the creases between them, and the mends for vessels and handles.
+//! Which voxels are one object: patches, and the creases between them.
 
+use super::SceneOptions;
+use super::mend::mend;
 use super::patches::Voxels;
-use super::{SceneOptions, holds};
-use crate::surface::convex_hull;
 use nalgebra::{Point3, Vector3};
 use rustc_hash::FxHashMap;
-use std::collections::{BTreeMap, BTreeSet};
 
 /// Greatest distance of a patch's voxels from its seed, metres.
 const PATCH_REACH_M: f64 = 0.02;
@@ -13,11 +12,6 @@ const PATCH_REACH_M: f64 = 0.02;
 const PATCH_COS: f64 = 0.906;
 /// A concave joint is still smooth up to this angle, radians (as in locally convex connected patches).
 const SMOOTH_RAD: f64 = 0.35;
-/// A part smaller than this share of its neighbour is no object of its own.
-const CRUMB_SHARE: f64 = 0.12;
-/// A part whose base is lifted and which is smaller than this share of what it hangs on belongs to it (a handle, a spout).
-const HANGING_SHARE: f64 = 0.25;
-
 /// For each voxel the number of its part. Numbers are voxel indices, the same in every run.
 pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
     if !options.part_touching {
@@ -135,10 +129,10 @@ fn describe(voxels: &Voxels, patch_of: &[u32]) -> Vec<Patch> {
 }
 
 /// Two neighbouring patches, the lower number first.
-struct Border {
-    patches: (u32, u32),
+pub(super) struct Border {
+    pub patches: (u32, u32),
     /// Pairs of voxels along it.
-    length: u32,
+    pub length: u32,
 }
 
 /// The borders of all patches, in order of the patches.
@@ -178,142 +172,6 @@ fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
     smooth || along < 0.85
 }
 
-/// Joins what the creases wrongly parted: insides of vessels, handles, crumbs.
-///
-/// The smallest part that belongs to a neighbour goes first; then what touches the joined part is looked at anew.
-fn mend(joined: &mut Union, borders: &[Border], voxels: &Voxels, patch_of: &[u32]) {
-    let mut parts = gather(joined, voxels, patch_of);
-    for border in borders {
-        let (a, b) = (joined.root(border.patches.0), joined.root(border.patches.1));
-        if a != b {
-            link(&mut parts, a, b, border.length);
-        }
-    }
-    let mut belonging: BTreeSet<Belonging> = BTreeSet::new();
-    for (&root, part) in &parts {
-        belonging.extend(part.links.keys().filter_map(|&other| belongs(&parts, root, other)));
-    }
-    while let Some(Belonging { small, large, .. }) = belonging.pop_first() {
-        let touched: BTreeSet<u32> =
-            [small, large].iter().flat_map(|root| parts[root].links.keys().copied()).collect();
-        belonging.retain(|b| ![b.small, b.large].iter().any(|root| *root == small || *root == large));
-        joined.join(small, large);
-        let root = joined.root(small);
-        let (Some(a), Some(b)) = (parts.remove(&small), parts.remove(&large)) else { return };
-        let links = [&a.links, &b.links].map(Clone::clone);
-        parts.insert(root, a.with(b));
-        for other in &touched {
-            if let Some(part) = parts.get_mut(other) {
-                part.links.retain(|to, _| *to != small && *to != large);
-            }
-        }
-        for (other, length) in links.into_iter().flatten().filter(|(o, _)| *o != small && *o != large) {
-            link(&mut parts, root, other, length);
-        }
-        for &other in touched.iter().filter(|&&o| o != small && o != large) {
-            belonging
-                .extend([belongs(&parts, root, other), belongs(&parts, other, root)].into_iter().flatten());
-        }
-    }
-}
-
-fn link(parts: &mut BTreeMap<u32, Part>, a: u32, b: u32, length: u32) {
-    for (from, to) in [(a, b), (b, a)] {
-        if let Some(part) = parts.get_mut(&from) {
-            *part.links.entry(to).or_default() += length;
-        }
-    }
-}
-
-/// A part that belongs to a neighbour, in the order in which they are joined: few points first, then long borders.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Belonging {
-    points: u32,
-    small: u32,
-    /// The border's length below the greatest number.
-    shortness: u32,
-    large: u32,
-}
-
-fn belongs(parts: &BTreeMap<u32, Part>, small: u32, large: u32) -> Option<Belonging> {
-    let (s, l) = (parts.get(&small)?, parts.get(&large)?);
-    let length = *s.links.get(&large)?;
-    let own = s.points <= l.points && (is_crumb(s, l) || hangs_on(s, l) || is_inside(s, l));
-    own.then_some(Belonging { points: s.points, small, shortness: u32::MAX - length, large })
-}
-
-struct Part {
-    points: u32,
-    /// Of its voxels, ascending, metres.
-    heights_m: Vec<f64>,
-    hull: Vec<[f64; 2]>,
-    places: Vec<[f64; 2]>,
-    /// Lengths of the borders with other parts.
-    links: BTreeMap<u32, u32>,
-}
-
-impl Part {
-    fn height_m(&self, share: f64) -> f64 {
-        let at = (self.heights_m.len().saturating_sub(1) as f64 * share).round() as usize;
-        self.heights_m.get(at).copied().unwrap_or(0.0)
-    }
-
-    fn low_m(&self) -> f64 {
-        self.height_m(0.03)
-    }
-
-    fn top_m(&self) -> f64 {
-        self.height_m(0.97)
-    }
-
-    /// Both in one; the links are left to the caller.
-    fn with(self, other: Part) -> Part {
-        let (mut large, small) =
-            if self.places.len() >= other.places.len() { (self, other) } else { (other, self) };
-        large.points += small.points;
-        large.places.extend(&small.places);
-        // Two ascending runs: the sort joins them in one pass.
-        large.heights_m.extend(&small.heights_m);
-        large.heights_m.sort_by(f64::total_cmp);
-        large.hull.extend(&small.hull);
-        large.hull = convex_hull(large.hull);
-        large.links = BTreeMap::new();
-        large
-    }
-}
-
-fn gather(joined: &mut Union, voxels: &Voxels, patch_of: &[u32]) -> BTreeMap<u32, Part> {
-    let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for (i, &p) in patch_of.iter().enumerate() {
-        members.entry(joined.root(p)).or_default().push(i);
-    }
-    let part = |of: Vec<usize>| {
-        let places: Vec<[f64; 2]> = of.iter().map(|&i| [voxels.centres[i].x, voxels.centres[i].y]).collect();
-        let mut heights_m: Vec<f64> = of.iter().map(|&i| voxels.centres[i].z).collect();
-        heights_m.sort_by(f64::total_cmp);
-        let points = of.iter().map(|&i| voxels.counts[i]).sum();
-        Part { points, heights_m, hull: convex_hull(places.clone()), places, links: BTreeMap::new() }
-    };
-    members.into_iter().map(|(root, of)| (root, part(of))).collect()
-}
-
-fn is_crumb(small: &Part, large: &Part) -> bool {
-    f64::from(small.points) < CRUMB_SHARE * f64::from(large.points) && small.places.len() < 40
-}
-
-/// The inside of a vessel: within the outline of the body and no higher than its rim.
-fn is_inside(small: &Part, large: &Part) -> bool {
-    let within = || small.places.iter().filter(|&&p| holds(&large.hull, p)).count();
-    small.top_m() < large.top_m() + 0.01 && within() * 10 >= small.places.len() * 7
-}
-
-/// A handle: small, lifted off the surface, not above the body.
-fn hangs_on(small: &Part, large: &Part) -> bool {
-    f64::from(small.points) < HANGING_SHARE * f64::from(large.points)
-        && small.low_m() > large.low_m() + 0.01
-        && small.top_m() < large.top_m() + 0.005
-}
-
 /// A voxel of each root patch, to name parts by.
 fn first_voxels(patch_of: &[u32], joined: &mut Union, patches: usize) -> Vec<u32> {
     let mut first = vec![u32::MAX; patches];
@@ -325,7 +183,7 @@ fn first_voxels(patch_of: &[u32], joined: &mut Union, patches: usize) -> Vec<u32
 }
 
 /// Disjoint sets; the lowest member is the root, whatever the order of joins.
-struct Union {
+pub(super) struct Union {
     parent: Vec<u32>,
 }
 
@@ -334,7 +192,7 @@ impl Union {
         Union { parent: (0..n as u32).collect() }
     }
 
-    fn root(&mut self, mut i: u32) -> u32 {
+    pub fn root(&mut self, mut i: u32) -> u32 {
         while self.parent[i as usize] != i {
             self.parent[i as usize] = self.parent[self.parent[i as usize] as usize];
             i = self.parent[i as usize];
@@ -342,7 +200,7 @@ impl Union {
         i
     }
 
-    fn join(&mut self, a: u32, b: u32) {
+    pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         self.parent[a.max(b) as usize] = a.min(b);
     }

@@ -1,9 +1,9 @@
 //! Vessels in one piece: their near outside and far inside meet only in a thin rim, which no camera resolves.
 
-use super::{Segment, holds, top_m};
+use super::{Segment, hull_from_above, most_within, top_m};
 use crate::outline;
 use crate::round::{self, Round};
-use crate::surface::{convex_hull, range_sigma_m};
+use crate::surface::range_sigma_m;
 use nalgebra::Point3;
 use std::cell::OnceCell;
 
@@ -49,7 +49,7 @@ impl Candidate {
     }
 
     fn hull(&self) -> &[[f64; 2]] {
-        self.hull.get_or_init(|| convex_hull(self.segment.points.iter().map(|p| [p.x, p.y]).collect()))
+        self.hull.get_or_init(|| hull_from_above(&self.segment.points))
     }
 }
 
@@ -172,7 +172,10 @@ fn near(a: &Candidate, b: &Candidate) -> bool {
 }
 
 fn footprint_inside(large: &Candidate, small: &Candidate) -> bool {
+    let beside =
+        |p: &&Point3<f64>| p.x < large.low.x || p.x > large.high.x || p.y < large.low.y || p.y > large.high.y;
     let points = &small.segment.points;
-    let within = points.iter().filter(|p| holds(large.hull(), [p.x, p.y])).count();
-    within * 10 >= points.len() * 7
+    // The outline is drawn only where the box around it does not settle it.
+    points.iter().filter(beside).count() * 10 <= points.len() * 3
+        && most_within(large.hull(), points, |p| [p.x, p.y])
 }

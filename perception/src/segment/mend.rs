@@ -1,0 +1,202 @@
+//! The mends for vessels and handles: what creases wrongly parted.
+
+use super::join::{Border, Union};
+use super::most_within;
+use super::patches::Voxels;
+use crate::surface::convex_hull;
+use std::cell::OnceCell;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// A part smaller than this share of its neighbour is no object of its own.
+const CRUMB_SHARE: f64 = 0.12;
+/// A part whose base is lifted and which is smaller than this share of what it hangs on belongs to it (a handle, a spout).
+const HANGING_SHARE: f64 = 0.25;
+
+/// Joins what the creases wrongly parted: insides of vessels, handles, crumbs.
+///
+/// The smallest part that belongs to a neighbour goes first; then what touches the joined part is looked at anew.
+pub(super) fn mend(joined: &mut Union, borders: &[Border], voxels: &Voxels, patch_of: &[u32]) {
+    let mut parts = gather(joined, voxels, patch_of);
+    link(&mut parts, joined, borders);
+    let mut open: BinaryHeap<Reverse<Belonging>> = BinaryHeap::new();
+    for (root, part) in (0..).zip(&parts) {
+        let others = part.iter().flat_map(|part| &part.links);
+        open.extend(others.filter_map(|link| Belonging::of(&parts, root, link.other)).map(Reverse));
+    }
+    let mut joins = 0;
+    while let Some(Reverse(next)) = open.pop() {
+        let Belonging { small, large, .. } = next;
+        if !next.is_current(&parts) {
+            continue;
+        }
+        let (Some(a), Some(b)) = (parts[small as usize].take(), parts[large as usize].take()) else { return };
+        joined.join(small, large);
+        joins += 1;
+        let root = joined.root(small);
+        let whole = a.with(b, [small, large], joins);
+        for link in &whole.links {
+            if let Some(other) = &mut parts[link.other as usize] {
+                other.links.retain(|l| l.other != small && l.other != large);
+                other.links.push(Link { other: root, length: link.length });
+            }
+        }
+        let others: Vec<u32> = whole.links.iter().map(|link| link.other).collect();
+        parts[root as usize] = Some(whole);
+        for other in others {
+            let both = [Belonging::of(&parts, root, other), Belonging::of(&parts, other, root)];
+            open.extend(both.into_iter().flatten().map(Reverse));
+        }
+    }
+}
+
+/// A part that belongs to a neighbour, in the order in which they are joined: few points first, then long borders.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Belonging {
+    points: u32,
+    small: u32,
+    /// The border's length below the greatest number.
+    shortness: u32,
+    large: u32,
+    /// After how many joins the two were made.
+    made: [u32; 2],
+}
+
+impl Belonging {
+    fn of(parts: &[Option<Part>], small: u32, large: u32) -> Option<Belonging> {
+        let (s, l) = (parts[small as usize].as_ref()?, parts[large as usize].as_ref()?);
+        let own = s.points <= l.points && (is_crumb(s, l) || hangs_on(s, l) || is_inside(s, l));
+        let length = s.links.iter().find(|link| link.other == large)?.length;
+        let made = [s.made, l.made];
+        own.then_some(Belonging { points: s.points, small, shortness: u32::MAX - length, large, made })
+    }
+
+    /// True if neither part has been joined to another since.
+    fn is_current(&self, parts: &[Option<Part>]) -> bool {
+        let is_same = |part: u32, made| parts[part as usize].as_ref().is_some_and(|p| p.made == made);
+        is_same(self.small, self.made[0]) && is_same(self.large, self.made[1])
+    }
+}
+
+/// A border with another part.
+#[derive(Clone, Copy)]
+struct Link {
+    other: u32,
+    length: u32,
+}
+
+struct Part {
+    points: u32,
+    /// Of its voxels, ascending, metres.
+    heights_m: Vec<f64>,
+    places: Vec<[f64; 2]>,
+    /// Places whose hull is that of all.
+    outer: Vec<[f64; 2]>,
+    hull: OnceCell<Vec<[f64; 2]>>,
+    /// One for each other part, in no order.
+    links: Vec<Link>,
+    /// After how many joins it was made.
+    made: u32,
+}
+
+impl Part {
+    fn height_m(&self, share: f64) -> f64 {
+        let at = (self.heights_m.len().saturating_sub(1) as f64 * share).round() as usize;
+        self.heights_m.get(at).copied().unwrap_or(0.0)
+    }
+
+    fn low_m(&self) -> f64 {
+        self.height_m(0.03)
+    }
+
+    fn top_m(&self) -> f64 {
+        self.height_m(0.97)
+    }
+
+    fn hull(&self) -> &[[f64; 2]] {
+        self.hull.get_or_init(|| convex_hull(self.outer.clone()))
+    }
+
+    /// Both in one, without the links between them.
+    fn with(self, other: Part, both: [u32; 2], made: u32) -> Part {
+        let (mut large, small) =
+            if self.places.len() >= other.places.len() { (self, other) } else { (other, self) };
+        large.made = made;
+        large.points += small.points;
+        large.places.extend(&small.places);
+        // Two ascending runs: the sort joins them in one pass.
+        large.heights_m.extend(&small.heights_m);
+        large.heights_m.sort_by(f64::total_cmp);
+        large.outer = large.hull.take().unwrap_or(large.outer);
+        large.outer.extend(small.hull.get().unwrap_or(&small.outer));
+        large.links.extend(small.links);
+        large.links.retain(|link| !both.contains(&link.other));
+        large.links.sort_unstable_by_key(|link| link.other);
+        large.links.dedup_by(|next, kept| {
+            let same = next.other == kept.other;
+            kept.length += if same { next.length } else { 0 };
+            same
+        });
+        large
+    }
+}
+
+/// The parts by their roots, not linked yet.
+fn gather(joined: &mut Union, voxels: &Voxels, patch_of: &[u32]) -> Vec<Option<Part>> {
+    let patches = patch_of.iter().max().map_or(0, |&p| p as usize + 1);
+    let mut parts: Vec<Option<Part>> = (0..patches).map(|_| None).collect();
+    for (voxel, &patch) in patch_of.iter().enumerate() {
+        let part = parts[joined.root(patch) as usize].get_or_insert_with(|| Part {
+            points: 0,
+            heights_m: Vec::new(),
+            places: Vec::new(),
+            outer: Vec::new(),
+            hull: OnceCell::new(),
+            links: Vec::new(),
+            made: 0,
+        });
+        let centre = &voxels.centres[voxel];
+        part.points += voxels.counts[voxel];
+        part.heights_m.push(centre.z);
+        part.places.push([centre.x, centre.y]);
+    }
+    for part in parts.iter_mut().flatten() {
+        part.heights_m.sort_unstable_by(f64::total_cmp);
+        part.outer.clone_from(&part.places);
+    }
+    parts
+}
+
+/// Tells each part which others it has borders with, and how long they are.
+fn link(parts: &mut [Option<Part>], joined: &mut Union, borders: &[Border]) {
+    let mut links: Vec<(u32, u32, u32)> = Vec::with_capacity(2 * borders.len());
+    for Border { patches: (a, b), length } in borders {
+        let (a, b) = (joined.root(*a), joined.root(*b));
+        if a != b {
+            links.extend([(a, b, *length), (b, a, *length)]);
+        }
+    }
+    links.sort_unstable();
+    for same in links.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let (from, other, _) = same[0];
+        if let Some(part) = &mut parts[from as usize] {
+            part.links.push(Link { other, length: same.iter().map(|link| link.2).sum() });
+        }
+    }
+}
+
+fn is_crumb(small: &Part, large: &Part) -> bool {
+    f64::from(small.points) < CRUMB_SHARE * f64::from(large.points) && small.places.len() < 40
+}
+
+/// The inside of a vessel: within the outline of the body and no higher than its rim.
+fn is_inside(small: &Part, large: &Part) -> bool {
+    small.top_m() < large.top_m() + 0.01 && most_within(large.hull(), &small.places, |p| *p)
+}
+
+/// A handle: small, lifted off the surface, not above the body.
+fn hangs_on(small: &Part, large: &Part) -> bool {
+    f64::from(small.points) < HANGING_SHARE * f64::from(large.points)
+        && small.low_m() > large.low_m() + 0.01
+        && small.top_m() < large.top_m() + 0.005
+}

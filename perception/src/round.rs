@@ -83,7 +83,7 @@ pub(crate) fn sector(x: f64, y: f64, sectors: usize) -> usize {
 
 /// Length of a vector of metres: no overflow to guard against, so no need for `hypot`, which is a slow call.
 #[inline(always)]
-fn distance(x: f64, y: f64) -> f64 {
+pub(crate) fn distance(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }
 

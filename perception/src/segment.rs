@@ -9,6 +9,7 @@ mod mend;
 mod patches;
 mod rounds;
 mod vessels;
+mod votes;
 
 use crate::cloud::Cloud;
 use crate::quantile::end;

@@ -5,16 +5,17 @@
 
 use super::patches::Voxels;
 use super::vessels::round_body;
+use super::votes::{RADII, Votes};
 use crate::outline;
 use crate::quantile::quantile;
-use crate::round::sector;
-use nalgebra::{Point3, Vector2};
-use rustc_hash::FxHashMap;
+use crate::round::{distance, sector};
+use nalgebra::{Point2, Point3, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Radii that are sought, metres, and their step.
+/// Radii that are sought, metres.
 const RADII_M: (f64, f64) = (0.025, 0.085);
-const STEP_M: f64 = 0.006;
+/// Their step and that of places, metres.
+const STEP_M: f64 = (RADII_M.1 - RADII_M.0) / (RADII - 1) as f64;
 /// Fewest voxels of a side.
 const FEWEST: usize = 25;
 /// What is this far out of the body is no longer the body itself, metres.
@@ -167,35 +168,31 @@ impl Axis {
     /// The axes on which most normals of a part agree, best first.
     fn sought(voxels: &Voxels, of: &[usize]) -> Vec<Axis> {
         const MOST: usize = 8;
-        let mut votes: FxHashMap<[i32; 3], u32> = FxHashMap::default();
-        let steps = ((RADII_M.1 - RADII_M.0) / STEP_M) as i32;
-        for &v in of.iter().filter(|&&v| is_side(voxels, v)) {
-            let (place, normal) = (&voxels.centres[v], &voxels.normals[v]);
-            let across = normal.xy().normalize();
-            for k in 0..=steps {
-                let r = RADII_M.0 + f64::from(k) * STEP_M;
-                let cell =
-                    [place.x - across.x * r, place.y - across.y * r].map(|c| (c / STEP_M).round() as i32);
-                *votes.entry([cell[0], cell[1], k]).or_default() += 1;
+        let cell = |m: f64| (m / STEP_M + 0.5).floor() as i32;
+        let side: Vec<usize> = of.iter().copied().filter(|&v| is_side(voxels, v)).collect();
+        let (low, high) = bounds(side.iter().map(|&v| voxels.centres[v].xy()));
+        let mut votes = Votes::over(
+            [low.x, low.y].map(|c| cell(c - RADII_M.1) - 1),
+            [high.x, high.y].map(|c| cell(c + RADII_M.1) + 1),
+        );
+        for &v in &side {
+            let (place, across) = (&voxels.centres[v], voxels.normals[v].xy().normalize());
+            for k in 0..RADII {
+                let r = RADII_M.0 + k as f64 * STEP_M;
+                votes.add(cell(place.x - across.x * r), cell(place.y - across.y * r), k);
             }
         }
-        let around = |&[i, j, k]: &[i32; 3]| -> u32 {
-            let near = (-1..=1)
-                .flat_map(|a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [i + a, j + b, k + c])));
-            near.filter_map(|cell| votes.get(&cell)).sum()
-        };
-        let mut cells: Vec<(u32, [i32; 3])> =
-            votes.iter().filter(|(_, n)| **n > 3).map(|(cell, _)| (around(cell), *cell)).collect();
-        cells.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut cells = votes.peaks(3, FEWEST as u32);
+        cells.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut axes: Vec<Axis> = Vec::new();
-        for (n, [i, j, k]) in cells {
+        for (_, [i, j, k]) in cells {
             let axis = Axis {
                 x: f64::from(i) * STEP_M,
                 y: f64::from(j) * STEP_M,
                 radius_m: RADII_M.0 + f64::from(k) * STEP_M,
             };
             let is_new = axes.iter().all(|a| (a.x - axis.x).hypot(a.y - axis.y) > 3.0 * STEP_M);
-            if (n as usize) < FEWEST || axes.len() == MOST {
+            if axes.len() == MOST {
                 break;
             }
             if is_new {
@@ -206,7 +203,7 @@ impl Axis {
     }
 
     fn distance_m(&self, p: &Point3<f64>) -> f64 {
-        (p.x - self.x).hypot(p.y - self.y)
+        distance(p.x - self.x, p.y - self.y)
     }
 
     /// The voxels, ascending, of the body about the axis: its side, from enough directions, and what is within.
@@ -239,6 +236,12 @@ impl Axis {
         };
         wide.then(|| of.iter().copied().filter(belongs).collect())
     }
+}
+
+/// Lowest and highest corner of a box around places.
+fn bounds(places: impl Iterator<Item = Point2<f64>> + Clone) -> (Point2<f64>, Point2<f64>) {
+    let first = places.clone().next().unwrap_or_else(Point2::origin);
+    places.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)))
 }
 
 /// True if the voxel lies on something upright.

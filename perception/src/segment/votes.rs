@@ -1,0 +1,105 @@
+//! Votes for upright axes: a place and a radius each, counted in cells.
+
+/// Radii that are voted for.
+pub(super) const RADII: usize = 11;
+/// Cells along each side of a tile.
+const TILE: usize = 16;
+
+/// Counts in tiles, which are laid where votes fall.
+pub(super) struct Votes {
+    /// The lowest cell.
+    low: [i32; 2],
+    /// Tiles along y.
+    deep: usize,
+    /// Number of each tile among those that are laid, plus one.
+    tiles: Vec<u32>,
+    counts: Vec<[u16; RADII]>,
+}
+
+impl Votes {
+    /// None yet, over the cells from `low` to `high`.
+    pub fn over(low: [i32; 2], high: [i32; 2]) -> Votes {
+        let tiles = |k: usize| (high[k] - low[k]).max(0) as usize / TILE + 1;
+        Votes { low, deep: tiles(1), tiles: vec![0; tiles(0) * tiles(1)], counts: Vec::new() }
+    }
+
+    /// Tile and place in it.
+    fn locate(&self, x: i32, y: i32) -> Option<(usize, usize)> {
+        let (i, j) = (usize::try_from(x - self.low[0]).ok()?, usize::try_from(y - self.low[1]).ok()?);
+        (j / TILE < self.deep).then_some((i / TILE * self.deep + j / TILE, i % TILE * TILE + j % TILE))
+    }
+
+    /// One vote more. Beyond the cells that were named, votes are lost.
+    pub fn add(&mut self, x: i32, y: i32, radius: usize) {
+        let Some((tile, place)) = self.locate(x, y).filter(|(tile, _)| *tile < self.tiles.len()) else {
+            return;
+        };
+        if self.tiles[tile] == 0 {
+            self.counts.resize(self.counts.len() + TILE * TILE, [0; RADII]);
+            self.tiles[tile] = (self.counts.len() / (TILE * TILE)) as u32;
+        }
+        let count = &mut self.counts[(self.tiles[tile] as usize - 1) * TILE * TILE + place][radius];
+        *count = count.saturating_add(1);
+    }
+
+    fn at(&self, x: i32, y: i32) -> Option<&[u16; RADII]> {
+        let (tile, place) = self.locate(x, y)?;
+        let laid = (*self.tiles.get(tile)? as usize).checked_sub(1)?;
+        self.counts.get(laid * TILE * TILE + place)
+    }
+
+    /// The cells with more than `few` votes of their own and `most` or more with those around: how many these are, and x, y and radius.
+    pub fn peaks(&self, few: u16, most: u32) -> Vec<(u32, [i32; 3])> {
+        let mut peaks = Vec::new();
+        for (tile, laid) in self.tiles.iter().enumerate().filter(|(_, laid)| **laid > 0) {
+            let counts = &self.counts[(*laid as usize - 1) * TILE * TILE..*laid as usize * TILE * TILE];
+            for (place, own) in counts.iter().enumerate() {
+                if own.iter().all(|n| *n <= few) {
+                    continue;
+                }
+                let x = self.low[0] + (tile / self.deep * TILE + place / TILE) as i32;
+                let y = self.low[1] + (tile % self.deep * TILE + place % TILE) as i32;
+                let around = self.around(x, y);
+                let cells = (0..RADII).filter(|&k| own[k] > few).map(|k| (around[k], [x, y, k as i32]));
+                peaks.extend(cells.filter(|(n, _)| *n >= most));
+            }
+        }
+        peaks
+    }
+
+    /// For each radius the votes for it and those next to it, in the cell and the eight around.
+    fn around(&self, x: i32, y: i32) -> [u32; RADII] {
+        let mut columns = [0; RADII];
+        for counts in (-1..=1).flat_map(|i| (-1..=1).filter_map(move |j| self.at(x + i, y + j))) {
+            columns.iter_mut().zip(counts).for_each(|(sum, n)| *sum += u32::from(*n));
+        }
+        std::array::from_fn(|k| columns[k.saturating_sub(1)..(k + 2).min(RADII)].iter().sum())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    proptest! {
+        #[test]
+        fn peaks_are_those_of_a_map(votes in prop::collection::vec((-3..30_i32, 40..60_i32, 0..RADII), 1..900)) {
+            let mut map: BTreeMap<[i32; 3], u32> = BTreeMap::new();
+            let mut counted = Votes::over([-3, 40], [29, 59]);
+            for &(x, y, k) in &votes {
+                *map.entry([x, y, k as i32]).or_default() += 1;
+                counted.add(x, y, k);
+            }
+            let near = |a: &[i32; 3], b: &[i32; 3]| (0..3).all(|i| (a[i] - b[i]).abs() <= 1);
+            let around = |cell| map.iter().filter(|(other, _)| near(cell, other)).map(|(_, n)| *n).sum::<u32>();
+            let peaks = map.iter().filter(|(_, n)| **n > 1).map(|(cell, _)| (around(cell), *cell));
+            let mut expected: Vec<_> = peaks.filter(|(n, _)| *n >= 5).collect();
+            let mut found = counted.peaks(1, 5);
+            expected.sort_unstable();
+            found.sort_unstable();
+            prop_assert_eq!(found, expected);
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! Sets of cells and of points in a plane: what hangs together, and the hull.
+
+use rustc_hash::FxHashMap;
+
+/// The largest set of cells that hang together over gaps of up to two cells (shadows of objects); ties go to the first in order.
+pub(crate) fn largest_part(cells: &FxHashMap<[i32; 2], u32>) -> Vec<[i32; 2]> {
+    let mut order: Vec<([i32; 2], u32)> = cells.iter().map(|(cell, count)| (*cell, *count)).collect();
+    order.sort_unstable();
+    let first = first_of_part(&order);
+    let mut counts = vec![0; order.len()];
+    order.iter().zip(&first).for_each(|((_, count), &first)| counts[first] += count);
+    let best = (0..order.len()).max_by_key(|&i| (counts[i], order.len() - i));
+    let members = order.iter().zip(&first).filter(|(_, first)| Some(**first) == best);
+    members.map(|((cell, _), _)| *cell).collect()
+}
+
+/// For each of some cells in order the first that it hangs together with.
+fn first_of_part(order: &[([i32; 2], u32)]) -> Vec<usize> {
+    const GAP: i32 = 2;
+    let mut first: Vec<usize> = (0..order.len()).collect();
+    // The cells that follow within reach: in the same column, and in the next ones.
+    let mut ahead = [0; GAP as usize + 1];
+    for (i, ([x, y], _)) in order.iter().enumerate() {
+        for (dx, start) in (0..).zip(&mut ahead) {
+            let from = [x + dx, if dx == 0 { y + 1 } else { y - GAP }];
+            while order.get(*start).is_some_and(|(cell, _)| *cell < from) {
+                *start += 1;
+            }
+            let near = order[*start..].iter().take_while(|(cell, _)| *cell <= [x + dx, y + GAP]);
+            for j in (*start..).take(near.count()) {
+                let (a, b) = (root(&mut first, i), root(&mut first, j));
+                first[a.max(b)] = a.min(b);
+            }
+        }
+    }
+    (0..order.len()).map(|i| root(&mut first, i)).collect()
+}
+
+fn root(first: &mut [usize], mut i: usize) -> usize {
+    while first[i] != i {
+        first[i] = first[first[i]];
+        i = first[i];
+    }
+    i
+}
+
+/// Corners of the convex hull, anticlockwise (Andrew's monotone chain).
+pub(crate) fn convex_hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    drop_inner(&mut points);
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let turns_right = |hull: &[[f64; 2]], p: &[f64; 2]| match hull {
+        [.., a, b] => (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) <= 0.0,
+        _ => false,
+    };
+    let half = |points: &mut dyn Iterator<Item = &[f64; 2]>| {
+        let mut chain: Vec<[f64; 2]> = Vec::new();
+        for p in points {
+            while turns_right(&chain, p) {
+                chain.pop();
+            }
+            chain.push(*p);
+        }
+        chain.pop();
+        chain
+    };
+    let mut hull = half(&mut points.iter());
+    hull.extend(half(&mut points.iter().rev()));
+    hull
+}
+
+/// Drops what lies well inside the octagon of the extreme points, which is no corner of the hull (Akl and Toussaint 1978).
+fn drop_inner(points: &mut Vec<[f64; 2]>) {
+    const WORTH_IT: usize = 64;
+    const WAYS: [[f64; 2]; 8] = [
+        [1.0, 0.0],
+        [1.0, 1.0],
+        [0.0, 1.0],
+        [-1.0, 1.0],
+        [-1.0, 0.0],
+        [-1.0, -1.0],
+        [0.0, -1.0],
+        [1.0, -1.0],
+    ];
+    if points.len() < WORTH_IT {
+        return;
+    }
+    let mut extreme = [(f64::NEG_INFINITY, points[0]); 8];
+    for p in points.iter() {
+        for (far, way) in extreme.iter_mut().zip(&WAYS) {
+            let reach = way[0] * p[0] + way[1] * p[1];
+            if reach > far.0 {
+                *far = (reach, *p);
+            }
+        }
+    }
+    // The box between the corners that reach farthest at a slant lies in the octagon, and holds most points.
+    let [_, (_, ne), _, (_, nw), _, (_, sw), _, (_, se)] = extreme;
+    let (west, east) = (nw[0].max(sw[0]), ne[0].min(se[0]));
+    let (south, north) = (sw[1].max(se[1]), nw[1].min(ne[1]));
+    points.retain(|p| !(p[0] > west && p[0] < east && p[1] > south && p[1] < north));
+    let mut octagon: Vec<[f64; 2]> = extreme.iter().map(|(_, p)| *p).collect();
+    octagon.dedup();
+    if octagon.len() < 3 {
+        return;
+    }
+    points.retain(|p| {
+        !(0..octagon.len()).all(|i| {
+            let (a, b) = (octagon[i], octagon[(i + 1) % octagon.len()]);
+            a == b || (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) > 1e-12
+        })
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A corner between every two neighbours and nothing outside.
+    fn check(points: Vec<[f64; 2]>, corners: usize) {
+        let hull = convex_hull(points.clone());
+        assert_eq!(hull.len(), corners, "{hull:?}");
+        for i in 0..hull.len() {
+            let (a, b) = (hull[i], hull[(i + 1) % hull.len()]);
+            let left = |p: &[f64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+            assert!(points.iter().all(|p| left(p) >= -1e-9), "{a:?} to {b:?}");
+        }
+    }
+
+    #[test]
+    fn hulls_of_many_points_of_one_place_and_of_a_line() {
+        let circle = |i: i32| [(f64::from(i) * 0.1).cos(), (f64::from(i) * 0.1).sin()];
+        let inside = (0..1000).map(|i| circle(i).map(|c| c * f64::from(i % 97) / 100.0));
+        check((0..62).map(circle).chain(inside).collect(), 62);
+        check((0..400).map(|i| [f64::from(i % 20), f64::from(i / 20)]).collect(), 4);
+        check(vec![[0.3, 0.4]; 100], 1);
+        check((0..100).map(|i| [f64::from(i), 2.0 * f64::from(i)]).collect(), 2);
+    }
+}

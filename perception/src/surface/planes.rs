@@ -1,0 +1,243 @@
+//! The large planes of a sample of points.
+
+use crate::draw::Draws;
+use nalgebra::{Matrix3, Point3, Vector3};
+use rustc_hash::FxHashMap;
+
+/// Points looked at when a plane is sought; more do not change it.
+pub(super) const SAMPLE: usize = 16_000;
+/// Fewest points that make a surface.
+pub(super) const FEWEST: usize = 50;
+/// Planes proposed in each round.
+const PROPOSALS: usize = 240;
+/// Planes taken away one after another at most.
+const ROUNDS: usize = 6;
+/// Proposals go through points of one cube of this side, metres.
+const REACH_M: f64 = 0.3;
+/// Points that judge a proposal, at the least.
+const JUDGES: usize = 1500;
+
+#[derive(Clone, Copy)]
+pub(super) struct Plane {
+    pub normal: Vector3<f64>,
+    pub offset: f64,
+}
+
+impl Plane {
+    pub fn distance(&self, p: &Point3<f64>) -> f64 {
+        self.normal.dot(&p.coords) - self.offset
+    }
+
+    /// True if a point may be a measurement of one of the plane.
+    pub fn holds(&self, sample: &Sample) -> bool {
+        self.distance(&sample.point).abs() <= 3.0 * sample.sigma_m + 0.004
+    }
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Sample {
+    pub point: Point3<f64>,
+    /// Standard deviation of the measurement along the ray, metres.
+    pub sigma_m: f64,
+}
+
+/// Normals and offsets of planes that hold at least a share of all points; points by view, with their spreads.
+pub(crate) fn dominant_planes<'a>(
+    places: &[Vec<Point3<f64>>],
+    sigmas_m: impl Iterator<Item = &'a [f64]>,
+    share: f64,
+) -> Vec<(Vector3<f64>, f64)> {
+    let total: usize = places.iter().map(Vec::len).sum();
+    let stride = (total / (SAMPLE / 2)).max(1);
+    let samples: Vec<Sample> = places
+        .iter()
+        .zip(sigmas_m)
+        .flat_map(|(view, sigmas)| view.iter().zip(sigmas))
+        .step_by(stride)
+        .map(|(point, sigma_m)| Sample { point: *point, sigma_m: *sigma_m })
+        .collect();
+    let holds = |plane: &Plane| {
+        samples.iter().filter(|s| plane.holds(s)).count() as f64 >= share * samples.len() as f64
+    };
+    let planes = large_planes(&samples, 1, |_| true);
+    planes.into_iter().filter(holds).map(|p| (p.normal, p.offset)).collect()
+}
+
+/// Large planes, one after another, each without the points of those before it.
+pub(super) fn large_planes(samples: &[Sample], seed: u64, plausible: impl Fn(&Plane) -> bool) -> Vec<Plane> {
+    let mut rng = Draws::new(seed);
+    let mut left = samples.to_vec();
+    let mut cubes = Cubes::of(samples);
+    let mut planes = Vec::new();
+    for _ in 0..ROUNDS {
+        if left.len() < FEWEST {
+            break;
+        }
+        let Some(plane) = propose(&left, &cubes, &mut rng, &plausible) else { break };
+        let Some(plane) = refine(plane, &left) else { break };
+        let before = left.len();
+        cubes.keep(left.iter().map(|s| !plane.holds(s)));
+        left.retain(|s| !plane.holds(s));
+        if before - left.len() < FEWEST {
+            break;
+        }
+        planes.push(plane);
+    }
+    planes
+}
+
+/// Which points lie in one cube.
+struct Cubes {
+    /// The cube of each point.
+    of: Vec<u32>,
+    /// Where the points of each cube begin in `members`, and where the last ones end.
+    starts: Vec<u32>,
+    /// Numbers of points, cube by cube, ascending in each.
+    members: Vec<u32>,
+}
+
+impl Cubes {
+    fn of(samples: &[Sample]) -> Cubes {
+        let mut numbers: FxHashMap<[i32; 3], u32> = FxHashMap::default();
+        let mut last = ([i32::MIN; 3], 0);
+        let mut number = |sample: &Sample| {
+            let key = [0, 1, 2].map(|k| super::floor(sample.point[k] / REACH_M));
+            if key != last.0 {
+                let next = numbers.len() as u32;
+                last = (key, *numbers.entry(key).or_insert(next));
+            }
+            last.1
+        };
+        let of: Vec<u32> = samples.iter().map(&mut number).collect();
+        let mut cubes = Cubes { of, starts: vec![0; numbers.len() + 1], members: Vec::new() };
+        cubes.sort();
+        cubes
+    }
+
+    /// Only the points that are told to be kept, in their order.
+    fn keep(&mut self, mut kept: impl Iterator<Item = bool>) {
+        self.of.retain(|_| kept.next().unwrap_or(false));
+        self.sort();
+    }
+
+    fn sort(&mut self) {
+        self.starts.fill(0);
+        self.of.iter().for_each(|&cube| self.starts[cube as usize + 1] += 1);
+        let mut sum = 0;
+        for start in &mut self.starts {
+            sum += *start;
+            *start = sum;
+        }
+        let mut next = self.starts.clone();
+        self.members.resize(self.of.len(), 0);
+        for (point, &cube) in (0..).zip(&self.of) {
+            let at = &mut next[cube as usize];
+            self.members[*at as usize] = point;
+            *at += 1;
+        }
+    }
+
+    /// The points in the cube of a point, itself among them.
+    fn around(&self, point: usize) -> &[u32] {
+        let cube = self.of[point] as usize;
+        &self.members[self.starts[cube] as usize..self.starts[cube + 1] as usize]
+    }
+}
+
+/// The points that proposals are judged by, each coordinate by itself.
+struct Judges {
+    coordinates: [Vec<f64>; 3],
+    /// How far each may be off a plane that it speaks for, metres.
+    bands_m: Vec<f64>,
+}
+
+impl Judges {
+    fn of(samples: &[Sample]) -> Judges {
+        let judges = || samples.iter().step_by((samples.len() / JUDGES).max(1));
+        let axis = |k: usize| judges().map(|s| s.point[k]).collect();
+        let bands_m = judges().map(|s| 2.0 * s.sigma_m + 0.004).collect();
+        Judges { coordinates: [axis(0), axis(1), axis(2)], bands_m }
+    }
+
+    /// How many speak for the plane; `None` as soon as it cannot be more than `beaten`.
+    fn near(&self, plane: &Plane, beaten: usize) -> Option<usize> {
+        const BLOCK: usize = 128;
+        let [x, y, z] = self.coordinates.each_ref().map(|axis| axis.chunks(BLOCK));
+        let (mut found, mut left) = (0, self.bands_m.len());
+        for (((x, y), z), bands_m) in x.zip(y).zip(z).zip(self.bands_m.chunks(BLOCK)) {
+            if found + left <= beaten {
+                return None;
+            }
+            let near = x.iter().zip(y).zip(z).zip(bands_m).map(|(((x, y), z), band_m)| {
+                let along = plane.normal.x * x + plane.normal.y * y + plane.normal.z * z;
+                u64::from((along - plane.offset).abs() < *band_m)
+            });
+            found += near.sum::<u64>() as usize;
+            left -= bands_m.len();
+        }
+        (found > beaten).then_some(found)
+    }
+}
+
+/// The best of planes through three neighbouring points.
+fn propose(
+    left: &[Sample],
+    cubes: &Cubes,
+    rng: &mut Draws,
+    plausible: &impl Fn(&Plane) -> bool,
+) -> Option<Plane> {
+    let judges = Judges::of(left);
+    let mut best: Option<(usize, Plane)> = None;
+    for _ in 0..PROPOSALS {
+        let first = rng.below(left.len());
+        let near = cubes.around(first);
+        let mut pick = || left[near[rng.below(near.len())] as usize].point;
+        let (a, b, c) = (left[first].point, pick(), pick());
+        let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-4) else { continue };
+        let plane = Plane { normal, offset: normal.dot(&a.coords) };
+        if !plausible(&plane) {
+            continue;
+        }
+        let count = match best {
+            Some((beaten, _)) => judges.near(&plane, beaten),
+            None => judges.near(&plane, 0).or(Some(0)),
+        };
+        best = count.map(|count| (count, plane)).or(best);
+    }
+    best.map(|(_, plane)| plane)
+}
+
+/// Weighted least squares on the points near the plane, repeated with a narrowing band.
+fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
+    for band in [4.0, 3.0, 2.5, 2.5] {
+        let near = samples.iter().filter(|s| plane.distance(&s.point).abs() < band * s.sigma_m + 0.003);
+        plane = least_squares(near, &plane.normal)?;
+    }
+    Some(plane)
+}
+
+fn least_squares<'a>(samples: impl Iterator<Item = &'a Sample>, side: &Vector3<f64>) -> Option<Plane> {
+    let (mut weight, mut sum) = (0.0, [0.0; 3]);
+    // xx xy xz yy yz zz.
+    let mut products = [0.0; 6];
+    for Sample { point: p, sigma_m } in samples {
+        let w = 1.0 / (sigma_m * sigma_m);
+        weight += w;
+        let [x, y, z] = [w * p.x, w * p.y, w * p.z];
+        sum.iter_mut().zip([x, y, z]).for_each(|(sum, term)| *sum += term);
+        let terms = [x * p.x, y * p.x, z * p.x, y * p.y, z * p.y, z * p.z];
+        products.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+    }
+    if weight <= 0.0 {
+        return None;
+    }
+    let mean = Vector3::from(sum) / weight;
+    let [xx, xy, xz, yy, yz, zz] = products;
+    let moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    let eigen = (moments / weight - mean * mean.transpose()).symmetric_eigen();
+    let least = eigen.eigenvalues.imin();
+    let normal: Vector3<f64> = eigen.eigenvectors.column(least).into_owned();
+    let normal = if normal.dot(side) < 0.0 { -normal } else { normal };
+    let offset = normal.dot(&mean);
+    normal.iter().all(|c| c.is_finite()).then_some(Plane { normal, offset })
+}

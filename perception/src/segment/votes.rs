@@ -85,7 +85,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn peaks_are_those_of_a_map(votes in prop::collection::vec((-3..30_i32, 40..60_i32, 0..RADII), 1..900)) {
+        fn peaks_are_those_of_a_map(votes in prop::collection::vec((-3..30_i32, 40..60_i32, 0..RADII), 1..300)) {
             let mut map: BTreeMap<[i32; 3], u32> = BTreeMap::new();
             let mut counted = Votes::over([-3, 40], [29, 59]);
             for &(x, y, k) in &votes {

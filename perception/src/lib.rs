@@ -18,7 +18,6 @@ pub mod outliers;
 mod outline;
 pub mod picture;
 pub mod plane;
-mod quantile;
 pub mod recognise;
 pub mod register;
 mod round;

@@ -7,16 +7,17 @@
 mod join;
 mod mend;
 mod patches;
+mod quantile;
 mod rounds;
 mod vessels;
 mod votes;
 
 use crate::cloud::Cloud;
-use crate::quantile::end;
 use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, convex_hull, find_surface};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
 use patches::Voxels;
+pub(crate) use quantile::{end, quantile};
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 

@@ -2,9 +2,8 @@
 
 use super::percept::{Evidence, Sighting};
 use crate::outline::{self, Rectangle};
-use crate::quantile::quantile;
 use crate::round::{self, Edge, Round};
-use crate::segment::{Scene, Segment, top_m};
+use crate::segment::{Scene, Segment, quantile, top_m};
 use crate::surface::range_sigma_m;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::{Isometry3, Point3};

@@ -4,10 +4,10 @@
 //! agree, a body is fitted, and parted off if what is left is more than a handle.
 
 use super::patches::Voxels;
+use super::quantile;
 use super::vessels::round_body;
 use super::votes::{RADII, Votes};
 use crate::outline;
-use crate::quantile::quantile;
 use crate::round::{distance, sector};
 use nalgebra::{Point2, Point3, Vector2};
 use std::collections::{BTreeMap, BTreeSet};

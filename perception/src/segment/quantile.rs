@@ -67,7 +67,7 @@ mod tests {
             ascending in any::<bool>(),
         ) {
             if ascending {
-                values.sort_by(|a, b| a.0.cmp(&b.0));
+                values.sort_by_key(|value| value.0);
             }
             let values: Vec<f64> =
                 values.iter().map(|(whole, rest)| f64::from(*whole) * if coarse { 1.0 } else { *rest }).collect();

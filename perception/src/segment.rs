@@ -134,8 +134,8 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>,
     let offset = surface.offset_m as f32;
     let band = clearance_m as f32..options.tallest_m as f32;
     let rows = Rows::of(surface);
-    let mut indices = Vec::new();
-    let mut points = Vec::new();
+    let (mut indices, mut points) =
+        (Vec::with_capacity(cloud.len() / 2), Vec::with_capacity(cloud.len() / 2));
     for (i, p) in (0u32..).zip(&cloud.points) {
         // What is not finite is in no band.
         if band.contains(&(up.dot(&p.coords) - offset)) {

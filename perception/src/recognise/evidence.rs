@@ -3,7 +3,7 @@
 use super::percept::{Evidence, Sighting};
 use crate::outline::{self, Rectangle};
 use crate::round::{self, Edge, Round};
-use crate::segment::{Scene, Segment, quantile, top_m};
+use crate::segment::{Scene, Segment, end, quantile, top_m};
 use crate::surface::range_sigma_m;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::{Isometry3, Point3};
@@ -144,10 +144,19 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
     measured
 }
 
+/// Heights at which silhouettes are looked at, as shares of the body's height.
+const SILHOUETTES: [(f64, f64); 3] = [(0.15, 0.4), (0.4, 0.65), (0.65, 0.92)];
+
 /// Where the outline of the body, seen from each camera, ends against free space: left and right, at three heights.
 fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Vec<Edge> {
     /// Lost pixels at depth edges make what is seen narrower by about this on each side, metres.
     const LOST_M: f64 = 0.001;
+    let bands = SILHOUETTES.map(|(low, high)| (base_m + low * height, base_m + high * height));
+    let in_band = |&(low, high): &(f64, f64)| {
+        let near = |p: &&Point3<f64>| p.z >= low && p.z < high && round.outside_m(p) < 0.012;
+        segment.points.iter().filter(near).map(|p| [p.x, p.y]).collect::<Vec<[f64; 2]>>()
+    };
+    let near = bands.each_ref().map(in_band);
     let mut edges = Vec::new();
     for map in &asker.seen.maps {
         let eye = asker.world_from_surface.inverse() * map.viewpoint();
@@ -159,19 +168,10 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
         for side in [-1.0, 1.0] {
             // The tangent point leans a little towards the camera: across the ray, not across the table.
             let across = [side * -ey / distance, side * ex / distance];
-            for (low, high) in [(0.15, 0.4), (0.4, 0.65), (0.65, 0.92)] {
-                let (low, high) = (base_m + low * height, base_m + high * height);
+            for ((low, high), near) in bands.iter().zip(&near).filter(|(_, near)| near.len() >= 25) {
                 let z = 0.5 * (low + high);
-                let mut reaches: Vec<f64> = segment
-                    .points
-                    .iter()
-                    .filter(|p| p.z >= low && p.z < high && round.outside_m(p) < 0.012)
-                    .map(|p| across[0] * p.x + across[1] * p.y)
-                    .collect();
-                if reaches.len() < 25 {
-                    continue;
-                }
-                let reach_m = quantile(&mut reaches, 0.985) + LOST_M;
+                let reaches: Vec<f64> = near.iter().map(|p| across[0] * p[0] + across[1] * p[1]).collect();
+                let reach_m = end(&reaches, 0.985) + LOST_M;
                 let beyond = reach_m + 0.012 - (across[0] * round.x + across[1] * round.y);
                 let place = Point3::new(round.x + across[0] * beyond, round.y + across[1] * beyond, z);
                 if map.look(&(asker.world_from_surface * place), asker.tolerance_m) == Seen::Free {
@@ -266,15 +266,8 @@ struct Sectors {
 
 impl Sectors {
     fn measure(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Sectors {
-        let mut counts = [0_u32; SECTORS];
-        for p in &segment.points {
-            let inner = p.z > base_m + 0.15 * height && p.z < base_m + 0.9 * height;
-            if inner && round.outside_m(p).abs() < 0.009 {
-                counts[sector_of(round, p)] += 1;
-            }
-        }
         let mut sectors = Sectors {
-            measured: counts.map(|c| c >= 2),
+            measured: measured_sectors(round, segment, base_m, height),
             looked_through: [false; SECTORS],
             handle_free: [0.0; SECTORS],
         };
@@ -318,6 +311,34 @@ impl Sectors {
         let hides = |i: usize| self.handle_free[i] < 0.6 && self.handle_free[(i + 1) % SECTORS] < 0.6;
         (0..SECTORS).filter(|&i| hides(i)).count() as f64 / SECTORS as f64
     }
+}
+
+/// In which directions two or more points lie on the side.
+fn measured_sectors(round: &Round, segment: &Segment, base_m: f64, height: f64) -> [bool; SECTORS] {
+    let (low, high) = (base_m + 0.15 * height, base_m + 0.9 * height);
+    let on_side = |p: &&Point3<f64>| p.z > low && p.z < high && round.outside_m(p).abs() < 0.009;
+    let mut counts = [0_u32; SECTORS];
+    // What follows lies in the same direction, most often: this much of the circle needs no angle to be told.
+    let mut settled: Option<[[f64; 2]; 2]> = None;
+    for p in segment.points.iter().filter(on_side) {
+        let (x, y) = (p.x - round.x, p.y - round.y);
+        if settled.is_some_and(|[from, to]| from[0] * y - from[1] * x > 0.0 && to[0] * y - to[1] * x < 0.0) {
+            continue;
+        }
+        let sector = round::sector(x, y, SECTORS);
+        counts[sector] += 1;
+        settled = (counts[sector] >= 2).then(|| within_sector(sector));
+    }
+    counts.map(|c| c >= 2)
+}
+
+/// Directions just inside both ends of a sector.
+fn within_sector(sector: usize) -> [[f64; 2]; 2] {
+    const ROUNDING: f64 = 1e-9;
+    [ROUNDING, 1.0 - ROUNDING].map(|share| {
+        let (sin, cos) = (std::f64::consts::TAU * (sector as f64 + share) / SECTORS as f64).sin_cos();
+        [cos, sin]
+    })
 }
 
 fn share(flags: &[bool; SECTORS]) -> f64 {
@@ -410,6 +431,11 @@ fn along_and_across(round: &Round, p: &Point3<f64>, (sin, cos): (f64, f64)) -> (
     (x * cos + y * sin, y * cos - x * sin)
 }
 
+/// [`f64::round`] but for halves, without the call that it is on some processors.
+fn nearest_step(steps: f64) -> i32 {
+    (steps + 0.5_f64.copysign(steps)) as i32
+}
+
 /// What was seen of the upper end: the share of it that was looked into, and the share that is a face.
 struct TopFace {
     open: f64,
@@ -434,8 +460,7 @@ impl TopFace {
             } else {
                 continue;
             };
-            let (i, j) =
-                (((p.x - round.x) / STEP_M).round() as i32, ((p.y - round.y) / STEP_M).round() as i32);
+            let [i, j] = [p.x - round.x, p.y - round.y].map(|m| nearest_step(m / STEP_M));
             if i.abs() <= cells && j.abs() <= cells {
                 points[((i + cells) * side + j + cells) as usize] |= kind;
             }

@@ -72,12 +72,20 @@ pub(super) fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<
     parts.into_iter().map(|c| c.segment).collect()
 }
 
+/// Both in one, in order of the indices.
 fn union(a: &Segment, b: &Segment) -> Segment {
-    let mut both: Vec<(u32, Point3<f64>)> =
-        a.indices.iter().chain(&b.indices).copied().zip(a.points.iter().chain(&b.points).copied()).collect();
-    both.sort_by_key(|(i, _)| *i);
-    let (indices, points) = both.into_iter().unzip();
-    Segment { indices, points, base_m: 0.0 }
+    let count = a.indices.len() + b.indices.len();
+    let mut both =
+        Segment { indices: Vec::with_capacity(count), points: Vec::with_capacity(count), base_m: 0.0 };
+    let (mut i, mut j) = (0, 0);
+    while i < a.indices.len() || j < b.indices.len() {
+        let from_a = b.indices.get(j).is_none_or(|next| a.indices.get(i).is_some_and(|own| own <= next));
+        let (from, at) = if from_a { (a, &mut i) } else { (b, &mut j) };
+        both.indices.push(from.indices[*at]);
+        both.points.push(from.points[*at]);
+        *at += 1;
+    }
+    both
 }
 
 fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {

@@ -72,37 +72,34 @@ pub(crate) fn convex_hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     hull
 }
 
-/// Drops what lies well inside the octagon of the extreme points, which is no corner of the hull (Akl and Toussaint 1978).
-fn drop_inner(points: &mut Vec<[f64; 2]>) {
-    const WORTH_IT: usize = 64;
-    const WAYS: [[f64; 2]; 8] = [
-        [1.0, 0.0],
-        [1.0, 1.0],
-        [0.0, 1.0],
-        [-1.0, 1.0],
-        [-1.0, 0.0],
-        [-1.0, -1.0],
-        [0.0, -1.0],
-        [1.0, -1.0],
-    ];
-    if points.len() < WORTH_IT {
-        return;
-    }
-    let mut extreme = [(f64::NEG_INFINITY, points[0]); 8];
-    for p in points.iter() {
-        for (far, way) in extreme.iter_mut().zip(&WAYS) {
+/// The points that reach farthest in some ways.
+fn farthest<const N: usize>(points: &[[f64; 2]], ways: [[f64; 2]; N]) -> [[f64; 2]; N] {
+    let mut far = [(f64::NEG_INFINITY, [0.0; 2]); N];
+    for p in points {
+        for (far, way) in far.iter_mut().zip(&ways) {
             let reach = way[0] * p[0] + way[1] * p[1];
             if reach > far.0 {
                 *far = (reach, *p);
             }
         }
     }
-    // The box between the corners that reach farthest at a slant lies in the octagon, and holds most points.
-    let [_, (_, ne), _, (_, nw), _, (_, sw), _, (_, se)] = extreme;
+    far.map(|(_, p)| p)
+}
+
+/// Drops what lies well inside the octagon of the extreme points, which is no corner of the hull (Akl and Toussaint 1978).
+fn drop_inner(points: &mut Vec<[f64; 2]>) {
+    const WORTH_IT: usize = 64;
+    const SLANTS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
+    if points.len() < WORTH_IT {
+        return;
+    }
+    // The box between the points that reach farthest at a slant lies in the hull, and holds most points.
+    let [ne, nw, sw, se] = farthest(points, SLANTS);
     let (west, east) = (nw[0].max(sw[0]), ne[0].min(se[0]));
     let (south, north) = (sw[1].max(se[1]), nw[1].min(ne[1]));
     points.retain(|p| !(p[0] > west && p[0] < east && p[1] > south && p[1] < north));
-    let mut octagon: Vec<[f64; 2]> = extreme.iter().map(|(_, p)| *p).collect();
+    let [e, n, w, s] = farthest(points, [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]]);
+    let mut octagon = vec![e, ne, n, nw, w, sw, s, se];
     octagon.dedup();
     if octagon.len() < 3 {
         return;

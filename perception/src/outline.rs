@@ -17,8 +17,8 @@ pub(crate) struct Rectangle {
 
 /// Orientations tried over a quarter turn.
 const TURNS: usize = 30;
-/// Points that are looked at, at most.
-const MOST: usize = 600;
+/// Points that are looked at, at the least, if there are as many.
+const LEAST: usize = 600;
 /// Points that are looked at together.
 const BLOCK: usize = 16;
 
@@ -39,6 +39,19 @@ pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
         }
     }
     best.map(|(_, rectangle)| rectangle)
+}
+
+/// True if some rectangle fits the points, as [`fit`] does, with a lesser residual.
+pub(crate) fn fits(points: &[Point3<f64>], residual_m: f64) -> bool {
+    if points.len() < 8 {
+        return false;
+    }
+    let mut turner = Turner::of(points);
+    let bound = residual_m * residual_m * turner.xs.len() as f64;
+    (0..TURNS).any(|turn| {
+        let turned = turner.turned(turn);
+        turner.squares_within(&turned, bound).is_some()
+    })
 }
 
 /// Sides of the rectangle of least area around nearly all points (longer, shorter), and its middle.
@@ -65,7 +78,7 @@ struct Turner {
 
 impl Turner {
     fn of(points: &[Point3<f64>]) -> Turner {
-        let stride = points.len().div_ceil(MOST).max(1);
+        let stride = (points.len() / LEAST).max(1);
         let (xs, ys): (Vec<f64>, Vec<f64>) = points.iter().step_by(stride).map(|p| (p.x, p.y)).unzip();
         // Filled up to whole blocks with what lies outside of no side.
         let coordinates = vec![f64::NAN; xs.len().next_multiple_of(BLOCK)];

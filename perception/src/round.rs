@@ -14,6 +14,8 @@ const RADII_M: (f64, f64) = (0.012, 0.20);
 const PROPOSALS: usize = 120;
 /// Points that judge a proposal.
 const JUDGES: usize = 160;
+/// Points that all steps of a fit but the last go by, at the least.
+const SCOUTS: usize = 800;
 
 /// An upright cone frustum in the surface's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,9 +114,11 @@ pub(crate) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64,
         spread_m: 0.0,
         inliers: 0.0,
     };
-    for gate in [3.0, 2.0, LAST_GATE, LAST_GATE, LAST_GATE] {
-        round = improve(&round, &side, &[], gate * tolerance, sigma_m)?;
+    let few = side.thinned(SCOUTS);
+    for gate in [3.0, 2.0, LAST_GATE, LAST_GATE] {
+        round = improve(&round, &few, &[], gate * tolerance, sigma_m)?;
     }
+    let round = improve(&round, &side, &[], LAST_GATE * tolerance, sigma_m)?;
     (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * 1.2).then_some(round)
 }
 
@@ -130,9 +134,11 @@ pub(crate) fn refit(
     let side = Side::between(points, base_m, top_m);
     let tolerance = tolerance(sigma_m);
     let mut round = *round;
-    for _ in 0..4 {
-        round = improve(&round, &side, edges, LAST_GATE * tolerance, sigma_m)?;
+    let few = side.thinned(SCOUTS);
+    for _ in 0..3 {
+        round = improve(&round, &few, edges, LAST_GATE * tolerance, sigma_m)?;
     }
+    let round = improve(&round, &side, edges, LAST_GATE * tolerance, sigma_m)?;
     (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * 1.2).then_some(round)
 }
 

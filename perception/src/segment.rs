@@ -134,13 +134,15 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>,
     let offset = surface.offset_m as f32;
     let band = clearance_m as f32..options.tallest_m as f32;
     let rows = Rows::of(surface);
+    let rotation = surface.surface_from_world.rotation.to_rotation_matrix();
+    let shift = surface.surface_from_world.translation.vector;
     let (mut indices, mut points) =
         (Vec::with_capacity(cloud.len() / 2), Vec::with_capacity(cloud.len() / 2));
     for (i, p) in (0u32..).zip(&cloud.points) {
         // What is not finite is in no band.
         if band.contains(&(up.dot(&p.coords) - offset)) {
             let world = p.cast::<f64>();
-            let flat = surface.surface_from_world * world;
+            let flat = rotation * world + shift;
             if rows.covers(&flat, &world) {
                 indices.push(i);
                 points.push(flat);
@@ -191,6 +193,19 @@ fn middle(points: &[Point3<f64>]) -> [f64; 2] {
     let n = points.len().max(1) as f64;
     let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.x, y + p.y));
     [x / n, y / n]
+}
+
+/// Lowest and highest corner of the box around points.
+fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
+    let first = points.first().copied().unwrap_or_else(Point3::origin);
+    let (mut low, mut high) = (first, first);
+    for p in points {
+        for k in 0..3 {
+            low[k] = if p[k] < low[k] { p[k] } else { low[k] };
+            high[k] = if p[k] > high[k] { p[k] } else { high[k] };
+        }
+    }
+    (low, high)
 }
 
 /// The convex outline of points.

@@ -210,7 +210,7 @@ fn held_up(seen: &Visibility) -> Option<Unit<Vector3<f64>>> {
 
 /// [`f64::floor`], which is a call on some processors.
 #[inline(always)]
-fn floor(value: f64) -> i32 {
+pub(crate) fn floor(value: f64) -> i32 {
     let whole = value as i32;
     whole - i32::from(value < f64::from(whole))
 }

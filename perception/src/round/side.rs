@@ -58,12 +58,17 @@ impl Side {
         [self.x[i], self.y[i]]
     }
 
-    /// The same side with about so many points.
+    /// The same side with every so manieth point: so many, or less than twice as many.
     pub fn thinned(&self, to: usize) -> Side {
         let stride = (self.len / to).max(1);
-        let pick = |column: &[f64]| column[..self.len].iter().step_by(stride).copied().collect();
-        let (x, y, z): (Vec<f64>, _, _) = (pick(&self.x), pick(&self.y), pick(&self.z));
-        Side { len: x.len(), x, y, z }
+        let len = self.len.div_ceil(stride);
+        let pick = |column: &[f64]| {
+            let mut few: Vec<f64> = Vec::with_capacity(len.next_multiple_of(LANES));
+            few.extend(column[..self.len].iter().step_by(stride));
+            few.resize(len.next_multiple_of(LANES), f64::NAN);
+            few
+        };
+        Side { x: pick(&self.x), y: pick(&self.y), z: pick(&self.z), len }
     }
 
     /// How well a circle explains the points, seen from above; `None` if not better than `best`.
@@ -72,7 +77,7 @@ impl Side {
         const ROUNDING: f64 = 1e-6;
         let mut score = 0.0;
         let mut left = self.len;
-        for (xs, ys) in self.x.chunks(BLOCK).zip(self.y.chunks(BLOCK)) {
+        for (xs, ys) in self.x[..self.len].chunks(BLOCK).zip(self.y[..self.len].chunks(BLOCK)) {
             if score + left as f64 + ROUNDING < best {
                 return None;
             }

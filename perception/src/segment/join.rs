@@ -72,11 +72,13 @@ fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
 /// Patches: voxels around a flat seed with like normals. Flattest seeds first.
 fn grow_patches(voxels: &Voxels, thin: &[bool]) -> Vec<u32> {
     const NONE: u32 = u32::MAX;
-    let mut order: Vec<(f64, u32)> = voxels.curvatures.iter().copied().zip(0..).collect();
-    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    // Curvatures are not negative: their bits are in the order of their values.
+    let key = |(curvature, voxel): (&f64, u32)| u128::from(curvature.to_bits()) << 32 | u128::from(voxel);
+    let mut order: Vec<u128> = voxels.curvatures.iter().zip(0..).map(key).collect();
+    order.sort_unstable();
     let mut patch_of = vec![NONE; voxels.len()];
     let mut patches = 0;
-    for (_, seed) in order {
+    for seed in order.into_iter().map(|key| key as u32) {
         if patch_of[seed as usize] != NONE {
             continue;
         }

@@ -124,9 +124,7 @@ impl Part {
         large.made = made;
         large.points += small.points;
         large.places.extend(&small.places);
-        // Two ascending runs: the sort joins them in one pass.
-        large.heights_m.extend(&small.heights_m);
-        large.heights_m.sort_by(f64::total_cmp);
+        large.heights_m = merged(&large.heights_m, &small.heights_m);
         large.outer = large.hull.take().unwrap_or(large.outer);
         large.outer.extend(small.hull.get().unwrap_or(&small.outer));
         large.links.extend(small.links);
@@ -139,6 +137,20 @@ impl Part {
         });
         large
     }
+}
+
+/// Two ascending runs in one.
+fn merged(long: &[f64], short: &[f64]) -> Vec<f64> {
+    let mut both = Vec::with_capacity(long.len() + short.len());
+    let mut from = 0;
+    for value in short {
+        let to = from + long[from..].partition_point(|other| other < value);
+        both.extend_from_slice(&long[from..to]);
+        both.push(*value);
+        from = to;
+    }
+    both.extend_from_slice(&long[from..]);
+    both
 }
 
 /// The parts by their roots, not linked yet.

@@ -1,5 +1,6 @@
 //! Points in voxels, with normals and neighbours.
 
+use super::bounds;
 use crate::lattice::{Around, Lattice};
 use crate::spread;
 use nalgebra::{Point3, Vector3};
@@ -76,8 +77,7 @@ impl Moments {
 
 /// Gathers points into voxels of a side and estimates a normal for each from its surroundings.
 pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f64>]) -> Voxels {
-    let first = points.first().copied().unwrap_or_else(Point3::origin);
-    let (low, high) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+    let (low, high) = bounds(points);
     let lattice = Lattice::over(&low, &high, side_m);
     let (mut entries, starts) = runs(&lattice, points);
     lattice.sort(&mut entries, &mut Vec::new());

@@ -9,6 +9,7 @@ use super::vessels::round_body;
 use super::votes::{RADII, Votes};
 use crate::outline;
 use crate::round::{distance, sector};
+use crate::surface::floor;
 use nalgebra::{Point2, Point3, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -76,7 +77,7 @@ fn is_box(voxels: &Voxels, of: &[usize], points: &[Point3<f64>]) -> bool {
     if square <= SQUARE {
         return false;
     }
-    outline::fit(&voxels.points_of(&side, points)).is_some_and(|fit| fit.residual_m < BOX_M)
+    outline::fits(&voxels.points_of(&side, points), BOX_M)
 }
 
 /// The voxels in sets that hang together, each ascending.
@@ -168,7 +169,7 @@ impl Axis {
     /// The axes on which most normals of a part agree, best first.
     fn sought(voxels: &Voxels, of: &[usize]) -> Vec<Axis> {
         const MOST: usize = 8;
-        let cell = |m: f64| (m / STEP_M + 0.5).floor() as i32;
+        let cell = |m: f64| floor(m * (1.0 / STEP_M) + 0.5);
         let side: Vec<usize> = of.iter().copied().filter(|&v| is_side(voxels, v)).collect();
         let (low, high) = bounds(side.iter().map(|&v| voxels.centres[v].xy()));
         let mut votes = Votes::over(

@@ -1,6 +1,6 @@
 //! Vessels in one piece: their near outside and far inside meet only in a thin rim, which no camera resolves.
 
-use super::{Segment, hull_from_above, most_within, top_m};
+use super::{Segment, bounds, hull_from_above, most_within, top_m};
 use crate::outline;
 use crate::round::{self, Round};
 use crate::surface::range_sigma_m;
@@ -35,9 +35,7 @@ struct Candidate {
 
 impl Candidate {
     fn new(segment: Segment) -> Candidate {
-        let first = segment.points.first().copied().unwrap_or_else(Point3::origin);
-        let (low, high) =
-            segment.points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+        let (low, high) = bounds(&segment.points);
         let top_m = top_m(&segment);
         Candidate { segment, low, high, top_m, hull: OnceCell::new(), fitted: OnceCell::new() }
     }
@@ -124,8 +122,6 @@ pub(super) fn round_body(
 /// The round body that comes nearest to points, however badly.
 struct Fitted {
     body: Round,
-    /// How far the points are from a box, metres; fitted when it matters.
-    box_residual_m: OnceCell<f64>,
     /// Spread of one measurement, metres.
     sigma_m: f64,
 }
@@ -136,13 +132,12 @@ impl Fitted {
         let near = viewpoints.iter().map(|v| (first - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
         let sigma_m = range_sigma_m(near).min(0.012);
         let body = round::fit(points, low_m, top_m, sigma_m, 3)?;
-        (body.radius_m < WIDEST_M).then_some(Fitted { body, box_residual_m: OnceCell::new(), sigma_m })
+        (body.radius_m < WIDEST_M).then_some(Fitted { body, sigma_m })
     }
 
-    /// Whether its points, the same as it was fitted to, are nearer to it than a share of how near they are to a box.
+    /// Whether its points, the same as it was fitted to, are nearer to it than a share of how near they are to any box.
     fn beats_box(&self, points: &[Point3<f64>], share: f64) -> bool {
-        let fit = || outline::fit(points).map_or(0.0, |fit| fit.residual_m);
-        self.body.residual_m < share * self.box_residual_m.get_or_init(fit)
+        !outline::fits(points, self.body.residual_m / share)
     }
 
     /// Judged by what lies on it: a handle does not.

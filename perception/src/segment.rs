@@ -100,8 +100,8 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
         parts = vessels::whole(parts, &viewpoints);
     }
     parts.retain(|s| s.indices.len() >= options.fewest_points);
-    stand(&mut parts);
-    parts.retain(|s| top_m(s) - s.base_m >= options.least_height_m);
+    let mut tops = stand(&mut parts).into_iter();
+    parts.retain(|s| tops.next().is_some_and(|top| top - s.base_m >= options.least_height_m));
     parts.sort_by(|a, b| b.indices.len().cmp(&a.indices.len()).then(a.indices.cmp(&b.indices)));
     Scene { surface, segments: parts }
 }
@@ -114,15 +114,18 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
     }
     let mut parts: Vec<Segment> = Vec::new();
     let mut slots: Vec<Option<usize>> = vec![None; voxels.len()];
-    for ((&index, &point), &voxel) in indices.iter().zip(points).zip(&voxels.of_point) {
-        let part = part_of_voxel[voxel as usize] as usize;
+    let mut from = 0;
+    for run in voxels.of_point.chunk_by(|a, b| a == b) {
+        let range = from..from + run.len();
+        from = range.end;
+        let part = part_of_voxel[run[0] as usize] as usize;
         let slot = *slots[part].get_or_insert_with(|| {
             let (indices, points) = (Vec::with_capacity(counts[part]), Vec::with_capacity(counts[part]));
             parts.push(Segment { indices, points, base_m: 0.0 });
             parts.len() - 1
         });
-        parts[slot].indices.push(index);
-        parts[slot].points.push(point);
+        parts[slot].indices.extend_from_slice(&indices[range.clone()]);
+        parts[slot].points.extend_from_slice(&points[range]);
     }
     parts
 }
@@ -158,8 +161,8 @@ pub(crate) fn top_m(segment: &Segment) -> f64 {
     end(&heights, 0.99)
 }
 
-/// Tells for each segment what it stands on: the surface, or the top of another segment under its footprint.
-fn stand(parts: &mut [Segment]) {
+/// Tells for each segment what it stands on: the surface, or the top of another segment under its footprint. Gives all tops.
+fn stand(parts: &mut [Segment]) -> Vec<f64> {
     /// A lower edge this high has been cut or hidden rather than set on something, unless something is below it.
     const LIFTED_M: f64 = 0.02;
     let tops: Vec<f64> = parts.iter().map(top_m).collect();
@@ -187,6 +190,7 @@ fn stand(parts: &mut [Segment]) {
     for (part, base) in parts.iter_mut().zip(bases) {
         part.base_m = base;
     }
+    tops
 }
 
 fn middle(points: &[Point3<f64>]) -> [f64; 2] {

@@ -104,11 +104,12 @@ fn drop_inner(points: &mut Vec<[f64; 2]>) {
     if octagon.len() < 3 {
         return;
     }
+    let ends = octagon.iter().zip(octagon.iter().cycle().skip(1)).filter(|(a, b)| a != b);
+    let edges: Vec<([f64; 2], [f64; 2])> = ends.map(|(a, b)| (*a, [b[0] - a[0], b[1] - a[1]])).collect();
     points.retain(|p| {
-        !(0..octagon.len()).all(|i| {
-            let (a, b) = (octagon[i], octagon[(i + 1) % octagon.len()]);
-            a == b || (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) > 1e-12
-        })
+        let left_of =
+            |(a, along): &([f64; 2], [f64; 2])| along[0] * (p[1] - a[1]) - along[1] * (p[0] - a[0]) > 1e-12;
+        !edges.iter().all(left_of)
     });
 }
 

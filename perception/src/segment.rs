@@ -137,15 +137,13 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>,
     let offset = surface.offset_m as f32;
     let band = clearance_m as f32..options.tallest_m as f32;
     let rows = Rows::of(surface);
-    let rotation = surface.surface_from_world.rotation.to_rotation_matrix();
-    let shift = surface.surface_from_world.translation.vector;
     let (mut indices, mut points) =
         (Vec::with_capacity(cloud.len() / 2), Vec::with_capacity(cloud.len() / 2));
     for (i, p) in (0u32..).zip(&cloud.points) {
         // What is not finite is in no band.
         if band.contains(&(up.dot(&p.coords) - offset)) {
             let world = p.cast::<f64>();
-            let flat = rotation * world + shift;
+            let flat = surface.surface_from_world * world;
             if rows.covers(&flat, &world) {
                 indices.push(i);
                 points.push(flat);

@@ -24,6 +24,10 @@ use descry_robots::{Robot, Watch};
 use divan::Bencher;
 use tempfile::TempDir;
 
+/// As the program has it.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn main() {
     divan::main();
 }

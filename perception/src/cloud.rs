@@ -203,5 +203,6 @@ impl Cloud {
 
 /// True if all three coordinates are finite.
 pub fn is_finite(p: &Point3<f32>) -> bool {
-    p.x.is_finite() && p.y.is_finite() && p.z.is_finite()
+    // What is not finite times nothing is NaN: one comparison in place of three.
+    p.x * 0.0 + p.y * 0.0 + p.z * 0.0 == 0.0
 }

@@ -5,7 +5,6 @@ use nalgebra::{Point3, Vector3};
 /// Numbers the voxels of a part of the world: x counts most, then y, then z. The lattice is fixed to the world's origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lattice {
-    pub voxel_m: f64,
     per_m: f64,
     /// Lowest voxel, with a layer of margin.
     low: [f64; 3],
@@ -25,34 +24,17 @@ impl Lattice {
             let bits: [u32; 3] = std::array::from_fn(|k| (end[k] - start[k]).log2().ceil().max(1.0) as u32);
             if bits.iter().sum::<u32>() < 64 {
                 let shift = [bits[1] + bits[2], bits[2]];
-                return Lattice { voxel_m, per_m, low: start, shift, bits: bits.iter().sum() };
+                return Lattice { per_m, low: start, shift, bits: bits.iter().sum() };
             }
             voxel_m *= 2.0;
         }
     }
 
-    /// Key of the voxel that holds a point of the box, and where in the voxel the point lies, metres from its low corner.
+    /// Key of the voxel that holds a point of the box.
     #[inline(always)]
-    pub fn locate(&self, p: &Vector3<f64>) -> (u64, [f32; 3]) {
-        let from_low = |k: usize| p[k] * self.per_m - self.low[k];
-        let (x, y, z) = (from_low(0), from_low(1), from_low(2));
-        let (i, j, k) = (x as u64, y as u64, z as u64);
-        let rest = |c: f64, whole: u64| ((c - whole as f64) * self.voxel_m) as f32;
-        (i << self.shift[0] | j << self.shift[1] | k, [rest(x, i), rest(y, j), rest(z, k)])
-    }
-
-    /// Low corner of a voxel, metres from the lattice's lowest corner.
-    #[inline(always)]
-    pub fn corner_m(&self, key: u64) -> [f32; 3] {
-        let part = |from: u32, to: u32| (key >> from) & ((1 << (to - from)) - 1);
-        let [x, y, z] =
-            [part(self.shift[0], self.bits), part(self.shift[1], self.shift[0]), part(0, self.shift[1])];
-        [x, y, z].map(|c| (c as f64 * self.voxel_m) as f32)
-    }
-
-    /// The lattice's lowest corner in the world, metres.
-    pub fn origin_m(&self) -> Vector3<f64> {
-        Vector3::from(self.low) * self.voxel_m
+    pub fn key(&self, p: &Vector3<f64>) -> u64 {
+        let [i, j, k] = [0, 1, 2].map(|axis| (p[axis] * self.per_m - self.low[axis]) as u64);
+        i << self.shift[0] | j << self.shift[1] | k
     }
 
     /// What the nine columns of voxels around one differ in from its key: add, and three voxels in a row are meant.
@@ -142,7 +124,7 @@ mod tests {
             let lattice = lattice();
             let voxel = |p: &(f64, f64, f64)| [p.0, p.1, p.2].map(|c| (c / 0.05).floor() as i64);
             let mut entries: Vec<(u64, u32)> = (0..).zip(&places)
-                .map(|(i, p)| (lattice.locate(&Vector3::new(p.0, p.1, p.2)).0, i))
+                .map(|(i, p)| (lattice.key(&Vector3::new(p.0, p.1, p.2)), i))
                 .collect();
             let mut expected = entries.clone();
             expected.sort();
@@ -167,19 +149,9 @@ mod tests {
     }
 
     #[test]
-    fn a_point_is_its_voxels_corner_and_the_rest() {
-        let lattice = lattice();
-        for p in [Vector3::new(-1.0, -0.5, 0.2), Vector3::new(0.7, 0.5, 0.9), Vector3::new(0.013, 0.0, 0.5)] {
-            let (key, rest) = lattice.locate(&p);
-            let corner = Vector3::from(lattice.corner_m(key)) + Vector3::from(rest);
-            assert!((lattice.origin_m() + corner.cast() - p).norm() < 1e-6, "{p}");
-        }
-    }
-
-    #[test]
     fn a_box_beyond_all_numbers_gets_wider_voxels() {
         let far = 1e9;
         let lattice = Lattice::over(&Point3::new(-far, -far, -far), &Point3::new(far, far, far), 0.003);
-        assert!(lattice.voxel_m > 0.003 && lattice.bits < 64);
+        assert!(lattice.per_m < 1.0 / 0.003 && lattice.bits < 64);
     }
 }

@@ -3,11 +3,13 @@
 //! The paper chains pairwise ICP. Here all views are aligned together, against each other and against where localisation had them, so that
 //! nothing drifts and the merged frame stays the average of what localisation said. A view that cannot be placed is left out and says so.
 
+mod bricks;
 mod check;
 mod fuse;
 mod joint;
 mod parts;
 mod prepare;
+mod returns;
 mod search;
 
 use crate::cloud::Cloud;
@@ -15,7 +17,7 @@ use crate::view::View;
 use crate::visibility::{DepthMap, Visibility};
 use joint::{Found, Round};
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
-use parts::Part;
+use parts::{Part, Parts, Plane};
 use prepare::Prepared;
 use rayon::prelude::*;
 use search::Oriented;
@@ -151,13 +153,13 @@ pub enum MergeError {
 }
 
 /// First alignment: everything, from far to near (the table weighs most; paper step 3).
-const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 200, rest_weight: 1.0 };
+const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 800, rest_weight: 1.0 };
 /// The same where a view was left out: localisation may have been worse than it said, or what is seen far off.
-const WIDE: Round = Round { from_m: 0.3, passes: 12, asked: 300, ..FIRST };
+const WIDE: Round = Round { from_m: 0.3, passes: 12, asked: 900, ..FIRST };
 /// Second alignment: planes and what is far weigh little, the objects decide (paper step 4).
-const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 300, rest_weight: 0.2 };
+const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 1200, rest_weight: 0.2 };
 /// After a view was left out, the rest settles again.
-const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 300, rest_weight: 0.2 };
+const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 1200, rest_weight: 0.2 };
 /// Merges views into one cloud in the world frame. One view is filtered and fused only.
 ///
 /// # Errors
@@ -177,10 +179,10 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
             aligned = wide;
         }
     }
-    let Aligned { poses, used, mut whys, found, steps: alignments } = aligned;
+    let Aligned { poses, used, mut whys, found, planes, steps: alignments } = aligned;
     steps.extend(alignments);
     let seen = visibility(maps, &used, &poses);
-    let fused = fuse::fuse(views, &used, &poses, &seen, options);
+    let fused = fuse::fuse(views, &prepared, &used, &poses, &planes, &seen, options);
     steps.push(Step {
         name: "fuse".to_owned(),
         points: fused.cloud.len(),
@@ -199,6 +201,8 @@ struct Aligned {
     /// Why a view is not used.
     whys: Vec<Option<String>>,
     found: Vec<Found>,
+    /// The dominant planes that are level, world frame.
+    planes: Vec<Plane>,
     steps: Vec<Step>,
 }
 
@@ -223,9 +227,10 @@ fn align(
         .collect();
     let mut used: Vec<bool> = whys.iter().map(Option::is_none).collect();
     align_everything(prepared, &used, &mut poses, first, &mut steps);
-    let (parts, up) = parts::find(prepared, &used, &poses, up, &mut steps);
+    let Parts { of: parts, planes, up } = parts::find(prepared, &used, &poses, up, &mut steps);
     let found = align_objects(prepared, &mut used, &mut whys, &parts, up, &mut poses, maps, &mut steps);
-    Aligned { poses, used, whys, found, steps }
+    let planes = parts::level_again(&planes, up, prepared, &used, &parts, &poses);
+    Aligned { poses, used, whys, found, planes, steps }
 }
 
 fn check(views: &[View], options: &MergeOptions) -> Result<(), MergeError> {

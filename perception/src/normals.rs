@@ -6,6 +6,7 @@ use crate::neighbours::{Nearby, Neighbours};
 use crate::spread;
 use nalgebra::{Point3, Vector3};
 
+pub(crate) use organised::organised_where;
 pub use organised::{OrganisedOptions, organised};
 
 /// The surface at each point.

@@ -10,6 +10,7 @@ use crate::normals;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
 pub use align::align;
+pub(crate) use equations::Sums;
 pub(crate) use pairs::Partner;
 pub use pairs::{Pair, pairs};
 

@@ -64,7 +64,12 @@ pub(crate) struct Least {
 /// Spread across a line below this part of the spread along it is rounding of coordinates, not a surface.
 const COLLINEAR: f64 = 1e-9;
 
-/// Direction of least spread of a covariance (xx xy xz yy yz zz), in closed form (Smith 1961); `None` if the points lie on a line or in one place.
+/// Newton's steps towards the least eigenvalue; from a few on they change nothing, but where two of them are nearly the same.
+const MOST_STEPS: usize = 40;
+
+/// Direction of least spread of a covariance (xx xy xz yy yz zz); `None` if the points lie on a line or in one place.
+///
+/// The characteristic polynomial falls and is convex from 0 to its least root: Newton's method rises to it and does not pass it.
 #[inline(always)]
 pub(crate) fn least(c: &[f64; 6]) -> Option<Least> {
     let scale = c[0].max(c[3]).max(c[5]);
@@ -73,18 +78,21 @@ pub(crate) fn least(c: &[f64; 6]) -> Option<Least> {
     }
     let per = 1.0 / scale;
     let [xx, xy, xz, yy, yz, zz] = [c[0] * per, c[1] * per, c[2] * per, c[3] * per, c[4] * per, c[5] * per];
-    let mean = (xx + yy + zz) / 3.0;
-    let (dx, dy, dz) = (xx - mean, yy - mean, zz - mean);
-    let off = xy * xy + xz * xz + yz * yz;
-    let p = ((dx * dx + dy * dy + dz * dz + 2.0 * off) / 6.0).sqrt();
-    let determinant = dx * (dy * dz - yz * yz) - xy * (xy * dz - yz * xz) + xz * (xy * yz - dy * xz);
-    let half = (determinant / (2.0 * p * p * p)).clamp(-1.0, 1.0);
-    let angle = half.acos() / 3.0;
-    let smallest = mean + 2.0 * p * (angle + std::f64::consts::TAU / 3.0).cos();
+    let trace = xx + yy + zz;
     // The sum of products of two eigenvalues each: next to nothing if only one differs from zero.
-    let pairs = xx * yy + xx * zz + yy * zz - off;
-    if smallest.is_nan() || pairs <= COLLINEAR * mean * mean {
+    let pairs = xx * yy + xx * zz + yy * zz - xy * xy - xz * xz - yz * yz;
+    if pairs.is_nan() || pairs <= COLLINEAR / 9.0 * trace * trace {
         return None;
+    }
+    let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+    let mut smallest = 0.0;
+    for _ in 0..MOST_STEPS {
+        let value = ((trace - smallest) * smallest - pairs) * smallest + determinant;
+        let step = value / (pairs - (2.0 * trace - 3.0 * smallest) * smallest);
+        if step.is_nan() || step <= 1e-15 {
+            break;
+        }
+        smallest += step;
     }
     let rows = [[xx - smallest, xy, xz], [xy, yy - smallest, yz], [xz, yz, zz - smallest]];
     let square = |v: [f64; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
@@ -93,7 +101,7 @@ pub(crate) fn least(c: &[f64; 6]) -> Option<Least> {
     let length = square(best).sqrt();
     let per = 1.0 / length;
     let normal = [best[0] * per, best[1] * per, best[2] * per];
-    (length > 0.0).then_some(Least { normal, share: smallest.max(0.0) / (3.0 * mean) })
+    (length > 0.0).then_some(Least { normal, share: smallest / trace })
 }
 
 #[inline(always)]

@@ -119,12 +119,41 @@ impl DepthMap {
         }
         nearest
     }
+}
 
-    /// True if the very pixel that a point (optical frame) falls on shows that it was not looked through.
+/// A depth map made ready to be asked about many points.
+pub(crate) struct Gaze<'a> {
+    map: &'a DepthMap,
+    turn: Matrix3<f32>,
+    shift: Vector3<f32>,
+    focal: [f32; 2],
+    centre: [f32; 2],
+}
+
+impl Gaze<'_> {
+    fn of(map: &DepthMap) -> Gaze<'_> {
+        let Intrinsics { fx, fy, cx, cy, .. } = map.intrinsics;
+        Gaze {
+            map,
+            turn: map.camera_from_world.rotation.to_rotation_matrix().into_inner().cast(),
+            shift: map.camera_from_world.translation.vector.cast(),
+            focal: [fx, fy].map(|f| f as f32),
+            centre: [cx, cy].map(|c| c as f32 + 0.5),
+        }
+    }
+
+    /// True if the camera looked through the point (world): [`DepthMap::look`] says free. Quicker than that where most points are not.
     #[inline(always)]
-    fn stops_before(&self, q: &Point3<f64>, tolerance_m: f64) -> bool {
-        let pixel = self.intrinsics.project(q).and_then(|(u, v)| self.intrinsics.pixel(u, v));
-        pixel.is_none_or(|pixel| f64::from(self.depths_m[pixel]) <= q.z + tolerance_m)
+    pub(crate) fn passes(&self, p: &Point3<f64>, tolerance_m: f64) -> bool {
+        let q = self.turn * p.coords.cast::<f32>() + self.shift;
+        let (u, v) = (self.focal[0] * q.x / q.z + self.centre[0], self.focal[1] * q.y / q.z + self.centre[1]);
+        let Intrinsics { width, height, .. } = self.map.intrinsics;
+        if !(q.z > 0.0 && u >= 0.0 && v >= 0.0 && u < width as f32 && v < height as f32) {
+            return false;
+        }
+        // The very pixel that the point falls on may show already that it was not.
+        let pixel = (v as usize).min(height - 1) * width + (u as usize).min(width - 1);
+        self.map.depths_m[pixel] > q.z + tolerance_m as f32 && self.map.look(p, tolerance_m) == Seen::Free
     }
 }
 
@@ -162,12 +191,9 @@ impl Visibility {
         best
     }
 
-    /// True if any camera looked through the point: [`Visibility::look`] says free. Quicker than that where most points are not.
-    pub(crate) fn looked_through(&self, p: &Point3<f64>, tolerance_m: f64) -> bool {
-        self.maps.iter().any(|map| {
-            let q = map.camera_from_world * p;
-            !map.stops_before(&q, tolerance_m) && map.look_from(&q, tolerance_m) == Seen::Free
-        })
+    /// The cameras made ready to be asked about many points.
+    pub(crate) fn gazes(&self) -> Vec<Gaze<'_>> {
+        self.maps.iter().map(Gaze::of).collect()
     }
 
     /// Positions of the cameras in the world, metres.

@@ -112,7 +112,8 @@ fn disturbed_poses_come_back_together() {
     let from_first = |poses: &[Isometry3<f64>], i: usize| poses[0].inv_mul(&poses[i]);
     let merged_poses = |m: &Merged| m.fits.iter().map(|f| f.world_from_camera).collect::<Vec<_>>();
     let best = merged_poses(&merge(&views, &MergeOptions::default()).unwrap());
-    for draw in 0..3 {
+    let mut all_mm = Vec::new();
+    for draw in 0..8 {
         let mut off = views.clone();
         off.iter_mut()
             .enumerate()
@@ -127,7 +128,10 @@ fn disturbed_poses_come_back_together() {
             let (before_mm, after_mm) = (apart_mm(&before), apart_mm(&after));
             println!("draw {draw}, view {}: {before_mm:.0} mm before, {after_mm:.1} mm after", i + 1);
             assert!(merged.fits[i].used, "draw {draw}, view {}: {}", i + 1, merged.fits[i].why);
-            assert!(before_mm > 70.0 && after_mm < 30.0);
+            assert!(before_mm > 40.0 && after_mm < 60.0);
+            all_mm.push(after_mm);
         }
     }
+    all_mm.sort_by(f64::total_cmp);
+    assert!(all_mm[all_mm.len() / 2] < 20.0);
 }

@@ -5,7 +5,7 @@
 
 use super::parts::Part;
 use super::prepare::Prepared;
-use crate::register::Partner;
+use crate::register::{Partner, Sums};
 use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6,
 };
@@ -20,7 +20,7 @@ pub(super) struct Round {
     pub to_m: f64,
     /// Most passes.
     pub passes: usize,
-    /// Points of each view and pair that are asked for a partner at most.
+    /// Points of what stands that each view asks for partners at most, its partners together; of the rest two thirds of that.
     pub asked: usize,
     /// Weight of points on planes, and of what stands on no surface, against the objects.
     pub rest_weight: f64,
@@ -44,6 +44,8 @@ struct Link {
     squares: f64,
 }
 
+/// Spread that all partners have at least: they are seldom the same place, metres.
+const LEAST_SIGMA_M: f64 = 0.002;
 /// Smallest cosine between the normals of partners.
 const SAME_SIDE: f64 = 0.75;
 /// A pass that moves no camera farther than this, metres and radians, ends the round.
@@ -60,7 +62,9 @@ pub(super) fn align(
     let _span = tracing::debug_span!("align", views = views.len(), passes = round.passes).entered();
     let askers: Vec<Askers> = parts.iter().map(|parts| Askers::of(parts)).collect();
     let pairs = pairs(views, used, poses);
-    let mut asked: Vec<Asked> = pairs.iter().map(|&(i, j)| Asked::of(&askers[i], (i, j), round)).collect();
+    let of_view = |i: usize| pairs.iter().filter(|pair| pair.0 == i).count();
+    let ask = |&(i, j): &(usize, usize)| Asked::of(&askers[i], (i, j), round.asked / of_view(i), round);
+    let mut asked: Vec<Asked> = pairs.iter().map(ask).collect();
     let mut found = vec![Found::default(); views.len()];
     for pass in 0..round.passes {
         let share = pass as f64 / (round.passes.max(2) - 1) as f64;
@@ -92,15 +96,17 @@ impl Askers {
         Askers([Part::Plane, Part::Standing, Part::Around].map(of))
     }
 
-    /// At most about as many of each sort as are asked, evenly spread, others for each partner; and their weights.
-    fn some(&self, round: &Round, partner: usize) -> impl Iterator<Item = (usize, f64)> {
-        let spread = move |of: &'_ [u32]| {
-            let stride = (of.len() / round.asked).max(1);
+    /// At most about `asked` of what stands and fewer of each other sort, evenly spread, others for each partner; and their weights.
+    fn some(&self, asked: usize, round: &Round, partner: usize) -> impl Iterator<Item = (usize, f64)> {
+        let spread = move |of: &'_ [u32], asked: usize| {
+            let stride = (of.len() / asked.max(1)).max(1);
             (partner % stride..of.len()).step_by(stride)
         };
-        let weights = [round.rest_weight, 1.0, round.rest_weight];
-        let sorts = self.0.iter().zip(weights);
-        sorts.flat_map(move |(sort, weight)| spread(sort).map(move |at| (sort[at] as usize, weight)))
+        let rest = (asked, round.rest_weight);
+        let sorts = self.0.iter().zip([rest, (asked, 1.0), rest]);
+        sorts.flat_map(move |(sort, (asked, weight))| {
+            spread(sort, asked).map(move |at| (sort[at] as usize, weight))
+        })
     }
 }
 
@@ -115,8 +121,8 @@ struct Asked {
 }
 
 impl Asked {
-    fn of(askers: &Askers, (from, to): (usize, usize), round: &Round) -> Asked {
-        let points: Vec<(usize, f64)> = askers.some(round, to).collect();
+    fn of(askers: &Askers, (from, to): (usize, usize), asked: usize, round: &Round) -> Asked {
+        let points: Vec<(usize, f64)> = askers.some(asked, round, to).collect();
         Asked { from, to, partners: vec![Partner::UNKNOWN; points.len()], points }
     }
 }
@@ -150,52 +156,54 @@ fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(us
 fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius: f64) -> Link {
     let (i, j) = (asked.from, asked.to);
     let (a, b) = (&views[i], &views[j]);
-    let mut link = Link {
-        from: i,
-        to: j,
-        blocks: [Matrix6::zeros(); 3],
-        rights: [Vector6::zeros(); 2],
-        matched: 0,
-        squares: 0.0,
-    };
-    let Some(tree) = &b.tree else { return link };
+    let mut sums = Sums::ZERO;
+    let Some(tree) = &b.tree else { return Link::of(i, j, &sums, poses) };
     let j_from_i = poses[j].inv_mul(&poses[i]);
-    let turn_i = poses[i].rotation;
+    let (turn, shift) = (j_from_i.rotation.to_rotation_matrix(), j_from_i.translation.vector);
     for (&(k, part_weight), partner) in asked.points.iter().zip(&mut asked.partners) {
-        let p = &a.points[k];
-        let in_j = (j_from_i * p).cast::<f32>();
-        let Some(slot) = partner.update(tree, in_j.into(), radius as f32) else { continue };
+        // From the first camera, and from the second, along the axes of the second.
+        let arm = turn * a.points[k].coords;
+        let in_j = arm + shift;
+        let Some(slot) = partner.update(tree, in_j.cast::<f32>().into(), radius as f32) else { continue };
         let partner = tree.indices()[slot] as usize;
-        let normal_j = b.normals[partner];
-        if (j_from_i.rotation * a.normals[k]).dot(&normal_j) < SAME_SIDE {
+        let normal = b.normals[partner];
+        if (turn * a.normals[k]).dot(&normal) < SAME_SIDE {
             continue;
         }
-        let normal = poses[j].rotation * normal_j;
-        let (from_i, from_j) = (turn_i * p.coords, poses[j].rotation * b.points[partner].coords);
-        let gap = poses[i].translation.vector + from_i - poses[j].translation.vector - from_j;
-        let residual = normal.dot(&gap);
-        let sigma = a.sigmas_m[k].hypot(b.sigmas_m[partner]).hypot(0.002);
+        let residual = normal.dot(&(in_j - b.points[partner].coords));
+        let variance = a.sigmas_m[k].powi(2) + b.sigmas_m[partner].powi(2) + LEAST_SIGMA_M.powi(2);
         // Geman-McClure: what does not fit within the radius loses its say smoothly.
-        let scale = (0.5 * radius).max(2.0 * sigma);
-        let robust = (1.0 / (1.0 + (residual / scale).powi(2))).powi(2);
-        let weight = part_weight * robust / (sigma * sigma);
-        let own = jacobian(&from_i, &normal);
-        let other = -jacobian(&from_j, &normal);
-        link.blocks[0] += own * own.transpose() * weight;
-        link.blocks[1] += own * other.transpose() * weight;
-        link.blocks[2] += other * other.transpose() * weight;
-        link.rights[0] -= own * (residual * weight);
-        link.rights[1] -= other * (residual * weight);
-        link.matched += 1;
-        link.squares += residual * residual;
+        let scale_sq = (0.25 * radius * radius).max(4.0 * variance);
+        let robust = (scale_sq / (scale_sq + residual * residual)).powi(2);
+        let along = arm.cross(&normal);
+        let derivative = [along.x, along.y, along.z, normal.x, normal.y, normal.z];
+        sums.add_scalar(derivative, residual, part_weight * robust / variance);
     }
-    link
+    Link::of(i, j, &sums, poses)
 }
 
-/// Change of the distance along `normal` with a turn about the camera and a shift of it.
-fn jacobian(arm: &Vector3<f64>, normal: &Vector3<f64>) -> Vector6<f64> {
-    let turn = arm.cross(normal);
-    Vector6::new(turn.x, turn.y, turn.z, normal.x, normal.y, normal.z)
+impl Link {
+    /// The equations in the world, of motions that turn a view about its camera, from the sums of motions of the first camera along the axes of
+    /// the second. The second camera's are the opposite; a turn about it shifts the first.
+    fn of(i: usize, j: usize, sums: &Sums, poses: &[Isometry3<f64>]) -> Link {
+        let axes = poses[j].rotation.to_rotation_matrix().into_inner();
+        let mut world = Matrix6::zeros();
+        world.fixed_view_mut::<3, 3>(0, 0).copy_from(&axes);
+        world.fixed_view_mut::<3, 3>(3, 3).copy_from(&axes);
+        let own = world * sums.information() * world.transpose();
+        let right = world * sums.right();
+        let apart = poses[i].translation.vector - poses[j].translation.vector;
+        let mut other = -Matrix6::identity();
+        other.fixed_view_mut::<3, 3>(0, 3).copy_from(&-apart.cross_matrix());
+        Link {
+            from: i,
+            to: j,
+            blocks: [own, own * other.transpose(), other * own * other.transpose()],
+            rights: [-right, -(other * right)],
+            matched: sums.matched,
+            squares: sums.square,
+        }
+    }
 }
 
 /// One Gauss-Newton step on all poses; returns the largest shift and turn.

@@ -3,7 +3,7 @@
 use super::Step;
 use super::joint::in_world;
 use super::prepare::Prepared;
-use crate::spread::tangents;
+use crate::spread::{self, Moments, tangents};
 use crate::surface::{self, Outline};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use rustc_hash::FxHashMap;
@@ -32,7 +32,17 @@ pub(super) enum Part {
 }
 
 /// A dominant plane: `normal · p = offset_m`.
-type Plane = (Vector3<f64>, f64);
+pub(super) type Plane = (Vector3<f64>, f64);
+
+/// What the points of all views belong to.
+pub(super) struct Parts {
+    /// By view and point.
+    pub of: Vec<Vec<Part>>,
+    /// The dominant planes, world frame.
+    pub planes: Vec<Plane>,
+    /// Away from the ground, if that could be told.
+    pub up: Option<Unit<Vector3<f64>>>,
+}
 
 /// Sorts the points of the used views, and tells which way is up.
 pub(super) fn find(
@@ -41,7 +51,7 @@ pub(super) fn find(
     poses: &[Isometry3<f64>],
     up: Option<Unit<Vector3<f64>>>,
     steps: &mut Vec<Step>,
-) -> (Vec<Vec<Part>>, Option<Unit<Vector3<f64>>>) {
+) -> Parts {
     let places: Vec<Vec<Point3<f64>>> = (0..prepared.len())
         .map(|i| if used[i] { in_world(&prepared[i], &poses[i]) } else { Vec::new() })
         .collect();
@@ -54,24 +64,74 @@ pub(super) fn find(
         Some(held) if held.dot(normal) < 0.0 => Unit::new_normalize(-normal),
         _ => Unit::new_normalize(*normal),
     });
-    let lies_on = |(normal, offset_m): &Plane, i: usize, k: usize| {
-        let near =
-            (normal.dot(&places[i][k].coords) - offset_m).abs() < 3.0 * prepared[i].sigmas_m[k] + 0.006;
-        near && normal.dot(&(poses[i].rotation * prepared[i].normals[k])).abs() > 0.8
-    };
+    let seen: Vec<Vec<PlaneOfView>> =
+        poses.iter().map(|pose| planes.iter().map(|plane| PlaneOfView::of(plane, pose)).collect()).collect();
     let mut parts: Vec<Vec<Part>> = prepared.iter().map(|p| vec![Part::Standing; p.points.len()]).collect();
-    for (i, places) in places.iter().enumerate() {
-        for k in (0..places.len()).filter(|&k| planes.iter().any(|plane| lies_on(plane, i, k))) {
+    for (i, view) in prepared.iter().enumerate().filter(|(i, _)| used[*i]) {
+        for k in (0..view.points.len()).filter(|&k| seen[i].iter().any(|plane| plane.holds(view, k))) {
             parts[i][k] = Part::Plane;
         }
     }
-    if let Some(surface) = up.and_then(|up| Standing::on(&planes, &up, &places, prepared, lies_on)) {
+    let on = |plane: usize, (i, k): (usize, usize)| {
+        parts[i][k] == Part::Plane && seen[i][plane].holds(&prepared[i], k)
+    };
+    if let Some(surface) = up.and_then(|up| Standing::on(&planes, &up, &places, prepared, on)) {
         parts.iter_mut().zip(&places).for_each(|(parts, places)| surface.part(parts, places));
     }
     let left = parts.iter().flatten().filter(|part| **part != Part::Plane).count();
     let result = format!("{} dominant planes removed", planes.len());
     steps.push(Step { name: "plane removal".to_owned(), points: left, result });
-    (parts, up)
+    Parts { of: parts, planes, up }
+}
+
+/// The level planes once more, by least squares where the views lie now.
+pub(super) fn level_again(
+    planes: &[Plane],
+    up: Option<Unit<Vector3<f64>>>,
+    prepared: &[Prepared],
+    used: &[bool],
+    parts: &[Vec<Part>],
+    poses: &[Isometry3<f64>],
+) -> Vec<Plane> {
+    let again = |plane: &Plane| {
+        let (normal, offset_m) = plane;
+        let mut moments = Moments::about(&Point3::from(normal * *offset_m).cast());
+        for (i, view) in prepared.iter().enumerate().filter(|(i, _)| used[*i]) {
+            let seen = PlaneOfView::of(plane, &poses[i]);
+            let (turn, shift) = (poses[i].rotation.to_rotation_matrix(), poses[i].translation.vector);
+            for k in (0..view.points.len()).filter(|&k| parts[i][k] == Part::Plane && seen.holds(view, k)) {
+                moments.add(&Point3::from(turn * view.points[k].coords + shift).cast());
+            }
+        }
+        let least = Vector3::from(spread::least(&moments.covariance())?.normal);
+        let least = if least.dot(normal) < 0.0 { -least } else { least };
+        Some((least, least.dot(&moments.mean().coords)))
+    };
+    let is_level = |plane: &&Plane| up.is_some_and(|up| plane.0.dot(&up).abs() > LEVEL);
+    planes.iter().filter(is_level).filter_map(again).collect()
+}
+
+/// A plane in the frame of a camera.
+struct PlaneOfView {
+    normal: Vector3<f64>,
+    offset_m: f64,
+}
+
+impl PlaneOfView {
+    fn of((normal, offset_m): &Plane, pose: &Isometry3<f64>) -> PlaneOfView {
+        PlaneOfView {
+            normal: pose.rotation.inverse() * normal,
+            offset_m: offset_m - normal.dot(&pose.translation.vector),
+        }
+    }
+
+    /// True if a point of the view lies on the plane and faces as it does.
+    #[inline(always)]
+    fn holds(&self, view: &Prepared, k: usize) -> bool {
+        let near = 3.0 * view.sigmas_m[k] + 0.006;
+        (self.normal.dot(&view.points[k].coords) - self.offset_m).abs() < near
+            && self.normal.dot(&view.normals[k]).abs() > 0.8
+    }
 }
 
 /// The level plane that was measured best, and its outline.
@@ -87,18 +147,19 @@ impl Standing {
         up: &Unit<Vector3<f64>>,
         places: &[Vec<Point3<f64>>],
         prepared: &[Prepared],
-        lies_on: impl Fn(&Plane, usize, usize) -> bool,
+        lies_on: impl Fn(usize, (usize, usize)) -> bool,
     ) -> Option<Standing> {
-        let on = |plane: &Plane| -> Vec<(usize, usize)> {
+        let on = |plane: usize| -> Vec<(usize, usize)> {
             let all = (0..places.len()).flat_map(|i| (0..places[i].len()).map(move |k| (i, k)));
-            all.filter(|&(i, k)| lies_on(plane, i, k)).collect()
+            all.filter(|&point| lies_on(plane, point)).collect()
         };
         let known = |points: &[(usize, usize)]| -> f64 {
             points.iter().map(|&(i, k)| prepared[i].sigmas_m[k].powi(-2)).sum()
         };
-        let level = planes.iter().filter(|(normal, _)| normal.dot(up).abs() > LEVEL);
-        let (plane, points) =
-            level.map(|plane| (plane, on(plane))).max_by(|a, b| known(&a.1).total_cmp(&known(&b.1)))?;
+        let level = (0..planes.len()).filter(|&plane| planes[plane].0.dot(up).abs() > LEVEL);
+        let (plane, points) = level
+            .map(|plane| (&planes[plane], on(plane)))
+            .max_by(|a, b| known(&a.1).total_cmp(&known(&b.1)))?;
         let side = plane.0.dot(up).signum();
         let (up, offset_m) = (plane.0 * side, plane.1 * side);
         let (across, along) = tangents(&up);

@@ -12,7 +12,7 @@ pub(super) type Oriented = (Point3<f64>, Vector3<f64>);
 /// Fewest points off the planes for a search to mean something.
 const FEWEST: usize = 60;
 /// Points of the view that are tried against the others.
-const TRIED: usize = 350;
+const TRIED: usize = 220;
 /// Surfaces farther than this from the middle of a view, along the table and in height, are nothing to fall onto, metres.
 const FARTHEST_M: [f64; 2] = [3.0, 1.5];
 /// Side of the coarse and fine cells, metres.
@@ -89,30 +89,36 @@ impl Cells {
 
     /// Mean worth (1 for a hit) of points over all shifts of up to `reach` cells along x and y, row by row of x.
     fn scores(&self, points: &[(Point3<f64>, usize)], reach: i32) -> Vec<f64> {
+        /// Shifts along y are summed up by as many at once.
+        const LANES: usize = 8;
         let across = (2 * reach + 1) as usize;
-        let mut sums = vec![0_u32; across * across];
+        let wide = across.next_multiple_of(LANES);
+        let mut sums = vec![0_u32; across * wide];
         let table = self.size.iter().product::<usize>();
         for (p, side) in points {
             let key = [p.x, p.y, p.z].map(|c| (c / self.side_m).floor() as i32);
-            for (i, sums) in (-reach..=reach).zip(sums.chunks_exact_mut(across)) {
+            let worth = &self.worth[side * table..(side + 1) * table];
+            for (i, sums) in (-reach..=reach).zip(sums.chunks_exact_mut(wide)) {
                 // A row that sticks out of the cells on one side is met shift by shift.
                 let shifted =
                     |j: i32| self.index([key[0].saturating_add(i), key[1].saturating_add(j), key[2]]);
-                match (shifted(-reach), shifted(reach)) {
-                    (Some(from), Some(to)) => {
-                        let row = &self.worth[side * table + from..=side * table + to];
+                let row =
+                    shifted(-reach).zip(shifted(reach)).and_then(|(from, _)| worth.get(from..from + wide));
+                if let Some(row) = row {
+                    let (sums, row) = (sums.as_chunks_mut::<LANES>().0, row.as_chunks::<LANES>().0);
+                    for (sums, row) in sums.iter_mut().zip(row) {
                         sums.iter_mut().zip(row).for_each(|(sum, &worth)| *sum += u32::from(worth));
                     }
-                    _ => {
-                        for (j, sum) in (-reach..=reach).zip(sums) {
-                            *sum += shifted(j).map_or(0, |at| u32::from(self.worth[side * table + at]));
-                        }
+                } else {
+                    for (j, sum) in (-reach..=reach).zip(sums) {
+                        *sum += shifted(j).map_or(0, |at| u32::from(worth[at]));
                     }
                 }
             }
         }
         let whole = f64::from(HIT) * points.len().max(1) as f64;
-        sums.into_iter().map(|s| f64::from(s) / whole).collect()
+        let rows = sums.chunks_exact(wide).flat_map(|row| &row[..across]);
+        rows.map(|&sum| f64::from(sum) / whole).collect()
     }
 }
 
@@ -210,7 +216,6 @@ pub(super) fn place(
                 }
             }
         }
-        found.sort_by(|a, b| b.score.total_cmp(&a.score));
         best = distinct(&found, 2.0 * side_m);
     }
     let Candidate { x, y, turn: angle, score } = best[0];
@@ -233,19 +238,17 @@ struct Candidate {
 }
 
 /// The three best that are not the same valley.
-fn distinct(sorted: &[Candidate], apart: f64) -> [Candidate; 3] {
-    let mut kept: Vec<Candidate> = Vec::with_capacity(3);
-    for c in sorted {
-        if kept.iter().all(|k| (k.x - c.x).hypot(k.y - c.y) > apart) {
-            kept.push(*c);
-            if kept.len() == 3 {
-                break;
-            }
-        }
+fn distinct(found: &[Candidate], apart: f64) -> [Candidate; 3] {
+    let mut kept = [found[0]; 3];
+    for k in 0..3 {
+        let other = |c: &&Candidate| {
+            kept[..k].iter().all(|kept| (kept.x - c.x).powi(2) + (kept.y - c.y).powi(2) > apart * apart)
+        };
+        // Of equally good ones the first.
+        let best = found.iter().filter(other).reduce(|best, c| if c.score > best.score { c } else { best });
+        kept[k] = *best.unwrap_or(&kept[0]);
     }
-    let first = kept[0];
-    kept.resize(3, first);
-    [kept[0], kept[1], kept[2]]
+    kept
 }
 
 /// The points turned about the vertical, each with the side that it faces most.

@@ -1,8 +1,7 @@
 //! Normals of organised clouds from the pixels around each point: no tree.
 
 use super::Normals;
-use crate::cloud::{Cloud, Grid, is_finite};
-use crate::spread;
+use crate::cloud::{Cloud, Grid};
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
@@ -31,22 +30,38 @@ const LANES: usize = 16;
 /// Normals from the window around each pixel, turned towards the camera; `None` if the cloud has no grid that fits its points.
 /// Expects the camera's optical frame (depth along z).
 pub fn organised(cloud: &Cloud, options: &OrganisedOptions) -> Option<Normals> {
+    organised_where(cloud, options, |_| true)
+}
+
+/// The same only where a normal is wanted of a pixel; others may have none.
+pub(crate) fn organised_where(
+    cloud: &Cloud,
+    options: &OrganisedOptions,
+    wanted: impl Fn(usize) -> bool + Sync,
+) -> Option<Normals> {
     let Grid { width, height } = cloud.grid.filter(|_| cloud.check().is_ok())?;
     let _span = tracing::debug_span!("organised normals", points = cloud.len()).entered();
     let image = Image::of(&cloud.points, width, height, options.reach);
-    let mut found = vec![[f32::NAN; 4]; cloud.len()];
-    found.par_chunks_mut(width.max(1)).enumerate().for_each(|(row, out)| {
-        for (group, out) in out.chunks_mut(LANES).enumerate() {
-            let sums = image.sums(row, group * LANES, options);
-            for (lane, out) in out.iter_mut().enumerate() {
-                *out = surface(&cloud.points[row * width + group * LANES + lane], &sums, lane, options);
+    let mut found = Normals {
+        normals: vec![Vector3::repeat(f32::NAN); cloud.len()],
+        variation: vec![f32::NAN; cloud.len()],
+    };
+    let rows = found.normals.par_chunks_mut(width.max(1)).zip(found.variation.par_chunks_mut(width.max(1)));
+    rows.enumerate().for_each(|(row, (normals, variation))| {
+        for column in (0..width).step_by(LANES) {
+            let pixels = column..width.min(column + LANES);
+            if !pixels.clone().any(|column| wanted(row * width + column)) {
+                continue;
+            }
+            let Some((at, sums)) = image.sums(row, column, options) else { continue };
+            let [x, y, z, share] = sums.surfaces(&at, options);
+            for (lane, pixel) in pixels.enumerate() {
+                normals[pixel] = Vector3::new(x[lane], y[lane], z[lane]);
+                variation[pixel] = share[lane];
             }
         }
     });
-    Some(Normals {
-        normals: found.iter().map(|v| Vector3::new(v[0], v[1], v[2])).collect(),
-        variation: found.iter().map(|v| v[3]).collect(),
-    })
+    Some(found)
 }
 
 /// The coordinates of an image, each by itself, with a frame of pixels without a return around it.
@@ -86,10 +101,18 @@ impl Image {
         self.planes.each_ref().map(|plane| plane[at..].first_chunk().copied().unwrap_or([f32::NAN; LANES]))
     }
 
-    /// The sums of the windows around `LANES` pixels from a column on.
+    /// `LANES` pixels from a column on and the sums of the windows around them; `None` if there is no return among them.
     #[inline(always)]
-    fn sums(&self, row: usize, column: usize, options: &OrganisedOptions) -> WindowSums {
+    fn sums(
+        &self,
+        row: usize,
+        column: usize,
+        options: &OrganisedOptions,
+    ) -> Option<([[f32; LANES]; 3], WindowSums)> {
         let at = self.some((row + self.reach) * self.pitch + column + self.reach);
+        if at[2].iter().all(|z| z.is_nan()) {
+            return None;
+        }
         let step = at[2].map(|z| options.base_m.max(options.depth_step_share * z.abs()));
         let mut all = WindowSums { count: [0; LANES], sum: [[0.0; LANES]; 3], products: [[0.0; LANES]; 6] };
         for v in row..=row + 2 * self.reach {
@@ -97,7 +120,7 @@ impl Image {
                 all.add(&self.some(v * self.pitch + u), &at, &step);
             }
         }
-        all
+        Some((at, all))
     }
 }
 
@@ -123,18 +146,61 @@ impl WindowSums {
             }
         }
     }
-}
 
-fn surface(at: &Point3<f32>, sums: &WindowSums, lane: usize, options: &OrganisedOptions) -> [f32; 4] {
-    let none = [f32::NAN; 4];
-    if !is_finite(at) || (sums.count[lane] as usize) < options.least.max(3) {
-        return none;
+    /// Normals towards the camera and the share of the spread along them, NaN where there is none. As [`spread::least`], but lane by lane
+    /// without a branch.
+    #[inline(always)]
+    fn surfaces(&self, at: &[[f32; LANES]; 3], options: &OrganisedOptions) -> [[f32; LANES]; 4] {
+        /// Newton's steps; in single precision they have settled then, but where there is no direction of least spread.
+        const STEPS: usize = 6;
+        /// Spread across a line below this part of that along it is rounding.
+        const COLLINEAR: f32 = 1e-6;
+        let least_count = options.least.max(3) as f32;
+        let mut all = [[f32::NAN; LANES]; 4];
+        for i in 0..LANES {
+            let count = self.count[i] as f32;
+            let per = 1.0 / count;
+            let [x, y, z] = [self.sum[0][i] * per, self.sum[1][i] * per, self.sum[2][i] * per];
+            let [xx, xy, xz] = [
+                self.products[0][i] * per - x * x,
+                self.products[1][i] * per - x * y,
+                self.products[2][i] * per - x * z,
+            ];
+            let [yy, yz, zz] = [
+                self.products[3][i] * per - y * y,
+                self.products[4][i] * per - y * z,
+                self.products[5][i] * per - z * z,
+            ];
+            let per = 1.0 / (xx + yy + zz);
+            let [xx, xy, xz, yy, yz, zz] = [xx * per, xy * per, xz * per, yy * per, yz * per, zz * per];
+            let pairs = xx * yy + xx * zz + yy * zz - xy * xy - xz * xz - yz * yz;
+            let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+            let mut smallest = 0.0_f32;
+            for _ in 0..STEPS {
+                let value = ((1.0 - smallest) * smallest - pairs) * smallest + determinant;
+                let step = value / (pairs - (2.0 - 3.0 * smallest) * smallest);
+                smallest += if step > 0.0 { step } else { 0.0 };
+            }
+            let (rx, ry, rz) = (xx - smallest, yy - smallest, zz - smallest);
+            // Products of two rows of what is left each; the longest is the surest.
+            let a = [xy * yz - xz * ry, xz * xy - rx * yz, rx * ry - xy * xy];
+            let b = [xy * rz - xz * yz, xz * xz - rx * rz, rx * yz - xy * xz];
+            let c = [ry * rz - yz * yz, yz * xz - xy * rz, xy * yz - ry * xz];
+            let square = |v: [f32; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+            let longer = |a: [f32; 3], b: [f32; 3]| {
+                let second = square(b) > square(a);
+                [0, 1, 2].map(|k| if second { b[k] } else { a[k] })
+            };
+            let [nx, ny, nz] = longer(longer(a, b), c);
+            let towards = nx * at[0][i] + ny * at[1][i] + nz * at[2][i];
+            let length = (nx * nx + ny * ny + nz * nz).sqrt();
+            let is_one = count >= least_count && pairs > COLLINEAR && length > 0.0;
+            let per = if is_one { -1_f32.copysign(towards) / length } else { f32::NAN };
+            all[0][i] = per * nx;
+            all[1][i] = per * ny;
+            all[2][i] = per * nz;
+            all[3][i] = if is_one { smallest } else { f32::NAN };
+        }
+        all
     }
-    let sum = sums.sum.map(|sum| f64::from(sum[lane]));
-    let products = sums.products.map(|sum| f64::from(sum[lane]));
-    let covariance = spread::covariance(f64::from(sums.count[lane]), sum, products);
-    let Some(least) = spread::least(&covariance) else { return none };
-    let n = least.normal.map(|v| v as f32);
-    let sign = if n[0] * at.x + n[1] * at.y + n[2] * at.z > 0.0 { -1.0 } else { 1.0 };
-    [sign * n[0], sign * n[1], sign * n[2], least.share as f32]
 }

@@ -7,7 +7,7 @@ use nalgebra::{
 
 /// Sums over pairs. Motions are small rotations, then shifts, about `centre` in the target's frame.
 #[derive(Clone, Copy)]
-pub(super) struct Sums {
+pub(crate) struct Sums {
     pub matched: usize,
     /// Sum of squared residuals, without weights.
     pub square: f64,
@@ -24,7 +24,7 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    pub(super) const ZERO: Sums = Sums {
+    pub(crate) const ZERO: Sums = Sums {
         matched: 0,
         square: 0.0,
         h: [0.0; 21],
@@ -38,7 +38,7 @@ impl Sums {
 
     /// A residual `r` whose derivative by the motion is `j`.
     #[inline(always)]
-    pub(super) fn add_scalar(&mut self, j: [f64; 6], r: f64, weight: f64) {
+    pub(crate) fn add_scalar(&mut self, j: [f64; 6], r: f64, weight: f64) {
         self.matched += 1;
         self.square += r * r;
         let mut at = 0;
@@ -133,7 +133,13 @@ impl Sums {
         self
     }
 
-    fn information(&self) -> Matrix6<f64> {
+    /// Weighted sum of derivatives by residuals.
+    pub(crate) fn right(&self) -> Vector6<f64> {
+        Vector6::from(self.g)
+    }
+
+    /// The normal matrix.
+    pub(crate) fn information(&self) -> Matrix6<f64> {
         let mut full = Matrix6::zeros();
         let mut at = 0;
         for row in 0..6 {
@@ -150,7 +156,7 @@ impl Sums {
     pub(super) fn motion(&self, centre: &Point3<f64>) -> Motion {
         let information = self.information();
         let (inverse, free) = held_inverse(&information);
-        let twist = inverse * Vector6::from(self.g);
+        let twist = inverse * self.right();
         let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(twist[0], twist[1], twist[2]));
         Motion::about(centre, rotation, Vector3::new(twist[3], twist[4], twist[5]), free, information)
     }

@@ -124,7 +124,7 @@ fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>
     let mut starts: Vec<u32> = Vec::with_capacity(points.len() / 2);
     let mut last = None;
     for (i, p) in (0..).zip(points) {
-        let key = lattice.locate(&p.coords).0;
+        let key = lattice.key(&p.coords);
         if last != Some(key) {
             entries.push((key, starts.len() as u32));
             starts.push(i);

@@ -1,0 +1,167 @@
+//! A sparse grid of voxels in bricks of 8 × 8 × 8, or 8 × 8 columns: a surface fills few bricks, and in each many voxels beside each other.
+
+use nalgebra::{Point3, Vector3};
+use rustc_hash::FxHashMap;
+
+/// Voxels along a side of a brick, and along that of a brick with a layer of its neighbours' voxels around.
+const SIDE: usize = 8;
+const WIDE: usize = SIDE + 2;
+/// No cell, or no brick.
+const NONE: u32 = u32::MAX;
+/// Most voxels along an axis: positions in single precision tell a sixteenth of a voxel then.
+const MOST: f64 = (1 << 20) as f64;
+
+/// Voxels over a box, fixed to the world's origin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grid {
+    /// Side of a voxel, metres.
+    pub voxel_m: f64,
+    /// Lowest corner, metres.
+    pub origin_m: Vector3<f64>,
+}
+
+impl Grid {
+    /// The grid over a box. The voxels are at least `voxel_m` wide, wider if they could not be told apart.
+    pub fn over(low: &Point3<f64>, high: &Point3<f64>, voxel_m: f64) -> Grid {
+        let voxel_m = voxel_m.max((high - low).amax() / (MOST - 4.0));
+        let origin_m = low.coords.map(|c| ((c / voxel_m).floor() - 1.0) * voxel_m);
+        Grid { voxel_m, origin_m }
+    }
+}
+
+/// Cells of occupied voxels.
+pub(super) struct Bricks<C> {
+    numbers: FxHashMap<[u32; 3], u32>,
+    /// Where each brick lies, in bricks.
+    places: Vec<[u32; 3]>,
+    /// Number of the cell of each voxel, brick by brick, x fastest.
+    slots: Vec<u32>,
+    /// Layers of voxels in a brick, along z.
+    layers: usize,
+    pub cells: Vec<C>,
+    /// The brick that was asked for last.
+    last: Option<([u32; 3], usize)>,
+}
+
+impl<C> Bricks<C> {
+    /// No cell yet. Voxels that are columns along z make bricks of one layer.
+    pub fn new(columns: bool) -> Bricks<C> {
+        Bricks {
+            numbers: FxHashMap::default(),
+            places: Vec::new(),
+            slots: Vec::new(),
+            layers: if columns { 1 } else { SIDE },
+            cells: Vec::new(),
+            last: None,
+        }
+    }
+
+    fn voxels(&self) -> usize {
+        self.layers * SIDE * SIDE
+    }
+
+    /// Number of the cell at a place, voxels from the grid's lowest corner; a new one is made if there was none.
+    #[inline(always)]
+    pub fn cell(&mut self, at: &[f32; 3], new: C) -> u32 {
+        let mut voxel = at.map(|c| c as i32 as u32);
+        voxel[2] *= u32::from(self.layers > 1);
+        let place = voxel.map(|c| c / SIDE as u32);
+        let brick = match self.last {
+            Some((last, brick)) if last == place => brick,
+            _ => self.brick(place),
+        };
+        let [x, y, z] = voxel.map(|c| c as usize % SIDE);
+        let slot = &mut self.slots[brick * self.layers * SIDE * SIDE + (z * SIDE + y) * SIDE + x];
+        if *slot == NONE {
+            *slot = self.cells.len() as u32;
+            self.cells.push(new);
+        }
+        *slot
+    }
+
+    /// The same with the cells brick by brick, each made anew of the old one and its number.
+    pub fn in_order<D>(mut self, mut anew: impl FnMut(&C, usize) -> D) -> Bricks<D> {
+        let mut cells = Vec::with_capacity(self.cells.len());
+        for slot in self.slots.iter_mut().filter(|slot| **slot != NONE) {
+            let number = *slot as usize;
+            *slot = cells.len() as u32;
+            cells.push(anew(&self.cells[number], number));
+        }
+        let Bricks { numbers, places, slots, layers, last, .. } = self;
+        Bricks { cells, numbers, places, slots, layers, last }
+    }
+
+    #[inline(never)]
+    fn brick(&mut self, place: [u32; 3]) -> usize {
+        let next = self.places.len();
+        let brick = *self.numbers.entry(place).or_insert(next as u32) as usize;
+        if brick == next {
+            self.places.push(place);
+            self.slots.resize(self.slots.len() + self.voxels(), NONE);
+        }
+        self.last = Some((place, brick));
+        brick
+    }
+
+    /// Number of bricks that hold a cell.
+    pub fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Calls `found` for each cell of a brick with its number and those of the cells in the 27 voxels around it, itself among them.
+    pub fn visit(&self, brick: usize, mut found: impl FnMut(usize, &[u32])) {
+        let wide = self.wide(brick);
+        let mut around = [0_u32; 27];
+        for z in 1..=self.layers {
+            for y in 1..=SIDE {
+                for x in 1..=SIDE {
+                    let own = wide[z][y][x];
+                    if own == NONE {
+                        continue;
+                    }
+                    let mut count = 0;
+                    for layer in &wide[z - 1..=z + 1] {
+                        for row in &layer[y - 1..=y + 1] {
+                            for &cell in &row[x - 1..=x + 1] {
+                                // Written over by the next if there is none.
+                                around[count.min(26)] = cell;
+                                count += usize::from(cell != NONE);
+                            }
+                        }
+                    }
+                    found(own as usize, &around[..count]);
+                }
+            }
+        }
+    }
+
+    /// The cells of a brick with a layer of those around.
+    fn wide(&self, brick: usize) -> [[[u32; WIDE]; WIDE]; WIDE] {
+        let place = self.places[brick];
+        // Columns have nothing above and below them.
+        let columns = self.layers == 1;
+        let mut beside = [None; 27];
+        for part in if columns { 9..18 } else { 0..27 } {
+            let step = [part % 3, part / 3 % 3, part / 9];
+            let next: [u32; 3] =
+                std::array::from_fn(|c| place[c].wrapping_add(step[c] as u32).wrapping_sub(1));
+            beside[part] = if next == place { Some(brick as u32) } else { self.numbers.get(&next).copied() };
+        }
+        // Of a voxel of the wide brick: which of the three bricks along an axis holds it, and where.
+        let at = |w: usize| (w.div_ceil(SIDE), (w + SIDE - 1) % SIDE);
+        let mut wide = [[[NONE; WIDE]; WIDE]; WIDE];
+        for (z, layer) in wide.iter_mut().enumerate().filter(|(z, _)| !columns || *z == 1) {
+            for (y, row) in layer.iter_mut().enumerate() {
+                let ((above, z), (behind, y)) = (at(z), at(y));
+                let of = |aside: usize| {
+                    let first = beside[(above * 3 + behind) * 3 + aside]? as usize * self.voxels();
+                    self.slots[first + (z * SIDE + y) * SIDE..].first_chunk::<SIDE>()
+                };
+                row[0] = of(0).map_or(NONE, |slots| slots[SIDE - 1]);
+                row[SIDE + 1] = of(2).map_or(NONE, |slots| slots[0]);
+                row[1..=SIDE].copy_from_slice(of(1).unwrap_or(&[NONE; SIDE]));
+            }
+        }
+        wide
+    }
+}

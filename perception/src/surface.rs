@@ -212,7 +212,7 @@ fn held_up(seen: &Visibility) -> Option<Unit<Vector3<f64>>> {
 #[inline(always)]
 pub(crate) fn floor(value: f64) -> i32 {
     let whole = value as i32;
-    whole - i32::from(value < f64::from(whole))
+    whole.saturating_sub(i32::from(value < f64::from(whole)))
 }
 
 /// The plane with its normal up: along the hint, else towards the cameras.

@@ -134,6 +134,18 @@ fn the_table_and_the_can() {
 }
 
 #[test]
+fn returns_from_beyond_all_cells_leave_the_table_where_it_is() {
+    let mut points = table();
+    points.extend((0..200).map(|i| Point3::new(-1e10, 1e10, -1e10 - 1e6 * i as f32)));
+    let cloud = Cloud::from_points(points);
+    let surface = SurfaceOptions { up: Some(Unit::new_normalize(Vector3::z())), ..SurfaceOptions::default() };
+    let options = SceneOptions { surface, ..SceneOptions::default() };
+    let seen = descry_perception::visibility::Visibility::default();
+    let scene = segment(&cloud, &seen, &options).expect("there is a table");
+    assert!((scene.surface.offset_m - 0.7).abs() < 2e-3, "{}", scene.surface.offset_m);
+}
+
+#[test]
 fn clusters_are_what_hangs_together() {
     let chain = |x: f32, n: usize, step: f32| (0..n).map(move |i| Point3::new(x, step * i as f32, 0.5));
     let points: Vec<Point3<f32>> = chain(0.0, 50, 0.019)

@@ -20,7 +20,7 @@ pub(super) struct Round {
     pub to_m: f64,
     /// Most passes.
     pub passes: usize,
-    /// Points of what stands that each view asks for partners at most, its partners together; of the rest two thirds of that.
+    /// Points of each sort that a view asks for partners at most, all its partners together.
     pub asked: usize,
     /// Weight of points on planes, and of what stands on no surface, against the objects.
     pub rest_weight: f64,
@@ -96,17 +96,15 @@ impl Askers {
         Askers([Part::Plane, Part::Standing, Part::Around].map(of))
     }
 
-    /// At most about `asked` of what stands and fewer of each other sort, evenly spread, others for each partner; and their weights.
+    /// At most about `asked` of each sort, evenly spread, others for each partner; and their weights.
     fn some(&self, asked: usize, round: &Round, partner: usize) -> impl Iterator<Item = (usize, f64)> {
-        let spread = move |of: &'_ [u32], asked: usize| {
+        let spread = move |of: &'_ [u32]| {
             let stride = (of.len() / asked.max(1)).max(1);
             (partner % stride..of.len()).step_by(stride)
         };
-        let rest = (asked, round.rest_weight);
-        let sorts = self.0.iter().zip([rest, (asked, 1.0), rest]);
-        sorts.flat_map(move |(sort, (asked, weight))| {
-            spread(sort, asked).map(move |at| (sort[at] as usize, weight))
-        })
+        let weights = [round.rest_weight, 1.0, round.rest_weight];
+        let sorts = self.0.iter().zip(weights);
+        sorts.flat_map(move |(sort, weight)| spread(sort).map(move |at| (sort[at] as usize, weight)))
     }
 }
 

@@ -11,6 +11,7 @@ mod parts;
 mod prepare;
 mod returns;
 mod search;
+mod settle;
 
 use crate::cloud::Cloud;
 use crate::view::View;

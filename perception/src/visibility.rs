@@ -142,18 +142,31 @@ impl Gaze<'_> {
         }
     }
 
-    /// True if the camera looked through the point (world): [`DepthMap::look`] says free. Quicker than that where most points are not.
-    #[inline(always)]
-    pub(crate) fn passes(&self, p: &Point3<f64>, tolerance_m: f64) -> bool {
-        let q = self.turn * p.coords.cast::<f32>() + self.shift;
-        let (u, v) = (self.focal[0] * q.x / q.z + self.centre[0], self.focal[1] * q.y / q.z + self.centre[1]);
+    /// Marks those of some points (world) that the camera looked through: of which [`DepthMap::look`] says free. Quicker than that where most are
+    /// not.
+    pub(crate) fn pass(&self, points: &[Point3<f32>], tolerance_m: f64, through: &mut [bool]) {
+        const LANES: usize = 16;
+        const NONE: u32 = u32::MAX;
         let Intrinsics { width, height, .. } = self.map.intrinsics;
-        if !(q.z > 0.0 && u >= 0.0 && v >= 0.0 && u < width as f32 && v < height as f32) {
-            return false;
+        let (right, bottom) = (width as f32, height as f32);
+        for (points, through) in points.chunks(LANES).zip(through.chunks_mut(LANES)) {
+            let mut pixels = [NONE; LANES];
+            let mut depths_m = [0.0; LANES];
+            for ((p, pixel), depth_m) in points.iter().zip(&mut pixels).zip(&mut depths_m) {
+                let q = self.turn * p.coords + self.shift;
+                let per = 1.0 / q.z;
+                let (u, v) =
+                    (self.focal[0] * q.x * per + self.centre[0], self.focal[1] * q.y * per + self.centre[1]);
+                let inside = q.z > 0.0 && u >= 0.0 && v >= 0.0 && u < right && v < bottom;
+                *pixel = if inside { v as u32 * width as u32 + u as u32 } else { NONE };
+                *depth_m = q.z + tolerance_m as f32;
+            }
+            for (((p, through), pixel), depth_m) in points.iter().zip(through).zip(pixels).zip(depths_m) {
+                // The very pixel that the point falls on may show already that it was not.
+                let beyond = self.map.depths_m.get(pixel as usize).is_some_and(|seen| *seen > depth_m);
+                *through |= beyond && self.map.look(&p.cast(), tolerance_m) == Seen::Free;
+            }
         }
-        // The very pixel that the point falls on may show already that it was not.
-        let pixel = (v as usize).min(height - 1) * width + (u as usize).min(width - 1);
-        self.map.depths_m[pixel] > q.z + tolerance_m as f32 && self.map.look(p, tolerance_m) == Seen::Free
     }
 }
 

@@ -4,10 +4,10 @@ use nalgebra::{Point3, Vector3};
 use rustc_hash::FxHashMap;
 
 /// Voxels along a side of a brick, and along that of a brick with a layer of its neighbours' voxels around.
-const SIDE: usize = 8;
-const WIDE: usize = SIDE + 2;
+pub(super) const SIDE: usize = 8;
+pub(super) const WIDE: usize = SIDE + 2;
 /// No cell, or no brick.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 /// Most voxels along an axis: positions in single precision tell a sixteenth of a voxel then.
 const MOST: f64 = (1 << 20) as f64;
 
@@ -114,19 +114,22 @@ impl<C> Bricks<C> {
         let mut around = [0_u32; 27];
         for z in 1..=self.layers {
             for y in 1..=SIDE {
+                if wide[z][y] == [NONE; WIDE] {
+                    continue;
+                }
+                let rows: [&[u32; WIDE]; 9] =
+                    std::array::from_fn(|row| &wide[z + row / 3 - 1][y + row % 3 - 1]);
                 for x in 1..=SIDE {
                     let own = wide[z][y][x];
                     if own == NONE {
                         continue;
                     }
                     let mut count = 0;
-                    for layer in &wide[z - 1..=z + 1] {
-                        for row in &layer[y - 1..=y + 1] {
-                            for &cell in &row[x - 1..=x + 1] {
-                                // Written over by the next if there is none.
-                                around[count.min(26)] = cell;
-                                count += usize::from(cell != NONE);
-                            }
+                    for row in rows {
+                        for &cell in &row[x - 1..x + 2] {
+                            // Written over by the next if there is none.
+                            around[count.min(26)] = cell;
+                            count += usize::from(cell != NONE);
                         }
                     }
                     found(own as usize, &around[..count]);
@@ -135,8 +138,8 @@ impl<C> Bricks<C> {
         }
     }
 
-    /// The cells of a brick with a layer of those around.
-    fn wide(&self, brick: usize) -> [[[u32; WIDE]; WIDE]; WIDE] {
+    /// Numbers of the cells of a brick and of a layer of those around: by z, y, x. Of columns, those of the layer in the middle.
+    pub fn wide(&self, brick: usize) -> [[[u32; WIDE]; WIDE]; WIDE] {
         let place = self.places[brick];
         // Columns have nothing above and below them.
         let columns = self.layers == 1;

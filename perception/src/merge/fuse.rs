@@ -1,38 +1,30 @@
 //! Step 5: one cloud, sharper than any view, of bounded size.
 //!
 //! Returns at depth edges that hang between two surfaces are dropped. The rest are averaged in voxels, each weighted by the spread of its
-//! range; then every voxel is moved along its normal onto the weighted mean of the like-facing voxels beside it. What lies on a level
-//! plane is averaged in columns that stand on it instead: the table is one sheet. What a single view claims and another looked through
-//! is left out.
+//! range. What lies on a level plane is averaged in columns that stand on it instead: the table is one sheet.
 
 use super::MergeOptions;
 use super::bricks::{Bricks, Grid};
 use super::parts::Plane;
 use super::prepare::Prepared;
-use super::returns::{Return, Returns, sigma_m};
-use crate::cloud::{Cloud, is_finite};
+use super::returns::{Return, Returns};
+use super::settle::settle;
+use crate::cloud::Cloud;
 use crate::view::View;
 use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-/// How far along its normal a voxel may be moved by its neighbours, in spreads of its own.
-const TUBE_SPREADS: f32 = 2.5;
-/// The spread of a voxel: that of a point at arm's length, metres. A voxel of many points is no narrower a tube.
-const VOXEL_SPREAD_M: f32 = 0.003;
-/// Looks through a place this far off the surface say that nothing is there, metres.
-const CARVE_M: f64 = 0.03;
-
 /// What is known of a voxel: running sums, weighted, while it is gathered; then means.
 #[derive(Clone, Copy)]
-struct Cell {
-    weight: f32,
+pub(super) struct Cell {
+    pub weight: f32,
     /// Voxels from the grid's lowest corner.
-    at: Vector3<f32>,
+    pub at: Vector3<f32>,
     /// Unit length or zero in the end.
-    normal: Vector3<f32>,
+    pub normal: Vector3<f32>,
     /// Views that measured it, and the last of them.
-    views: u16,
+    pub views: u16,
     last: u16,
 }
 
@@ -54,7 +46,7 @@ impl Cell {
         self.last = view;
     }
 
-    fn mean(&self) -> Cell {
+    pub fn mean(&self) -> Cell {
         let normal = self.normal.try_normalize(1e-6).unwrap_or_else(Vector3::zeros);
         Cell { at: self.at / self.weight, normal, ..*self }
     }
@@ -73,16 +65,16 @@ struct Measured {
 }
 
 /// Occupied voxels, or columns on a plane.
-struct Gathered {
-    grid: Grid,
+pub(super) struct Gathered {
+    pub grid: Grid,
     /// The grid's axes: those of the world, or z away from a plane.
-    axes_from_world: UnitQuaternion<f64>,
+    pub axes_from_world: UnitQuaternion<f64>,
     /// True if the voxels are columns along z.
-    flat: bool,
-    bricks: Bricks<Cell>,
+    pub flat: bool,
+    pub bricks: Bricks<Cell>,
     /// Weighted sums of the colours of each cell, if there are any.
-    colours: Vec<Vector3<f32>>,
-    returns: usize,
+    pub colours: Vec<Vector3<f32>>,
+    pub returns: usize,
 }
 
 pub(super) struct Fused {
@@ -125,17 +117,22 @@ pub(super) fn fuse(
 
 /// Sorts the returns of a view into voxels and sheets.
 fn take(all: &mut [Gathered], of: &Returns, view: u16, coloured: bool) {
+    /// Returns that are added together.
+    const SOME: usize = 512;
     let colours = of.view.cloud.colours.as_deref().filter(|_| coloured);
+    let list = || Vec::with_capacity(SOME);
     let mut kept: Vec<(Scale, Vec<Measured>)> =
-        all.iter().map(|gathered| (Scale::of(&of.world_from_camera, gathered), Vec::new())).collect();
-    for row in 0..of.rows() {
-        of.row(row, |found| {
-            let (scale, kept) = &mut kept[found.plane.map_or(0, |plane| plane + 1)];
-            kept.push(scale.measured(&found));
-        });
-        for (gathered, (_, kept)) in all.iter_mut().zip(&mut kept) {
-            gathered.add(kept, view, colours);
+        all.iter().map(|gathered| (Scale::of(&of.world_from_camera, gathered), list())).collect();
+    of.visit(|found| {
+        let number = found.plane.map_or(0, |plane| plane + 1);
+        let (scale, kept) = &mut kept[number];
+        kept.push(scale.measured(&found));
+        if kept.len() == SOME {
+            all[number].add(kept, view, colours);
         }
+    });
+    for (gathered, (_, kept)) in all.iter_mut().zip(&mut kept) {
+        gathered.add(kept, view, colours);
     }
 }
 
@@ -158,10 +155,9 @@ impl Scale {
 
     #[inline(always)]
     fn measured(&self, of: &Return) -> Measured {
-        let sigma_m = sigma_m(of.at);
-        let (at, weight) = (self.turn * of.at.coords + self.shift, 1.0 / (sigma_m * sigma_m));
         let normal = if of.normal.x.is_finite() { self.axes * of.normal } else { Vector3::zeros() };
-        Measured { at, weight, normal, pixel: of.pixel as u32, cell: 0 }
+        let at = self.turn * of.at + self.shift;
+        Measured { at, weight: of.weight, normal, pixel: of.pixel as u32, cell: 0 }
     }
 }
 
@@ -203,109 +199,4 @@ impl Gathered {
         self.returns += kept.len();
         kept.clear();
     }
-}
-
-/// Position, normal, colour and number of views of a fused point.
-type Settled = (Point3<f32>, Vector3<f32>, [u8; 3], u16);
-
-/// Moves the voxels onto their common surface and drops what was looked through.
-fn settle(all: Vec<Gathered>, seen: &Visibility) -> Fused {
-    let most = all.iter().map(|gathered| gathered.bricks.cells.len()).sum();
-    let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
-    let mut fused = Fused {
-        cloud: Cloud::from_points(Vec::with_capacity(most)),
-        views_per_point: Vec::with_capacity(most),
-        returns: all.iter().map(|gathered| gathered.returns).sum(),
-        voxel_m: all[0].grid.voxel_m,
-    };
-    let mut normals = Vec::with_capacity(most);
-    let mut colours = coloured.then(|| Vec::with_capacity(most));
-    for gathered in all {
-        gathered.settle(seen, |kept| {
-            fused.cloud.points.extend(kept.iter().map(|settled| settled.0));
-            normals.extend(kept.iter().map(|settled| settled.1));
-            fused.views_per_point.extend(kept.iter().map(|settled| settled.3));
-            if let Some(colours) = &mut colours {
-                colours.extend(kept.iter().map(|settled| settled.2));
-            }
-        });
-    }
-    fused.cloud.normals = Some(normals);
-    fused.cloud.colours = colours;
-    fused
-}
-
-impl Gathered {
-    /// Gives what is left of the cells, some at a time.
-    fn settle(self, seen: &Visibility, mut give: impl FnMut(&[Settled])) {
-        /// Bricks that one thread settles in a row, and such rows at a time: what they fill is used again.
-        const TOGETHER: usize = 64;
-        const ROWS: usize = 32;
-        let Gathered { grid, axes_from_world, flat, bricks, colours: sums, .. } = self;
-        let world_from_axes = axes_from_world.inverse().to_rotation_matrix();
-        let turn = world_from_axes.cast::<f32>();
-        let mut colours: Vec<[u8; 3]> = Vec::with_capacity(sums.len());
-        let bricks = bricks.in_order(|cell, number| {
-            let colour = |sum: &Vector3<f32>| <[u8; 3]>::from((sum / cell.weight).map(|c| c.round() as u8));
-            colours.extend(sums.get(number).map(colour));
-            cell.mean()
-        });
-        let gazes = seen.gazes();
-        let settle_row = |row: usize, kept: &mut Vec<Settled>| {
-            kept.clear();
-            for brick in (row * TOGETHER..bricks.len()).take(TOGETHER) {
-                bricks.visit(brick, |number, around| {
-                    let cell = &bricks.cells[number];
-                    let at = match flat {
-                        true => levelled(cell, around, &bricks.cells),
-                        false => smoothed(cell, around, &bricks.cells, grid.voxel_m as f32),
-                    };
-                    let at = world_from_axes * Point3::from(grid.origin_m + at.cast::<f64>() * grid.voxel_m);
-                    // One view's word against another's look through the place.
-                    let alone = cell.views < 2 && gazes.len() > 1;
-                    let through = alone && gazes.iter().any(|gaze| gaze.passes(&at, CARVE_M));
-                    let at = at.cast::<f32>();
-                    if through || !is_finite(&at) {
-                        return;
-                    }
-                    let none = cell.normal == Vector3::zeros();
-                    let normal = if none { Vector3::repeat(f32::NAN) } else { turn * cell.normal };
-                    kept.push((at, normal, colours.get(number).copied().unwrap_or_default(), cell.views));
-                });
-            }
-        };
-        let mut rows: Vec<Vec<Settled>> = vec![Vec::new(); ROWS];
-        let all = bricks.len().div_ceil(TOGETHER);
-        for first in (0..all).step_by(ROWS) {
-            let rows = &mut rows[..ROWS.min(all - first)];
-            rows.par_iter_mut().enumerate().for_each(|(row, kept)| settle_row(first + row, kept));
-            rows.iter().for_each(|kept| give(kept));
-        }
-    }
-}
-
-/// The voxel's mean, moved along its normal onto the mean of the like-facing voxels around it.
-#[inline(always)]
-fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3<f32> {
-    let tube = TUBE_SPREADS * VOXEL_SPREAD_M / voxel_m;
-    let (mut weight, mut offset) = (0.0, 0.0);
-    for &number in around {
-        let near = &cells[number as usize];
-        let gap = own.normal.dot(&(near.at - own.at));
-        let counts = gap.abs() < tube && near.normal.dot(&own.normal) > 0.7;
-        let share = if counts { near.weight } else { 0.0 };
-        weight += share;
-        offset += share * gap;
-    }
-    if weight > 0.0 { own.at + own.normal * (offset / weight) } else { own.at }
-}
-
-/// The column's mean, moved along z onto the mean of the columns around it.
-#[inline(always)]
-fn levelled(own: &Cell, around: &[u32], cells: &[Cell]) -> Vector3<f32> {
-    let (weight, sum) = around.iter().fold((0.0, 0.0), |(weight, sum), &number| {
-        let near = &cells[number as usize];
-        (weight + near.weight, sum + near.weight * near.at.z)
-    });
-    Vector3::new(own.at.x, own.at.y, sum / weight)
 }

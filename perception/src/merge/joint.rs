@@ -48,6 +48,8 @@ struct Link {
 const LEAST_SIGMA_M: f64 = 0.002;
 /// Smallest cosine between the normals of partners.
 const SAME_SIDE: f64 = 0.75;
+/// Another point may be nearer than the partner by this part of how far a partner may be: the surface is much the same there.
+const SLACK: f32 = 0.1;
 /// A pass that moves no camera farther than this, metres and radians, ends the round.
 const SETTLED: (f64, f64) = (2e-4, 2e-4);
 
@@ -158,12 +160,19 @@ fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius:
     let Some(tree) = &b.tree else { return Link::of(i, j, &sums, poses) };
     let j_from_i = poses[j].inv_mul(&poses[i]);
     let (turn, shift) = (j_from_i.rotation.to_rotation_matrix(), j_from_i.translation.vector);
+    let mut last = Partner::UNKNOWN;
     for (&(k, part_weight), partner) in asked.points.iter().zip(&mut asked.partners) {
         // From the first camera, and from the second, along the axes of the second.
         let arm = turn * a.points[k].coords;
         let in_j = arm + shift;
-        let Some(slot) = partner.update(tree, in_j.cast::<f32>().into(), radius as f32) else { continue };
-        let partner = tree.indices()[slot] as usize;
+        if partner.is_unknown() {
+            // Points that are asked for one after another are near each other.
+            *partner = last.guess();
+        }
+        let (at, within_m) = (in_j.cast::<f32>().into(), radius as f32);
+        let found = partner.update(tree, at, within_m, SLACK * within_m);
+        last = *partner;
+        let Some(partner) = found else { continue };
         let normal = b.normals[partner];
         if (turn * a.normals[k]).dot(&normal) < SAME_SIDE {
             continue;

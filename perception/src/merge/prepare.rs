@@ -18,13 +18,13 @@ const WIDE: normals::OrganisedOptions =
 
 /// A view as the alignment sees it.
 pub(super) struct Prepared {
-    /// Thinned points, camera frame, metres.
+    /// Thinned points, camera frame, metres, in the order of the tree.
     pub points: Vec<Point3<f64>>,
     /// Their unit normals, towards the camera.
     pub normals: Vec<Vector3<f64>>,
     /// Spread of each measurement, metres.
     pub sigmas_m: Vec<f64>,
-    /// The points as a search tree; none if there are more than it can hold.
+    /// The points as a search tree; none, and no points, if there are more than it can hold.
     pub tree: Option<Neighbours>,
     /// What is to be merged of an organised cloud, coarser, with normals in the camera frame.
     pub coarse: Option<Cloud>,
@@ -64,9 +64,9 @@ impl Within {
 
     /// False also for what is no return.
     #[inline(always)]
-    pub fn holds(&self, p: &Point3<f32>) -> bool {
-        let height = self.up.dot(&p.coords);
-        p.coords.norm_squared() <= self.range_sq && height >= self.heights_m.0 && height <= self.heights_m.1
+    pub fn holds(&self, [x, y, z]: [f32; 3]) -> bool {
+        let height = self.up.x * x + self.up.y * y + self.up.z * z;
+        (x * x + y * y + z * z <= self.range_sq) & (height >= self.heights_m.0) & (height <= self.heights_m.1)
     }
 }
 
@@ -84,6 +84,8 @@ pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
     let cloud = coarse.unwrap_or_else(|| thinned(view, &within, options));
     let kept = firsts(&cloud, options.align_voxel_m as f32);
     let tree = Neighbours::new(&kept.points).ok();
+    // What is near each other in space is so in memory then, and a slot of the tree is the number of its point.
+    let kept = tree.as_ref().map_or_else(Cloud::default, |tree| kept.select(tree.indices()));
     let points: Vec<Point3<f64>> = kept.points.iter().map(|p| p.cast()).collect();
     let normals = kept.normals.iter().flatten().map(|n| n.cast()).collect();
     let coarse = cloud.grid.is_some().then_some(cloud);
@@ -110,7 +112,7 @@ fn firsts(cloud: &Cloud, voxel_m: f32) -> Cloud {
 
 /// What is to be merged of a cloud, thinned, with normals from the nearest points.
 fn thinned(view: &View, within: &Within, options: &MergeOptions) -> Cloud {
-    let kept = view.cloud.filter(|p| within.holds(p));
+    let kept = view.cloud.filter(|p| within.holds([p.x, p.y, p.z]));
     let thin = voxel::downsample(&kept, options.align_voxel_m as f32).unwrap_or(kept);
     match Neighbours::new(&thin.points) {
         Ok(tree) => {
@@ -130,7 +132,7 @@ pub(super) fn coarser(view: &View, within: &Within, about: usize) -> Option<Clou
     let mut points = Vec::with_capacity(columns * rows);
     for row in view.cloud.points.chunks_exact(width.max(1)).step_by(stride).take(rows) {
         let pixels = row.iter().step_by(stride).take(columns);
-        points.extend(pixels.map(|p| if within.holds(p) { *p } else { NONE }));
+        points.extend(pixels.map(|p| if within.holds([p.x, p.y, p.z]) { *p } else { NONE }));
     }
     Some(Cloud { points, grid: Some(Grid { width: columns, height: rows }), ..Cloud::default() })
 }

@@ -4,8 +4,8 @@ use super::MergeOptions;
 use super::parts::Plane;
 use super::prepare::{Prepared, Within, coarser};
 use crate::cloud::{Cloud, Grid};
+use crate::noise::frontal_sigma_m;
 use crate::normals::{OrganisedOptions, organised_where};
-use crate::surface::range_sigma_m;
 use crate::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::borrow::Cow;
@@ -24,13 +24,21 @@ const FINE: OrganisedOptions = OrganisedOptions { reach: 1, depth_step_share: 0.
 
 /// Returns that are taken together of a cloud without rows.
 const ROW: usize = 512;
+/// Pixels that are judged together.
+const LANES: usize = 16;
+
+/// What a return is instead of the number of the plane that it lies on: not fused, or off the planes.
+const DROPPED: u32 = u32::MAX;
+const THING: u32 = u32::MAX - 1;
 
 /// A return that is fused.
-pub(super) struct Return<'a> {
+pub(super) struct Return {
     /// Camera frame, metres.
-    pub at: &'a Point3<f32>,
+    pub at: Vector3<f32>,
     /// Camera frame; not finite if unknown.
-    pub normal: &'a Vector3<f32>,
+    pub normal: Vector3<f32>,
+    /// One by the square of its spread, metres.
+    pub weight: f32,
     pub pixel: usize,
     /// Number of the plane that it lies on.
     pub plane: Option<usize>,
@@ -41,52 +49,58 @@ pub(super) struct Returns<'a> {
     pub view: &'a View,
     pub world_from_camera: Isometry3<f64>,
     within: Within,
+    organised: bool,
     /// Pixels a row.
     width: usize,
-    /// What each pixel of the coarser copy lies on, and how it faces.
-    planes: Vec<On>,
+    planes: Vec<InCamera>,
+    /// Number of the plane that each pixel of the coarser copy lies on, or [`THING`].
+    on: Vec<u32>,
     coarse: Facing<'a>,
     things: Facing<'a>,
 }
 
-/// A plane (camera frame) that something lies on, and how far from it what does so may be, metres.
-#[derive(Clone, Copy)]
-struct On {
+/// A plane in the camera's frame, metres.
+struct InCamera {
     normal: Vector3<f32>,
     along_m: f32,
-    reach_m: f32,
-    number: usize,
 }
 
-impl On {
-    /// Nothing is as near as this.
-    const NONE: On = On { normal: Vector3::new(0.0, 0.0, 0.0), along_m: 0.0, reach_m: -1.0, number: 0 };
-
-    fn is_some(&self) -> bool {
-        self.reach_m > 0.0
-    }
-
-    /// True if the return is as near to the plane as what lies on it.
+impl InCamera {
+    /// True if what is measured with that spread lies on it.
     #[inline(always)]
-    fn holds(&self, p: &Point3<f32>) -> bool {
-        (self.normal.dot(&p.coords) - self.along_m).abs() < self.reach_m
+    fn holds(&self, [x, y, z]: [f32; 3], sigma_m: f32) -> bool {
+        let height_m = self.normal.x * x + self.normal.y * y + self.normal.z * z - self.along_m;
+        height_m.abs() < PLANE_SPREADS * sigma_m + PLANE_M
     }
 }
 
 /// Normals (camera frame) of some of a view's pixels: of every nth row and column.
 struct Facing<'a> {
     normals: Cow<'a, [Vector3<f32>]>,
-    /// Normals a row.
-    width: usize,
-    stride: usize,
+    /// Number of the first normal of each row of the view, and of its columns from there.
+    rows: Vec<usize>,
+    columns: Vec<usize>,
 }
 
-impl Facing<'_> {
-    /// Number of the normal of a pixel. Pixels that are too few for one more go with the last.
+impl<'a> Facing<'a> {
+    /// Of a copy of the view's cloud, every nth row and column.
+    fn of(view: &View, copy: Option<Grid>, normals: Cow<'a, [Vector3<f32>]>) -> Facing<'a> {
+        let width = view.cloud.grid.map_or(ROW, |g| g.width).max(1);
+        let size = copy.map_or(width, |g| g.width).max(1);
+        // Pixels that are too few for one more go with the last.
+        let (stride, last) = (width / size, normals.len().div_ceil(size).saturating_sub(1));
+        let rows = view.cloud.len().div_ceil(width);
+        Facing {
+            normals,
+            rows: (0..rows).map(|row| (row / stride).min(last) * size).collect(),
+            columns: (0..width).map(|column| (column / stride).min(size - 1)).collect(),
+        }
+    }
+
     #[inline(always)]
-    fn index(&self, row: usize, column: usize) -> usize {
-        let last = self.normals.len().div_ceil(self.width).saturating_sub(1);
-        (row / self.stride).min(last) * self.width + (column / self.stride).min(self.width - 1)
+    fn normal(&self, row: usize, column: usize) -> Vector3<f32> {
+        const NONE: Vector3<f32> = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
+        self.normals.get(self.rows[row] + self.columns[column]).copied().unwrap_or(NONE)
     }
 }
 
@@ -100,122 +114,164 @@ impl<'a> Returns<'a> {
     ) -> Returns<'a> {
         let within = Within::of(world_from_camera, options, 0.0);
         let cloud = prepared.coarse.as_ref().unwrap_or(&view.cloud);
-        let coarse = Facing::of(view, cloud);
-        let planes = lying_on(cloud, &coarse, &within, planes, world_from_camera);
-        let things = things(view, &within, &coarse, &planes);
+        let normals = Cow::Borrowed(cloud.normals.as_deref().unwrap_or_default());
+        let coarse = Facing::of(view, cloud.grid, normals);
+        let in_camera = |(normal, offset_m): &Plane| InCamera {
+            along_m: (offset_m - normal.dot(&world_from_camera.translation.vector)) as f32,
+            normal: (world_from_camera.rotation.inverse() * normal).cast(),
+        };
+        let planes: Vec<InCamera> = planes.iter().map(in_camera).collect();
+        let on = lying_on(cloud, &coarse.normals, &within, &planes);
+        let things = things(view, &within, &coarse, &on);
         Returns {
             view,
             world_from_camera: *world_from_camera,
             within,
+            organised: view.cloud.grid.is_some(),
             width: view.cloud.grid.map_or(ROW, |g| g.width).max(1),
             planes,
+            on,
             coarse,
             things,
         }
     }
 
-    /// Rows of pixels, or of as many points.
-    pub fn rows(&self) -> usize {
-        self.view.cloud.len().div_ceil(self.width)
+    /// A row of pixels, or as many points; nothing after the last.
+    fn line(&self, row: usize) -> &[Point3<f32>] {
+        let points = &self.view.cloud.points;
+        &points[points.len().min(row * self.width)..points.len().min((row + 1) * self.width)]
     }
 
-    /// Calls `found` for those of a row that are in range and band and do not fly.
-    #[inline(always)]
-    pub fn row(&self, row: usize, mut found: impl FnMut(Return)) {
-        const NONE: Vector3<f32> = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
-        let cloud = &self.view.cloud;
-        let line = &cloud.points[row * self.width..cloud.len().min((row + 1) * self.width)];
-        let stride = self.coarse.stride;
-        let first = self.coarse.index(row, 0);
-        for (column, some) in line.chunks(stride).enumerate() {
-            let coarse = first + column.min(self.coarse.width - 1);
-            let on = &self.planes[coarse];
-            for (p, column) in some.iter().zip(column * stride..) {
-                if !self.within.holds(p) || is_flying(cloud, row, column) {
-                    continue;
-                }
-                let plane = on.holds(p).then_some(on.number);
-                let normal = match plane {
-                    Some(_) => self.coarse.normals.get(coarse),
-                    None => self.things.normals.get(self.things.index(row, column)),
-                };
-                let pixel = row * self.width + column;
-                found(Return { at: p, normal: normal.unwrap_or(&NONE), pixel, plane });
+    /// Calls `found` for those that are in range and band and do not fly.
+    pub fn visit(&self, mut found: impl FnMut(Return)) {
+        let mut lines: [Line; 3] = std::array::from_fn(|_| Line::of(self.width));
+        lines[2].fill(self.line(0));
+        let mut around = vec![THING; self.width.next_multiple_of(LANES)];
+        for row in 0..self.view.cloud.len().div_ceil(self.width) {
+            lines.rotate_left(1);
+            lines[2].fill(self.line(row + 1));
+            for (on, column) in around.iter_mut().zip(&self.coarse.columns) {
+                *on = self.on.get(self.coarse.rows[row] + column).copied().unwrap_or(THING);
             }
+            for (some, around) in around.as_chunks().0.iter().enumerate() {
+                let block = self.block(&lines, some * LANES, around);
+                for (lane, &on) in block.on.iter().enumerate().filter(|(_, on)| **on != DROPPED) {
+                    let column = some * LANES + lane;
+                    let thing = on == THING;
+                    found(Return {
+                        at: Vector3::from(block.at.map(|axis| axis[lane])),
+                        normal: if thing { &self.things } else { &self.coarse }.normal(row, column),
+                        weight: block.weight[lane],
+                        pixel: row * self.width + column,
+                        plane: (!thing).then_some(on as usize),
+                    });
+                }
+            }
+        }
+    }
+
+    /// What some pixels in the middle one of three rows are; `around` tells which planes there may be.
+    fn block(&self, lines: &[Line; 3], column: usize, around: &[u32; LANES]) -> Block {
+        let [x, y, z] = [0, 1, 2].map(|axis| some(&lines[1].0[axis], column + 1));
+        let [left, right] = [0, 2].map(|aside| some(&lines[1].0[2], column + aside));
+        let [above, below] = [0, 2].map(|line: usize| some(&lines[line].0[2], column + 1));
+        let mut block = Block { at: [*x, *y, *z], weight: [0.0; LANES], on: [DROPPED; LANES] };
+        let mut flies = [false; LANES];
+        for i in 0..LANES {
+            // In the air: before one neighbour and behind the opposite one.
+            let step = FLYING_SHARE * z[i];
+            let (near, far) = (z[i] - step, z[i] + step);
+            let across = ((left[i] > far) & (right[i] < near)) | ((left[i] < near) & (right[i] > far));
+            let down = ((above[i] > far) & (below[i] < near)) | ((above[i] < near) & (below[i] > far));
+            flies[i] = (across | down) & self.organised;
+        }
+        let mut sigmas_m = [0.0; LANES];
+        for i in 0..LANES {
+            let kept = self.within.holds([x[i], y[i], z[i]]) & !flies[i];
+            block.on[i] = if kept { THING } else { DROPPED };
+            sigmas_m[i] = sigma_m(z[i], x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+            block.weight[i] = 1.0 / (sigmas_m[i] * sigmas_m[i]);
+        }
+        for (number, plane) in (0..).zip(&self.planes).filter(|(number, _)| around.contains(number)) {
+            for i in 0..LANES {
+                let holds = plane.holds([x[i], y[i], z[i]], sigmas_m[i]);
+                let counts = holds & (around[i] == number) & (block.on[i] == THING);
+                block.on[i] = if counts { number } else { block.on[i] };
+            }
+        }
+        block
+    }
+}
+
+/// Pixels beside each other.
+struct Block {
+    /// Camera frame, metres.
+    at: [[f32; LANES]; 3],
+    weight: [f32; LANES],
+    /// Numbers of planes, [`THING`] or [`DROPPED`].
+    on: [u32; LANES],
+}
+
+/// A row of pixels, each coordinate by itself, with pixels without a return before and after.
+struct Line([Vec<f32>; 3]);
+
+impl Line {
+    fn of(width: usize) -> Line {
+        Line(std::array::from_fn(|_| vec![f32::NAN; width.next_multiple_of(LANES) + 2]))
+    }
+
+    /// A row may be shorter than others.
+    fn fill(&mut self, row: &[Point3<f32>]) {
+        for (axis, line) in self.0.iter_mut().enumerate() {
+            line[1..].iter_mut().zip(row).for_each(|(c, p)| *c = p[axis]);
+            line[1 + row.len()..].fill(f32::NAN);
         }
     }
 }
 
-impl<'a> Facing<'a> {
-    /// Of all points of a cloud that is every nth row and column of a view's.
-    fn of(view: &View, cloud: &'a Cloud) -> Facing<'a> {
-        let width = cloud.grid.map_or(ROW, |g| g.width).max(1);
-        let stride = view.cloud.grid.map_or(1, |g| g.width / width);
-        Facing { normals: Cow::Borrowed(cloud.normals.as_deref().unwrap_or_default()), width, stride }
-    }
+#[inline(always)]
+fn some(line: &[f32], from: usize) -> &[f32; LANES] {
+    line[from..].first_chunk().unwrap_or(&[f32::NAN; LANES])
+}
+
+/// Spread of a return, metres.
+#[inline(always)]
+fn sigma_m(depth: f32, range_sq: f32) -> f32 {
+    // Depth, but for what is seen far aside.
+    let (depth_sq, half_sq) = (depth * depth, 0.25 * range_sq);
+    frontal_sigma_m(if depth_sq > half_sq { depth_sq } else { half_sq }.sqrt())
 }
 
 /// What each point of the coarser copy lies on.
-fn lying_on(
-    cloud: &Cloud,
-    facing: &Facing,
-    within: &Within,
-    planes: &[Plane],
-    world_from_camera: &Isometry3<f64>,
-) -> Vec<On> {
-    let in_camera = |(number, (normal, offset_m)): (usize, &Plane)| {
-        let along_m = offset_m - normal.dot(&world_from_camera.translation.vector);
-        let normal = (world_from_camera.rotation.inverse() * normal).cast();
-        On { normal, along_m: along_m as f32, reach_m: 0.0, number }
+fn lying_on(cloud: &Cloud, normals: &[Vector3<f32>], within: &Within, planes: &[InCamera]) -> Vec<u32> {
+    let on = |(p, normal): (&Point3<f32>, &Vector3<f32>)| {
+        let at = [p.x, p.y, p.z];
+        if !within.holds(at) {
+            return THING;
+        }
+        let sigma_m = sigma_m(p.z, p.coords.norm_squared());
+        let on = |(_, plane): &(u32, &InCamera)| {
+            normal.dot(&plane.normal).abs() > PLANE_FACING && plane.holds(at, sigma_m)
+        };
+        (0..).zip(planes).find(on).map_or(THING, |(number, _)| number)
     };
-    let planes: Vec<On> = planes.iter().enumerate().map(in_camera).collect();
-    let on = |(k, p): (usize, &Point3<f32>)| {
-        let Some(normal) = facing.normals.get(k).filter(|_| within.holds(p)) else { return On::NONE };
-        let reach_m = PLANE_SPREADS * sigma_m(p) + PLANE_M;
-        let faces = planes.iter().filter(|plane| normal.dot(&plane.normal).abs() > PLANE_FACING);
-        faces.map(|plane| On { reach_m, ..*plane }).find(|on| on.holds(p)).unwrap_or(On::NONE)
-    };
-    cloud.points.iter().enumerate().map(on).collect()
+    cloud.points.iter().zip(normals).map(on).collect()
 }
 
 /// Normals of what lies on no plane: a finer copy's of an organised cloud, else the cloud's own.
-fn things<'a>(view: &'a View, within: &Within, coarse: &Facing, planes: &[On]) -> Facing<'a> {
-    let fine = coarser(view, within, COLUMNS);
-    let Some((cloud, Grid { width, .. })) = fine.zip(view.cloud.grid) else {
-        return Facing::of(view, &view.cloud);
+fn things<'a>(view: &'a View, within: &Within, coarse: &Facing, on: &[u32]) -> Facing<'a> {
+    let Some((cloud, Grid { width, .. })) = coarser(view, within, COLUMNS).zip(view.cloud.grid) else {
+        let normals = Cow::Borrowed(view.cloud.normals.as_deref().unwrap_or_default());
+        return Facing::of(view, view.cloud.grid, normals);
     };
     let size = cloud.grid.map_or(width, |g| g.width).max(1);
     let stride = width / size;
-    let columns: Vec<usize> = (0..size).map(|column| coarse.index(0, column * stride)).collect();
     let mut wanted = Vec::with_capacity(cloud.len());
-    for row in 0..cloud.len() / size {
-        let first = coarse.index(row * stride, 0);
-        wanted.extend(columns.iter().map(|column| !planes[first + column].is_some()));
+    for first in coarse.rows.iter().step_by(stride).take(cloud.len() / size) {
+        let columns = coarse.columns.iter().step_by(stride).take(size);
+        wanted.extend(columns.map(|column| on.get(first + column).is_none_or(|on| *on == THING)));
     }
     let found = organised_where(&cloud, &FINE, |k| wanted[k]);
     let normals = found.map_or(Vec::new(), |found| found.normals);
-    Facing { normals: Cow::Owned(normals), width: size, stride }
-}
-
-/// Spread of a return (camera frame), metres.
-#[inline(always)]
-pub(super) fn sigma_m(p: &Point3<f32>) -> f32 {
-    // Depth, but for what is seen far aside.
-    let (depth, half_sq) = (p.z.abs(), 0.25 * p.coords.norm_squared());
-    let depth = if depth * depth >= half_sq { depth } else { half_sq.sqrt() };
-    range_sigma_m(f64::from(depth)) as f32
-}
-
-/// True if the pixel hangs in the air: before one neighbour and behind the opposite one.
-#[inline(always)]
-fn is_flying(cloud: &Cloud, row: usize, column: usize) -> bool {
-    let Some(Grid { width, height }) = cloud.grid else { return false };
-    let i = row * width + column;
-    let depth = cloud.points[i].z;
-    let step = FLYING_SHARE * depth;
-    let beyond = |j: usize| cloud.points[j].z - depth;
-    let between = |a: f32, b: f32| (a > step && b < -step) || (a < -step && b > step);
-    let across = column > 0 && column + 1 < width && between(beyond(i - 1), beyond(i + 1));
-    let down = row > 0 && row + 1 < height && between(beyond(i - width), beyond(i + width));
-    across || down
+    Facing::of(view, cloud.grid, Cow::Owned(normals))
 }

@@ -196,7 +196,7 @@ impl<'a> Run<'a> {
         for (offset, partner) in partners.iter_mut().enumerate() {
             let i = (from + offset) * self.stride;
             let at = place.apply(&self.points[i]);
-            let Some(slot) = partner.update(tree, at, self.options.within_m) else { continue };
+            let Some(slot) = partner.update(tree, at, self.options.within_m, 0.0) else { continue };
             let target = tree.at(slot);
             let about = |p: [f32; 3]| {
                 [f64::from(p[0]) - centre[0], f64::from(p[1]) - centre[1], f64::from(p[2]) - centre[2]]

@@ -85,16 +85,27 @@ impl Partner {
     };
 
     /// The same partner, to be made sure of.
-    pub(super) fn guess(self) -> Partner {
+    pub(crate) fn guess(self) -> Partner {
         Partner { slot: self.slot, ..Partner::UNKNOWN }
     }
 
-    /// Brings the partner up to date for the point at `at`; its slot, if it is no farther than `within_m`.
+    /// True before the first search.
+    pub(crate) fn is_unknown(&self) -> bool {
+        self.others_m == f32::NEG_INFINITY
+    }
+
+    /// Brings the partner up to date for the point at `at`; its slot, if it is no farther than `within_m`. Others may be nearer by up to `slack_m`.
     #[inline(always)]
-    pub(crate) fn update(&mut self, tree: &Neighbours, at: [f32; 3], within_m: f32) -> Option<usize> {
+    pub(crate) fn update(
+        &mut self,
+        tree: &Neighbours,
+        at: [f32; 3],
+        within_m: f32,
+        slack_m: f32,
+    ) -> Option<usize> {
         let limit = within_m * within_m;
         let moved = distance_sq(&at, &self.searched_at).sqrt();
-        let to_others = self.others_m - moved;
+        let to_others = self.others_m - moved + slack_m;
         let still = match self.slot {
             NONE => to_others > within_m,
             slot => {

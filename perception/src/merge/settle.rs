@@ -1,0 +1,161 @@
+//! Step 5, second half: the voxels moved onto their common surface.
+//!
+//! Every voxel is moved along its normal onto the weighted mean of the like-facing voxels beside it, every column of a sheet along the sheet's
+//! normal onto that of the columns beside it. What a single view claims and another looked through is left out.
+
+use super::bricks::{Bricks, NONE, SIDE, WIDE};
+use super::fuse::{Cell, Fused, Gathered};
+use crate::cloud::{Cloud, is_finite};
+use crate::visibility::{Gaze, Visibility};
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+/// How far along its normal a voxel may be moved by its neighbours, in spreads of its own.
+const TUBE_SPREADS: f32 = 2.5;
+/// The spread of a voxel: that of a point at arm's length, metres. A voxel of many points is no narrower a tube.
+const VOXEL_SPREAD_M: f32 = 0.003;
+/// Looks through a place this far off the surface say that nothing is there, metres.
+const CARVE_M: f64 = 0.03;
+
+/// A fused point, world frame.
+#[derive(Clone)]
+struct Settled {
+    at: Point3<f32>,
+    normal: Vector3<f32>,
+    colour: [u8; 3],
+    views: u16,
+}
+
+/// One cloud of what was gathered.
+pub(super) fn settle(all: Vec<Gathered>, seen: &Visibility) -> Fused {
+    let most = all.iter().map(|gathered| gathered.bricks.cells.len()).sum();
+    let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
+    let mut fused = Fused {
+        cloud: Cloud::from_points(Vec::with_capacity(most)),
+        views_per_point: Vec::with_capacity(most),
+        returns: all.iter().map(|gathered| gathered.returns).sum(),
+        voxel_m: all[0].grid.voxel_m,
+    };
+    let mut normals = Vec::with_capacity(most);
+    let mut colours = coloured.then(|| Vec::with_capacity(most));
+    for gathered in all {
+        gathered.settle(seen, |kept| {
+            fused.cloud.points.extend(kept.iter().map(|settled| settled.at));
+            normals.extend(kept.iter().map(|settled| settled.normal));
+            fused.views_per_point.extend(kept.iter().map(|settled| settled.views));
+            if let Some(colours) = &mut colours {
+                colours.extend(kept.iter().map(|settled| settled.colour));
+            }
+        });
+    }
+    fused.cloud.normals = Some(normals);
+    fused.cloud.colours = colours;
+    fused
+}
+
+impl Gathered {
+    /// Gives what is left of the cells, some at a time.
+    fn settle(self, seen: &Visibility, mut give: impl FnMut(&[Settled])) {
+        /// Bricks that one thread settles in a row, and such rows at a time: what they fill is used again.
+        const TOGETHER: usize = 64;
+        const ROWS: usize = 32;
+        let Gathered { grid, axes_from_world, flat, bricks, colours: sums, .. } = self;
+        let world_from_axes = axes_from_world.inverse().to_rotation_matrix();
+        let turn = world_from_axes.cast::<f32>();
+        let mut colours: Vec<[u8; 3]> = Vec::with_capacity(sums.len());
+        let bricks = bricks.in_order(|cell, number| {
+            let colour = |sum: &Vector3<f32>| <[u8; 3]>::from((sum / cell.weight).map(|c| c.round() as u8));
+            colours.extend(sums.get(number).map(colour));
+            cell.mean()
+        });
+        let gazes = seen.gazes();
+        let settle_row = |row: usize, kept: &mut Vec<Settled>| {
+            kept.clear();
+            let mut keep = |number: usize, at: Vector3<f32>| {
+                let cell: &Cell = &bricks.cells[number];
+                let at = world_from_axes * Point3::from(grid.origin_m + at.cast::<f64>() * grid.voxel_m);
+                let none = cell.normal == Vector3::zeros();
+                let normal = if none { Vector3::repeat(f32::NAN) } else { turn * cell.normal };
+                let colour = colours.get(number).copied().unwrap_or_default();
+                kept.push(Settled { at: at.cast(), normal, colour, views: cell.views });
+            };
+            for brick in (row * TOGETHER..bricks.len()).take(TOGETHER) {
+                match flat {
+                    true => level(&bricks, brick, &mut keep),
+                    false => bricks.visit(brick, |number, around| {
+                        let own = &bricks.cells[number];
+                        keep(number, smoothed(own, around, &bricks.cells, grid.voxel_m as f32));
+                    }),
+                }
+            }
+            drop_looked_through(kept, &gazes);
+        };
+        let mut rows: Vec<Vec<Settled>> = vec![Vec::new(); ROWS];
+        let all = bricks.len().div_ceil(TOGETHER);
+        for first in (0..all).step_by(ROWS) {
+            let rows = &mut rows[..ROWS.min(all - first)];
+            rows.par_iter_mut().enumerate().for_each(|(row, kept)| settle_row(first + row, kept));
+            rows.iter().for_each(|kept| give(kept));
+        }
+    }
+}
+
+/// One view's word against another's look through the place.
+fn drop_looked_through(kept: &mut Vec<Settled>, gazes: &[Gaze]) {
+    let mut alone: Vec<Point3<f32>> = Vec::new();
+    if gazes.len() > 1 {
+        alone.extend(kept.iter().filter(|settled| settled.views < 2).map(|settled| settled.at));
+    }
+    let mut through = vec![false; alone.len()];
+    gazes.iter().for_each(|gaze| gaze.pass(&alone, CARVE_M, &mut through));
+    let mut through = through.into_iter();
+    kept.retain(|settled| {
+        let through = settled.views < 2 && through.next().unwrap_or(false);
+        !through && is_finite(&settled.at)
+    });
+}
+
+/// The voxel's mean, moved along its normal onto the mean of the like-facing voxels around it.
+#[inline(always)]
+fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3<f32> {
+    let tube = TUBE_SPREADS * VOXEL_SPREAD_M / voxel_m;
+    let (mut weight, mut offset) = (0.0, 0.0);
+    for &number in around {
+        let near = &cells[number as usize];
+        let gap = own.normal.dot(&(near.at - own.at));
+        let counts = gap.abs() < tube && near.normal.dot(&own.normal) > 0.7;
+        let share = if counts { near.weight } else { 0.0 };
+        weight += share;
+        offset += share * gap;
+    }
+    if weight > 0.0 { own.at + own.normal * (offset / weight) } else { own.at }
+}
+
+/// Calls `found` for each column of a brick with its number and its mean, moved along z onto the mean of the columns around it.
+fn level(bricks: &Bricks<Cell>, brick: usize, mut found: impl FnMut(usize, Vector3<f32>)) {
+    let numbers = &bricks.wide(brick)[1];
+    // Weight and weighted height: of the columns, then of three beside each other.
+    let mut sums = [[[0.0_f32; WIDE]; WIDE]; 2];
+    for (y, row) in numbers.iter().enumerate() {
+        for (x, &number) in row.iter().enumerate().filter(|(_, number)| **number != NONE) {
+            let cell = &bricks.cells[number as usize];
+            sums[0][y][x] = cell.weight;
+            sums[1][y][x] = cell.weight * cell.at.z;
+        }
+    }
+    let across = sums.map(|sums| {
+        sums.map(|row| -> [f32; SIDE] { std::array::from_fn(|x| row[x] + row[x + 1] + row[x + 2]) })
+    });
+    for y in 0..SIDE {
+        let [weights, heights] = across.each_ref().map(|rows| -> [f32; SIDE] {
+            std::array::from_fn(|x| rows[y][x] + rows[y + 1][x] + rows[y + 2][x])
+        });
+        for x in 0..SIDE {
+            let number = numbers[y + 1][x + 1];
+            if number != NONE {
+                let own = bricks.cells[number as usize].at;
+                found(number as usize, Vector3::new(own.x, own.y, heights[x] / weights[x]));
+            }
+        }
+    }
+}

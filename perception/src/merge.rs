@@ -350,7 +350,7 @@ fn align_objects(
 /// drawn by whatever surfaces happened to be near; tilt and height are certain.
 fn only_levelled(view: &Prepared, pose: &Isometry3<f64>, up: &Unit<Vector3<f64>>) -> Isometry3<f64> {
     let n = view.points.len().max(1) as f64;
-    let middle = view.points.iter().fold(Vector3::zeros(), |s, p| s + p.coords) / n;
+    let middle = view.points.iter().fold(Vector3::zeros(), |s, p| s + p.at().coords) / n;
     let (before, after) = (view.prior * Point3::from(middle), pose * Point3::from(middle));
     let turn = pose.rotation * view.prior.rotation.inverse();
     // Swing and twist: the twist is the part of the turn about the vertical.
@@ -419,7 +419,7 @@ fn place_on(
 /// Points and normals of what stands on the surface in a view, in the world.
 fn objects(view: &Prepared, parts: &[Part], pose: &Isometry3<f64>) -> Vec<Oriented> {
     let standing = (0..view.points.len()).filter(|&k| parts[k] == Part::Standing);
-    standing.map(|k| (pose * view.points[k], pose.rotation * view.normals[k])).collect()
+    standing.map(|k| (pose * view.points[k].at(), pose.rotation * view.points[k].normal())).collect()
 }
 
 /// How far off two views may be from each other at the distance of the objects: three spreads, at least the 10 cm and 6° of a poor localisation.

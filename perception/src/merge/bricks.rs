@@ -29,19 +29,25 @@ impl Grid {
     }
 }
 
+/// Where a brick lies, in bricks: by axis, 20 bits each.
+type Place = u64;
+const PLACE_BITS: u32 = 20;
+
 /// Cells of occupied voxels.
 pub(super) struct Bricks<C> {
-    numbers: FxHashMap<[u32; 3], u32>,
-    /// Where each brick lies, in bricks.
-    places: Vec<[u32; 3]>,
+    numbers: FxHashMap<Place, u32>,
+    places: Vec<Place>,
     /// Number of the cell of each voxel, brick by brick, x fastest.
     slots: Vec<u32>,
     /// Layers of voxels in a brick, along z.
     layers: usize,
     pub cells: Vec<C>,
-    /// The brick that was asked for last.
-    last: Option<([u32; 3], usize)>,
+    /// Bricks that were asked for of late, by the last bits of their place.
+    recent: [(Place, u32); RECENT * RECENT * RECENT],
 }
+
+/// Bricks along each axis of which one may be in `recent`.
+const RECENT: usize = 4;
 
 impl<C> Bricks<C> {
     /// No cell yet. Voxels that are columns along z make bricks of one layer.
@@ -52,7 +58,7 @@ impl<C> Bricks<C> {
             slots: Vec::new(),
             layers: if columns { 1 } else { SIDE },
             cells: Vec::new(),
-            last: None,
+            recent: [(Place::MAX, NONE); RECENT * RECENT * RECENT],
         }
     }
 
@@ -65,10 +71,12 @@ impl<C> Bricks<C> {
     pub fn cell(&mut self, at: &[f32; 3], new: C) -> u32 {
         let mut voxel = at.map(|c| c as i32 as u32);
         voxel[2] *= u32::from(self.layers > 1);
-        let place = voxel.map(|c| c / SIDE as u32);
-        let brick = match self.last {
-            Some((last, brick)) if last == place => brick,
-            _ => self.brick(place),
+        let [x, y, z] = voxel.map(|c| c / SIDE as u32);
+        let place = Place::from(x) | Place::from(y) << PLACE_BITS | Place::from(z) << (2 * PLACE_BITS);
+        let recent = [x, y, z].iter().fold(0, |at, c| at * RECENT + *c as usize % RECENT);
+        let brick = match self.recent[recent] {
+            (known, brick) if known == place => brick as usize,
+            _ => self.brick(place, recent),
         };
         let [x, y, z] = voxel.map(|c| c as usize % SIDE);
         let slot = &mut self.slots[brick * self.layers * SIDE * SIDE + (z * SIDE + y) * SIDE + x];
@@ -87,19 +95,19 @@ impl<C> Bricks<C> {
             *slot = cells.len() as u32;
             cells.push(anew(&self.cells[number], number));
         }
-        let Bricks { numbers, places, slots, layers, last, .. } = self;
-        Bricks { cells, numbers, places, slots, layers, last }
+        let Bricks { numbers, places, slots, layers, recent, .. } = self;
+        Bricks { cells, numbers, places, slots, layers, recent }
     }
 
     #[inline(never)]
-    fn brick(&mut self, place: [u32; 3]) -> usize {
+    fn brick(&mut self, place: Place, recent: usize) -> usize {
         let next = self.places.len();
         let brick = *self.numbers.entry(place).or_insert(next as u32) as usize;
         if brick == next {
             self.places.push(place);
             self.slots.resize(self.slots.len() + self.voxels(), NONE);
         }
-        self.last = Some((place, brick));
+        self.recent[recent] = (place, brick as u32);
         brick
     }
 
@@ -145,9 +153,12 @@ impl<C> Bricks<C> {
         let columns = self.layers == 1;
         let mut beside = [None; 27];
         for part in if columns { 9..18 } else { 0..27 } {
-            let step = [part % 3, part / 3 % 3, part / 9];
-            let next: [u32; 3] =
-                std::array::from_fn(|c| place[c].wrapping_add(step[c] as u32).wrapping_sub(1));
+            let step = |by: usize, bits: u32| (by as Place).wrapping_sub(1) << bits;
+            // Beyond the lowest lies a place that is beyond the highest as well: no brick.
+            let next = place
+                .wrapping_add(step(part % 3, 0))
+                .wrapping_add(step(part / 3 % 3, PLACE_BITS))
+                .wrapping_add(step(part / 9, 2 * PLACE_BITS));
             beside[part] = if next == place { Some(brick as u32) } else { self.numbers.get(&next).copied() };
         }
         // Of a voxel of the wide brick: which of the three bricks along an axis holds it, and where.

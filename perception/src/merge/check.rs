@@ -93,8 +93,8 @@ fn contradiction(
     let stride = (standing.len() / ASKED).max(1);
     let (mut judged, mut through) = (0_u32, 0_u32);
     for &k in standing.iter().step_by(stride) {
-        let place = map_from_view * view.points[k];
-        let sigma_m = range_sigma_m(place.coords.norm()).hypot(view.sigmas_m[k]);
+        let place = map_from_view * view.points[k].at();
+        let sigma_m = range_sigma_m(place.coords.norm()).hypot(f64::from(view.points[k].sigma_m));
         match map.look_from(&place, CLEAR_M.max(CLEAR_SPREADS * sigma_m)) {
             Seen::Free => (judged, through) = (judged + 1, through + 1),
             Seen::Surface => judged += 1,

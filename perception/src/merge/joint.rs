@@ -4,10 +4,10 @@
 //! from where localisation had it. The second part fixes the common frame: it is the robust average of what localisation said.
 
 use super::parts::Part;
-use super::prepare::Prepared;
+use super::prepare::{Prepared, Surfel};
 use crate::register::{Partner, Sums};
 use nalgebra::{
-    DMatrix, DVector, Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6,
+    DMatrix, DVector, Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6,
 };
 use rayon::prelude::*;
 
@@ -23,7 +23,7 @@ pub(super) struct Round {
     /// Points of each sort that a view asks for partners at most, all its partners together.
     pub asked: usize,
     /// Weight of points on planes, and of what stands on no surface, against the objects.
-    pub rest_weight: f64,
+    pub rest_weight: f32,
 }
 
 /// What a round found of one view.
@@ -45,9 +45,9 @@ struct Link {
 }
 
 /// Spread that all partners have at least: they are seldom the same place, metres.
-const LEAST_SIGMA_M: f64 = 0.002;
+const LEAST_SIGMA_M: f32 = 0.002;
 /// Smallest cosine between the normals of partners.
-const SAME_SIDE: f64 = 0.75;
+const SAME_SIDE: f32 = 0.75;
 /// Another point may be nearer than the partner by this part of how far a partner may be: the surface is much the same there.
 const SLACK: f32 = 0.1;
 /// A pass that moves no camera farther than this, metres and radians, ends the round.
@@ -65,7 +65,9 @@ pub(super) fn align(
     let askers: Vec<Askers> = parts.iter().map(|parts| Askers::of(parts)).collect();
     let pairs = pairs(views, used, poses);
     let of_view = |i: usize| pairs.iter().filter(|pair| pair.0 == i).count();
-    let ask = |&(i, j): &(usize, usize)| Asked::of(&askers[i], (i, j), round.asked / of_view(i), round);
+    let ask = |&(i, j): &(usize, usize)| {
+        Asked::of(&views[i].points, &askers[i], (i, j), round.asked / of_view(i), round)
+    };
     let mut asked: Vec<Asked> = pairs.iter().map(ask).collect();
     let mut found = vec![Found::default(); views.len()];
     for pass in 0..round.passes {
@@ -99,7 +101,7 @@ impl Askers {
     }
 
     /// At most about `asked` of each sort, evenly spread, others for each partner; and their weights.
-    fn some(&self, asked: usize, round: &Round, partner: usize) -> impl Iterator<Item = (usize, f64)> {
+    fn some(&self, asked: usize, round: &Round, partner: usize) -> impl Iterator<Item = (usize, f32)> {
         let spread = move |of: &'_ [u32]| {
             let stride = (of.len() / asked.max(1)).max(1);
             (partner % stride..of.len()).step_by(stride)
@@ -115,14 +117,21 @@ struct Asked {
     from: usize,
     to: usize,
     /// Points of the first view with their weights.
-    points: Vec<(usize, f64)>,
+    points: Vec<(Surfel, f32)>,
     /// What is known of the partner of each.
     partners: Vec<Partner>,
 }
 
 impl Asked {
-    fn of(askers: &Askers, (from, to): (usize, usize), asked: usize, round: &Round) -> Asked {
-        let points: Vec<(usize, f64)> = askers.some(asked, round, to).collect();
+    fn of(
+        view: &[Surfel],
+        askers: &Askers,
+        (from, to): (usize, usize),
+        asked: usize,
+        round: &Round,
+    ) -> Asked {
+        let some = askers.some(asked, round, to);
+        let points: Vec<(Surfel, f32)> = some.map(|(k, weight)| (view[k], weight)).collect();
         Asked { from, to, partners: vec![Partner::UNKNOWN; points.len()], points }
     }
 }
@@ -155,36 +164,36 @@ fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(us
 /// Partners of the points that one view asks for in the other, and what they ask of both poses.
 fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius: f64) -> Link {
     let (i, j) = (asked.from, asked.to);
-    let (a, b) = (&views[i], &views[j]);
+    let b = &views[j];
     let mut sums = Sums::ZERO;
     let Some(tree) = &b.tree else { return Link::of(i, j, &sums, poses) };
     let j_from_i = poses[j].inv_mul(&poses[i]);
-    let (turn, shift) = (j_from_i.rotation.to_rotation_matrix(), j_from_i.translation.vector);
+    let turn: Matrix3<f32> = j_from_i.rotation.to_rotation_matrix().into_inner().cast();
+    let (shift, radius) = (j_from_i.translation.vector.cast::<f32>(), radius as f32);
     let mut last = Partner::UNKNOWN;
-    for (&(k, part_weight), partner) in asked.points.iter().zip(&mut asked.partners) {
+    for ((point, part_weight), partner) in asked.points.iter().zip(&mut asked.partners) {
         // From the first camera, and from the second, along the axes of the second.
-        let arm = turn * a.points[k].coords;
+        let arm = turn * point.at.coords;
         let in_j = arm + shift;
         if partner.is_unknown() {
             // Points that are asked for one after another are near each other.
             *partner = last.guess();
         }
-        let (at, within_m) = (in_j.cast::<f32>().into(), radius as f32);
-        let found = partner.update(tree, at, within_m, SLACK * within_m);
+        let found = partner.update(tree, in_j.into(), radius, SLACK * radius);
         last = *partner;
-        let Some(partner) = found else { continue };
-        let normal = b.normals[partner];
-        if (turn * a.normals[k]).dot(&normal) < SAME_SIDE {
+        let Some(slot) = found else { continue };
+        let Surfel { at, normal, sigma_m } = &b.points[slot];
+        if (turn * point.normal).dot(normal) < SAME_SIDE {
             continue;
         }
-        let residual = normal.dot(&(in_j - b.points[partner].coords));
-        let variance = a.sigmas_m[k].powi(2) + b.sigmas_m[partner].powi(2) + LEAST_SIGMA_M.powi(2);
+        let residual = normal.dot(&(in_j - at.coords));
+        let variance = point.sigma_m * point.sigma_m + sigma_m * sigma_m + LEAST_SIGMA_M * LEAST_SIGMA_M;
         // Geman-McClure: what does not fit within the radius loses its say smoothly.
         let scale_sq = (0.25 * radius * radius).max(4.0 * variance);
-        let robust = (scale_sq / (scale_sq + residual * residual)).powi(2);
-        let along = arm.cross(&normal);
-        let derivative = [along.x, along.y, along.z, normal.x, normal.y, normal.z];
-        sums.add_scalar(derivative, residual, part_weight * robust / variance);
+        let robust = scale_sq / (scale_sq + residual * residual);
+        let along = arm.cross(normal);
+        let derivative = [along.x, along.y, along.z, normal.x, normal.y, normal.z].map(f64::from);
+        sums.add_scalar(derivative, f64::from(residual), f64::from(part_weight * robust * robust / variance));
     }
     Link::of(i, j, &sums, poses)
 }
@@ -281,5 +290,5 @@ pub(super) fn departure(pose: &Isometry3<f64>, prior: &Isometry3<f64>) -> (Vecto
 
 /// Points of the view in the world.
 pub(super) fn in_world(view: &Prepared, pose: &Isometry3<f64>) -> Vec<Point3<f64>> {
-    view.points.iter().map(|p| pose * p).collect()
+    view.points.iter().map(|p| pose * p.at()).collect()
 }

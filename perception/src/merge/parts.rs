@@ -55,7 +55,10 @@ pub(super) fn find(
     let places: Vec<Vec<Point3<f64>>> = (0..prepared.len())
         .map(|i| if used[i] { in_world(&prepared[i], &poses[i]) } else { Vec::new() })
         .collect();
-    let planes = surface::dominant_planes(&places, prepared.iter().map(|p| p.sigmas_m.as_slice()), DOMINANT);
+    let of_views = places.iter().zip(prepared).flat_map(|(places, view)| places.iter().zip(&view.points));
+    let of_views = of_views.map(|(place, point)| (*place, f64::from(point.sigma_m)));
+    let total = places.iter().map(Vec::len).sum();
+    let planes = surface::dominant_planes(of_views, total, DOMINANT);
     let held: Vector3<f64> =
         poses.iter().zip(used).filter(|(_, u)| **u).map(|(p, _)| p.rotation * -Vector3::y()).sum();
     let held = up.or_else(|| Unit::try_new(held, 1e-6));
@@ -100,7 +103,7 @@ pub(super) fn level_again(
             let seen = PlaneOfView::of(plane, &poses[i]);
             let (turn, shift) = (poses[i].rotation.to_rotation_matrix(), poses[i].translation.vector);
             for k in (0..view.points.len()).filter(|&k| parts[i][k] == Part::Plane && seen.holds(view, k)) {
-                moments.add(&Point3::from(turn * view.points[k].coords + shift).cast());
+                moments.add(&Point3::from(turn * view.points[k].at().coords + shift).cast());
             }
         }
         let least = Vector3::from(spread::least(&moments.covariance())?.normal);
@@ -128,9 +131,9 @@ impl PlaneOfView {
     /// True if a point of the view lies on the plane and faces as it does.
     #[inline(always)]
     fn holds(&self, view: &Prepared, k: usize) -> bool {
-        let near = 3.0 * view.sigmas_m[k] + 0.006;
-        (self.normal.dot(&view.points[k].coords) - self.offset_m).abs() < near
-            && self.normal.dot(&view.normals[k]).abs() > 0.8
+        let near = 3.0 * f64::from(view.points[k].sigma_m) + 0.006;
+        (self.normal.dot(&view.points[k].at().coords) - self.offset_m).abs() < near
+            && self.normal.dot(&view.points[k].normal()).abs() > 0.8
     }
 }
 
@@ -154,7 +157,7 @@ impl Standing {
             all.filter(|&point| lies_on(plane, point)).collect()
         };
         let known = |points: &[(usize, usize)]| -> f64 {
-            points.iter().map(|&(i, k)| prepared[i].sigmas_m[k].powi(-2)).sum()
+            points.iter().map(|&(i, k)| f64::from(prepared[i].points[k].sigma_m).powi(-2)).sum()
         };
         let level = (0..planes.len()).filter(|&plane| planes[plane].0.dot(up).abs() > LEVEL);
         let (plane, points) = level

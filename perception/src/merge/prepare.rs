@@ -3,11 +3,13 @@
 use super::MergeOptions;
 use crate::cloud::{Cloud, Grid};
 use crate::neighbours::Neighbours;
+use crate::noise::frontal_sigma_m;
 use crate::normals;
-use crate::surface::range_sigma_m;
+use crate::surface::floor;
 use crate::view::View;
 use crate::voxel;
 use nalgebra::{Isometry3, Point3, Vector3};
+use rustc_hash::FxHashSet;
 
 /// Columns of the image in which points for the alignment are sought; more tells no more at a voxel of 1 cm.
 const COLUMNS: usize = 216;
@@ -18,12 +20,8 @@ const WIDE: normals::OrganisedOptions =
 
 /// A view as the alignment sees it.
 pub(super) struct Prepared {
-    /// Thinned points, camera frame, metres, in the order of the tree.
-    pub points: Vec<Point3<f64>>,
-    /// Their unit normals, towards the camera.
-    pub normals: Vec<Vector3<f64>>,
-    /// Spread of each measurement, metres.
-    pub sigmas_m: Vec<f64>,
+    /// Thinned points in the order of the tree.
+    pub points: Vec<Surfel>,
     /// The points as a search tree; none, and no points, if there are more than it can hold.
     pub tree: Option<Neighbours>,
     /// What is to be merged of an organised cloud, coarser, with normals in the camera frame.
@@ -34,6 +32,27 @@ pub(super) struct Prepared {
     pub sigma_m: f64,
     /// Spread of that orientation, radians.
     pub sigma_rad: f64,
+}
+
+/// A place on a surface, camera frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surfel {
+    /// Metres.
+    pub at: Point3<f32>,
+    /// Unit length, towards the camera.
+    pub normal: Vector3<f32>,
+    /// Spread of its measurement, metres.
+    pub sigma_m: f32,
+}
+
+impl Surfel {
+    pub fn at(&self) -> Point3<f64> {
+        self.at.cast()
+    }
+
+    pub fn normal(&self) -> Vector3<f64> {
+        self.normal.cast()
+    }
 }
 
 /// What of a camera's returns is merged, told in its own frame.
@@ -82,32 +101,35 @@ pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
         Some(Cloud { normals, ..coarse })
     });
     let cloud = coarse.unwrap_or_else(|| thinned(view, &within, options));
-    let kept = firsts(&cloud, options.align_voxel_m as f32);
+    let kept = firsts(&cloud, options.align_voxel_m);
     let tree = Neighbours::new(&kept.points).ok();
     // What is near each other in space is so in memory then, and a slot of the tree is the number of its point.
     let kept = tree.as_ref().map_or_else(Cloud::default, |tree| kept.select(tree.indices()));
-    let points: Vec<Point3<f64>> = kept.points.iter().map(|p| p.cast()).collect();
-    let normals = kept.normals.iter().flatten().map(|n| n.cast()).collect();
+    let surfels = kept.points.iter().zip(kept.normals.iter().flatten());
+    let points = surfels.map(|(&at, &normal)| {
+        let sigma_m = frontal_sigma_m(at.coords.norm()).min(0.03);
+        Surfel { at, normal, sigma_m }
+    });
+    let points = points.collect();
     let coarse = cloud.grid.is_some().then_some(cloud);
-    let sigmas_m = points.iter().map(|p| range_sigma_m(p.coords.norm()).min(0.03)).collect();
-    Prepared { points, normals, sigmas_m, tree, coarse, prior: view.world_from_camera, sigma_m, sigma_rad }
+    Prepared { points, tree, coarse, prior: view.world_from_camera, sigma_m, sigma_rad }
 }
 
 /// The first point of each voxel that has a normal.
-fn firsts(cloud: &Cloud, voxel_m: f32) -> Cloud {
-    let normals = cloud.normals.iter().flatten();
-    let known: Vec<u32> = (0..).zip(normals).filter(|(_, n)| n.x.is_finite()).map(|(k, _)| k).collect();
-    let known = cloud.select(&known);
-    let Ok(assigned) = voxel::assign(&known.points, voxel_m) else { return known };
-    let mut next = 0;
-    let mut firsts = Vec::with_capacity(assigned.voxels);
-    for (k, voxel) in (0..).zip(assigned.voxel) {
-        if voxel == next {
+fn firsts(cloud: &Cloud, voxel_m: f64) -> Cloud {
+    let (mut firsts, mut taken, mut last) = (Vec::new(), FxHashSet::default(), None);
+    let per_m = 1.0 / voxel_m;
+    for (k, (p, normal)) in (0..).zip(cloud.points.iter().zip(cloud.normals.iter().flatten())) {
+        if !normal.x.is_finite() {
+            continue;
+        }
+        let voxel = [p.x, p.y, p.z].map(|c| floor(f64::from(c) * per_m));
+        // Most are in the voxel of the point before.
+        if last.replace(voxel) != Some(voxel) && taken.insert(voxel) {
             firsts.push(k);
-            next += 1;
         }
     }
-    known.select(&firsts)
+    cloud.select(&firsts)
 }
 
 /// What is to be merged of a cloud, thinned, with normals from the nearest points.

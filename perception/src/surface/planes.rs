@@ -41,21 +41,15 @@ pub(super) struct Sample {
     pub sigma_m: f64,
 }
 
-/// Normals and offsets of planes that hold at least a share of all points; points by view, with their spreads.
-pub(crate) fn dominant_planes<'a>(
-    places: &[Vec<Point3<f64>>],
-    sigmas_m: impl Iterator<Item = &'a [f64]>,
+/// Normals and offsets of planes that hold at least a share of all `total` places, which come with their spreads, metres.
+pub(crate) fn dominant_planes(
+    places: impl Iterator<Item = (Point3<f64>, f64)>,
+    total: usize,
     share: f64,
 ) -> Vec<(Vector3<f64>, f64)> {
-    let total: usize = places.iter().map(Vec::len).sum();
     let stride = (total / (SAMPLE / 2)).max(1);
-    let samples: Vec<Sample> = places
-        .iter()
-        .zip(sigmas_m)
-        .flat_map(|(view, sigmas)| view.iter().zip(sigmas))
-        .step_by(stride)
-        .map(|(point, sigma_m)| Sample { point: *point, sigma_m: *sigma_m })
-        .collect();
+    let samples: Vec<Sample> =
+        places.step_by(stride).map(|(point, sigma_m)| Sample { point, sigma_m }).collect();
     let holds = |plane: &Plane| {
         samples.iter().filter(|s| plane.holds(s)).count() as f64 >= share * samples.len() as f64
     };

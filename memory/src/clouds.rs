@@ -130,20 +130,25 @@ pub(crate) fn decode(info: &BlobInfo, data: &[u8]) -> Result<(Cloud, Sensing), S
     };
     let position = at(POSITION).ok_or("it has no x, y, z of f32 side by side")?;
     let rows = || data.chunks_exact(layout.stride);
-    let three = |row: &[u8], from: usize| [0, 1, 2].map(|i| f32::from_bits(word(row, from + 4 * i)));
     let cloud = Cloud {
         points: rows().map(|row| Point3::from(three(row, position))).collect(),
         grid: layout.grid,
         colours: at(COLOUR).map(|from| rows().map(|row| [row[from], row[from + 1], row[from + 2]]).collect()),
         normals: at(NORMAL).map(|from| rows().map(|row| Vector3::from(three(row, from))).collect()),
-        labels: at(LABEL).map(|from| rows().map(|row| word(row, from)).collect()),
+        labels: at(LABEL).map(|from| rows().map(|row| u32::from_le_bytes(words(row, from)[0])).collect()),
     };
     cloud.check().map_err(|e| e.to_string())?;
     Ok((cloud, layout.sensing))
 }
 
-fn word(row: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes([row[at], row[at + 1], row[at + 2], row[at + 3]])
+fn words(row: &[u8], from: usize) -> &[[u8; 4]] {
+    row[from..].as_chunks().0
+}
+
+fn three(row: &[u8], from: usize) -> [f32; 3] {
+    // Word by word: a closure over an array of places is not unrolled.
+    let words = words(row, from);
+    [f32::from_le_bytes(words[0]), f32::from_le_bytes(words[1]), f32::from_le_bytes(words[2])]
 }
 
 #[cfg(test)]

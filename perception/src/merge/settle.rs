@@ -64,7 +64,8 @@ impl Gathered {
         let turn = world_from_axes.cast::<f32>();
         let mut colours: Vec<[u8; 3]> = Vec::with_capacity(sums.len());
         let bricks = bricks.in_order(|cell, number| {
-            let colour = |sum: &Vector3<f32>| <[u8; 3]>::from((sum / cell.weight).map(|c| c.round() as u8));
+            // Half up by cutting off: rounding is a call on some processors.
+            let colour = |sum: &Vector3<f32>| <[u8; 3]>::from((sum / cell.weight).map(|c| (c + 0.5) as u8));
             colours.extend(sums.get(number).map(colour));
             cell.mean()
         });

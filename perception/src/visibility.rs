@@ -142,8 +142,8 @@ impl Gaze<'_> {
         }
     }
 
-    /// Marks those of some points (world) that the camera looked through: of which [`DepthMap::look`] says free. Quicker than that where most are
-    /// not.
+    /// Marks those of some points (world) that the camera looked through: of which [`DepthMap::look`] says free, and whose very pixel has a
+    /// return. Quicker than that where most are not.
     pub(crate) fn pass(&self, points: &[Point3<f32>], tolerance_m: f64, through: &mut [bool]) {
         const LANES: usize = 16;
         const NONE: u32 = u32::MAX;
@@ -293,6 +293,38 @@ mod tests {
         for ((x, y, z), expected) in cases {
             assert_eq!(visibility.look(&Point3::new(x, y, z), 0.01), expected, "at {x} {y} {z}");
         }
+    }
+
+    #[test]
+    fn many_points_are_judged_as_each_by_itself() {
+        // A near half, a far half, and a column without a return.
+        let depths: Vec<f32> = (0..64 * 48)
+            .map(|pixel| match pixel % 64 {
+                10 => f32::NAN,
+                0..32 => 1.5,
+                _ => 3.0,
+            })
+            .collect();
+        let cloud = CAMERA.cloud_from_depth(&depths).unwrap_or_default();
+        let visibility = Visibility::from_views(&[View { cloud, ..wall_at(1.0) }]);
+        let step = |k: i32| k as f32 * 0.0713;
+        let places = (-40..40).flat_map(|x| (-8..8).map(move |y| (x, y)));
+        let points: Vec<Point3<f32>> = places
+            .flat_map(|(x, y)| [0.2, 1.7, 2.2, 2.6, 4.2].map(|z| Point3::new(step(x), step(y) * 2.0, z)))
+            .collect();
+        let mut through = vec![false; points.len()];
+        visibility.gazes()[0].pass(&points, 0.03, &mut through);
+        let map = &visibility.maps[0];
+        let free = |p: &Point3<f32>| {
+            let pixel =
+                CAMERA.project(&(map.camera_from_world * p.cast())).and_then(|(u, v)| CAMERA.pixel(u, v));
+            let returned = pixel.is_some_and(|pixel| map.depths_m[pixel].is_finite());
+            returned && map.look(&p.cast(), 0.03) == Seen::Free
+        };
+        let expected: Vec<bool> = points.iter().map(free).collect();
+        assert_eq!(through, expected);
+        let count = through.iter().filter(|through| **through).count();
+        assert!(count > 100 && count < points.len() - 100, "{count} of {}", points.len());
     }
 
     #[test]

@@ -3,8 +3,10 @@
 /// Steepest angle between ray and normal that still returns, degrees.
 pub const STEEPEST_DEG: f64 = 85.0;
 
-/// The least deviation along the ray, metres, how it grows with the square of what the depth is beyond the nearest, and that, metres.
-const AXIAL: (f64, f64, f64) = (0.0012, 0.0019, 0.4);
+/// Standard deviation along the ray at the nearest depth, metres, and what it grows by with the square of the depth beyond it.
+const LEAST_AXIAL_M: f64 = 0.0012;
+const AXIAL_GROWTH_PER_M: f64 = 0.0019;
+const NEAREST_M: f64 = 0.4;
 
 /// Standard deviation along the ray, metres, of a return at depth `z_m` from a surface whose normal makes `angle_rad` with the ray (eq. 2 and the
 /// steep-angle term); `None` beyond the steepest angle, where there is no return.
@@ -12,15 +14,15 @@ pub fn axial_sigma_m(z_m: f64, angle_rad: f64) -> Option<f64> {
     let degrees = angle_rad.abs().to_degrees();
     (degrees <= STEEPEST_DEG && z_m > 0.0).then(|| {
         let steep = 0.0001 * degrees * degrees / (z_m.sqrt() * (90.0 - degrees).powi(2));
-        AXIAL.0 + AXIAL.1 * (z_m - AXIAL.2).powi(2) + steep
+        LEAST_AXIAL_M + AXIAL_GROWTH_PER_M * (z_m - NEAREST_M).powi(2) + steep
     })
 }
 
 /// The same of a surface that faces the camera, without a branch.
 #[inline(always)]
 pub(crate) fn frontal_sigma_m(z_m: f32) -> f32 {
-    let beyond_m = z_m - AXIAL.2 as f32;
-    AXIAL.0 as f32 + AXIAL.1 as f32 * (beyond_m * beyond_m)
+    let beyond_m = z_m - NEAREST_M as f32;
+    LEAST_AXIAL_M as f32 + AXIAL_GROWTH_PER_M as f32 * (beyond_m * beyond_m)
 }
 
 /// Standard deviation across the ray, metres, at depth `z_m` for focal length `focal_px` (eq. 1: pixels times depth over focal length).

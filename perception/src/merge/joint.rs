@@ -164,9 +164,8 @@ fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(us
 /// Partners of the points that one view asks for in the other, and what they ask of both poses.
 fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius: f64) -> Link {
     let (i, j) = (asked.from, asked.to);
-    let b = &views[j];
     let mut sums = Sums::ZERO;
-    let Some(tree) = &b.tree else { return Link::of(i, j, &sums, poses) };
+    let Some(tree) = &views[j].tree else { return Link::of(i, j, &sums, poses) };
     let j_from_i = poses[j].inv_mul(&poses[i]);
     let turn: Matrix3<f32> = j_from_i.rotation.to_rotation_matrix().into_inner().cast();
     let (shift, radius) = (j_from_i.translation.vector.cast::<f32>(), radius as f32);
@@ -182,7 +181,7 @@ fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius:
         let found = partner.update(tree, in_j.into(), radius, SLACK * radius);
         last = *partner;
         let Some(slot) = found else { continue };
-        let Surfel { at, normal, sigma_m } = &b.points[slot];
+        let Surfel { at, normal, sigma_m } = &views[j].points[slot];
         if (turn * point.normal).dot(normal) < SAME_SIDE {
             continue;
         }

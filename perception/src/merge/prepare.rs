@@ -105,12 +105,13 @@ pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
     let tree = Neighbours::new(&kept.points).ok();
     // What is near each other in space is so in memory then, and a slot of the tree is the number of its point.
     let kept = tree.as_ref().map_or_else(Cloud::default, |tree| kept.select(tree.indices()));
-    let surfels = kept.points.iter().zip(kept.normals.iter().flatten());
-    let points = surfels.map(|(&at, &normal)| {
-        let sigma_m = frontal_sigma_m(at.coords.norm()).min(0.03);
-        Surfel { at, normal, sigma_m }
-    });
-    let points = points.collect();
+    let facing = kept.points.iter().zip(kept.normals.iter().flatten());
+    let surfel = |(&at, &normal): (&Point3<f32>, &Vector3<f32>)| Surfel {
+        at,
+        normal,
+        sigma_m: frontal_sigma_m(at.coords.norm()).min(0.03),
+    };
+    let points = facing.map(surfel).collect();
     let coarse = cloud.grid.is_some().then_some(cloud);
     Prepared { points, tree, coarse, prior: view.world_from_camera, sigma_m, sigma_rad }
 }

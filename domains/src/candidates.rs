@@ -53,7 +53,7 @@ fn ring(robot: &dyn Robot, from: &Place, centre: &Point3<f64>, config: &Candidat
     (0..config.poses)
         .filter_map(|k| {
             let tries: Vec<Place> = OUTWARDS_M.iter().map(|&d| pose(k, d)).collect();
-            let travel = robot.travel(from, &tries);
+            let travel = robot.travel(from, &tries, &[]);
             let fits = travel.iter().position(Result::is_ok)?;
             Some((k + 1, tries[fits].clone()))
         })

@@ -173,7 +173,7 @@ impl Situation {
     pub fn travel_s(&self, from: usize, to: usize) -> f64 {
         let row = self.derived.travel_s[from].get_or_init(|| {
             let places: Vec<Place> = self.candidates.iter().map(|c| c.place.clone()).collect();
-            let travel = self.robot.travel(&self.candidates[from].place, &places);
+            let travel = self.robot.travel(&self.candidates[from].place, &places, &[]);
             travel.into_iter().map(|t| t.map_or(f64::INFINITY, |t| t.duration_s)).collect()
         });
         row[to]

@@ -170,6 +170,9 @@ pub struct Description {
     pub frames: Frames,
     /// How far from the base's middle the arm reaches, metres; `None` if there is no arm for [`Robot::push_aside`].
     pub reach_m: Option<f64>,
+    /// The widest thing that the hand takes, metres; `None` if there is no hand for [`Robot::grasp`].
+    #[serde(default)]
+    pub hand_opening_m: Option<f64>,
     /// Direction of "up" in the map, if it is known.
     pub up: Option<Vector3<f64>>,
     /// Standard deviation of localisation along each axis, metres.
@@ -187,6 +190,33 @@ pub struct SurfaceHint {
     pub outline_m: Vec<Point2<f64>>,
     /// Roughly, above the floor, metres.
     pub height_m: f64,
+    /// The room that it is in, if the map knows rooms.
+    #[serde(default)]
+    pub room: Option<String>,
+}
+
+/// A room that the map knows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Room {
+    /// As people call it: `kitchen`.
+    pub name: String,
+    /// Outline of its floor in the map, corners in order, metres.
+    pub outline_m: Vec<Point2<f64>>,
+}
+
+/// A door that the map knows. Whether it is open, only being there tells.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Door {
+    /// As people call it: `kitchen door`.
+    pub name: String,
+    /// Middle of the opening, in the map, metres.
+    pub centre_m: Point2<f64>,
+    /// Along the wall, counter-clockwise from the map's x, radians.
+    pub along_rad: f64,
+    /// Of the opening, metres.
+    pub width_m: f64,
+    /// The rooms on either side.
+    pub between: [String; 2],
 }
 
 /// Where the body believes it is.
@@ -322,6 +352,52 @@ pub struct Pushed {
     pub duration_s: f64,
 }
 
+/// A grasp of one object that stands free.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grasp {
+    /// Middle of the object's body, in the map, metres.
+    pub object: Point3<f64>,
+    /// How wide the hand must open, metres.
+    pub width_m: f64,
+}
+
+/// A grasp that ended with the object lifted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grasped {
+    /// How wide the hand is closed around it, metres.
+    pub width_m: f64,
+    /// On the body's clock, seconds.
+    pub duration_s: f64,
+}
+
+/// Where what the hand holds is put down.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Placing {
+    /// Where the foot of the object comes to stand, in the map, metres.
+    pub foot: Point3<f64>,
+}
+
+/// Something was put down.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Placed {
+    /// On the body's clock, seconds.
+    pub duration_s: f64,
+}
+
+/// What the hand feels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hand {
+    /// Whether there is something in it.
+    pub holds: bool,
+}
+
+/// A door was opened.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Opened {
+    /// On the body's clock, seconds.
+    pub duration_s: f64,
+}
+
 /// How far something that takes time has got.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
@@ -374,11 +450,22 @@ pub trait Robot: Send + Sync {
     /// `Some` if the body can stand at these poses only.
     fn stations(&self) -> Option<&[Station]>;
 
-    /// What going from one place to each of the others takes, predicted on the map: nothing moves.
+    /// Rooms that the map knows.
+    fn rooms(&self) -> &[Room] {
+        &[]
+    }
+
+    /// Doors that the map knows.
+    fn doors(&self) -> &[Door] {
+        &[]
+    }
+
+    /// What going from one place to each of the others takes, predicted on the map: nothing moves. Every door counts as open
+    /// but those named in `shut`.
     ///
     /// # Errors
     /// Each entry by itself: [`Failure::Unreachable`] with the reason.
-    fn travel(&self, from: &Place, to: &[Place]) -> Vec<Result<Travel, Failure>>;
+    fn travel(&self, from: &Place, to: &[Place], shut: &[String]) -> Vec<Result<Travel, Failure>>;
 
     /// Where the camera would be (`map_from_camera`) if the base stood at `place` and the head looked towards `look_at` (straight
     /// ahead if `None`), within the head's limits. A body without a head looks where the place says.
@@ -420,4 +507,47 @@ pub trait Robot: Send + Sync {
         let _ = (push, watch);
         Err(Failure::Unable { because: format!("{} has no arm", self.description().name) })
     }
+
+    /// Opens a door from where the base stands, near it.
+    ///
+    /// # Errors
+    /// [`Failure::Unable`] if it cannot open doors; [`Failure::Unreachable`] if no door of that name is in reach;
+    /// [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    async fn open_door(&self, door: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
+        let _ = (door, watch);
+        Err(Failure::Unable { because: format!("{} does not open doors", self.description().name) })
+    }
+
+    /// Takes an object into the hand and lifts it.
+    ///
+    /// # Errors
+    /// [`Failure::Unable`] without [`Description::hand_opening_m`], if the hand is full, or if the object is too wide;
+    /// [`Failure::Unreachable`] if it is out of reach; [`Failure::Slipped`] if the hand closes on nothing or loses it;
+    /// [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
+        let _ = (grasp, watch);
+        Err(no_hand(self.description()))
+    }
+
+    /// Puts what the hand holds down.
+    ///
+    /// # Errors
+    /// [`Failure::Unable`] if the hand is empty; [`Failure::Unreachable`] if the place is out of reach; [`Failure::Blocked`] if
+    /// something stands there; [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
+        let _ = (placing, watch);
+        Err(no_hand(self.description()))
+    }
+
+    /// What the hand feels now.
+    ///
+    /// # Errors
+    /// [`Failure::Unable`] without a hand; [`Failure::Broken`].
+    async fn hand(&self) -> Result<Hand, Failure> {
+        Err(no_hand(self.description()))
+    }
+}
+
+fn no_hand(body: &Description) -> Failure {
+    Failure::Unable { because: format!("{} has no hand", body.name) }
 }

@@ -187,11 +187,11 @@ async fn check_travel(robot: &dyn Robot) -> Result<Place, Breach> {
     let here = done(robot.pose().await, "a body knows where it is")?.place();
     let before_ns = robot.now_ns();
     let to = places(robot);
-    let answers = robot.travel(&here, &to);
+    let answers = robot.travel(&here, &to, &[]);
     ensure(answers.len() == to.len(), "each question about a route has an answer", || {
         format!("{} answers to {} questions", answers.len(), to.len())
     })?;
-    ensure(answers == robot.travel(&here, &to), "the same question has the same answer", || {
+    ensure(answers == robot.travel(&here, &to, &[]), "the same question has the same answer", || {
         "two answers differ".into()
     })?;
     ensure(robot.now_ns() == before_ns, "asking for routes takes no time", || "the clock moved".into())?;
@@ -222,7 +222,7 @@ async fn check_travel(robot: &dyn Robot) -> Result<Place, Breach> {
 
 async fn check_drive(robot: &dyn Robot, goal: &Place) -> Result<(), Breach> {
     let here = done(robot.pose().await, "a body knows where it is")?.place();
-    let predicted = robot.travel(&here, std::slice::from_ref(goal)).remove(0);
+    let predicted = robot.travel(&here, std::slice::from_ref(goal), &[]).remove(0);
     let predicted = done(predicted, "a route that was found is found again")?;
     let heard: Mutex<Vec<f64>> = Mutex::new(Vec::new());
     let listen = |p: &Progress| {
@@ -308,7 +308,8 @@ async fn check_stops(robot: &dyn Robot) -> Result<(), Breach> {
     let stopped = Watch { cancel, ..Watch::default() };
     let here = done(robot.pose().await, "a body knows where it is")?.place();
     let to = places(robot);
-    let far = to.iter().zip(robot.travel(&here, &to)).find(|(_, t)| matches!(t, Ok(t) if t.duration_s > 0.1));
+    let far =
+        to.iter().zip(robot.travel(&here, &to, &[])).find(|(_, t)| matches!(t, Ok(t) if t.duration_s > 0.1));
     let Some((far, _)) = far else { return Ok(()) };
     let answer = robot.drive_to(far, &stopped).await;
     ensure(matches!(answer, Err(Failure::Cancelled { .. })), "a drive can be stopped", || {

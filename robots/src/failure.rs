@@ -18,6 +18,9 @@ pub enum Failure {
     Blocked {
         /// Where and by what, as far as the body knows.
         because: String,
+        /// The door or thing of the map that it was, by name, if the body knows.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        by: Option<String>,
     },
     /// The time limit passed. The body stands still, wherever it got to.
     #[error("timed out: {because}")]
@@ -72,7 +75,7 @@ impl Failure {
     pub fn because(&self) -> &str {
         match self {
             Failure::Unreachable { because }
-            | Failure::Blocked { because }
+            | Failure::Blocked { because, .. }
             | Failure::TimedOut { because }
             | Failure::Cancelled { because }
             | Failure::SensorDropped { because, .. }

@@ -73,8 +73,8 @@ impl Robot for Liar {
     fn stations(&self) -> Option<&[Station]> {
         None
     }
-    fn travel(&self, from: &Place, to: &[Place]) -> Vec<Result<Travel, Failure>> {
-        let mut answers = self.honest.travel(from, to);
+    fn travel(&self, from: &Place, to: &[Place], shut: &[String]) -> Vec<Result<Travel, Failure>> {
+        let mut answers = self.honest.travel(from, to, shut);
         if self.lie == Lie::Moody {
             answers.pop();
         }

@@ -160,11 +160,14 @@ async fn what_was_tried_in_vain_stays_unreachable() {
     let robot = robot_in(SCENE, 1, "[[fault]]\nkind = \"unreachable_pose\"\nat = 1\n");
     let (goal, other) = (at(0.0, 1.3), at(1.4, 0.0));
     let here = robot.pose().await.unwrap().place();
-    assert!(robot.travel(&here, std::slice::from_ref(&goal))[0].is_ok(), "nobody knows before it is tried");
+    assert!(
+        robot.travel(&here, std::slice::from_ref(&goal), &[])[0].is_ok(),
+        "nobody knows before it is tried"
+    );
     for _ in 0..2 {
         assert!(matches!(drive(&robot, &goal).await, Err(Failure::Unreachable { .. })));
     }
-    let answers = robot.travel(&here, &[goal, other.clone()]);
+    let answers = robot.travel(&here, &[goal, other.clone()], &[]);
     assert!(answers[0].is_err() && answers[1].is_ok());
     drive(&robot, &other).await.unwrap();
 }

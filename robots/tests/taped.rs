@@ -73,7 +73,7 @@ async fn tour(robot: &dyn Robot, tape: &Memory, steps: std::ops::Range<usize>) -
     let watch = Watch::default();
     for n in steps {
         let (place, point) = step(robot, n);
-        told.push(format!("{:?}", robot.travel(&place, &[step(robot, n + 1).0])));
+        told.push(format!("{:?}", robot.travel(&place, &[step(robot, n + 1).0], &[])));
         told.push(format!("{:?}", robot.camera_at(&place, Some(&point))));
         told.push(format!("{:?}", robot.drive_to(&place, &watch).await));
         told.push(format!("{:?}", robot.look_at(&point, &watch).await));
@@ -145,7 +145,7 @@ async fn what_is_not_on_the_tape_ends_it() {
     let robot = replay(tape.entries());
     let before = tape.entries().len();
     for n in 7..9 {
-        assert!(robot.travel(&step(&robot, n).0, &[step(&robot, n + 1).0])[0].is_err());
+        assert!(robot.travel(&step(&robot, n).0, &[step(&robot, n + 1).0], &[])[0].is_err());
     }
     assert!(robot.ended().is_some());
     assert_eq!(tape.entries().len(), before + 1, "where it ended is marked once");

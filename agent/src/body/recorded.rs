@@ -56,7 +56,9 @@ pub fn open(record: Record, place: &str) -> Result<RecordedRobot, CommandError> 
     };
     let known = Known {
         description: description(known.as_ref(), intrinsics, &sensing, place),
-        surfaces: known.map(|k| k.surfaces).unwrap_or_default(),
+        surfaces: known.as_ref().map(|k| k.surfaces.clone()).unwrap_or_default(),
+        rooms: known.as_ref().map(|k| k.rooms.clone()).unwrap_or_default(),
+        doors: known.map(|k| k.doors).unwrap_or_default(),
         stations: Some(stations),
         map: None,
         now_ns: 0,
@@ -93,6 +95,7 @@ fn description(known: Option<&Known>, camera: Intrinsics, sensing: &Sensing, pla
         head: None,
         frames: Frames::default(),
         reach_m: None,
+        hand_opening_m: None,
         up: None,
         pose_sigma_m: sensing.pose_sigma_m,
         pose_sigma_rad: sensing.pose_sigma_rad,

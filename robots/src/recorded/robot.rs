@@ -64,6 +64,7 @@ impl RecordedRobot {
             head: None,
             frames: Frames::default(),
             reach_m: None,
+            hand_opening_m: None,
             up: settings.up.map(|[x, y, z]| Vector3::new(x, y, z).normalize()),
             pose_sigma_m: settings.pose_sigma_m,
             pose_sigma_rad: settings.pose_sigma_deg.to_radians(),
@@ -74,14 +75,23 @@ impl RecordedRobot {
         };
         let stations = recording.frames.iter().map(station).collect();
         let (start, surfaces) = (recording.start, Vec::new());
-        let known = Known { description, surfaces, stations: Some(stations), map: None, now_ns: 0 };
+        let known = Known {
+            description,
+            surfaces,
+            rooms: Vec::new(),
+            doors: Vec::new(),
+            stations: Some(stations),
+            map: None,
+            now_ns: 0,
+        };
         Self::of(known, start, Box::new(recording))
     }
 
     /// The body that stands where frames were taken, at the station of number `start` first. There is at least one station; a head,
     /// an arm or a map that is known does not count.
     pub fn of(known: Known, start: usize, frames: Box<dyn Footage>) -> RecordedRobot {
-        let description = Description { head: None, reach_m: None, ..known.description };
+        let description =
+            Description { head: None, reach_m: None, hand_opening_m: None, ..known.description };
         let stations = known.stations.unwrap_or_default();
         let state = State { at: start.min(stations.len().saturating_sub(1)), now_ns: known.now_ns };
         RecordedRobot { description, surfaces: known.surfaces, stations, frames, state: Mutex::new(state) }
@@ -194,7 +204,7 @@ impl Robot for RecordedRobot {
         Some(&self.stations)
     }
 
-    fn travel(&self, from: &Place, to: &[Place]) -> Vec<Result<Travel, Failure>> {
+    fn travel(&self, from: &Place, to: &[Place], _shut: &[String]) -> Vec<Result<Travel, Failure>> {
         let from = self.index(from);
         to.iter()
             .map(|place| {

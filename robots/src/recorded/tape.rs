@@ -1,8 +1,8 @@
 //! What a body was asked and what it answered, in order: enough to live through it again.
 
 use crate::body::{
-    Colour, Description, Driven, Place, PoseEstimate, Push, Pushed, Sensed, Stamp, StampedTransform, Station,
-    SurfaceHint, Travel,
+    Colour, Description, Door, Driven, Grasp, Grasped, Hand, Opened, Place, Placed, Placing, PoseEstimate,
+    Push, Pushed, Room, Sensed, Stamp, StampedTransform, Station, SurfaceHint, Travel,
 };
 use crate::body::{Looked, Robot};
 use crate::failure::Failure;
@@ -18,6 +18,12 @@ pub struct Known {
     pub description: Description,
     /// See [`Robot::surfaces`].
     pub surfaces: Vec<SurfaceHint>,
+    /// See [`Robot::rooms`].
+    #[serde(default)]
+    pub rooms: Vec<Room>,
+    /// See [`Robot::doors`].
+    #[serde(default)]
+    pub doors: Vec<Door>,
     /// See [`Robot::stations`].
     pub stations: Option<Vec<Station>>,
     /// See [`Robot::map`].
@@ -32,6 +38,8 @@ impl Known {
         Known {
             description: robot.description().clone(),
             surfaces: robot.surfaces().to_vec(),
+            rooms: robot.rooms().to_vec(),
+            doors: robot.doors().to_vec(),
             stations: robot.stations().map(<[Station]>::to_vec),
             map: robot.map().cloned(),
             now_ns: robot.now_ns(),
@@ -53,6 +61,14 @@ pub enum Request {
     Sense,
     /// [`Robot::push_aside`].
     PushAside(Push),
+    /// [`Robot::open_door`].
+    OpenDoor(String),
+    /// [`Robot::grasp`].
+    Grasp(Grasp),
+    /// [`Robot::place`].
+    Place(Placing),
+    /// [`Robot::hand`].
+    Hand,
 }
 
 impl std::fmt::Display for Request {
@@ -63,6 +79,10 @@ impl std::fmt::Display for Request {
             Request::LookAt(p) => write!(f, "look at ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z),
             Request::Sense => write!(f, "take a frame"),
             Request::PushAside(push) => write!(f, "push what stands at {}", push.object),
+            Request::OpenDoor(door) => write!(f, "open {door}"),
+            Request::Grasp(grasp) => write!(f, "take what stands at {}", grasp.object),
+            Request::Place(placing) => write!(f, "put down what it holds at {}", placing.foot),
+            Request::Hand => write!(f, "say what the hand feels"),
         }
     }
 }
@@ -81,6 +101,14 @@ pub enum Answer {
     Sensed(Exposure),
     /// To [`Request::PushAside`].
     Pushed(Pushed),
+    /// To [`Request::OpenDoor`].
+    Opened(Opened),
+    /// To [`Request::Grasp`].
+    Grasped(Grasped),
+    /// To [`Request::Place`].
+    Placed(Placed),
+    /// To [`Request::Hand`].
+    Hand(Hand),
     /// It could not be done.
     Failed(Failure),
 }
@@ -150,6 +178,9 @@ pub enum Question {
         from: Place,
         /// To each of these.
         to: Vec<Place>,
+        /// Doors that count as shut.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        shut: Vec<String>,
     },
     /// [`Robot::camera_at`].
     CameraAt {

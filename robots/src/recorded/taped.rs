@@ -2,8 +2,8 @@
 
 use super::tape::{Answer, Entry, Exposure, Known, Question, Reply, Request, Tape};
 use crate::body::{
-    Description, Driven, Looked, Place, PoseEstimate, Push, Pushed, Robot, Sensed, Stamp, Station,
-    SurfaceHint, Travel, Watch,
+    Description, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, PoseEstimate,
+    Push, Pushed, Robot, Room, Sensed, Stamp, Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
@@ -240,6 +240,10 @@ async fn perform(body: &dyn Robot, request: &Request, watch: &Watch<'_>) -> (Ans
         Request::DriveTo(place) => body.drive_to(place, watch).await.map(Answer::Driven),
         Request::LookAt(point) => body.look_at(point, watch).await.map(Answer::Looked),
         Request::PushAside(push) => body.push_aside(push, watch).await.map(Answer::Pushed),
+        Request::OpenDoor(door) => body.open_door(door, watch).await.map(Answer::Opened),
+        Request::Grasp(grasp) => body.grasp(grasp, watch).await.map(Answer::Grasped),
+        Request::Place(placing) => body.place(placing, watch).await.map(Answer::Placed),
+        Request::Hand => body.hand().await.map(Answer::Hand),
         Request::Sense => match body.sense(watch).await {
             Ok(sensed) => return (Answer::Sensed(Exposure::of(&sensed)), Some(sensed)),
             Err(failure) => Err(failure),
@@ -278,9 +282,17 @@ impl Robot for TapedRobot {
         self.known.stations.as_deref()
     }
 
-    fn travel(&self, from: &Place, to: &[Place]) -> Vec<Result<Travel, Failure>> {
-        let question = Question::Travel { from: from.clone(), to: to.to_vec() };
-        match self.reply(question, |live| Reply::Travel(live.travel(from, to))) {
+    fn rooms(&self) -> &[Room] {
+        &self.known.rooms
+    }
+
+    fn doors(&self) -> &[Door] {
+        &self.known.doors
+    }
+
+    fn travel(&self, from: &Place, to: &[Place], shut: &[String]) -> Vec<Result<Travel, Failure>> {
+        let question = Question::Travel { from: from.clone(), to: to.to_vec(), shut: shut.to_vec() };
+        match self.reply(question, |live| Reply::Travel(live.travel(from, to, shut))) {
             Some(Reply::Travel(said)) => said,
             _ => vec![Err(not_on_tape()); to.len()],
         }
@@ -329,6 +341,34 @@ impl Robot for TapedRobot {
     async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
         match self.ask(Request::PushAside(*push), watch).await? {
             (Answer::Pushed(pushed), _) => Ok(pushed),
+            (other, _) => mixed_up(other),
+        }
+    }
+
+    async fn open_door(&self, door: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
+        match self.ask(Request::OpenDoor(door.into()), watch).await? {
+            (Answer::Opened(opened), _) => Ok(opened),
+            (other, _) => mixed_up(other),
+        }
+    }
+
+    async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
+        match self.ask(Request::Grasp(*grasp), watch).await? {
+            (Answer::Grasped(grasped), _) => Ok(grasped),
+            (other, _) => mixed_up(other),
+        }
+    }
+
+    async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
+        match self.ask(Request::Place(*placing), watch).await? {
+            (Answer::Placed(placed), _) => Ok(placed),
+            (other, _) => mixed_up(other),
+        }
+    }
+
+    async fn hand(&self) -> Result<Hand, Failure> {
+        match self.ask(Request::Hand, &Watch::default()).await? {
+            (Answer::Hand(hand), _) => Ok(hand),
             (other, _) => mixed_up(other),
         }
     }

@@ -46,6 +46,7 @@ pub fn description() -> Description {
         }),
         frames: Frames::default(),
         reach_m: Some(REACH_M),
+        hand_opening_m: None,
         up: Some(Vector3::z()),
         pose_sigma_m: 0.03,
         pose_sigma_rad: 2f64.to_radians(),

@@ -81,6 +81,7 @@ impl SimRobot {
             name: s.name.clone(),
             outline_m: s.outline_m(),
             height_m: s.height_m,
+            room: None,
         };
         let surfaces = scene.surfaces.iter().map(hint).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(noise::mix(options.seed));
@@ -220,7 +221,7 @@ impl SimRobot {
         match end {
             End::Person => {
                 state.note("somebody stands in the way");
-                Failure::Blocked { because: "somebody stands in the way".into() }
+                Failure::Blocked { because: "somebody stands in the way".into(), by: None }
             }
             End::Stuck => {
                 state.note("the wheels slip until the time is up");
@@ -231,7 +232,10 @@ impl SimRobot {
             End::Obstacle(obstacle) => {
                 let name = state.scene.obstacles.get(*obstacle).map_or("", |o| &o.name).to_string();
                 state.note(format!("the base meets \"{name}\", which its map does not show"));
-                Failure::Blocked { because: "something stands in the way that the map does not show".into() }
+                Failure::Blocked {
+                    because: "something stands in the way that the map does not show".into(),
+                    by: None,
+                }
             }
         }
     }
@@ -382,7 +386,7 @@ impl Robot for SimRobot {
         None
     }
 
-    fn travel(&self, from: &Place, to: &[Place]) -> Vec<Result<Travel, Failure>> {
+    fn travel(&self, from: &Place, to: &[Place], _shut: &[String]) -> Vec<Result<Travel, Failure>> {
         let (router, tried) = {
             let state = self.lock();
             let tried = |p: &Place| self.pose_of(p).and_then(|pose| state.known_unreachable(&pose));

@@ -100,7 +100,7 @@ async fn place(
             Place::Pose(Pose2::facing(middle.x + d * angle.cos(), middle.y + d * angle.sin(), &middle.xy()))
         })
         .collect();
-    let fits = robot.travel(&here, &tries).iter().position(Result::is_ok);
+    let fits = robot.travel(&here, &tries, &[]).iter().position(Result::is_ok);
     fits.map(|n| tries[n].clone()).ok_or_else(|| format!("pose {} of {poses} cannot be reached", k + 1))
 }
 

@@ -19,6 +19,17 @@ pub struct Body {
     simulated: Option<Arc<SimRobot>>,
 }
 
+/// Where something is in truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TruePlace {
+    /// The middle of its body, in the map, metres.
+    pub position_m: [f64; 3],
+    /// The surface that it stands on.
+    pub on: String,
+    /// The room that this is in.
+    pub room: Option<String>,
+}
+
 impl Body {
     /// A simulated body, whose truth a report may show.
     pub fn simulated(robot: SimRobot) -> Self {
@@ -26,9 +37,9 @@ impl Body {
         Self { robot: robot.clone(), simulated: Some(robot) }
     }
 
-    /// Where an object of that name or kind stands in truth (the middle of its body), the one nearest to where it is
-    /// believed to stand if there are several. None without a simulation, or if it is not there.
-    pub fn true_position_m(&self, name: &str, believed_m: Option<[f64; 3]>) -> Option<[f64; 3]> {
+    /// Where an object of that name or kind stands in truth, the one nearest to where it is believed to stand if there are
+    /// several. None without a simulation, or if it is not there.
+    pub fn true_place(&self, name: &str, believed_m: Option<[f64; 3]>) -> Option<TruePlace> {
         let truth = self.simulated.as_ref()?.truth();
         let distance = |at: &[f64; 3]| {
             let believed = believed_m.unwrap_or(*at);
@@ -38,8 +49,16 @@ impl Body {
             .objects
             .iter()
             .filter(|o| o.present && (o.name == name || o.kind == name))
-            .map(|o| o.centre_m.coords.into())
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .map(|o| TruePlace {
+                position_m: o.centre_m.coords.into(),
+                on: o.surface.clone(),
+                room: self.room_of(&o.surface),
+            })
+            .min_by(|a, b| distance(&a.position_m).total_cmp(&distance(&b.position_m)))
+    }
+
+    fn room_of(&self, surface: &str) -> Option<String> {
+        self.robot.surfaces().iter().find(|s| s.name == surface)?.room.clone()
     }
 
     /// The simulator, for experiments that score against the truth.

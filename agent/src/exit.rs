@@ -2,6 +2,8 @@
 
 use std::process::ExitCode;
 
+use descry_domains::world::WorldError;
+
 /// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
@@ -58,6 +60,16 @@ impl CommandError {
             Self::BadInput(_) => Exit::BadInput,
             Self::Broken(_) => Exit::Broken,
             Self::Bug(_) => Exit::Bug,
+        }
+    }
+}
+
+impl From<WorldError> for CommandError {
+    fn from(error: WorldError) -> Self {
+        match error {
+            WorldError::Store(error) => Self::broken(error),
+            WorldError::Domain(text) => Self::BadInput(text),
+            WorldError::Bug(text) => Self::Bug(text),
         }
     }
 }

@@ -6,6 +6,5 @@ pub mod commands;
 pub mod exit;
 pub mod experiment;
 pub mod keeping;
-pub mod policies;
 pub mod report;
 pub mod run;

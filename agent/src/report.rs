@@ -2,8 +2,9 @@
 
 use std::fmt;
 
+use descry_domains::answer::{Believed, Verdict};
 use descry_domains::goal::Goal;
-use descry_perception::Percept;
+use descry_domains::note::Note;
 use serde::{Deserialize, Serialize};
 
 /// Something that happened in a run, with its reason.
@@ -62,31 +63,9 @@ pub enum Event {
         /// What is concluded from it.
         therefore: String,
     },
-    /// Views were merged and looked through.
-    Perceived {
-        /// Views in the merged cloud.
-        merged: usize,
-        /// Views that could not be aligned, with the reason.
-        left_out: Vec<String>,
-        /// Points of the merged cloud.
-        points: usize,
-        /// Root mean square distance between the views, metres.
-        residual_m: f64,
-        /// What each object on the surface is taken for.
-        objects: Vec<String>,
-        /// What the last view changed in the belief.
-        changed: Vec<String>,
-    },
-    /// Somebody has moved something: what was seen before the last view no longer holds.
-    Changed {
-        /// What shows it.
-        because: String,
-    },
-    /// Nothing could be made of what has been seen so far.
-    Nothing {
-        /// Why.
-        because: String,
-    },
+    /// The world has learned something.
+    #[serde(untagged)]
+    Noted(Note),
 }
 
 impl fmt::Display for Event {
@@ -113,54 +92,9 @@ impl fmt::Display for Event {
             Event::Failed { call, because, therefore } => {
                 write!(f, "failed    {call}: {because}; {therefore}")
             }
-            Event::Perceived { merged, left_out, points, residual_m, objects, changed } => {
-                let (views, mm) = (if *merged == 1 { "view" } else { "views" }, residual_m * 1e3);
-                write!(
-                    f,
-                    "see       {merged} {views} merged, {points} points, {mm:.1} mm apart; {} objects",
-                    objects.len()
-                )?;
-                lines(f, left_out)?;
-                lines(f, objects)?;
-                lines(f, changed)
-            }
-            Event::Changed { because } => write!(f, "changed   {because}; only the last view still holds"),
-            Event::Nothing { because } => write!(f, "see       nothing yet: {because}"),
+            Event::Noted(note) => write!(f, "{note}"),
         }
     }
-}
-
-fn lines(f: &mut fmt::Formatter<'_>, texts: &[String]) -> fmt::Result {
-    texts.iter().try_for_each(|text| write!(f, "\n          {text}"))
-}
-
-/// How a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// The goal is reached with the confidence that was asked for.
-    Achieved,
-    /// Every useful pose has been tried: it is not there.
-    NotFound,
-    /// Nothing that the body can do would settle it.
-    CannotTell,
-    /// The body or the store failed, or a limit was reached.
-    Failed,
-}
-
-/// An object on the surface, as believed at the end.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Believed {
-    /// The known object that it most likely is; none: unknown.
-    pub label: Option<String>,
-    /// Its kind.
-    pub kind: Option<String>,
-    /// Probability of that.
-    pub confidence: f64,
-    /// The middle of its body, in the map.
-    pub position_m: [f64; 3],
-    /// Sides of its footprint and height.
-    pub size_m: [f64; 3],
 }
 
 /// The result of a run: what `--json` prints.
@@ -188,6 +122,16 @@ pub struct Report {
     pub position_m: Option<[f64; 3]>,
     /// Where it is; simulation only.
     pub true_position_m: Option<[f64; 3]>,
+    /// The surface that it is believed to stand on, as people call it.
+    pub on: Option<String>,
+    /// The surface that it stands on; simulation only.
+    pub true_on: Option<String>,
+    /// The room that it is believed to be in.
+    #[serde(rename = "in")]
+    pub room: Option<String>,
+    /// The room that it is in; simulation only.
+    #[serde(rename = "true_in")]
+    pub true_room: Option<String>,
     /// Everything that was seen on the surface.
     pub objects: Vec<Believed>,
     /// Views that were taken.
@@ -212,19 +156,23 @@ pub struct Report {
 
 impl Report {
     /// A report of a run that has only begun.
-    pub fn begin(goal: &Goal, object: Option<String>, run: String) -> Self {
+    pub fn begin(goal: &Goal, run: String) -> Self {
         Self {
             goal: goal.said.clone(),
             pddl_goal: goal.pddl.clone(),
             verdict: Verdict::Failed,
             answer: None,
             why: String::new(),
-            object,
+            object: None,
             confidence: 0.0,
             threshold: goal.threshold,
             remaining: None,
             position_m: None,
             true_position_m: None,
+            on: None,
+            true_on: None,
+            room: None,
+            true_room: None,
             objects: Vec::new(),
             views: 0,
             replans: 0,
@@ -244,20 +192,27 @@ impl fmt::Display for Report {
             Verdict::Achieved => "achieved",
             Verdict::NotFound => "not found",
             Verdict::CannotTell => "cannot tell",
+            Verdict::Impossible => "cannot be done",
             Verdict::Failed => "failed",
         };
         let answer = self.answer.as_ref().map(|a| format!("{a}; ")).unwrap_or_default();
         writeln!(f, "\n{answer}{verdict}: {}", self.why)?;
         if let (Some(object), Some([x, y, z])) = (&self.object, self.position_m) {
-            writeln!(f, "  {object} at ({x:.3}, {y:.3}, {z:.3}) m, confidence {:.2}", self.confidence)?;
+            let on = self.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
+            writeln!(f, "  {object}{on} at ({x:.3}, {y:.3}, {z:.3}) m, confidence {:.2}", self.confidence)?;
         }
         if let Some([x, y, z]) = self.true_position_m {
             writeln!(f, "  in truth at ({x:.3}, {y:.3}, {z:.3}) m")?;
         }
-        for o in self.objects.iter().filter(|_| self.object.is_none()) {
+        let any_asked = self.objects.iter().any(|o| o.asked);
+        for (n, o) in self.objects.iter().enumerate().filter(|_| self.object.is_none()) {
+            if any_asked && !o.asked && self.objects[..n].last().is_some_and(|before| before.asked) {
+                writeln!(f, "  besides:")?;
+            }
             let [x, y, z] = o.position_m;
             let name = o.label.as_deref().unwrap_or("unknown");
-            writeln!(f, "  {name:16} {:.2} at ({x:.3}, {y:.3}, {z:.3}) m", o.confidence)?;
+            let on = o.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
+            writeln!(f, "  {name:16} {:.2} at ({x:.3}, {y:.3}, {z:.3}) m{on}", o.confidence)?;
         }
         writeln!(
             f,
@@ -272,16 +227,4 @@ impl fmt::Display for Report {
         )?;
         write!(f, "  record: {}", self.run)
     }
-}
-
-/// A percept in a line.
-pub fn percept(p: &Percept) -> String {
-    let name = p.label.as_deref().unwrap_or("unknown");
-    let probability = p.label.as_deref().map_or(p.unknown, |label| p.probability_of(label));
-    let (at, [w, d, h]) = (p.position_m, p.size_m.map(|m| m * 100.0));
-    let seen = p.seen_fraction * 100.0;
-    format!(
-        "{name:16} {probability:.2}  at ({:.2}, {:.2}, {:.2}) m, {w:.0} x {d:.0} x {h:.0} cm, {seen:.0} % seen",
-        at.x, at.y, at.z
-    )
 }

@@ -4,22 +4,23 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use descry_domains::goal::{Goal, symbol};
+use descry_domains::answer::{Conclusion, Verdict};
+use descry_domains::goal::Goal;
+use descry_domains::lexicon::symbol;
 use descry_domains::load::Domain;
-use descry_memory::belief::Track;
+use descry_domains::world::{Chooser, Setting};
 use descry_memory::{Query, Record};
 use descry_robots::recorded::TapedRobot;
 use descry_robots::{CancellationToken, Robot};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::agent::{Agent, Conclusion, Setup};
+use crate::agent::{Agent, Totals};
 use crate::body::Body;
 use crate::body::tape::{self, RecordTape};
 use crate::exit::CommandError;
 use crate::keeping::{self, Keeping};
-use crate::policies::Chooser;
-use crate::report::{Believed, Event, Report, Verdict};
+use crate::report::{Event, Report};
 
 /// What a run was started with: enough to start it again.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -158,7 +159,7 @@ pub fn live_through(
     let recogniser = descry_perception::recognise::Descry::default();
     let start_ns = robot.now_ns();
     let cancel = CancellationToken::new();
-    let conclusion = runtime.block_on(async {
+    let (conclusion, totals) = runtime.block_on(async {
         let stop = cancel.clone();
         tokio::spawn(async move {
             if tokio::signal::ctrl_c().await.is_ok() {
@@ -166,16 +167,14 @@ pub fn live_through(
             }
         });
         let body: Arc<dyn Robot> = Arc::clone(robot) as _;
-        let setup = Setup { domain, robot: body, record, recogniser: &recogniser, goal, cancel, chooser };
-        Agent::new(setup, tell).pursue().await
+        let setting = Setting { domain, goal, robot: Arc::clone(&body), record, recogniser: &recogniser };
+        Agent::new(body, record, cancel, tell).pursue(setting, chooser).await
     })?;
     robot.finish().map_err(CommandError::broken)?;
     record.sync().map_err(CommandError::broken)?;
-    let things = descry_domains::situation::things(domain, &goal.things);
-    let object = things.first().map(|t| t.name.clone());
-    let mut report = Report::begin(goal, object, folder.display().to_string());
-    fill(&mut report, &conclusion);
+    let mut report = Report::begin(goal, folder.display().to_string());
     report.answer = goal.question.then(|| answer(conclusion.verdict).to_string());
+    fill(&mut report, conclusion, totals);
     report.sim_time_s = (robot.now_ns() - start_ns) as f64 * 1e-9;
     Ok(report)
 }
@@ -183,7 +182,10 @@ pub fn live_through(
 /// Where the thing is; simulation only.
 fn show_true_position(report: &mut Report, body: &Body) {
     let object = report.object.as_deref();
-    report.true_position_m = object.and_then(|name| body.true_position_m(name, report.position_m));
+    let true_place = object.and_then(|name| body.true_place(name, report.position_m));
+    report.true_position_m = true_place.as_ref().map(|p| p.position_m);
+    report.true_on = true_place.as_ref().map(|p| p.on.clone());
+    report.true_room = true_place.and_then(|p| p.room);
 }
 
 /// What a run was started with.
@@ -225,36 +227,25 @@ fn answer(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Achieved => "yes",
         Verdict::NotFound => "no",
-        Verdict::CannotTell | Verdict::Failed => "cannot tell",
+        Verdict::CannotTell | Verdict::Impossible | Verdict::Failed => "cannot tell",
     }
 }
 
-fn fill(report: &mut Report, conclusion: &Conclusion) {
+fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) {
     report.verdict = conclusion.verdict;
-    report.why = conclusion.why.clone();
+    report.why = conclusion.why;
     report.confidence = conclusion.confidence;
     report.remaining = conclusion.remaining;
-    report.views = conclusion.totals.views;
-    report.replans = conclusion.totals.plans.saturating_sub(1);
-    report.distance_m = conclusion.totals.distance_m;
-    report.planning_s = conclusion.totals.planning_s;
-    report.geometry_s = conclusion.totals.geometry_s;
-    let tracks = &conclusion.belief.tracks;
-    let middle = |t: &Track| (t.position_m + conclusion.up * (t.size_m[2] / 2.0)).coords.into();
-    report.objects = tracks
-        .iter()
-        .map(|t| Believed {
-            label: t.label().map(str::to_string),
-            kind: t.kind().map(str::to_string),
-            confidence: t.certainty(),
-            position_m: middle(t),
-            size_m: t.size_m,
-        })
-        .collect();
-    if let Some(name) = &report.object {
-        let best = tracks.iter().max_by(|a, b| a.probability_of(name).total_cmp(&b.probability_of(name)));
-        report.position_m = best.map(middle);
-    }
+    report.views = totals.views;
+    report.replans = totals.plans.saturating_sub(1);
+    report.distance_m = totals.distance_m;
+    report.planning_s = totals.planning_s;
+    report.geometry_s = totals.geometry_s;
+    report.object = conclusion.object;
+    report.position_m = conclusion.found.as_ref().map(|o| o.position_m);
+    report.on = conclusion.found.as_ref().and_then(|o| o.on.clone());
+    report.room = conclusion.found.and_then(|o| o.room);
+    report.objects = conclusion.objects;
 }
 
 /// The events of a run in their order, from its record.

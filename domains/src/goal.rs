@@ -1,5 +1,8 @@
 //! From what a person says to a PDDL goal, by the phrases of the domain.
 
+use crate::asked::Asked;
+use crate::config::{Answers, GoalPhrase};
+use crate::lexicon::{Lexicon, Named, symbol};
 use crate::load::Domain;
 
 /// A goal that a person gave, with what it means in the planner's language.
@@ -11,18 +14,31 @@ pub struct Goal {
     pub phrase: String,
     /// The goal condition in PDDL.
     pub pddl: String,
-    /// The known objects that are asked for, by PDDL symbol.
-    pub things: Vec<String>,
-    /// The surfaces that are asked about, by PDDL symbol.
-    pub surfaces: Vec<String>,
-    /// The kinds of which all are asked for, by PDDL symbol.
-    pub kinds: Vec<String>,
+    /// What the condition asks about.
+    pub asked: Asked,
+    /// What the slots hold.
+    pub slots: Vec<Filled>,
     /// Whether the answer is yes or no.
     pub question: bool,
+    /// What is answered.
+    pub answer: Answers,
     /// The confidence that ends the search, 0 to 1.
     pub threshold: f64,
     /// Seconds on the body's clock after which it must be over.
     pub deadline_s: Option<f64>,
+}
+
+/// A slot of a phrase and what fills it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Filled {
+    /// As it stands in the phrase: `thing`, or `first:thing`.
+    pub slot: String,
+    /// Which of several of the same name, from 0.
+    pub number: usize,
+    /// The PDDL symbol.
+    pub symbol: String,
+    /// The usual name.
+    pub name: String,
 }
 
 /// Why a goal was not understood, with what could have been said.
@@ -64,93 +80,145 @@ pub enum GoalError {
         /// What followed "within".
         found: String,
     },
-}
-
-/// The PDDL symbol of a name: lower case, with hyphens for everything that is no letter or digit.
-pub fn symbol(name: &str) -> String {
-    let words: Vec<String> = name
-        .split(|c: char| !c.is_alphanumeric())
-        .filter(|word| !word.is_empty())
-        .map(str::to_lowercase)
-        .collect();
-    words.join("-")
+    /// The phrase itself cannot be used.
+    #[error("the phrase \"{phrase}\" in domain.toml: {because}")]
+    BadPhrase {
+        /// The phrase.
+        phrase: String,
+        /// What is wrong with it, and a mend.
+        because: String,
+    },
 }
 
 /// Reads a goal in the words of the domain.
 ///
 /// # Errors
 /// [`GoalError`] names what could have been said instead.
-pub fn read(said: &str, domain: &Domain) -> Result<Goal, GoalError> {
-    let (words, asked) = conditions(said, domain.config.thresholds.confidence)?;
+pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, GoalError> {
+    let (words, wanted) = conditions(said, domain.config.thresholds.confidence)?;
     let mut nearest_miss = None;
     for phrase in &domain.config.goal {
         let Some(slots) = match_phrase(&phrase.say, &words) else { continue };
-        match fill(domain, &slots) {
-            Ok(filled) => return Ok(goal_of(said, phrase, filled, asked)),
+        match fill(lexicon, &slots) {
+            Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
             Err(found) => nearest_miss = nearest_miss.or(Some(found)),
         }
     }
     let domain_name = domain.config.name.clone();
     Err(match nearest_miss {
         Some(miss) => GoalError::NoSuchName {
-            suggestions: name_suggestions(domain, &miss),
+            suggestions: name_suggestions(lexicon, &miss),
             found: miss.found,
             domain: domain_name,
         },
         None => GoalError::NoPhrase {
             said: said.into(),
-            suggestions: phrase_suggestions(domain),
+            suggestions: phrase_suggestions(domain, lexicon),
             domain: domain_name,
         },
     })
 }
 
-/// A slot of a phrase and the symbol that fills it.
-struct Filled {
-    slot: String,
-    symbol: String,
-}
-
 /// A slot that holds a word which nothing is called.
 struct Miss {
-    slot: String,
+    of_type: String,
     found: String,
 }
 
-fn goal_of(said: &str, phrase: &crate::load::GoalPhrase, filled: Vec<Filled>, asked: Asked) -> Goal {
-    let mut pddl = phrase.means.replace("<threshold>", &asked.confidence.to_string());
-    for f in &filled {
-        pddl = pddl.replace(&format!("<{}>", f.slot), &f.symbol);
+/// The type that fills a slot: `thing` of `thing` and of `first:thing`.
+pub fn type_of_slot(slot: &str) -> &str {
+    slot.rsplit(':').next().unwrap_or(slot)
+}
+
+/// The slots of a text in their order.
+pub fn slots_of(text: &str) -> Vec<&str> {
+    let mut slots = Vec::new();
+    let mut rest = text;
+    while let Some((_, behind)) = rest.split_once('<') {
+        let Some((slot, after)) = behind.split_once('>') else { break };
+        // A comparison is no slot.
+        if !slot.is_empty() && slot.chars().all(|c| c.is_alphanumeric() || "-_:".contains(c)) {
+            slots.push(slot);
+        }
+        rest = if slots.last() == Some(&slot) { after } else { behind };
     }
-    let of = |slot: &str| filled.iter().filter(|f| f.slot == slot).map(|f| f.symbol.clone()).collect();
-    Goal {
+    slots
+}
+
+/// Puts what fills the slots into a text: the first of a name in the place of its first mention, and so on; where the text mentions
+/// it more or less often than the phrase has it, each mention stands for the only one.
+///
+/// # Errors
+/// A slot that the phrase does not have, or of which it has several and the text not as many.
+pub fn put_in(text: &str, slots: &[Filled], with: impl Fn(&Filled) -> String) -> Result<String, String> {
+    let mut out = text.to_string();
+    let mentioned = slots_of(text);
+    for (n, slot) in mentioned.iter().enumerate().filter(|(n, slot)| !mentioned[..*n].contains(slot)) {
+        let fitting: Vec<&Filled> = slots.iter().filter(|f| f.slot == *slot).collect();
+        let mentions = mentioned[n..].iter().filter(|m| *m == slot).count();
+        let tag = format!("<{slot}>");
+        match fitting.as_slice() {
+            [] => {
+                let known: Vec<String> = slots.iter().map(|f| format!("<{}>", f.slot)).collect();
+                let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+                return Err(format!("there is no slot {tag}; it has {known}"));
+            }
+            [only] => out = out.replace(&tag, &with(only)),
+            several if several.len() == mentions => {
+                for one in several {
+                    out = out.replacen(&tag, &with(one), 1);
+                }
+            }
+            several => {
+                return Err(format!(
+                    "it says {tag} {} times and \"{text}\" {mentions} times; name them, as <first:{slot}> and <second:{slot}>",
+                    several.len()
+                ));
+            }
+        }
+    }
+    Ok(out)
+}
+
+fn goal_of(
+    said: &str,
+    phrase: &GoalPhrase,
+    slots: Vec<Filled>,
+    wanted: Wanted,
+    domain: &Domain,
+) -> Result<Goal, GoalError> {
+    let bad = |because: String| GoalError::BadPhrase { phrase: phrase.say.clone(), because };
+    let means = phrase.means.replace("<threshold>", &wanted.confidence.to_string());
+    let pddl = put_in(&means, &slots, |f| f.symbol.clone()).map_err(bad)?;
+    let asked = Asked::of(&pddl, &domain.vocabulary);
+    Ok(Goal {
         said: said.into(),
         phrase: phrase.say.clone(),
         pddl,
-        things: of("thing"),
-        surfaces: of("surface"),
-        kinds: of("kind"),
+        asked,
+        slots,
         question: phrase.question,
-        threshold: asked.confidence,
-        deadline_s: asked.deadline_s,
-    }
+        answer: phrase.answer.clone(),
+        threshold: wanted.confidence,
+        deadline_s: wanted.deadline_s,
+    })
 }
 
 /// How sure, and how soon.
 #[derive(Clone, Copy)]
-struct Asked {
+struct Wanted {
     confidence: f64,
     deadline_s: Option<f64>,
 }
 
 /// Takes "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.
-fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Asked), GoalError> {
+fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Wanted), GoalError> {
     let mut words: Vec<String> = said
         .split_whitespace()
         .map(|w| w.trim_matches(|c: char| "\"'.,!?".contains(c)).to_lowercase())
         .filter(|w| !w.is_empty())
         .collect();
-    let mut asked = Asked { confidence: default, deadline_s: None };
+    let mut wanted = Wanted { confidence: default, deadline_s: None };
     loop {
         let confidence = words.windows(2).rposition(|w| w[0] == "with" && w[1] == "confidence");
         let within = words.iter().rposition(|w| w == "within");
@@ -158,13 +226,13 @@ fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Asked), GoalErro
             (Some(at), within) if within.is_none_or(|w| w < at) => {
                 let found = words.split_off(at)[2..].join(" ");
                 let probability = found.parse::<f64>().ok().filter(|c| *c > 0.0 && *c < 1.0);
-                asked.confidence = probability.ok_or(GoalError::BadConfidence { found })?;
+                wanted.confidence = probability.ok_or(GoalError::BadConfidence { found })?;
             }
             (_, Some(at)) => {
                 let found = words.split_off(at)[1..].join(" ");
-                asked.deadline_s = Some(seconds(&found).ok_or(GoalError::BadDeadline { found })?);
+                wanted.deadline_s = Some(seconds(&found).ok_or(GoalError::BadDeadline { found })?);
             }
-            _ => return Ok((words, asked)),
+            _ => return Ok((words, wanted)),
         }
     }
 }
@@ -196,65 +264,101 @@ fn match_phrase<'a>(say: &'a str, words: &[String]) -> Option<Vec<(&'a str, Stri
     step(&say.split_whitespace().collect::<Vec<_>>(), words)
 }
 
-fn fill(domain: &Domain, slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> {
-    slots
-        .iter()
-        .map(|(slot, found)| {
-            let wanted = without_article(found);
-            domain
-                .names(slot)
-                .into_iter()
-                .find(|(_, names)| names.iter().any(|n| symbol(n) == symbol(wanted)))
-                .map(|(symbol, _)| Filled { slot: (*slot).into(), symbol })
-                .ok_or_else(|| Miss { slot: (*slot).into(), found: wanted.into() })
-        })
-        .collect()
+fn fill(lexicon: &Lexicon, slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> {
+    let mut filled: Vec<Filled> = Vec::new();
+    for (slot, found) in slots {
+        let (of_type, wanted) = (type_of_slot(slot), without_article(found));
+        let is_called = |n: &&Named| n.names.iter().any(|name| symbol(name) == symbol(wanted));
+        let Some(named) = lexicon.of_type(of_type).iter().find(is_called) else {
+            return Err(Miss { of_type: of_type.into(), found: wanted.into() });
+        };
+        filled.push(Filled {
+            slot: (*slot).into(),
+            number: filled.iter().filter(|f| f.slot == *slot).count(),
+            symbol: named.symbol.clone(),
+            name: lexicon.name_of(&named.symbol).into(),
+        });
+    }
+    Ok(filled)
 }
 
 fn without_article(name: &str) -> &str {
     ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 
-fn phrase_suggestions(domain: &Domain) -> String {
+fn phrase_suggestions(domain: &Domain, lexicon: &Lexicon) -> String {
     let mut lines = vec!["  what could be said:".to_string()];
     for phrase in &domain.config.goal {
         lines.push(format!("    {:40} {}", phrase.say, phrase.about));
     }
-    lines.push(format!("  things: {}", listed(domain, "thing")));
-    lines.push(format!("  surfaces: {}", listed(domain, "surface")));
+    let mut types: Vec<&str> =
+        domain.config.goal.iter().flat_map(|g| slots_of(&g.say)).map(type_of_slot).collect();
+    types.sort_unstable();
+    types.dedup();
+    // The kinds are the things, in the plural.
+    for of in types.into_iter().filter(|of| *of != "kind").rev() {
+        lines.push(format!("  {of}s: {}", lexicon.listed(of)));
+    }
     lines.join("\n")
 }
 
-fn name_suggestions(domain: &Domain, miss: &Miss) -> String {
-    let names = domain.names(&miss.slot);
-    let all = names.iter().flat_map(|(_, names)| names.iter());
-    let nearest = all.min_by_key(|n| edit_distance(&n.to_lowercase(), &miss.found));
+fn name_suggestions(lexicon: &Lexicon, miss: &Miss) -> String {
+    let names: Vec<&String> = lexicon.of_type(&miss.of_type).iter().flat_map(|n| &n.names).collect();
+    let distance = |name: &str| strsim::levenshtein(&name.to_lowercase(), &miss.found);
+    let nearest = names.iter().min_by_key(|n| distance(n));
     let mut lines = Vec::new();
-    if let Some(nearest) = nearest.filter(|n| edit_distance(&n.to_lowercase(), &miss.found) <= 2) {
+    if let Some(nearest) = nearest.filter(|n| distance(n) <= 2) {
         lines.push(format!("  did you mean \"{nearest}\"?"));
     }
-    lines.push(format!("  known: {}", listed(domain, &miss.slot)));
-    lines.push("  a new object is a file in the domain's folder objects/".into());
+    lines.push(format!("  known: {}", lexicon.listed(&miss.of_type)));
+    if miss.of_type == "thing" || miss.of_type == "kind" {
+        lines.push("  a new object is a file in the domain's folder objects/".into());
+    }
     lines.join("\n")
 }
 
-fn listed(domain: &Domain, slot: &str) -> String {
-    let names = domain.names(slot);
-    names.iter().filter_map(|(_, names)| names.first().cloned()).collect::<Vec<_>>().join(", ")
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Levenshtein's distance between two words, in letters.
-fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(ca != *cb);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+    fn filled(slots: &[(&str, &str)]) -> Vec<Filled> {
+        let mut all: Vec<Filled> = Vec::new();
+        for (slot, symbol) in slots {
+            let number = all.iter().filter(|f| f.slot == *slot).count();
+            all.push(Filled {
+                slot: (*slot).into(),
+                number,
+                symbol: (*symbol).into(),
+                name: (*symbol).into(),
+            });
         }
+        all
     }
-    row[b.len()]
+
+    #[test]
+    fn slots_are_filled_one_by_one() {
+        let check = |text: &str, slots: &[(&str, &str)], expected: Result<&str, &str>| {
+            let found = put_in(text, &filled(slots), |f| f.symbol.clone());
+            match expected {
+                Ok(expected) => assert_eq!(found.as_deref(), Ok(expected)),
+                Err(part) => assert!(found.as_ref().is_err_and(|e| e.contains(part)), "{text}: {found:?}"),
+            }
+        };
+        check("(>= (c <thing>) 0.8)", &[("thing", "a")], Ok("(>= (c a) 0.8)"));
+        check("(and (c <thing>) (d <thing>))", &[("thing", "a")], Ok("(and (c a) (d a))"));
+        check("(and (c <thing>) (c <thing>))", &[("thing", "a"), ("thing", "b")], Ok("(and (c a) (c b))"));
+        check(
+            "(and (c <thing> <surface>) (c <thing> <surface>))",
+            &[("thing", "a"), ("surface", "s"), ("thing", "b")],
+            Ok("(and (c a s) (c b s))"),
+        );
+        check(
+            "(on <first:thing> <second:thing>)",
+            &[("first:thing", "a"), ("second:thing", "b")],
+            Ok("(on a b)"),
+        );
+        check("(c <thing>)", &[("thing", "a"), ("thing", "b")], Err("<first:thing>"));
+        check("(c <cup>)", &[("thing", "a")], Err("no slot <cup>; it has <thing>"));
+        check("(< (x) 3) ", &[], Ok("(< (x) 3) "));
+    }
 }

@@ -1,9 +1,9 @@
 //! Everything that the symbols of a planning round are grounded in: the body, the belief, and where one could look from.
 
-use std::collections::BTreeSet;
-use std::sync::{Arc, OnceLock};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use descry_memory::belief::Belief;
+use descry_memory::belief::{Belief, Track};
 use descry_memory::space::Space;
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::noise::axial_sigma_m;
@@ -11,10 +11,11 @@ use descry_perception::recognise::ObjectModel;
 use descry_planner::{Call, CallError, FactValue};
 use descry_robots::{Place, Robot};
 
-use crate::doubt::{Doubt, Hypothesis, Taken};
-use crate::goal::symbol;
-use crate::load::{Domain, Thresholds};
-use crate::obstacle::{self, Obstacle};
+use crate::abilities::searching::doubt::{Doubt, Hypothesis, Taken};
+use crate::abilities::searching::obstacle::{self, Obstacle};
+use crate::config::Thresholds;
+use crate::lexicon::symbol;
+use crate::load::Domain;
 
 /// Somewhere to stand and look from.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,11 +26,15 @@ pub struct Candidate {
     pub place: Place,
 }
 
-/// A surface that goals speak of, as far as it is known.
+/// Something to stand things on, as far as it is known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownSurface {
     /// Its PDDL symbol.
     pub symbol: String,
+    /// As people call it.
+    pub name: String,
+    /// The room that it is in, as people call it, if the map knows.
+    pub room: Option<String>,
     /// Convex outline in the map, metres; empty while nothing is known of it.
     pub outline: Vec<Point3<f64>>,
     /// Unit normal, away from the floor.
@@ -69,26 +74,65 @@ pub struct Thing {
     pub name: String,
     /// The models that it may be.
     pub models: Vec<ObjectModel>,
+    /// The surfaces that it is asked about; none: wherever it is.
+    pub on: Option<Vec<usize>>,
+    /// The number of the one object that is meant, where it is one that has been seen.
+    pub track: Option<u64>,
 }
 
-/// What an agent knows when a round begins.
+impl Thing {
+    /// The probability that an object is it, where it is asked about.
+    pub fn probability(&self, track: &Track, surfaces: &[KnownSurface]) -> f64 {
+        let meant = self.track.is_none_or(|id| id == track.id);
+        let asked = self.on.as_ref().is_none_or(|on| on.iter().any(|&n| surfaces[n].symbol == track.on));
+        if meant && asked { track.probability_of(&self.name) } else { 0.0 }
+    }
+
+    /// Whether it may be on a surface, as far as it is asked.
+    pub fn may_be_on(&self, surface: usize) -> bool {
+        self.track.is_none() && self.on.as_ref().is_none_or(|on| on.contains(&surface))
+    }
+}
+
+/// A door, as far as it is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnownDoor {
+    /// Its PDDL symbol.
+    pub symbol: String,
+    /// What the map says of it.
+    pub door: descry_robots::Door,
+}
+
+/// What the hand holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Held {
+    /// The number of the track that it was.
+    pub track: u64,
+}
+
+/// What is known when a round begins.
+#[derive(Clone)]
 pub struct Known {
     /// The body, which is only asked.
     pub robot: Arc<dyn Robot>,
     /// What is believed.
     pub belief: Arc<Belief>,
-    /// What has been seen free, occupied, or not at all.
-    pub space: Arc<Space>,
+    /// Everything to stand things on.
+    pub surfaces: Vec<KnownSurface>,
+    /// What has been seen free, occupied, or not at all around each surface.
+    pub spaces: Vec<Arc<Space>>,
     /// Poses to look from.
     pub candidates: Vec<Candidate>,
     /// The one at which the body stands.
     pub at: usize,
-    /// Surfaces that goals speak of.
-    pub surfaces: Vec<KnownSurface>,
     /// What is looked for.
     pub things: Vec<Thing>,
     /// Of what all are looked for.
     pub kinds: Vec<Thing>,
+    /// The surfaces of which it is asked what stands there.
+    pub asked: Vec<usize>,
+    /// How sure one wants to be, 0 to 1.
+    pub threshold: f64,
     /// Seconds until the deadline, if there is one.
     pub time_left_s: Option<f64>,
     /// Looks that have been taken: candidate and surface.
@@ -99,6 +143,14 @@ pub struct Known {
     pub stuck: BTreeSet<(u64, usize)>,
     /// Pushes that may still be tried.
     pub pushes_left: usize,
+    /// Doors that the map knows.
+    pub doors: Vec<KnownDoor>,
+    /// Those that are believed to be shut, by number.
+    pub shut: BTreeSet<usize>,
+    /// What the hand holds.
+    pub held: Option<Held>,
+    /// How much more often each thing, then each kind, then anything is expected on each surface than elsewhere, by area.
+    pub expected: Vec<Vec<f64>>,
 }
 
 /// What grounds the symbols of one planning round: all that is [`Known`], and what follows from it. Nothing in it moves anything.
@@ -113,6 +165,7 @@ pub struct Situation {
 #[derive(Default)]
 struct Derived {
     travel_s: Vec<OnceLock<Vec<f64>>>,
+    travel_past_s: Mutex<BTreeMap<(usize, Vec<usize>), Arc<Vec<f64>>>>,
     cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
     about: Vec<OnceLock<Doubt>>,
     on: Vec<OnceLock<Doubt>>,
@@ -136,6 +189,7 @@ impl Situation {
         }
         let derived = Derived {
             travel_s: cells(known.candidates.len()),
+            travel_past_s: Mutex::default(),
             cameras: cells(known.candidates.len() * known.surfaces.len()),
             about: cells(known.things.len()),
             on: cells(known.surfaces.len()),
@@ -169,33 +223,73 @@ impl Situation {
         find(self.things.iter().map(|t| &t.symbol), name, "something that is looked for")
     }
 
-    /// Seconds that a drive takes on the map; infinite where no route leads.
+    /// The door of a symbol.
+    ///
+    /// # Errors
+    /// [`CallError::Failed`] if there is none.
+    pub fn door(&self, name: &str) -> Result<usize, CallError> {
+        find(self.doors.iter().map(|d| &d.symbol), name, "a door")
+    }
+
+    /// Seconds that a drive takes on the map, past the doors that are believed to be shut; infinite where no route leads.
     pub fn travel_s(&self, from: usize, to: usize) -> f64 {
-        let row = self.derived.travel_s[from].get_or_init(|| {
-            let places: Vec<Place> = self.candidates.iter().map(|c| c.place.clone()).collect();
-            let travel = self.robot.travel(&self.candidates[from].place, &places, &[]);
-            travel.into_iter().map(|t| t.map_or(f64::INFINITY, |t| t.duration_s)).collect()
+        let row = self.derived.travel_s[from].get_or_init(|| self.travel_row(from, &self.shut));
+        row[to]
+    }
+
+    /// The same where other doors are shut than now.
+    pub fn travel_past_s(&self, from: usize, to: usize, shut: &BTreeSet<usize>) -> f64 {
+        if *shut == self.shut {
+            return self.travel_s(from, to);
+        }
+        let key = (from, shut.iter().copied().collect());
+        let known =
+            self.derived.travel_past_s.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+        let row = known.unwrap_or_else(|| {
+            let row = Arc::new(self.travel_row(from, shut));
+            let mut rows = self.derived.travel_past_s.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::clone(rows.entry(key).or_insert(row))
         });
         row[to]
     }
 
-    /// Whether the body can get to a candidate from where it stands.
-    pub fn can_reach(&self, to: usize) -> bool {
+    fn travel_row(&self, from: usize, shut: &BTreeSet<usize>) -> Vec<f64> {
+        let places: Vec<Place> = self.candidates.iter().map(|c| c.place.clone()).collect();
+        let shut: Vec<String> = shut.iter().map(|&n| self.doors[n].door.name.clone()).collect();
+        let travel = self.robot.travel(&self.candidates[from].place, &places, &shut);
+        travel.into_iter().map(|t| t.map_or(f64::INFINITY, |t| t.duration_s)).collect()
+    }
+
+    /// Whether the body can drive to a candidate from where it stands without opening anything.
+    pub fn can_drive_to(&self, to: usize) -> bool {
         to == self.at || (!self.out_of_reach.contains(&to) && self.travel_s(self.at, to).is_finite())
+    }
+
+    /// Whether the body can get to a candidate from where it stands, through doors that it would have to open too.
+    pub fn can_reach(&self, to: usize) -> bool {
+        let through_doors =
+            || !self.shut.is_empty() && self.travel_past_s(self.at, to, &BTreeSet::new()).is_finite();
+        self.can_drive_to(to) || (!self.out_of_reach.contains(&to) && through_doors())
     }
 
     /// Whether a look from a candidate may settle anything that is in doubt about what is asked for, once an obstacle has
     /// been moved out of the way.
     pub fn worth_a_look(&self, from: usize, on: usize, moved: Option<usize>) -> bool {
         let taken = Taken { looks: &[], moved };
-        self.doubts(on).iter().any(|doubt| doubt.share_settled(self, from, taken) > 0.0)
+        self.doubts().iter().any(|doubt| doubt.share_settled(self, (from, on), taken) > 0.0)
     }
 
-    /// Everything that is in doubt about what is asked for: things, kinds, or where none is asked for a surface.
-    pub fn doubts(&self, on: usize) -> Vec<&Doubt> {
+    /// Everything that is in doubt about what is asked for: things, kinds and surfaces; where nothing is asked for, every surface.
+    pub fn doubts(&self) -> Vec<&Doubt> {
         let things = (0..self.things.len()).map(|what| self.doubt_about(what));
-        let doubts: Vec<&Doubt> = things.chain((0..self.kinds.len()).map(|of| self.doubt_of(of))).collect();
-        if doubts.is_empty() { vec![self.doubt_on(on)] } else { doubts }
+        let kinds = (0..self.kinds.len()).map(|of| self.doubt_of(of));
+        let mut doubts: Vec<&Doubt> = things.chain(kinds).collect();
+        doubts.extend(self.asked.iter().map(|&on| self.doubt_on(on)));
+        if doubts.is_empty() {
+            (0..self.surfaces.len()).map(|on| self.doubt_on(on)).collect()
+        } else {
+            doubts
+        }
     }
 
     /// The objects that may be pushed aside to see what they hide; none while looking alone can settle anything.
@@ -204,8 +298,8 @@ impl Situation {
     }
 
     /// Whether looks would settle enough that is in doubt once an obstacle were out of the way.
-    pub(crate) fn would_uncover(&self, what: usize, on: usize) -> bool {
-        self.doubts(on).iter().any(|doubt| doubt.can_be_settled_without(self, what))
+    pub(crate) fn would_uncover(&self, what: usize) -> bool {
+        self.doubts().iter().any(|doubt| doubt.can_be_settled_without(self, what))
     }
 
     /// The kind of a symbol.
@@ -285,41 +379,64 @@ impl Situation {
             }
         }
         let gone = |p: &Point3<f64>| moved.is_some_and(|o| o.covers(p));
-        let visible = |p: &&Point3<f64>| self.in_view(&camera, p) && self.space.line_of_sight(&eye, p, &gone);
+        let space = &self.spaces[on];
+        let visible = |p: &&Point3<f64>| self.in_view(&camera, p) && space.line_of_sight(&eye, p, &gone);
         if hypothesis.points.iter().filter(visible).count() * 2 <= hypothesis.points.len() {
             return 0.0;
         }
         let sum = hypothesis.points.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords);
         let middle = Point3::from(sum / hypothesis.points.len() as f64);
         let before = middle + (eye - middle).normalize() * BEFORE_M;
-        let unseen_m = self.space.unseen_m(&eye, &before, UNSEEN_WITHIN_M);
+        let unseen_m = space.unseen_m(&eye, &before, UNSEEN_WITHIN_M);
         self.clearness(from, on) * (-unseen_m / FREE_PATH_M).exp()
     }
 
-    /// How sure it is where a thing stands, 0 to 1: the most probable object that it may be.
+    /// How sure it is where a thing stands, 0 to 1: the most probable object that it may be, where it is asked about.
     pub fn confidence(&self, what: usize) -> f64 {
-        let name = &self.things[what].name;
-        self.belief.tracks.iter().map(|t| t.probability_of(name)).fold(0.0, f64::max)
+        let thing = &self.things[what];
+        self.belief.tracks.iter().map(|t| thing.probability(t, &self.surfaces)).fold(0.0, f64::max)
     }
 
-    /// The probability that a thing is there: as one of the objects that were seen, or hidden.
+    /// How sure it is that a thing stands on a surface, 0 to 1.
+    pub fn presence(&self, what: usize, on: usize) -> f64 {
+        let (thing, surface) = (&self.things[what], &self.surfaces[on].symbol);
+        let there = self.belief.tracks.iter().filter(|t| t.on == *surface);
+        there
+            .filter(|t| thing.track.is_none_or(|id| id == t.id))
+            .map(|t| t.probability_of(&thing.name))
+            .fold(0.0, f64::max)
+    }
+
+    /// The probability that a thing is there, where it is asked about: as one of the objects that were seen, or hidden.
     pub fn chance_there(&self, what: usize) -> f64 {
-        let name = &self.things[what].name;
-        let none_is = self.belief.tracks.iter().map(|t| 1.0 - t.probability_of(name)).product::<f64>();
+        let thing = &self.things[what];
+        let none_is =
+            self.belief.tracks.iter().map(|t| 1.0 - thing.probability(t, &self.surfaces)).product::<f64>();
         1.0 - none_is * (1.0 - self.doubt_about(what).hidden)
     }
 
     /// How sure it is what each object on a surface is and that none is hidden, 0 to 1.
     pub fn clarity(&self, on: usize) -> f64 {
-        let sure = self.belief.tracks.iter().map(|t| t.certainty()).fold(1.0, f64::min);
+        let sure = self.on_surface(on).map(Track::certainty).fold(1.0, f64::min);
         sure * (1.0 - self.doubt_on(on).hidden)
+    }
+
+    /// The objects on a surface.
+    pub fn on_surface(&self, on: usize) -> impl Iterator<Item = &Track> {
+        let symbol = &self.surfaces[on].symbol;
+        self.belief.tracks.iter().filter(move |t| t.on == *symbol)
+    }
+
+    /// The surface that an object stands on.
+    pub fn surface_of(&self, track: &Track) -> Option<usize> {
+        self.surfaces.iter().position(|s| s.symbol == track.on)
     }
 
     /// How sure it is which objects are of a kind and that no other is hidden, 0 to 1.
     pub fn completeness(&self, of: usize) -> f64 {
-        let name = &self.kinds[of].name;
-        let sure = |t: &descry_memory::belief::Track| {
-            let p = t.probability_of(name);
+        let kind = &self.kinds[of];
+        let sure = |t: &Track| {
+            let p = kind.probability(t, &self.surfaces);
             p.max(1.0 - p)
         };
         self.belief.tracks.iter().map(sure).product::<f64>() * (1.0 - self.doubt_of(of).hidden)
@@ -354,27 +471,6 @@ impl Situation {
     pub(crate) fn planned_push(&self, call: &Call) -> Option<usize> {
         holding(call, "pushed").find_map(|r| self.obstacle(r.arguments.first()?).ok())
     }
-
-    /// The problem of this round in PDDL.
-    pub fn problem(&self, domain: &Domain, name: &str, goal: &str) -> String {
-        let names = |symbols: Vec<&String>, of: &str| match symbols.is_empty() {
-            true => String::new(),
-            false => format!("    {} - {of}\n", symbols.into_iter().cloned().collect::<Vec<_>>().join(" ")),
-        };
-        let mut text = format!("(define (problem {name})\n  (:domain {})\n  (:objects\n", domain.config.name);
-        text += &names(self.candidates.iter().map(|c| &c.symbol).collect(), "pose");
-        text += &names(self.surfaces.iter().map(|s| &s.symbol).collect(), "surface");
-        text += &names(self.things.iter().map(|t| &t.symbol).collect(), "thing");
-        text += &names(self.kinds.iter().map(|t| &t.symbol).collect(), "kind");
-        text += &names(self.obstacles().iter().map(|o| &o.symbol).collect(), "obstacle");
-        text += "  )\n  (:init\n";
-        for (_, states) in crate::facts::ALL {
-            for line in states(self) {
-                text += &format!("    {line}\n");
-            }
-        }
-        text + &format!("  )\n  (:goal {goal})\n  (:metric minimize (total-time)))\n")
-    }
 }
 
 /// How far before the middle of a place that may hold something the way to it begins, metres.
@@ -393,7 +489,10 @@ fn nalgebra_middle(a: &Point3<f64>, b: &Point3<f64>) -> Point3<f64> {
 }
 
 /// The atoms of a predicate that hold among the facts that a call reads.
-fn holding<'a>(call: &'a Call, predicate: &'a str) -> impl Iterator<Item = &'a descry_planner::Reading> {
+pub(crate) fn holding<'a>(
+    call: &'a Call,
+    predicate: &'a str,
+) -> impl Iterator<Item = &'a descry_planner::Reading> {
     call.readings.iter().filter(move |r| &*r.symbol == predicate && r.value == FactValue::Truth(true))
 }
 
@@ -405,16 +504,13 @@ fn find<'a>(
     symbols.position(|s| s == name).ok_or_else(|| CallError::Failed(format!("`{name}` is not {expected}")))
 }
 
-/// The things that a goal asks for, from the models of the domain.
-pub fn things(domain: &Domain, symbols: &[String]) -> Vec<Thing> {
-    let of = |wanted: &String| {
-        let single = domain.objects.iter().find(|o| symbol(&o.name) == *wanted);
-        let models: Vec<ObjectModel> = match single {
-            Some(model) => vec![model.clone()],
-            None => domain.objects.iter().filter(|o| symbol(&o.kind) == *wanted).cloned().collect(),
-        };
-        let name = single.map(|m| m.name.clone()).or_else(|| models.first().map(|m| m.kind.clone()));
-        Thing { symbol: wanted.clone(), name: name.unwrap_or_default(), models }
+/// A thing that a goal asks for, from the models of the domain: one of the known objects, or a kind of them.
+pub fn thing(domain: &Domain, wanted: &str) -> Thing {
+    let single = domain.objects.iter().find(|o| symbol(&o.name) == wanted);
+    let models: Vec<ObjectModel> = match single {
+        Some(model) => vec![model.clone()],
+        None => domain.objects.iter().filter(|o| symbol(&o.kind) == wanted).cloned().collect(),
     };
-    symbols.iter().map(of).collect()
+    let name = single.map(|m| m.name.clone()).or_else(|| models.first().map(|m| m.kind.clone()));
+    Thing { symbol: wanted.into(), name: name.unwrap_or_default(), models, on: None, track: None }
 }

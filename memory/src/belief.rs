@@ -18,6 +18,9 @@ const MUCH_LARGER: f64 = 3.0;
 pub struct Track {
     /// Its number, never used again.
     pub id: u64,
+    /// The symbol of the surface that it stands on; empty: in the hand.
+    #[serde(default)]
+    pub on: String,
     /// Where it stands: the centre of its body's footprint, world frame, metres.
     pub position_m: Point3<f64>,
     /// Standard deviation of each coordinate, metres.
@@ -90,30 +93,40 @@ impl Track {
 }
 
 impl Belief {
-    /// Takes in what the merge of all views shows. A percept is the object that was believed nearest to it, at the least
-    /// sum of distances; what no percept is taken for is gone.
+    /// Takes in what the merge of all views of a surface shows. A percept is the object there that was believed nearest to it, at
+    /// the least sum of distances; what no percept is taken for is gone. What stands elsewhere stays as it is.
     ///
-    /// The percepts rest on every view so far, so that their probabilities replace the earlier ones. A known object that a
+    /// The percepts rest on every view of the surface so far, so that their probabilities replace the earlier ones. A known object that a
     /// larger unknown thing has swallowed, since the last view blurs the two, is still believed in as before.
-    pub fn update(&mut self, sighted: &[Sighted<'_>], stamp_ns: i64, cites: &[RecordId]) {
+    pub fn update(&mut self, on: &str, sighted: &[Sighted<'_>], stamp_ns: i64, cites: &[RecordId]) {
+        let (here, elsewhere) = std::mem::take(&mut self.tracks).into_iter().partition(|t| t.on == on);
+        self.tracks = here;
         let partner = self.associate(sighted);
-        let mut kept: Vec<Track> = Vec::with_capacity(sighted.len());
+        let mut kept: Vec<Track> = elsewhere;
         for (track, found) in std::mem::take(&mut self.tracks).into_iter().zip(partner.tracks) {
             match found {
                 Some(n) => kept.push(Track {
                     id: track.id,
                     first_ns: track.first_ns,
-                    ..seen(&sighted[n], stamp_ns, cites)
+                    ..seen(on, &sighted[n], stamp_ns, cites)
                 }),
                 None if sighted.iter().any(|s| swallows(s.percept, &track)) => kept.push(track),
                 None => self.gone.push(track),
             }
         }
         for n in partner.new {
-            kept.push(Track { id: self.next_id, ..seen(&sighted[n], stamp_ns, cites) });
+            kept.push(Track { id: self.next_id, ..seen(on, &sighted[n], stamp_ns, cites) });
             self.next_id += 1;
         }
+        kept.sort_by_key(|track| track.id);
         self.tracks = kept;
+    }
+
+    /// The object of a number is no longer believed in.
+    pub fn lose(&mut self, id: u64) {
+        if let Some(at) = self.tracks.iter().position(|t| t.id == id) {
+            self.gone.push(self.tracks.remove(at));
+        }
     }
 
     /// The percept of each track, and the percepts of none: the assignment of least distance within the gate.
@@ -155,10 +168,11 @@ fn swallows(percept: &Percept, track: &Track) -> bool {
         && (track.position_m - percept.position_m).norm() < reach_m
 }
 
-fn seen(sighted: &Sighted<'_>, stamp_ns: i64, cites: &[RecordId]) -> Track {
+fn seen(on: &str, sighted: &Sighted<'_>, stamp_ns: i64, cites: &[RecordId]) -> Track {
     let p = sighted.percept;
     Track {
         id: 0,
+        on: on.into(),
         position_m: p.position_m,
         position_sigma_m: p.position_sigma_m,
         size_m: p.size_m,
@@ -203,7 +217,7 @@ mod tests {
             let percepts: Vec<Percept> = places.iter().map(|&x| percept(x, 0.5)).collect();
             let sighted: Vec<Sighted<'_>> =
                 percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[] }).collect();
-            belief.update(&sighted, stamp_ns, &[]);
+            belief.update("table", &sighted, stamp_ns, &[]);
         }
         let ids = |tracks: &[Track]| tracks.iter().map(|t| t.id).collect::<Vec<_>>();
         assert_eq!(
@@ -224,13 +238,29 @@ mod tests {
     }
 
     #[test]
+    fn what_stands_elsewhere_is_not_asked_about() {
+        let mut belief = Belief::default();
+        for (on, places, stamp_ns) in
+            [("table", &[0.0, 1.0][..], 1), ("shelf", &[0.0], 2), ("shelf", &[], 3), ("table", &[0.0], 4)]
+        {
+            let percepts: Vec<Percept> = places.iter().map(|&x| percept(x, 0.5)).collect();
+            let sighted: Vec<Sighted<'_>> =
+                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[] }).collect();
+            belief.update(on, &sighted, stamp_ns, &[]);
+        }
+        let there: Vec<(u64, &str)> = belief.tracks.iter().map(|t| (t.id, t.on.as_str())).collect();
+        assert_eq!(there, [(0, "table")]);
+        assert_eq!(belief.gone.iter().map(|t| t.id).collect::<Vec<_>>(), [2, 1]);
+    }
+
+    #[test]
     fn a_known_object_outlives_the_blur_that_swallows_it() {
         let mut belief = Belief::default();
         let cup = percept(0.0, 0.7);
         let mut blur = percept(0.03, 0.0);
         blur.size_m = [0.2, 0.15, 0.34];
         for (seen, stamp_ns) in [&cup, &blur, &cup].into_iter().zip(1..) {
-            belief.update(&[Sighted { percept: seen, viewpoints_m: &[] }], stamp_ns, &[]);
+            belief.update("table", &[Sighted { percept: seen, viewpoints_m: &[] }], stamp_ns, &[]);
             let best = belief.tracks.iter().map(|t| t.probability_of("cup A")).fold(0.0, f64::max);
             assert_eq!((best, belief.tracks[0].id), (0.7, 0), "after merge {stamp_ns}");
         }
@@ -243,6 +273,7 @@ mod tests {
         for (cup, stamp_ns) in [(0.4, 1), (0.9, 2)] {
             let p = percept(0.0, cup);
             belief.update(
+                "table",
                 &[Sighted { percept: &p, viewpoints_m: &[Point3::origin()] }],
                 stamp_ns,
                 &[RecordId(7)],

@@ -31,4 +31,4 @@ pub use semantics::Semantics;
 pub use solve::{EPSILON_S, Options, Outcome, PlanError, Statistics, plan};
 pub use state::State;
 pub use task::Task;
-pub use validate::{Broken, SEPARATION_S, Verdict, monitor, validate};
+pub use validate::{Broken, SEPARATION_S, Verdict, after, monitor, validate};

@@ -110,6 +110,11 @@ impl State {
         self.facts[predicate.index()].iter().map(|arguments| &**arguments)
     }
 
+    /// The arguments of which a numeric function has a value, with it, in no particular order.
+    pub fn values(&self, function: FunctionId) -> impl Iterator<Item = (&[ObjectId], f64)> {
+        self.numbers[function.index()].iter().map(|(arguments, value)| (&**arguments, *value))
+    }
+
     /// Of how many arguments a predicate is true.
     pub fn count(&self, predicate: PredicateId) -> usize {
         self.facts[predicate.index()].len()

@@ -1,25 +1,19 @@
-//! `(move ?from ?to)`: drives along a route on the map.
+//! `move`: drives along a route on the map.
 
 use async_trait::async_trait;
+use descry_robots::Place;
 
-use crate::skill::{Call, Context, Outcome, Skill, SkillFailure, arguments};
+use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Drives from a pose to another.
-pub struct Move;
+/// Drives somewhere.
+pub struct Move {
+    /// Where to.
+    pub to: Place,
+}
 
 #[async_trait]
 impl Skill for Move {
-    fn name(&self) -> &'static str {
-        "move"
-    }
-
-    fn arity(&self) -> usize {
-        2
-    }
-
-    async fn perform(&self, call: &Call, context: &Context<'_>) -> Result<Outcome, SkillFailure> {
-        let [_, to] = arguments(call)?;
-        let driven = context.robot.drive_to(context.place(to)?, &context.watch()).await?;
-        Ok(Outcome::Driven(driven))
+    async fn perform(&self, context: &Context<'_>) -> Result<Outcome, SkillFailure> {
+        Ok(Outcome::Driven(context.robot.drive_to(&self.to, &context.watch()).await?))
     }
 }

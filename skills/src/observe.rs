@@ -1,26 +1,21 @@
-//! `(observe ?from ?on)`: turns the head to the surface and takes a view.
+//! `observe`: turns the head and takes a view.
 
 use async_trait::async_trait;
+use descry_robots::nalgebra::Point3;
 
-use crate::skill::{Call, Context, Outcome, Skill, SkillFailure, arguments};
+use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Takes a view of a surface from where the body stands.
-pub struct Observe;
+/// Takes a view from where the body stands.
+pub struct Observe {
+    /// What the head turns to, in the map; none: nowhere in particular.
+    pub at: Option<Point3<f64>>,
+}
 
 #[async_trait]
 impl Skill for Observe {
-    fn name(&self) -> &'static str {
-        "observe"
-    }
-
-    fn arity(&self) -> usize {
-        2
-    }
-
-    async fn perform(&self, call: &Call, context: &Context<'_>) -> Result<Outcome, SkillFailure> {
-        let [_, on] = arguments(call)?;
-        if let Some(centre) = context.surface(on)? {
-            context.robot.look_at(centre, &context.watch()).await?;
+    async fn perform(&self, context: &Context<'_>) -> Result<Outcome, SkillFailure> {
+        if let Some(point) = &self.at {
+            context.robot.look_at(point, &context.watch()).await?;
         }
         let sensed = context.robot.sense(&context.watch()).await?;
         Ok(Outcome::Seen(Box::new(sensed)))

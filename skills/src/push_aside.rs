@@ -1,25 +1,19 @@
-//! `(push-aside ?from ?what)`: pushes an object out of the way of what it hides.
+//! `push-aside`: pushes an object out of the way of what it hides.
 
 use async_trait::async_trait;
+use descry_robots::Push;
 
-use crate::skill::{Call, Context, Outcome, Skill, SkillFailure, arguments};
+use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
 /// Pushes an object aside.
-pub struct PushAside;
+pub struct PushAside {
+    /// How.
+    pub push: Push,
+}
 
 #[async_trait]
 impl Skill for PushAside {
-    fn name(&self) -> &'static str {
-        "push-aside"
-    }
-
-    fn arity(&self) -> usize {
-        2
-    }
-
-    async fn perform(&self, call: &Call, context: &Context<'_>) -> Result<Outcome, SkillFailure> {
-        let [_, what] = arguments(call)?;
-        let pushed = context.robot.push_aside(context.push(what)?, &context.watch()).await?;
-        Ok(Outcome::Pushed(pushed))
+    async fn perform(&self, context: &Context<'_>) -> Result<Outcome, SkillFailure> {
+        Ok(Outcome::Pushed(context.robot.push_aside(&self.push, &context.watch()).await?))
     }
 }

@@ -1,15 +1,12 @@
-//! What every skill is: it turns one action of a plan into motion and looking, can be stopped, and ends in time.
-
-use std::collections::BTreeMap;
+//! What every skill is: it has its arguments in the units of the body, can be stopped, and ends in time.
 
 use async_trait::async_trait;
-use descry_robots::nalgebra::Point3;
 use descry_robots::{
-    CancellationToken, Driven, Failure, Place, Progress, Push, Pushed, Robot, Sensed, Watch,
+    CancellationToken, Driven, Failure, Grasped, Hand, Opened, Placed, Progress, Pushed, Robot, Sensed, Watch,
 };
 
 /// One action of a plan, with the names of its objects.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Call {
     /// The action's name.
     pub action: String,
@@ -27,23 +24,10 @@ impl std::fmt::Display for Call {
     }
 }
 
-/// What the objects of a call are in the world at this moment.
-#[derive(Debug, Clone, Default)]
-pub struct Symbols {
-    /// Where each pose is.
-    pub places: BTreeMap<String, Place>,
-    /// The point of each surface that a look is directed at, in the map; none while nothing is known of it.
-    pub surfaces: BTreeMap<String, Option<Point3<f64>>>,
-    /// How each object that may be pushed is pushed from where the body stands.
-    pub pushes: BTreeMap<String, Push>,
-}
-
 /// What a skill works with.
 pub struct Context<'a> {
     /// The body.
     pub robot: &'a dyn Robot,
-    /// The meaning of the call's objects.
-    pub symbols: &'a Symbols,
     /// Stops the skill.
     pub cancel: CancellationToken,
     /// Time for it, on the body's clock.
@@ -57,40 +41,6 @@ impl Context<'_> {
     pub fn watch(&self) -> Watch<'_> {
         Watch { cancel: self.cancel.clone(), time_limit_s: self.time_limit_s, progress: self.progress }
     }
-
-    /// Where a pose is.
-    ///
-    /// # Errors
-    /// [`SkillFailure::Unknown`] if nothing of that name is a pose.
-    pub fn place(&self, name: &str) -> Result<&Place, SkillFailure> {
-        self.symbols
-            .places
-            .get(name)
-            .ok_or_else(|| SkillFailure::Unknown { name: name.into(), expected: "a pose" })
-    }
-
-    /// How an object is pushed.
-    ///
-    /// # Errors
-    /// [`SkillFailure::Unknown`] if nothing of that name can be pushed from here.
-    pub fn push(&self, name: &str) -> Result<&Push, SkillFailure> {
-        self.symbols.pushes.get(name).ok_or_else(|| SkillFailure::Unknown {
-            name: name.into(),
-            expected: "something to push from here",
-        })
-    }
-
-    /// The point of a surface that a look is directed at.
-    ///
-    /// # Errors
-    /// [`SkillFailure::Unknown`] if nothing of that name is a surface.
-    pub fn surface(&self, name: &str) -> Result<Option<&Point3<f64>>, SkillFailure> {
-        self.symbols
-            .surfaces
-            .get(name)
-            .map(Option::as_ref)
-            .ok_or_else(|| SkillFailure::Unknown { name: name.into(), expected: "a surface" })
-    }
 }
 
 /// What a skill brought about.
@@ -102,6 +52,14 @@ pub enum Outcome {
     Seen(Box<Sensed>),
     /// Something was moved.
     Pushed(Pushed),
+    /// A door is open.
+    Opened(Opened),
+    /// Something was lifted, and what the hand then felt.
+    Grasped(Grasped, Hand),
+    /// Something was put down.
+    Placed(Placed),
+    /// A program says that it has done its work.
+    Told(String),
 }
 
 /// Why a skill did not do what its action promises.
@@ -110,50 +68,57 @@ pub enum SkillFailure {
     /// The body could not.
     #[error(transparent)]
     Body(#[from] Failure),
-    /// A call names something that is not there.
-    #[error("`{name}` is not {expected}")]
-    Unknown {
-        /// The name.
-        name: String,
-        /// What it should be.
-        expected: &'static str,
+    /// A program could not, and says why.
+    #[error("{because}")]
+    Program {
+        /// In its words.
+        because: String,
+        /// Whether the same may work when it is tried again.
+        passing: bool,
     },
-    /// A call has not as many objects as the skill takes.
-    #[error("{call} takes {expected} objects")]
-    Arity {
-        /// The call.
-        call: String,
-        /// How many it should have.
-        expected: usize,
+    /// What is to be done has no meaning for the body as things stand.
+    #[error("{because}")]
+    Meaningless {
+        /// Why.
+        because: String,
+    },
+    /// It was carried out, and what it should bring about did not come about.
+    #[error("it was done, but {condition} does not hold")]
+    Unmet {
+        /// The condition that should hold afterwards.
+        condition: String,
     },
 }
 
-/// A way to carry out an action.
+impl SkillFailure {
+    /// Whether the same may work when it is tried again.
+    pub fn is_passing(&self) -> bool {
+        match self {
+            SkillFailure::Body(failure) => failure.is_passing(),
+            SkillFailure::Program { passing, .. } => *passing,
+            SkillFailure::Meaningless { .. } => false,
+            SkillFailure::Unmet { .. } => true,
+        }
+    }
+
+    /// One word for what kind of failure it is: that of the body ([`Failure::kind`]), `program`, `meaningless` or
+    /// `unmet`.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            SkillFailure::Body(failure) => failure.kind(),
+            SkillFailure::Program { .. } => "program",
+            SkillFailure::Meaningless { .. } => "meaningless",
+            SkillFailure::Unmet { .. } => "unmet",
+        }
+    }
+}
+
+/// A way to bring something about, with its arguments.
 #[async_trait]
 pub trait Skill: Send + Sync {
-    /// The action's name in the domain.
-    fn name(&self) -> &'static str;
-
-    /// How many objects the action takes.
-    fn arity(&self) -> usize;
-
-    /// Carries the action out. Ends within the context's time limit and soon after its token is cancelled.
+    /// Carries it out. Ends within the context's time limit and soon after its token is cancelled.
     ///
     /// # Errors
     /// [`SkillFailure`] says what the body could not do; the world may have changed nevertheless.
-    async fn perform(&self, call: &Call, context: &Context<'_>) -> Result<Outcome, SkillFailure>;
-}
-
-/// Every skill there is.
-pub const ALL: &[&dyn Skill] = &[&crate::Move, &crate::Observe, &crate::PushAside];
-
-/// The skill that carries out an action.
-pub fn named(action: &str) -> Option<&'static dyn Skill> {
-    ALL.iter().copied().find(|s| s.name() == action)
-}
-
-/// The objects of a call, if they are as many as expected.
-pub(crate) fn arguments<const N: usize>(call: &Call) -> Result<[&str; N], SkillFailure> {
-    let names: Vec<&str> = call.arguments.iter().map(String::as_str).collect();
-    names.try_into().map_err(|_| SkillFailure::Arity { call: call.to_string(), expected: N })
+    async fn perform(&self, context: &Context<'_>) -> Result<Outcome, SkillFailure>;
 }

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use descry_memory::{Blob, Draft, Form, Image, Meta, Query, Record, kind};
+use descry_memory::{Blob, Draft, Form, Query, Record, kind};
 use descry_robots::image::RgbImage;
 use descry_robots::recorded::{Answer, Entry, Known, Pixels, Tape};
-use descry_robots::{Colour, OccupancyGrid, Sensed, Stamp};
-use serde_json::{Value, json};
+use descry_robots::{Colour, OccupancyGrid, Stamp};
+use serde_json::Value;
 
 use crate::exit::CommandError;
 
@@ -56,7 +56,7 @@ pub fn pixels(record: &Record, cloud: &descry_memory::Document) -> Result<Pixels
     Ok(Pixels { cloud: points, colour })
 }
 
-/// A colour image that was recorded by [`put_colour`]; none if it is another kind of image.
+/// A colour image that was recorded with a view; none if it is another kind of image.
 fn colour(record: &Record, document: &descry_memory::Document) -> Result<Option<Colour>, String> {
     let Some(info) = document.blobs.iter().find(|b| b.form == Form::RawImage) else { return Ok(None) };
     let number = |key: &str| info.layout.get(key).and_then(Value::as_u64).and_then(|n| u32::try_from(n).ok());
@@ -64,22 +64,6 @@ fn colour(record: &Record, document: &descry_memory::Document) -> Result<Option<
     let data = record.store().blob(document.id, &info.name).map_err(|e| e.to_string())?;
     let registered = document.body.get("registered").and_then(Value::as_bool).unwrap_or(false);
     Ok(RgbImage::from_raw(width, height, data).map(|image| Colour { image, registered }))
-}
-
-/// Records the colours of a frame, if it has some.
-///
-/// # Errors
-/// [`CommandError::Broken`] if they cannot be kept.
-pub fn put_colour(record: &Record, frame: &str, sensed: &Sensed) -> Result<(), CommandError> {
-    let Some(colour) = &sensed.colour else { return Ok(()) };
-    let image = Image::Raw {
-        width: colour.image.width(),
-        height: colour.image.height(),
-        encoding: "rgb8",
-        data: colour.image.as_raw(),
-    };
-    let meta = Meta { body: json!({ "registered": colour.registered }), ..Meta::default() };
-    record.put_image(sensed.stamp_ns, frame, image, meta).map(|_| ()).map_err(CommandError::broken)
 }
 
 /// Records what a body is.

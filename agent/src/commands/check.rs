@@ -1,6 +1,12 @@
-//! `descry check DOMAIN [PROBLEM]`: every finding at once, drawn under the text.
+//! `descry check DOMAIN [PROBLEM]`: every finding at once, drawn under the text; of a domain's folder all of its files, and how each
+//! word, call and action is grounded.
 
 use std::path::PathBuf;
+
+use descry_domains::check;
+use descry_domains::load::{Domain, LoadError};
+use descry_planner::Findings;
+use serde_json::json;
 
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
@@ -8,7 +14,7 @@ use crate::exit::{CommandError, Exit};
 /// Arguments of `descry check`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// PDDL domain
+    /// PDDL domain, or the folder of a domain (a built-in one by its name)
     domain: PathBuf,
     /// PDDL problem
     problem: Option<PathBuf>,
@@ -24,6 +30,10 @@ struct Report<'a> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    let path = &arguments.domain;
+    if arguments.problem.is_none() && (path.is_dir() || !path.exists() && path.extension().is_none()) {
+        return folder(&path.display().to_string(), arguments.json);
+    }
     let domain = input::source(&arguments.domain)?;
     let problem = arguments.problem.as_deref().map(input::source).transpose()?;
     let findings = descry_planner::check(&domain, problem.as_ref());
@@ -33,6 +43,33 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         eprintln!("no finding");
     } else {
         eprint!("{}", input::drawn(&findings));
+    }
+    Ok(if findings.has_errors() { Exit::No } else { Exit::Done })
+}
+
+/// The whole folder of a domain.
+fn folder(name: &str, json: bool) -> Result<Exit, CommandError> {
+    let domain = match Domain::load(name) {
+        Ok(domain) => domain,
+        Err(LoadError::Pddl { findings }) => return say(&findings, &[], json),
+        Err(other) => return Err(CommandError::bad_input(other)),
+    };
+    let mut findings = descry_planner::check(&domain.pddl, None);
+    let own = check::findings(&domain);
+    findings.list.extend(own.list);
+    findings.sources = own.sources;
+    say(&findings, &check::grounding(&domain), json)
+}
+
+fn say(findings: &Findings, grounding: &[String], json: bool) -> Result<Exit, CommandError> {
+    if json {
+        let errors = findings.has_errors();
+        input::print_json(&json!({ "errors": errors, "findings": findings.list, "grounding": grounding }))?;
+    } else {
+        if !grounding.is_empty() {
+            input::print_text(&grounding.join("\n"))?;
+        }
+        eprint!("{}", if findings.is_empty() { "no finding\n".to_string() } else { input::drawn(findings) });
     }
     Ok(if findings.has_errors() { Exit::No } else { Exit::Done })
 }

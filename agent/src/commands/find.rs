@@ -3,15 +3,20 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use descry_domains::goal;
+use descry_domains::goal::{self, Goal};
+use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
+
+use descry_robots::Robot;
 
 use crate::body;
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
 use crate::keeping::Keeping;
-use crate::policies;
-use crate::report::{Event, Report, Verdict};
+use descry_domains::abilities::searching::policies;
+use descry_domains::answer::Verdict;
+
+use crate::report::{Event, Report};
 use crate::run::{self, Settings, Task};
 
 /// Arguments of `descry find`.
@@ -89,7 +94,7 @@ fn carry_out(words: &[String], verb: &str, with: &With) -> Result<Exit, CommandE
     }
     Ok(match report.verdict {
         Verdict::Achieved => Exit::Done,
-        Verdict::NotFound | Verdict::CannotTell => Exit::No,
+        Verdict::NotFound | Verdict::CannotTell | Verdict::Impossible => Exit::No,
         Verdict::Failed => Exit::Broken,
     })
 }
@@ -98,10 +103,16 @@ fn tell(event: &Event) {
     eprintln!("{event}");
 }
 
+/// A goal in the words of a domain and of the places that a body knows.
+pub(super) fn understood(said: &str, domain: &Domain, robot: &dyn Robot) -> Result<Goal, CommandError> {
+    let lexicon = Lexicon::new(domain, &Places::of_body(robot));
+    goal::read(said, domain, &lexicon).map_err(CommandError::bad_input)
+}
+
 fn begin(said: &str, with: &With) -> Result<(Report, PathBuf), CommandError> {
     let domain = Domain::load(&with.domain).map_err(CommandError::bad_input)?;
-    let goal = goal::read(said, &domain).map_err(CommandError::bad_input)?;
     let body = body::open(&with.robot, with.scene.as_deref(), with.seed, &domain)?;
+    let goal = understood(said, &domain, &*body.robot)?;
     let chooser = policies::named(&with.policy, with.seed, None).map_err(CommandError::bad_input)?;
     let folder = run::folder(with.run.as_deref(), &goal)?;
     let settings = Settings {
@@ -128,8 +139,8 @@ fn go_on(folder: &Path, said: Option<&String>) -> Result<Report, CommandError> {
     }
     let settings = &header.settings;
     let domain = Domain::load(&settings.domain).map_err(CommandError::bad_input)?;
-    let goal = goal::read(&header.goal, &domain).map_err(CommandError::bad_input)?;
     let body = body::open(&settings.robot, settings.scene.as_deref(), settings.seed, &domain)?;
+    let goal = understood(&header.goal, &domain, &*body.robot)?;
     let chooser = policies::named(&settings.policy, settings.seed, None).map_err(CommandError::bad_input)?;
     let task = Task { domain: &domain, goal: &goal };
     run::go_on(task, &body, folder, &settings.keeping, chooser, &mut tell)

@@ -1,5 +1,7 @@
 //! `descry goals`: what may be said to a domain.
 
+use descry_domains::goal::{slots_of, type_of_slot};
+use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
 use serde_json::json;
 
@@ -19,14 +21,22 @@ pub struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let domain = Domain::load(&arguments.domain).map_err(CommandError::bad_input)?;
-    let names =
-        |slot: &str| -> Vec<Vec<String>> { domain.names(slot).into_iter().map(|(_, names)| names).collect() };
+    let lexicon = Lexicon::new(&domain, &Places::of_scene(&domain));
+    let names = |of: &str| -> Vec<Vec<String>> {
+        lexicon.of_type(of).iter().map(|named| named.names.clone()).collect()
+    };
+    // The kinds are the things, in the plural.
+    let mut types: Vec<&str> =
+        domain.config.goal.iter().flat_map(|g| slots_of(&g.say)).map(type_of_slot).collect();
+    types.retain(|of| *of != "kind");
+    types.sort_unstable_by_key(|of| (*of != "thing", *of));
+    types.dedup();
     if arguments.json {
         let phrases: Vec<_> =
             domain.config.goal.iter().map(|g| json!({"say": g.say, "means": g.means})).collect();
-        input::print_json(&json!({
-            "domain": domain.config.name, "phrases": phrases, "things": names("thing"), "surfaces": names("surface"),
-        }))?;
+        let mut said = json!({ "domain": domain.config.name, "phrases": phrases });
+        types.iter().for_each(|of| said[format!("{of}s")] = json!(names(of)));
+        input::print_json(&said)?;
         return Ok(Exit::Done);
     }
     let mut lines = vec![format!("{}: {}", domain.config.name, domain.config.about), String::new()];
@@ -34,12 +44,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         lines.push(format!("  {:36} {}", phrase.say, phrase.about));
     }
     lines.push(String::new());
-    lines.push("  any of them may end in \"with confidence 0.9\"".into());
-    lines.push(String::new());
-    lines.push("things:".into());
-    lines.extend(names("thing").iter().map(|n| format!("  {}", n.join(", "))));
-    lines.push("surfaces:".into());
-    lines.extend(names("surface").iter().map(|n| format!("  {}", n.join(", "))));
+    lines.push(
+        "  any of them may end in \"with confidence 0.9\", in \"within 60 seconds\", or in both".into(),
+    );
+    for of in types {
+        lines.push(String::new());
+        lines.push(format!("{of}s:"));
+        lines.extend(names(of).iter().map(|n| format!("  {}", n.join(", "))));
+    }
     input::print_text(&lines.join("\n"))?;
     Ok(Exit::Done)
 }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use descry_domains::attachments::ProgramAttachment;
-use descry_domains::load::Program;
+use descry_domains::config::Program;
+use descry_domains::program::ProgramAttachment;
 use descry_planner::{Attachment, Attachments, Findings, Source};
 use serde::Serialize;
 

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use descry_domains::abilities::searching::perceive;
 use descry_domains::load::{DEFAULT, Domain};
 use descry_perception::files::read_cloud;
 use descry_perception::nalgebra::Point3;
@@ -114,7 +115,7 @@ fn as_text(seen: &Seen) -> String {
                 s.points,
                 s.residual_m * 1e3
             ));
-            lines.extend(percepts.iter().map(|p| format!("  {}", crate::report::percept(p))));
+            lines.extend(percepts.iter().map(|p| format!("  {}", perceive::in_a_line(p))));
         }
         Err(why) => lines.push(format!("  no table: {why}")),
     }

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use descry_domains::goal;
 use descry_domains::load::Domain;
 use descry_memory::{Document, Durability, Options, Query, Record};
 use descry_robots::recorded::TapedRobot;
@@ -14,9 +13,9 @@ use crate::body::tape::{self, RecordTape};
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
 use crate::keeping;
-use crate::policies;
 use crate::report::{Event, Report};
 use crate::run::{self, Task};
+use descry_domains::abilities::searching::policies;
 
 /// Arguments of `descry replay`.
 #[derive(clap::Args)]
@@ -37,7 +36,7 @@ pub struct Arguments {
 /// Of these kinds, what comes about again must be what was recorded, byte for byte.
 const COMPARED: [&str; 5] = ["percepts", "belief", "problem", "skill", "event"];
 /// What a report says of this run alone, or knows from a simulator.
-const OWN: [&str; 3] = ["wall_s", "run", "true_position_m"];
+const OWN: [&str; 5] = ["wall_s", "run", "true_position_m", "true_on", "true_in"];
 
 /// The outcome of a replay.
 #[derive(Serialize)]
@@ -63,7 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let record = Arc::new(record);
     let robot = Arc::new(robot(&source, &record, arguments)?);
     let domain = Domain::load(&header.settings.domain).map_err(CommandError::bad_input)?;
-    let goal = goal::read(&header.goal, &domain).map_err(CommandError::bad_input)?;
+    let goal = super::find::understood(&header.goal, &domain, &*robot)?;
     let chooser = policies::named(&header.settings.policy, header.settings.seed, None);
     let chooser = chooser.map_err(CommandError::bad_input)?;
     let mut tell = |event: &Event| eprintln!("{event}");

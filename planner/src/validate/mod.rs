@@ -4,6 +4,7 @@
 //! what happens at one time must not interfere, conditions over all hold strictly between start and end, durations
 //! meet their bounds, timed literals happen by themselves.
 
+mod after;
 mod monitor;
 mod replay;
 mod timeline;
@@ -18,6 +19,7 @@ use crate::semantics::{Binding, CallFailure, Semantics};
 use crate::state::State;
 use crate::task::{Expression, Task};
 
+pub use after::after;
 pub use monitor::{Broken, monitor};
 
 /// Happenings closer than this are at the same time, in seconds. Plans are printed with few digits, and peers keep

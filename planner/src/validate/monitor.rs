@@ -8,7 +8,7 @@ use super::{Fault, whole};
 use crate::attachment::Attachments;
 use crate::diagnostic::{Findings, Span};
 use crate::plan::Plan;
-use crate::semantics::Semantics;
+use crate::semantics::{CallFailure, Semantics};
 use crate::task::Task;
 
 /// Why the rest of a plan no longer reaches the goal.
@@ -46,22 +46,29 @@ impl std::error::Error for Broken {}
 pub fn monitor(task: &Task, attachments: &Attachments, rest: &Plan) -> Result<(), Box<Broken>> {
     let _span = tracing::debug_span!("monitor", steps = rest.steps.len()).entered();
     let semantics = Semantics::new(task, attachments);
-    let broken = match whole(&semantics, rest) {
-        Ok(Ok(_)) => return Ok(()),
-        Ok(Err(fault)) => {
-            let Fault { reason, step, condition, values, finding } = *fault;
-            let span = finding.labels.first().map_or(Span::default(), |label| label.span);
-            let findings = Findings { sources: task.sources.to_vec(), list: vec![finding] };
-            Broken { step, reason, condition, span, values, findings }
-        }
-        Err(failure) => Broken {
+    match whole(&semantics, rest) {
+        Ok(Ok(_)) => Ok(()),
+        Ok(Err(fault)) => Err(Box::new(Broken::of_fault(task, *fault))),
+        Err(failure) => Err(Box::new(Broken::of_call(task, &failure))),
+    }
+}
+
+impl Broken {
+    pub(super) fn of_fault(task: &Task, fault: Fault) -> Broken {
+        let Fault { reason, step, condition, values, finding } = fault;
+        let span = finding.labels.first().map_or(Span::default(), |label| label.span);
+        let findings = Findings { sources: task.sources.to_vec(), list: vec![finding] };
+        Broken { step, reason, condition, span, values, findings }
+    }
+
+    pub(super) fn of_call(task: &Task, failure: &CallFailure) -> Broken {
+        Broken {
             step: None,
             reason: failure.to_string(),
             condition: failure.error.call.clone(),
             span: failure.span,
             values: Vec::new(),
             findings: failure.findings(task),
-        },
-    };
-    Err(Box::new(broken))
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use descry_domains::goal::{self, Goal};
+use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
 use descry_robots::sim::{Fault, FaultPlan, SceneSpec};
 use serde::Deserialize;
@@ -16,7 +17,7 @@ use crate::experiment::plot::{Axis, Plot, Point, Series};
 use crate::experiment::statistics::{self, Observation};
 use crate::experiment::table::{Table, shown};
 use crate::experiment::{ExperimentError, Finished, Job, Outcome, Source};
-use crate::policies;
+use descry_domains::abilities::searching::policies;
 
 /// What a file of this kind says.
 #[derive(Debug, Clone, Deserialize)]
@@ -119,10 +120,10 @@ pub(super) fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
     }
     let domain = Domain::load(&text.domain)
         .map_err(|e| refuse(source, "domain", e.to_string(), "name another domain"))?;
-    let goal = goal::read(&text.goal, &domain)
-        .map_err(|e| refuse(source, "goal", e.to_string(), "see descry goals"))?;
     let spec = body::scene_spec(Some(&text.scene), &domain)
         .map_err(|e| refuse(source, "scene", e.to_string(), "name another scene"))?;
+    let goal = goal::read(&text.goal, &domain, &Lexicon::new(&domain, &Places::of_spec(&spec)))
+        .map_err(|e| refuse(source, "goal", e.to_string(), "see descry goals"))?;
     let head = Head { name: text.name.clone(), kind: text.kind.clone(), about: text.about.clone() };
     Ok(Box::new(Faults { head, domain, goal, spec, text }))
 }

@@ -11,8 +11,10 @@ use serde_json::{Value, json};
 use crate::body::Body;
 use crate::experiment::{Outcome, Row};
 use crate::keeping::{Keeping, Kept};
-use crate::policies::{self, Foresight};
-use crate::report::{Report, Verdict};
+use descry_domains::abilities::searching::policies::{self, Foresight};
+use descry_domains::answer::Verdict;
+
+use crate::report::Report;
 use crate::run::{self, Settings};
 
 /// Seeds tried for an arrangement that is as hidden as was asked for.

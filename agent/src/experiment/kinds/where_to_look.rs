@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use descry_domains::goal::{self, Goal};
+use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
 use descry_robots::sim::{FaultPlan, SceneSpec};
 use serde::Deserialize;
@@ -13,7 +14,7 @@ use super::trial::{self, Trial};
 use super::{Head, Kind, Summary, parse, refuse};
 use crate::body;
 use crate::experiment::{ExperimentError, Finished, Job, Outcome, Source};
-use crate::policies;
+use descry_domains::abilities::searching::policies;
 
 mod summary;
 
@@ -105,10 +106,10 @@ pub(super) fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
     check(source, &text)?;
     let domain = Domain::load(&text.domain)
         .map_err(|e| refuse(source, "domain", e.to_string(), "name another domain"))?;
-    let goal = goal::read(&text.goal, &domain)
-        .map_err(|e| refuse(source, "goal", e.to_string(), "see descry goals"))?;
     let spec = body::scene_spec(Some(&text.scene), &domain)
         .map_err(|e| refuse(source, "scene", e.to_string(), "name another scene"))?;
+    let goal = goal::read(&text.goal, &domain, &Lexicon::new(&domain, &Places::of_spec(&spec)))
+        .map_err(|e| refuse(source, "goal", e.to_string(), "see descry goals"))?;
     let Some(target) = spec.target.clone().filter(|_| has(&spec, &text.target)) else {
         let problem = format!("the scene has no [target], or nothing in it is called \"{}\"", text.target);
         return Err(refuse(

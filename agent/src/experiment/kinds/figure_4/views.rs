@@ -10,7 +10,7 @@ use descry_robots::sim::world::LABEL_OBJECT;
 use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, Truth, arrange};
 use descry_robots::{Place, Pose2, Robot, SurfaceHint, Watch};
 
-use crate::agent::look;
+use descry_domains::abilities::searching::perceive;
 
 /// Tried in turn where the footprint does not fit.
 const OUTWARDS_M: [f64; 6] = [0.0, 0.1, 0.2, -0.1, 0.3, 0.4];
@@ -48,7 +48,7 @@ pub(super) fn take(spec: &SceneSpec, seed: u64, poses: usize, distance_m: f64) -
         map_from_camera: Vec::new(),
         handles: handled.iter().map(|(_, name)| (name.clone(), Vec::new())).collect(),
         truth: robot.truth(),
-        options: look::options(&robot),
+        options: perceive::options(&robot, None),
     };
     runtime.block_on(async {
         let watch = Watch::default();

@@ -1,0 +1,237 @@
+//! *carrying*: a hand that takes one thing and puts it down where there is room. It needs *searching*, which knows where things stand.
+
+mod spot;
+
+use std::sync::Arc;
+
+use descry_memory::belief::Track;
+use descry_planner::{Answer, Call, CallError};
+use descry_robots::{Failure, Grasp, Place, Placing};
+use descry_skills::{Outcome, PickUp, PutDown, SkillFailure};
+
+use super::{Ability, Fact, Meaning, SkillWord, argument};
+use crate::abilities::searching::change::Change;
+use crate::abilities::searching::perceive::{self, Eyes};
+use crate::mind::Mind;
+use crate::note::Note;
+use crate::situation::{Held, Situation};
+use crate::world::WorldError;
+
+/// A hand may touch what stands so near to what it takes, metres.
+const TOUCHED_M: f64 = 0.03;
+/// What slipped out of the hand may lie so far from where it stood, metres.
+const SLIPPED_M: f64 = 0.15;
+
+/// See the module.
+pub const ABILITY: Ability = Ability {
+    name: "carrying",
+    about: "takes one thing into the hand and puts it down elsewhere",
+    facts: &[
+        Fact { name: "holding", types: &["thing"], about: "the thing is in the hand", states: holding },
+        Fact { name: "hand-free", types: &[], about: "nothing is in the hand", states: hand_free },
+    ],
+    calls: &[
+        Meaning {
+            name: "can-grasp",
+            reads: &[],
+            about: "whether the hand reaches the thing from there and is wide enough for it",
+            answers: can_grasp,
+        },
+        Meaning {
+            name: "can-put",
+            reads: &[],
+            about: "whether the hand reaches a place on the surface from there that is free as far as is known",
+            answers: can_put,
+        },
+    ],
+    skills: &[
+        SkillWord {
+            name: "pick-up",
+            types: &["pose", "thing", "surface"],
+            about: "takes the thing into the hand and lifts it",
+            ground: |s, arguments| {
+                let track =
+                    standing(s, arguments[1], arguments[2]).ok_or("it is not known where that stands")?;
+                let grasp = Grasp { object: middle(s, track), width_m: track.size_m[0].min(track.size_m[1]) };
+                Ok(Box::new(PickUp { grasp }))
+            },
+            because: |_, arguments| format!("{} is to be elsewhere", arguments[1]),
+            learn: picked_up,
+            failed: pick_up_failed,
+        },
+        SkillWord {
+            name: "put-down",
+            types: &["pose", "thing", "surface"],
+            about: "puts what is in the hand down where there is room on the surface",
+            ground: |s, arguments| {
+                let foot = place(s, arguments)?;
+                Ok(Box::new(PutDown { placing: Placing { foot } }))
+            },
+            because: |_, arguments| format!("{} is to be on {}", arguments[1], arguments[2]),
+            learn: put_down,
+            failed: put_down_failed,
+        },
+    ],
+};
+
+/// `(holding ?thing)`.
+fn holding(s: &Situation) -> Vec<String> {
+    let Some(track) = held(s) else { return Vec::new() };
+    let is = |t: &&crate::situation::Thing| match t.track {
+        Some(id) => id == track.id,
+        None => track.probability_of(&t.name) >= s.threshold,
+    };
+    s.things.iter().filter(is).map(|t| format!("(holding {})", t.symbol)).collect()
+}
+
+/// `(hand-free)`.
+fn hand_free(s: &Situation) -> Vec<String> {
+    let has_hand = s.robot.description().hand_opening_m.is_some();
+    if s.held.is_none() && has_hand { vec!["(hand-free)".into()] } else { Vec::new() }
+}
+
+/// What is in the hand.
+fn held(s: &Situation) -> Option<&Track> {
+    let held = s.held.as_ref()?;
+    s.belief.tracks.iter().find(|t| t.id == held.track)
+}
+
+/// The object on a surface that a thing most likely is.
+fn standing<'a>(s: &'a Situation, thing: &str, surface: &str) -> Option<&'a Track> {
+    let thing = &s.things[s.thing(thing).ok()?];
+    let there = s.belief.tracks.iter().filter(|t| t.on == surface);
+    let p =
+        |t: &Track| if thing.track.is_none_or(|id| id == t.id) { t.probability_of(&thing.name) } else { 0.0 };
+    there.max_by(|a, b| p(a).total_cmp(&p(b))).filter(|t| p(t) >= s.threshold)
+}
+
+/// The middle of an object's body.
+fn middle(s: &Situation, track: &Track) -> descry_perception::nalgebra::Point3<f64> {
+    let up = s.surface_of(track).map_or_else(descry_perception::nalgebra::Vector3::z, |on| s.surfaces[on].up);
+    track.position_m + up * (0.5 * track.size_m[2])
+}
+
+/// How far a point is from the body at a candidate, along the floor.
+fn distance_m(s: &Situation, from: usize, p: &descry_perception::nalgebra::Point3<f64>) -> Option<f64> {
+    let Place::Pose(base) = &s.candidates[from].place else { return None };
+    Some((p.xy() - base.point()).norm())
+}
+
+/// `[can-grasp ?from ?what ?on]`.
+fn can_grasp(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let from = s.candidate(argument(call, 0)?)?;
+    let body = s.robot.description();
+    let can = standing(s, argument(call, 1)?, argument(call, 2)?).is_some_and(|track| {
+        let near =
+            distance_m(s, from, &middle(s, track)).zip(body.reach_m).is_some_and(|(d, reach)| d <= reach);
+        near && body.hand_opening_m.is_some_and(|opening| track.size_m[0].min(track.size_m[1]) <= opening)
+    });
+    Ok(Answer::Truth(can))
+}
+
+/// `[can-put ?from ?on]`.
+fn can_put(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let (from, on) = (s.candidate(argument(call, 0)?)?, s.surface(argument(call, 1)?)?);
+    Ok(Answer::Truth(spot::free(s, from, on, spot::USUAL_RADIUS_M).is_some()))
+}
+
+/// Where the thing in the hand is put down.
+fn place(s: &Situation, arguments: &[&str]) -> Result<descry_perception::nalgebra::Point3<f64>, String> {
+    let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
+    let on = s.surface(arguments[2]).map_err(|e| e.to_string())?;
+    let radius_m = held(s).map_or(spot::USUAL_RADIUS_M, |t| 0.5 * t.size_m[0].max(t.size_m[1]));
+    spot::free(s, from, on, radius_m)
+        .ok_or_else(|| format!("there is no free place within reach on {}", arguments[2]))
+}
+
+/// Voids what was seen of the place of an object.
+fn void(mind: &mut Mind, eyes: Eyes<'_>, track: &Track, more_m: f64) -> Result<(), WorldError> {
+    let Some(on) = mind.known.surfaces.iter().position(|k| k.symbol == track.on) else { return Ok(()) };
+    let change = Change {
+        stamp_ns: eyes.robot.now_ns(),
+        foot: track.position_m,
+        up: mind.known.surfaces[on].up,
+        radius_m: 0.5 * track.size_m[0].max(track.size_m[1]) + more_m,
+        height_m: track.size_m[2] + TOUCHED_M,
+    };
+    perceive::something_moved(mind, eyes.record, on, change)
+}
+
+fn picked_up(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    s: &Situation,
+    arguments: &[&str],
+    outcome: &Outcome,
+    _: &mut Vec<Note>,
+) -> Result<String, WorldError> {
+    let Outcome::Grasped(grasped, _) = outcome else { return Err(WorldError::strange(outcome)) };
+    let track = standing(s, arguments[1], arguments[2]).cloned();
+    let track = track.ok_or_else(|| WorldError::Bug(format!("`{}` was taken from nowhere", arguments[1])))?;
+    void(mind, eyes, &track, TOUCHED_M)?;
+    let belief = Arc::make_mut(&mut mind.known.belief);
+    belief.tracks.iter_mut().filter(|t| t.id == track.id).for_each(|t| t.on = String::new());
+    mind.known.held = Some(Held { track: track.id });
+    Ok(format!("the hand is closed to {:.3} m around it", grasped.width_m))
+}
+
+/// A grasp that failed may have moved what it was to take.
+fn pick_up_failed(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    s: &Situation,
+    arguments: &[&str],
+    failure: &SkillFailure,
+) -> Result<Option<String>, WorldError> {
+    if let (SkillFailure::Body(Failure::Slipped { .. }), Some(track)) =
+        (failure, standing(s, arguments[1], arguments[2]))
+    {
+        void(mind, eyes, track, SLIPPED_M)?;
+        // Where it stands now, the next look will say.
+        Arc::make_mut(&mut mind.known.belief).lose(track.id);
+    }
+    Ok(None)
+}
+
+fn put_down(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    s: &Situation,
+    arguments: &[&str],
+    outcome: &Outcome,
+    _: &mut Vec<Note>,
+) -> Result<String, WorldError> {
+    let Outcome::Placed(placed) = outcome else { return Err(WorldError::strange(outcome)) };
+    let foot = place(s, arguments).map_err(WorldError::Bug)?;
+    if let Some(held) = mind.known.held.take() {
+        let belief = Arc::make_mut(&mut mind.known.belief);
+        let found = belief.tracks.iter_mut().find(|t| t.id == held.track);
+        let moved = found.map(|t| {
+            (t.on, t.position_m) = (arguments[2].to_string(), foot);
+            t.clone()
+        });
+        if let Some(track) = moved {
+            void(mind, eyes, &track, TOUCHED_M)?;
+        }
+    }
+    Ok(format!(
+        "it was put down at ({:.2}, {:.2}, {:.2}) m in {:.1} s",
+        foot.x, foot.y, foot.z, placed.duration_s
+    ))
+}
+
+/// What was to be put down may have been lost on the way.
+fn put_down_failed(
+    mind: &mut Mind,
+    _: Eyes<'_>,
+    _: &Situation,
+    _: &[&str],
+    failure: &SkillFailure,
+) -> Result<Option<String>, WorldError> {
+    if let (SkillFailure::Body(Failure::Slipped { .. }), Some(held)) = (failure, mind.known.held.clone()) {
+        mind.known.held = None;
+        Arc::make_mut(&mut mind.known.belief).lose(held.track);
+        return Ok(Some("what it held was lost".into()));
+    }
+    Ok(None)
+}

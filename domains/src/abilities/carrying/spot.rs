@@ -1,0 +1,56 @@
+//! Where on a surface there is room for something.
+
+use descry_memory::space::Cell;
+use descry_perception::nalgebra::{Point3, Vector3};
+
+use super::distance_m;
+use crate::situation::Situation;
+
+/// Radius of a thing that is not known yet: that of a cup with its handle, metres.
+pub(super) const USUAL_RADIUS_M: f64 = 0.06;
+/// Least gap to what stands there and to the edge, metres.
+const GAP_M: f64 = 0.05;
+/// Distance of the places that are tried, metres.
+const GRID_M: f64 = 0.04;
+/// Heights above the surface at which a place must have been seen free, metres.
+const FREE_AT_M: [f64; 2] = [0.04, 0.10];
+
+/// The place on a surface nearest to the body at a candidate that is within reach and free: nothing is believed there, and where
+/// the surface has been looked at it was seen empty. None if there is none.
+pub(super) fn free(s: &Situation, from: usize, on: usize, radius_m: f64) -> Option<Point3<f64>> {
+    let surface = &s.surfaces[on];
+    let centre = surface.centre()?;
+    let reach_m = s.robot.description().reach_m?;
+    let helper = if surface.up.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    let e1 = surface.up.cross(&helper).normalize();
+    let e2 = surface.up.cross(&e1);
+    let widest = surface.outline.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+    let steps = (widest / GRID_M).ceil() as i64;
+    let looked_at = s.observed.iter().any(|look| look.1 == on);
+    let is_empty = |p: &Point3<f64>| {
+        FREE_AT_M.iter().all(|h| match s.spaces[on].cell(&(p + surface.up * *h)) {
+            Cell::Free => true,
+            Cell::Unseen => !looked_at,
+            Cell::Occupied => false,
+        })
+    };
+    let around = |p: &Point3<f64>| {
+        [(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]
+            .map(|(a, b)| p + (e1 * a + e2 * b) * radius_m)
+    };
+    let is_apart = |p: &Point3<f64>| {
+        s.on_surface(on).all(|t| {
+            let own = 0.5 * t.size_m[0].max(t.size_m[1]);
+            (t.position_m - p).norm() >= own + radius_m + GAP_M
+        })
+    };
+    let near = |p: &Point3<f64>| distance_m(s, from, p).filter(|d| *d <= reach_m);
+    (-steps..=steps)
+        .flat_map(|i| (-steps..=steps).map(move |j| (i, j)))
+        .map(|(i, j)| centre + (e1 * i as f64 + e2 * j as f64) * GRID_M)
+        .filter(|p| surface.covers(p, -(radius_m + GAP_M)))
+        .filter(|p| is_apart(p) && around(p).iter().all(is_empty))
+        .filter_map(|p| near(&p).map(|d| (d, p)))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, p)| p)
+}

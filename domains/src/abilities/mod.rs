@@ -1,0 +1,112 @@
+//! Abilities: what a domain takes by name. Each is a list of facts, calls and skills, with the functions behind them.
+
+pub mod carrying;
+pub mod moving;
+pub mod searching;
+
+use descry_planner::{Answer, Call, CallError};
+use descry_skills::{Outcome, Skill, SkillFailure};
+
+use crate::abilities::searching::perceive::Eyes;
+use crate::mind::Mind;
+use crate::note::Note;
+use crate::situation::Situation;
+use crate::world::WorldError;
+
+/// What a body can do and know, in the words of a domain.
+#[derive(Debug)]
+pub struct Ability {
+    /// By which a domain takes it.
+    pub name: &'static str,
+    /// What it is for, in a line.
+    pub about: &'static str,
+    /// The words that it states.
+    pub facts: &'static [Fact],
+    /// The calls that it answers.
+    pub calls: &'static [Meaning],
+    /// What it can carry out.
+    pub skills: &'static [SkillWord],
+}
+
+/// A word whose value an ability states.
+#[derive(Debug)]
+pub struct Fact {
+    /// The predicate or function.
+    pub name: &'static str,
+    /// The types of its arguments.
+    pub types: &'static [&'static str],
+    /// What it says, in a line.
+    pub about: &'static str,
+    /// The instances that hold now, a line of PDDL each.
+    pub states: fn(&Situation) -> Vec<String>,
+}
+
+/// A call that an ability answers.
+#[derive(Debug)]
+pub struct Meaning {
+    /// The module's name.
+    pub name: &'static str,
+    /// The facts that its answer depends on besides its arguments.
+    pub reads: &'static [&'static str],
+    /// What it says, in a line.
+    pub about: &'static str,
+    /// The answer.
+    pub answers: fn(&Situation, &Call) -> Result<Answer, CallError>,
+}
+
+/// Something that an ability can carry out.
+#[derive(Debug)]
+pub struct SkillWord {
+    /// By which actions take it.
+    pub name: &'static str,
+    /// The types of its arguments.
+    pub types: &'static [&'static str],
+    /// What it does, in a line.
+    pub about: &'static str,
+    /// Its meaning for the body now, or why it has none.
+    pub ground: fn(&Situation, &[&str]) -> Result<Box<dyn Skill>, String>,
+    /// What it costs and what is hoped from it.
+    pub because: fn(&Situation, &[&str]) -> String,
+    /// What follows from what came of it; in words, if there is anything to say.
+    pub learn: Learn,
+    /// What follows from its failure besides what the domain says; in words, if no second try is worth it.
+    pub failed: Failed,
+}
+
+/// Takes the outcome of a skill in.
+pub type Learn =
+    fn(&mut Mind, Eyes<'_>, &Situation, &[&str], &Outcome, &mut Vec<Note>) -> Result<String, WorldError>;
+
+/// Takes the failure of a skill in.
+pub type Failed =
+    fn(&mut Mind, Eyes<'_>, &Situation, &[&str], &SkillFailure) -> Result<Option<String>, WorldError>;
+
+/// Every ability; the first is that of every body and needs no naming.
+pub const ALL: &[&Ability] = &[&moving::ABILITY, &searching::ABILITY, &carrying::ABILITY];
+
+/// The abilities that a domain uses.
+pub fn used(names: &[String]) -> impl Iterator<Item = &'static Ability> + '_ {
+    ALL.iter()
+        .copied()
+        .enumerate()
+        .filter(|(n, a)| *n == 0 || names.iter().any(|name| name == a.name))
+        .map(|(_, a)| a)
+}
+
+/// The fact of a name among those of the abilities that a domain uses.
+pub fn fact(uses: &[String], name: &str) -> Option<&'static Fact> {
+    used(uses).flat_map(|a| a.facts).find(|f| f.name == name)
+}
+
+/// The skill of a name.
+pub fn skill(uses: &[String], name: &str) -> Option<&'static SkillWord> {
+    used(uses).flat_map(|a| a.skills).find(|s| s.name == name)
+}
+
+/// The `n`-th argument of a call, by name.
+pub(crate) fn argument(call: &Call, n: usize) -> Result<&str, CallError> {
+    call.arguments
+        .get(n)
+        .map(|a| &**a)
+        .ok_or_else(|| CallError::Failed(format!("{call} lacks argument {}", n + 1)))
+}

@@ -1,0 +1,114 @@
+//! *moving*: where the body stands, what a drive costs, doors. Every domain has it.
+
+mod at;
+mod path_cost;
+mod time_left;
+
+use descry_skills::{Move, OpenDoor, Outcome};
+
+use super::{Ability, Fact, Meaning, SkillWord};
+use crate::abilities::searching::perceive::Eyes;
+use crate::mind::Mind;
+use crate::note::Note;
+use crate::situation::Situation;
+use crate::world::WorldError;
+
+/// See the module.
+pub const ABILITY: Ability = Ability {
+    name: "moving",
+    about: "drives on the map, opens doors",
+    facts: &[
+        Fact { name: "at", types: &["pose"], about: "where the body stands", states: at::state },
+        Fact {
+            name: "time-left",
+            types: &[],
+            about: "the deadline, if there is one, has not passed",
+            states: time_left::state,
+        },
+        Fact {
+            name: "beside",
+            types: &["pose", "door"],
+            about: "the door can be opened from there, by the map",
+            states: beside,
+        },
+        Fact {
+            name: "in",
+            types: &["surface", "room"],
+            about: "the surface is in the room, by the map",
+            states: in_room,
+        },
+    ],
+    calls: &[Meaning {
+        name: "path-cost",
+        reads: &["shut"],
+        about: "seconds that the drive takes past shut doors; infinite where no route leads",
+        answers: path_cost::answer,
+    }],
+    skills: &[
+        SkillWord {
+            name: "move",
+            types: &["pose", "pose"],
+            about: "drives from one pose to the other",
+            ground: |s, arguments| {
+                let to = s.candidate(arguments[1]).map_err(|e| e.to_string())?;
+                Ok(Box::new(Move { to: s.candidates[to].place.clone() }))
+            },
+            because: |s, arguments| match (s.candidate(arguments[0]), s.candidate(arguments[1])) {
+                (Ok(from), Ok(to)) => {
+                    format!("to {}, {:.1} s of driving", s.candidates[to].place, s.travel_s(from, to))
+                }
+                _ => String::new(),
+            },
+            learn: driven,
+            failed: |_, _, _, _, _| Ok(None),
+        },
+        SkillWord {
+            name: "open-door",
+            types: &["pose", "door"],
+            about: "opens a door from beside it",
+            ground: |s, arguments| {
+                let door = s.door(arguments[1]).map_err(|e| e.to_string())?;
+                Ok(Box::new(OpenDoor { door: s.doors[door].door.name.clone() }))
+            },
+            because: |_, _| "it is shut and in the way".into(),
+            learn: |_, _, _, _, outcome, _| match outcome {
+                Outcome::Opened(opened) => Ok(format!("it is open after {:.1} s", opened.duration_s)),
+                other => Err(WorldError::strange(other)),
+            },
+            failed: |_, _, _, _, _| Ok(None),
+        },
+    ],
+};
+
+/// A drive ended: the body stands where it was to go.
+fn driven(
+    mind: &mut Mind,
+    _: Eyes<'_>,
+    situation: &Situation,
+    arguments: &[&str],
+    outcome: &Outcome,
+    _: &mut Vec<Note>,
+) -> Result<String, WorldError> {
+    let Outcome::Driven(driven) = outcome else { return Err(WorldError::strange(outcome)) };
+    mind.known.at = situation.candidate(arguments[1]).map_err(|e| WorldError::Bug(e.to_string()))?;
+    mind.distance_m += driven.distance_m;
+    Ok(format!("drove {:.2} m in {:.1} s", driven.distance_m, driven.duration_s))
+}
+
+/// `(beside ?pose ?door)`: the poses before each door.
+fn beside(s: &Situation) -> Vec<String> {
+    let symbols = |d: &crate::situation::KnownDoor| {
+        let own = format!("{}-side-", d.symbol);
+        let poses = s.candidates.iter().filter(|c| c.symbol.starts_with(&own));
+        poses.map(|c| format!("(beside {} {})", c.symbol, d.symbol)).collect::<Vec<_>>()
+    };
+    s.doors.iter().flat_map(symbols).collect()
+}
+
+/// `(in ?surface ?room)`: what the map says.
+fn in_room(s: &Situation) -> Vec<String> {
+    let room = |k: &crate::situation::KnownSurface| {
+        k.room.as_ref().map(|room| format!("(in {} {})", k.symbol, crate::lexicon::symbol(room)))
+    };
+    s.surfaces.iter().filter_map(room).collect()
+}

@@ -1,0 +1,12 @@
+//! `[can-see ?from ?on]`: whether a look from a pose shows any of a surface, by the camera's field of view and range.
+
+use descry_planner::{Answer, Call, CallError};
+
+use crate::abilities::argument;
+use crate::situation::Situation;
+
+pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let from = situation.candidate(argument(call, 0)?)?;
+    let on = situation.surface(argument(call, 1)?)?;
+    Ok(Answer::Truth(situation.sees(from, on)))
+}

@@ -1,0 +1,13 @@
+//! `[expected-clarity ?from ?on]`: by how much a look is expected to raise the clarity of a surface.
+
+use descry_planner::{Answer, Call, CallError};
+
+use super::settled;
+use crate::abilities::argument;
+use crate::situation::Situation;
+
+pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let on = situation.surface(argument(call, 1)?)?;
+    let settled = settled(situation, call, situation.doubt_on(on), true)?;
+    Ok(Answer::Number((1.0 - situation.clarity(on)) * settled))
+}

@@ -1,0 +1,72 @@
+//! The calls that *searching* answers: one file each, and the list of them.
+
+mod can_see;
+mod expected_clarity;
+mod expected_completeness;
+mod expected_gain;
+mod worth_a_look;
+mod worth_a_push;
+
+use descry_planner::{Call, CallError};
+
+use crate::abilities::searching::doubt::{Doubt, Taken};
+use crate::abilities::{Meaning, argument};
+use crate::situation::Situation;
+
+const LOOKS: &[&str] = &["observed", "pushed"];
+
+/// Every call.
+pub(super) const ALL: &[Meaning] = &[
+    Meaning {
+        name: "can-see",
+        reads: &[],
+        about: "whether a look from there shows any of the surface",
+        answers: can_see::answer,
+    },
+    Meaning {
+        name: "worth-a-look",
+        reads: &["pushed"],
+        about: "whether a look from there may settle anything that is in doubt",
+        answers: worth_a_look::answer,
+    },
+    Meaning {
+        name: "worth-a-push",
+        reads: &["pushed"],
+        about: "whether a push would uncover what no look shows",
+        answers: worth_a_push::answer,
+    },
+    Meaning {
+        name: "expected-gain",
+        reads: LOOKS,
+        about: "how much of the doubt about a thing a look would settle",
+        answers: expected_gain::answer,
+    },
+    Meaning {
+        name: "expected-clarity",
+        reads: LOOKS,
+        about: "how much of the doubt about all on a surface a look would settle",
+        answers: expected_clarity::answer,
+    },
+    Meaning {
+        name: "expected-completeness",
+        reads: LOOKS,
+        about: "how much of the doubt about all of a kind a look would settle",
+        answers: expected_completeness::answer,
+    },
+];
+
+/// The share of a doubt that a call's look settles beyond what the plan does before it. The look is the call's first argument at
+/// its second; without a surface, `is_whole` saying so, at every surface.
+fn settled(situation: &Situation, call: &Call, doubt: &Doubt, names_surface: bool) -> Result<f64, CallError> {
+    let from = situation.candidate(argument(call, 0)?)?;
+    let surfaces = match names_surface {
+        true => {
+            let on = situation.surface(argument(call, 1)?)?;
+            on..on + 1
+        }
+        false => 0..situation.surfaces.len(),
+    };
+    let looks = situation.planned_looks(call);
+    let before = Taken { looks: &looks, moved: situation.planned_push(call) };
+    Ok(surfaces.map(|on| doubt.share_settled(situation, (from, on), before)).sum())
+}

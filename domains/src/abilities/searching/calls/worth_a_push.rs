@@ -1,0 +1,18 @@
+//! `[worth-a-push ?from ?what]`: whether a push from a pose would move an object out of the way of looks that settle what no
+//! look can settle now. One push is planned at a time: what it uncovers says what is worth the next.
+
+use descry_planner::{Answer, Call, CallError};
+
+use crate::abilities::argument;
+use crate::abilities::searching::obstacle;
+use crate::situation::Situation;
+
+pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let from = situation.candidate(argument(call, 0)?)?;
+    let what = situation.obstacle(argument(call, 1)?)?;
+    if situation.planned_push(call).is_some() {
+        return Ok(Answer::Truth(false));
+    }
+    let uncovers = || situation.would_uncover(what);
+    Ok(Answer::Truth(obstacle::push(situation, from, &situation.obstacles()[what]).is_some() && uncovers()))
+}

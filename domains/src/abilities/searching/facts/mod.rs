@@ -1,0 +1,50 @@
+//! What the belief says in the words of a domain: one file per fact, and the list of them.
+
+mod clarity;
+mod completeness;
+mod confidence;
+mod is;
+mod on;
+mod presence;
+
+use crate::abilities::Fact;
+
+/// Every fact.
+pub(super) const ALL: &[Fact] = &[
+    Fact {
+        name: "confidence",
+        types: &["thing"],
+        about: "how sure it is where the thing stands, 0 to 1",
+        states: confidence::state,
+    },
+    Fact {
+        name: "presence",
+        types: &["thing", "surface"],
+        about: "how sure it is that the thing stands on the surface, 0 to 1",
+        states: presence::state,
+    },
+    Fact {
+        name: "on",
+        types: &["thing", "surface"],
+        about: "the thing surely stands on the surface",
+        states: on::state,
+    },
+    Fact {
+        name: "is",
+        types: &["thing", "kind"],
+        about: "the thing is surely of the kind",
+        states: is::state,
+    },
+    Fact {
+        name: "completeness",
+        types: &["kind"],
+        about: "how sure it is that all of the kind are found, 0 to 1",
+        states: completeness::state,
+    },
+    Fact {
+        name: "clarity",
+        types: &["surface"],
+        about: "how sure it is what each object on the surface is, 0 to 1",
+        states: clarity::state,
+    },
+];

@@ -1,0 +1,116 @@
+//! *searching*: poses to look from, looks, what is in doubt and what a look would settle, pushing aside what hides it.
+
+mod calls;
+pub mod candidates;
+pub mod change;
+pub mod doubt;
+mod facts;
+pub mod obstacle;
+pub mod perceive;
+pub mod policies;
+pub mod reasons;
+
+use descry_skills::{Observe, Outcome, PushAside, SkillFailure};
+
+use super::{Ability, SkillWord};
+use crate::mind::Mind;
+use crate::note::Note;
+use crate::situation::Situation;
+use crate::world::WorldError;
+use perceive::Eyes;
+
+/// See the module.
+pub const ABILITY: Ability = Ability {
+    name: "searching",
+    about: "looks for things on surfaces until it is sure, pushes aside what hides them",
+    facts: facts::ALL,
+    calls: calls::ALL,
+    skills: &[
+        SkillWord {
+            name: "observe",
+            types: &["pose", "surface"],
+            about: "turns to the surface, takes a view, believes what all its views show",
+            ground: |s, arguments| {
+                let on = s.surface(arguments[1]).map_err(|e| e.to_string())?;
+                Ok(Box::new(Observe { at: s.surfaces[on].centre() }))
+            },
+            because: |s, arguments| match (s.candidate(arguments[0]), s.surface(arguments[1])) {
+                (Ok(from), Ok(on)) => reasons::hope(s, from, on),
+                _ => String::new(),
+            },
+            learn: seen,
+            failed: |_, _, _, _, _| Ok(None),
+        },
+        SkillWord {
+            name: "push-aside",
+            types: &["pose", "obstacle"],
+            about: "pushes an object aside, so that what is behind it can be seen",
+            ground: |s, arguments| {
+                let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
+                let what = s.obstacle(arguments[1]).map_err(|e| e.to_string())?;
+                let push = obstacle::push(s, from, &s.obstacles()[what]);
+                Ok(Box::new(PushAside { push: push.ok_or("the arm does not reach it")? }))
+            },
+            because: |s, arguments| match s.obstacle(arguments[1]) {
+                Ok(what) => {
+                    let [x, y, z] = s.obstacles()[what].at.into();
+                    format!("no look can settle what is left; it hides it, at ({x:.2}, {y:.2}, {z:.2}) m")
+                }
+                Err(_) => String::new(),
+            },
+            learn: pushed,
+            failed: push_failed,
+        },
+    ],
+};
+
+/// A look ended: record the view, and believe what it shows with the others.
+fn seen(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    _: &Situation,
+    arguments: &[&str],
+    outcome: &Outcome,
+    notes: &mut Vec<Note>,
+) -> Result<String, WorldError> {
+    let Outcome::Seen(sensed) = outcome else { return Err(WorldError::strange(outcome)) };
+    let on = mind.known.surfaces.iter().position(|s| s.symbol == arguments[1]);
+    let on = on.ok_or_else(|| WorldError::Bug(format!("`{}` is no surface", arguments[1])))?;
+    perceive::remember(mind, eyes, on, sensed)?;
+    let here = mind.known.candidates[mind.known.at].symbol.clone();
+    mind.words.set("observed", vec![here, arguments[1].into()], Some(1.0));
+    mind.attend();
+    perceive::perceive(mind, eyes, on, notes)?;
+    Ok(String::new())
+}
+
+fn pushed(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    situation: &Situation,
+    arguments: &[&str],
+    outcome: &Outcome,
+    _: &mut Vec<Note>,
+) -> Result<String, WorldError> {
+    let Outcome::Pushed(pushed) = outcome else { return Err(WorldError::strange(outcome)) };
+    perceive::pushed(mind, eyes, situation, arguments[1], pushed.moved_m)?;
+    Ok(format!("the hand moved {:.2} m with it", pushed.moved_m))
+}
+
+/// A push that failed: something may have moved nevertheless, and pushing that from there again leads to nothing.
+fn push_failed(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    situation: &Situation,
+    arguments: &[&str],
+    failure: &SkillFailure,
+) -> Result<Option<String>, WorldError> {
+    let obstacle = situation.obstacle(arguments[1]).map(|n| situation.obstacles()[n].track);
+    mind.known.stuck.extend(obstacle.ok().map(|track| (track, mind.known.at)));
+    let moved_m = match failure {
+        SkillFailure::Body(descry_robots::Failure::Slipped { moved_m, .. }) => *moved_m,
+        _ => 0.0,
+    };
+    perceive::pushed(mind, eyes, situation, arguments[1], moved_m)?;
+    Ok(Some(format!("{} is not pushed from there again", arguments[1])))
+}

@@ -1,0 +1,398 @@
+//! What happens with a view: recorded, read back with the others of its surface by timestamp, merged, recognised, believed.
+
+use std::sync::Arc;
+
+use descry_memory::belief::{Sighted, Track};
+use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
+use descry_perception::View;
+use descry_perception::locate::locate;
+use descry_perception::merge::{MergeOptions, Merged, merge};
+use descry_perception::nalgebra::{Point3, Unit, Vector3};
+use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
+use descry_perception::segment::{Scene, SceneOptions, segment_on};
+use descry_perception::surface::{Surface, SurfaceOptions, find_surface};
+use descry_perception::visibility::{DepthMap, Seen, Visibility};
+use descry_robots::{Robot, Sensed};
+use serde::Serialize;
+use serde_json::json;
+
+use super::change::Change;
+use crate::lexicon::symbol;
+use crate::mind::{Look, Mind};
+use crate::note::Note;
+use crate::situation::{KnownSurface, Situation};
+use crate::world::WorldError;
+
+/// A side counts as seen if a surface was measured this near to where it should be.
+const SIDE_TOLERANCE_M: f64 = 0.03;
+/// What is sought and was at least so probable is missed when it is gone.
+const PERHAPS: f64 = 0.2;
+/// How far a surface may be from the height at which the map has it.
+const HEIGHT_TOLERANCE_M: f64 = 0.15;
+/// How far beside the outline on the map points of a surface may lie: localisation errs by centimetres and degrees.
+const BESIDE_M: f64 = 0.25;
+/// Points this near to a surface lie on it.
+const ON_SURFACE_M: f64 = 0.012;
+/// How far beyond the hull of a surface points of it are looked for.
+const HULL_MARGIN_M: f64 = 0.02;
+
+/// What perceiving needs besides what is known.
+#[derive(Clone, Copy)]
+pub struct Eyes<'a> {
+    /// Everything that is sensed and believed.
+    pub record: &'a Record,
+    /// Tells which object a segment is.
+    pub recogniser: &'a dyn Recogniser,
+    /// The known objects.
+    pub objects: &'a [ObjectModel],
+    /// The body, which is only asked.
+    pub robot: &'a dyn Robot,
+}
+
+/// Puts a view into the record: its transforms and colours, then its cloud, so that a cloud is never without its place. When
+/// this returns it survives a crash.
+pub fn remember(mind: &mut Mind, eyes: Eyes<'_>, on: usize, sensed: &Sensed) -> Result<(), WorldError> {
+    let record = eyes.record;
+    for t in &sensed.transforms {
+        record.put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
+    }
+    record.sync()?;
+    let frame = &eyes.robot.description().frames.camera;
+    put_colour(record, frame, sensed)?;
+    let eye = sensed.map_from_camera.translation.vector;
+    let sensing = Sensing {
+        intrinsics: Some(sensed.intrinsics),
+        pose_sigma_m: sensed.pose_sigma_m,
+        pose_sigma_rad: sensed.pose_sigma_rad,
+    };
+    let known = &mind.known;
+    let from = &known.candidates[known.at].symbol;
+    let meta = Meta {
+        seen_from_m: Some(eye.into()),
+        covers_m: extent(sensed),
+        body: json!({ "from": from, "on": known.surfaces[on].symbol }),
+        ..Meta::default()
+    };
+    let id = record.put_cloud(sensed.stamp_ns, frame, &sensed.cloud, &sensing, meta)?;
+    let region = &mut mind.regions[on];
+    region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id });
+    region.taken += 1;
+    mind.views += 1;
+    // Every merge reads all views of its surface again.
+    Ok(record.hold(&views(mind), "views")?)
+}
+
+/// Records the colours of a frame, if it has some.
+fn put_colour(record: &Record, frame: &str, sensed: &Sensed) -> Result<(), WorldError> {
+    let Some(colour) = &sensed.colour else { return Ok(()) };
+    let image = Image::Raw {
+        width: colour.image.width(),
+        height: colour.image.height(),
+        encoding: "rgb8",
+        data: colour.image.as_raw(),
+    };
+    let meta = Meta { body: json!({ "registered": colour.registered }), ..Meta::default() };
+    record.put_image(sensed.stamp_ns, frame, image, meta)?;
+    Ok(())
+}
+
+/// The records of all views that still hold.
+fn views(mind: &Mind) -> Vec<RecordId> {
+    mind.regions.iter().flat_map(|r| &r.looks).map(|look| look.record).collect()
+}
+
+/// The multi-view perception of paper 004, section V, on one surface: restore its views by their timestamps, merge, recognise,
+/// believe.
+pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
+    let views = restore(mind, eyes, on)?;
+    let (merging, seeking) = options(eyes.robot, Some(&mind.known.surfaces[on].symbol));
+    let seen = merge(&views, &merging).map_err(|nothing| nothing.to_string()).and_then(|merged| {
+        let near = near(&merged, &mind.known.surfaces[on]);
+        let surface = find_surface(&near, &merged.visibility, &seeking.surface);
+        surface.map(|surface| (merged, surface)).map_err(|nothing| nothing.to_string())
+    });
+    let (merged, surface) = match seen {
+        Ok(seen) => seen,
+        Err(because) => {
+            mind.regions[on].nothing = Some(because.clone());
+            notes.push(Note::Nothing { because });
+            return Ok(());
+        }
+    };
+    mind.regions[on].nothing = None;
+    let (merged, surface) = lay_on_map(eyes.robot, &mind.known.surfaces[on], merged, surface);
+    let newest = newest(&views, &merged);
+    if let Some(map) = &newest {
+        Arc::make_mut(&mut mind.known.spaces[on]).integrate(map);
+    }
+    let scene = segment_on(&merged.cloud, &merged.visibility, surface, &seeking);
+    let percepts = eyes.recogniser.recognise(&scene, &merged.visibility, eyes.objects);
+    note_surface(&mut mind.known.surfaces[on], &scene);
+    let gone_before = mind.known.belief.gone.len();
+    notes.push(believe(mind, eyes, on, &merged, &percepts)?);
+    match newest.and_then(|newest| taken_away(mind, on, gone_before, &newest)) {
+        Some(because) => {
+            notes.push(Note::Changed { because });
+            begin_again(mind, on);
+            perceive(mind, eyes, on, notes)
+        }
+        None => Ok(()),
+    }
+}
+
+/// The part of a merged cloud where the surface can be, as the map has it; all of it where the map has none.
+fn near(merged: &Merged, surface: &KnownSurface) -> descry_perception::Cloud {
+    if !surface.whole {
+        return merged.cloud.clone();
+    }
+    merged.cloud.filter(|p| surface.covers(&p.cast(), BESIDE_M))
+}
+
+/// What was sought and believed to stand where the newest view looks through: somebody has moved it. In words; none if nothing.
+fn taken_away(mind: &Mind, on: usize, gone_before: usize, newest: &DepthMap) -> Option<String> {
+    let known = &mind.known;
+    let up = known.surfaces[on].up;
+    mind.known.belief.gone[gone_before..].iter().find_map(|track| {
+        let (p, name) = known
+            .things
+            .iter()
+            .chain(&known.kinds)
+            .map(|thing| (track.probability_of(&thing.name), &thing.name))
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let [x, y, z] = track.position_m.into();
+        (p > PERHAPS && looked_through(track, &up, newest))
+            .then(|| format!("{name} ({p:.2}) stood at ({x:.2}, {y:.2}, {z:.2}) m and is gone"))
+    })
+}
+
+/// Things on a surface were moved while nobody looked: only its newest view still holds, and looks at it may be taken again.
+fn begin_again(mind: &mut Mind, on: usize) {
+    let region = &mut mind.regions[on];
+    let last = region.looks.len().saturating_sub(1);
+    region.looks.drain(..last);
+    mind.known.spaces[on] = Arc::default();
+    let surface = mind.known.surfaces[on].symbol.clone();
+    mind.forget_looks(Some(&surface));
+    let here = mind.known.candidates[mind.known.at].symbol.clone();
+    mind.words.set("observed", vec![here, surface], Some(1.0));
+    mind.attend();
+}
+
+/// Lays the surface on the outline that the map has of it: that mends what is left of localisation's error.
+fn lay_on_map(
+    robot: &dyn Robot,
+    known: &KnownSurface,
+    merged: Merged,
+    surface: Surface,
+) -> (Merged, Surface) {
+    if !known.whole {
+        return (merged, surface);
+    }
+    let body = robot.description();
+    let outline = surface.outline();
+    let on_it =
+        |p: &Point3<f64>| surface.height_m(p).abs() < ON_SURFACE_M && outline.covers(p, HULL_MARGIN_M);
+    let points: Vec<Point3<f64>> = merged.cloud.points.iter().map(|p| p.cast()).filter(on_it).collect();
+    let (sigma_m, sigma_rad) = (body.pose_sigma_m, body.pose_sigma_rad);
+    let is_past = |p: &Point3<f64>| merged.visibility.looked_past(p, ON_SURFACE_M);
+    let located = locate(&points, &surface.up, &known.outline, sigma_m, sigma_rad, is_past);
+    (merged.moved(&located.map_from_world), surface.moved(&located.map_from_world))
+}
+
+/// Reads the views of a surface back from the record by their timestamps, with the transforms of those times. What a view shows
+/// of a place where something has moved since is left out.
+fn restore(mind: &Mind, eyes: Eyes<'_>, on: usize) -> Result<Vec<View>, WorldError> {
+    let map = &eyes.robot.description().frames.map;
+    let region = &mind.regions[on];
+    let restored = |look: &Look| -> Result<View, WorldError> {
+        let mut view = eyes.record.view_at(look.stamp_ns, map)?;
+        let since = region.changes.iter().filter(|c| c.stamp_ns >= look.stamp_ns);
+        since.for_each(|change| change.blank(&mut view));
+        Ok(view)
+    };
+    region.looks.iter().map(restored).collect()
+}
+
+/// Something on a surface was moved: what was seen in the cylinder around it holds no longer, and looks may be taken again.
+pub fn something_moved(
+    mind: &mut Mind,
+    record: &Record,
+    on: usize,
+    change: Change,
+) -> Result<(), WorldError> {
+    let space = Arc::make_mut(&mut mind.known.spaces[on]);
+    space.forget(&change.foot, &change.up, change.radius_m, change.height_m);
+    put(record, "change", change.stamp_ns, &change)?;
+    mind.regions[on].changes.push(change);
+    let surface = mind.known.surfaces[on].symbol.clone();
+    mind.forget_looks(Some(&surface));
+    Ok(())
+}
+
+/// A push ended that moved an obstacle by so much, if at all.
+pub fn pushed(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    situation: &Situation,
+    what: &str,
+    moved_m: f64,
+) -> Result<(), WorldError> {
+    mind.pushes += 1;
+    let obstacle = situation.obstacle(what).map_err(|e| WorldError::Bug(e.to_string()))?;
+    let obstacle = &situation.obstacles()[obstacle];
+    if moved_m < mind.known.spaces[obstacle.on].voxel_m() {
+        return Ok(());
+    }
+    let (foot, (radius_m, height_m)) = (obstacle.at, obstacle.reach_of_push(moved_m));
+    let change = Change { stamp_ns: eyes.robot.now_ns(), foot, up: obstacle.up, radius_m, height_m };
+    something_moved(mind, eyes.record, obstacle.on, change)
+}
+
+/// What the surface turned out to be: its height and tilt, and where the map knows none its outline.
+fn note_surface(known: &mut KnownSurface, scene: &Scene) {
+    let seen = &scene.surface;
+    known.up = seen.up.into_inner();
+    if known.whole {
+        let onto_plane = |p: &Point3<f64>| p - seen.up.into_inner() * seen.height_m(p);
+        known.outline = known.outline.iter().map(onto_plane).collect();
+    } else {
+        known.outline.clone_from(&seen.hull);
+    }
+}
+
+fn believe(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    on: usize,
+    merged: &Merged,
+    percepts: &[Percept],
+) -> Result<Note, WorldError> {
+    let before = confidences(mind);
+    let stamp_ns = eyes.robot.now_ns();
+    let surface = mind.known.surfaces[on].clone();
+    let viewpoints: Vec<Vec<Point3<f64>>> =
+        percepts.iter().map(|p| seen_from(p, &surface.up, &merged.visibility)).collect();
+    let sighted: Vec<Sighted<'_>> =
+        percepts.iter().zip(&viewpoints).map(|(percept, v)| Sighted { percept, viewpoints_m: v }).collect();
+    let cites: Vec<RecordId> = mind.regions[on].looks.iter().map(|look| look.record).collect();
+    Arc::make_mut(&mut mind.known.belief).update(&surface.symbol, &sighted, stamp_ns, &cites);
+    let after = confidences(mind);
+    let changed = mind.known.things.iter().zip(before.iter().zip(&after));
+    let changed =
+        changed.map(|(thing, (b, a))| format!("confidence in {}: {b:.2} -> {a:.2}", thing.name)).collect();
+    let used: Vec<_> = merged.fits.iter().filter(|fit| fit.used).collect();
+    let left_out = merged.fits.iter().zip(1..).filter(|(fit, _)| !fit.used);
+    let note = Note::Perceived {
+        on: surface.name,
+        merged: used.len(),
+        left_out: left_out.map(|(fit, n)| format!("view {n} left out: {}", fit.why)).collect(),
+        points: merged.cloud.points.len(),
+        residual_m: used.iter().map(|fit| fit.residual_m).fold(0.0, f64::max),
+        objects: percepts.iter().map(in_a_line).collect(),
+        changed,
+    };
+    let seen = serde_json::to_value(percepts).map_err(|e| WorldError::Bug(e.to_string()))?;
+    let seen = json!({ "on": surface.symbol, "percepts": seen, "fits": merged.fits, "steps": merged.steps });
+    let meta = Meta { objects: sightings(percepts), body: seen, ..Meta::default() };
+    let percepts = eyes.record.put(Draft { meta, ..Draft::new("percepts", stamp_ns) })?;
+    let belief = put(eyes.record, "belief", stamp_ns, &*mind.known.belief)?;
+    // What the belief rests on outlasts any limit of the record.
+    let held: Vec<RecordId> = views(mind).into_iter().chain([percepts, belief]).collect();
+    eyes.record.hold(&held, "belief")?;
+    Ok(note)
+}
+
+/// Records a document.
+pub(crate) fn put(
+    record: &Record,
+    kind: &str,
+    stamp_ns: i64,
+    body: &impl Serialize,
+) -> Result<RecordId, WorldError> {
+    let body = serde_json::to_value(body).map_err(|e| WorldError::Bug(e.to_string()))?;
+    let meta = Meta { body, ..Meta::default() };
+    Ok(record.put(Draft { meta, ..Draft::new(kind, stamp_ns) })?)
+}
+
+fn confidences(mind: &Mind) -> Vec<f64> {
+    let (tracks, surfaces) = (&mind.known.belief.tracks, &mind.known.surfaces);
+    let best = |thing: &crate::situation::Thing| {
+        tracks.iter().map(|t| thing.probability(t, surfaces)).fold(0.0, f64::max)
+    };
+    mind.known.things.iter().map(best).collect()
+}
+
+/// A percept in a line.
+pub fn in_a_line(p: &Percept) -> String {
+    let name = p.label.as_deref().unwrap_or("unknown");
+    let probability = p.label.as_deref().map_or(p.unknown, |label| p.probability_of(label));
+    let (at, [w, d, h]) = (p.position_m, p.size_m.map(|m| m * 100.0));
+    let seen = p.seen_fraction * 100.0;
+    format!(
+        "{name:16} {probability:.2}  at ({:.2}, {:.2}, {:.2}) m, {w:.0} x {d:.0} x {h:.0} cm, {seen:.0} % seen",
+        at.x, at.y, at.z
+    )
+}
+
+/// What the newest view measured, from where it was placed; none if it could not be aligned.
+fn newest(views: &[View], merged: &Merged) -> Option<DepthMap> {
+    let (fit, view) = merged.fits.last().filter(|fit| fit.used).zip(views.last())?;
+    DepthMap::from_view(view, &fit.world_from_camera)
+}
+
+/// Whether a camera saw through the middle of an object's place, low and high.
+fn looked_through(track: &Track, up: &Vector3<f64>, map: &DepthMap) -> bool {
+    let free = |share: f64| {
+        let place = track.position_m + up * (track.size_m[2] * share);
+        map.look(&place, SIDE_TOLERANCE_M) == Seen::Free
+    };
+    [0.3, 0.5, 0.7].into_iter().all(free)
+}
+
+/// How a body's views of a surface (a symbol; none: of any) are merged and looked through. It is looked for where the map has it,
+/// if it has it; what can stand on it, and it itself, is merged; without any map, all that is in range.
+pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptions) {
+    let up = robot.description().up.map(Unit::new_normalize);
+    let asked = robot.surfaces().iter().filter(|hint| on.is_none_or(|on| symbol(&hint.name) == on));
+    let band = asked.map(|hint| hint.height_m).fold(None, |band: Option<(f64, f64)>, h| {
+        let (low, high) = band.unwrap_or((h, h));
+        Some((low.min(h), high.max(h)))
+    });
+    let height_band_m = band.map(|(low, high)| (low - HEIGHT_TOLERANCE_M, high + HEIGHT_TOLERANCE_M));
+    let surface = SurfaceOptions { up, height_band_m, ..SurfaceOptions::default() };
+    let scene = SceneOptions { surface, ..SceneOptions::default() };
+    let height_band_m = height_band_m.map(|(low, high)| (low, high + scene.tallest_m));
+    (MergeOptions { up, height_band_m, ..MergeOptions::default() }, scene)
+}
+
+/// The part of the map that a frame shows; none if nothing returned.
+fn extent(sensed: &Sensed) -> Option<Bounds> {
+    let points =
+        sensed.cloud.points.iter().map(|p| p.cast::<f64>()).filter(|p| p.iter().all(|x| x.is_finite()));
+    points.map(|p| sensed.map_from_camera * p).fold(None, |bounds: Option<Bounds>, p| {
+        let at: [f64; 3] = p.coords.into();
+        let bounds = bounds.unwrap_or(Bounds { min_m: at, max_m: at });
+        let with = |side: [f64; 3], of: fn(f64, f64) -> f64| std::array::from_fn(|i| of(side[i], at[i]));
+        Some(Bounds { min_m: with(bounds.min_m, f64::min), max_m: with(bounds.max_m, f64::max) })
+    })
+}
+
+/// By which names percepts are found again: what each may be, and how sure that is.
+fn sightings(percepts: &[Percept]) -> Vec<Sighting> {
+    let of = |p: &Percept| p.label.clone().map(|label| (p.probability_of(&label), label));
+    let named = percepts.iter().filter_map(of);
+    named.map(|(p, object)| Sighting { object, confidence: p.clamp(0.0, 1.0) }).collect()
+}
+
+/// The cameras that saw an object: those that measured the side of its body which faces them.
+fn seen_from(p: &Percept, up: &Vector3<f64>, visibility: &Visibility) -> Vec<Point3<f64>> {
+    let middle = p.position_m + up * (p.size_m[2] / 2.0);
+    let radius = p.size_m[0].min(p.size_m[1]) / 2.0;
+    let sees = |map: &&DepthMap| {
+        let towards = map.viewpoint() - middle;
+        let aside = towards - up * towards.dot(up);
+        let side = middle + aside.try_normalize(1e-9).unwrap_or(*up) * radius;
+        map.look(&side, SIDE_TOLERANCE_M) == Seen::Surface
+    };
+    visibility.maps.iter().filter(sees).map(DepthMap::viewpoint).collect()
+}

@@ -1,0 +1,204 @@
+//! Ways to choose where to look next: one file each behind one interface, and the list of them.
+//!
+//! `plan`, the way that descry goes by default, is not among them: it is the planner, which weighs gain against cost over
+//! several looks. The others choose one look after another; they are what it is measured against. All act on the same belief
+//! and declare by the same thresholds. All but the sweep stop when no look would settle anything that is worth a look.
+
+mod gain_per_second;
+mod most_unknown;
+mod nearest;
+mod oracle;
+mod random;
+mod rear_side;
+mod sweep;
+mod unseen;
+
+use crate::abilities::searching::doubt::Taken;
+use crate::abilities::searching::reasons::LOOK_S;
+use crate::situation::Situation;
+use descry_robots::Place;
+
+/// The planner's name among the policies.
+pub const PLAN: &str = "plan";
+
+/// A look that could be taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// The candidate to look from.
+    pub from: usize,
+    /// The surface to look at.
+    pub on: usize,
+    /// Seconds of driving until then.
+    pub travel_s: f64,
+    /// The share of what is in doubt that it is expected to settle, 0 to 1.
+    pub gain: f64,
+}
+
+/// A way to choose where to look next.
+pub trait Policy: Send {
+    /// The next of the looks (there is at least one), or none to give up. Looks that have been taken, that cannot be reached
+    /// or that do not show the surface are not offered; of the others those that promise nothing only if
+    /// [`Policy::looks_at_all`].
+    fn choose(&mut self, situation: &Situation, looks: &[Look]) -> Option<Look>;
+
+    /// Whether it takes looks that promise nothing, too.
+    fn looks_at_all(&self) -> bool {
+        false
+    }
+}
+
+/// What a look from a place would truly show of what is sought, 0 to 1. Only experiments in simulation have it.
+pub type Foresight = Box<dyn Fn(&Place) -> f64 + Send>;
+
+/// Who chooses in a run.
+pub struct Chooser {
+    /// Who it is.
+    pub by: By,
+    /// Whether the first look is nobody's choice: it is taken from where the body stands.
+    pub first_look_here: bool,
+}
+
+/// Who chooses where to look next.
+pub enum By {
+    /// The planner.
+    Planner,
+    /// A policy.
+    Policy(Box<dyn Policy>),
+}
+
+impl From<By> for Chooser {
+    fn from(by: By) -> Self {
+        Self { by, first_look_here: false }
+    }
+}
+
+/// Makes a policy for a run: the seed of the run, and foresight where there is any.
+type Make = fn(u64, Option<Foresight>) -> Option<Box<dyn Policy>>;
+
+/// Every policy by its name.
+const ALL: [(&str, Make); 7] = [
+    ("sweep", |_, _| Some(Box::new(sweep::Sweep))),
+    ("nearest", |_, _| Some(Box::new(nearest::Nearest))),
+    ("random", |seed, _| Some(Box::new(random::Random::new(seed)))),
+    ("most-unknown", |_, _| Some(Box::new(most_unknown::MostUnknown))),
+    ("rear-side", |_, _| Some(Box::new(rear_side::RearSide))),
+    ("gain-per-second", |_, _| Some(Box::new(gain_per_second::GainPerSecond))),
+    ("oracle", |_, foresight| Some(Box::new(oracle::Oracle::new(foresight?)))),
+];
+
+/// Why there is no such policy.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum PolicyError {
+    /// No policy has that name.
+    #[error("no policy is called \"{name}\"\n  expected one of: {known}")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
+    /// It needs to know in advance what looks show, as only experiments can.
+    #[error(
+        "the policy \"{name}\" knows in advance what each look shows and is for experiments in simulation only\n  take another, such as plan"
+    )]
+    NeedsForesight {
+        /// What was asked for.
+        name: String,
+    },
+}
+
+/// The names of all policies, the planner's first.
+pub fn names() -> Vec<&'static str> {
+    std::iter::once(PLAN).chain(ALL.iter().map(|(name, _)| *name)).collect()
+}
+
+/// The policy of a name.
+///
+/// # Errors
+/// [`PolicyError`] says what there is.
+pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Chooser, PolicyError> {
+    if name == PLAN {
+        return Ok(By::Planner.into());
+    }
+    let Some((_, make)) = ALL.iter().find(|(known, _)| *known == name) else {
+        return Err(PolicyError::Unknown { name: name.into(), known: names().join(", ") });
+    };
+    make(seed, foresight)
+        .map(|policy| By::Policy(policy).into())
+        .ok_or_else(|| PolicyError::NeedsForesight { name: name.into() })
+}
+
+/// The next look of a policy; none if it gives up.
+pub fn next(policy: &mut dyn Policy, situation: &Situation) -> Option<Look> {
+    let all = policy.looks_at_all();
+    let looks: Vec<Look> = open(situation).into_iter().filter(|look| all || look.gain > 0.0).collect();
+    if looks.is_empty() { None } else { policy.choose(situation, &looks) }
+}
+
+/// The look from where the body stands that is expected to settle most; none if it can take none there.
+pub fn here(situation: &Situation) -> Option<Look> {
+    let looks: Vec<Look> = open(situation).into_iter().filter(|look| look.from == situation.at).collect();
+    best(&looks, |look| look.gain)
+}
+
+/// Every look that can be taken and has not been, in the order of the candidates.
+fn open(situation: &Situation) -> Vec<Look> {
+    let reachable = |from: usize| from == situation.at || !situation.out_of_reach.contains(&from);
+    let looks = (0..situation.candidates.len())
+        .flat_map(|from| (0..situation.surfaces.len()).map(move |on| (from, on)));
+    looks
+        .filter(|look| reachable(look.0) && !situation.observed.contains(look))
+        .filter_map(|(from, on)| {
+            let travel_s = if from == situation.at { 0.0 } else { situation.travel_s(situation.at, from) };
+            let can = travel_s.is_finite() && situation.sees(from, on);
+            can.then(|| Look { from, on, travel_s, gain: gain(situation, from, on) })
+        })
+        .collect()
+}
+
+/// The share of what the goal leaves in doubt that a look would settle.
+fn gain(situation: &Situation, from: usize, on: usize) -> f64 {
+    let doubts = situation.doubts();
+    let shares = doubts.iter().map(|doubt| doubt.share_settled(situation, (from, on), Taken::default()));
+    shares.sum::<f64>() / doubts.len() as f64
+}
+
+/// The look of the greatest value; among equals the nearest, then the first.
+fn best(looks: &[Look], value: impl Fn(&Look) -> f64) -> Option<Look> {
+    let valued = looks.iter().map(|look| (value(look), look));
+    let better = |a: &(f64, &Look), b: &(f64, &Look)| {
+        a.0.total_cmp(&b.0)
+            .then(b.1.travel_s.total_cmp(&a.1.travel_s))
+            .then(b.1.from.cmp(&a.1.from))
+            .then(b.1.on.cmp(&a.1.on))
+    };
+    valued.max_by(better).map(|(_, look)| *look)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_errors() {
+        for name in names() {
+            let made = named(name, 1, Some(Box::new(|_| 0.0)));
+            assert!(made.is_ok(), "{name}");
+        }
+        let error = |name: &str| named(name, 1, None).err().map(|e| e.to_string()).unwrap_or_default();
+        assert_eq!(
+            error("best"),
+            "no policy is called \"best\"\n  expected one of: plan, sweep, nearest, random, most-unknown, rear-side, gain-per-second, oracle"
+        );
+        assert!(error("oracle").contains("experiments"), "{}", error("oracle"));
+    }
+
+    #[test]
+    fn ties_go_to_the_nearest_then_the_first() {
+        let look = |from, travel_s, gain| Look { from, on: 0, travel_s, gain };
+        let looks = [look(0, 5.0, 0.4), look(1, 3.0, 0.4), look(2, 3.0, 0.4), look(3, 1.0, 0.2)];
+        assert_eq!(best(&looks, |l| l.gain).map(|l| l.from), Some(1));
+        assert_eq!(best(&looks, |_| 0.0).map(|l| l.from), Some(3));
+        assert_eq!(best(&[], |_| 0.0), None);
+    }
+}

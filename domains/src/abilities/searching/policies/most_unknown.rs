@@ -1,0 +1,13 @@
+//! `most-unknown`: the look that shows most of the space above the surface that no view has shown.
+
+use crate::situation::Situation;
+
+use super::{Look, Policy, best, unseen};
+
+pub(super) struct MostUnknown;
+
+impl Policy for MostUnknown {
+    fn choose(&mut self, situation: &Situation, looks: &[Look]) -> Option<Look> {
+        best(looks, |look| unseen::visible(situation, look, |_| true))
+    }
+}

@@ -1,0 +1,13 @@
+//! `nearest`: from the nearest pose that has not been looked from.
+
+use crate::situation::Situation;
+
+use super::{Look, Policy, best};
+
+pub(super) struct Nearest;
+
+impl Policy for Nearest {
+    fn choose(&mut self, _: &Situation, looks: &[Look]) -> Option<Look> {
+        best(looks, |look| -look.travel_s)
+    }
+}

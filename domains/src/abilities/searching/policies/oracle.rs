@@ -1,0 +1,27 @@
+//! `oracle`: knows what each look would truly show of what is sought. It looks from where most of it can be seen; what is not
+//! there or has been seen from there it must still make sure of, by the look that settles most. For experiments only.
+
+use crate::situation::Situation;
+
+use super::{Foresight, Look, Policy, best};
+
+pub(super) struct Oracle {
+    foresight: Foresight,
+}
+
+impl Oracle {
+    pub(super) fn new(foresight: Foresight) -> Self {
+        Self { foresight }
+    }
+}
+
+impl Policy for Oracle {
+    fn choose(&mut self, situation: &Situation, looks: &[Look]) -> Option<Look> {
+        let shown = |look: &Look| (self.foresight)(&situation.candidates[look.from].place);
+        let gain = best(looks, |look| look.gain);
+        match best(looks, shown) {
+            Some(look) if shown(&look) > 0.0 => Some(look),
+            _ => gain,
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! The space above a surface that no view has shown, as points on a grid.
+
+use crate::situation::{KnownSurface, Situation};
+use descry_memory::space::Cell;
+use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
+
+use super::Look;
+
+/// Distance of the points.
+const GRID_M: f64 = 0.05;
+/// Height up to which space counts: that of the tallest of the published objects.
+const HEIGHT_M: f64 = 0.28;
+
+/// How many unseen points of a kind a look would show, as far as is known of what stands in the way. While nothing is known
+/// of the surface all looks are the same.
+pub(super) fn visible(situation: &Situation, look: &Look, counts: impl Fn(&Point3<f64>) -> bool) -> f64 {
+    let Some(map_from_camera) = situation.camera(look.from, look.on) else { return 0.0 };
+    let eye = Point3::from(map_from_camera.translation.vector);
+    let shown = |p: &Point3<f64>| {
+        situation.spaces[look.on].cell(p) == Cell::Unseen
+            && counts(p)
+            && in_view(situation, &map_from_camera, p)
+            && situation.spaces[look.on].line_of_sight(&eye, p, &|_| false)
+    };
+    above(&situation.surfaces[look.on]).iter().filter(|p| shown(p)).count() as f64
+}
+
+fn in_view(situation: &Situation, map_from_camera: &Isometry3<f64>, point: &Point3<f64>) -> bool {
+    let body = situation.robot.description();
+    let (c, p) = (&body.camera, map_from_camera.inverse_transform_point(point));
+    let (u, v) = (c.fx * p.x / p.z + c.cx, c.fy * p.y / p.z + c.cy);
+    let near = p.z > 0.0 && p.z >= body.range_m.0 && p.z <= body.range_m.1;
+    near && u >= 0.0 && v >= 0.0 && u < c.width as f64 && v < c.height as f64
+}
+
+/// The grid above a surface's outline.
+fn above(surface: &KnownSurface) -> Vec<Point3<f64>> {
+    let Some(centre) = surface.centre() else { return Vec::new() };
+    let helper = if surface.up.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    let e1 = surface.up.cross(&helper).normalize();
+    let e2 = surface.up.cross(&e1);
+    let reach_m = surface.outline.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+    let (steps, levels) = ((reach_m / GRID_M).ceil() as i64, (HEIGHT_M / GRID_M).ceil() as i64);
+    let mut points = Vec::new();
+    for i in -steps..=steps {
+        for j in -steps..=steps {
+            let foot = centre + (e1 * i as f64 + e2 * j as f64) * GRID_M;
+            if covers(surface, &foot) {
+                points.extend((0..levels).map(|l| foot + surface.up * (GRID_M * (l as f64 + 0.5))));
+            }
+        }
+    }
+    points
+}
+
+fn covers(surface: &KnownSurface, point: &Point3<f64>) -> bool {
+    let n = surface.outline.len();
+    let inside = |i: usize| {
+        let (a, b) = (surface.outline[i], surface.outline[(i + 1) % n]);
+        surface.up.cross(&(b - a)).dot(&(point - a)) >= 0.0
+    };
+    n >= 3 && (0..n).all(inside)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_grid_fills_the_space_above_the_outline() {
+        let outline =
+            [(0.0, 0.0), (0.4, 0.0), (0.4, 0.2), (0.0, 0.2)].map(|(x, y)| Point3::new(x, y, 0.7)).to_vec();
+        let surface = KnownSurface { symbol: "table".into(), outline, up: Vector3::z(), whole: true };
+        let points = above(&surface);
+        assert_eq!(points.len(), 9 * 5 * 6);
+        assert!(points.iter().all(|p| p.z > 0.7 && p.z < 1.0 && p.x > -0.01 && p.x < 0.41));
+        assert_eq!(above(&KnownSurface { outline: vec![], ..surface }), vec![]);
+    }
+}

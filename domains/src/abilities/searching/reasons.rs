@@ -1,0 +1,133 @@
+//! Why looks are taken, which one settles most, and what is left in doubt, in words.
+
+use descry_memory::belief::Track;
+use descry_perception::nalgebra::{self, Point3, Vector3};
+use descry_planner::{Plan, Step};
+
+use super::doubt::{Doubt, Taken};
+use crate::situation::{KnownSurface, Situation};
+
+/// What a look takes, as in the domain.
+pub(super) const LOOK_S: f64 = 2.0;
+
+/// The single look that settles most a second; none if no look settles anything.
+pub fn one_look(s: &Situation) -> Option<Plan> {
+    let looks = (0..s.candidates.len()).flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));
+    let open =
+        looks.filter(|look| !s.observed.contains(look) && s.can_drive_to(look.0) && s.sees(look.0, look.1));
+    let rate = |&look: &(usize, usize)| {
+        let share: f64 = s.doubts().iter().map(|d| d.share_settled(s, look, Taken::default())).sum();
+        share / (s.travel_s(s.at, look.0) + LOOK_S)
+    };
+    let (from, on) = open.filter(|look| rate(look) > 0.0).max_by(|a, b| rate(a).total_cmp(&rate(b)))?;
+    Some(look(s, from, on))
+}
+
+/// A look as a plan in the words of *searching*: a drive if one is needed, then the look.
+pub fn look(s: &Situation, from: usize, on: usize) -> Plan {
+    let symbol = |n: usize| s.candidates[n].symbol.clone();
+    let step = |start_s: f64, action: &str, arguments: Vec<String>, duration_s: f64| Step {
+        start_s: Some(start_s),
+        action: action.into(),
+        arguments,
+        duration_s,
+    };
+    let drive_s = if from == s.at { 0.0 } else { s.travel_s(s.at, from) };
+    let mut steps = Vec::new();
+    if from != s.at {
+        steps.push(step(0.0, "move", vec![symbol(s.at), symbol(from)], drive_s));
+    }
+    steps.push(step(drive_s, "observe", vec![symbol(from), s.surfaces[on].symbol.clone()], LOOK_S));
+    Plan { steps, ..Plan::default() }
+}
+
+/// What a look is expected to settle.
+pub(super) fn hope(s: &Situation, from: usize, on: usize) -> String {
+    let things = s.things.iter().filter(|t| t.track.is_none()).chain(&s.kinds).map(|t| t.name.as_str());
+    let surfaces = s.asked.iter().map(|&on| s.surfaces[on].name.as_str());
+    let mut names: Vec<&str> = things.chain(surfaces).collect();
+    if names.is_empty() {
+        names = s.surfaces.iter().map(|on| on.name.as_str()).collect();
+    }
+    let doubts = names.into_iter().zip(s.doubts());
+    let said = |(name, doubt): (&str, &Doubt)| {
+        if doubt.anywhere {
+            return format!("nothing is known yet of where {name} could be");
+        }
+        let share = doubt.share_settled(s, (from, on), Taken::default()) * 100.0;
+        format!("shows {share:.0} % of where {name} is in doubt ({:.2} left)", doubt.remaining())
+    };
+    doubts.map(said).collect::<Vec<_>>().join(", ")
+}
+
+/// What keeps one from saying that a thing is not there; none if nothing does.
+pub fn left_about(s: &Situation, what: usize) -> Option<String> {
+    if let Some(late) = out_of_time(s) {
+        return Some(late);
+    }
+    let thing = &s.things[what];
+    let p = |t: &Track| thing.probability(t, &s.surfaces);
+    let best = s.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b)));
+    if let Some(track) = best.filter(|t| p(t) > 1.0 - s.thresholds.confidence) {
+        return Some(format!("what stands at {} may be it ({:.2})", place(&track.position_m), p(track)));
+    }
+    let doubt = s.doubt_about(what);
+    out_of_sight(s, doubt, "it").or_else(|| {
+        let (left, t) = (doubt.hidden, &s.thresholds);
+        (left > t.remaining + t.out_of_sight).then(|| {
+            format!("there is room for it where looks promised to settle that, and did not ({left:.2})")
+        })
+    })
+}
+
+/// What keeps one from saying what everything is; none if nothing is known that does.
+pub fn left_in_all(s: &Situation) -> Option<String> {
+    if let Some(late) = out_of_time(s) {
+        return Some(late);
+    }
+    let asked = |t: &&Track| s.surface_of(t).is_some_and(|on| s.asked.is_empty() || s.asked.contains(&on));
+    let unsure = |t: &&Track| t.certainty() < s.thresholds.confidence;
+    let places: Vec<String> =
+        s.belief.tracks.iter().filter(asked).filter(unsure).map(|t| place(&t.position_m)).collect();
+    if !places.is_empty() {
+        return Some(format!("what stands at {} looks the same from every side", places.join(" and at ")));
+    }
+    s.doubts().into_iter().find_map(|doubt| out_of_sight(s, doubt, "more"))
+}
+
+fn out_of_time(s: &Situation) -> Option<String> {
+    (s.time_left_s.is_some() && s.doubts().iter().any(|doubt| doubt.can_be_settled(s)))
+        .then(|| "there is no time left for the looks that would settle it".into())
+}
+
+/// What was seen of where a thing could be: which share of which surfaces, and how much is left.
+pub fn seen_of(s: &Situation, doubt: &Doubt, looks: impl Fn(usize) -> usize) -> String {
+    let of = |on: usize, surface: &KnownSurface| -> Option<String> {
+        let share = doubt.share_seen(on)?;
+        let places = looks(on);
+        let (percent, word) = ((share * 100.0).floor(), if places == 1 { "place" } else { "places" });
+        Some(match places {
+            0 => format!("the {} was not looked at", surface.name),
+            _ => format!("{percent:.0} % of the {} was seen from {places} {word}", surface.name),
+        })
+    };
+    let parts: Vec<String> = s.surfaces.iter().enumerate().filter_map(|(on, k)| of(on, k)).collect();
+    format!("{}; {:.3} is left", parts.join(", "), doubt.hidden)
+}
+
+/// Where there is room for something that no look can show; none if too little hangs on it.
+fn out_of_sight(s: &Situation, doubt: &Doubt, what: &str) -> Option<String> {
+    let (hidden, places) = doubt.out_of_sight(s);
+    let middle =
+        Point3::from(places.iter().map(|p| p.coords).sum::<Vector3<f64>>() / places.len().max(1) as f64);
+    let first = places
+        .iter()
+        .min_by(|a, b| nalgebra::distance(a, &middle).total_cmp(&nalgebra::distance(b, &middle)))?;
+    (hidden > s.thresholds.out_of_sight)
+        .then(|| format!("there is room for {what} out of sight, near {} ({hidden:.2})", place(first)))
+}
+
+/// A place in words.
+pub fn place(p: &Point3<f64>) -> String {
+    format!("({:.2}, {:.2}) m", p.x, p.y)
+}

@@ -1,0 +1,149 @@
+//! What the actions of a domain are for the body: skills with their arguments, limits, checks, what failures teach.
+
+use std::sync::Arc;
+
+use descry_planner::{Answer, Attachment, CallError, Read, Step};
+use descry_skills::{Call, Outcome, Skill, SkillFailure};
+use serde_json::{Value, json};
+
+use crate::abilities::{self, Meaning, SkillWord};
+use crate::config::ActionConfig;
+use crate::load::Domain;
+use crate::situation::Situation;
+
+/// A call that was carried out whole, as it stood in the plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Carried {
+    /// The call.
+    pub call: Call,
+    /// The plan's step; times count from when the first of those that were carried out together began.
+    pub step: Step,
+}
+
+/// A skill with its arguments by name.
+pub(crate) struct Grounded {
+    /// What it is.
+    pub word: &'static SkillWord,
+    arguments: Vec<String>,
+}
+
+impl Grounded {
+    /// The names of its arguments.
+    pub fn arguments(&self) -> Vec<&str> {
+        self.arguments.iter().map(String::as_str).collect()
+    }
+
+    /// Why it is done now.
+    pub fn because(&self, situation: &Situation) -> String {
+        (self.word.because)(situation, &self.arguments())
+    }
+
+    /// What it is for the body now.
+    pub fn skill(&self, situation: &Situation) -> Result<Box<dyn Skill>, SkillFailure> {
+        (self.word.ground)(situation, &self.arguments())
+            .map_err(|because| SkillFailure::Meaningless { because })
+    }
+}
+
+/// How an action is carried out; by the skill of its name where nothing is said.
+pub(crate) fn config(domain: &Domain, call: &Call) -> ActionConfig {
+    domain.config.action.get(&call.action).cloned().unwrap_or_default()
+}
+
+/// Time for each part of a call.
+pub(crate) fn limit_s(domain: &Domain, call: &Call) -> f64 {
+    config(domain, call).limit_s()
+}
+
+/// What must hold after a call.
+pub(crate) fn check(domain: &Domain, call: &Call) -> Option<String> {
+    config(domain, call).check.map(|text| substitute(domain, call, &text, None))
+}
+
+/// Why a call is made, where the domain says so.
+pub(crate) fn because(domain: &Domain, call: &Call) -> Option<String> {
+    config(domain, call).because.map(|text| substitute(domain, call, &text, None))
+}
+
+/// The `step`-th part of a call; none where it has no such part.
+pub(crate) fn grounded(domain: &Domain, call: &Call, step: usize) -> Option<Grounded> {
+    let config = config(domain, call);
+    let texts = config.does.texts();
+    if texts.is_empty() {
+        let word = abilities::skill(&domain.config.uses, &call.action).filter(|_| step == 0)?;
+        return Some(Grounded { word, arguments: call.arguments.clone() });
+    }
+    let text = substitute(domain, call, texts.get(step)?, None);
+    let mut tokens = text.split_whitespace().map(str::to_string);
+    let word = abilities::skill(&domain.config.uses, &tokens.next()?)?;
+    Some(Grounded { word, arguments: tokens.collect() })
+}
+
+/// Texts over the variables of an action, with a call's objects in their place.
+pub(crate) fn substituted(domain: &Domain, call: &Call, texts: &[String]) -> Vec<String> {
+    texts.iter().map(|text| substitute(domain, call, text, None)).collect()
+}
+
+/// The atoms that a failure teaches.
+pub(crate) fn taught(
+    domain: &Domain,
+    call: &Call,
+    config: &ActionConfig,
+    failure: &SkillFailure,
+    by: Option<&str>,
+) -> Vec<String> {
+    let fits =
+        |t: &&crate::config::Teaching| t.when == failure.kind() && (by.is_some() || !t.says.contains("?by"));
+    config.teaches.iter().filter(fits).map(|t| substitute(domain, call, &t.says, by)).collect()
+}
+
+/// A text over the variables of an action with a call's objects in their place; `?by` stands for what was in the way.
+fn substitute(domain: &Domain, call: &Call, text: &str, by: Option<&str>) -> String {
+    let parameters = domain.vocabulary.action(&call.action).unwrap_or_default();
+    let value = |variable: &str| {
+        let at = parameters.iter().position(|(name, _)| name == variable);
+        at.and_then(|n| call.arguments.get(n)).map(String::as_str).or(by.filter(|_| variable == "?by"))
+    };
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find('?') {
+        let end = rest[at + 1..].find(|c: char| !(c.is_alphanumeric() || c == '-' || c == '_'));
+        let end = end.map_or(rest.len(), |e| at + 1 + e);
+        let variable = rest[at..end].to_lowercase();
+        out += &rest[..at];
+        out += value(&variable).unwrap_or(&variable);
+        rest = &rest[end..];
+    }
+    out + rest
+}
+
+/// What an outcome is in a record.
+pub(crate) fn outcome(outcome: &Outcome) -> Value {
+    match outcome {
+        Outcome::Driven(d) => json!({ "distance_m": d.distance_m, "duration_s": d.duration_s }),
+        Outcome::Seen(s) => json!({ "stamp_ns": s.stamp_ns }),
+        Outcome::Pushed(p) => json!({ "moved_m": p.moved_m, "duration_s": p.duration_s }),
+        Outcome::Opened(o) => json!({ "duration_s": o.duration_s }),
+        Outcome::Grasped(g, hand) => {
+            json!({ "width_m": g.width_m, "duration_s": g.duration_s, "holds": hand.holds })
+        }
+        Outcome::Placed(p) => json!({ "duration_s": p.duration_s }),
+        Outcome::Told(word) => json!({ "said": word }),
+    }
+}
+
+/// A call's meaning, bound to a situation.
+pub(crate) struct Bound {
+    pub situation: Arc<Situation>,
+    pub meaning: &'static Meaning,
+}
+
+impl Attachment for Bound {
+    fn reads(&self) -> Vec<Read> {
+        self.meaning.reads.iter().map(|symbol| Read::All((*symbol).into())).collect()
+    }
+
+    fn evaluate(&self, call: &descry_planner::Call) -> Result<Answer, CallError> {
+        (self.meaning.answers)(&self.situation, call)
+    }
+}

@@ -1,0 +1,321 @@
+//! What is answered in the end: about what was asked, with where it is and what it rests on.
+
+use descry_memory::belief::Track;
+use descry_perception::nalgebra::Vector3;
+use descry_planner::{FactValue, Plan, after};
+use serde::{Deserialize, Serialize};
+
+use crate::abilities::searching::reasons;
+use crate::config::Answers;
+use crate::goal::{Goal, put_in};
+use crate::lexicon::{Lexicon, symbol};
+use crate::mind::Mind;
+use crate::situation::{Situation, Thing};
+use crate::world::Round;
+
+/// Why a run ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ended {
+    /// The goal holds.
+    Reached,
+    /// There is no plan, and why.
+    NoPlan(String),
+    /// A limit was reached.
+    Limit(String),
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The goal is reached with the confidence that was asked for.
+    Achieved,
+    /// Every useful pose has been tried: it is not there.
+    NotFound,
+    /// Nothing that the body can do would settle it.
+    CannotTell,
+    /// What was asked for is known, and nothing that the body can do brings it about.
+    Impossible,
+    /// The body or the store failed, or a limit was reached.
+    Failed,
+}
+
+/// An object, as believed at the end.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Believed {
+    /// The known object that it most likely is; none: unknown.
+    pub label: Option<String>,
+    /// Its kind.
+    pub kind: Option<String>,
+    /// Probability of that.
+    pub confidence: f64,
+    /// The middle of its body, in the map.
+    pub position_m: [f64; 3],
+    /// Sides of its footprint and height.
+    pub size_m: [f64; 3],
+    /// The surface that it stands on, as people call it.
+    #[serde(default)]
+    pub on: Option<String>,
+    /// The room that this is in.
+    #[serde(default, rename = "in")]
+    pub room: Option<String>,
+    /// Whether it is of what was asked for.
+    #[serde(default)]
+    pub asked: bool,
+}
+
+/// What is answered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conclusion {
+    /// How it ended.
+    pub verdict: Verdict,
+    /// What is said, and why, in a sentence.
+    pub why: String,
+    /// How sure it is.
+    pub confidence: f64,
+    /// Probability that what was looked for is there after all.
+    pub remaining: Option<f64>,
+    /// What was looked for, if it was one thing.
+    pub object: Option<String>,
+    /// Where it is believed to be, if it is.
+    pub found: Option<Believed>,
+    /// Everything that is believed.
+    pub objects: Vec<Believed>,
+}
+
+/// What is answered when a run has ended.
+pub(crate) fn conclude(
+    goal: &Goal,
+    lexicon: &Lexicon,
+    mind: &Mind,
+    round: &Round,
+    ended: &Ended,
+) -> Conclusion {
+    let s = &*round.situation;
+    let asker = Asker { goal, lexicon, mind, round, s };
+    let (verdict, why) = match ended {
+        Ended::Reached => asker.reached(),
+        Ended::NoPlan(planner_says) => asker.gave_up(planner_says),
+        Ended::Limit(why) => (Verdict::Failed, why.clone()),
+    };
+    let why = asker.worded(verdict).unwrap_or(why);
+    let own = s.things.iter().filter(|t| t.track.is_none()).count();
+    let confidence = match (own, s.kinds.is_empty(), s.asked.first()) {
+        (1.., _, _) => (0..own).map(|n| s.confidence(n)).fold(1.0, f64::min),
+        (_, false, _) => (0..s.kinds.len()).map(|n| s.completeness(n)).fold(1.0, f64::min),
+        (_, _, Some(_)) => s.asked.iter().map(|&on| s.clarity(on)).fold(1.0, f64::min),
+        _ => f64::from(u8::from(verdict == Verdict::Achieved)),
+    };
+    let first = s.things.first().filter(|t| t.track.is_none());
+    let mut objects: Vec<Believed> = s.belief.tracks.iter().map(|t| asker.believed(t)).collect();
+    objects.sort_by_key(|o| !o.asked);
+    Conclusion {
+        verdict,
+        why,
+        confidence,
+        remaining: first.map(|_| s.chance_there(0)),
+        object: first.map(|t| t.name.clone()),
+        found: first.and_then(|t| asker.best(t)).map(|t| asker.believed(t)),
+        objects,
+    }
+}
+
+/// What answering needs.
+struct Asker<'a> {
+    goal: &'a Goal,
+    lexicon: &'a Lexicon,
+    mind: &'a Mind,
+    round: &'a Round,
+    s: &'a Situation,
+}
+
+impl Asker<'_> {
+    /// The goal holds: what was asked for, and where.
+    fn reached(&self) -> (Verdict, String) {
+        let s = self.s;
+        let things: Vec<String> = self.own().map(|(_, t)| format!("{} {}", t.name, self.stands(t))).collect();
+        let mut said = things;
+        for kind in &s.kinds {
+            let members = self.members(kind);
+            if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {
+                let seen = self.seen_of(s.doubt_of(0));
+                return (Verdict::NotFound, format!("there is no {}: {seen}", kind.name));
+            }
+            said.push(match members.len() {
+                0 => format!("there is no {}", kind.name),
+                n => format!("all of {} are found: {n}, {}", kind.name, members.join("; ")),
+            });
+        }
+        for &on in &s.asked {
+            said.push(format!("everything on the {} is identified", s.surfaces[on].name));
+        }
+        if said.is_empty() {
+            said.push(format!("it holds that {}", self.goal.pddl));
+        }
+        (Verdict::Achieved, said.join("; "))
+    }
+
+    /// No plan is left: what is known of what was asked for, and what keeps one from saying more.
+    fn gave_up(&self, planner_says: &str) -> (Verdict, String) {
+        let s = self.s;
+        let says = if planner_says.is_empty() { String::new() } else { format!(": {planner_says}") };
+        let missing: Vec<usize> =
+            self.own().map(|(n, _)| n).filter(|&n| s.confidence(n) < s.threshold).collect();
+        let open = missing.iter().find_map(|&n| Some((n, reasons::left_about(s, n)?)));
+        if let Some((n, doubt)) = open {
+            let asked = self.where_asked(&s.things[n]);
+            let text = format!("it cannot be told whether {} is {asked}, {doubt}", s.things[n].name);
+            return (Verdict::CannotTell, format!("{text}; {}{says}", self.looks()));
+        }
+        if let Some(&n) = missing.first() {
+            let thing = &s.things[n];
+            let elsewhere = self.elsewhere(thing).map(|w| format!(", it {w}")).unwrap_or_default();
+            let asked = self.where_asked(thing);
+            let seen = self.seen_of(s.doubt_about(n));
+            return (Verdict::NotFound, format!("{} is not {asked}{elsewhere}: {seen}", thing.name));
+        }
+        let unclear = s.kinds.iter().enumerate().any(|(n, _)| s.completeness(n) < s.threshold)
+            || s.asked.iter().any(|&on| s.clarity(on) < s.threshold);
+        if unclear {
+            let doubt = reasons::left_in_all(s).map(|d| format!(", {d}")).unwrap_or_default();
+            return (
+                Verdict::CannotTell,
+                format!("not everything could be identified{doubt}; {}{says}", self.looks()),
+            );
+        }
+        let known: Vec<String> = self.own().map(|(_, t)| format!("{} {}", t.name, self.stands(t))).collect();
+        let known = if known.is_empty() { String::new() } else { format!("{}; ", known.join("; ")) };
+        (
+            Verdict::Impossible,
+            format!("{known}nothing that can be done brings about {}{says}", self.goal.pddl),
+        )
+    }
+
+    /// The things that were asked for by name.
+    fn own(&self) -> impl Iterator<Item = (usize, &Thing)> {
+        self.s.things.iter().enumerate().filter(|(_, t)| t.track.is_none())
+    }
+
+    /// The object that a thing most likely is, if any may be it.
+    fn best(&self, thing: &Thing) -> Option<&Track> {
+        let p = |t: &Track| thing.probability(t, &self.s.surfaces);
+        self.s.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b))).filter(|t| p(t) > 0.0)
+    }
+
+    fn stands(&self, thing: &Thing) -> String {
+        match self.best(thing) {
+            Some(track) => self.standing(track),
+            None => "has not been seen".into(),
+        }
+    }
+
+    fn standing(&self, track: &Track) -> String {
+        match self.s.surface_of(track) {
+            Some(on) => {
+                let surface = &self.s.surfaces[on];
+                let room = surface.room.as_ref().map(|room| format!(" in the {room}")).unwrap_or_default();
+                format!("stands on the {}{room}", surface.name)
+            }
+            None => "is in the hand".into(),
+        }
+    }
+
+    /// Where a thing surely stands that is not where it was asked about.
+    fn elsewhere(&self, thing: &Thing) -> Option<String> {
+        thing.on.as_ref()?;
+        let anywhere = Thing { on: None, ..thing.clone() };
+        let track = self.best(&anywhere).filter(|t| t.probability_of(&thing.name) >= self.s.threshold)?;
+        Some(self.standing(track))
+    }
+
+    fn where_asked(&self, thing: &Thing) -> String {
+        match thing.on.as_deref() {
+            None | Some([]) => "there".into(),
+            Some(on) => {
+                let names: Vec<&str> = on.iter().map(|&n| self.s.surfaces[n].name.as_str()).collect();
+                format!("on the {}", names.join(" or the "))
+            }
+        }
+    }
+
+    fn members(&self, kind: &Thing) -> Vec<String> {
+        let is = |t: &&Track| kind.probability(t, &self.s.surfaces) > 0.5;
+        let named = |t: &Track| format!("{} {}", t.label().unwrap_or(&kind.name), self.standing(t));
+        self.s.belief.tracks.iter().filter(is).map(named).collect()
+    }
+
+    fn looks(&self) -> String {
+        let known = &self.mind.known;
+        let poses = known.candidates.len() - known.out_of_reach.len();
+        format!("after {} looks, with {poses} poses that can be reached", self.mind.views)
+    }
+
+    fn seen_of(&self, doubt: &crate::abilities::searching::doubt::Doubt) -> String {
+        reasons::seen_of(self.s, doubt, |on| self.mind.regions[on].taken)
+    }
+
+    fn believed(&self, t: &Track) -> Believed {
+        let on = self.s.surface_of(t).map(|n| &self.s.surfaces[n]);
+        let up = on.map_or_else(Vector3::z, |s| s.up);
+        let asked = |thing: &Thing| thing.probability(t, &self.s.surfaces) > 0.5;
+        Believed {
+            label: t.label().map(str::to_string),
+            kind: t.kind().map(str::to_string),
+            confidence: t.certainty(),
+            position_m: (t.position_m + up * (t.size_m[2] / 2.0)).coords.into(),
+            size_m: t.size_m,
+            on: on.map(|s| s.name.clone()),
+            room: on.and_then(|s| s.room.clone()),
+            asked: self.s.things.iter().chain(&self.s.kinds).any(asked),
+        }
+    }
+
+    /// The phrase's own answer to a verdict.
+    fn worded(&self, verdict: Verdict) -> Option<String> {
+        let Answers { achieved, not_found, cannot_tell } = &self.goal.answer;
+        let text = match verdict {
+            Verdict::Achieved => achieved,
+            Verdict::NotFound => not_found,
+            Verdict::CannotTell => cannot_tell,
+            Verdict::Impossible | Verdict::Failed => &None,
+        };
+        let text = text.as_ref()?;
+        // What is asked of the state stands for symbols, the rest for names.
+        let mut out = String::new();
+        let mut rest = text.as_str();
+        while let Some((before, behind)) = rest.split_once('{') {
+            let (inside, after) = behind.split_once('}').unwrap_or((behind, ""));
+            out += before;
+            let atom = put_in(inside, &self.goal.slots, |f| f.symbol.clone()).ok()?;
+            out += &self.value(&atom);
+            rest = after;
+        }
+        put_in(&(out + rest), &self.goal.slots, |f| f.name.clone()).ok()
+    }
+
+    /// What holds of an atom now: the names in the place of the question mark, or a number, or yes or no.
+    fn value(&self, atom: &str) -> String {
+        let tokens: Vec<String> =
+            atom.trim_matches(|c| c == '(' || c == ')').split_whitespace().map(str::to_lowercase).collect();
+        let Some((word, arguments)) = tokens.split_first() else { return String::new() };
+        let readings =
+            after(&self.round.task, &self.round.attachments, &Plan::default(), &[word]).unwrap_or_default();
+        let fitting = readings.iter().filter(|r| {
+            r.arguments.len() == arguments.len()
+                && r.arguments.iter().zip(arguments).all(|(a, b)| b == "?" || **a == *symbol(b))
+        });
+        let mut names: Vec<String> = Vec::new();
+        for reading in fitting {
+            match (&reading.value, arguments.iter().position(|a| a == "?")) {
+                (FactValue::Number(n), None) => return format!("{n:.2}"),
+                (_, Some(at)) => names.push(self.lexicon.name_of(&reading.arguments[at]).to_string()),
+                (_, None) => return "yes".into(),
+            }
+        }
+        match (names.is_empty(), arguments.iter().any(|a| a == "?")) {
+            (false, _) => names.join(", "),
+            (true, true) => "nothing".into(),
+            (true, false) => "no".into(),
+        }
+    }
+}

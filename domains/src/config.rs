@@ -1,0 +1,321 @@
+//! `domain.toml`: what may be said, what counts as sure, how actions are carried out, where words come from.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use crate::load::LoadError;
+
+/// `domain.toml`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// The domain's name.
+    pub name: String,
+    /// What the domain is for, in a line.
+    pub about: String,
+    /// The abilities that it uses, by name.
+    #[serde(default = "searching_alone")]
+    pub uses: Vec<String>,
+    /// Surfaces that goals may name although no map tells of them. Those of the map are known without being named here.
+    #[serde(default)]
+    pub surfaces: Vec<String>,
+    /// The scene of the simulated robot when none is named.
+    #[serde(default)]
+    pub scene: String,
+    /// What may be said.
+    #[serde(default)]
+    pub goal: Vec<GoalPhrase>,
+    /// What counts as sure.
+    #[serde(default)]
+    pub thresholds: Thresholds,
+    /// Where to look from.
+    #[serde(default)]
+    pub candidates: Candidates,
+    /// What is expected where before anything has been seen.
+    #[serde(default)]
+    pub expect: Vec<Expectation>,
+    /// Limits of a run.
+    #[serde(default)]
+    pub limits: Limits,
+    /// How each action is carried out; one without an entry is carried out by the skill of its name.
+    #[serde(default)]
+    pub action: BTreeMap<String, ActionConfig>,
+    /// Where words come from that no ability states.
+    #[serde(default)]
+    pub word: BTreeMap<String, WordConfig>,
+    /// Objects of the domain's own types, by type.
+    #[serde(default)]
+    pub objects: BTreeMap<String, Vec<String>>,
+    /// What holds in the beginning of words that are remembered or fixed: PDDL atoms and values.
+    #[serde(default)]
+    pub init: Vec<String>,
+    /// Attachments that are programs.
+    #[serde(default)]
+    pub attachments: BTreeMap<String, Program>,
+}
+
+fn searching_alone() -> Vec<String> {
+    vec!["searching".into()]
+}
+
+/// A phrase and its meaning.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GoalPhrase {
+    /// Words and `<slots>`. A slot is called after the type that fills it; where two slots are of one type, `<first:thing>`.
+    pub say: String,
+    /// The goal condition in PDDL, with the same slots.
+    pub means: String,
+    /// Whether the answer is yes or no.
+    #[serde(default)]
+    pub question: bool,
+    /// What the agent will do, in a line.
+    #[serde(default)]
+    pub about: String,
+    /// What is answered.
+    #[serde(default)]
+    pub answer: Answers,
+}
+
+/// What a phrase answers, by how the run ended. `<slots>` stand for what was said, `{(on <thing> ?)}` for the names of the
+/// objects in the place of the question mark for which the atom holds, `{(confidence <thing>)}` for a number.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Answers {
+    /// The goal holds.
+    pub achieved: Option<String>,
+    /// It is sure that what was asked for is not there.
+    pub not_found: Option<String>,
+    /// It cannot be told.
+    pub cannot_tell: Option<String>,
+}
+
+/// How much of something is expected somewhere.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Expectation {
+    /// An object or a kind; none: anything.
+    #[serde(default)]
+    pub what: Option<String>,
+    /// A surface or a room.
+    pub at: String,
+    /// How much more often it is there than anywhere else, by area.
+    pub weight: f64,
+}
+
+/// How an action is carried out.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActionConfig {
+    /// A skill with the action's variables, `"move ?from ?to"`, or several, one after the other.
+    #[serde(default)]
+    pub does: Steps,
+    /// A program that carries it out, instead of a skill.
+    pub program: Option<Vec<String>>,
+    /// Time for each of its skills on the body's clock, or for the program, seconds.
+    pub limit_s: Option<f64>,
+    /// Failures that may pass are tried again so often.
+    pub retries: Option<usize>,
+    /// What becomes true when it is given up: atoms of remembered words over its variables.
+    #[serde(default)]
+    pub gives_up: Vec<String>,
+    /// What a failure teaches.
+    #[serde(default)]
+    pub teaches: Vec<Teaching>,
+    /// What must hold afterwards, in PDDL over its variables; else it has failed.
+    pub check: Option<String>,
+    /// Why it is done, for people, over its variables.
+    pub because: Option<String>,
+}
+
+/// One step or several.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum Steps {
+    /// Nothing is said.
+    #[default]
+    Unsaid,
+    /// One.
+    One(String),
+    /// One after the other.
+    Several(Vec<String>),
+}
+
+impl Steps {
+    /// Each as its text.
+    pub fn texts(&self) -> Vec<&str> {
+        match self {
+            Steps::Unsaid => Vec::new(),
+            Steps::One(step) => vec![step],
+            Steps::Several(steps) => steps.iter().map(String::as_str).collect(),
+        }
+    }
+}
+
+/// What a failure teaches.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Teaching {
+    /// The kind of failure: `blocked`, `slipped`, `unreachable`, ….
+    pub when: String,
+    /// The atom that becomes true, over the action's variables and `?by`, what was in the way.
+    pub says: String,
+}
+
+impl ActionConfig {
+    /// Seconds for each skill where none are named.
+    pub const LIMIT_S: f64 = 60.0;
+    /// Tries after the first where none are named.
+    pub const RETRIES: usize = 2;
+
+    /// Time for each of its skills, or for the program, seconds.
+    pub fn limit_s(&self) -> f64 {
+        self.limit_s.unwrap_or(Self::LIMIT_S)
+    }
+
+    /// Tries after the first.
+    pub fn retries(&self) -> usize {
+        self.retries.unwrap_or(Self::RETRIES)
+    }
+}
+
+/// Where a word comes from that no ability states.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WordConfig {
+    /// A program that states it: the word is sensed.
+    pub program: Option<Vec<String>>,
+    /// Time for its answer, seconds.
+    #[serde(default = "default_program_time_s")]
+    pub time_limit_s: f64,
+    /// `remembered` or `fixed`, where it should be said rather than follow from the effects of the actions.
+    pub is: Option<Source>,
+}
+
+/// Where a word that no fact states has its value from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Source {
+    /// It changes as the effects of carried-out actions say.
+    Remembered,
+    /// It never changes.
+    Fixed,
+}
+
+/// What counts as sure; all are probabilities.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Thresholds {
+    /// Ends a search.
+    pub confidence: f64,
+    /// No look is worth it where no more than this could be settled.
+    pub remaining: f64,
+    /// No more than this may hang on places that can be seen from nowhere, for an object to be called not there; and no more than both
+    /// on anything.
+    pub out_of_sight: f64,
+    /// That a sought object is there, before the first look.
+    pub prior: f64,
+}
+
+impl Default for Thresholds {
+    fn default() -> Self {
+        Self { confidence: 0.8, remaining: 0.04, out_of_sight: 0.01, prior: 0.75 }
+    }
+}
+
+/// A ring of poses around each surface.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Candidates {
+    /// How many poses the ring holds.
+    pub poses: usize,
+    /// From the centre of the surface to the robot.
+    pub distance_m: f64,
+}
+
+impl Default for Candidates {
+    fn default() -> Self {
+        Self { poses: 8, distance_m: 1.4 }
+    }
+}
+
+/// Limits of a run, so that none is without end.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Limits {
+    /// Looks in a run.
+    pub views: usize,
+    /// Pushes in a run.
+    pub pushes: usize,
+    /// Plans in a run.
+    pub plans: usize,
+    /// How often the very same situation may come back.
+    pub repeats: usize,
+    /// Time for a run on the body's clock.
+    pub seconds: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { views: 40, pushes: 6, plans: 300, repeats: 3, seconds: 7200.0 }
+    }
+}
+
+/// An attachment that is a program which answers JSON lines.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Program {
+    /// The command and its arguments, run in the domain's folder.
+    pub program: Vec<String>,
+    /// Time for one answer.
+    #[serde(default = "default_program_time_s")]
+    pub time_limit_s: f64,
+    /// Predicates and functions whose values the program wants with every call.
+    #[serde(default)]
+    pub reads: Vec<String>,
+}
+
+fn default_program_time_s() -> f64 {
+    5.0
+}
+
+/// Checks the numbers of a configuration.
+pub(crate) fn check(path: &str, config: &Config) -> Result<(), LoadError> {
+    let value = |key: &str, value: f64, holds: bool, expected: &'static str| {
+        let error = || LoadError::Value {
+            path: path.into(),
+            key: key.into(),
+            found: value.to_string(),
+            expected: expected.into(),
+        };
+        if holds { Ok(()) } else { Err(error()) }
+    };
+    let t = &config.thresholds;
+    for (key, p) in [
+        ("thresholds.confidence", t.confidence),
+        ("thresholds.remaining", t.remaining),
+        ("thresholds.out_of_sight", t.out_of_sight),
+        ("thresholds.prior", t.prior),
+    ] {
+        value(key, p, p > 0.0 && p < 1.0, "a number above 0 and below 1")?;
+    }
+    let c = &config.candidates;
+    value("candidates.poses", c.poses as f64, (1..=1000).contains(&c.poses), "1 to 1000 poses")?;
+    let fits = c.distance_m > 0.0 && c.distance_m < 20.0;
+    value("candidates.distance_m", c.distance_m, fits, "metres, above 0 and below 20")?;
+    let l = &config.limits;
+    value("limits.views", l.views as f64, l.views > 0, "at least one look")?;
+    value("limits.plans", l.plans as f64, l.plans > 0, "at least one plan")?;
+    value("limits.repeats", l.repeats as f64, l.repeats > 0, "at least one")?;
+    value("limits.seconds", l.seconds, l.seconds > 0.0, "seconds, above 0")?;
+    for (name, action) in &config.action {
+        let (key, limit_s) = (format!("action.{name}.limit_s"), action.limit_s());
+        value(&key, limit_s, limit_s > 0.0 && limit_s.is_finite(), "seconds, above 0")?;
+    }
+    for (n, expectation) in config.expect.iter().enumerate() {
+        let (key, w) = (format!("expect[{n}].weight"), expectation.weight);
+        value(&key, w, w > 0.0 && w.is_finite(), "a number above 0")?;
+    }
+    Ok(())
+}

@@ -1,0 +1,162 @@
+//! What things are called: the names of the objects of every type, from the domain and from the body's map.
+
+use std::collections::BTreeMap;
+
+use descry_perception::recognise::ObjectModel;
+use descry_robots::Robot;
+use descry_robots::sim::SceneSpec;
+
+use crate::load::Domain;
+
+/// The PDDL symbol of a name: lower case, with hyphens for everything that is no letter or digit.
+pub fn symbol(name: &str) -> String {
+    let words: Vec<String> = name
+        .split(|c: char| !c.is_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .map(str::to_lowercase)
+        .collect();
+    let symbol = words.join("-");
+    // A PDDL symbol must not begin with a digit.
+    if symbol.starts_with(|c: char| c.is_ascii_digit()) { format!("n-{symbol}") } else { symbol }
+}
+
+/// Something that can be named: its PDDL symbol, and what it is called, the usual name first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Named {
+    /// The PDDL symbol.
+    pub symbol: String,
+    /// At least one.
+    pub names: Vec<String>,
+}
+
+impl Named {
+    fn of(name: &str) -> Self {
+        Self { symbol: symbol(name), names: vec![name.into()] }
+    }
+}
+
+/// The names of places.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Places {
+    /// Surfaces.
+    pub surfaces: Vec<String>,
+    /// Rooms.
+    pub rooms: Vec<String>,
+    /// Doors.
+    pub doors: Vec<String>,
+}
+
+impl Places {
+    /// Those that a body's map knows.
+    pub fn of_body(robot: &dyn Robot) -> Self {
+        Self {
+            surfaces: robot.surfaces().iter().map(|s| s.name.clone()).collect(),
+            rooms: robot.rooms().iter().map(|r| r.name.clone()).collect(),
+            doors: robot.doors().iter().map(|d| d.name.clone()).collect(),
+        }
+    }
+
+    /// Those of the domain's usual scene, as far as it can be read.
+    pub fn of_scene(domain: &Domain) -> Self {
+        let name = &domain.config.scene;
+        let spec = domain.scenes.get(name).and_then(|text| SceneSpec::parse(name, text).ok());
+        spec.map_or_else(Self::default, |spec| Self::of_spec(&spec))
+    }
+
+    /// Those of a scene.
+    pub fn of_spec(spec: &SceneSpec) -> Self {
+        Self { surfaces: spec.surfaces.iter().map(|s| s.name.clone()).collect(), ..Self::default() }
+    }
+}
+
+/// Everything that has a name, by type.
+#[derive(Debug, Clone, Default)]
+pub struct Lexicon {
+    by_type: BTreeMap<String, Vec<Named>>,
+}
+
+impl Lexicon {
+    /// The names of a domain's objects, and of the places.
+    pub fn new(domain: &Domain, places: &Places) -> Self {
+        let mut by_type: BTreeMap<String, Vec<Named>> = BTreeMap::new();
+        let mut add = |of: &str, named: Named| {
+            let list = by_type.entry(of.to_string()).or_default();
+            if list.iter().all(|known| known.symbol != named.symbol) {
+                list.push(named);
+            }
+        };
+        for thing in things(&domain.objects) {
+            add("kind", in_plural(&thing));
+            add("thing", thing);
+        }
+        let surfaces = if places.surfaces.is_empty() { &domain.config.surfaces } else { &places.surfaces };
+        surfaces.iter().for_each(|name| add("surface", Named::of(name)));
+        places.rooms.iter().for_each(|name| add("room", Named::of(name)));
+        places.doors.iter().for_each(|name| add("door", Named::of(name)));
+        for (of, names) in &domain.config.objects {
+            names.iter().for_each(|name| add(of, Named::of(name)));
+        }
+        let vocabulary = &domain.vocabulary;
+        for declared in &vocabulary.task.types {
+            for constant in vocabulary.constants(&declared.name) {
+                add(&declared.name, Named { names: vec![constant.replace('-', " ")], symbol: constant });
+            }
+        }
+        // What is of a subtype is of the type, too.
+        for declared in &vocabulary.task.types {
+            for other in vocabulary.task.types.iter().filter(|t| t.name != declared.name) {
+                if vocabulary.is_a(&other.name, &declared.name) {
+                    let found = by_type.get(&other.name).cloned().unwrap_or_default();
+                    let list = by_type.entry(declared.name.clone()).or_default();
+                    list.extend(found.into_iter().filter(|n| n.symbol != declared.name));
+                }
+            }
+        }
+        Self { by_type }
+    }
+
+    /// Everything of a type.
+    pub fn of_type(&self, name: &str) -> &[Named] {
+        self.by_type.get(name).map_or(&[], Vec::as_slice)
+    }
+
+    /// The types that have names.
+    pub fn types(&self) -> impl Iterator<Item = &str> {
+        self.by_type.keys().map(String::as_str)
+    }
+
+    /// What a symbol is usually called; the symbol itself if it has no name.
+    pub fn name_of<'a>(&'a self, symbol: &'a str) -> &'a str {
+        let all = self.by_type.iter().filter(|(of, _)| *of != "kind").flat_map(|(_, list)| list);
+        let found = all.into_iter().find(|n| n.symbol == symbol);
+        found.and_then(|n| n.names.first()).map_or(symbol, String::as_str)
+    }
+
+    /// The names of a type, the usual one of each, for suggestions.
+    pub fn listed(&self, of: &str) -> String {
+        let names: Vec<&str> =
+            self.of_type(of).iter().filter_map(|n| n.names.first()).map(String::as_str).collect();
+        names.join(", ")
+    }
+}
+
+/// Known objects, and the kinds that no object is called by.
+fn things(objects: &[ObjectModel]) -> Vec<Named> {
+    let named = |o: &ObjectModel| Named {
+        symbol: symbol(&o.name),
+        names: std::iter::once(&o.name).chain(&o.phrases).cloned().collect(),
+    };
+    let mut things: Vec<Named> = objects.iter().map(named).collect();
+    for kind in objects.iter().map(|o| &o.kind) {
+        if things.iter().all(|known| known.symbol != symbol(kind)) {
+            things.push(Named::of(kind));
+        }
+    }
+    things
+}
+
+/// The names of a thing, each with an s too.
+fn in_plural(thing: &Named) -> Named {
+    let plural = thing.names.iter().map(|name| format!("{name}s"));
+    Named { symbol: thing.symbol.clone(), names: plural.chain(thing.names.iter().cloned()).collect() }
+}

@@ -1,0 +1,79 @@
+//! What a world knows and keeps from round to round.
+
+use std::collections::BTreeSet;
+
+use descry_memory::RecordId;
+
+use crate::abilities::searching::change::Change;
+use crate::situation::Known;
+use crate::words::Words;
+
+/// Everything that a world has come to know.
+pub struct Mind {
+    /// What rounds are grounded in.
+    pub known: Known,
+    /// The values of remembered and fixed words.
+    pub words: Words,
+    /// Looks at each surface, and what was changed there.
+    pub regions: Vec<Region>,
+    /// Views taken so far.
+    pub views: usize,
+    /// Pushes tried so far.
+    pub pushes: usize,
+    /// Driven so far, metres.
+    pub distance_m: f64,
+}
+
+/// What was done about one surface.
+#[derive(Debug, Default)]
+pub struct Region {
+    /// Views that still hold.
+    pub looks: Vec<Look>,
+    /// Places where something has moved.
+    pub changes: Vec<Change>,
+    /// How many looks have been taken in all.
+    pub taken: usize,
+    /// Why the last look showed no surface; none if it did.
+    pub nothing: Option<String>,
+}
+
+/// A view that was taken and recorded.
+#[derive(Debug, Clone, Copy)]
+pub struct Look {
+    /// When.
+    pub stamp_ns: i64,
+    /// Its record.
+    pub record: RecordId,
+}
+
+impl Mind {
+    /// Takes from the remembered words what rounds are grounded in.
+    pub fn attend(&mut self) {
+        let (known, words) = (&mut self.known, &self.words);
+        let candidate = |name: &String| known.candidates.iter().position(|c| c.symbol == *name);
+        let surface = |name: &String| known.surfaces.iter().position(|s| s.symbol == *name);
+        let observed: BTreeSet<(usize, usize)> = words
+            .instances("observed")
+            .filter_map(|a| match a {
+                [from, on] => candidate(from).zip(surface(on)),
+                _ => None,
+            })
+            .collect();
+        let out_of_reach: BTreeSet<usize> =
+            words.instances("out-of-reach").filter_map(|a| candidate(a.first()?)).collect();
+        let door = |name: &String| known.doors.iter().position(|d| d.symbol == *name);
+        let shut: BTreeSet<usize> = words.instances("shut").filter_map(|a| door(a.first()?)).collect();
+        (known.observed, known.out_of_reach, known.shut) = (observed, out_of_reach, shut);
+    }
+
+    /// The looks that have been taken at a surface no longer count.
+    pub fn forget_looks(&mut self, surface: Option<&str>) {
+        let all: Vec<Vec<String>> = self.words.instances("observed").map(<[String]>::to_vec).collect();
+        for look in all {
+            if surface.is_none_or(|s| look.get(1).is_some_and(|on| on == s)) {
+                self.words.set("observed", look, None);
+            }
+        }
+        self.attend();
+    }
+}

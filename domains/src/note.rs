@@ -1,0 +1,58 @@
+//! What a world has learned, for people and for the record.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Something that was learned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "event")]
+pub enum Note {
+    /// Views were merged and looked through.
+    Perceived {
+        /// The surface.
+        #[serde(default)]
+        on: String,
+        /// Views in the merged cloud.
+        merged: usize,
+        /// Views that could not be aligned, with the reason.
+        left_out: Vec<String>,
+        /// Points of the merged cloud.
+        points: usize,
+        /// Root mean square distance between the views, metres.
+        residual_m: f64,
+        /// What each object on the surface is taken for.
+        objects: Vec<String>,
+        /// What the last view changed in the belief.
+        changed: Vec<String>,
+    },
+    /// Somebody has moved something: what was seen before the last view no longer holds.
+    Changed {
+        /// What shows it.
+        because: String,
+    },
+    /// Nothing could be made of what has been seen so far.
+    Nothing {
+        /// Why.
+        because: String,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Note::Perceived { on, merged, left_out, points, residual_m, objects, changed } => {
+                let (views, mm) = (if *merged == 1 { "view" } else { "views" }, residual_m * 1e3);
+                write!(
+                    f,
+                    "see       {on}: {merged} {views} merged, {points} points, {mm:.1} mm apart; {} objects",
+                    objects.len()
+                )?;
+                let lines = left_out.iter().chain(objects).chain(changed);
+                lines.into_iter().try_for_each(|text| write!(f, "\n          {text}"))
+            }
+            Note::Changed { because } => write!(f, "changed   {because}; only the last view still holds"),
+            Note::Nothing { because } => write!(f, "see       nothing yet: {because}"),
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The programs that a domain names: behind calls, behind facts, behind actions.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use descry_planner::{Attachment, Attachments, CallError};
+use descry_skills::{Asked, Call, Skill};
+use serde_json::json;
+
+use crate::config::Program;
+use crate::load::Domain;
+use crate::program::ProgramAttachment;
+use crate::vocabulary::Word;
+use crate::words;
+
+/// Every program of a domain, started by its first question.
+pub struct Programs {
+    calls: Vec<(String, Arc<ProgramAttachment>)>,
+    facts: BTreeMap<String, ProgramAttachment>,
+    actions: BTreeMap<String, ProgramAction>,
+}
+
+/// An action that a program carries out.
+pub struct ProgramAction {
+    program: Arc<ProgramAttachment>,
+}
+
+impl Programs {
+    /// Those that a domain names.
+    pub fn of(domain: &Domain) -> Self {
+        let bind = |p: Program| ProgramAttachment::new(p, domain.folder.clone());
+        let config = &domain.config;
+        let calls = config.attachments.iter().map(|(name, p)| (name.clone(), Arc::new(bind(p.clone()))));
+        let facts = config.word.iter().filter_map(|(name, word)| {
+            let program = word.program.clone()?;
+            Some((
+                name.clone(),
+                bind(Program { program, time_limit_s: word.time_limit_s, reads: Vec::new() }),
+            ))
+        });
+        let actions = config.action.iter().filter_map(|(name, action)| {
+            let program = action.program.clone()?;
+            let program = bind(Program { program, time_limit_s: action.limit_s(), reads: Vec::new() });
+            Some((name.clone(), ProgramAction { program: Arc::new(program) }))
+        });
+        Self { calls: calls.collect(), facts: facts.collect(), actions: actions.collect() }
+    }
+
+    /// Binds the programs behind calls.
+    pub fn bind(&self, attachments: &mut Attachments) {
+        for (name, program) in &self.calls {
+            attachments.insert_shared(name.clone(), Arc::clone(program) as Arc<dyn Attachment>);
+        }
+    }
+
+    /// The program behind an action, if it has one.
+    pub fn action(&self, name: &str) -> Option<&ProgramAction> {
+        self.actions.get(name)
+    }
+
+    /// What the program behind a word says holds of it now, a line of PDDL each. It is asked
+    /// `{"id": 0, "fact": "raining", "objects": ["table", …]}` and answers `{"id": 0, "value": ["(raining)"]}`.
+    ///
+    /// # Errors
+    /// Why there is no usable answer.
+    pub fn state(&self, word: &Word, objects: &[String]) -> Result<Vec<String>, String> {
+        let Some(program) = self.facts.get(&word.name) else { return Ok(Vec::new()) };
+        let failed =
+            |because: String| format!("the program that says what holds of {}: {because}", word.name);
+        let answer = program
+            .ask_one(json!({ "fact": word.name, "objects": objects }))
+            .map_err(|e| failed(e.to_string()))?;
+        let lines: Vec<String> = serde_json::from_value(answer["value"].clone()).map_err(|_| {
+            failed(format!("answered {answer}, expected {{\"value\": [\"({} …)\"]}}", word.name))
+        })?;
+        for line in &lines {
+            for (name, arguments, _) in words::read(line).map_err(|e| failed(format!("\"{line}\": {e}")))? {
+                let unknown = arguments.iter().find(|a| !objects.contains(a));
+                if name != word.name || arguments.len() != word.types.len() {
+                    return Err(failed(format!("\"{line}\" is not about ({})", word.name)));
+                }
+                if let Some(unknown) = unknown {
+                    return Err(failed(format!("\"{line}\": there is no object {unknown}")));
+                }
+            }
+        }
+        Ok(lines)
+    }
+}
+
+impl ProgramAction {
+    /// The call as a skill. The program is asked `{"id": 0, "action": "greet", "arguments": ["anna"]}` and answers
+    /// `{"id": 0, "value": "said hello"}`, or `{"id": 0, "error": "why not"}`, which is tried again as the domain says.
+    pub fn perform(&self, call: &Call) -> Box<dyn Skill> {
+        let program = Arc::clone(&self.program);
+        let question = json!({ "action": call.action, "arguments": call.arguments });
+        let ask = move || match program.ask_one(question.clone()) {
+            Ok(answer) => Asked::Done(match &answer["value"] {
+                serde_json::Value::String(word) => word.clone(),
+                serde_json::Value::Null | serde_json::Value::Bool(true) => "done".into(),
+                other => other.to_string(),
+            }),
+            Err(CallError::Failed(because)) => Asked::Failed { because, passing: true },
+            Err(other) => Asked::Failed { because: other.to_string(), passing: false },
+        };
+        Box::new(descry_skills::Program { ask: Arc::new(ask) })
+    }
+}

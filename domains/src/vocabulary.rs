@@ -1,0 +1,170 @@
+//! The words that a domain declares, and where each has its meaning from.
+
+use std::collections::BTreeSet;
+
+use descry_planner::task::{Change, Task, TypeId, Written};
+use descry_planner::{Findings, Source, Span};
+
+use crate::abilities::{self, Fact};
+use crate::config::{Config, Source as Kept};
+
+/// What a domain's PDDL text declares.
+#[derive(Debug, Clone)]
+pub struct Vocabulary {
+    /// The domain with an empty problem.
+    pub task: Task,
+    changed: BTreeSet<String>,
+}
+
+/// A predicate or a function.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Word {
+    /// Its name.
+    pub name: String,
+    /// The types of its arguments, by name; a type that is `either` of several by the first.
+    pub types: Vec<String>,
+    /// Whether it is a numeric function.
+    pub is_number: bool,
+    /// Whether rules of the domain derive it.
+    pub is_derived: bool,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// Where the value of a word comes from in a run.
+#[derive(Debug, Clone, Copy)]
+pub enum Ground {
+    /// A fact of an ability states it, from what is known now.
+    Sensed(&'static Fact),
+    /// A program states it.
+    SensedByProgram,
+    /// It starts as the domain or the store says and changes as the effects of carried-out actions say.
+    Remembered,
+    /// It never changes.
+    Fixed,
+    /// The domain's own rules derive it.
+    Derived,
+}
+
+impl Vocabulary {
+    /// Reads the declarations of a domain.
+    ///
+    /// # Errors
+    /// Every finding in its text.
+    pub fn read(pddl: &Source) -> Result<Self, Findings> {
+        let name = domain_name(&pddl.text);
+        let nothing = format!("(define (problem nothing) (:domain {name}) (:objects) (:init) (:goal (and)))");
+        let task = Task::read(pddl, &Source::new("nothing.pddl", nothing))?;
+        let changed = changed(&task);
+        Ok(Self { task, changed })
+    }
+
+    /// Whether a type is declared.
+    pub fn has_type(&self, name: &str) -> bool {
+        self.task.types.iter().any(|t| t.name == name)
+    }
+
+    /// Whether a type is the other or a subtype of it.
+    pub fn is_a(&self, name: &str, other: &str) -> bool {
+        let Some(found) = self.task.types.iter().find(|t| t.name == name) else { return false };
+        found.ancestors.iter().any(|id| self.task.type_of(*id).name == other)
+    }
+
+    /// Every predicate and numeric function.
+    pub fn words(&self) -> Vec<Word> {
+        let types = |parameters: &[descry_planner::task::Parameter]| {
+            parameters.iter().map(|p| self.type_name(&p.types)).collect()
+        };
+        let predicates = self.task.predicates.iter().map(|p| Word {
+            name: p.name.clone(),
+            types: types(&p.parameters),
+            is_number: false,
+            is_derived: p.stratum.is_some(),
+            span: p.span,
+        });
+        let functions = self.task.functions.iter().filter(|f| f.result.is_none()).map(|f| Word {
+            name: f.name.clone(),
+            types: types(&f.parameters),
+            is_number: true,
+            is_derived: false,
+            span: f.span,
+        });
+        predicates.chain(functions).collect()
+    }
+
+    /// The word of a name.
+    pub fn word(&self, name: &str) -> Option<Word> {
+        self.words().into_iter().find(|w| w.name == name)
+    }
+
+    /// The types of an action's parameters, by name, with the parameters' names; none if there is no such action.
+    pub fn action(&self, name: &str) -> Option<Vec<(String, String)>> {
+        let action = self.task.actions.iter().find(|a| a.name == name)?;
+        Some(action.parameters.iter().map(|p| (p.name.clone(), self.type_name(&p.types))).collect())
+    }
+
+    /// The domain's constants of a type or a subtype of it.
+    pub fn constants(&self, of: &str) -> Vec<String> {
+        let is = |types: &[TypeId]| types.iter().any(|id| self.is_a(&self.task.type_of(*id).name, of));
+        self.task.objects.iter().filter(|o| is(&o.types)).map(|o| o.name.clone()).collect()
+    }
+
+    /// Where a word of the domain has its value from.
+    pub fn ground(&self, word: &Word, config: &Config) -> Ground {
+        let configured = config.word.get(&word.name);
+        if word.is_derived {
+            return Ground::Derived;
+        }
+        if configured.is_some_and(|c| c.program.is_some()) {
+            return Ground::SensedByProgram;
+        }
+        match (configured.and_then(|c| c.is), abilities::fact(&config.uses, &word.name)) {
+            (Some(Kept::Remembered), _) => Ground::Remembered,
+            (Some(Kept::Fixed), _) => Ground::Fixed,
+            (None, Some(fact)) => Ground::Sensed(fact),
+            (None, None) if self.changed.contains(&word.name) => Ground::Remembered,
+            (None, None) => Ground::Fixed,
+        }
+    }
+
+    /// Whether an action's effects change a word.
+    pub fn is_changed(&self, word: &str) -> bool {
+        self.changed.contains(word)
+    }
+
+    fn type_name(&self, types: &[TypeId]) -> String {
+        types.first().map_or_else(|| "object".into(), |id| self.task.type_of(*id).name.clone())
+    }
+}
+
+/// The name behind `(define (domain`; the reading itself says what is wrong where there is none.
+fn domain_name(text: &str) -> String {
+    let lower: String =
+        text.lines().map(|l| l.split(';').next().unwrap_or_default()).collect::<Vec<_>>().join(" ");
+    let mut tokens =
+        lower.split(|c: char| c.is_whitespace() || c == '(' || c == ')').filter(|t| !t.is_empty());
+    let found = tokens.by_ref().find(|t| t.eq_ignore_ascii_case("domain")).and_then(|_| tokens.next());
+    found.unwrap_or("domain").to_string()
+}
+
+/// The words that effects of actions change.
+fn changed(task: &Task) -> BTreeSet<String> {
+    let predicate = |id: descry_planner::task::PredicateId| task.predicate(id).name.clone();
+    let function = |id: descry_planner::task::FunctionId| task.function(id).name.clone();
+    let of = |change: &Change| -> Vec<String> {
+        match change {
+            Change::Add(atom) | Change::Delete(atom) => vec![predicate(atom.predicate)],
+            Change::Number(_, fluent, _) | Change::Object(fluent, _) => vec![function(fluent.function)],
+            Change::Call(call) => {
+                let written = |w: &Written| match w {
+                    Written::Number(f) | Written::Object(f) => function(f.function),
+                    Written::Truth(atom) => predicate(atom.predicate),
+                };
+                task.module(call.module).writes.iter().map(written).collect()
+            }
+        }
+    };
+    let effects = task.actions.iter().flat_map(|a| a.effects.start.iter().chain(&a.effects.end));
+    let rates = task.actions.iter().flat_map(|a| &a.continuous).map(|r| function(r.fluent.function));
+    effects.flat_map(|e| of(&e.change)).chain(rates).collect()
+}

@@ -1,0 +1,189 @@
+//! The words that are remembered or fixed, and their values.
+
+use std::collections::BTreeMap;
+
+use descry_planner::task::Task;
+use descry_planner::{FactValue, Reading, Source};
+use serde::{Deserialize, Serialize};
+
+use crate::load::Domain;
+use crate::vocabulary::{Ground, Vocabulary};
+
+/// The instances of remembered and fixed words that hold or have a value, each word by itself.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Words {
+    held: BTreeMap<String, BTreeMap<Vec<String>, f64>>,
+}
+
+/// What an atom has for a value that holds.
+const HOLDS: f64 = 1.0;
+
+impl Words {
+    /// What the domain says holds in the beginning.
+    ///
+    /// # Errors
+    /// Why a line of `init` cannot be read.
+    pub fn begin(domain: &Domain) -> Result<Self, String> {
+        let mut words = Self::default();
+        for line in &domain.config.init {
+            for (name, arguments, value) in read(line).map_err(|e| format!("init: \"{line}\": {e}"))? {
+                match domain.vocabulary.word(&name) {
+                    None => return Err(format!("init: \"{line}\": no word is called {name}")),
+                    Some(word)
+                        if matches!(
+                            domain.vocabulary.ground(&word, &domain.config),
+                            Ground::Sensed(_) | Ground::SensedByProgram
+                        ) =>
+                    {
+                        return Err(format!(
+                            "init: \"{line}\": {name} is sensed; only what is remembered or fixed can be said to begin so"
+                        ));
+                    }
+                    Some(_) => words.set(&name, arguments, value),
+                }
+            }
+        }
+        Ok(words)
+    }
+
+    /// Gives a word a value on some arguments: of a predicate 1 for true, 0 for false.
+    pub fn set(&mut self, name: &str, arguments: Vec<String>, value: Option<f64>) {
+        let instances = self.held.entry(name.into()).or_default();
+        match value {
+            Some(value) => instances.insert(arguments, value),
+            None => instances.remove(&arguments),
+        };
+    }
+
+    /// Makes an atom true that is written in PDDL.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    pub fn say(&mut self, atom: &str) -> Result<(), String> {
+        for (name, arguments, value) in read(atom)? {
+            self.set(&name, arguments, value);
+        }
+        Ok(())
+    }
+
+    /// Forgets everything about a word.
+    pub fn forget(&mut self, name: &str) {
+        self.held.remove(name);
+    }
+
+    /// The arguments of which a word holds or has a value.
+    pub fn instances(&self, name: &str) -> impl Iterator<Item = &[String]> {
+        self.held.get(name).into_iter().flat_map(|i| i.keys().map(Vec::as_slice))
+    }
+
+    /// Whether an atom holds.
+    pub fn holds(&self, name: &str, arguments: &[String]) -> bool {
+        self.held.get(name).is_some_and(|i| i.contains_key(arguments))
+    }
+
+    /// Takes over what actions changed: what held of some words before them and after them by the task's own semantics. What
+    /// skills have said themselves in the meantime stays, as do instances whose objects the task does not know.
+    pub fn take_over(&mut self, before: &[Reading], after: &[Reading]) {
+        for gone in before.iter().filter(|r| !after.contains(r)) {
+            self.set(&gone.symbol, names(gone), None);
+        }
+        for reading in after.iter().filter(|r| !before.contains(r)) {
+            let value = match &reading.value {
+                FactValue::Truth(true) => HOLDS,
+                FactValue::Number(value) => *value,
+                _ => continue,
+            };
+            self.set(&reading.symbol, names(reading), Some(value));
+        }
+    }
+
+    /// The lines of PDDL that state them, for objects that are known.
+    pub fn lines(&self, vocabulary: &Vocabulary, is_known: impl Fn(&str) -> bool) -> Vec<String> {
+        let mut lines = Vec::new();
+        for (name, instances) in &self.held {
+            let Some(word) = vocabulary.word(name) else { continue };
+            for (arguments, value) in instances.iter().filter(|(a, _)| a.iter().all(|a| is_known(a))) {
+                let atom = std::iter::once(name).chain(arguments).cloned().collect::<Vec<_>>().join(" ");
+                lines.push(if word.is_number {
+                    format!("(= ({atom}) {value})")
+                } else {
+                    format!("({atom})")
+                });
+            }
+        }
+        lines
+    }
+}
+
+fn names(reading: &Reading) -> Vec<String> {
+    reading.arguments.iter().map(ToString::to_string).collect()
+}
+
+/// The names of the words of a domain that are remembered, and of those that are fixed.
+pub fn remembered(domain: &Domain) -> Vec<String> {
+    let vocabulary = &domain.vocabulary;
+    let is_remembered =
+        |w: &crate::vocabulary::Word| matches!(vocabulary.ground(w, &domain.config), Ground::Remembered);
+    vocabulary.words().into_iter().filter(is_remembered).map(|w| w.name).collect()
+}
+
+/// An instance of a word: its name, its arguments, and its value (none: it does not hold).
+type Instance = (String, Vec<String>, Option<f64>);
+
+/// Reads one atom, its negation, or one value: `(a b)`, `(not (a b))`, `(= (f a) 3)`.
+pub(crate) fn read(text: &str) -> Result<Vec<Instance>, String> {
+    let spaced = text.to_lowercase().replace('(', " ( ").replace(')', " ) ");
+    let tokens: Vec<&str> = spaced.split_whitespace().collect();
+    let expected =
+        || "expected (word arguments), (not (word arguments)) or (= (word arguments) 3)".to_string();
+    let atom = |tokens: &[&str]| -> Option<(String, Vec<String>)> {
+        let [open, name, arguments @ .., close] = tokens else { return None };
+        let plain = |t: &&str| !"()=".contains(*t) && !t.starts_with('?');
+        (*open == "(" && *close == ")" && plain(name) && arguments.iter().all(plain))
+            .then(|| (name.to_string(), arguments.iter().map(ToString::to_string).collect()))
+    };
+    let found = match tokens.as_slice() {
+        ["(", "not", inner @ .., ")"] => atom(inner).map(|(n, a)| (n, a, None)),
+        ["(", "=", inner @ .., value, ")"] => {
+            let value = value.parse::<f64>().ok().filter(|v| v.is_finite());
+            atom(inner).zip(value).map(|((n, a), v)| (n, a, Some(v)))
+        }
+        all => atom(all).map(|(n, a)| (n, a, Some(HOLDS))),
+    };
+    found.map(|instance| vec![instance]).ok_or_else(expected)
+}
+
+/// The task of a round with another goal: for asking whether a condition holds now.
+///
+/// # Errors
+/// What is wrong with the condition, drawn under it.
+pub(crate) fn with_goal(
+    domain: &Domain,
+    problem: &Source,
+    goal: &str,
+    condition: &str,
+) -> Result<Task, String> {
+    let text = problem.text.replacen(&format!("(:goal {goal})"), &format!("(:goal {condition})"), 1);
+    Task::read(&domain.pddl, &Source::new(problem.name.clone(), text)).map_err(|f| f.render(false))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn atoms_and_values_are_read() {
+        let check = |text: &str, expected: Option<(&str, &[&str], Option<f64>)>| {
+            let expected =
+                expected.map(|(n, a, v)| vec![(n.to_string(), a.iter().map(|s| s.to_string()).collect(), v)]);
+            assert_eq!(read(text).ok(), expected, "{text}");
+        };
+        check("(visited table-3)", Some(("visited", &["table-3"], Some(1.0))));
+        check("( Raining )", Some(("raining", &[], Some(1.0))));
+        check("(not (open door))", Some(("open", &["door"], None)));
+        check("(= (count anna) 2.5)", Some(("count", &["anna"], Some(2.5))));
+        for bad in ["visited", "(visited", "(a (b))", "(= (count anna) many)", "(visited ?x)", "()"] {
+            check(bad, None);
+        }
+    }
+}

@@ -1,0 +1,630 @@
+//! A running domain: the problem now, what its calls mean, what an action is for the body, what an outcome teaches, what is
+//! answered. It is all that the loop sees of a domain.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use descry_memory::belief::Belief;
+use descry_memory::{Record, RecordId};
+use descry_perception::recognise::Recogniser;
+use descry_planner::{Attachments, Plan, PlanError, Source, Task, after, monitor};
+use descry_robots::{PoseEstimate, Robot};
+use descry_skills::{Call, Outcome, Skill, SkillFailure};
+use serde_json::json;
+
+use crate::abilities::searching::candidates;
+use crate::abilities::searching::perceive::{self, Eyes};
+pub use crate::abilities::searching::policies::Chooser;
+use crate::abilities::searching::policies::{self, By};
+use crate::abilities::searching::reasons;
+use crate::actions::{self, Carried, Grounded};
+use crate::answer::{self, Conclusion, Ended};
+use crate::goal::Goal;
+use crate::lexicon::{Lexicon, Places, symbol};
+use crate::load::Domain;
+use crate::mind::{Mind, Region};
+use crate::note::Note;
+use crate::programs::Programs;
+use crate::situation::{self, Candidate, Known, KnownDoor, Situation, Thing};
+use crate::words::{self, Words};
+
+/// How far from a door the body stands to open it, metres.
+const BEFORE_DOOR_M: [f64; 4] = [0.8, 0.9, 0.7, 1.0];
+
+/// Why a world cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum WorldError {
+    /// The store failed for good.
+    #[error("{0}")]
+    Store(#[from] descry_memory::Error),
+    /// The domain cannot be used; the text points at the place and offers a mend.
+    #[error("{0}")]
+    Domain(String),
+    /// A fault of descry itself.
+    #[error("{0}")]
+    Bug(String),
+}
+
+impl WorldError {
+    /// A skill came back with what another brings about.
+    pub(crate) fn strange(outcome: &Outcome) -> Self {
+        WorldError::Bug(format!("a skill came back with {outcome:?}"))
+    }
+
+    /// The planner could not read the task, or an attachment failed.
+    pub fn of_planner(error: &PlanError) -> Self {
+        error.findings().map_or_else(|| Self::Domain(error.to_string()), |f| Self::Domain(f.render(false)))
+    }
+}
+
+/// What a world is made of.
+#[derive(Clone)]
+pub struct Setting<'a> {
+    /// What may be said and what it means.
+    pub domain: &'a Domain,
+    /// What is pursued.
+    pub goal: &'a Goal,
+    /// The body, which is only asked.
+    pub robot: Arc<dyn Robot>,
+    /// Everything that is sensed, done and believed.
+    pub record: &'a Record,
+    /// Tells which object a segment is.
+    pub recogniser: &'a dyn Recogniser,
+}
+
+/// See the module.
+pub struct World<'a> {
+    setting: Setting<'a>,
+    chooser: Chooser,
+    lexicon: Lexicon,
+    mind: Mind,
+    programs: Programs,
+    asked: Vec<Thing>,
+    began_ns: i64,
+    plans: usize,
+    tries: BTreeMap<Call, usize>,
+    seen_before: BTreeMap<String, usize>,
+    given_up: Option<String>,
+}
+
+/// The planning problem of one round, and what its calls are bound to.
+pub struct Round {
+    /// What the calls are answered from.
+    pub situation: Arc<Situation>,
+    /// The problem.
+    pub task: Task,
+    /// Its calls, bound.
+    pub attachments: Attachments,
+    /// The problem's text.
+    pub problem: Source,
+    /// Its record.
+    pub record: RecordId,
+}
+
+/// Who says what to do next.
+pub enum Choice {
+    /// The planner.
+    Planner,
+    /// Somebody has chosen these steps.
+    Steps(Plan),
+    /// Somebody gives up.
+    Nothing(String),
+}
+
+impl<'a> World<'a> {
+    /// A world that has seen nothing yet, the body standing where it says.
+    ///
+    /// # Errors
+    /// [`WorldError::Domain`] if the domain cannot be used with this body.
+    pub fn begin(setting: Setting<'a>, chooser: Chooser, here: &PoseEstimate) -> Result<Self, WorldError> {
+        let Setting { domain, goal, robot, .. } = &setting;
+        crate::check::runnable(domain).map_err(|f| WorldError::Domain(f.render(false)))?;
+        let surfaces = candidates::surfaces(domain, &**robot);
+        known_by_map(domain, &surfaces)?;
+        let index = |name: &String| {
+            surfaces.iter().position(|s| s.symbol == *name).ok_or_else(|| no_surface(name, &surfaces))
+        };
+        let asked: Vec<Thing> = goal
+            .asked
+            .things
+            .iter()
+            .map(|(name, on)| {
+                let on =
+                    on.as_ref().map(|on| on.iter().map(index).collect::<Result<Vec<_>, _>>()).transpose()?;
+                Ok(Thing { on, ..situation::thing(domain, name) })
+            })
+            .collect::<Result<_, WorldError>>()?;
+        let (mut poses, at) = candidates::candidates(&**robot, &surfaces, &domain.config.candidates, here);
+        let doors = doors(&**robot, here, &mut poses);
+        let known = Known {
+            robot: Arc::clone(robot),
+            belief: Arc::new(Belief::default()),
+            spaces: surfaces.iter().map(|_| Arc::default()).collect(),
+            candidates: poses,
+            at,
+            things: asked.clone(),
+            kinds: goal.asked.kinds.iter().map(|kind| situation::thing(domain, kind)).collect(),
+            asked: goal.asked.surfaces.iter().map(index).collect::<Result<_, _>>()?,
+            threshold: goal.threshold,
+            time_left_s: goal.deadline_s,
+            observed: Default::default(),
+            out_of_reach: Default::default(),
+            stuck: Default::default(),
+            pushes_left: domain.config.limits.pushes,
+            doors,
+            shut: Default::default(),
+            held: None,
+            expected: Vec::new(),
+            surfaces,
+        };
+        let regions = known.surfaces.iter().map(|_| Region::default()).collect();
+        let words = Words::begin(domain).map_err(|e| WorldError::Domain(format!("domain.toml: {e}")))?;
+        let mut mind = Mind { known, words, regions, views: 0, pushes: 0, distance_m: 0.0 };
+        mind.attend();
+        Ok(Self {
+            chooser,
+            lexicon: Lexicon::new(domain, &Places::of_body(&**robot)),
+            mind,
+            programs: Programs::of(domain),
+            asked,
+            began_ns: robot.now_ns(),
+            plans: 0,
+            tries: BTreeMap::new(),
+            seen_before: BTreeMap::new(),
+            given_up: None,
+            setting,
+        })
+    }
+
+    /// How many poses there are to look from.
+    pub fn poses(&self) -> usize {
+        self.mind.known.candidates.len()
+    }
+
+    /// Views taken, and metres driven.
+    pub fn taken(&self) -> (usize, f64) {
+        (self.mind.views, self.mind.distance_m)
+    }
+
+    /// The planning problem of this round: symbols, facts and the goal as PDDL, kept in the record.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the domain's texts make no task, a fact's program fails, or the record does.
+    pub fn round(&mut self) -> Result<Round, WorldError> {
+        self.attend();
+        let domain = self.setting.domain;
+        let situation = Arc::new(Situation::new(self.mind.known.clone(), domain.config.thresholds));
+        let problem = self.problem(&situation)?;
+        let task = Task::read(&domain.pddl, &problem).map_err(|f| WorldError::Domain(f.render(false)))?;
+        let attachments = self.bind(&situation);
+        let said = json!({ "name": problem.name, "pddl": problem.text });
+        let record = perceive::put(self.setting.record, "problem", self.setting.robot.now_ns(), &said)?;
+        Ok(Round { situation, task, attachments, problem, record })
+    }
+
+    /// Takes from memory, clock and belief what the next round is grounded in.
+    fn attend(&mut self) {
+        let Setting { domain, goal, robot, .. } = &self.setting;
+        let gone_s = (robot.now_ns() - self.began_ns) as f64 * 1e-9;
+        self.mind.known.time_left_s = goal.deadline_s.map(|deadline_s| deadline_s - gone_s);
+        self.mind.known.pushes_left = domain.config.limits.pushes.saturating_sub(self.mind.pushes);
+        let members =
+            if domain.vocabulary.word("is").is_some() { members(&self.mind.known) } else { Vec::new() };
+        self.mind.known.things = self.asked.iter().cloned().chain(members).collect();
+        self.mind.known.expected = expected(domain, &self.mind.known);
+        self.mind.attend();
+    }
+
+    /// The problem of this round in PDDL.
+    fn problem(&self, s: &Situation) -> Result<Source, WorldError> {
+        let Setting { domain, goal, .. } = &self.setting;
+        let vocabulary = &domain.vocabulary;
+        let name = format!("round-{}", self.mind.views + 1);
+        let mut text =
+            format!("(define (problem {name})\n  (:domain {})\n  (:objects\n", domain_name(domain));
+        let mut symbols: Vec<String> = vocabulary.task.objects.iter().map(|o| o.name.clone()).collect();
+        for (of, names) in objects(s, &self.lexicon, domain) {
+            let fresh: Vec<String> = names.into_iter().filter(|n| !symbols.contains(n)).collect();
+            if !fresh.is_empty() && vocabulary.has_type(&of) {
+                text += &format!("    {} - {of}\n", fresh.join(" "));
+                symbols.extend(fresh);
+            }
+        }
+        text += "  )\n  (:init\n";
+        let mut lines: Vec<String> = Vec::new();
+        for word in vocabulary.words() {
+            match vocabulary.ground(&word, &domain.config) {
+                crate::vocabulary::Ground::Sensed(fact) => lines.extend((fact.states)(s)),
+                crate::vocabulary::Ground::SensedByProgram => {
+                    let said = self.programs.state(&word, &symbols).map_err(WorldError::Domain)?;
+                    lines.extend(said);
+                }
+                _ => {}
+            }
+        }
+        lines.extend(self.mind.words.lines(vocabulary, |name| symbols.iter().any(|s| s == name)));
+        for line in lines {
+            text += &format!("    {line}\n");
+        }
+        let metric = if vocabulary.task.actions.iter().any(|a| a.is_durative()) {
+            "\n  (:metric minimize (total-time))"
+        } else {
+            ""
+        };
+        text += &format!("  )\n  (:goal {}){metric})\n", goal.pddl);
+        Ok(Source::new(format!("{name}.pddl"), text))
+    }
+
+    /// Every call, bound to a situation. A program of the domain's own replaces what is built in.
+    fn bind(&self, situation: &Arc<Situation>) -> Attachments {
+        let started = Instant::now();
+        let mut attachments = Attachments::new().with_clock(move || started.elapsed().as_secs_f64());
+        for ability in crate::abilities::used(&self.setting.domain.config.uses) {
+            for meaning in ability.calls {
+                attachments
+                    .insert(meaning.name, actions::Bound { situation: Arc::clone(situation), meaning });
+            }
+        }
+        self.programs.bind(&mut attachments);
+        attachments
+    }
+
+    /// Who says what to do next: the planner, or a policy that has chosen.
+    pub fn choice(&mut self, round: &Round) -> Choice {
+        let s = &round.situation;
+        if self.chooser.first_look_here
+            && self.mind.views == 0
+            && let Some(look) = policies::here(s)
+        {
+            return Choice::Steps(reasons::look(s, look.from, look.on));
+        }
+        match &mut self.chooser.by {
+            By::Planner => Choice::Planner,
+            By::Policy(policy) => match policies::next(&mut **policy, s) {
+                Some(look) => Choice::Steps(reasons::look(s, look.from, look.on)),
+                None => Choice::Nothing("no look that is left promises to settle anything".into()),
+            },
+        }
+    }
+
+    /// Whether steps are taken whatever they promise: a policy chooses one look at a time and does not say that it will be enough.
+    pub fn takes_steps_unasked(&self) -> bool {
+        matches!(self.chooser.by, By::Policy(_))
+    }
+
+    /// A step that is surely no waste, for when the planner has run out of states; none if there is none.
+    pub fn fallback(&self, round: &Round) -> Option<Plan> {
+        reasons::one_look(&round.situation)
+    }
+
+    /// A plan was made.
+    pub fn planned(&mut self) {
+        self.plans += 1;
+    }
+
+    /// Why a call is made: what it costs and what is hoped from it.
+    pub fn explain(&self, round: &Round, call: &Call) -> String {
+        match actions::because(self.setting.domain, call) {
+            Some(said) => said,
+            None => self.grounded(call, 0).map_or_else(String::new, |g| g.because(&round.situation)),
+        }
+    }
+
+    /// What the `step`-th part of a call is for the body, and its time limit; none where the call has no such part.
+    ///
+    /// # Errors
+    /// [`SkillFailure`] where it has no meaning now; [`WorldError`] where it never has.
+    pub fn ground(&self, call: &Call, step: usize) -> Result<Option<Job>, WorldError> {
+        let domain = self.setting.domain;
+        let limit_s = actions::limit_s(domain, call);
+        if let Some(program) = self.programs.action(&call.action) {
+            return Ok((step == 0).then(|| Job { skill: Ok(program.perform(call)), limit_s }));
+        }
+        let Some(grounded) = self.grounded(call, step) else {
+            return if step == 0 { Err(WorldError::Bug(format!("{call} has no meaning"))) } else { Ok(None) };
+        };
+        let s = Situation::new(self.mind.known.clone(), domain.config.thresholds);
+        Ok(Some(Job { skill: grounded.skill(&s), limit_s }))
+    }
+
+    fn grounded(&self, call: &Call, step: usize) -> Option<Grounded> {
+        actions::grounded(self.setting.domain, call, step)
+    }
+
+    /// Takes in what a part of a call brought about. Returns what came of it in words; empty if its notes say it.
+    ///
+    /// # Errors
+    /// [`WorldError::Store`] if the record fails.
+    pub fn learn(
+        &mut self,
+        call: &Call,
+        step: usize,
+        outcome: &Outcome,
+        notes: &mut Vec<Note>,
+    ) -> Result<String, WorldError> {
+        let said = json!({ "call": call.to_string(), "outcome": actions::outcome(outcome) });
+        perceive::put(self.setting.record, "skill", self.setting.robot.now_ns(), &said)?;
+        if let Outcome::Told(word) = outcome {
+            return Ok(word.clone());
+        }
+        let Some(grounded) = self.grounded(call, step) else { return Ok(String::new()) };
+        let s = Situation::new(self.mind.known.clone(), self.setting.domain.config.thresholds);
+        let robot = Arc::clone(&self.setting.robot);
+        let eyes = eyes(&self.setting, &*robot);
+        (grounded.word.learn)(&mut self.mind, eyes, &s, &grounded.arguments(), outcome, notes)
+    }
+
+    /// Calls were carried out whole: what they promise of remembered words comes about, and what they must bring about is asked
+    /// for. Returns those that did not do what they should.
+    ///
+    /// # Errors
+    /// [`WorldError`] as for [`World::round`].
+    pub fn done(&mut self, round: &Round, done: &[Carried]) -> Result<Vec<(Call, SkillFailure)>, WorldError> {
+        let domain = self.setting.domain;
+        let names = words::remembered(domain);
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let before = self.mind.words.clone();
+        let steps = Plan { steps: done.iter().map(|d| d.step.clone()).collect(), ..Plan::default() };
+        match after(&round.task, &round.attachments, &steps, &names) {
+            Ok(readings) => self.mind.words.take_over(&initial(round, &names), &readings),
+            Err(broken) => {
+                let because = format!("its effects are not taken over: {broken}");
+                return Ok(done
+                    .iter()
+                    .map(|d| {
+                        (d.call.clone(), SkillFailure::Program { because: because.clone(), passing: true })
+                    })
+                    .collect());
+            }
+        }
+        self.mind.attend();
+        let mut unmet = Vec::new();
+        for carried in done {
+            if let Some(condition) = actions::check(domain, &carried.call)
+                && !self.holds_now(&condition)?
+            {
+                unmet.push((carried.call.clone(), SkillFailure::Unmet { condition }));
+            } else {
+                self.tries.remove(&carried.call);
+            }
+        }
+        if !unmet.is_empty() {
+            self.mind.words = before;
+            self.mind.attend();
+        }
+        Ok(unmet)
+    }
+
+    /// Whether a condition holds as things are believed now.
+    fn holds_now(&mut self, condition: &str) -> Result<bool, WorldError> {
+        self.attend();
+        let Setting { domain, goal, .. } = self.setting.clone();
+        let situation = Arc::new(Situation::new(self.mind.known.clone(), domain.config.thresholds));
+        let problem = self.problem(&situation)?;
+        let task = words::with_goal(domain, &problem, &goal.pddl, condition).map_err(WorldError::Domain)?;
+        Ok(monitor(&task, &self.bind(&situation), &Plan::default()).is_ok())
+    }
+
+    /// Takes in what the failure of a call teaches. Returns what is concluded from it.
+    ///
+    /// # Errors
+    /// [`WorldError::Store`] if the record fails.
+    pub fn learn_from_failure(
+        &mut self,
+        round: &Round,
+        call: &Call,
+        step: usize,
+        failure: &SkillFailure,
+    ) -> Result<String, WorldError> {
+        let domain = self.setting.domain;
+        let said = json!({ "call": call.to_string(), "failure": failure.to_string() });
+        perceive::put(self.setting.record, "skill", self.setting.robot.now_ns(), &said)?;
+        if let Some(grounded) = self.grounded(call, step) {
+            let robot = Arc::clone(&self.setting.robot);
+            let eyes = eyes(&self.setting, &*robot);
+            let failed = grounded.word.failed;
+            if let Some(therefore) =
+                failed(&mut self.mind, eyes, &round.situation, &grounded.arguments(), failure)?
+            {
+                return Ok(therefore);
+            }
+        }
+        let config = actions::config(domain, call);
+        let by = match failure {
+            SkillFailure::Body(descry_robots::Failure::Blocked { by: Some(by), .. }) => Some(symbol(by)),
+            _ => None,
+        };
+        let taught: Vec<String> = actions::taught(domain, call, &config, failure, by.as_deref());
+        if !taught.is_empty() {
+            self.say_all(&taught)?;
+            return Ok(taught.join(" "));
+        }
+        let tries = self.tries.entry(call.clone()).or_insert(0);
+        *tries += 1;
+        let (tries, limit) = (*tries, config.retries());
+        if failure.is_passing() && tries <= limit {
+            return Ok(format!("try {tries} of {}", limit + 1));
+        }
+        let given_up = actions::substituted(domain, call, &config.gives_up);
+        self.say_all(&given_up)?;
+        if given_up.is_empty() || tries > limit + 1 {
+            self.given_up = Some(format!("{call} has failed {tries} times: {failure}"));
+        }
+        Ok(if given_up.is_empty() {
+            format!("{call} is given up")
+        } else {
+            format!("{call} is given up: {}", given_up.join(" "))
+        })
+    }
+
+    fn say_all(&mut self, atoms: &[String]) -> Result<(), WorldError> {
+        for atom in atoms {
+            self.mind
+                .words
+                .say(atom)
+                .map_err(|e| WorldError::Domain(format!("domain.toml: \"{atom}\": {e}")))?;
+        }
+        self.mind.attend();
+        Ok(())
+    }
+
+    /// After a failure the body may stand anywhere: that is one more pose to look from.
+    pub fn stands_at(&mut self, here: &PoseEstimate) {
+        let place = here.place();
+        let known = &mut self.mind.known;
+        let found = known.candidates.iter().position(|c| c.place == place);
+        known.at = found.unwrap_or_else(|| {
+            let symbol = format!("here-{}", known.candidates.len());
+            known.candidates.push(Candidate { symbol, place });
+            known.candidates.len() - 1
+        });
+    }
+
+    /// The limit that the run has reached, if it has.
+    pub fn exhausted(&mut self, round: &Round) -> Option<String> {
+        if let Some(why) = self.given_up.take() {
+            return Some(why);
+        }
+        let limits = &self.setting.domain.config.limits;
+        if self.mind.views >= limits.views {
+            return Some(format!("{} looks were taken and it is still in doubt", limits.views));
+        }
+        if self.plans >= limits.plans {
+            return Some(format!("{} plans were made and the goal is not reached", limits.plans));
+        }
+        let gone_s = (self.setting.robot.now_ns() - self.began_ns) as f64 * 1e-9;
+        if gone_s >= limits.seconds {
+            return Some(format!("{:.0} s are over, the most that a run may take", limits.seconds));
+        }
+        // A failure that is tried again is progress of a kind: it is counted elsewhere.
+        let tries: usize = self.tries.values().sum();
+        let times = self.seen_before.entry(format!("{tries} {}", round.problem.text)).or_insert(0);
+        *times += 1;
+        (*times > limits.repeats)
+            .then(|| format!("the same situation has come back {times} times: what is done changes nothing"))
+    }
+
+    /// What is answered in the end.
+    pub fn answer(&self, round: &Round, ended: &Ended) -> Conclusion {
+        answer::conclude(self.setting.goal, &self.lexicon, &self.mind, round, ended)
+    }
+}
+
+/// What perceiving needs.
+fn eyes<'e>(setting: &'e Setting<'_>, robot: &'e dyn Robot) -> Eyes<'e> {
+    Eyes { record: setting.record, recogniser: setting.recogniser, objects: &setting.domain.objects, robot }
+}
+
+/// A part of a call for the body.
+pub struct Job {
+    /// What is to be done, or why it has no meaning now.
+    pub skill: Result<Box<dyn Skill>, SkillFailure>,
+    /// Time for it, on the body's clock.
+    pub limit_s: f64,
+}
+
+/// The name in the domain's text.
+fn domain_name(domain: &Domain) -> &str {
+    &domain.vocabulary.task.domain
+}
+
+/// What held of some words when a round began.
+fn initial(round: &Round, names: &[&str]) -> Vec<descry_planner::Reading> {
+    after(&round.task, &round.attachments, &Plan::default(), names).unwrap_or_default()
+}
+
+/// The objects of the problem, by type.
+fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<(String, Vec<String>)> {
+    let mut objects: Vec<(String, Vec<String>)> = vec![
+        ("pose".into(), s.candidates.iter().map(|c| c.symbol.clone()).collect()),
+        ("surface".into(), s.surfaces.iter().map(|k| k.symbol.clone()).collect()),
+        ("thing".into(), s.things.iter().map(|t| t.symbol.clone()).collect()),
+        ("kind".into(), s.kinds.iter().map(|t| t.symbol.clone()).collect()),
+        ("obstacle".into(), s.obstacles().iter().map(|o| o.symbol.clone()).collect()),
+        ("door".into(), s.doors.iter().map(|d| d.symbol.clone()).collect()),
+        ("room".into(), lexicon.of_type("room").iter().map(|n| n.symbol.clone()).collect()),
+    ];
+    for (of, names) in &domain.config.objects {
+        objects.push((of.clone(), names.iter().map(|n| symbol(n)).collect()));
+    }
+    objects
+}
+
+/// The objects that were seen and may be of a kind that is asked for, each as a thing of its own.
+fn members(known: &Known) -> Vec<Thing> {
+    let of = |kind: &Thing| -> Vec<Thing> {
+        let is = |t: &&descry_memory::belief::Track| t.probability_of(&kind.name) > 0.5;
+        let member = |t: &descry_memory::belief::Track| Thing {
+            symbol: format!("{}-{}", kind.symbol, t.id),
+            track: Some(t.id),
+            ..kind.clone()
+        };
+        known.belief.tracks.iter().filter(is).map(member).collect()
+    };
+    known.kinds.iter().flat_map(of).collect()
+}
+
+/// How much more often each thing, then each kind, is expected on each surface than elsewhere.
+fn expected(domain: &Domain, known: &Known) -> Vec<Vec<f64>> {
+    let weight = |what: &Thing, on: usize| -> f64 {
+        let surface = &known.surfaces[on];
+        let is_it = |e: &&crate::config::Expectation| {
+            let there = symbol(&e.at) == surface.symbol
+                || surface.room.as_ref().is_some_and(|r| symbol(r) == symbol(&e.at));
+            let kinds =
+                || what.models.iter().any(|m| e.what.as_ref().is_some_and(|w| symbol(w) == symbol(&m.kind)));
+            there && e.what.as_ref().is_none_or(|w| symbol(w) == what.symbol || kinds())
+        };
+        domain.config.expect.iter().filter(is_it).map(|e| e.weight).product()
+    };
+    let surfaces = 0..known.surfaces.len();
+    known
+        .things
+        .iter()
+        .chain(&known.kinds)
+        .map(|what| surfaces.clone().map(|on| weight(what, on)).collect())
+        .collect()
+}
+
+/// A surface that the domain names and the map, which knows others, does not have.
+fn known_by_map(domain: &Domain, surfaces: &[situation::KnownSurface]) -> Result<(), WorldError> {
+    domain.config.surfaces.iter().try_for_each(|name| {
+        match surfaces.iter().any(|s| s.symbol == symbol(name)) {
+            true => Ok(()),
+            false => Err(no_surface(name, surfaces)),
+        }
+    })
+}
+
+fn no_surface(name: &str, surfaces: &[situation::KnownSurface]) -> WorldError {
+    let known: Vec<&str> = surfaces.iter().map(|s| s.name.as_str()).collect();
+    let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+    WorldError::Domain(format!(
+        "there is no surface \"{name}\" here\n  the map has: {known}\n  name one of these, or give the scene a [[surface]] of that name"
+    ))
+}
+
+/// The doors that the map knows; poses on both sides of each are added to those that the body can be sent to.
+fn doors(robot: &dyn Robot, here: &PoseEstimate, poses: &mut Vec<Candidate>) -> Vec<KnownDoor> {
+    let mut known = Vec::new();
+    for door in robot.doors() {
+        let symbol = symbol(&door.name);
+        let across = descry_perception::nalgebra::Vector2::new(-door.along_rad.sin(), door.along_rad.cos());
+        for (side, sign) in [(1, 1.0), (2, -1.0)] {
+            let tries: Vec<descry_robots::Place> = BEFORE_DOOR_M
+                .iter()
+                .map(|d| {
+                    let at = door.centre_m + across * (sign * d);
+                    descry_robots::Place::Pose(descry_robots::Pose2::facing(at.x, at.y, &door.centre_m))
+                })
+                .collect();
+            let fits = robot.travel(&here.place(), &tries, &[]).iter().position(Result::is_ok);
+            poses.extend(
+                fits.map(|n| Candidate { symbol: format!("{symbol}-side-{side}"), place: tries[n].clone() }),
+            );
+        }
+        known.push(KnownDoor { symbol, door: door.clone() });
+    }
+    known
+}

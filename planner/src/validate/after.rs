@@ -1,0 +1,50 @@
+//! What holds after a few steps: the effects of what was carried out, by the same rules as everything else.
+
+use std::sync::Arc;
+
+use super::monitor::Broken;
+use super::replay;
+use crate::attachment::{Attachments, FactValue, Reading};
+use crate::plan::Plan;
+use crate::semantics::Semantics;
+use crate::state::State;
+use crate::task::Task;
+
+/// Every instance of the named predicates and numeric functions that holds or has a value once the steps are carried out from
+/// the initial state; in the order of the names, instances in the order of the task's objects. The goal is not asked for.
+///
+/// # Errors
+/// The first condition that does not hold, as [`monitor`](super::monitor()) gives it.
+pub fn after(
+    task: &Task,
+    attachments: &Attachments,
+    steps: &Plan,
+    names: &[&str],
+) -> Result<Vec<Reading>, Box<Broken>> {
+    let semantics = Semantics::new(task, attachments);
+    let replayed = match replay::replay(&semantics, steps) {
+        Ok(Ok(replayed)) => replayed,
+        Ok(Err(fault)) => return Err(Box::new(Broken::of_fault(task, *fault))),
+        Err(failure) => return Err(Box::new(Broken::of_call(task, &failure))),
+    };
+    Ok(names.iter().flat_map(|name| instances(task, &replayed.state, name)).collect())
+}
+
+fn instances(task: &Task, state: &State, name: &str) -> Vec<Reading> {
+    let named = |arguments: &[crate::task::ObjectId]| -> Arc<[Arc<str>]> {
+        arguments.iter().map(|id| Arc::from(task.object(*id).name.as_str())).collect()
+    };
+    let mut found: Vec<(Vec<u32>, Reading)> = Vec::new();
+    let mut add = |arguments: &[crate::task::ObjectId], value: FactValue| {
+        let reading = Reading { symbol: Arc::from(name), arguments: named(arguments), value };
+        found.push((arguments.iter().map(|id| id.0).collect(), reading));
+    };
+    for (id, _) in (0..).zip(&task.predicates).filter(|(_, p)| p.name == name) {
+        state.instances(crate::task::PredicateId(id)).for_each(|a| add(a, FactValue::Truth(true)));
+    }
+    for (id, _) in (0..).zip(&task.functions).filter(|(_, f)| f.name == name) {
+        state.values(crate::task::FunctionId(id)).for_each(|(a, v)| add(a, FactValue::Number(v)));
+    }
+    found.sort_by(|a, b| a.0.cmp(&b.0));
+    found.into_iter().map(|(_, reading)| reading).collect()
+}

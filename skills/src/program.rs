@@ -1,0 +1,46 @@
+//! An action that a program carries out, in any language.
+
+use std::sync::Arc;
+
+use async_trait::async_trait;
+use descry_robots::Failure;
+
+use crate::skill::{Context, Outcome, Skill, SkillFailure};
+
+/// What a program said: that it is done, with a word about it; or that it could not, why, and whether a second try may help.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Asked {
+    /// It is done.
+    Done(String),
+    /// It could not.
+    Failed {
+        /// Why.
+        because: String,
+        /// Whether the same may work when it is tried again.
+        passing: bool,
+    },
+}
+
+/// Lets a program do something. The question blocks until there is an answer or the time is up; it is asked on a thread of its own.
+pub struct Program {
+    /// Asks the program and waits.
+    pub ask: Arc<dyn Fn() -> Asked + Send + Sync>,
+}
+
+#[async_trait]
+impl Skill for Program {
+    async fn perform(&self, context: &Context<'_>) -> Result<Outcome, SkillFailure> {
+        let ask = Arc::clone(&self.ask);
+        let asked = tokio::task::spawn_blocking(move || ask());
+        tokio::select! {
+            () = context.cancel.cancelled() => {
+                Err(Failure::Cancelled { because: "the program was left alone".into() }.into())
+            }
+            said = asked => match said {
+                Ok(Asked::Done(word)) => Ok(Outcome::Told(word)),
+                Ok(Asked::Failed { because, passing }) => Err(SkillFailure::Program { because, passing }),
+                Err(ended) => Err(SkillFailure::Program { because: ended.to_string(), passing: false }),
+            },
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! `put-down`: puts what the hand holds down.
+
+use async_trait::async_trait;
+use descry_robots::{Failure, Placing};
+
+use crate::skill::{Context, Outcome, Skill, SkillFailure};
+
+/// Puts down what the hand holds.
+pub struct PutDown {
+    /// Where.
+    pub placing: Placing,
+}
+
+#[async_trait]
+impl Skill for PutDown {
+    async fn perform(&self, context: &Context<'_>) -> Result<Outcome, SkillFailure> {
+        let hand = context.robot.hand().await?;
+        if !hand.holds {
+            return Err(Failure::Slipped { because: "the hand is empty".into(), moved_m: 0.0 }.into());
+        }
+        Ok(Outcome::Placed(context.robot.place(&self.placing, &context.watch()).await?))
+    }
+}

@@ -107,6 +107,7 @@ pub(crate) fn conclude(
         _ => f64::from(u8::from(verdict == Verdict::Achieved)),
     };
     let first = s.things.first().filter(|t| t.track.is_none());
+    let may_be = |thing: &Thing, t: &Track| thing.probability(t, &s.surfaces) > 1.0 - s.thresholds.confidence;
     let mut objects: Vec<Believed> = s.belief.tracks.iter().map(|t| asker.believed(t)).collect();
     objects.sort_by_key(|o| !o.asked);
     Conclusion {
@@ -115,7 +116,7 @@ pub(crate) fn conclude(
         confidence,
         remaining: first.map(|_| s.chance_there(0)),
         object: first.map(|t| t.name.clone()),
-        found: first.and_then(|t| asker.best(t)).map(|t| asker.believed(t)),
+        found: first.and_then(|t| asker.best(t).filter(|track| may_be(t, track))).map(|t| asker.believed(t)),
         objects,
     }
 }

@@ -7,8 +7,8 @@ use crate::vocabulary::Vocabulary;
 pub struct Asked {
     /// Things that are looked for, each with the surfaces on which it is asked about; none: wherever it is.
     pub things: Vec<(String, Option<Vec<String>>)>,
-    /// Kinds of which all are asked for.
-    pub kinds: Vec<String>,
+    /// Kinds of which all are asked for, each with the room in which it is asked about; none: wherever they are.
+    pub kinds: Vec<(String, Option<String>)>,
     /// Surfaces of which it is asked what stands there.
     pub surfaces: Vec<String>,
 }
@@ -19,22 +19,28 @@ const PRESENCE: &str = "presence";
 const CLARITY: &str = "clarity";
 
 impl Asked {
-    /// Reads a condition without variables for things and kinds.
+    /// Reads a condition.
     pub fn of(condition: &str, vocabulary: &Vocabulary) -> Self {
         let mut asked = Self::default();
         for mention in mentions(condition) {
             let Some(word) = mention.first().and_then(|name| vocabulary.word(name)) else { continue };
             let arguments = || mention[1..].iter().zip(&word.types);
-            let of = |wanted: &'static str| {
+            let named = |wanted: &'static str| {
                 arguments().filter(move |(_, t)| vocabulary.is_a(t, wanted)).map(|(a, _)| a.clone())
             };
+            // A variable stands for whichever there are.
+            let of = |wanted: &'static str| named(wanted).filter(|a| !a.starts_with('?'));
             let surfaces: Vec<String> = of("surface").collect();
+            let anywhere = named("surface").any(|a| a.starts_with('?'));
             for thing in of("thing") {
-                asked.note_thing(thing, (word.name == PRESENCE).then(|| surfaces.clone()));
+                let restricted = word.name == PRESENCE && !anywhere;
+                asked.note_thing(thing, restricted.then(|| surfaces.clone()));
             }
+            let room = of("room").next();
             for kind in of("kind") {
-                if !asked.kinds.contains(&kind) {
-                    asked.kinds.push(kind);
+                match asked.kinds.iter_mut().find(|(known, _)| *known == kind) {
+                    None => asked.kinds.push((kind, room.clone())),
+                    Some((_, known)) => *known = known.take().filter(|known| Some(known) == room.as_ref()),
                 }
             }
             if word.name == CLARITY {
@@ -57,7 +63,7 @@ impl Asked {
     }
 }
 
-/// Every list of plain symbols in a condition that has no variable: `(on cup-a desk)`, `(confidence cup-a)`.
+/// Every list of plain symbols in a condition: `(on cup-a ?s)`, `(confidence cup-a)`.
 fn mentions(condition: &str) -> Vec<Vec<String>> {
     let mut found = Vec::new();
     let mut open: Vec<Option<Vec<String>>> = Vec::new();
@@ -72,8 +78,7 @@ fn mentions(condition: &str) -> Vec<Vec<String>> {
                 open.push(Some(Vec::new()));
             }
             ")" => {
-                let list = open.pop().flatten().filter(|l| l.iter().all(|t| !t.starts_with('?')));
-                found.extend(list.filter(|l| !l.is_empty()));
+                found.extend(open.pop().flatten().filter(|l| !l.is_empty()));
             }
             word => {
                 if let Some(Some(list)) = open.last_mut() {
@@ -98,7 +103,7 @@ mod tests {
                 let own = |list: &[&str]| list.iter().map(|s| s.to_string()).collect::<Vec<_>>();
                 let expected = Asked {
                     things: things.iter().map(|(t, on)| (t.to_string(), on.map(own))).collect(),
-                    kinds: own(kinds),
+                    kinds: own(kinds).into_iter().map(|kind| (kind, None)).collect(),
                     surfaces: own(surfaces),
                 };
                 assert_eq!(Asked::of(condition, &domain.vocabulary), expected, "{condition}");
@@ -117,6 +122,7 @@ mod tests {
             &[],
             &[],
         );
+        check("(exists (?s - surface) (>= (presence cup-a ?s) 0.8))", &[("cup-a", None)], &[], &[]);
         check("(>= (completeness cup) 0.8)", &[], &["cup"], &[]);
         check("(>= (clarity table) 0.8)", &[], &[], &["table"]);
         check("(observed table-3 table)", &[], &[], &[]);

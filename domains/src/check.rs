@@ -42,6 +42,7 @@ pub fn grounding(domain: &Domain) -> Vec<String> {
             Ground::SensedByProgram => "sensed: by a program".into(),
             Ground::Remembered => "remembered: changes as carried-out actions say".into(),
             Ground::Fixed => "fixed: as domain.toml says in init".into(),
+            Ground::Planned => "planned: changes within a plan alone".into(),
             Ground::Derived => "derived by the domain's rules".into(),
         };
         let types: String = word.types.iter().map(|t| format!(" {t}")).collect();
@@ -289,15 +290,13 @@ impl Check<'_> {
                 error("no-action", format!("there is no action `{name}`"), self.table("action", name), help);
                 continue;
             }
-            let taught = action.teaches.iter().map(|t| &t.says);
-            for atom in action.gives_up.iter().chain(taught) {
-                let word =
-                    atom.trim_matches(|c| c == '(' || c == ')').split_whitespace().next().unwrap_or_default();
-                let ground = vocabulary.word(&word.to_lowercase()).map(|w| vocabulary.ground(&w, config));
-                if !matches!(ground, Some(Ground::Remembered | Ground::Fixed)) {
-                    let message = format!("`{atom}` does not say anything of a word that is remembered");
-                    let help = "name a predicate that no ability states, as (given-up ?to)".into();
-                    error("not-remembered", message, self.in_toml(&[atom]), help);
+            for word in action.taught() {
+                let ground = vocabulary.word(&word).map(|w| vocabulary.ground(&w, config));
+                if !matches!(ground, Some(Ground::Remembered)) {
+                    let message =
+                        format!("what a failure of `{name}` teaches, `{word}`, is no word that is remembered");
+                    let help = "name a predicate of domain.pddl that no ability states, as (given-up ?to)".into();
+                    error("not-remembered", message, self.in_toml(&[&format!("({word}")]), help);
                 }
             }
         }

@@ -164,6 +164,15 @@ pub struct Teaching {
 }
 
 impl ActionConfig {
+    /// The words that its failures teach.
+    pub fn taught(&self) -> impl Iterator<Item = String> + '_ {
+        let atoms = self.gives_up.iter().chain(self.teaches.iter().map(|t| &t.says));
+        atoms.filter_map(|atom| {
+            let tokens = atom.split(|c: char| c.is_whitespace() || "()".contains(c));
+            tokens.filter(|t| !t.is_empty() && *t != "not").map(str::to_lowercase).next()
+        })
+    }
+
     /// Seconds for each skill where none are named.
     pub const LIMIT_S: f64 = 60.0;
     /// Tries after the first where none are named.
@@ -189,7 +198,7 @@ pub struct WordConfig {
     /// Time for its answer, seconds.
     #[serde(default = "default_program_time_s")]
     pub time_limit_s: f64,
-    /// `remembered` or `fixed`, where it should be said rather than follow from the effects of the actions.
+    /// `remembered`, `fixed` or `planned`, where it should be said rather than follow from the effects of the actions.
     pub is: Option<Source>,
 }
 
@@ -201,6 +210,8 @@ pub enum Source {
     Remembered,
     /// It never changes.
     Fixed,
+    /// It changes within a plan alone: every round begins without it.
+    Planned,
 }
 
 /// What counts as sure; all are probabilities.

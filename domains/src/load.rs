@@ -12,7 +12,10 @@ use crate::config::{self, Config};
 use crate::vocabulary::Vocabulary;
 
 /// The domains that come with the program.
-static BUILT_IN: [(&str, Dir<'_>); 1] = [("tabletop", include_dir!("$CARGO_MANIFEST_DIR/tabletop"))];
+static BUILT_IN: [(&str, Dir<'_>); 2] = [
+    ("tabletop", include_dir!("$CARGO_MANIFEST_DIR/tabletop")),
+    ("home", include_dir!("$CARGO_MANIFEST_DIR/home")),
+];
 
 /// The domain that is used when none is named.
 pub const DEFAULT: &str = "tabletop";

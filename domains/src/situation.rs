@@ -13,6 +13,7 @@ use descry_robots::{Place, Robot};
 
 use crate::abilities::searching::doubt::{Doubt, Hypothesis, Taken};
 use crate::abilities::searching::obstacle::{self, Obstacle};
+use crate::abilities::searching::reasons;
 use crate::config::Thresholds;
 use crate::lexicon::symbol;
 use crate::load::Domain;
@@ -170,6 +171,8 @@ struct Derived {
     about: Vec<OnceLock<Doubt>>,
     on: Vec<OnceLock<Doubt>>,
     of: Vec<OnceLock<Doubt>>,
+    about_on: Vec<OnceLock<Doubt>>,
+    going_on_s: OnceLock<f64>,
     obstacles: OnceLock<Vec<Obstacle>>,
 }
 
@@ -194,6 +197,8 @@ impl Situation {
             about: cells(known.things.len()),
             on: cells(known.surfaces.len()),
             of: cells(known.kinds.len()),
+            about_on: cells(known.things.len() * known.surfaces.len()),
+            going_on_s: OnceLock::new(),
             obstacles: OnceLock::new(),
         };
         Self { known, thresholds, derived }
@@ -450,6 +455,23 @@ impl Situation {
     /// What is in doubt about a thing.
     pub fn doubt_about(&self, what: usize) -> &Doubt {
         self.derived.about[what].get_or_init(|| Doubt::about(self, what))
+    }
+
+    /// What is in doubt about a thing on one surface.
+    pub fn doubt_about_on(&self, what: usize, on: usize) -> &Doubt {
+        self.derived.about_on[what * self.surfaces.len() + on].get_or_init(|| Doubt::about_on(self, what, on))
+    }
+
+    /// What going on to look elsewhere takes on average, seconds: a drive to another surface and a look.
+    pub fn going_on_s(&self) -> f64 {
+        *self.derived.going_on_s.get_or_init(|| {
+            let to = |on: usize| {
+                let sees = (0..self.candidates.len()).filter(|&n| self.can_drive_to(n) && self.sees(n, on));
+                sees.map(|n| self.travel_s(self.at, n)).fold(f64::INFINITY, f64::min)
+            };
+            let all: Vec<f64> = (0..self.surfaces.len()).map(to).filter(|s| s.is_finite()).collect();
+            reasons::LOOK_S + all.iter().sum::<f64>() / all.len().max(1) as f64
+        })
     }
 
     /// What is in doubt on a surface.

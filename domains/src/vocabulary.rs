@@ -42,6 +42,8 @@ pub enum Ground {
     Remembered,
     /// It never changes.
     Fixed,
+    /// It changes within a plan alone.
+    Planned,
     /// The domain's own rules derive it.
     Derived,
 }
@@ -121,8 +123,12 @@ impl Vocabulary {
         match (configured.and_then(|c| c.is), abilities::fact(&config.uses, &word.name)) {
             (Some(Kept::Remembered), _) => Ground::Remembered,
             (Some(Kept::Fixed), _) => Ground::Fixed,
+            (Some(Kept::Planned), _) => Ground::Planned,
             (None, Some(fact)) => Ground::Sensed(fact),
             (None, None) if self.changed.contains(&word.name) => Ground::Remembered,
+            (None, None) if config.action.values().any(|a| a.taught().any(|t| t == word.name)) => {
+                Ground::Remembered
+            }
             (None, None) => Ground::Fixed,
         }
     }

@@ -144,7 +144,7 @@ impl<'a> World<'a> {
             candidates: poses,
             at,
             things: asked.clone(),
-            kinds: goal.asked.kinds.iter().map(|kind| situation::thing(domain, kind)).collect(),
+            kinds: kinds(domain, goal, &surfaces),
             asked: goal.asked.surfaces.iter().map(index).collect::<Result<_, _>>()?,
             threshold: goal.threshold,
             time_left_s: goal.deadline_s,
@@ -549,6 +549,16 @@ fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<(String, Ve
         objects.push((of.clone(), names.iter().map(|n| symbol(n)).collect()));
     }
     objects
+}
+
+/// The kinds of which all are asked for, each on the surfaces of the room in which it is asked about.
+fn kinds(domain: &Domain, goal: &Goal, surfaces: &[situation::KnownSurface]) -> Vec<Thing> {
+    let of = |(kind, room): &(String, Option<String>)| {
+        let is_in = |n: &usize| surfaces[*n].room.as_deref().map(symbol).as_ref() == room.as_ref();
+        let on = room.as_ref().map(|_| (0..surfaces.len()).filter(is_in).collect());
+        Thing { on, ..situation::thing(domain, kind) }
+    };
+    goal.asked.kinds.iter().map(of).collect()
 }
 
 /// The objects that were seen and may be of a kind that is asked for, each as a thing of its own.

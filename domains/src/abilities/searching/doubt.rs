@@ -99,6 +99,20 @@ impl Doubt {
         doubt
     }
 
+    /// What is in doubt about a thing on one surface.
+    pub(crate) fn about_on(situation: &Situation, what: usize, on: usize) -> Self {
+        let thing = Thing { on: Some(vec![on]), ..situation.things[what].clone() };
+        let mut doubt = Self::hidden(situation, &thing, &situation.expected[what]);
+        doubt.scale_hidden(1.0 - situation.presence(what, on));
+        for track in situation.on_surface(on) {
+            let p = thing.probability(track, &situation.surfaces);
+            if p > NEGLIGIBLE {
+                doubt.hypotheses.extend(unseen_sides(situation, track, p));
+            }
+        }
+        doubt
+    }
+
     /// What is in doubt about which objects are of a kind: where more of it may be hidden, and which objects may be of it.
     pub(crate) fn of(situation: &Situation, of: usize) -> Self {
         let kind = &situation.kinds[of];
@@ -177,6 +191,11 @@ impl Doubt {
         let uncovered: f64 =
             (0..self.hypotheses.len()).filter(only_after).map(|n| self.hypotheses[n].weight).sum();
         uncovered >= negligible(situation, Some(what))
+    }
+
+    /// The probability that hangs on a surface.
+    pub fn weight_on(&self, on: usize) -> f64 {
+        self.hypotheses.iter().filter(|h| h.on == on).map(|h| h.weight).sum()
     }
 
     /// The share of the places on a surface where it could not stand unseen, 0 to 1; none if it is not asked about there or

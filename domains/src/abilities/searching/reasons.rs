@@ -8,7 +8,7 @@ use super::doubt::{Doubt, Taken};
 use crate::situation::{KnownSurface, Situation};
 
 /// What a look takes, as in the domain.
-pub(super) const LOOK_S: f64 = 2.0;
+pub(crate) const LOOK_S: f64 = 2.0;
 
 /// The single look that settles most a second; none if no look settles anything.
 pub fn one_look(s: &Situation) -> Option<Plan> {
@@ -112,7 +112,7 @@ pub fn seen_of(s: &Situation, doubt: &Doubt, looks: impl Fn(usize) -> usize) -> 
         })
     };
     let parts: Vec<String> = s.surfaces.iter().enumerate().filter_map(|(on, k)| of(on, k)).collect();
-    format!("{}; {:.3} is left", parts.join(", "), doubt.hidden)
+    format!("{}; {:.3} is left", parts.join(", "), doubt.hidden.max(0.0))
 }
 
 /// Where there is room for something that no look can show; none if too little hangs on it.

@@ -4,6 +4,8 @@ mod can_see;
 mod expected_clarity;
 mod expected_completeness;
 mod expected_gain;
+mod expected_presence;
+mod search_cost;
 mod worth_a_look;
 mod worth_a_push;
 
@@ -40,6 +42,18 @@ pub(super) const ALL: &[Meaning] = &[
         reads: LOOKS,
         about: "how much of the doubt about a thing a look would settle",
         answers: expected_gain::answer,
+    },
+    Meaning {
+        name: "expected-presence",
+        reads: LOOKS,
+        about: "how much of the doubt about a thing on that surface a look would settle",
+        answers: expected_presence::answer,
+    },
+    Meaning {
+        name: "search-cost",
+        reads: &["observed"],
+        about: "seconds that looking there first may have been in vain for",
+        answers: search_cost::answer,
     },
     Meaning {
         name: "expected-clarity",

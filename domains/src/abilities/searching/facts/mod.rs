@@ -2,10 +2,12 @@
 
 mod clarity;
 mod completeness;
+mod completeness_in;
 mod confidence;
 mod is;
 mod on;
 mod presence;
+mod sure;
 
 use crate::abilities::Fact;
 
@@ -41,6 +43,13 @@ pub(super) const ALL: &[Fact] = &[
         about: "how sure it is that all of the kind are found, 0 to 1",
         states: completeness::state,
     },
+    Fact {
+        name: "completeness-in",
+        types: &["kind", "room"],
+        about: "the same of those in the room that is asked about",
+        states: completeness_in::state,
+    },
+    Fact { name: "sure", types: &[], about: "the confidence that was asked for", states: sure::state },
     Fact {
         name: "clarity",
         types: &["surface"],

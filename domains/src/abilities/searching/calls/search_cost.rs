@@ -1,0 +1,24 @@
+//! `[search-cost ?on]`: seconds that a look at a surface may turn out to have been in vain for, counted at the first look of a plan
+//! there: (1 - p) / p of what going on elsewhere takes, where p is the probability that what is asked for is there. Nothing where
+//! all surfaces must be looked at, and nothing where the time is limited: then only real seconds count.
+
+use descry_planner::{Answer, Call, CallError};
+
+use crate::abilities::argument;
+use crate::situation::Situation;
+
+/// No look costs more than so many seconds for being in vain.
+const MOST_S: f64 = 300.0;
+
+pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let on = situation.surface(argument(call, 0)?)?;
+    let begun = situation.planned_looks(call).iter().any(|look| look.1 == on);
+    let open: Vec<usize> =
+        (0..situation.things.len()).filter(|&n| situation.confidence(n) < situation.threshold).collect();
+    if begun || open.is_empty() || situation.time_left_s.is_some() {
+        return Ok(Answer::Number(0.0));
+    }
+    let there = open.iter().map(|&n| situation.doubt_about(n).weight_on(on) + situation.presence(n, on));
+    let p = there.fold(0.0, f64::max).clamp(1e-6, 1.0);
+    Ok(Answer::Number(((1.0 - p) / p * situation.going_on_s()).min(MOST_S)))
+}

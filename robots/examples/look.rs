@@ -1,15 +1,18 @@
-//! Renders a scene from the start and from around its first surface: `cargo run --release --example look -- SCENE.toml [SEED] [OUT]`.
+//! Renders a scene from the start and from poses around its surfaces, opening doors on the way:
+//! `cargo run --release --example look -- SCENE.toml [SEED] [OUT]`.
 
 use descry_robots::image::{GrayImage, Luma};
 use descry_robots::nalgebra::Point3;
 use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};
-use descry_robots::{Place, Pose2, Robot, Watch};
+use descry_robots::{Failure, Place, Pose2, Robot, SurfaceHint, Watch};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
 /// Poses on a ring of this radius, metres.
-const RING_M: f64 = 1.4;
+const RING_M: f64 = 1.3;
 const RING_POSES: usize = 5;
+/// Drives that are tried to get somewhere: a door may be shut.
+const TRIES: usize = 20;
 
 #[tokio::main(flavor = "current_thread")]
 async fn main() -> Result<(), Box<dyn Error>> {
@@ -21,10 +24,25 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let robot = SimRobot::new(arrange(&spec, seed)?, SimOptions { seed, ..SimOptions::default() });
     let truth = robot.truth();
     for o in &truth.objects {
-        println!("{:16} at {:.3} {:.3} {:.3}", o.name, o.centre_m.x, o.centre_m.y, o.centre_m.z);
+        let (surface, room) = (o.surface.as_deref().unwrap_or("-"), o.room.as_deref().unwrap_or("-"));
+        println!(
+            "{:16} {:.3} {:.3} {:.3} {surface}, {room}",
+            o.name, o.centre_m.x, o.centre_m.y, o.centre_m.z
+        );
+    }
+    for door in &truth.doors {
+        println!("{} is {}", door.name, if door.shut { "shut" } else { "open" });
     }
     println!("target {:?}: {:?} of it visible from the start", truth.target, truth.target_visible_from_start);
-    let Some(surface) = robot.surfaces().first() else { return Ok(()) };
+    map(&robot).save(out.join("map.png"))?;
+    for surface in robot.surfaces() {
+        look_around(&robot, surface, &out).await?;
+    }
+    println!("pictures in {}", out.display());
+    Ok(())
+}
+
+async fn look_around(robot: &SimRobot, surface: &SurfaceHint, out: &Path) -> Result<(), Box<dyn Error>> {
     let sum = surface.outline_m.iter().fold(Point3::origin(), |s: Point3<f64>, c| s + c.coords.push(0.0));
     let centre = Point3::from(sum.coords / surface.outline_m.len() as f64)
         + Point3::new(0.0, 0.0, surface.height_m).coords;
@@ -33,15 +51,39 @@ async fn main() -> Result<(), Box<dyn Error>> {
         if k > 0 {
             let angle = std::f64::consts::TAU * k as f64 / RING_POSES as f64;
             let (x_m, y_m) = (centre.x + RING_M * angle.cos(), centre.y + RING_M * angle.sin());
-            let driven = robot.drive_to(&Place::Pose(Pose2::facing(x_m, y_m, &centre.xy())), &watch).await?;
-            println!("pose {k}: {:.2} m, {:.1} s", driven.distance_m, driven.duration_s);
+            if let Err(failure) = go(robot, &Place::Pose(Pose2::facing(x_m, y_m, &centre.xy()))).await {
+                println!("{} {k}: {failure}", surface.name);
+                continue;
+            }
         }
         robot.look_at(&centre, &watch).await?;
         let sensed = robot.sense(&watch).await?;
-        save(&sensed, &out.join(format!("look-{k}")))?;
+        save(&sensed, &out.join(format!("{}-{k}", surface.name.replace(' ', "-"))))?;
     }
-    println!("pictures in {}", out.display());
     Ok(())
+}
+
+/// Drives there and opens what is shut.
+async fn go(robot: &SimRobot, place: &Place) -> Result<(), Failure> {
+    for _ in 0..TRIES {
+        match robot.drive_to(place, &Watch::default()).await {
+            Err(Failure::Blocked { by: Some(door), .. }) => {
+                let opened = robot.open_door(&door, &Watch::default()).await;
+                println!("{door}: {opened:?}");
+            }
+            driven => return driven.map(|_| ()),
+        }
+    }
+    Err(Failure::Unreachable { because: "the doors stay shut".into() })
+}
+
+/// The map, four pixels a cell.
+fn map(robot: &SimRobot) -> GrayImage {
+    let Some(map) = robot.map() else { return GrayImage::new(1, 1) };
+    GrayImage::from_fn(4 * map.width as u32, 4 * map.height as u32, |u, v| {
+        let (column, row) = (u as usize / 4, map.height - 1 - v as usize / 4);
+        Luma([if map.occupied[row * map.width + column] { 0 } else { 255 }])
+    })
 }
 
 fn save(sensed: &descry_robots::Sensed, stem: &Path) -> Result<(), Box<dyn Error>> {

@@ -7,7 +7,7 @@ use descry_robots::sim::noise::{DepthNoise, observe};
 use descry_robots::sim::render::{Frame, render, visible_share};
 use descry_robots::sim::shape::Shape;
 use descry_robots::sim::world::{LABEL_OBJECT, LABEL_ROOM};
-use descry_robots::sim::{Object, Scene, SceneSpec, arrange, body};
+use descry_robots::sim::{Object, Scene, SceneSpec, Stand, arrange, body};
 use descry_robots::{Pose2, sim};
 
 const SCENE: &str = r#"
@@ -189,7 +189,12 @@ fn shares_agree_with_whole_pictures() {
         for k in 0..scene.objects.len() {
             let label = LABEL_OBJECT + k as u16;
             let mut alone = scene.clone();
-            alone.objects.iter_mut().enumerate().for_each(|(i, o)| o.present = i == k);
+            alone
+                .objects
+                .iter_mut()
+                .enumerate()
+                .filter(|(i, _)| *i != k)
+                .for_each(|(_, o)| o.stands = Stand::Away);
             alone.surfaces.clear();
             alone.obstacles.clear();
             let count = |f: &Frame| f.label.iter().filter(|&&l| l == label).count() as f64;

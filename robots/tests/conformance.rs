@@ -7,8 +7,8 @@ use descry_robots::conformance;
 use descry_robots::recorded::RecordedRobot;
 use descry_robots::sim::{SimOptions, SimRobot};
 use descry_robots::{
-    Description, Driven, Failure, Looked, OccupancyGrid, Place, PoseEstimate, Robot, Sensed, Stamp, Station,
-    SurfaceHint, Travel, Watch, async_trait, nalgebra,
+    Description, Driven, Failure, Grasp, Grasped, Hand, Looked, OccupancyGrid, Place, Placed, Placing,
+    PoseEstimate, Robot, Sensed, Stamp, Station, SurfaceHint, Travel, Watch, async_trait, nalgebra,
 };
 
 fn simulated(seed: u64) -> SimRobot {
@@ -54,6 +54,8 @@ enum Lie {
     WrongChain,
     Everywhere,
     Moody,
+    Numb,
+    Greedy,
 }
 
 #[async_trait]
@@ -113,6 +115,20 @@ impl Robot for Liar {
         }
         Ok(sensed)
     }
+    async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
+        match self.honest.grasp(grasp, watch).await {
+            Err(Failure::Slipped { .. }) if self.lie == Lie::Greedy => {
+                Ok(Grasped { width_m: grasp.width_m, duration_s: 1.0 })
+            }
+            answer => answer,
+        }
+    }
+    async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
+        self.honest.place(placing, watch).await
+    }
+    async fn hand(&self) -> Result<Hand, Failure> {
+        if self.lie == Lie::Numb { Ok(Hand { holds: true }) } else { self.honest.hand().await }
+    }
 }
 
 #[tokio::test]
@@ -123,6 +139,8 @@ async fn broken_promises_are_found() {
         (Lie::WrongChain, "the chain is map, base, camera"),
         (Lie::Everywhere, "a place that is none is unreachable, with a reason"),
         (Lie::Moody, "each question about a route has an answer"),
+        (Lie::Numb, "a hand feels whether it holds something"),
+        (Lie::Greedy, "a hand that closes on nothing says so"),
     ] {
         let breach = conformance::check(&Liar { honest: simulated(1), lie }).await.unwrap_err();
         assert_eq!(breach.promise, promise, "{lie:?}: {breach}");

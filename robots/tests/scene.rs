@@ -86,7 +86,7 @@ fn covers(o: &Object, p: &Point3<f64>) -> bool {
 
 fn check_arrangement(name: &str, seed: u64, spec: &SceneSpec, scene: &Scene) {
     for o in &scene.objects {
-        let surface = scene.surfaces.iter().find(|s| s.name == o.surface).unwrap();
+        let surface = o.surface().and_then(|s| scene.surface(s)).unwrap();
         let top = surface.map_from_top();
         for i in -40..=40 {
             for j in -20..=20 {

@@ -5,10 +5,12 @@ use crate::head;
 use crate::input::InputError;
 use crate::route::Router;
 use crate::sim::body::{self, SAFETY_M};
+use crate::sim::noise::{mix, share};
 use crate::sim::render::visible_share;
-use crate::sim::scene::{ObjectSpec, SceneSpec, SurfaceSpec, TargetSpec};
+use crate::sim::scene::{DoorSpec, DoorState, ObjectSpec, RoomSpec, SceneSpec, SurfaceSpec, TargetSpec};
 use crate::sim::shape::Outline;
-use crate::sim::world::{LABEL_OBJECT, Object, Scene, upright};
+use crate::sim::walls::walls;
+use crate::sim::world::{HungDoor, LABEL_OBJECT, Object, Scene, Stand, upright};
 use nalgebra::{Isometry2, Point2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -31,9 +33,14 @@ const RING_POSES: usize = 16;
 /// If no arrangement fits: what was tried and which demand failed most.
 pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let doors = hang_doors(spec, seed);
+    let doorways: Vec<_> = doors.iter().map(|d| d.doorway.clone()).collect();
     let mut scene = Scene {
         title: spec.title.clone(),
-        room: spec.room,
+        room: RoomSpec::around(&spec.rooms),
+        rooms: spec.named_rooms().cloned().collect(),
+        walls: walls(&spec.rooms, &doorways),
+        doors,
         surfaces: spec.surfaces.clone(),
         obstacles: spec.obstacles.clone(),
         start: Pose2::new(
@@ -67,6 +74,20 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
         }
     }
     Err(failures.report(spec, seed))
+}
+
+/// Each door draws by itself: an arrangement does not depend on how many doors there are.
+fn hang_doors(spec: &SceneSpec, seed: u64) -> Vec<HungDoor> {
+    let hang = |(i, door): (usize, &DoorSpec)| {
+        let drawn = mix(mix(seed ^ 0xd00f) ^ i as u64);
+        let shut = match (door.state, door.shut_chance) {
+            (Some(state), _) => state == DoorState::Shut,
+            (None, Some(chance)) => share(drawn) < chance,
+            (None, None) => false,
+        };
+        door.doorway(&spec.rooms).map(|doorway| HungDoor { doorway, shut })
+    };
+    spec.doors.iter().enumerate().filter_map(hang).collect()
 }
 
 fn title_of(spec: &SceneSpec) -> &str {
@@ -132,18 +153,18 @@ fn place_all(spec: &SceneSpec, scene: &mut Scene, rng: &mut ChaCha8Rng) -> bool 
         let free = |i: usize| spec.objects[i].position_m.is_none();
         free(a).cmp(&free(b)).then(reach(b).total_cmp(&reach(a))).then(a.cmp(&b))
     });
+    let Some(surfaces) = choose_surfaces(spec, rng) else { return false };
     let mut placed: Vec<Option<Object>> = vec![None; spec.objects.len()];
     for i in order {
         let o = &spec.objects[i];
-        let Some(surface) = spec.surface_of(o) else { return false };
+        let surface = surfaces[i];
         let mut object = Object {
             name: o.name.clone(),
             kind: o.kind.clone().unwrap_or_else(|| o.name.clone()),
             shape: shapes[i].clone(),
             colour: o.colour,
-            surface: surface.name.clone(),
+            stands: Stand::On(surface.name.clone()),
             map_from_object: surface.map_from_top(),
-            present: true,
         };
         let tries = if o.position_m.is_some() { 1 } else { PLACES };
         let fixed = o.position_m.is_some();
@@ -158,6 +179,38 @@ fn place_all(spec: &SceneSpec, scene: &mut Scene, rng: &mut ChaCha8Rng) -> bool 
     }
     scene.objects = placed.into_iter().flatten().collect();
     true
+}
+
+/// For each object one of the surfaces that it may stand on, by their weights; nothing is drawn where there is one.
+fn choose_surfaces<'a>(spec: &'a SceneSpec, rng: &mut ChaCha8Rng) -> Option<Vec<&'a SurfaceSpec>> {
+    let mut chosen: Vec<&SurfaceSpec> = Vec::new();
+    for o in &spec.objects {
+        let other = spec.objects.iter().position(|other| Some(&other.name) == o.apart_from.as_ref());
+        let taken = other.and_then(|k| chosen.get(k)).map(|s| &s.name);
+        let weight = |k: usize| o.weights.as_ref().map_or(1.0, |w| w[k]);
+        let choice: Vec<(&SurfaceSpec, f64)> = spec
+            .surfaces_of(o)
+            .into_iter()
+            .enumerate()
+            .filter(|(_, s)| Some(&s.name) != taken)
+            .map(|(k, s)| (s, weight(k)))
+            .filter(|(_, weight)| *weight > 0.0)
+            .collect();
+        let surface = match choice.as_slice() {
+            [] => return None,
+            [(only, _)] => only,
+            several => {
+                let mut left = rng.random::<f64>() * several.iter().map(|(_, weight)| weight).sum::<f64>();
+                let first = several.iter().find(|(_, weight)| {
+                    left -= weight;
+                    left < 0.0
+                });
+                first.unwrap_or(&several[several.len() - 1]).0
+            }
+        };
+        chosen.push(surface);
+    }
+    Some(chosen)
 }
 
 fn move_somewhere(o: &ObjectSpec, surface: &SurfaceSpec, object: &mut Object, rng: &mut ChaCha8Rng) {
@@ -178,15 +231,24 @@ pub(crate) fn fits<'a>(
     gap_m: f64,
 ) -> bool {
     let local = surface.map_from_top().inv_mul(&object.map_from_object);
-    let outline = object.shape.outline();
-    let on_top = corners(&outline, &flat(&local))
+    let on_top = corners(&object.shape.outline(), &flat(&local))
         .iter()
         .all(|(p, r)| p.x.abs() + r <= 0.5 * surface.size_m[0] && p.y.abs() + r <= 0.5 * surface.size_m[1]);
-    let here = flat(&object.map_from_object);
-    on_top
-        && others
-            .filter(|o| o.present && o.name != object.name && o.surface == object.surface)
-            .all(|o| gap_between(&outline, &here, &o.shape.outline(), &flat(&o.map_from_object)) >= gap_m)
+    on_top && keeps_apart(object, others, gap_m)
+}
+
+/// True if the object keeps its gap to the others that stand on the same surface.
+pub(crate) fn keeps_apart<'a>(
+    object: &Object,
+    mut others: impl Iterator<Item = &'a Object>,
+    gap_m: f64,
+) -> bool {
+    let (outline, here) = (object.shape.outline(), flat(&object.map_from_object));
+    others.all(|o| {
+        o.name == object.name
+            || o.stands != object.stands
+            || gap_between(&outline, &here, &o.shape.outline(), &flat(&o.map_from_object)) >= gap_m
+    })
 }
 
 fn flat(map_from_object: &nalgebra::Isometry3<f64>) -> Isometry2<f64> {
@@ -205,7 +267,7 @@ fn corners(outline: &Outline, at: &Isometry2<f64>) -> Vec<(Point2<f64>, f64)> {
 }
 
 /// Gap between two outlines, metres; zero or below where they overlap. For two boxes by separating axes: never more than the true gap.
-fn gap_between(a: &Outline, at_a: &Isometry2<f64>, b: &Outline, at_b: &Isometry2<f64>) -> f64 {
+pub(crate) fn gap_between(a: &Outline, at_a: &Isometry2<f64>, b: &Outline, at_b: &Isometry2<f64>) -> f64 {
     match (a, b) {
         (Outline::Disc { radius_m: ra }, Outline::Disc { radius_m: rb }) => {
             (at_a.translation.vector - at_b.translation.vector).norm() - ra - rb
@@ -251,7 +313,7 @@ fn settle_target(
 ) -> Option<f64> {
     let index = spec.objects.iter().position(|o| o.name == target.object)?;
     let o = &spec.objects[index];
-    let surface = spec.surface_of(o)?;
+    let surface = spec.surfaces.iter().find(|s| Some(s.name.as_str()) == scene.objects[index].surface())?;
     let label = LABEL_OBJECT + index as u16;
     let [low, high] = target.visible_from_start;
     let tries = if o.position_m.is_some() { 1 } else { TARGET_PLACES };
@@ -298,7 +360,7 @@ fn some_pose_sees(scene: &Scene, label: u16, surface: &SurfaceSpec, router: &Rou
     if least <= 0.0 {
         return true;
     }
-    let centre = Point2::new(surface.position_m[0], surface.position_m[1]);
+    let centre = surface.centre_m();
     (0..RING_POSES)
         .map(|k| {
             let angle = std::f64::consts::TAU * k as f64 / RING_POSES as f64;

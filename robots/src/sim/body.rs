@@ -1,4 +1,4 @@
-//! The body in the simulated room: a round base with a pan-tilt head that carries a Kinect, and an arm.
+//! The body in the simulated room: a round base with a pan-tilt head that carries a Kinect, and an arm with a hand.
 
 use crate::body::{Description, Footprint, Frames, Head, Speeds};
 use descry_perception::Intrinsics;
@@ -8,6 +8,8 @@ use nalgebra::{Point3, Vector3};
 pub const SAFETY_M: f64 = 0.05;
 /// How far from the base's origin the arm reaches, metres.
 pub const REACH_M: f64 = 1.8;
+/// The widest thing that the hand takes, metres.
+pub const HAND_OPENING_M: f64 = 0.12;
 /// How fast the head turns.
 pub const HEAD_SPEED_RAD_S: f64 = 1.0;
 
@@ -46,7 +48,7 @@ pub fn description() -> Description {
         }),
         frames: Frames::default(),
         reach_m: Some(REACH_M),
-        hand_opening_m: None,
+        hand_opening_m: Some(HAND_OPENING_M),
         up: Some(Vector3::z()),
         pose_sigma_m: 0.03,
         pose_sigma_rad: 2f64.to_radians(),

@@ -2,8 +2,9 @@
 //!
 //! ```toml
 //! [[fault]]
-//! kind = "dropped_frame"      # blocked_path, unreachable_pose, timed_out_drive, bad_localisation, object_moved, object_taken
-//! at = 2                      # the second frame (for the others: drive); or
+//! kind = "dropped_frame"      # blocked_path, unreachable_pose, timed_out_drive, bad_localisation, object_moved, object_taken,
+//!                             # object_relocated, object_dropped, door_shut, grasp_slips
+//! at = 2                      # the second frame (`grasp_slips`: grasp; the others: drive); or
 //! chance = 0.1                # of each
 //!
 //! [[fault]]
@@ -11,10 +12,21 @@
 //! at = 3
 //! object = "cup A"            # the seed chooses if left out
 //! by_m = 0.2
+//!
+//! [[fault]]
+//! kind = "object_relocated"
+//! chance = 0.05
+//! object = "cup A"
+//! to = "desk"                 # the surface; the seed chooses if left out
+//!
+//! [[fault]]
+//! kind = "door_shut"          # as that drive begins: at = 1 is before the body has moved
+//! at = 1
+//! door = "kitchen door"       # the seed chooses if left out
 //! ```
 
 use crate::input::{self, InputError, Objection, Step};
-use crate::sim::noise::mix;
+use crate::sim::noise::{mix, share};
 use serde::{Deserialize, Serialize};
 
 /// A kind of mishap.
@@ -35,11 +47,19 @@ pub enum FaultKind {
     ObjectMoved,
     /// During the drive somebody takes an object away.
     ObjectTaken,
+    /// During the drive somebody puts an object on another surface.
+    ObjectRelocated,
+    /// During the drive what the hand holds falls to the floor.
+    ObjectDropped,
+    /// As the drive begins somebody shuts a door.
+    DoorShut,
+    /// The grasp slips.
+    GraspSlips,
 }
 
 impl FaultKind {
     /// Every kind.
-    pub const ALL: [FaultKind; 7] = [
+    pub const ALL: [FaultKind; 11] = [
         FaultKind::BlockedPath,
         FaultKind::UnreachablePose,
         FaultKind::TimedOutDrive,
@@ -47,6 +67,10 @@ impl FaultKind {
         FaultKind::BadLocalisation,
         FaultKind::ObjectMoved,
         FaultKind::ObjectTaken,
+        FaultKind::ObjectRelocated,
+        FaultKind::ObjectDropped,
+        FaultKind::DoorShut,
+        FaultKind::GraspSlips,
     ];
 }
 
@@ -56,7 +80,7 @@ impl FaultKind {
 pub struct Fault {
     /// Which.
     pub kind: FaultKind,
-    /// At the drive (or frame) of this number, from 1.
+    /// At the drive (or frame, or grasp) of this number, from 1.
     #[serde(default)]
     pub at: Option<u64>,
     /// Or at each with this chance.
@@ -65,6 +89,12 @@ pub struct Fault {
     /// The object that is moved or taken; the seed chooses if left out.
     #[serde(default)]
     pub object: Option<String>,
+    /// The surface that it is put on; the seed chooses if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<String>,
+    /// The door that is shut; the seed chooses if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub door: Option<String>,
     /// How far it is moved, metres.
     #[serde(default = "default_by_m")]
     pub by_m: f64,
@@ -112,11 +142,19 @@ impl FaultPlan {
                 (Some(_), Some(_)) => {
                     return Err(objection("chance", "both `at` and `chance` are given", "keep one of them"));
                 }
-                (Some(0), _) => return Err(objection("at", "there is no drive or frame 0", "count from 1")),
+                (Some(0), _) => {
+                    return Err(objection("at", "there is no drive, frame or grasp 0", "count from 1"));
+                }
                 (_, Some(chance)) if !(0.0..=1.0).contains(&chance) => {
                     return Err(objection("chance", "this is no chance", "a number between 0 and 1"));
                 }
                 _ => {}
+            }
+            if fault.to.is_some() && fault.kind != FaultKind::ObjectRelocated {
+                return Err(objection("to", "nothing is put anywhere", "kind = \"object_relocated\""));
+            }
+            if fault.door.is_some() && fault.kind != FaultKind::DoorShut {
+                return Err(objection("door", "no door is shut", "kind = \"door_shut\""));
             }
             if !(fault.by_m.is_finite() && fault.by_m > 0.0) {
                 return Err(objection("by_m", "this is no distance", "metres above zero, such as 0.2"));
@@ -125,13 +163,13 @@ impl FaultPlan {
         Ok(())
     }
 
-    /// The first fault of that kind that happens at drive (or frame) `number`, from 1.
+    /// The first fault of that kind that happens at drive (or frame, or grasp) `number`, from 1.
     pub fn strikes(&self, kind: FaultKind, number: u64, seed: u64) -> Option<&Fault> {
         self.faults.iter().enumerate().filter(|(_, f)| f.kind == kind).find_map(|(i, fault)| {
             let drawn = mix(mix(mix(seed ^ 0xfa17) ^ i as u64) ^ number);
             let happens = match (fault.at, fault.chance) {
                 (Some(at), _) => at == number,
-                (None, Some(chance)) => (drawn >> 11) as f64 / ((1u64 << 53) as f64) < chance,
+                (None, Some(chance)) => share(drawn) < chance,
                 (None, None) => false,
             };
             happens.then_some(fault)

@@ -1,17 +1,22 @@
-//! A simulated room with a table: scenes, the depth camera, driving, faults. The only place that reads the truth.
+//! Simulated rooms with tables, shelves and doors: scenes, the depth camera, driving, the hand, faults. The only place that reads the
+//! truth.
 
 pub mod arrange;
 pub mod body;
 pub mod drive;
 pub mod faults;
+mod hand;
+mod handling;
 pub mod noise;
 pub mod push;
 pub mod render;
 mod robot;
+mod routes;
 pub mod scene;
 pub mod shape;
 mod state;
 pub mod truth;
+pub mod walls;
 pub mod world;
 
 pub use arrange::arrange;
@@ -19,5 +24,5 @@ pub use faults::{Fault, FaultKind, FaultPlan};
 pub use noise::DepthNoise;
 pub use robot::{SimOptions, SimRobot};
 pub use scene::SceneSpec;
-pub use truth::{Event, TrueObject, Truth};
-pub use world::{Object, Scene};
+pub use truth::{Event, TrueDoor, TrueObject, Truth};
+pub use world::{HungDoor, Object, Scene, Stand};

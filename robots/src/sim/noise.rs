@@ -85,6 +85,11 @@ pub(crate) fn mix(key: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// A share from 0 to 1 (1 left out) for well mixed bits.
+pub(crate) fn share(bits: u64) -> f64 {
+    (bits >> 11) as f64 / ((1u64 << 53) as f64)
+}
+
 /// What the camera reports for an ideal frame: depths along z in metres, NaN where nothing returns.
 ///
 /// σ_axial = 1.2 mm + 1.9 mm/m²·(z − 0.4 m)² + 0.1 mm·θ²/(√z·(90° − θ)²), σ_lateral = 0.8 px + 0.034 px·θ/(90° − θ).
@@ -126,7 +131,7 @@ fn pixel(
     let (width, height) = (frame.intrinsics.width, frame.intrinsics.height);
     let here = row * width + column;
     let bits = mix(key ^ here as u64);
-    if is_edge(frame, column, row) && (mix(bits) >> 11) as f64 / ((1u64 << 53) as f64) < noise.edge_loss {
+    if is_edge(frame, column, row) && share(mix(bits)) < noise.edge_loss {
         return f32::NAN;
     }
     let scale = noise.scale as f32;

@@ -17,6 +17,8 @@ const DIRECTION_SIGMA_RAD: f64 = 0.08;
 const TURN_SIGMA_RAD: f64 = 0.15;
 /// The hand finds an object whose centre is at most this far beside where it was said to be, metres.
 const FIND_M: f64 = 0.15;
+/// The hand finds it this far above its top or below its foot, metres: not what stands on another board.
+const FIND_HEIGHT_M: f64 = 0.05;
 /// The push goes on in steps of this length, metres, each looked at for what is in the way.
 const STEP_M: f64 = 0.005;
 
@@ -46,7 +48,8 @@ pub fn push(
 ) -> Effect {
     let off = |i: usize| (scene.objects[i].centre_m().xy() - at.xy()).norm();
     let found = (0..scene.objects.len())
-        .filter(|&i| scene.objects[i].present && off(i) <= FIND_M)
+        .filter(|&i| scene.objects[i].is_in_place() && off(i) <= FIND_M)
+        .filter(|&i| scene.objects[i].is_at_height(at.z, FIND_HEIGHT_M))
         .min_by(|&a, &b| off(a).total_cmp(&off(b)));
     let Some(object) = found else { return Effect::Nothing };
     let slips = rng.random_bool(SLIP_CHANCE);
@@ -54,8 +57,7 @@ pub fn push(
     let wanted_m = (distance_m * reach).max(0.0);
     let heading_rad = direction.y.atan2(direction.x) + DIRECTION_SIGMA_RAD * normal(rng);
     let turned_rad = TURN_SIGMA_RAD * normal(rng);
-    let Some(surface) = scene.surfaces.iter().find(|s| s.name == scene.objects[object].surface).cloned()
-    else {
+    let Some(surface) = scene.objects[object].surface().and_then(|s| scene.surface(s)).cloned() else {
         return Effect::Nothing;
     };
     let steps = (wanted_m / STEP_M).ceil().max(1.0);

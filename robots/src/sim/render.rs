@@ -5,7 +5,7 @@
 
 use crate::body::Stamp;
 use crate::sim::scene::RoomSpec;
-use crate::sim::world::{LABEL_NOTHING, LABEL_ROOM, Scene, Solid};
+use crate::sim::world::{LABEL_NOTHING, LABEL_ROOM, Scene, Solid, WALL_COLOUR};
 use descry_perception::Intrinsics;
 use image::RgbImage;
 use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
@@ -50,7 +50,6 @@ struct Placed<'a> {
 /// Nearer than this to the camera's plane a bounding box is taken to cover the whole image, metres.
 const NEAR_M: f64 = 0.02;
 const FLOOR_COLOUR: [u8; 3] = [120, 115, 110];
-const WALL_COLOUR: [u8; 3] = [205, 205, 195];
 /// Towards the lamp, in the map.
 const LIGHT: Vector3<f64> = Vector3::new(0.32, -0.24, 0.917);
 
@@ -149,7 +148,7 @@ struct Line<'a> {
     colour: &'a mut [[u8; 3]],
 }
 
-/// Floor and walls: the inside of a box without a lid.
+/// The floor and the walls around it all: the inside of a box without a lid.
 fn draw_room(
     room: &RoomSpec,
     map_from_camera: &Isometry3<f64>,
@@ -159,7 +158,7 @@ fn draw_room(
 ) {
     let rotation = map_from_camera.rotation.to_rotation_matrix();
     let o = map_from_camera.translation.vector;
-    let half = [0.5 * room.size_m[0], 0.5 * room.size_m[1]];
+    let (low, high) = (room.low(), room.high());
     for column in 0..camera.width {
         let in_camera = ray(camera, column, row);
         let d = rotation * in_camera;
@@ -168,7 +167,7 @@ fn draw_room(
             nearest.0 = -o.z / d.z;
         }
         for axis in 0..2 {
-            let wall = if d[axis] > 0.0 { half[axis] } else { -half[axis] };
+            let wall = if d[axis] > 0.0 { high[axis] } else { low[axis] };
             let t = (wall - o[axis]) / d[axis];
             if t > 0.0 && t < nearest.0 {
                 let mut normal = Vector3::zeros();

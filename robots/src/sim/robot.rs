@@ -1,36 +1,29 @@
 //! The simulated body in its room.
 
 use crate::body::{
-    CancellationToken, Colour, Description, Driven, Looked, Place, Pose2, PoseEstimate, Progress, Push,
-    Pushed, Robot, Sensed, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
+    CancellationToken, Colour, Description, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place,
+    Placed, Placing, Pose2, PoseEstimate, Progress, Push, Pushed, Robot, Room, Sensed, Stamp,
+    StampedTransform, Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
 use crate::head::{self, Gaze};
-use crate::route::Router;
-use crate::sim::body::{self, HEAD_SPEED_RAD_S, REACH_M, SAFETY_M};
+use crate::sim::body::{self, HEAD_SPEED_RAD_S, SAFETY_M};
 use crate::sim::drive::{self, Localisation};
 use crate::sim::faults::{Fault, FaultKind, FaultPlan};
 use crate::sim::noise::{self, DepthNoise};
-use crate::sim::push::{self, Effect};
 use crate::sim::render::{Frame, render, visible_share};
+use crate::sim::routes::{Doors, Routes};
 use crate::sim::state::{End, State};
 use crate::sim::truth::Truth;
 use crate::sim::world::{LABEL_OBJECT, Scene};
 use nalgebra::{Isometry3, Point3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// From the trigger to the frame, seconds.
 const FRAME_S: f64 = 0.1;
-/// A push without the way that the hand moves with the object, seconds.
-const PUSH_S: f64 = 8.0;
-/// Speed of the hand while it pushes, metres a second.
-const HAND_M_S: f64 = 0.1;
-/// A hand that moved less than this share of what was asked for reports that it slipped.
-const SLIPPED_SHARE: f64 = 0.5;
-
 /// What a run of the simulator is made with besides the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SimOptions {
@@ -50,6 +43,8 @@ pub struct SimRobot {
     options: SimOptions,
     map: OccupancyGrid,
     surfaces: Vec<SurfaceHint>,
+    rooms: Vec<Room>,
+    doors: Vec<Door>,
     state: Mutex<State>,
 }
 
@@ -66,6 +61,8 @@ struct Trip {
     at: Option<Pose2>,
     elapsed_s: f64,
     distance_m: f64,
+    /// Steps that were done.
+    done: usize,
     failure: Option<Failure>,
 }
 
@@ -76,31 +73,38 @@ impl SimRobot {
         description.pose_sigma_m = options.localisation.sigma_m;
         description.pose_sigma_rad = options.localisation.sigma_rad;
         let map = scene.map();
-        let router = Router::new(&map, description.footprint.radius_m() + SAFETY_M, description.speeds);
+        let doorways = scene.doors.iter().map(|d| d.doorway.clone()).collect();
+        let radius_m = description.footprint.radius_m() + SAFETY_M;
+        let routes = Routes::new(map.clone(), doorways, radius_m, description.speeds);
         let hint = |s: &crate::sim::scene::SurfaceSpec| SurfaceHint {
             name: s.name.clone(),
             outline_m: s.outline_m(),
             height_m: s.height_m,
-            room: None,
+            room: scene.room_at(&s.centre_m()).map(String::from),
         };
         let surfaces = scene.surfaces.iter().map(hint).collect();
+        let rooms = scene.rooms.iter().map(|r| Room { name: r.name.clone(), outline_m: r.outline_m() });
+        let rooms = rooms.collect();
+        let doors = scene.doors.iter().map(|d| d.doorway.hint()).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(noise::mix(options.seed));
         let error = options.localisation.error(&mut rng);
         let state = State {
             now_ns: 0,
             events: Vec::new(),
             rng,
-            router: Arc::new(router),
+            routes,
+            seen_shut: Doors::new(),
             // The scene says where the body stands, not where it believes to be.
             estimate: Pose2::from_isometry(&(scene.start.isometry() * error)),
             error,
             gaze: Gaze::default(),
             drives: 0,
             frames: 0,
+            grasps: 0,
             unreachable: Vec::new(),
             scene,
         };
-        SimRobot { description, options, map, surfaces, state: Mutex::new(state) }
+        SimRobot { description, options, map, surfaces, rooms, doors, state: Mutex::new(state) }
     }
 
     /// How everything really is. For scoring and reports: nothing that decides may ask.
@@ -113,7 +117,7 @@ impl SimRobot {
     /// of experiments and for reports.
     pub fn true_visible_share(&self, object: &str, pose: &Pose2) -> f64 {
         let state = self.lock();
-        let Some(index) = state.scene.objects.iter().position(|o| o.name == object && o.present) else {
+        let Some(index) = state.scene.objects.iter().position(|o| o.name == object && o.is_in_place()) else {
             return 0.0;
         };
         let Some(head) = &self.description.head else { return 0.0 };
@@ -140,7 +144,7 @@ impl SimRobot {
         self.description.head.as_ref().map_or(Isometry3::identity(), |h| head::base_from_camera(h, gaze))
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    pub(super) fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -153,19 +157,18 @@ impl SimRobot {
         }
     }
 
-    fn strikes(&self, kind: FaultKind, number: u64) -> Option<&Fault> {
+    pub(super) fn strikes(&self, kind: FaultKind, number: u64) -> Option<&Fault> {
         self.options.faults.strikes(kind, number, self.options.seed)
-    }
-
-    fn room_m(&self) -> f64 {
-        self.description.footprint.radius_m() + SAFETY_M
     }
 
     fn depart(&self, goal: &Pose2) -> Result<Departure, Failure> {
         let mut state = self.lock();
         state.drives += 1;
         let number = state.drives;
-        let route = state.router.route(&state.estimate, goal)?;
+        if let Some(fault) = self.strikes(FaultKind::DoorShut, number) {
+            state.shut_a_door(fault, self.description.footprint.radius_m());
+        }
+        let route = state.plan(goal)?;
         if self.strikes(FaultKind::UnreachablePose, number).is_some() {
             state.note("the goal of this drive turns out to be unreachable");
             state.unreachable.push(*goal);
@@ -184,12 +187,17 @@ impl SimRobot {
         {
             end = Some((at, End::Obstacle(obstacle)));
         }
+        if let Some((at, door)) = state.first_shut_door(&steps, self.description.footprint.radius_m())
+            && end.as_ref().is_none_or(|(earlier, _)| at < *earlier)
+        {
+            end = Some((at, End::Door(door)));
+        }
         Ok(Departure { number, steps, end })
     }
 
     async fn travel_along(&self, departure: &Departure, watch: &Watch<'_>) -> Trip {
         let total_s: f64 = departure.steps.iter().map(|s| s.seconds).sum();
-        let mut trip = Trip { at: None, elapsed_s: 0.0, distance_m: 0.0, failure: None };
+        let mut trip = Trip { at: None, elapsed_s: 0.0, distance_m: 0.0, done: 0, failure: None };
         for (i, step) in departure.steps.iter().enumerate() {
             if watch.cancel.is_cancelled() {
                 trip.failure = Some(cancelled("the drive", trip.elapsed_s));
@@ -208,6 +216,7 @@ impl SimRobot {
             self.lock().follow(step);
             trip.elapsed_s += step.seconds;
             trip.distance_m += step.metres;
+            trip.done += 1;
             trip.at = Some(step.pose);
             let fraction = trip.elapsed_s / total_s;
             (watch.progress)(&Progress { elapsed_s: trip.elapsed_s, fraction, distance_m: trip.distance_m });
@@ -237,15 +246,24 @@ impl SimRobot {
                     by: None,
                 }
             }
+            End::Door(door) => {
+                let name = state.scene.doors[*door].doorway.name.clone();
+                state.note(format!("the base stops before \"{name}\", which is shut"));
+                Failure::Blocked { because: format!("\"{name}\" is shut"), by: Some(name) }
+            }
         }
     }
 
-    /// What others do while the base drives.
-    fn disturb(&self, number: u64) {
-        for kind in [FaultKind::ObjectMoved, FaultKind::ObjectTaken] {
-            if let Some(fault) = self.strikes(kind, number) {
+    /// What others do while the base drives, and what falls on the way.
+    fn disturb(&self, departure: &Departure, trip: &Trip) {
+        for kind in [FaultKind::ObjectMoved, FaultKind::ObjectTaken, FaultKind::ObjectRelocated] {
+            if let Some(fault) = self.strikes(kind, departure.number) {
                 self.lock().disturb(fault);
             }
+        }
+        if self.strikes(FaultKind::ObjectDropped, departure.number).is_some() {
+            let half_way = departure.steps[..trip.done].get(trip.done / 2);
+            self.lock().drop_held(half_way.map(|step| &step.pose));
         }
     }
 
@@ -313,50 +331,13 @@ impl SimRobot {
             pose_sigma_rad: self.description.pose_sigma_rad,
         })
     }
-
-    fn push(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
-        let mut state = self.lock();
-        let reach_m = (push.object.xy() - state.estimate.point()).norm();
-        if reach_m > REACH_M {
-            return Err(Failure::Unreachable {
-                because: format!("the object is {reach_m:.2} m away and the arm reaches {REACH_M:.2} m"),
-            });
-        }
-        if !(push.direction.norm() > 0.0 && push.distance_m.is_finite() && push.distance_m > 0.0) {
-            return Err(Failure::Unreachable { because: "a push needs a direction and a distance".into() });
-        }
-        let needed_s = PUSH_S + push.distance_m / HAND_M_S;
-        if needed_s > watch.time_limit_s {
-            state.pass(watch.time_limit_s);
-            return Err(timed_out("the push, before the hand touched anything,", watch.time_limit_s));
-        }
-        let really = state.truth_from_estimate();
-        let at = really * push.object;
-        let direction = (really.rotation * push.direction.push(0.0)).xy();
-        let State { scene, rng, .. } = &mut *state;
-        let effect = push::push(scene, &at, &direction, push.distance_m, rng);
-        let Effect::Moved { object, moved_m, stopped } = effect else {
-            state.pass(PUSH_S);
-            return Err(Failure::Slipped { because: "the hand met nothing there".into(), moved_m: 0.0 });
-        };
-        let duration_s = PUSH_S + moved_m / HAND_M_S;
-        state.pass(duration_s);
-        let name = state.scene.objects[object].name.clone();
-        state.note(format!("the hand pushes \"{name}\" by {moved_m:.3} m"));
-        match stopped {
-            Some(why) if moved_m < SLIPPED_SHARE * push.distance_m => {
-                Err(Failure::Slipped { because: format!("{why} after {moved_m:.2} m"), moved_m })
-            }
-            _ => Ok(Pushed { moved_m, duration_s }),
-        }
-    }
 }
 
-fn cancelled(what: &str, after_s: f64) -> Failure {
+pub(super) fn cancelled(what: &str, after_s: f64) -> Failure {
     Failure::Cancelled { because: format!("{what} was stopped after {after_s:.1} s") }
 }
 
-fn timed_out(what: &str, limit_s: f64) -> Failure {
+pub(super) fn timed_out(what: &str, limit_s: f64) -> Failure {
     Failure::TimedOut { because: format!("{what} took longer than {limit_s:.1} s") }
 }
 
@@ -386,11 +367,23 @@ impl Robot for SimRobot {
         None
     }
 
-    fn travel(&self, from: &Place, to: &[Place], _shut: &[String]) -> Vec<Result<Travel, Failure>> {
+    fn rooms(&self) -> &[Room] {
+        &self.rooms
+    }
+
+    fn doors(&self) -> &[Door] {
+        &self.doors
+    }
+
+    fn travel(&self, from: &Place, to: &[Place], shut: &[String]) -> Vec<Result<Travel, Failure>> {
         let (router, tried) = {
-            let state = self.lock();
+            let mut state = self.lock();
             let tried = |p: &Place| self.pose_of(p).and_then(|pose| state.known_unreachable(&pose));
-            (state.router.clone(), to.iter().map(tried).collect::<Vec<_>>())
+            let tried = to.iter().map(tried).collect::<Vec<_>>();
+            match state.doors(shut) {
+                Ok(shut) => (state.routes.with_shut(&shut), tried),
+                Err(failure) => return to.iter().map(|_| Err(failure.clone())).collect(),
+            }
         };
         let from = match self.pose_of(from) {
             Ok(pose) => pose,
@@ -424,17 +417,15 @@ impl Robot for SimRobot {
         let goal = self.pose_of(to)?;
         let departure = self.depart(&goal)?;
         let trip = self.travel_along(&departure, watch).await;
-        self.disturb(departure.number);
+        self.disturb(&departure, &trip);
         let mut state = self.lock();
         let misled = self.strikes(FaultKind::BadLocalisation, departure.number).is_some();
         let wanted = if trip.failure.is_none() { Some(goal) } else { trip.at };
         if let Some(pose) = wanted {
             state.stop(&pose, &self.options.localisation, misled);
         }
-        if let (Some(Failure::Blocked { .. }), Some((_, End::Obstacle(obstacle)))) =
-            (&trip.failure, &departure.end)
-        {
-            state.learn_obstacle(*obstacle, self.room_m(), self.description.speeds);
+        if let (Some(Failure::Blocked { .. }), Some((_, end))) = (&trip.failure, &departure.end) {
+            state.learn(end);
         }
         match trip.failure {
             Some(failure) => Err(failure),
@@ -464,5 +455,26 @@ impl Robot for SimRobot {
     async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
         go_on(&watch.cancel, "the push")?;
         self.push(push, watch)
+    }
+    #[tracing::instrument(level = "debug", skip_all, fields(%door))]
+    async fn open_door(&self, door: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
+        go_on(&watch.cancel, "opening the door")?;
+        self.open(door, watch).await
+    }
+
+    #[tracing::instrument(level = "debug", skip_all)]
+    async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
+        go_on(&watch.cancel, "the grasp")?;
+        self.take(grasp, watch).await
+    }
+
+    #[tracing::instrument(level = "debug", skip_all)]
+    async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
+        go_on(&watch.cancel, "placing")?;
+        self.put(placing, watch).await
+    }
+
+    async fn hand(&self) -> Result<Hand, Failure> {
+        Ok(Hand { holds: self.lock().held().is_some() })
     }
 }

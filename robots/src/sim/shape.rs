@@ -153,6 +153,14 @@ impl Shape {
         }
     }
 
+    /// How wide a hand must open around its body, a handle left out, metres.
+    pub fn width_m(&self) -> f64 {
+        match self {
+            Shape::Box(Cuboid { size_m }) => size_m[0].min(size_m[1]),
+            _ => 2.0 * self.round_radius_m(),
+        }
+    }
+
     /// The same shape, larger.
     pub fn scaled(&self, factor: f64) -> Shape {
         let mut shape = self.clone();

@@ -1,18 +1,19 @@
 //! What changes in the simulated room while it runs.
 
-use crate::body::{Pose2, Speeds, Stamp};
+use crate::body::{Pose2, Stamp};
 use crate::failure::Failure;
 use crate::head::Gaze;
-use crate::route::Router;
+use crate::route::Route;
 use crate::sim::arrange::fits;
 use crate::sim::drive::{self, Localisation};
 use crate::sim::faults::{Fault, FaultKind};
+use crate::sim::routes::{Doors, Routes};
+use crate::sim::scene::{SurfaceSpec, headroom_m};
 use crate::sim::truth::Event;
-use crate::sim::world::{MAP_RESOLUTION_M, Scene};
+use crate::sim::world::{HungDoor, MAP_RESOLUTION_M, Scene, Stand, upright};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
-use std::sync::Arc;
 
 /// What stops the base is seen by its own scanner up to this far around it, metres.
 const SCANNER_M: f64 = 0.8;
@@ -27,13 +28,16 @@ pub(crate) struct State {
     pub now_ns: Stamp,
     pub events: Vec<Event>,
     pub rng: ChaCha8Rng,
-    pub router: Arc<Router>,
+    pub routes: Routes,
+    /// Doors that the base stopped before and nobody has opened since, as far as the body knows.
+    pub seen_shut: Doors,
     pub estimate: Pose2,
     /// `estimate = truth · error`: wrong in the body's own frame.
     pub error: Isometry3<f64>,
     pub gaze: Gaze,
     pub drives: u64,
     pub frames: u64,
+    pub grasps: u64,
     pub unreachable: Vec<Pose2>,
 }
 
@@ -42,6 +46,7 @@ pub(crate) enum End {
     Person,
     Stuck,
     Obstacle(usize),
+    Door(usize),
 }
 
 impl State {
@@ -95,16 +100,71 @@ impl State {
         })
     }
 
-    /// Draws on the body's own map what its scanner sees of an obstacle, placed by where the body believes to be.
-    pub fn learn_obstacle(&mut self, obstacle: usize, radius_m: f64, speeds: Speeds) {
-        let Some(obstacle) = self.scene.obstacles.get(obstacle) else { return };
+    /// The object in the hand.
+    pub fn held(&self) -> Option<usize> {
+        self.scene.objects.iter().position(|o| o.stands == Stand::Hand)
+    }
+
+    /// The door of that name.
+    pub fn door(&self, name: &str) -> Option<usize> {
+        self.scene.doors.iter().position(|d| d.doorway.name == name)
+    }
+
+    /// The doors of those names.
+    pub fn doors(&self, names: &[String]) -> Result<Doors, Failure> {
+        let known = |name: &String| {
+            let because = || format!("the map has no door \"{name}\"");
+            self.door(name).ok_or_else(|| Failure::Unreachable { because: because() })
+        };
+        names.iter().map(known).collect()
+    }
+
+    /// The route to a goal around the doors that the body knows to be shut; up to one of them if no other leads there.
+    pub fn plan(&mut self, goal: &Pose2) -> Result<Route, Failure> {
+        let around = self.routes.with_shut(&self.seen_shut).route(&self.estimate, goal);
+        match around {
+            Err(Failure::Unreachable { .. }) if !self.seen_shut.is_empty() => {
+                self.routes.with_shut(&Doors::new()).route(&self.estimate, goal)
+            }
+            known => known,
+        }
+    }
+
+    /// The first step that would bring the footprint into a shut door, and which door that is. The base sees a door where its map has
+    /// it: the step counts as planned.
+    pub fn first_shut_door(&self, steps: &[drive::Step], radius_m: f64) -> Option<(usize, usize)> {
+        let mut before = self.estimate.point();
+        for (i, step) in steps.iter().enumerate() {
+            let here = step.pose.point();
+            let meets = |d: &HungDoor| {
+                let gap_m = d.doorway.distance_m(&here);
+                d.shut && gap_m < radius_m && gap_m < d.doorway.distance_m(&before)
+            };
+            if let Some(door) = self.scene.doors.iter().position(meets) {
+                return Some((i, door));
+            }
+            before = here;
+        }
+        None
+    }
+
+    /// Keeps in mind what ended a drive: a shut door, or on the body's own map what its scanner sees of an obstacle, placed by where
+    /// the body believes to be.
+    pub fn learn(&mut self, end: &End) {
+        let obstacle = match end {
+            End::Door(door) => {
+                self.seen_shut.insert(*door);
+                return;
+            }
+            End::Obstacle(obstacle) => self.scene.obstacles.get(*obstacle),
+            End::Person | End::Stuck => None,
+        };
+        let Some(obstacle) = obstacle.cloned() else { return };
         let (here, really) = (self.estimate.point(), self.truth_from_estimate());
-        let mut grid = self.router.map().clone();
-        grid.occupy(|p| {
+        self.routes.occupy(|p| {
             let there = (really * Point3::new(p.x, p.y, 0.0)).xy();
             (p - here).norm() <= SCANNER_M && obstacle.touches(&there, 0.5 * MAP_RESOLUTION_M)
         });
-        self.router = Arc::new(Router::new(&grid, radius_m, speeds));
     }
 
     /// Stops where the base means to be; draws by how much it misses that and by how much it is wrong about where it is.
@@ -120,7 +180,7 @@ impl State {
     /// Somebody takes or moves an object.
     pub fn disturb(&mut self, fault: &Fault) {
         let present: Vec<usize> =
-            (0..self.scene.objects.len()).filter(|&i| self.scene.objects[i].present).collect();
+            (0..self.scene.objects.len()).filter(|&i| self.scene.objects[i].is_in_place()).collect();
         let chosen = match &fault.object {
             Some(name) => present
                 .into_iter()
@@ -134,8 +194,13 @@ impl State {
         };
         let name = self.scene.objects[i].name.clone();
         if fault.kind == FaultKind::ObjectTaken {
-            self.scene.objects[i].present = false;
+            self.scene.objects[i].stands = Stand::Away;
             self.note(format!("somebody takes \"{name}\" away"));
+        } else if fault.kind == FaultKind::ObjectRelocated {
+            match self.relocate_object(i, fault.to.as_deref()) {
+                Some(surface) => self.note(format!("somebody puts \"{name}\" on \"{surface}\"")),
+                None => self.note(format!("somebody wants to put \"{name}\" elsewhere and finds no room")),
+            }
         } else if self.move_object(i, fault.by_m) {
             self.note(format!("somebody moves \"{name}\" by {:.2} m", fault.by_m));
         } else {
@@ -143,8 +208,60 @@ impl State {
         }
     }
 
+    /// What the hand holds falls to the floor where the base was on its way.
+    pub fn drop_held(&mut self, on_the_way: Option<&Pose2>) {
+        let Some(i) = self.held() else { return };
+        let at = on_the_way.map_or(self.map_from_base(), |pose| self.really(pose)).translation;
+        let o = &mut self.scene.objects[i];
+        o.stands = Stand::Floor;
+        o.map_from_object = upright(at.x, at.y, 0.0, 0.0);
+        let name = o.name.clone();
+        self.note(format!("\"{name}\" falls out of the hand"));
+    }
+
+    /// Somebody shuts a door, unless the base stands in it.
+    pub fn shut_a_door(&mut self, fault: &Fault, radius_m: f64) {
+        let here = self.map_from_base().translation.vector.xy().into();
+        let free = |d: &HungDoor| !d.shut && d.doorway.distance_m(&here) > radius_m;
+        let open: Vec<usize> = (0..self.scene.doors.len()).filter(|&i| free(&self.scene.doors[i])).collect();
+        let chosen = match &fault.door {
+            Some(name) => open.into_iter().find(|&i| &self.scene.doors[i].doorway.name == name),
+            None if open.is_empty() => None,
+            None => Some(open[self.rng.random_range(0..open.len())]),
+        };
+        let Some(i) = chosen else {
+            self.note("somebody found no door to shut");
+            return;
+        };
+        self.scene.doors[i].shut = true;
+        self.note(format!("somebody shuts \"{}\"", self.scene.doors[i].doorway.name));
+    }
+
+    /// Puts an object somewhere on another surface; its name.
+    fn relocate_object(&mut self, i: usize, to: Option<&str>) -> Option<String> {
+        let o = &self.scene.objects[i];
+        let goes = |s: &&SurfaceSpec| {
+            let wanted = to.map_or(o.surface() != Some(s.name.as_str()), |to| s.name == to);
+            wanted && o.shape.height_m() <= headroom_m(&self.scene.surfaces, s)
+        };
+        let others: Vec<SurfaceSpec> = self.scene.surfaces.iter().filter(goes).cloned().collect();
+        for _ in 0..if others.is_empty() { 0 } else { MOVE_TRIES } {
+            let surface = &others[self.rng.random_range(0..others.len())];
+            let [x, y] = surface.size_m.map(|s| s * (self.rng.random::<f64>() - 0.5));
+            let mut moved = self.scene.objects[i].clone();
+            moved.stands = Stand::On(surface.name.clone());
+            let yaw_rad = self.rng.random_range(0.0..std::f64::consts::TAU);
+            moved.map_from_object = surface.map_from_top() * upright(x, y, 0.0, yaw_rad);
+            if fits(&moved, surface, self.scene.objects.iter(), 0.0) {
+                self.scene.objects[i] = moved;
+                return Some(surface.name.clone());
+            }
+        }
+        None
+    }
+
     fn move_object(&mut self, i: usize, by_m: f64) -> bool {
-        let surface = self.scene.surfaces.iter().find(|s| s.name == self.scene.objects[i].surface).cloned();
+        let surface = self.scene.objects[i].surface().and_then(|s| self.scene.surface(s)).cloned();
         let Some(surface) = surface else { return false };
         for _ in 0..MOVE_TRIES {
             let angle = self.rng.random_range(0.0..std::f64::consts::TAU);

@@ -1,7 +1,8 @@
 //! How everything in the simulator really is: for scoring and reports only.
 
 use crate::body::{Pose2, Stamp};
-use crate::sim::world::Scene;
+use crate::sim::hand;
+use crate::sim::world::{Scene, Stand};
 use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +15,9 @@ pub struct Truth {
     pub base: Pose2,
     /// Every object of the scene, in the order of the scene file.
     pub objects: Vec<TrueObject>,
+    /// Every door, in the order of the scene file.
+    #[serde(default)]
+    pub doors: Vec<TrueDoor>,
     /// Name of the object that the arrangement was chosen for.
     pub target: Option<String>,
     /// Share of it that the camera saw from the start.
@@ -29,8 +33,14 @@ pub struct TrueObject {
     pub name: String,
     /// What it is.
     pub kind: String,
-    /// The surface it stands on.
-    pub surface: String,
+    /// The surface it stands on; none in the hand, on the floor or taken away.
+    pub surface: Option<String>,
+    /// The room it is in, if the scene names rooms; none once it has been taken away.
+    #[serde(default)]
+    pub room: Option<String>,
+    /// True while the body holds it.
+    #[serde(default)]
+    pub in_hand: bool,
     /// False once it has been taken away.
     pub present: bool,
     /// Where its base stands, in the map.
@@ -39,6 +49,15 @@ pub struct TrueObject {
     pub centre_m: Point3<f64>,
     /// Sides of the box around it in its own frame, a handle included, metres.
     pub size_m: [f64; 3],
+}
+
+/// A door as it really is.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TrueDoor {
+    /// As people call it.
+    pub name: String,
+    /// Whether it is shut.
+    pub shut: bool,
 }
 
 /// Something that happened in the simulated room.
@@ -59,13 +78,21 @@ impl Truth {
     ) -> Truth {
         let objects = scene.objects.iter().map(|o| {
             let (low, high) = o.shape.bounds();
+            let mut o = o.clone();
+            if o.stands == Stand::Hand {
+                o.map_from_object = hand::map_from_held(map_from_base);
+            }
+            let present = o.stands != Stand::Away;
+            let centre_m = o.centre_m();
             TrueObject {
-                name: o.name.clone(),
-                kind: o.kind.clone(),
-                surface: o.surface.clone(),
-                present: o.present,
+                surface: o.surface().map(String::from),
+                room: scene.room_at(&centre_m.xy()).filter(|_| present).map(String::from),
+                in_hand: o.stands == Stand::Hand,
+                present,
+                name: o.name,
+                kind: o.kind,
                 map_from_object: o.map_from_object,
-                centre_m: o.centre_m(),
+                centre_m,
                 size_m: (high - low).into(),
             }
         });
@@ -73,6 +100,11 @@ impl Truth {
             stamp_ns,
             base: Pose2::from_isometry(map_from_base),
             objects: objects.collect(),
+            doors: scene
+                .doors
+                .iter()
+                .map(|d| TrueDoor { name: d.doorway.name.clone(), shut: d.shut })
+                .collect(),
             target: scene.target.as_ref().map(|t| t.object.clone()),
             target_visible_from_start: scene.target_visible_from_start,
             events: events.to_vec(),

@@ -2,13 +2,28 @@
 
 use crate::body::Pose2;
 use crate::grid::OccupancyGrid;
-use crate::sim::scene::{ObstacleSpec, RoomSpec, SurfaceSpec, TargetSpec};
+use crate::sim::scene::{Doorway, ObstacleSpec, RoomSpec, SurfaceKind, SurfaceSpec, TargetSpec};
 use crate::sim::shape::{Cuboid, Hit, Part, Shape};
+use crate::sim::walls::Wall;
 use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Side of a cell of the robot's map, metres.
 pub const MAP_RESOLUTION_M: f64 = 0.05;
+
+/// Where an object is.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stand {
+    /// On the surface of that name.
+    On(String),
+    /// On the floor, where it fell.
+    Floor,
+    /// In the body's hand.
+    Hand,
+    /// Somebody took it away.
+    Away,
+}
 
 /// An object in its place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,12 +36,10 @@ pub struct Object {
     pub shape: Shape,
     /// Red, green, blue.
     pub colour: [u8; 3],
-    /// Name of the surface that it stands on.
-    pub surface: String,
-    /// Where its base stands.
+    /// Where it is.
+    pub stands: Stand,
+    /// Where its base stands; where it last stood while it is in the hand or taken away.
     pub map_from_object: Isometry3<f64>,
-    /// False once it has been taken away.
-    pub present: bool,
 }
 
 impl Object {
@@ -34,6 +47,34 @@ impl Object {
     pub fn centre_m(&self) -> Point3<f64> {
         self.map_from_object * Point3::new(0.0, 0.0, 0.5 * self.shape.height_m())
     }
+
+    /// Name of the surface that it stands on.
+    pub fn surface(&self) -> Option<&str> {
+        match &self.stands {
+            Stand::On(surface) => Some(surface),
+            _ => None,
+        }
+    }
+
+    /// True if it stands in the scene, on a surface or on the floor.
+    pub fn is_in_place(&self) -> bool {
+        matches!(self.stands, Stand::On(_) | Stand::Floor)
+    }
+
+    /// True if the height of a point is between foot and top, or at most `margin_m` above or below.
+    pub fn is_at_height(&self, z_m: f64, margin_m: f64) -> bool {
+        let above_m = z_m - self.map_from_object.translation.z;
+        above_m >= -margin_m && above_m <= self.shape.height_m() + margin_m
+    }
+}
+
+/// A door in its wall.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HungDoor {
+    /// Its opening.
+    pub doorway: Doorway,
+    /// True while the panel fills the opening.
+    pub shut: bool,
 }
 
 /// A scene in which the seed has chosen.
@@ -41,9 +82,15 @@ impl Object {
 pub struct Scene {
     /// One line for people.
     pub title: String,
-    /// The room.
+    /// The rectangle around all rooms.
     pub room: RoomSpec,
-    /// Tables.
+    /// The rooms that have names.
+    pub rooms: Vec<RoomSpec>,
+    /// Walls between them.
+    pub walls: Vec<Wall>,
+    /// Doors in those walls.
+    pub doors: Vec<HungDoor>,
+    /// What things stand on.
     pub surfaces: Vec<SurfaceSpec>,
     /// Boxes on the floor.
     pub obstacles: Vec<ObstacleSpec>,
@@ -59,9 +106,9 @@ pub struct Scene {
 
 /// What a pixel shows.
 pub const LABEL_NOTHING: u16 = 0;
-/// Floor and walls.
+/// Floor, walls and doors.
 pub const LABEL_ROOM: u16 = 1;
-/// Tables and obstacles.
+/// Surfaces and obstacles.
 pub const LABEL_FURNITURE: u16 = 2;
 /// Object `i` has the label `LABEL_OBJECT + i`.
 pub const LABEL_OBJECT: u16 = 3;
@@ -105,6 +152,10 @@ impl Solid {
             label: LABEL_FURNITURE,
         }
     }
+
+    fn of_room(low: Point3<f64>, high: Point3<f64>, colour: [u8; 3]) -> Solid {
+        Solid { label: LABEL_ROOM, ..Solid::cuboid(Isometry3::identity(), low, high, colour) }
+    }
 }
 
 /// Upright at a place in the map.
@@ -117,43 +168,56 @@ pub(crate) fn upright(x_m: f64, y_m: f64, z_m: f64, yaw_rad: f64) -> Isometry3<f
 
 /// Side of a table's legs, metres.
 const LEG_M: f64 = 0.05;
+/// Thickness of a shelf's uprights, beside its boards, metres.
+const UPRIGHT_M: f64 = 0.02;
+/// Thickness of a door's panel, metres.
+const PANEL_M: f64 = 0.04;
+/// Of every wall.
+pub const WALL_COLOUR: [u8; 3] = [205, 205, 195];
+const PANEL_COLOUR: [u8; 3] = [140, 90, 60];
 
 impl SurfaceSpec {
-    /// Frame of the top: origin at its centre, z up.
-    pub fn map_from_top(&self) -> Isometry3<f64> {
-        upright(self.position_m[0], self.position_m[1], self.height_m, self.yaw_deg.to_radians())
-    }
-
-    /// Corners of the top in the map, in order.
-    pub fn outline_m(&self) -> Vec<Point2<f64>> {
-        let [x, y] = self.size_m.map(|s| 0.5 * s);
-        let top = self.map_from_top();
-        [(-x, -y), (x, -y), (x, y), (-x, y)]
-            .iter()
-            .map(|&(x, y)| (top * Point3::new(x, y, 0.0)).xy())
-            .collect()
-    }
-
     fn solids(&self) -> Vec<Solid> {
         let [x, y] = self.size_m.map(|s| 0.5 * s);
         let top = self.map_from_top();
-        let mut solids = vec![Solid::cuboid(
-            top,
-            Point3::new(-x, -y, -self.thickness_m),
-            Point3::new(x, y, 0.0),
-            self.colour,
-        )];
-        for (sx, sy) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+        let board =
+            Solid::cuboid(top, Point3::new(-x, -y, -self.thickness_m), Point3::new(x, y, 0.0), self.colour);
+        match self.kind {
+            SurfaceKind::Table => [vec![board], self.legs()].concat(),
+            SurfaceKind::Board if self.uprights => {
+                let side = |inner: f64, outer: f64| {
+                    let low = Point3::new(inner.min(outer), -y, -self.height_m);
+                    Solid::cuboid(top, low, Point3::new(inner.max(outer), y, 0.0), self.colour)
+                };
+                vec![board, side(-x, -x - UPRIGHT_M), side(x, x + UPRIGHT_M)]
+            }
+            SurfaceKind::Board => vec![board],
+        }
+    }
+
+    fn legs(&self) -> Vec<Solid> {
+        let [x, y] = self.size_m.map(|s| 0.5 * s);
+        let half = Vector3::new(0.5 * LEG_M, 0.5 * LEG_M, 0.0);
+        let leg = |(sx, sy): (f64, f64)| {
             let centre = Point3::new(sx * (x - 0.5 * LEG_M), sy * (y - 0.5 * LEG_M), 0.0);
-            let half = Vector3::new(0.5 * LEG_M, 0.5 * LEG_M, 0.0);
-            solids.push(Solid::cuboid(
-                top,
+            Solid::cuboid(
+                self.map_from_top(),
                 centre - half - Vector3::z() * self.height_m,
                 centre + half - Vector3::z() * self.thickness_m,
                 self.colour,
-            ));
-        }
-        solids
+            )
+        };
+        [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(leg).to_vec()
+    }
+}
+
+impl HungDoor {
+    fn panel(&self) -> Solid {
+        let d = &self.doorway;
+        let mut half = d.half_m();
+        half[1 - d.along] = 0.5 * PANEL_M.min(d.thickness_m);
+        let (low, high) = (d.centre_m - half, d.centre_m + half);
+        Solid::of_room(Point3::new(low.x, low.y, 0.0), Point3::new(high.x, high.y, d.height_m), PANEL_COLOUR)
     }
 }
 
@@ -172,39 +236,49 @@ impl ObstacleSpec {
 }
 
 impl Scene {
-    /// Everything that a ray can meet but floor and walls; objects that are present carry their labels.
+    /// Everything that a ray can meet but the floor and the walls around it all; objects carry their labels.
     pub fn solids(&self) -> Vec<Solid> {
-        let mut solids: Vec<Solid> = self.surfaces.iter().flat_map(SurfaceSpec::solids).collect();
+        let walls = self.walls.iter().map(|w| Solid::of_room(w.low, w.high, WALL_COLOUR));
+        let shut = self.doors.iter().filter(|d| d.shut).map(HungDoor::panel);
+        let surfaces = self.surfaces.iter().flat_map(SurfaceSpec::solids);
+        let mut solids: Vec<Solid> = walls.chain(shut).chain(surfaces).collect();
         for o in &self.obstacles {
             let box_ = Shape::Box(Cuboid { size_m: o.size_m });
             let (low, high) = box_.bounds();
             solids.push(Solid::cuboid(o.map_from_obstacle(), low, high, o.colour));
         }
         for (label, o) in (LABEL_OBJECT..).zip(&self.objects) {
-            if o.present {
+            if o.is_in_place() {
                 solids.push(o.solid(label));
             }
         }
         solids
     }
 
-    /// The room as the robot knows it from mapping: tables and known obstacles down to the floor, walls at the edge.
+    /// The rooms as the robot knows them from mapping: surfaces and known obstacles down to the floor, walls with every door open.
     pub fn map(&self) -> OccupancyGrid {
-        let half = Point2::new(0.5 * self.room.size_m[0], 0.5 * self.room.size_m[1]);
-        let mut grid = OccupancyGrid::covering(-half, half, MAP_RESOLUTION_M);
+        let mut grid = OccupancyGrid::covering(self.room.low(), self.room.high(), MAP_RESOLUTION_M);
         // A cell is taken if anything reaches into it, so outlines grow by half a cell.
         let grown = 0.5 * MAP_RESOLUTION_M;
+        grid.occupy(|p| self.walls.iter().any(|w| w.blocks(p, grown)));
         for s in &self.surfaces {
-            let top = s.map_from_top();
-            grid.occupy(|p| {
-                let local = top.inverse_transform_point(&Point3::new(p.x, p.y, s.height_m));
-                local.x.abs() <= 0.5 * s.size_m[0] + grown && local.y.abs() <= 0.5 * s.size_m[1] + grown
-            });
+            let grown = if s.uprights { grown + UPRIGHT_M } else { grown };
+            grid.occupy(|p| s.covers(p, grown));
         }
         for o in self.obstacles.iter().filter(|o| o.on_map) {
             grid.occupy(|p| o.touches(p, grown));
         }
         grid
+    }
+
+    /// The named room that holds a point of the floor.
+    pub fn room_at(&self, p: &Point2<f64>) -> Option<&str> {
+        self.rooms.iter().find(|r| r.holds(p, 0.0)).map(|r| r.name.as_str())
+    }
+
+    /// The surface of that name.
+    pub fn surface(&self, name: &str) -> Option<&SurfaceSpec> {
+        self.surfaces.iter().find(|s| s.name == name)
     }
 
     /// The object of that name.

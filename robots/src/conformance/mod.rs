@@ -1,6 +1,12 @@
 //! What every body promises, as one check that any implementation of [`Robot`] can run in its tests.
 //!
-//! The body is driven, looks and takes frames; it needs one place besides its own that it can reach, and no mishaps.
+//! The body is driven, looks and takes frames; it needs one place besides its own that it can reach, open doors, an empty hand, and no
+//! mishaps. [`check_carrying`] is for bodies with a hand and needs to be told of an object.
+
+mod doors;
+mod hand;
+
+pub use hand::check_carrying;
 
 use crate::body::{CancellationToken, Place, Pose2, Progress, Push, Robot, Sensed, Watch};
 use crate::failure::Failure;
@@ -44,6 +50,8 @@ pub async fn check(robot: &dyn Robot) -> Result<(), Breach> {
     check_drive(robot, &goal).await?;
     check_frame(robot).await?;
     check_refusals(robot).await?;
+    doors::check_doors(robot).await?;
+    hand::check_hand(robot).await?;
     check_stops(robot).await?;
     check_frame(robot).await
 }
@@ -173,12 +181,14 @@ fn places(robot: &dyn Robot) -> Vec<Place> {
         return stations.iter().map(|s| Place::Station(s.name.clone())).collect();
     }
     let Some(map) = robot.map() else { return Vec::new() };
-    let stride = (map.occupied.len() / PLACES).max(1);
-    (0..map.occupied.len())
-        .step_by(stride)
-        .map(|i| {
-            let p = map.centre(i % map.width, i / map.width);
-            Place::Pose(Pose2::new(p.x, p.y, i as f64))
+    // The R2 sequence (Roberts 2018) spreads over any map.
+    let share = |k: usize, step: f64| (0.5 + step * k as f64).fract();
+    (0..PLACES)
+        .map(|k| {
+            let column = (share(k, 0.754_877_666) * map.width as f64) as usize;
+            let row = (share(k, 0.569_840_291) * map.height as f64) as usize;
+            let p = map.centre(column, row);
+            Place::Pose(Pose2::new(p.x, p.y, k as f64))
         })
         .collect()
 }

@@ -1,0 +1,148 @@
+//! Taking an object into the hand and putting it down.
+
+use crate::sim::arrange::{fits, keeps_apart};
+use crate::sim::drive::normal;
+use crate::sim::scene::{SurfaceSpec, headroom_m};
+use crate::sim::shape::Outline;
+use crate::sim::world::{Scene, Stand, upright};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+/// Chance that what the hand closes on slides out of it.
+const SLIP_CHANCE: f64 = 0.08;
+/// The hand finds an object whose middle is at most this far beside where it was said to be, metres.
+const FIND_M: f64 = 0.12;
+/// The hand reaches this far above and below the object for its middle, metres.
+const FIND_HEIGHT_M: f64 = 0.05;
+/// What slides out of the hand is displaced by up to this much, metres.
+const SLIDE_M: f64 = 0.05;
+/// Directions tried for it.
+const SLIDE_TRIES: usize = 8;
+/// Standard deviation of where things are put down, along x and y, metres.
+const PLACE_SIGMA_M: f64 = 0.01;
+/// The hand finds a surface whose height is at most this far from where it was said to be, metres.
+const SURFACE_HEIGHT_M: f64 = 0.1;
+/// What would jut out by up to this much is put down a little further inside, metres.
+const EDGE_M: f64 = 0.05;
+/// Where the held object's foot is, in the base frame.
+pub(crate) const BASE_FROM_HAND: Vector3<f64> = Vector3::new(0.35, 0.0, 0.9);
+
+/// What a grasp did.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Taken {
+    /// There was no object.
+    Nothing,
+    /// The object is wider than the hand opens.
+    TooWide(usize),
+    /// The object slid out of the hand and stands, perhaps a little elsewhere.
+    Slid(usize),
+    /// The object is in the hand.
+    Held(usize),
+}
+
+/// Takes what stands at a point of the map (true coordinates): the object there that is nearest and about as wide as expected.
+pub(crate) fn take(
+    scene: &mut Scene,
+    at: &Point3<f64>,
+    width_m: f64,
+    opening_m: f64,
+    slips: bool,
+    rng: &mut ChaCha8Rng,
+) -> Taken {
+    let off = |i: usize| (scene.objects[i].centre_m().xy() - at.xy()).norm();
+    let unlike = |i: usize| off(i) + (scene.objects[i].shape.width_m() - width_m).abs();
+    let found = (0..scene.objects.len())
+        .filter(|&i| scene.objects[i].is_in_place() && off(i) <= FIND_M)
+        .filter(|&i| scene.objects[i].is_at_height(at.z, FIND_HEIGHT_M))
+        .min_by(|&a, &b| unlike(a).total_cmp(&unlike(b)));
+    let slides = rng.random_bool(SLIP_CHANCE) || slips;
+    let Some(object) = found else { return Taken::Nothing };
+    if scene.objects[object].shape.width_m() > opening_m {
+        return Taken::TooWide(object);
+    }
+    if slides {
+        slide(scene, object, rng);
+        return Taken::Slid(object);
+    }
+    scene.objects[object].stands = Stand::Hand;
+    Taken::Held(object)
+}
+
+fn slide(scene: &mut Scene, object: usize, rng: &mut ChaCha8Rng) {
+    let Some(surface) = scene.objects[object].surface().and_then(|s| scene.surface(s)).cloned() else {
+        return;
+    };
+    for _ in 0..SLIDE_TRIES {
+        let angle = rng.random_range(0.0..std::f64::consts::TAU);
+        let step_m = rng.random_range(0.0..SLIDE_M);
+        let mut moved = scene.objects[object].clone();
+        let step = Translation3::from(Vector3::new(angle.cos(), angle.sin(), 0.0) * step_m);
+        moved.map_from_object = step * moved.map_from_object;
+        if fits(&moved, &surface, scene.objects.iter(), 0.0) {
+            scene.objects[object] = moved;
+            return;
+        }
+    }
+}
+
+/// Why something is not put down.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum NoPlace {
+    /// There is no surface.
+    NoSurface,
+    /// The surface is too small for it there.
+    Edge(String),
+    /// Another surface is too low above it.
+    Under(String),
+    /// Something stands there.
+    Taken,
+}
+
+/// Puts an object down with its foot at a point of the map (true coordinates), more or less; the surface's name.
+pub(crate) fn put(
+    scene: &mut Scene,
+    object: usize,
+    foot: &Point3<f64>,
+    yaw_rad: f64,
+    rng: &mut ChaCha8Rng,
+) -> Result<String, NoPlace> {
+    let off = [normal(rng), normal(rng)].map(|n| PLACE_SIGMA_M * n);
+    let height_off = |s: &&SurfaceSpec| (s.height_m - foot.z).abs();
+    let surface = scene
+        .surfaces
+        .iter()
+        .filter(|s| height_off(s) <= SURFACE_HEIGHT_M && s.covers(&foot.xy(), EDGE_M))
+        .min_by(|a, b| height_off(a).total_cmp(&height_off(b)))
+        .ok_or(NoPlace::NoSurface)?;
+    let name = surface.name.clone();
+    let radius_m = match scene.objects[object].shape.outline() {
+        Outline::Disc { radius_m } => radius_m,
+        Outline::Rectangle { half_m: [x, y] } => x.hypot(y),
+    };
+    let half_m = surface.size_m.map(|s| 0.5 * s - radius_m);
+    if half_m.iter().any(|h| *h < 0.0) {
+        return Err(NoPlace::Edge(name));
+    }
+    let wanted = Point3::new(foot.x + off[0], foot.y + off[1], surface.height_m);
+    let local = surface.map_from_top().inverse_transform_point(&wanted);
+    let [x, y] = [local.x.clamp(-half_m[0], half_m[0]), local.y.clamp(-half_m[1], half_m[1])];
+    let room_m = headroom_m(&scene.surfaces, surface);
+    let mut put = scene.objects[object].clone();
+    if put.shape.height_m() > room_m {
+        return Err(NoPlace::Under(name));
+    }
+    let at = surface.map_from_top() * Point3::new(x, y, 0.0);
+    put.map_from_object = upright(at.x, at.y, at.z, yaw_rad);
+    put.stands = Stand::On(name.clone());
+    if !keeps_apart(&put, scene.objects.iter(), 0.0) {
+        return Err(NoPlace::Taken);
+    }
+    scene.objects[object] = put;
+    Ok(name)
+}
+
+/// Where an object in the hand is.
+pub(crate) fn map_from_held(map_from_base: &Isometry3<f64>) -> Isometry3<f64> {
+    map_from_base * Translation3::from(BASE_FROM_HAND)
+}

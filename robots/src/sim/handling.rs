@@ -1,0 +1,215 @@
+//! What the simulated body does with its arm: pushing, grasping, placing, opening doors.
+
+use crate::body::{Grasp, Grasped, Opened, Placed, Placing, Pose2, Progress, Push, Pushed, Watch};
+use crate::failure::Failure;
+use crate::sim::body::{HAND_OPENING_M, REACH_M};
+use crate::sim::faults::FaultKind;
+use crate::sim::hand::{self, NoPlace, Taken};
+use crate::sim::push::{self, Effect};
+use crate::sim::robot::{SimRobot, cancelled, timed_out};
+use crate::sim::state::State;
+use nalgebra::{Point2, Point3};
+use rand::Rng;
+
+/// A push without the way that the hand moves with the object, seconds.
+const PUSH_S: f64 = 8.0;
+/// Speed of the hand while it pushes, metres a second.
+const HAND_M_S: f64 = 0.1;
+/// A hand that moved less than this share of what was asked for reports that it slipped.
+const SLIPPED_SHARE: f64 = 0.5;
+/// From the first move of the arm until the object is lifted, seconds.
+const GRASP_S: f64 = 12.0;
+/// From the first move of the arm until the object stands and the hand is away, seconds.
+const PLACE_S: f64 = 10.0;
+/// Opening a door, seconds.
+const DOOR_S: f64 = 6.0;
+/// How far from the middle of a door the base stands at most to open it, metres.
+const DOOR_REACH_M: f64 = 1.2;
+/// Chance that the hand slips off a door.
+const DOOR_SLIP_CHANCE: f64 = 0.08;
+/// While the arm works it can be stopped this often, seconds.
+const WORK_STEP_S: f64 = 0.5;
+
+fn unreachable(because: impl Into<String>) -> Failure {
+    Failure::Unreachable { because: because.into() }
+}
+
+fn slipped(because: impl Into<String>) -> Failure {
+    Failure::Slipped { because: because.into(), moved_m: 0.0 }
+}
+
+fn unable(because: impl Into<String>) -> Failure {
+    Failure::Unable { because: because.into() }
+}
+
+/// Where the arm is asked to go must be a point within its reach.
+fn in_reach(state: &State, what: &str, at: &Point3<f64>) -> Result<(), Failure> {
+    let reach_m = (at.xy() - state.estimate.point()).norm();
+    if reach_m <= REACH_M && at.z.is_finite() {
+        return Ok(());
+    }
+    if !(reach_m.is_finite() && at.z.is_finite()) {
+        return Err(unreachable(format!("{at} is no place for {what}")));
+    }
+    Err(unreachable(format!("{what} is {reach_m:.2} m away and the arm reaches {REACH_M:.2} m")))
+}
+
+impl SimRobot {
+    pub(super) fn push(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
+        let mut state = self.lock();
+        if state.held().is_some() {
+            return Err(unable("the hand is full"));
+        }
+        in_reach(&state, "the object", &push.object)?;
+        if !(push.direction.norm() > 0.0 && push.distance_m.is_finite() && push.distance_m > 0.0) {
+            return Err(unreachable("a push needs a direction and a distance"));
+        }
+        let needed_s = PUSH_S + push.distance_m / HAND_M_S;
+        if needed_s > watch.time_limit_s {
+            state.pass(watch.time_limit_s);
+            return Err(timed_out("the push, before the hand touched anything,", watch.time_limit_s));
+        }
+        let really = state.truth_from_estimate();
+        let at = really * push.object;
+        let direction = (really.rotation * push.direction.push(0.0)).xy();
+        let State { scene, rng, .. } = &mut *state;
+        let effect = push::push(scene, &at, &direction, push.distance_m, rng);
+        let Effect::Moved { object, moved_m, stopped } = effect else {
+            state.pass(PUSH_S);
+            return Err(slipped("the hand met nothing there"));
+        };
+        let duration_s = PUSH_S + moved_m / HAND_M_S;
+        state.pass(duration_s);
+        let name = state.scene.objects[object].name.clone();
+        state.note(format!("the hand pushes \"{name}\" by {moved_m:.3} m"));
+        match stopped {
+            Some(why) if moved_m < SLIPPED_SHARE * push.distance_m => {
+                Err(Failure::Slipped { because: format!("{why} after {moved_m:.2} m"), moved_m })
+            }
+            _ => Ok(Pushed { moved_m, duration_s }),
+        }
+    }
+
+    /// The arm works for so long, unless it is stopped.
+    async fn work(&self, what: &str, seconds: f64, watch: &Watch<'_>) -> Result<(), Failure> {
+        let mut elapsed_s = 0.0;
+        while elapsed_s < seconds {
+            if watch.cancel.is_cancelled() {
+                return Err(cancelled(what, elapsed_s));
+            }
+            let step_s = WORK_STEP_S.min(seconds - elapsed_s);
+            if elapsed_s + step_s > watch.time_limit_s {
+                self.lock().pass((watch.time_limit_s - elapsed_s).max(0.0));
+                return Err(timed_out(what, watch.time_limit_s));
+            }
+            self.lock().pass(step_s);
+            elapsed_s += step_s;
+            (watch.progress)(&Progress { elapsed_s, fraction: elapsed_s / seconds, distance_m: 0.0 });
+            tokio::task::yield_now().await;
+        }
+        Ok(())
+    }
+
+    pub(super) async fn take(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
+        {
+            let state = self.lock();
+            if state.held().is_some() {
+                return Err(unable("the hand is full"));
+            }
+            if grasp.width_m > HAND_OPENING_M {
+                let width_m = grasp.width_m;
+                return Err(unable(format!("the hand opens {HAND_OPENING_M:.2} m, not {width_m:.2} m")));
+            }
+            if !(grasp.width_m.is_finite() && grasp.width_m > 0.0) {
+                return Err(unreachable(format!("{} m is no width of an object", grasp.width_m)));
+            }
+            in_reach(&state, "the object", &grasp.object)?;
+        }
+        self.work("the grasp", GRASP_S, watch).await?;
+        let mut state = self.lock();
+        state.grasps += 1;
+        let slips = self.strikes(FaultKind::GraspSlips, state.grasps).is_some();
+        let at = state.truth_from_estimate() * grasp.object;
+        let State { scene, rng, .. } = &mut *state;
+        let taken = hand::take(scene, &at, grasp.width_m, HAND_OPENING_M, slips, rng);
+        let name = |state: &State, object: usize| state.scene.objects[object].name.clone();
+        match taken {
+            Taken::Nothing => Err(slipped("the hand closed on nothing")),
+            Taken::TooWide(object) => {
+                let name = name(&state, object);
+                state.note(format!("\"{name}\" is too wide for the hand"));
+                Err(slipped("what stands there is wider than the hand opens"))
+            }
+            Taken::Slid(object) => {
+                let name = name(&state, object);
+                state.note(format!("\"{name}\" slides out of the hand"));
+                Err(slipped("it slid out of the hand"))
+            }
+            Taken::Held(object) => {
+                let name = name(&state, object);
+                state.note(format!("the hand takes \"{name}\""));
+                let width_m = state.scene.objects[object].shape.width_m();
+                Ok(Grasped { width_m, duration_s: GRASP_S })
+            }
+        }
+    }
+
+    pub(super) async fn put(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
+        let object = {
+            let state = self.lock();
+            let object = state.held().ok_or_else(|| unable("the hand is empty"))?;
+            in_reach(&state, "the place", &placing.foot)?;
+            object
+        };
+        self.work("placing", PLACE_S, watch).await?;
+        let mut state = self.lock();
+        let foot = state.truth_from_estimate() * placing.foot;
+        let yaw_rad = Pose2::from_isometry(&state.map_from_base()).yaw_rad;
+        let State { scene, rng, .. } = &mut *state;
+        match hand::put(scene, object, &foot, yaw_rad, rng) {
+            Ok(surface) => {
+                let name = state.scene.objects[object].name.clone();
+                state.note(format!("the hand puts \"{name}\" on \"{surface}\""));
+                Ok(Placed { duration_s: PLACE_S })
+            }
+            Err(NoPlace::NoSurface) => Err(unreachable("the hand feels no surface there")),
+            Err(NoPlace::Edge(surface)) => {
+                Err(unreachable(format!("what the hand holds is too wide for \"{surface}\"")))
+            }
+            Err(NoPlace::Under(surface)) => Err(Failure::Blocked {
+                because: format!("what the hand holds is too high for \"{surface}\""),
+                by: Some(surface),
+            }),
+            Err(NoPlace::Taken) => {
+                Err(Failure::Blocked { because: "something stands there".into(), by: None })
+            }
+        }
+    }
+
+    pub(super) async fn open(&self, name: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
+        let door = {
+            let state = self.lock();
+            let door = state.door(name).ok_or_else(|| unreachable(format!("there is no door \"{name}\"")))?;
+            let centre: Point2<f64> = state.scene.doors[door].doorway.centre_m;
+            let off_m = (centre - state.estimate.point()).norm();
+            if off_m > DOOR_REACH_M {
+                return Err(unreachable(format!(
+                    "\"{name}\" is {off_m:.2} m away and can be opened from {DOOR_REACH_M:.2} m"
+                )));
+            }
+            door
+        };
+        self.work("opening the door", DOOR_S, watch).await?;
+        let mut state = self.lock();
+        if state.scene.doors[door].shut {
+            if state.rng.random_bool(DOOR_SLIP_CHANCE) {
+                state.note(format!("the hand slips off \"{name}\""));
+                return Err(slipped("the hand slipped off the door"));
+            }
+            state.scene.doors[door].shut = false;
+            state.note(format!("the hand opens \"{name}\""));
+        }
+        state.seen_shut.remove(&door);
+        Ok(Opened { duration_s: DOOR_S })
+    }
+}

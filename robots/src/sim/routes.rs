@@ -1,0 +1,59 @@
+//! What the simulated body knows of ways: its map, and a router for each set of doors that counted as shut.
+
+use crate::body::Speeds;
+use crate::grid::OccupancyGrid;
+use crate::route::Router;
+use crate::sim::scene::Doorway;
+use crate::sim::world::MAP_RESOLUTION_M;
+use nalgebra::Point2;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// Routers that are kept; beyond that all are made anew.
+const MOST_ROUTERS: usize = 64;
+
+/// Doors by number.
+pub(crate) type Doors = BTreeSet<usize>;
+
+/// The body's own map and what follows from it.
+pub(crate) struct Routes {
+    map: OccupancyGrid,
+    doors: Vec<Doorway>,
+    radius_m: f64,
+    speeds: Speeds,
+    routers: BTreeMap<Doors, Arc<Router>>,
+}
+
+impl Routes {
+    /// Ways on a map for a base that needs `radius_m` of room.
+    pub fn new(map: OccupancyGrid, doors: Vec<Doorway>, radius_m: f64, speeds: Speeds) -> Routes {
+        Routes { map, doors, radius_m, speeds, routers: BTreeMap::new() }
+    }
+
+    /// The router on which these doors are walls.
+    pub fn with_shut(&mut self, shut: &Doors) -> Arc<Router> {
+        if let Some(router) = self.routers.get(shut) {
+            return router.clone();
+        }
+        let mut map = self.map.clone();
+        for door in shut.iter().filter_map(|&d| self.doors.get(d)) {
+            let half = door.half_m().add_scalar(0.5 * MAP_RESOLUTION_M);
+            map.occupy(|p| {
+                let off = (p - door.centre_m).abs();
+                off.x <= half.x && off.y <= half.y
+            });
+        }
+        if self.routers.len() >= MOST_ROUTERS {
+            self.routers.clear();
+        }
+        let router = Arc::new(Router::new(&map, self.radius_m, self.speeds));
+        self.routers.insert(shut.clone(), router.clone());
+        router
+    }
+
+    /// Draws something on the map.
+    pub fn occupy(&mut self, inside: impl Fn(&Point2<f64>) -> bool) {
+        self.map.occupy(inside);
+        self.routers.clear();
+    }
+}

@@ -1,0 +1,202 @@
+//! Scenes as people write them: a room, surfaces, obstacles, a start and objects, in TOML.
+//!
+//! ```toml
+//! title = "Cup A behind a box"
+//!
+//! [room]                            # walls around it, its centre is the map's origin
+//! size_m = [6.0, 5.0]
+//!
+//! [[surface]]                       # `position_m` is the centre, in the map
+//! name = "table"
+//! size_m = [1.6, 0.8]
+//! height_m = 0.72
+//!
+//! [[surface]]
+//! name = "upper board"
+//! kind = "board"                    # without legs; several above each other are a shelf
+//! uprights = true                   # with sides down to the floor
+//! position_m = [2.0, 2.35]
+//! size_m = [0.9, 0.3]
+//! height_m = 1.15
+//!
+//! [[obstacle]]                      # boxes on the floor; `on_map = false`: nobody told the robot
+//! name = "cupboard"
+//! position_m = [2.6, -1.5]
+//! size_m = [0.5, 1.0, 1.8]
+//!
+//! [start]
+//! position_m = [-2.2, 0.0]
+//! yaw_deg = 0.0
+//!
+//! [[object]]                        # `position_m` (from the centre of the surface) fixes it; else the seed does
+//! name = "cup A"                    # unique; `kind` is what it is, the name if left out
+//! shape.cup = { diameter_m = 0.070, height_m = 0.104 }
+//! colour = [40, 140, 60]
+//!
+//! [[object]]
+//! name = "box"
+//! on = ["table", "upper board"]     # the surface, or several of which the seed chooses; the first of the scene if left out
+//! weights = [3.0, 1.0]              # how likely each is; equal if left out
+//! apart_from = "cup A"              # on another surface than an object above
+//! shape.box = { size_m = [0.25, 0.12, 0.28] }
+//! area_m = [0.8, 0.5]               # arranged within this rectangle around the centre of the surface
+//! scale = [0.9, 1.1]                # made larger or smaller by the seed
+//!
+//! [target]                          # only arrangements are taken where this holds
+//! object = "cup A"
+//! visible_from_start = [0.0, 0.0]   # least and greatest share of it that the camera sees from the start
+//! visible_from_some = 0.6           # and what some pose around the surface sees at least
+//! ```
+//!
+//! A flat has several rooms instead of the one. What lies between them is wall, as high as the highest; doors are openings in it:
+//!
+//! ```toml
+//! [[room]]
+//! name = "kitchen"
+//! position_m = [-2.0, 0.0]          # centre, in the map
+//! size_m = [3.9, 4.0]               # inside
+//!
+//! [[room]]
+//! name = "hall"
+//! position_m = [1.0, 0.0]           # the wall between the two is 0.05 m thick; rooms that touch have none
+//! size_m = [2.0, 4.0]
+//!
+//! [[door]]
+//! name = "kitchen door"
+//! position_m = [-0.025, 0.5]        # middle of the opening, within the wall
+//! width_m = 0.9
+//! shut_chance = 0.3                 # or state = "open" or "shut"
+//! ```
+
+mod check;
+mod door;
+mod object;
+mod one_or_many;
+mod room;
+mod surface;
+
+pub use door::{DoorSpec, DoorState, Doorway};
+pub use object::{ObjectSpec, TargetSpec};
+pub use room::RoomSpec;
+pub(crate) use surface::headroom_m;
+pub use surface::{ObstacleSpec, SurfaceKind, SurfaceSpec};
+
+use crate::input::{self, InputError, Objection, Step};
+use check::{finite, object};
+use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
+
+/// A scene as written: what is fixed and what a seed may choose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSpec {
+    /// One line for people.
+    #[serde(default)]
+    pub title: String,
+    /// One room, or several with walls between them.
+    #[serde(default = "room::one_room", rename = "room", with = "one_or_many")]
+    pub rooms: Vec<RoomSpec>,
+    /// Doors in those walls.
+    #[serde(default, rename = "door", skip_serializing_if = "Vec::is_empty")]
+    pub doors: Vec<DoorSpec>,
+    /// Surfaces; things stand on them.
+    #[serde(default, rename = "surface")]
+    pub surfaces: Vec<SurfaceSpec>,
+    /// Things on the floor.
+    #[serde(default, rename = "obstacle")]
+    pub obstacles: Vec<ObstacleSpec>,
+    /// Where the robot stands first.
+    pub start: StartSpec,
+    /// Things on surfaces.
+    #[serde(default, rename = "object")]
+    pub objects: Vec<ObjectSpec>,
+    /// Least gap between things on a surface, metres.
+    #[serde(default = "default_gap_m")]
+    pub gap_m: f64,
+    /// What the arrangement must show and hide.
+    #[serde(default)]
+    pub target: Option<TargetSpec>,
+}
+
+/// Where the robot stands first.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StartSpec {
+    /// In the map.
+    pub position_m: [f64; 2],
+    /// Counter-clockwise from the map's x.
+    #[serde(default)]
+    pub yaw_deg: f64,
+}
+
+fn default_gap_m() -> f64 {
+    0.02
+}
+fn default_grey() -> [u8; 3] {
+    [150, 150, 150]
+}
+
+impl SceneSpec {
+    /// Reads a scene. `file` is its name for messages.
+    ///
+    /// # Errors
+    /// The first mistake, with its place in the text and how to mend it.
+    pub fn parse(file: &str, text: &str) -> Result<SceneSpec, InputError> {
+        let spec: SceneSpec = input::parse_toml(file, text)?;
+        match spec.check() {
+            Ok(()) => Ok(spec),
+            Err(objection) => Err(input::draw(file, text, objection)),
+        }
+    }
+
+    /// The scene without an object (or all objects of that kind): for questions about what is not there. Its `[target]` goes with it.
+    pub fn without(&self, name_or_kind: &str) -> SceneSpec {
+        let mut spec = self.clone();
+        spec.objects.retain(|o| o.name != name_or_kind && o.kind.as_deref() != Some(name_or_kind));
+        let known: Vec<String> = spec.objects.iter().map(|o| o.name.clone()).collect();
+        for o in &mut spec.objects {
+            o.apart_from = o.apart_from.take().filter(|other| known.contains(other));
+        }
+        spec.target = spec.target.filter(|t| spec.objects.iter().any(|o| o.name == t.object));
+        spec
+    }
+
+    /// Checks what the format cannot: sizes above zero, names unique and known, things within the room.
+    ///
+    /// # Errors
+    /// The first objection, with its path in the document.
+    pub fn check(&self) -> Result<(), Objection> {
+        self.check_rooms()?;
+        for (i, door) in self.doors.iter().enumerate() {
+            self.check_door(i, door)?;
+        }
+        finite(&[self.gap_m], &[Step::Key("gap_m")])?;
+        self.check_start()?;
+        for (i, s) in self.surfaces.iter().enumerate() {
+            self.check_surface(i, s)?;
+        }
+        for (i, o) in self.obstacles.iter().enumerate() {
+            self.check_obstacle(i, o)?;
+        }
+        for (i, o) in self.objects.iter().enumerate() {
+            self.check_object(i, o)?;
+        }
+        self.check_target()
+    }
+
+    fn check_start(&self) -> Result<(), Objection> {
+        let at = [Step::Key("start"), Step::Key("position_m")];
+        finite(&self.start.position_m, &at)?;
+        finite(&[self.start.yaw_deg], &[Step::Key("start"), Step::Key("yaw_deg")])?;
+        if self.rooms.iter().any(|r| r.holds(&Point2::from(self.start.position_m), 0.0)) {
+            return Ok(());
+        }
+        let outer = RoomSpec::around(&self.rooms);
+        let (low, high) = (outer.low(), outer.high());
+        Err(object(
+            &at,
+            "the start lies outside the room".into(),
+            format!("x between {} and {}, y between {} and {}", low.x, high.x, low.y, high.y),
+        ))
+    }
+}

@@ -1,0 +1,173 @@
+//! Surfaces that things stand on, and boxes on the floor.
+
+use super::check::{finite, object, positive, unique};
+use super::room::RoomSpec;
+use super::{SceneSpec, default_grey};
+use crate::input::{Objection, Step};
+use crate::sim::arrange::gap_between;
+use crate::sim::shape::Outline;
+use crate::sim::world::upright;
+use nalgebra::{Isometry2, Isometry3, Point2, Point3, Vector2};
+use serde::{Deserialize, Serialize};
+
+/// How a surface is held up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SurfaceKind {
+    /// On four legs.
+    #[default]
+    Table,
+    /// By a wall, or by the uprights at its ends: a shelf board, a counter.
+    Board,
+}
+
+/// A surface that things stand on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceSpec {
+    /// Unique among the surfaces.
+    pub name: String,
+    /// How it is held up.
+    #[serde(default)]
+    pub kind: SurfaceKind,
+    /// Sides from the floor to a board, at both ends of its own x.
+    #[serde(default)]
+    pub uprights: bool,
+    /// Centre, in the map.
+    #[serde(default)]
+    pub position_m: [f64; 2],
+    /// Counter-clockwise.
+    #[serde(default)]
+    pub yaw_deg: f64,
+    /// Along its own x and y.
+    pub size_m: [f64; 2],
+    /// Of the top above the floor.
+    pub height_m: f64,
+    /// Of the top.
+    #[serde(default = "default_thickness_m")]
+    pub thickness_m: f64,
+    /// Red, green, blue.
+    #[serde(default = "default_wood")]
+    pub colour: [u8; 3],
+}
+
+/// A box on the floor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObstacleSpec {
+    /// For messages.
+    pub name: String,
+    /// Centre, in the map.
+    pub position_m: [f64; 2],
+    /// Counter-clockwise.
+    #[serde(default)]
+    pub yaw_deg: f64,
+    /// Along its own x and y, and its height.
+    pub size_m: [f64; 3],
+    /// True if the robot's map shows it.
+    #[serde(default = "default_true")]
+    pub on_map: bool,
+    /// Red, green, blue.
+    #[serde(default = "default_grey")]
+    pub colour: [u8; 3],
+}
+
+fn default_thickness_m() -> f64 {
+    0.03
+}
+fn default_true() -> bool {
+    true
+}
+fn default_wood() -> [u8; 3] {
+    [170, 130, 90]
+}
+
+/// Corners of surfaces may lie this far inside a wall: rounding, not building.
+const IN_WALL_M: f64 = 1e-3;
+
+impl SurfaceSpec {
+    /// Frame of the top: origin at its centre, z up.
+    pub fn map_from_top(&self) -> Isometry3<f64> {
+        upright(self.position_m[0], self.position_m[1], self.height_m, self.yaw_deg.to_radians())
+    }
+
+    /// Middle of it, on the floor of the map.
+    pub fn centre_m(&self) -> Point2<f64> {
+        Point2::from(self.position_m)
+    }
+
+    /// Corners of the top in the map, in order.
+    pub fn outline_m(&self) -> Vec<Point2<f64>> {
+        let [x, y] = self.size_m.map(|s| 0.5 * s);
+        let top = self.map_from_top();
+        [(-x, -y), (x, -y), (x, y), (-x, y)]
+            .iter()
+            .map(|&(x, y)| (top * Point3::new(x, y, 0.0)).xy())
+            .collect()
+    }
+
+    /// True if a point of the map, whatever its height, is over or under the top or at most `margin_m` beside it.
+    pub fn covers(&self, p: &Point2<f64>, margin_m: f64) -> bool {
+        let local = self.map_from_top().inverse_transform_point(&Point3::new(p.x, p.y, self.height_m));
+        local.x.abs() <= 0.5 * self.size_m[0] + margin_m && local.y.abs() <= 0.5 * self.size_m[1] + margin_m
+    }
+}
+
+impl SceneSpec {
+    pub(super) fn check_surface(&self, i: usize, s: &SurfaceSpec) -> Result<(), Objection> {
+        let at = |key| [Step::Key("surface"), Step::Index(i), Step::Key(key)];
+        positive(&s.size_m, &at("size_m"))?;
+        positive(&[s.height_m], &at("height_m"))?;
+        positive(&[s.thickness_m], &at("thickness_m"))?;
+        finite(&s.position_m, &at("position_m"))?;
+        finite(&[s.yaw_deg], &at("yaw_deg"))?;
+        if s.thickness_m >= s.height_m {
+            return Err(object(
+                &at("thickness_m"),
+                format!("the top is {} m thick and {} m high", s.thickness_m, s.height_m),
+                "make the top thinner than it is high".into(),
+            ));
+        }
+        unique("surface", &s.name, self.surfaces[..i].iter().map(|o| o.name.as_str()), &at("name"))?;
+        if s.uprights && s.kind == SurfaceKind::Table {
+            return Err(object(
+                &at("uprights"),
+                format!("\"{}\" stands on legs", s.name),
+                "kind = \"board\", or leave `uprights` out".into(),
+            ));
+        }
+        let inside = |room: &RoomSpec| s.outline_m().iter().all(|c| room.holds(c, IN_WALL_M));
+        if self.rooms.len() > 1 && !self.rooms.iter().any(inside) {
+            return Err(object(
+                &at("position_m"),
+                format!("\"{}\" is not within one room", s.name),
+                "move it, or make it smaller".into(),
+            ));
+        }
+        Ok(())
+    }
+
+    pub(super) fn check_obstacle(&self, i: usize, o: &ObstacleSpec) -> Result<(), Objection> {
+        let at = |key| [Step::Key("obstacle"), Step::Index(i), Step::Key(key)];
+        positive(&o.size_m, &at("size_m"))?;
+        finite(&[o.position_m[0], o.position_m[1], o.yaw_deg], &at("position_m"))
+    }
+}
+
+/// Height that things on a surface can have: up to the lowest of `surfaces` above any part of it, metres; infinite if there is none.
+pub(crate) fn headroom_m(surfaces: &[SurfaceSpec], below: &SurfaceSpec) -> f64 {
+    let overlaps = |other: &&SurfaceSpec| {
+        let at = |s: &SurfaceSpec| {
+            let middle = s.centre_m();
+            Isometry2::new(Vector2::new(middle.x, middle.y), s.yaw_deg.to_radians())
+        };
+        let outline = |s: &SurfaceSpec| Outline::Rectangle { half_m: s.size_m.map(|side| 0.5 * side) };
+        gap_between(&outline(below), &at(below), &outline(other), &at(other)) < 0.0
+    };
+    surfaces
+        .iter()
+        .filter(|other| other.height_m > below.height_m)
+        .filter(overlaps)
+        .map(|other| other.height_m - other.thickness_m - below.height_m)
+        .fold(f64::INFINITY, f64::min)
+}

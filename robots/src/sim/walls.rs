@@ -1,0 +1,103 @@
+//! The walls of a flat, as they follow from its rooms and doors: all that is neither floor nor opening.
+
+use crate::sim::scene::{Doorway, RoomSpec};
+use nalgebra::{Point2, Point3};
+use serde::{Deserialize, Serialize};
+
+/// A box of wall along the map's axes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Wall {
+    /// Least corner, in the map, metres; above the floor where it is the lintel of a door.
+    pub low: Point3<f64>,
+    /// Greatest corner.
+    pub high: Point3<f64>,
+}
+
+impl Wall {
+    /// True if it stands on the floor and a point is in it or at most `margin_m` beside it.
+    pub fn blocks(&self, p: &Point2<f64>, margin_m: f64) -> bool {
+        let within = |k: usize| p[k] >= self.low[k] - margin_m && p[k] <= self.high[k] + margin_m;
+        self.low.z <= 0.0 && within(0) && within(1)
+    }
+}
+
+/// Edges nearer to each other than this are one, metres.
+const SAME_EDGE_M: f64 = 1e-6;
+
+/// The plane cut at every edge of a room or a door: no cell is part of one.
+struct Cells {
+    edges: [Vec<f64>; 2],
+    /// Row by row: how high above the floor the wall begins, metres; none where there is floor.
+    from_m: Vec<Option<f64>>,
+}
+
+impl Cells {
+    fn new(rooms: &[RoomSpec], doors: &[Doorway]) -> Cells {
+        let edges = [0, 1].map(|k| {
+            let of_rooms = rooms.iter().flat_map(|r| [r.low()[k], r.high()[k]]);
+            let of_doors = doors.iter().flat_map(|d| [-1.0, 1.0].map(|s| d.centre_m[k] + s * d.half_m()[k]));
+            let mut edges: Vec<f64> = of_rooms.chain(of_doors).collect();
+            edges.sort_by(f64::total_cmp);
+            edges.dedup_by(|a, b| *a - *b < SAME_EDGE_M);
+            edges
+        });
+        let middle = |k: usize, i: usize| 0.5 * (edges[k][i] + edges[k][i + 1]);
+        let (width, height) = (edges[0].len() - 1, edges[1].len() - 1);
+        let from_m = (0..width * height).map(|cell| {
+            let p = Point2::new(middle(0, cell % width), middle(1, cell / width));
+            let opening = |d: &&Doorway| (0..2).all(|k| (p[k] - d.centre_m[k]).abs() < d.half_m()[k]);
+            match doors.iter().find(opening) {
+                _ if rooms.iter().any(|r| r.holds(&p, 0.0)) => None,
+                Some(door) => Some(door.height_m),
+                None => Some(0.0),
+            }
+        });
+        Cells { from_m: from_m.collect(), edges }
+    }
+
+    fn width(&self) -> usize {
+        self.edges[0].len() - 1
+    }
+
+    fn height(&self) -> usize {
+        self.edges[1].len() - 1
+    }
+
+    /// Takes the largest run of equal cells from a cell on, to the right and then up.
+    fn take(&mut self, column: usize, row: usize) -> Option<(f64, [usize; 2])> {
+        let from_m = self.from_m[row * self.width() + column]?;
+        let same = |cells: &Cells, c: usize, r: usize| cells.from_m[r * cells.width() + c] == Some(from_m);
+        let right = (column..self.width()).take_while(|&c| same(self, c, row)).last()? + 1;
+        let full = |r: &usize| (column..right).all(|c| same(self, c, *r));
+        let top = (row..self.height()).take_while(full).last()? + 1;
+        let width = self.width();
+        for r in row..top {
+            self.from_m[r * width + column..r * width + right].fill(None);
+        }
+        Some((from_m, [right, top]))
+    }
+}
+
+/// The walls between rooms, up to the height of the rectangle around them. One room has its walls in that rectangle.
+pub fn walls(rooms: &[RoomSpec], doors: &[Doorway]) -> Vec<Wall> {
+    if rooms.len() < 2 {
+        return Vec::new();
+    }
+    let top_m = RoomSpec::around(rooms).wall_height_m;
+    let mut cells = Cells::new(rooms, doors);
+    let mut walls = Vec::new();
+    for row in 0..cells.height() {
+        for column in 0..cells.width() {
+            if let Some((from_m, [right, top])) = cells.take(column, row)
+                && from_m < top_m
+            {
+                let [x, y] = &cells.edges;
+                walls.push(Wall {
+                    low: Point3::new(x[column], y[row], from_m),
+                    high: Point3::new(x[right], y[top], top_m),
+                });
+            }
+        }
+    }
+    walls
+}

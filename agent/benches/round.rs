@@ -2,25 +2,22 @@
 //!
 //! `cargo bench -p descry-agent`
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use descry_agent::agent::look;
 use descry_agent::body::{self, Body};
+use descry_domains::abilities::searching::{candidates, perceive, policies};
+use descry_domains::goal::{self, Goal};
+use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
-use descry_domains::situation::{Known, Situation, things};
-use descry_domains::{attachments, candidates, goal};
-use descry_memory::belief::Belief;
-use descry_memory::space::Space;
+use descry_domains::world::{Round, Setting, World};
 use descry_memory::{Meta, Options, Record, Sensing};
 use descry_perception::View;
 use descry_perception::merge::{Merged, merge};
 use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::{Descry, Recogniser};
 use descry_perception::segment::segment;
-use descry_perception::visibility::DepthMap;
-use descry_planner::{Source, Task};
-use descry_robots::{Robot, Watch};
+use descry_robots::{CancellationToken, Progress, Robot, Watch};
+use descry_skills::{Call, Context};
 use divan::Bencher;
 use tempfile::TempDir;
 
@@ -89,56 +86,46 @@ impl Looked {
     }
 
     fn merged(&self) -> Merged {
-        merge(&self.views(), &look::options(&*self.body.robot).0).expect("the views merge")
+        merge(&self.views(), &perceive::options(&*self.body.robot, None).0).expect("the views merge")
     }
 
-    /// The situation of a planning round; after the first look if `seen`.
-    fn situation(&self, seen: bool) -> Arc<Situation> {
-        let robot: Arc<dyn Robot> = Arc::clone(&self.body.robot);
-        let surfaces = candidates::surfaces(&self.domain, &*robot);
-        let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
-        let here = runtime.block_on(robot.pose()).expect("it knows where it is");
-        let (candidates, at) =
-            candidates::candidates(&*robot, &surfaces, &self.domain.config.candidates, &here);
-        let mut space = Space::default();
-        let mut observed = BTreeSet::new();
-        if seen {
-            let view = &self.views()[0];
-            if let Some(map) = DepthMap::from_view(view, &view.world_from_camera) {
-                space.integrate(&map);
-            }
-            observed.insert((0, 0));
-        }
-        let known = Known {
-            robot,
-            belief: Arc::new(Belief::default()),
-            space: Arc::new(space),
-            candidates,
-            at,
-            surfaces,
-            things: things(&self.domain, &["cup-a".into()]),
-            observed,
-            out_of_reach: BTreeSet::new(),
-            kinds: Vec::new(),
-            time_left_s: None,
-            stuck: BTreeSet::new(),
-            pushes_left: 0,
-        };
-        Arc::new(Situation::new(known, self.domain.config.thresholds))
+    /// The goal of the main job.
+    fn goal(&self) -> Goal {
+        let lexicon = Lexicon::new(&self.domain, &Places::of_body(&*self.body.robot));
+        goal::read("find cup A", &self.domain, &lexicon).expect("the goal is understood")
     }
 }
 
-/// From the problem's text to the plan, geometry answered anew.
+/// The problem of a planning round; after the first look if `seen`.
+fn round(looked: &Looked, goal: &Goal, recogniser: &Descry, seen: bool) -> Round {
+    let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
+    let robot: Arc<dyn Robot> = Arc::clone(&looked.body.robot);
+    let here = runtime.block_on(robot.pose()).expect("it knows where it is");
+    let (domain, record) = (&looked.domain, &looked.record);
+    let setting = Setting { domain, goal, robot: Arc::clone(&robot), record, recogniser };
+    let chooser = policies::named(policies::PLAN, 1, None).expect("the planner is there");
+    let mut world = World::begin(setting, chooser, &here).expect("the domain can be used");
+    if seen {
+        let call = Call { action: "observe".into(), arguments: vec!["start".into(), "table".into()] };
+        let job = world.ground(&call, 0).expect("it has a meaning").expect("it has a part");
+        let (cancel, progress) = (CancellationToken::new(), &|_: &Progress| {});
+        let context = Context { robot: &*robot, cancel, time_limit_s: job.limit_s, progress };
+        let skill = job.skill.expect("it can be done");
+        let outcome = runtime.block_on(skill.perform(&context)).expect("a view");
+        world.learn(&call, 0, &outcome, &mut Vec::new()).expect("it is recorded");
+    }
+    world.round().expect("the problem is right")
+}
+
+/// From a round's task to the plan, geometry answered anew.
 #[divan::bench(args = [false, true])]
 fn plan(bencher: Bencher, after_a_look: bool) {
     let looked = looked();
-    let goal = goal::read("find cup A", &looked.domain).expect("the goal is understood");
-    bencher.with_inputs(|| looked.situation(after_a_look)).bench_values(|situation| {
-        let problem = Source::new("problem", situation.problem(&looked.domain, "round", &goal.pddl));
-        let task = Task::read(&looked.domain.pddl, &problem).expect("the problem is right");
-        let attachments = attachments::bind(&situation, &[], || 0.0);
+    let (goal, recogniser) = (looked.goal(), Descry::default());
+    bencher.with_inputs(|| round(&looked, &goal, &recogniser, after_a_look)).bench_values(|round| {
         let options = descry_planner::Options::default();
-        descry_planner::plan(&task, &attachments, &options, &|| false, &mut |_| {}).expect("planning ends")
+        descry_planner::plan(&round.task, &round.attachments, &options, &|| false, &mut |_| {})
+            .expect("planning ends")
     });
 }
 
@@ -154,7 +141,7 @@ fn merge_five_views_from_the_record(bencher: Bencher) {
 fn recognise_the_merged_cloud(bencher: Bencher) {
     let looked = looked();
     let merged = looked.merged();
-    let (_, seeking) = look::options(&*looked.body.robot);
+    let (_, seeking) = perceive::options(&*looked.body.robot, None);
     bencher.bench(|| {
         let scene = segment(&merged.cloud, &merged.visibility, &seeking).expect("there is a table");
         Descry::default().recognise(&scene, &merged.visibility, &looked.domain.objects)

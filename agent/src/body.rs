@@ -24,8 +24,8 @@ pub struct Body {
 pub struct TruePlace {
     /// The middle of its body, in the map, metres.
     pub position_m: [f64; 3],
-    /// The surface that it stands on.
-    pub on: String,
+    /// The surface that it stands on; none in the hand.
+    pub on: Option<String>,
     /// The room that this is in.
     pub room: Option<String>,
 }
@@ -52,13 +52,9 @@ impl Body {
             .map(|o| TruePlace {
                 position_m: o.centre_m.coords.into(),
                 on: o.surface.clone(),
-                room: self.room_of(&o.surface),
+                room: o.room.clone(),
             })
             .min_by(|a, b| distance(&a.position_m).total_cmp(&distance(&b.position_m)))
-    }
-
-    fn room_of(&self, surface: &str) -> Option<String> {
-        self.robot.surfaces().iter().find(|s| s.name == surface)?.room.clone()
     }
 
     /// The simulator, for experiments that score against the truth.

@@ -184,7 +184,7 @@ fn show_true_position(report: &mut Report, body: &Body) {
     let object = report.object.as_deref();
     let true_place = object.and_then(|name| body.true_place(name, report.position_m));
     report.true_position_m = true_place.as_ref().map(|p| p.position_m);
-    report.true_on = true_place.as_ref().map(|p| p.on.clone());
+    report.true_on = true_place.as_ref().and_then(|p| p.on.clone());
     report.true_room = true_place.and_then(|p| p.room);
 }
 

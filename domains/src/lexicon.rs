@@ -65,7 +65,11 @@ impl Places {
 
     /// Those of a scene.
     pub fn of_spec(spec: &SceneSpec) -> Self {
-        Self { surfaces: spec.surfaces.iter().map(|s| s.name.clone()).collect(), ..Self::default() }
+        Self {
+            surfaces: spec.surfaces.iter().map(|s| s.name.clone()).collect(),
+            rooms: spec.rooms.iter().map(|r| r.name.clone()).filter(|name| !name.is_empty()).collect(),
+            doors: spec.doors.iter().map(|d| d.name.clone()).collect(),
+        }
     }
 }
 

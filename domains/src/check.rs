@@ -293,9 +293,11 @@ impl Check<'_> {
             for word in action.taught() {
                 let ground = vocabulary.word(&word).map(|w| vocabulary.ground(&w, config));
                 if !matches!(ground, Some(Ground::Remembered)) {
-                    let message =
-                        format!("what a failure of `{name}` teaches, `{word}`, is no word that is remembered");
-                    let help = "name a predicate of domain.pddl that no ability states, as (given-up ?to)".into();
+                    let message = format!(
+                        "what a failure of `{name}` teaches, `{word}`, is no word that is remembered"
+                    );
+                    let help =
+                        "name a predicate of domain.pddl that no ability states, as (given-up ?to)".into();
                     error("not-remembered", message, self.in_toml(&[&format!("({word}")]), help);
                 }
             }

@@ -462,12 +462,13 @@ impl Situation {
         self.derived.about_on[what * self.surfaces.len() + on].get_or_init(|| Doubt::about_on(self, what, on))
     }
 
-    /// What going on to look elsewhere takes on average, seconds: a drive to another surface and a look.
+    /// What going on to look elsewhere takes on average, seconds: a drive to another surface and a look. It is told from where the
+    /// body began, so that it stays the same while the body moves.
     pub fn going_on_s(&self) -> f64 {
         *self.derived.going_on_s.get_or_init(|| {
             let to = |on: usize| {
-                let sees = (0..self.candidates.len()).filter(|&n| self.can_drive_to(n) && self.sees(n, on));
-                sees.map(|n| self.travel_s(self.at, n)).fold(f64::INFINITY, f64::min)
+                let sees = (0..self.candidates.len()).filter(|&n| self.sees(n, on));
+                sees.map(|n| self.travel_past_s(0, n, &BTreeSet::new())).fold(f64::INFINITY, f64::min)
             };
             let all: Vec<f64> = (0..self.surfaces.len()).map(to).filter(|s| s.is_finite()).collect();
             reasons::LOOK_S + all.iter().sum::<f64>() / all.len().max(1) as f64

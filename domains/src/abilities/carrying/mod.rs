@@ -5,6 +5,7 @@ mod spot;
 use std::sync::Arc;
 
 use descry_memory::belief::Track;
+use descry_perception::nalgebra::{Point3, Vector3};
 use descry_planner::{Answer, Call, CallError};
 use descry_robots::{Failure, Grasp, Place, Placing};
 use descry_skills::{Outcome, PickUp, PutDown, SkillFailure};
@@ -106,26 +107,33 @@ fn standing<'a>(s: &'a Situation, thing: &str, surface: &str) -> Option<&'a Trac
 }
 
 /// The middle of an object's body.
-fn middle(s: &Situation, track: &Track) -> descry_perception::nalgebra::Point3<f64> {
-    let up = s.surface_of(track).map_or_else(descry_perception::nalgebra::Vector3::z, |on| s.surfaces[on].up);
+fn middle(s: &Situation, track: &Track) -> Point3<f64> {
+    let up = s.surface_of(track).map_or_else(Vector3::z, |on| s.surfaces[on].up);
     track.position_m + up * (0.5 * track.size_m[2])
 }
 
 /// How far a point is from the body at a candidate, along the floor.
-fn distance_m(s: &Situation, from: usize, p: &descry_perception::nalgebra::Point3<f64>) -> Option<f64> {
+fn distance_m(s: &Situation, from: usize, p: &Point3<f64>) -> Option<f64> {
     let Place::Pose(base) = &s.candidates[from].place else { return None };
     Some((p.xy() - base.point()).norm())
 }
 
-/// `[can-grasp ?from ?what ?on]`.
+/// `[can-grasp ?from ?what ?on]`: what has not been found yet may stand anywhere on the surface.
 fn can_grasp(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let from = s.candidate(argument(call, 0)?)?;
     let body = s.robot.description();
-    let can = standing(s, argument(call, 1)?, argument(call, 2)?).is_some_and(|track| {
-        let near =
-            distance_m(s, from, &middle(s, track)).zip(body.reach_m).is_some_and(|(d, reach)| d <= reach);
-        near && body.hand_opening_m.is_some_and(|opening| track.size_m[0].min(track.size_m[1]) <= opening)
-    });
+    let within =
+        |p: Point3<f64>| distance_m(s, from, &p).zip(body.reach_m).is_some_and(|(d, reach)| d <= reach);
+    let can = match standing(s, argument(call, 1)?, argument(call, 2)?) {
+        Some(track) => {
+            let width_m = track.size_m[0].min(track.size_m[1]);
+            within(middle(s, track)) && body.hand_opening_m.is_some_and(|opening| width_m <= opening)
+        }
+        None => {
+            let on = s.surface(argument(call, 2)?)?;
+            body.hand_opening_m.is_some() && s.surfaces[on].centre().is_some_and(within)
+        }
+    };
     Ok(Answer::Truth(can))
 }
 
@@ -136,7 +144,7 @@ fn can_put(s: &Situation, call: &Call) -> Result<Answer, CallError> {
 }
 
 /// Where the thing in the hand is put down.
-fn place(s: &Situation, arguments: &[&str]) -> Result<descry_perception::nalgebra::Point3<f64>, String> {
+fn place(s: &Situation, arguments: &[&str]) -> Result<Point3<f64>, String> {
     let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
     let on = s.surface(arguments[2]).map_err(|e| e.to_string())?;
     let radius_m = held(s).map_or(spot::USUAL_RADIUS_M, |t| 0.5 * t.size_m[0].max(t.size_m[1]));

@@ -33,6 +33,8 @@ const HEIGHT_TOLERANCE_M: f64 = 0.15;
 const BESIDE_M: f64 = 0.25;
 /// Points this near to a surface lie on it.
 const ON_SURFACE_M: f64 = 0.012;
+/// What lies so near to a wall of the map, or beyond it, is the wall, metres.
+const WALL_M: f64 = 0.04;
 /// How far beyond the hull of a surface points of it are looked for.
 const HULL_MARGIN_M: f64 = 0.02;
 
@@ -121,6 +123,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     };
     mind.regions[on].nothing = None;
     let (merged, surface) = lay_on_map(eyes.robot, &mind.known.surfaces[on], merged, surface);
+    let merged = without_walls(eyes.robot, &mind.known.surfaces[on], merged);
     let newest = newest(&views, &merged);
     if let Some(map) = &newest {
         Arc::make_mut(&mut mind.known.spaces[on]).integrate(map);
@@ -197,6 +200,16 @@ fn lay_on_map(
     let is_past = |p: &Point3<f64>| merged.visibility.looked_past(p, ON_SURFACE_M);
     let located = locate(&points, &surface.up, &known.outline, sigma_m, sigma_rad, is_past);
     (merged.moved(&located.map_from_world), surface.moved(&located.map_from_world))
+}
+
+/// Takes the walls of the surface's room out of a merged cloud, as the map has them: what stands against a wall is not one with it.
+fn without_walls(robot: &dyn Robot, known: &KnownSurface, mut merged: Merged) -> Merged {
+    let room = robot.rooms().iter().find(|room| Some(&room.name) == known.room.as_ref());
+    let Some(room) = room.filter(|room| room.outline_m.len() >= 3) else { return merged };
+    let floor: Vec<Point3<f64>> = room.outline_m.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
+    let inside = KnownSurface { outline: floor, up: Vector3::z(), ..known.clone() };
+    merged.cloud = merged.cloud.filter(|p| inside.covers(&p.cast(), -WALL_M));
+    merged
 }
 
 /// Reads the views of a surface back from the record by their timestamps, with the transforms of those times. What a view shows

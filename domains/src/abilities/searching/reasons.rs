@@ -72,6 +72,9 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
         return Some(format!("what stands at {} may be it ({:.2})", place(&track.position_m), p(track)));
     }
     let doubt = s.doubt_about(what);
+    if doubt.can_be_settled(s) {
+        return Some("there are looks that would settle it, and no plan leads through them".into());
+    }
     out_of_sight(s, doubt, "it").or_else(|| {
         let (left, t) = (doubt.hidden, &s.thresholds);
         (left > t.remaining + t.out_of_sight).then(|| {

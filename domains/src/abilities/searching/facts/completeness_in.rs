@@ -5,9 +5,7 @@ use crate::lexicon::symbol;
 use crate::situation::Situation;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
-    let mut rooms: Vec<String> = situation.surfaces.iter().filter_map(|s| s.room.as_deref()).map(symbol).collect();
-    rooms.sort_unstable();
-    rooms.dedup();
+    let rooms: Vec<String> = situation.robot.rooms().iter().map(|room| symbol(&room.name)).collect();
     let mut lines = Vec::new();
     for (of, kind) in situation.kinds.iter().enumerate() {
         for room in &rooms {

@@ -336,6 +336,9 @@ impl Situation {
         let surface = &self.surfaces[on];
         let Some(centre) = surface.centre() else { return true };
         let Some(camera) = self.camera(from, on) else { return false };
+        if surface.whole && self.clearness(from, on) < CLEAR_ENOUGH {
+            return false;
+        }
         let halfway = surface.outline.iter().map(|p| nalgebra_middle(p, &centre));
         std::iter::once(centre)
             .chain(surface.outline.iter().copied())
@@ -502,6 +505,8 @@ const BEFORE_M: f64 = 0.05;
 /// among the things on a surface, metres.
 const UNSEEN_WITHIN_M: f64 = 0.4;
 const FREE_PATH_M: f64 = 0.5;
+/// A look at a known surface that shows things less clearly than this shows nothing of use: from over three metres for a Kinect.
+const CLEAR_ENOUGH: f64 = 0.1;
 /// Size of the smallest thing that tells objects apart, the wall of a cup's handle, metres.
 const SMALLEST_M: f64 = 0.01;
 /// Cosine of the widest angle between the normal of a sector and the line of sight at which the sector still counts as seen.

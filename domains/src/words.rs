@@ -1,6 +1,6 @@
 //! The words that are remembered or fixed, and their values.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use descry_planner::task::Task;
 use descry_planner::{FactValue, Reading, Source};
@@ -151,6 +151,20 @@ pub(crate) fn read(text: &str) -> Result<Vec<Instance>, String> {
         all => atom(all).map(|(n, a)| (n, a, Some(HOLDS))),
     };
     found.map(|instance| vec![instance]).ok_or_else(expected)
+}
+
+/// Whether every name in a condition stands in a problem's text or is a word of the domain.
+pub(crate) fn are_known(condition: &str, problem: &str, domain: &Domain) -> bool {
+    let split = |c: char| c.is_whitespace() || "()".contains(c);
+    let objects: BTreeSet<&str> = problem.split(split).collect();
+    let vocabulary = &domain.vocabulary;
+    let is_name = |t: &&str| t.starts_with(char::is_alphabetic);
+    let is_known = |t: &str| {
+        let operator = ["and", "or", "not", "forall", "exists", "imply", "either"].contains(&t);
+        let declared = vocabulary.word(t).is_some() || vocabulary.has_type(t);
+        operator || declared || objects.contains(t) || vocabulary.task.find_object(t).is_some()
+    };
+    condition.to_lowercase().split(split).filter(is_name).all(is_known)
 }
 
 /// The task of a round with another goal: for asking whether a condition holds now.

@@ -402,6 +402,10 @@ impl<'a> World<'a> {
         let Setting { domain, goal, .. } = self.setting.clone();
         let situation = Arc::new(Situation::new(self.mind.known.clone(), domain.config.thresholds));
         let problem = self.problem(&situation)?;
+        // What is no longer believed in holds of nothing.
+        if !words::are_known(condition, &problem.text, domain) {
+            return Ok(false);
+        }
         let task = words::with_goal(domain, &problem, &goal.pddl, condition).map_err(WorldError::Domain)?;
         Ok(monitor(&task, &self.bind(&situation), &Plan::default()).is_ok())
     }

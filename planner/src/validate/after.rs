@@ -5,13 +5,14 @@ use std::sync::Arc;
 use super::monitor::Broken;
 use super::replay;
 use crate::attachment::{Attachments, FactValue, Reading};
-use crate::plan::Plan;
+use crate::plan::{Plan, Step};
 use crate::semantics::Semantics;
 use crate::state::State;
-use crate::task::Task;
+use crate::task::{Comparison, Task, When};
 
 /// Every instance of the named predicates and numeric functions that holds or has a value once the steps are carried out from
-/// the initial state; in the order of the names, instances in the order of the task's objects. The goal is not asked for.
+/// the initial state; in the order of the names, instances in the order of the task's objects. The goal is not asked for, and the
+/// steps take what the task says that they take in that state, whatever the plan says.
 ///
 /// # Errors
 /// The first condition that does not hold, as [`monitor`](super::monitor()) gives it.
@@ -22,12 +23,25 @@ pub fn after(
     names: &[&str],
 ) -> Result<Vec<Reading>, Box<Broken>> {
     let semantics = Semantics::new(task, attachments);
-    let replayed = match replay::replay(&semantics, steps) {
+    let replayed = match replay::replay(&semantics, &timed(&semantics, steps)) {
         Ok(Ok(replayed)) => replayed,
         Ok(Err(fault)) => return Err(Box::new(Broken::of_fault(task, *fault))),
         Err(failure) => return Err(Box::new(Broken::of_call(task, &failure))),
     };
     Ok(names.iter().flat_map(|name| instances(task, &replayed.state, name)).collect())
+}
+
+/// The steps with the durations that the initial state gives them, where it gives one.
+fn timed(semantics: &Semantics<'_>, steps: &Plan) -> Plan {
+    let Ok(state) = semantics.initial() else { return steps.clone() };
+    let asked_s = |step: &Step| -> Option<f64> {
+        let (action, binding) = semantics.bind(step).ok()?;
+        let bounds = semantics.task.action(action).duration.as_ref()?;
+        let bound = bounds.iter().find(|b| b.comparison == Comparison::Equal && b.when == When::Start)?;
+        semantics.number(&state, &bound.value, &binding).ok()?.filter(|s| s.is_finite())
+    };
+    let timed = |step: &Step| Step { duration_s: asked_s(step).unwrap_or(step.duration_s), ..step.clone() };
+    Plan { steps: steps.steps.iter().map(timed).collect(), ..steps.clone() }
 }
 
 fn instances(task: &Task, state: &State, name: &str) -> Vec<Reading> {

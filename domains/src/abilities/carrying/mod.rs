@@ -140,7 +140,7 @@ fn can_grasp(s: &Situation, call: &Call) -> Result<Answer, CallError> {
 /// `[can-put ?from ?on]`.
 fn can_put(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let (from, on) = (s.candidate(argument(call, 0)?)?, s.surface(argument(call, 1)?)?);
-    Ok(Answer::Truth(spot::free(s, from, on, spot::USUAL_RADIUS_M).is_some()))
+    Ok(Answer::Truth(spot::free(s, from, on, spot::USUAL_RADIUS_M, true).is_some()))
 }
 
 /// Where the thing in the hand is put down.
@@ -148,7 +148,7 @@ fn place(s: &Situation, arguments: &[&str]) -> Result<Point3<f64>, String> {
     let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
     let on = s.surface(arguments[2]).map_err(|e| e.to_string())?;
     let radius_m = held(s).map_or(spot::USUAL_RADIUS_M, |t| 0.5 * t.size_m[0].max(t.size_m[1]));
-    spot::free(s, from, on, radius_m)
+    spot::free(s, from, on, radius_m, false)
         .ok_or_else(|| format!("there is no free place within reach on {}", arguments[2]))
 }
 

@@ -15,9 +15,15 @@ const GRID_M: f64 = 0.04;
 /// Heights above the surface at which a place must have been seen free, metres.
 const FREE_AT_M: [f64; 2] = [0.04, 0.10];
 
-/// The place on a surface nearest to the body at a candidate that is within reach and free: nothing is believed there, and where
-/// the surface has been looked at it was seen empty. None if there is none.
-pub(super) fn free(s: &Situation, from: usize, on: usize, radius_m: f64) -> Option<Point3<f64>> {
+/// The place on a surface nearest to the body at a candidate that is within reach and free: nothing is believed there, and it was
+/// seen empty, or `if_unseen` has not been seen at all. None if there is none.
+pub(super) fn free(
+    s: &Situation,
+    from: usize,
+    on: usize,
+    radius_m: f64,
+    if_unseen: bool,
+) -> Option<Point3<f64>> {
     let surface = &s.surfaces[on];
     let centre = surface.centre()?;
     let reach_m = s.robot.description().reach_m?;
@@ -26,11 +32,10 @@ pub(super) fn free(s: &Situation, from: usize, on: usize, radius_m: f64) -> Opti
     let e2 = surface.up.cross(&e1);
     let widest = surface.outline.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
     let steps = (widest / GRID_M).ceil() as i64;
-    let looked_at = s.observed.iter().any(|look| look.1 == on);
     let is_empty = |p: &Point3<f64>| {
         FREE_AT_M.iter().all(|h| match s.spaces[on].cell(&(p + surface.up * *h)) {
             Cell::Free => true,
-            Cell::Unseen => !looked_at,
+            Cell::Unseen => if_unseen,
             Cell::Occupied => false,
         })
     };

@@ -23,6 +23,7 @@
     (search-cost ?on - surface                                   cost             search_cost@descry)
     (expected-gain ?from - pose ?on - surface ?what - thing      cost             expected_gain@descry)
     (expected-presence ?from - pose ?on - surface ?what - thing  cost             expected_presence@descry)
+    (expected-clarity ?from - pose ?on - surface                 cost             expected_clarity@descry)
     (expected-completeness ?from - pose ?on - surface ?of - kind cost             expected_completeness@descry)
     (can-grasp ?from - pose ?what - thing ?on - surface          conditionchecker can_grasp@descry)
     (can-put ?from - pose ?on - surface                          conditionchecker can_put@descry))
@@ -37,6 +38,7 @@
     (out-of-reach ?where - pose)                ; a drive there has failed for good
     (observed ?from - pose ?on - surface)       ; this look has been taken, and nothing has been moved since
     (on ?what - thing ?on - surface)            ; it surely stands there
+    (last-seen ?what - thing ?on - surface)     ; an earlier run saw it there last
     (is ?what - thing ?of - kind)               ; it was seen, and is surely of the kind
     (hand-free)
     (holding ?what - thing)
@@ -48,6 +50,8 @@
     (presence ?what - thing ?on - surface)      ; how sure we are that it stands on that surface, 0 to 1
     (completeness ?of - kind)                   ; how sure we are of having found all of a kind, 0 to 1
     (completeness-in ?of - kind ?where - room)  ; the same of those in a room
+    (clarity ?on - surface)                     ; how sure we are what each object on it is, the least sure one, 0 to 1
+    (hours-since ?what - thing)                 ; how long ago an earlier run saw it
     (sure))                                     ; the confidence that was asked for
 
   (:durative-action move
@@ -89,6 +93,7 @@
       (at start (not (at ?from)))
       (at end (at ?from))
       (at end (observed ?from ?on))
+      (at end (increase (clarity ?on) [expected-clarity ?from ?on]))
       (forall (?what - thing)
         (and (at end (increase (confidence ?what) [expected-gain ?from ?on ?what]))
              (at end (increase (presence ?what ?on) [expected-presence ?from ?on ?what]))))

@@ -121,6 +121,11 @@ pub(crate) fn conclude(
     }
 }
 
+/// In an answer, `{changes <surface>}` stands for what has changed there since an earlier run.
+const CHANGES: &str = "changes";
+/// An object nearer than this to where one was is that one, metres.
+const SAME_M: f64 = 0.10;
+
 /// What answering needs.
 struct Asker<'a> {
     goal: &'a Goal,
@@ -294,11 +299,37 @@ impl Asker<'_> {
         put_in(&(out + rest), &self.goal.slots, |f| f.name.clone()).ok()
     }
 
+    /// What has changed on a surface since an earlier run looked at it.
+    fn changes(&self, surface: &str) -> String {
+        let Some(past) = &self.s.past else { return "nothing is remembered of earlier".into() };
+        let before: Vec<&Track> =
+            past.remembered.present.iter().map(|r| &r.track).filter(|t| t.on == *surface).collect();
+        let now: Vec<&Track> = self.s.belief.tracks.iter().filter(|t| t.on == *surface).collect();
+        let name = |t: &Track| t.label().unwrap_or("something unknown").to_string();
+        let near = |a: &Track, b: &Track| (a.position_m - b.position_m).norm() < SAME_M;
+        let came: Vec<&&Track> = now.iter().filter(|t| !before.iter().any(|b| near(t, b))).collect();
+        let went: Vec<&&Track> = before.iter().filter(|b| !now.iter().any(|t| near(t, b))).collect();
+        let moved = |t: &Track| t.label().is_some() && went.iter().any(|b| b.label() == t.label());
+        let at = |t: &Track| reasons::place(&t.position_m);
+        let came_lines = came.iter().map(|t| match moved(t) {
+            true => format!("{} was moved to {}", name(t), at(t)),
+            false => format!("{} came, at {}", name(t), at(t)),
+        });
+        let stays_gone = |b: &&&&Track| b.label().is_none() || !came.iter().any(|t| t.label() == b.label());
+        let went_lines =
+            went.iter().filter(stays_gone).map(|b| format!("{} is gone from {}", name(b), at(b)));
+        let lines: Vec<String> = came_lines.chain(went_lines).collect();
+        if lines.is_empty() { "nothing has changed".into() } else { lines.join("; ") }
+    }
+
     /// What holds of an atom now: the names in the place of the question mark, or a number, or yes or no.
     fn value(&self, atom: &str) -> String {
         let tokens: Vec<String> =
             atom.trim_matches(|c| c == '(' || c == ')').split_whitespace().map(str::to_lowercase).collect();
         let Some((word, arguments)) = tokens.split_first() else { return String::new() };
+        if word == CHANGES {
+            return arguments.first().map_or_else(String::new, |surface| self.changes(surface));
+        }
         let readings =
             after(&self.round.task, &self.round.attachments, &Plan::default(), &[word]).unwrap_or_default();
         let fitting = readings.iter().filter(|r| {

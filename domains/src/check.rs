@@ -141,7 +141,10 @@ impl Check<'_> {
         let name = tokens.next()?;
         let uses = &self.domain.config.uses;
         let Some(skill) = abilities::skill(uses, name) else {
-            let message = format!("no skill is called `{name}`, to carry out the action `{action}`");
+            let message = match text.trim_start().strip_prefix(action) {
+                Some(_) => format!("no skill carries out the action `{action}`"),
+                None => format!("no skill is called `{name}`, to carry out the action `{action}`"),
+            };
             let help = format!(
                 "skills: {}; or a program: [action.{action}] program = [\"python3\", \"{action}.py\"]",
                 self.skills()

@@ -286,17 +286,21 @@ fn without_article(name: &str) -> &str {
     ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 
+/// The types that the phrases of a domain speak of, things first; the kinds are the things, in the plural.
+pub fn spoken_types(domain: &Domain) -> Vec<&str> {
+    let slots = domain.config.goal.iter().flat_map(|g| slots_of(&g.say)).map(type_of_slot);
+    let mut types: Vec<&str> = slots.filter(|of| *of != "kind" && *of != "threshold").collect();
+    types.sort_unstable_by_key(|of| (*of != "thing", *of));
+    types.dedup();
+    types
+}
+
 fn phrase_suggestions(domain: &Domain, lexicon: &Lexicon) -> String {
     let mut lines = vec!["  what could be said:".to_string()];
     for phrase in &domain.config.goal {
         lines.push(format!("    {:40} {}", phrase.say, phrase.about));
     }
-    let mut types: Vec<&str> =
-        domain.config.goal.iter().flat_map(|g| slots_of(&g.say)).map(type_of_slot).collect();
-    types.sort_unstable();
-    types.dedup();
-    // The kinds are the things, in the plural.
-    for of in types.into_iter().filter(|of| *of != "kind").rev() {
+    for of in spoken_types(domain) {
         lines.push(format!("  {of}s: {}", lexicon.listed(of)));
     }
     lines.join("\n")

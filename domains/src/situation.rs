@@ -4,12 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use descry_memory::belief::{Belief, Track};
+use descry_memory::remember::Remembered;
 use descry_memory::space::Space;
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::noise::axial_sigma_m;
 use descry_perception::recognise::ObjectModel;
 use descry_planner::{Call, CallError, FactValue};
 use descry_robots::{Place, Robot};
+use serde::{Deserialize, Serialize};
 
 use crate::abilities::searching::doubt::{Doubt, Hypothesis, Taken};
 use crate::abilities::searching::obstacle::{self, Obstacle};
@@ -111,6 +113,15 @@ pub struct Held {
     pub track: u64,
 }
 
+/// What is remembered of earlier runs, and when this one began.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Past {
+    /// What they saw last.
+    pub remembered: Arc<Remembered>,
+    /// Seconds since 1970.
+    pub now_unix_s: f64,
+}
+
 /// What is known when a round begins.
 #[derive(Clone)]
 pub struct Known {
@@ -150,6 +161,8 @@ pub struct Known {
     pub shut: BTreeSet<usize>,
     /// What the hand holds.
     pub held: Option<Held>,
+    /// What is remembered of earlier runs.
+    pub past: Option<Past>,
     /// How much more often each thing, then each kind, then anything is expected on each surface than elsewhere, by area.
     pub expected: Vec<Vec<f64>>,
 }

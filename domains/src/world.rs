@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use descry_memory::belief::Belief;
+use descry_memory::remember::Remembered;
 use descry_memory::{Record, RecordId};
 use descry_perception::recognise::Recogniser;
 use descry_planner::{Attachments, Plan, PlanError, Source, Task, after, monitor};
@@ -26,9 +27,11 @@ use crate::load::Domain;
 use crate::mind::{Mind, Region};
 use crate::note::Note;
 use crate::programs::Programs;
-use crate::situation::{self, Candidate, Known, KnownDoor, Situation, Thing};
+use crate::situation::{self, Candidate, Known, KnownDoor, Past, Situation, Thing};
 use crate::words::{self, Words};
 
+/// What is remembered is believed at most so much, as a share of the confidence that is asked for.
+const RECALLED: f64 = 0.9;
 /// How far from a door the body stands to open it, metres.
 const BEFORE_DOOR_M: [f64; 4] = [0.8, 0.9, 0.7, 1.0];
 
@@ -71,6 +74,8 @@ pub struct Setting<'a> {
     pub record: &'a Record,
     /// Tells which object a segment is.
     pub recogniser: &'a dyn Recogniser,
+    /// What is remembered of earlier runs.
+    pub past: Option<Past>,
 }
 
 /// See the module.
@@ -139,7 +144,7 @@ impl<'a> World<'a> {
         let doors = doors(&**robot, here, &mut poses);
         let known = Known {
             robot: Arc::clone(robot),
-            belief: Arc::new(Belief::default()),
+            belief: Arc::new(recalled(setting.past.as_ref(), goal, &surfaces)),
             spaces: surfaces.iter().map(|_| Arc::default()).collect(),
             candidates: poses,
             at,
@@ -155,6 +160,7 @@ impl<'a> World<'a> {
             doors,
             shut: Default::default(),
             held: None,
+            past: setting.past.clone(),
             expected: Vec::new(),
             surfaces,
         };
@@ -509,6 +515,18 @@ impl<'a> World<'a> {
             .then(|| format!("the same situation has come back {times} times: what is done changes nothing"))
     }
 
+    /// What is to be remembered after this run, if anything is.
+    pub fn to_remember(&self) -> Option<Remembered> {
+        let known = &self.mind.known;
+        let past = known.past.as_ref()?;
+        let looked_at: Vec<String> = (0..known.surfaces.len())
+            .filter(|&on| self.mind.regions[on].taken > 0 && self.mind.regions[on].nothing.is_none())
+            .map(|on| known.surfaces[on].symbol.clone())
+            .collect();
+        let before = Remembered::clone(&past.remembered);
+        Some(before.after(&known.belief, &looked_at, past.now_unix_s))
+    }
+
     /// What is answered in the end.
     pub fn answer(&self, round: &Round, ended: &Ended) -> Conclusion {
         answer::conclude(self.setting.goal, &self.lexicon, &self.mind, round, ended)
@@ -553,6 +571,16 @@ fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<(String, Ve
         objects.push((of.clone(), names.iter().map(|n| symbol(n)).collect()));
     }
     objects
+}
+
+/// Of what is remembered of earlier runs, what may still stand where it was seen: less than sure, so that it is looked at again.
+fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[situation::KnownSurface]) -> Belief {
+    let mut belief = Belief::default();
+    if let Some(past) = past {
+        let aged = past.remembered.aged(past.now_unix_s, RECALLED * goal.threshold);
+        belief.adopt(aged.into_iter().filter(|t| surfaces.iter().any(|s| s.symbol == t.on)));
+    }
+    belief
 }
 
 /// The kinds of which all are asked for, each on the surfaces of the room in which it is asked about.

@@ -122,6 +122,14 @@ impl Belief {
         self.tracks = kept;
     }
 
+    /// Begins with objects that are remembered of earlier.
+    pub fn adopt(&mut self, remembered: impl IntoIterator<Item = Track>) {
+        for track in remembered {
+            self.tracks.push(Track { id: self.next_id, ..track });
+            self.next_id += 1;
+        }
+    }
+
     /// The object of a number is no longer believed in.
     pub fn lose(&mut self, id: u64) {
         if let Some(at) = self.tracks.iter().position(|t| t.id == id) {

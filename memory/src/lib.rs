@@ -8,6 +8,7 @@ mod export;
 mod flusher;
 mod foxglove;
 mod record;
+pub mod remember;
 mod retrace;
 pub mod space;
 pub mod stores;

@@ -1,6 +1,6 @@
 //! `descry goals`: what may be said to a domain.
 
-use descry_domains::goal::{slots_of, type_of_slot};
+use descry_domains::goal::spoken_types;
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
 use serde_json::json;
@@ -25,12 +25,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let names = |of: &str| -> Vec<Vec<String>> {
         lexicon.of_type(of).iter().map(|named| named.names.clone()).collect()
     };
-    // The kinds are the things, in the plural.
-    let mut types: Vec<&str> =
-        domain.config.goal.iter().flat_map(|g| slots_of(&g.say)).map(type_of_slot).collect();
-    types.retain(|of| *of != "kind");
-    types.sort_unstable_by_key(|of| (*of != "thing", *of));
-    types.dedup();
+    let types = spoken_types(&domain);
     if arguments.json {
         let phrases: Vec<_> =
             domain.config.goal.iter().map(|g| json!({"say": g.say, "means": g.means})).collect();

@@ -5,6 +5,7 @@ mod completeness;
 mod completeness_in;
 mod confidence;
 mod is;
+mod last_seen;
 mod on;
 mod presence;
 mod sure;
@@ -30,6 +31,18 @@ pub(super) const ALL: &[Fact] = &[
         types: &["thing", "surface"],
         about: "the thing surely stands on the surface",
         states: on::state,
+    },
+    Fact {
+        name: "last-seen",
+        types: &["thing", "surface"],
+        about: "an earlier run that is remembered saw the thing there last",
+        states: last_seen::place,
+    },
+    Fact {
+        name: "hours-since",
+        types: &["thing"],
+        about: "hours since an earlier run saw the thing last",
+        states: last_seen::hours,
     },
     Fact {
         name: "is",

@@ -1,0 +1,30 @@
+//! `(last-seen ?what ?on)` and `(hours-since ?what)`: where an earlier run saw a sought object last, and how long ago.
+
+use descry_memory::remember::Recollection;
+
+use crate::situation::Situation;
+
+/// Each sought object that is remembered, with what is remembered of it and the time now.
+fn remembered(s: &Situation) -> impl Iterator<Item = (&str, &Recollection, f64)> {
+    let past = s.past.as_ref();
+    let own = s.things.iter().filter(|t| t.track.is_none());
+    own.filter_map(move |thing| {
+        let (recollection, _) = past?.remembered.last_seen(&thing.name)?;
+        Some((thing.symbol.as_str(), recollection, past?.now_unix_s))
+    })
+}
+
+pub(super) fn place(situation: &Situation) -> Vec<String> {
+    let is_known = |on: &str| situation.surfaces.iter().any(|s| s.symbol == on);
+    remembered(situation)
+        .filter(|(_, r, _)| is_known(&r.track.on))
+        .map(|(thing, r, _)| format!("(last-seen {thing} {})", r.track.on))
+        .collect()
+}
+
+pub(super) fn hours(situation: &Situation) -> Vec<String> {
+    let since = |(thing, r, now_unix_s): (&str, &Recollection, f64)| {
+        format!("(= (hours-since {thing}) {:.3})", (now_unix_s - r.seen_unix_s).max(0.0) / 3600.0)
+    };
+    remembered(situation).map(since).collect()
+}

@@ -1,0 +1,182 @@
+//! What outlasts a run: where things were seen last, and when. A later run begins with it, as far as time has not worn it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Meta;
+use crate::belief::{Belief, Track};
+use crate::document::Draft;
+use crate::error::Error;
+use crate::record::Record;
+
+/// The kind under which it is kept.
+const KIND: &str = "remembered";
+/// Time in which the probability that a thing still stands where it was seen falls by a half, seconds: a day.
+const HALF_LIFE_S: f64 = 86_400.0;
+/// So many things that are gone are remembered; the oldest are forgotten.
+const MOST_GONE: usize = 500;
+
+/// An object as it was seen last.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Recollection {
+    /// When, seconds since 1970.
+    pub seen_unix_s: f64,
+    /// What was believed of it then.
+    pub track: Track,
+}
+
+/// What is remembered of all earlier runs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Remembered {
+    /// What stood where it was looked last.
+    pub present: Vec<Recollection>,
+    /// What stood somewhere and was not there when it was looked again, the oldest first.
+    pub gone: Vec<Recollection>,
+}
+
+impl Remembered {
+    /// What a store holds; nothing if it holds nothing yet.
+    ///
+    /// # Errors
+    /// [`Error`] if it cannot be read.
+    pub fn recall(store: &Record) -> Result<Self, Error> {
+        let Some(document) = store.newest(KIND)? else { return Ok(Self::default()) };
+        serde_json::from_value(document.body).map_err(|e| Error::Input {
+            what: format!("what is remembered there cannot be read: {e}"),
+            mend: "name another store".into(),
+        })
+    }
+
+    /// Keeps it in a store.
+    ///
+    /// # Errors
+    /// [`Error`] if it cannot be kept.
+    pub fn keep(&self, store: &Record, now_unix_s: f64) -> Result<(), Error> {
+        let body = serde_json::to_value(self).map_err(|e| Error::Input {
+            what: format!("what is to be remembered cannot be written: {e}"),
+            mend: "this is a fault of descry".into(),
+        })?;
+        let meta = Meta { body, ..Meta::default() };
+        store.put(Draft { meta, ..Draft::new(KIND, (now_unix_s * 1e9) as i64) })?;
+        store.sync()
+    }
+
+    /// What there is to remember after a run: of the surfaces that it looked at what it believes, of all others what was
+    /// remembered before.
+    pub fn after(self, belief: &Belief, looked_at: &[String], now_unix_s: f64) -> Self {
+        let is_here = |r: &Recollection| looked_at.contains(&r.track.on);
+        let (before, elsewhere): (Vec<_>, Vec<_>) = self.present.into_iter().partition(is_here);
+        let still = |old: &Track| {
+            belief.tracks.iter().any(|t| t.on == old.on && (t.position_m - old.position_m).norm() < SAME_M)
+        };
+        let mut gone = self.gone;
+        gone.extend(before.into_iter().filter(|r| !still(&r.track)));
+        gone.drain(..gone.len().saturating_sub(MOST_GONE));
+        let now = belief.tracks.iter().filter(|t| looked_at.contains(&t.on));
+        let seen = now.map(|track| Recollection { seen_unix_s: now_unix_s, track: track.clone() });
+        Self { present: elsewhere.into_iter().chain(seen).collect(), gone }
+    }
+
+    /// What may be believed of it now: probabilities worn by time, and below `most`, so that nothing is taken for sure that was not
+    /// looked at again.
+    pub fn aged(&self, now_unix_s: f64, most: f64) -> Vec<Track> {
+        let aged = |r: &Recollection| {
+            let worn = 0.5_f64.powf((now_unix_s - r.seen_unix_s).max(0.0) / HALF_LIFE_S);
+            let wear = |list: &[(String, f64)]| {
+                list.iter().map(|(name, p)| (name.clone(), (p * worn).min(most))).collect::<Vec<_>>()
+            };
+            let probabilities = wear(&r.track.probabilities);
+            let known: f64 = probabilities.iter().map(|(_, p)| p).sum();
+            Track {
+                kinds: wear(&r.track.kinds),
+                unknown: (1.0 - known).max(0.0),
+                probabilities,
+                viewpoints_m: Vec::new(),
+                seen_fraction: 0.0,
+                cites: Vec::new(),
+                ..r.track.clone()
+            }
+        };
+        self.present.iter().map(aged).collect()
+    }
+
+    /// Where something of a name was seen last, and whether it was still there when it was looked again; none if never.
+    pub fn last_seen(&self, name: &str) -> Option<(&Recollection, bool)> {
+        let is = |r: &&Recollection| r.track.probability_of(name) > 0.5;
+        let newest = |list: &'_ [Recollection]| -> Option<usize> {
+            (0..list.len())
+                .filter(|&n| is(&&list[n]))
+                .max_by(|&a, &b| list[a].seen_unix_s.total_cmp(&list[b].seen_unix_s))
+        };
+        let there = newest(&self.present).map(|n| (&self.present[n], true));
+        there.or_else(|| newest(&self.gone).map(|n| (&self.gone[n], false)))
+    }
+}
+
+/// An object nearer than this to where one was is that one, metres.
+const SAME_M: f64 = 0.10;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::belief::Sighted;
+    use descry_perception::nalgebra::Point3;
+    use descry_perception::recognise::{Evidence, Percept};
+
+    fn cup(x: f64, p: f64) -> Percept {
+        Percept {
+            label: None,
+            kind: None,
+            probabilities: vec![("cup A".into(), p)],
+            kinds: vec![("cup".into(), p)],
+            unknown: 1.0 - p,
+            position_m: Point3::new(x, 0.0, 0.0),
+            position_sigma_m: 0.002,
+            size_m: [0.07, 0.07, 0.1],
+            stance: Default::default(),
+            points: 100,
+            seen_fraction: 0.5,
+            evidence: Evidence::default(),
+            indices: vec![],
+        }
+    }
+
+    fn believed(places: &[(&str, f64, f64)]) -> Belief {
+        let mut belief = Belief::default();
+        for surface in ["desk", "shelf"] {
+            let percepts: Vec<Percept> =
+                places.iter().filter(|(on, ..)| *on == surface).map(|&(_, x, p)| cup(x, p)).collect();
+            let sighted: Vec<Sighted<'_>> =
+                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[] }).collect();
+            belief.update(surface, &sighted, 1, &[]);
+        }
+        belief
+    }
+
+    #[test]
+    fn what_was_not_looked_at_again_is_remembered_as_it_was() {
+        let desk = ["desk".to_string()];
+        let all = ["desk".to_string(), "shelf".to_string()];
+        let first =
+            Remembered::default().after(&believed(&[("desk", 0.0, 0.9), ("shelf", 1.0, 0.9)]), &all, 100.0);
+        let later = first.after(&believed(&[]), &desk, 200.0);
+        let there: Vec<(&str, f64)> =
+            later.present.iter().map(|r| (r.track.on.as_str(), r.seen_unix_s)).collect();
+        assert_eq!(there, [("shelf", 100.0)]);
+        let (last, still) = later.last_seen("cup A").unwrap();
+        assert_eq!((last.track.on.as_str(), still), ("shelf", true));
+        let empty = later.after(&believed(&[]), &all, 300.0);
+        let (last, still) = empty.last_seen("cup A").unwrap();
+        assert_eq!((last.seen_unix_s, still), (100.0, false));
+        assert_eq!(empty.last_seen("mug"), None);
+    }
+
+    #[test]
+    fn time_wears_what_is_remembered_and_it_is_never_sure() {
+        let desk = ["desk".to_string()];
+        let kept = Remembered::default().after(&believed(&[("desk", 0.0, 0.96)]), &desk, 0.0);
+        for (age_s, expected) in [(0.0, 0.7), (HALF_LIFE_S, 0.48), (4.0 * HALF_LIFE_S, 0.06)] {
+            let p = kept.aged(age_s, 0.7)[0].probability_of("cup A");
+            assert!((p - expected).abs() < 1e-9, "{age_s}: {p}");
+        }
+    }
+}

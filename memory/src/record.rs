@@ -9,7 +9,7 @@ use crate::flusher::{Flusher, Group};
 use crate::foxglove::{self, LogLevel};
 use crate::retrace::Retrace;
 use crate::stores::local::{Durability, LocalOptions, LocalStore, Recovery};
-use crate::stores::{Report, Retention, Stats, Store};
+use crate::stores::{Fault, Report, Retention, Stats, Store};
 use crate::transforms::{self, Reach, Sample};
 use descry_perception::Cloud;
 use nalgebra::Isometry3;
@@ -365,6 +365,19 @@ impl Record {
     /// If the store cannot be read.
     pub fn find(&self, query: &Query) -> Result<Vec<Document>, Error> {
         self.store.find(query)
+    }
+
+    /// What meets a query and is whole to the last byte of its blobs, and what of it is not.
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub fn find_whole(&self, query: &Query) -> Result<(Vec<Document>, Vec<Fault>), Error> {
+        let mut whole = Vec::new();
+        let faults = self.store.each_whole(query, &mut |document, _| {
+            whole.push(document);
+            Ok(())
+        })?;
+        Ok((whole, faults))
     }
 
     /// The newest of a kind.

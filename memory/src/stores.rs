@@ -12,6 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The kinds under which pins are recorded.
 pub(crate) const PIN: &str = "pin";
 pub(crate) const UNPIN: &str = "unpin";
+/// In whose name a record is pinned that is never pruned.
+pub(crate) const KEPT: &str = "record";
 
 /// How much is kept; what is over goes oldest first, pinned records excepted. The default keeps everything.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

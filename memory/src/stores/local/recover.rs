@@ -6,10 +6,10 @@
 use super::closed::Closed;
 use super::index::{INDEX, Index, SegmentRow};
 use super::segment::Segment;
-use super::{Recovery, lock, scan, segment_dir, segment_path};
+use super::{Recovery, lock, pins, scan, segment_dir, segment_path};
 use crate::document::{Document, RecordId};
 use crate::error::Error;
-use crate::stores::{Fault, PIN, UNPIN};
+use crate::stores::Fault;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -309,7 +309,7 @@ impl<'a> Rebuild<'a> {
             index.insert(number, end, &rows)?;
             for (document, _) in records {
                 found.insert(document.id);
-                if [PIN, UNPIN].contains(&document.kind.as_str()) {
+                if pins::speaks(&document) {
                     of_pins.insert(document.id, document);
                 }
             }

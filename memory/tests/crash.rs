@@ -176,7 +176,8 @@ fn an_index_that_is_none_is_made_again_with_its_pins() {
 /// Damage to what a closed store consists of, and what is left of its records then, by their place.
 fn check_damage(what: &str, spoil: impl Fn(&Path), left: &[usize]) {
     let dir = tempfile::tempdir().unwrap();
-    let store = LocalStore::create(dir.path(), "", LocalOptions { segment_bytes: 10 << 10, ..options() }).unwrap();
+    let store =
+        LocalStore::create(dir.path(), "", LocalOptions { segment_bytes: 10 << 10, ..options() }).unwrap();
     let ids: Vec<_> = (0..5).map(|i| store.append(&[draft(i, 40 << 10)]).unwrap()[0]).collect();
     store.pin(&ids[..2], "belief").unwrap();
     store.hold(&ids[2..4], "plan").unwrap();

@@ -337,13 +337,21 @@ impl<'a> Rebuild<'a> {
                 self.recovery.faults.push(fault(self.dir, number, what));
             }
             Some(_) => (),
+            None if !self.mend && !lost.is_empty() => {
+                let what = format!("ends at byte {bytes}{}", lost_text(&lost));
+                self.recovery.faults.push(fault(self.dir, number, what));
+            }
             None => {
                 self.recovery.lost += lost.len() as u64;
                 self.recovery.dropped_bytes += bytes - whole_to;
             }
         }
         let mut end = bytes;
-        if self.mend && was_complete.is_none() && !scan.complete {
+        if was_complete.is_none() && !scan.complete {
+            if !self.mend {
+                // As it is beside somebody who writes: what stands behind the last record is no part of it.
+                return Ok(());
+            }
             if scan.chunks.is_empty() && !is_damaged {
                 return fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e));
             }

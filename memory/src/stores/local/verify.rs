@@ -18,8 +18,8 @@ pub(super) fn verify(store: &LocalStore) -> Result<Report, Error> {
         report
             .faults
             .extend(faults(vec!["it is not what was written; it is made again from the segments".into()]));
-        report.faults.extend(store.recovery.faults.iter().cloned());
     }
+    report.faults.extend(store.recovery.faults.iter().cloned());
     let segments = store.index().segments()?;
     for row in segments {
         let path = segment_path(&store.dir, row.number);

@@ -72,13 +72,14 @@ const MOST_STREAM_BYTES: u64 = 256 << 20;
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, CommandError> {
     let name = path.display();
     let refused = |e: std::io::Error| CommandError::BadInput(format!("{name}: {e}"));
+    let file = std::fs::File::open(path).map_err(refused)?;
+    let metadata = file.metadata().map_err(refused)?;
+    let most = if metadata.is_file() { most } else { most.min(MOST_STREAM_BYTES) };
     let too_much = || {
-        let text =
-            format!("{name}: it has more than {} MB\n  expected a file that is smaller", most / 1_000_000);
+        let text = format!("{name}: it has more than {} MB\n  expected a smaller file", most / 1_000_000);
         CommandError::BadInput(text)
     };
-    let file = std::fs::File::open(path).map_err(refused)?;
-    if file.metadata().map_err(refused)?.len() > most {
+    if metadata.len() > most {
         return Err(too_much());
     }
     let mut bytes = Vec::new();

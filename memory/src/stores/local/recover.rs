@@ -213,12 +213,11 @@ impl Old {
         row.or_else(|| self.closed.as_ref()?.segments.get(&number).copied())
     }
 
-    /// The segments that should be there, and those that should not.
-    fn expected(&self) -> (BTreeSet<u64>, BTreeSet<u64>) {
-        let going: BTreeSet<u64> = self.rows.values().filter(|r| r.going).map(|r| r.number).collect();
+    /// The segments that should be there. One that was being deleted may be gone; if it is not, its records are as good as any.
+    fn expected(&self) -> BTreeSet<u64> {
         let closed = self.closed.iter().flat_map(|closed| closed.segments.keys());
         let all = closed.chain(self.rows.keys()).copied();
-        (all.filter(|number| !going.contains(number)).collect(), going)
+        all.filter(|number| self.rows.get(number).is_none_or(|row| !row.going)).collect()
     }
 }
 
@@ -252,17 +251,8 @@ impl<'a> Rebuild<'a> {
 
     fn run(mut self) -> Result<Opened, Error> {
         let there = on_disk(self.dir)?;
-        let (expected, going) = self.old.expected();
-        for number in &there {
-            match (going.contains(number), self.mend) {
-                (true, false) => (),
-                (true, true) => {
-                    let path = segment_path(self.dir, *number);
-                    fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e))?;
-                }
-                (false, _) => self.read(*number)?,
-            }
-        }
+        let expected = self.old.expected();
+        there.iter().try_for_each(|number| self.read(*number))?;
         for number in expected.difference(&there) {
             let known = self.old.records.get(number).cloned().unwrap_or_default();
             // A segment without a record is removed, and may still stand in an index that was not closed.

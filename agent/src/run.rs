@@ -160,11 +160,12 @@ pub fn live_through(
         Agent::new(body, record, cancel, tell).pursue(setting, chooser).await
     })?;
     robot.finish().map_err(CommandError::broken)?;
-    record.sync().map_err(CommandError::broken)?;
     let mut report = Report::begin(goal, folder.display().to_string());
     report.answer = goal.question.then(|| answer(conclusion.verdict).to_string());
     fill(&mut report, conclusion, totals);
     report.sim_time_s = (robot.now_ns() - start_ns) as f64 * 1e-9;
+    files::put_report(record, robot.now_ns(), &report)?;
+    record.sync().map_err(CommandError::broken)?;
     Ok(report)
 }
 

@@ -56,6 +56,7 @@ struct Replayed {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    run::header(&arguments.run)?;
     let source = Arc::new(keeping::open(&arguments.run)?);
     let damage = source.verify().map_err(CommandError::broken)?.faults;
     let replayed = match damage.is_empty() {

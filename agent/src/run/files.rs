@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use descry_memory::{Draft, Record};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -15,6 +16,8 @@ use crate::report::Report;
 pub(super) const HEADER: &str = "run.json";
 /// How it ended.
 const REPORT: &str = "report.json";
+/// The kind under which it is recorded how a run ended.
+const REPORTED: &str = "report";
 /// Under this key a file says the checksum of all else in it.
 const CHECKSUM: &str = "crc32";
 
@@ -31,7 +34,7 @@ pub fn header(folder: &Path) -> Result<Header, CommandError> {
         return Err(CommandError::BadInput(text));
     }
     read_json(&folder.join(HEADER)).or_else(|why| {
-        let record = descry_memory::Record::open_shared(&folder.join(RECORD));
+        let record = Record::open_shared(&folder.join(RECORD));
         let beginning = record.ok().and_then(|record| Beginning::of(&record).ok().flatten());
         let expected = "expected the folder of a run; `descry runs` lists them";
         let Some(beginning) = beginning else {
@@ -50,13 +53,35 @@ pub fn keep_header(folder: &Path, header: &Header) -> Result<(), CommandError> {
     write_json(&folder.join(HEADER), header)
 }
 
-/// The report of a run; none while it has not finished.
+/// The report of a run: what its folder says, or its record where that is missing or damaged; none while it has not finished.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if it is damaged.
+/// [`CommandError::Broken`] if it is damaged, and the record has none.
 pub fn report(folder: &Path) -> Result<Option<Report>, CommandError> {
     let path = folder.join(REPORT);
-    if path.exists() { read_json(&path).map(Some).map_err(CommandError::Broken) } else { Ok(None) }
+    read_json(&path).map(Some).or_else(|why| {
+        let record = Record::open_shared(&folder.join(RECORD)).ok();
+        let found = record.and_then(|record| record.newest(REPORTED).ok().flatten());
+        match found.and_then(|document| serde_json::from_value::<Report>(document.body).ok()) {
+            Some(report) => {
+                tracing::warn!("{why}; the report is taken from the record");
+                Ok(Some(Report { run: folder.display().to_string(), ..report }))
+            }
+            None if path.exists() => Err(CommandError::Broken(why)),
+            None => Ok(None),
+        }
+    })
+}
+
+/// Records how a run ended: what is the same however often it is lived through.
+///
+/// # Errors
+/// [`CommandError::Broken`] if it cannot be kept.
+pub(super) fn put_report(record: &Record, now_ns: i64, report: &Report) -> Result<(), CommandError> {
+    let report = Report { run: String::new(), wall_s: 0.0, ..report.clone() };
+    let mut draft = Draft { kept: true, ..Draft::new(REPORTED, now_ns.max(0)) };
+    draft.meta.body = serde_json::to_value(report).map_err(|e| CommandError::Bug(e.to_string()))?;
+    record.put(draft).map(|_| ()).map_err(CommandError::broken)
 }
 
 /// Writes the report beside the record.

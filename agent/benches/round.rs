@@ -102,7 +102,7 @@ fn round(looked: &Looked, goal: &Goal, recogniser: &Descry, seen: bool) -> Round
     let robot: Arc<dyn Robot> = Arc::clone(&looked.body.robot);
     let here = runtime.block_on(robot.pose()).expect("it knows where it is");
     let (domain, record) = (&looked.domain, &looked.record);
-    let setting = Setting { domain, goal, robot: Arc::clone(&robot), record, recogniser };
+    let setting = Setting { domain, goal, robot: Arc::clone(&robot), record, recogniser, past: None };
     let chooser = policies::named(policies::PLAN, 1, None).expect("the planner is there");
     let mut world = World::begin(setting, chooser, &here).expect("the domain can be used");
     if seen {

@@ -80,7 +80,8 @@ impl<'a> Agent<'a> {
             let round = world.round()?;
             if let Some(ended) = self.step(&mut world, &round).await? {
                 (self.totals.views, self.totals.distance_m) = world.taken();
-                return Ok((world.answer(&round, &ended), self.totals));
+                let remembered = world.to_remember();
+                return Ok((Conclusion { remembered, ..world.answer(&round, &ended) }, self.totals));
             }
         }
     }

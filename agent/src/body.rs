@@ -16,6 +16,8 @@ pub mod tape;
 pub struct Body {
     /// What the agent sees of it.
     pub robot: Arc<dyn Robot>,
+    /// Name and text of the scene that it stands in, if it was read from one.
+    pub scene: Option<(String, String)>,
     simulated: Option<Arc<SimRobot>>,
 }
 
@@ -34,7 +36,7 @@ impl Body {
     /// A simulated body, whose truth a report may show.
     pub fn simulated(robot: SimRobot) -> Self {
         let robot = Arc::new(robot);
-        Self { robot: robot.clone(), simulated: Some(robot) }
+        Self { robot: robot.clone(), scene: None, simulated: Some(robot) }
     }
 
     /// Where an object of that name or kind stands in truth, the one nearest to where it is believed to stand if there are
@@ -69,7 +71,11 @@ impl Body {
 /// [`CommandError::BadInput`] names the place and what was expected.
 pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Result<Body, CommandError> {
     match robot.split_once(':') {
-        None if robot == "sim" => simulate(&scene_spec(scene, domain)?, seed, FaultPlan::default()),
+        None if robot == "sim" => {
+            let (name, text) = scene_text(scene, domain)?;
+            let body = simulate(&parse(&name, &text, domain)?, seed, FaultPlan::default())?;
+            Ok(Body { scene: Some((name, text)), ..body })
+        }
         Some(("recorded", folder)) => {
             if let Some(scene) = scene {
                 let text = format!(
@@ -85,11 +91,11 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
                 return Err(CommandError::BadInput(text));
             }
             let robot = if keeping::is_address(path) || recorded::is_record(path) {
-                recorded::open(keeping::open(path)?, folder)?
+                recorded::open(keeping::open_whole(path)?, folder)?
             } else {
                 descry_robots::recorded::RecordedRobot::open(path).map_err(CommandError::bad_input)?
             };
-            Ok(Body { robot: Arc::new(robot), simulated: None })
+            Ok(Body { robot: Arc::new(robot), scene: None, simulated: None })
         }
         _ => Err(CommandError::BadInput(format!("--robot {robot}\n  expected: sim, or recorded:DIR"))),
     }
@@ -109,9 +115,20 @@ pub fn simulate(spec: &SceneSpec, seed: u64, faults: FaultPlan) -> Result<Body, 
 /// # Errors
 /// [`CommandError::BadInput`] names the scenes that there are, or the mistake in the file.
 pub fn scene_spec(scene: Option<&str>, domain: &Domain) -> Result<SceneSpec, CommandError> {
+    let (name, text) = scene_text(scene, domain)?;
+    parse(&name, &text, domain)
+}
+
+fn parse(name: &str, text: &str, domain: &Domain) -> Result<SceneSpec, CommandError> {
+    let shown = if domain.scenes.contains_key(name) { format!("scenes/{name}.toml") } else { name.into() };
+    SceneSpec::parse(&shown, text).map_err(CommandError::bad_input)
+}
+
+/// Name and text of a scene.
+fn scene_text(scene: Option<&str>, domain: &Domain) -> Result<(String, String), CommandError> {
     let name = scene.unwrap_or(&domain.config.scene);
     if let Some(text) = domain.scenes.get(name) {
-        return SceneSpec::parse(&format!("scenes/{name}.toml"), text).map_err(CommandError::bad_input);
+        return Ok((name.into(), text.clone()));
     }
     let text = std::fs::read_to_string(name).map_err(|e| {
         let known: Vec<&str> = domain.scenes.keys().map(String::as_str).collect();
@@ -120,5 +137,5 @@ pub fn scene_spec(scene: Option<&str>, domain: &Domain) -> Result<SceneSpec, Com
             known.join(", ")
         ))
     })?;
-    SceneSpec::parse(name, &text).map_err(CommandError::bad_input)
+    Ok((name.into(), text))
 }

@@ -59,6 +59,11 @@ impl Keeping {
         }
     }
 
+    /// Whether anything that was recorded may be gone.
+    pub fn prunes(&self) -> bool {
+        self.options().retention != Retention::default()
+    }
+
     fn address(&self) -> Result<Option<Address>, CommandError> {
         self.memory.as_deref().map(Address::read).transpose()
     }
@@ -113,14 +118,30 @@ pub fn open(place: &Path) -> Result<Record, CommandError> {
     {
         return address.read_only();
     }
-    Record::open_shared(place).map_err(|e| match e {
+    let record = Record::open_shared(place).map_err(|e| match e {
         descry_memory::Error::NoRecord { .. } => CommandError::bad_input(e),
         other => CommandError::broken(other),
-    })
+    })?;
+    if record.recovery().index_rebuilt {
+        tracing::warn!("{}: the index is damaged, and the segments are read without it", place.display());
+    }
+    Ok(record)
+}
+
+/// The same, of which nothing is lost as far as can be told without reading all of it.
+///
+/// # Errors
+/// As [`open`], or [`CommandError::Broken`] that says what is lost.
+pub fn open_whole(place: &Path) -> Result<Record, CommandError> {
+    let record = open(place)?;
+    match record.recovery().faults.clone() {
+        faults if faults.is_empty() => Ok(record),
+        faults => Err(CommandError::broken(descry_memory::Error::Faulty { place: place.to_owned(), faults })),
+    }
 }
 
 /// The folder of the record in that of its run.
-const RECORD: &str = "record";
+pub const RECORD: &str = "record";
 
 fn size(text: &str) -> Result<u64, String> {
     let units = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("TB", 1e12), ("B", 1.0), ("", 1.0)];

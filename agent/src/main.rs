@@ -5,6 +5,8 @@ use std::process::ExitCode;
 use clap::Parser;
 use descry_agent::commands::{self, Command};
 use descry_agent::exit::Exit;
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::LevelFilter;
 
 /// Merging asks for tens of megabytes a look and gives them back: one that keeps them for the next is quicker.
 #[global_allocator]
@@ -29,10 +31,11 @@ const EXIT_CODES: &str = "Exit codes:
 
 fn main() -> ExitCode {
     std::panic::set_hook(Box::new(|panic| {
-        eprintln!(
+        commands::narrate(&format!(
             "descry: {panic}\n  this is a bug of descry; please report it with the command and its input"
-        );
+        ));
     }));
+    warn_people();
     let outcome = std::panic::catch_unwind(|| {
         let arguments = Arguments::parse();
         commands::run(&arguments.command)
@@ -40,9 +43,16 @@ fn main() -> ExitCode {
     match outcome {
         Ok(Ok(exit)) => exit.into(),
         Ok(Err(error)) => {
-            eprintln!("descry: {error}");
+            commands::narrate(&format!("descry: {error}"));
             error.exit().into()
         }
         Err(_) => Exit::Bug.into(),
     }
+}
+
+/// Lets warnings reach people, on standard error; `RUST_LOG` asks for more or less.
+fn warn_people() {
+    let filter = EnvFilter::builder().with_default_directive(LevelFilter::WARN.into()).from_env_lossy();
+    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    lines.with_ansi(commands::is_coloured()).without_time().with_target(false).init();
 }

@@ -1,15 +1,22 @@
 //! One run from beginning to end: its folder, its record, its report.
 
-use std::path::{Path, PathBuf};
+mod beginning;
+mod files;
+mod folder;
+pub mod programs;
+mod remembering;
+
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use descry_domains::answer::{Conclusion, Verdict};
 use descry_domains::goal::Goal;
-use descry_domains::lexicon::symbol;
 use descry_domains::load::Domain;
+use descry_domains::situation::Past;
 use descry_domains::world::{Chooser, Setting};
-use descry_memory::{Query, Record};
+use descry_memory::remember::Remembered;
+use descry_memory::{Fault, Query, Record};
 use descry_robots::recorded::TapedRobot;
 use descry_robots::{CancellationToken, Robot};
 use serde::{Deserialize, Serialize};
@@ -19,11 +26,14 @@ use crate::agent::{Agent, Totals};
 use crate::body::Body;
 use crate::body::tape::{self, RecordTape};
 use crate::exit::CommandError;
-use crate::keeping::{self, Keeping};
+use crate::keeping::Keeping;
 use crate::report::{Event, Report};
+pub use beginning::Beginning;
+pub use files::{finish, header, keep_header, report};
+pub use folder::Folder;
 
 /// What a run was started with: enough to start it again.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The body, as on the command line.
     pub robot: String,
@@ -38,10 +48,13 @@ pub struct Settings {
     /// How the record is kept.
     #[serde(default)]
     pub keeping: Keeping,
+    /// Where it is remembered from run to run what was seen last; none: nowhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remember: Option<String>,
 }
 
 /// `run.json` in a run's folder.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Version of descry.
     pub version: String,
@@ -56,29 +69,6 @@ pub struct Header {
     pub settings: Settings,
 }
 
-/// The folder of a new run: the one that was asked for, or a new one under `runs/`.
-///
-/// # Errors
-/// [`CommandError::BadInput`] if it holds a run already or cannot be made.
-pub fn folder(asked: Option<&Path>, goal: &Goal) -> Result<PathBuf, CommandError> {
-    let folder = match asked {
-        Some(folder) if folder.join("run.json").exists() => {
-            let text = format!("--run {}: it holds a run already\n  name another folder", folder.display());
-            return Err(CommandError::BadInput(text));
-        }
-        Some(folder) => folder.to_path_buf(),
-        None => unused(&Path::new("runs").join(symbol(&goal.said))),
-    };
-    std::fs::create_dir_all(&folder)
-        .map_err(|e| CommandError::BadInput(format!("{}: {e}", folder.display())))?;
-    Ok(folder)
-}
-
-fn unused(stem: &Path) -> PathBuf {
-    let numbered = |n: u32| PathBuf::from(format!("{}-{n:03}", stem.display()));
-    (1..).map(numbered).find(|path| !path.exists()).unwrap_or_else(|| stem.to_path_buf())
-}
-
 /// What a run is about.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
@@ -86,6 +76,8 @@ pub struct Task<'a> {
     pub domain: &'a Domain,
     /// What is pursued.
     pub goal: &'a Goal,
+    /// What is remembered of earlier runs.
+    pub past: Option<&'a Past>,
 }
 
 /// Pursues a goal and reports.
@@ -96,7 +88,7 @@ pub fn pursue(
     domain: &Domain,
     goal: &Goal,
     body: &Body,
-    folder: &Path,
+    folder: &Folder,
     settings: &Settings,
     chooser: Chooser,
     tell: &mut dyn FnMut(&Event),
@@ -105,16 +97,35 @@ pub fn pursue(
         version: env!("CARGO_PKG_VERSION").into(),
         goal: goal.said.clone(),
         pddl_goal: goal.pddl.clone(),
-        started_unix_s: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
+        started_unix_s: now_unix_s() as u64,
         settings: settings.clone(),
     };
-    keep_header(folder, &header)?;
-    let record = Arc::new(settings.keeping.create(folder)?);
+    keep_header(folder.path(), &header)?;
+    let record = Arc::new(settings.keeping.create(folder.path())?);
+    let store = settings.remember.as_deref();
+    let past = store.map(|store| remembering::recall(store, now_unix_s())).transpose()?;
+    let beginning = Beginning { past: past.clone(), ..Beginning::new(header, domain, body.scene.clone()) };
+    beginning.put(&record, body.robot.now_ns())?;
     let tape = Arc::new(RecordTape { into: Arc::clone(&record), from: Arc::clone(&record) });
     let robot = Arc::new(TapedRobot::begin(Arc::clone(&body.robot), tape));
-    let mut report = live_through(Task { domain, goal }, &robot, &record, chooser, folder, tell)?;
+    let kept = programs::on_record(domain, &record, None, &robot, true)?;
+    let task = Task { domain: &kept.domain, goal, past: past.as_ref() };
+    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), tell)?;
+    remember(settings, remembered.as_ref())?;
     show_true_position(&mut report, body);
     Ok(report)
+}
+
+fn now_unix_s() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64())
+}
+
+/// Keeps what is to be remembered of a run, if its settings say where.
+fn remember(settings: &Settings, remembered: Option<&Remembered>) -> Result<(), CommandError> {
+    match (&settings.remember, remembered) {
+        (Some(store), Some(remembered)) => remembering::keep(store, remembered, now_unix_s()),
+        _ => Ok(()),
+    }
 }
 
 /// Goes on with a run that was cut off: its agent lives through what the record holds once more, and then goes on with the body.
@@ -124,16 +135,20 @@ pub fn pursue(
 pub fn go_on(
     task: Task<'_>,
     body: &Body,
-    folder: &Path,
-    keeping: &Keeping,
+    folder: &Folder,
+    record: Record,
+    settings: &Settings,
     chooser: Chooser,
     tell: &mut dyn FnMut(&Event),
 ) -> Result<Report, CommandError> {
-    let record = Arc::new(keeping.resume(folder)?);
+    let record = Arc::new(record);
     let entries = tape::entries(&record)?;
     let tape = Arc::new(RecordTape { into: Arc::clone(&record), from: Arc::clone(&record) });
     let robot = Arc::new(TapedRobot::go_on(Arc::clone(&body.robot), tape, entries));
-    let mut report = live_through(task, &robot, &record, chooser, folder, tell)?;
+    let kept = programs::on_record(task.domain, &record, Some(&record), &robot, true)?;
+    let task = Task { domain: &kept.domain, ..task };
+    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), tell)?;
+    remember(settings, remembered.as_ref())?;
     show_true_position(&mut report, body);
     Ok(report)
 }
@@ -149,8 +164,8 @@ pub fn live_through(
     chooser: Chooser,
     folder: &Path,
     tell: &mut dyn FnMut(&Event),
-) -> Result<Report, CommandError> {
-    let Task { domain, goal } = task;
+) -> Result<(Report, Option<Remembered>), CommandError> {
+    let Task { domain, goal, past } = task;
     tape::put_known(record, robot.known())?;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
@@ -167,16 +182,18 @@ pub fn live_through(
             }
         });
         let body: Arc<dyn Robot> = Arc::clone(robot) as _;
-        let setting = Setting { domain, goal, robot: Arc::clone(&body), record, recogniser: &recogniser };
+        let (robot, past) = (Arc::clone(&body), past.cloned());
+        let setting = Setting { domain, goal, robot, record, recogniser: &recogniser, past };
         Agent::new(body, record, cancel, tell).pursue(setting, chooser).await
     })?;
     robot.finish().map_err(CommandError::broken)?;
-    record.sync().map_err(CommandError::broken)?;
     let mut report = Report::begin(goal, folder.display().to_string());
     report.answer = goal.question.then(|| answer(conclusion.verdict).to_string());
-    fill(&mut report, conclusion, totals);
+    let remembered = fill(&mut report, conclusion, totals);
     report.sim_time_s = (robot.now_ns() - start_ns) as f64 * 1e-9;
-    Ok(report)
+    files::put_report(record, robot.now_ns(), &report)?;
+    record.sync().map_err(CommandError::broken)?;
+    Ok((report, remembered))
 }
 
 /// Where the thing is; simulation only.
@@ -188,40 +205,6 @@ fn show_true_position(report: &mut Report, body: &Body) {
     report.true_room = true_place.and_then(|p| p.room);
 }
 
-/// What a run was started with.
-///
-/// # Errors
-/// [`CommandError::BadInput`] if the folder holds no run.
-pub fn header(folder: &Path) -> Result<Header, CommandError> {
-    if keeping::is_address(folder) {
-        let text = format!(
-            "{}: a store does not hold what a run was started with\n  name the run's folder, which says where its record is",
-            folder.display()
-        );
-        return Err(CommandError::BadInput(text));
-    }
-    let path = folder.join(HEADER);
-    let text = std::fs::read_to_string(&path).map_err(|e| {
-        let text =
-            format!("{}: {e}\n  expected the folder of a run; `descry runs` lists them", path.display());
-        CommandError::BadInput(text)
-    })?;
-    serde_json::from_str(&text).map_err(|e| CommandError::BadInput(format!("{}: {e}", path.display())))
-}
-
-/// Writes what a run was started with into its folder.
-///
-/// # Errors
-/// [`CommandError::Broken`] if the folder cannot be written.
-pub fn keep_header(folder: &Path, header: &Header) -> Result<(), CommandError> {
-    write_json(&folder.join(HEADER), header)
-}
-
-/// The report of a run; none while it has not finished.
-pub fn report(folder: &Path) -> Option<Report> {
-    serde_json::from_str(&std::fs::read_to_string(folder.join(REPORT)).ok()?).ok()
-}
-
 /// What a verdict says to a question.
 fn answer(verdict: Verdict) -> &'static str {
     match verdict {
@@ -231,7 +214,8 @@ fn answer(verdict: Verdict) -> &'static str {
     }
 }
 
-fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) {
+/// Fills a report in. Returns what is to be remembered.
+fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) -> Option<Remembered> {
     report.verdict = conclusion.verdict;
     report.why = conclusion.why;
     report.confidence = conclusion.confidence;
@@ -246,34 +230,14 @@ fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) {
     report.on = conclusion.found.as_ref().and_then(|o| o.on.clone());
     report.room = conclusion.found.and_then(|o| o.room);
     report.objects = conclusion.objects;
+    conclusion.remembered
 }
 
-/// The events of a run in their order, from its record.
+/// The events of a run in their order, from its record, and what of them is lost.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
-pub fn events(record: &Record) -> Result<Vec<Value>, CommandError> {
-    let documents = record.find(&Query::of_kind("event")).map_err(CommandError::broken)?;
-    Ok(documents.into_iter().map(|d| d.body).collect())
+pub fn events(record: &Record) -> Result<(Vec<Value>, Vec<Fault>), CommandError> {
+    let (documents, faults) = record.find_whole(&Query::of_kind("event")).map_err(CommandError::broken)?;
+    Ok((documents.into_iter().map(|d| d.body).collect(), faults))
 }
-
-/// Writes the report beside the record.
-///
-/// # Errors
-/// [`CommandError::Broken`] if the folder cannot be written.
-pub fn finish(folder: &Path, report: &Report) -> Result<(), CommandError> {
-    write_json(&folder.join(REPORT), report)
-}
-
-/// Writes a file whole or not at all, however the process ends.
-fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| CommandError::Bug(e.to_string()))?;
-    let fresh = path.with_extension("json.new");
-    let written = std::fs::write(&fresh, text + "\n").and_then(|()| std::fs::rename(&fresh, path));
-    written.map_err(|e| CommandError::broken(format!("{}: {e}", path.display())))
-}
-
-/// What a run was started with, in its folder.
-const HEADER: &str = "run.json";
-/// How it ended.
-const REPORT: &str = "report.json";

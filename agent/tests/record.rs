@@ -6,15 +6,23 @@ mod binary;
 use std::path::Path;
 
 use beside::shared;
-use binary::{check, check_refused, kill_after};
+use binary::{check, check_refused, first_line, kill_after, outcome, start, without_readers};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Everything in a record but the bytes of blobs.
+/// Everything in a record but the bytes of blobs, and when the run began.
 fn documents(folder: &Path, run: &str) -> Vec<String> {
-    let found = check(folder, &["memory", "query", run, "--json"], 0);
-    let mut all: Vec<String> =
-        found["records"].as_array().expect("a list").iter().map(Value::to_string).collect();
+    let mut found = check(folder, &["memory", "query", run, "--json"], 0);
+    let all = found["records"].as_array_mut().expect("a list");
+    let mut all: Vec<String> = all
+        .iter_mut()
+        .map(|document| {
+            if document["kind"] == "run" {
+                document["body"]["started_unix_s"] = Value::Null;
+            }
+            document.to_string()
+        })
+        .collect();
     all.sort();
     all
 }
@@ -22,8 +30,9 @@ fn documents(folder: &Path, run: &str) -> Vec<String> {
 fn report(folder: &Path, run: &str) -> Value {
     let text = std::fs::read_to_string(folder.join(run).join("report.json")).expect("the run has ended");
     let mut report: Value = serde_json::from_str(&text).expect("a report");
-    report["wall_s"] = Value::Null;
-    report["run"] = Value::Null;
+    for key in ["wall_s", "run", "crc32"] {
+        report[key] = Value::Null;
+    }
     report
 }
 
@@ -121,7 +130,7 @@ fn what_cannot_be_played_or_go_on_is_said() {
     check_refused(folder, &["do", "--resume", "cut", "--seed", "3"], 2, &["--seed"]);
     std::fs::remove_dir_all(folder.join("cut/record")).expect("the record can be spoilt");
     std::fs::create_dir_all(folder.join("cut/record/segments")).expect("the record can be spoilt");
-    check_refused(folder, &["replay", "cut"], 2, &["does not say what the body was"]);
+    check_refused(folder, &["replay", "cut"], 2, &["does not say what the run began with"]);
 }
 
 /// How many records a query of a run finds; none is exit code 1.
@@ -212,4 +221,141 @@ fn a_bounded_record_keeps_what_the_belief_rests_on() {
     let first = &events["records"][0]["body"]["event"];
     assert_ne!(first, "goal", "what nothing rests on has gone: {shown}");
     check(folder, &["memory", "verify", "run", "--json"], 0);
+    let again = check(folder, &["replay", "run", "--json"], 0);
+    assert_eq!((&again["same"], &again["verdict"]), (&true.into(), &"achieved".into()), "{again}");
+}
+
+/// A copy of the built-in domain's folder, in which every text is changed.
+fn domain(folder: &Path, change: impl Fn(&str, String) -> String) {
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../domains/tabletop");
+    for sub in ["", "objects", "scenes"] {
+        std::fs::create_dir_all(folder.join(sub)).expect("a folder can be made");
+        for entry in std::fs::read_dir(from.join(sub)).expect("the domain is a folder").flatten() {
+            if entry.path().is_file() {
+                let text = std::fs::read_to_string(entry.path()).expect("a domain is text");
+                let text = change(&entry.file_name().to_string_lossy(), text);
+                std::fs::write(folder.join(sub).join(entry.file_name()), text).expect("it can be written");
+            }
+        }
+    }
+}
+
+/// The domain of today is another one, or gone: a run is played and goes on with that of its record.
+#[test]
+fn a_run_needs_no_domain_but_that_of_its_record() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let folder = folder.path();
+    let words = folder.join("words");
+    domain(&words, |_, text| text);
+    let scene = std::fs::read_to_string(words.join("scenes/default.toml")).expect("the scene is a file");
+    std::fs::write(folder.join("my.toml"), scene).expect("a scene can be written");
+    let goal = ["find", "cup A", "--domain", "words", "--scene", "my.toml"];
+    check(folder, &[&goal[..], &["--run", "whole", "--json"]].concat(), 0);
+    kill_after(folder, &[&goal[..], &["--run", "cut"]].concat(), 9);
+    let wider = |_: &str, text: String| text.replace("diameter_m = 0.070", "diameter_m = 0.072");
+    domain(&words, wider);
+    std::fs::remove_file(folder.join("my.toml")).expect("the scene can be removed");
+    let again = check(folder, &["replay", "whole", "--json"], 0);
+    assert_eq!(again["same"], true, "{again}");
+    std::fs::remove_dir_all(&words).expect("the domain can be removed");
+    check(folder, &["replay", "whole", "--json"], 0);
+    check(folder, &["do", "--resume", "cut", "--json"], 0);
+    assert_eq!(documents(folder, "cut"), documents(folder, "whole"));
+}
+
+/// What programs answered is in the record: a replay runs none, and who goes on must allow it.
+#[test]
+fn a_record_runs_no_program_by_itself() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let folder = folder.path();
+    let ran = folder.join("ran");
+    let script = format!(
+        "touch {}; while read line; do n=${{line#*:}}; echo \"{{\\\"id\\\":${{n%%,*}},\\\"value\\\":2.5}}\"; done",
+        ran.display()
+    );
+    let attached = format!("\n[attachments.path-cost]\nprogram = [\"sh\", \"-c\", '''{script}''']\n");
+    domain(&folder.join("words"), |name, text| match name {
+        "domain.toml" => text + &attached,
+        _ => text,
+    });
+    let goal = ["find", "cup A", "--domain", "words"];
+    check(folder, &[&goal[..], &["--run", "whole", "--json"]].concat(), 0);
+    let forget = || std::fs::remove_file(&ran).expect("the program was run");
+    forget();
+    let again = check(folder, &["replay", "whole", "--json"], 0);
+    assert_eq!((&again["same"], &again["cut_off"]), (&true.into(), &Value::Null), "{again}");
+    kill_after(folder, &[&goal[..], &["--run", "cut"]].concat(), 9);
+    forget();
+    let cut = check(folder, &["replay", "cut", "--json"], 0);
+    assert!(cut["cut_off"].is_string(), "{cut}");
+    let words = ["path-cost: sh -c touch", "--allow-programs"];
+    check_refused(folder, &["do", "--resume", "cut"], 2, &words);
+    assert!(!ran.exists(), "no program was run");
+    check(folder, &["do", "--resume", "cut", "--allow-programs", "--json"], 0);
+    assert_eq!(documents(folder, "cut"), documents(folder, "whole"));
+}
+
+/// Several processes that make a run at once: in one folder one of them has it, in folders of their own each has one.
+#[test]
+fn every_run_has_a_folder_of_its_own() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let folder = folder.path();
+    let goals = ["cup A", "cup B", "mug"];
+    let all: Vec<_> = goals.iter().map(|goal| start(folder, &["find", goal, "--run", "one"])).collect();
+    let mut lost = 0;
+    for mut child in all {
+        // A winner speaks of its goal; the others of the winner, before they end.
+        let said = first_line(&mut child);
+        if said.contains("another process is writing a run there") || said.contains("holds a run already") {
+            lost += 1;
+            assert_eq!(child.wait().expect("it ends").code(), Some(2), "{said}");
+        } else {
+            child.kill().expect("it can be killed");
+            child.wait().expect("it is gone");
+        }
+    }
+    assert_eq!(lost, goals.len() - 1);
+    let header = std::fs::read_to_string(folder.join("one/run.json")).expect("the winner has one");
+    let header: Value = serde_json::from_str(&header).expect("it is whole");
+    let begun = check(folder, &["memory", "query", "one", "--kind", "run", "--json"], 0);
+    assert_eq!(begun["records"][0]["body"]["goal"], header["goal"]);
+    let all: Vec<_> = goals.iter().map(|_| start(folder, &["find", "cup A"])).collect();
+    for mut child in all {
+        let said = first_line(&mut child);
+        assert!(said.contains("cup A"), "{said}");
+        child.kill().expect("it can be killed");
+        child.wait().expect("it is gone");
+    }
+    let runs = check(folder, &["runs", "--json"], 0);
+    assert_eq!(runs["runs"].as_array().map(Vec::len), Some(goals.len()), "{runs}");
+}
+
+/// Warnings are heard, a reader that goes away is no fault, input without an end has one, and runs have dates.
+#[test]
+fn the_world_around_a_run_is_as_it_is() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let folder = folder.path();
+    check_refused(folder, &["recognise", "/dev/zero"], 2, &["/dev/zero", "more than 268 MB"]);
+    check_refused(folder, &["check", "/dev/zero"], 2, &["/dev/zero", "more than 268 MB"]);
+    kill_after(folder, &["find", "cup A", "--run", "runs/one"], 8);
+    let listed = outcome(folder, &["runs"]);
+    let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
+    let is_date = |text: &str| text.starts_with("20") && text[..16].matches(['-', ':']).count() == 3;
+    assert!(is_date(&listed) && listed.contains("unfinished"), "{listed}");
+    for file in ["index.sqlite", "index.sqlite-wal", "index.sqlite-shm"] {
+        std::fs::write(folder.join("runs/one/record").join(file), "no index").expect("it can be spoilt");
+    }
+    let shown = outcome(folder, &["show", "runs/one"]);
+    let warned = String::from_utf8_lossy(&shown.stderr).into_owned();
+    assert!(
+        shown.status.success() && warned.contains("WARN") && warned.contains("index is damaged"),
+        "{warned}"
+    );
+    assert!(!warned.contains('\u{1b}'), "no colour where there is no terminal");
+    for (out, err) in [(true, false), (false, true), (true, true)] {
+        for arguments in [&["show", "runs/one"][..], &["runs", "nowhere"], &["replay", "runs/one"]] {
+            let exit = without_readers(folder, arguments, out, err);
+            assert_eq!(exit, Some(0), "{arguments:?} without a reader of {out} {err}");
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! What is answered in the end: about what was asked, with where it is and what it rests on.
 
 use descry_memory::belief::Track;
+use descry_memory::remember::Remembered;
 use descry_perception::nalgebra::Vector3;
 use descry_planner::{FactValue, Plan, after};
 use serde::{Deserialize, Serialize};
@@ -81,6 +82,8 @@ pub struct Conclusion {
     pub found: Option<Believed>,
     /// Everything that is believed.
     pub objects: Vec<Believed>,
+    /// What is to be remembered, where anything is.
+    pub remembered: Option<Remembered>,
 }
 
 /// What is answered when a run has ended.
@@ -118,6 +121,7 @@ pub(crate) fn conclude(
         object: first.map(|t| t.name.clone()),
         found: first.and_then(|t| asker.best(t).filter(|track| may_be(t, track))).map(|t| asker.believed(t)),
         objects,
+        remembered: None,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use descry_perception::recognise::{ObjectModel, check_models};
 use descry_planner::{Findings, Source};
@@ -9,6 +10,7 @@ use include_dir::{Dir, include_dir};
 use serde::Deserialize;
 
 use crate::config::{self, Config};
+use crate::program::Tape;
 use crate::vocabulary::Vocabulary;
 
 /// The domains that come with the program.
@@ -37,6 +39,10 @@ pub struct Domain {
     pub scenes: BTreeMap<String, String>,
     /// The folder, or none for a built-in domain.
     pub folder: Option<PathBuf>,
+    /// The texts that all this was read from.
+    pub files: Files,
+    /// Where the answers of its programs are kept, and come from.
+    pub tape: Option<Arc<dyn Tape>>,
 }
 
 /// Why a domain's folder could not be loaded.
@@ -106,7 +112,7 @@ impl Domain {
         if let Some((name, files)) =
             built_in.filter(|_| !Path::new(name_or_folder).join("domain.toml").exists())
         {
-            return from_files(&embedded(name, files), None);
+            return from_files(embedded(name, files), None);
         }
         let folder = Path::new(name_or_folder);
         if !folder.is_dir() {
@@ -115,7 +121,16 @@ impl Domain {
                 known: BUILT_IN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", "),
             });
         }
-        from_files(&on_disk(folder)?, Some(folder.to_path_buf()))
+        from_files(on_disk(folder)?, Some(folder.to_path_buf()))
+    }
+
+    /// The programs that it names: what each is for, and its command.
+    pub fn programs(&self) -> Vec<(&str, &[String])> {
+        let calls = self.config.attachments.iter().map(|(name, p)| (name.as_str(), p.program.as_slice()));
+        let words = self.config.word.iter().map(|(name, word)| (name.as_str(), &word.program));
+        let actions = self.config.action.iter().map(|(name, action)| (name.as_str(), &action.program));
+        let optional = words.chain(actions).filter_map(|(name, p)| Some((name, p.as_deref()?)));
+        calls.chain(optional).collect()
     }
 }
 
@@ -145,7 +160,7 @@ fn parse_objects(files: &Files) -> Result<Vec<ObjectModel>, LoadError> {
 }
 
 /// The files of a domain by their path within its folder, each with the name that errors show.
-type Files = BTreeMap<String, (String, String)>;
+pub type Files = BTreeMap<String, (String, String)>;
 
 fn embedded(domain: &str, folder: &Dir<'_>) -> Files {
     fn walk(domain: &str, dir: &Dir<'_>, files: &mut Files) {
@@ -199,7 +214,11 @@ fn unreadable(path: &Path, error: &std::io::Error) -> LoadError {
     }
 }
 
-fn from_files(files: &Files, folder: Option<PathBuf>) -> Result<Domain, LoadError> {
+/// Reads a domain from its texts; programs that it names are run in `folder`.
+///
+/// # Errors
+/// [`LoadError`] names the file, the place in it and what was expected.
+pub fn from_files(files: Files, folder: Option<PathBuf>) -> Result<Domain, LoadError> {
     let file = |name: &str| {
         files.get(name).ok_or_else(|| LoadError::File {
             path: name.into(),
@@ -213,7 +232,7 @@ fn from_files(files: &Files, folder: Option<PathBuf>) -> Result<Domain, LoadErro
     let config: Config = parse(config_name, config)?;
     config::check(config_name, &config)?;
     let under = |prefix: &'static str| files.iter().filter(move |(key, _)| key.starts_with(prefix));
-    let objects = parse_objects(files)?;
+    let objects = parse_objects(&files)?;
     let scenes = under("scenes/")
         .map(|(key, (_, text))| {
             let name = key.trim_start_matches("scenes/").trim_end_matches(".toml");
@@ -222,7 +241,7 @@ fn from_files(files: &Files, folder: Option<PathBuf>) -> Result<Domain, LoadErro
         .collect();
     let pddl = Source { name: pddl_name.clone(), text: pddl.clone() };
     let vocabulary = Vocabulary::read(&pddl).map_err(|findings| LoadError::Pddl { findings })?;
-    Ok(Domain { pddl, vocabulary, toml, config, objects, scenes, folder })
+    Ok(Domain { pddl, vocabulary, toml, config, objects, scenes, folder, files, tape: None })
 }
 
 fn parse<T: for<'de> Deserialize<'de>>(path: &str, text: &str) -> Result<T, LoadError> {

@@ -5,28 +5,70 @@
 //! (`"inf"` for infinity) for a cost, true or false for a condition, a list of values for an effect, a list of names for
 //! a grounding module. Answers may come in any order; the program is started at its first question and gets many
 //! questions at once where the planner has them.
+//!
+//! It runs in a process group of its own, which is killed as a whole, with at most [`MOST_DATA_BYTES`] of memory a process (Linux).
+//! Of the environment it sees [`SEEN`] and nothing else: no password or token of whoever runs descry. A line that is longer than
+//! [`MOST_LINE_BYTES`] is an error, and lines that nobody has read wait in its pipe.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, Read as _, Write};
+use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use descry_planner::{Answer, Attachment, Call, CallError, Level, Read};
+use rustix::process::{Pid, Signal, kill_process_group};
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use crate::config::Program;
 
 /// How many of its last words on standard error are shown when a program ends.
 const LAST_WORDS: usize = 5;
+/// How much of such a line is shown, bytes.
+const MOST_WORD_BYTES: u64 = 1 << 10;
+/// A line of answer is at most so long: some ten thousand proposals.
+const MOST_LINE_BYTES: u64 = 1 << 20;
+/// So many lines of answer are read ahead.
+const LINES_AHEAD: usize = 16;
+/// What a process of a program may allocate.
+const MOST_DATA_BYTES: u64 = 4 << 30;
+/// A program that has closed its output has so long to end by itself.
+const END_WAIT: Duration = Duration::from_millis(500);
+/// What a program sees of the environment, beside `LC_…`: where things are, and the language.
+const SEEN: [&str; 12] = [
+    "PATH",
+    "HOME",
+    "USER",
+    "LANG",
+    "TZ",
+    "TMPDIR",
+    "PYTHONPATH",
+    "PYTHONHOME",
+    "VIRTUAL_ENV",
+    "CONDA_PREFIX",
+    "LD_LIBRARY_PATH",
+    "TERM",
+];
+
+/// Keeps what programs answer, and has what they answered in an earlier life of the same run.
+pub trait Tape: std::fmt::Debug + Send + Sync {
+    /// The answers to `asked`: those of the tape, or else those that `live` gets from the program, which are kept.
+    ///
+    /// # Errors
+    /// Why there are none.
+    fn answer(&self, asked: &Value, live: &dyn Fn() -> Value) -> Result<Value, String>;
+}
 
 /// A program that answers calls.
 pub struct ProgramAttachment {
     program: Program,
     folder: Option<PathBuf>,
+    tape: Option<Arc<dyn Tape>>,
     running: Mutex<Option<Running>>,
 }
 
@@ -34,7 +76,7 @@ pub struct ProgramAttachment {
 struct Running {
     child: Child,
     questions: Sender<String>,
-    answers: Receiver<String>,
+    answers: Receiver<Result<String, CallError>>,
     last_words: Arc<Mutex<VecDeque<String>>>,
     next_id: u64,
 }
@@ -50,8 +92,15 @@ struct Question<'a> {
 #[derive(Deserialize)]
 struct Reply {
     id: u64,
+    #[serde(flatten)]
+    said: Said,
+}
+
+/// What a program says to a question.
+#[derive(Deserialize)]
+struct Said {
     #[serde(default)]
-    value: Option<serde_json::Value>,
+    value: Option<Value>,
     #[serde(default)]
     error: Option<String>,
 }
@@ -59,55 +108,67 @@ struct Reply {
 impl ProgramAttachment {
     /// Binds a program that is run in `folder` (none: the current one). It is started by its first question.
     pub fn new(program: Program, folder: Option<PathBuf>) -> Self {
-        Self { program, folder, running: Mutex::new(None) }
+        Self { program, folder, tape: None, running: Mutex::new(None) }
+    }
+
+    /// The same with its answers on a tape.
+    #[must_use]
+    pub fn on(self, tape: Option<Arc<dyn Tape>>) -> Self {
+        Self { tape, ..self }
     }
 
     fn ask(&self, calls: &[Call], level: Level) -> Vec<Result<Answer, CallError>> {
+        let Some(tape) = &self.tape else { return self.ask_program(calls, level) };
+        let asked = json!({ "program": self.program.program, "level": named(level), "calls": calls });
+        let live = || self.ask_program(calls, level).iter().map(written).collect();
+        let answers = tape.answer(&asked, &live).map_err(CallError::Failed);
+        let all = answers.and_then(|answers| read_answers(answers, calls.len()));
+        all.unwrap_or_else(|error| calls.iter().map(|_| Err(error.clone())).collect())
+    }
+
+    fn ask_program(&self, calls: &[Call], level: Level) -> Vec<Result<Answer, CallError>> {
         let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
         let outcome = self.ensure_started(&mut running).and_then(|r| self.exchange(r, calls, level));
-        match outcome {
-            Ok(answers) => answers,
-            Err(error) => {
-                if let Some(mut ended) = running.take() {
-                    // A program that is late or has closed its output is of no more use; it is stopped either way.
-                    let _ = ended.child.kill();
-                    let _ = ended.child.wait();
-                }
-                calls.iter().map(|_| Err(error.clone())).collect()
-            }
-        }
+        outcome.unwrap_or_else(|error| {
+            // A program that is late or has closed its output is of no more use.
+            *running = None;
+            calls.iter().map(|_| Err(error.clone())).collect()
+        })
     }
 
     /// Asks one question of any kind, a JSON object without `id`, and waits for the answer: the object that comes back.
     ///
     /// # Errors
     /// [`CallError`] as for calls; [`CallError::Failed`] with its words if the program answers with an `error`.
-    pub fn ask_one(&self, question: serde_json::Value) -> Result<serde_json::Value, CallError> {
+    pub fn ask_one(&self, question: Value) -> Result<Value, CallError> {
+        let Some(tape) = &self.tape else { return self.ask_program_one(question) };
+        let asked = json!({ "program": self.program.program, "question": question });
+        let live = || self.ask_program_one(question.clone()).unwrap_or_else(|error| written_error(&error));
+        let answer = tape.answer(&asked, &live).map_err(CallError::Failed)?;
+        read_error(&answer).map_or(Ok(answer), Err)
+    }
+
+    fn ask_program_one(&self, question: Value) -> Result<Value, CallError> {
         let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
         let outcome = self.ensure_started(&mut running).and_then(|r| self.exchange_one(r, question));
         let is_over = matches!(
             outcome,
             Err(CallError::TimedOut { .. } | CallError::Crashed(_) | CallError::WrongAnswer { .. })
         );
-        if is_over && let Some(mut ended) = running.take() {
-            let _ = ended.child.kill();
-            let _ = ended.child.wait();
+        if is_over {
+            *running = None;
         }
         outcome
     }
 
-    fn exchange_one(
-        &self,
-        running: &mut Running,
-        mut question: serde_json::Value,
-    ) -> Result<serde_json::Value, CallError> {
+    fn exchange_one(&self, running: &mut Running, mut question: Value) -> Result<Value, CallError> {
         let id = running.next_id;
         running.next_id += 1;
         question["id"] = id.into();
         let _ = running.questions.send(format!("{question}\n"));
         let deadline = Instant::now() + self.limit();
         let line = self.line(running, deadline)?;
-        let answer: serde_json::Value =
+        let answer: Value =
             serde_json::from_str(&line).map_err(|_| unreadable(&line, "{\"id\": 7, \"value\": ...}"))?;
         if answer["id"] != id {
             return Err(unreadable(&line, "the `id` that was asked"));
@@ -126,8 +187,8 @@ impl ProgramAttachment {
     fn line(&self, running: &mut Running, deadline: Instant) -> Result<String, CallError> {
         loop {
             match running.answers.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
-                Ok(line) if line.trim().is_empty() => {}
-                Ok(line) => return Ok(line),
+                Ok(Ok(line)) if line.is_empty() => {}
+                Ok(line) => return line,
                 Err(RecvTimeoutError::Timeout) => {
                     return Err(CallError::TimedOut { limit_s: self.program.time_limit_s });
                 }
@@ -150,45 +211,29 @@ impl ProgramAttachment {
                 "its `program` is empty; expected a command and its arguments".into(),
             ));
         };
+        let seen = std::env::vars_os().filter(|(name, _)| is_seen(&name.to_string_lossy()));
         let mut command = Command::new(command);
-        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.args(arguments).env_clear().envs(seen).process_group(0);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         if let Some(folder) = &self.folder {
             command.current_dir(folder);
         }
         let mut child =
             command.spawn().map_err(|e| CallError::Failed(format!("`{shown}` could not be started: {e}")))?;
+        limit_memory(&child);
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        let (Some(mut stdin), Some(stdout), Some(stderr)) = pipes else {
-            return Err(CallError::Failed(format!("`{shown}` was started without pipes")));
-        };
         let (questions, to_write) = channel::<String>();
-        thread::spawn(move || {
-            for lines in to_write {
-                if stdin.write_all(lines.as_bytes()).and_then(|()| stdin.flush()).is_err() {
-                    break;
-                }
-            }
-        });
-        let (read, answers) = channel::<String>();
-        thread::spawn(move || {
-            for line in BufReader::new(stdout).lines().map_while(Result::ok) {
-                if read.send(line).is_err() {
-                    break;
-                }
-            }
-        });
+        let (read, answers) = sync_channel(LINES_AHEAD);
         let last_words = Arc::new(Mutex::new(VecDeque::new()));
         let words = Arc::clone(&last_words);
-        thread::spawn(move || {
-            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                let mut words = words.lock().unwrap_or_else(PoisonError::into_inner);
-                if words.len() == LAST_WORDS {
-                    words.pop_front();
-                }
-                words.push_back(line);
-            }
-        });
-        Ok(Running { child, questions, answers, last_words, next_id: 0 })
+        let running = Running { child, questions, answers, last_words, next_id: 0 };
+        let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
+            return Err(CallError::Failed(format!("`{shown}` was started without pipes")));
+        };
+        thread::spawn(move || write_questions(stdin, &to_write));
+        thread::spawn(move || hear(stdout, &read));
+        thread::spawn(move || listen(stderr, &words));
+        Ok(running)
     }
 
     fn exchange(
@@ -199,7 +244,7 @@ impl ProgramAttachment {
     ) -> Result<Vec<Result<Answer, CallError>>, CallError> {
         let first = running.next_id;
         running.next_id += calls.len() as u64;
-        let level = if level == Level::Exact { "exact" } else { "relaxed" };
+        let level = named(level);
         let mut lines = String::new();
         for (id, call) in (first..).zip(calls) {
             let question = serde_json::to_string(&Question { id, level, call });
@@ -223,7 +268,7 @@ impl ProgramAttachment {
     }
 
     fn ended(&self, running: &mut Running) -> CallError {
-        let status = running.child.wait().map_or_else(|e| e.to_string(), |s| s.to_string());
+        let status = running.end().map_or_else(|e| e.to_string(), |s| s.to_string());
         // The thread that reads standard error ends with the program; give it the moment that it needs.
         for _ in 0..50 {
             if Arc::strong_count(&running.last_words) == 1 {
@@ -237,10 +282,86 @@ impl ProgramAttachment {
     }
 }
 
+impl Running {
+    /// Waits a moment for the program to end, and ends what is left of it and of what it has started.
+    fn end(&mut self) -> std::io::Result<ExitStatus> {
+        let deadline = Instant::now() + END_WAIT;
+        while self.child.try_wait()?.is_none() && Instant::now() < deadline {
+            thread::sleep(Duration::from_millis(2));
+        }
+        self.kill();
+        self.child.wait()
+    }
+
+    /// That nothing is left to be killed is as well.
+    fn kill(&self) {
+        let _ = kill_process_group(Pid::from_child(&self.child), Signal::KILL);
+    }
+}
+
 impl Drop for Running {
     fn drop(&mut self) {
-        let _ = self.child.kill();
+        self.kill();
         let _ = self.child.wait();
+    }
+}
+
+fn is_seen(variable: &str) -> bool {
+    SEEN.contains(&variable) || variable.starts_with("LC_")
+}
+
+/// What cannot be limited is not: time and length of lines are.
+fn limit_memory(child: &Child) {
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::process::{Resource, Rlimit, prlimit};
+        let limit = Rlimit { current: Some(MOST_DATA_BYTES), maximum: Some(MOST_DATA_BYTES) };
+        let _ = prlimit(Some(Pid::from_child(child)), Resource::Data, limit);
+    }
+}
+
+fn write_questions(mut stdin: ChildStdin, questions: &Receiver<String>) {
+    for lines in questions {
+        if stdin.write_all(lines.as_bytes()).and_then(|()| stdin.flush()).is_err() {
+            break;
+        }
+    }
+}
+
+fn hear(stdout: ChildStdout, answers: &SyncSender<Result<String, CallError>>) {
+    let mut stdout = BufReader::new(stdout);
+    loop {
+        let mut line = Vec::new();
+        let read = stdout.by_ref().take(MOST_LINE_BYTES + 1).read_until(b'\n', &mut line);
+        if !matches!(read, Ok(1..)) {
+            break;
+        }
+        let line = if line.len() as u64 > MOST_LINE_BYTES {
+            let start = String::from_utf8_lossy(&line[..120]);
+            Err(unreadable(&start, &format!("a line of at most {MOST_LINE_BYTES} bytes")))
+        } else {
+            Ok(String::from_utf8_lossy(&line).trim_end().to_owned())
+        };
+        if answers.send(line).is_err() {
+            break;
+        }
+    }
+}
+
+/// Remembers the last lines that a program says on standard error.
+fn listen(stderr: ChildStderr, words: &Mutex<VecDeque<String>>) {
+    let mut stderr = BufReader::new(stderr);
+    loop {
+        let mut line = Vec::new();
+        let read = stderr.by_ref().take(MOST_WORD_BYTES).read_until(b'\n', &mut line);
+        if !matches!(read, Ok(1..)) {
+            break;
+        }
+        let mut words = words.lock().unwrap_or_else(PoisonError::into_inner);
+        if words.len() == LAST_WORDS {
+            words.pop_front();
+        }
+        words.push_back(String::from_utf8_lossy(&line).trim_end().to_owned());
     }
 }
 
@@ -262,20 +383,70 @@ impl Attachment for ProgramAttachment {
 fn read_reply(line: &str) -> Result<(u64, Result<Answer, CallError>), CallError> {
     let reply: Reply =
         serde_json::from_str(line).map_err(|_| unreadable(line, "{\"id\": 7, \"value\": 3.2}"))?;
-    let answer = match (reply.value, reply.error) {
-        (_, Some(error)) => Err(CallError::Failed(error)),
-        (Some(serde_json::Value::String(s)), None)
-            if matches!(s.as_str(), "inf" | "infinity" | "Infinity") =>
-        {
-            Ok(Answer::Number(f64::INFINITY))
+    Ok((reply.id, read_said(reply.said, line)?))
+}
+
+fn read_said(said: Said, line: &str) -> Result<Result<Answer, CallError>, CallError> {
+    match (said.value, said.error) {
+        (_, Some(error)) => Ok(Err(CallError::Failed(error))),
+        (Some(Value::String(s)), None) if matches!(s.as_str(), "inf" | "infinity" | "Infinity") => {
+            Ok(Ok(Answer::Number(f64::INFINITY)))
         }
         (Some(value), None) => {
             let read = serde_json::from_value::<Answer>(value);
-            Ok(read.map_err(|_| unreadable(line, "a number, \"inf\", true, false or a list as `value`"))?)
+            Ok(Ok(read.map_err(|_| unreadable(line, "a number, \"inf\", true, false or a list as `value`"))?))
         }
-        (None, None) => return Err(unreadable(line, "a `value` or an `error`")),
+        (None, None) => Err(unreadable(line, "a `value` or an `error`")),
+    }
+}
+
+/// An answer as a program gives it.
+fn written(answer: &Result<Answer, CallError>) -> Value {
+    match answer {
+        Ok(Answer::Number(cost)) if cost.is_infinite() => json!({ "value": "inf" }),
+        Ok(answer) => json!({ "value": answer }),
+        Err(error) => written_error(error),
+    }
+}
+
+fn written_error(error: &CallError) -> Value {
+    match error {
+        CallError::TimedOut { limit_s } => json!({ "timed_out_s": limit_s }),
+        CallError::Crashed(words) => json!({ "crashed": words }),
+        CallError::WrongAnswer { expected, got } => json!({ "expected": expected, "got": got }),
+        other => json!({ "error": other.to_string() }),
+    }
+}
+
+/// The error that was [`written`], if it was one.
+fn read_error(answer: &Value) -> Option<CallError> {
+    let text = |key: &str| answer[key].as_str().map(str::to_owned);
+    let timed_out = || answer["timed_out_s"].as_f64().map(|limit_s| CallError::TimedOut { limit_s });
+    let wrong = || Some(CallError::WrongAnswer { expected: text("expected")?, got: text("got")? });
+    let other = || text("crashed").map(CallError::Crashed).or_else(|| text("error").map(CallError::Failed));
+    timed_out().or_else(wrong).or_else(other)
+}
+
+/// Answers as they were [`written`], so many.
+fn read_answers(answers: Value, most: usize) -> Result<Vec<Result<Answer, CallError>>, CallError> {
+    let line = answers.to_string();
+    let said: Vec<Value> =
+        serde_json::from_value(answers).map_err(|_| unreadable(&line, "the answers of a program"))?;
+    if said.len() != most {
+        return Err(unreadable(&line, &format!("{most} answers")));
+    }
+    let read = |answer: Value| match read_error(&answer) {
+        Some(error) => Ok(Err(error)),
+        None => {
+            let said = serde_json::from_value(answer).map_err(|_| unreadable(&line, "an answer"))?;
+            read_said(said, &line)
+        }
     };
-    Ok((reply.id, answer))
+    said.into_iter().map(read).collect()
+}
+
+fn named(level: Level) -> &'static str {
+    if level == Level::Exact { "exact" } else { "relaxed" }
 }
 
 fn unreadable(line: &str, expected: &str) -> CallError {
@@ -328,7 +499,45 @@ mod tests {
         check("read a; echo broken pipe dream >&2; exit 3", &format!("{crashed} | {crashed}"));
         let late = "no answer within 0.5 s";
         check("sleep 5", &format!("{late} | {late}"));
+        let closed = "the attachment's program ended: `sh -c exec >&-; sleep 5`, signal: 9 (SIGKILL)";
+        check("exec >&-; sleep 5", &format!("{closed} | {closed}"));
         let garbled = "answered `hello`, expected {\"id\": 7, \"value\": 3.2}";
         check("read a; echo hello; sleep 1", &format!("{garbled} | {garbled}"));
+    }
+
+    /// A program that floods is stopped at the first line that is too long, or none of whose lines is an answer.
+    #[test]
+    fn a_flood_is_an_error_and_waits_in_the_pipe() {
+        let start = "x".repeat(120);
+        let long = format!("answered `{start}`, expected a line of at most 1048576 bytes");
+        check("read a; yes x | tr -d '\\n'", &format!("{long} | {long}"));
+        let lines = "answered `y`, expected {\"id\": 7, \"value\": 3.2}";
+        check("yes", &format!("{lines} | {lines}"));
+        check("yes ''", "no answer within 0.5 s | no answer within 0.5 s");
+    }
+
+    /// What a program has started ends with it, and it hears nothing of what is secret.
+    #[test]
+    fn a_program_leaves_nothing_behind_and_sees_no_secret() {
+        let folder = std::env::temp_dir().join(format!("descry-program-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder can be made");
+        let beat = folder.join("beat");
+        let shown = beat.display();
+        let late = "no answer within 0.5 s";
+        check(
+            &format!("(while :; do echo x >> {shown}; sleep 0.02; done) & sleep 60"),
+            &format!("{late} | {late}"),
+        );
+        let length = || std::fs::metadata(&beat).map_or(0, |m| m.len());
+        let then = length();
+        assert!(then > 0, "the child had begun");
+        thread::sleep(Duration::from_millis(200));
+        assert_eq!(length(), then, "the child has ended");
+        // Cargo's own variables stand for any that is not on the list.
+        assert!(std::env::var_os("CARGO_MANIFEST_DIR").is_some() && is_seen("PATH") && is_seen("LC_ALL"));
+        let env = "read a; read b; env | cut -d= -f1 | grep -c CARGO_ >&2; exit 1";
+        let ended = format!("the attachment's program ended: `sh -c {env}`, exit status: 1\n    0");
+        check(env, &format!("{ended} | {ended}"));
+        std::fs::remove_dir_all(&folder).expect("the folder can be removed");
     }
 }

@@ -28,7 +28,7 @@ pub struct ProgramAction {
 impl Programs {
     /// Those that a domain names.
     pub fn of(domain: &Domain) -> Self {
-        let bind = |p: Program| ProgramAttachment::new(p, domain.folder.clone());
+        let bind = |p: Program| ProgramAttachment::new(p, domain.folder.clone()).on(domain.tape.clone());
         let config = &domain.config;
         let calls = config.attachments.iter().map(|(name, p)| (name.clone(), Arc::new(bind(p.clone()))));
         let facts = config.word.iter().filter_map(|(name, word)| {

@@ -115,6 +115,9 @@ pub struct Document {
     /// Objects that it speaks of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<Sighting>,
+    /// Whether it is never pruned: what the record cannot be understood without.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub kept: bool,
     /// Its content.
     #[serde(default, skip_serializing_if = "Value::is_null")]
     pub body: Value,
@@ -147,6 +150,8 @@ pub struct Draft<'a> {
     pub end_ns: Option<i64>,
     /// The coordinate frame, or "".
     pub frame: String,
+    /// Whether it is never pruned.
+    pub kept: bool,
     /// By what it is found again, and its content.
     pub meta: Meta,
     /// Blobs, each with a name of its own.
@@ -161,6 +166,7 @@ impl Draft<'_> {
             stamp_ns,
             end_ns: None,
             frame: String::new(),
+            kept: false,
             meta: Meta::default(),
             blobs: Vec::new(),
         }
@@ -198,6 +204,7 @@ impl Draft<'_> {
             seen_from_m: self.meta.seen_from_m,
             covers_m: self.meta.covers_m,
             objects: self.meta.objects.clone(),
+            kept: self.kept,
             body: self.meta.body.clone(),
             blobs: blobs.collect(),
         })

@@ -1,5 +1,6 @@
 //! What can go wrong with a record, said with the place and a mend.
 
+use crate::stores::Fault;
 use std::path::{Path, PathBuf};
 
 /// A record that cannot be read or written as asked.
@@ -72,6 +73,17 @@ pub enum Error {
         /// What was found and expected.
         what: String,
     },
+    /// A record of which something is lost must not be gone on with: what is left would be taken for all there was.
+    #[error(
+        "{place} is damaged, so that it can be read as far as it is whole and not be gone on with{}",
+        listed(faults)
+    )]
+    Faulty {
+        /// The folder.
+        place: PathBuf,
+        /// What is lost.
+        faults: Vec<Fault>,
+    },
     /// The index refused.
     #[error("the index of {place}: {because}")]
     Index {
@@ -135,6 +147,10 @@ pub enum Error {
         /// That failure.
         because: String,
     },
+}
+
+fn listed(faults: &[Fault]) -> String {
+    faults.iter().map(|fault| format!("\n  {fault}")).collect()
 }
 
 /// Megabytes, rounded up to a tenth.

@@ -9,7 +9,7 @@ use crate::flusher::{Flusher, Group};
 use crate::foxglove::{self, LogLevel};
 use crate::retrace::Retrace;
 use crate::stores::local::{Durability, LocalOptions, LocalStore, Recovery};
-use crate::stores::{Report, Retention, Stats, Store};
+use crate::stores::{Fault, Report, Retention, Stats, Store};
 use crate::transforms::{self, Reach, Sample};
 use descry_perception::Cloud;
 use nalgebra::Isometry3;
@@ -110,6 +110,8 @@ pub struct Record {
     recovery: Recovery,
     options: Options,
     groups: Mutex<Groups>,
+    /// What goes to the store with what is put next.
+    soon: Mutex<Vec<Draft<'static>>>,
     flusher: Flusher,
     retrace: Option<Retrace>,
 }
@@ -180,6 +182,7 @@ impl Record {
             recovery: Recovery::default(),
             options,
             groups: Mutex::default(),
+            soon: Mutex::default(),
             retrace: None,
         }
     }
@@ -338,8 +341,34 @@ impl Record {
         {
             return Ok(id);
         }
-        let ids = self.store.append(std::slice::from_ref(&draft))?;
-        ids.first().copied().ok_or(Error::Missing { id: 0 })
+        let mut soon = self.soon.lock().unwrap_or_else(PoisonError::into_inner);
+        // All or none: what was held back is not dropped with a draft that cannot be recorded.
+        let drafts: Vec<Draft> = soon.iter().cloned().chain([draft]).collect();
+        let ids = self.store.append(&drafts)?;
+        soon.clear();
+        ids.last().copied().ok_or(Error::Missing { id: 0 })
+    }
+
+    /// Records a draft together with what is put next, so that many small ones cost one wait for the disk. It is acknowledged with
+    /// that one, or by [`Record::sync`].
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub fn put_soon(&self, draft: Draft<'static>) -> Result<(), Error> {
+        if let Some(retrace) = &self.retrace
+            && retrace.next(&*self.store, &draft)?.is_some()
+        {
+            return Ok(());
+        }
+        self.soon.lock().unwrap_or_else(PoisonError::into_inner).push(draft);
+        Ok(())
+    }
+
+    fn flush_soon(&self) -> Result<(), Error> {
+        let mut soon = self.soon.lock().unwrap_or_else(PoisonError::into_inner);
+        self.store.append(&soon)?;
+        soon.clear();
+        Ok(())
     }
 
     /// Records several drafts, all or none.
@@ -356,6 +385,7 @@ impl Record {
     /// If it cannot be brought there; it is kept and tried again.
     pub fn sync(&self) -> Result<(), Error> {
         self.flush_open()?;
+        self.flush_soon()?;
         self.store.sync()
     }
 
@@ -365,6 +395,19 @@ impl Record {
     /// If the store cannot be read.
     pub fn find(&self, query: &Query) -> Result<Vec<Document>, Error> {
         self.store.find(query)
+    }
+
+    /// What meets a query and is whole to the last byte of its blobs, and what of it is not.
+    ///
+    /// # Errors
+    /// If the store cannot be read.
+    pub fn find_whole(&self, query: &Query) -> Result<(Vec<Document>, Vec<Fault>), Error> {
+        let mut whole = Vec::new();
+        let faults = self.store.each_whole(query, &mut |document, _| {
+            whole.push(document);
+            Ok(())
+        })?;
+        Ok((whole, faults))
     }
 
     /// The newest of a kind.
@@ -462,8 +505,8 @@ impl Groups {
 impl Drop for Record {
     /// Writes what is open. Who must know whether that succeeded calls [`Record::sync`] first.
     fn drop(&mut self) {
-        if let Err(e) = self.flush_open() {
-            tracing::warn!("transforms were lost at the end of the record: {e}");
+        if let Err(e) = self.flush_open().and_then(|()| self.flush_soon()) {
+            tracing::warn!("something was lost at the end of the record: {e}");
         }
     }
 }

@@ -12,6 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The kinds under which pins are recorded.
 pub(crate) const PIN: &str = "pin";
 pub(crate) const UNPIN: &str = "unpin";
+/// In whose name a record is pinned that is never pruned.
+pub(crate) const KEPT: &str = "record";
 
 /// How much is kept; what is over goes oldest first, pinned records excepted. The default keeps everything.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,7 +66,7 @@ pub struct Report {
 }
 
 /// Something that is not whole.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
     /// The record, where it is known.
     pub record: Option<RecordId>,
@@ -74,10 +76,63 @@ pub struct Fault {
     pub what: String,
 }
 
+impl Fault {
+    /// That a record is damaged.
+    ///
+    /// # Errors
+    /// Any other error as it is.
+    pub(crate) fn of(record: RecordId, error: Error) -> Result<Self, Error> {
+        match error {
+            Error::Damaged { place, what, .. } => {
+                Ok(Fault { record: Some(record), place: place.display().to_string(), what })
+            }
+            other => Err(other),
+        }
+    }
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self.record {
+            Some(id) => write!(f, "record {id} in {}: {}", self.place, self.what),
+            None => write!(f, "{}: {}", self.place, self.what),
+        }
+    }
+}
+
 impl Report {
     /// Whether everything is whole.
     pub fn is_whole(&self) -> bool {
         self.faults.is_empty()
+    }
+}
+
+/// Takes a record with the bytes of its blobs.
+pub type Take<'a> = dyn FnMut(Document, Vec<Vec<u8>>) -> Result<(), Error> + 'a;
+
+/// Goes through what meets a query, a part at a time.
+pub(crate) struct Pages {
+    query: Query,
+    left: usize,
+}
+
+impl Pages {
+    const AT_ONCE: usize = 256;
+
+    pub fn of(query: &Query) -> Self {
+        Pages { query: query.clone(), left: query.limit.unwrap_or(usize::MAX) }
+    }
+
+    /// The query for the next part, if there is one.
+    pub fn next(&self) -> Option<Query> {
+        let limit = Some(self.left.min(Self::AT_ONCE));
+        (self.left > 0).then(|| Query { limit, ..self.query.clone() })
+    }
+
+    /// So many records were found, the last of them of that stamp and number.
+    pub fn was(&mut self, found: usize, last: Option<(i64, RecordId)>) {
+        self.query.after = last;
+        self.left = if last.is_some() { self.left - found } else { 0 };
     }
 }
 
@@ -106,8 +161,31 @@ pub trait Store: Send + Sync {
     /// What meets a query, in its order.
     ///
     /// # Errors
-    /// If the store cannot be read.
+    /// [`Error::Damaged`] if any of it is not what was written; if the store cannot be read.
     fn find(&self, query: &Query) -> Result<Vec<Document>, Error>;
+
+    /// Hands over, in the order of the query, what meets it and is whole to the last byte, with the bytes of its blobs; returns what
+    /// of it is not.
+    ///
+    /// # Errors
+    /// If the store cannot be read, or what `take` returns.
+    fn each_whole(&self, query: &Query, take: &mut Take) -> Result<Vec<Fault>, Error> {
+        let mut faults = Vec::new();
+        let mut pages = Pages::of(query);
+        while let Some(query) = pages.next() {
+            let page = self.find(&query)?;
+            pages.was(page.len(), page.last().map(|d| (d.stamp_ns, d.id)));
+            for document in page {
+                let blobs = document.blobs.iter().map(|b| self.blob(document.id, &b.name)).collect();
+                let id = document.id;
+                match blobs {
+                    Ok(blobs) => take(document, blobs)?,
+                    Err(e) => faults.push(Fault::of(id, e)?),
+                }
+            }
+        }
+        Ok(faults)
+    }
 
     /// Of what meets a query (its order and limit aside) the record whose stamp is nearest; the earlier of two as near, of one stamp the newest.
     ///

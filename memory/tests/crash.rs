@@ -2,7 +2,7 @@
 
 use descry_memory::stores::Store;
 use descry_memory::{
-    Blob, Draft, Durability, Error, Form, LocalOptions, LocalStore, Query, RecordId, Retention,
+    Blob, Draft, Durability, Error, Fault, Form, LocalOptions, LocalStore, Query, RecordId, Retention,
 };
 use serde_json::{Value, json};
 use std::fs;
@@ -24,6 +24,16 @@ fn draft(i: u64, bytes: usize) -> Draft<'static> {
 fn assert_whole(store: &dyn Store, id: RecordId, i: u64, bytes: usize) {
     assert_eq!(store.get(id).unwrap().body, json!({ "i": i }));
     assert_eq!(store.blob(id, "data").unwrap(), draft(i, bytes).blobs[0].data.as_ref());
+}
+
+/// What of a kind is whole, and which records are not.
+fn whole(store: &dyn Store) -> (Vec<RecordId>, Vec<Fault>) {
+    let mut whole = Vec::new();
+    let faults = store.each_whole(&Query::of_kind("scan"), &mut |document, _| {
+        whole.push(document.id);
+        Ok(())
+    });
+    (whole, faults.unwrap())
 }
 
 fn segments(dir: &Path) -> Vec<PathBuf> {
@@ -161,6 +171,166 @@ fn an_index_that_is_none_is_made_again_with_its_pins() {
     assert_eq!(store.pins().unwrap(), pins);
     assert_eq!(store.stats().unwrap().kinds, stats.kinds);
     (0..5).for_each(|i| assert_whole(&store, ids[i], i as u64, 1000));
+}
+
+/// Damage to what a closed store consists of, and what is left of its records then, by their place.
+fn check_damage(what: &str, spoil: impl Fn(&Path), left: &[usize]) {
+    let dir = tempfile::tempdir().unwrap();
+    let store =
+        LocalStore::create(dir.path(), "", LocalOptions { segment_bytes: 10 << 10, ..options() }).unwrap();
+    let ids: Vec<_> = (0..5).map(|i| store.append(&[draft(i, 40 << 10)]).unwrap()[0]).collect();
+    store.pin(&ids[..2], "belief").unwrap();
+    store.hold(&ids[2..4], "plan").unwrap();
+    let pins = store.pins().unwrap();
+    drop(store);
+    spoil(dir.path());
+    let all_left = left.len() == ids.len();
+    for _ in 0..2 {
+        // Whoever reads changes nothing, so that the next one finds the same.
+        let store = LocalStore::open_shared(dir.path()).unwrap();
+        assert_eq!(store.recovery().faults.is_empty(), all_left, "{what}: {:?}", store.recovery());
+        assert_eq!(whole(&store).0, left.iter().map(|i| ids[*i]).collect::<Vec<_>>(), "{what}");
+        left.iter().for_each(|i| assert_whole(&store, ids[*i], *i as u64, 40 << 10));
+        assert!(!store.verify().unwrap().is_whole(), "{what}");
+        if all_left {
+            assert_eq!(store.pins().unwrap(), pins, "{what}");
+        }
+    }
+    match LocalStore::open(dir.path(), "", options()) {
+        Ok(store) => {
+            assert!(all_left, "{what}: who writes must not go on with what is left");
+            assert!(store.recovery().index_rebuilt && store.verify().unwrap().is_whole(), "{what}");
+            assert_eq!(store.pins().unwrap(), pins, "{what}");
+        }
+        Err(Error::Faulty { faults, .. }) => assert!(!all_left && !faults.is_empty(), "{what}"),
+        Err(e) => panic!("{what}: {e}"),
+    }
+}
+
+#[test]
+fn what_is_lost_is_said_and_the_rest_is_read() {
+    let flip = |path: PathBuf, at: fn(usize) -> usize| {
+        let mut bytes = fs::read(&path).unwrap();
+        let at = at(bytes.len());
+        bytes[at] ^= 4;
+        fs::write(path, bytes).unwrap();
+    };
+    let cut = |path: PathBuf, to: fn(u64) -> u64| {
+        let length = fs::metadata(&path).unwrap().len();
+        fs::File::options().write(true).open(path).unwrap().set_len(to(length)).unwrap();
+    };
+    let index = |dir: &Path| dir.join("index.sqlite");
+    let all = [0, 1, 2, 3, 4];
+    for eighth in 0..8 {
+        let spoil = |dir: &Path| {
+            let mut bytes = fs::read(index(dir)).unwrap();
+            let at = bytes.len() * eighth / 8 + 20;
+            bytes[at] ^= 1;
+            fs::write(index(dir), bytes).unwrap();
+        };
+        check_damage("a flipped bit in the index", spoil, &all);
+    }
+    check_damage("a cut index", |dir| cut(index(dir), |n| n / 2), &all);
+    check_damage("an empty index", |dir| cut(index(dir), |_| 0), &all);
+    check_damage("no index", |dir| fs::remove_file(index(dir)).unwrap(), &all);
+    check_damage("a cut segment", |dir| cut(segments(dir)[1].clone(), |n| n / 2), &[0, 2, 3, 4]);
+    check_damage("a missing segment", |dir| fs::remove_file(&segments(dir)[2]).unwrap(), &[0, 1, 3, 4]);
+    let both = |dir: &Path| {
+        fs::remove_file(&segments(dir)[2]).unwrap();
+        flip(index(dir), |n| n / 2);
+    };
+    check_damage("a missing segment and a flipped bit in the index", both, &[0, 1, 3, 4]);
+    let both = |dir: &Path| {
+        cut(segments(dir)[4].clone(), |n| n / 2);
+        fs::remove_file(index(dir)).unwrap();
+    };
+    check_damage("a cut segment and no index", both, &[0, 1, 2, 3]);
+}
+
+/// A flipped bit in a blob or a document: whatever reads it fails and names the record.
+#[test]
+fn no_byte_is_read_that_was_not_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = LocalStore::create(dir.path(), "", options()).unwrap();
+    let ids: Vec<_> = (0..3).map(|i| store.append(&[draft(i, 40 << 10)]).unwrap()[0]).collect();
+    let path = segments(dir.path())[0].clone();
+    drop(store);
+    let original = fs::read(&path).unwrap();
+    let data = draft(1, 40 << 10).blobs[0].data.to_vec();
+    let blob = original.windows(data.len()).position(|w| w == data).unwrap();
+    let document = blob + original[blob..].windows(7).position(|w| w == br#"{"i":1}"#).unwrap();
+    for (hit, is_blob) in [(blob, true), (blob + data.len() - 1, true), (document + 5, false)] {
+        let mut bytes = original.clone();
+        bytes[hit] ^= 1;
+        fs::write(&path, bytes).unwrap();
+        let store = LocalStore::open_shared(dir.path()).unwrap();
+        let read = store.blob(ids[1], "data").map(drop);
+        let refused = if is_blob { read } else { store.get(ids[1]).map(drop) }.unwrap_err();
+        assert!(refused.to_string().contains(&format!("record {} is damaged", ids[1])), "{refused}");
+        assert_eq!(store.find(&Query::default()).is_err(), !is_blob);
+        let (whole, faults) = whole(&store);
+        assert_eq!(whole, [ids[0], ids[2]]);
+        assert_eq!(faults.iter().map(|f| f.record).collect::<Vec<_>>(), [Some(ids[1])]);
+        let file = dir.path().join("all.mcap");
+        let exported = descry_memory::export(&store, &Query::of_kind("scan"), &file).unwrap();
+        assert_eq!((exported.records, exported.faults), (2, faults));
+        let written = fs::read(&file).unwrap();
+        let damaged = format!(r#"{{"id":{},"#, ids[1]);
+        assert!(!written.windows(damaged.len()).any(|w| w == damaged.as_bytes()), "it is in no new file");
+        fs::remove_file(file).unwrap();
+    }
+}
+
+/// Readers neither lock nor write: a writer that opens while they open is never turned away.
+#[test]
+fn readers_are_in_nobodys_way() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = LocalStore::create(dir.path(), "", options()).unwrap();
+    store.append(&[draft(0, 100)]).unwrap();
+    drop(store);
+    let done = std::sync::atomic::AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        for _ in 0..3 {
+            scope.spawn(|| {
+                while !done.load(std::sync::atomic::Ordering::Relaxed) {
+                    let store = LocalStore::open_shared(dir.path()).unwrap();
+                    assert!(!store.find(&Query::default()).unwrap().is_empty());
+                    assert!(store.recovery().faults.is_empty(), "{:?}", store.recovery());
+                }
+            });
+        }
+        for i in 1..100 {
+            let store = LocalStore::open(dir.path(), "", options()).map_err(|e| e.to_string());
+            let recorded = store.and_then(|store| store.append(&[draft(i, 100)]).map_err(|e| e.to_string()));
+            if recorded.is_err() {
+                done.store(true, std::sync::atomic::Ordering::Relaxed);
+            }
+            recorded.unwrap();
+        }
+        done.store(true, std::sync::atomic::Ordering::Relaxed);
+    });
+    let store = LocalStore::open_shared(dir.path()).unwrap();
+    assert_eq!(store.find(&Query::default()).unwrap().len(), 100);
+}
+
+/// Of several that make a store in one folder one has it, and nothing of it is written over.
+#[test]
+fn one_of_several_makes_a_store() {
+    for _ in 0..20 {
+        let dir = tempfile::tempdir().unwrap();
+        let made = std::thread::scope(|scope| {
+            let make = |i| {
+                let store = LocalStore::create(dir.path(), "", options());
+                store.and_then(|store| store.append(&[draft(i, 10)]))
+            };
+            let all: Vec<_> = (0..4).map(|i| scope.spawn(move || make(i))).collect();
+            all.into_iter().map(|t| t.join().unwrap()).collect::<Vec<_>>()
+        });
+        let won = made.iter().filter(|m| m.is_ok()).count();
+        assert_eq!(won, 1, "{made:?}");
+        let store = LocalStore::open_shared(dir.path()).unwrap();
+        assert_eq!(store.find(&Query::default()).unwrap().len(), 1);
+    }
 }
 
 #[test]

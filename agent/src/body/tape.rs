@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use descry_memory::{Blob, Draft, Form, Query, Record, kind};
+use descry_memory::{Blob, Draft, Error, Form, Query, Record, kind};
 use descry_robots::image::RgbImage;
 use descry_robots::recorded::{Answer, Entry, Known, Pixels, Tape};
 use descry_robots::{Colour, OccupancyGrid, Stamp};
@@ -28,12 +28,20 @@ pub struct RecordTape {
 impl Tape for RecordTape {
     fn keep(&self, entry: &Entry) -> Result<(), String> {
         let body = serde_json::to_value(entry).map_err(|e| e.to_string())?;
-        let kept = self.into.put_document(ANSWER, entry.now_ns, body, Vec::new());
+        let mut draft = Draft { kept: true, ..Draft::new(ANSWER, entry.now_ns) };
+        draft.meta.body = body;
+        let kept = self.into.put(draft);
         kept.map(|_| ()).map_err(|e| e.to_string())
     }
 
     fn pixels(&self, stamp_ns: Stamp) -> Result<Pixels, String> {
-        let document = self.from.nearest(kind::CLOUD, stamp_ns, 0).map_err(|e| e.to_string())?;
+        let document = self.from.nearest(kind::CLOUD, stamp_ns, 0).map_err(|e| match e {
+            Error::NotNear { .. } => format!(
+                "the cloud of {:.3} s is no longer in the record: it was pruned, since nothing rested on it",
+                stamp_ns as f64 * 1e-9
+            ),
+            other => other.to_string(),
+        })?;
         pixels(&self.from, &document)
     }
 }
@@ -76,8 +84,8 @@ pub fn put_known(record: &Record, known: &Known) -> Result<(), CommandError> {
     let body = serde_json::to_value(Known { map: None, ..known.clone() }).map_err(text)?;
     let blob =
         |data: Vec<u8>| Blob { name: MAP.into(), form: Form::Bytes, layout: Value::Null, data: data.into() };
-    let mut draft =
-        Draft { blobs: map.map(blob).into_iter().collect(), ..Draft::new(BODY, known.now_ns.max(0)) };
+    let blobs = map.map(blob).into_iter().collect();
+    let mut draft = Draft { blobs, kept: true, ..Draft::new(BODY, known.now_ns.max(0)) };
     draft.meta.body = body;
     record.put(draft).map(|_| ()).map_err(CommandError::broken)
 }
@@ -99,17 +107,18 @@ pub fn known(record: &Record) -> Result<Option<Known>, CommandError> {
     Ok(Some(known))
 }
 
-/// The answers in a record, in their order; none behind a frame whose pixels did not make it to the disk.
+/// The answers in a record, in their order; not the last, if the pixels of its frame did not make it to the disk.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if they cannot be read.
 pub fn entries(record: &Record) -> Result<Vec<Entry>, CommandError> {
+    let last_ns = record.newest(kind::CLOUD).map_err(CommandError::broken)?.map(|d| d.stamp_ns);
     let mut entries = Vec::new();
     for document in record.find(&record.own(ANSWER)).map_err(CommandError::broken)? {
         let entry: Entry = serde_json::from_value(document.body)
             .map_err(|e| CommandError::broken(format!("record {}: no answer of a body: {e}", document.id)))?;
         if let Some((_, Answer::Sensed(exposure))) = &entry.done
-            && record.nearest(kind::CLOUD, exposure.stamp_ns, 0).is_err()
+            && last_ns.is_none_or(|last_ns| exposure.stamp_ns > last_ns)
         {
             break;
         }

@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     if arguments.json {
         input::print_json(&Report { errors: findings.has_errors(), findings: &findings.list })?;
     } else if findings.is_empty() {
-        eprintln!("no finding");
+        input::narrate(&format!("no finding"));
     } else {
         eprint!("{}", input::drawn(&findings));
     }

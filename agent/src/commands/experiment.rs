@@ -40,15 +40,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     };
     match experiment::run(&source, &options).map_err(failed)? {
         Ended::Part { done, all, folder } => {
-            eprintln!("{done} of {all} jobs are done; this shard's are in {}", folder.display());
+            input::narrate(&format!(
+                "{done} of {all} jobs are done; this shard's are in {}",
+                folder.display()
+            ));
             if arguments.json {
                 input::print_json(&serde_json::json!({ "done": done, "jobs": all, "shard": folder }))?;
             }
             Ok(Exit::Done)
         }
         Ended::Whole(results) => {
-            eprintln!("{}\n{}", results.tables, results.clock);
-            eprintln!("results: {}", options.out.join("index.html").display());
+            input::narrate(&format!("{}\n{}", results.tables, results.clock));
+            input::narrate(&format!("results: {}", options.out.join("index.html").display()));
             if arguments.json {
                 input::print_json(&results.summary)?;
             }

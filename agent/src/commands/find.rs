@@ -17,7 +17,7 @@ use descry_domains::abilities::searching::policies;
 use descry_domains::answer::Verdict;
 
 use crate::report::{Event, Report};
-use crate::run::{self, Settings, Task};
+use crate::run::{self, Beginning, Folder, Settings, Task, programs};
 
 /// Arguments of `descry find`.
 #[derive(clap::Args)]
@@ -62,8 +62,14 @@ pub struct With {
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
     /// Go on with a run that was cut off, from its record: goal and settings are those of that run
-    #[arg(long, value_name = "RUN", conflicts_with_all = ["run", "domain", "scene", "robot", "seed", "policy", "Keeping"])]
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["run", "domain", "scene", "robot", "seed", "policy", "remember", "Keeping"])]
     resume: Option<PathBuf>,
+    /// With --resume: run the programs that the record names to answer calls of its domain
+    #[arg(long, requires = "resume")]
+    allow_programs: bool,
+    /// Begin with what earlier runs saw last, and keep what this one sees: a folder, or mongodb://HOST/DATABASE
+    #[arg(long, value_name = "STORE")]
+    remember: Option<String>,
     #[command(flatten)]
     keeping: Keeping,
     /// Print the result as one JSON object
@@ -83,12 +89,12 @@ fn carry_out(words: &[String], verb: &str, with: &With) -> Result<Exit, CommandE
     let started = Instant::now();
     let said = format!("{verb}{}", words.join(" "));
     let (mut report, folder) = match &with.resume {
-        Some(folder) => (go_on(folder, (!words.is_empty()).then_some(&said))?, folder.clone()),
+        Some(folder) => go_on(folder, (!words.is_empty()).then_some(&said), with.allow_programs)?,
         None => begin(&said, with)?,
     };
     report.wall_s = started.elapsed().as_secs_f64();
-    run::finish(&folder, &report)?;
-    eprintln!("{report}");
+    run::finish(folder.path(), &report)?;
+    input::narrate(&report.to_string());
     if with.json {
         input::print_json(&report)?;
     }
@@ -100,7 +106,7 @@ fn carry_out(words: &[String], verb: &str, with: &With) -> Result<Exit, CommandE
 }
 
 fn tell(event: &Event) {
-    eprintln!("{event}");
+    input::narrate(&event.to_string());
 }
 
 /// A goal in the words of a domain and of the places that a body knows.
@@ -109,25 +115,30 @@ pub(super) fn understood(said: &str, domain: &Domain, robot: &dyn Robot) -> Resu
     goal::read(said, domain, &lexicon).map_err(CommandError::bad_input)
 }
 
-fn begin(said: &str, with: &With) -> Result<(Report, PathBuf), CommandError> {
+fn begin(said: &str, with: &With) -> Result<(Report, Folder), CommandError> {
     let domain = Domain::load(&with.domain).map_err(CommandError::bad_input)?;
     let body = body::open(&with.robot, with.scene.as_deref(), with.seed, &domain)?;
     let goal = understood(said, &domain, &*body.robot)?;
     let chooser = policies::named(&with.policy, with.seed, None).map_err(CommandError::bad_input)?;
-    let folder = run::folder(with.run.as_deref(), &goal)?;
+    let folder = Folder::of_new_run(with.run.as_deref(), &goal)?;
     let settings = Settings {
         robot: with.robot.clone(),
         scene: with.scene.clone(),
         seed: with.seed,
         domain: with.domain.clone(),
         policy: with.policy.clone(),
-        keeping: with.keeping.of_new_run(&folder)?,
+        keeping: with.keeping.of_new_run(folder.path())?,
+        remember: with.remember.clone(),
     };
     let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, &mut tell)?;
     Ok((report, folder))
 }
 
-fn go_on(folder: &Path, said: Option<&String>) -> Result<Report, CommandError> {
+fn go_on(
+    folder: &Path,
+    said: Option<&String>,
+    allow_programs: bool,
+) -> Result<(Report, Folder), CommandError> {
     let header = run::header(folder)?;
     if let Some(said) = said.filter(|said| **said != header.goal) {
         let text = format!(
@@ -137,11 +148,24 @@ fn go_on(folder: &Path, said: Option<&String>) -> Result<Report, CommandError> {
         );
         return Err(CommandError::BadInput(text));
     }
+    let claimed = Folder::locked(folder)?;
+    let record = header.settings.keeping.resume(folder)?;
+    let beginning = Beginning::of(&record)?;
+    // A run that was cut off before it had recorded anything begins now.
+    let domain = match &beginning {
+        Some(beginning) => beginning.domain()?,
+        None => Domain::load(&header.settings.domain).map_err(CommandError::bad_input)?,
+    };
+    programs::check_allowed(&domain, &folder.display().to_string(), allow_programs)?;
     let settings = &header.settings;
-    let domain = Domain::load(&settings.domain).map_err(CommandError::bad_input)?;
     let body = body::open(&settings.robot, settings.scene.as_deref(), settings.seed, &domain)?;
     let goal = understood(&header.goal, &domain, &*body.robot)?;
     let chooser = policies::named(&settings.policy, settings.seed, None).map_err(CommandError::bad_input)?;
-    let task = Task { domain: &domain, goal: &goal };
-    run::go_on(task, &body, folder, &settings.keeping, chooser, &mut tell)
+    if beginning.is_none() {
+        Beginning::new(header.clone(), &domain, body.scene.clone()).put(&record, body.robot.now_ns())?;
+    }
+    let past = beginning.as_ref().and_then(|b| b.past.as_ref());
+    let task = Task { domain: &domain, goal: &goal, past };
+    let report = run::go_on(task, &body, &claimed, record, settings, chooser, &mut tell)?;
+    Ok((report, claimed))
 }

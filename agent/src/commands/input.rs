@@ -1,22 +1,26 @@
 //! What several commands read and print in the same way.
 
-use std::io::{IsTerminal, Write};
+use std::io::{IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use descry_domains::config::Program;
 use descry_domains::program::ProgramAttachment;
+use descry_memory::Fault;
 use descry_planner::{Attachment, Attachments, Findings, Source};
 use serde::Serialize;
 
-use crate::exit::CommandError;
+use crate::exit::{CommandError, Exit};
+
+/// No text that people write is longer.
+const MOST_TEXT_BYTES: u64 = 256 << 20;
 
 /// Reads a text file.
 pub fn source(path: &Path) -> Result<Source, CommandError> {
     let name = path.display().to_string();
-    let bytes = std::fs::read(path)
-        .map_err(|e| CommandError::BadInput(format!("{name}: {e}\n  a PDDL file was expected")))?;
+    let expected = |e: CommandError| CommandError::BadInput(format!("{e}\n  a PDDL file was expected"));
+    let bytes = read(path, MOST_TEXT_BYTES).map_err(expected)?;
     let text = String::from_utf8(bytes).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
         CommandError::BadInput(format!("{name}: byte {at} is not UTF-8 text\n  a PDDL file was expected"))
@@ -26,7 +30,7 @@ pub fn source(path: &Path) -> Result<Source, CommandError> {
 
 /// Findings as people read them: drawn under the text, in colour on a terminal.
 pub fn drawn(findings: &Findings) -> String {
-    findings.render(std::io::stderr().is_terminal())
+    findings.render(is_coloured())
 }
 
 /// Prints one JSON object on standard output. A reader that has gone away is no fault.
@@ -43,6 +47,44 @@ pub fn print_text(text: &str) -> Result<(), CommandError> {
         }
         _ => Ok(()),
     }
+}
+
+/// Tells people what happens, on standard error; that nobody hears it is no fault.
+pub fn narrate(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// Says what of a record is lost; returns how a command ends that showed the rest.
+pub fn lost(faults: &[Fault]) -> Exit {
+    faults.iter().for_each(|fault| narrate(&format!("descry: lost: {fault}")));
+    if faults.is_empty() { Exit::Done } else { Exit::No }
+}
+
+/// Whether standard error shows colours: a terminal, and nobody said [`NO_COLOR`](https://no-color.org).
+pub fn is_coloured() -> bool {
+    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty())
+}
+
+/// So much is read of what does not say how long it is: a pipe or a device.
+const MOST_STREAM_BYTES: u64 = 256 << 20;
+
+/// Reads a file of at most so many bytes; more, or an end that does not come, is an error.
+pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, CommandError> {
+    let name = path.display();
+    let refused = |e: std::io::Error| CommandError::BadInput(format!("{name}: {e}"));
+    let file = std::fs::File::open(path).map_err(refused)?;
+    let metadata = file.metadata().map_err(refused)?;
+    let most = if metadata.is_file() { most } else { most.min(MOST_STREAM_BYTES) };
+    let too_much = || {
+        let text = format!("{name}: it has more than {} MB\n  expected a smaller file", most / 1_000_000);
+        CommandError::BadInput(text)
+    };
+    if metadata.len() > most {
+        return Err(too_much());
+    }
+    let mut bytes = Vec::new();
+    file.take(most + 1).read_to_end(&mut bytes).map_err(refused)?;
+    if bytes.len() as u64 > most { Err(too_much()) } else { Ok(bytes) }
 }
 
 /// Where the programs behind a domain's attachments are named.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use descry_memory::{Document, Near, Order, Query, Record};
+use descry_memory::{Document, Fault, Near, Order, Query, Record};
 use serde_json::json;
 
 use crate::commands::input;
@@ -113,18 +113,20 @@ fn open(place: &Place) -> Result<Record, CommandError> {
 }
 
 fn show(place: &Place) -> Result<Exit, CommandError> {
-    let stats = open(place)?.stats().map_err(CommandError::broken)?;
+    let record = open(place)?;
+    let stats = record.stats().map_err(CommandError::broken)?;
+    let lost = &record.recovery().faults;
     let runs = match place.record.to_str().filter(|_| keeping::is_address(&place.record)) {
         Some(address) => keeping::Address::read(address)?.runs()?,
         None => Vec::new(),
     };
     if place.json {
-        let mut shown = json!({ "record": place.record.display().to_string(), "stats": stats });
+        let mut shown = json!({ "record": place.record.display().to_string(), "stats": stats, "lost": lost });
         if !runs.is_empty() {
             shown["runs"] = json!(runs);
         }
         input::print_json(&shown)?;
-        return Ok(Exit::Done);
+        return Ok(input::lost(lost));
     }
     let time = |ns: Option<i64>| ns.map_or("-".into(), |ns| format!("{:.3} s", seconds(ns)));
     input::print_text(&format!(
@@ -141,29 +143,37 @@ fn show(place: &Place) -> Result<Exit, CommandError> {
     if !runs.is_empty() {
         input::print_text(&format!("runs: {}", runs.join(", ")))?;
     }
-    Ok(Exit::Done)
+    Ok(input::lost(lost))
 }
 
 fn query(arguments: &QueryArguments) -> Result<Exit, CommandError> {
     let record = open(&arguments.place)?;
     let query = arguments.filter.query();
-    let found = match arguments.nearest {
-        None => record.find(&query).map_err(CommandError::broken)?,
+    let (found, faults) = match arguments.nearest {
+        None => record.find_whole(&query).map_err(CommandError::broken)?,
         Some(s) => match record.nearest_of(&query, nanoseconds(s), nanoseconds(arguments.tolerance)) {
-            Ok(document) => vec![document],
+            Ok(document) => record.find_whole(&exactly(query, &document)).map_err(CommandError::broken)?,
             Err(e @ descry_memory::Error::NotNear { .. }) => {
-                eprintln!("descry: {e}");
-                Vec::new()
+                input::narrate(&format!("descry: {e}"));
+                (Vec::new(), Vec::new())
             }
             Err(e) => return Err(CommandError::broken(e)),
         },
     };
+    let lost: Vec<Fault> = record.recovery().faults.iter().cloned().chain(faults).collect();
     if arguments.place.json {
-        input::print_json(&json!({ "records": found }))?;
+        input::print_json(&json!({ "records": found, "lost": lost }))?;
     } else {
         found.iter().try_for_each(|document| input::print_text(&line(document)))?;
     }
-    Ok(if found.is_empty() { Exit::No } else { Exit::Done })
+    let exit = input::lost(&lost);
+    Ok(if found.is_empty() { Exit::No } else { exit })
+}
+
+/// A query that finds one record of those that another finds.
+fn exactly(query: Query, document: &Document) -> Query {
+    let before = descry_memory::RecordId(document.id.0.saturating_sub(1));
+    Query { after: Some((document.stamp_ns, before)), order: Order::Oldest, limit: Some(1), ..query }
 }
 
 fn verify(place: &Place) -> Result<Exit, CommandError> {
@@ -194,9 +204,11 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, CommandError> 
         )));
     }
     let exported = record.export(&arguments.filter.query(), &arguments.file).map_err(CommandError::broken)?;
+    let lost: Vec<Fault> = record.recovery().faults.iter().chain(&exported.faults).cloned().collect();
     if arguments.place.json {
         let file = arguments.file.display().to_string();
-        input::print_json(&json!({ "file": file, "records": exported.records, "bytes": exported.bytes }))?;
+        let (records, bytes) = (exported.records, exported.bytes);
+        input::print_json(&json!({ "file": file, "records": records, "bytes": bytes, "lost": lost }))?;
     } else {
         let megabytes = exported.bytes as f64 / 1e6;
         input::print_text(&format!(
@@ -205,7 +217,7 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, CommandError> 
             exported.records
         ))?;
     }
-    Ok(Exit::Done)
+    Ok(input::lost(&lost))
 }
 
 impl Filter {

@@ -15,7 +15,7 @@ mod validate;
 
 use clap::Subcommand;
 
-pub use input::drawn;
+pub use input::{drawn, is_coloured, narrate};
 
 use crate::exit::{CommandError, Exit};
 

@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
             unwritten = write_plan(path, plan);
         }
         if arguments.anytime && !arguments.json {
-            eprintln!("{:8.2} s: {}", started.elapsed().as_secs_f64(), summary(plan));
+            input::narrate(&format!("{:8.2} s: {}", started.elapsed().as_secs_f64(), summary(plan)));
         }
     };
     let outcome = descry_planner::plan(&task, &attachments, &options, &stop, &mut on_plan).map_err(failed)?;
@@ -135,27 +135,29 @@ fn show(
     );
     match (outcome, outcome.plan()) {
         (Outcome::Unsolvable { why, .. }, _) => {
-            eprintln!("proven unsolvable ({time})\n{}", input::drawn(&why.findings));
+            input::narrate(&format!("proven unsolvable ({time})\n{}", input::drawn(&why.findings)));
         }
         (_, Some(plan)) => {
             if !written {
                 input::print_text(plan.to_string().trim_end())?;
             }
-            eprintln!("{} ({time})", summary(plan));
+            input::narrate(&format!("{} ({time})", summary(plan)));
         }
-        _ if matches!(status, Status::OutOfMemory) => eprintln!("out of memory, no plan yet ({time})"),
-        _ if cut_short => eprintln!("out of time, no plan yet ({time})"),
-        _ => eprintln!(
+        _ if matches!(status, Status::OutOfMemory) => {
+            input::narrate(&format!("out of memory, no plan yet ({time})"))
+        }
+        _ if cut_short => input::narrate(&format!("out of time, no plan yet ({time})")),
+        _ => input::narrate(&format!(
             "no plan was found, and none is ruled out: the search has left possibilities out ({time})"
-        ),
+        )),
     }
     for (name, calls) in &outcome.statistics().attachments {
-        eprintln!(
+        input::narrate(&format!(
             "  [{name}] {} calls, {} from the cache, {:.3} s",
             calls.calls + calls.relaxed,
             calls.hits,
             calls.time_s
-        );
+        ));
     }
     Ok(())
 }

@@ -31,6 +31,9 @@ pub struct Arguments {
     json: bool,
 }
 
+/// A larger cloud than any sensor gives at once: some fifty million points.
+const MOST_CLOUD_BYTES: u64 = 1 << 30;
+
 /// What a cloud holds.
 struct Seen {
     path: String,
@@ -64,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
 
 fn look(path: &Path, recogniser: &dyn Recogniser, objects: &[ObjectModel]) -> Result<Seen, CommandError> {
     let shown = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|e| CommandError::BadInput(format!("{shown}: {e}")))?;
+    let bytes = input::read(path, MOST_CLOUD_BYTES)?;
     let loaded = read_cloud(&bytes).map_err(|e| CommandError::BadInput(format!("{shown}, {e}")))?;
     let cloud = loaded.cloud;
     let points = cloud.points.len();

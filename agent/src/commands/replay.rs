@@ -1,10 +1,10 @@
 //! `descry replay RUN`: lives through a run again from its record, and says whether it comes out the same.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use descry_domains::load::Domain;
-use descry_memory::{Document, Durability, Options, Query, Record};
+use descry_memory::{Document, Durability, Fault, Options, Query, Record};
 use descry_robots::recorded::TapedRobot;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -12,9 +12,9 @@ use serde_json::{Value, json};
 use crate::body::tape::{self, RecordTape};
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
-use crate::keeping;
+use crate::keeping::{self, Keeping, RECORD};
 use crate::report::{Event, Report};
-use crate::run::{self, Task};
+use crate::run::{self, Beginning, Task, programs};
 use descry_domains::abilities::searching::policies;
 
 /// Arguments of `descry replay`.
@@ -39,9 +39,11 @@ const COMPARED: [&str; 5] = ["percepts", "belief", "problem", "skill", "event"];
 const OWN: [&str; 5] = ["wall_s", "run", "true_position_m", "true_on", "true_in"];
 
 /// The outcome of a replay.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct Replayed {
     run: String,
+    /// What is not as it was written. Of such a record nothing is played.
+    damage: Vec<Fault>,
     /// Whether everything that was recorded came about again.
     same: bool,
     /// Documents that are the same, by kind.
@@ -54,37 +56,57 @@ struct Replayed {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
-    let header = run::header(&arguments.run)?;
-    let scratch = Scratch::new(arguments.out.as_deref())?;
+    run::header(&arguments.run)?;
     let source = Arc::new(keeping::open(&arguments.run)?);
+    let damage = source.verify().map_err(CommandError::broken)?.faults;
+    let replayed = match damage.is_empty() {
+        true => replay(arguments, &source)?,
+        false => Replayed { damage, ..Replayed::default() },
+    };
+    let replayed = Replayed { run: arguments.run.display().to_string(), ..replayed };
+    say(&replayed, arguments.json)?;
+    Ok(if replayed.same { Exit::Done } else { Exit::No })
+}
+
+/// Lives through a run whose record is whole.
+fn replay(arguments: &Arguments, source: &Arc<Record>) -> Result<Replayed, CommandError> {
+    let Some(beginning) = Beginning::of(source)? else {
+        let text = format!(
+            "{}: the record does not say what the run began with\n  it is empty, or of an older version",
+            arguments.run.display()
+        );
+        return Err(CommandError::BadInput(text));
+    };
+    let header = &beginning.header;
+    let scratch = Scratch::new(arguments.out.as_deref())?;
     let options = Options { durability: Durability::Process, ..Options::default() };
-    let record = Record::create(&scratch.folder.join("record"), options).map_err(CommandError::broken)?;
+    let record = Record::create(&scratch.folder.join(RECORD), options).map_err(CommandError::broken)?;
     let record = Arc::new(record);
-    let robot = Arc::new(robot(&source, &record, arguments)?);
-    let domain = Domain::load(&header.settings.domain).map_err(CommandError::bad_input)?;
-    let goal = super::find::understood(&header.goal, &domain, &*robot)?;
+    let robot = Arc::new(robot(source, &record, arguments)?);
+    beginning.put(&record, robot.known().now_ns)?;
+    let kept = programs::on_record(&beginning.domain()?, &record, Some(source), &robot, false)?;
+    let goal = super::find::understood(&header.goal, &kept.domain, &*robot)?;
     let chooser = policies::named(&header.settings.policy, header.settings.seed, None);
     let chooser = chooser.map_err(CommandError::bad_input)?;
-    let mut tell = |event: &Event| eprintln!("{event}");
-    let task = Task { domain: &domain, goal: &goal };
+    let mut tell = |event: &Event| input::narrate(&event.to_string());
+    let task = Task { domain: &kept.domain, goal: &goal, past: beginning.past.as_ref() };
     let lived = run::live_through(task, &robot, &record, chooser, &scratch.folder, &mut tell);
-    let report = match (lived, robot.ended()) {
+    let ended = robot.ended().or_else(|| kept.ended());
+    let report = match (lived, &ended) {
         (_, Some(_)) => None,
-        (Ok(report), None) => Some(report),
+        (Ok((report, _)), None) => Some(report),
         (Err(e), None) => return Err(e),
     };
-    let recorded = run::report(&arguments.run);
-    let mut replayed = compare(&source, &record, robot.ended())?;
-    replayed.run = arguments.run.display().to_string();
+    let recorded = run::report(&arguments.run)?;
+    let mut replayed = compare(source, &record, ended, &header.settings.keeping)?;
     replayed.verdict = report.as_ref().map(|r| json!(r.verdict));
     replayed.differences.extend(compare_reports(recorded.as_ref(), report.as_ref()));
     replayed.same = replayed.differences.is_empty();
     if let (Some(report), true) = (&report, arguments.out.is_some()) {
-        run::keep_header(&scratch.folder, &header)?;
+        run::keep_header(&scratch.folder, header)?;
         run::finish(&scratch.folder, report)?;
     }
-    say(&replayed, arguments.json)?;
-    Ok(if replayed.same { Exit::Done } else { Exit::No })
+    Ok(replayed)
 }
 
 /// The body of the run, as its record has it.
@@ -105,16 +127,14 @@ fn robot(
     Ok(TapedRobot::replay(known, tape, entries, arguments.speed))
 }
 
-/// Holds what came about again against what was recorded: all of it, or up to where the record ends.
-fn compare(source: &Record, again: &Record, ended: Option<String>) -> Result<Replayed, CommandError> {
-    let mut replayed = Replayed {
-        run: String::new(),
-        same: false,
-        compared: Vec::new(),
-        verdict: None,
-        cut_off: ended,
-        differences: Vec::new(),
-    };
+/// Holds what came about again against what was recorded: all of it, what of it was kept, or up to where the record ends.
+fn compare(
+    source: &Record,
+    again: &Record,
+    ended: Option<String>,
+    keeping: &Keeping,
+) -> Result<Replayed, CommandError> {
+    let mut replayed = Replayed { cut_off: ended, ..Replayed::default() };
     let cut = match replayed.cut_off {
         Some(_) => again.newest(tape::ANSWER).map_err(CommandError::broken)?.map(|d| d.id),
         None => None,
@@ -123,6 +143,11 @@ fn compare(source: &Record, again: &Record, ended: Option<String>) -> Result<Rep
         let recorded = source.find(&source.own(kind)).map_err(CommandError::broken)?;
         let mut found = again.find(&Query::of_kind(kind)).map_err(CommandError::broken)?;
         found.retain(|d| cut.is_none_or(|cut| d.id < cut));
+        if keeping.prunes() {
+            // What was pruned is not there to be compared.
+            let kept: BTreeSet<i64> = recorded.iter().map(|d| d.stamp_ns).collect();
+            found.retain(|d| kept.contains(&d.stamp_ns));
+        }
         let text = |d: &Document| format!("{} {}", d.stamp_ns, d.body);
         let pairs = recorded.iter().zip(&found);
         let same = pairs.take_while(|(a, b)| text(a) == text(b)).count();
@@ -166,6 +191,10 @@ fn compare_reports(recorded: Option<&Report>, found: Option<&Report>) -> Vec<Str
 fn say(replayed: &Replayed, json: bool) -> Result<(), CommandError> {
     if json {
         return input::print_json(replayed);
+    }
+    if !replayed.damage.is_empty() {
+        input::print_text("the record is damaged, and nothing of it is played")?;
+        return replayed.damage.iter().try_for_each(|fault| input::print_text(&format!("damaged: {fault}")));
     }
     let counts: Vec<String> = replayed.compared.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
     if let Some(why) = &replayed.cut_off {

@@ -1,12 +1,13 @@
 //! `descry runs`: the runs in a folder, one a line.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
-use crate::keeping;
+use crate::keeping::{self, RECORD};
+use crate::run;
 
 /// Arguments of `descry runs`.
 #[derive(clap::Args)]
@@ -28,8 +29,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     for run in &runs {
         let text = |key: &str| run[key].as_str().unwrap_or("?").to_string();
         let views = run["views"].as_u64().map_or(String::new(), |n| format!("{n} views"));
+        let started = run["started_unix_s"].as_u64().map_or("?".into(), date);
         input::print_text(&format!(
-            "{:40} {:12} {:9} {}",
+            "{:16}  {:40} {:12} {:9} {}",
+            started,
             text("run"),
             text("verdict"),
             views,
@@ -37,7 +40,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         ))?;
     }
     if runs.is_empty() {
-        eprintln!("{}: no run yet; `descry find \"cup A\"` makes one", arguments.folder.display());
+        input::narrate(&format!(
+            "{}: no run yet; `descry find \"cup A\"` makes one",
+            arguments.folder.display()
+        ));
     }
     Ok(Exit::Done)
 }
@@ -56,20 +62,59 @@ fn list(arguments: &Arguments) -> Result<Vec<Value>, CommandError> {
     }
     let entries = std::fs::read_dir(folder)
         .map_err(|e| CommandError::BadInput(format!("{}: {e}", folder.display())))?;
-    let mut paths: Vec<PathBuf> =
-        entries.flatten().map(|e| e.path()).filter(|p| p.join("run.json").exists()).collect();
+    let is_run = |path: &PathBuf| ["run.json", RECORD].iter().any(|name| path.join(name).exists());
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(is_run).collect();
     paths.sort();
-    let describe = |path: &PathBuf| {
-        let read = |name: &str| -> Option<Value> {
-            serde_json::from_str(&std::fs::read_to_string(path.join(name)).ok()?).ok()
-        };
-        let header = read("run.json").unwrap_or(Value::Null);
-        let report = read("report.json").unwrap_or(Value::Null);
-        let verdict = report["verdict"].as_str().unwrap_or("unfinished");
-        json!({
-            "run": path.display().to_string(), "goal": header["goal"], "started_unix_s": header["started_unix_s"],
-            "verdict": verdict, "views": report["views"], "confidence": report["confidence"],
-        })
+    Ok(paths.iter().map(|path| describe(path)).collect())
+}
+
+/// A run, as far as its folder tells.
+fn describe(path: &Path) -> Value {
+    let header = run::header(path).ok();
+    let (report, otherwise) = match run::report(path) {
+        Ok(report) => (report, "unfinished"),
+        Err(_) => (None, "damaged"),
     };
-    Ok(paths.iter().map(describe).collect())
+    json!({
+        "run": path.display().to_string(),
+        "goal": header.as_ref().map(|h| &h.goal),
+        "started_unix_s": header.as_ref().map(|h| h.started_unix_s),
+        "verdict": report.as_ref().map_or(json!(otherwise), |r| json!(r.verdict)),
+        "views": report.as_ref().map(|r| r.views),
+        "confidence": report.as_ref().map(|r| r.confidence),
+    })
+}
+
+/// Day and time in UTC, to the minute.
+fn date(unix_s: u64) -> String {
+    // Days are counted from the first of March of the year 0, so that a leap day ends a year and 400 years are one era of 146097
+    // days (Richards, Explanatory Supplement to the Astronomical Almanac, 15.11.3).
+    let days = unix_s / 86_400 + 719_468;
+    let (era, of_era) = (days / 146_097, days % 146_097);
+    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year + year / 4 - year / 100);
+    let from_march = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * from_march + 2) / 5 + 1;
+    let (month, later) = if from_march < 10 { (from_march + 3, 0) } else { (from_march - 9, 1) };
+    let (hour, minute) = (unix_s / 3600 % 24, unix_s / 60 % 60);
+    format!("{:04}-{month:02}-{day:02} {hour:02}:{minute:02}", era * 400 + year + later)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        let cases = [
+            (0, "1970-01-01 00:00"),
+            (951_782_399, "2000-02-28 23:59"),
+            (951_825_600, "2000-02-29 12:00"),
+            (1_709_251_140, "2024-02-29 23:59"),
+            (1_709_251_200, "2024-03-01 00:00"),
+            (1_735_689_599, "2024-12-31 23:59"),
+            (4_107_542_400, "2100-03-01 00:00"),
+        ];
+        for (unix_s, text) in cases {
+            assert_eq!(super::date(unix_s), text);
+        }
+    }
 }

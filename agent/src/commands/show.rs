@@ -22,25 +22,34 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let folder = &arguments.run;
     crate::run::header(folder)?;
     let record = crate::keeping::open(folder)?;
-    let events = crate::run::events(&record)?;
-    let report = crate::run::report(folder);
+    let (events, mut lost) = crate::run::events(&record)?;
+    lost.splice(0..0, record.recovery().faults.iter().cloned());
+    let (report, damaged) = match crate::run::report(folder) {
+        Ok(report) => (report, None),
+        Err(e) => (None, Some(e)),
+    };
     if arguments.json {
-        input::print_json(
-            &json!({ "run": folder.display().to_string(), "events": events, "report": report }),
-        )?;
-        return Ok(Exit::Done);
-    }
-    for event in &events {
-        match serde_json::from_value::<Event>(event.clone()) {
-            Ok(event) => input::print_text(&event.to_string())?,
-            Err(_) => input::print_text(&compact(event))?,
+        input::print_json(&json!({
+            "run": folder.display().to_string(), "events": events, "report": report, "lost": lost,
+        }))?;
+    } else {
+        for event in &events {
+            match serde_json::from_value::<Event>(event.clone()) {
+                Ok(event) => input::print_text(&event.to_string())?,
+                Err(_) => input::print_text(&compact(event))?,
+            }
+        }
+        match (report, &damaged) {
+            (Some(report), _) => input::print_text(&report.to_string())?,
+            (None, None) => input::print_text("\nthe run has not finished")?,
+            (None, Some(_)) => (),
         }
     }
-    match report {
-        Some(report) => input::print_text(&report.to_string())?,
-        None => input::print_text("\nthe run has not finished")?,
+    if let Some(damaged) = &damaged {
+        input::narrate(&format!("descry: lost: {damaged}"));
     }
-    Ok(Exit::Done)
+    let exit = input::lost(&lost);
+    Ok(if damaged.is_some() { Exit::No } else { exit })
 }
 
 /// An event of another version, as it stands in the record.

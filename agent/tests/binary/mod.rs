@@ -1,8 +1,11 @@
 //! The binary as a script runs it.
 
+// Each test uses some of it.
+#![allow(dead_code)]
+
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value;
 
@@ -12,18 +15,34 @@ fn command(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
+/// Runs descry.
+pub fn outcome(folder: &Path, arguments: &[&str]) -> Output {
+    command(folder, arguments).output().expect("the binary runs")
+}
+
 /// Runs descry and returns what it printed as JSON.
 pub fn check(folder: &Path, arguments: &[&str], exit: i32) -> Value {
-    let output: Output = command(folder, arguments).output().expect("the binary runs");
+    let output = outcome(folder, arguments);
     let err = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(exit), "{arguments:?}\n{err}");
     serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{arguments:?}: {e}\n{err}"))
 }
 
+/// Starts descry; what it says on standard error can be heard.
+pub fn start(folder: &Path, arguments: &[&str]) -> Child {
+    command(folder, arguments).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it starts")
+}
+
+/// The first line that it says.
+pub fn first_line(child: &mut Child) -> String {
+    let mut line = String::new();
+    BufReader::new(child.stderr.as_mut().expect("it speaks")).read_line(&mut line).expect("it is text");
+    line
+}
+
 /// Kills a run after it has said so many lines.
 pub fn kill_after(folder: &Path, arguments: &[&str], lines: usize) {
-    let mut child =
-        command(folder, arguments).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it starts");
+    let mut child = start(folder, arguments);
     let said = BufReader::new(child.stderr.take().expect("it speaks"));
     let heard = said.lines().take(lines).filter_map(Result::ok).count();
     assert_eq!(heard, lines, "{arguments:?} ended by itself");
@@ -33,10 +52,19 @@ pub fn kill_after(folder: &Path, arguments: &[&str], lines: usize) {
 
 /// Runs descry where it cannot do what it is asked, and expects an exit code and words.
 pub fn check_refused(folder: &Path, arguments: &[&str], exit: i32, words: &[&str]) {
-    let output = command(folder, arguments).output().expect("the binary runs");
+    let output = outcome(folder, arguments);
     let err = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(exit), "{arguments:?}\n{err}");
     for word in words {
         assert!(err.contains(word), "{arguments:?} does not say {word:?}: {err}");
     }
+}
+
+/// Runs descry where nobody reads its standard output, or its standard error; returns its exit code.
+pub fn without_readers(folder: &Path, arguments: &[&str], out: bool, err: bool) -> Option<i32> {
+    let pipe = |closed: bool| if closed { Stdio::piped() } else { Stdio::null() };
+    let mut child =
+        command(folder, arguments).stdout(pipe(out)).stderr(pipe(err)).spawn().expect("it starts");
+    drop((child.stdout.take(), child.stderr.take()));
+    child.wait().expect("it ends").code()
 }

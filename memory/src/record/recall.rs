@@ -133,7 +133,8 @@ impl Record {
         Ok(around)
     }
 
-    /// These records, and for clouds among them the transforms up to their time: what it takes to place them again.
+    /// These records, and for clouds among them the transforms up to their time and the images of their moment: what it takes to
+    /// place and to colour them again.
     pub(super) fn with_their_place(&self, ids: &[RecordId]) -> Result<Vec<RecordId>, Error> {
         let mut all = ids.to_vec();
         for id in ids {
@@ -147,9 +148,15 @@ impl Record {
                 to_ns: Some(document.stamp_ns),
                 ..of(kind::TRANSFORMS)
             };
-            let placing =
-                self.store.find(&near)?.into_iter().chain(self.store.find(&of(kind::STATIC_TRANSFORM))?);
-            all.extend(placing.map(|d| d.id));
+            let beside = Query {
+                frame: Some(document.frame.clone()),
+                from_ns: Some(document.stamp_ns),
+                to_ns: Some(document.stamp_ns),
+                ..of(kind::IMAGE)
+            };
+            for query in [near, of(kind::STATIC_TRANSFORM), beside] {
+                all.extend(self.store.find(&query)?.iter().map(|d| d.id));
+            }
         }
         all.sort_unstable();
         all.dedup();

@@ -1,10 +1,12 @@
 //! The store on this machine's disk: segments that any MCAP reader opens, and an index beside them.
 //!
-//! A folder holds `segments/NNNNNNNN.mcap`, `index.sqlite` and `lock`. A batch of records is one chunk of a segment,
-//! and what the index says follows from the segments: opening reads on from where the index ends, so that a crash costs
-//! what was not acknowledged and nothing else.
+//! A folder holds `segments/NNNNNNNN.mcap`, `index.sqlite`, `closed.json` while nobody writes, and two locks. A batch of records
+//! is one chunk of a segment, and what the index says follows from the segments: after a crash it is made again from them, so
+//! that a crash costs what was not acknowledged and nothing else. Every byte that is read is held against its checksum.
 
+mod closed;
 mod index;
+mod lock;
 pub(crate) mod pins;
 mod prune;
 mod recover;
@@ -14,11 +16,14 @@ mod verify;
 
 use crate::document::{Document, Draft, Query, RecordId};
 use crate::error::Error;
-use crate::stores::{Report, Retention, Stats, Store, no_blob};
+use crate::stores::{Fault, Pages, Report, Retention, Stats, Store, Take, no_blob};
+use closed::Closed;
 use index::{INDEX, Index, Place};
-use segment::{Encoded, Segment};
+use lock::Writing;
+use recover::Opened;
+use segment::{Encoded, Segment, Spot};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -64,8 +69,10 @@ pub struct Recovery {
     pub dropped_bytes: u64,
     /// Records that the index knew and that never reached the disk: a power cut under [`Durability::Process`].
     pub lost: u64,
-    /// Whether the index had to be made again.
+    /// Whether the index was damaged, and made again from the segments.
     pub index_rebuilt: bool,
+    /// What is missing, cut or damaged. Whoever writes is not given such a store.
+    pub faults: Vec<Fault>,
 }
 
 /// What only the process that writes has.
@@ -80,7 +87,7 @@ struct WriteState {
     newest_ns: i64,
     /// What was written since the last sync.
     unsynced: bool,
-    _lock: File,
+    _writing: Writing,
 }
 
 /// A store in a folder.
@@ -103,73 +110,65 @@ impl LocalStore {
     /// # Errors
     /// [`Error::Exists`], or what the system refuses.
     pub fn create(dir: &Path, robot: &str, options: LocalOptions) -> Result<Self, Error> {
-        if dir.join(INDEX).exists() || segment_dir(dir).exists() {
+        let exists = || dir.join(INDEX).exists() || segment_dir(dir).exists();
+        if exists() {
             return Err(Error::Exists { place: dir.to_owned() });
         }
-        Self::open_or_create(dir, robot, options)
+        fs::create_dir_all(dir).map_err(|e| Error::file("cannot create", dir, e))?;
+        let writing = lock::lock(dir)?;
+        // Another may have been quicker.
+        if exists() {
+            return Err(Error::Exists { place: dir.to_owned() });
+        }
+        fs::create_dir(segment_dir(dir)).map_err(|e| Error::file("cannot create", dir, e))?;
+        Self::to_write(dir, robot, options, writing)
     }
 
     /// Opens a store (its folder, or that of the run that holds it as `record`) and mends what a crash has left.
     ///
     /// # Errors
-    /// [`Error::NoRecord`], [`Error::InUse`], or what the system refuses.
+    /// [`Error::NoRecord`], [`Error::InUse`], [`Error::Faulty`] if something of it is lost, or what the system refuses.
     pub fn open(dir: &Path, robot: &str, options: LocalOptions) -> Result<Self, Error> {
-        Self::open_or_create(&folder(dir)?, robot, options)
+        let dir = &folder(dir)?;
+        Self::to_write(dir, robot, options, lock::lock(dir)?)
     }
 
-    /// Opens a store for reading, while another process may be writing it. If none does, a crash is mended first.
+    /// Opens a store for reading, whether or not a process is writing it. Nothing in the folder is changed or locked; what is
+    /// damaged is told by [`LocalStore::recovery`].
     ///
     /// # Errors
     /// [`Error::NoRecord`], or what the system refuses.
     pub fn open_shared(dir: &Path) -> Result<Self, Error> {
-        let dir = &folder(dir)?;
-        let mended = match Self::open_or_create(dir, "", LocalOptions::default()) {
-            Ok(store) => store.recovery.clone(),
-            Err(Error::InUse { .. }) => Recovery::default(),
-            // A folder that may not be written has nobody writing it: what its index says is what there is.
-            Err(Error::File { because, .. }) if is_refusal(&because) => Recovery::default(),
-            // On a full disk nothing can be mended, and what was acknowledged is there all the same.
-            Err(e) if e.is_full() => Recovery::default(),
-            Err(e) => return Err(e),
-        };
+        let dir = folder(dir)?;
+        let Opened { index, recovery, .. } = recover::for_reading(&dir)?;
         Ok(LocalStore {
-            index: Mutex::new(Index::open_shared(dir)?),
-            dir: dir.to_owned(),
+            index: Mutex::new(index),
+            dir,
             robot: String::new(),
             options: LocalOptions::default(),
-            recovery: mended,
+            recovery,
             writer: None,
             files: Mutex::default(),
         })
     }
 
-    fn open_or_create(dir: &Path, robot: &str, mut options: LocalOptions) -> Result<Self, Error> {
+    fn to_write(dir: &Path, robot: &str, mut options: LocalOptions, writing: Writing) -> Result<Self, Error> {
+        let mut log_bytes = u64::MAX;
         if let Some(bound) = options.retention.max_bytes {
             options.segment_bytes = options.segment_bytes.min(bound / 16).max(64 << 10);
+            log_bytes = bound / 64;
         }
-        fs::create_dir_all(segment_dir(dir)).map_err(|e| Error::file("cannot create", dir, e))?;
-        let lock = lock(dir)?;
-        let mut recovery = Recovery::default();
-        let log_bytes = options.retention.max_bytes.map_or(u64::MAX, |bound| bound / 64);
-        let mut index = match Index::open(dir, log_bytes) {
-            Err(e) if index::is_broken(&e) => {
-                recover::set_aside(dir)?;
-                recovery.index_rebuilt = true;
-                Index::open(dir, log_bytes)?
-            }
-            opened => opened?,
-        };
-        let (sealed_bytes, next_segment) = recover::recover(dir, &mut index, &mut recovery)?;
+        let Opened { index, segments, next_segment, recovery } = recover::for_writing(dir, log_bytes)?;
         let segment = new_segment(dir, next_segment)?;
         let writer = WriteState {
             segment,
             kept: None,
             next_id: index.next_id()?,
             next_segment: next_segment + 1,
-            sealed_bytes,
+            sealed_bytes: segments.values().sum(),
             newest_ns: index.stats()?.newest_ns.unwrap_or(i64::MIN),
             unsynced: false,
-            _lock: lock,
+            _writing: writing,
         };
         Ok(LocalStore {
             dir: dir.to_owned(),
@@ -240,15 +239,30 @@ impl LocalStore {
         self.index().seal(number, bytes)
     }
 
-    fn read(&self, place: &Place, at: u64, length: u64) -> Result<Vec<u8>, Error> {
+    /// The bytes of a record that lie there, as they were written.
+    fn read(&self, place: &Place, spot: Spot, length: u64) -> Result<Vec<u8>, Error> {
         let path = segment_path(&self.dir, place.segment);
+        let damaged = |what: String| Error::Damaged {
+            place: path.clone(),
+            at: spot.at,
+            what: format!("record {} {what}", place.id),
+        };
         let file = self.file(place, &path)?;
+        let there = file.metadata().map_err(|e| Error::file("cannot read", &path, e))?.len();
+        if spot.at.checked_add(length).is_none_or(|end| end > there) {
+            return Err(damaged(format!(
+                "is lost: it has {length} bytes there, and the file ends at {there}"
+            )));
+        }
         let mut bytes = vec![0; usize::try_from(length).unwrap_or(0)];
-        file.read_exact_at(&mut bytes, at).map_err(|e| Error::Damaged {
-            place: path,
-            at,
-            what: format!("the {length} bytes of record {} cannot be read: {e}", place.id),
-        })?;
+        file.read_exact_at(&mut bytes, spot.at).map_err(|e| damaged(format!("cannot be read: {e}")))?;
+        let found = crc32fast::hash(&bytes);
+        if found != spot.crc32 {
+            let written = spot.crc32;
+            return Err(damaged(format!(
+                "is damaged: its checksum is {found:08x}, written was {written:08x}"
+            )));
+        }
         Ok(bytes)
     }
 
@@ -270,10 +284,11 @@ impl LocalStore {
     }
 
     fn document(&self, place: &Place) -> Result<Document, Error> {
-        let bytes = self.read(place, place.located.document, place.located.document_bytes)?;
+        let spot = place.located.document;
+        let bytes = self.read(place, spot, place.located.document_bytes)?;
         let damaged = |what: String| Error::Damaged {
             place: segment_path(&self.dir, place.segment),
-            at: place.located.document,
+            at: spot.at,
             what,
         };
         let document: Document = serde_json::from_slice(&bytes)
@@ -299,20 +314,34 @@ impl LocalStore {
         self.index().place(id)?.ok_or(Error::Missing { id: id.0 })
     }
 
-    /// Reads documents; what is pruned in between is left out.
-    fn documents(&self, places: &[Place]) -> Result<Vec<Document>, Error> {
-        let mut documents = Vec::with_capacity(places.len());
-        for place in places {
-            match self.document(place) {
-                Err(Error::Missing { id }) => match self.index().place(RecordId(id))? {
-                    Some(moved) if moved.segment != place.segment => documents.push(self.document(&moved)?),
-                    Some(_) => return Err(Error::Missing { id }),
-                    None => (),
-                },
-                document => documents.push(document?),
-            }
+    /// Reads what lies at a place; none if it is pruned in between.
+    fn at<T>(&self, place: &Place, read: impl Fn(&Place) -> Result<T, Error>) -> Result<Option<T>, Error> {
+        match read(place) {
+            Err(Error::Missing { id }) => match self.index().place(RecordId(id))? {
+                Some(moved) if moved.segment != place.segment => read(&moved).map(Some),
+                Some(_) => Err(Error::Damaged {
+                    place: segment_path(&self.dir, place.segment),
+                    at: 0,
+                    what: format!("record {id} is lost: the file is missing"),
+                }),
+                None => Ok(None),
+            },
+            read => read.map(Some),
         }
-        Ok(documents)
+    }
+
+    fn documents(&self, places: &[Place]) -> Result<Vec<Document>, Error> {
+        let documents = places.iter().map(|place| self.at(place, |place| self.document(place)));
+        documents.filter_map(Result::transpose).collect()
+    }
+
+    /// A document and the bytes of its blobs.
+    fn whole(&self, place: &Place) -> Result<(Document, Vec<Vec<u8>>), Error> {
+        let document = self.document(place)?;
+        let blobs = document.blobs.iter().zip(&place.located.blobs);
+        let blobs =
+            blobs.map(|(info, spot)| self.read(place, *spot, info.bytes)).collect::<Result<_, _>>()?;
+        Ok((document, blobs))
     }
 
     /// Records a batch of drafts with what else is to go into the index with it.
@@ -358,13 +387,13 @@ impl Store for LocalStore {
     }
 
     fn blob(&self, id: RecordId, name: &str) -> Result<Vec<u8>, Error> {
-        let place = self.place(id)?;
-        let document = self.document(&place)?;
-        let found = document.blobs.iter().zip(&place.located.blobs).find(|(info, _)| info.name == name);
-        let Some((info, at)) = found else {
-            return Err(no_blob(&document, name));
-        };
-        self.read(&place, *at, info.bytes)
+        let blob = self.at(&self.place(id)?, |place| {
+            let document = self.document(place)?;
+            let found = document.blobs.iter().zip(&place.located.blobs).find(|(info, _)| info.name == name);
+            let (info, spot) = found.ok_or_else(|| no_blob(&document, name))?;
+            self.read(place, *spot, info.bytes)
+        })?;
+        blob.ok_or(Error::Missing { id: id.0 })
     }
 
     fn find(&self, query: &Query) -> Result<Vec<Document>, Error> {
@@ -372,9 +401,26 @@ impl Store for LocalStore {
         self.documents(&places)
     }
 
+    fn each_whole(&self, query: &Query, take: &mut Take) -> Result<Vec<Fault>, Error> {
+        let mut faults = Vec::new();
+        let mut pages = Pages::of(query);
+        while let Some(query) = pages.next() {
+            let places = self.index().find(&query)?;
+            pages.was(places.len(), places.last().map(|p| (p.stamp_ns, p.id)));
+            for place in places {
+                match self.at(&place, |place| self.whole(place)) {
+                    Ok(Some((document, blobs))) => take(document, blobs)?,
+                    Ok(None) => (),
+                    Err(e) => faults.push(Fault::of(place.id, e)?),
+                }
+            }
+        }
+        Ok(faults)
+    }
+
     fn nearest(&self, query: &Query, stamp_ns: i64) -> Result<Option<Document>, Error> {
         let place = self.index().nearest(query, stamp_ns)?;
-        place.map(|p| self.document(&p)).transpose()
+        place.map_or(Ok(None), |place| self.at(&place, |place| self.document(place)))
     }
 
     fn frames(&self, kind: &str) -> Result<Vec<String>, Error> {
@@ -429,19 +475,33 @@ impl Store for LocalStore {
 }
 
 impl Drop for LocalStore {
-    /// Finishes the segment, so that any viewer finds its way in it. Without room it is finished when the store is next opened.
+    /// Finishes the segment, so that any viewer finds its way in it, and writes down what there is. Without room that is done when
+    /// the store is next opened.
     fn drop(&mut self) {
         let Ok(mut writer) = self.writer() else { return };
+        if let Err(e) = self.close(&mut writer) {
+            tracing::warn!("{} is mended when it is next opened: {e}", self.dir.display());
+        }
+    }
+}
+
+impl LocalStore {
+    fn close(&self, writer: &mut WriteState) -> Result<(), Error> {
+        let mut index = self.index();
         if writer.segment.chunks.is_empty() {
-            drop(fs::remove_file(&writer.segment.path));
-        } else if let Ok(bytes) = writer.segment.finish() {
-            drop(self.index().seal(writer.segment.number, bytes));
+            let path = &writer.segment.path;
+            fs::remove_file(path).map_err(|e| Error::file("cannot delete", path, e))?;
+        } else {
+            index.seal(writer.segment.number, writer.segment.finish()?)?;
         }
-        if let Some(mut kept) = writer.kept.take()
-            && let Ok(bytes) = kept.finish()
-        {
-            drop(self.index().seal(kept.number, bytes));
+        if let Some(mut kept) = writer.kept.take() {
+            index.seal(kept.number, kept.finish()?)?;
         }
+        let rows = index.segments()?.into_iter().filter(|row| !row.going);
+        let segments = rows.map(|row| (row.number, row.bytes)).collect();
+        let (records, next) = (index.stats()?.records, index.next_id()?.0);
+        index.close()?;
+        Closed::write(&self.dir, segments, records, next)
     }
 }
 
@@ -462,22 +522,6 @@ fn segment_path(dir: &Path, number: u64) -> PathBuf {
 fn folder(named: &Path) -> Result<PathBuf, Error> {
     let found = [named.to_owned(), named.join("record")].into_iter().find(|dir| segment_dir(dir).is_dir());
     found.ok_or_else(|| Error::NoRecord { place: named.to_owned(), expected: "segments" })
-}
-
-fn is_refusal(e: &std::io::Error) -> bool {
-    use std::io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
-    matches!(e.kind(), PermissionDenied | ReadOnlyFilesystem)
-}
-
-fn lock(dir: &Path) -> Result<File, Error> {
-    let path = dir.join("lock");
-    let file = File::options().create(true).truncate(false).write(true).open(&path);
-    let file = file.map_err(|e| Error::file("cannot open", &path, e))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(Error::InUse { place: dir.to_owned() }),
-        Err(TryLockError::Error(e)) => Err(Error::file("cannot lock", &path, e)),
-    }
 }
 
 /// Starts a segment whose name is on the disk before anything in it is acknowledged.

@@ -12,7 +12,7 @@ mod number;
 mod query;
 mod write;
 
-use crate::document::{Document, Order, Query, RecordId};
+use crate::document::{BlobInfo, Document, Order, Query, RecordId};
 use crate::error::Error;
 use crate::stores::local::Durability;
 use crate::stores::{Count, Fault, Report, Retention, Stats, Store, no_blob};
@@ -205,10 +205,23 @@ impl MongoStore {
         self.said(self.records.find_one(this).run())?.ok_or(Error::Missing { id: id.0 })
     }
 
-    fn download(&self, file: ObjectId) -> Result<Vec<u8>, Error> {
+    /// The bytes of a record's blob of that place, as they were written.
+    fn whole_blob(
+        &self,
+        document: &Document,
+        fields: &Fields,
+        n: usize,
+        info: &BlobInfo,
+    ) -> Result<Vec<u8>, Error> {
+        let (file, crc32) = file_of(fields, n).ok_or_else(|| no_blob(document, &info.name))?;
         let mut bytes = Vec::new();
         let mut stream = self.said(self.files.open_download_stream(file.into()).run())?;
         stream.read_to_end(&mut bytes).map_err(|e| self.remote(e))?;
+        if bytes.len() as u64 != info.bytes || crc32.is_some_and(|c| c != crc32fast::hash(&bytes)) {
+            let what =
+                format!("record {}: the file of blob `{}` is not what was written", document.id, info.name);
+            return Err(Error::Damaged { place: self.place.clone().into(), at: 0, what });
+        }
         Ok(bytes)
     }
 
@@ -233,13 +246,7 @@ impl MongoStore {
         let bytes = fields.get_i64("bytes").unwrap_or(0);
         let whole = self.document(fields.clone()).and_then(|document| {
             for (n, info) in document.blobs.iter().enumerate() {
-                let (file, crc32) = file_of(&fields, n).ok_or_else(|| no_blob(&document, &info.name))?;
-                let data = self.download(file)?;
-                if data.len() as u64 != info.bytes || crc32.is_some_and(|c| c != crc32fast::hash(&data)) {
-                    return Err(
-                        self.remote(format!("the file of blob `{}` is not what was written", info.name))
-                    );
-                }
+                self.whole_blob(&document, &fields, n, info)?;
             }
             Ok(())
         });
@@ -299,9 +306,9 @@ impl Store for MongoStore {
         apart(|| {
             let fields = self.one(id)?;
             let document = self.document(fields.clone())?;
-            let n = document.blobs.iter().position(|b| b.name == name);
-            let file = n.and_then(|n| file_of(&fields, n)).ok_or_else(|| no_blob(&document, name))?;
-            self.download(file.0)
+            let mut blobs = document.blobs.iter().enumerate();
+            let (n, info) = blobs.find(|(_, b)| b.name == name).ok_or_else(|| no_blob(&document, name))?;
+            self.whole_blob(&document, &fields, n, info)
         })
     }
 

@@ -222,6 +222,7 @@ pub fn check_bounded(store: &dyn Store) {
         ..Draft::new("scan", i * 1000)
     };
     let put = |i: i64, kilobytes: usize| store.append(&[scan(i, kilobytes)]);
+    store.append(&[Draft { kept: true, ..Draft::new("run", 0) }]).unwrap();
     let pinned: Vec<RecordId> = (0..5).map(|i| put(i, 600).unwrap()[0]).collect();
     store.pin(&pinned, "model").unwrap();
     put(10, 700).unwrap();
@@ -239,6 +240,7 @@ pub fn check_bounded(store: &dyn Store) {
     put(12, 1500).unwrap();
     let left = stamps(store, Query::of_kind("scan"));
     assert!(left.ends_with(&[11, 12]) && left.len() < 6, "{left:?}");
+    assert_eq!(stamps(store, Query::of_kind("run")).len(), 1, "what is kept is never pruned");
     assert!(store.stats().unwrap().bytes <= 4 << 20);
     assert!(store.verify().unwrap().is_whole());
 }

@@ -15,7 +15,7 @@ use descry_domains::abilities::searching::policies::{self, Foresight};
 use descry_domains::answer::Verdict;
 
 use crate::report::Report;
-use crate::run::{self, Settings};
+use crate::run::{self, Folder, Settings};
 
 /// Seeds tried for an arrangement that is as hidden as was asked for.
 const ARRANGEMENTS: u64 = 20;
@@ -64,7 +64,7 @@ pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path) -> Result<Outcome, St
     let mut chooser = policies::named(trial.policy, trial.seed, foresight(&body, trial.target))
         .map_err(|e| e.to_string())?;
     chooser.first_look_here = trial.first_look_here;
-    std::fs::create_dir_all(scratch).map_err(|e| format!("{}: {e}", scratch.display()))?;
+    let folder = Folder::made(scratch).map_err(|e| e.to_string())?;
     let settings = Settings {
         robot: "sim".into(),
         scene: None,
@@ -73,8 +73,9 @@ pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path) -> Result<Outcome, St
         policy: trial.policy.into(),
         // What a batch has done is in its journal; a power cut costs a run at most.
         keeping: Keeping { durability: Some(Kept::Process), ..Keeping::default() },
+        remember: None,
     };
-    let report = run::pursue(trial.domain, trial.goal, &body, scratch, &settings, chooser, &mut |_| {});
+    let report = run::pursue(trial.domain, trial.goal, &body, &folder, &settings, chooser, &mut |_| {});
     let report = report.map_err(|e| e.to_string())?;
     let mut row = measured(trial, &report);
     row.insert("visible_from_start".into(), json!(share.map(|s| (s * 1e4).round() / 1e4)));

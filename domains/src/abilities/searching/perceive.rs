@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use descry_memory::belief::{Sighted, Track};
+use descry_memory::belief::{Belief, Sighted, Track};
 use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
 use descry_perception::View;
 use descry_perception::locate::locate;
@@ -31,6 +31,8 @@ const PERHAPS: f64 = 0.2;
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
 /// How far beside the outline on the map points of a surface may lie: localisation errs by centimetres and degrees.
 const BESIDE_M: f64 = 0.25;
+/// What is remembered of an object that was seen again nearer than this is that one, metres.
+const SAME_M: f64 = 0.10;
 /// Points this near to a surface lie on it.
 const ON_SURFACE_M: f64 = 0.012;
 /// What lies so near to a wall of the map, or beyond it, is the wall, metres.
@@ -288,7 +290,16 @@ fn believe(
     let sighted: Vec<Sighted<'_>> =
         percepts.iter().zip(&viewpoints).map(|(percept, v)| Sighted { percept, viewpoints_m: v }).collect();
     let cites: Vec<RecordId> = mind.regions[on].looks.iter().map(|look| look.record).collect();
-    Arc::make_mut(&mut mind.known.belief).update(&surface.symbol, &sighted, stamp_ns, &cites);
+    let belief = Arc::make_mut(&mut mind.known.belief);
+    let unseen = set_aside_unseen(belief, &surface, &merged.visibility);
+    belief.update(&surface.symbol, &sighted, stamp_ns, &cites);
+    let is_one = |old: &Track| {
+        let reach_m = SAME_M.max(old.size_m[0].max(old.size_m[1]) / 2.0);
+        belief.tracks.iter().any(|t| t.on == old.on && (t.position_m - old.position_m).norm() < reach_m)
+    };
+    let apart: Vec<Track> = unseen.into_iter().filter(|old| !is_one(old)).collect();
+    belief.tracks.extend(apart);
+    belief.tracks.sort_by_key(|track| track.id);
     let after = confidences(mind);
     let changed = mind.known.things.iter().zip(before.iter().zip(&after));
     let changed =
@@ -313,6 +324,20 @@ fn believe(
     let held: Vec<RecordId> = views(mind).into_iter().chain([percepts, belief]).collect();
     eyes.record.hold(&held, "belief")?;
     Ok(note)
+}
+
+/// Takes out of a belief what is remembered of earlier runs on a surface and stands where no view has looked yet: of that the views
+/// say nothing.
+fn set_aside_unseen(belief: &mut Belief, surface: &KnownSurface, visibility: &Visibility) -> Vec<Track> {
+    let is_unseen = |t: &Track| {
+        let middle = t.position_m + surface.up * (t.size_m[2] / 2.0);
+        t.on == surface.symbol
+            && t.cites.is_empty()
+            && matches!(visibility.look(&middle, SIDE_TOLERANCE_M), Seen::Never | Seen::Hidden)
+    };
+    let (unseen, rest) = std::mem::take(&mut belief.tracks).into_iter().partition(is_unseen);
+    belief.tracks = rest;
+    unseen
 }
 
 /// Records a document.

@@ -2,7 +2,7 @@
 //! need not be synced with every record and can be made again from nothing.
 
 use super::pins;
-use super::segment::Located;
+use super::segment::{Located, Spot};
 use crate::document::{Document, Near, Order, Query, RecordId};
 use crate::error::Error;
 use crate::stores::{Count, Stats};
@@ -16,8 +16,8 @@ use std::time::Duration;
 
 /// The file name.
 pub(super) const INDEX: &str = "index.sqlite";
-/// What readers of the file expect; a newer one is refused.
-const FORMAT: i64 = 1;
+/// What readers of the file expect; an older one is made again, a newer one is refused.
+const FORMAT: i64 = 2;
 
 const TABLES: &str = "
 CREATE TABLE meta(key TEXT PRIMARY KEY, value INTEGER) WITHOUT ROWID;
@@ -26,7 +26,7 @@ CREATE TABLE names(id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE kinds(kind INTEGER, frame INTEGER, records INTEGER NOT NULL, bytes INTEGER NOT NULL, PRIMARY KEY(kind, frame)) WITHOUT ROWID;
 CREATE TABLE records(id INTEGER PRIMARY KEY, kind INTEGER NOT NULL, frame INTEGER NOT NULL, robot INTEGER NOT NULL,
   stamp INTEGER NOT NULL, ends INTEGER, segment INTEGER NOT NULL, chunk INTEGER NOT NULL, document INTEGER NOT NULL,
-  document_bytes INTEGER NOT NULL, blobs BLOB NOT NULL, bytes INTEGER NOT NULL);
+  document_bytes INTEGER NOT NULL, document_crc INTEGER NOT NULL, blobs BLOB NOT NULL, bytes INTEGER NOT NULL);
 CREATE INDEX records_stamp ON records(stamp, id);
 CREATE INDEX records_frame ON records(kind, frame, stamp, id);
 CREATE INDEX records_kind ON records(kind, stamp, id);
@@ -43,6 +43,7 @@ CREATE INDEX pins_holder ON pins(holder);
 #[derive(Clone, Debug)]
 pub(super) struct Place {
     pub id: RecordId,
+    pub stamp_ns: i64,
     pub segment: u64,
     pub located: Located,
 }
@@ -59,14 +60,8 @@ pub(super) struct SegmentRow {
 
 pub(super) struct Index {
     db: Connection,
-    dir: PathBuf,
+    pub dir: PathBuf,
     names: BTreeMap<String, i64>,
-}
-
-/// Whether a failure means that the file is no index any more, as against a system that does not let us.
-pub(super) fn is_broken(error: &Error) -> bool {
-    use rusqlite::ErrorCode::{DatabaseCorrupt, NotADatabase};
-    matches!(error, Error::Index { because, .. } if matches!(because.sqlite_error_code(), Some(DatabaseCorrupt | NotADatabase)))
 }
 
 impl Index {
@@ -86,24 +81,26 @@ impl Index {
         run(&format!("PRAGMA wal_autocheckpoint={pages}; PRAGMA journal_size_limit={}", pages * 4096))?;
         if format == 0 {
             run(&format!("BEGIN; {TABLES} PRAGMA user_version={FORMAT}; COMMIT"))?;
-        } else if format > FORMAT {
-            return Err(Error::Damaged {
-                place: dir.join(INDEX),
-                at: 0,
-                what: format!(
-                    "index format {format} is newer than {FORMAT}, which this version reads: update descry"
-                ),
-            });
         }
-        index.check_tables()?;
         Ok(index)
     }
 
     /// Opens the index of a folder for reading, beside a process that may be writing.
     pub fn open_shared(dir: &Path) -> Result<Self, Error> {
-        let index = Self::connect(dir, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
-        index.check_tables()?;
-        Ok(index)
+        Self::connect(dir, OpenFlags::SQLITE_OPEN_READ_ONLY)
+    }
+
+    /// An index that is on no disk.
+    pub fn in_memory(dir: &Path) -> Result<Self, Error> {
+        let db = Connection::open_in_memory().map_err(|e| Error::index(dir, e))?;
+        db.execute_batch(TABLES).map_err(|e| Error::index(dir, e))?;
+        Ok(Index { db, dir: dir.to_owned(), names: BTreeMap::new() })
+    }
+
+    /// Lets go of the file: what is asked from now on finds nothing.
+    pub fn close(&mut self) -> Result<(), Error> {
+        let none = Connection::open_in_memory().map_err(|e| self.err(e))?;
+        std::mem::replace(&mut self.db, none).close().map_err(|(_, e)| self.err(e))
     }
 
     fn connect(dir: &Path, flags: OpenFlags) -> Result<Self, Error> {
@@ -114,11 +111,20 @@ impl Index {
         Ok(Index { db, dir: dir.to_owned(), names: BTreeMap::new() })
     }
 
-    fn check_tables(&self) -> Result<(), Error> {
-        self.db
-            .query_row("SELECT count(*) FROM segments", [], |r| r.get::<_, i64>(0))
-            .map(|_| ())
-            .map_err(|e| self.err(e))
+    /// Whether it is of the format that is written now. An older one has to be made again.
+    ///
+    /// # Errors
+    /// [`Error::Damaged`] for a newer one, which must not be written over.
+    pub fn is_current(&self) -> Result<bool, Error> {
+        let format: i64 =
+            self.db.query_row("PRAGMA user_version", [], |r| r.get(0)).map_err(|e| self.err(e))?;
+        if format > FORMAT {
+            let what = format!(
+                "index format {format} is newer than {FORMAT}, which this version reads: update descry"
+            );
+            return Err(Error::Damaged { place: self.dir.join(INDEX), at: 0, what });
+        }
+        Ok(format == FORMAT)
     }
 
     fn rows<T>(
@@ -206,30 +212,16 @@ impl Index {
 
     /// Forgets a segment and what lay in it; returns the number of records.
     pub fn forget(&mut self, segment: u64) -> Result<u64, Error> {
-        let gone = self.forget_from(segment, 0)?;
-        self.db
-            .execute("DELETE FROM segments WHERE number = ?1", [segment as i64])
-            .map_err(|e| self.err(e))?;
-        Ok(gone)
-    }
-
-    /// Forgets what lay in a segment in chunks from an offset on; returns the number of records.
-    pub fn forget_from(&mut self, segment: u64, offset: u64) -> Result<u64, Error> {
-        const GOING: &str = "SELECT id FROM records WHERE segment = ?1 AND chunk >= ?2";
-        let next = self.next_id()?;
+        const GOING: &str = "SELECT id FROM records WHERE segment = ?1";
+        self.keep_numbers(self.next_id()?)?;
         let dir = self.dir.clone();
-        let which = [segment as i64, offset as i64];
+        let which = [segment as i64];
         let result = (|| -> rusqlite::Result<u64> {
             let tx = self.db.transaction()?;
-            // Numbers are never used again, even when every record is gone.
-            tx.execute(
-                "INSERT INTO meta VALUES('next', ?1) ON CONFLICT DO UPDATE SET value = max(value, ?1)",
-                [next.0 as i64],
-            )?;
             tx.execute(
                 "UPDATE kinds SET records = records - g.n, bytes = bytes - g.b FROM
                    (SELECT kind AS k, frame AS f, count(*) AS n, sum(bytes) AS b FROM records
-                    WHERE segment = ?1 AND chunk >= ?2 GROUP BY kind, frame) AS g
+                    WHERE segment = ?1 GROUP BY kind, frame) AS g
                  WHERE kind = g.k AND frame = g.f",
                 which,
             )?;
@@ -237,7 +229,8 @@ impl Index {
             for table in ["objects", "seen_from", "covers", "pins"] {
                 tx.execute(&format!("DELETE FROM {table} WHERE record IN ({GOING})"), which)?;
             }
-            let gone = tx.execute("DELETE FROM records WHERE segment = ?1 AND chunk >= ?2", which)?;
+            let gone = tx.execute("DELETE FROM records WHERE segment = ?1", which)?;
+            tx.execute("DELETE FROM segments WHERE number = ?1", which)?;
             tx.commit()?;
             let mut vacuum = self.db.prepare("PRAGMA incremental_vacuum")?;
             let mut steps = vacuum.query([])?;
@@ -245,6 +238,30 @@ impl Index {
             Ok(gone as u64)
         })();
         result.map_err(|e| Error::index(&dir, e))
+    }
+
+    /// Says that no record gets a number below this one: none is used again, even when every record is gone.
+    pub fn keep_numbers(&self, next: RecordId) -> Result<(), Error> {
+        let sql = "INSERT INTO meta VALUES('next', ?1) ON CONFLICT DO UPDATE SET value = max(value, ?1)";
+        self.db.execute(sql, [next.0 as i64]).map(|_| ()).map_err(|e| self.err(e))
+    }
+
+    /// Pins what these records say, which are all that say something of pins, in the order of their numbers.
+    pub fn pin_again(&mut self, said: &[Document]) -> Result<(), Error> {
+        let dir = self.dir.clone();
+        let result = (|| -> rusqlite::Result<()> {
+            let tx = self.db.transaction()?;
+            tx.execute("DELETE FROM pins", [])?;
+            said.iter().try_for_each(|document| pins::apply(&tx, document))?;
+            tx.commit()
+        })();
+        result.map_err(|e| Error::index(&dir, e))
+    }
+
+    /// Number, segment and chunk of every record, in the order of their numbers.
+    pub fn numbers(&self) -> Result<Vec<(RecordId, u64, u64)>, Error> {
+        let read = |r: &Row| Ok((RecordId(unsigned(r, 0)?), unsigned(r, 1)?, unsigned(r, 2)?));
+        self.rows("SELECT id, segment, chunk FROM records ORDER BY id", [], read)
     }
 
     /// The number that the next record gets.
@@ -289,26 +306,23 @@ impl Index {
     /// Where lies the record nearest in time.
     pub fn nearest(&self, query: &Query, stamp_ns: i64) -> Result<Option<Place>, Error> {
         let (select, values) = self.select(query);
-        let one = |end: &str| -> Result<Option<(Place, i64)>, Error> {
-            let sql = select.replacen("FROM", ", stamp FROM", 1) + end;
+        let one = |end: &str| -> Result<Option<Place>, Error> {
+            let sql = select.clone() + end;
             let mut values = values.clone();
             values.push(Sql::Integer(stamp_ns));
             let mut statement = self.db.prepare_cached(&sql).map_err(|e| self.err(e))?;
-            let found =
-                statement.query_row(params_from_iter(values), |r| Ok((place(r)?, r.get(PLACE_COLUMNS)?)));
-            found.optional().map_err(|e| self.err(e))
+            statement.query_row(params_from_iter(values), place).optional().map_err(|e| self.err(e))
         };
         let before = one(" AND stamp <= ? ORDER BY stamp DESC, id DESC LIMIT 1")?;
-        if before.as_ref().is_some_and(|(_, stamp)| *stamp == stamp_ns) {
-            return Ok(before.map(|(place, _)| place));
+        if before.as_ref().is_some_and(|place| place.stamp_ns == stamp_ns) {
+            return Ok(before);
         }
         let after = one(" AND stamp > ? ORDER BY stamp, id DESC LIMIT 1")?;
-        let off = |(_, stamp): &(Place, i64)| stamp.abs_diff(stamp_ns);
-        let nearest = match (before, after) {
+        let off = |place: &Place| place.stamp_ns.abs_diff(stamp_ns);
+        Ok(match (before, after) {
             (Some(b), Some(a)) => Some(if off(&a) < off(&b) { a } else { b }),
             (b, a) => b.or(a),
-        };
-        Ok(nearest.map(|(place, _)| place))
+        })
     }
 
     /// The conditions of a query as SQL, without its order and limit.
@@ -380,8 +394,13 @@ impl Index {
                 params![segment as i64, end as i64],
             )?;
             for (id, l) in records {
-                tx.prepare_cached("UPDATE records SET segment = ?2, chunk = ?3, document = ?4, document_bytes = ?5, blobs = ?6 WHERE id = ?1")?
-                    .execute(params![id.0 as i64, segment as i64, l.chunk as i64, l.document as i64, l.document_bytes as i64, offsets(&l.blobs)])?;
+                tx.prepare_cached(MOVE)?.execute(params![
+                    id.0 as i64,
+                    segment as i64,
+                    l.chunk as i64,
+                    l.document.at as i64,
+                    spots(&l.blobs)
+                ])?;
             }
             tx.commit()
         })();
@@ -454,8 +473,9 @@ impl Index {
     }
 }
 
-const PLACE: &str = "id, segment, chunk, document, document_bytes, blobs, bytes";
-const PLACE_COLUMNS: usize = 7;
+const PLACE: &str = "id, segment, chunk, document, document_bytes, blobs, bytes, document_crc, stamp";
+/// Its bytes are the same wherever it lies.
+const MOVE: &str = "UPDATE records SET segment = ?2, chunk = ?3, document = ?4, blobs = ?5 WHERE id = ?1";
 const WITHIN: &str = "x1 >= ? AND x0 <= ? AND y1 >= ? AND y0 <= ? AND z1 >= ? AND z0 <= ?";
 const FROM_DISTANCE: &str = "(x-?)*(x-?) + (y-?)*(y-?) + (z-?)*(z-?)";
 const COVER_DISTANCE: &str = "max(ax-?, ?-bx, 0)*max(ax-?, ?-bx, 0) + max(ay-?, ?-by, 0)*max(ay-?, ?-by, 0) + max(az-?, ?-bz, 0)*max(az-?, ?-bz, 0)";
@@ -476,16 +496,23 @@ fn place(row: &Row) -> rusqlite::Result<Place> {
     let blobs: Vec<u8> = row.get(5)?;
     let located = Located {
         chunk: unsigned(row, 2)?,
-        document: unsigned(row, 3)?,
+        document: Spot { at: unsigned(row, 3)?, crc32: row.get(7)? },
         document_bytes: unsigned(row, 4)?,
-        blobs: blobs.as_chunks().0.iter().map(|b| u64::from_le_bytes(*b)).collect(),
+        blobs: blobs.as_chunks().0.iter().map(spot).collect(),
         message_bytes: unsigned(row, 6)?,
     };
-    Ok(Place { id: RecordId(unsigned(row, 0)?), segment: unsigned(row, 1)?, located })
+    Ok(Place { id: RecordId(unsigned(row, 0)?), stamp_ns: row.get(8)?, segment: unsigned(row, 1)?, located })
 }
 
-fn offsets(blobs: &[u64]) -> Vec<u8> {
-    blobs.iter().flat_map(|b| b.to_le_bytes()).collect()
+/// Offset and checksum of a blob, as they stand in the index.
+fn spot(bytes: &[u8; 12]) -> Spot {
+    let [a, b, c, d, e, f, g, h, crc32 @ ..] = *bytes;
+    Spot { at: u64::from_le_bytes([a, b, c, d, e, f, g, h]), crc32: u32::from_le_bytes(crc32) }
+}
+
+fn spots(blobs: &[Spot]) -> Vec<u8> {
+    let bytes = |b: &Spot| b.at.to_le_bytes().into_iter().chain(b.crc32.to_le_bytes());
+    blobs.iter().flat_map(bytes).collect()
 }
 
 /// The number of a name, given one where it is new.
@@ -518,11 +545,16 @@ fn insert_one(
     // A record that is found twice was being moved to where it is found last.
     let known_already = tx.prepare_cached("SELECT 1 FROM records WHERE id = ?1")?.exists([id])?;
     if known_already {
-        tx.prepare_cached("UPDATE records SET segment = ?2, chunk = ?3, document = ?4, document_bytes = ?5, blobs = ?6 WHERE id = ?1")?
-            .execute(params![id, segment as i64, l.chunk as i64, l.document as i64, l.document_bytes as i64, offsets(&l.blobs)])?;
+        tx.prepare_cached(MOVE)?.execute(params![
+            id,
+            segment as i64,
+            l.chunk as i64,
+            l.document.at as i64,
+            spots(&l.blobs)
+        ])?;
         return Ok(());
     }
-    tx.prepare_cached("INSERT INTO records VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)")?
+    tx.prepare_cached("INSERT INTO records VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)")?
         .execute(params![
             id,
             kind,
@@ -532,9 +564,10 @@ fn insert_one(
             document.end_ns,
             segment as i64,
             l.chunk as i64,
-            l.document as i64,
+            l.document.at as i64,
             l.document_bytes as i64,
-            offsets(&l.blobs),
+            l.document.crc32,
+            spots(&l.blobs),
             l.message_bytes as i64
         ])?;
     tx.prepare_cached("INSERT INTO kinds VALUES(?1, ?2, 1, ?3) ON CONFLICT DO UPDATE SET records = records + 1, bytes = bytes + ?3")?

@@ -1,7 +1,7 @@
 //! What is held, and by whom: said by records of their own, and known to the index with them.
 
 use crate::document::{Document, Draft, RecordId};
-use crate::stores::{PIN, UNPIN};
+use crate::stores::{KEPT, PIN, UNPIN};
 use rusqlite::{Transaction, params};
 use serde_json::json;
 
@@ -19,8 +19,17 @@ pub(crate) fn unpinned(stamp_ns: i64, by: &str) -> Draft<'static> {
     draft
 }
 
+/// Whether a record says something of pins.
+pub(super) fn speaks(document: &Document) -> bool {
+    document.kept || [PIN, UNPIN].contains(&document.kind.as_str())
+}
+
 /// Takes into the index what a record says of pins. What says that records are pinned is pinned with them.
 pub(super) fn apply(tx: &Transaction, document: &Document) -> rusqlite::Result<()> {
+    if document.kept {
+        tx.prepare_cached("INSERT OR IGNORE INTO pins VALUES(?1, ?2)")?
+            .execute(params![document.id.0 as i64, KEPT])?;
+    }
     let says = |key: &str| document.body.get(key);
     let by = says("by").and_then(|v| v.as_str()).unwrap_or("");
     let instead = says("instead").and_then(|v| v.as_bool()).unwrap_or(false);

@@ -121,8 +121,8 @@ impl LocalStore {
         for place in &places {
             let document = self.document(place)?;
             let mut blobs = Vec::with_capacity(document.blobs.len());
-            for (info, at) in document.blobs.iter().zip(&place.located.blobs) {
-                blobs.push(self.read(place, *at, info.bytes)?);
+            for (info, spot) in document.blobs.iter().zip(&place.located.blobs) {
+                blobs.push(self.read(place, *spot, info.bytes)?);
             }
             let mut kept = match writer.kept.take() {
                 Some(kept) if !kept.is_long(self.options.segment_bytes) => kept,

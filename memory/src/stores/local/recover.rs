@@ -1,93 +1,353 @@
 //! Opening after whatever happened: segments and index are brought together again.
+//!
+//! The index is taken as it stands if it is what it was when the store was closed, or if somebody writes it right now. Otherwise
+//! it is made again from the segments: on the disk by who writes, in memory by who reads.
 
-use super::index::{INDEX, Index};
-use super::segment::{Located, Segment};
-use super::{Recovery, scan, segment_dir, segment_path};
-use crate::document::Document;
+use super::closed::Closed;
+use super::index::{INDEX, Index, SegmentRow};
+use super::segment::Segment;
+use super::{Recovery, lock, pins, scan, segment_dir, segment_path};
+use crate::document::{Document, RecordId};
 use crate::error::Error;
+use crate::stores::Fault;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Moves an index that cannot be read out of the way.
-pub(super) fn set_aside(dir: &Path) -> Result<(), Error> {
-    for suffix in ["", "-wal", "-shm"] {
-        let path = dir.join(format!("{INDEX}{suffix}"));
-        if path.exists() {
-            let aside = dir.join(format!("{INDEX}{suffix}.broken"));
-            fs::rename(&path, &aside).map_err(|e| Error::file("cannot move", &path, e))?;
+/// A store that was opened, and what was found.
+pub(super) struct Opened {
+    pub index: Index,
+    /// The length of each segment, bytes, by its number.
+    pub segments: BTreeMap<u64, u64>,
+    /// The number of the next segment.
+    pub next_segment: u64,
+    pub recovery: Recovery,
+}
+
+/// How often a reader looks whether a store that neither is written nor was closed is just being opened or closed.
+const LOOKS: usize = 3;
+
+/// Opens a store that this process alone writes, and mends what a crash has left.
+///
+/// # Errors
+/// [`Error::Faulty`] if something is damaged: then nothing of it is changed. [`Error::Damaged`] for an index of a newer version, or
+/// what the system refuses.
+pub(super) fn for_writing(dir: &Path, log_bytes: u64) -> Result<Opened, Error> {
+    let closed = Closed::read(dir);
+    let whole = closed.as_ref().is_some_and(|closed| is_as_closed(dir, closed));
+    let old = Old::read(dir, closed)?;
+    let opened = if whole && old.is_current {
+        Index::open(dir, log_bytes).and_then(|index| look_over(dir, index)).and_then(without_faults)?
+    } else {
+        move_index(dir, "", OLD)?;
+        let made = Index::open(dir, log_bytes).and_then(|index| Rebuild::new(dir, index, old, true).run());
+        made.and_then(without_faults).or_else(|e| move_index(dir, OLD, "").and(Err(e)))?
+    };
+    Closed::remove(dir)?;
+    for path in index_files(dir, OLD) {
+        drop(fs::remove_file(path));
+    }
+    Ok(opened)
+}
+
+/// What the index is called while another is made.
+const OLD: &str = ".old";
+
+fn index_files(dir: &Path, ending: &str) -> [PathBuf; 3] {
+    ["", "-wal", "-shm"].map(|suffix| dir.join(format!("{INDEX}{suffix}{ending}")))
+}
+
+/// Renames the index and what belongs to it, over what is there.
+fn move_index(dir: &Path, from: &str, to: &str) -> Result<(), Error> {
+    for (from, to) in index_files(dir, from).iter().zip(index_files(dir, to)) {
+        let gone = if from.exists() { fs::rename(from, &to) } else { fs::remove_file(&to) };
+        match gone {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+                return Err(Error::file("cannot move", &to, e));
+            }
+            _ => (),
         }
     }
     Ok(())
 }
 
-/// Brings segments and index together again. Returns the bytes of all segments and the next free number.
-pub(super) fn recover(dir: &Path, index: &mut Index, recovery: &mut Recovery) -> Result<(u64, u64), Error> {
-    let mut on_disk = BTreeSet::new();
+fn without_faults(opened: Opened) -> Result<Opened, Error> {
+    if opened.recovery.faults.is_empty() {
+        return Ok(opened);
+    }
+    Err(Error::Faulty { place: opened.index.dir.clone(), faults: opened.recovery.faults })
+}
+
+/// Opens a store to read it, and changes nothing.
+///
+/// # Errors
+/// As [`for_writing`].
+pub(super) fn for_reading(dir: &Path) -> Result<Opened, Error> {
+    for _ in 0..LOOKS {
+        let is_written = lock::is_written(dir);
+        let closed = Closed::read(dir);
+        if !is_written && !closed.is_some_and(|closed| is_as_closed(dir, &closed)) {
+            continue;
+        }
+        if let Ok(index) = Index::open_shared(dir)
+            && index.is_current()?
+            && (!is_written || index.check().is_ok_and(|faults| faults.is_empty()))
+        {
+            return look_over(dir, index);
+        }
+    }
+    let old = Old::read(dir, Closed::read(dir))?;
+    Rebuild::new(dir, Index::in_memory(dir)?, old, false).run()
+}
+
+/// Whether the index is what it was, and no segment has come since.
+fn is_as_closed(dir: &Path, closed: &Closed) -> bool {
+    let known = |number: &u64| closed.segments.contains_key(number);
+    closed.has_index(dir) && on_disk(dir).is_ok_and(|found| found.iter().all(known))
+}
+
+/// The numbers of the segments that are there.
+fn on_disk(dir: &Path) -> Result<BTreeSet<u64>, Error> {
     let folder = segment_dir(dir);
     let fail = |e| Error::file("cannot read", &folder, e);
+    let mut numbers = BTreeSet::new();
     for entry in fs::read_dir(&folder).map_err(fail)? {
         let name = entry.map_err(fail)?.file_name();
         let number = name.to_str().and_then(|n| n.strip_suffix(".mcap")).and_then(|n| n.parse::<u64>().ok());
-        on_disk.extend(number);
+        numbers.extend(number);
     }
-    let known: BTreeMap<u64, _> = index.segments()?.into_iter().map(|row| (row.number, row)).collect();
-    for row in known.values().filter(|row| row.going) {
-        let path = segment_path(dir, row.number);
-        if on_disk.remove(&row.number) {
-            fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e))?;
-        }
-        index.forget(row.number)?;
-    }
-    let mut bytes = 0;
-    for number in &on_disk {
-        let row = known.get(number);
-        bytes += match row {
-            Some(row) if row.sealed => row.bytes,
-            _ => recover_segment(dir, *number, row.map_or(0, |r| r.bytes), index, recovery)?,
-        };
-    }
-    let last = on_disk.last().max(known.keys().next_back()).copied().unwrap_or(0);
-    Ok((bytes, last + 1))
+    Ok(numbers)
 }
 
-/// Takes in what a segment holds beyond what the index knows, drops its torn end and finishes it.
-fn recover_segment(
-    dir: &Path,
-    number: u64,
-    known: u64,
-    index: &mut Index,
-    recovery: &mut Recovery,
-) -> Result<u64, Error> {
-    let path = segment_path(dir, number);
-    let length = fs::metadata(&path).map_err(|e| Error::file("cannot read", &path, e))?.len();
-    let mut chunks: Vec<u64> = index.places(number, false)?.iter().map(|p| p.located.chunk).collect();
-    chunks.sort_unstable();
-    let mut take = |records: Vec<(Document, Located)>, end: u64| {
-        if end <= known {
-            return Ok(());
+fn length(dir: &Path, number: u64) -> Option<u64> {
+    fs::metadata(segment_path(dir, number)).ok().map(|m| m.len())
+}
+
+/// Holds the segments against an index that can be trusted.
+fn look_over(dir: &Path, index: Index) -> Result<Opened, Error> {
+    let mut recovery = Recovery::default();
+    let rows = index.segments()?;
+    let next_segment = rows.last().map_or(0, |row| row.number) + 1;
+    let mut segments = BTreeMap::new();
+    for row in rows {
+        let found = length(dir, row.number);
+        if row.going {
+            continue;
         }
-        let rows: Vec<_> = records.iter().map(|(d, l)| (d, l)).collect();
-        index.insert(number, end, &rows)?;
-        recovery.regained += records.len() as u64;
-        Ok(())
-    };
-    let scan = scan::scan(&path, &chunks, &mut take)?;
-    if scan.end < known {
-        recovery.lost += index.forget_from(number, scan.end)?;
+        segments.insert(row.number, row.bytes);
+        // One that still grows is at least as long as the index says.
+        let what = match found {
+            None => "is missing".to_owned(),
+            Some(n) if n < row.bytes => format!("is cut at byte {n} of {}", row.bytes),
+            Some(n) if n > row.bytes && row.sealed => format!("has {} bytes too many", n - row.bytes),
+            Some(_) => continue,
+        };
+        let end = found.unwrap_or(0);
+        let places = index.places(row.number, false)?;
+        let lost = places.iter().filter(|p| p.located.document.at + p.located.document_bytes > end);
+        let what = format!("{what}{}", lost_text(&lost.map(|p| p.id).collect()));
+        recovery.faults.push(fault(dir, row.number, what));
     }
-    if scan.chunks.is_empty() && scan.damaged.is_empty() {
-        recovery.dropped_bytes += length;
-        fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e))?;
-        index.forget(number)?;
-        return Ok(0);
+    Ok(Opened { index, segments, next_segment, recovery })
+}
+
+fn fault(dir: &Path, segment: u64, what: String) -> Fault {
+    Fault { record: None, place: segment_path(dir, segment).display().to_string(), what }
+}
+
+/// Which records are lost, as numbers and ranges of them.
+fn lost_text(lost: &BTreeSet<RecordId>) -> String {
+    let mut ranges: Vec<(u64, u64)> = Vec::new();
+    for id in lost {
+        match ranges.last_mut() {
+            Some((_, last)) if *last + 1 == id.0 => *last = id.0,
+            _ => ranges.push((id.0, id.0)),
+        }
     }
-    let bytes = if scan.complete {
-        length
-    } else {
-        recovery.dropped_bytes += length - scan.end;
-        Segment::reopen(&path, number, scan.end, scan.channels, scan.chunks)?.finish()?
+    let text = |(first, last): &(u64, u64)| match first == last {
+        true => first.to_string(),
+        false => format!("{first} to {last}"),
     };
-    index.seal(number, bytes)?;
-    Ok(bytes)
+    let all: Vec<String> = ranges.iter().map(text).collect();
+    match lost.len() {
+        0 => "; no record is lost".into(),
+        1 => format!("; record {} is lost", all.concat()),
+        n => format!("; {n} records are lost: {}", all.join(", ")),
+    }
+}
+
+/// What is known of a store whose index is to be made again, as far as it can still be read.
+#[derive(Default)]
+struct Old {
+    closed: Option<Closed>,
+    is_current: bool,
+    rows: BTreeMap<u64, SegmentRow>,
+    /// The chunks and the records of each segment.
+    chunks: BTreeMap<u64, BTreeSet<u64>>,
+    records: BTreeMap<u64, BTreeSet<RecordId>>,
+    next: u64,
+}
+
+impl Old {
+    /// # Errors
+    /// [`Error::Damaged`] for an index of a newer version.
+    fn read(dir: &Path, closed: Option<Closed>) -> Result<Self, Error> {
+        let mut old = Old { closed, ..Old::default() };
+        let Ok(index) = Index::open_shared(dir) else { return Ok(old) };
+        old.is_current = match index.is_current() {
+            Err(newer @ Error::Damaged { .. }) => return Err(newer),
+            is_current => is_current.unwrap_or(false),
+        };
+        old.rows = index.segments().unwrap_or_default().into_iter().map(|row| (row.number, row)).collect();
+        for (id, segment, chunk) in index.numbers().unwrap_or_default() {
+            old.chunks.entry(segment).or_default().insert(chunk);
+            old.records.entry(segment).or_default().insert(id);
+        }
+        old.next = index.next_id().map_or(0, |id| id.0);
+        Ok(old)
+    }
+
+    /// The length of a segment that was complete.
+    fn sealed(&self, number: u64) -> Option<u64> {
+        let row = self.rows.get(&number).filter(|row| row.sealed).map(|row| row.bytes);
+        row.or_else(|| self.closed.as_ref()?.segments.get(&number).copied())
+    }
+
+    /// The segments that should be there. One that was being deleted may be gone; if it is not, its records are as good as any.
+    fn expected(&self) -> BTreeSet<u64> {
+        let closed = self.closed.iter().flat_map(|closed| closed.segments.keys());
+        let all = closed.chain(self.rows.keys()).copied();
+        all.filter(|number| self.rows.get(number).is_none_or(|row| !row.going)).collect()
+    }
+}
+
+/// An index in the making.
+struct Rebuild<'a> {
+    dir: &'a Path,
+    index: Index,
+    old: Old,
+    /// Whether torn ends are cut off and segments finished.
+    mend: bool,
+    segments: BTreeMap<u64, u64>,
+    recovery: Recovery,
+    /// What says that something is pinned, or is no more.
+    of_pins: BTreeMap<RecordId, Document>,
+    found: BTreeSet<RecordId>,
+}
+
+impl<'a> Rebuild<'a> {
+    fn new(dir: &'a Path, index: Index, old: Old, mend: bool) -> Self {
+        Rebuild {
+            dir,
+            index,
+            old,
+            mend,
+            segments: BTreeMap::new(),
+            recovery: Recovery::default(),
+            of_pins: BTreeMap::new(),
+            found: BTreeSet::new(),
+        }
+    }
+
+    fn run(mut self) -> Result<Opened, Error> {
+        let there = on_disk(self.dir)?;
+        let expected = self.old.expected();
+        there.iter().try_for_each(|number| self.read(*number))?;
+        for number in expected.difference(&there) {
+            let known = self.old.records.get(number).cloned().unwrap_or_default();
+            // A segment without a record is removed, and may still stand in an index that was not closed.
+            if self.old.sealed(*number).is_some() || !known.is_empty() {
+                let lost: BTreeSet<RecordId> = known.difference(&self.found).copied().collect();
+                let what = if known.is_empty() { String::new() } else { lost_text(&lost) };
+                self.recovery.faults.push(fault(self.dir, *number, format!("is missing{what}")));
+            }
+        }
+        let said: Vec<Document> = self.of_pins.values().cloned().collect();
+        self.index.pin_again(&said)?;
+        let closed_next = self.old.closed.as_ref().map_or(0, |closed| closed.next);
+        self.index.keep_numbers(RecordId(self.old.next.max(closed_next)))?;
+        self.count();
+        let last = there.last().max(expected.last()).copied().unwrap_or(0);
+        let Rebuild { index, segments, recovery, .. } = self;
+        Ok(Opened { index, segments, next_segment: last + 1, recovery })
+    }
+
+    /// Says what came back, and what did not that no fault speaks of yet.
+    fn count(&mut self) {
+        let known: BTreeSet<RecordId> = self.old.records.values().flatten().copied().collect();
+        self.recovery.regained = self.found.difference(&known).count() as u64;
+        let is_new = self.segments.is_empty() && self.old.rows.is_empty();
+        self.recovery.index_rebuilt = !is_new && (self.old.closed.is_some() || !self.old.is_current);
+        let Some(closed) = &self.old.closed else { return };
+        let missing = closed.records.saturating_sub(self.found.len() as u64);
+        if missing > 0 {
+            let what = format!("{missing} of {} records are lost", closed.records);
+            let place = segment_dir(self.dir).display().to_string();
+            self.recovery.faults.push(Fault { record: None, place, what });
+        }
+    }
+
+    /// Takes in what a segment holds.
+    fn read(&mut self, number: u64) -> Result<(), Error> {
+        let path = segment_path(self.dir, number);
+        let bytes = length(self.dir, number).unwrap_or(0);
+        let chunks: Vec<u64> = self.old.chunks.get(&number).into_iter().flatten().copied().collect();
+        let (index, of_pins) = (&mut self.index, &mut self.of_pins);
+        let mut found = BTreeSet::new();
+        let scan = scan::scan(&path, &chunks, |records, end| {
+            let rows: Vec<_> = records.iter().map(|(d, l)| (d, l)).collect();
+            index.insert(number, end, &rows)?;
+            for (document, _) in records {
+                found.insert(document.id);
+                if pins::speaks(&document) {
+                    of_pins.insert(document.id, document);
+                }
+            }
+            Ok(())
+        })?;
+        let lost: BTreeSet<RecordId> = self
+            .old
+            .records
+            .get(&number)
+            .into_iter()
+            .flatten()
+            .filter(|id| !found.contains(id))
+            .copied()
+            .collect();
+        self.found.append(&mut found);
+        let was_complete = self.old.sealed(number);
+        let is_damaged = !scan.damaged.is_empty();
+        for (at, what) in scan.damaged.iter().chain(scan.torn.iter().filter(|_| was_complete.is_some())) {
+            self.recovery.faults.push(fault(self.dir, number, format!("byte {at}: {what}")));
+        }
+        let whole_to = if scan.complete { bytes } else { scan.end };
+        match was_complete {
+            Some(was) if bytes != was || is_damaged || !lost.is_empty() => {
+                let what = format!("has {bytes} of {was} bytes{}", lost_text(&lost));
+                self.recovery.faults.push(fault(self.dir, number, what));
+            }
+            Some(_) => (),
+            None if !self.mend && !lost.is_empty() => {
+                let what = format!("ends at byte {bytes}{}", lost_text(&lost));
+                self.recovery.faults.push(fault(self.dir, number, what));
+            }
+            None => {
+                self.recovery.lost += lost.len() as u64;
+                self.recovery.dropped_bytes += bytes - whole_to;
+            }
+        }
+        let mut end = bytes;
+        if was_complete.is_none() && !scan.complete {
+            if !self.mend {
+                // As it is beside somebody who writes: what stands behind the last record is no part of it.
+                return Ok(());
+            }
+            if scan.chunks.is_empty() && !is_damaged {
+                return fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e));
+            }
+            end = Segment::reopen(&path, number, scan.end, scan.channels, scan.chunks)?.finish()?;
+        }
+        self.segments.insert(number, end);
+        self.index.seal(number, end)
+    }
 }

@@ -1,7 +1,7 @@
 //! Reading a segment from end to end, as far as it is whole.
 
 use super::segment::{
-    CHUNK_HEAD, Channels, ChunkEntry, Located, MAGIC, MESSAGE_HEAD, RECORD_HEAD, message_index, op,
+    CHUNK_HEAD, Channels, ChunkEntry, Located, MAGIC, MESSAGE_HEAD, RECORD_HEAD, Spot, message_index, op,
 };
 use crate::document::Document;
 use crate::error::Error;
@@ -254,7 +254,7 @@ fn records(data: &[u8], chunk_at: u64) -> Result<RecordParts, Fault> {
     let mut records = Vec::new();
     let mut channels = Channels::default();
     let mut messages = Vec::new();
-    let mut blobs: Vec<u64> = Vec::new();
+    let mut blobs: Vec<usize> = Vec::new();
     let (mut at, mut record_from) = (0, 0);
     while at < data.len() {
         let place = data_at + at as u64;
@@ -272,32 +272,21 @@ fn records(data: &[u8], chunk_at: u64) -> Result<RecordParts, Fault> {
                 let content = body.get(MESSAGE_HEAD as usize..).unwrap_or(&[]);
                 match document(content) {
                     Some(document) => {
-                        let mut located = Located {
+                        let ends = std::mem::take(&mut blobs);
+                        let blobs =
+                            located_blobs(data, data_at, &document, &ends).map_err(|what| (place, what))?;
+                        let located = Located {
                             chunk: chunk_at,
-                            document: data_at + end as u64 - content.len() as u64,
+                            document: spot(data, data_at, end, content.len()),
                             document_bytes: content.len() as u64,
-                            blobs: std::mem::take(&mut blobs),
+                            blobs,
                             message_bytes: (end - record_from) as u64,
                         };
-                        if document.blobs.len() != located.blobs.len() {
-                            return Err((
-                                place,
-                                format!(
-                                    "record {} has {} blobs, its document says {}",
-                                    document.id,
-                                    located.blobs.len(),
-                                    document.blobs.len()
-                                ),
-                            ));
-                        }
-                        for (end, info) in located.blobs.iter_mut().zip(&document.blobs) {
-                            *end = end.saturating_sub(info.bytes);
-                        }
                         records.push((document, located));
                         record_from = end;
                     }
                     // The bytes of a blob stand last in its message: its end and their number say where they begin.
-                    None => blobs.push(data_at + end as u64),
+                    None => blobs.push(end),
                 }
             }
             other => {
@@ -311,6 +300,27 @@ fn records(data: &[u8], chunk_at: u64) -> Result<RecordParts, Fault> {
     } else {
         Err((chunk_at, "blobs without their document".into()))
     }
+}
+
+/// The last `length` bytes before `end` in the data of a chunk.
+fn spot(data: &[u8], data_at: u64, end: usize, length: usize) -> Spot {
+    let from = end.saturating_sub(length);
+    Spot { at: data_at + from as u64, crc32: crc32fast::hash(data.get(from..end).unwrap_or(&[])) }
+}
+
+/// Where the blobs of a document lie, whose messages end there.
+fn located_blobs(
+    data: &[u8],
+    data_at: u64,
+    document: &Document,
+    ends: &[usize],
+) -> Result<Vec<Spot>, String> {
+    if document.blobs.len() != ends.len() {
+        let (id, found, said) = (document.id, ends.len(), document.blobs.len());
+        return Err(format!("record {id} has {found} blobs, its document says {said}"));
+    }
+    let blobs = ends.iter().zip(&document.blobs);
+    Ok(blobs.map(|(end, info)| spot(data, data_at, *end, info.bytes as usize)).collect())
 }
 
 /// The document that a message is, if it is one; the messages of blobs never begin with a brace.

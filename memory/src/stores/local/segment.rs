@@ -6,6 +6,7 @@
 use crate::document::{Document, Form};
 use crate::error::Error;
 use crate::foxglove;
+use crc32fast::Hasher;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{IoSlice, Seek, SeekFrom, Write};
@@ -44,13 +45,21 @@ pub(crate) struct Encoded<'a> {
     pub blobs: Vec<&'a [u8]>,
 }
 
-/// Where a record came to lie: its document and the bytes of its blobs, as offsets in the file.
+/// Where bytes came to lie, and their checksum, by which they are known to be what was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Spot {
+    /// Offset in the file.
+    pub at: u64,
+    pub crc32: u32,
+}
+
+/// Where a record came to lie: its document and the bytes of its blobs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Located {
     pub chunk: u64,
-    pub document: u64,
+    pub document: Spot,
     pub document_bytes: u64,
-    pub blobs: Vec<u64>,
+    pub blobs: Vec<Spot>,
     /// Bytes of all its messages in the file.
     pub message_bytes: u64,
 }
@@ -177,8 +186,8 @@ impl Channels {
 #[derive(Default)]
 struct Batch<'a> {
     small: Vec<u8>,
-    /// After so many bytes of `small` comes this blob.
-    blobs: Vec<(usize, &'a [u8])>,
+    /// After so many bytes of `small` comes this blob, with its checksum.
+    blobs: Vec<(usize, &'a [u8], Hasher)>,
     blob_bytes: u64,
     start_ns: u64,
     end_ns: u64,
@@ -191,7 +200,7 @@ impl<'a> Batch<'a> {
         self.small.len() as u64 + self.blob_bytes
     }
 
-    /// Adds a message and returns the offset of its last part within the chunk's data.
+    /// Adds a message and returns the offset of its last part within the chunk's data, and the checksum of that part.
     fn message(
         &mut self,
         channel: u16,
@@ -200,7 +209,7 @@ impl<'a> Batch<'a> {
         head: &[u8],
         tail: &'a [u8],
         copy: bool,
-    ) -> u64 {
+    ) -> Spot {
         if self.messages.is_empty() {
             (self.start_ns, self.end_ns) = (stamp_ns, stamp_ns);
         }
@@ -215,25 +224,33 @@ impl<'a> Batch<'a> {
         w.u64(stamp_ns);
         w.0.extend_from_slice(head);
         let at = self.len();
+        let mut sum = Hasher::new();
+        sum.update(tail);
+        let crc32 = sum.clone().finalize();
         if copy {
             self.small.extend_from_slice(tail);
         } else {
-            self.blobs.push((self.small.len(), tail));
+            self.blobs.push((self.small.len(), tail, sum));
             self.blob_bytes += tail.len() as u64;
         }
-        at
+        Spot { at, crc32 }
     }
 
-    fn slices(&self) -> Vec<&[u8]> {
+    /// The chunk's data in pieces, and its checksum: that of a blob is there already.
+    fn slices(&self) -> (Vec<&[u8]>, u32) {
         let mut slices = Vec::with_capacity(2 * self.blobs.len() + 1);
+        let mut sum = Hasher::new();
         let mut from = 0;
-        for (at, blob) in &self.blobs {
+        for (at, blob, of_blob) in &self.blobs {
             slices.extend([&self.small[from..*at], blob]);
+            sum.update(&self.small[from..*at]);
+            sum.combine(of_blob);
             from = *at;
         }
         slices.push(&self.small[from..]);
+        sum.update(&self.small[from..]);
         slices.retain(|s| !s.is_empty());
-        slices
+        (slices, sum.finalize())
     }
 }
 
@@ -312,7 +329,7 @@ impl Segment {
             let stamp_ns = document.stamp_ns.max(0) as u64;
             let mut place = Located {
                 chunk: chunk_at,
-                document: 0,
+                document: Spot { at: 0, crc32: 0 },
                 document_bytes: 0,
                 blobs: Vec::new(),
                 message_bytes: 0,
@@ -324,15 +341,16 @@ impl Segment {
                 chunk.small.append(declared);
                 let prefix = foxglove::prefix(document, info);
                 let sequence = self.channels.count(channel);
-                let at = chunk.message(channel, sequence, stamp_ns, &prefix, data, data.len() < COPIED_BELOW);
-                place.blobs.push(data_at + at);
+                let spot =
+                    chunk.message(channel, sequence, stamp_ns, &prefix, data, data.len() < COPIED_BELOW);
+                place.blobs.push(Spot { at: data_at + spot.at, ..spot });
             }
             let text = encode(document)?;
             let channel = self.channels.channel(&foxglove::document_topic(&document.kind), None, declared)?;
             chunk.small.append(declared);
             let sequence = self.channels.count(channel);
-            let at = chunk.message(channel, sequence, stamp_ns, &text, &[], true);
-            place.document = data_at + at - text.len() as u64;
+            let end = chunk.message(channel, sequence, stamp_ns, &text, &[], true).at;
+            place.document = Spot { at: data_at + end - text.len() as u64, crc32: crc32fast::hash(&text) };
             place.document_bytes = text.len() as u64;
             place.message_bytes = chunk.len() - before;
             located.push(place);
@@ -342,9 +360,7 @@ impl Segment {
     }
 
     fn write_chunk(&mut self, chunk: &Batch) -> Result<(), Error> {
-        let slices = chunk.slices();
-        let mut crc = crc32fast::Hasher::new();
-        slices.iter().for_each(|s| crc.update(s));
+        let (slices, crc32) = chunk.slices();
         let mut head = Vec::with_capacity(64);
         let mut w = Writer(&mut head);
         w.0.push(op::CHUNK);
@@ -352,7 +368,7 @@ impl Segment {
         w.u64(chunk.start_ns);
         w.u64(chunk.end_ns);
         w.u64(chunk.len());
-        w.u32(crc.finalize());
+        w.u32(crc32);
         w.text("");
         w.u64(chunk.len());
         let offset = self.end;

@@ -14,6 +14,12 @@ pub(super) fn verify(store: &LocalStore) -> Result<Report, Error> {
         what.into_iter().map(|what| Fault { record: None, place: super::INDEX.into(), what })
     };
     report.faults.extend(faults(store.index().check()?));
+    if store.recovery.index_rebuilt && store.writer.is_none() {
+        report
+            .faults
+            .extend(faults(vec!["it is not what was written; it is made again from the segments".into()]));
+    }
+    report.faults.extend(store.recovery.faults.iter().cloned());
     let segments = store.index().segments()?;
     for row in segments {
         let path = segment_path(&store.dir, row.number);
@@ -42,11 +48,13 @@ pub(super) fn verify(store: &LocalStore) -> Result<Report, Error> {
             Ok(scan) => {
                 // What stands behind the last record of a segment that still grows is on its way.
                 let torn = scan.torn.filter(|(at, _)| row.sealed || *at < row.bytes);
-                report.faults.extend(scan.damaged.into_iter().chain(torn).map(|(at, what)| Fault {
+                let found = scan.damaged.into_iter().chain(torn).map(|(at, what)| Fault {
                     record: None,
                     place: place.clone(),
                     what: format!("byte {at}: {what}"),
-                }));
+                });
+                let new: Vec<Fault> = found.filter(|fault| !report.faults.contains(fault)).collect();
+                report.faults.extend(new);
             }
             Err(e) => report.faults.push(Fault { record: None, place: place.clone(), what: e.to_string() }),
         }

@@ -3,6 +3,7 @@
 use super::{MongoStore, number_of};
 use crate::document::{Document, Draft, RecordId};
 use crate::error::Error;
+use crate::stores::KEPT;
 use crate::stores::local::pins;
 use mongodb::bson::{self, Document as Fields, doc, oid::ObjectId};
 use std::collections::BTreeSet;
@@ -76,6 +77,9 @@ impl MongoStore {
                     blob.insert("crc32", i64::from(crc32fast::hash(&given.data)));
                 }
             }
+        }
+        if draft.kept {
+            fields.insert("pins", vec![KEPT]);
         }
         let own = bson::serialize_to_vec(&fields).map_or(0, |bytes| bytes.len() as u64);
         fields.insert("bytes", (own + document.blobs.iter().map(|b| b.bytes).sum::<u64>()) as i64);

@@ -1,0 +1,73 @@
+//! What a run began with, as the first document of its record: all that it takes to live through it again.
+
+use std::path::PathBuf;
+
+use descry_domains::load::{Domain, Files, from_files};
+use descry_domains::situation::Past;
+use descry_memory::{Draft, Query, Record};
+use serde::{Deserialize, Serialize};
+
+use super::Header;
+use crate::exit::CommandError;
+
+/// What a run began with.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Beginning {
+    /// What it was started with.
+    #[serde(flatten)]
+    pub header: Header,
+    /// The texts of the domain.
+    pub files: Files,
+    /// Where the domain's programs are run.
+    pub folder: Option<PathBuf>,
+    /// What was remembered of earlier runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub past: Option<Past>,
+    /// Name and text of the scene, if the body stood in one that has a text.
+    pub scene: Option<(String, String)>,
+}
+
+/// The kind under which it is recorded.
+const RUN: &str = "run";
+
+impl Beginning {
+    /// What a run with this domain begins with.
+    pub fn new(header: Header, domain: &Domain, scene: Option<(String, String)>) -> Self {
+        Beginning { header, files: domain.files.clone(), folder: domain.folder.clone(), past: None, scene }
+    }
+
+    /// Records it, never to be pruned.
+    ///
+    /// # Errors
+    /// [`CommandError::Broken`] if it cannot be kept.
+    pub fn put(&self, record: &Record, now_ns: i64) -> Result<(), CommandError> {
+        let mut draft = Draft { kept: true, ..Draft::new(RUN, now_ns.max(0)) };
+        draft.meta.body = serde_json::to_value(self).map_err(|e| CommandError::Bug(e.to_string()))?;
+        record.put(draft).map(|_| ()).map_err(CommandError::broken)
+    }
+
+    /// What the run of a record began with; none if the record does not say.
+    ///
+    /// # Errors
+    /// [`CommandError::Broken`] if it cannot be read.
+    pub fn of(record: &Record) -> Result<Option<Self>, CommandError> {
+        let query = Query { limit: Some(1), ..record.own(RUN) };
+        let Some(document) = record.find(&query).map_err(CommandError::broken)?.pop() else {
+            return Ok(None);
+        };
+        let read = serde_json::from_value(document.body);
+        read.map(Some)
+            .map_err(|e| CommandError::broken(format!("record {}: no beginning of a run: {e}", document.id)))
+    }
+
+    /// The domain as it was, and its scene under the name of that time.
+    ///
+    /// # Errors
+    /// [`CommandError::BadInput`] if this version does not understand it.
+    pub fn domain(&self) -> Result<Domain, CommandError> {
+        let mut domain =
+            from_files(self.files.clone(), self.folder.clone()).map_err(CommandError::bad_input)?;
+        domain.scenes.extend(self.scene.clone());
+        Ok(domain)
+    }
+}

@@ -1,0 +1,120 @@
+//! What stands beside the record of a run: with what it was started, and how it ended.
+
+use std::path::Path;
+
+use descry_memory::{Draft, Record};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use super::{Beginning, Header};
+use crate::exit::CommandError;
+use crate::keeping::{self, RECORD};
+use crate::report::Report;
+
+/// What a run was started with, in its folder.
+pub(super) const HEADER: &str = "run.json";
+/// How it ended.
+const REPORT: &str = "report.json";
+/// The kind under which it is recorded how a run ended.
+const REPORTED: &str = "report";
+/// Under this key a file says the checksum of all else in it.
+const CHECKSUM: &str = "crc32";
+
+/// What a run was started with: what its folder says, or its record where that is missing or damaged.
+///
+/// # Errors
+/// [`CommandError::BadInput`] if the folder holds no run.
+pub fn header(folder: &Path) -> Result<Header, CommandError> {
+    if keeping::is_address(folder) {
+        let text = format!(
+            "{}: a store does not hold what a run was started with\n  name the run's folder, which says where its record is",
+            folder.display()
+        );
+        return Err(CommandError::BadInput(text));
+    }
+    read_json(&folder.join(HEADER)).or_else(|why| {
+        let record = Record::open_shared(&folder.join(RECORD));
+        let beginning = record.ok().and_then(|record| Beginning::of(&record).ok().flatten());
+        let expected = "expected the folder of a run; `descry runs` lists them";
+        let Some(beginning) = beginning else {
+            return Err(CommandError::BadInput(format!("{why}\n  {expected}")));
+        };
+        tracing::warn!("{why}; what the run was started with is taken from its record");
+        Ok(beginning.header)
+    })
+}
+
+/// Writes what a run was started with into its folder.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the folder cannot be written.
+pub fn keep_header(folder: &Path, header: &Header) -> Result<(), CommandError> {
+    write_json(&folder.join(HEADER), header)
+}
+
+/// The report of a run: what its folder says, or its record where that is missing or damaged; none while it has not finished.
+///
+/// # Errors
+/// [`CommandError::Broken`] if it is damaged, and the record has none.
+pub fn report(folder: &Path) -> Result<Option<Report>, CommandError> {
+    let path = folder.join(REPORT);
+    read_json(&path).map(Some).or_else(|why| {
+        let record = Record::open_shared(&folder.join(RECORD)).ok();
+        let found = record.and_then(|record| record.newest(REPORTED).ok().flatten());
+        match found.and_then(|document| serde_json::from_value::<Report>(document.body).ok()) {
+            Some(report) => {
+                tracing::warn!("{why}; the report is taken from the record");
+                Ok(Some(Report { run: folder.display().to_string(), ..report }))
+            }
+            None if path.exists() => Err(CommandError::Broken(why)),
+            None => Ok(None),
+        }
+    })
+}
+
+/// Records how a run ended: what is the same however often it is lived through.
+///
+/// # Errors
+/// [`CommandError::Broken`] if it cannot be kept.
+pub(super) fn put_report(record: &Record, now_ns: i64, report: &Report) -> Result<(), CommandError> {
+    let report = Report { run: String::new(), wall_s: 0.0, ..report.clone() };
+    let mut draft = Draft { kept: true, ..Draft::new(REPORTED, now_ns.max(0)) };
+    draft.meta.body = serde_json::to_value(report).map_err(|e| CommandError::Bug(e.to_string()))?;
+    record.put(draft).map(|_| ()).map_err(CommandError::broken)
+}
+
+/// Writes the report beside the record.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the folder cannot be written.
+pub fn finish(folder: &Path, report: &Report) -> Result<(), CommandError> {
+    write_json(&folder.join(REPORT), report)
+}
+
+/// Writes a file whole or not at all, however the process ends.
+fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
+    let bug = |e: serde_json::Error| CommandError::Bug(e.to_string());
+    let mut value = serde_json::to_value(value).map_err(bug)?;
+    value[CHECKSUM] = checksum(&value).into();
+    let text = serde_json::to_string_pretty(&value).map_err(bug)?;
+    let fresh = path.with_extension("json.new");
+    let written = std::fs::write(&fresh, text + "\n").and_then(|()| std::fs::rename(&fresh, path));
+    written.map_err(|e| CommandError::broken(format!("{}: {e}", path.display())))
+}
+
+/// Reads such a file; says why if it is not what was written.
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, String> {
+    let shown = path.display();
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{shown}: {e}"))?;
+    let mut value: Value = serde_json::from_str(&text).map_err(|e| format!("{shown} is damaged: {e}"))?;
+    let written = value.as_object_mut().and_then(|fields| fields.shift_remove(CHECKSUM));
+    if written != Some(checksum(&value).into()) {
+        return Err(format!("{shown} is damaged: its content does not fit its checksum"));
+    }
+    serde_json::from_value(value).map_err(|e| format!("{shown}: {e}"))
+}
+
+fn checksum(value: &Value) -> String {
+    format!("{:08x}", crc32fast::hash(value.to_string().as_bytes()))
+}

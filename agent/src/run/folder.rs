@@ -1,0 +1,95 @@
+//! The folder of a run: made by one process, and locked as long as that one writes.
+
+use std::fs::{File, TryLockError, create_dir, create_dir_all};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use descry_domains::goal::Goal;
+use descry_domains::lexicon::symbol;
+
+use super::files::HEADER;
+use crate::exit::CommandError;
+use crate::keeping::RECORD;
+
+/// The folder of a run that this process writes, and no other.
+pub struct Folder {
+    path: PathBuf,
+    _lock: File,
+}
+
+/// What is locked.
+const LOCK: &str = "run.lock";
+
+impl Folder {
+    /// The folder of a new run: the one that was asked for, or a new one under `runs/`.
+    ///
+    /// # Errors
+    /// [`CommandError::BadInput`] if it holds a run already, if another process makes one there, or if it cannot be made.
+    pub fn of_new_run(asked: Option<&Path>, goal: &Goal) -> Result<Self, CommandError> {
+        match asked {
+            Some(folder) => Self::made(folder),
+            None => Self::numbered(&Path::new("runs").join(symbol(&goal.said))),
+        }
+    }
+
+    /// The folder of that name, for a new run.
+    ///
+    /// # Errors
+    /// As [`Folder::of_new_run`].
+    pub fn made(folder: &Path) -> Result<Self, CommandError> {
+        let refuse_a_run = || match holds_a_run(folder) {
+            true => Err(refused(folder, "it holds a run already\n  name another folder")),
+            false => Ok(()),
+        };
+        refuse_a_run()?;
+        create_dir_all(folder).map_err(|e| refused(folder, e))?;
+        let claimed = Self::locked(folder)?;
+        // Another process may have been quicker, and be done.
+        refuse_a_run()?;
+        Ok(claimed)
+    }
+
+    /// The folder of a run that is to go on.
+    ///
+    /// # Errors
+    /// [`CommandError::BadInput`] if another process writes there, or if it cannot be written.
+    pub fn locked(folder: &Path) -> Result<Self, CommandError> {
+        let lock = File::options().create(true).truncate(false).write(true).open(folder.join(LOCK));
+        let lock = lock.map_err(|e| refused(folder, e))?;
+        match lock.try_lock() {
+            Ok(()) => Ok(Folder { path: folder.to_owned(), _lock: lock }),
+            Err(TryLockError::WouldBlock) => Err(refused(
+                folder,
+                "another process is writing a run there\n  name another folder, or wait until it has ended",
+            )),
+            Err(TryLockError::Error(e)) => Err(refused(folder, e)),
+        }
+    }
+
+    /// The first folder that is not there yet: a process that makes it at the same time gets the next.
+    fn numbered(stem: &Path) -> Result<Self, CommandError> {
+        let parent = stem.parent().unwrap_or(Path::new("."));
+        create_dir_all(parent).map_err(|e| refused(parent, e))?;
+        for n in 1_u32.. {
+            let folder = PathBuf::from(format!("{}-{n:03}", stem.display()));
+            match create_dir(&folder) {
+                Err(e) if e.kind() == ErrorKind::AlreadyExists => (),
+                made => return made.map_err(|e| refused(&folder, e)).and_then(|()| Self::locked(&folder)),
+            }
+        }
+        Err(refused(stem, "no number is left for a new run: remove some, or name a folder with --run"))
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+fn holds_a_run(folder: &Path) -> bool {
+    [HEADER, RECORD].iter().any(|name| folder.join(name).exists())
+}
+
+fn refused(folder: &Path, why: impl std::fmt::Display) -> CommandError {
+    CommandError::BadInput(format!("--run {}: {why}", folder.display()))
+}

@@ -1,0 +1,139 @@
+//! What the programs of a domain answered, in the record of the run.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use descry_domains::load::Domain;
+use descry_domains::program::Tape;
+use descry_memory::{Draft, Record};
+use descry_robots::Robot;
+use descry_robots::recorded::TapedRobot;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::exit::CommandError;
+
+/// The kind under which it is recorded.
+const PROGRAM: &str = "program";
+
+/// A question to a program, and what it said.
+#[derive(Debug, Serialize, Deserialize)]
+struct Exchange {
+    asked: Value,
+    answered: Value,
+}
+
+/// Where the answers of programs go to, and come from.
+struct Programs {
+    into: Arc<Record>,
+    robot: Arc<TapedRobot>,
+    played: Mutex<VecDeque<Exchange>>,
+    /// Whether programs are run for what the record does not answer.
+    run: bool,
+    /// Why a replay could go no further.
+    ended: Mutex<Option<String>>,
+}
+
+/// A domain whose programs' answers are on record.
+pub struct Kept {
+    /// The domain.
+    pub domain: Domain,
+    programs: Option<Arc<Programs>>,
+}
+
+impl Kept {
+    /// Why a replay could go no further: the record has no answer to what a program was asked. None if it could.
+    pub fn ended(&self) -> Option<String> {
+        self.programs.as_ref()?.ended.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+impl Programs {
+    fn end(&self, because: String) -> String {
+        *self.ended.lock().unwrap_or_else(PoisonError::into_inner) = Some(because.clone());
+        because
+    }
+}
+
+impl std::fmt::Debug for Programs {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.debug_struct("Programs").field("run", &self.run).finish_non_exhaustive()
+    }
+}
+
+impl Tape for Programs {
+    fn answer(&self, asked: &Value, live: &dyn Fn() -> Value) -> Result<Value, String> {
+        let next = self.played.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+        let exchange = match next {
+            Some(exchange) if exchange.asked == *asked => exchange,
+            Some(other) if !self.run => {
+                let text =
+                    format!("the record has an answer to {} where a program is asked {asked}", other.asked);
+                return Err(self.end(text));
+            }
+            None if !self.run => {
+                return Err(self.end(format!("the record ends before a program was asked {asked}")));
+            }
+            _ => {
+                self.played.lock().unwrap_or_else(PoisonError::into_inner).clear();
+                Exchange { asked: asked.clone(), answered: live() }
+            }
+        };
+        let body = serde_json::to_value(&exchange).map_err(|e| e.to_string())?;
+        let mut draft = Draft { kept: true, ..Draft::new(PROGRAM, self.robot.now_ns().max(0)) };
+        draft.meta.body = body;
+        self.into.put_soon(draft).map_err(|e| e.to_string())?;
+        Ok(exchange.answered)
+    }
+}
+
+/// The domain with its programs' answers kept in `into`; those of an earlier life come `from` the record of that. Programs are run
+/// for further questions only if `run`.
+///
+/// # Errors
+/// [`CommandError::Broken`] if earlier answers cannot be read.
+pub fn on_record(
+    domain: &Domain,
+    into: &Arc<Record>,
+    from: Option<&Record>,
+    robot: &Arc<TapedRobot>,
+    run: bool,
+) -> Result<Kept, CommandError> {
+    let mut domain = domain.clone();
+    if domain.programs().is_empty() {
+        return Ok(Kept { domain, programs: None });
+    }
+    let mut played = VecDeque::new();
+    let earlier = from.map_or(Ok(Vec::new()), |from| from.find(&from.own(PROGRAM)));
+    for document in earlier.map_err(CommandError::broken)? {
+        played.push_back(serde_json::from_value(document.body).map_err(|e| {
+            CommandError::broken(format!("record {}: no answer of a program: {e}", document.id))
+        })?);
+    }
+    let programs = Arc::new(Programs {
+        into: Arc::clone(into),
+        robot: Arc::clone(robot),
+        played: Mutex::new(played),
+        run,
+        ended: Mutex::default(),
+    });
+    domain.tape = Some(Arc::clone(&programs) as Arc<dyn Tape>);
+    Ok(Kept { domain, programs: Some(programs) })
+}
+
+/// That the programs which a record names may be run here.
+///
+/// # Errors
+/// [`CommandError::BadInput`] names them, unless it is `allowed` or there are none.
+pub fn check_allowed(domain: &Domain, place: &str, allowed: bool) -> Result<(), CommandError> {
+    let programs = domain.programs();
+    if allowed || programs.is_empty() {
+        return Ok(());
+    }
+    let one = |(name, command): &(&str, &[String])| format!("\n    {name}: {}", command.join(" "));
+    let all: String = programs.iter().map(one).collect();
+    let text = format!(
+        "{place}: its record names programs that would be run here:{all}\n  allow that with --allow-programs, if you trust them"
+    );
+    Err(CommandError::BadInput(text))
+}

@@ -1,0 +1,128 @@
+//! Several surfaces in one room: every answer is about what was asked, and names where.
+
+mod binary;
+
+use std::fs;
+use std::path::Path;
+
+use binary::{check, check_refused, outcome};
+use serde_json::Value;
+use tempfile::TempDir;
+
+const SCENE: &str = r#"
+title = "Two tables: the cup on the sideboard, the mug on the table"
+[room]
+size_m = [8.0, 6.0]
+[[surface]]
+name = "table"
+position_m = [-1.5, 0.0]
+size_m = [1.6, 0.8]
+height_m = 0.72
+[[surface]]
+name = "sideboard"
+position_m = [2.0, 0.0]
+size_m = [1.2, 0.6]
+height_m = 0.90
+[start]
+position_m = [0.3, -2.0]
+[[object]]
+name = "cup A"
+on = "sideboard"
+shape.cup = { diameter_m = 0.070, height_m = 0.104 }
+[[object]]
+name = "handled mug"
+kind = "mug"
+on = "table"
+shape.mug = { diameter_m = 0.080, height_m = 0.095 }
+[[object]]
+name = "small box"
+kind = "box"
+on = "table"
+shape.box = { size_m = [0.07, 0.07, 0.10] }
+"#;
+
+/// Runs a goal in the two-table scene; the report.
+fn pursue(folder: &Path, goal: &str, seed: u64, exit: i32) -> Value {
+    let (seed, run) = (seed.to_string(), format!("{}-{seed}", goal.replace(' ', "-")));
+    let arguments = ["do", goal, "--scene", "two.toml", "--seed", &seed, "--run", &run, "--json"];
+    check(folder, &arguments, exit)
+}
+
+fn scene() -> TempDir {
+    let folder = TempDir::new().expect("a folder can be made");
+    fs::write(folder.path().join("two.toml"), SCENE).expect("the scene is written");
+    folder
+}
+
+#[test]
+fn a_verdict_is_about_the_surface_that_was_asked_about() {
+    let folder = scene();
+    for seed in [1, 4] {
+        for (goal, exit, answer, on) in [
+            ("find cup A", 0, None, Some("sideboard")),
+            ("is cup A on the sideboard", 0, Some("yes"), Some("sideboard")),
+            ("is cup A on the table", 1, Some("no"), None),
+            ("is mug on the sideboard", 1, Some("no"), None),
+        ] {
+            let report = pursue(folder.path(), goal, seed, exit);
+            let what = format!("{goal}, seed {seed}: {report}");
+            assert_eq!(report["answer"].as_str(), answer, "{what}");
+            assert_eq!(report["on"].as_str(), on, "{what}");
+            let truly = if goal.contains("mug") { "table" } else { "sideboard" };
+            assert_eq!(report["true_on"], truly, "{what}");
+            if on.is_none() {
+                let asked = goal.rsplit(' ').next().expect("a goal has words");
+                let why = report["why"].as_str().unwrap_or_default();
+                assert!(why.contains(&format!("is not on the {asked}")) && why.contains("was seen from"), "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn all_of_a_kind_are_marked_among_what_else_is_there() {
+    let folder = scene();
+    let report = pursue(folder.path(), "find all cups", 2, 0);
+    let marked: Vec<(&str, &str)> = report["objects"]
+        .as_array()
+        .expect("there are objects")
+        .iter()
+        .filter(|o| o["asked"] == true)
+        .map(|o| (o["label"].as_str().unwrap_or_default(), o["on"].as_str().unwrap_or_default()))
+        .collect();
+    assert_eq!(marked, [("cup A", "sideboard")], "{report}");
+    assert!(report["objects"].as_array().is_some_and(|o| o.len() > 1), "{report}");
+}
+
+#[test]
+fn one_head_looks_at_one_surface_at_a_time() {
+    let folder = scene();
+    let output = outcome(folder.path(), &["do", "find all cups", "--scene", "two.toml", "--run", "r"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    let mut last_end_s = f64::NEG_INFINITY;
+    for line in said.lines().map(str::trim) {
+        if line.starts_with("plan") {
+            last_end_s = f64::NEG_INFINITY;
+        }
+        let Some((start, rest)) = line.split_once(": (observe") else { continue };
+        let Some(duration) = rest.rsplit('[').next().and_then(|d| d.trim_end_matches(']').parse::<f64>().ok())
+        else {
+            continue;
+        };
+        let start_s: f64 = start.parse().expect("a step has a time");
+        assert!(start_s >= last_end_s, "two looks at once: {line}\n{said}");
+        last_end_s = start_s + duration;
+    }
+    assert!(last_end_s > 0.0, "no look in {said}");
+}
+
+#[test]
+fn a_surface_that_is_not_there_is_refused() {
+    let folder = scene();
+    check_refused(
+        folder.path(),
+        &["do", "is cup A on the shelf", "--scene", "two.toml", "--run", "r"],
+        2,
+        &["nothing is called \"shelf\"", "known: table, sideboard"],
+    );
+}

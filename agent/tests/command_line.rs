@@ -188,7 +188,7 @@ fn a_broken_domain_is_drawn_with_place_reason_and_mend() {
     check(
         &["find", "cup A", "--domain", &domain],
         2,
-        &["no skill carries out the action `squint`", "move, observe, push-aside"],
+        &["no skill carries out the action `squint`", "observe, push-aside"],
     );
 
     std::fs::write(&pddl, text).expect("the folder is writable");

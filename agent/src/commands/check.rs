@@ -40,9 +40,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     if arguments.json {
         input::print_json(&Report { errors: findings.has_errors(), findings: &findings.list })?;
     } else if findings.is_empty() {
-        input::narrate(&format!("no finding"));
+        input::narrate("no finding");
     } else {
-        eprint!("{}", input::drawn(&findings));
+        input::narrate(input::drawn(&findings).trim_end());
     }
     Ok(if findings.has_errors() { Exit::No } else { Exit::Done })
 }
@@ -69,7 +69,8 @@ fn say(findings: &Findings, grounding: &[String], json: bool) -> Result<Exit, Co
         if !grounding.is_empty() {
             input::print_text(&grounding.join("\n"))?;
         }
-        eprint!("{}", if findings.is_empty() { "no finding\n".to_string() } else { input::drawn(findings) });
+        let said = if findings.is_empty() { "no finding".to_string() } else { input::drawn(findings) };
+        input::narrate(said.trim_end());
     }
     Ok(if findings.has_errors() { Exit::No } else { Exit::Done })
 }

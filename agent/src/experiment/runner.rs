@@ -63,6 +63,8 @@ pub fn run(
 /// Does one job. A job that panics is a row like any other that failed.
 fn finish(kind: &dyn Kind, jobs: &[Job], number: usize, scratch: &Path) -> Finished {
     let scratch = scratch.join(number.to_string());
+    // What a batch that was cut off has left there is no run that could go on.
+    let _ = std::fs::remove_dir_all(&scratch);
     let outcome = catch_unwind(AssertUnwindSafe(|| kind.run(number, &scratch)));
     let _ = std::fs::remove_dir_all(&scratch);
     let outcome = outcome.unwrap_or_else(|panic| Err(format!("panic: {}", said(&*panic))));

@@ -28,7 +28,7 @@ class DepthNoise:
     disparity_steps: float = 8.0
     jitter_px: float = 0.45
     scale: float = 1.0
-    # Share of pixels without a return on surfaces that face the camera; more on steep ones.
+    # Share of pixels without a return on surfaces that face the camera; up to twice that on steep ones.
     holes: float = 0.002
     range_m: tuple[float, float] = (0.5, 6.0)
 
@@ -85,7 +85,7 @@ def shadow(depth_m: np.ndarray, focal_px: float, baseline_m: float) -> np.ndarra
 def share_lost(depth_m: np.ndarray, shine: np.ndarray, focal_px: float, holes: float) -> np.ndarray:
     """Share of pixels without a return, pixel by pixel."""
     angle = steepness_deg(depth_m, focal_px)
-    facing = holes * (1.0 + 4.0 * smooth(angle, 45.0, 75.0))
+    facing = holes * (1.0 + smooth(angle, 50.0, 80.0))
     steep = smooth(angle, 72.0, 86.0)
     shiny = shine * smooth(angle, 30.0, 65.0) * 0.8
     return 1.0 - (1.0 - np.clip(facing, 0.0, 1.0)) * (1.0 - steep) * (1.0 - shiny)

@@ -12,7 +12,7 @@ from PIL import Image
 
 from .noise import DepthNoise
 from .scenes import Scene
-from .stage import Stage, arrange, ring_poses
+from .stage import Stage, arrange, ring_poses, worst_first
 
 DEPTH_SCALE = 1000.0
 # A wheeled body errs on the floor; its neck is better known than its place, by these factors.
@@ -40,7 +40,8 @@ def record(order: Order, folder: Path) -> None:
     how = DepthNoise(scale=order.noise_scale, holes=order.holes)
     truth = {"order": asdict(order), "target": scene.target, "views": []}
     with Stage(scene) as stage:
-        for k, map_from_camera in enumerate(ring_poses(scene, order.views, order.seed)):
+        views = worst_first(stage, ring_poses(scene, order.views, order.seed))
+        for k, map_from_camera in enumerate(views):
             frame = stage.look(map_from_camera)
             depth_m = stage.measure(frame, how, (order.seed, 4, k))
             shares = {p.thing.name: round(stage.visible_share(p.thing.name, map_from_camera), 4) for p in scene.placed}

@@ -68,7 +68,7 @@ class Scene:
     start: tuple[float, float, float] = (-2.0, 0.0, 0.0)
     # What a person would look for here.
     target: str | None = None
-    # Share of the target that may be seen from the start, and that some view must show.
+    # Shares of the target that the view shows which hides it most, and the view that hides it least.
     target_from_start: tuple[float, float] = (0.0, 1.0)
     target_from_best: tuple[float, float] = (0.0, 1.0)
 
@@ -161,14 +161,16 @@ def two_tables(seed: int, rng: np.random.Generator) -> Scene:
     return scene
 
 
-def _clutter(name: str, seed: int, rng: np.random.Generator, with_cup: bool) -> Scene:
+def _clutter(name: str, seed: int, rng: np.random.Generator, with_cup: bool, cartons: int = 2) -> Scene:
     scene = _room(name, seed, rng, [_table(rng)])
     make, put = Maker(rng), Arranger(scene, rng)
     table = scene.tables[0]
     around = (float(rng.uniform(-0.25, 0.25)), float(rng.uniform(-0.08, 0.08)))
     if with_cup:
         put.put(make.cup_a(), table, (0.08, 0.08), around)
-    things = [make.tall_box(), make.tall_box(), make.any_of("bottle white_cylinder canister"), make.any_of("mug other_cup cup_b")]
+    for carton in [make.tall_box() for _ in range(cartons)]:
+        put.put(carton, table, (0.3, 0.3) if cartons > 2 else (0.4, 0.4), around)
+    things = [make.any_of("bottle white_cylinder canister"), make.any_of("mug other_cup cup_b")]
     things += [make.any_of("mug other_cup cup_b small_box canister bowl bottle") for _ in range(int(rng.integers(2, 5)))]
     for thing in sorted(things, key=lambda t: -t.radius_m):
         put.put(thing, table, (0.6, 0.5), around)
@@ -183,10 +185,10 @@ def absent(seed: int, rng: np.random.Generator) -> Scene:
 
 
 def present(seed: int, rng: np.random.Generator) -> Scene:
-    """Narrow clutter that nearly hides cup A: no view shows it whole, some views show part of it."""
-    scene = _clutter("present", seed, rng, with_cup=True)
+    """Narrow clutter that nearly hides cup A: no view shows it whole, some show part of it."""
+    scene = _clutter("present", seed, rng, with_cup=True, cartons=4)
     scene.target = "cup A"
-    scene.target_from_start, scene.target_from_best = (0.0, 0.15), (0.2, 0.6)
+    scene.target_from_start, scene.target_from_best = (0.0, 0.15), (0.2, 0.7)
     return scene
 
 

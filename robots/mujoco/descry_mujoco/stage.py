@@ -67,17 +67,23 @@ class Stage:
 
 
 def hides_its_target(scene: Scene, views: list[np.ndarray]) -> bool:
-    """Whether the first view shows no more of the target than asked for, and the best one as much as asked for."""
+    """Whether some view hides the target as far as asked for, and the best one shows as much of it as asked for."""
     if not any(p.thing.name == scene.target for p in scene.placed):
         return True
     small = (WIDTH // SHARE_SCALE, HEIGHT // SHARE_SCALE, FOCAL_PX / SHARE_SCALE)
     with Stage(scene, *small) as stage:
-        def shows(low: float, high: float, share: float) -> bool:
-            return low <= share <= high
+        shares = [stage.visible_share(scene.target, view) for view in views]
+    (low, high), (least, most) = scene.target_from_start, scene.target_from_best
+    return low <= min(shares) <= high and least <= max(shares) <= most
 
-        if not shows(*scene.target_from_start, stage.visible_share(scene.target, views[0])):
-            return False
-        return shows(*scene.target_from_best, max(stage.visible_share(scene.target, v) for v in views))
+
+def worst_first(stage: Stage, views: list[np.ndarray]) -> list[np.ndarray]:
+    """The views in their order round the tables, from the one on that shows least of the target."""
+    if not any(p.thing.name == stage.scene.target for p in stage.scene.placed):
+        return views
+    shares = [stage.visible_share(stage.scene.target, view) for view in views]
+    first = int(np.argmin(shares))
+    return views[first:] + views[:first]
 
 
 def ring_poses(scene: Scene, count: int, seed: int) -> list[np.ndarray]:

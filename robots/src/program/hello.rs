@@ -1,8 +1,6 @@
 //! The first message: what the body is and what its map knows.
 
-use crate::body::{
-    Description, Door, Footprint, Frames, Head, Room, Speeds, Stamp, Station, SurfaceHint,
-};
+use crate::body::{Description, Door, Footprint, Frames, Head, Room, Speeds, Stamp, Station, SurfaceHint};
 use crate::grid::OccupancyGrid;
 use crate::program::message;
 use crate::recorded::Known;
@@ -177,7 +175,10 @@ impl Hello {
         let c = &self.camera;
         let pixels = c.width.checked_mul(c.height).filter(|n| (1..=MOST_CELLS).contains(n));
         if pixels.is_none() {
-            return Err(format!("the camera has {} x {} pixels, expected 1 to {MOST_CELLS}", c.width, c.height));
+            return Err(format!(
+                "the camera has {} x {} pixels, expected 1 to {MOST_CELLS}",
+                c.width, c.height
+            ));
         }
         if !(c.cx.is_finite() && c.cy.is_finite()) {
             return Err("camera.cx and camera.cy are pixels".into());
@@ -200,10 +201,15 @@ impl Hello {
             }
         }
         if let Some(arm) = &self.arm {
-            above_zero(&[("arm.reach_m", arm.reach_m), ("arm.hand_opening_m", arm.hand_opening_m.unwrap_or(1.0))])?;
+            above_zero(&[
+                ("arm.reach_m", arm.reach_m),
+                ("arm.hand_opening_m", arm.hand_opening_m.unwrap_or(1.0)),
+            ])?;
         }
         match self.up {
-            Some(up) if !(up.norm().is_finite() && up.norm() > 0.0) => Err(format!("up is {up}, no direction")),
+            Some(up) if !(up.norm().is_finite() && up.norm() > 0.0) => {
+                Err(format!("up is {up}, no direction"))
+            }
             _ => Ok(()),
         }
     }
@@ -226,12 +232,15 @@ impl Hello {
         let stations = self.stations.as_deref().unwrap_or_default();
         names(&stations.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), "station")?;
         for station in stations {
-            message::transform(&station.map_from_base).map_err(|e| format!("station {}: {e}", station.name))?;
+            message::transform(&station.map_from_base)
+                .map_err(|e| format!("station {}: {e}", station.name))?;
         }
         let outlines = self.surfaces.iter().map(|s| (&s.name, &s.outline_m));
         for (name, outline) in outlines.chain(self.rooms.iter().map(|r| (&r.name, &r.outline_m))) {
             if outline.len() < 3 || outline.iter().any(|p| !(p.x.is_finite() && p.y.is_finite())) {
-                return Err(format!("the outline of \"{name}\" is none: expected three corners or more, metres"));
+                return Err(format!(
+                    "the outline of \"{name}\" is none: expected three corners or more, metres"
+                ));
             }
         }
         match self.surfaces.iter().find(|s| !s.height_m.is_finite()) {
@@ -286,7 +295,10 @@ impl Map {
         }
         let count = self.width.checked_mul(self.height).filter(|n| (1..=MOST_CELLS).contains(n));
         let Some(count) = count else {
-            return Err(format!("the map has {} x {} cells, expected 1 to {MOST_CELLS}", self.width, self.height));
+            return Err(format!(
+                "the map has {} x {} cells, expected 1 to {MOST_CELLS}",
+                self.width, self.height
+            ));
         };
         if cells.len() != count {
             return Err(format!("{} bytes follow the hello, its map has {count} cells", cells.len()));

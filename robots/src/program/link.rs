@@ -71,8 +71,12 @@ impl Link {
         match greeted.recv_timeout(hello_limit) {
             Ok(Ok(message)) => Ok((Link { lines: Lines(lines), heard, most_bytes }, message)),
             Ok(Err(Ended::Breach(because))) => Err(because),
-            Ok(Err(Ended::Closed)) | Err(RecvTimeoutError::Disconnected) => Err("it ended without a hello".into()),
-            Err(RecvTimeoutError::Timeout) => Err(format!("no hello came within {} s", hello_limit.as_secs_f64())),
+            Ok(Err(Ended::Closed)) | Err(RecvTimeoutError::Disconnected) => {
+                Err("it ended without a hello".into())
+            }
+            Err(RecvTimeoutError::Timeout) => {
+                Err(format!("no hello came within {} s", hello_limit.as_secs_f64()))
+            }
         }
     }
 
@@ -103,7 +107,12 @@ fn write_lines(mut to: impl Write, lines: &Receiver<String>) {
     }
 }
 
-fn read_messages(mut from: impl BufRead, most: &AtomicUsize, first: &SyncSender<Heard>, say: &mpsc::Sender<Heard>) {
+fn read_messages(
+    mut from: impl BufRead,
+    most: &AtomicUsize,
+    first: &SyncSender<Heard>,
+    say: &mpsc::Sender<Heard>,
+) {
     let mut greeted = false;
     loop {
         let heard = read_message(&mut from, most);
@@ -145,7 +154,11 @@ fn read_line(from: &mut impl BufRead) -> Result<String, Ended> {
     }
     if line.last() != Some(&b'\n') {
         let full = line.len() as u64 == LONGEST_LINE;
-        let why = if full { format!("a line has more than {LONGEST_LINE} bytes") } else { "it ended within a line".into() };
+        let why = if full {
+            format!("a line has more than {LONGEST_LINE} bytes")
+        } else {
+            "it ended within a line".into()
+        };
         return Err(Ended::Breach(why));
     }
     String::from_utf8(line).map_err(|_| Ended::Breach("a line is not UTF-8".into()))

@@ -79,7 +79,9 @@ impl Said {
             return Err(format!("its clock went from {before_ns} to {} ns", self.now_ns));
         }
         match &self.what {
-            What::Feedback(f) if !(0.0..=1.0).contains(&f.fraction) || !(0.0..1e9).contains(&f.distance_m) => {
+            What::Feedback(f)
+                if !(0.0..=1.0).contains(&f.fraction) || !(0.0..1e9).contains(&f.distance_m) =>
+            {
                 Err(format!("feedback of {} done after {} m", f.fraction, f.distance_m))
             }
             _ => Ok(()),

@@ -68,7 +68,12 @@ impl Places {
     ///
     /// # Errors
     /// [`Failure::Unreachable`] with the reason.
-    pub fn route(&self, known: &Known, from: &Isometry3<f64>, to: &Place) -> Result<Vec<Point2<f64>>, Failure> {
+    pub fn route(
+        &self,
+        known: &Known,
+        from: &Isometry3<f64>,
+        to: &Place,
+    ) -> Result<Vec<Point2<f64>>, Failure> {
         let goal = stand(known, to)?;
         let Some(map) = &known.map else { return Ok(Vec::new()) };
         let (from, goal) = (Pose2::from_isometry(from), Pose2::from_isometry(&goal));
@@ -90,7 +95,9 @@ pub(super) fn stand(known: &Known, place: &Place) -> Result<Isometry3<f64>, Fail
                 None => format!("{name} has no station \"{wanted}\""),
             }
         }
-        (Place::Pose(_), Some(stations)) => format!("{name} can stand at its {} stations only", stations.len()),
+        (Place::Pose(_), Some(stations)) => {
+            format!("{name} can stand at its {} stations only", stations.len())
+        }
         (Place::Pose(p), None) if ![p.x_m, p.y_m, p.yaw_rad].iter().all(|x| x.is_finite()) => {
             format!("({}, {}, {} rad) is no pose", p.x_m, p.y_m, p.yaw_rad)
         }

@@ -11,7 +11,17 @@ use std::time::{Duration, Instant};
 
 /// What of the environment a program sees. Keys, tokens and logins are not among it.
 const ENVIRONMENT: [&str; 12] = [
-    "PATH", "HOME", "USER", "LANG", "LC_ALL", "LC_CTYPE", "TZ", "TMPDIR", "DISPLAY", "PYTHONPATH", "VIRTUAL_ENV",
+    "PATH",
+    "HOME",
+    "USER",
+    "LANG",
+    "LC_ALL",
+    "LC_CTYPE",
+    "TZ",
+    "TMPDIR",
+    "DISPLAY",
+    "PYTHONPATH",
+    "VIRTUAL_ENV",
     "LD_LIBRARY_PATH",
 ];
 /// Bytes of standard error that are kept.
@@ -79,8 +89,11 @@ impl Process {
         let bytes: Vec<u8> = words.iter().copied().collect();
         let text = String::from_utf8_lossy(&bytes);
         let lines: Vec<&str> = text.lines().filter(|l| !l.trim().is_empty()).collect();
-        let shown: Vec<String> =
-            lines.iter().skip(lines.len().saturating_sub(SHOWN_LINES)).map(|l| format!("\n    {l}")).collect();
+        let shown: Vec<String> = lines
+            .iter()
+            .skip(lines.len().saturating_sub(SHOWN_LINES))
+            .map(|l| format!("\n    {l}"))
+            .collect();
         let how = if by_itself { format!(" ({status})") } else { " (it was killed)".into() };
         format!("{how}{}", shown.concat())
     }

@@ -74,7 +74,12 @@ impl ProgramRobot {
         })
     }
 
-    async fn ask(&self, request: &'static str, with: Arguments<'_>, watch: &Watch<'_>) -> Result<Done, Failure> {
+    async fn ask(
+        &self,
+        request: &'static str,
+        with: Arguments<'_>,
+        watch: &Watch<'_>,
+    ) -> Result<Done, Failure> {
         if watch.cancel.is_cancelled() {
             return Err(Failure::Cancelled { because: format!("{request} was not begun") });
         }

@@ -10,7 +10,7 @@ use std::time::Duration;
 use tokio::time::{Instant, timeout_at};
 
 /// More feedback than this in one request is a flood.
-const MOST_FEEDBACK: usize = 1_000_000;
+const MOST_FEEDBACK: usize = 100_000;
 /// A request may take this much longer on the body's clock than its limit: the last step before it is stopped.
 const CLOCK_SLACK_NS: Stamp = 50_000_000;
 

@@ -108,6 +108,10 @@ class Request:
                 raise Failure("cancelled", "nobody is left to ask")
             if message.get("cancel") == self.id:
                 raise Failure("cancelled", f"stopped after {self.elapsed_s():.1f} s")
+        self.check_time()
+
+    def check_time(self):
+        """Raises `Failure` if its time is up."""
         if self.elapsed_s() > self.time_limit_s:
             raise Failure("timed_out", f"not done within {self.time_limit_s:g} s")
 

@@ -1,8 +1,9 @@
-"""`python -m descry_mujoco record --scene floor --seed 1 --views 8 --out DIR`"""
+"""`python -m descry_mujoco record --scene floor --seed 1 --views 8 --out DIR`, `python -m descry_mujoco serve --scene search --seed 1`"""
 
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 from pathlib import Path
@@ -34,7 +35,11 @@ def arguments() -> argparse.Namespace:
     record.add_argument("--out", type=Path, required=True, help="the folder")
     record.add_argument("--views", type=int, default=8, help="frames, all round the tables")
     record.add_argument("--pose-error", type=pose_error, default=(0.0, 0.0), metavar="METRES,DEGREES", help="standard deviations of the stated poses")
-    for command in (record,):
+    serve = commands.add_parser("serve", help="be a robot: `descry --robot \"program:…\"`")
+    serve.add_argument("--pose-error", type=pose_error, default=(0.03, 2.0), metavar="METRES,DEGREES", help="standard deviations of localisation")
+    serve.add_argument("--truth", type=Path, help="write there how everything really stands, for reports")
+    serve.add_argument("--listen", metavar="HOST:PORT", help="wait for who connects, instead of standard input and output")
+    for command in (record, serve):
         command.add_argument("--scene", choices=sorted(SCENES), default="search")
         command.add_argument("--seed", type=int, default=1)
         command.add_argument("--holes", type=share, default=0.002, help="share of pixels without a return, 0 to 0.1; more on steep sides")
@@ -45,14 +50,32 @@ def arguments() -> argparse.Namespace:
     return given
 
 
-def main() -> None:
-    given = arguments()
+def record(given: argparse.Namespace) -> None:
     from . import recording
 
     order = recording.Order(given.scene, given.seed, given.views, given.holes, given.noise, *given.pose_error)
     recording.record(order, given.out)
     print(given.out)
+
+
+def serve(given: argparse.Namespace) -> None:
+    import descry_robot
+
+    from . import body, stage
+
+    scene = stage.arrange(given.scene, given.seed)
+    scene.start = stage.start_pose(scene)
+    metres, degrees = given.pose_error
+    settings = body.Settings(given.seed, metres, math.radians(degrees), given.holes, given.noise, given.truth)
+    descry_robot.serve(body.Body(scene, settings), given.listen)
+
+
+def main() -> None:
+    given = arguments()
+    {"record": record, "serve": serve}[given.command](given)
+    # The renderer's own clean-up at the end of Python complains about its order.
     sys.stdout.flush()
+    os._exit(0)
 
 
 if __name__ == "__main__":

@@ -65,5 +65,6 @@ class Camera:
 def aim_eye(data: mujoco.MjData, map_from_camera: np.ndarray) -> None:
     """Puts the free camera there (optical frame: x right, y down, z forward)."""
     rotation = map_from_camera[:3, :3] * np.array([1.0, -1.0, -1.0])
-    data.mocap_pos[0] = map_from_camera[:3, 3]
-    mujoco.mju_mat2Quat(data.mocap_quat[0], rotation.ravel())
+    number = data.model.body(EYE).mocapid[0]
+    data.mocap_pos[number] = map_from_camera[:3, 3]
+    mujoco.mju_mat2Quat(data.mocap_quat[number], rotation.ravel())

@@ -12,7 +12,7 @@ from PIL import Image
 
 from .noise import DepthNoise
 from .scenes import Scene
-from .stage import Stage, arrange, ring_poses, worst_first
+from .stage import Stage, arrange, ring_poses, small_stage, worst_first
 
 DEPTH_SCALE = 1000.0
 # A wheeled body errs on the floor; its neck is better known than its place, by these factors.
@@ -39,18 +39,19 @@ def record(order: Order, folder: Path) -> None:
     rng = np.random.default_rng([order.seed, 3])
     how = DepthNoise(scale=order.noise_scale, holes=order.holes)
     truth = {"order": asdict(order), "target": scene.target, "views": []}
+    with small_stage(scene) as counting:
+        views = worst_first(counting, ring_poses(scene, order.views, order.seed))
+        shares = [counting.visible_shares([p.thing.name for p in scene.placed], view) for view in views]
     with Stage(scene) as stage:
-        views = worst_first(stage, ring_poses(scene, order.views, order.seed))
         for k, map_from_camera in enumerate(views):
             frame = stage.look(map_from_camera)
             depth_m = stage.measure(frame, how, (order.seed, 4, k))
-            shares = {p.thing.name: round(stage.visible_share(p.thing.name, map_from_camera), 4) for p in scene.placed}
             believed = stray(map_from_camera, order.pose_sigma_m, order.pose_sigma_deg, rng)
             stem = folder / f"frame-{k:06d}"
-            Image.fromarray(millimetres(depth_m)).save(f"{stem}.depth.png")
-            Image.fromarray(frame.colour).save(f"{stem}.color.png")
+            Image.fromarray(millimetres(depth_m)).save(f"{stem}.depth.png", compress_level=3)
+            Image.fromarray(frame.colour).save(f"{stem}.color.png", compress_level=3)
             np.savetxt(f"{stem}.pose.txt", believed, fmt="%.9f")
-            truth["views"].append({"frame": stem.name, "map_from_camera": map_from_camera.tolist(), "visible_share": shares})
+            truth["views"].append({"frame": stem.name, "map_from_camera": map_from_camera.tolist(), "visible_share": shares[k]})
         truth |= {"tables": [asdict(t) for t in scene.tables], "objects": objects(stage)}
         write_settings(folder, order, stage)
     (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")

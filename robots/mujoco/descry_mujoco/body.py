@@ -12,13 +12,14 @@ import mujoco
 import numpy as np
 
 from . import machine, recording
+from .hand import Hand
 from .localisation import Localisation, Pose, apply, turn
 from .noise import DepthNoise
 from .scenes import Scene
 from .stage import Stage
 
-# What the body says of itself: along the ground and on the spot; the head; how far the hand goes.
-LINEAR_M_S, ANGULAR_RAD_S, HEAD_RAD_S, REACH_M = 0.4, 0.8, 1.0, 1.6
+# What the body says of itself: along the ground and on the spot; the head; how far the hand goes and how wide it opens.
+LINEAR_M_S, ANGULAR_RAD_S, HEAD_RAD_S, REACH_M, OPENING_M = 0.4, 0.8, 1.0, 1.6, 0.11
 # How quickly the base gains speed and brakes.
 GAIN_M_S2, GAIN_RAD_S2 = 4.0, 10.0
 HEAD = {"base_from_head": [0.0, 0.0, machine.HEAD_HEIGHT_M], "pan_limit_rad": 2.6, "tilt_down_rad": 1.2, "tilt_up_rad": 0.8}
@@ -26,13 +27,6 @@ CELL_M, CLEARANCE_M = 0.05, 0.05
 FRAME_S = 0.1
 # Between two commands to the motors; and how long a base may stand still before it counts as blocked.
 TICK_S, STUCK_S = 0.02, 1.5
-HAND_M_S = 0.1
-# A push starts this far behind the middle of an object, at the first of these where the hand has room.
-BEHIND_M = (0.06, 0.09, 0.12, 0.15, 0.18, 0.21, 0.24)
-# Above its surface: low, so that what is pushed slides and does not fall.
-PUSH_HEIGHT_M = 0.035
-# A push that ends after less than this share of what was asked for has slipped.
-SLIPPED_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -56,8 +50,9 @@ class Body(descry.Robot):
         self.model, self.data = self.stage.model, self.stage.data
         self.localisation = Localisation(settings.sigma_m, settings.sigma_rad, np.random.default_rng([settings.seed, 5]))
         self.gaze, self.frames = (0.0, 0.0), 0
+        self.arm = Hand(self.stage, self.run)
         machine.place(self.model, self.data, scene.start)
-        self._run(0.6)
+        self.run(0.6)
         # What has settled is where the clock begins.
         self.data.time = 0.0
         self.tell_truth()
@@ -80,7 +75,7 @@ class Body(descry.Robot):
                 "width": camera.width, "height": camera.height, "fx": camera.focal_px, "fy": camera.focal_px, "cx": cx, "cy": cy,
                 "range_m": list(DepthNoise().range_m), "colour": True,
             },
-            "head": HEAD, "arm": {"reach_m": REACH_M},
+            "head": HEAD, "arm": {"reach_m": REACH_M, "hand_opening_m": OPENING_M},
             "map": {"resolution_m": CELL_M, "origin_m": origin, "width": width, "height": height},
             "surfaces": [{"name": t.name, "outline_m": t.outline_m(), "height_m": t.height_m} for t in self.scene.tables],
         }, self._cells(width, height, origin)
@@ -111,8 +106,7 @@ class Body(descry.Robot):
 
     def stop(self) -> None:
         self._command(0.0, 0.0)
-        for _ in range(10):
-            self._run(TICK_S)
+        self.run(0.2)
         self.tell_truth()
 
     def tell_truth(self) -> None:
@@ -123,8 +117,11 @@ class Body(descry.Robot):
 
     # The base.
 
-    def _run(self, seconds: float) -> None:
-        mujoco.mj_step(self.model, self.data, max(1, round(seconds / self.model.opt.timestep)))
+    def run(self, seconds: float) -> None:
+        """Lets time pass. What the hand holds goes where the base goes."""
+        for _ in range(max(1, round(seconds / TICK_S))):
+            self.arm.carry(self.truth())
+            mujoco.mj_step(self.model, self.data, round(TICK_S / self.model.opt.timestep))
 
     def _command(self, forward_m_s: float, turning_rad_s: float) -> None:
         yaw = self.truth()[2]
@@ -141,7 +138,7 @@ class Body(descry.Robot):
             self._go_straight(trip, point)
         self._turn_to(trip, goal["yaw_rad"])
         self._command(0.0, 0.0)
-        self._run(TICK_S)
+        self.run(TICK_S)
         self.localisation.share = 1.0
         self.tell_truth()
         return {"distance_m": trip.driven_m, "map_from_base": descry.planar(*self.believed())}
@@ -187,13 +184,13 @@ class Body(descry.Robot):
         ticks = max(1, math.ceil(seconds / TICK_S))
         for k in range(1, ticks + 1):
             self._aim(*(a + (b - a) * k / ticks for a, b in zip(start, (pan, tilt))))
-            self._run(TICK_S)
+            self.run(TICK_S)
             if k % 10 == 0:
                 request.feedback(k / ticks)
         for _ in range(50):
             if max(abs(self.data.joint(n).qpos[0] - v) for n, v in (("pan", pan), ("tilt", tilt))) < 5e-4:
                 break
-            self._run(TICK_S)
+            self.run(TICK_S)
         return {"miss_rad": miss_rad}
 
     def _aim(self, pan: float, tilt: float) -> None:
@@ -201,7 +198,7 @@ class Body(descry.Robot):
         self.data.actuator("pan").ctrl[0], self.data.actuator("tilt").ctrl[0] = pan, tilt
 
     def sense(self, request):
-        self._run(FRAME_S)
+        self.run(FRAME_S)
         request.check()
         self.frames += 1
         frame = self.stage.frame(machine.HEAD_CAMERA)
@@ -215,61 +212,33 @@ class Body(descry.Robot):
     def push_aside(self, request, object, direction, distance_m):
         self._reach(object)
         to_truth = self.localisation.truth_from_map(self.truth())
-        at = apply(to_truth, np.array(object))
         way = apply((0.0, 0.0, to_truth[2]), np.array([*direction, 0.0]))
-        way /= np.linalg.norm(way)
-        start = self._room_behind(at, way)
-        if start is None:
-            raise descry.Failure("slipped", "there is no room for the hand behind it", moved_m=0.0)
-        moved_m = self._push(request, start, way, float(np.linalg.norm(at - start)), distance_m)
-        if moved_m < SLIPPED_SHARE * distance_m:
-            because = "the hand met nothing there" if moved_m == 0.0 else f"it came off after {moved_m:.2f} m"
-            raise descry.Failure("slipped", because, moved_m=moved_m)
-        return {"moved_m": moved_m}
+        return {"moved_m": self.arm.push(request, apply(to_truth, np.array(object)), way / np.linalg.norm(way), distance_m)}
+
+    def grasp(self, request, object, width_m):
+        if self.arm.held is not None:
+            raise descry.Failure("unable", "the hand is full")
+        if width_m > OPENING_M:
+            raise descry.Failure("unable", f"it is {width_m:.3f} m wide and the hand opens {OPENING_M:.3f} m")
+        self._reach(object)
+        at = apply(self.localisation.truth_from_map(self.truth()), np.array(object))
+        return {"width_m": self.arm.grasp(request, at, OPENING_M)}
+
+    def place(self, request, foot):
+        if self.arm.held is None:
+            raise descry.Failure("unable", "the hand is empty")
+        self._reach(foot)
+        self.arm.place(request, apply(self.localisation.truth_from_map(self.truth()), np.array(foot)))
+        return {}
+
+    def hand(self, request):
+        return {"holds": self.arm.held is not None}
 
     def _reach(self, point) -> None:
         x, y, _ = self.believed()
         away = math.hypot(point[0] - x, point[1] - y)
         if away > REACH_M:
             raise descry.Failure("unreachable", f"it is {away:.2f} m away and the arm reaches {REACH_M:.2f} m")
-
-    def _room_behind(self, at: np.ndarray, way: np.ndarray) -> np.ndarray | None:
-        """Where the hand can come down behind what it is to push."""
-        heights = [t.height_m for t in self.scene.tables if t.height_m <= at[2] + 0.02]
-        height = max(heights, default=0.0) + PUSH_HEIGHT_M
-        yaw = math.atan2(way[1], way[0])
-        for behind in BEHIND_M:
-            start = np.array([*(at - behind * way)[:2], height])
-            machine.put_hand(self.data, start, yaw)
-            mujoco.mj_forward(self.model, self.data)
-            if not self._felt():
-                return start
-        machine.put_hand(self.data, np.array(machine.PARKED_M), 0.0)
-        mujoco.mj_forward(self.model, self.data)
-        return None
-
-    def _felt(self) -> bool:
-        """Whether the hand touches something."""
-        number = self.model.geom(machine.HAND).id
-        return any(number in (c.geom1, c.geom2) for c in self.data.contact[: self.data.ncon])
-
-    def _push(self, request, start: np.ndarray, way: np.ndarray, approach_m: float, distance_m: float) -> float:
-        """Moves the hand on until it has felt something for as long as asked for, or met nothing; how far it felt it."""
-        yaw = math.atan2(way[1], way[0])
-        gone, moved = 0.0, 0.0
-        step = HAND_M_S * TICK_S
-        try:
-            while moved < distance_m and (moved > 0.0 or gone < approach_m + 0.05) and gone < approach_m + distance_m + 0.1:
-                gone += step
-                machine.put_hand(self.data, start + gone * way, yaw)
-                self._run(TICK_S)
-                moved += step if self._felt() else 0.0
-                request.feedback(min(moved / distance_m, 1.0))
-        finally:
-            machine.put_hand(self.data, np.array(machine.PARKED_M), 0.0)
-            self._run(0.5)
-            self.tell_truth()
-        return moved
 
 
 class Trip:
@@ -288,7 +257,7 @@ class Trip:
         before = body.truth()
         self.speed = speed_m_s
         body._command(speed_m_s, turning_rad_s)
-        body._run(TICK_S)
+        body.run(TICK_S)
         after = body.truth()
         moved = math.hypot(after[0] - before[0], after[1] - before[1])
         self.driven_m += moved

@@ -42,7 +42,8 @@ async fn the_template_conforms() {
 /// A program that cannot be a robot is refused, and the reason holds these words.
 fn check_refused(what: &str, words: &[&str]) {
     let limits = Limits { hello_s: if what == "no hello" { 0.5 } else { 20.0 }, ..HURRIED };
-    let failure = ProgramRobot::start(&rogue(what), limits).map(|r| r.description().name.clone()).unwrap_err();
+    let failure =
+        ProgramRobot::start(&rogue(what), limits).map(|r| r.description().name.clone()).unwrap_err();
     assert_eq!(failure.kind(), "broken", "{what}: {failure}");
     for word in words {
         assert!(failure.because().contains(word), "{what}: {failure} does not say \"{word}\"");

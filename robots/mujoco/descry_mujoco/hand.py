@@ -12,7 +12,7 @@ import numpy as np
 from . import machine
 from .stage import Stage
 
-TICK_S, PUSH_M_S, MOVE_M_S = 0.02, 0.1, 0.4
+TICK_S, PUSH_M_S, MOVE_M_S, CARRY_M_S = 0.02, 0.1, 0.4, 1.0
 # A push starts this far behind the middle of an object, at the first of these where the hand has room.
 BEHIND_M = (0.06, 0.09, 0.12, 0.15, 0.18, 0.21, 0.24)
 # Above its surface: low, so that what is pushed slides and does not fall.
@@ -21,6 +21,8 @@ PUSH_HEIGHT_M = 0.035
 SLIPPED_SHARE = 0.5
 # Over things on its way, and beside the middle of what it is to lift, metres.
 ABOVE_M, ASIDE_M = 0.45, 0.03
+# What stops higher than this above where it was to stand, stands on something else.
+STANDS_M = 0.02
 # Where what is held is carried: in the base's frame, beside what the camera sees.
 CARRIED_M = (0.0, -0.3, 1.0)
 
@@ -31,13 +33,15 @@ class Hand:
     def __init__(self, stage: Stage, run: Callable[[float], None]):
         self.model, self.data, self.scene, self._run = stage.model, stage.data, stage.scene, run
         self.held: str | None = None
-        self._at, self._yaw, self._with_base = np.array(machine.PARKED_M), 0.0, False
+        self._at, self._yaw, self._busy = np.array(machine.PARKED_M), 0.0, False
 
     def carry(self, base: tuple[float, float, float]) -> None:
         """What is held goes with the base."""
-        if self._with_base:
-            self._put(self._carried(base), base[2])
-        self._base = base
+        if self.held is None or self._busy:
+            return
+        way = self._carried(base) - self._at
+        step = CARRY_M_S * TICK_S
+        self._put(self._at + way * min(1.0, step / max(float(np.linalg.norm(way)), 1e-9)), self._yaw)
 
     @staticmethod
     def _carried(base: tuple[float, float, float]) -> np.ndarray:
@@ -115,16 +119,16 @@ class Hand:
     def grasp(self, request, at: np.ndarray, opening_m: float) -> float:
         """Comes down on what stands at a point and lifts it; how wide that is."""
         self._put(at + [0.0, 0.0, ABOVE_M], 0.0)
+        self._busy = True
         try:
             self._move(request, at, PUSH_M_S, until=self._felt)
             thing = self._under(at, opening_m)
-        except descry.Failure:
-            self._park()
-            raise
-        self._hold(thing.name)
-        self._move(request, self._at + [0.0, 0.0, ABOVE_M], PUSH_M_S)
-        self._move(request, self._carried(self._base), MOVE_M_S)
-        self._with_base = True
+            self._hold(thing.name)
+            self._move(request, self._at + [0.0, 0.0, ABOVE_M], PUSH_M_S)
+        finally:
+            self._busy = False
+            if self.held is None:
+                self._park()
         return min(2.0 * thing.radius_m, opening_m)
 
     def _under(self, at: np.ndarray, opening_m: float):
@@ -153,23 +157,22 @@ class Hand:
         self.data.eq_active[number] = 1
         self.held = name
 
-    def _release(self) -> None:
-        self.data.eq_active[self.model.equality(self.held).id] = 0
-        self.held = None
-
     def place(self, request, foot: np.ndarray) -> None:
         """Puts what it holds down with its foot at a point."""
         held, grip = self.held, self._at - self.data.body(self.held).xpos
-        self._with_base = False
         over = foot + [grip[0], grip[1], grip[2] + ABOVE_M]
-        self._move(request, np.array([*self._at[:2], max(over[2], self._at[2])]), MOVE_M_S)
-        self._move(request, np.array([*over[:2], max(over[2], self._at[2])]), MOVE_M_S)
-        down = over - [0.0, 0.0, ABOVE_M - 0.001]
-        arrived = self._move(request, down, PUSH_M_S, until=lambda: bool(self._felt(held) - {machine.HAND}))
-        if not arrived and self.data.body(held).xpos[2] - foot[2] > 0.02:
-            self._move(request, self._at + [0.0, 0.0, ABOVE_M], MOVE_M_S)
-            self._move(request, self._carried(self._base), MOVE_M_S)
-            self._with_base = True
-            raise descry.Failure("blocked", "something stands there")
-        self._release()
+        height = max(over[2], self._at[2])
+        self._busy = True
+        try:
+            self._move(request, np.array([*self._at[:2], height]), MOVE_M_S)
+            self._move(request, np.array([*over[:2], height]), MOVE_M_S)
+            down = over - [0.0, 0.0, ABOVE_M - 0.001]
+            arrived = self._move(request, down, PUSH_M_S, until=lambda: bool(self._felt(held) - {machine.HAND}))
+            if not arrived and self.data.body(held).xpos[2] - foot[2] > STANDS_M:
+                self._move(request, self._at + [0.0, 0.0, ABOVE_M], MOVE_M_S)
+                raise descry.Failure("blocked", "something stands there")
+            self.data.eq_active[self.model.equality(held).id] = 0
+            self.held = None
+        finally:
+            self._busy = False
         self._park()

@@ -8,12 +8,17 @@ use crate::head;
 use crate::recorded::Known;
 use crate::route::Router;
 use nalgebra::{Isometry3, Point2, Point3, Rotation2};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Routers that are kept; beyond that all are made anew.
+const MOST_ROUTERS: usize = 64;
 
 /// The map of a program's hello, with the routes on it.
 pub(super) struct Places {
     clearance_m: f64,
+    /// Doors that ended a drive and were not opened since.
+    shut: Mutex<BTreeSet<String>>,
     /// By the doors that count as shut.
     routers: Mutex<BTreeMap<Vec<String>, Arc<Router>>>,
 }
@@ -21,7 +26,17 @@ pub(super) struct Places {
 impl Places {
     /// Nothing is computed before it is asked for.
     pub fn new(clearance_m: f64) -> Self {
-        Places { clearance_m, routers: Mutex::new(BTreeMap::new()) }
+        Places { clearance_m, shut: Mutex::default(), routers: Mutex::default() }
+    }
+
+    /// Keeps in mind whether a door is shut.
+    pub fn met_door(&self, name: &str, is_shut: bool) {
+        let mut shut = self.shut.lock().unwrap_or_else(PoisonError::into_inner);
+        if is_shut {
+            shut.insert(name.to_owned());
+        } else {
+            shut.remove(name);
+        }
     }
 
     /// The router with some doors shut.
@@ -30,6 +45,9 @@ impl Places {
         key.sort_unstable();
         key.dedup();
         let mut routers = self.routers.lock().unwrap_or_else(PoisonError::into_inner);
+        if routers.len() >= MOST_ROUTERS {
+            routers.clear();
+        }
         let make = || {
             let mut map = map.clone();
             for door in known.doors.iter().filter(|d| shut.contains(&d.name)) {
@@ -64,7 +82,8 @@ impl Places {
         goals.into_iter().zip(found).map(|(goal, travel)| goal.and(travel)).collect()
     }
 
-    /// The way to a place for the base to follow, metres; none without a map.
+    /// The way to a place for the base to follow, metres: around the doors that are known to be shut, up to one of them if no other
+    /// leads there. None without a map.
     ///
     /// # Errors
     /// [`Failure::Unreachable`] with the reason.
@@ -77,7 +96,15 @@ impl Places {
         let goal = stand(known, to)?;
         let Some(map) = &known.map else { return Ok(Vec::new()) };
         let (from, goal) = (Pose2::from_isometry(from), Pose2::from_isometry(&goal));
-        Ok(self.router(known, map, &[]).route(&from, &goal)?.points_m)
+        let shut: Vec<String> =
+            self.shut.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect();
+        let around = self.router(known, map, &shut).route(&from, &goal);
+        let found = if shut.is_empty() {
+            around
+        } else {
+            around.or_else(|_| self.router(known, map, &[]).route(&from, &goal))
+        };
+        Ok(found?.points_m)
     }
 }
 

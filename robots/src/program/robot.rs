@@ -243,7 +243,13 @@ impl Robot for ProgramRobot {
         }
         let here = self.pose().await?;
         let route_m = self.places.route(&self.known, &here.map_from_base, to)?;
-        let done = self.ask("drive_to", Arguments::DriveTo { to, route_m: &route_m }, watch).await?;
+        let done = self.ask("drive_to", Arguments::DriveTo { to, route_m: &route_m }, watch).await;
+        if let Err(Failure::Blocked { by: Some(door), .. }) = &done
+            && self.known.doors.iter().any(|d| &d.name == door)
+        {
+            self.places.met_door(door, true);
+        }
+        let done = done?;
         let read = |done: Done| {
             let duration_s = done.duration_s();
             let said: message::DrivenSaid = answer("drive_to", done.said)?;
@@ -297,7 +303,9 @@ impl Robot for ProgramRobot {
         let done = self.ask("open_door", Arguments::Door { door }, watch).await?;
         let duration_s = done.duration_s();
         let said = answer("open_door", done.said).map(|_: message::NothingSaid| Opened { duration_s });
-        self.hold(said).await
+        let opened = self.hold(said).await?;
+        self.places.met_door(door, false);
+        Ok(opened)
     }
 
     async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {

@@ -27,6 +27,8 @@ CELL_M, CLEARANCE_M = 0.05, 0.05
 FRAME_S = 0.1
 # Between two commands to the motors; and how long a base may stand still before it counts as blocked.
 TICK_S, STUCK_S = 0.02, 1.5
+# A point of the route that is nearer than this is not driven to.
+NEAR_M = 0.02
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,7 @@ class Body(descry.Robot):
 
     def drive_to(self, request, to, route_m):
         goal = to["pose"]
-        points = [np.array(p) for p in route_m] + [np.array([goal["x_m"], goal["y_m"]])]
+        points = [np.array(p) for p in route_m or [self.believed()[:2], (goal["x_m"], goal["y_m"])]]
         legs = sum(float(np.linalg.norm(b - a)) for a, b in zip(points, points[1:]))
         self.localisation.depart()
         trip = Trip(self, request, max(legs, 1e-6))
@@ -147,7 +149,7 @@ class Body(descry.Robot):
         x, y, yaw = self.believed()
         way = point - (x, y)
         length = float(np.linalg.norm(way))
-        if length < 0.005:
+        if length < NEAR_M:
             return
         self._turn_to(trip, math.atan2(way[1], way[0]))
         cruise = cruising(length, LINEAR_M_S, GAIN_M_S2)
@@ -158,7 +160,7 @@ class Body(descry.Robot):
             left = length - float(((x, y) - start) @ along)
             if left <= 0.002:
                 return
-            aside = float(np.cross(along, (x, y) - start))
+            aside = float(along[0] * (y - start[1]) - along[1] * (x - start[0]))
             heading = math.atan2(along[1], along[0]) - math.atan2(aside, 0.4)
             speed = min(cruise, trip.speed + GAIN_M_S2 * TICK_S, math.sqrt(2.0 * GAIN_M_S2 * left) + 0.01)
             trip.go(speed, 3.0 * turn(yaw, heading))

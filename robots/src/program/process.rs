@@ -62,6 +62,11 @@ impl Process {
         Ok((process, stdin, stdout))
     }
 
+    /// Whether the program has ended; something that it has started may live on.
+    pub fn has_ended(&self) -> bool {
+        self.ends_within(Duration::ZERO)
+    }
+
     /// Waits until the program has ended, for a while; true if it has. It is not reaped, so that its group keeps its number.
     fn ends_within(&self, limit: Duration) -> bool {
         let Some(pid) = pid(&self.child) else { return true };

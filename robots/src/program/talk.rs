@@ -14,6 +14,9 @@ const MOST_FEEDBACK: usize = 100_000;
 /// A request may take this much longer on the body's clock than its limit: the last step before it is stopped.
 const CLOCK_SLACK_NS: Stamp = 50_000_000;
 
+/// How often a silent program is asked whether it is still there.
+const GLANCE: Duration = Duration::from_millis(200);
+
 /// What a request was answered with.
 pub(super) struct Done {
     pub said: serde_json::Value,
@@ -53,6 +56,13 @@ impl Drop for Asker {
             self.lines.send(&Cancel { cancel: self.id });
         }
     }
+}
+
+/// Why there is no message.
+enum Silence {
+    Late,
+    Ended(Ended),
+    Gone,
 }
 
 /// Why a request is being stopped.
@@ -204,20 +214,35 @@ impl Talk {
         Instant::now() + Duration::try_from_secs_f64(seconds.max(0.0)).unwrap_or(far).min(far)
     }
 
+    /// The next message. A program that has ended is noticed even if something that it has started holds its output open.
+    async fn message(&mut self, by: Instant) -> Result<Message, Silence> {
+        let Some((link, process)) = &mut self.line else { return Err(Silence::Gone) };
+        let mut gone = false;
+        loop {
+            match timeout_at(by.min(Instant::now() + GLANCE), link.next()).await {
+                Ok(heard) => return heard.map_err(Silence::Ended),
+                Err(_) if gone => return Err(Silence::Ended(Ended::Closed)),
+                Err(_) if Instant::now() >= by => return Err(Silence::Late),
+                // What it said last may still be on its way.
+                Err(_) => gone = process.has_ended(),
+            }
+        }
+    }
+
     /// The next message about a request.
     ///
     /// # Errors
     /// [`Failure::TimedOut`] if none comes in time and there is no `complaint`; otherwise the program is at an end.
     async fn hear(&mut self, id: u64, by: Instant, complaint: &str) -> Result<(Said, Vec<u8>), Failure> {
-        let Some((link, _)) = &mut self.line else {
-            return Err(Failure::Broken { because: self.ended.clone() });
-        };
-        let message = match timeout_at(by, link.next()).await {
-            Ok(Ok(message)) => message,
-            Ok(Err(Ended::Closed)) => return Err(self.end("the program has ended".into())),
-            Ok(Err(Ended::Breach(because))) => return Err(self.end(because)),
-            Err(_) if complaint.is_empty() => return Err(Failure::TimedOut { because: String::new() }),
-            Err(_) => {
+        let message = match self.message(by).await {
+            Ok(message) => message,
+            Err(Silence::Gone) => return Err(Failure::Broken { because: self.ended.clone() }),
+            Err(Silence::Ended(Ended::Closed)) => return Err(self.end("the program has ended".into())),
+            Err(Silence::Ended(Ended::Breach(because))) => return Err(self.end(because)),
+            Err(Silence::Late) if complaint.is_empty() => {
+                return Err(Failure::TimedOut { because: String::new() });
+            }
+            Err(Silence::Late) => {
                 let because = format!("{complaint} within {} s", self.limits.stop_s);
                 return Err(self.end(because));
             }

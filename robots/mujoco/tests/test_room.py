@@ -1,27 +1,17 @@
-"""What the room promises. Where MuJoCo or a renderer is missing, this says so and tests what is left."""
+"""What the room and its camera promise."""
 
 import json
-import sys
 import tempfile
 import unittest
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from installed import MISSING, needs_mujoco
 
-try:
+if not MISSING:
     import numpy as np
 
-    import descry_mujoco  # noqa: F401  chooses the renderer before MuJoCo is loaded
-    import mujoco
 
-    mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8).close()
-    MISSING = None
-except Exception as error:  # every way in which an installation can fall short
-    MISSING = f"{type(error).__name__}: {error}"
-    print(f"SKIPPED: the room on MuJoCo is not tested: {MISSING}", file=sys.stderr)
-
-
-@unittest.skipIf(MISSING, MISSING)
+@needs_mujoco
 class Meshes(unittest.TestCase):
     def test_every_form_is_closed_and_looks_outwards(self):
         from descry_mujoco import meshes, things
@@ -46,7 +36,7 @@ class Meshes(unittest.TestCase):
         self.assertAlmostEqual(2 * np.hypot(vertices[:, 0], vertices[:, 1]).max(), 0.070, delta=0.001)
 
 
-@unittest.skipIf(MISSING, MISSING)
+@needs_mujoco
 class Noise(unittest.TestCase):
     def test_disparity_errs_as_much_and_as_far_together_as_measured(self):
         from descry_mujoco import noise
@@ -81,7 +71,7 @@ class Noise(unittest.TestCase):
             self.assertAlmostEqual(lost, share, delta=0.004)
 
 
-@unittest.skipIf(MISSING, MISSING)
+@needs_mujoco
 class Pictures(unittest.TestCase):
     def test_depth_lies_on_the_floor_and_the_table(self):
         from descry_mujoco import scenes, stage, world

@@ -27,6 +27,8 @@ CELL_M, CLEARANCE_M = 0.05, 0.05
 FRAME_S = 0.1
 # Between two commands to the motors; and how long a base may stand still before it counts as blocked.
 TICK_S, STUCK_S = 0.02, 1.5
+# The base is still this long after it was told to stand.
+HALT_S = 0.1
 # A point of the route that is nearer than this is not driven to.
 NEAR_M = 0.02
 
@@ -57,6 +59,7 @@ class Body(descry.Robot):
         self.run(0.6)
         # What has settled is where the clock begins.
         self.data.time = 0.0
+        self.stands = self.believed()
         self.tell_truth()
 
     # What it is.
@@ -104,11 +107,16 @@ class Body(descry.Robot):
         return self.localisation.believed(self.truth())
 
     def pose(self, request):
-        return {"map_from_base": descry.planar(*self.believed())}
+        return {"map_from_base": descry.planar(*self.stands)}
 
     def stop(self) -> None:
+        self._halt()
+
+    def _halt(self) -> None:
+        """The base comes to rest, and knows where it stands until it drives again."""
         self._command(0.0, 0.0)
-        self.run(0.2)
+        self.run(HALT_S)
+        self.stands = self.believed()
         self.tell_truth()
 
     def tell_truth(self) -> None:
@@ -139,11 +147,9 @@ class Body(descry.Robot):
         for point in points[1:]:
             self._go_straight(trip, point)
         self._turn_to(trip, goal["yaw_rad"])
-        self._command(0.0, 0.0)
-        self.run(TICK_S)
         self.localisation.share = 1.0
-        self.tell_truth()
-        return {"distance_m": trip.driven_m, "map_from_base": descry.planar(*self.believed())}
+        self._halt()
+        return {"distance_m": trip.driven_m, "map_from_base": descry.planar(*self.stands)}
 
     def _go_straight(self, trip: Trip, point: np.ndarray) -> None:
         x, y, yaw = self.believed()
@@ -179,8 +185,7 @@ class Body(descry.Robot):
     # The head and the camera.
 
     def look_at(self, request, point_m):
-        believed = self.believed()
-        pan, tilt, miss_rad = descry.aim(HEAD, descry.into_base(believed, point_m))
+        pan, tilt, miss_rad = descry.aim(HEAD, descry.into_base(self.stands, point_m))
         start = self.gaze
         seconds = max(abs(pan - start[0]), abs(tilt - start[1])) / HEAD_RAD_S
         ticks = max(1, math.ceil(seconds / TICK_S))
@@ -206,7 +211,7 @@ class Body(descry.Robot):
         frame = self.stage.frame(machine.HEAD_CAMERA)
         how = DepthNoise(scale=self.settings.noise_scale, holes=self.settings.holes)
         depth_m = self.stage.measure(frame, how, (self.settings.seed, 6, self.frames))
-        chain = {"map_from_base": descry.planar(*self.believed()), "base_from_camera": descry.base_from_camera(HEAD, *self.gaze)}
+        chain = {"map_from_base": descry.planar(*self.stands), "base_from_camera": descry.base_from_camera(HEAD, *self.gaze)}
         return chain, recording.millimetres(depth_m).astype("<u2").tobytes() + frame.colour.tobytes()
 
     # The hand.
@@ -237,7 +242,7 @@ class Body(descry.Robot):
         return {"holds": self.arm.held is not None}
 
     def _reach(self, point) -> None:
-        x, y, _ = self.believed()
+        x, y, _ = self.stands
         away = math.hypot(point[0] - x, point[1] - y)
         if away > REACH_M:
             raise descry.Failure("unreachable", f"it is {away:.2f} m away and the arm reaches {REACH_M:.2f} m")

@@ -37,7 +37,7 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Limits { hello_s: 60.0, silence_s: 20.0, stop_s: 5.0, overrun_s: 20.0, memory_bytes: 8 << 30 }
+        Limits { hello_s: 120.0, silence_s: 20.0, stop_s: 5.0, overrun_s: 20.0, memory_bytes: 8 << 30 }
     }
 }
 

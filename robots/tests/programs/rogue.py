@@ -71,7 +71,7 @@ class Rogue(Template):
         if WHAT == "past its end":
             raw(json.dumps({**said, "feedback": {"fraction": 1.5}}).encode() + b"\n")
         if WHAT == "clock goes back":
-            self.clock_s -= 1.0
+            self.clock_s -= 100.0
         if WHAT == "eats memory":
             hold = bytearray(1 << 31)
             raise descry.Failure("unable", f"holds {len(hold)} bytes")

@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 use tokio::sync::Mutex;
 
-/// How long a program may take, in seconds of the wall's clock, and how much memory.
+/// How long a program may take, in seconds of the wall's clock, how much it may say, and how much memory it has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// From the start to the hello.
@@ -31,13 +31,22 @@ pub struct Limits {
     pub stop_s: f64,
     /// Beyond a request's own limit, which counts on the body's clock.
     pub overrun_s: f64,
+    /// Most messages of feedback in one request.
+    pub feedback: usize,
     /// Address space of each of its processes, bytes.
     pub memory_bytes: u64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Limits { hello_s: 120.0, silence_s: 20.0, stop_s: 5.0, overrun_s: 20.0, memory_bytes: 8 << 30 }
+        Limits {
+            hello_s: 120.0,
+            silence_s: 20.0,
+            stop_s: 5.0,
+            overrun_s: 20.0,
+            feedback: 100_000,
+            memory_bytes: 8 << 30,
+        }
     }
 }
 

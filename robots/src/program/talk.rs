@@ -9,8 +9,6 @@ use crate::program::robot::Limits;
 use std::time::Duration;
 use tokio::time::{Instant, timeout_at};
 
-/// More feedback than this in one request is a flood.
-const MOST_FEEDBACK: usize = 100_000;
 /// A request may take this much longer on the body's clock than its limit: the last step before it is stopped.
 const CLOCK_SLACK_NS: Stamp = 50_000_000;
 
@@ -166,7 +164,7 @@ impl Talk {
             match said.what {
                 What::Accepted(_) | What::Feedback(_) => {
                     heard += 1;
-                    if heard > MOST_FEEDBACK {
+                    if heard > self.limits.feedback {
                         return Err(self.end(format!("{heard} messages of feedback in one request")));
                     }
                     if let What::Feedback(f) = said.what {

@@ -116,6 +116,7 @@ async fn a_rogue_program_is_a_failure_with_its_reason() {
     check_rogue("endless line", "broken", &["a line has more than 4194304 bytes"]).await;
     check_rogue("endless feedback", "broken", &["501 messages of feedback"]).await;
     check_rogue("huge frame", "broken", &["announced 1099511627776 bytes"]).await;
+    check_rogue("stops by itself", "blocked", &["the emergency stop was pressed"]).await;
     check_rogue("late", "timed_out", &["drive_to took longer than 1.0 s"]).await;
     check_rogue("past its end", "broken", &["feedback of 1.5"]).await;
     check_rogue("clock goes back", "broken", &["its clock went from"]).await;

@@ -9,6 +9,8 @@ use crate::program::robot::Limits;
 use std::time::Duration;
 use tokio::time::{Instant, timeout_at};
 
+/// The longest limit of a request, seconds: no limit in practice, and a number in any language.
+const LONGEST_S: f64 = 1e9;
 /// A request may take this much longer on the body's clock than its limit: the last step before it is stopped.
 const CLOCK_SLACK_NS: Stamp = 50_000_000;
 
@@ -97,7 +99,8 @@ impl Talk {
         };
         let id = self.next_id;
         self.next_id += 1;
-        link.lines().send(&Ask { id, request, with, time_limit_s: watch.time_limit_s });
+        let time_limit_s = watch.time_limit_s.clamp(0.0, LONGEST_S);
+        link.lines().send(&Ask { id, request, with, time_limit_s });
         self.open = Some(id);
         let mut asker = Asker { id, lines: link.lines(), waits: true };
         let done = self.follow(id, request, watch, progress).await;
@@ -126,7 +129,7 @@ impl Talk {
         progress: &(dyn Fn(Stamp, f64, f64) + Send + Sync),
     ) -> Result<Done, Failure> {
         let before_ns = self.now_ns;
-        let limit_ns = (watch.time_limit_s.clamp(0.0, 1e9) * 1e9) as Stamp;
+        let limit_ns = (watch.time_limit_s.clamp(0.0, LONGEST_S) * 1e9) as Stamp;
         let total = self.within(watch.time_limit_s + self.limits.overrun_s);
         let mut silent = self.within(self.limits.silence_s);
         let mut stopping: Option<Stopping> = None;
@@ -202,6 +205,8 @@ impl Talk {
     fn failed(&mut self, failure: Failure, stopping: Option<Stopping>) -> Failure {
         match (failure, stopping) {
             (Failure::Cancelled { .. }, Some(stop)) => stop.failure,
+            // Nobody here asked for that: somebody stopped the robot itself.
+            (Failure::Cancelled { because }, None) => Failure::Blocked { because, by: None },
             (Failure::Broken { because }, _) => self.end(because),
             (failure, _) => failure,
         }

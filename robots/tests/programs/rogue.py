@@ -65,6 +65,8 @@ class Rogue(Template):
                 raw((json.dumps({**said, "feedback": {"fraction": 0.5}}).encode() + b"\n") * 1000)
         if WHAT == "huge frame":
             raw(json.dumps({**said, "done": {}, "bytes": 1 << 40}).encode() + b"\n")
+        if WHAT == "stops by itself":
+            raise descry.Failure("cancelled", "the emergency stop was pressed")
         if WHAT == "late":
             self.clock_s += 1000.0
             return {"distance_m": 1.0, "map_from_base": descry.planar(*self.at)}

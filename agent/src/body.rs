@@ -1,9 +1,10 @@
-//! Which body pursues a goal: the simulated one in a scene, or a recording.
+//! Which body pursues a goal: the simulated one in a scene, a recording, or a program.
 
 use std::sync::Arc;
 
 use descry_domains::load::Domain;
 use descry_robots::Robot;
+use descry_robots::program::{Limits, ProgramRobot};
 use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
 
 use crate::exit::CommandError;
@@ -65,10 +66,10 @@ impl Body {
     }
 }
 
-/// Opens the body of `--robot`: `sim`, or `recorded:DIR` with a folder of frames or the record of a run.
+/// Opens the body of `--robot`: `sim`, `recorded:DIR` with a folder of frames or the record of a run, or `program:COMMAND`.
 ///
 /// # Errors
-/// [`CommandError::BadInput`] names the place and what was expected.
+/// [`CommandError::BadInput`] names the place and what was expected; [`CommandError::Broken`] if a program says no hello.
 pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Result<Body, CommandError> {
     match robot.split_once(':') {
         None if robot == "sim" => {
@@ -97,7 +98,19 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
             };
             Ok(Body { robot: Arc::new(robot), scene: None, simulated: None })
         }
-        _ => Err(CommandError::BadInput(format!("--robot {robot}\n  expected: sim, or recorded:DIR"))),
+        Some(("program", command)) => {
+            if let Some(scene) = scene {
+                let text = format!(
+                    "--scene {scene}: a program has its own world\n  leave --scene out, or say it in the program's command line"
+                );
+                return Err(CommandError::BadInput(text));
+            }
+            let robot = ProgramRobot::start(command, Limits::default()).map_err(CommandError::broken)?;
+            Ok(Body { robot: Arc::new(robot), simulated: None })
+        }
+        _ => Err(CommandError::BadInput(format!(
+            "--robot {robot}\n  expected: sim, recorded:DIR or program:COMMAND"
+        ))),
     }
 }
 

@@ -1,11 +1,12 @@
 //! What a frame and a table of routes cost: `cargo bench -p descry-robots`.
 
 use descry_robots::nalgebra::Point3;
+use descry_robots::program::{Limits, ProgramRobot};
 use descry_robots::route::Router;
 use descry_robots::sim::noise::{DepthNoise, observe};
 use descry_robots::sim::render::render;
 use descry_robots::sim::{Scene, SceneSpec, arrange, body};
-use descry_robots::{Pose2, head};
+use descry_robots::{Pose2, Robot, Watch, head};
 use divan::Bencher;
 
 const DEFAULT_SCENE: &str =
@@ -59,4 +60,30 @@ fn routes_between(bencher: Bencher, poses: usize) {
     let Some(scene) = scene() else { return };
     let (map, speeds, poses) = (scene.map(), body::description().speeds, ring(poses));
     bencher.bench_local(|| Router::new(&map, 0.3, speeds).travel_table(&poses));
+}
+
+/// A program in Python that has its frames ready: what the protocol costs.
+fn program(bencher: Bencher, ask: impl AsyncFn(&ProgramRobot)) {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/programs/frames.py");
+    let Ok(robot) = ProgramRobot::start(&format!("python3 '{file}'"), Limits::default()) else {
+        println!("SKIPPED: python3 is not here");
+        return;
+    };
+    let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_time().build() else { return };
+    bencher.bench_local(|| runtime.block_on(ask(&robot)));
+}
+
+#[divan::bench]
+fn ask_a_program_where_it_is(bencher: Bencher) {
+    program(bencher, async |robot| {
+        let _ = divan::black_box(robot.pose().await);
+    });
+}
+
+/// 640x480 depths of 16 bits, to a cloud.
+#[divan::bench]
+fn take_a_frame_of_a_program(bencher: Bencher) {
+    program(bencher, async |robot| {
+        let _ = divan::black_box(robot.sense(&Watch::default()).await);
+    });
 }

@@ -6,6 +6,7 @@ pub mod failure;
 pub mod grid;
 pub mod head;
 pub mod input;
+pub mod program;
 pub mod recorded;
 pub mod route;
 pub mod sim;

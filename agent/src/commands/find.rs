@@ -48,7 +48,8 @@ pub struct With {
     /// Scene of the simulated robot: a name of the domain or a TOML file
     #[arg(long)]
     scene: Option<String>,
-    /// The body: sim, or recorded:DIR for a folder of depth frames or of an earlier run (also recorded:mongodb://HOST/DATABASE#RUN)
+    /// The body: sim; recorded:DIR for a folder of depth frames or of an earlier run (also recorded:mongodb://HOST/DATABASE#RUN);
+    /// or program:COMMAND for a program that is a robot
     #[arg(long, default_value = "sim")]
     robot: String,
     /// Fixes the arrangement, the noise and every choice

@@ -9,6 +9,7 @@ mod memory;
 mod plan;
 mod recognise;
 mod replay;
+mod robot;
 mod runs;
 mod show;
 mod validate;
@@ -38,6 +39,9 @@ pub enum Command {
     Recognise(recognise::Arguments),
     /// Carry out a batch of runs: tables with intervals, plots and a page; goes on where it was cut off
     Experiment(experiment::Arguments),
+    /// A body by itself: check that it keeps the promises of bodies
+    #[command(subcommand)]
+    Robot(robot::Arguments),
     /// Show what happened in a run
     Show(show::Arguments),
     /// Live through a run again from its record: the same percepts, beliefs and verdict, or where they part
@@ -65,6 +69,7 @@ pub fn run(command: &Command) -> Result<Exit, CommandError> {
         Command::Check(arguments) => check::run(arguments),
         Command::Recognise(arguments) => recognise::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments),
+        Command::Robot(arguments) => robot::run(arguments),
         Command::Show(arguments) => show::run(arguments),
         Command::Replay(arguments) => replay::run(arguments),
         Command::Runs(arguments) => runs::run(arguments),

@@ -11,6 +11,7 @@ pub use hand::check_carrying;
 use crate::body::{CancellationToken, Place, Pose2, Progress, Push, Robot, Sensed, Watch};
 use crate::failure::Failure;
 use nalgebra::{Isometry3, Point3, Vector2};
+use std::pin::Pin;
 use std::sync::Mutex;
 
 /// A promise that a body did not keep.
@@ -38,22 +39,38 @@ fn done<T>(answer: Result<T, Failure>, promise: &'static str) -> Result<T, Breac
     answer.map_err(|f| Breach { promise, found: f.to_string() })
 }
 
+/// A check that is under way.
+type Checking<'a> = Pin<Box<dyn Future<Output = Result<(), Breach>> + Send + 'a>>;
+/// Begins a check of a body.
+type Check = for<'a> fn(&'a dyn Robot) -> Checking<'a>;
+
+/// Every check by its name, in the order in which a body goes through them.
+pub const CHECKS: [(&str, Check); 9] = [
+    ("what it is", |robot| Box::pin(async { check_description(robot).and_then(|()| check_stations(robot)) })),
+    ("a frame", |robot| Box::pin(check_frame(robot))),
+    ("routes and a drive", |robot| {
+        Box::pin(async {
+            let goal = check_travel(robot).await?;
+            check_drive(robot, &goal).await
+        })
+    }),
+    ("a frame after the drive", |robot| Box::pin(check_frame(robot))),
+    ("what it refuses", |robot| Box::pin(check_refusals(robot))),
+    ("doors", |robot| Box::pin(doors::check_doors(robot))),
+    ("the hand", |robot| Box::pin(hand::check_hand(robot))),
+    ("being stopped", |robot| Box::pin(check_stops(robot))),
+    ("a frame after it was stopped", |robot| Box::pin(check_frame(robot))),
+];
+
 /// Runs every check.
 ///
 /// # Errors
 /// The first promise that is not kept, and how.
 pub async fn check(robot: &dyn Robot) -> Result<(), Breach> {
-    check_description(robot)?;
-    check_stations(robot)?;
-    check_frame(robot).await?;
-    let goal = check_travel(robot).await?;
-    check_drive(robot, &goal).await?;
-    check_frame(robot).await?;
-    check_refusals(robot).await?;
-    doors::check_doors(robot).await?;
-    hand::check_hand(robot).await?;
-    check_stops(robot).await?;
-    check_frame(robot).await
+    for (_, begin) in CHECKS {
+        begin(robot).await?;
+    }
+    Ok(())
 }
 
 fn check_description(robot: &dyn Robot) -> Result<(), Breach> {

@@ -1,0 +1,325 @@
+//! The first message: what the body is and what its map knows.
+
+use crate::body::{Description, Door, Footprint, Frames, Head, Room, Speeds, Stamp, Station, SurfaceHint};
+use crate::grid::OccupancyGrid;
+use crate::program::message;
+use crate::recorded::Known;
+use descry_perception::Intrinsics;
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use serde::Deserialize;
+
+/// The version of the protocol that is spoken here.
+pub const PROTOCOL: u32 = 1;
+/// Most pixels of an image, and most cells of a map.
+const MOST_CELLS: usize = 1 << 25;
+/// Most surfaces, rooms, doors or stations.
+const MOST_NAMES: usize = 10_000;
+
+/// What a program says first.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Hello {
+    /// Checked before the rest is read.
+    #[serde(rename = "protocol")]
+    _protocol: u32,
+    name: String,
+    #[serde(default)]
+    simulated: bool,
+    #[serde(default)]
+    now_ns: Stamp,
+    base: Base,
+    camera: Camera,
+    head: Option<Head>,
+    arm: Option<Arm>,
+    #[serde(default)]
+    frames: BodyFrames,
+    up: Option<Vector3<f64>>,
+    pose_sigma_m: f64,
+    pose_sigma_rad: f64,
+    map: Option<Map>,
+    #[serde(default)]
+    surfaces: Vec<SurfaceHint>,
+    #[serde(default)]
+    rooms: Vec<Room>,
+    #[serde(default)]
+    doors: Vec<Door>,
+    stations: Option<Vec<Station>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Base {
+    footprint: Footprint,
+    linear_m_s: f64,
+    angular_rad_s: f64,
+    /// Kept between the footprint and what the map shows.
+    #[serde(default = "default_clearance_m")]
+    clearance_m: f64,
+}
+
+fn default_clearance_m() -> f64 {
+    0.05
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Camera {
+    width: usize,
+    height: usize,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    range_m: (f64, f64),
+    /// Of a depth of 1.
+    #[serde(default = "default_unit_m")]
+    unit_m: f64,
+    /// Whether a colour image of the same pixels follows the depths.
+    #[serde(default)]
+    colour: bool,
+    #[serde(default = "default_camera_frame")]
+    frame: String,
+}
+
+fn default_unit_m() -> f64 {
+    0.001
+}
+
+fn default_camera_frame() -> String {
+    Frames::default().camera
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Arm {
+    reach_m: f64,
+    hand_opening_m: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct BodyFrames {
+    map: String,
+    base: String,
+}
+
+impl Default for BodyFrames {
+    fn default() -> Self {
+        let Frames { map, base, .. } = Frames::default();
+        BodyFrames { map, base }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Map {
+    resolution_m: f64,
+    origin_m: Point2<f64>,
+    width: usize,
+    height: usize,
+}
+
+/// A hello that was understood and holds.
+pub(super) struct Greeting {
+    pub known: Known,
+    pub clearance_m: f64,
+    pub pixels: PixelFormat,
+}
+
+/// How the bytes of a frame are read.
+#[derive(Clone, Copy)]
+pub(super) struct PixelFormat {
+    pub unit_m: f64,
+    pub colour: bool,
+}
+
+impl PixelFormat {
+    /// Bytes of a frame with that many pixels: 16 bits of depth each, then red, green and blue.
+    pub fn bytes(&self, pixels: usize) -> usize {
+        pixels * if self.colour { 5 } else { 2 }
+    }
+}
+
+impl Hello {
+    /// What the body is, with the bytes that came after the line: the cells of the map.
+    ///
+    /// # Errors
+    /// What in it cannot be.
+    pub fn check(self, cells: &[u8]) -> Result<Greeting, String> {
+        if self.now_ns < 0 {
+            return Err(format!("now_ns is {}, expected nanoseconds from 0", self.now_ns));
+        }
+        above_zero(&[
+            ("base.linear_m_s", self.base.linear_m_s),
+            ("base.angular_rad_s", self.base.angular_rad_s),
+            ("camera.fx", self.camera.fx),
+            ("camera.fy", self.camera.fy),
+            ("camera.unit_m", self.camera.unit_m),
+            ("pose_sigma_m", self.pose_sigma_m),
+            ("pose_sigma_rad", self.pose_sigma_rad),
+        ])?;
+        self.check_parts()?;
+        self.check_names()?;
+        let map = match &self.map {
+            Some(map) => Some(map.grid(cells)?),
+            None if cells.is_empty() => None,
+            None => return Err(format!("{} bytes follow the hello, which has no map", cells.len())),
+        };
+        if map.is_none() && self.stations.as_ref().is_none_or(Vec::is_empty) {
+            return Err("it has neither a map nor stations: there is nowhere to go".into());
+        }
+        Ok(self.greeting(map))
+    }
+
+    fn check_parts(&self) -> Result<(), String> {
+        let c = &self.camera;
+        let pixels = c.width.checked_mul(c.height).filter(|n| (1..=MOST_CELLS).contains(n));
+        if pixels.is_none() {
+            return Err(format!(
+                "the camera has {} x {} pixels, expected 1 to {MOST_CELLS}",
+                c.width, c.height
+            ));
+        }
+        if !(c.cx.is_finite() && c.cy.is_finite()) {
+            return Err("camera.cx and camera.cy are pixels".into());
+        }
+        if !(c.range_m.0 >= 0.0 && c.range_m.0 < c.range_m.1 && c.range_m.1.is_finite()) {
+            return Err(format!("camera.range_m is {:?}, expected least and greatest depth", c.range_m));
+        }
+        let radius_m = self.base.footprint.radius_m();
+        if !(radius_m.is_finite() && radius_m >= 0.0) {
+            return Err(format!("base.footprint has a radius of {radius_m} m"));
+        }
+        let clearance_m = self.base.clearance_m;
+        if !(clearance_m.is_finite() && clearance_m >= 0.0) {
+            return Err(format!("base.clearance_m is {clearance_m}"));
+        }
+        if let Some(h) = &self.head {
+            let angles = [h.pan_limit_rad, h.tilt_down_rad, h.tilt_up_rad];
+            if !(angles.iter().all(|a| a.is_finite() && *a >= 0.0) && finite3(&h.base_from_head)) {
+                return Err("head: expected base_from_head in metres and three limits from 0".into());
+            }
+        }
+        if let Some(arm) = &self.arm {
+            above_zero(&[
+                ("arm.reach_m", arm.reach_m),
+                ("arm.hand_opening_m", arm.hand_opening_m.unwrap_or(1.0)),
+            ])?;
+        }
+        match self.up {
+            Some(up) if !(up.norm().is_finite() && up.norm() > 0.0) => {
+                Err(format!("up is {up}, no direction"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_names(&self) -> Result<(), String> {
+        let names = |list: &[&str], what: &str| {
+            if list.len() > MOST_NAMES {
+                return Err(format!("{} {what}s, expected {MOST_NAMES} at most", list.len()));
+            }
+            let mut sorted = list.to_vec();
+            sorted.sort_unstable();
+            match sorted.windows(2).find(|w| w[0] == w[1]) {
+                Some(w) => Err(format!("two {what}s are called \"{}\"", w[0])),
+                None => Ok(()),
+            }
+        };
+        names(&self.surfaces.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), "surface")?;
+        names(&self.rooms.iter().map(|r| r.name.as_str()).collect::<Vec<_>>(), "room")?;
+        names(&self.doors.iter().map(|d| d.name.as_str()).collect::<Vec<_>>(), "door")?;
+        let stations = self.stations.as_deref().unwrap_or_default();
+        names(&stations.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), "station")?;
+        for station in stations {
+            message::transform(&station.map_from_base)
+                .map_err(|e| format!("station {}: {e}", station.name))?;
+        }
+        let outlines = self.surfaces.iter().map(|s| (&s.name, &s.outline_m));
+        for (name, outline) in outlines.chain(self.rooms.iter().map(|r| (&r.name, &r.outline_m))) {
+            if outline.len() < 3 || outline.iter().any(|p| !(p.x.is_finite() && p.y.is_finite())) {
+                return Err(format!(
+                    "the outline of \"{name}\" is none: expected three corners or more, metres"
+                ));
+            }
+        }
+        match self.surfaces.iter().find(|s| !s.height_m.is_finite()) {
+            Some(s) => Err(format!("surface {}: its height is {}", s.name, s.height_m)),
+            None => Ok(()),
+        }
+    }
+
+    fn greeting(self, map: Option<OccupancyGrid>) -> Greeting {
+        let c = self.camera;
+        let description = Description {
+            name: self.name,
+            simulated: self.simulated,
+            footprint: self.base.footprint,
+            speeds: Speeds { linear_m_s: self.base.linear_m_s, angular_rad_s: self.base.angular_rad_s },
+            camera: Intrinsics { width: c.width, height: c.height, fx: c.fx, fy: c.fy, cx: c.cx, cy: c.cy },
+            range_m: c.range_m,
+            head: self.head,
+            frames: Frames { map: self.frames.map, base: self.frames.base, camera: c.frame },
+            reach_m: self.arm.as_ref().map(|a| a.reach_m),
+            hand_opening_m: self.arm.as_ref().and_then(|a| a.hand_opening_m),
+            up: self.up.map(|up| up.normalize()),
+            pose_sigma_m: self.pose_sigma_m,
+            pose_sigma_rad: self.pose_sigma_rad,
+        };
+        let tidy = |s: Station| Station {
+            map_from_base: message::transform(&s.map_from_base).unwrap_or(Isometry3::identity()),
+            ..s
+        };
+        let known = Known {
+            description,
+            surfaces: self.surfaces,
+            rooms: self.rooms,
+            doors: self.doors,
+            stations: self.stations.map(|list| list.into_iter().map(tidy).collect()),
+            map,
+            now_ns: self.now_ns,
+        };
+        Greeting {
+            known,
+            clearance_m: self.base.clearance_m,
+            pixels: PixelFormat { unit_m: c.unit_m, colour: c.colour },
+        }
+    }
+}
+
+impl Map {
+    fn grid(&self, cells: &[u8]) -> Result<OccupancyGrid, String> {
+        above_zero(&[("map.resolution_m", self.resolution_m)])?;
+        if !(self.origin_m.x.is_finite() && self.origin_m.y.is_finite()) {
+            return Err("map.origin_m is no place".into());
+        }
+        let count = self.width.checked_mul(self.height).filter(|n| (1..=MOST_CELLS).contains(n));
+        let Some(count) = count else {
+            return Err(format!(
+                "the map has {} x {} cells, expected 1 to {MOST_CELLS}",
+                self.width, self.height
+            ));
+        };
+        if cells.len() != count {
+            return Err(format!("{} bytes follow the hello, its map has {count} cells", cells.len()));
+        }
+        Ok(OccupancyGrid {
+            resolution_m: self.resolution_m,
+            origin_m: self.origin_m,
+            width: self.width,
+            height: self.height,
+            occupied: cells.iter().map(|&c| c != 0).collect(),
+        })
+    }
+}
+
+fn finite3(p: &Point3<f64>) -> bool {
+    p.iter().all(|x| x.is_finite())
+}
+
+fn above_zero(numbers: &[(&str, f64)]) -> Result<(), String> {
+    match numbers.iter().find(|(_, x)| !(x.is_finite() && *x > 0.0)) {
+        Some((name, x)) => Err(format!("{name} is {x}, expected a number above zero")),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,173 @@
+//! The lines that go to and fro, and what in them cannot be.
+
+use crate::body::{Grasp, Place, Placing, Push, Stamp};
+use crate::failure::Failure;
+use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+/// The latest stamp that a program may say: what comes later leaves no room to reckon with.
+const LATEST_NS: Stamp = 4_000_000_000_000_000_000;
+/// How far the length of a quaternion may be from 1.
+const QUATERNION_TOLERANCE: f64 = 1e-3;
+
+/// A request as a line.
+#[derive(Serialize)]
+pub(super) struct Ask<'a> {
+    pub id: u64,
+    pub request: &'static str,
+    pub with: Arguments<'a>,
+    pub time_limit_s: f64,
+}
+
+/// What a request says besides its name.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub(super) enum Arguments<'a> {
+    Nothing {},
+    DriveTo { to: &'a Place, route_m: &'a [Point2<f64>] },
+    LookAt { point_m: &'a Point3<f64> },
+    Push(&'a Push),
+    Door { door: &'a str },
+    Grasp(&'a Grasp),
+    Place(&'a Placing),
+}
+
+/// Stops a request.
+#[derive(Serialize)]
+pub(super) struct Cancel {
+    pub cancel: u64,
+}
+
+/// A line of the program after its hello.
+#[derive(Debug, Deserialize)]
+pub(super) struct Said {
+    pub id: u64,
+    pub now_ns: Stamp,
+    #[serde(flatten)]
+    pub what: What,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum What {
+    /// It has understood the request and begins.
+    Accepted(serde::de::IgnoredAny),
+    /// How far it has got.
+    Feedback(Feedback),
+    /// It is done; what is in it depends on the request.
+    Done(serde_json::Value),
+    /// It could not be done.
+    Failed(Failure),
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Feedback {
+    pub fraction: f64,
+    #[serde(default)]
+    pub distance_m: f64,
+}
+
+impl Said {
+    /// Checks what holds for every line: the clock does not go back, numbers are some.
+    ///
+    /// # Errors
+    /// What cannot be.
+    pub fn check(&self, before_ns: Stamp) -> Result<(), String> {
+        if self.now_ns < before_ns || self.now_ns > LATEST_NS {
+            return Err(format!("its clock went from {before_ns} to {} ns", self.now_ns));
+        }
+        match &self.what {
+            What::Feedback(f)
+                if !(0.0..=1.0).contains(&f.fraction) || !(0.0..1e9).contains(&f.distance_m) =>
+            {
+                Err(format!("feedback of {} done after {} m", f.fraction, f.distance_m))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What `pose` is answered with.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PoseSaid {
+    pub map_from_base: Isometry3<f64>,
+    pub sigma_m: Option<f64>,
+    pub sigma_rad: Option<f64>,
+    pub station: Option<String>,
+}
+
+/// What `drive_to` is answered with.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DrivenSaid {
+    pub distance_m: f64,
+    pub map_from_base: Isometry3<f64>,
+}
+
+/// What `look_at` is answered with.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LookedSaid {
+    pub miss_rad: f64,
+}
+
+/// What `sense` is answered with; the pixels follow as bytes.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SensedSaid {
+    pub stamp_ns: Option<Stamp>,
+    pub map_from_base: Isometry3<f64>,
+    pub base_from_camera: Isometry3<f64>,
+}
+
+/// What `push_aside` is answered with.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PushedSaid {
+    pub moved_m: f64,
+}
+
+/// What `grasp` is answered with.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GraspedSaid {
+    pub width_m: f64,
+}
+
+/// What `open_door` and `place` are answered with.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct NothingSaid {}
+
+/// The answer that a request has.
+///
+/// # Errors
+/// What is missing or cannot be read.
+pub(super) fn answer<T: DeserializeOwned>(request: &str, value: serde_json::Value) -> Result<T, String> {
+    serde_json::from_value(value).map_err(|e| format!("its answer to {request} is none: {e}"))
+}
+
+/// The transform as one whose rotation is exact.
+///
+/// # Errors
+/// If its numbers are none, or its quaternion no rotation.
+pub(super) fn transform(said: &Isometry3<f64>) -> Result<Isometry3<f64>, String> {
+    let quaternion = said.rotation.into_inner();
+    let length = quaternion.norm();
+    let finite = said.translation.vector.iter().all(|x| x.is_finite()) && length.is_finite();
+    if !finite || (length - 1.0).abs() > QUATERNION_TOLERANCE {
+        return Err(format!("a transform with the quaternion {:?}", quaternion.coords.as_slice()));
+    }
+    Ok(Isometry3::from_parts(said.translation, UnitQuaternion::new_normalize(quaternion)))
+}
+
+/// A length or an angle, from 0.
+///
+/// # Errors
+/// If it is none.
+pub(super) fn amount(what: &str, x: f64) -> Result<f64, String> {
+    if x.is_finite() && x >= 0.0 { Ok(x) } else { Err(format!("{what} is {x}, expected a number from 0")) }
+}

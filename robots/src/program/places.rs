@@ -1,0 +1,162 @@
+//! What is answered here without asking the program: where it can go at what cost, and where its camera would be. Planning asks
+//! thousands of such questions; they need no round trips.
+
+use crate::body::{Description, Door, Place, Pose2, Station, Travel};
+use crate::failure::Failure;
+use crate::grid::OccupancyGrid;
+use crate::head;
+use crate::recorded::Known;
+use crate::route::Router;
+use nalgebra::{Isometry3, Point2, Point3, Rotation2};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Routers that are kept; beyond that all are made anew.
+const MOST_ROUTERS: usize = 64;
+
+/// The map of a program's hello, with the routes on it.
+pub(super) struct Places {
+    clearance_m: f64,
+    /// Doors that ended a drive and were not opened since.
+    shut: Mutex<BTreeSet<String>>,
+    /// By the doors that count as shut.
+    routers: Mutex<BTreeMap<Vec<String>, Arc<Router>>>,
+}
+
+impl Places {
+    /// Nothing is computed before it is asked for.
+    pub fn new(clearance_m: f64) -> Self {
+        Places { clearance_m, shut: Mutex::default(), routers: Mutex::default() }
+    }
+
+    /// Keeps in mind whether a door is shut.
+    pub fn met_door(&self, name: &str, is_shut: bool) {
+        let mut shut = self.shut.lock().unwrap_or_else(PoisonError::into_inner);
+        if is_shut {
+            shut.insert(name.to_owned());
+        } else {
+            shut.remove(name);
+        }
+    }
+
+    /// The router with some doors shut.
+    fn router(&self, known: &Known, map: &OccupancyGrid, shut: &[String]) -> Arc<Router> {
+        let mut key = shut.to_vec();
+        key.sort_unstable();
+        key.dedup();
+        let mut routers = self.routers.lock().unwrap_or_else(PoisonError::into_inner);
+        if routers.len() >= MOST_ROUTERS {
+            routers.clear();
+        }
+        let make = || {
+            let mut map = map.clone();
+            for door in known.doors.iter().filter(|d| shut.contains(&d.name)) {
+                close(&mut map, door);
+            }
+            let d = &known.description;
+            Arc::new(Router::new(&map, d.footprint.radius_m() + self.clearance_m, d.speeds))
+        };
+        Arc::clone(routers.entry(key).or_insert_with(make))
+    }
+
+    /// See [`Robot::travel`](crate::Robot::travel).
+    pub fn travel(
+        &self,
+        known: &Known,
+        from: &Place,
+        to: &[Place],
+        shut: &[String],
+    ) -> Vec<Result<Travel, Failure>> {
+        let from = match stand(known, from) {
+            Ok(pose) => pose,
+            Err(failure) => return to.iter().map(|_| Err(failure.clone())).collect(),
+        };
+        let goals: Vec<_> = to.iter().map(|place| stand(known, place)).collect();
+        let Some(map) = &known.map else {
+            return goals.into_iter().map(|goal| Ok(straight(&known.description, &from, &goal?))).collect();
+        };
+        let nowhere = Isometry3::translation(f64::NAN, f64::NAN, 0.0);
+        let poses: Vec<Pose2> =
+            goals.iter().map(|g| Pose2::from_isometry(g.as_ref().unwrap_or(&nowhere))).collect();
+        let found = self.router(known, map, shut).travel_to_each(&Pose2::from_isometry(&from), &poses);
+        goals.into_iter().zip(found).map(|(goal, travel)| goal.and(travel)).collect()
+    }
+
+    /// The way to a place for the base to follow, metres: around the doors that are known to be shut, up to one of them if no other
+    /// leads there. None without a map.
+    ///
+    /// # Errors
+    /// [`Failure::Unreachable`] with the reason.
+    pub fn route(
+        &self,
+        known: &Known,
+        from: &Isometry3<f64>,
+        to: &Place,
+    ) -> Result<Vec<Point2<f64>>, Failure> {
+        let goal = stand(known, to)?;
+        let Some(map) = &known.map else { return Ok(Vec::new()) };
+        let (from, goal) = (Pose2::from_isometry(from), Pose2::from_isometry(&goal));
+        let shut: Vec<String> =
+            self.shut.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect();
+        let around = self.router(known, map, &shut).route(&from, &goal);
+        let found = if shut.is_empty() {
+            around
+        } else {
+            around.or_else(|_| self.router(known, map, &[]).route(&from, &goal))
+        };
+        Ok(found?.points_m)
+    }
+}
+
+/// Where the base stands at a place.
+///
+/// # Errors
+/// [`Failure::Unreachable`] for a station that there is not, a pose where only stations are, and numbers that are none.
+pub(super) fn stand(known: &Known, place: &Place) -> Result<Isometry3<f64>, Failure> {
+    let name = &known.description.name;
+    let because = match (place, known.stations.as_deref()) {
+        (Place::Station(wanted), stations) => {
+            let found = stations.unwrap_or_default().iter().find(|s| &s.name == wanted);
+            match found {
+                Some(Station { map_from_base, .. }) => return Ok(*map_from_base),
+                None => format!("{name} has no station \"{wanted}\""),
+            }
+        }
+        (Place::Pose(_), Some(stations)) => {
+            format!("{name} can stand at its {} stations only", stations.len())
+        }
+        (Place::Pose(p), None) if ![p.x_m, p.y_m, p.yaw_rad].iter().all(|x| x.is_finite()) => {
+            format!("({}, {}, {} rad) is no pose", p.x_m, p.y_m, p.yaw_rad)
+        }
+        (Place::Pose(p), None) => return Ok(p.isometry()),
+    };
+    Err(Failure::Unreachable { because })
+}
+
+/// See [`Robot::camera_at`](crate::Robot::camera_at).
+pub(super) fn camera_at(
+    known: &Known,
+    place: &Place,
+    look_at: Option<&Point3<f64>>,
+) -> Result<Isometry3<f64>, Failure> {
+    let base = stand(known, place)?;
+    Ok(known.description.head.as_ref().map_or(base, |h| head::camera_towards(h, &base, look_at)))
+}
+
+/// A straight line at constant speed while turning: max(ds/v, dθ/ω).
+fn straight(body: &Description, from: &Isometry3<f64>, to: &Isometry3<f64>) -> Travel {
+    let distance_m = (from.translation.vector - to.translation.vector).norm();
+    let turned_rad = from.rotation.angle_to(&to.rotation);
+    let duration_s = (distance_m / body.speeds.linear_m_s).max(turned_rad / body.speeds.angular_rad_s);
+    Travel { distance_m, duration_s }
+}
+
+/// Occupies a door's opening, half a cell thick to either side.
+fn close(map: &mut OccupancyGrid, door: &Door) {
+    let door_from_map = Rotation2::new(-door.along_rad);
+    let (half_width_m, half_depth_m) = (0.5 * door.width_m, map.resolution_m);
+    map.occupy(|p| {
+        let local = door_from_map * (p - door.centre_m);
+        local.x.abs() <= half_width_m && local.y.abs() <= half_depth_m
+    });
+}

@@ -1,0 +1,135 @@
+//! The program itself: started with little, ended as a whole.
+
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
+use std::collections::VecDeque;
+use std::io::Read;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// What of the environment a program sees. Keys, tokens and logins are not among it.
+const ENVIRONMENT: [&str; 12] = [
+    "PATH",
+    "HOME",
+    "USER",
+    "LANG",
+    "LC_ALL",
+    "LC_CTYPE",
+    "TZ",
+    "TMPDIR",
+    "DISPLAY",
+    "PYTHONPATH",
+    "VIRTUAL_ENV",
+    "LD_LIBRARY_PATH",
+];
+/// Bytes of standard error that are kept.
+const LAST_WORDS: usize = 4096;
+/// Lines of them that are shown.
+const SHOWN_LINES: usize = 6;
+/// How long a program has to end by itself once its input is closed.
+const PARTING: Duration = Duration::from_millis(500);
+/// How often it is asked whether it has ended.
+const GLANCE: Duration = Duration::from_millis(5);
+
+/// A program in a process group of its own.
+pub(super) struct Process {
+    child: Child,
+    last_words: Arc<Mutex<VecDeque<u8>>>,
+}
+
+impl Process {
+    /// Starts a command line of the shell, with `memory_bytes` of address space for each of its processes.
+    ///
+    /// # Errors
+    /// Why it could not be started.
+    pub fn start(command_line: &str, memory_bytes: u64) -> Result<(Self, ChildStdin, ChildStdout), String> {
+        // A soft limit: a program that needs more may say so in its own command line.
+        let script = format!("ulimit -S -v {} 2>/dev/null\n{command_line}", memory_bytes / 1024);
+        let mut command = Command::new("/bin/sh");
+        command.arg("-c").arg(script).process_group(0).env_clear();
+        command.envs(ENVIRONMENT.iter().filter_map(|name| Some((name, std::env::var_os(name)?))));
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().map_err(|e| format!("it could not be started: {e}"))?;
+        let (stdin, stdout, stderr) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let last_words = Arc::default();
+        let process = Process { child, last_words: Arc::clone(&last_words) };
+        let (Some(stdin), Some(stdout), Some(stderr)) = (stdin, stdout, stderr) else {
+            return Err("it was started without pipes".into());
+        };
+        thread::spawn(move || listen(stderr, &last_words));
+        Ok((process, stdin, stdout))
+    }
+
+    /// Whether the program has ended; something that it has started may live on.
+    pub fn has_ended(&self) -> bool {
+        self.ends_within(Duration::ZERO)
+    }
+
+    /// Waits until the program has ended, for a while; true if it has. It is not reaped, so that its group keeps its number.
+    fn ends_within(&self, limit: Duration) -> bool {
+        let Some(pid) = pid(&self.child) else { return true };
+        let deadline = Instant::now() + limit;
+        loop {
+            let options = WaitIdOptions::EXITED | WaitIdOptions::NOWAIT | WaitIdOptions::NOHANG;
+            match waitid(WaitId::Pid(pid), options) {
+                Ok(None) if Instant::now() < deadline => thread::sleep(GLANCE),
+                Ok(None) => return false,
+                Ok(Some(_)) | Err(_) => return true,
+            }
+        }
+    }
+
+    /// How it ended and what it said last, once it has closed its output or broken the protocol: ends what is left of it.
+    pub fn epitaph(&mut self) -> String {
+        let by_itself = self.ends_within(GLANCE * 20);
+        let status = self.kill();
+        // Standard error is read by a thread, which ends with the last process that holds it.
+        let deadline = Instant::now() + GLANCE * 20;
+        while Arc::strong_count(&self.last_words) > 1 && Instant::now() < deadline {
+            thread::sleep(GLANCE);
+        }
+        let words = self.last_words.lock().unwrap_or_else(PoisonError::into_inner);
+        let bytes: Vec<u8> = words.iter().copied().collect();
+        let text = String::from_utf8_lossy(&bytes);
+        let lines: Vec<&str> = text.lines().filter(|l| !l.trim().is_empty()).collect();
+        let shown: Vec<String> = lines
+            .iter()
+            .skip(lines.len().saturating_sub(SHOWN_LINES))
+            .map(|l| format!("\n    {l}"))
+            .collect();
+        let how = if by_itself { format!(" ({status})") } else { " (it was killed)".into() };
+        format!("{how}{}", shown.concat())
+    }
+
+    fn kill(&mut self) -> String {
+        if let Some(pid) = pid(&self.child) {
+            let _ = kill_process_group(pid, Signal::KILL);
+        }
+        self.child.wait().map_or_else(|e| e.to_string(), |status| status.to_string())
+    }
+}
+
+impl Drop for Process {
+    /// By now its input is closed: it has a moment to stop the body, then all of its group is killed.
+    fn drop(&mut self) {
+        self.ends_within(PARTING);
+        self.kill();
+    }
+}
+
+fn pid(child: &Child) -> Option<Pid> {
+    Pid::from_raw(i32::try_from(child.id()).ok()?)
+}
+
+/// Keeps the end of what a program writes to standard error.
+fn listen(mut stderr: ChildStderr, last_words: &Mutex<VecDeque<u8>>) {
+    let mut chunk = [0; 1024];
+    while let Ok(n @ 1..) = stderr.read(&mut chunk) {
+        let mut words = last_words.lock().unwrap_or_else(PoisonError::into_inner);
+        words.extend(&chunk[..n]);
+        let over = words.len().saturating_sub(LAST_WORDS);
+        words.drain(..over);
+    }
+}

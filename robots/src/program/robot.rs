@@ -1,0 +1,360 @@
+//! The body that a program is.
+
+use crate::body::{
+    Colour, Description, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing,
+    PoseEstimate, Progress, Push, Pushed, Robot, Room, Sensed, Stamp, StampedTransform, Station, SurfaceHint,
+    Travel, Watch,
+};
+use crate::failure::Failure;
+use crate::grid::OccupancyGrid;
+use crate::program::hello::{Hello, PROTOCOL, PixelFormat};
+use crate::program::link::{Link, Message};
+use crate::program::message::{self, Arguments, amount, answer, transform};
+use crate::program::places::{self, Places};
+use crate::program::process::Process;
+use crate::program::talk::{Done, Talk};
+use crate::recorded::{Exposure, Known, Pixels};
+use image::RgbImage;
+use nalgebra::{Isometry3, Point3};
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::Duration;
+use tokio::sync::Mutex;
+
+/// How long a program may take, in seconds of the wall's clock, how much it may say, and how much memory it has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// From the start to the hello.
+    pub hello_s: f64,
+    /// Longest silence while it carries a request out.
+    pub silence_s: f64,
+    /// From being told to stop to the end of the request.
+    pub stop_s: f64,
+    /// Beyond a request's own limit, which counts on the body's clock.
+    pub overrun_s: f64,
+    /// Most messages of feedback in one request.
+    pub feedback: usize,
+    /// Address space of each of its processes, bytes.
+    pub memory_bytes: u64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits {
+            hello_s: 120.0,
+            silence_s: 20.0,
+            stop_s: 5.0,
+            overrun_s: 20.0,
+            feedback: 100_000,
+            memory_bytes: 8 << 30,
+        }
+    }
+}
+
+/// A program as a robot. When it is dropped the program is told by the end of its input, and killed with all that it has started.
+pub struct ProgramRobot {
+    known: Known,
+    places: Places,
+    pixels: PixelFormat,
+    now_ns: AtomicI64,
+    talk: Mutex<Talk>,
+}
+
+impl ProgramRobot {
+    /// Starts a command line of the shell as a robot and hears what it is.
+    ///
+    /// # Errors
+    /// [`Failure::Broken`] if it does not start, or its hello does not come or hold.
+    pub fn start(command_line: &str, limits: Limits) -> Result<ProgramRobot, Failure> {
+        let broken = |because: String| Failure::Broken { because: format!("`{command_line}`: {because}") };
+        let (mut process, stdin, stdout) =
+            Process::start(command_line, limits.memory_bytes).map_err(broken)?;
+        let hello_limit = Duration::try_from_secs_f64(limits.hello_s).unwrap_or(Duration::MAX);
+        let opened = Link::open(stdout, stdin, hello_limit)
+            .and_then(|(link, first)| Ok((link, read_hello(&first)?.check(&first.bytes)?)));
+        let (link, greeting) = opened.map_err(|because| broken(format!("{because}{}", process.epitaph())))?;
+        let camera = &greeting.known.description.camera;
+        link.allow_bytes(greeting.pixels.bytes(camera.width * camera.height));
+        Ok(ProgramRobot {
+            places: Places::new(greeting.clearance_m),
+            pixels: greeting.pixels,
+            now_ns: AtomicI64::new(greeting.known.now_ns),
+            talk: Mutex::new(Talk::new(link, process, limits, greeting.known.now_ns)),
+            known: greeting.known,
+        })
+    }
+
+    async fn ask(
+        &self,
+        request: &'static str,
+        with: Arguments<'_>,
+        watch: &Watch<'_>,
+    ) -> Result<Done, Failure> {
+        if watch.cancel.is_cancelled() {
+            return Err(Failure::Cancelled { because: format!("{request} was not begun") });
+        }
+        let mut talk = self.talk.lock().await;
+        let before_ns = talk.now_ns;
+        let told = |now_ns: Stamp| self.now_ns.store(now_ns, Ordering::Release);
+        let progress = |now_ns: Stamp, fraction: f64, distance_m: f64| {
+            told(now_ns);
+            let elapsed_s = (now_ns - before_ns) as f64 * 1e-9;
+            (watch.progress)(&Progress { elapsed_s, fraction, distance_m });
+        };
+        let done = talk.ask(request, with, watch, &progress).await;
+        told(talk.now_ns);
+        done
+    }
+
+    /// The answer as what it should be; one that is not ends the program.
+    async fn hold<T>(&self, checked: Result<T, String>) -> Result<T, Failure> {
+        match checked {
+            Ok(answer) => Ok(answer),
+            Err(because) => Err(self.talk.lock().await.end(because)),
+        }
+    }
+
+    fn sensed(&self, done: Done) -> Result<Sensed, String> {
+        let said: message::SensedSaid = answer("sense", done.said)?;
+        let stamp_ns = said.stamp_ns.unwrap_or(done.now_ns);
+        if !(done.before_ns..=done.now_ns).contains(&stamp_ns) {
+            return Err(format!(
+                "a frame of {stamp_ns} ns, taken between {} and {} ns",
+                done.before_ns, done.now_ns
+            ));
+        }
+        let (map_from_base, base_from_camera) =
+            (transform(&said.map_from_base)?, transform(&said.base_from_camera)?);
+        let d = &self.known.description;
+        let link = |parent: &str, child: &str, parent_from_child| StampedTransform {
+            stamp_ns,
+            parent: parent.into(),
+            child: child.into(),
+            parent_from_child,
+        };
+        let exposure = Exposure {
+            stamp_ns,
+            intrinsics: d.camera,
+            transforms: vec![
+                link(&d.frames.map, &d.frames.base, map_from_base),
+                link(&d.frames.base, &d.frames.camera, base_from_camera),
+            ],
+            map_from_camera: map_from_base * base_from_camera,
+            pose_sigma_m: d.pose_sigma_m,
+            pose_sigma_rad: d.pose_sigma_rad,
+        };
+        Ok(exposure.with(read_pixels(d, self.pixels, &done.bytes)?))
+    }
+}
+
+fn read_hello(first: &Message) -> Result<Hello, String> {
+    #[derive(serde::Deserialize)]
+    struct First<T> {
+        hello: T,
+    }
+    #[derive(serde::Deserialize)]
+    struct Version {
+        protocol: u32,
+    }
+    let none = |e| format!("its hello is none: {e}");
+    // The version first: another one has other fields.
+    let First { hello: Version { protocol } } = serde_json::from_str(&first.line).map_err(none)?;
+    if protocol != PROTOCOL {
+        return Err(format!("it speaks protocol {protocol}, and this is protocol {PROTOCOL}"));
+    }
+    serde_json::from_str(&first.line).map(|first: First<Hello>| first.hello).map_err(none)
+}
+
+fn read_pixels(body: &Description, format: PixelFormat, bytes: &[u8]) -> Result<Pixels, String> {
+    let camera = &body.camera;
+    let pixels = camera.width * camera.height;
+    if bytes.len() != format.bytes(pixels) {
+        return Err(format!("a frame of {} bytes, expected {}", bytes.len(), format.bytes(pixels)));
+    }
+    let (depths, colours) = bytes.split_at(2 * pixels);
+    let (near_m, far_m) = body.range_m;
+    let metres = |steps: &[u8]| {
+        let z = f64::from(u16::from_le_bytes([steps[0], steps[1]])) * format.unit_m;
+        if z > 0.0 && z >= near_m && z <= far_m { z as f32 } else { f32::NAN }
+    };
+    let depth_m: Vec<f32> = depths.chunks_exact(2).map(metres).collect();
+    let mut cloud = camera.cloud_from_depth(&depth_m).map_err(|e| e.to_string())?;
+    let image = format
+        .colour
+        .then(|| RgbImage::from_raw(camera.width as u32, camera.height as u32, colours.to_vec()))
+        .flatten();
+    if image.is_some() {
+        cloud.colours = Some(colours.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect());
+    }
+    Ok(Pixels { cloud, colour: image.map(|image| Colour { image, registered: true }) })
+}
+
+#[async_trait::async_trait]
+impl Robot for ProgramRobot {
+    fn description(&self) -> &Description {
+        &self.known.description
+    }
+
+    fn now_ns(&self) -> Stamp {
+        self.now_ns.load(Ordering::Acquire)
+    }
+
+    fn map(&self) -> Option<&OccupancyGrid> {
+        self.known.map.as_ref()
+    }
+
+    fn surfaces(&self) -> &[SurfaceHint] {
+        &self.known.surfaces
+    }
+
+    fn stations(&self) -> Option<&[Station]> {
+        self.known.stations.as_deref()
+    }
+
+    fn rooms(&self) -> &[Room] {
+        &self.known.rooms
+    }
+
+    fn doors(&self) -> &[Door] {
+        &self.known.doors
+    }
+
+    fn travel(&self, from: &Place, to: &[Place], shut: &[String]) -> Vec<Result<Travel, Failure>> {
+        self.places.travel(&self.known, from, to, shut)
+    }
+
+    fn camera_at(&self, place: &Place, look_at: Option<&Point3<f64>>) -> Result<Isometry3<f64>, Failure> {
+        places::camera_at(&self.known, place, look_at)
+    }
+
+    async fn pose(&self) -> Result<PoseEstimate, Failure> {
+        let done = self.ask("pose", Arguments::Nothing {}, &Watch::default()).await?;
+        let d = &self.known.description;
+        let read = |done: Done| {
+            let said: message::PoseSaid = answer("pose", done.said)?;
+            if said.station.is_some() != self.known.stations.is_some() {
+                return Err(format!("it stands at the station {:?}", said.station));
+            }
+            Ok(PoseEstimate {
+                stamp_ns: done.now_ns,
+                map_from_base: transform(&said.map_from_base)?,
+                sigma_m: amount("sigma_m", said.sigma_m.unwrap_or(d.pose_sigma_m))?,
+                sigma_rad: amount("sigma_rad", said.sigma_rad.unwrap_or(d.pose_sigma_rad))?,
+                station: said.station,
+            })
+        };
+        self.hold(read(done)).await
+    }
+
+    async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure> {
+        places::stand(&self.known, to)?;
+        if watch.cancel.is_cancelled() {
+            return Err(Failure::Cancelled { because: "the drive was not begun".into() });
+        }
+        let here = self.pose().await?;
+        let route_m = self.places.route(&self.known, &here.map_from_base, to)?;
+        let done = self.ask("drive_to", Arguments::DriveTo { to, route_m: &route_m }, watch).await;
+        if let Err(Failure::Blocked { by: Some(door), .. }) = &done
+            && self.known.doors.iter().any(|d| &d.name == door)
+        {
+            self.places.met_door(door, true);
+        }
+        let done = done?;
+        let read = |done: Done| {
+            let duration_s = done.duration_s();
+            let said: message::DrivenSaid = answer("drive_to", done.said)?;
+            Ok(Driven {
+                distance_m: amount("distance_m", said.distance_m)?,
+                duration_s,
+                map_from_base: transform(&said.map_from_base)?,
+            })
+        };
+        self.hold(read(done)).await
+    }
+
+    async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
+        if !point.iter().all(|x| x.is_finite()) {
+            return Err(Failure::Unreachable { because: format!("{point} is no point to look at") });
+        }
+        let done = self.ask("look_at", Arguments::LookAt { point_m: point }, watch).await?;
+        let duration_s = done.duration_s();
+        let said = answer("look_at", done.said).and_then(|said: message::LookedSaid| {
+            Ok(Looked { duration_s, miss_rad: amount("miss_rad", said.miss_rad)? })
+        });
+        self.hold(said).await
+    }
+
+    async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure> {
+        let done = self.ask("sense", Arguments::Nothing {}, watch).await?;
+        self.hold(self.sensed(done)).await
+    }
+
+    async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
+        let Some(reach_m) = self.known.description.reach_m else { return Err(self.lacks("arm")) };
+        let numbers = [push.object.x, push.object.y, push.object.z, push.direction.x, push.direction.y];
+        let way = push.direction.norm() > 0.0 && push.distance_m.is_finite() && push.distance_m > 0.0;
+        if !(numbers.iter().all(|x| x.is_finite()) && way) {
+            let because = format!("a push needs a place, a direction and a distance within {reach_m} m");
+            return Err(Failure::Unreachable { because });
+        }
+        let done = self.ask("push_aside", Arguments::Push(push), watch).await?;
+        let duration_s = done.duration_s();
+        let said = answer("push_aside", done.said).and_then(|said: message::PushedSaid| {
+            Ok(Pushed { moved_m: amount("moved_m", said.moved_m)?, duration_s })
+        });
+        self.hold(said).await
+    }
+
+    async fn open_door(&self, door: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
+        if !self.known.doors.iter().any(|d| d.name == door) {
+            let because = format!("{} knows no door \"{door}\"", self.known.description.name);
+            return Err(Failure::Unreachable { because });
+        }
+        let done = self.ask("open_door", Arguments::Door { door }, watch).await?;
+        let duration_s = done.duration_s();
+        let said = answer("open_door", done.said).map(|_: message::NothingSaid| Opened { duration_s });
+        let opened = self.hold(said).await?;
+        self.places.met_door(door, false);
+        Ok(opened)
+    }
+
+    async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
+        self.hand_for(&grasp.object)?;
+        let done = self.ask("grasp", Arguments::Grasp(grasp), watch).await?;
+        let duration_s = done.duration_s();
+        let said = answer("grasp", done.said).and_then(|said: message::GraspedSaid| {
+            Ok(Grasped { width_m: amount("width_m", said.width_m)?, duration_s })
+        });
+        self.hold(said).await
+    }
+
+    async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
+        self.hand_for(&placing.foot)?;
+        let done = self.ask("place", Arguments::Place(placing), watch).await?;
+        let duration_s = done.duration_s();
+        let said = answer("place", done.said).map(|_: message::NothingSaid| Placed { duration_s });
+        self.hold(said).await
+    }
+
+    async fn hand(&self) -> Result<Hand, Failure> {
+        self.hand_for(&Point3::origin())?;
+        let done = self.ask("hand", Arguments::Nothing {}, &Watch::default()).await?;
+        self.hold(answer("hand", done.said)).await
+    }
+}
+
+impl ProgramRobot {
+    fn lacks(&self, part: &str) -> Failure {
+        Failure::Unable { because: format!("{} has no {part}", self.known.description.name) }
+    }
+
+    /// Whether there is a hand, and the point is one.
+    fn hand_for(&self, point: &Point3<f64>) -> Result<(), Failure> {
+        if self.known.description.hand_opening_m.is_none() {
+            return Err(self.lacks("hand"));
+        }
+        match point.iter().all(|x| x.is_finite()) {
+            true => Ok(()),
+            false => Err(Failure::Unreachable { because: format!("{point} is no place for a hand") }),
+        }
+    }
+}

@@ -1,0 +1,119 @@
+"""The template robot, but for one thing that a program must not do: `python3 rogue.py WHAT`."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "python"))
+import descry_robot as descry  # noqa: E402
+from template import Template  # noqa: E402
+
+WHAT = sys.argv[1]
+
+
+def raw(data):
+    view = memoryview(data)
+    while view:
+        view = view[os.write(1, view) :]
+
+
+def last_words(text, code):
+    print(text, file=sys.stderr, flush=True)
+    os._exit(code)
+
+
+class Rogue(Template):
+    def hello(self):
+        hello, cells = super().hello()
+        if WHAT == "no map":
+            del hello["map"]
+            return hello
+        if WHAT == "short map":
+            cells = cells[1:]
+        if WHAT == "unknown part":
+            hello["camra"] = {}
+        if WHAT == "no focal length":
+            hello["camera"]["fx"] = 0
+        if WHAT == "two tables of one name":
+            hello["surfaces"] *= 2
+        return hello, cells
+
+    def drive_to(self, request, to, route_m):
+        said = {"id": request.id, "now_ns": self.now_ns()}
+        if WHAT == "hangs":
+            time.sleep(1000)
+        if WHAT == "silent":
+            while True:
+                request.check()
+                time.sleep(0.01)
+        if WHAT == "goes on":
+            while True:
+                raw(json.dumps({**said, "feedback": {"fraction": 0.5}}).encode() + b"\n")
+                time.sleep(0.01)
+        if WHAT == "dies":
+            last_words("the motors are gone", 7)
+        if WHAT == "leaves a child":
+            child = subprocess.Popen(["sleep", "1000"])
+            last_words(f"child {child.pid}", 1)
+        if WHAT == "endless line":
+            while True:
+                raw(b"x" * 65536)
+        if WHAT == "endless feedback":
+            while True:
+                raw((json.dumps({**said, "feedback": {"fraction": 0.5}}).encode() + b"\n") * 1000)
+        if WHAT == "huge frame":
+            raw(json.dumps({**said, "done": {}, "bytes": 1 << 40}).encode() + b"\n")
+        if WHAT == "stops by itself":
+            raise descry.Failure("cancelled", "the emergency stop was pressed")
+        if WHAT == "late":
+            self.clock_s += 1000.0
+            return {"distance_m": 1.0, "map_from_base": descry.planar(*self.at)}
+        if WHAT == "past its end":
+            raw(json.dumps({**said, "feedback": {"fraction": 1.5}}).encode() + b"\n")
+        if WHAT == "clock goes back":
+            self.clock_s -= 100.0
+        if WHAT == "eats memory":
+            hold = bytearray(1 << 31)
+            raise descry.Failure("unable", f"holds {len(hold)} bytes")
+        return super().drive_to(request, to, route_m)
+
+    def pose(self, request):
+        if WHAT == "another request":
+            raw(json.dumps({"id": request.id + 5, "now_ns": self.now_ns(), "done": {}}).encode() + b"\n")
+        if WHAT == "answers twice" and request.id > 1:
+            raw(json.dumps({"id": request.id - 1, "now_ns": self.now_ns(), "done": super().pose(request)}).encode() + b"\n")
+        if WHAT == "no pose":
+            return {}
+        if WHAT == "no number":
+            raw(b'{"id": 1, "now_ns": 0, "done": {"map_from_base": {"translation": [NaN, 0, 0], "rotation": [0, 0, 0, 1]}}}\n')
+        if WHAT == "no rotation":
+            return {"map_from_base": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 2]}}
+        if WHAT == "talks on standard error":
+            for _ in range(2000):
+                print("x" * 10000, file=sys.stderr)
+        if WHAT == "looks for secrets" and "CARGO_MANIFEST_DIR" in os.environ:
+            raise descry.Failure("lost", "the environment is here")
+        return super().pose(request)
+
+    def sense(self, request):
+        chain, depths = super().sense(request)
+        if WHAT == "short frame":
+            return chain, depths[2:]
+        if WHAT == "frame of tomorrow":
+            return dict(chain, stamp_ns=self.now_ns() + 1), depths
+        return chain, depths
+
+
+if WHAT == "no hello":
+    time.sleep(1000)
+if WHAT == "dies at once":
+    last_words("no camera was found", 3)
+if WHAT == "chatters":
+    print("my robot 1.0", flush=True)
+if WHAT == "another version":
+    descry.PROTOCOL = 2
+# The wire takes standard output away; what is said raw goes there all the same.
+os.dup2 = lambda *_: None
+descry.serve(Rogue())

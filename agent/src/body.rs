@@ -106,7 +106,7 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
                 return Err(CommandError::BadInput(text));
             }
             let robot = ProgramRobot::start(command, Limits::default()).map_err(CommandError::broken)?;
-            Ok(Body { robot: Arc::new(robot), simulated: None })
+            Ok(Body { robot: Arc::new(robot), simulated: None, scene: None })
         }
         _ => Err(CommandError::BadInput(format!(
             "--robot {robot}\n  expected: sim, recorded:DIR or program:COMMAND"

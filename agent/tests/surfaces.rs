@@ -73,7 +73,10 @@ fn a_verdict_is_about_the_surface_that_was_asked_about() {
             if on.is_none() {
                 let asked = goal.rsplit(' ').next().expect("a goal has words");
                 let why = report["why"].as_str().unwrap_or_default();
-                assert!(why.contains(&format!("is not on the {asked}")) && why.contains("was seen from"), "{what}");
+                assert!(
+                    why.contains(&format!("is not on the {asked}")) && why.contains("was seen from"),
+                    "{what}"
+                );
             }
         }
     }
@@ -105,7 +108,8 @@ fn one_head_looks_at_one_surface_at_a_time() {
             last_end_s = f64::NEG_INFINITY;
         }
         let Some((start, rest)) = line.split_once(": (observe") else { continue };
-        let Some(duration) = rest.rsplit('[').next().and_then(|d| d.trim_end_matches(']').parse::<f64>().ok())
+        let Some(duration) =
+            rest.rsplit('[').next().and_then(|d| d.trim_end_matches(']').parse::<f64>().ok())
         else {
             continue;
         };

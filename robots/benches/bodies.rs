@@ -5,12 +5,15 @@ use descry_robots::program::{Limits, ProgramRobot};
 use descry_robots::route::Router;
 use descry_robots::sim::noise::{DepthNoise, observe};
 use descry_robots::sim::render::render;
+use descry_robots::sim::scene::SurfaceSpec;
 use descry_robots::sim::{Scene, SceneSpec, arrange, body};
 use descry_robots::{Pose2, Robot, Watch, head};
 use divan::Bencher;
 
 const DEFAULT_SCENE: &str =
     include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../domains/tabletop/scenes/default.toml"));
+
+const FLAT: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../domains/home/scenes/default.toml"));
 
 fn main() {
     // One core: what a batch run has for each of its runs.
@@ -20,6 +23,21 @@ fn main() {
 
 fn scene() -> Option<Scene> {
     arrange(&SceneSpec::parse("default.toml", DEFAULT_SCENE).ok()?, 1).ok()
+}
+
+fn flat() -> Option<Scene> {
+    arrange(&SceneSpec::parse("flat.toml", FLAT).ok()?, 1).ok()
+}
+
+/// Poses before the surfaces of the flat.
+fn stands(scene: &Scene) -> Vec<Pose2> {
+    let router = Router::new(&scene.map(), 0.3, body::description().speeds);
+    let pose = |s: &SurfaceSpec, k: usize| {
+        let (centre, angle) = (s.centre_m(), std::f64::consts::TAU * k as f64 / 8.0);
+        Pose2::facing(centre.x + 1.2 * angle.cos(), centre.y + 1.2 * angle.sin(), &centre)
+    };
+    let all = scene.surfaces.iter().flat_map(|s| (0..8).map(move |k| pose(s, k)));
+    all.filter(|p| router.travel(&scene.start, p).is_ok()).collect()
 }
 
 fn ring(count: usize) -> Vec<Pose2> {
@@ -36,6 +54,16 @@ fn render_frame(bencher: Bencher) {
     let solids = scene.solids();
     let look_at = Point3::new(0.0, 0.0, 0.75);
     let camera = head::camera_towards(&head, &ring(5)[1].isometry(), Some(&look_at));
+    bencher.bench_local(|| render(&scene.room, &solids, &camera, &body::camera(), 0));
+}
+
+/// From the middle of the hall of a flat, through a door.
+#[divan::bench]
+fn render_flat_frame(bencher: Bencher) {
+    let (Some(scene), Some(head)) = (flat(), body::description().head) else { return };
+    let solids = scene.solids();
+    let look_at = Point3::new(-2.7, 1.3, 0.75);
+    let camera = head::camera_towards(&head, &Pose2::new(0.4, 1.2, 3.1).isometry(), Some(&look_at));
     bencher.bench_local(|| render(&scene.room, &solids, &camera, &body::camera(), 0));
 }
 
@@ -86,4 +114,34 @@ fn take_a_frame_of_a_program(bencher: Bencher) {
     program(bencher, async |robot| {
         let _ = divan::black_box(robot.sense(&Watch::default()).await);
     });
+}
+
+/// Every route between the poses before the surfaces of the flat; first with a new router, then with one that is there.
+#[divan::bench(args = [true, false])]
+fn routes_in_the_flat(bencher: Bencher, anew: bool) {
+    let Some(scene) = flat() else { return };
+    let (map, speeds, poses) = (scene.map(), body::description().speeds, stands(&scene));
+    let router = Router::new(&map, 0.3, speeds);
+    bencher.bench_local(|| match anew {
+        true => Router::new(&map, 0.3, speeds).travel_table(&poses),
+        false => router.travel_table(&poses),
+    });
+}
+
+/// One question for the way to each of the poses before the surfaces of the flat.
+#[divan::bench]
+fn routes_from_one_pose_in_the_flat(bencher: Bencher) {
+    let Some(scene) = flat() else { return };
+    let (map, speeds, poses) = (scene.map(), body::description().speeds, stands(&scene));
+    let router = Router::new(&map, 0.3, speeds);
+    bencher.bench_local(|| router.travel_to_each(&scene.start, &poses));
+}
+
+/// The same from one pose to 16 around the table of the tabletop.
+#[divan::bench]
+fn routes_from_one_pose(bencher: Bencher) {
+    let Some(scene) = scene() else { return };
+    let (map, speeds, poses) = (scene.map(), body::description().speeds, ring(16));
+    let router = Router::new(&map, 0.3, speeds);
+    bencher.bench_local(|| router.travel_to_each(&scene.start, &poses));
 }

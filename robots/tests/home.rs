@@ -76,7 +76,7 @@ fn two_hundred_seeds_fill_the_flat() {
     }
     for (name, chance) in [("kitchen door", 0.25), ("study door", 0.35), ("side door", 0.5)] {
         let n = shut[name] as f64;
-        let sigma = (200.0 * chance * (1.0 - chance) as f64).sqrt();
+        let sigma = f64::sqrt(200.0 * chance * (1.0 - chance));
         assert!((n - 200.0 * chance).abs() < 4.0 * sigma, "{shut:?}");
     }
 }

@@ -45,8 +45,12 @@ struct Placed<'a> {
     solid_from_camera: Rotation3<f64>,
     columns: (usize, usize),
     rows: (usize, usize),
+    /// No part of it is nearer along the line of sight, metres.
+    near_m: f64,
 }
 
+/// Depths are compared with the near side of a bounding box with this slack, for rounding, metres.
+const SLACK_M: f64 = 1e-6;
 /// Nearer than this to the camera's plane a bounding box is taken to cover the whole image, metres.
 const NEAR_M: f64 = 0.02;
 const FLOOR_COLOUR: [u8; 3] = [120, 115, 110];
@@ -60,9 +64,11 @@ impl<'a> Placed<'a> {
         let (low, high) = solid.bounds;
         let mut box_ = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
         let (mut behind, mut before) = (false, false);
+        let mut near_m = f64::INFINITY;
         for corner in 0..8 {
             let pick = |bit: usize, axis: usize| if corner & bit == 0 { low[axis] } else { high[axis] };
             let p = camera_from_solid * Point3::new(pick(1, 0), pick(2, 1), pick(4, 2));
+            near_m = near_m.min(p.z - SLACK_M);
             if p.z < NEAR_M {
                 behind = true;
                 continue;
@@ -88,6 +94,7 @@ impl<'a> Placed<'a> {
             solid_from_camera: solid_from_camera.rotation.to_rotation_matrix(),
             columns,
             rows,
+            near_m,
         })
     }
 }
@@ -106,7 +113,16 @@ pub fn render(
     camera: &Intrinsics,
     stamp_ns: Stamp,
 ) -> Frame {
-    let placed: Vec<Placed> = solids.iter().filter_map(|s| Placed::new(s, map_from_camera, camera)).collect();
+    let mut placed: Vec<Placed> =
+        solids.iter().filter_map(|s| Placed::new(s, map_from_camera, camera)).collect();
+    // The nearest walls first: they hide most of the rest of a flat.
+    placed.sort_by(|a, b| {
+        let wall = |p: &Placed| p.solid.label == LABEL_ROOM;
+        wall(b).cmp(&wall(a)).then_with(|| match wall(a) && wall(b) {
+            true => a.near_m.total_cmp(&b.near_m),
+            false => std::cmp::Ordering::Equal,
+        })
+    });
     let pixels = camera.width * camera.height;
     let mut frame = Frame {
         intrinsics: *camera,
@@ -189,6 +205,9 @@ fn draw_room(
 fn draw_solid(p: &Placed, camera: &Intrinsics, row: usize, line: &mut Line) {
     let rotation = p.solid.map_from_solid.rotation;
     for column in p.columns.0..p.columns.1 {
+        if line.depth[column] <= p.near_m {
+            continue;
+        }
         let in_camera = ray(camera, column, row);
         let d = p.solid_from_camera * in_camera;
         if let Some(hit) = p.solid.hit(&p.origin, &d, line.depth[column]) {
@@ -237,7 +256,7 @@ pub fn visible_share(
             let hidden = others
                 .iter()
                 .filter(|o| (o.rows.0..o.rows.1).contains(&row))
-                .filter(|o| (o.columns.0..o.columns.1).contains(&column))
+                .filter(|o| (o.columns.0..o.columns.1).contains(&column) && o.near_m < hit.t)
                 .any(|o| o.solid.hit(&o.origin, &(o.solid_from_camera * in_camera), hit.t).is_some());
             seen += usize::from(!hidden);
         }

@@ -631,6 +631,14 @@ fn expected(domain: &Domain, known: &Known) -> Vec<Vec<f64>> {
 
 /// A surface that the domain names and the map, which knows others, does not have.
 fn known_by_map(domain: &Domain, surfaces: &[situation::KnownSurface]) -> Result<(), WorldError> {
+    if let [first, second, ..] = surfaces
+        && surfaces.iter().all(|s| !s.whole)
+    {
+        return Err(WorldError::Domain(format!(
+            "nothing tells the {} from the {} here: the body has no map of them\n  name one surface in domain.toml, or say where each is: [[surface]] in the recording's recording.toml",
+            first.name, second.name
+        )));
+    }
     domain.config.surfaces.iter().try_for_each(|name| {
         match surfaces.iter().any(|s| s.symbol == symbol(name)) {
             true => Ok(()),

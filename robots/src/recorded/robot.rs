@@ -74,7 +74,13 @@ impl RecordedRobot {
             map_from_base: f.world_from_camera,
         };
         let stations = recording.frames.iter().map(station).collect();
-        let (start, surfaces) = (recording.start, Vec::new());
+        let hint = |s: &crate::recorded::settings::SurfaceSettings| SurfaceHint {
+            name: s.name.clone(),
+            outline_m: s.outline_m.iter().map(|&[x, y]| nalgebra::Point2::new(x, y)).collect(),
+            height_m: s.height_m,
+            room: None,
+        };
+        let (start, surfaces) = (recording.start, settings.surfaces.iter().map(hint).collect());
         let known = Known {
             description,
             surfaces,

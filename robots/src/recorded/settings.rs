@@ -31,6 +31,21 @@ pub struct Settings {
     pub range_m: [f64; 2],
     /// The camera.
     pub camera: Option<CameraSettings>,
+    /// Surfaces whose place in the world of the poses is known, where z is up.
+    #[serde(rename = "surface")]
+    pub surfaces: Vec<SurfaceSettings>,
+}
+
+/// A surface that is known beforehand: which of several is called what.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceSettings {
+    /// As people call it.
+    pub name: String,
+    /// Corners in order around it, along the world's x and y, metres.
+    pub outline_m: Vec<[f64; 2]>,
+    /// Of its top, along the world's z, metres.
+    pub height_m: f64,
 }
 
 /// A pinhole camera, pixels.
@@ -63,6 +78,7 @@ impl Default for Settings {
             angular_deg_s: 30.0,
             range_m: [0.4, 8.0],
             camera: None,
+            surfaces: Vec::new(),
         }
     }
 }
@@ -99,6 +115,22 @@ impl Settings {
             if !(length.is_finite() && length > 0.0) {
                 let problem = format!("{up:?} is no direction");
                 return Err(objection(vec![Step::Key("up")], problem, "such as [0.0, 0.0, 1.0]"));
+            }
+        }
+        for (n, surface) in self.surfaces.iter().enumerate() {
+            let at = |key| vec![Step::Key("surface"), Step::Index(n), Step::Key(key)];
+            if surface.outline_m.len() < 3 || surface.outline_m.iter().flatten().any(|x| !x.is_finite()) {
+                let problem = format!("\"{}\" has no outline", surface.name);
+                return Err(objection(at("outline_m"), problem, "at least three corners, [x, y] in metres"));
+            }
+            if !surface.height_m.is_finite() {
+                let problem = format!("found {}, expected a height", surface.height_m);
+                return Err(objection(at("height_m"), problem, "metres along the world's z"));
+            }
+            let is_upright = self.up.is_none_or(|[x, y, z]| z > 0.99 * (x * x + y * y + z * z).sqrt());
+            if !is_upright {
+                let problem = "surfaces can be named only where the world's z is up".to_string();
+                return Err(objection(at("name"), problem, "leave the surfaces out, or turn the poses"));
             }
         }
         let [near, far] = self.range_m;

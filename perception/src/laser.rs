@@ -26,5 +26,5 @@ pub use known::{Candidate, KnownShape, Recognition, RecogniseOptions, Verdict, r
 pub use next::{NextOptions, NextScan, next_scan, undetermined_m2};
 pub use scan::{Scan, ScanError};
 pub use shape::{ObjectScan, PosedScan, ShapeError, ShapeModel};
-pub use solve::{Solver, SolverOptions};
+pub use solve::{Objective, Solver, SolverOptions};
 pub use violation::Violation;

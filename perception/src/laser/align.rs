@@ -45,8 +45,7 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
         .collect();
     let assembly = Assembly::new(unposed.iter().map(std::slice::from_ref));
     let start: Vec<Isometry2<f64>> = model.scans().iter().map(|s| s.model_from_laser).collect();
-    let problem = Problem { assembly: &assembly, start: &start, movable: (0..scans.len()).collect() };
-    let solved = solve(&problem, options);
+    let solved = solve(&Problem::free(&assembly, &start, options.objective), options);
     let moved = start.iter().zip(&solved.poses).map(|(from, to)| {
         ((to.translation.vector - from.translation.vector).norm(), from.rotation.angle_to(&to.rotation))
     });

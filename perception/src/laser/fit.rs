@@ -2,7 +2,7 @@
 
 use super::background::{direction, origin};
 use super::shape::{ObjectScan, PosedScan, ShapeModel};
-use super::solve::{Problem, SolverOptions, solve};
+use super::solve::{Problem, Solved, SolverOptions, solve};
 use super::violation::{Assembly, Violation};
 use nalgebra::{Isometry2, Vector2};
 use std::f64::consts::TAU;
@@ -99,29 +99,40 @@ fn facing(model: &ShapeModel, scan: &ObjectScan, count: usize) -> Vec<Isometry2<
         .collect()
 }
 
+/// Roughly settled: a step makes less than this part of the objective.
+const ROUGH: f64 = 0.05;
+/// Of the ends that are roughly settled, so many are settled in full.
+const SETTLED: usize = 2;
+
 /// Follows the most promising starts to the end.
 fn follow(model: &ShapeModel, other: &[PosedScan], starts: &[Isometry2<f64>], options: &FitOptions) -> ModelFit {
     let assembly = Assembly::new([model.scans(), other]);
     let poses = |pose: &Isometry2<f64>| [Isometry2::identity(), *pose];
-    let cost = |pose: &Isometry2<f64>| assembly.violation(&poses(pose)).boundary_m2;
-    let mut ends: Vec<(f64, Isometry2<f64>, bool)> = Vec::new();
+    let violation = |pose: &Isometry2<f64>| assembly.violation(&poses(pose)).boundary_m2;
     let (mut iterations, mut evaluations) = (0, starts.len());
-    for start in promising(&starts.iter().map(cost).collect::<Vec<f64>>(), options.followed) {
-        let start = poses(&starts[start]);
-        let solved = solve(&Problem { assembly: &assembly, start: &start, movable: vec![1] }, &options.solver);
+    let mut settle = |from: &Isometry2<f64>, options: &SolverOptions| {
+        let solved = solve(&Problem::onto(&assembly, &poses(from), options.objective), options);
         iterations += solved.iterations;
         evaluations += solved.evaluations;
-        ends.push((cost(&solved.poses[1]), solved.poses[1], solved.converged));
+        solved
+    };
+    let violations: Vec<f64> = starts.iter().map(violation).collect();
+    let rough = SolverOptions { settle: options.solver.settle.max(ROUGH), ..options.solver };
+    let mut ends: Vec<Solved> =
+        promising(&violations, options.followed).map(|start| settle(&starts[start], &rough)).collect();
+    ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    for end in ends.iter_mut().take(SETTLED) {
+        *end = settle(&end.poses[1], &options.solver);
     }
-    ends.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (_, best, converged) = ends[0];
-    let between = assembly.violation(&poses(&best));
+    ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let (best, converged) = (ends[0].poses[1], ends[0].converged);
     let mut rivals: Vec<(Isometry2<f64>, f64)> = Vec::new();
-    for (cost, pose, _) in &ends[1..] {
-        if !same(pose, &best) && rivals.iter().all(|(other, _)| !same(pose, other)) {
-            rivals.push((*pose, *cost));
+    for pose in ends[1..].iter().map(|end| end.poses[1]) {
+        if !same(&pose, &best) && rivals.iter().all(|(other, _)| !same(&pose, other)) {
+            rivals.push((pose, violation(&pose)));
         }
     }
+    let between = assembly.violation(&poses(&best));
     let f_c_m2 = between.boundary_m2 + within(model.scans()) + within(other);
     ModelFit { model_from_other: best, f_c_m2, between, converged, iterations, evaluations, rivals }
 }
@@ -136,13 +147,15 @@ fn within(scans: &[PosedScan]) -> f64 {
     assembly.violation(&vec![Isometry2::identity(); scans.len()]).boundary_m2
 }
 
-/// Those of a ring of starts that cost no more than their neighbours, the cheapest first; at least one.
-fn promising(costs: &[f64], most: usize) -> Vec<usize> {
-    let n = costs.len();
-    let mut low: Vec<usize> = (0..n)
-        .filter(|&i| costs[i] <= costs[(i + 1) % n] && costs[i] <= costs[(i + n - 1) % n])
-        .collect();
-    low.sort_by(|&a, &b| costs[a].total_cmp(&costs[b]));
-    low.truncate(most.max(1));
-    if low.is_empty() { vec![0] } else { low }
+/// Those of a ring of starts that violate no more than their neighbours, the least first; the first of all where there is none such.
+fn promising(violations: &[f64], most: usize) -> impl Iterator<Item = usize> {
+    let n = violations.len();
+    let (before, after) = (|i: usize| violations[(i + n - 1) % n], |i: usize| violations[(i + 1) % n]);
+    let mut low: Vec<usize> =
+        (0..n).filter(|&i| violations[i] <= before(i) && violations[i] <= after(i)).collect();
+    low.sort_by(|&a, &b| violations[a].total_cmp(&violations[b]));
+    if low.is_empty() {
+        low.push(0);
+    }
+    low.into_iter().take(most.max(1))
 }

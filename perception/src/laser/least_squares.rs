@@ -1,14 +1,75 @@
-//! Least squares on the violated constraints (Levenberg 1944, Marquardt 1963). Which constraints are violated, and by which point, is asked anew each time.
+//! Least squares on the violated constraints (Levenberg 1944, Marquardt 1963). Which constraints are violated, and by which points, is asked anew each time.
 
 use super::solve::{Problem, Solved, SolverOptions};
-use nalgebra::{DMatrix, DVector, Isometry2, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry2, Point2, Vector3};
 
+/// Softness of the farthest points, metres, one round after the other: the last is the objective itself.
+const SOFTNESS_M: [f64; 3] = [0.01, 0.002, 0.0];
 /// A turn of one radian about the middle of a thing counts as a shift by so much, metres: about its radius.
 const RADIUS_M: f64 = 0.3;
-/// A violation below this is nothing, square metres.
+/// An objective below this is nothing, square metres.
 const NOTHING_M2: f64 = 1e-12;
-/// Damping at the start, and where no step helps any more.
-const DAMPING: (f64, f64) = (1e-3, 1e6);
+/// Damping at the start, and where steps are so short that they do not help any more.
+const DAMPING: (f64, f64) = (1e-3, 1e1);
+
+/// Damped least squares, ever less soft; the least of all that was come by is kept.
+pub(super) fn least_squares(problem: &Problem, options: &SolverOptions) -> Solved {
+    let start = problem.start().to_vec();
+    let cost = problem.cost(&start);
+    let mut poses = start.clone();
+    let mut solved = Solved { poses: start, cost, converged: false, iterations: 0, evaluations: 1 };
+    for soft_m in SOFTNESS_M {
+        solved.converged = descend(problem, options, soft_m, &mut poses, &mut solved);
+        let cost = problem.cost(&poses);
+        solved.evaluations += 1;
+        if cost < solved.cost {
+            solved.cost = cost;
+            solved.poses.clone_from(&poses);
+        }
+        if solved.cost <= NOTHING_M2 {
+            solved.converged = true;
+            break;
+        }
+    }
+    solved
+}
+
+/// Steps until they change nothing; false if they still do.
+fn descend(
+    problem: &Problem,
+    options: &SolverOptions,
+    soft_m: f64,
+    poses: &mut Vec<Isometry2<f64>>,
+    count: &mut Solved,
+) -> bool {
+    let mut linear = linearise(problem, poses, soft_m);
+    count.evaluations += 1;
+    let mut damping = DAMPING.0;
+    for _ in 0..options.most_iterations {
+        if linear.cost <= NOTHING_M2 || damping > DAMPING.1 {
+            return true;
+        }
+        count.iterations += 1;
+        let Some(step) = step(&linear, damping) else {
+            damping *= 10.0;
+            continue;
+        };
+        let stepped = problem.moved(poses, step.as_slice());
+        let next = linearise(problem, &stepped, soft_m);
+        count.evaluations += 1;
+        if next.cost < linear.cost {
+            let settled = linear.cost - next.cost <= options.settle * linear.cost;
+            (*poses, linear) = (stepped, next);
+            if settled {
+                return true;
+            }
+            damping *= 0.2;
+        } else {
+            damping *= 5.0;
+        }
+    }
+    false
+}
 
 /// Normal equations at poses.
 struct Linear {
@@ -17,83 +78,47 @@ struct Linear {
     right: DVector<f64>,
 }
 
-fn linearise(problem: &Problem, poses: &[Isometry2<f64>]) -> Linear {
-    let n = 3 * problem.movable.len();
+fn linearise(problem: &Problem, poses: &[Isometry2<f64>], soft_m: f64) -> Linear {
+    let assembly = problem.assembly();
+    let n = 3 * problem.movable().len();
     let mut linear = Linear { cost: 0.0, normal: DMatrix::zeros(n, n), right: DVector::zeros(n) };
-    let mut row_of: Vec<Option<usize>> = vec![None; problem.assembly.groups()];
-    let mut pivots = vec![nalgebra::Point2::origin(); row_of.len()];
-    for (index, &group) in problem.movable.iter().enumerate() {
-        row_of[group] = Some(3 * index);
-        pivots[group] = poses[group] * problem.assembly.pivot(group);
+    let mut rows: Vec<Option<(usize, Point2<f64>)>> = vec![None; poses.len()];
+    for (index, &group) in problem.movable().iter().enumerate() {
+        rows[group] = Some((3 * index, poses[group] * assembly.pivot(group)));
+        for (i, (off, weight)) in problem.strayed(poses, group).enumerate() {
+            let row = 3 * index + i;
+            linear.cost += weight * off * off;
+            linear.right[row] -= weight * off;
+            linear.normal[(row, row)] += weight;
+        }
     }
-    problem.assembly.residuals(&problem.assembly.placed(poses), |r| {
-        linear.cost += r.value_m * r.value_m;
-        // How the error grows with shift and turn of a group that carries the point; with the line it falls by as much.
-        let slope = |group: usize| {
-            let arm = r.at - pivots[group];
-            Vector3::new(r.normal.x, r.normal.y, arm.perp(&r.normal))
-        };
-        let ends = [(r.point, 1.0), (r.line, -1.0)]
-            .map(|(group, sign)| row_of[group].map(|row| (row, slope(group) * sign)));
-        for (row, slope) in ends.iter().flatten() {
-            for i in 0..3 {
-                linear.right[row + i] -= slope[i] * r.value_m;
-            }
-            for (column, other) in ends.iter().flatten() {
-                for i in 0..3 {
-                    for j in 0..3 {
-                        linear.normal[(row + i, column + j)] += slope[i] * other[j];
-                    }
-                }
+    assembly.residuals(&assembly.placed(poses), soft_m, |r| {
+        let weight = problem.weight(&r);
+        linear.cost += weight * r.value_m * r.value_m;
+        // How the error grows with shift and turn of the group that carries the point; with the group that carries the line it falls by as much.
+        let slopes = [(r.point, 1.0), (r.line, -1.0)].map(|(group, sign)| {
+            rows[group].map(|(row, pivot)| {
+                let turn = (r.at - pivot).perp(&r.normal);
+                (row, Vector3::new(r.normal.x, r.normal.y, turn) * sign)
+            })
+        });
+        for (row, slope) in slopes.iter().flatten() {
+            let mut right = linear.right.fixed_rows_mut::<3>(*row);
+            right -= slope * (weight * r.value_m);
+            for (column, other) in slopes.iter().flatten() {
+                let mut block = linear.normal.fixed_view_mut::<3, 3>(*row, *column);
+                block += slope * other.transpose() * weight;
             }
         }
     });
     linear
 }
 
-/// Steps of damped least squares until they change nothing.
-pub(super) fn least_squares(problem: &Problem, options: &SolverOptions) -> Solved {
-    let mut solved =
-        Solved { poses: problem.start.to_vec(), converged: false, iterations: 0, evaluations: 1 };
-    let mut linear = linearise(problem, &solved.poses);
-    let mut damping = DAMPING.0;
-    while solved.iterations < options.most_iterations {
-        if linear.cost <= NOTHING_M2 {
-            solved.converged = true;
-            break;
-        }
-        solved.iterations += 1;
-        let Some(step) = step(&linear, damping) else {
-            damping *= 10.0;
-            continue;
-        };
-        let poses = problem.moved(&solved.poses, step.as_slice());
-        let next = linearise(problem, &poses);
-        solved.evaluations += 1;
-        if next.cost < linear.cost {
-            let fell = linear.cost - next.cost;
-            solved.poses = poses;
-            solved.converged = fell <= options.settle * linear.cost && damping <= DAMPING.0;
-            linear = next;
-            damping *= 0.2;
-        } else {
-            damping *= 5.0;
-            solved.converged = damping > DAMPING.1;
-        }
-        if solved.converged {
-            break;
-        }
-    }
-    solved
-}
-
 /// The step that the damped equations ask for.
 fn step(linear: &Linear, damping: f64) -> Option<DVector<f64>> {
     let mut damped = linear.normal.clone();
-    let scale = (0..damped.nrows()).map(|i| damped[(i, i)]).fold(f64::MIN_POSITIVE, f64::max);
     for i in 0..damped.nrows() {
-        let weight = if i % 3 == 2 { RADIUS_M * RADIUS_M } else { 1.0 };
-        damped[(i, i)] += damping * scale.min(linear.normal.nrows() as f64) * weight;
+        damped[(i, i)] += damping * if i % 3 == 2 { RADIUS_M * RADIUS_M } else { 1.0 };
     }
     Some(damped.cholesky()?.solve(&linear.right))
 }

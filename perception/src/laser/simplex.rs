@@ -4,6 +4,8 @@
 pub(super) struct Found {
     /// The best place.
     pub at: Vec<f64>,
+    /// The value there.
+    pub cost: f64,
     pub converged: bool,
     pub iterations: usize,
     pub evaluations: usize,
@@ -22,7 +24,7 @@ pub(super) fn simplex(cost: impl Fn(&[f64]) -> f64, steps: &[f64], most: usize, 
             (cost(&at), at)
         })
         .collect();
-    let mut found = Found { at: Vec::new(), converged: false, iterations: 0, evaluations: n + 1 };
+    let mut found = Found { at: Vec::new(), cost: 0.0, converged: false, iterations: 0, evaluations: n + 1 };
     let d = n.max(2) as f64;
     let (expand, contract, shrink) = (1.0 + 2.0 / d, 0.75 - 0.5 / d, 1.0 - 1.0 / d);
     while n > 0 {
@@ -64,7 +66,7 @@ pub(super) fn simplex(cost: impl Fn(&[f64]) -> f64, steps: &[f64], most: usize, 
             }
         }
     }
-    found.at = corners.swap_remove(0).1;
+    (found.cost, found.at) = corners.swap_remove(0);
     found
 }
 

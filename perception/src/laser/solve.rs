@@ -2,10 +2,10 @@
 
 use super::least_squares::least_squares;
 use super::simplex::simplex;
-use super::violation::Assembly;
+use super::violation::{Assembly, Kind, Residual};
 use nalgebra::{Isometry2, Rotation2, Translation2, UnitComplex, Vector2};
 
-/// How the violation is minimised.
+/// How the objective is minimised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Solver {
     /// Levenberg's and Marquardt's method on the errors, whose derivatives are known.
@@ -15,16 +15,45 @@ pub enum Solver {
     Simplex,
 }
 
-/// How long to go on.
+/// What is minimised.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Objective {
+    /// The boundary violation alone (Eq. 3). Many poses violate nothing, for a reading a degree bounds a thing loosely; which of them is found is left to
+    /// chance, and models come out too large.
+    Violation,
+    /// The boundary violation, and with a tenth of its weight what chooses among the poses that violate nothing: silhouettes lie in the middle between
+    /// the last ray that met the thing and the first that went past, and poses stay near those given.
+    Centred {
+        /// Spread of the given positions, metres.
+        pose_sigma_m: f64,
+        /// Spread of the given headings, radians.
+        pose_sigma_rad: f64,
+    },
+}
+
+impl Default for Objective {
+    fn default() -> Self {
+        Objective::Centred { pose_sigma_m: 0.05, pose_sigma_rad: 0.01 }
+    }
+}
+
+/// Weight of what chooses among poses that violate nothing.
+const CENTRED: f64 = 0.1;
+/// Spread of a silhouette between two rays that are a degree apart, 1.5 m away, metres: their distance over the square root of twelve.
+const GAP_SIGMA_M: f64 = 0.0075;
+
+/// What is minimised, how, and how long to go on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverOptions {
     /// Which solver.
     pub solver: Solver,
-    /// Most iterations of least squares.
+    /// What it minimises.
+    pub objective: Objective,
+    /// Most iterations of least squares in each of its rounds.
     pub most_iterations: usize,
-    /// Most evaluations of the simplex, for each of three numbers a group.
+    /// Most evaluations of the simplex, for each of three numbers a pose.
     pub most_evaluations: usize,
-    /// Settled if the boundary violation falls by less than this part of it.
+    /// Settled if a step makes less than this part of the objective.
     pub settle: f64,
     /// First steps of the simplex: metres, and radians.
     pub simplex_steps: (f64, f64),
@@ -34,9 +63,10 @@ impl Default for SolverOptions {
     fn default() -> Self {
         SolverOptions {
             solver: Solver::LeastSquares,
+            objective: Objective::default(),
             most_iterations: 100,
             most_evaluations: 400,
-            settle: 1e-6,
+            settle: 1e-5,
             simplex_steps: (0.03, 0.02),
         }
     }
@@ -46,20 +76,69 @@ impl Default for SolverOptions {
 #[derive(Clone, Debug)]
 pub(super) struct Solved {
     pub poses: Vec<Isometry2<f64>>,
+    /// What was minimised, at these poses.
+    pub cost: f64,
     pub converged: bool,
     pub iterations: usize,
-    /// Times the violation was computed.
+    /// Times the errors were computed.
     pub evaluations: usize,
 }
 
-/// Which groups may move; the others stay where they are.
+/// Groups of scans, where they are, and which of them may move.
 pub(super) struct Problem<'a> {
-    pub assembly: &'a Assembly,
-    pub start: &'a [Isometry2<f64>],
-    pub movable: Vec<usize>,
+    assembly: &'a Assembly,
+    start: &'a [Isometry2<f64>],
+    movable: Vec<usize>,
+    /// Weight of [`Kind::Slack`].
+    slack: f64,
+    /// Weights of a group's shift (twice) and turn from its start.
+    prior: [f64; 3],
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
+    /// Scans that are all free to move, from where localisation put them.
+    pub fn free(assembly: &'a Assembly, start: &'a [Isometry2<f64>], objective: Objective) -> Problem<'a> {
+        let movable = (0..start.len()).collect();
+        let (slack, prior) = match objective {
+            Objective::Violation => (0.0, [0.0; 3]),
+            Objective::Centred { pose_sigma_m, pose_sigma_rad } => {
+                let weight = |sigma: f64| CENTRED * (GAP_SIGMA_M / sigma.max(1e-6)).powi(2);
+                (CENTRED, [weight(pose_sigma_m), weight(pose_sigma_m), weight(pose_sigma_rad)])
+            }
+        };
+        Problem { assembly, start, movable, slack, prior }
+    }
+
+    /// The last group moves onto the others; nothing is known of where it belongs.
+    pub fn onto(assembly: &'a Assembly, start: &'a [Isometry2<f64>], objective: Objective) -> Problem<'a> {
+        let movable = vec![start.len() - 1];
+        Problem { movable, prior: [0.0; 3], ..Problem::free(assembly, start, objective) }
+    }
+
+    pub fn assembly(&self) -> &Assembly {
+        self.assembly
+    }
+
+    pub fn start(&self) -> &[Isometry2<f64>] {
+        self.start
+    }
+
+    pub fn movable(&self) -> &[usize] {
+        &self.movable
+    }
+
+    pub fn weight(&self, r: &Residual) -> f64 {
+        if r.kind == Kind::Slack { self.slack } else { 1.0 }
+    }
+
+    /// How far a group is from its start, shift and turn, each with the weight of its square.
+    pub fn strayed(&self, poses: &[Isometry2<f64>], group: usize) -> impl Iterator<Item = (f64, f64)> {
+        let pivot = self.assembly.pivot(group);
+        let (from, to) = (&self.start[group], &poses[group]);
+        let shift = to * pivot - from * pivot;
+        [shift.x, shift.y, from.rotation.angle_to(&to.rotation)].into_iter().zip(self.prior)
+    }
+
     /// The poses after a shift (metres) and a turn (radians) of each movable group about its pivot.
     pub fn moved(&self, poses: &[Isometry2<f64>], by: &[f64]) -> Vec<Isometry2<f64>> {
         let mut moved = poses.to_vec();
@@ -74,11 +153,13 @@ impl Problem<'_> {
         moved
     }
 
-    /// BV at poses, square metres.
+    /// What is minimised, square metres.
     pub fn cost(&self, poses: &[Isometry2<f64>]) -> f64 {
         let mut sum = 0.0;
-        self.assembly.residuals(&self.assembly.placed(poses), |r| sum += r.value_m * r.value_m);
-        sum
+        let placed = self.assembly.placed(poses);
+        self.assembly.residuals(&placed, 0.0, |r| sum += r.value_m * r.value_m * self.weight(&r));
+        let strayed = self.movable.iter().flat_map(|&group| self.strayed(poses, group));
+        sum + strayed.map(|(off, weight)| weight * off * off).sum::<f64>()
     }
 }
 
@@ -94,6 +175,7 @@ pub(super) fn solve(problem: &Problem, options: &SolverOptions) -> Solved {
             let found = simplex(cost, &steps, most, options.settle);
             Solved {
                 poses: problem.moved(problem.start, &found.at),
+                cost: found.cost,
                 converged: found.converged,
                 iterations: found.iterations,
                 evaluations: found.evaluations,

@@ -27,6 +27,9 @@ impl Violation {
     }
 }
 
+/// Points nearer by so many softnesses have no weight.
+const FADED: f64 = 6.0;
+
 /// One scan, ready to be held against others.
 #[derive(Clone, Debug)]
 struct Part {
@@ -61,13 +64,13 @@ impl Rays {
     }
 
     /// The object ray that a scan from `other` must reach: the one on its side (Eq. 2); none if it looks from between the bounds, or from behind the thing.
-    fn facing(&self, other: &Point2<f64>) -> Option<Vector2<f64>> {
+    fn facing(&self, other: &Point2<f64>) -> Option<(Vector2<f64>, Vector2<f64>)> {
         let towards = other - self.laser;
         let side = self.middle.perp(&towards);
         if side < 0.0 && self.right_bound.dot(&towards) > 0.0 {
-            Some(self.right_object)
+            Some((self.right_object, self.right_bound))
         } else if side > 0.0 && self.left_bound.dot(&towards) > 0.0 {
-            Some(self.left_object)
+            Some((self.left_object, self.left_bound))
         } else {
             None
         }
@@ -97,6 +100,7 @@ pub(super) struct Placed {
 pub(super) enum Kind {
     Exterior,
     Interior,
+    Slack,
 }
 
 /// One violated constraint: `value_m = normal · (at - a point of the line)`, to be made nought.
@@ -145,11 +149,6 @@ impl Assembly {
         self.rays.push(rays.map(|p| pose * p, |v| pose * v));
     }
 
-    /// Number of groups.
-    pub fn groups(&self) -> usize {
-        self.pivots.len()
-    }
-
     /// About what a group turns, in its own frame.
     pub fn pivot(&self, group: usize) -> Point2<f64> {
         self.pivots[group]
@@ -170,13 +169,13 @@ impl Assembly {
         placed
     }
 
-    /// Every violated constraint between scans of different groups.
-    pub fn residuals(&self, placed: &Placed, mut each: impl FnMut(Residual)) {
+    /// Every violated constraint between scans of different groups; see [`farthest`] for `soft_m`.
+    pub fn residuals(&self, placed: &Placed, soft_m: f64, mut each: impl FnMut(Residual)) {
         for (of_line, rays) in self.parts.iter().zip(&placed.rays) {
             for (of_points, other) in self.parts.iter().zip(&placed.rays) {
                 if of_line.group != of_points.group {
                     let corners = &placed.corners[of_points.begin..of_points.end];
-                    errors(rays, &other.laser, corners, |kind, value_m, normal, at| {
+                    errors(rays, &other.laser, corners, soft_m, |kind, value_m, normal, at| {
                         each(Residual { kind, value_m, normal, at, line: of_line.group, point: of_points.group })
                     });
                 }
@@ -187,12 +186,13 @@ impl Assembly {
     /// The violation at poses of the groups.
     pub fn violation(&self, poses: &[Isometry2<f64>]) -> Violation {
         let mut violation = Violation { pairs: self.pairs, ..Violation::default() };
-        self.residuals(&self.placed(poses), |r| {
-            violation.boundary_m2 += r.value_m * r.value_m;
+        self.residuals(&self.placed(poses), 0.0, |r| {
             let longest = match r.kind {
                 Kind::Exterior => &mut violation.exterior_m,
                 Kind::Interior => &mut violation.interior_m,
+                Kind::Slack => return,
             };
+            violation.boundary_m2 += r.value_m * r.value_m;
             *longest = longest.max(r.value_m);
         });
         violation
@@ -205,33 +205,54 @@ fn errors(
     rays: &Rays,
     other: &Point2<f64>,
     corners: &[Point2<f64>],
+    soft_m: f64,
     mut each: impl FnMut(Kind, f64, Vector2<f64>, Point2<f64>),
 ) {
     // Eq. 1, left and right: the point farthest beyond the bound.
     for bound in [rays.left_bound, rays.right_bound] {
-        let (beyond, at) = farthest(&bound, &rays.laser, corners);
+        let (beyond, at) = farthest(&bound, &rays.laser, corners, soft_m);
         if beyond > 0.0 {
             each(Kind::Exterior, beyond, bound, at);
         }
     }
     // Eq. 2: some point must reach the object ray; the one that lacks least.
-    if let Some(object) = rays.facing(other) {
-        let (beyond, at) = farthest(&object, &rays.laser, corners);
+    if let Some((object, bound)) = rays.facing(other) {
+        let (beyond, at) = farthest(&object, &rays.laser, corners, soft_m);
         if beyond < 0.0 {
             each(Kind::Interior, -beyond, -object, at);
         }
+        let between = (object + bound).normalize();
+        let (beyond, at) = farthest(&between, &rays.laser, corners, soft_m);
+        each(Kind::Slack, beyond, between, at);
     }
 }
 
-/// The point farthest along a normal, measured from `from`.
+/// The point farthest along a normal, measured from `from`, and how far it is.
+///
+/// With a softness it is a mean of points, the weight of each falling with how much nearer it is: which point is farthest then changes without a jump, so that
+/// derivatives tell where to go when two points are as far.
 #[inline(always)]
-fn farthest(normal: &Vector2<f64>, from: &Point2<f64>, points: &[Point2<f64>]) -> (f64, Point2<f64>) {
+fn farthest(normal: &Vector2<f64>, from: &Point2<f64>, points: &[Point2<f64>], soft_m: f64) -> (f64, Point2<f64>) {
+    let along = |p: &Point2<f64>| normal.dot(&(p - from));
     let (mut most, mut at) = (f64::NEG_INFINITY, *from);
     for p in points {
-        let along = normal.dot(&(p - from));
-        if along > most {
-            (most, at) = (along, *p);
+        let distance = along(p);
+        if distance > most {
+            (most, at) = (distance, *p);
         }
     }
-    (most, at)
+    if soft_m <= 0.0 {
+        return (most, at);
+    }
+    let (mut weights, mut sum) = (0.0, Vector2::zeros());
+    for p in points {
+        let nearer = (most - along(p)) / soft_m;
+        if nearer < FADED {
+            let weight = (-nearer).exp();
+            weights += weight;
+            sum += p.coords * weight;
+        }
+    }
+    let mean = Point2::from(sum / weights);
+    (along(&mean), mean)
 }

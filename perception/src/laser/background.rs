@@ -61,8 +61,7 @@ impl Occupancy {
                     middle.x.clamp(column as f64, column as f64 + 1.0),
                     middle.y.clamp(row as f64, row as f64 + 1.0),
                 );
-                (nearest - middle).norm() <= reach
-                    && self.cell(column as f64, row as f64) == Space::Occupied
+                (nearest - middle).norm() <= reach && self.cell(column as f64, row as f64) == Space::Occupied
             })
         })
     }
@@ -219,8 +218,7 @@ fn bounded(scan: &Scan, readings: &[usize], options: &ObserveOptions) -> Result<
         }
         Err(missing)
     };
-    let left_bound =
-        past(left, &mut around[left + 1..].iter(), Ignored::NoLeftBound, Ignored::LeftCovered)?;
+    let left_bound = past(left, &mut around[left + 1..].iter(), Ignored::NoLeftBound, Ignored::LeftCovered)?;
     let right_bound =
         past(right, &mut around[..right].iter().rev(), Ignored::NoRightBound, Ignored::RightCovered)?;
     if left_bound - right_bound >= PI {

@@ -102,14 +102,17 @@ pub fn groups(models: &[Features], apart: f64) -> Vec<Vec<usize>> {
         .collect();
     let mut groups: Vec<Vec<usize>> = (0..models.len()).map(|i| vec![i]).collect();
     let distance = |a: &[usize], b: &[usize]| {
-        let sum: f64 = a.iter().flat_map(|&i| b.iter().map(move |&j| (i, j))).map(|(i, j)| (scaled[i] - scaled[j]).norm()).sum();
+        let sum: f64 = a
+            .iter()
+            .flat_map(|&i| b.iter().map(move |&j| (i, j)))
+            .map(|(i, j)| (scaled[i] - scaled[j]).norm())
+            .sum();
         sum / (a.len() * b.len()) as f64
     };
     loop {
         let pairs = (0..groups.len()).flat_map(|i| (i + 1..groups.len()).map(move |j| (i, j)));
-        let nearest = pairs
-            .map(|(i, j)| (distance(&groups[i], &groups[j]), i, j))
-            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let nearest =
+            pairs.map(|(i, j)| (distance(&groups[i], &groups[j]), i, j)).min_by(|a, b| a.0.total_cmp(&b.0));
         match nearest {
             Some((d, i, j)) if d < apart => {
                 let joined = groups.remove(j);

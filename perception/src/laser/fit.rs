@@ -105,7 +105,12 @@ const ROUGH: f64 = 0.05;
 const SETTLED: usize = 2;
 
 /// Follows the most promising starts to the end.
-fn follow(model: &ShapeModel, other: &[PosedScan], starts: &[Isometry2<f64>], options: &FitOptions) -> ModelFit {
+fn follow(
+    model: &ShapeModel,
+    other: &[PosedScan],
+    starts: &[Isometry2<f64>],
+    options: &FitOptions,
+) -> ModelFit {
     let assembly = Assembly::new([model.scans(), other]);
     let poses = |pose: &Isometry2<f64>| [Isometry2::identity(), *pose];
     let violation = |pose: &Isometry2<f64>| assembly.violation(&poses(pose)).boundary_m2;

@@ -111,8 +111,10 @@ pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &Recognis
     near.truncate(options.aligned);
     let mut candidates: Vec<Candidate> = near
         .into_iter()
-        .map(|(distance, index)| {
-            Candidate { index, distance, fit: fit(&known[index].model, instance, &options.fit) }
+        .map(|(distance, index)| Candidate {
+            index,
+            distance,
+            fit: fit(&known[index].model, instance, &options.fit),
         })
         .collect();
     candidates.sort_by(|a, b| a.fit.between.per_pair_m().total_cmp(&b.fit.between.per_pair_m()));

@@ -4,7 +4,7 @@ use super::solve::{Problem, Solved, SolverOptions};
 use nalgebra::{DMatrix, DVector, Isometry2, Point2, Vector3};
 
 /// Softness of the farthest points, metres, one round after the other: the last is the objective itself.
-const SOFTNESS_M: [f64; 3] = [0.01, 0.002, 0.0];
+const SOFTNESS_M: [f64; 3] = [0.03, 0.006, 0.0];
 /// A turn of one radian about the middle of a thing counts as a shift by so much, metres: about its radius.
 const RADIUS_M: f64 = 0.3;
 /// An objective below this is nothing, square metres.

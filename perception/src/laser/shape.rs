@@ -62,7 +62,9 @@ pub enum ShapeError {
     #[error("a shape model of no scans: give at least one scan in which the thing is bounded on both sides")]
     NoScans,
     /// A scan without points, or with a point that is nowhere.
-    #[error("scan {index} has no point, or one that is not finite: give the places where readings met the thing")]
+    #[error(
+        "scan {index} has no point, or one that is not finite: give the places where readings met the thing"
+    )]
     Points {
         /// Which scan.
         index: usize,

@@ -59,7 +59,8 @@ pub(super) fn simplex(cost: impl Fn(&[f64]) -> f64, steps: &[f64], most: usize, 
             None => {
                 let best = corners[0].1.clone();
                 for corner in &mut corners[1..] {
-                    let at: Vec<f64> = best.iter().zip(&corner.1).map(|(b, c)| b + shrink * (c - b)).collect();
+                    let at: Vec<f64> =
+                        best.iter().zip(&corner.1).map(|(b, c)| b + shrink * (c - b)).collect();
                     *corner = (cost(&at), at);
                 }
                 found.evaluations += n;

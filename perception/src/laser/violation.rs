@@ -27,9 +27,6 @@ impl Violation {
     }
 }
 
-/// Points nearer by so many softnesses have no weight.
-const FADED: f64 = 6.0;
-
 /// One scan, ready to be held against others.
 #[derive(Clone, Debug)]
 struct Part {
@@ -52,7 +49,11 @@ struct Rays {
 }
 
 impl Rays {
-    fn map(&self, at: impl Fn(&Point2<f64>) -> Point2<f64>, turn: impl Fn(&Vector2<f64>) -> Vector2<f64>) -> Rays {
+    fn map(
+        &self,
+        at: impl Fn(&Point2<f64>) -> Point2<f64>,
+        turn: impl Fn(&Vector2<f64>) -> Vector2<f64>,
+    ) -> Rays {
         Rays {
             laser: at(&self.laser),
             middle: turn(&self.middle),
@@ -119,8 +120,13 @@ pub(super) struct Residual {
 impl Assembly {
     /// Groups of scans, each with poses in a frame of the group's own.
     pub fn new<'a>(groups: impl IntoIterator<Item = &'a [PosedScan]>) -> Assembly {
-        let mut assembly =
-            Assembly { parts: Vec::new(), corners: Vec::new(), rays: Vec::new(), pivots: Vec::new(), pairs: 0 };
+        let mut assembly = Assembly {
+            parts: Vec::new(),
+            corners: Vec::new(),
+            rays: Vec::new(),
+            pivots: Vec::new(),
+            pairs: 0,
+        };
         for (group, scans) in groups.into_iter().enumerate() {
             let first = assembly.corners.len();
             assembly.pairs += 2 * assembly.parts.len() * scans.len();
@@ -176,7 +182,14 @@ impl Assembly {
                 if of_line.group != of_points.group {
                     let corners = &placed.corners[of_points.begin..of_points.end];
                     errors(rays, &other.laser, corners, soft_m, |kind, value_m, normal, at| {
-                        each(Residual { kind, value_m, normal, at, line: of_line.group, point: of_points.group })
+                        each(Residual {
+                            kind,
+                            value_m,
+                            normal,
+                            at,
+                            line: of_line.group,
+                            point: of_points.group,
+                        })
                     });
                 }
             }
@@ -229,10 +242,15 @@ fn errors(
 
 /// The point farthest along a normal, measured from `from`, and how far it is.
 ///
-/// With a softness it is a mean of points, the weight of each falling with how much nearer it is: which point is farthest then changes without a jump, so that
+/// With a softness it is a mean of points, the weight of each falling to nothing where it is nearer by as much: which point is farthest then changes without a jump, so that
 /// derivatives tell where to go when two points are as far.
 #[inline(always)]
-fn farthest(normal: &Vector2<f64>, from: &Point2<f64>, points: &[Point2<f64>], soft_m: f64) -> (f64, Point2<f64>) {
+fn farthest(
+    normal: &Vector2<f64>,
+    from: &Point2<f64>,
+    points: &[Point2<f64>],
+    soft_m: f64,
+) -> (f64, Point2<f64>) {
     let along = |p: &Point2<f64>| normal.dot(&(p - from));
     let (mut most, mut at) = (f64::NEG_INFINITY, *from);
     for p in points {
@@ -246,12 +264,9 @@ fn farthest(normal: &Vector2<f64>, from: &Point2<f64>, points: &[Point2<f64>], s
     }
     let (mut weights, mut sum) = (0.0, Vector2::zeros());
     for p in points {
-        let nearer = (most - along(p)) / soft_m;
-        if nearer < FADED {
-            let weight = (-nearer).exp();
-            weights += weight;
-            sum += p.coords * weight;
-        }
+        let weight = (1.0 - (most - along(p)) / soft_m).max(0.0).powi(2);
+        weights += weight;
+        sum += p.coords * weight;
     }
     let mean = Point2::from(sum / weights);
     (along(&mean), mean)

@@ -2,9 +2,12 @@
 
 #![allow(dead_code)]
 
+pub mod paper;
+
 use super::tabletop::Draws;
 use descry_perception::laser::{
-    ObserveOptions, Occupancy, PosedScan, Scan, Space, observe,
+    Alignment, FitOptions, ModelFit, ObserveOptions, Occupancy, PosedScan, Scan, ShapeModel, SolverOptions,
+    Space, Start, align, fit, localise, observe,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -82,7 +85,11 @@ fn room() -> Vec<Vec<Point2<f64>>> {
 }
 
 /// Distance along a ray to the nearest side of closed outlines.
-fn ray<'a>(from: &Point2<f64>, along: &Vector2<f64>, outlines: impl Iterator<Item = &'a Vec<Point2<f64>>>) -> f64 {
+fn ray<'a>(
+    from: &Point2<f64>,
+    along: &Vector2<f64>,
+    outlines: impl Iterator<Item = &'a Vec<Point2<f64>>>,
+) -> f64 {
     let mut nearest = f64::INFINITY;
     for outline in outlines {
         for (i, a) in outline.iter().enumerate() {
@@ -151,7 +158,10 @@ impl Lab {
     pub fn look_from(&self, bearing_rad: f64, draws: &mut Draws) -> Isometry2<f64> {
         let range_m = 1.2 + 0.6 * draws.next();
         let away = Vector2::new(bearing_rad.cos(), bearing_rad.sin()) * range_m;
-        Isometry2::new(self.map_from_object.translation.vector + away, bearing_rad + PI + 0.1 * draws.normal())
+        Isometry2::new(
+            self.map_from_object.translation.vector + away,
+            bearing_rad + PI + 0.1 * draws.normal(),
+        )
     }
 
     /// Scans on a circle around the object, with the poses that they were really taken from.
@@ -216,8 +226,24 @@ pub fn map_of_the_lab(draws: &mut Draws) -> Occupancy {
     map
 }
 
-/// The object's readings in scans, by background subtraction, around where the stated poses say that the robot circled.
-pub fn seen(lab: &Lab, scans: &[(Scan, Isometry2<f64>)], map: &Occupancy, run: &Run, draws: &mut Draws) -> Vec<PosedScan> {
+/// One observation of an object: what scans said of it, and where they were really taken from.
+pub struct Observed {
+    /// Scans at their stated poses, without those that were ignored.
+    pub scans: Vec<PosedScan>,
+    /// The true poses of these.
+    pub map_from_lasers: Vec<Isometry2<f64>>,
+    /// Scans that were ignored.
+    pub ignored: usize,
+}
+
+/// The object's readings by background subtraction, around where the robot was told that it is.
+pub fn observed(
+    lab: &Lab,
+    sweeps: &[(Scan, Isometry2<f64>)],
+    map: &Occupancy,
+    run: &Run,
+    draws: &mut Draws,
+) -> Observed {
     let near = Point2::from(lab.map_from_object.translation.vector);
     let margin_m = 0.1 + 2.0 * run.pose_sigma_m;
     let draws = std::cell::RefCell::new(draws);
@@ -225,6 +251,88 @@ pub fn seen(lab: &Lab, scans: &[(Scan, Isometry2<f64>)], map: &Occupancy, run: &
         let wrong = run.wrong > 0.0 && draws.borrow_mut().next() < run.wrong;
         map.is_background(place, margin_m) != wrong
     };
-    let sweeps: Vec<Scan> = scans.iter().map(|s| s.0.clone()).collect();
-    observe(&sweeps, &near, is_background, &ObserveOptions::default()).map(|o| o.scans).unwrap_or_default()
+    let scans: Vec<Scan> = sweeps.iter().map(|s| s.0.clone()).collect();
+    let observation =
+        observe(&scans, &near, is_background, &ObserveOptions::default()).expect("sweeps are sound");
+    let used = |i: &usize| observation.ignored.iter().all(|(ignored, _)| ignored != i);
+    Observed {
+        map_from_lasers: (0..sweeps.len()).filter(used).map(|i| sweeps[i].1).collect(),
+        ignored: observation.ignored.len(),
+        scans: observation.scans,
+    }
+}
+
+/// An object that the robot circled once.
+pub fn circled(outline: &Outline, run: &Run, map: &Occupancy, seed: u64) -> (Lab, Observed) {
+    let mut draws = Draws(seed);
+    let lab = Lab::with(outline, &mut draws);
+    let sweeps = lab.circle(run, &mut draws);
+    let observed = observed(&lab, &sweeps, map, run, &mut draws);
+    (lab, observed)
+}
+
+/// Observations of each of the five objects.
+pub const INSTANCES: usize = 5;
+
+/// Seed of an observation of an object in an experiment.
+pub fn seed_of(experiment: u64, object: usize, instance: usize) -> u64 {
+    experiment * 1000 + (object * INSTANCES + instance) as u64
+}
+
+/// Models of all observations, object by object.
+pub fn models(experiment: u64, run: &Run, options: &SolverOptions) -> Vec<Alignment> {
+    let map = map_of_the_lab(&mut Draws(experiment));
+    let all = (0..NAMES.len()).flat_map(|k| (0..INSTANCES).map(move |i| (k, i)));
+    all.map(|(k, i)| {
+        let (_, observed) = circled(&object(k), run, &map, seed_of(experiment, k, i));
+        align(&observed.scans, options).expect("the object was seen")
+    })
+    .collect()
+}
+
+/// Least and greatest f_C, and the root of the violation a pair of scans, between instances of two objects (Fig. 8). An instance is not held against itself.
+pub fn f_c_range(models: &[Alignment], a: usize, b: usize, options: &FitOptions) -> [(f64, f64); 2] {
+    let mut ranges = [(f64::INFINITY, 0.0_f64); 2];
+    for i in 0..INSTANCES {
+        for j in 0..if a == b { i } else { INSTANCES } {
+            let found = fit(&models[a * INSTANCES + i].model, &models[b * INSTANCES + j].model, options);
+            for (range, value) in ranges.iter_mut().zip([found.f_c_m2, found.between.per_pair_m()]) {
+                *range = (range.0.min(value), range.1.max(value));
+            }
+        }
+    }
+    ranges
+}
+
+/// A scan of an instance put off and found again on another model (Fig. 9).
+pub struct Relocalised {
+    /// Of the middle of the thing, in the laser's frame, metres.
+    pub position_m: f64,
+    /// Of its heading, radians.
+    pub angle_rad: f64,
+    /// Where it ended.
+    pub fit: ModelFit,
+}
+
+/// The paper's procedure: the instance is aligned with the model, one of its scans is moved by `paper::MOVED` and localised.
+pub fn relocalised(
+    model: &ShapeModel,
+    instance: &ShapeModel,
+    scan: usize,
+    options: &FitOptions,
+) -> Relocalised {
+    let aligned = instance.moved(&fit(model, instance, options).model_from_other);
+    let posed = &aligned.scans()[scan % aligned.scans().len()];
+    let pose = posed.model_from_laser;
+    let [x, y, turn] = paper::MOVED;
+    let shift = pose.translation.vector + Vector2::new(x, y);
+    let moved = Isometry2::new(shift, pose.rotation.angle() + turn);
+    let fit = localise(model, &posed.scan, Start::Near(moved), options);
+    let centre = model.features().centre;
+    let place = |pose: &Isometry2<f64>| pose.inverse() * centre;
+    Relocalised {
+        position_m: (place(&fit.model_from_other) - place(&pose)).norm(),
+        angle_rad: fit.model_from_other.rotation.angle_to(&pose.rotation).abs(),
+        fit,
+    }
 }

@@ -18,11 +18,11 @@ mod simplex;
 mod solve;
 mod violation;
 
-pub use align::{AlignError, Alignment, align};
+pub use align::{AlignError, Alignment, align, align_consistent};
 pub use background::{Ignored, Observation, ObserveError, ObserveOptions, Occupancy, Space, observe};
 pub use features::{FeatureClass, Features, Nearest, classes, groups, nearest};
 pub use fit::{FitOptions, ModelFit, Start, fit, localise};
-pub use known::{Candidate, KnownShape, RecogniseOptions, Recognition, Verdict, recognise};
+pub use known::{Candidate, KnownShape, RecogniseOptions, Recognition, Verdict, recognise, recognise_scan};
 pub use next::{NextOptions, NextScan, next_scan, undetermined_m2};
 pub use scan::{Scan, ScanError};
 pub use shape::{ObjectScan, PosedScan, ShapeError, ShapeModel};

@@ -32,15 +32,17 @@ fn options(method: usize) -> SolverOptions {
 
 fn run(seed: u64, out: Option<&Path>) -> Result<(), String> {
     let learnt = models(seed, &Run::default(), &options(0));
+    out.map_or(Ok(()), |dir| plot::write(seed, &learnt, dir))?;
     tables::alignment(seed);
     tables::features(&learnt);
     tables::f_c(&learnt);
     tables::recycle_bins(seed, &learnt);
     tables::localisation(seed, &learnt);
+    tables::single_scans(&learnt);
     variations::print(seed, &learnt);
     scanning::print(seed, &learnt);
     times::print(seed, &learnt);
-    out.map_or(Ok(()), |dir| plot::write(seed, &learnt, dir))
+    Ok(())
 }
 
 fn main() -> ExitCode {

@@ -9,8 +9,6 @@ use descry_perception::nalgebra::{Point2, Vector2};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Pixels a metre.
-const SCALE: f64 = 180.0;
 /// Okabe and Ito.
 const COLOURS: [&str; 8] =
     ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8A8A00"];
@@ -20,6 +18,8 @@ struct Panel {
     left: f64,
     top: f64,
     side_m: f64,
+    /// Pixels a metre.
+    scale: f64,
     centre: Point2<f64>,
     text: String,
 }
@@ -27,7 +27,10 @@ struct Panel {
 impl Panel {
     fn at(&self, p: &Point2<f64>) -> (f64, f64) {
         let off = p - self.centre;
-        (self.left + SCALE * (0.5 * self.side_m + off.x), self.top + SCALE * (0.5 * self.side_m - off.y))
+        (
+            self.left + self.scale * (0.5 * self.side_m + off.x),
+            self.top + self.scale * (0.5 * self.side_m - off.y),
+        )
     }
 
     fn line(&mut self, a: &Point2<f64>, b: &Point2<f64>, style: &str) {
@@ -81,30 +84,38 @@ fn page(width: f64, height: f64, panels: &[Panel]) -> String {
 }
 
 /// Panels side by side, each of scans around the middle of their readings.
-fn side_by_side(rows: &[(&str, Vec<PosedScan>)], side_m: f64, rays: bool) -> String {
+fn side_by_side(rows: &[(&str, Vec<PosedScan>)], side_m: f64, scale: f64, rays: bool) -> String {
     let panels: Vec<Panel> = rows
         .iter()
         .enumerate()
         .filter_map(|(i, (title, scans))| {
             let centre = ShapeModel::new(scans.clone()).ok()?.features().centre;
-            let mut panel =
-                Panel { left: SCALE * side_m * i as f64, top: 0.0, side_m, centre, text: String::new() };
+            let mut panel = Panel {
+                left: scale * side_m * i as f64,
+                top: 0.0,
+                side_m,
+                scale,
+                centre,
+                text: String::new(),
+            };
             panel.scans(scans, rays);
             panel.title(title);
             Some(panel)
         })
         .collect();
-    page(SCALE * side_m * rows.len() as f64, SCALE * side_m, &panels)
+    page(scale * side_m * rows.len() as f64, scale * side_m, &panels)
 }
 
 /// Fig. 4: every observation of every object, a column an object.
 fn all_objects(learnt: &[Alignment]) -> String {
     const SIDE_M: f64 = 0.9;
+    const SCALE: f64 = 220.0;
     let panel = |(i, alignment): (usize, &Alignment)| {
         let mut panel = Panel {
             left: SCALE * SIDE_M * (i / INSTANCES) as f64,
             top: SCALE * SIDE_M * (i % INSTANCES) as f64,
             side_m: SIDE_M,
+            scale: SCALE,
             centre: alignment.model.features().centre,
             text: String::new(),
         };
@@ -137,10 +148,10 @@ pub fn write(seed: u64, learnt: &[Alignment], dir: &Path) -> Result<(), String> 
         let aligned = align(&seen, &options(0)).map_err(|e| e.to_string())?;
         let icp = by_icp(&seen);
         let rows = [("as localised", seen), ("aligned", aligned.model.scans().to_vec()), ("by ICP", icp)];
-        save(&format!("{name}.svg"), side_by_side(&rows[..2], 4.2, true))?;
-        save(&format!("{name}-near.svg"), side_by_side(&rows, 1.2, false))?;
+        save(&format!("{name}.svg"), side_by_side(&rows[..2], 4.2, 180.0, true))?;
+        save(&format!("{name}-near.svg"), side_by_side(&rows, 1.2, 400.0, false))?;
     }
     save("figure-4.svg", all_objects(learnt))?;
-    println!("\nplots written to {}", dir.display());
+    println!("plots written to {}\n", dir.display());
     Ok(())
 }

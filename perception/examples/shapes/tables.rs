@@ -5,7 +5,11 @@ use super::lab::{
 };
 use super::tabletop::Draws;
 use super::{METHODS, options};
-use descry_perception::laser::{Alignment, FitOptions, align, classes, groups, nearest};
+use descry_perception::laser::{
+    Alignment, FitOptions, KnownShape, RecogniseOptions, ShapeModel, Verdict, align, classes, groups,
+    nearest, recognise_scan,
+};
+use descry_perception::nalgebra::Isometry2;
 
 /// Mean and standard deviation.
 pub fn mean_and_spread(values: &[f64]) -> (f64, f64) {
@@ -177,5 +181,46 @@ pub fn localisation(seed: u64, learnt: &[Alignment]) {
         share(&|a| a.0 < paper::FARTHEST_M),
         most(&|a| a.0),
         most(&|a| a.2)
+    );
+}
+
+/// What single scans are taken for, and where, with no pose to start from: each scan of each instance, held against all models but its own.
+pub fn single_scans(learnt: &[Alignment]) {
+    let known: Vec<KnownShape> = learnt
+        .iter()
+        .enumerate()
+        .map(|(i, a)| KnownShape::new(NAMES[i / INSTANCES], a.model.clone()))
+        .collect();
+    let (mut scans, mut right, mut among, mut wrong, mut missed, mut off_m) = (0, 0, 0, 0, 0, Vec::new());
+    for (i, alignment) in learnt.iter().enumerate() {
+        let own = NAMES[i / INSTANCES];
+        let others: Vec<KnownShape> =
+            known.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, shape)| shape.clone()).collect();
+        for posed in alignment.model.scans() {
+            let found = recognise_scan(&posed.scan, &others, &RecogniseOptions::default());
+            scans += 1;
+            match &found.verdict {
+                Verdict::Is(name) if name == own => right += 1,
+                Verdict::OneOf(names) if names.iter().any(|n| n == own) => among += 1,
+                Verdict::Unknown => missed += 1,
+                _ => wrong += 1,
+            }
+            let same = found.candidates.iter().find(|c| others[c.index].name == own);
+            let centre = |model: &ShapeModel, pose: &Isometry2<f64>| pose.inverse() * model.features().centre;
+            off_m.extend(same.map(|c| {
+                let there = centre(&others[c.index].model, &c.fit.model_from_other);
+                (there - centre(&alignment.model, &posed.model_from_laser)).norm()
+            }));
+        }
+    }
+    let within = |limit: f64| 100.0 * off_m.iter().filter(|m| **m < limit).count() as f64 / scans as f64;
+    println!(
+        "\none scan, no pose to start from, {scans} scans against the other 24 models: {right} named right, {among} left among several with the right one, {missed} unknown, {wrong} wrong"
+    );
+    println!(
+        "the middle of the right object: {:.1} % within 1 cm, {:.1} % within 3 cm, {:.1} % within 10 cm",
+        within(0.01),
+        within(0.03),
+        within(0.1)
     );
 }

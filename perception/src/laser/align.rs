@@ -22,6 +22,15 @@ pub struct Alignment {
     pub evaluations: usize,
     /// How far each scan's pose was moved: metres, and radians anticlockwise.
     pub moved: Vec<(f64, f64)>,
+    /// Scans that contradict the others and are no part of the model, by their index; only [`align_consistent`] leaves out any.
+    pub left_out: Vec<usize>,
+}
+
+impl Alignment {
+    /// The longest error of either kind after alignment, metres: beyond twice the laser's precision the scans contradict each other.
+    pub fn longest_m(&self) -> f64 {
+        self.after.exterior_m.max(self.after.interior_m)
+    }
 }
 
 /// Scans that cannot be aligned.
@@ -56,6 +65,7 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
         iterations: solved.iterations,
         evaluations: solved.evaluations,
         moved: moved.collect(),
+        left_out: Vec::new(),
         model: ShapeModel::new(
             unposed
                 .into_iter()
@@ -64,4 +74,44 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
                 .collect(),
         )?,
     })
+}
+
+/// Fewest scans that can tell which of them is wrong: two contradict each other, a third decides.
+const FEWEST: usize = 3;
+
+/// Aligns scans of which some may be wrong: where the end of the thing was taken for background, a bound lies on the thing and contradicts all other scans.
+///
+/// While an error is longer than `longest_m`, the scan is left out without which the rest go together best. If no three scans agree, all are kept, and
+/// [`Alignment::longest_m`] says that they do not.
+///
+/// # Errors
+/// As [`align`].
+pub fn align_consistent(
+    scans: &[PosedScan],
+    longest_m: f64,
+    options: &SolverOptions,
+) -> Result<Alignment, AlignError> {
+    let all = align(scans, options)?;
+    let mut kept: Vec<usize> = (0..scans.len()).collect();
+    let mut best = all.clone();
+    while best.longest_m() > longest_m {
+        if kept.len() <= FEWEST {
+            return Ok(all);
+        }
+        let mut without: Option<(f64, usize, Alignment)> = None;
+        for out in 0..kept.len() {
+            let rest: Vec<PosedScan> =
+                (0..kept.len()).filter(|&i| i != out).map(|i| scans[kept[i]].clone()).collect();
+            let alignment = align(&rest, options)?;
+            let cost = alignment.after.per_pair_m();
+            if without.as_ref().is_none_or(|(least, ..)| cost < *least) {
+                without = Some((cost, out, alignment));
+            }
+        }
+        let Some((_, out, alignment)) = without else { return Ok(all) };
+        kept.remove(out);
+        best = alignment;
+    }
+    best.left_out = (0..scans.len()).filter(|i| !kept.contains(i)).collect();
+    Ok(best)
 }

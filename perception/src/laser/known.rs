@@ -1,9 +1,14 @@
 //! Recognition in two steps: hull features leave few of the known shapes, model alignment decides among these.
 
+use super::background::direction;
 use super::features::{Features, USUAL_SPREAD};
-use super::fit::{FitOptions, ModelFit, fit};
-use super::shape::ShapeModel;
+use super::fit::{FitOptions, ModelFit, Start, fit, localise};
+use super::shape::{ObjectScan, ShapeModel};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// Directions in which the width of a shape is measured.
+const WIDTHS: usize = 18;
 
 /// A shape with a name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -47,10 +52,8 @@ impl KnownShape {
 /// How to recognise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecogniseOptions {
-    /// Shapes whose area or perimeter differ by more are not aligned: spreads of such a difference.
+    /// Shapes whose features, or width, are off by more spreads are not aligned.
     pub gate: f64,
-    /// Most shapes that are aligned: those with the nearest features.
-    pub aligned: usize,
     /// The same shape: the root of the boundary violation a pair of scans stays below, metres. The precision of the paper's laser.
     pub same_m: f64,
     /// How models are brought onto each other.
@@ -59,16 +62,16 @@ pub struct RecogniseOptions {
 
 impl Default for RecogniseOptions {
     fn default() -> Self {
-        RecogniseOptions { gate: 5.0, aligned: 10, same_m: 0.01, fit: FitOptions::default() }
+        RecogniseOptions { gate: 5.0, same_m: 0.01, fit: FitOptions::default() }
     }
 }
 
-/// A known shape that the features left.
+/// A known shape that features or width did not rule out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// Its place in the list of known shapes.
     pub index: usize,
-    /// How far its features are, in spreads of such a difference.
+    /// How far its features, or its width, are off, in spreads.
     pub distance: f64,
     /// How the instance lies on it.
     pub fit: ModelFit,
@@ -92,31 +95,61 @@ pub struct Recognition {
     pub verdict: Verdict,
     /// Those that were aligned, the best fit first.
     pub candidates: Vec<Candidate>,
-    /// Known shapes that the features ruled out.
+    /// Known shapes that features or width ruled out.
     pub ruled_out: usize,
-    /// Known shapes that had like features but were one too many to be aligned; if any, a verdict may have missed one.
-    pub left_over: usize,
 }
 
 /// Takes a shape for one of those known.
 pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
     let _span = tracing::debug_span!("recognise", known = known.len()).entered();
     let features = instance.features();
-    let mut near: Vec<(f64, usize)> =
-        known.iter().enumerate().map(|(i, k)| (apart(&features, &k.features), i)).collect();
-    near.retain(|(distance, _)| *distance <= options.gate);
-    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let ruled_out = known.len() - near.len();
-    let left_over = near.len().saturating_sub(options.aligned);
-    near.truncate(options.aligned);
-    let mut candidates: Vec<Candidate> = near
-        .into_iter()
-        .map(|(distance, index)| Candidate {
-            index,
-            distance,
-            fit: fit(&known[index].model, instance, &options.fit),
-        })
-        .collect();
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for (index, shape) in known.iter().enumerate() {
+        let distance = apart(&features, &shape.features);
+        if distance <= options.gate {
+            candidates.push(Candidate { index, distance, fit: fit(&shape.model, instance, &options.fit) });
+        }
+    }
+    decide(candidates, known, options)
+}
+
+/// Takes what a single scan shows for one of the shapes known; the candidates say from where it was taken. One scan seldom leaves one name.
+///
+/// Shapes that are too wide for the bounds of the scan, or too narrow for its readings, are not aligned; the features of a hull need more than one scan.
+pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
+    let _span = tracing::debug_span!("recognise_scan", known = known.len()).entered();
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for (index, shape) in known.iter().enumerate() {
+        let distance = width_apart_m(scan, &shape.model) / USUAL_SPREAD.1;
+        if distance <= options.gate {
+            let fit = localise(&shape.model, scan, Start::AllAngles, &options.fit);
+            candidates.push(Candidate { index, distance, fit });
+        }
+    }
+    decide(candidates, known, options)
+}
+
+/// By how much a shape is too wide, from every side, for the bounds of a scan, or too narrow for its readings, metres.
+fn width_apart_m(scan: &ObjectScan, model: &ShapeModel) -> f64 {
+    let corners = model.hull().corners;
+    let widths = (0..WIDTHS).map(|i| {
+        let across = direction(PI * i as f64 / WIDTHS as f64);
+        let along = corners.iter().map(|c| c.coords.dot(&across));
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        high - low
+    });
+    let (least_m, most_m) = widths.fold((f64::INFINITY, 0.0_f64), |(l, h), w| (l.min(w), h.max(w)));
+    let points = &scan.points;
+    let apart_m = points.iter().flat_map(|p| points.iter().map(move |q| (p - q).norm()));
+    // No part of the shape lies farther out than its greatest width behind the farthest reading.
+    let farthest_m = points.iter().map(|p| p.coords.norm()).fold(0.0, f64::max) + most_m;
+    let room_m = 2.0 * farthest_m * (0.5 * (scan.left_bound_rad - scan.right_bound_rad)).tan();
+    (apart_m.fold(0.0, f64::max) - most_m).max(least_m - room_m).max(0.0)
+}
+
+/// Names whose shapes violate next to nothing.
+fn decide(mut candidates: Vec<Candidate>, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
+    let ruled_out = known.len() - candidates.len();
     candidates.sort_by(|a, b| a.fit.between.per_pair_m().total_cmp(&b.fit.between.per_pair_m()));
     let mut names: Vec<String> = Vec::new();
     for candidate in candidates.iter().filter(|c| c.fit.between.per_pair_m() <= options.same_m) {
@@ -130,7 +163,7 @@ pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &Recognis
         1 => Verdict::Is(names.swap_remove(0)),
         _ => Verdict::OneOf(names),
     };
-    Recognition { verdict, candidates, ruled_out, left_over }
+    Recognition { verdict, candidates, ruled_out }
 }
 
 /// How far features of two models are apart, in spreads of such a difference: the larger of area's and perimeter's.

@@ -14,6 +14,8 @@ pub struct Alignment {
     pub before: Violation,
     /// Violation after.
     pub after: Violation,
+    /// What was minimised, after: the violation, and what chooses among poses that violate nothing; square metres.
+    pub objective_m2: f64,
     /// True if the solver settled; false if it was cut short.
     pub converged: bool,
     /// Iterations of the solver.
@@ -61,6 +63,7 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
     Ok(Alignment {
         before: assembly.violation(&start),
         after: assembly.violation(&solved.poses),
+        objective_m2: solved.cost,
         converged: solved.converged,
         iterations: solved.iterations,
         evaluations: solved.evaluations,
@@ -81,7 +84,8 @@ const FEWEST: usize = 3;
 
 /// Aligns scans of which some may be wrong: where the end of the thing was taken for background, a bound lies on the thing and contradicts all other scans.
 ///
-/// While an error is longer than `longest_m`, the scan is left out without which the rest go together best. If no three scans agree, all are kept, and
+/// While an error is longer than `longest_m`, the scan is left out without which the rest go together best. If no three scans, or no more than half of them, agree, all are
+/// kept, and
 /// [`Alignment::longest_m`] says that they do not.
 ///
 /// # Errors
@@ -95,7 +99,7 @@ pub fn align_consistent(
     let mut kept: Vec<usize> = (0..scans.len()).collect();
     let mut best = all.clone();
     while best.longest_m() > longest_m {
-        if kept.len() <= FEWEST {
+        if kept.len() <= FEWEST.max(scans.len() / 2 + 1) {
             return Ok(all);
         }
         let mut without: Option<(f64, usize, Alignment)> = None;
@@ -103,7 +107,7 @@ pub fn align_consistent(
             let rest: Vec<PosedScan> =
                 (0..kept.len()).filter(|&i| i != out).map(|i| scans[kept[i]].clone()).collect();
             let alignment = align(&rest, options)?;
-            let cost = alignment.after.per_pair_m();
+            let cost = alignment.objective_m2;
             if without.as_ref().is_none_or(|(least, ..)| cost < *least) {
                 without = Some((cost, out, alignment));
             }

@@ -2,7 +2,7 @@
 
 use super::background::{direction, origin};
 use super::shape::{ObjectScan, PosedScan, ShapeModel};
-use super::solve::{Problem, Solved, SolverOptions, solve};
+use super::solve::{Problem, Solved, SolverOptions, solve, solve_roughly};
 use super::violation::{Assembly, Violation};
 use nalgebra::{Isometry2, Vector2};
 use std::f64::consts::TAU;
@@ -115,19 +115,19 @@ fn follow(
     let poses = |pose: &Isometry2<f64>| [Isometry2::identity(), *pose];
     let violation = |pose: &Isometry2<f64>| assembly.violation(&poses(pose)).boundary_m2;
     let (mut iterations, mut evaluations) = (0, starts.len());
-    let mut settle = |from: &Isometry2<f64>, options: &SolverOptions| {
-        let solved = solve(&Problem::onto(&assembly, &poses(from), options.objective), options);
+    let mut settle = |from: &Isometry2<f64>, solve: fn(&Problem, &SolverOptions) -> Solved| {
+        let start = poses(from);
+        let solved = solve(&Problem::onto(&assembly, &start, options.solver.objective), &options.solver);
         iterations += solved.iterations;
         evaluations += solved.evaluations;
         solved
     };
     let violations: Vec<f64> = starts.iter().map(violation).collect();
-    let rough = SolverOptions { settle: options.solver.settle.max(ROUGH), ..options.solver };
-    let mut ends: Vec<Solved> =
-        promising(&violations, options.followed).map(|start| settle(&starts[start], &rough)).collect();
+    let promising = promising(&violations, options.followed);
+    let mut ends: Vec<Solved> = promising.map(|start| settle(&starts[start], solve_roughly)).collect();
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     for end in ends.iter_mut().take(SETTLED) {
-        *end = settle(&end.poses[1], &options.solver);
+        *end = settle(&end.poses[1], solve);
     }
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let (best, converged) = (ends[0].poses[1], ends[0].converged);

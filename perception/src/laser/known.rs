@@ -54,15 +54,17 @@ impl KnownShape {
 pub struct RecogniseOptions {
     /// Shapes whose features, or width, are off by more spreads are not aligned.
     pub gate: f64,
-    /// The same shape: the root of the boundary violation a pair of scans stays below, metres. The precision of the paper's laser.
+    /// A shape fits if the root of the boundary violation a pair of scans stays below, metres: the precision of the paper's laser.
     pub same_m: f64,
+    /// What fits by so much less well than the best is told from it, metres: more than models of one thing differ among themselves.
+    pub apart_m: f64,
     /// How models are brought onto each other.
     pub fit: FitOptions,
 }
 
 impl Default for RecogniseOptions {
     fn default() -> Self {
-        RecogniseOptions { gate: 5.0, same_m: 0.01, fit: FitOptions::default() }
+        RecogniseOptions { gate: 4.0, same_m: 0.01, apart_m: 0.003, fit: FitOptions::default() }
     }
 }
 
@@ -147,12 +149,14 @@ fn width_apart_m(scan: &ObjectScan, model: &ShapeModel) -> f64 {
     (apart_m.fold(0.0, f64::max) - most_m).max(least_m - room_m).max(0.0)
 }
 
-/// Names whose shapes violate next to nothing.
+/// The names of those that fit and cannot be told from the best.
 fn decide(mut candidates: Vec<Candidate>, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
     let ruled_out = known.len() - candidates.len();
     candidates.sort_by(|a, b| a.fit.between.per_pair_m().total_cmp(&b.fit.between.per_pair_m()));
+    let best_m = candidates.first().map_or(0.0, |c| c.fit.between.per_pair_m());
+    let limit_m = options.same_m.min(best_m + options.apart_m);
     let mut names: Vec<String> = Vec::new();
-    for candidate in candidates.iter().filter(|c| c.fit.between.per_pair_m() <= options.same_m) {
+    for candidate in candidates.iter().filter(|c| c.fit.between.per_pair_m() <= limit_m) {
         let name = &known[candidate.index].name;
         if !names.contains(name) {
             names.push(name.clone());

@@ -12,13 +12,22 @@ const NOTHING_M2: f64 = 1e-12;
 /// Damping at the start, and where steps are so short that they do not help any more.
 const DAMPING: (f64, f64) = (1e-3, 1e1);
 
+/// One round, as soft as can be.
+pub(super) fn roughly(problem: &Problem, options: &SolverOptions) -> Solved {
+    rounds(problem, options, &SOFTNESS_M[..1])
+}
+
 /// Damped least squares, ever less soft; the least of all that was come by is kept.
 pub(super) fn least_squares(problem: &Problem, options: &SolverOptions) -> Solved {
+    rounds(problem, options, &SOFTNESS_M)
+}
+
+fn rounds(problem: &Problem, options: &SolverOptions, softness_m: &[f64]) -> Solved {
     let start = problem.start().to_vec();
     let cost = problem.cost(&start);
     let mut poses = start.clone();
     let mut solved = Solved { poses: start, cost, converged: false, iterations: 0, evaluations: 1 };
-    for soft_m in SOFTNESS_M {
+    for &soft_m in softness_m {
         solved.converged = descend(problem, options, soft_m, &mut poses, &mut solved);
         let cost = problem.cost(&poses);
         solved.evaluations += 1;
@@ -121,4 +130,68 @@ fn step(linear: &Linear, damping: f64) -> Option<DVector<f64>> {
         damped[(i, i)] += damping * if i % 3 == 2 { RADIUS_M * RADIUS_M } else { 1.0 };
     }
     Some(damped.cholesky()?.solve(&linear.right))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::shape::{ObjectScan, PosedScan};
+    use super::super::solve::Objective;
+    use super::super::violation::Assembly;
+    use super::*;
+
+    /// A scan of a few readings from a place, as seen towards the origin.
+    fn scan(bearing: f64, half_rad: f64) -> PosedScan {
+        let points = [(-0.8, 1.3), (-0.3, 1.21), (0.2, 1.2), (0.8, 1.28)]
+            .map(|(share, range)| {
+                let angle: f64 = share * half_rad;
+                Point2::new(range * angle.cos(), range * angle.sin())
+            })
+            .to_vec();
+        let laser = nalgebra::Vector2::new(bearing.cos(), bearing.sin()) * 1.4;
+        PosedScan {
+            scan: ObjectScan {
+                points,
+                right_bound_rad: -half_rad,
+                right_object_rad: -0.8 * half_rad,
+                left_object_rad: 0.8 * half_rad,
+                left_bound_rad: half_rad,
+            },
+            model_from_laser: Isometry2::new(laser, bearing + std::f64::consts::PI),
+        }
+    }
+
+    /// The right side is half the downward slope of the cost.
+    #[test]
+    fn derivatives_are_those_of_the_cost() {
+        let scans = [scan(0.0, 0.10), scan(2.0, 0.14), scan(4.1, 0.12)];
+        for (onto, groups) in
+            [(false, vec![&scans[..1], &scans[1..2], &scans[2..]]), (true, vec![&scans[..2], &scans[2..]])]
+        {
+            let assembly = Assembly::new(groups.iter().copied());
+            let start = vec![Isometry2::identity(); groups.len()];
+            let objective = Objective::default();
+            let problem = if onto {
+                Problem::onto(&assembly, &start, objective)
+            } else {
+                Problem::free(&assembly, &start, objective)
+            };
+            let away: Vec<f64> = (0..3 * problem.movable().len()).map(|i| 0.02 * (i as f64).sin()).collect();
+            let poses = problem.moved(&start, &away);
+            let linear = linearise(&problem, &poses, 0.0);
+            assert!(linear.cost > 1e-4 && (linear.cost - problem.cost(&poses)).abs() < 1e-12);
+            for i in 0..away.len() {
+                let cost = |by: f64| {
+                    let mut step = vec![0.0; away.len()];
+                    step[i] = by;
+                    problem.cost(&problem.moved(&poses, &step))
+                };
+                let slope = (cost(1e-6) - cost(-1e-6)) / 2e-6;
+                assert!(
+                    (slope + 2.0 * linear.right[i]).abs() < 1e-5,
+                    "{onto} {i}: {slope} {}",
+                    linear.right[i]
+                );
+            }
+        }
+    }
 }

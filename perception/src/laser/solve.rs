@@ -1,6 +1,6 @@
 //! Poses of groups of scans that violate their angular constraints least.
 
-use super::least_squares::least_squares;
+use super::least_squares::{least_squares, roughly};
 use super::simplex::simplex;
 use super::violation::{Assembly, Kind, Residual};
 use nalgebra::{Isometry2, Rotation2, Translation2, UnitComplex, Vector2};
@@ -163,23 +163,36 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// Roughly settled: a step makes less than this part of the objective.
+const ROUGH: f64 = 0.05;
+
 /// Runs the chosen solver.
 pub(super) fn solve(problem: &Problem, options: &SolverOptions) -> Solved {
     match options.solver {
         Solver::LeastSquares => least_squares(problem, options),
-        Solver::Simplex => {
-            let (step_m, step_rad) = options.simplex_steps;
-            let steps = [step_m, step_m, step_rad].repeat(problem.movable.len());
-            let cost = |by: &[f64]| problem.cost(&problem.moved(problem.start, by));
-            let most = options.most_evaluations * steps.len();
-            let found = simplex(cost, &steps, most, options.settle);
-            Solved {
-                poses: problem.moved(problem.start, &found.at),
-                cost: found.cost,
-                converged: found.converged,
-                iterations: found.iterations,
-                evaluations: found.evaluations,
-            }
-        }
+        Solver::Simplex => by_simplex(problem, options),
+    }
+}
+
+/// The same, no farther than tells whether it is worth going on.
+pub(super) fn solve_roughly(problem: &Problem, options: &SolverOptions) -> Solved {
+    let rough = SolverOptions { settle: options.settle.max(ROUGH), ..*options };
+    match options.solver {
+        Solver::LeastSquares => roughly(problem, &rough),
+        Solver::Simplex => by_simplex(problem, &rough),
+    }
+}
+
+fn by_simplex(problem: &Problem, options: &SolverOptions) -> Solved {
+    let (step_m, step_rad) = options.simplex_steps;
+    let steps = [step_m, step_m, step_rad].repeat(problem.movable.len());
+    let cost = |by: &[f64]| problem.cost(&problem.moved(problem.start, by));
+    let found = simplex(cost, &steps, options.most_evaluations * steps.len(), options.settle);
+    Solved {
+        poses: problem.moved(problem.start, &found.at),
+        cost: found.cost,
+        converged: found.converged,
+        iterations: found.iterations,
+        evaluations: found.evaluations,
     }
 }

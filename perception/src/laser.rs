@@ -1,9 +1,10 @@
 //! Shape models from a planar laser: scans of one thing, aligned by the angles that bound it (Modayil and Kuipers, *Autonomous Shape Model
 //! Learning for Object Localization and Recognition*).
 //!
-//! The pipeline, a file a step: [`Scan`]s; what of them is no background ([`observe`]); what one scan says of the thing ([`ObjectScan`]); the
-//! violation of its angular constraints (Eq. 1 to 3); poses that violate them least ([`align`]), which makes a [`ShapeModel`]; models brought onto
-//! each other and single scans onto models ([`fit`], [`localise`]: Eq. 4); what the thing is ([`recognise`]); where to scan from next ([`next_scan`]).
+//! The pipeline, a file a step: a [`Scan`]; what of it is no background ([`observe`]); what it says of the thing ([`ObjectScan`]); how far poses violate
+//! the angular constraints between scans ([`Violation`]: Eq. 1 to 3); poses that do so least ([`align`], or [`align_consistent`] where some scans may be
+//! wrong), which make a [`ShapeModel`]; models brought onto each other and single scans onto models ([`fit`], [`localise`]: Eq. 4); what the thing is
+//! ([`nearest`] by features, [`recognise`], and [`recognise_scan`] from one scan); where to scan from next ([`next_scan`]).
 
 mod align;
 mod background;

@@ -216,6 +216,10 @@ fn a_single_scan_leaves_the_right_object() {
             Verdict::Unknown => Vec::new(),
         };
         assert!(names.iter().any(|n| n == name), "{name}: {names:?}");
+        let fit = &found.candidates.iter().find(|c| c.index == k).unwrap().fit;
+        let middle = fit.model_from_other.inverse() * instance(k, 0).features().centre;
+        let expected = posed.model_from_laser.inverse() * instance(k, 1).features().centre;
+        assert!((middle - expected).norm() < paper::FARTHEST_M, "{name}: {middle}, {expected}");
     }
 }
 

@@ -120,7 +120,7 @@ pub fn recycle_bins(seed: u64, learnt: &[Alignment]) {
         "\nrecycle-bin and garbage-can, f_C (m²) [0.013-0.039], for other outlines with the same hull area and perimeter"
     );
     let map = map_of_the_lab(&mut Draws(seed));
-    for radius_cm in [7.0, 9.0, 11.0, lab::RECYCLE_RADIUS_CM] {
+    for radius_cm in [7.0, 9.0, lab::RECYCLE_RADIUS_CM, 12.5] {
         let mut all = learnt.to_vec();
         let outline = rounded_with(932.0, 113.7, radius_cm);
         for (i, alignment) in all.iter_mut().take(INSTANCES).enumerate() {

@@ -3,7 +3,7 @@
 use super::scan::{Scan, ScanError};
 use super::shape::{ObjectScan, PosedScan};
 use crate::cluster::{ClusterError, euclidean};
-use nalgebra::{Isometry2, Point2, Point3, Vector2};
+use nalgebra::{Point2, Point3, Vector2};
 use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
 
@@ -54,9 +54,11 @@ impl Occupancy {
         }
         let middle = (place - self.origin) / self.cell_m;
         let reach = margin_m / self.cell_m;
-        let span = |c: f64| (c - reach).floor() as i64..=(c + reach).floor() as i64;
-        span(middle.y).any(|row| {
-            span(middle.x).any(|column| {
+        let span = |c: f64, count: usize| {
+            (c - reach).max(0.0) as usize..count.min(((c + reach).max(-1.0) + 1.0) as usize)
+        };
+        span(middle.y, self.cells.len() / self.width + 1).any(|row| {
+            span(middle.x, self.width).any(|column| {
                 let nearest = Vector2::new(
                     middle.x.clamp(column as f64, column as f64 + 1.0),
                     middle.y.clamp(row as f64, row as f64 + 1.0),
@@ -240,14 +242,4 @@ fn past(own_m: f64, reading_m: f64, clear_m: f64) -> Option<Ordering> {
     }
     let beyond_m = reading_m - own_m;
     Some(if beyond_m.abs() <= clear_m { Ordering::Equal } else { beyond_m.total_cmp(&0.0) })
-}
-
-/// A direction in the plane.
-pub(super) fn direction(angle_rad: f64) -> Vector2<f64> {
-    Vector2::new(angle_rad.cos(), angle_rad.sin())
-}
-
-/// Where a laser stands.
-pub(super) fn origin(pose: &Isometry2<f64>) -> Point2<f64> {
-    pose.translation.vector.into()
 }

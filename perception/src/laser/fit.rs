@@ -1,6 +1,6 @@
 //! Model alignment and localisation: the motion of one model that makes two violate each other's constraints least (Eq. 4).
 
-use super::background::{direction, origin};
+use super::scan::{direction, origin};
 use super::shape::{ObjectScan, PosedScan, ShapeModel};
 use super::solve::{Problem, Solved, SolverOptions, solve, solve_roughly};
 use super::violation::{Assembly, Violation};
@@ -99,8 +99,6 @@ fn facing(model: &ShapeModel, scan: &ObjectScan, count: usize) -> Vec<Isometry2<
         .collect()
 }
 
-/// Roughly settled: a step makes less than this part of the objective.
-const ROUGH: f64 = 0.05;
 /// Of the ends that are roughly settled, so many are settled in full.
 const SETTLED: usize = 2;
 

@@ -1,8 +1,8 @@
 //! Recognition in two steps: hull features leave few of the known shapes, model alignment decides among these.
 
-use super::background::direction;
 use super::features::{Features, USUAL_SPREAD};
 use super::fit::{FitOptions, ModelFit, Start, fit, localise};
+use super::scan::direction;
 use super::shape::{ObjectScan, ShapeModel};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;

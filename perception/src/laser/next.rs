@@ -3,7 +3,7 @@
 //! A place may belong to the thing if no scan looked past it on either side and none looked through it. What of these places lies outside the hull of the
 //! readings is undetermined: constraints that the thing may still violate. A scan from elsewhere, if the thing is as its hull, looks past or through some of them.
 
-use super::background::{direction, origin};
+use super::scan::{direction, origin};
 use super::shape::ShapeModel;
 use crate::hull::Hull;
 use nalgebra::{Isometry2, Point2, Point3};
@@ -26,6 +26,9 @@ impl Default for NextOptions {
         NextOptions { within_m: 2.0, cell_m: 0.02, step_rad: std::f64::consts::PI / 180.0, depth_m: 0.03 }
     }
 }
+
+/// Cells along the square's edge, at the most.
+const MOST_ACROSS: f64 = 2000.0;
 
 /// What a scan from a pose is expected to bring.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +70,7 @@ pub fn next_scan(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOpt
 /// Middles of the cells outside the hull that no scan looked past or through.
 fn undetermined(model: &ShapeModel, hull: &Hull, options: &NextOptions) -> Vec<Point2<f64>> {
     let centre = hull.centre();
-    let across = (options.within_m / options.cell_m).ceil().max(0.0) as usize;
+    let across = (options.within_m / options.cell_m).ceil().clamp(0.0, MOST_ACROSS) as usize;
     let at = |i: usize| (i as f64 + 0.5 - 0.5 * across as f64) * options.cell_m;
     let lasers: Vec<Isometry2<f64>> = model.scans().iter().map(|s| s.model_from_laser.inverse()).collect();
     let open = |place: &Point2<f64>| {

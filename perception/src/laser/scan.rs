@@ -1,6 +1,6 @@
 //! One sweep of a planar laser.
 
-use nalgebra::{Isometry2, Point2};
+use nalgebra::{Isometry2, Point2, Vector2};
 
 /// One sweep: a distance at each of a set of angles, and where the laser was said to be.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,7 +67,7 @@ impl Scan {
     /// Where a reading ended, in the laser's frame; `None` if nothing returned it.
     pub fn endpoint(&self, index: usize) -> Option<Point2<f64>> {
         let (angle, range) = (*self.angles_rad.get(index)?, *self.ranges_m.get(index)?);
-        (range > 0.0 && range.is_finite()).then(|| Point2::new(range * angle.cos(), range * angle.sin()))
+        (range > 0.0 && range.is_finite()).then(|| Point2::from(direction(angle) * range))
     }
 }
 
@@ -76,4 +76,14 @@ pub(super) fn is_pose(pose: &Isometry2<f64>) -> bool {
     let turn = pose.rotation.complex();
     let finite = pose.translation.vector.iter().all(|c| c.is_finite());
     finite && (turn.re * turn.re + turn.im * turn.im - 1.0).abs() < 1e-6
+}
+
+/// A direction in the plane.
+pub(super) fn direction(angle_rad: f64) -> Vector2<f64> {
+    Vector2::new(angle_rad.cos(), angle_rad.sin())
+}
+
+/// Where a laser stands.
+pub(super) fn origin(pose: &Isometry2<f64>) -> Point2<f64> {
+    pose.translation.vector.into()
 }

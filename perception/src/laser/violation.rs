@@ -2,7 +2,7 @@
 //!
 //! All errors are distances of points from lines, the worst or the best of a scan's points: only corners of its convex hull can be either.
 
-use super::background::direction;
+use super::scan::direction;
 use super::shape::PosedScan;
 use crate::hull::convex;
 use nalgebra::{Isometry2, Point2, Vector2};
@@ -64,7 +64,8 @@ impl Rays {
         }
     }
 
-    /// The object ray that a scan from `other` must reach: the one on its side (Eq. 2); none if it looks from between the bounds, or from behind the thing.
+    /// The object ray that a scan from `other` must reach, the one on its side (Eq. 2), and the bound beside it; none if it looks from between the bounds,
+    /// for then it need not see either end of what this scan saw.
     fn facing(&self, other: &Point2<f64>) -> Option<(Vector2<f64>, Vector2<f64>)> {
         let towards = other - self.laser;
         let side = self.middle.perp(&towards);
@@ -96,7 +97,8 @@ pub(super) struct Placed {
     rays: Vec<Rays>,
 }
 
-/// Which error.
+/// Which error: exterior (Eq. 1), interior (Eq. 2), or how far an end of the thing is from the middle between the last ray that met it and the first that
+/// went past, which may have either sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Exterior,

@@ -58,7 +58,7 @@ pub fn rounded_with(area_cm2: f64, perimeter_cm: f64, radius_cm: f64) -> Outline
 pub const NAMES: [&str; 5] = ["recycle-bin", "big-chair", "garbage-can", "red-chair", "dell-box"];
 
 /// Corner radius of the simulated recycle-bin, centimetres: what its published area and perimeter leave open.
-pub const RECYCLE_RADIUS_CM: f64 = 12.5;
+pub const RECYCLE_RADIUS_CM: f64 = 11.0;
 
 /// The outline of one of them.
 pub fn object(index: usize) -> Outline {

@@ -19,7 +19,7 @@ mod simplex;
 mod solve;
 mod violation;
 
-pub use align::{AlignError, Alignment, align, align_consistent};
+pub use align::{Alignment, align, align_consistent};
 pub use background::{Ignored, Observation, ObserveError, ObserveOptions, Occupancy, Space, observe};
 pub use features::{FeatureClass, Features, Nearest, classes, groups, nearest};
 pub use fit::{FitOptions, ModelFit, Start, fit, localise};

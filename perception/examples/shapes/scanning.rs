@@ -1,6 +1,6 @@
 //! How many scans it takes: the next one from where it is expected to settle most, beside a circle and chance.
 
-use super::lab::{self, INSTANCES, Lab, NAMES, Run, map_of_the_lab, object, observed, seed_of};
+use super::lab::{self, INSTANCES, Lab, NAMES, Run, map_of_the_lab, named, object, observed, seed_of};
 use super::options;
 use super::tabletop::Draws;
 use super::variations::{area_m2, off_m};
@@ -32,11 +32,7 @@ struct Sum {
 
 /// Prints what is known after each scan.
 pub fn print(seed: u64, learnt: &[Alignment]) {
-    let known: Vec<KnownShape> = learnt
-        .iter()
-        .enumerate()
-        .map(|(i, a)| KnownShape::new(NAMES[i / INSTANCES], a.model.clone()))
-        .collect();
+    let known = named(learnt);
     println!(
         "\nscans one after the other, 25 new observations: undetermined area (cm²), area of the hull off from the true one (%), readings off (mm),"
     );

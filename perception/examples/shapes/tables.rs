@@ -1,7 +1,8 @@
 //! The paper's tables beside its numbers.
 
 use super::lab::{
-    self, INSTANCES, NAMES, Run, circled, f_c_range, map_of_the_lab, models, paper, relocalised, rounded_with,
+    self, INSTANCES, NAMES, Run, circled, f_c_range, map_of_the_lab, models, named, paper, relocalised,
+    rounded_with,
 };
 use super::tabletop::Draws;
 use super::{METHODS, options};
@@ -186,11 +187,7 @@ pub fn localisation(seed: u64, learnt: &[Alignment]) {
 
 /// What single scans are taken for, and where, with no pose to start from: each scan of each instance, held against all models but its own.
 pub fn single_scans(learnt: &[Alignment]) {
-    let known: Vec<KnownShape> = learnt
-        .iter()
-        .enumerate()
-        .map(|(i, a)| KnownShape::new(NAMES[i / INSTANCES], a.model.clone()))
-        .collect();
+    let known = named(learnt);
     let (mut scans, mut right, mut among, mut wrong, mut missed, mut off_m) = (0, 0, 0, 0, 0, Vec::new());
     for (i, alignment) in learnt.iter().enumerate() {
         let own = NAMES[i / INSTANCES];

@@ -1,6 +1,8 @@
 //! Fewer and more scans, wrong background subtraction, worse poses, a porous object; ICP on the same data.
 
-use super::lab::{INSTANCES, NAMES, Outline, Run, circled, four_legs, map_of_the_lab, object, seed_of};
+use super::lab::{
+    INSTANCES, NAMES, Outline, Run, circled, four_legs, map_of_the_lab, named, object, seed_of,
+};
 use super::tabletop::Draws;
 use super::{METHODS, options};
 use descry_perception::hull::convex;
@@ -31,11 +33,7 @@ struct Tally {
 
 /// Prints a row for each variation and method.
 pub fn print(seed: u64, learnt: &[Alignment]) {
-    let known: Vec<KnownShape> = learnt
-        .iter()
-        .enumerate()
-        .map(|(i, a)| KnownShape::new(NAMES[i / INSTANCES], a.model.clone()))
-        .collect();
+    let known = named(learnt);
     let base = Run::default();
     let five: Vec<Outline> = (0..NAMES.len()).map(object).collect();
     let chair = vec![four_legs(45.0, 3.0)];

@@ -22,7 +22,7 @@ pub struct Alignment {
     pub iterations: usize,
     /// Times that the violation was computed.
     pub evaluations: usize,
-    /// How far each scan's pose was moved: metres, and radians anticlockwise.
+    /// How far the pose of each scan of the model was moved: metres, and radians anticlockwise.
     pub moved: Vec<(f64, f64)>,
     /// Scans that contradict the others and are no part of the model, by their index; only [`align_consistent`] leaves out any.
     pub left_out: Vec<usize>,
@@ -35,19 +35,11 @@ impl Alignment {
     }
 }
 
-/// Scans that cannot be aligned.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum AlignError {
-    /// The scans make no model.
-    #[error(transparent)]
-    Shape(#[from] ShapeError),
-}
-
 /// Minimises the boundary violation over the poses of all scans, from the poses given. One scan alone stays as it is.
 ///
 /// # Errors
 /// If there is no scan, or one is unsound.
-pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, AlignError> {
+pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, ShapeError> {
     let _span = tracing::debug_span!("align", scans = scans.len()).entered();
     let model = ShapeModel::new(scans.to_vec())?;
     let unposed: Vec<PosedScan> = scans
@@ -84,9 +76,8 @@ const FEWEST: usize = 3;
 
 /// Aligns scans of which some may be wrong: where the end of the thing was taken for background, a bound lies on the thing and contradicts all other scans.
 ///
-/// While an error is longer than `longest_m`, the scan is left out without which the rest go together best. If no three scans, or no more than half of them, agree, all are
-/// kept, and
-/// [`Alignment::longest_m`] says that they do not.
+/// While an error is longer than `longest_m`, the scan is left out without which the rest go together best. If no three scans, or no more than half of
+/// all, agree, none is left out, and [`Alignment::longest_m`] says that they do not go together.
 ///
 /// # Errors
 /// As [`align`].
@@ -94,7 +85,7 @@ pub fn align_consistent(
     scans: &[PosedScan],
     longest_m: f64,
     options: &SolverOptions,
-) -> Result<Alignment, AlignError> {
+) -> Result<Alignment, ShapeError> {
     let all = align(scans, options)?;
     let mut kept: Vec<usize> = (0..scans.len()).collect();
     let mut best = all.clone();

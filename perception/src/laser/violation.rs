@@ -244,8 +244,8 @@ fn errors(
 
 /// The point farthest along a normal, measured from `from`, and how far it is.
 ///
-/// With a softness it is a mean of points, the weight of each falling to nothing where it is nearer by as much: which point is farthest then changes without a jump, so that
-/// derivatives tell where to go when two points are as far.
+/// With a softness it is a mean of points, the weight of each falling to nothing where it is nearer by as much: which point is farthest then changes
+/// without a jump, so that derivatives tell where to go when two points are as far.
 #[inline(always)]
 fn farthest(
     normal: &Vector2<f64>,

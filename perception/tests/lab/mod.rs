@@ -6,8 +6,8 @@ pub mod paper;
 
 use super::tabletop::Draws;
 use descry_perception::laser::{
-    Alignment, FitOptions, ModelFit, ObserveOptions, Occupancy, PosedScan, Scan, ShapeModel, SolverOptions,
-    Space, Start, align, fit, localise, observe,
+    Alignment, FitOptions, KnownShape, ModelFit, ObserveOptions, Occupancy, PosedScan, Scan, ShapeModel,
+    SolverOptions, Space, Start, align, fit, localise, observe,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -288,6 +288,12 @@ pub fn models(experiment: u64, run: &Run, options: &SolverOptions) -> Vec<Alignm
         align(&observed.scans, options).expect("the object was seen")
     })
     .collect()
+}
+
+/// All models under the names of their objects.
+pub fn named(models: &[Alignment]) -> Vec<KnownShape> {
+    let name = |i: usize| NAMES[i / INSTANCES];
+    models.iter().enumerate().map(|(i, a)| KnownShape::new(name(i), a.model.clone())).collect()
 }
 
 /// Least and greatest f_C, and the root of the violation a pair of scans, between instances of two objects (Fig. 8). An instance is not held against itself.

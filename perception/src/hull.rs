@@ -2,7 +2,7 @@
 
 use crate::plane::Plane;
 use crate::spread::tangents;
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 /// A convex region of a plane.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,6 +79,22 @@ impl Hull {
         self.edges().map(|(a, b)| (b - a).norm()).sum()
     }
 
+    /// Centre of mass of the region, in the plane's coordinates; of the corners, where they enclose nothing.
+    pub fn centre(&self) -> Point2<f64> {
+        let first = self.corners.first().map_or(Vector2::zeros(), |c| c.coords);
+        let (mut sum, mut twice_area) = (Vector2::zeros(), 0.0);
+        for (a, b) in self.edges() {
+            let (a, b) = (a.coords - first, b.coords - first);
+            sum += (a + b) * a.perp(&b);
+            twice_area += a.perp(&b);
+        }
+        if twice_area > 0.0 {
+            return (first + sum / (3.0 * twice_area)).into();
+        }
+        let corners: Vector2<f64> = self.corners.iter().map(|c| c.coords).sum();
+        (corners / self.corners.len().max(1) as f64).into()
+    }
+
     fn edges(&self) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> {
         let n = self.corners.len();
         (0..n).map(move |i| (self.corners[i], self.corners[(i + 1) % n]))
@@ -130,6 +146,7 @@ mod tests {
         let hull = square();
         assert_eq!(hull.corners.len(), 4);
         assert!((hull.area_m2() - 1.0).abs() < 1e-6 && (hull.perimeter_m() - 4.0).abs() < 1e-6);
+        assert!((hull.lift(&hull.centre()) - Point3::new(0.5, 0.5, 0.7)).norm() < 1e-6);
         assert!(hull.contains(&Point3::new(0.5, 0.5, 9.0), 0.0));
         assert!(!hull.contains(&Point3::new(1.05, 0.5, 0.7), 0.0));
         assert!(hull.contains(&Point3::new(1.05, 0.5, 0.7), 0.06));
@@ -146,6 +163,7 @@ mod tests {
             hull.contains(&Point3::new(2.0, 0.0, 0.0), 1e-9)
                 && !hull.contains(&Point3::new(2.0, 0.1, 0.0), 1e-9)
         );
+        assert!((hull.lift(&hull.centre()) - Point3::new(2.0, 0.0, 0.0)).norm() < 1e-6);
         let place = Hull::around(plane, &[Point3::origin(); 3]).unwrap();
         assert_eq!((place.corners.len(), place.area_m2()), (1, 0.0));
         assert!(Hull::around(plane, &[]).is_none());

@@ -8,6 +8,7 @@ pub mod cylinder;
 mod draw;
 pub mod files;
 pub mod hull;
+pub mod laser;
 mod lattice;
 pub mod locate;
 pub mod merge;

@@ -7,6 +7,7 @@ pub mod drive;
 pub mod faults;
 mod hand;
 mod handling;
+pub mod laser;
 pub mod noise;
 pub mod push;
 pub mod render;

@@ -1,0 +1,31 @@
+//! Shape models from a planar laser: scans of one thing, aligned by the angles that bound it (Modayil and Kuipers, *Autonomous Shape Model
+//! Learning for Object Localization and Recognition*).
+//!
+//! The pipeline, a file a step: a [`Scan`]; what of it is no background ([`observe`]); what it says of the thing ([`ObjectScan`]); how far poses violate
+//! the angular constraints between scans ([`Violation`]: Eq. 1 to 3); poses that do so least ([`align`], or [`align_consistent`] where some scans may be
+//! wrong), which make a [`ShapeModel`]; models brought onto each other and single scans onto models ([`fit`], [`localise`]: Eq. 4); what the thing is
+//! ([`nearest`] by features, [`recognise`], and [`recognise_scan`] from one scan); where to scan from next ([`next_scan`]).
+
+mod align;
+mod background;
+mod features;
+mod fit;
+mod known;
+mod least_squares;
+mod next;
+mod scan;
+mod shape;
+mod simplex;
+mod solve;
+mod violation;
+
+pub use align::{Alignment, align, align_consistent};
+pub use background::{Ignored, Observation, ObserveError, ObserveOptions, Occupancy, Space, observe};
+pub use features::{FeatureClass, Features, Nearest, classes, groups, nearest};
+pub use fit::{FitOptions, ModelFit, Start, fit, localise};
+pub use known::{Candidate, KnownShape, RecogniseOptions, Recognition, Verdict, recognise, recognise_scan};
+pub use next::{NextOptions, NextScan, next_scan, undetermined_m2};
+pub use scan::{Scan, ScanError};
+pub use shape::{ObjectScan, PosedScan, ShapeError, ShapeModel};
+pub use solve::{Objective, Solver, SolverOptions};
+pub use violation::Violation;

@@ -1,0 +1,245 @@
+//! The readings of a thing in a scan: what is no background, in clusters, and the angles that bound it.
+
+use super::scan::{Scan, ScanError};
+use super::shape::{ObjectScan, PosedScan};
+use crate::cluster::{ClusterError, euclidean};
+use nalgebra::{Point2, Point3, Vector2};
+use std::cmp::Ordering;
+use std::f64::consts::{PI, TAU};
+
+/// What a cell of a map holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Space {
+    /// Nothing known.
+    #[default]
+    Unknown,
+    /// Reliably empty.
+    Free,
+    /// Reliably occupied.
+    Occupied,
+}
+
+/// An occupancy grid: the environment without the things that come and go.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Occupancy {
+    /// The corner of the first cell that has the least coordinates, in the map.
+    pub origin: Point2<f64>,
+    /// Edge of a cell, metres.
+    pub cell_m: f64,
+    /// Cells along x.
+    pub width: usize,
+    /// Cells along x, row by row in ascending y. Cells that are missing are unknown.
+    pub cells: Vec<Space>,
+}
+
+impl Occupancy {
+    /// What lies at a place of the map.
+    pub fn at(&self, place: &Point2<f64>) -> Space {
+        let cell = (place - self.origin) / self.cell_m;
+        self.cell(cell.x.floor(), cell.y.floor())
+    }
+
+    fn cell(&self, column: f64, row: f64) -> Space {
+        if column >= 0.0 && row >= 0.0 && column < self.width as f64 {
+            let index = row as usize * self.width + column as usize;
+            return self.cells.get(index).copied().unwrap_or_default();
+        }
+        Space::Unknown
+    }
+
+    /// True unless the place is free and farther than `margin_m` from any occupied cell: a reading there may be of the environment.
+    pub fn is_background(&self, place: &Point2<f64>, margin_m: f64) -> bool {
+        if self.at(place) != Space::Free {
+            return true;
+        }
+        let middle = (place - self.origin) / self.cell_m;
+        let reach = margin_m / self.cell_m;
+        let span = |c: f64, count: usize| {
+            (c - reach).max(0.0) as usize..count.min(((c + reach).max(-1.0) + 1.0) as usize)
+        };
+        span(middle.y, self.cells.len() / self.width + 1).any(|row| {
+            span(middle.x, self.width).any(|column| {
+                let nearest = Vector2::new(
+                    middle.x.clamp(column as f64, column as f64 + 1.0),
+                    middle.y.clamp(row as f64, row as f64 + 1.0),
+                );
+                (nearest - middle).norm() <= reach && self.cell(column as f64, row as f64) == Space::Occupied
+            })
+        })
+    }
+}
+
+/// How readings of a thing are told from others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObserveOptions {
+    /// Readings of one thing lie no farther apart, metres: more than the gap between a chair's legs.
+    pub step_m: f32,
+    /// Fewest readings of a thing.
+    pub least: usize,
+    /// The middle of its readings lies no farther from where the thing is looked for, metres.
+    pub within_m: f64,
+    /// A reading bounds the thing if it ended so much farther out than the thing's own last one, metres; nearer by as much, it was cut off.
+    pub clear_m: f64,
+}
+
+impl Default for ObserveOptions {
+    fn default() -> Self {
+        ObserveOptions { step_m: 0.5, least: 3, within_m: 1.0, clear_m: 0.1 }
+    }
+}
+
+/// Why a scan says nothing of the thing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ignored {
+    /// No cluster of readings near where it was looked for.
+    NotSeen,
+    /// It reaches to the left end of the field of view: LeftBound does not exist.
+    NoLeftBound,
+    /// It reaches to the right end of the field of view: RightBound does not exist.
+    NoRightBound,
+    /// Something nearer covers its left end.
+    LeftCovered,
+    /// Something nearer covers its right end.
+    RightCovered,
+    /// It and its bounds fill half a turn or more.
+    TooNear,
+}
+
+impl std::fmt::Display for Ignored {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Ignored::NotSeen => "no readings of it where it was looked for",
+            Ignored::NoLeftBound => "it reaches to the left end of the field of view",
+            Ignored::NoRightBound => "it reaches to the right end of the field of view",
+            Ignored::LeftCovered => "something nearer covers its left end",
+            Ignored::RightCovered => "something nearer covers its right end",
+            Ignored::TooNear => "it fills half of the directions around the laser",
+        })
+    }
+}
+
+/// What scans say of a thing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Observation {
+    /// Scans in which it is bounded on both sides, posed in the map.
+    pub scans: Vec<PosedScan>,
+    /// The others, by their index, and why they are left out.
+    pub ignored: Vec<(usize, Ignored)>,
+}
+
+/// Observations that cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ObserveError {
+    /// A scan is unsound.
+    #[error("scan {index}: {why}")]
+    Scan {
+        /// Which.
+        index: usize,
+        /// What is wrong with it.
+        why: ScanError,
+    },
+    /// Readings cannot be clustered.
+    #[error(transparent)]
+    Cluster(#[from] ClusterError),
+}
+
+/// Takes the thing near a place of the map out of each scan: readings that are no background, the cluster of them nearest to `near`, and its bounds.
+///
+/// `is_background` is asked with places of the map; see [`Occupancy::is_background`].
+///
+/// # Errors
+/// If a scan is unsound, or `step_m` is no length.
+pub fn observe(
+    scans: &[Scan],
+    near: &Point2<f64>,
+    is_background: impl Fn(&Point2<f64>) -> bool,
+    options: &ObserveOptions,
+) -> Result<Observation, ObserveError> {
+    let _span = tracing::debug_span!("observe", scans = scans.len()).entered();
+    let mut observation = Observation::default();
+    for (index, scan) in scans.iter().enumerate() {
+        scan.check().map_err(|why| ObserveError::Scan { index, why })?;
+        let readings = readings_near(scan, near, &is_background, options)?;
+        match readings.ok_or(Ignored::NotSeen).and_then(|readings| bounded(scan, &readings, options)) {
+            Ok(object) => {
+                observation.scans.push(PosedScan { scan: object, model_from_laser: scan.map_from_laser });
+            }
+            Err(why) => observation.ignored.push((index, why)),
+        }
+    }
+    Ok(observation)
+}
+
+/// The cluster of readings, no background, whose middle is nearest to a place.
+fn readings_near(
+    scan: &Scan,
+    near: &Point2<f64>,
+    is_background: impl Fn(&Point2<f64>) -> bool,
+    options: &ObserveOptions,
+) -> Result<Option<Vec<usize>>, ObserveError> {
+    let foreground = |index: usize| {
+        let place = scan.map_from_laser * scan.endpoint(index)?;
+        (!is_background(&place)).then_some((index, place))
+    };
+    let (index, places): (Vec<usize>, Vec<Point2<f64>>) =
+        (0..scan.ranges_m.len()).filter_map(foreground).unzip();
+    // Told from the place that is looked at, so that single precision is fine everywhere on a large map.
+    let flat: Vec<Point3<f32>> =
+        places.iter().map(|p| Point3::new((p.x - near.x) as f32, (p.y - near.y) as f32, 0.0)).collect();
+    let clusters = euclidean(&flat, options.step_m, options.least)?;
+    let distance = |cluster: &Vec<u32>| {
+        let sum: Vector2<f64> = cluster.iter().map(|&i| places[i as usize] - near).sum();
+        (sum / cluster.len() as f64).norm()
+    };
+    let reachable = clusters.iter().map(|c| (distance(c), c)).filter(|(d, _)| *d <= options.within_m);
+    let nearest = reachable.min_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(nearest.map(|(_, cluster)| cluster.iter().map(|&i| index[i as usize]).collect()))
+}
+
+/// The thing of these readings with its angles.
+fn bounded(scan: &Scan, readings: &[usize], options: &ObserveOptions) -> Result<ObjectScan, Ignored> {
+    let points: Vec<Point2<f64>> = readings.iter().filter_map(|&i| scan.endpoint(i)).collect();
+    let middle: Vector2<f64> = points.iter().map(|p| p.coords).sum();
+    let towards = middle.y.atan2(middle.x);
+    // All angles from the direction of the thing, so that a laser that looks all around has no seam in it.
+    let from_middle = |i: usize| (scan.angles_rad[i] - towards + PI).rem_euclid(TAU) - PI;
+    let mut around: Vec<(f64, usize)> = (0..scan.angles_rad.len()).map(|i| (from_middle(i), i)).collect();
+    around.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let own = |(_, i): &(f64, usize)| readings.contains(i);
+    let (Some(right), Some(left)) = (around.iter().position(own), around.iter().rposition(own)) else {
+        return Err(Ignored::NotSeen);
+    };
+    let past = |at: usize, others: &mut dyn Iterator<Item = &(f64, usize)>, missing, covered| {
+        let own_m = scan.ranges_m[around[at].1];
+        for &(angle, i) in others {
+            match past(own_m, scan.ranges_m[i], options.clear_m) {
+                Some(Ordering::Greater) => return Ok(angle),
+                Some(Ordering::Less) => return Err(covered),
+                _ => {}
+            }
+        }
+        Err(missing)
+    };
+    let left_bound = past(left, &mut around[left + 1..].iter(), Ignored::NoLeftBound, Ignored::LeftCovered)?;
+    let right_bound =
+        past(right, &mut around[..right].iter().rev(), Ignored::NoRightBound, Ignored::RightCovered)?;
+    if left_bound - right_bound >= PI {
+        return Err(Ignored::TooNear);
+    }
+    Ok(ObjectScan {
+        points,
+        right_bound_rad: towards + right_bound,
+        right_object_rad: towards + around[right].0,
+        left_object_rad: towards + around[left].0,
+        left_bound_rad: towards + left_bound,
+    })
+}
+
+/// Whether a reading beside the thing went past it (greater), ended before it (less), or at it; `None` if it is no reading.
+fn past(own_m: f64, reading_m: f64, clear_m: f64) -> Option<Ordering> {
+    if reading_m.is_nan() || reading_m <= 0.0 {
+        return None;
+    }
+    let beyond_m = reading_m - own_m;
+    Some(if beyond_m.abs() <= clear_m { Ordering::Equal } else { beyond_m.total_cmp(&0.0) })
+}

@@ -1,0 +1,125 @@
+//! Recognition without alignment: area and perimeter of the hull (section IV), with the spread that each class shows.
+
+use super::shape::ShapeModel;
+use nalgebra::{Matrix2, Point2, Vector2};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Features of a shape's convex hull that no pose changes, and its centre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Features {
+    /// Square metres.
+    pub area_m2: f64,
+    /// Metres.
+    pub perimeter_m: f64,
+    /// Centre of mass, in the model's frame.
+    pub centre: Point2<f64>,
+}
+
+impl Features {
+    fn vector(&self) -> Vector2<f64> {
+        Vector2::new(self.area_m2, self.perimeter_m)
+    }
+}
+
+/// Standard deviations of area (square metres) and perimeter (metres) between models of one thing that seven scans leave: the middle of the paper's Fig. 7.
+pub(super) const USUAL_SPREAD: (f64, f64) = (0.0044, 0.017);
+
+/// What instances of a class have in common.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FeatureClass {
+    /// Its name.
+    pub name: String,
+    /// Instances it was learnt from.
+    pub instances: usize,
+    /// Mean area (square metres) and perimeter (metres).
+    pub mean: Vector2<f64>,
+    /// Their covariance: that of the instances, drawn towards that of all classes where instances are few.
+    pub covariance: Matrix2<f64>,
+}
+
+impl FeatureClass {
+    /// How many spreads of the class features lie from its mean (Mahalanobis' distance).
+    pub fn distance(&self, features: &Features) -> f64 {
+        let off = features.vector() - self.mean;
+        let inverse = self.covariance.try_inverse().unwrap_or_else(Matrix2::zeros);
+        (off.transpose() * inverse * off)[0].max(0.0).sqrt()
+    }
+}
+
+/// The class that features are nearest to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nearest<'a> {
+    /// The class.
+    pub class: &'a FeatureClass,
+    /// Spreads from its mean.
+    pub distance: f64,
+    /// The same for the class that comes second; infinite if there is none.
+    pub second: f64,
+}
+
+/// Learns classes from named models; in order of their names.
+pub fn classes<'a>(named: impl IntoIterator<Item = (&'a str, &'a ShapeModel)>) -> Vec<FeatureClass> {
+    let mut instances: BTreeMap<&str, Vec<Vector2<f64>>> = BTreeMap::new();
+    for (name, model) in named {
+        instances.entry(name).or_default().push(model.features().vector());
+    }
+    let mean = |of: &[Vector2<f64>]| of.iter().sum::<Vector2<f64>>() / of.len() as f64;
+    let scatter = |of: &[Vector2<f64>]| {
+        let middle = mean(of);
+        of.iter().map(|v| (v - middle) * (v - middle).transpose()).sum::<Matrix2<f64>>()
+    };
+    let usual = Matrix2::new(USUAL_SPREAD.0.powi(2), 0.0, 0.0, USUAL_SPREAD.1.powi(2));
+    // One instance's worth of the usual spread, so that what few instances happen to share is not taken for certain.
+    let all = instances.values().map(|of| scatter(of)).sum::<Matrix2<f64>>();
+    let free: usize = instances.values().map(|of| of.len() - 1).sum();
+    let pooled = (all + usual) / (free + 1) as f64;
+    instances
+        .into_iter()
+        .map(|(name, of)| FeatureClass {
+            name: name.to_owned(),
+            instances: of.len(),
+            mean: mean(&of),
+            covariance: (scatter(&of) + pooled) / of.len() as f64,
+        })
+        .collect()
+}
+
+/// The class nearest to features, in its spreads; `None` without classes. Whether it is near enough is for the caller to say.
+pub fn nearest<'a>(classes: &'a [FeatureClass], features: &Features) -> Option<Nearest<'a>> {
+    let mut ranked: Vec<(f64, &FeatureClass)> = classes.iter().map(|c| (c.distance(features), c)).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let second = ranked.get(1).map_or(f64::INFINITY, |r| r.0);
+    ranked.first().map(|&(distance, class)| Nearest { class, distance, second })
+}
+
+/// Categories without names: models whose mean features differ by fewer than `apart` usual spreads are joined, the nearest first (average linkage).
+/// Indices of each category ascend; categories come in order of their first.
+pub fn groups(models: &[Features], apart: f64) -> Vec<Vec<usize>> {
+    let scaled: Vec<Vector2<f64>> = models
+        .iter()
+        .map(|f| Vector2::new(f.area_m2 / USUAL_SPREAD.0, f.perimeter_m / USUAL_SPREAD.1))
+        .collect();
+    let mut groups: Vec<Vec<usize>> = (0..models.len()).map(|i| vec![i]).collect();
+    let distance = |a: &[usize], b: &[usize]| {
+        let sum: f64 = a
+            .iter()
+            .flat_map(|&i| b.iter().map(move |&j| (i, j)))
+            .map(|(i, j)| (scaled[i] - scaled[j]).norm())
+            .sum();
+        sum / (a.len() * b.len()) as f64
+    };
+    loop {
+        let pairs = (0..groups.len()).flat_map(|i| (i + 1..groups.len()).map(move |j| (i, j)));
+        let nearest =
+            pairs.map(|(i, j)| (distance(&groups[i], &groups[j]), i, j)).min_by(|a, b| a.0.total_cmp(&b.0));
+        match nearest {
+            Some((d, i, j)) if d < apart => {
+                let joined = groups.remove(j);
+                groups[i].extend(joined);
+                groups[i].sort_unstable();
+            }
+            _ => return groups,
+        }
+    }
+}

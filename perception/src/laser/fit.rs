@@ -1,0 +1,164 @@
+//! Model alignment and localisation: the motion of one model that makes two violate each other's constraints least (Eq. 4).
+
+use super::scan::{direction, origin};
+use super::shape::{ObjectScan, PosedScan, ShapeModel};
+use super::solve::{Problem, Solved, SolverOptions, solve, solve_roughly};
+use super::violation::{Assembly, Violation};
+use nalgebra::{Isometry2, Vector2};
+use std::f64::consts::TAU;
+
+/// How models are brought onto each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitOptions {
+    /// The solver.
+    pub solver: SolverOptions,
+    /// Angles to start from, evenly around.
+    pub starts: usize,
+    /// Of the starts that violate less than their neighbours, so many are followed to the end.
+    pub followed: usize,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        FitOptions { solver: SolverOptions::default(), starts: 36, followed: 6 }
+    }
+}
+
+/// Where a search for a pose starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// From what is known already.
+    Near(Isometry2<f64>),
+    /// From every angle, the middles together.
+    AllAngles,
+}
+
+/// How one model, or one scan, lies on a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelFit {
+    /// The pose found: of the other model's frame, or of the laser.
+    pub model_from_other: Isometry2<f64>,
+    /// f_C: BV of all scans of both together, square metres (Eq. 4).
+    pub f_c_m2: f64,
+    /// The part of it between scans of the one and of the other.
+    pub between: Violation,
+    /// True if the solver settled; false if it was cut short.
+    pub converged: bool,
+    /// Iterations of the solver, over all starts that were followed.
+    pub iterations: usize,
+    /// Times that the violation was computed, starts included.
+    pub evaluations: usize,
+    /// Where the other starts ended that turned out elsewhere, best first: pose, and BV between the two, square metres. What is symmetric has good ones.
+    pub rivals: Vec<(Isometry2<f64>, f64)>,
+}
+
+/// Ends closer than this are one: metres, and radians.
+const SAME: (f64, f64) = (0.01, 0.05);
+
+/// Brings a model onto another, from all angles with the centres of their hulls together.
+pub fn fit(model: &ShapeModel, other: &ShapeModel, options: &FitOptions) -> ModelFit {
+    let _span = tracing::debug_span!("fit").entered();
+    let (to, from) = (model.features().centre, other.features().centre);
+    let starts: Vec<Isometry2<f64>> = turns(options.starts)
+        .map(|turn| Isometry2::new(to.coords, turn) * Isometry2::new(-from.coords, 0.0))
+        .collect();
+    follow(model, other.scans(), &starts, options)
+}
+
+/// Where a scan was taken, by the model of the thing that it shows: the pose of the laser in the model's frame.
+///
+/// Without a start every angle is tried, the scan's nearest reading put on the side of the hull that faces it.
+pub fn localise(model: &ShapeModel, scan: &ObjectScan, start: Start, options: &FitOptions) -> ModelFit {
+    let _span = tracing::debug_span!("localise").entered();
+    let starts = match start {
+        Start::Near(model_from_laser) => vec![model_from_laser],
+        Start::AllAngles => facing(model, scan, options.starts),
+    };
+    let posed = PosedScan { scan: scan.clone(), model_from_laser: Isometry2::identity() };
+    follow(model, std::slice::from_ref(&posed), &starts, options)
+}
+
+fn turns(count: usize) -> impl Iterator<Item = f64> {
+    (0..count.max(1)).map(move |i| TAU * i as f64 / count.max(1) as f64)
+}
+
+/// Poses of a laser all around a model, from each of which the scan's nearest reading would lie on the side of the hull that is nearest to it.
+fn facing(model: &ShapeModel, scan: &ObjectScan, count: usize) -> Vec<Isometry2<f64>> {
+    let hull = model.hull();
+    let centre = hull.centre();
+    let middle = 0.5 * (scan.left_bound_rad + scan.right_bound_rad);
+    let ahead = direction(middle);
+    let nearest_m = scan.points.iter().map(|p| p.coords.dot(&ahead)).fold(f64::INFINITY, f64::min);
+    turns(count)
+        .map(|turn| {
+            let looks: Vector2<f64> = direction(turn);
+            let depth_m = hull.corners.iter().map(|c| looks.dot(&(centre - c))).fold(0.0, f64::max);
+            let laser = centre - looks * (nearest_m + depth_m);
+            Isometry2::new(laser.coords, turn - middle)
+        })
+        .collect()
+}
+
+/// Of the ends that are roughly settled, so many are settled in full.
+const SETTLED: usize = 2;
+
+/// Follows the most promising starts to the end.
+fn follow(
+    model: &ShapeModel,
+    other: &[PosedScan],
+    starts: &[Isometry2<f64>],
+    options: &FitOptions,
+) -> ModelFit {
+    let assembly = Assembly::new([model.scans(), other]);
+    let poses = |pose: &Isometry2<f64>| [Isometry2::identity(), *pose];
+    let violation = |pose: &Isometry2<f64>| assembly.violation(&poses(pose)).boundary_m2;
+    let (mut iterations, mut evaluations) = (0, starts.len());
+    let mut settle = |from: &Isometry2<f64>, solve: fn(&Problem, &SolverOptions) -> Solved| {
+        let start = poses(from);
+        let solved = solve(&Problem::onto(&assembly, &start, options.solver.objective), &options.solver);
+        iterations += solved.iterations;
+        evaluations += solved.evaluations;
+        solved
+    };
+    let violations: Vec<f64> = starts.iter().map(violation).collect();
+    let promising = promising(&violations, options.followed);
+    let mut ends: Vec<Solved> = promising.map(|start| settle(&starts[start], solve_roughly)).collect();
+    ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    for end in ends.iter_mut().take(SETTLED) {
+        *end = settle(&end.poses[1], solve);
+    }
+    ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let (best, converged) = (ends[0].poses[1], ends[0].converged);
+    let mut rivals: Vec<(Isometry2<f64>, f64)> = Vec::new();
+    for pose in ends[1..].iter().map(|end| end.poses[1]) {
+        if !same(&pose, &best) && rivals.iter().all(|(other, _)| !same(&pose, other)) {
+            rivals.push((pose, violation(&pose)));
+        }
+    }
+    let between = assembly.violation(&poses(&best));
+    let f_c_m2 = between.boundary_m2 + within(model.scans()) + within(other);
+    ModelFit { model_from_other: best, f_c_m2, between, converged, iterations, evaluations, rivals }
+}
+
+fn same(a: &Isometry2<f64>, b: &Isometry2<f64>) -> bool {
+    (origin(a) - origin(b)).norm() < SAME.0 && a.rotation.angle_to(&b.rotation).abs() < SAME.1
+}
+
+/// BV of the scans of one model, square metres.
+fn within(scans: &[PosedScan]) -> f64 {
+    let assembly = Assembly::new(scans.iter().map(std::slice::from_ref));
+    assembly.violation(&vec![Isometry2::identity(); scans.len()]).boundary_m2
+}
+
+/// Those of a ring of starts that violate no more than their neighbours, the least first; the first of all where there is none such.
+fn promising(violations: &[f64], most: usize) -> impl Iterator<Item = usize> {
+    let n = violations.len();
+    let (before, after) = (|i: usize| violations[(i + n - 1) % n], |i: usize| violations[(i + 1) % n]);
+    let mut low: Vec<usize> =
+        (0..n).filter(|&i| violations[i] <= before(i) && violations[i] <= after(i)).collect();
+    low.sort_by(|&a, &b| violations[a].total_cmp(&violations[b]));
+    if low.is_empty() {
+        low.push(0);
+    }
+    low.into_iter().take(most.max(1))
+}

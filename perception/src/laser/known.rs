@@ -1,0 +1,178 @@
+//! Recognition in two steps: hull features leave few of the known shapes, model alignment decides among these.
+
+use super::features::{Features, USUAL_SPREAD};
+use super::fit::{FitOptions, ModelFit, Start, fit, localise};
+use super::scan::direction;
+use super::shape::{ObjectScan, ShapeModel};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// Directions in which the width of a shape is measured.
+const WIDTHS: usize = 18;
+
+/// A shape with a name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Named")]
+pub struct KnownShape {
+    /// Its name; several may share one.
+    pub name: String,
+    /// Its model.
+    pub model: ShapeModel,
+    /// Features of the model's hull, kept so that many known shapes are gone through quickly.
+    #[serde(skip)]
+    features: Features,
+}
+
+/// A known shape as it stands in a file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Named {
+    name: String,
+    model: ShapeModel,
+}
+
+impl From<Named> for KnownShape {
+    fn from(named: Named) -> KnownShape {
+        KnownShape::new(named.name, named.model)
+    }
+}
+
+impl KnownShape {
+    /// A model under a name.
+    pub fn new(name: impl Into<String>, model: ShapeModel) -> KnownShape {
+        KnownShape { name: name.into(), features: model.features(), model }
+    }
+
+    /// Features of its hull.
+    pub fn features(&self) -> &Features {
+        &self.features
+    }
+}
+
+/// How to recognise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecogniseOptions {
+    /// Shapes whose features, or width, are off by more spreads are not aligned.
+    pub gate: f64,
+    /// A shape fits if the root of the boundary violation a pair of scans stays below, metres: the precision of the paper's laser.
+    pub same_m: f64,
+    /// What fits by so much less well than the best is told from it, metres: more than models of one thing differ among themselves.
+    pub apart_m: f64,
+    /// How models are brought onto each other.
+    pub fit: FitOptions,
+}
+
+impl Default for RecogniseOptions {
+    fn default() -> Self {
+        RecogniseOptions { gate: 4.0, same_m: 0.01, apart_m: 0.003, fit: FitOptions::default() }
+    }
+}
+
+/// A known shape that features or width did not rule out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// Its place in the list of known shapes.
+    pub index: usize,
+    /// How far its features, or its width, are off, in spreads.
+    pub distance: f64,
+    /// How the instance lies on it.
+    pub fit: ModelFit,
+}
+
+/// What was recognised.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Verdict {
+    /// One name fits.
+    Is(String),
+    /// Several names fit: more scans, or other features, must tell them apart.
+    OneOf(Vec<String>),
+    /// No known shape fits.
+    Unknown,
+}
+
+/// What a shape was taken for, and what else it was held against.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recognition {
+    /// What it is.
+    pub verdict: Verdict,
+    /// Those that were aligned, the best fit first.
+    pub candidates: Vec<Candidate>,
+    /// Known shapes that features or width ruled out.
+    pub ruled_out: usize,
+}
+
+/// Takes a shape for one of those known.
+pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
+    let _span = tracing::debug_span!("recognise", known = known.len()).entered();
+    let features = instance.features();
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for (index, shape) in known.iter().enumerate() {
+        let distance = apart(&features, &shape.features);
+        if distance <= options.gate {
+            candidates.push(Candidate { index, distance, fit: fit(&shape.model, instance, &options.fit) });
+        }
+    }
+    decide(candidates, known, options)
+}
+
+/// Takes what a single scan shows for one of the shapes known; the candidates say from where it was taken. One scan seldom leaves one name.
+///
+/// Shapes that are too wide for the bounds of the scan, or too narrow for its readings, are not aligned; the features of a hull need more than one scan.
+pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
+    let _span = tracing::debug_span!("recognise_scan", known = known.len()).entered();
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for (index, shape) in known.iter().enumerate() {
+        let distance = width_apart_m(scan, &shape.model) / USUAL_SPREAD.1;
+        if distance <= options.gate {
+            let fit = localise(&shape.model, scan, Start::AllAngles, &options.fit);
+            candidates.push(Candidate { index, distance, fit });
+        }
+    }
+    decide(candidates, known, options)
+}
+
+/// By how much a shape is too wide, from every side, for the bounds of a scan, or too narrow for its readings, metres.
+fn width_apart_m(scan: &ObjectScan, model: &ShapeModel) -> f64 {
+    let corners = model.hull().corners;
+    let widths = (0..WIDTHS).map(|i| {
+        let across = direction(PI * i as f64 / WIDTHS as f64);
+        let along = corners.iter().map(|c| c.coords.dot(&across));
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        high - low
+    });
+    let (least_m, most_m) = widths.fold((f64::INFINITY, 0.0_f64), |(l, h), w| (l.min(w), h.max(w)));
+    let points = &scan.points;
+    let apart_m = points.iter().flat_map(|p| points.iter().map(move |q| (p - q).norm()));
+    // No part of the shape lies farther out than its greatest width behind the farthest reading.
+    let farthest_m = points.iter().map(|p| p.coords.norm()).fold(0.0, f64::max) + most_m;
+    let room_m = 2.0 * farthest_m * (0.5 * (scan.left_bound_rad - scan.right_bound_rad)).tan();
+    (apart_m.fold(0.0, f64::max) - most_m).max(least_m - room_m).max(0.0)
+}
+
+/// The names of those that fit and cannot be told from the best.
+fn decide(mut candidates: Vec<Candidate>, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
+    let ruled_out = known.len() - candidates.len();
+    candidates.sort_by(|a, b| a.fit.between.per_pair_m().total_cmp(&b.fit.between.per_pair_m()));
+    let best_m = candidates.first().map_or(0.0, |c| c.fit.between.per_pair_m());
+    let limit_m = options.same_m.min(best_m + options.apart_m);
+    let mut names: Vec<String> = Vec::new();
+    for candidate in candidates.iter().filter(|c| c.fit.between.per_pair_m() <= limit_m) {
+        let name = &known[candidate.index].name;
+        if !names.contains(name) {
+            names.push(name.clone());
+        }
+    }
+    let verdict = match names.len() {
+        0 => Verdict::Unknown,
+        1 => Verdict::Is(names.swap_remove(0)),
+        _ => Verdict::OneOf(names),
+    };
+    Recognition { verdict, candidates, ruled_out }
+}
+
+/// How far features of two models are apart, in spreads of such a difference: the larger of area's and perimeter's.
+fn apart(a: &Features, b: &Features) -> f64 {
+    let area = (a.area_m2 - b.area_m2) / USUAL_SPREAD.0;
+    let perimeter = (a.perimeter_m - b.perimeter_m) / USUAL_SPREAD.1;
+    area.abs().max(perimeter.abs()) / std::f64::consts::SQRT_2
+}

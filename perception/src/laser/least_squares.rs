@@ -1,0 +1,197 @@
+//! Least squares on the violated constraints (Levenberg 1944, Marquardt 1963). Which constraints are violated, and by which points, is asked anew each time.
+
+use super::solve::{Problem, Solved, SolverOptions};
+use nalgebra::{DMatrix, DVector, Isometry2, Point2, Vector3};
+
+/// Softness of the farthest points, metres, one round after the other: the last is the objective itself.
+const SOFTNESS_M: [f64; 3] = [0.03, 0.006, 0.0];
+/// A turn of one radian about the middle of a thing counts as a shift by so much, metres: about its radius.
+const RADIUS_M: f64 = 0.3;
+/// An objective below this is nothing, square metres.
+const NOTHING_M2: f64 = 1e-12;
+/// Damping at the start, and where steps are so short that they do not help any more.
+const DAMPING: (f64, f64) = (1e-3, 1e1);
+
+/// One round, as soft as can be.
+pub(super) fn roughly(problem: &Problem, options: &SolverOptions) -> Solved {
+    rounds(problem, options, &SOFTNESS_M[..1])
+}
+
+/// Damped least squares, ever less soft; the least of all that was come by is kept.
+pub(super) fn least_squares(problem: &Problem, options: &SolverOptions) -> Solved {
+    rounds(problem, options, &SOFTNESS_M)
+}
+
+fn rounds(problem: &Problem, options: &SolverOptions, softness_m: &[f64]) -> Solved {
+    let start = problem.start().to_vec();
+    let cost = problem.cost(&start);
+    let mut poses = start.clone();
+    let mut solved = Solved { poses: start, cost, converged: false, iterations: 0, evaluations: 1 };
+    for &soft_m in softness_m {
+        solved.converged = descend(problem, options, soft_m, &mut poses, &mut solved);
+        let cost = problem.cost(&poses);
+        solved.evaluations += 1;
+        if cost < solved.cost {
+            solved.cost = cost;
+            solved.poses.clone_from(&poses);
+        }
+        if solved.cost <= NOTHING_M2 {
+            solved.converged = true;
+            break;
+        }
+    }
+    solved
+}
+
+/// Steps until they change nothing; false if they still do.
+fn descend(
+    problem: &Problem,
+    options: &SolverOptions,
+    soft_m: f64,
+    poses: &mut Vec<Isometry2<f64>>,
+    count: &mut Solved,
+) -> bool {
+    let mut linear = linearise(problem, poses, soft_m);
+    count.evaluations += 1;
+    let mut damping = DAMPING.0;
+    for _ in 0..options.most_iterations {
+        if linear.cost <= NOTHING_M2 || damping > DAMPING.1 {
+            return true;
+        }
+        count.iterations += 1;
+        let Some(step) = step(&linear, damping) else {
+            damping *= 10.0;
+            continue;
+        };
+        let stepped = problem.moved(poses, step.as_slice());
+        let next = linearise(problem, &stepped, soft_m);
+        count.evaluations += 1;
+        if next.cost < linear.cost {
+            let settled = linear.cost - next.cost <= options.settle * linear.cost;
+            (*poses, linear) = (stepped, next);
+            if settled {
+                return true;
+            }
+            damping *= 0.2;
+        } else {
+            damping *= 5.0;
+        }
+    }
+    false
+}
+
+/// Normal equations at poses.
+struct Linear {
+    cost: f64,
+    normal: DMatrix<f64>,
+    right: DVector<f64>,
+}
+
+fn linearise(problem: &Problem, poses: &[Isometry2<f64>], soft_m: f64) -> Linear {
+    let assembly = problem.assembly();
+    let n = 3 * problem.movable().len();
+    let mut linear = Linear { cost: 0.0, normal: DMatrix::zeros(n, n), right: DVector::zeros(n) };
+    let mut rows: Vec<Option<(usize, Point2<f64>)>> = vec![None; poses.len()];
+    for (index, &group) in problem.movable().iter().enumerate() {
+        rows[group] = Some((3 * index, poses[group] * assembly.pivot(group)));
+        for (i, (off, weight)) in problem.strayed(poses, group).enumerate() {
+            let row = 3 * index + i;
+            linear.cost += weight * off * off;
+            linear.right[row] -= weight * off;
+            linear.normal[(row, row)] += weight;
+        }
+    }
+    assembly.residuals(&assembly.placed(poses), soft_m, |r| {
+        let weight = problem.weight(&r);
+        linear.cost += weight * r.value_m * r.value_m;
+        // How the error grows with shift and turn of the group that carries the point; with the group that carries the line it falls by as much.
+        let slopes = [(r.point, 1.0), (r.line, -1.0)].map(|(group, sign)| {
+            rows[group].map(|(row, pivot)| {
+                let turn = (r.at - pivot).perp(&r.normal);
+                (row, Vector3::new(r.normal.x, r.normal.y, turn) * sign)
+            })
+        });
+        for (row, slope) in slopes.iter().flatten() {
+            let mut right = linear.right.fixed_rows_mut::<3>(*row);
+            right -= slope * (weight * r.value_m);
+            for (column, other) in slopes.iter().flatten() {
+                let mut block = linear.normal.fixed_view_mut::<3, 3>(*row, *column);
+                block += slope * other.transpose() * weight;
+            }
+        }
+    });
+    linear
+}
+
+/// The step that the damped equations ask for.
+fn step(linear: &Linear, damping: f64) -> Option<DVector<f64>> {
+    let mut damped = linear.normal.clone();
+    for i in 0..damped.nrows() {
+        damped[(i, i)] += damping * if i % 3 == 2 { RADIUS_M * RADIUS_M } else { 1.0 };
+    }
+    Some(damped.cholesky()?.solve(&linear.right))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::shape::{ObjectScan, PosedScan};
+    use super::super::solve::Objective;
+    use super::super::violation::Assembly;
+    use super::*;
+
+    /// A scan of a few readings from a place, as seen towards the origin.
+    fn scan(bearing: f64, half_rad: f64) -> PosedScan {
+        let points = [(-0.8, 1.3), (-0.3, 1.21), (0.2, 1.2), (0.8, 1.28)]
+            .map(|(share, range)| {
+                let angle: f64 = share * half_rad;
+                Point2::new(range * angle.cos(), range * angle.sin())
+            })
+            .to_vec();
+        let laser = nalgebra::Vector2::new(bearing.cos(), bearing.sin()) * 1.4;
+        PosedScan {
+            scan: ObjectScan {
+                points,
+                right_bound_rad: -half_rad,
+                right_object_rad: -0.8 * half_rad,
+                left_object_rad: 0.8 * half_rad,
+                left_bound_rad: half_rad,
+            },
+            model_from_laser: Isometry2::new(laser, bearing + std::f64::consts::PI),
+        }
+    }
+
+    /// The right side is half the downward slope of the cost.
+    #[test]
+    fn derivatives_are_those_of_the_cost() {
+        let scans = [scan(0.0, 0.10), scan(2.0, 0.14), scan(4.1, 0.12)];
+        for (onto, groups) in
+            [(false, vec![&scans[..1], &scans[1..2], &scans[2..]]), (true, vec![&scans[..2], &scans[2..]])]
+        {
+            let assembly = Assembly::new(groups.iter().copied());
+            let start = vec![Isometry2::identity(); groups.len()];
+            let objective = Objective::default();
+            let problem = if onto {
+                Problem::onto(&assembly, &start, objective)
+            } else {
+                Problem::free(&assembly, &start, objective)
+            };
+            let away: Vec<f64> = (0..3 * problem.movable().len()).map(|i| 0.02 * (i as f64).sin()).collect();
+            let poses = problem.moved(&start, &away);
+            let linear = linearise(&problem, &poses, 0.0);
+            assert!(linear.cost > 1e-4 && (linear.cost - problem.cost(&poses)).abs() < 1e-12);
+            for i in 0..away.len() {
+                let cost = |by: f64| {
+                    let mut step = vec![0.0; away.len()];
+                    step[i] = by;
+                    problem.cost(&problem.moved(&poses, &step))
+                };
+                let slope = (cost(1e-6) - cost(-1e-6)) / 2e-6;
+                assert!(
+                    (slope + 2.0 * linear.right[i]).abs() < 1e-5,
+                    "{onto} {i}: {slope} {}",
+                    linear.right[i]
+                );
+            }
+        }
+    }
+}

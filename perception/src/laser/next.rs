@@ -1,0 +1,120 @@
+//! Where to scan from next: the pose from which a scan is expected to settle most of what the scans so far leave open.
+//!
+//! A place may belong to the thing if no scan looked past it on either side and none looked through it. What of these places lies outside the hull of the
+//! readings is undetermined: constraints that the thing may still violate. A scan from elsewhere, if the thing is as its hull, looks past or through some of them.
+
+use super::scan::{direction, origin};
+use super::shape::ShapeModel;
+use crate::hull::Hull;
+use nalgebra::{Isometry2, Point2, Point3};
+
+/// How the undetermined places are counted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NextOptions {
+    /// Edge of the square around the hull's centre that the thing is believed to lie in, metres.
+    pub within_m: f64,
+    /// Edge of a cell, metres.
+    pub cell_m: f64,
+    /// Angle between readings of the laser, radians: a bound lies so far beside the thing.
+    pub step_rad: f64,
+    /// Depths of readings are told no finer, metres.
+    pub depth_m: f64,
+}
+
+impl Default for NextOptions {
+    fn default() -> Self {
+        NextOptions { within_m: 2.0, cell_m: 0.02, step_rad: std::f64::consts::PI / 180.0, depth_m: 0.03 }
+    }
+}
+
+/// Cells along the square's edge, at the most.
+const MOST_ACROSS: f64 = 2000.0;
+
+/// What a scan from a pose is expected to bring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NextScan {
+    /// Which of the poses.
+    pub index: usize,
+    /// Undetermined area that it is expected to settle, square metres.
+    pub settles_m2: f64,
+    /// Undetermined area that is expected to stay, square metres.
+    pub leaves_m2: f64,
+}
+
+/// The area that may belong to the thing beyond the hull of its readings, square metres.
+pub fn undetermined_m2(model: &ShapeModel, options: &NextOptions) -> f64 {
+    undetermined(model, &model.hull(), options).len() as f64 * options.cell_m * options.cell_m
+}
+
+/// Ranks poses of the laser in the model's frame: the one whose scan is expected to settle most comes first, equals by their place in the list.
+///
+/// Whether a pose can be reached, and what that costs, is for the caller to weigh.
+pub fn next_scan(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> Vec<NextScan> {
+    let _span = tracing::debug_span!("next_scan", poses = poses.len()).entered();
+    let hull = model.hull();
+    let open = undetermined(model, &hull, options);
+    let area = |cells: usize| cells as f64 * options.cell_m * options.cell_m;
+    let mut ranked: Vec<NextScan> = poses
+        .iter()
+        .enumerate()
+        .map(|(index, pose)| {
+            let laser = origin(pose);
+            let settled = open.iter().filter(|cell| settles(&laser, cell, &hull, options)).count();
+            NextScan { index, settles_m2: area(settled), leaves_m2: area(open.len() - settled) }
+        })
+        .collect();
+    ranked.sort_by(|a, b| b.settles_m2.total_cmp(&a.settles_m2).then(a.index.cmp(&b.index)));
+    ranked
+}
+
+/// Middles of the cells outside the hull that no scan looked past or through.
+fn undetermined(model: &ShapeModel, hull: &Hull, options: &NextOptions) -> Vec<Point2<f64>> {
+    let centre = hull.centre();
+    let across = (options.within_m / options.cell_m).ceil().clamp(0.0, MOST_ACROSS) as usize;
+    let at = |i: usize| (i as f64 + 0.5 - 0.5 * across as f64) * options.cell_m;
+    let lasers: Vec<Isometry2<f64>> = model.scans().iter().map(|s| s.model_from_laser.inverse()).collect();
+    let open = |place: &Point2<f64>| {
+        model.scans().iter().zip(&lasers).all(|(s, laser_from_model)| {
+            let seen = laser_from_model * place;
+            let scan = &s.scan;
+            let past = direction(scan.left_bound_rad).perp(&seen.coords) > 0.0
+                || direction(scan.right_bound_rad).perp(&seen.coords) < 0.0;
+            !past && !through(&scan.points, &seen, options)
+        })
+    };
+    (0..across)
+        .flat_map(|row| (0..across).map(move |column| Point2::new(at(column), at(row)) + centre.coords))
+        .filter(|place| hull.distance_m(&Point3::new(place.x, place.y, 0.0)) > 0.0 && open(place))
+        .collect()
+}
+
+/// True if a reading beside the direction of a place ended beyond it.
+fn through(points: &[Point2<f64>], place: &Point2<f64>, options: &NextOptions) -> bool {
+    let range_m = place.coords.norm();
+    points.iter().any(|p| {
+        let beside = p.coords.perp(&place.coords).abs() <= 0.5 * options.step_rad * range_m * p.coords.norm();
+        beside && p.coords.norm() > range_m + options.depth_m && p.coords.dot(&place.coords) > 0.0
+    })
+}
+
+/// True if a scan from here would look past the place, or through it, were the thing as its hull.
+fn settles(laser: &Point2<f64>, place: &Point2<f64>, hull: &Hull, options: &NextOptions) -> bool {
+    let towards = place - laser;
+    let middle = hull.centre() - laser;
+    let angle = |v: nalgebra::Vector2<f64>| middle.perp(&v).atan2(middle.dot(&v));
+    let angles = hull.corners.iter().map(|c| angle(c - laser));
+    let (right, left) = angles.fold((0.0_f64, 0.0_f64), |(r, l), a| (r.min(a), l.max(a)));
+    let own = angle(towards);
+    if own > left + options.step_rad || own < right - options.step_rad {
+        return true;
+    }
+    // In front: the way from the laser to a little behind the place meets no side of the hull.
+    let end = place + towards.normalize() * options.depth_m;
+    let n = hull.corners.len();
+    let crosses = (0..n).any(|i| {
+        let (a, b) = (hull.corners[i], hull.corners[(i + 1) % n]);
+        let side = |p: &Point2<f64>, q: &Point2<f64>, r: &Point2<f64>| (q - p).perp(&(r - p));
+        side(laser, &end, &a) * side(laser, &end, &b) < 0.0 && side(&a, &b, laser) * side(&a, &b, &end) < 0.0
+    });
+    !crosses && own >= right && own <= left
+}

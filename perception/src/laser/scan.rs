@@ -1,0 +1,89 @@
+//! One sweep of a planar laser.
+
+use nalgebra::{Isometry2, Point2, Vector2};
+
+/// One sweep: a distance at each of a set of angles, and where the laser was said to be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scan {
+    /// Ascending, anticlockwise from the laser's x axis, over no more than a full turn.
+    pub angles_rad: Vec<f64>,
+    /// One an angle. Infinite: nothing within reach. NaN, zero or less: no reading, which tells nothing.
+    pub ranges_m: Vec<f64>,
+    /// Where localisation says that the laser was.
+    pub map_from_laser: Isometry2<f64>,
+}
+
+/// A scan that cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ScanError {
+    /// Angles and ranges do not go together.
+    #[error("{ranges} ranges for {angles} angles: give one range an angle")]
+    Lengths {
+        /// Number of angles.
+        angles: usize,
+        /// Number of ranges.
+        ranges: usize,
+    },
+    /// The angles do not ascend.
+    #[error(
+        "angle {index} is {angle_rad} rad: give finite angles that ascend, over no more than a full turn (6.283 rad)"
+    )]
+    Angle {
+        /// Which.
+        index: usize,
+        /// Its value.
+        angle_rad: f64,
+    },
+    /// The pose is no pose.
+    #[error("the pose of the laser is not finite: give metres and radians")]
+    Pose,
+}
+
+impl Scan {
+    /// That angles, ranges and pose go together.
+    ///
+    /// # Errors
+    /// Names the first fault.
+    pub fn check(&self) -> Result<(), ScanError> {
+        let (angles, ranges) = (self.angles_rad.len(), self.ranges_m.len());
+        if angles != ranges {
+            return Err(ScanError::Lengths { angles, ranges });
+        }
+        let first = self.angles_rad.first().copied().unwrap_or(0.0);
+        let mut before = f64::NEG_INFINITY;
+        for (index, &angle_rad) in self.angles_rad.iter().enumerate() {
+            let within = angle_rad - first < std::f64::consts::TAU + 1e-9;
+            if !(angle_rad.is_finite() && angle_rad > before && within) {
+                return Err(ScanError::Angle { index, angle_rad });
+            }
+            before = angle_rad;
+        }
+        if !is_pose(&self.map_from_laser) {
+            return Err(ScanError::Pose);
+        }
+        Ok(())
+    }
+
+    /// Where a reading ended, in the laser's frame; `None` if nothing returned it.
+    pub fn endpoint(&self, index: usize) -> Option<Point2<f64>> {
+        let (angle, range) = (*self.angles_rad.get(index)?, *self.ranges_m.get(index)?);
+        (range > 0.0 && range.is_finite()).then(|| Point2::from(direction(angle) * range))
+    }
+}
+
+/// Finite, and turned by a unit complex number.
+pub(super) fn is_pose(pose: &Isometry2<f64>) -> bool {
+    let turn = pose.rotation.complex();
+    let finite = pose.translation.vector.iter().all(|c| c.is_finite());
+    finite && (turn.re * turn.re + turn.im * turn.im - 1.0).abs() < 1e-6
+}
+
+/// A direction in the plane.
+pub(super) fn direction(angle_rad: f64) -> Vector2<f64> {
+    Vector2::new(angle_rad.cos(), angle_rad.sin())
+}
+
+/// Where a laser stands.
+pub(super) fn origin(pose: &Isometry2<f64>) -> Point2<f64> {
+    pose.translation.vector.into()
+}

@@ -1,0 +1,169 @@
+//! What one scan says of a thing, and what many say together: the shape model.
+
+use super::features::Features;
+use super::scan::is_pose;
+use crate::hull::{Hull, convex};
+use crate::plane::Plane;
+use nalgebra::{Isometry2, Point2, Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// A scan's readings of one thing, and the angles that bound it (section III of the paper). Angles are from the laser's x axis, anticlockwise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObjectScan {
+    /// Where readings ended on the thing, in the laser's frame, metres.
+    pub points: Vec<Point2<f64>>,
+    /// RightBound: the nearest angle to the right of the thing at which the laser looked past it.
+    pub right_bound_rad: f64,
+    /// RightObject: the rightmost angle at which the thing was met.
+    pub right_object_rad: f64,
+    /// LeftObject: the leftmost angle at which the thing was met.
+    pub left_object_rad: f64,
+    /// LeftBound: the nearest angle to the left of the thing at which the laser looked past it.
+    pub left_bound_rad: f64,
+}
+
+/// A scan of a thing, and where it was taken.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PosedScan {
+    /// The readings.
+    pub scan: ObjectScan,
+    /// Where the laser was: in the map before scans are aligned, in the model's own frame after.
+    pub model_from_laser: Isometry2<f64>,
+}
+
+/// Scans of one thing with poses in one frame: `M = {(S, p_S)}`. Read back only if every scan is sound.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Written")]
+pub struct ShapeModel {
+    scans: Vec<PosedScan>,
+}
+
+/// A model as it stands in a file, not yet looked at.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    scans: Vec<PosedScan>,
+}
+
+impl TryFrom<Written> for ShapeModel {
+    type Error = ShapeError;
+
+    fn try_from(written: Written) -> Result<ShapeModel, ShapeError> {
+        ShapeModel::new(written.scans)
+    }
+}
+
+/// Scans that make no model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    /// There is none.
+    #[error("a shape model of no scans: give at least one scan in which the thing is bounded on both sides")]
+    NoScans,
+    /// A scan without points, or with a point that is nowhere.
+    #[error(
+        "scan {index} has no point, or one that is not finite: give the places where readings met the thing"
+    )]
+    Points {
+        /// Which scan.
+        index: usize,
+    },
+    /// The angles bound nothing.
+    #[error(
+        "the angles of scan {index} are {angles_rad:?} rad: expected right bound < right object <= left object < left bound, over less than half a turn"
+    )]
+    Angles {
+        /// Which scan.
+        index: usize,
+        /// From right to left.
+        angles_rad: [f64; 4],
+    },
+    /// The pose is no pose.
+    #[error("the pose of scan {index} is not finite, or its rotation is no unit complex number")]
+    Pose {
+        /// Which scan.
+        index: usize,
+    },
+}
+
+impl ShapeModel {
+    /// A model of these scans, as they are posed.
+    ///
+    /// # Errors
+    /// If there is none, or one of them is unsound.
+    pub fn new(scans: Vec<PosedScan>) -> Result<ShapeModel, ShapeError> {
+        if scans.is_empty() {
+            return Err(ShapeError::NoScans);
+        }
+        for (index, posed) in scans.iter().enumerate() {
+            posed.scan.check(index)?;
+            if !is_pose(&posed.model_from_laser) {
+                return Err(ShapeError::Pose { index });
+            }
+        }
+        Ok(ShapeModel { scans })
+    }
+
+    /// The scans.
+    pub fn scans(&self) -> &[PosedScan] {
+        &self.scans
+    }
+
+    /// Where readings ended on the thing, in the model's frame, metres.
+    pub fn points(&self) -> impl Iterator<Item = Point2<f64>> {
+        self.scans.iter().flat_map(|s| s.scan.points.iter().map(|p| s.model_from_laser * p))
+    }
+
+    /// The convex hull of all readings of the thing, in the plane z = 0 of the model's frame.
+    pub fn hull(&self) -> Hull {
+        hull_of(self.points())
+    }
+
+    /// Area, perimeter and centre of the hull.
+    pub fn features(&self) -> Features {
+        let hull = self.hull();
+        Features { area_m2: hull.area_m2(), perimeter_m: hull.perimeter_m(), centre: hull.centre() }
+    }
+
+    /// The same model with its frame moved: `t(N, p)` of Eq. 4.
+    pub fn moved(&self, by: &Isometry2<f64>) -> ShapeModel {
+        let moved =
+            |s: &PosedScan| PosedScan { scan: s.scan.clone(), model_from_laser: by * s.model_from_laser };
+        ShapeModel { scans: self.scans.iter().map(moved).collect() }
+    }
+
+    /// The scans of both; `other` is brought into this model's frame.
+    pub fn joined(&self, other: &ShapeModel, self_from_other: &Isometry2<f64>) -> ShapeModel {
+        let scans = [self.scans.clone(), other.moved(self_from_other).scans].concat();
+        ShapeModel { scans }
+    }
+}
+
+impl ObjectScan {
+    fn check(&self, index: usize) -> Result<(), ShapeError> {
+        let finite = |p: &Point2<f64>| p.x.is_finite() && p.y.is_finite();
+        if self.points.is_empty() || !self.points.iter().all(finite) {
+            return Err(ShapeError::Points { index });
+        }
+        let angles_rad =
+            [self.right_bound_rad, self.right_object_rad, self.left_object_rad, self.left_bound_rad];
+        let [right_bound, right, left, left_bound] = angles_rad;
+        let ordered = right_bound < right && right <= left && left < left_bound;
+        if !(ordered && left_bound - right_bound < std::f64::consts::PI) {
+            return Err(ShapeError::Angles { index, angles_rad });
+        }
+        Ok(())
+    }
+}
+
+/// The convex hull of points of the plane z = 0.
+pub(super) fn hull_of(points: impl Iterator<Item = Point2<f64>>) -> Hull {
+    Hull {
+        plane: Plane { normal: Vector3::z(), offset_m: 0.0 },
+        origin: Point3::origin(),
+        u: Vector3::x(),
+        v: Vector3::y(),
+        corners: convex(points.collect()),
+    }
+}

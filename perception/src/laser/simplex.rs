@@ -1,0 +1,108 @@
+//! The downhill simplex method (Nelder and Mead 1965) with coefficients that suit many dimensions (Gao and Han 2012).
+
+/// Where the simplex ended.
+pub(super) struct Found {
+    /// The best place.
+    pub at: Vec<f64>,
+    /// The value there.
+    pub cost: f64,
+    pub converged: bool,
+    pub iterations: usize,
+    pub evaluations: usize,
+}
+
+/// The corners of the simplex are told apart no finer than this part of the first steps.
+const FINEST: f64 = 1e-4;
+
+/// Minimises a function near the origin, from a simplex of the given steps. Settled once the corners lie within a ten-thousandth of the first steps, or
+/// their values differ by less than `settle` of them.
+pub(super) fn simplex(cost: impl Fn(&[f64]) -> f64, steps: &[f64], most: usize, settle: f64) -> Found {
+    let n = steps.len();
+    let mut corners: Vec<(f64, Vec<f64>)> = (0..=n)
+        .map(|i| {
+            let at: Vec<f64> = (0..n).map(|k| if k + 1 == i { steps[k] } else { 0.0 }).collect();
+            (cost(&at), at)
+        })
+        .collect();
+    let mut found = Found { at: Vec::new(), cost: 0.0, converged: false, iterations: 0, evaluations: n + 1 };
+    let d = n.max(2) as f64;
+    let (expand, contract, shrink) = (1.0 + 2.0 / d, 0.75 - 0.5 / d, 1.0 - 1.0 / d);
+    loop {
+        corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.converged = settled(&corners, steps, settle);
+        if found.converged || found.evaluations >= most {
+            break;
+        }
+        found.iterations += 1;
+        let middle: Vec<f64> =
+            (0..n).map(|k| corners[..n].iter().map(|c| c.1[k]).sum::<f64>() / n as f64).collect();
+        let mut attempt = |reach: f64| {
+            let worst = &corners[n].1;
+            let at: Vec<f64> = middle.iter().zip(worst).map(|(m, w)| m + reach * (m - w)).collect();
+            found.evaluations += 1;
+            (cost(&at), at)
+        };
+        let reflected = attempt(1.0);
+        let (best, second, worst) = (corners[0].0, corners[n - 1].0, corners[n].0);
+        let replacement = if reflected.0 < best {
+            let expanded = attempt(expand);
+            Some(if expanded.0 < reflected.0 { expanded } else { reflected })
+        } else if reflected.0 < second {
+            Some(reflected)
+        } else {
+            let bar = reflected.0.min(worst);
+            let contracted = attempt(if reflected.0 < worst { contract } else { -contract });
+            (contracted.0 < bar).then_some(contracted)
+        };
+        match replacement {
+            Some(corner) => corners[n] = corner,
+            None => {
+                let best = corners[0].1.clone();
+                for corner in &mut corners[1..] {
+                    let at: Vec<f64> =
+                        best.iter().zip(&corner.1).map(|(b, c)| b + shrink * (c - b)).collect();
+                    *corner = (cost(&at), at);
+                }
+                found.evaluations += n;
+            }
+        }
+    }
+    (found.cost, found.at) = corners.swap_remove(0);
+    found
+}
+
+fn settled(corners: &[(f64, Vec<f64>)], steps: &[f64], settle: f64) -> bool {
+    let (best, worst) = (&corners[0], &corners[corners.len() - 1]);
+    let near = |c: &(f64, Vec<f64>)| {
+        c.1.iter().zip(&best.1).zip(steps).all(|((a, b), step)| (a - b).abs() <= FINEST * step)
+    };
+    worst.0 - best.0 <= settle * best.0 || corners.iter().all(near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check(name: &str, cost: impl Fn(&[f64]) -> f64, steps: &[f64], expected: &[f64]) {
+        let found = simplex(&cost, steps, 4000, 1e-12);
+        let near = found.at.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3);
+        assert!(near && found.converged, "{name}: {:?} after {} evaluations", found.at, found.evaluations);
+        assert_eq!(found.cost, cost(&found.at), "{name}");
+    }
+
+    #[test]
+    fn minima_are_found() {
+        let bowl = |x: &[f64]| 1.0 + x.iter().enumerate().map(|(i, v)| (v - i as f64).powi(2)).sum::<f64>();
+        check("one dimension", bowl, &[0.5], &[0.0]);
+        check("six dimensions", bowl, &[0.5; 6], &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        let valley = |x: &[f64]| (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2);
+        check("a bent valley", valley, &[0.1, 0.1], &[1.0, 1.0]);
+        check("nothing to move", |_: &[f64]| 3.0, &[], &[]);
+    }
+
+    #[test]
+    fn a_cut_is_told() {
+        let found = simplex(|x| x[0] * x[0] - x[0], &[1e-3], 5, 1e-12);
+        assert!(!found.converged && found.evaluations >= 5);
+    }
+}

@@ -1,0 +1,198 @@
+//! Poses of groups of scans that violate their angular constraints least.
+
+use super::least_squares::{least_squares, roughly};
+use super::simplex::simplex;
+use super::violation::{Assembly, Kind, Residual};
+use nalgebra::{Isometry2, Rotation2, Translation2, UnitComplex, Vector2};
+
+/// How the objective is minimised.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Solver {
+    /// Levenberg's and Marquardt's method on the errors, whose derivatives are known.
+    #[default]
+    LeastSquares,
+    /// The downhill simplex of Nelder and Mead (the paper's choice), on the sum alone.
+    Simplex,
+}
+
+/// What is minimised.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Objective {
+    /// The boundary violation alone (Eq. 3). Many poses violate nothing, for a reading a degree bounds a thing loosely; which of them is found is left to
+    /// chance, and models come out too large.
+    Violation,
+    /// The boundary violation, and with a tenth of its weight what chooses among the poses that violate nothing: silhouettes lie in the middle between
+    /// the last ray that met the thing and the first that went past, and poses stay near those given.
+    Centred {
+        /// Spread of the given positions, metres.
+        pose_sigma_m: f64,
+        /// Spread of the given headings, radians.
+        pose_sigma_rad: f64,
+    },
+}
+
+impl Default for Objective {
+    fn default() -> Self {
+        Objective::Centred { pose_sigma_m: 0.05, pose_sigma_rad: 0.01 }
+    }
+}
+
+/// Weight of what chooses among poses that violate nothing.
+const CENTRED: f64 = 0.1;
+/// Spread of a silhouette between two rays that are a degree apart, 1.5 m away, metres: their distance over the square root of twelve.
+const GAP_SIGMA_M: f64 = 0.0075;
+
+/// What is minimised, how, and how long to go on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverOptions {
+    /// Which solver.
+    pub solver: Solver,
+    /// What it minimises.
+    pub objective: Objective,
+    /// Most iterations of least squares in each of its rounds.
+    pub most_iterations: usize,
+    /// Most evaluations of the simplex, for each of three numbers a pose.
+    pub most_evaluations: usize,
+    /// Settled if a step makes less than this part of the objective.
+    pub settle: f64,
+    /// First steps of the simplex: metres, and radians.
+    pub simplex_steps: (f64, f64),
+}
+
+impl Default for SolverOptions {
+    fn default() -> Self {
+        SolverOptions {
+            solver: Solver::LeastSquares,
+            objective: Objective::default(),
+            most_iterations: 100,
+            most_evaluations: 400,
+            settle: 1e-5,
+            simplex_steps: (0.03, 0.02),
+        }
+    }
+}
+
+/// Where a solver ended.
+#[derive(Clone, Debug)]
+pub(super) struct Solved {
+    pub poses: Vec<Isometry2<f64>>,
+    /// What was minimised, at these poses.
+    pub cost: f64,
+    pub converged: bool,
+    pub iterations: usize,
+    /// Times the errors were computed.
+    pub evaluations: usize,
+}
+
+/// Groups of scans, where they are, and which of them may move.
+pub(super) struct Problem<'a> {
+    assembly: &'a Assembly,
+    start: &'a [Isometry2<f64>],
+    movable: Vec<usize>,
+    /// Weight of [`Kind::Slack`].
+    slack: f64,
+    /// Weights of a group's shift (twice) and turn from its start.
+    prior: [f64; 3],
+}
+
+impl<'a> Problem<'a> {
+    /// Scans that are all free to move, from where localisation put them.
+    pub fn free(assembly: &'a Assembly, start: &'a [Isometry2<f64>], objective: Objective) -> Problem<'a> {
+        let movable = (0..start.len()).collect();
+        let (slack, prior) = match objective {
+            Objective::Violation => (0.0, [0.0; 3]),
+            Objective::Centred { pose_sigma_m, pose_sigma_rad } => {
+                let weight = |sigma: f64| CENTRED * (GAP_SIGMA_M / sigma.max(1e-6)).powi(2);
+                (CENTRED, [weight(pose_sigma_m), weight(pose_sigma_m), weight(pose_sigma_rad)])
+            }
+        };
+        Problem { assembly, start, movable, slack, prior }
+    }
+
+    /// The last group moves onto the others; nothing is known of where it belongs.
+    pub fn onto(assembly: &'a Assembly, start: &'a [Isometry2<f64>], objective: Objective) -> Problem<'a> {
+        let movable = vec![start.len() - 1];
+        Problem { movable, prior: [0.0; 3], ..Problem::free(assembly, start, objective) }
+    }
+
+    pub fn assembly(&self) -> &Assembly {
+        self.assembly
+    }
+
+    pub fn start(&self) -> &[Isometry2<f64>] {
+        self.start
+    }
+
+    pub fn movable(&self) -> &[usize] {
+        &self.movable
+    }
+
+    pub fn weight(&self, r: &Residual) -> f64 {
+        if r.kind == Kind::Slack { self.slack } else { 1.0 }
+    }
+
+    /// How far a group is from its start, shift and turn, each with the weight of its square.
+    pub fn strayed(&self, poses: &[Isometry2<f64>], group: usize) -> impl Iterator<Item = (f64, f64)> {
+        let pivot = self.assembly.pivot(group);
+        let (from, to) = (&self.start[group], &poses[group]);
+        let shift = to * pivot - from * pivot;
+        [shift.x, shift.y, from.rotation.angle_to(&to.rotation)].into_iter().zip(self.prior)
+    }
+
+    /// The poses after a shift (metres) and a turn (radians) of each movable group about its pivot.
+    pub fn moved(&self, poses: &[Isometry2<f64>], by: &[f64]) -> Vec<Isometry2<f64>> {
+        let mut moved = poses.to_vec();
+        for (&group, by) in self.movable.iter().zip(by.chunks_exact(3)) {
+            let pose = &poses[group];
+            let pivot = (pose * self.assembly.pivot(group)).coords;
+            let turn = Rotation2::new(by[2]);
+            let shift = turn * (pose.translation.vector - pivot) + pivot + Vector2::new(by[0], by[1]);
+            let rotation = UnitComplex::new(pose.rotation.angle() + by[2]);
+            moved[group] = Isometry2::from_parts(Translation2::from(shift), rotation);
+        }
+        moved
+    }
+
+    /// What is minimised, square metres.
+    pub fn cost(&self, poses: &[Isometry2<f64>]) -> f64 {
+        let mut sum = 0.0;
+        let placed = self.assembly.placed(poses);
+        self.assembly.residuals(&placed, 0.0, |r| sum += r.value_m * r.value_m * self.weight(&r));
+        let strayed = self.movable.iter().flat_map(|&group| self.strayed(poses, group));
+        sum + strayed.map(|(off, weight)| weight * off * off).sum::<f64>()
+    }
+}
+
+/// Roughly settled: a step makes less than this part of the objective.
+const ROUGH: f64 = 0.05;
+
+/// Runs the chosen solver.
+pub(super) fn solve(problem: &Problem, options: &SolverOptions) -> Solved {
+    match options.solver {
+        Solver::LeastSquares => least_squares(problem, options),
+        Solver::Simplex => by_simplex(problem, options),
+    }
+}
+
+/// The same, no farther than tells whether it is worth going on.
+pub(super) fn solve_roughly(problem: &Problem, options: &SolverOptions) -> Solved {
+    let rough = SolverOptions { settle: options.settle.max(ROUGH), ..*options };
+    match options.solver {
+        Solver::LeastSquares => roughly(problem, &rough),
+        Solver::Simplex => by_simplex(problem, &rough),
+    }
+}
+
+fn by_simplex(problem: &Problem, options: &SolverOptions) -> Solved {
+    let (step_m, step_rad) = options.simplex_steps;
+    let steps = [step_m, step_m, step_rad].repeat(problem.movable.len());
+    let cost = |by: &[f64]| problem.cost(&problem.moved(problem.start, by));
+    let found = simplex(cost, &steps, options.most_evaluations * steps.len(), options.settle);
+    Solved {
+        poses: problem.moved(problem.start, &found.at),
+        cost: found.cost,
+        converged: found.converged,
+        iterations: found.iterations,
+        evaluations: found.evaluations,
+    }
+}

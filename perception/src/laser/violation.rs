@@ -1,0 +1,275 @@
+//! The angular constraints between scans, and how far poses violate them (Eq. 1 to 3).
+//!
+//! All errors are distances of points from lines, the worst or the best of a scan's points: only corners of its convex hull can be either.
+
+use super::scan::direction;
+use super::shape::PosedScan;
+use crate::hull::convex;
+use nalgebra::{Isometry2, Point2, Vector2};
+
+/// How far poses violate the angular constraints.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Violation {
+    /// BV: the sum of the squared errors over ordered pairs of scans (Eq. 3), square metres.
+    pub boundary_m2: f64,
+    /// Length of the longest exterior error (Eq. 1), metres.
+    pub exterior_m: f64,
+    /// Length of the longest interior error (Eq. 2), metres.
+    pub interior_m: f64,
+    /// Ordered pairs of scans that were held against each other.
+    pub pairs: usize,
+}
+
+impl Violation {
+    /// Root of the boundary violation a pair of scans, metres: unlike the sum, the same for few scans as for many.
+    pub fn per_pair_m(&self) -> f64 {
+        (self.boundary_m2 / self.pairs.max(1) as f64).sqrt()
+    }
+}
+
+/// One scan, ready to be held against others.
+#[derive(Clone, Debug)]
+struct Part {
+    /// Which scans move together.
+    group: usize,
+    /// Its corners in `Assembly::corners`.
+    begin: usize,
+    end: usize,
+}
+
+/// Where a scan was taken from and its lines: unit normals that point away from the thing.
+#[derive(Clone, Copy, Debug)]
+struct Rays {
+    laser: Point2<f64>,
+    middle: Vector2<f64>,
+    left_bound: Vector2<f64>,
+    right_bound: Vector2<f64>,
+    left_object: Vector2<f64>,
+    right_object: Vector2<f64>,
+}
+
+impl Rays {
+    fn map(
+        &self,
+        at: impl Fn(&Point2<f64>) -> Point2<f64>,
+        turn: impl Fn(&Vector2<f64>) -> Vector2<f64>,
+    ) -> Rays {
+        Rays {
+            laser: at(&self.laser),
+            middle: turn(&self.middle),
+            left_bound: turn(&self.left_bound),
+            right_bound: turn(&self.right_bound),
+            left_object: turn(&self.left_object),
+            right_object: turn(&self.right_object),
+        }
+    }
+
+    /// The object ray that a scan from `other` must reach, the one on its side (Eq. 2), and the bound beside it; none if it looks from between the bounds,
+    /// for then it need not see either end of what this scan saw.
+    fn facing(&self, other: &Point2<f64>) -> Option<(Vector2<f64>, Vector2<f64>)> {
+        let towards = other - self.laser;
+        let side = self.middle.perp(&towards);
+        if side < 0.0 && self.right_bound.dot(&towards) > 0.0 {
+            Some((self.right_object, self.right_bound))
+        } else if side > 0.0 && self.left_bound.dot(&towards) > 0.0 {
+            Some((self.left_object, self.left_bound))
+        } else {
+            None
+        }
+    }
+}
+
+/// Scans in groups, each of which moves as one.
+#[derive(Clone, Debug)]
+pub(super) struct Assembly {
+    parts: Vec<Part>,
+    corners: Vec<Point2<f64>>,
+    rays: Vec<Rays>,
+    /// About what each group turns, in its own frame: the middle of its corners.
+    pivots: Vec<Point2<f64>>,
+    /// Pairs of scans of different groups that are held against each other.
+    pairs: usize,
+}
+
+/// An assembly with each group at its pose.
+pub(super) struct Placed {
+    corners: Vec<Point2<f64>>,
+    rays: Vec<Rays>,
+}
+
+/// Which error: exterior (Eq. 1), interior (Eq. 2), or how far an end of the thing is from the middle between the last ray that met it and the first that
+/// went past, which may have either sign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Exterior,
+    Interior,
+    Slack,
+}
+
+/// One violated constraint: `value_m = normal · (at - a point of the line)`, to be made nought.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Residual {
+    pub kind: Kind,
+    pub value_m: f64,
+    pub normal: Vector2<f64>,
+    pub at: Point2<f64>,
+    /// Group of the scan whose line it is.
+    pub line: usize,
+    /// Group of the scan whose point it is.
+    pub point: usize,
+}
+
+impl Assembly {
+    /// Groups of scans, each with poses in a frame of the group's own.
+    pub fn new<'a>(groups: impl IntoIterator<Item = &'a [PosedScan]>) -> Assembly {
+        let mut assembly = Assembly {
+            parts: Vec::new(),
+            corners: Vec::new(),
+            rays: Vec::new(),
+            pivots: Vec::new(),
+            pairs: 0,
+        };
+        for (group, scans) in groups.into_iter().enumerate() {
+            let first = assembly.corners.len();
+            assembly.pairs += 2 * assembly.parts.len() * scans.len();
+            scans.iter().for_each(|scan| assembly.add(group, scan));
+            let corners = &assembly.corners[first..];
+            let sum: Vector2<f64> = corners.iter().map(|c| c.coords).sum();
+            assembly.pivots.push((sum / corners.len().max(1) as f64).into());
+        }
+        assembly
+    }
+
+    fn add(&mut self, group: usize, posed: &PosedScan) {
+        let (scan, pose) = (&posed.scan, &posed.model_from_laser);
+        let begin = self.corners.len();
+        self.corners.extend(convex(scan.points.clone()).iter().map(|p| pose * p));
+        self.parts.push(Part { group, begin, end: self.corners.len() });
+        let left = |angle: f64| direction(angle + std::f64::consts::FRAC_PI_2);
+        let rays = Rays {
+            laser: Point2::origin(),
+            middle: direction(0.5 * (scan.left_bound_rad + scan.right_bound_rad)),
+            left_bound: left(scan.left_bound_rad),
+            right_bound: -left(scan.right_bound_rad),
+            left_object: left(scan.left_object_rad),
+            right_object: -left(scan.right_object_rad),
+        };
+        self.rays.push(rays.map(|p| pose * p, |v| pose * v));
+    }
+
+    /// About what a group turns, in its own frame.
+    pub fn pivot(&self, group: usize) -> Point2<f64> {
+        self.pivots[group]
+    }
+
+    /// Every scan where the pose of its group puts it.
+    pub fn placed(&self, poses: &[Isometry2<f64>]) -> Placed {
+        let mut placed = Placed {
+            corners: Vec::with_capacity(self.corners.len()),
+            rays: Vec::with_capacity(self.rays.len()),
+        };
+        for (part, rays) in self.parts.iter().zip(&self.rays) {
+            let turn = poses[part.group].rotation.to_rotation_matrix();
+            let shift = poses[part.group].translation.vector;
+            placed.corners.extend(self.corners[part.begin..part.end].iter().map(|c| turn * c + shift));
+            placed.rays.push(rays.map(|p| turn * p + shift, |v| turn * v));
+        }
+        placed
+    }
+
+    /// Every violated constraint between scans of different groups; see [`farthest`] for `soft_m`.
+    pub fn residuals(&self, placed: &Placed, soft_m: f64, mut each: impl FnMut(Residual)) {
+        for (of_line, rays) in self.parts.iter().zip(&placed.rays) {
+            for (of_points, other) in self.parts.iter().zip(&placed.rays) {
+                if of_line.group != of_points.group {
+                    let corners = &placed.corners[of_points.begin..of_points.end];
+                    errors(rays, &other.laser, corners, soft_m, |kind, value_m, normal, at| {
+                        each(Residual {
+                            kind,
+                            value_m,
+                            normal,
+                            at,
+                            line: of_line.group,
+                            point: of_points.group,
+                        })
+                    });
+                }
+            }
+        }
+    }
+
+    /// The violation at poses of the groups.
+    pub fn violation(&self, poses: &[Isometry2<f64>]) -> Violation {
+        let mut violation = Violation { pairs: self.pairs, ..Violation::default() };
+        self.residuals(&self.placed(poses), 0.0, |r| {
+            let longest = match r.kind {
+                Kind::Exterior => &mut violation.exterior_m,
+                Kind::Interior => &mut violation.interior_m,
+                Kind::Slack => return,
+            };
+            violation.boundary_m2 += r.value_m * r.value_m;
+            *longest = longest.max(r.value_m);
+        });
+        violation
+    }
+}
+
+/// The errors of points that were seen from `other` against the lines of a scan; nought is not told.
+#[inline(always)]
+fn errors(
+    rays: &Rays,
+    other: &Point2<f64>,
+    corners: &[Point2<f64>],
+    soft_m: f64,
+    mut each: impl FnMut(Kind, f64, Vector2<f64>, Point2<f64>),
+) {
+    // Eq. 1, left and right: the point farthest beyond the bound.
+    for bound in [rays.left_bound, rays.right_bound] {
+        let (beyond, at) = farthest(&bound, &rays.laser, corners, soft_m);
+        if beyond > 0.0 {
+            each(Kind::Exterior, beyond, bound, at);
+        }
+    }
+    // Eq. 2: some point must reach the object ray; the one that lacks least.
+    if let Some((object, bound)) = rays.facing(other) {
+        let (beyond, at) = farthest(&object, &rays.laser, corners, soft_m);
+        if beyond < 0.0 {
+            each(Kind::Interior, -beyond, -object, at);
+        }
+        let between = (object + bound).normalize();
+        let (beyond, at) = farthest(&between, &rays.laser, corners, soft_m);
+        each(Kind::Slack, beyond, between, at);
+    }
+}
+
+/// The point farthest along a normal, measured from `from`, and how far it is.
+///
+/// With a softness it is a mean of points, the weight of each falling to nothing where it is nearer by as much: which point is farthest then changes
+/// without a jump, so that derivatives tell where to go when two points are as far.
+#[inline(always)]
+fn farthest(
+    normal: &Vector2<f64>,
+    from: &Point2<f64>,
+    points: &[Point2<f64>],
+    soft_m: f64,
+) -> (f64, Point2<f64>) {
+    let along = |p: &Point2<f64>| normal.dot(&(p - from));
+    let (mut most, mut at) = (f64::NEG_INFINITY, *from);
+    for p in points {
+        let distance = along(p);
+        if distance > most {
+            (most, at) = (distance, *p);
+        }
+    }
+    if soft_m <= 0.0 {
+        return (most, at);
+    }
+    let (mut weights, mut sum) = (0.0, Vector2::zeros());
+    for p in points {
+        let weight = (1.0 - (most - along(p)) / soft_m).max(0.0).powi(2);
+        weights += weight;
+        sum += p.coords * weight;
+    }
+    let mean = Point2::from(sum / weights);
+    (along(&mean), mean)
+}

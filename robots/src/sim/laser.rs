@@ -1,0 +1,211 @@
+//! A planar laser in the scene: level rays against room and solids at one height, and the noise of a SICK LMS 200.
+
+use crate::body::Pose2;
+use crate::sim::scene::RoomSpec;
+use crate::sim::world::{Scene, Solid};
+use descry_perception::laser::Scan;
+use nalgebra::{Isometry2, Isometry3, Point3, Vector3};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// A laser that sweeps in a plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Laser {
+    /// Angle of the first reading, anticlockwise from straight ahead.
+    pub first_rad: f64,
+    /// Angle from one reading to the next.
+    pub step_rad: f64,
+    /// Readings in a sweep.
+    pub readings: usize,
+    /// Of the plane above the floor.
+    pub height_m: f64,
+    /// Nothing farther returns.
+    pub reach_m: f64,
+    /// Spread of a range.
+    pub sigma_m: f64,
+    /// Ranges are told in steps of this; 0 for exact ones.
+    pub precision_m: f64,
+}
+
+impl Default for Laser {
+    /// A SICK LMS 200, 40 cm above the floor (Modayil and Kuipers, section V).
+    fn default() -> Self {
+        Laser {
+            first_rad: -std::f64::consts::FRAC_PI_2,
+            step_rad: std::f64::consts::PI / 180.0,
+            readings: 181,
+            height_m: 0.4,
+            reach_m: 8.0,
+            sigma_m: 0.005,
+            precision_m: 0.01,
+        }
+    }
+}
+
+/// What a laser reads that truly stands at `map_from_laser`, told with the pose that localisation states. Infinite ranges: nothing within reach.
+pub fn sweep(
+    scene: &Scene,
+    laser: &Laser,
+    map_from_laser: &Pose2,
+    stated: &Pose2,
+    rng: &mut impl Rng,
+) -> Scan {
+    let solids = crossing(scene, laser.height_m);
+    let angles_rad: Vec<f64> =
+        (0..laser.readings).map(|i| laser.first_rad + laser.step_rad * i as f64).collect();
+    let eye = Point3::new(map_from_laser.x_m, map_from_laser.y_m, laser.height_m);
+    let range = |angle: &f64| {
+        let heading = map_from_laser.yaw_rad + angle;
+        let along = Vector3::new(heading.cos(), heading.sin(), 0.0);
+        let exact = nearest_m(&scene.room, &solids, &eye, &along, laser.reach_m);
+        // Drawn whether something returns or not, so that a reading's noise does not depend on the others.
+        let noise: f64 = StandardNormal.sample(rng);
+        told(laser, exact, noise)
+    };
+    Scan {
+        ranges_m: angles_rad.iter().map(range).collect(),
+        angles_rad,
+        map_from_laser: Isometry2::new(nalgebra::Vector2::new(stated.x_m, stated.y_m), stated.yaw_rad),
+    }
+}
+
+fn told(laser: &Laser, exact_m: f64, noise: f64) -> f64 {
+    if exact_m > laser.reach_m {
+        return f64::INFINITY;
+    }
+    let noisy = exact_m + laser.sigma_m * noise;
+    let steps =
+        if laser.precision_m > 0.0 { (noisy / laser.precision_m).round() * laser.precision_m } else { noisy };
+    steps.max(laser.precision_m)
+}
+
+/// Solids that reach through the plane, with the way from the map into their own frames.
+fn crossing(scene: &Scene, height_m: f64) -> Vec<(Isometry3<f64>, Solid)> {
+    scene
+        .solids()
+        .into_iter()
+        .filter(|solid| {
+            // All solids of a scene stand upright.
+            let base = solid.map_from_solid.translation.z;
+            (base + solid.bounds.0.z..=base + solid.bounds.1.z).contains(&height_m)
+        })
+        .map(|solid| (solid.map_from_solid.inverse(), solid))
+        .collect()
+}
+
+/// How far a level ray goes; infinite if it meets nothing.
+fn nearest_m(
+    room: &RoomSpec,
+    solids: &[(Isometry3<f64>, Solid)],
+    eye: &Point3<f64>,
+    along: &Vector3<f64>,
+    reach_m: f64,
+) -> f64 {
+    let wall = if eye.z <= room.wall_height_m { wall_m(room, eye, along) } else { f64::INFINITY };
+    solids.iter().fold(wall, |nearest, (solid_from_map, solid)| {
+        let (o, d) = (solid_from_map * eye, solid_from_map * along);
+        solid.hit(&o, &d, nearest.min(reach_m)).map_or(nearest, |hit| hit.t)
+    })
+}
+
+/// To the walls around it all from inside them.
+fn wall_m(room: &RoomSpec, eye: &Point3<f64>, along: &Vector3<f64>) -> f64 {
+    let (low, high) = (room.low(), room.high());
+    let to = |axis: usize| match along[axis] {
+        d if d > 0.0 => (high[axis] - eye[axis]) / d,
+        d if d < 0.0 => (low[axis] - eye[axis]) / d,
+        _ => f64::INFINITY,
+    };
+    let nearest = to(0).min(to(1));
+    if nearest > 0.0 { nearest } else { f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::{SceneSpec, arrange};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    const LAB: &str = r#"
+[room]
+size_m = [6.0, 4.0]
+wall_height_m = 2.0
+[[surface]]
+name = "table"
+position_m = [0.0, -1.0]
+size_m = [1.0, 0.6]
+height_m = 0.72
+[[obstacle]]
+name = "box"
+position_m = [1.5, 0.5]
+size_m = [0.5, 0.5, 0.6]
+[start]
+position_m = [-1.0, 0.5]
+[[object]]
+name = "tin"
+shape.cylinder = { diameter_m = 0.2, height_m = 0.2 }
+position_m = [0.0, 0.0]
+"#;
+
+    fn lab() -> Scene {
+        arrange(&SceneSpec::parse("lab.toml", LAB).unwrap(), 1).unwrap()
+    }
+
+    fn look(laser: &Laser, pose: Pose2, seed: u64) -> Scan {
+        sweep(&lab(), laser, &pose, &pose, &mut ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    /// The range straight along a heading, exact.
+    fn check(height_m: f64, pose: Pose2, expected_m: f64) {
+        let laser = Laser { height_m, sigma_m: 0.0, precision_m: 0.0, ..Laser::default() };
+        let ahead = look(&laser, pose, 1).ranges_m[90];
+        assert!((ahead - expected_m).abs() < 1e-9 || ahead == expected_m, "{height_m} {pose:?}: {ahead} m");
+    }
+
+    #[test]
+    fn rays_end_where_things_are() {
+        let half_turn = std::f64::consts::PI;
+        check(0.4, Pose2::new(-1.0, 0.5, 0.0), 2.25);
+        check(0.65, Pose2::new(-1.0, 0.5, 0.0), 4.0);
+        check(0.4, Pose2::new(-1.0, 0.5, half_turn), 2.0);
+        check(2.5, Pose2::new(-1.0, 0.5, half_turn), f64::INFINITY);
+        check(0.4, Pose2::new(0.0, 1.0, -0.5 * half_turn), 3.0);
+        check(0.71, Pose2::new(0.0, 1.0, -0.5 * half_turn), 1.7);
+        check(0.8, Pose2::new(0.0, 1.0, -0.5 * half_turn), 1.9);
+        check(0.4, Pose2::new(0.475, 1.0, -0.5 * half_turn), 1.7);
+    }
+
+    #[test]
+    fn noise_is_that_of_the_laser_and_of_the_seed() {
+        let pose = Pose2::new(-1.0, 0.5, 0.0);
+        let laser = Laser::default();
+        let scan = look(&laser, pose, 1);
+        assert_eq!(scan.check(), Ok(()));
+        assert_eq!(scan, look(&laser, pose, 1));
+        assert_ne!(scan, look(&laser, pose, 2));
+        let exact = look(&Laser { sigma_m: 0.0, precision_m: 0.0, ..laser }, pose, 1);
+        let off: Vec<f64> = scan.ranges_m.iter().zip(&exact.ranges_m).map(|(a, b)| a - b).collect();
+        let spread = (off.iter().map(|d| d * d).sum::<f64>() / off.len() as f64).sqrt();
+        // Noise and rounding together: 5 mm, and 1 cm over the square root of twelve.
+        assert!((0.0048..0.0068).contains(&spread), "{spread} m");
+        assert!(scan.ranges_m.iter().all(|r| (r * 100.0 - (r * 100.0).round()).abs() < 1e-6));
+    }
+
+    #[test]
+    fn nothing_returns_from_beyond_reach() {
+        let laser = Laser { reach_m: 1.5, ..Laser::default() };
+        let scan = look(&laser, Pose2::new(-1.0, 0.5, 0.0), 1);
+        assert_eq!(scan.ranges_m[90], f64::INFINITY);
+        assert!(scan.ranges_m.iter().all(|r| *r <= 1.55 || r.is_infinite()));
+    }
+
+    #[test]
+    fn the_pose_is_told_as_localisation_states_it() {
+        let stated = Pose2::new(0.1, -0.2, 0.3);
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let scan = sweep(&lab(), &Laser::default(), &Pose2::new(-1.0, 0.5, 0.0), &stated, &mut rng);
+        assert_eq!(scan.map_from_laser.translation.vector.y, -0.2);
+        assert!((scan.map_from_laser.rotation.angle() - 0.3).abs() < 1e-12);
+    }
+}

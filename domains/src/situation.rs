@@ -175,11 +175,14 @@ pub struct Situation {
     derived: Derived,
 }
 
+/// A candidate to drive from, and the doors that are shut then.
+type Departure = (usize, Vec<usize>);
+
 /// What is computed at the first question and kept.
 #[derive(Default)]
 struct Derived {
     travel_s: Vec<OnceLock<Vec<f64>>>,
-    travel_past_s: Mutex<BTreeMap<(usize, Vec<usize>), Arc<Vec<f64>>>>,
+    travel_past_s: Mutex<BTreeMap<Departure, Arc<Vec<f64>>>>,
     cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
     about: Vec<OnceLock<Doubt>>,
     on: Vec<OnceLock<Doubt>>,

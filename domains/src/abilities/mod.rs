@@ -64,7 +64,7 @@ pub struct SkillWord {
     /// What it does, in a line.
     pub about: &'static str,
     /// Its meaning for the body now, or why it has none.
-    pub ground: fn(&Situation, &[&str]) -> Result<Box<dyn Skill>, String>,
+    pub ground: Ground,
     /// What it costs and what is hoped from it.
     pub because: fn(&Situation, &[&str]) -> String,
     /// What follows from what came of it; in words, if there is anything to say.
@@ -72,6 +72,9 @@ pub struct SkillWord {
     /// What follows from its failure besides what the domain says; in words, if no second try is worth it.
     pub failed: Failed,
 }
+
+/// Finds the meaning of a skill for the body now, or why it has none.
+pub type Ground = fn(&Situation, &[&str]) -> Result<Box<dyn Skill>, String>;
 
 /// Takes the outcome of a skill in.
 pub type Learn =

@@ -6,9 +6,9 @@
 //! a grounding module. Answers may come in any order; the program is started at its first question and gets many
 //! questions at once where the planner has them.
 //!
-//! It runs in a process group of its own, which is killed as a whole, with at most [`MOST_DATA_BYTES`] of memory a process (Linux).
-//! Of the environment it sees [`SEEN`] and nothing else: no password or token of whoever runs descry. A line that is longer than
-//! [`MOST_LINE_BYTES`] is an error, and lines that nobody has read wait in its pipe.
+//! It runs in a process group of its own, which is killed as a whole, with at most `MOST_DATA_BYTES` of memory a process (Linux).
+//! Of the environment it sees `SEEN` and nothing else: no password or token of whoever runs descry. A line that is longer than
+//! `MOST_LINE_BYTES` is an error, and lines that nobody has read wait in its pipe.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{BufRead, BufReader, Read as _, Write};

@@ -210,7 +210,11 @@ fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
     Some(plane)
 }
 
-fn least_squares<'a>(samples: impl Iterator<Item = &'a Sample>, side: &Vector3<f64>) -> Option<Plane> {
+/// The plane of least squares through samples, each weighed by its spread; its normal on a side.
+pub(super) fn least_squares<'a>(
+    samples: impl Iterator<Item = &'a Sample>,
+    side: &Vector3<f64>,
+) -> Option<Plane> {
     let (mut weight, mut sum) = (0.0, [0.0; 3]);
     // xx xy xz yy yz zz.
     let mut products = [0.0; 6];

@@ -36,15 +36,14 @@ pub(super) fn faces(
         parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, n))).collect();
     let mut members: Vec<Vec<&Sample>> = vec![Vec::new(); parts.len()];
     held.iter().for_each(|(cell, s)| members[part_of[cell]].push(s));
-    let several = members.iter().filter(|members| members.len() >= FEWEST).count() > 1;
     let scale = (cloud.len() as f64 / samples.len().max(1) as f64).max(1.0);
     let surface = |(n, (cells, members)): (usize, (&Vec<[i32; 2]>, &Vec<&Sample>))| {
-        // A plane that was asked for has its largest part whatever its size.
         if n > 0 && members.len() < FEWEST {
             return None;
         }
+        // The plane is the largest part's; another may lie a little off it.
         let mean = members.iter().map(|s| plane.distance(&s.point)).sum::<f64>() / members.len() as f64;
-        let own = (several && mean.abs() > OWN_PLANE_M)
+        let own = (n > 0 && mean.abs() > OWN_PLANE_M)
             .then(|| least_squares(members.iter().copied(), &plane.normal))
             .flatten();
         let hull = hull_of(cells);

@@ -120,7 +120,7 @@ pub struct Surface {
     pub area_m2: f64,
     /// Points of the cloud that lie on it.
     pub points: usize,
-    /// Root mean square distance of those points from the plane, metres.
+    /// Root mean square distance from the plane of all points near it, metres.
     pub residual_m: f64,
     /// Share of the finite points that lie on it.
     pub share: f64,
@@ -242,17 +242,17 @@ pub fn find_surfaces(
     let up = options.up.or_else(|| held_up(seen));
     // What cameras are held like is a weaker hint than a known direction.
     let tilt_rad = if options.up.is_some() { options.tilt_rad } else { 1.2 };
-    let planes = large_planes(&samples, options.seed, |plane| {
-        up.is_none_or(|up| plane.normal.dot(&up).abs() >= tilt_rad.cos())
-    });
-    let planes: Vec<Plane> = planes.iter().map(|plane| face_up(plane, up.as_deref(), &viewpoints)).collect();
+    let is_level = |plane: &Plane| up.is_none_or(|up| plane.normal.dot(&up).abs() >= tilt_rad.cos());
+    // What a plane was proposed as, its points may not bear out.
+    let planes = large_planes(&samples, options.seed, is_level).into_iter().filter(is_level);
+    let planes: Vec<Plane> = planes.map(|plane| face_up(&plane, up.as_deref(), &viewpoints)).collect();
     let faces = planes.iter().flat_map(|plane| face::faces(plane, &samples, cloud, &viewpoints));
     let surfaces: Vec<Surface> = faces.filter(|s| s.area_m2 >= options.least_area_m2).collect();
     if surfaces.is_empty() {
         return Err(SurfaceError::NotFound { tried: planes.len(), wanted: wanted(options) });
     }
     let mut surfaces = distinct(surfaces, &samples);
-    role::tell(&mut surfaces, &samples, seen, options);
+    role::tell(&mut surfaces, &samples, seen, up.as_ref(), options);
     surfaces.sort_by_key(|surface| (!options.wants(surface), surface.role));
     Ok(surfaces.into_iter().map(|surface| options.within_region(surface)).collect())
 }

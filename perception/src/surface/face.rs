@@ -23,14 +23,33 @@ pub(super) fn faces(
         return Vec::new();
     }
     let turn = level(plane).to_rotation_matrix();
-    let mut cells: FxHashMap<[i32; 2], u32> = FxHashMap::default();
+    let mut counts: FxHashMap<[i32; 2], Counts> = FxHashMap::default();
     let mut held: Vec<([i32; 2], &Sample)> = Vec::new();
-    for s in samples.iter().filter(|s| plane.holds(s)) {
+    for s in samples {
+        let (distance, band) = (plane.distance(&s.point), Plane::band_m(s));
+        if distance.abs() > 2.0 * band {
+            continue;
+        }
         let flat = turn * s.point;
         let cell = [floor(flat.x / CELL_M), floor(flat.y / CELL_M)];
-        *cells.entry(cell).or_default() += 1;
-        held.push((cell, s));
+        let counts = counts.entry(cell).or_default();
+        if distance.abs() <= band {
+            counts.near += 1;
+            held.push((cell, s));
+        } else {
+            counts.beside[usize::from(distance > 0.0)] += 1;
+        }
     }
+    let is_face = |cell: &[i32; 2]| {
+        let around = (0..9).map(|k| [cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]);
+        let around = around.filter_map(|cell| counts.get(&cell));
+        !around.fold(Counts::default(), |all, counts| all.with(counts)).is_slice()
+    };
+    let near = counts.iter().filter(|(cell, counts)| counts.near > 0 && is_face(cell));
+    let cells: FxHashMap<[i32; 2], u32> = near.map(|(cell, counts)| (*cell, counts.near)).collect();
+    let squares: f64 = held.iter().map(|(_, s)| plane.distance(&s.point).powi(2)).sum();
+    let residual_m = (squares / held.len().max(1) as f64).sqrt();
+    held.retain(|(cell, _)| cells.contains_key(cell));
     let parts = parts(&cells);
     let part_of: FxHashMap<[i32; 2], usize> =
         parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, n))).collect();
@@ -38,7 +57,8 @@ pub(super) fn faces(
     held.iter().for_each(|(cell, s)| members[part_of[cell]].push(s));
     let scale = (cloud.len() as f64 / samples.len().max(1) as f64).max(1.0);
     let surface = |(n, (cells, members)): (usize, (&Vec<[i32; 2]>, &Vec<&Sample>))| {
-        if n > 0 && members.len() < FEWEST {
+        let all = cells.iter().fold(Counts::default(), |all, cell| all.with(&counts[cell]));
+        if n > 0 && members.len() < FEWEST || all.is_slice() {
             return None;
         }
         // The plane is the largest part's; another may lie a little off it.
@@ -47,9 +67,33 @@ pub(super) fn faces(
             .then(|| least_squares(members.iter().copied(), &plane.normal))
             .flatten();
         let hull = hull_of(cells);
-        (hull.len() >= 3).then(|| face(&own.unwrap_or(*plane), plane, &hull, members, scale, samples.len()))
+        let own_plane = own.unwrap_or(*plane);
+        let surface =
+            || Surface { residual_m, ..face(&own_plane, plane, &hull, members, scale, samples.len()) };
+        (hull.len() >= 3).then(surface)
     };
     parts.iter().zip(&members).enumerate().filter_map(surface).collect()
+}
+
+/// Samples near a plane, and as far again below and above it.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    near: u32,
+    beside: [u32; 2],
+}
+
+impl Counts {
+    fn with(self, other: &Counts) -> Counts {
+        let beside = [0, 1].map(|side| self.beside[side] + other.beside[side]);
+        Counts { near: self.near + other.near, beside }
+    }
+
+    /// True if the plane goes through a wall or clutter here: about as much lies on either side of it as near it.
+    fn is_slice(&self) -> bool {
+        /// Of a body that goes through, it is a half.
+        const SHARE: f64 = 0.2;
+        f64::from(self.beside[0].min(self.beside[1])) > SHARE * f64::from(self.near)
+    }
 }
 
 /// Corners of the hull around cells, metres.
@@ -87,7 +131,6 @@ fn face(
     };
     let turn = level(plane);
     let surface_from_world = Translation3::from(-(turn * onto(middle)).coords) * turn;
-    let squares: f64 = members.iter().map(|s| plane.distance(&s.point).powi(2)).sum();
     Surface {
         up,
         offset_m: plane.offset,
@@ -95,7 +138,7 @@ fn face(
         area_m2: area(hull),
         points: (members.len() as f64 * scale) as usize,
         share: members.len() as f64 / of.max(1) as f64,
-        residual_m: (squares / members.len().max(1) as f64).sqrt(),
+        residual_m: 0.0,
         surface_from_world,
         role: Role::Untold,
         because: Sign::NoCamera,

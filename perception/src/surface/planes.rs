@@ -30,7 +30,12 @@ impl Plane {
 
     /// True if a point may be a measurement of one of the plane.
     pub fn holds(&self, sample: &Sample) -> bool {
-        self.distance(&sample.point).abs() <= 3.0 * sample.sigma_m + 0.004
+        self.distance(&sample.point).abs() <= Plane::band_m(sample)
+    }
+
+    /// How far from a plane a measurement of it may lie, metres.
+    pub fn band_m(sample: &Sample) -> f64 {
+        3.0 * sample.sigma_m + 0.004
     }
 }
 

@@ -18,10 +18,10 @@ pub enum Role {
     Support,
     /// Either that or the floor: nothing tells.
     Untold,
-    /// Neither.
-    Other,
     /// The floor.
     Floor,
+    /// None of these.
+    Other,
 }
 
 /// What tells the role of a surface.
@@ -52,6 +52,8 @@ pub enum Sign {
         /// How far below that surface lies, metres.
         by_m: f64,
     },
+    /// It was seen through another surface: a mirror image.
+    Mirrored,
     /// It is a strip.
     Narrow {
         /// Its width, metres.
@@ -84,6 +86,7 @@ impl fmt::Display for Sign {
             Sign::Wide { area_m2 } => write!(f, "nothing lies lower in a view of {area_m2:.1} m²"),
             Sign::LevelWithFloor => write!(f, "it is level with the floor"),
             Sign::OnTop { by_m } => write!(f, "it is the top of something {by_m:.2} m high"),
+            Sign::Mirrored => write!(f, "it was seen through another surface, as in a mirror"),
             Sign::Narrow { width_m } => write!(f, "it is a strip {width_m:.2} m wide"),
             Sign::Slanted { by_rad } => write!(f, "it leans by {:.0}°", by_rad.to_degrees()),
             Sign::NoEdge { eye_m } => {
@@ -108,6 +111,8 @@ const PARALLEL: f64 = 0.99;
 const THING_M: (f64, f64) = (0.015, 0.3);
 /// What is lower than this on a table is a thing unless something was seen beneath it, metres.
 const TALL_THING_M: f64 = 0.6;
+/// Boards that keep what is on them are measured as well as this, root mean square, metres.
+const BOARD_RESIDUAL_M: f64 = 0.015;
 /// So many samples so far within an outline and below it were seen beneath it, metres.
 const BENEATH: usize = 15;
 const BENEATH_M: (f64, f64) = (0.05, 0.08);
@@ -133,21 +138,29 @@ pub(super) fn tell(
     surfaces: &mut [Surface],
     samples: &[Sample],
     seen: &Visibility,
+    up: Option<&Unit<Vector3<f64>>>,
     options: &SurfaceOptions,
 ) {
-    let level = level(surfaces);
+    let level = level(surfaces, up);
     let rays = rays(samples, seen);
     let past: Vec<Option<f64>> = surfaces.iter().map(|s| past(s, &rays)).collect();
     let told: Vec<(Role, Sign)> =
         (0..surfaces.len()).map(|n| supports(n, surfaces, &level, &past, samples)).collect();
     assign(surfaces, told);
-    let told: Vec<(Role, Sign)> = surfaces.iter().map(|s| lowest(s, surfaces, seen)).collect();
+    let eyes = seen.viewpoints();
+    let mirrored: Vec<bool> = (0..surfaces.len()).map(|n| is_mirrored(n, surfaces, &eyes)).collect();
+    for (surface, _) in surfaces.iter_mut().zip(mirrored).filter(|(_, mirrored)| *mirrored) {
+        (surface.role, surface.because) = (Role::Other, Sign::Mirrored);
+    }
+    let told: Vec<(Role, Sign)> = surfaces.iter().map(|s| lowest(s, surfaces, &eyes)).collect();
     assign(surfaces, told);
     let told: Vec<(Role, Sign)> = surfaces.iter().map(|s| level_with_floor(s, surfaces)).collect();
     assign(surfaces, told);
     let ground = surfaces.iter().filter(|s| s.role == Role::Floor).max_by_key(|s| s.points).cloned();
-    let boards: Vec<&Surface> =
-        surfaces.iter().filter(|s| s.role == Role::Support && s.is_open_beneath(samples)).collect();
+    let boards: Vec<&Surface> = surfaces
+        .iter()
+        .filter(|s| s.role == Role::Support && s.residual_m < BOARD_RESIDUAL_M && s.is_open_beneath(samples))
+        .collect();
     let over: Vec<Vec<Level>> = surfaces.iter().map(|s| over(s, &boards)).collect();
     for (surface, over) in surfaces.iter_mut().zip(over) {
         surface.above_floor_m = ground.as_ref().map(|floor| floor.height_m(&surface.middle()));
@@ -166,12 +179,14 @@ fn assign(surfaces: &mut [Surface], told: Vec<(Role, Sign)>) {
     }
 }
 
-/// The way up that the surfaces with most returns share.
-fn level(surfaces: &[Surface]) -> Unit<Vector3<f64>> {
-    let returns = |s: &Surface| -> usize {
-        surfaces.iter().filter(|other| other.is_parallel(s)).map(|other| other.points).sum()
+/// The way up that the surfaces with most returns share; what leans away from a hint of it counts less.
+fn level(surfaces: &[Surface], hint: Option<&Unit<Vector3<f64>>>) -> Unit<Vector3<f64>> {
+    let upright = |s: &Surface| hint.map_or(1.0, |up| up.dot(&s.up).powi(2));
+    let returns = |s: &Surface| -> f64 {
+        let parallel = surfaces.iter().filter(|other| other.is_parallel(s));
+        parallel.map(|other| other.points as f64).sum::<f64>() * upright(s)
     };
-    let best = surfaces.iter().rev().max_by_key(|s| returns(s));
+    let best = surfaces.iter().rev().max_by(|a, b| returns(a).total_cmp(&returns(b)));
     best.map_or(Vector3::z_axis(), |s| s.up)
 }
 
@@ -248,12 +263,28 @@ fn supports(
     }
 }
 
+/// True if every camera sees most of a surface through a better one above it.
+fn is_mirrored(n: usize, surfaces: &[Surface], eyes: &[Point3<f64>]) -> bool {
+    let surface = &surfaces[n];
+    let is_through = |above: &Surface| {
+        let outline = above.outline();
+        let crosses = |eye: &Point3<f64>, p: &&Point3<f64>| {
+            let (high, low) = (above.height_m(eye), above.height_m(p));
+            high > 0.0 && low < -LOWER_M && outline.covers(&(eye + (*p - eye) * (high / (high - low))), 0.0)
+        };
+        let most = |eye: &Point3<f64>| {
+            surface.hull.iter().filter(|p| crosses(eye, p)).count() * 10 >= surface.hull.len() * 7
+        };
+        !eyes.is_empty() && eyes.iter().all(most)
+    };
+    surfaces[..n].iter().any(is_through)
+}
+
 /// What a surface is if nothing lower was seen.
-fn lowest(surface: &Surface, surfaces: &[Surface], seen: &Visibility) -> (Role, Sign) {
+fn lowest(surface: &Surface, surfaces: &[Surface], eyes: &[Point3<f64>]) -> (Role, Sign) {
     if surface.role != Role::Untold {
         return (surface.role, surface.because.clone());
     }
-    let eyes = seen.viewpoints();
     if eyes.is_empty() {
         return (Role::Untold, Sign::NoCamera);
     }

@@ -1,14 +1,15 @@
-//! The surface that the objects stand on: its plane and its convex hull (paper 004, section V).
+//! The level surfaces in view, the floor told from what things stand on: plane and convex hull of each (paper 004, section V).
 
+mod face;
 mod hull;
 mod outline;
 mod planes;
+mod role;
 
 use crate::cloud::{Cloud, is_finite};
 use crate::noise::axial_sigma_m;
 use crate::visibility::Visibility;
-use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
-use rustc_hash::FxHashMap;
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use hull::{convex_hull, largest_part};
@@ -16,6 +17,7 @@ pub use outline::Outline;
 pub(crate) use outline::Rows;
 pub(crate) use planes::dominant_planes;
 use planes::{FEWEST, Plane, SAMPLE, Sample, large_planes};
+pub use role::{Role, Sign};
 
 /// How to look for the surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,6 +29,8 @@ pub struct SurfaceOptions {
     pub tilt_rad: f64,
     /// Least and greatest height of the surface along `up`, metres, if known.
     pub height_band_m: Option<(f64, f64)>,
+    /// Where the surface is as seen from above, if known: of what lies outside nothing is wanted.
+    pub region: Option<Region>,
     /// Least area of the surface, square metres.
     pub least_area_m2: f64,
     /// Seed of the sampling.
@@ -35,8 +39,25 @@ pub struct SurfaceOptions {
 
 impl Default for SurfaceOptions {
     fn default() -> Self {
-        SurfaceOptions { up: None, tilt_rad: 0.26, height_band_m: None, least_area_m2: 0.04, seed: 1 }
+        SurfaceOptions {
+            up: None,
+            tilt_rad: 0.26,
+            height_band_m: None,
+            region: None,
+            least_area_m2: 0.04,
+            seed: 1,
+        }
     }
+}
+
+/// Where a surface is expected, seen from above.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    /// Corners of its outline in the world, convex, in either direction, metres.
+    pub corners: Vec<Point3<f64>>,
+    /// How far the surface may lie outside, metres.
+    pub margin_m: f64,
 }
 
 /// Why no surface was found.
@@ -60,6 +81,30 @@ pub enum SurfaceError {
         /// What was wanted, in words.
         wanted: String,
     },
+    /// What is as wanted is the floor.
+    #[error(
+        "all that is level here is the floor ({because}): look at the table, or give the height band that it is in"
+    )]
+    OnlyFloor {
+        /// What tells that it is the floor.
+        because: Sign,
+    },
+    /// What is as wanted may be the floor as well as a table.
+    #[error(
+        "a level surface of {area_m2:.2} m² may be a table or the floor ({because}): look where its edge is in view, or give the height band that it is in"
+    )]
+    Untold {
+        /// Area of the largest, square metres.
+        area_m2: f64,
+        /// What does not tell.
+        because: Sign,
+    },
+    /// What is as wanted is nothing to stand things on.
+    #[error("what is level here is nothing to stand things on ({because}): look at the table")]
+    OnlyOther {
+        /// What tells so.
+        because: Sign,
+    },
 }
 
 /// A horizontal-enough face with its outline.
@@ -75,10 +120,36 @@ pub struct Surface {
     pub area_m2: f64,
     /// Points of the cloud that lie on it.
     pub points: usize,
-    /// Root mean square distance of those points from the plane, metres.
+    /// Root mean square distance from the plane of all points near it, metres.
     pub residual_m: f64,
+    /// Share of the finite points that lie on it.
+    pub share: f64,
     /// World to the surface's frame: z up with 0 on the surface, origin at the middle of the hull.
     pub surface_from_world: Isometry3<f64>,
+    /// What it is for.
+    pub role: Role,
+    /// What tells its role.
+    pub because: Sign,
+    /// Height above the floor, metres, where the floor is in view.
+    pub above_floor_m: Option<f64>,
+    /// Outlines of the other surfaces to stand things on that lie above this one, metres in the world.
+    pub over: Vec<Level>,
+}
+
+/// Where another surface is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Level {
+    /// How far above, metres.
+    pub above_m: f64,
+    /// Convex outline in the world, anticlockwise seen from above, metres.
+    pub hull: Vec<Point3<f64>>,
+}
+
+impl Level {
+    /// Its outline made ready to be asked about many points.
+    pub(crate) fn outline(&self, up: &Vector3<f64>) -> Outline {
+        Outline::of(&self.hull, up)
+    }
 }
 
 impl Surface {
@@ -87,13 +158,28 @@ impl Surface {
         self.up.dot(&p.coords) - self.offset_m
     }
 
+    /// Places of the world as seen from above, in the surface's frame.
+    fn flat(&self, places: &[Point3<f64>]) -> Vec<[f64; 2]> {
+        places.iter().map(|p| (self.surface_from_world * p).xy().coords.into()).collect()
+    }
+
+    /// True if it goes through another, or below it: no two surfaces do.
+    fn cuts(&self, other: &Surface) -> bool {
+        let heights = self.hull.iter().map(|p| other.height_m(p));
+        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
+        let common = || hull::clip(convex_hull(other.flat(&self.hull)), &other.flat(&other.hull), 0.0);
+        low < APART_M && high > -APART_M && hull::area(&common()) > COMMON * self.area_m2
+    }
+
     /// The same in another frame.
     pub fn moved(&self, there_from_world: &Isometry3<f64>) -> Surface {
         let up = there_from_world.rotation * self.up;
         let hull: Vec<Point3<f64>> = self.hull.iter().map(|p| there_from_world * p).collect();
         let shift = up.dot(&there_from_world.translation.vector);
         let surface_from_world = self.surface_from_world * there_from_world.inverse();
-        Surface { up, hull, offset_m: self.offset_m + shift, surface_from_world, ..self.clone() }
+        let mut over = self.over.clone();
+        over.iter_mut().flat_map(|level| &mut level.hull).for_each(|p| *p = there_from_world * *p);
+        Surface { up, hull, over, offset_m: self.offset_m + shift, surface_from_world, ..self.clone() }
     }
 
     /// True if the point lies above or below the outline widened by `margin_m`. For many points see [`Surface::outline`].
@@ -107,23 +193,47 @@ impl Surface {
     }
 }
 
-/// Side of the cells that tell which points of a plane hang together, metres.
-const CELL_M: f64 = 0.03;
 /// Heights above a surface at which things stand on it, metres.
 const THINGS_M: (f64, f64) = (0.025, 0.35);
+/// Surfaces that share so much of the lesser one, seen from above, lie at least so far apart, metres.
+const COMMON: f64 = 0.2;
+const APART_M: f64 = 0.015;
 
-/// Finds the surface: the plane with most returns that is level enough, faces the cameras and, if any has, has things on it.
-///
-/// `seen` gives the places of the cameras and, without a hint, which way is up. Deterministic for a seed.
+/// Finds the surface to stand things on: the best of [`find_surfaces`] that is as wanted.
 ///
 /// # Errors
-/// If there are too few points or no plane is as wanted.
+/// If there is none, with the reason: too few points, nothing level as wanted, only the floor, or nothing that tells a table from the floor.
 pub fn find_surface(
     cloud: &Cloud,
     seen: &Visibility,
     options: &SurfaceOptions,
 ) -> Result<Surface, SurfaceError> {
-    let _span = tracing::debug_span!("find_surface", points = cloud.len()).entered();
+    let surfaces = find_surfaces(cloud, seen, options)?;
+    let tried = surfaces.len();
+    let best = surfaces.into_iter().find(|surface| options.wants(surface));
+    let best = best.ok_or_else(|| SurfaceError::NotFound { tried, wanted: wanted(options) })?;
+    let because = best.because.clone();
+    match best.role {
+        Role::Support | Role::Untold => Ok(best),
+        Role::Floor => Err(SurfaceError::OnlyFloor { because }),
+        Role::Other => Err(SurfaceError::OnlyOther { because }),
+    }
+}
+
+/// Finds the level surfaces that face the cameras and tells what each is: first those as wanted, of these those to stand things on, of
+/// these the one with most returns and things on it.
+///
+/// `seen` gives the places of the cameras, what they saw past an edge and, without a hint, which way is up. Where a region is given,
+/// the outline of a surface in it ends there. Deterministic for a seed.
+///
+/// # Errors
+/// If there are too few points or nothing is level and large enough.
+pub fn find_surfaces(
+    cloud: &Cloud,
+    seen: &Visibility,
+    options: &SurfaceOptions,
+) -> Result<Vec<Surface>, SurfaceError> {
+    let _span = tracing::debug_span!("find_surfaces", points = cloud.len()).entered();
     let viewpoints = seen.viewpoints();
     let samples = sample(cloud, &viewpoints);
     if samples.len() < FEWEST {
@@ -132,36 +242,82 @@ pub fn find_surface(
     let up = options.up.or_else(|| held_up(seen));
     // What cameras are held like is a weaker hint than a known direction.
     let tilt_rad = if options.up.is_some() { options.tilt_rad } else { 1.2 };
-    let planes = large_planes(&samples, options.seed, |plane| {
-        up.is_none_or(|up| plane.normal.dot(&up).abs() >= tilt_rad.cos())
-    });
-    let mut best: Option<(f64, Surface)> = None;
-    for plane in &planes {
-        let plane = face_up(plane, up.as_deref(), &viewpoints);
-        let within = |(low, high): (f64, f64)| (low..=high).contains(&plane.offset);
-        if !options.height_band_m.is_none_or(within) {
-            continue;
-        }
-        let Some(surface) = outline(&plane, &samples, cloud, &viewpoints) else { continue };
-        if surface.area_m2 < options.least_area_m2 {
-            continue;
-        }
-        let hull = surface.outline();
-        let things = samples
-            .iter()
-            .filter(|s| {
-                let height = surface.height_m(&s.point);
-                height > THINGS_M.0 && height < THINGS_M.1 && hull.covers(&s.point, -0.02)
-            })
-            .count();
-        // Something on it doubles the claim of a plane: an empty table must still beat a wall behind it.
-        let score = surface.points as f64 * if things >= 20 { 2.0 } else { 1.0 };
-        if best.as_ref().is_none_or(|(s, _)| score > *s) {
-            best = Some((score, surface));
+    let is_level = |plane: &Plane| up.is_none_or(|up| plane.normal.dot(&up).abs() >= tilt_rad.cos());
+    // What a plane was proposed as, its points may not bear out.
+    let planes = large_planes(&samples, options.seed, is_level).into_iter().filter(is_level);
+    let planes: Vec<Plane> = planes.map(|plane| face_up(&plane, up.as_deref(), &viewpoints)).collect();
+    let faces = planes.iter().flat_map(|plane| face::faces(plane, &samples, cloud, &viewpoints));
+    let surfaces: Vec<Surface> = faces.filter(|s| s.area_m2 >= options.least_area_m2).collect();
+    if surfaces.is_empty() {
+        return Err(SurfaceError::NotFound { tried: planes.len(), wanted: wanted(options) });
+    }
+    let mut surfaces = distinct(surfaces, &samples);
+    role::tell(&mut surfaces, &samples, seen, up.as_ref(), options);
+    surfaces.sort_by_key(|surface| (!options.wants(surface), surface.role));
+    Ok(surfaces.into_iter().map(|surface| options.within_region(surface)).collect())
+}
+
+/// The surfaces by how much speaks for them, without those that are made of what is left over of a better one and of things on it.
+fn distinct(surfaces: Vec<Surface>, samples: &[Sample]) -> Vec<Surface> {
+    let mut claims: Vec<(f64, Surface)> = surfaces.into_iter().map(|s| (claim(&s, samples), s)).collect();
+    claims.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    let mut distinct: Vec<Surface> = Vec::new();
+    for (_, surface) in claims {
+        if !distinct.iter().any(|better| surface.cuts(better)) {
+            distinct.push(surface);
         }
     }
-    best.map(|(_, surface)| surface)
-        .ok_or_else(|| SurfaceError::NotFound { tried: planes.len(), wanted: wanted(options) })
+    distinct
+}
+
+impl SurfaceOptions {
+    /// True if a surface lies at the height and in the region that are asked for, whatever it is.
+    pub fn wants(&self, surface: &Surface) -> bool {
+        let height = self.height_band_m.is_none_or(|(low, high)| (low..=high).contains(&surface.offset_m));
+        height
+            && surface.area_m2 >= self.least_area_m2
+            && self.region.as_ref().is_none_or(|r| r.holds(surface))
+    }
+
+    /// The surface without what lies outside the region; itself if it is not in it.
+    fn within_region(&self, surface: Surface) -> Surface {
+        match &self.region {
+            Some(region) if self.wants(&surface) => region.cut(surface),
+            _ => surface,
+        }
+    }
+}
+
+impl Region {
+    /// True if most of the surface or of the region lies in both.
+    fn holds(&self, surface: &Surface) -> bool {
+        let own_m2 = hull::area(&convex_hull(surface.flat(&self.corners)));
+        let both_m2 = hull::area(&self.common(surface));
+        both_m2 >= 0.5 * surface.area_m2.min(own_m2) && both_m2 > 0.0
+    }
+
+    /// The part of the surface's outline in the widened region, in the surface's frame.
+    fn common(&self, surface: &Surface) -> Vec<[f64; 2]> {
+        hull::clip(surface.flat(&surface.hull), &convex_hull(surface.flat(&self.corners)), self.margin_m)
+    }
+
+    fn cut(&self, surface: Surface) -> Surface {
+        let common = self.common(&surface);
+        let world_from_surface = surface.surface_from_world.inverse();
+        let hull = common.iter().map(|&[x, y]| world_from_surface * Point3::new(x, y, 0.0)).collect();
+        Surface { hull, area_m2: hull::area(&common), ..surface }
+    }
+}
+
+/// How much speaks for a surface among others like it: something on it doubles the claim of its returns.
+fn claim(surface: &Surface, samples: &[Sample]) -> f64 {
+    let hull = surface.outline();
+    let is_on = |s: &&Sample| {
+        let height = surface.height_m(&s.point);
+        height > THINGS_M.0 && height < THINGS_M.1 && hull.covers(&s.point, -0.02)
+    };
+    let things = samples.iter().filter(is_on).take(20).count();
+    surface.points as f64 * if things >= 20 { 2.0 } else { 1.0 }
 }
 
 fn wanted(options: &SurfaceOptions) -> String {
@@ -223,63 +379,4 @@ fn face_up(plane: &Plane, up: Option<&Vector3<f64>>, viewpoints: &[Point3<f64>])
         None => viewpoints.iter().map(|v| plane.distance(v)).sum(),
     };
     if rise < 0.0 { Plane { normal: -plane.normal, offset: -plane.offset } } else { *plane }
-}
-
-/// The largest connected part of a plane with its convex hull. `None` if no camera is above it.
-fn outline(plane: &Plane, samples: &[Sample], cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Option<Surface> {
-    if !viewpoints.is_empty() && viewpoints.iter().all(|v| plane.distance(v) < 0.02) {
-        return None;
-    }
-    let up = Unit::new_normalize(plane.normal);
-    let turn = UnitQuaternion::rotation_between(&up, &Vector3::z()).unwrap_or_else(|| {
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(
-            &Vector3::x_axis(),
-            std::f64::consts::PI,
-        ))
-    });
-    let rotation = turn.to_rotation_matrix();
-    let mut cells: FxHashMap<[i32; 2], u32> = FxHashMap::default();
-    let mut run = ([i32::MIN; 2], 0);
-    let mut squares = 0.0;
-    for s in samples.iter().filter(|s| plane.holds(s)) {
-        let flat = rotation * s.point;
-        let cell = [floor(flat.x / CELL_M), floor(flat.y / CELL_M)];
-        if cell != run.0 {
-            let (cell, count) = std::mem::replace(&mut run, (cell, 0));
-            *cells.entry(cell).or_default() += count;
-        }
-        run.1 += 1;
-        squares += plane.distance(&s.point).powi(2);
-    }
-    *cells.entry(run.0).or_default() += run.1;
-    cells.retain(|_, count| *count > 0);
-    let total: u32 = cells.values().sum();
-    let part = largest_part(&cells);
-    let points: u32 = part.iter().filter_map(|c| cells.get(c)).sum();
-    let corners = part.iter().flat_map(|&[x, y]| [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]);
-    let hull = convex_hull(corners.map(|[x, y]| [f64::from(x) * CELL_M, f64::from(y) * CELL_M]).collect());
-    if hull.len() < 3 {
-        return None;
-    }
-    let middle =
-        hull.iter().fold([0.0, 0.0], |m, c| [m[0] + c[0], m[1] + c[1]]).map(|c| c / hull.len() as f64);
-    let area_m2 = 0.5
-        * (0..hull.len())
-            .map(|i| (hull[i], hull[(i + 1) % hull.len()]))
-            .map(|(a, b)| a[0] * b[1] - a[1] * b[0])
-            .sum::<f64>();
-    let origin = Vector3::new(middle[0], middle[1], plane.offset);
-    let surface_from_world = Translation3::from(-origin) * turn;
-    let back = surface_from_world.inverse();
-    let corner = |c: &[f64; 2]| back * Point3::new(c[0] - middle[0], c[1] - middle[1], 0.0);
-    let scale = cloud.len() as f64 / samples.len().max(1) as f64;
-    Some(Surface {
-        up,
-        offset_m: plane.offset,
-        hull: hull.iter().map(corner).collect(),
-        area_m2,
-        points: (f64::from(points) * scale.max(1.0)) as usize,
-        residual_m: (squares / f64::from(total.max(1))).sqrt(),
-        surface_from_world,
-    })
 }

@@ -1,8 +1,9 @@
 //! Segmentation, merging and recognition against what is known, and how long single views take, as tables:
-//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | table COUNT [PICTURES] | times REPETITIONS [made | DIR]...`.
+//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]...`.
 
 mod kitchen;
 mod mosd;
+mod surfaces;
 mod table;
 #[path = "../../tests/tabletop/mod.rs"]
 mod tabletop;
@@ -16,6 +17,7 @@ fn main() -> ExitCode {
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["mosd", dir] => mosd::run(Path::new(dir)),
         ["kitchen", dir, ..] => kitchen::run(Path::new(dir)),
+        ["surfaces", dirs @ ..] => surfaces::run(dirs),
         ["table", count, out @ ..] => match count.parse() {
             Ok(count) => table::run(count, out.first().map(Path::new)),
             Err(_) => Err(format!("`{count}` is no number of arrangements")),
@@ -25,7 +27,7 @@ fn main() -> ExitCode {
             Err(_) => Err(format!("`{repetitions}` is no number of repetitions")),
         },
         _ => Err(
-            "usage: evaluate mosd DIR | kitchen DIR | table COUNT [PICTURES] | times REPETITIONS [made | DIR]..."
+            "usage: evaluate mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]..."
                 .to_owned(),
         ),
     };

@@ -4,14 +4,53 @@ use rustc_hash::FxHashMap;
 
 /// The largest set of cells that hang together over gaps of up to two cells (shadows of objects); ties go to the first in order.
 pub(crate) fn largest_part(cells: &FxHashMap<[i32; 2], u32>) -> Vec<[i32; 2]> {
+    parts(cells).into_iter().next().unwrap_or_default()
+}
+
+/// The sets of cells that hang together so, the one with most returns first; ties go to the first in order.
+pub(crate) fn parts(cells: &FxHashMap<[i32; 2], u32>) -> Vec<Vec<[i32; 2]>> {
     let mut order: Vec<([i32; 2], u32)> = cells.iter().map(|(cell, count)| (*cell, *count)).collect();
     order.sort_unstable();
     let first = first_of_part(&order);
-    let mut counts = vec![0; order.len()];
-    order.iter().zip(&first).for_each(|((_, count), &first)| counts[first] += count);
-    let best = (0..order.len()).max_by_key(|&i| (counts[i], order.len() - i));
-    let members = order.iter().zip(&first).filter(|(_, first)| Some(**first) == best);
-    members.map(|((cell, _), _)| *cell).collect()
+    let mut parts = vec![(0, Vec::new()); order.len()];
+    for ((cell, count), &first) in order.iter().zip(&first) {
+        parts[first].0 += count;
+        parts[first].1.push(*cell);
+    }
+    parts.retain(|(count, _)| *count > 0);
+    parts.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+    parts.into_iter().map(|(_, cells)| cells).collect()
+}
+
+/// Area of a polygon with its corners anticlockwise.
+pub(crate) fn area(corners: &[[f64; 2]]) -> f64 {
+    let next = corners.iter().cycle().skip(1);
+    0.5 * corners.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>()
+}
+
+/// The part of a convex polygon that lies in another, widened by a margin (Sutherland and Hodgman 1974).
+pub(crate) fn clip(polygon: Vec<[f64; 2]>, by: &[[f64; 2]], margin: f64) -> Vec<[f64; 2]> {
+    if by.len() < 3 {
+        return Vec::new();
+    }
+    let edges = by.iter().zip(by.iter().cycle().skip(1));
+    edges.fold(polygon, |polygon, (a, b)| {
+        let along = [b[0] - a[0], b[1] - a[1]];
+        let length = along[0].hypot(along[1]);
+        let inside = |p: &[f64; 2]| (along[0] * (p[1] - a[1]) - along[1] * (p[0] - a[0])) / length + margin;
+        let mut kept = Vec::with_capacity(polygon.len() + 1);
+        for (p, q) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
+            let (from, to) = (inside(p), inside(q));
+            if from >= 0.0 {
+                kept.push(*p);
+            }
+            if (from >= 0.0) != (to >= 0.0) {
+                let share = from / (from - to);
+                kept.push([p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])]);
+            }
+        }
+        kept
+    })
 }
 
 /// For each of some cells in order the first that it hangs together with.

@@ -116,8 +116,13 @@ mod tests {
                 hull: hull.iter().map(|c| world_from_surface * Point3::new(c[0], c[1], 0.0)).collect(),
                 area_m2: 0.0,
                 points: 0,
+                share: 0.0,
                 residual_m: 0.0,
                 surface_from_world: world_from_surface.inverse(),
+                role: super::super::Role::Support,
+                because: super::super::Sign::Asked,
+                above_floor_m: None,
+                over: Vec::new(),
             };
             let (rows, outline) = (Rows::of(&surface), surface.outline());
             for (x, y) in places {

@@ -30,7 +30,12 @@ impl Plane {
 
     /// True if a point may be a measurement of one of the plane.
     pub fn holds(&self, sample: &Sample) -> bool {
-        self.distance(&sample.point).abs() <= 3.0 * sample.sigma_m + 0.004
+        self.distance(&sample.point).abs() <= Plane::band_m(sample)
+    }
+
+    /// How far from a plane a measurement of it may lie, metres.
+    pub fn band_m(sample: &Sample) -> f64 {
+        3.0 * sample.sigma_m + 0.004
     }
 }
 
@@ -210,7 +215,11 @@ fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
     Some(plane)
 }
 
-fn least_squares<'a>(samples: impl Iterator<Item = &'a Sample>, side: &Vector3<f64>) -> Option<Plane> {
+/// The plane of least squares through samples, each weighed by its spread; its normal on a side.
+pub(super) fn least_squares<'a>(
+    samples: impl Iterator<Item = &'a Sample>,
+    side: &Vector3<f64>,
+) -> Option<Plane> {
     let (mut weight, mut sum) = (0.0, [0.0; 3]);
     // xx xy xz yy yz zz.
     let mut products = [0.0; 6];

@@ -1,0 +1,148 @@
+//! The connected parts of a plane, each with its convex hull.
+
+use super::hull::{area, convex_hull, parts};
+use super::planes::{FEWEST, Plane, Sample, least_squares};
+use super::{Role, Sign, Surface, floor};
+use crate::cloud::Cloud;
+use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use rustc_hash::FxHashMap;
+
+/// Side of the cells that tell which points of a plane hang together, metres.
+const CELL_M: f64 = 0.03;
+/// A part whose points lie on average so far off the common plane has one of its own, metres.
+const OWN_PLANE_M: f64 = 0.002;
+
+/// The connected parts of a plane, most returns first. None if no camera is above it.
+pub(super) fn faces(
+    plane: &Plane,
+    samples: &[Sample],
+    cloud: &Cloud,
+    viewpoints: &[Point3<f64>],
+) -> Vec<Surface> {
+    if !viewpoints.is_empty() && viewpoints.iter().all(|v| plane.distance(v) < 0.02) {
+        return Vec::new();
+    }
+    let turn = level(plane).to_rotation_matrix();
+    let mut counts: FxHashMap<[i32; 2], Counts> = FxHashMap::default();
+    let mut held: Vec<([i32; 2], &Sample)> = Vec::new();
+    for s in samples {
+        let (distance, band) = (plane.distance(&s.point), Plane::band_m(s));
+        if distance.abs() > 2.0 * band {
+            continue;
+        }
+        let flat = turn * s.point;
+        let cell = [floor(flat.x / CELL_M), floor(flat.y / CELL_M)];
+        let counts = counts.entry(cell).or_default();
+        if distance.abs() <= band {
+            counts.near += 1;
+            held.push((cell, s));
+        } else {
+            counts.beside[usize::from(distance > 0.0)] += 1;
+        }
+    }
+    let is_face = |cell: &[i32; 2]| {
+        let around = (0..9).map(|k| [cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]);
+        let around = around.filter_map(|cell| counts.get(&cell));
+        !around.fold(Counts::default(), |all, counts| all.with(counts)).is_slice()
+    };
+    let near = counts.iter().filter(|(cell, counts)| counts.near > 0 && is_face(cell));
+    let cells: FxHashMap<[i32; 2], u32> = near.map(|(cell, counts)| (*cell, counts.near)).collect();
+    let squares: f64 = held.iter().map(|(_, s)| plane.distance(&s.point).powi(2)).sum();
+    let residual_m = (squares / held.len().max(1) as f64).sqrt();
+    held.retain(|(cell, _)| cells.contains_key(cell));
+    let parts = parts(&cells);
+    let part_of: FxHashMap<[i32; 2], usize> =
+        parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, n))).collect();
+    let mut members: Vec<Vec<&Sample>> = vec![Vec::new(); parts.len()];
+    held.iter().for_each(|(cell, s)| members[part_of[cell]].push(s));
+    let scale = (cloud.len() as f64 / samples.len().max(1) as f64).max(1.0);
+    let surface = |(n, (cells, members)): (usize, (&Vec<[i32; 2]>, &Vec<&Sample>))| {
+        let all = cells.iter().fold(Counts::default(), |all, cell| all.with(&counts[cell]));
+        if n > 0 && members.len() < FEWEST || all.is_slice() {
+            return None;
+        }
+        // The plane is the largest part's; another may lie a little off it.
+        let mean = members.iter().map(|s| plane.distance(&s.point)).sum::<f64>() / members.len() as f64;
+        let own = (n > 0 && mean.abs() > OWN_PLANE_M)
+            .then(|| least_squares(members.iter().copied(), &plane.normal))
+            .flatten();
+        let hull = hull_of(cells);
+        let own_plane = own.unwrap_or(*plane);
+        let surface =
+            || Surface { residual_m, ..face(&own_plane, plane, &hull, members, scale, samples.len()) };
+        (hull.len() >= 3).then(surface)
+    };
+    parts.iter().zip(&members).enumerate().filter_map(surface).collect()
+}
+
+/// Samples near a plane, and as far again below and above it.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    near: u32,
+    beside: [u32; 2],
+}
+
+impl Counts {
+    fn with(self, other: &Counts) -> Counts {
+        let beside = [0, 1].map(|side| self.beside[side] + other.beside[side]);
+        Counts { near: self.near + other.near, beside }
+    }
+
+    /// True if the plane goes through a wall or clutter here: about as much lies on either side of it as near it.
+    fn is_slice(&self) -> bool {
+        /// Of a body that goes through, it is a half.
+        const SHARE: f64 = 0.2;
+        f64::from(self.beside[0].min(self.beside[1])) > SHARE * f64::from(self.near)
+    }
+}
+
+/// Corners of the hull around cells, metres.
+fn hull_of(cells: &[[i32; 2]]) -> Vec<[f64; 2]> {
+    let corners = cells.iter().flat_map(|&[x, y]| [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]);
+    convex_hull(corners.map(|[x, y]| [f64::from(x) * CELL_M, f64::from(y) * CELL_M]).collect())
+}
+
+/// Turns the normal of a plane into z.
+fn level(plane: &Plane) -> UnitQuaternion<f64> {
+    UnitQuaternion::rotation_between(&plane.normal, &Vector3::z()).unwrap_or_else(|| {
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(
+            &Vector3::x_axis(),
+            std::f64::consts::PI,
+        ))
+    })
+}
+
+/// The surface of a plane with a hull that was found across another almost like it.
+fn face(
+    plane: &Plane,
+    found_in: &Plane,
+    hull: &[[f64; 2]],
+    members: &[&Sample],
+    scale: f64,
+    of: usize,
+) -> Surface {
+    let up = Unit::new_normalize(plane.normal);
+    let n = hull.len() as f64;
+    let middle = hull.iter().fold([0.0, 0.0], |m, c| [m[0] + c[0], m[1] + c[1]]).map(|c| c / n);
+    let lift = level(found_in).inverse();
+    let onto = |[x, y]: [f64; 2]| {
+        let p = lift * Point3::new(x, y, found_in.offset);
+        p - plane.normal * plane.distance(&p)
+    };
+    let turn = level(plane);
+    let surface_from_world = Translation3::from(-(turn * onto(middle)).coords) * turn;
+    Surface {
+        up,
+        offset_m: plane.offset,
+        hull: hull.iter().map(|c| onto(*c)).collect(),
+        area_m2: area(hull),
+        points: (members.len() as f64 * scale) as usize,
+        share: members.len() as f64 / of.max(1) as f64,
+        residual_m: 0.0,
+        surface_from_world,
+        role: Role::Untold,
+        because: Sign::NoCamera,
+        above_floor_m: None,
+        over: Vec::new(),
+    }
+}

@@ -1,0 +1,367 @@
+//! What a level surface is: the floor, or something to stand things on.
+//!
+//! A camera that looks past the edge of a table sees what lies lower. Past the floor nothing lies lower: where it ends in an image, the image
+//! ends, something stands before it or a wall rises from it.
+
+use super::planes::Sample;
+use super::{Level, Surface, SurfaceOptions};
+use crate::visibility::Visibility;
+use nalgebra::{Point3, Unit, Vector3};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What a level surface is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// Something to stand things on.
+    Support,
+    /// Either that or the floor: nothing tells.
+    Untold,
+    /// The floor.
+    Floor,
+    /// None of these.
+    Other,
+}
+
+/// What tells the role of a surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sign {
+    /// A surface at its height was asked for.
+    Asked,
+    /// Cameras saw past its edge to what lies lower.
+    SeenPast {
+        /// Share of the returns that lie there.
+        share: f64,
+    },
+    /// Nothing lies lower, and a surface to stand things on lies above it.
+    Under {
+        /// How far above, metres.
+        by_m: f64,
+    },
+    /// Nothing lies lower, and it is larger than tables are.
+    Wide {
+        /// Area in view, square metres.
+        area_m2: f64,
+    },
+    /// It is a further part of the floor.
+    LevelWithFloor,
+    /// It is the top of something that stands on another surface.
+    OnTop {
+        /// How far below that surface lies, metres.
+        by_m: f64,
+    },
+    /// It was seen through another surface: a mirror image.
+    Mirrored,
+    /// It is a strip.
+    Narrow {
+        /// Its width, metres.
+        width_m: f64,
+    },
+    /// It is not level with the surfaces that hold most returns.
+    Slanted {
+        /// Angle between the normals, radians.
+        by_rad: f64,
+    },
+    /// Nothing lower was seen past its edge.
+    NoEdge {
+        /// How high the cameras are above it on average, metres.
+        eye_m: f64,
+    },
+    /// It is not known from where it was seen, and nothing lies lower.
+    NoCamera,
+}
+
+impl fmt::Display for Sign {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Sign::Asked => write!(f, "a surface at its height was asked for"),
+            Sign::SeenPast { share } => {
+                write!(f, "{:.0} % of the returns lie lower, past its edge", 100.0 * share)
+            }
+            Sign::Under { by_m } => {
+                write!(f, "nothing lies lower, and a surface to stand things on {by_m:.2} m higher")
+            }
+            Sign::Wide { area_m2 } => write!(f, "nothing lies lower in a view of {area_m2:.1} m²"),
+            Sign::LevelWithFloor => write!(f, "it is level with the floor"),
+            Sign::OnTop { by_m } => write!(f, "it is the top of something {by_m:.2} m high"),
+            Sign::Mirrored => write!(f, "it was seen through another surface, as in a mirror"),
+            Sign::Narrow { width_m } => write!(f, "it is a strip {width_m:.2} m wide"),
+            Sign::Slanted { by_rad } => write!(f, "it leans by {:.0}°", by_rad.to_degrees()),
+            Sign::NoEdge { eye_m } => {
+                write!(f, "seen from {eye_m:.2} m above it, and nothing lower past its edge")
+            }
+            Sign::NoCamera => write!(f, "nothing lies lower, and no camera is known that could have seen it"),
+        }
+    }
+}
+
+/// Rays that are looked at for each camera.
+const RAYS: usize = 5000;
+/// Returns lie lower than a surface if they do by so much, metres, and by so much more per metre from its middle: sensors bend what is far.
+const LOWER_M: f64 = 0.06;
+const LOWER_PER_M: f64 = 0.03;
+/// So many rays and such a share of all that return, past the edge, are no accident.
+const PAST_RAYS: usize = 15;
+const PAST_SHARE: f64 = 0.005;
+/// Surfaces are parallel if their normals differ by no more, cosine of 8 degrees.
+const PARALLEL: f64 = 0.99;
+/// What is lower than this on another surface is a thing, or on the floor a step, metres.
+const THING_M: (f64, f64) = (0.015, 0.3);
+/// What is lower than this on a table is a thing unless something was seen beneath it, metres.
+const TALL_THING_M: f64 = 0.6;
+/// Boards that keep what is on them are measured as well as this, root mean square, metres.
+const BOARD_RESIDUAL_M: f64 = 0.015;
+/// So many samples so far within an outline and below it were seen beneath it, metres.
+const BENEATH: usize = 15;
+const BENEATH_M: (f64, f64) = (0.05, 0.08);
+/// What is narrower is a rail or the top of a wall, metres.
+const NARROW_M: f64 = 0.12;
+/// The floor is looked down on from at least so high, and lies at least so far below a surface to stand things on, metres.
+const EYE_M: f64 = 0.8;
+const UNDER_M: f64 = 0.25;
+/// How far the floor reaches in view if something stands on it, metres, and its area if nothing does, square metres.
+const REACH_M: f64 = 1.2;
+const WIDE_M2: f64 = 2.5;
+/// A height band no wider than this speaks of tables alone, metres.
+const TELLING_M: f64 = 1.0;
+
+/// Where a return was seen from, if that is known, and where it lies.
+struct Ray {
+    eye: Option<Point3<f64>>,
+    end: Point3<f64>,
+}
+
+/// Tells the role of each surface, and how high it lies above the floor.
+pub(super) fn tell(
+    surfaces: &mut [Surface],
+    samples: &[Sample],
+    seen: &Visibility,
+    up: Option<&Unit<Vector3<f64>>>,
+    options: &SurfaceOptions,
+) {
+    let level = level(surfaces, up);
+    let rays = rays(samples, seen);
+    let past: Vec<Option<f64>> = surfaces.iter().map(|s| past(s, &rays)).collect();
+    let told: Vec<(Role, Sign)> =
+        (0..surfaces.len()).map(|n| supports(n, surfaces, &level, &past, samples)).collect();
+    assign(surfaces, told);
+    let eyes = seen.viewpoints();
+    let mirrored: Vec<bool> = (0..surfaces.len()).map(|n| is_mirrored(n, surfaces, &eyes)).collect();
+    for (surface, _) in surfaces.iter_mut().zip(mirrored).filter(|(_, mirrored)| *mirrored) {
+        (surface.role, surface.because) = (Role::Other, Sign::Mirrored);
+    }
+    let told: Vec<(Role, Sign)> = surfaces.iter().map(|s| lowest(s, surfaces, &eyes)).collect();
+    assign(surfaces, told);
+    let told: Vec<(Role, Sign)> = surfaces.iter().map(|s| level_with_floor(s, surfaces)).collect();
+    assign(surfaces, told);
+    let ground = surfaces.iter().filter(|s| s.role == Role::Floor).max_by_key(|s| s.points).cloned();
+    let boards: Vec<&Surface> = surfaces
+        .iter()
+        .filter(|s| s.role == Role::Support && s.residual_m < BOARD_RESIDUAL_M && s.is_open_beneath(samples))
+        .collect();
+    let over: Vec<Vec<Level>> = surfaces.iter().map(|s| over(s, &boards)).collect();
+    for (surface, over) in surfaces.iter_mut().zip(over) {
+        surface.above_floor_m = ground.as_ref().map(|floor| floor.height_m(&surface.middle()));
+        surface.over = over;
+        let band = options.height_band_m.filter(|_| options.wants(surface));
+        let is_telling = |(low, high): (f64, f64)| surface.role == Role::Untold || high - low <= TELLING_M;
+        if matches!(surface.role, Role::Untold | Role::Floor) && band.is_some_and(is_telling) {
+            (surface.role, surface.because) = (Role::Support, Sign::Asked);
+        }
+    }
+}
+
+fn assign(surfaces: &mut [Surface], told: Vec<(Role, Sign)>) {
+    for (surface, told) in surfaces.iter_mut().zip(told) {
+        (surface.role, surface.because) = told;
+    }
+}
+
+/// The way up that the surfaces with most returns share; what leans away from a hint of it counts less.
+fn level(surfaces: &[Surface], hint: Option<&Unit<Vector3<f64>>>) -> Unit<Vector3<f64>> {
+    let upright = |s: &Surface| hint.map_or(1.0, |up| up.dot(&s.up).powi(2));
+    let returns = |s: &Surface| -> f64 {
+        let parallel = surfaces.iter().filter(|other| other.is_parallel(s));
+        parallel.map(|other| other.points as f64).sum::<f64>() * upright(s)
+    };
+    let best = surfaces.iter().rev().max_by(|a, b| returns(a).total_cmp(&returns(b)));
+    best.map_or(Vector3::z_axis(), |s| s.up)
+}
+
+/// Some returns of each camera; without cameras the points themselves.
+fn rays(samples: &[Sample], seen: &Visibility) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    for map in &seen.maps {
+        let (camera, eye) = (map.intrinsics, map.viewpoint());
+        let world_from_camera = map.camera_from_world.inverse();
+        let step = ((camera.width * camera.height) as f64 / RAYS as f64).sqrt().ceil().max(1.0) as usize;
+        for row in (step / 2..camera.height).step_by(step) {
+            for column in (step / 2..camera.width).step_by(step) {
+                let depth_m = f64::from(map.depths_m[row * camera.width + column]);
+                if depth_m.is_finite() {
+                    let end = world_from_camera * camera.unproject(column as f64, row as f64, depth_m);
+                    rays.push(Ray { eye: Some(eye), end });
+                }
+            }
+        }
+    }
+    if seen.maps.is_empty() {
+        rays.extend(samples.iter().map(|s| Ray { eye: None, end: s.point }));
+    }
+    rays
+}
+
+/// Share of the returns that lie lower than a surface, past its edge; `None` if it may be an accident.
+///
+/// What is seen lower *through* a surface is a reflection in it.
+fn past(surface: &Surface, rays: &[Ray]) -> Option<f64> {
+    let (outline, middle) = (surface.outline(), surface.middle());
+    let is_past = |ray: &&Ray| {
+        let low = surface.height_m(&ray.end);
+        if low > -LOWER_M || low > -LOWER_M - LOWER_PER_M * (ray.end - middle).norm() {
+            return false;
+        }
+        ray.eye.is_none_or(|eye| {
+            let high = surface.height_m(&eye);
+            let crossing = eye + (ray.end - eye) * (high / (high - low));
+            high > 0.0 && !outline.covers(&crossing, 0.0)
+        })
+    };
+    let count = rays.iter().filter(is_past).count();
+    let share = count as f64 / rays.len().max(1) as f64;
+    (count >= PAST_RAYS && share >= PAST_SHARE).then_some(share)
+}
+
+/// What a surface is if it is part of something else, or cameras saw past its edge.
+fn supports(
+    n: usize,
+    surfaces: &[Surface],
+    level: &Unit<Vector3<f64>>,
+    past: &[Option<f64>],
+    samples: &[Sample],
+) -> (Role, Sign) {
+    let surface = &surfaces[n];
+    let by_rad = surface.up.angle(level);
+    if by_rad.cos() < PARALLEL {
+        return (Role::Other, Sign::Slanted { by_rad });
+    }
+    let is_solid = !surface.is_open_beneath(samples);
+    let lies_on = |(other, past): (&Surface, &Option<f64>)| {
+        let tall_m = if past.is_some() && is_solid { TALL_THING_M } else { THING_M.1 };
+        surface.lies_on(other).filter(|by_m| *by_m < tall_m)
+    };
+    let under = surfaces.iter().zip(past).filter_map(lies_on).fold(f64::INFINITY, f64::min);
+    let width_m = surface.width_m();
+    match () {
+        () if under.is_finite() => (Role::Other, Sign::OnTop { by_m: under }),
+        () if past[n].is_some() && width_m < NARROW_M => (Role::Other, Sign::Narrow { width_m }),
+        () => {
+            past[n].map_or((Role::Untold, Sign::NoCamera), |share| (Role::Support, Sign::SeenPast { share }))
+        }
+    }
+}
+
+/// True if every camera sees most of a surface through a better one above it.
+fn is_mirrored(n: usize, surfaces: &[Surface], eyes: &[Point3<f64>]) -> bool {
+    let surface = &surfaces[n];
+    let is_through = |above: &Surface| {
+        let outline = above.outline();
+        let crosses = |eye: &Point3<f64>, p: &&Point3<f64>| {
+            let (high, low) = (above.height_m(eye), above.height_m(p));
+            high > 0.0 && low < -LOWER_M && outline.covers(&(eye + (*p - eye) * (high / (high - low))), 0.0)
+        };
+        let most = |eye: &Point3<f64>| {
+            surface.hull.iter().filter(|p| crosses(eye, p)).count() * 10 >= surface.hull.len() * 7
+        };
+        !eyes.is_empty() && eyes.iter().all(most)
+    };
+    surfaces[..n].iter().any(is_through)
+}
+
+/// What a surface is if nothing lower was seen.
+fn lowest(surface: &Surface, surfaces: &[Surface], eyes: &[Point3<f64>]) -> (Role, Sign) {
+    if surface.role != Role::Untold {
+        return (surface.role, surface.because.clone());
+    }
+    if eyes.is_empty() {
+        return (Role::Untold, Sign::NoCamera);
+    }
+    let eye_m = eyes.iter().map(|eye| surface.height_m(eye)).sum::<f64>() / eyes.len() as f64;
+    let above = surfaces.iter().filter(|s| s.role == Role::Support && s.is_parallel(surface));
+    let by_m = above.map(|s| surface.height_m(&s.middle())).fold(0.0, f64::max);
+    match () {
+        () if eye_m < EYE_M => (Role::Untold, Sign::NoEdge { eye_m }),
+        () if by_m >= UNDER_M && surface.reach_m() >= REACH_M => (Role::Floor, Sign::Under { by_m }),
+        () if surface.area_m2 >= WIDE_M2 => (Role::Floor, Sign::Wide { area_m2: surface.area_m2 }),
+        () => (Role::Untold, Sign::NoEdge { eye_m }),
+    }
+}
+
+/// A surface that nothing tells of is the floor if it lies where the floor goes on.
+fn level_with_floor(surface: &Surface, surfaces: &[Surface]) -> (Role, Sign) {
+    let goes_on = |floor: &Surface| {
+        let gap = surface.middle() - floor.middle();
+        floor.is_parallel(surface)
+            && floor.height_m(&surface.middle()).abs() < LOWER_M + LOWER_PER_M * gap.norm()
+    };
+    let floors = || surfaces.iter().filter(|s| s.role == Role::Floor);
+    match surface.role {
+        Role::Untold if floors().any(goes_on) => (Role::Floor, Sign::LevelWithFloor),
+        _ => (surface.role, surface.because.clone()),
+    }
+}
+
+/// Which boards lie above a surface.
+fn over(surface: &Surface, boards: &[&Surface]) -> Vec<Level> {
+    let is_over = |s: &&&Surface| s.is_parallel(surface);
+    let level = |s: &&Surface| Level { above_m: surface.height_m(&s.middle()), hull: s.hull.clone() };
+    boards.iter().filter(is_over).map(level).filter(|level| level.above_m > LOWER_M).collect()
+}
+
+impl Surface {
+    /// The middle of its outline in the world.
+    pub fn middle(&self) -> Point3<f64> {
+        Point3::from(self.surface_from_world.inverse().translation.vector)
+    }
+
+    /// Longest way across its outline, metres.
+    pub fn reach_m(&self) -> f64 {
+        let pairs = self.hull.iter().flat_map(|a| self.hull.iter().map(move |b| (a - b).norm()));
+        pairs.fold(0.0, f64::max)
+    }
+
+    /// Shortest way across its outline, metres.
+    pub fn width_m(&self) -> f64 {
+        let edges = self.hull.iter().zip(self.hull.iter().cycle().skip(1));
+        let across = |(a, b): (&Point3<f64>, &Point3<f64>)| {
+            let inward = self.up.cross(&(b - a)).try_normalize(0.0)?;
+            Some(self.hull.iter().map(|p| inward.dot(&(p - a))).fold(0.0, f64::max))
+        };
+        edges.filter_map(across).fold(f64::INFINITY, f64::min)
+    }
+
+    fn is_parallel(&self, other: &Surface) -> bool {
+        self.up.dot(&other.up) >= PARALLEL
+    }
+
+    /// True if something was seen beneath it.
+    fn is_open_beneath(&self, samples: &[Sample]) -> bool {
+        let outline = self.outline();
+        let is_beneath =
+            |s: &&Sample| self.height_m(&s.point) < -BENEATH_M.1 && outline.covers(&s.point, -BENEATH_M.0);
+        samples.iter().filter(is_beneath).take(BENEATH).count() == BENEATH
+    }
+
+    /// How low the other lies if it reaches on all around beneath this, metres.
+    fn lies_on(&self, other: &Surface) -> Option<f64> {
+        let by_m = other.height_m(&self.middle());
+        if by_m < THING_M.0 || !self.is_parallel(other) || other.area_m2 < 1.5 * self.area_m2 {
+            return None;
+        }
+        let outline = other.outline();
+        let within = self.hull.iter().filter(|p| outline.covers(p, 0.02)).count();
+        (within * 10 >= self.hull.len() * 7).then_some(by_m)
+    }
+}

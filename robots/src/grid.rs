@@ -49,8 +49,21 @@ impl OccupancyGrid {
 
     /// Marks the cells whose centres satisfy `inside`.
     pub fn occupy(&mut self, inside: impl Fn(&Point2<f64>) -> bool) {
-        for row in 0..self.height {
-            for column in 0..self.width {
+        self.occupy_in([(0, self.width), (0, self.height)], inside);
+    }
+
+    /// Marks the cells whose centres satisfy `inside`, which none does that is farther than `reach_m` from `middle`.
+    pub fn occupy_near(&mut self, middle: &Point2<f64>, reach_m: f64, inside: impl Fn(&Point2<f64>) -> bool) {
+        let span = |k: usize, size: usize| {
+            let at = |p: f64| ((p - self.origin_m[k]) / self.resolution_m).clamp(0.0, size as f64);
+            (at(middle[k] - reach_m).floor() as usize, at(middle[k] + reach_m).ceil() as usize)
+        };
+        self.occupy_in([span(0, self.width), span(1, self.height)], inside);
+    }
+
+    fn occupy_in(&mut self, [columns, rows]: [(usize, usize); 2], inside: impl Fn(&Point2<f64>) -> bool) {
+        for row in rows.0..rows.1 {
+            for column in columns.0..columns.1 {
                 if inside(&self.centre(column, row)) {
                     self.occupied[row * self.width + column] = true;
                 }

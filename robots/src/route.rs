@@ -10,11 +10,18 @@ use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
 use nalgebra::Point2;
 use pathfinding::directed::dijkstra::dijkstra_all;
-use std::sync::OnceLock;
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Farthest that a start inside the inflated zone is moved to free floor, metres: localisation may well say that a base which stands
 /// beside a table stands in it.
 const START_SLACK_M: f64 = 0.35;
+
+/// Sums of lengths along a route may fall short of the straight line by this share.
+const ROUNDING: f64 = 1e-9;
+/// Points whose lines of sight are kept; beyond that all are found anew.
+const MOST_ACCESSES: usize = 4096;
 
 /// A way to go.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +32,8 @@ pub struct Route {
     pub travel: Travel,
 }
 
-/// Answers questions about routes on one map for one footprint. Distances between corners are computed once, when first needed.
+/// Answers questions about routes on one map for one footprint. Distances between corners, and which corners a point sees, are computed
+/// once, when first needed.
 #[derive(Debug)]
 pub struct Router {
     blocked: OccupancyGrid,
@@ -35,6 +43,8 @@ pub struct Router {
     corners: Vec<Point2<f64>>,
     seen: Vec<OnceLock<Vec<u32>>>,
     rows: Vec<OnceLock<Vec<Option<Leg>>>>,
+    /// By the bits of the coordinates.
+    accesses: Mutex<BTreeMap<[u64; 2], Arc<Access>>>,
 }
 
 /// The shortest route from one corner to another: what the search for a pair of poses needs of it.
@@ -48,6 +58,7 @@ struct Leg {
 }
 
 /// How a pose reaches the corners: straight lines to those that it sees.
+#[derive(Debug)]
 struct Access {
     point: Point2<f64>,
     corners: Vec<(u32, f64, f64)>,
@@ -68,6 +79,7 @@ impl Router {
         Router {
             seen: corners.iter().map(|_| OnceLock::new()).collect(),
             rows: corners.iter().map(|_| OnceLock::new()).collect(),
+            accesses: Mutex::new(BTreeMap::new()),
             map: map.clone(),
             blocked,
             radius_m,
@@ -100,7 +112,7 @@ impl Router {
         if !self.blocked.is_occupied(p) {
             return Ok(());
         }
-        Err(unreachable(match nearest_occupied(&self.map, p) {
+        Err(unreachable(match nearest_occupied(&self.map, p, self.radius_m) {
             Some((at, gap_m)) => format!(
                 "({:.2}, {:.2}) is {gap_m:.2} m from what stands at ({:.2}, {:.2}); the base needs {:.2} m",
                 p.x, p.y, at.x, at.y, self.radius_m
@@ -132,8 +144,8 @@ impl Router {
     /// What going from each pose to each other takes: `table[from][to]`.
     pub fn travel_table(&self, poses: &[Pose2]) -> Vec<Vec<Result<Travel, Failure>>> {
         let ends: Vec<_> = poses.iter().map(|p| self.goal_access(p)).collect();
-        let row = |from: &Pose2, start: &Result<Access, Failure>| {
-            let cost = |(to, end): (&Pose2, &Result<Access, Failure>)| {
+        let row = |from: &Pose2, start: &Result<Arc<Access>, Failure>| {
+            let cost = |(to, end): (&Pose2, &Result<Arc<Access>, Failure>)| {
                 let start = start.as_ref().map_err(Clone::clone)?;
                 let end = end.as_ref().map_err(Clone::clone)?;
                 self.best(from, start, to, end).map(|(travel, _)| travel)
@@ -163,7 +175,7 @@ impl Router {
         Ok(Route { points_m, travel })
     }
 
-    fn start_access(&self, from: &Pose2) -> Result<Access, Failure> {
+    fn start_access(&self, from: &Pose2) -> Result<Arc<Access>, Failure> {
         check_heading(from)?;
         let point = match self.fits(&from.point()) {
             Ok(()) => from.point(),
@@ -172,13 +184,28 @@ impl Router {
         Ok(self.access(point))
     }
 
-    fn goal_access(&self, to: &Pose2) -> Result<Access, Failure> {
+    fn goal_access(&self, to: &Pose2) -> Result<Arc<Access>, Failure> {
         check_heading(to)?;
         self.fits(&to.point())?;
         Ok(self.access(to.point()))
     }
 
-    fn access(&self, point: Point2<f64>) -> Access {
+    fn access(&self, point: Point2<f64>) -> Arc<Access> {
+        let key = [point.x.to_bits(), point.y.to_bits()];
+        let kept = || self.accesses.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(access) = kept().get(&key) {
+            return access.clone();
+        }
+        let access = Arc::new(self.find_access(point));
+        let mut kept = kept();
+        if kept.len() >= MOST_ACCESSES {
+            kept.clear();
+        }
+        kept.insert(key, access.clone());
+        access
+    }
+
+    fn find_access(&self, point: Point2<f64>) -> Access {
         let line = |(c, corner): (u32, &Point2<f64>)| {
             let step = corner - point;
             self.sees(&point, corner).then(|| (c, step.norm(), step.y.atan2(step.x)))
@@ -234,26 +261,7 @@ impl Router {
             };
             return Ok((total(distance_m, turned), Via::Straight));
         }
-        let mut best: Option<(Travel, Via)> = None;
-        for &(a, out_m, out_rad) in &start.corners {
-            let row = self.row(a);
-            let leaving = turn(heading_rad, out_rad);
-            for &(b, in_m, back_rad) in &end.corners {
-                let Some(leg) = row[b as usize] else { continue };
-                let in_rad = back_rad + std::f64::consts::PI;
-                let bends = if a == b {
-                    turn(out_rad, in_rad)
-                } else {
-                    turn(out_rad, leg.first_heading_rad) + leg.turned_rad + turn(leg.last_heading_rad, in_rad)
-                };
-                let turned = leaving + bends + turn(in_rad, to.yaw_rad);
-                let travel = total(out_m + leg.distance_m + in_m, turned);
-                if best.is_none_or(|(least, _)| travel.duration_s < least.duration_s) {
-                    best = Some((travel, Via::Corners(a, b)));
-                }
-            }
-        }
-        best.ok_or_else(|| {
+        self.best_bent(heading_rad, start, to.yaw_rad, end, total).ok_or_else(|| {
             unreachable(format!(
                 "no passage {:.2} m wide leads from ({:.2}, {:.2}) to ({:.2}, {:.2})",
                 2.0 * self.radius_m,
@@ -263,6 +271,57 @@ impl Router {
                 to.y_m
             ))
         })
+    }
+
+    /// The quickest way around corners, `total` of metres and radians; of those that take the same the one whose corners come first.
+    /// Corners are asked by what they take at least, and not at all once that is more than the best.
+    fn best_bent(
+        &self,
+        heading_rad: f64,
+        start: &Access,
+        goal_rad: f64,
+        end: &Access,
+        total: impl Fn(f64, f64) -> Travel,
+    ) -> Option<(Travel, Via)> {
+        let least = |(i, &(a, out_m, out_rad)): (usize, &(u32, f64, f64))| {
+            let ahead_m = (end.point - self.corners[a as usize]).norm() * (1.0 - ROUNDING);
+            (total(out_m + ahead_m, turn(heading_rad, out_rad)).duration_s, i)
+        };
+        let mut firsts: Vec<(f64, usize)> = start.corners.iter().enumerate().map(least).collect();
+        firsts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let arriving: Vec<f64> =
+            end.corners.iter().map(|(_, _, back_rad)| turn(back_rad + PI, goal_rad)).collect();
+        let mut best: Option<(Travel, usize, Via)> = None;
+        for (least_s, i) in firsts {
+            let (a, out_m, out_rad) = start.corners[i];
+            if best.is_some_and(|(best, ..)| least_s > best.duration_s) {
+                break;
+            }
+            let row = self.row(a);
+            let leaving = turn(heading_rad, out_rad);
+            for (&(b, in_m, back_rad), &arriving) in end.corners.iter().zip(&arriving) {
+                let Some(leg) = row[b as usize] else { continue };
+                let length_m = out_m + leg.distance_m + in_m;
+                let least_s = total(length_m, leaving + arriving).duration_s;
+                if best.is_some_and(|(best, ..)| least_s > best.duration_s) {
+                    continue;
+                }
+                let in_rad = back_rad + PI;
+                let bends = if a == b {
+                    turn(out_rad, in_rad)
+                } else {
+                    turn(out_rad, leg.first_heading_rad) + leg.turned_rad + turn(leg.last_heading_rad, in_rad)
+                };
+                let travel = total(length_m, leaving + bends + arriving);
+                let better = |(best, first, _): (Travel, usize, Via)| {
+                    (travel.duration_s, i) < (best.duration_s, first)
+                };
+                if best.is_none_or(better) {
+                    best = Some((travel, i, Via::Corners(a, b)));
+                }
+            }
+        }
+        best.map(|(travel, _, via)| (travel, via))
     }
 
     fn neighbours(&self, corner: u32) -> &[u32] {
@@ -447,12 +506,14 @@ fn convex_corners(blocked: &OccupancyGrid) -> Vec<Point2<f64>> {
     corners
 }
 
-/// Centre of the occupied cell nearest to a point, and how far its side is, metres.
-fn nearest_occupied(map: &OccupancyGrid, p: &Point2<f64>) -> Option<(Point2<f64>, f64)> {
+/// Centre of the occupied cell nearest to a point within `reach_m`, and how far its side is, metres.
+fn nearest_occupied(map: &OccupancyGrid, p: &Point2<f64>, reach_m: f64) -> Option<(Point2<f64>, f64)> {
     let half_m = 0.5 * map.resolution_m;
+    let cells = (reach_m / map.resolution_m).ceil() as usize + 1;
+    let (column, row) = map.cell(p)?;
     let mut best: Option<(Point2<f64>, f64)> = None;
-    for row in 0..map.height {
-        for column in 0..map.width {
+    for row in row.saturating_sub(cells)..(row + cells + 1).min(map.height) {
+        for column in column.saturating_sub(cells)..(column + cells + 1).min(map.width) {
             if !map.occupied[row * map.width + column] {
                 continue;
             }

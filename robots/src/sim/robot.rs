@@ -14,6 +14,7 @@ use crate::sim::faults::{Fault, FaultKind, FaultPlan};
 use crate::sim::noise::{self, DepthNoise};
 use crate::sim::render::{Frame, render, visible_share};
 use crate::sim::routes::{Doors, Routes};
+use crate::sim::scene::SurfaceSpec;
 use crate::sim::state::{End, State};
 use crate::sim::truth::Truth;
 use crate::sim::world::{LABEL_OBJECT, Scene};
@@ -24,6 +25,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// From the trigger to the frame, seconds.
 const FRAME_S: f64 = 0.1;
+
 /// What a run of the simulator is made with besides the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SimOptions {
@@ -76,7 +78,7 @@ impl SimRobot {
         let doorways = scene.doors.iter().map(|d| d.doorway.clone()).collect();
         let radius_m = description.footprint.radius_m() + SAFETY_M;
         let routes = Routes::new(map.clone(), doorways, radius_m, description.speeds);
-        let hint = |s: &crate::sim::scene::SurfaceSpec| SurfaceHint {
+        let hint = |s: &SurfaceSpec| SurfaceHint {
             name: s.name.clone(),
             outline_m: s.outline_m(),
             height_m: s.height_m,
@@ -456,6 +458,7 @@ impl Robot for SimRobot {
         go_on(&watch.cancel, "the push")?;
         self.push(push, watch)
     }
+
     #[tracing::instrument(level = "debug", skip_all, fields(%door))]
     async fn open_door(&self, door: &str, watch: &Watch<'_>) -> Result<Opened, Failure> {
         go_on(&watch.cancel, "opening the door")?;

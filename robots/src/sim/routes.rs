@@ -38,7 +38,7 @@ impl Routes {
         let mut map = self.map.clone();
         for door in shut.iter().filter_map(|&d| self.doors.get(d)) {
             let half = door.half_m().add_scalar(0.5 * MAP_RESOLUTION_M);
-            map.occupy(|p| {
+            map.occupy_near(&door.centre_m, half.norm(), |p| {
                 let off = (p - door.centre_m).abs();
                 off.x <= half.x && off.y <= half.y
             });

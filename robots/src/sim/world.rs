@@ -260,13 +260,19 @@ impl Scene {
         let mut grid = OccupancyGrid::covering(self.room.low(), self.room.high(), MAP_RESOLUTION_M);
         // A cell is taken if anything reaches into it, so outlines grow by half a cell.
         let grown = 0.5 * MAP_RESOLUTION_M;
-        grid.occupy(|p| self.walls.iter().any(|w| w.blocks(p, grown)));
+        let reach_m = |x_m: f64, y_m: f64| 0.5 * x_m.hypot(y_m) + 2.0 * (grown + UPRIGHT_M);
+        for w in &self.walls {
+            let size = (w.high - w.low).xy();
+            let middle = w.low.xy() + 0.5 * size;
+            grid.occupy_near(&middle, reach_m(size.x, size.y), |p| w.blocks(p, grown));
+        }
         for s in &self.surfaces {
             let grown = if s.uprights { grown + UPRIGHT_M } else { grown };
-            grid.occupy(|p| s.covers(p, grown));
+            grid.occupy_near(&s.centre_m(), reach_m(s.size_m[0], s.size_m[1]), |p| s.covers(p, grown));
         }
         for o in self.obstacles.iter().filter(|o| o.on_map) {
-            grid.occupy(|p| o.touches(p, grown));
+            let reach_m = reach_m(o.size_m[0], o.size_m[1]);
+            grid.occupy_near(&o.position_m.into(), reach_m, |p| o.touches(p, grown));
         }
         grid
     }

@@ -24,7 +24,7 @@ pub(super) fn finite(values: &[f64], path: &[Step]) -> Result<(), Objection> {
     }
 }
 
-/// Objects that a name is given to twice.
+/// A name that is there and not that of an earlier one.
 pub(super) fn unique<'a>(
     what: &str,
     name: &str,

@@ -160,7 +160,7 @@ fn a_goal_that_is_not_understood_names_what_could_be_said() {
     check(&["do", "find cup A with confidence 2"], 2, &["no probability", "with confidence 0.9"]);
     check(&["do", "find cup A within a whiff"], 2, &["no time", "within 60 seconds"]);
     check(&["find", "cup A", "--scene", "attic"], 2, &["attic", "default", "no-cup-a"]);
-    check(&["find", "cup A", "--robot", "hoover"], 2, &["expected: sim, or recorded:DIR"]);
+    check(&["find", "cup A", "--robot", "hoover"], 2, &["expected: sim, recorded:DIR or program:COMMAND"]);
     check(&["find", "cup A", "--domain", "attic"], 2, &["attic", "tabletop"]);
 }
 

@@ -342,10 +342,11 @@ fn the_world_around_a_run_is_as_it_is() {
     let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
     let is_date = |text: &str| text.starts_with("20") && text[..16].matches(['-', ':']).count() == 3;
     assert!(is_date(&listed) && listed.contains("unfinished"), "{listed}");
+    check(folder, &["find", "cup A", "--run", "runs/two", "--json"], 0);
     for file in ["index.sqlite", "index.sqlite-wal", "index.sqlite-shm"] {
-        std::fs::write(folder.join("runs/one/record").join(file), "no index").expect("it can be spoilt");
+        std::fs::write(folder.join("runs/two/record").join(file), "no index").expect("it can be spoilt");
     }
-    let shown = outcome(folder, &["show", "runs/one"]);
+    let shown = outcome(folder, &["show", "runs/two"]);
     let warned = String::from_utf8_lossy(&shown.stderr).into_owned();
     assert!(
         shown.status.success() && warned.contains("WARN") && warned.contains("index is damaged"),

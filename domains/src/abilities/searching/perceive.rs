@@ -10,7 +10,7 @@ use descry_perception::merge::{MergeOptions, Merged, merge};
 use descry_perception::nalgebra::{Point3, Unit, Vector3};
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment_on};
-use descry_perception::surface::{Surface, SurfaceOptions, find_surface};
+use descry_perception::surface::{Region, Surface, SurfaceOptions, find_surface};
 use descry_perception::visibility::{DepthMap, Seen, Visibility};
 use descry_robots::{Robot, Sensed};
 use serde::Serialize;
@@ -110,9 +110,9 @@ fn views(mind: &Mind) -> Vec<RecordId> {
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
     let views = restore(mind, eyes, on)?;
     let (merging, seeking) = options(eyes.robot, Some(&mind.known.surfaces[on].symbol));
+    let seeking = seeking_at(seeking, &mind.known.surfaces[on]);
     let seen = merge(&views, &merging).map_err(|nothing| nothing.to_string()).and_then(|merged| {
-        let near = near(&merged, &mind.known.surfaces[on]);
-        let surface = find_surface(&near, &merged.visibility, &seeking.surface);
+        let surface = find_surface(&merged.cloud, &merged.visibility, &seeking.surface);
         surface.map(|surface| (merged, surface)).map_err(|nothing| nothing.to_string())
     });
     let (merged, surface) = match seen {
@@ -145,12 +145,10 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     }
 }
 
-/// The part of a merged cloud where the surface can be, as the map has it; all of it where the map has none.
-fn near(merged: &Merged, surface: &KnownSurface) -> descry_perception::Cloud {
-    if !surface.whole {
-        return merged.cloud.clone();
-    }
-    merged.cloud.filter(|p| surface.covers(&p.cast(), BESIDE_M))
+/// The same, for a surface that the map has: it is looked for where its outline is.
+fn seeking_at(seeking: SceneOptions, surface: &KnownSurface) -> SceneOptions {
+    let region = surface.whole.then(|| Region { corners: surface.outline.clone(), margin_m: BESIDE_M });
+    SceneOptions { surface: SurfaceOptions { region, ..seeking.surface.clone() }, ..seeking }
 }
 
 /// What was sought and believed to stand where the newest view looks through: somebody has moved it. In words; none if nothing.

@@ -38,6 +38,7 @@ fn each_fault_is_drawn_where_it_is() {
         ("cyclic-types", "cyclic-types.pddl", None),
         ("wrong-kind", "wrong-kind.pddl", None),
         ("swapped-files", "base-problem.pddl", Some("base-domain.pddl")),
+        ("goal-about-nothing", "base-domain.pddl", Some("goal-about-nothing.pddl")),
         ("faulty-problem", "base-domain.pddl", Some("faulty-problem.pddl")),
     ] {
         let findings = findings(domain, problem);

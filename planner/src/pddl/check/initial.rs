@@ -4,7 +4,7 @@ use rustc_hash::FxHashSet;
 
 use super::Checker;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::pddl::ast::{Initial, InitialValue, Name, Symbol};
+use crate::pddl::ast::{Initial, InitialValue, Name};
 use crate::pddl::nearest;
 use crate::task::{
     Fact, FunctionId, GroundChange, GroundFluent, Init, ObjectId, Parameter, PredicateId, TimedInitial,
@@ -85,10 +85,7 @@ impl Checker<'_> {
     fn ground_change(&mut self, one: &Initial) -> Option<(GroundChange, Span)> {
         match one {
             Initial::Literal { negated, name, arguments, span } => {
-                let Some(&predicate) = self.predicates.get(&name.symbol) else {
-                    self.unknown_initial(*name, true);
-                    return None;
-                };
+                let PredicateId(predicate) = self.find_predicate(*name)?;
                 let declared = &self.task.predicates[predicate as usize];
                 let derived = declared.stratum.is_some();
                 let arguments =
@@ -106,7 +103,7 @@ impl Checker<'_> {
             }
             Initial::Value { name, arguments, value, span } => {
                 let Some(&function) = self.functions.get(&name.symbol) else {
-                    self.unknown_initial(*name, false);
+                    self.unknown_function(*name);
                     return None;
                 };
                 let arguments =
@@ -159,33 +156,19 @@ impl Checker<'_> {
         }
     }
 
-    /// What no declaration knows cannot matter to any action; it is left out, and said so.
-    fn unknown_initial(&mut self, name: Name, predicate: bool) {
-        let code = if predicate { "undeclared-predicate" } else { "undeclared-function" };
-        if self.reported.contains_key(&(code, name.symbol)) {
-            return;
-        }
-        self.reported.insert((code, name.symbol), self.findings.len());
-        let kind = if predicate { "predicate" } else { "function" };
-        let task = &self.task;
-        let known: Vec<(&str, Span)> = if predicate {
-            task.predicates.iter().map(|own| (own.name.as_str(), own.span)).collect()
-        } else {
-            task.functions.iter().map(|own| (own.name.as_str(), own.span)).collect()
-        };
+    /// Problems are shared by variants of a domain: the value of a function that this one lacks is left out, and said
+    /// so, unless it looks like a slip. Whatever else uses the function finds it undeclared.
+    fn unknown_function(&mut self, name: Name) {
         let written = self.name(name.symbol);
-        let message = format!("{kind} `{written}` is not declared in the domain");
-        let finding = Diagnostic::warning(code, message, name.span, "what is said with it is left out");
-        let near = nearest(written, known.iter().map(|(own, _)| *own));
-        let finding = match near.and_then(|near| known.iter().find(|(own, _)| *own == near)) {
-            Some((near, declared)) => finding
-                .with_label(*declared, format!("`{near}` is declared here"))
-                .with_help(format!("did you mean `{near}`?")),
-            None => {
-                finding.with_help(format!("declare it in `(:{kind}s …)` of the domain, or remove it here"))
-            }
-        };
-        self.push(finding);
+        let near = nearest(written, self.task.functions.iter().map(|own| own.name.as_str()));
+        if near.is_some() || self.predicates.contains_key(&name.symbol) {
+            self.find_function(name);
+        } else if self.left_out.insert(name.symbol) {
+            let message = format!("function `{written}` is not declared in the domain");
+            let label = "what is said with it is left out";
+            let finding = Diagnostic::warning("undeclared-function", message, name.span, label);
+            self.push(finding.with_help("declare it in `(:functions …)` of the domain, or remove it here"));
+        }
     }
 
     fn ground_arguments(
@@ -206,11 +189,11 @@ impl Checker<'_> {
         }
         let mut ids = Vec::with_capacity(wanted);
         for (position, argument) in arguments.iter().enumerate() {
-            let Some(id) = self.object_id(*argument) else {
+            let Some(id) = self.find_object(*argument) else {
                 // The others may be unknown too.
-                for other in &arguments[position + 1..] {
-                    self.object_id(*other);
-                }
+                arguments[position + 1..].iter().for_each(|other| {
+                    self.find_object(*other);
+                });
                 return None;
             };
             if !self.task.fits(id, &self.declared(place).0[position].types) {
@@ -221,28 +204,6 @@ impl Checker<'_> {
             ids.push(id);
         }
         Some(ids.into())
-    }
-
-    /// A fact about an object that does not exist cannot matter to any action; it is left out, and said so.
-    fn object_id(&mut self, name: Name) -> Option<ObjectId> {
-        let Symbol(symbol) = name.symbol;
-        if let Some(id) = self.objects[symbol as usize] {
-            return Some(id);
-        }
-        let code = "undeclared-object";
-        if !self.reported.contains_key(&(code, name.symbol)) {
-            self.reported.insert((code, name.symbol), self.findings.len());
-            let written = self.name(name.symbol);
-            let near = nearest(written, self.task.objects.iter().map(|own| own.name.as_str()));
-            let message = format!("object `{written}` is not declared");
-            let finding = Diagnostic::warning(code, message, name.span, "what is said about it is left out");
-            let finding = match near {
-                Some(near) => finding.with_help(format!("did you mean `{near}`?")),
-                None => finding.with_help("declare it in `(:objects …)`"),
-            };
-            self.push(finding);
-        }
-        None
     }
 
     fn declared(&self, place: Place) -> (&[Parameter], Span) {

@@ -12,7 +12,7 @@ mod strata;
 
 use std::sync::Arc;
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::{self, Symbol};
 use super::lex::Symbols;
@@ -111,8 +111,11 @@ struct Checker<'a> {
     preferences: FxHashMap<Symbol, u32>,
     /// Objects that fit, by alternatives of types.
     fitting: FxHashMap<Vec<TypeId>, Arc<[ObjectId]>>,
-    /// Undeclared names reported already, by kind, with the finding that further uses are added to.
-    reported: FxHashMap<(&'static str, Symbol), usize>,
+    /// Undeclared names reported already, by kind, with the finding that further uses are added to and the nearest
+    /// declared name.
+    reported: FxHashMap<(&'static str, Symbol), (usize, Option<String>)>,
+    /// Functions that only another variant of the domain has, which the initial state gives values.
+    left_out: FxHashSet<Symbol>,
 }
 
 impl<'a> Checker<'a> {
@@ -150,6 +153,7 @@ impl<'a> Checker<'a> {
             preferences: FxHashMap::default(),
             fitting: FxHashMap::default(),
             reported: FxHashMap::default(),
+            left_out: FxHashSet::default(),
         }
     }
 

@@ -6,7 +6,7 @@ use super::{Checker, Scope};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::ast::{Name, Symbol};
 use crate::pddl::nearest;
-use crate::task::{FunctionId, ModuleId, ObjectId, PredicateId, TypeId};
+use crate::task::{FunctionId, ModuleId, ObjectId, PredicateId, Task, TypeId};
 
 /// More uses of one undeclared name that are shown.
 const MORE_USES: usize = 2;
@@ -16,7 +16,7 @@ impl Checker<'_> {
         if let Some(&id) = self.types.get(&name.symbol) {
             return Some(id);
         }
-        let known = self.task.types.iter().map(|own| own.name.clone()).collect();
+        let known = |task: &Task| task.types.iter().map(|own| own.name.clone()).collect();
         let near = self.undeclared("undeclared-type", "type", ":types", name, known)?;
         self.types.get(&self.symbols.find(&near)?).copied()
     }
@@ -25,7 +25,7 @@ impl Checker<'_> {
         if let Some(id) = self.objects[name.symbol.0 as usize] {
             return Some(id);
         }
-        let known = self.task.objects.iter().map(|own| own.name.clone()).collect();
+        let known = |task: &Task| task.objects.iter().map(|own| own.name.clone()).collect();
         let section = if name.span.source == 0 { ":constants" } else { ":objects" };
         let near = self.undeclared("undeclared-object", "object", section, name, known)?;
         self.task.find_object(&near)
@@ -35,7 +35,7 @@ impl Checker<'_> {
         if let Some(&id) = self.predicates.get(&name.symbol) {
             return Some(PredicateId(id));
         }
-        let known = self.task.predicates.iter().map(|own| own.name.clone()).collect();
+        let known = |task: &Task| task.predicates.iter().map(|own| own.name.clone()).collect();
         let near = self.undeclared("undeclared-predicate", "predicate", ":predicates", name, known)?;
         self.task.find_predicate(&near)
     }
@@ -50,7 +50,7 @@ impl Checker<'_> {
             self.push(Diagnostic::error("wrong-kind", message, name.span, label));
             return None;
         }
-        let known = self.task.functions.iter().map(|own| own.name.clone()).collect();
+        let known = |task: &Task| task.functions.iter().map(|own| own.name.clone()).collect();
         let near = self.undeclared("undeclared-function", "function", ":functions", name, known)?;
         self.task.find_function(&near)
     }
@@ -59,7 +59,7 @@ impl Checker<'_> {
         if let Some(&id) = self.modules.get(&name.symbol) {
             return Some(ModuleId(id));
         }
-        let known = self.task.modules.iter().map(|own| own.name.to_ascii_lowercase()).collect();
+        let known = |task: &Task| task.modules.iter().map(|own| own.name.to_ascii_lowercase()).collect();
         let near = self.undeclared("missing-attachment", "module", ":modules", name, known)?;
         let at = self.task.modules.iter().position(|own| own.name.eq_ignore_ascii_case(&near))?;
         Some(ModuleId(at as u32))
@@ -86,19 +86,20 @@ impl Checker<'_> {
         kind: &str,
         section: &str,
         name: Name,
-        known: Vec<String>,
+        known: impl Fn(&Task) -> Vec<String>,
     ) -> Option<String> {
         let written = self.name(name.symbol);
-        let near = nearest(written, known.iter().map(String::as_str)).map(str::to_string);
-        if let Some(&finding) = self.reported.get(&(code, name.symbol)) {
-            let finding = &mut self.findings[finding];
+        if let Some((finding, near)) = self.reported.get(&(code, name.symbol)) {
+            let finding = &mut self.findings[*finding];
             if finding.labels.len() <= MORE_USES {
                 finding
                     .labels
                     .push(crate::diagnostic::Label { span: name.span, text: "used here too".into() });
             }
-            return near;
+            return near.clone();
         }
+        let known = known(&self.task);
+        let near = nearest(written, known.iter().map(String::as_str)).map(str::to_string);
         let message = format!("{kind} `{written}` is not declared");
         let finding = Diagnostic::error(code, message, name.span, format!("unknown {kind}"));
         let finding = match &near {
@@ -111,7 +112,7 @@ impl Checker<'_> {
             }
             None => finding.with_help(format!("declare it in `({section} …)`")),
         };
-        self.reported.insert((code, name.symbol), self.findings.len());
+        self.reported.insert((code, name.symbol), (self.findings.len(), near.clone()));
         self.push(finding);
         near
     }

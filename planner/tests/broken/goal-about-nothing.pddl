@@ -1,0 +1,5 @@
+(define (problem lost)
+  (:domain kitchen)
+  (:objects mug - cup  table shelf - place)
+  (:init (on mug table) (on mug cellar) (on mugg table) (hand-free) (heavy mug) (= (weight mug) 3))
+  (:goal (and (on mug cellar) (heavy mug) (> (weight mug) 2))))

@@ -9,6 +9,7 @@ mod grouped;
 mod heuristics;
 mod invariants;
 mod landmarks;
+mod model;
 pub mod pddl;
 pub mod plan;
 mod search;

@@ -132,6 +132,48 @@ fn assignments_products_and_amounts_that_depend_on_the_state() {
 }
 
 #[test]
+fn rounding_decides_nothing() {
+    let domain = "(define (domain sums) (:requirements :fluents)
+      (:predicates (done)) (:functions (a) (b) (limit) (x))
+      (:action grow :parameters () :precondition (<= (+ (a) (b)) (limit)) :effect (increase (x) .1))
+      (:action finish :parameters () :precondition (and (= (* 1.1 1.1) 1.21) (not (> (+ (a) (b)) (limit))))
+        :effect (done)))";
+    let problem = |goal: &str| {
+        format!(
+            "(define (problem p) (:domain sums) (:init (= (a) .1) (= (b) .2) (= (limit) .3) (= (x) 0)) (:goal {goal}))"
+        )
+    };
+    check(domain, &problem("(done)"), Expect::Plan);
+    check(domain, &problem("(= (x) .3)"), Expect::Plan);
+    check(domain, &problem("(and (>= (x) .3) (<= (x) .3))"), Expect::Plan);
+    check(domain, &problem("(and (> (x) .6) (<= (x) .7))"), Expect::Plan);
+    check(domain, &problem("(> (+ (a) (b)) (limit))"), Expect::Unsolvable);
+    check(domain, &problem("(< (x) (/ (a) 0))"), Expect::Unsolvable);
+}
+
+#[test]
+fn large_numbers_are_told_apart() {
+    let domain = "(define (domain far) (:requirements :fluents) (:predicates (p)) (:functions (x))
+      (:action step :parameters () :precondition (p) :effect (increase (x) 1)))";
+    let problem =
+        |goal: &str| format!("(define (problem p) (:domain far) (:init (= (x) 100000000)) (:goal {goal}))");
+    check(domain, &problem("(>= (x) 100000001)"), Expect::Unsolvable);
+    check(domain, &problem("(= (x) 100000000)"), Expect::Plan);
+}
+
+#[test]
+fn products_of_two_changing_numbers() {
+    let domain = "(define (domain area) (:requirements :fluents) (:predicates (p)) (:functions (x) (y))
+      (:action wide :parameters () :precondition (p) :effect (increase (x) 1))
+      (:action high :parameters () :precondition (p) :effect (increase (y) 1)))";
+    let problem = |goal: &str| {
+        format!("(define (problem p) (:domain area) (:init (p) (= (x) 1) (= (y) 1)) (:goal {goal}))")
+    };
+    check(domain, &problem("(>= (* (x) (y)) 6)"), Expect::Plan);
+    check(domain, &problem("(and (= (/ (x) (y)) 1.5) (= (x) 3))"), Expect::Plan);
+}
+
+#[test]
 fn an_undefined_number_is_asked_for_in_vain() {
     // Nothing can be bought before the price is known.
     check(SHOP, &shop("(>= (stock) 1)"), Expect::Plan);

@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::model::relation::quotient;
 use crate::task::Task;
 
 use super::groups::Groups;
@@ -9,7 +10,6 @@ use super::instantiate::{Deed, GroundEffect, Instantiate, RawCall, RawPlace};
 use super::raw::{RawAction, RawTask};
 use super::relaxed::Reached;
 use super::relevant::{Relevant, reads};
-use super::statics::holds;
 use super::task::{
     Action, Axiom, Call, Comparison, Conjunction, DurationBound, DurativeAction, Effect, Expression, Fact,
     GroundTask, Meaning, Metric, NumericFluent, Origin, Outcome, Place, TimedEffect, Values, Variable,
@@ -371,7 +371,7 @@ fn holds_without_calls(ground: &GroundTask, condition: &Conjunction) -> bool {
         && condition.facts.iter().all(|f| state.values[f.variable as usize] == f.value)
         && condition.comparisons.iter().all(|&id| {
             let Comparison { left, relation, right } = &ground.comparisons[id as usize];
-            holds(*relation, left.number(&state.numbers), right.number(&state.numbers))
+            relation.holds(left.number(&state.numbers), right.number(&state.numbers))
         })
 }
 
@@ -384,7 +384,7 @@ impl Expression {
             Expression::Sum(parts) => parts.iter().map(|p| p.number(numbers)).sum(),
             Expression::Product(parts) => parts.iter().map(|p| p.number(numbers)).product(),
             Expression::Difference(left, right) => left.number(numbers) - right.number(numbers),
-            Expression::Quotient(left, right) => left.number(numbers) / right.number(numbers),
+            Expression::Quotient(left, right) => quotient(left.number(numbers), right.number(numbers)),
             Expression::Negative(inner) => -inner.number(numbers),
             Expression::Call(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {
                 f64::NAN

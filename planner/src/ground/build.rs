@@ -3,6 +3,7 @@
 use rustc_hash::FxHashSet;
 use tracing::debug_span;
 
+use crate::model::relation::Relation;
 use crate::task::{GroundChange, Task};
 
 use super::assemble::assemble;
@@ -17,7 +18,7 @@ use super::reach::Reach;
 use super::relaxed;
 use super::relevant::{self, Relevant};
 use super::rules::{self, Rules};
-use super::statics::{self, Statics};
+use super::statics::Statics;
 use super::task::{DurationBound, Expression, GroundTask, NumericFluent};
 
 /// Why a task was not grounded.
@@ -414,7 +415,7 @@ fn later(
         .iter()
         .map(|(at_end, comparison, number)| DurationBound {
             at_end: *at_end,
-            relation: statics::relation(*comparison, true),
+            relation: Relation::of(*comparison, true),
             seconds: make.expression(number, binding),
         })
         .collect();

@@ -8,7 +8,7 @@ use crate::task::{Assignment, ObjectId};
 
 use super::atoms::{Atoms, NONE};
 use super::normal::{Change_, Effect_, Formula, Named, Number, Pattern, Target, Term, module_writes};
-use super::statics::{Statics, each, found, holds, relation};
+use super::statics::{Statics, each, found};
 use super::task::{Change, Comparison, Expression, NumericFluent, Origin, Relation};
 
 /// A ground condition with its disjunctions still in place. A literal is `atom << 1 | negated`.
@@ -149,7 +149,7 @@ impl<'a> Instantiate<'a> {
             Formula::Compare(comparison, left, right, wanted) => {
                 let left = self.expression(left, binding);
                 let right = self.expression(right, binding);
-                self.comparison(relation(*comparison, *wanted), left, right, into)
+                self.comparison(Relation::of(*comparison, *wanted), left, right, into)
             }
             Formula::Call(call, wanted) => {
                 let id = self.call(call, binding);
@@ -232,7 +232,7 @@ impl<'a> Instantiate<'a> {
         into: &mut Clauses,
     ) -> bool {
         if let (Expression::Constant(left), Expression::Constant(right)) = (&left, &right) {
-            return holds(relation, *left, *right);
+            return relation.holds(*left, *right);
         }
         if [&left, &right].iter().any(|side| matches!(side, Expression::Constant(v) if v.is_nan())) {
             return false;

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::task::{Comparison as Compare, ObjectId, Task};
+use crate::model::relation::{Relation, quotient};
+use crate::task::{ObjectId, Task};
 
 use super::atoms::{Atoms, NONE};
 use super::normal::{Formula, Named, Number, Pattern};
 use super::reach::Possible;
-use super::task::Relation;
 
 /// What does not change in any state.
 pub(super) struct Statics<'a> {
@@ -43,33 +43,12 @@ impl Statics<'_> {
             Number::Difference(pair) => {
                 self.constant(&pair[0], binding)? - self.constant(&pair[1], binding)?
             }
-            Number::Quotient(pair) => self.constant(&pair[0], binding)? / self.constant(&pair[1], binding)?,
+            Number::Quotient(pair) => {
+                quotient(self.constant(&pair[0], binding)?, self.constant(&pair[1], binding)?)
+            }
             Number::Negative(inner) => -self.constant(inner, binding)?,
             _ => return None,
         })
-    }
-}
-
-/// Whether the comparison holds; never where a side is NaN.
-pub(super) fn holds(relation: Relation, left: f64, right: f64) -> bool {
-    match relation {
-        Relation::Less => left < right,
-        Relation::AtMost => left <= right,
-        Relation::Equal => left == right,
-        Relation::AtLeast => left >= right,
-        Relation::Greater => left > right,
-        Relation::Unequal => left != right && !left.is_nan() && !right.is_nan(),
-    }
-}
-
-pub(super) fn relation(comparison: Compare, wanted: bool) -> Relation {
-    match (comparison, wanted) {
-        (Compare::Less, true) | (Compare::GreaterOrEqual, false) => Relation::Less,
-        (Compare::LessOrEqual, true) | (Compare::Greater, false) => Relation::AtMost,
-        (Compare::Equal, true) => Relation::Equal,
-        (Compare::Equal, false) => Relation::Unequal,
-        (Compare::GreaterOrEqual, true) | (Compare::Less, false) => Relation::AtLeast,
-        (Compare::Greater, true) | (Compare::LessOrEqual, false) => Relation::Greater,
     }
 }
 
@@ -90,7 +69,7 @@ impl Possible for &Statics<'_> {
             Formula::Same(a, b, wanted) => (a.bound(binding) == b.bound(binding)) == *wanted,
             Formula::Compare(comparison, left, right, wanted) => {
                 match (self.constant(left, binding), self.constant(right, binding)) {
-                    (Some(left), Some(right)) => holds(relation(*comparison, *wanted), left, right),
+                    (Some(left), Some(right)) => Relation::of(*comparison, *wanted).holds(left, right),
                     _ => true,
                 }
             }

@@ -2,6 +2,8 @@
 //!
 //! Ids are plain indices. Those of predicates, fluents, objects, actions and modules are the lifted task's own.
 
+pub use crate::model::relation::Relation;
+
 /// Index of a finite-domain variable in [`GroundTask::variables`].
 pub type VariableId = u32;
 /// Index of a numeric fluent in [`GroundTask::numerics`].
@@ -95,30 +97,6 @@ pub enum Expression {
     Quotient(Box<Expression>, Box<Expression>),
     /// Minus the expression.
     Negative(Box<Expression>),
-}
-
-/// How two numbers compare.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Relation {
-    /// `<`
-    Less,
-    /// `<=`
-    AtMost,
-    /// `=`
-    Equal,
-    /// `>=`
-    AtLeast,
-    /// `>`
-    Greater,
-    /// Not `=`; only from negated conditions.
-    Unequal,
-}
-
-impl Relation {
-    /// Whether everything on one side of a bound will do.
-    pub fn is_bound(self) -> bool {
-        !matches!(self, Relation::Equal | Relation::Unequal)
-    }
 }
 
 impl Expression {

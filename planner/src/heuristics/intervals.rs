@@ -73,17 +73,11 @@ impl Range {
         self.times(Range { low: 1.0 / other.high, high: 1.0 / other.low })
     }
 
-    /// Whether some value stands in this relation to zero.
-    fn may(self, relation: Relation) -> bool {
+    /// Whether some value stands in this relation to one of the other.
+    fn may(self, relation: Relation, other: Range) -> bool {
         !self.is_empty()
-            && match relation {
-                Relation::Less => self.low < 0.0,
-                Relation::AtMost => self.low <= 0.0,
-                Relation::Equal => self.low <= 0.0 && self.high >= 0.0,
-                Relation::AtLeast => self.high >= 0.0,
-                Relation::Greater => self.high > 0.0,
-                Relation::Unequal => self.low != 0.0 || self.high != 0.0,
-            }
+            && !other.is_empty()
+            && relation.may_hold((self.low, self.high), (other.low, other.high))
     }
 }
 
@@ -156,7 +150,8 @@ impl Intervals {
             moves: Lists::new(),
             amounts_on: vec![Vec::new(); numbers.len()],
             givers: vec![Vec::new(); numbers.len()],
-            dynamic: numbers.initial.iter().any(|n| n.is_nan()),
+            dynamic: numbers.initial.iter().any(|n| n.is_nan())
+                || (0..count).any(|c| needed[c] && numbers.linear[c].is_none()),
             gaps: vec![0.0; count],
             ranges: vec![EMPTY; numbers.len()],
             widened: vec![[0; 2]; numbers.len()],
@@ -245,10 +240,10 @@ impl Intervals {
             again.extend(self.amounts_on[number as usize].iter().copied().filter(|&n| fired(n)));
             for &comparison in self.numbers.read_by.get(number as usize) {
                 let asked = &self.numbers.comparisons[comparison as usize];
-                let gap = range(&asked.left, &self.ranges).minus(range(&asked.right, &self.ranges));
+                let (left, right) = (range(&asked.left, &self.ranges), range(&asked.right, &self.ranges));
                 let fact = self.first + 2 * comparison;
                 let known = self.found.iter().any(|(found, _)| *found == fact);
-                if self.needed[comparison as usize] && !known && gap.may(asked.relation) {
+                if self.needed[comparison as usize] && !known && left.may(asked.relation, right) {
                     self.found.push((fact, self.times_now(node, comparison)));
                 }
             }

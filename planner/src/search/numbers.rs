@@ -4,7 +4,8 @@
 //! (value 0 where it holds), looked up after each change, so that all searches treat it like any other fact.
 
 use crate::ground::{Change, Comparison, Conjunction, Expression, Fact, GroundTask, Outcome, Relation};
-use crate::temporal::{change_number, relates};
+use crate::model::relation::quotient;
+use crate::temporal::change_number;
 
 use super::compiled::Lists;
 
@@ -170,7 +171,7 @@ impl Numbers {
 
     fn compare(&self, comparison: usize, state: &mut [u32]) {
         let Comparison { left, relation, right } = &self.comparisons[comparison];
-        let holds = relates(self.value(left, state), *relation, self.value(right, state));
+        let holds = relation.holds(self.value(left, state), self.value(right, state));
         state[self.first + comparison] = u32::from(!holds);
     }
 
@@ -284,7 +285,7 @@ pub(crate) fn evaluate(expression: &Expression, number: &impl Fn(u32) -> f64) ->
         Expression::Sum(parts) => parts.iter().map(|p| evaluate(p, number)).sum(),
         Expression::Product(parts) => parts.iter().map(|p| evaluate(p, number)).product(),
         Expression::Difference(left, right) => evaluate(left, number) - evaluate(right, number),
-        Expression::Quotient(left, right) => evaluate(left, number) / evaluate(right, number),
+        Expression::Quotient(left, right) => quotient(evaluate(left, number), evaluate(right, number)),
         Expression::Negative(inner) => -evaluate(inner, number),
         Expression::Call(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {
             f64::NAN

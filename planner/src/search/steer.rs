@@ -1,8 +1,6 @@
 //! Lookahead over numbers: what a relaxed plan wants next is made applicable by moving numbers towards its conditions,
 //! in whatever direction they lie by then.
 
-use crate::temporal::relates;
-
 use super::compiled::{Compiled, Lists};
 use super::lookahead::{Lookahead, MOST_STEPS};
 use super::numbers::repetitions;
@@ -122,7 +120,7 @@ impl Lookahead {
         for &(operator, gain) in self.movers.get(comparison as usize) {
             let Some(times) = repetitions(gap, relation, gain) else { continue };
             let after = gap + f64::from(times) * gain;
-            if !relates(after, relation, 0.0) || !task.applicable(operator, &self.state) {
+            if !relation.holds(after, 0.0) || !task.applicable(operator, &self.state) {
                 continue;
             }
             let cost = u64::from(times) * (u64::from(task.costs[operator as usize]) + 1);
@@ -146,7 +144,7 @@ impl Lookahead {
         let comparison = variable - task.numbers.first;
         let gain = task.numbers.gain(comparison as u32, &task.numbers.changes[operator as usize]);
         let gap = task.numbers.gap(comparison, &self.state) + f64::from(times) * gain;
-        !relates(gap, task.numbers.comparisons[comparison].relation, 0.0)
+        !task.numbers.comparisons[comparison].relation.holds(gap, 0.0)
     }
 
     /// Applies what the relaxed plan brings a condition about with, made applicable first.

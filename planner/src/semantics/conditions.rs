@@ -3,11 +3,9 @@
 use super::{Binding, CallFailure, Semantics};
 use crate::attachment::Answer;
 use crate::diagnostic::Span;
+use crate::model::relation::{Relation, quotient};
 use crate::state::State;
-use crate::task::{Comparison, Condition, Expression, Fluent, ObjectId, Quantified, Term};
-
-/// How far numbers may miss a non-strict comparison, relative to their size: plans are printed with few digits.
-const SLACK: f64 = 1e-7;
+use crate::task::{Condition, Expression, Fluent, ObjectId, Quantified, Term};
 
 /// The part of a condition that does not hold.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,8 +44,8 @@ impl Semantics<'_> {
                 false
             }
             Condition::Not(leaf) => match &**leaf {
-                Condition::Compare(_, sides, _) => match self.both(state, sides, binding)? {
-                    Some((left, right)) => !compare(Comparison::Equal, left, right),
+                Condition::Compare(comparison, sides, _) => match self.both(state, sides, binding)? {
+                    Some((left, right)) => Relation::of(*comparison, false).holds(left, right),
                     None => false,
                 },
                 other => !self.holds(state, other, binding)?,
@@ -70,7 +68,7 @@ impl Semantics<'_> {
                 left.is_some() && left == self.object(state, right, binding)
             }
             Condition::Compare(comparison, sides, _) => match self.both(state, sides, binding)? {
-                Some((left, right)) => compare(*comparison, left, right),
+                Some((left, right)) => Relation::of(*comparison, true).holds(left, right),
                 None => false,
             },
             Condition::Call(call) => matches!(self.ask(state, call, binding)?, Some(Answer::Truth(true))),
@@ -147,8 +145,8 @@ impl Semantics<'_> {
             }
             Expression::Divide(sides) => self
                 .both(state, sides, binding)?
-                .map(|(left, right)| left / right)
-                .filter(|value| value.is_finite()),
+                .map(|(left, right)| quotient(left, right))
+                .filter(|value| !value.is_nan()),
             Expression::Negative(inner) => self.number(state, inner, binding)?.map(|value| -value),
             Expression::Duration => binding.duration_s,
             Expression::TotalTime | Expression::Violated(_) => None,
@@ -227,15 +225,4 @@ impl Semantics<'_> {
 /// A number for people: short, and the word `undefined` where there is none.
 pub(crate) fn value_text(value: Option<f64>) -> String {
     value.map_or("undefined".to_string(), |value| format!("{}", (value * 1e6).round() / 1e6))
-}
-
-pub(crate) fn compare(comparison: Comparison, left: f64, right: f64) -> bool {
-    let slack = SLACK * left.abs().max(right.abs()).max(1.0);
-    match comparison {
-        Comparison::Less => left < right,
-        Comparison::LessOrEqual => left <= right || left - right <= slack,
-        Comparison::Equal => left == right || (left - right).abs() <= slack,
-        Comparison::GreaterOrEqual => left >= right || right - left <= slack,
-        Comparison::Greater => left > right,
-    }
 }

@@ -19,7 +19,7 @@ use crate::state::State;
 use crate::task::{ActionId, ObjectId, Slot, Task};
 
 pub use conditions::Why;
-pub(crate) use conditions::{compare, value_text};
+pub(crate) use conditions::value_text;
 pub use effects::{Changes, Clash, Pending};
 pub use reads::Touched;
 

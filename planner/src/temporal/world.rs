@@ -9,9 +9,9 @@ use crate::ground::{
     Axiom, Change, ComparisonId, Conjunction, DurationBound, Effect, Expression, GroundTask, Origin, Outcome,
     Relation, Values,
 };
-use crate::semantics::compare;
+use crate::model::relation::quotient;
 use crate::solve::EPSILON_S;
-use crate::task::{Comparison, Task, Term};
+use crate::task::{Task, Term};
 
 use super::together::some_only_together;
 use super::touch::{Touched, expression_touches};
@@ -173,7 +173,7 @@ impl<'a> World<'a> {
                 self.evaluate(left, moment)? - self.evaluate(right, moment)?
             }
             Expression::Quotient(left, right) => {
-                self.evaluate(left, moment)? / self.evaluate(right, moment)?
+                quotient(self.evaluate(left, moment)?, self.evaluate(right, moment)?)
             }
             Expression::Negative(inner) => -self.evaluate(inner, moment)?,
         })
@@ -184,7 +184,7 @@ impl<'a> World<'a> {
         let comparison = &self.ground.comparisons[comparison as usize];
         let left = self.evaluate(&comparison.left, moment)?;
         let right = self.evaluate(&comparison.right, moment)?;
-        Ok(relates(left, comparison.relation, right))
+        Ok(comparison.relation.holds(left, right))
     }
 
     /// Whether a conjunction holds; calls are asked last.
@@ -258,7 +258,7 @@ impl<'a> World<'a> {
     pub fn end_allows(&self, act: &Act, moment: &Moment) -> Result<bool, Failure> {
         for bound in act.bounds.iter().filter(|bound| bound.at_end) {
             let seconds = self.evaluate(&bound.seconds, moment)?;
-            if !relates(moment.duration_s, bound.relation, seconds) {
+            if !bound.relation.holds(moment.duration_s, seconds) {
                 return Ok(false);
             }
         }
@@ -356,22 +356,6 @@ fn mentions_duration(expression: &Expression) -> bool {
         Expression::Negative(inner) => mentions_duration(inner),
         _ => false,
     }
-}
-
-/// Whether two numbers relate so, with the validator's slack; never if one is undefined.
-pub(crate) fn relates(left: f64, relation: Relation, right: f64) -> bool {
-    if left.is_nan() || right.is_nan() {
-        return false;
-    }
-    let comparison = match relation {
-        Relation::Less => Comparison::Less,
-        Relation::AtMost => Comparison::LessOrEqual,
-        Relation::Equal => Comparison::Equal,
-        Relation::AtLeast => Comparison::GreaterOrEqual,
-        Relation::Greater => Comparison::Greater,
-        Relation::Unequal => return !compare(Comparison::Equal, left, right),
-    };
-    compare(comparison, left, right)
 }
 
 /// Changes a number.

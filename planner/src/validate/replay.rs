@@ -3,11 +3,10 @@
 use super::timeline::{Event, Happening, happenings};
 use super::{Fault, Replayed, SEPARATION_S};
 use crate::diagnostic::{Diagnostic, Span};
+use crate::model::relation::Relation;
 use crate::plan::Plan;
 use crate::semantics::effects::Clash;
-use crate::semantics::{
-    Binding, CallFailure, Changes, Pending, Semantics, Touched, Why, compare, value_text,
-};
+use crate::semantics::{Binding, CallFailure, Changes, Pending, Semantics, Touched, Why, value_text};
 use crate::solve::EPSILON_S;
 use crate::state::State;
 use crate::task::{Action, ActionId, Comparison, GroundChange, Timed, When};
@@ -238,7 +237,7 @@ impl Replay<'_, '_> {
             });
             let strict = match (bound.comparison, value) {
                 (Comparison::Less | Comparison::Greater, Some(value)) => {
-                    compare(bound.comparison, duration_s, value)
+                    Relation::of(bound.comparison, true).holds(duration_s, value)
                 }
                 _ => true,
             };

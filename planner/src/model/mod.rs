@@ -1,0 +1,3 @@
+//! What planner, validator and monitor share: numbers and how they compare.
+
+pub(crate) mod relation;

@@ -184,6 +184,34 @@ fn numbers_change_under_conditions_that_come_later() {
 }
 
 #[test]
+fn effects_at_the_end_remember_what_held_before() {
+    let crate_of = |count: usize| (0..count).map(|i| format!("c{i} ")).collect::<String>();
+    let domain = "(:requirements :adl) (:types crate) (:predicates (labelled ?c - crate) (sent ?c - crate) (idle) (slow))
+      (:durative-action send :parameters () :duration (= ?duration 4) :condition (at start (idle))
+        :effect (and (at start (not (idle)))
+          (forall (?c - crate) (when (at start (labelled ?c)) (at end (sent ?c))))))
+      (:durative-action label :parameters (?c - crate) :duration (= ?duration 3) :effect (at end (labelled ?c))))";
+    let domain = domain.strip_suffix(')').unwrap_or(domain);
+    for count in [3, 66, 130] {
+        let last = count - 1;
+        let problem = format!(
+            "(:objects {} - crate) (:init (idle)) (:goal (and (sent c0) (sent c{last})))",
+            crate_of(count)
+        );
+        check(domain, &problem, Some(7.0));
+    }
+    // What must hold over all may fail in between and hold again at the end.
+    let domain = "(:requirements :adl) (:predicates (idle) (still) (shaken) (set) (fresh))
+      (:durative-action bake :parameters () :duration (= ?duration 9) :condition (at start (idle))
+        :effect (and (at start (not (idle))) (at start (fresh)) (when (over all (still)) (at end (set)))))
+      (:durative-action shake :parameters () :duration (= ?duration 2) :condition (at start (fresh))
+        :effect (and (at start (not (still))) (at start (not (fresh))) (at end (still)) (at end (shaken)))))";
+    let domain = domain.strip_suffix(')').unwrap_or(domain);
+    // Shaking begins before all is still at first, or after it is set.
+    check(domain, "(:init (idle) (still)) (:goal (and (set) (shaken)))", Some(11.0));
+}
+
+#[test]
 fn a_plan_that_breaks_a_constraint_on_the_way_is_refused_under_the_text() {
     let domain = "(define (domain d) (:requirements :constraints) (:predicates (a) (b) (c))
       (:action one :parameters () :effect (a)) (:action two :parameters () :precondition (a) :effect (b)))";

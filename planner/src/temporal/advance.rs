@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::attachment::Level;
 use crate::calls::Failure;
-use crate::ground::{Change, Effect, Outcome, Values};
+use crate::ground::{Change, Effect, Outcome, Values, When};
 
 use super::order::Access;
 use super::relaxed::Part;
@@ -21,8 +21,35 @@ pub(crate) struct Open {
     pub proposal: Option<Arc<str>>,
     /// How long it may take.
     pub span: Span,
-    /// By end effect (the first 64), whether its conditions at the start were met.
-    pub gates: u64,
+    /// Which of its end effects can still happen.
+    pub gates: Gates,
+}
+
+/// Of the end effects of an action in progress, a bit for each whose conditions at the start or over all failed; no words
+/// where no effect has any.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
+pub(crate) struct Gates(Vec<u64>);
+
+impl Gates {
+    /// All open, for the effects at the end of an action.
+    fn open(effects: &[Effect]) -> Gates {
+        let remembered =
+            effects.iter().rposition(|effect| effect.when.as_ref().is_some_and(|when| is_remembered(when)));
+        Gates(vec![0; remembered.map_or(0, |last| last / 64 + 1)])
+    }
+
+    fn close(&mut self, effect: usize) {
+        self.0[effect / 64] |= 1 << (effect % 64);
+    }
+
+    fn is_open(&self, effect: usize) -> bool {
+        self.0.get(effect / 64).is_none_or(|word| word >> (effect % 64) & 1 == 0)
+    }
+}
+
+/// Whether a condition of an effect at the end speaks of earlier times.
+fn is_remembered(when: &When) -> bool {
+    !when.at_start.is_empty() || !when.over_all.is_empty()
 }
 
 /// Where the search stands: a state, the actions in progress, and how many timed effects have happened.
@@ -65,15 +92,15 @@ impl World<'_> {
         step.span = span;
         let act = &self.acts[step.act as usize];
         let mut next = Situation { state: after, open: from.open.clone(), timed: from.timed };
-        if !self.invariants_hold(&next)? {
+        if !self.goes_on(&mut next)? {
             return Ok(None);
         }
         if !act.durative {
             return Ok(Some(next));
         }
         let gates = self.start_gates(act, &from.state, step)?;
-        if !self.finish(act, step.proposal.as_ref(), span, gates, &mut next.state)?
-            || !self.invariants_hold(&next)?
+        if !self.finish(act, step.proposal.as_ref(), span, &gates, &mut next.state)?
+            || !self.goes_on(&mut next)?
         {
             return Ok(None);
         }
@@ -87,7 +114,7 @@ impl World<'_> {
         let gates = self.start_gates(act, &from.state, step)?;
         let mut next = Situation { state: after, open: from.open.clone(), timed: from.timed };
         next.open.push(Open { act: step.act, proposal: step.proposal.clone(), span, gates });
-        Ok(self.invariants_hold(&next)?.then_some(next))
+        Ok(self.goes_on(&mut next)?.then_some(next))
     }
 
     fn end(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {
@@ -97,10 +124,10 @@ impl World<'_> {
         let open = next.open.remove(position);
         step.span = open.span;
         let act = &self.acts[step.act as usize];
-        if !self.finish(act, open.proposal.as_ref(), open.span, open.gates, &mut next.state)? {
+        if !self.finish(act, open.proposal.as_ref(), open.span, &open.gates, &mut next.state)? {
             return Ok(None);
         }
-        Ok(self.invariants_hold(&next)?.then_some(next))
+        Ok(self.goes_on(&mut next)?.then_some(next))
     }
 
     fn timed(&self, from: &Situation) -> Result<Option<Situation>, Failure> {
@@ -112,7 +139,7 @@ impl World<'_> {
         if !self.apply(&effects, &moment, &|_, _| true, &mut next.state)? {
             return Ok(None);
         }
-        Ok(self.invariants_hold(&next)?.then_some(next))
+        Ok(self.goes_on(&mut next)?.then_some(next))
     }
 
     /// The state after the start, and the durations possible.
@@ -141,18 +168,18 @@ impl World<'_> {
         Ok(self.holds(act.over_all, &inside)?.then_some((after, span)))
     }
 
-    fn start_gates(&self, act: &Act, before: &Values, step: &Step) -> Result<u64, Failure> {
+    fn start_gates(&self, act: &Act, before: &Values, step: &Step) -> Result<Gates, Failure> {
         let moment = Moment {
             state: before,
             duration_s: step.span.least_s,
             proposal: step.proposal.as_ref(),
             level: Level::Exact,
         };
-        let mut gates = u64::MAX;
-        for (index, effect) in act.end_effects.iter().enumerate().take(64) {
-            let Some(when) = &effect.when else { continue };
+        let mut gates = Gates::open(act.end_effects);
+        for (index, effect) in act.end_effects.iter().enumerate() {
+            let Some(when) = effect.when.as_ref().filter(|when| is_remembered(when)) else { continue };
             if !self.holds(&when.at_start, &moment)? {
-                gates &= !(1 << index);
+                gates.close(index);
             }
         }
         Ok(gates)
@@ -164,7 +191,7 @@ impl World<'_> {
         act: &Act,
         proposal: Option<&Arc<str>>,
         span: Span,
-        gates: u64,
+        gates: &Gates,
         state: &mut Values,
     ) -> Result<bool, Failure> {
         let duration_s = span.least_s;
@@ -187,20 +214,31 @@ impl World<'_> {
         for effect in act.end_effects {
             inside.push(effect.when.as_ref().map_or(Ok(true), |when| self.holds(&when.over_all, &moment))?);
         }
-        let gate = |index: usize, _: &Effect| inside[index] && (index >= 64 || gates & (1 << index) != 0);
+        let gate = |index: usize, _: &Effect| inside[index] && gates.is_open(index);
         self.apply(act.end_effects, &moment, &gate, state)
     }
 
-    fn invariants_hold(&self, situation: &Situation) -> Result<bool, Failure> {
-        for open in &situation.open {
+    /// Whether all that is in progress can go on in a state; notes which end effects cannot happen any more.
+    fn goes_on(&self, situation: &mut Situation) -> Result<bool, Failure> {
+        for open in &mut situation.open {
             let moment = Moment {
                 state: &situation.state,
                 duration_s: open.span.least_s,
                 proposal: open.proposal.as_ref(),
                 level: Level::Exact,
             };
-            if !self.holds(self.acts[open.act as usize].over_all, &moment)? {
+            let act = &self.acts[open.act as usize];
+            if !self.holds(act.over_all, &moment)? {
                 return Ok(false);
+            }
+            if open.gates.0.is_empty() {
+                continue;
+            }
+            for (index, effect) in act.end_effects.iter().enumerate() {
+                let Some(when) = effect.when.as_ref().filter(|when| is_remembered(when)) else { continue };
+                if open.gates.is_open(index) && !self.holds(&when.over_all, &moment)? {
+                    open.gates.close(index);
+                }
             }
         }
         Ok(true)

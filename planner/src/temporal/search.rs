@@ -13,7 +13,7 @@ use rustc_hash::FxHashMap;
 use crate::calls::Failure;
 use crate::ground::Values;
 
-use super::advance::{Open, Situation, Step};
+use super::advance::{Gates, Open, Situation, Step};
 use super::estimate::{Estimate, From};
 use super::order::Inconsistent;
 use super::relaxed::{Part, Relaxed};
@@ -107,7 +107,7 @@ pub(crate) struct Counts {
 }
 
 /// An action in progress as a key: action, proposal, bits of its duration, gates of its end.
-type OpenKey = (u32, Option<Arc<str>>, u64, u64);
+type OpenKey = (u32, Option<Arc<str>>, u64, Gates);
 
 /// What is in progress, and how many timed effects have happened.
 type Phase = (Vec<Open>, usize);
@@ -419,7 +419,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         let key = situation
             .open
             .iter()
-            .map(|open| (open.act, open.proposal.clone(), open.span.least_s.to_bits(), open.gates))
+            .map(|open| (open.act, open.proposal.clone(), open.span.least_s.to_bits(), open.gates.clone()))
             .collect();
         let next = self.phases.len() as u32;
         let phase = *self.phase_ids.entry((key, situation.timed)).or_insert(next);

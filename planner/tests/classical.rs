@@ -56,6 +56,8 @@ const SHUTTLE_PROBLEM: &str = "(define (problem p) (:domain shuttle) (:objects a
 fn costs_are_minimised() {
     check(SHUTTLE, SHUTTLE_PROBLEM, Expect::CostAtMost(10.0));
     check(SHUTTLE, SHUTTLE_PROBLEM, Expect::Best(10.0));
+    // Nothing costs less than nothing.
+    check(SHUTTLE, &SHUTTLE_PROBLEM.replace("(and (box-at x c) (box-at y a))", "(at a)"), Expect::Best(0.0));
 }
 
 #[test]

@@ -79,7 +79,7 @@ pub(super) fn assemble(
         .map(|g| g.iter().filter_map(|&a| encoding.fact(a)).collect::<Vec<Fact>>())
         .filter(|g| g.windows(2).any(|pair| pair[0].variable != pair[1].variable))
         .collect();
-    let numbers = numbers(&make);
+    let numbers = initial_numbers(&make);
     let calls = make.calls.into_iter().map(|c| call(c, &encoding)).collect();
     let mut ground = GroundTask {
         variables,
@@ -216,7 +216,8 @@ fn timed(encoding: &Encoding, time_s: f64, deeds: &[Deed]) -> TimedEffect {
     TimedEffect { time_s, outcomes: outcomes.filter(|(plain, _)| *plain).map(|(_, o)| o).collect() }
 }
 
-fn numbers(make: &Instantiate<'_>) -> Vec<f64> {
+/// The numbers at first; NaN where undefined.
+pub(super) fn initial_numbers(make: &Instantiate<'_>) -> Vec<f64> {
     let number = |f: &NumericFluent| {
         make.statics.numbers.get(&(f.function, f.arguments[..].into())).copied().unwrap_or(f64::NAN)
     };

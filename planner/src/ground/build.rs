@@ -6,10 +6,10 @@ use tracing::debug_span;
 use crate::model::relation::Relation;
 use crate::task::{GroundChange, Task};
 
-use super::assemble::assemble;
+use super::assemble::{assemble, initial_numbers};
 use super::atoms::{Atoms, NONE};
 use super::groups::groups;
-use super::instantiate::{Clauses, Deed, Instantiate};
+use super::instantiate::{Clauses, Deed, GroundEffect, Instantiate};
 use super::metric;
 use super::normal::{self, Action_, Change_, Effect_, Formula, Normal, Number, Target};
 use super::obstacles;
@@ -106,7 +106,8 @@ pub fn ground(
         let valued: Vec<u32> = (0..make.atoms.len() as u32)
             .filter(|&atom| functions.contains(&(make.atoms.predicate(atom) as usize)))
             .collect();
-        relevant::prune(&mut raw, &make.comparisons, &make.calls, make.numerics.len(), &costs.read, &valued)
+        let undefined: Vec<bool> = initial_numbers(&make).iter().map(|number| number.is_nan()).collect();
+        relevant::prune(&mut raw, &make.comparisons, &make.calls, &undefined, &costs.read, &valued)
     };
     let mut ground = assemble(task, raw, make, reached, relevant, groups, costs.metric, goal_possible);
     ground.obstacles = found;
@@ -368,6 +369,9 @@ fn raw_actions(
     for effect in &action.start_effects {
         make.effect(effect, false, binding, &action.domains, &mut effects);
     }
+    if never(&effects) {
+        return;
+    }
     flatten(&mut effects, resolve, top);
     let later = match &action.duration {
         None => None,
@@ -405,6 +409,9 @@ fn later(
     for effect in &action.end_effects {
         make.effect(effect, true, binding, &action.domains, &mut end_effects);
     }
+    if never(&end_effects) {
+        return None;
+    }
     flatten(&mut end_effects, resolve, top);
     let flows = action
         .flows
@@ -423,7 +430,15 @@ fn later(
     Some(Later { over_all, end, end_effects, flows, duration })
 }
 
-fn flatten(effects: &mut [super::instantiate::GroundEffect], resolve: &mut Resolve, top: u32) {
+/// Whether effects need a number that never has a value.
+fn never(effects: &[GroundEffect]) -> bool {
+    let undefined = |amount: &Expression| matches!(amount, Expression::Constant(value) if !value.is_finite());
+    let fails =
+        |effect: &GroundEffect| matches!(&effect.deed, Deed::Change(_, _, amount) if undefined(amount));
+    effects.iter().any(|effect| effect.when.is_none() && fails(effect))
+}
+
+fn flatten(effects: &mut [GroundEffect], resolve: &mut Resolve, top: u32) {
     for effect in effects {
         for clauses in effect.when.iter_mut().flat_map(|w| w.iter_mut()) {
             if !clauses.ors.is_empty() {

@@ -2,7 +2,7 @@
 
 use super::instantiate::{Clauses, Deed, GroundEffect, RawCall, RawPlace};
 use super::raw::{RawAction, RawTask};
-use super::task::{Comparison, Expression};
+use super::task::{Change, Comparison, Expression};
 
 /// What matters.
 pub(super) struct Relevant {
@@ -18,6 +18,8 @@ struct Work<'a> {
     relevant: Relevant,
     comparisons: &'a [Comparison],
     calls: &'a [RawCall],
+    /// By numeric fluent: without a value at first.
+    undefined: &'a [bool],
     changed: bool,
 }
 
@@ -38,16 +40,54 @@ pub(super) fn reads(expression: &Expression, fluent: &mut dyn FnMut(u32), call: 
     }
 }
 
+/// Whether an expression may be undefined although all that it reads is defined.
+fn may_fail(expression: &Expression) -> bool {
+    match expression {
+        Expression::Constant(value) => !value.is_finite(),
+        Expression::Sum(parts) | Expression::Product(parts) => parts.iter().any(may_fail),
+        Expression::Difference(left, right) => may_fail(left) || may_fail(right),
+        Expression::Quotient(left, right) => {
+            let safe = matches!(**right, Expression::Constant(value) if value != 0.0);
+            !safe || may_fail(left)
+        }
+        Expression::Negative(inner) => may_fail(inner),
+        Expression::Call(_) => true,
+        _ => false,
+    }
+}
+
 impl Work<'_> {
     fn set(list: &mut [bool], index: u32, changed: &mut bool) {
         *changed |= !std::mem::replace(&mut list[index as usize], true);
     }
 
     fn clauses(&mut self, clauses: &Clauses) {
-        for &literal in &clauses.literals {
+        self.literals(clauses, 0);
+        self.numbers(clauses);
+    }
+
+    /// The body of an axiom whose head is asked for: what makes it true, and what makes it false if the head is to be.
+    fn body(&mut self, body: &Clauses, head: u32) {
+        if self.relevant.wanted[head as usize] {
+            self.literals(body, 0);
+        }
+        if self.relevant.unwanted[head as usize] {
+            self.literals(body, 1);
+        }
+        if self.keeps(&Deed::Add(head)) {
+            self.numbers(body);
+        }
+    }
+
+    /// Literals, or (`flipped` 1) their opposites.
+    fn literals(&mut self, clauses: &Clauses, flipped: u32) {
+        for literal in clauses.literals.iter().map(|literal| literal ^ flipped) {
             let list = if literal & 1 == 0 { &mut self.relevant.wanted } else { &mut self.relevant.unwanted };
             Self::set(list, literal >> 1, &mut self.changed);
         }
+    }
+
+    fn numbers(&mut self, clauses: &Clauses) {
         for &id in &clauses.comparisons {
             let comparison = &self.comparisons[id as usize];
             self.expression(&comparison.left);
@@ -69,11 +109,30 @@ impl Work<'_> {
         }
     }
 
+    /// Whether it may matter that this does not happen.
+    fn harms(&self, deed: &Deed) -> bool {
+        match deed {
+            Deed::Add(a) => self.relevant.unwanted[*a as usize],
+            Deed::Delete(a) => self.relevant.wanted[*a as usize],
+            other => self.keeps(other),
+        }
+    }
+
+    /// Whether a change may find something undefined: then the action cannot be taken, whoever asks for the number.
+    fn is_risky(&self, change: Change, fluent: u32, amount: &Expression) -> bool {
+        let mut undefined = change != Change::Assign && self.undefined[fluent as usize];
+        reads(amount, &mut |id| undefined |= self.undefined[id as usize], &mut |_| {});
+        undefined || change == Change::ScaleDown || may_fail(amount)
+    }
+
     /// Also what only harms must be followed once the action is kept.
     fn keeps(&self, deed: &Deed) -> bool {
         match deed {
             Deed::Add(a) | Deed::Delete(a) => {
                 self.relevant.wanted[*a as usize] || self.relevant.unwanted[*a as usize]
+            }
+            Deed::Change(id, change, amount) => {
+                self.relevant.numerics[*id as usize] || self.is_risky(*change, *id, amount)
             }
             other => self.touches(other),
         }
@@ -85,10 +144,19 @@ impl Work<'_> {
                 continue;
             }
             for clauses in effect.when.iter().flat_map(|w| w.iter()) {
-                self.clauses(clauses);
+                if self.touches(&effect.deed) {
+                    self.clauses(clauses);
+                }
+                if self.harms(&effect.deed) {
+                    self.literals(clauses, 1);
+                    self.numbers(clauses);
+                }
             }
             match &effect.deed {
-                Deed::Change(_, _, amount) => self.expression(amount),
+                Deed::Change(id, _, amount) => {
+                    Self::set(&mut self.relevant.numerics, *id, &mut self.changed);
+                    self.expression(amount);
+                }
                 Deed::Call(id) => {
                     for place in &self.calls[*id as usize].writes {
                         if let RawPlace::Number(number) = place {
@@ -122,14 +190,14 @@ impl Work<'_> {
     }
 }
 
-/// Removes actions that bring nothing about that matters, and effects that nothing asks about. `metric` lists numeric
-/// fluents that the metric depends on beyond the actions' costs; `valued` the atoms of object functions, where giving one
+/// Removes actions that bring nothing about that matters, and effects that nothing asks about. `undefined` says of the
+/// numeric fluents which have no value at first; `metric` lists those that the metric depends on beyond the actions' costs; `valued` the atoms of object functions, where giving one
 /// value takes the others away.
 pub(super) fn prune(
     task: &mut RawTask,
     comparisons: &[Comparison],
     calls: &[RawCall],
-    numerics: usize,
+    undefined: &[bool],
     metric: &[u32],
     valued: &[u32],
 ) -> Relevant {
@@ -137,9 +205,9 @@ pub(super) fn prune(
     let relevant = Relevant {
         wanted: vec![false; count],
         unwanted: vec![false; count],
-        numerics: vec![false; numerics],
+        numerics: vec![false; undefined.len()],
     };
-    let mut work = Work { relevant, comparisons, calls, changed: true };
+    let mut work = Work { relevant, comparisons, calls, undefined, changed: true };
     work.clauses(&task.goal);
     metric.iter().for_each(|&id| work.relevant.numerics[id as usize] = true);
     valued.iter().for_each(|&atom| work.relevant.wanted[atom as usize] = true);
@@ -152,10 +220,7 @@ pub(super) fn prune(
             }
         }
         for axiom in &task.axioms {
-            let head = axiom.head as usize;
-            if work.relevant.wanted[head] || work.relevant.unwanted[head] {
-                work.clauses(&axiom.body);
-            }
+            work.body(&axiom.body, axiom.head);
         }
     }
     let mut index = 0;

@@ -117,6 +117,7 @@ impl Relaxed {
             for e in task.effects.get(op as usize) {
                 need(&task.conditions[e.from as usize..e.to as usize]);
             }
+            task.numbers.changes.get(op as usize).into_iter().flatten().for_each(|c| need(&c.conditions));
         }
         (0..task.axiom_bodies.len()).for_each(|a| need(task.axiom_bodies.get(a)));
         let mut build = Build {

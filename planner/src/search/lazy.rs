@@ -166,6 +166,9 @@ impl<'a, 's> Search<'a, 's> {
 
     /// Searches on as far as is allowed.
     pub(crate) fn run(&mut self, allowed: Allowed) -> End {
+        if self.strategy.bound == 0 {
+            return End::Exhausted;
+        }
         if !std::mem::replace(&mut self.started, true) {
             let task = self.shared.task;
             let (first, _) = self.store.insert(&task.initial, NO_STATE, 0, 0);

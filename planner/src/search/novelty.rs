@@ -143,6 +143,9 @@ impl<'a, 's> Search<'a, 's> {
 
     /// Searches on as far as is allowed.
     pub(crate) fn run(&mut self, allowed: Allowed) -> End {
+        if self.bound == 0 {
+            return End::Exhausted;
+        }
         if !std::mem::replace(&mut self.started, true) && !self.start() {
             return End::Exhausted;
         }

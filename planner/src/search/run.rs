@@ -75,8 +75,16 @@ pub(crate) fn solve(
         stop,
     };
     let bound = options.bound.filter(|_| task.measure.is_sum()).map_or(u32::MAX, |bound| task.scaled(bound));
-    let mut run =
-        Run { task: &task, shared: &shared, options, counts: Counts::default(), bound, best: None, on_plan };
+    let mut run = Run {
+        task: &task,
+        shared: &shared,
+        options,
+        counts: Counts::default(),
+        bound,
+        best: None,
+        plans: 0,
+        on_plan,
+    };
     let end = run.all();
     tracing::debug!(landmarks = landmarks.len(), run.counts.evaluated, run.counts.work);
     ClassicalOutcome { end, evaluated: run.counts.evaluated, expanded: run.counts.expanded }
@@ -157,6 +165,8 @@ struct Run<'a, 's> {
     /// Only cheaper plans (in the search's costs) are of interest.
     bound: u32,
     best: Option<Vec<u32>>,
+    /// Plans taken, each better than the one before.
+    plans: u64,
     on_plan: &'s mut dyn FnMut(&[u32], f64),
 }
 
@@ -250,8 +260,8 @@ impl<'a, 's> Run<'a, 's> {
         search(self.shared, Strategy { evaluation_limit, ..strategy }, &mut self.counts)
     }
 
-    /// Improves a plan for so much work and takes it if it is the best so far.
-    fn improve(&mut self, mut plan: Vec<u32>, work: u64) {
+    /// Improves a plan for so much work and takes it if it is the best so far; tells whether more work would do no more.
+    fn improve(&mut self, mut plan: Vec<u32>, work: u64) -> bool {
         let mut improve = Improve::new(self.task, self.shared.successors, self.shared.stop);
         improve.evaluation_limit =
             self.options.evaluation_limit.unwrap_or(u64::MAX).saturating_sub(self.counts.evaluated);
@@ -259,7 +269,7 @@ impl<'a, 's> Run<'a, 's> {
         if anytime {
             self.take(&plan);
         }
-        improve.run(&mut plan, work, &mut |better| {
+        let settled = improve.run(&mut plan, work, &mut |better| {
             if anytime {
                 self.take(better);
             }
@@ -267,6 +277,7 @@ impl<'a, 's> Run<'a, 's> {
         self.counts.evaluated += improve.evaluated;
         self.counts.work += improve.work();
         self.take(&plan);
+        settled
     }
 
     fn take(&mut self, plan: &[u32]) {
@@ -280,14 +291,19 @@ impl<'a, 's> Run<'a, 's> {
                 self.bound = self.bound.min(self.task.search_cost(plan));
             }
             self.best = Some(plan.to_vec());
+            self.plans += 1;
             (self.on_plan)(plan, cost);
         }
     }
 
     /// Searches with falling weights for plans below the bound, each improved, until there is none.
+    ///
+    /// Where the metric is no sum over the operators, no bound keeps a search from the plan that it found before: once all
+    /// of them end so, there is nothing left to try.
     fn anytime(&mut self) -> ClassicalEnd {
         let mut work_limit = FIRST_WORK * 4;
         let mut turn = 0usize;
+        let mut again = 0;
         loop {
             let weight = WEIGHTS[turn % WEIGHTS.len()];
             let strategy = Strategy {
@@ -304,9 +320,14 @@ impl<'a, 's> Run<'a, 's> {
             };
             match self.search(strategy) {
                 End::Plan(plan) => {
-                    self.improve(plan, work_limit);
+                    let plans = self.plans;
+                    let settled = self.improve(plan, work_limit);
                     if self.task.measure.is_sum() {
                         continue;
+                    }
+                    again = if settled && self.plans == plans { again + 1 } else { 0 };
+                    if again == 2 * WEIGHTS.len() {
+                        return ClassicalEnd::Done;
                     }
                 }
                 End::Exhausted if !strategy.lookahead && self.task.has_exact_costs() => {
@@ -317,7 +338,7 @@ impl<'a, 's> Run<'a, 's> {
                 End::Memory if turn > WEIGHTS.len() => return ClassicalEnd::Memory,
                 End::Limit if self.limited() => return ClassicalEnd::Stopped,
                 // A lookahead search keeps the first way to a state: it cannot prove that no cheaper plan exists.
-                End::Memory | End::Limit | End::Exhausted => {}
+                End::Memory | End::Limit | End::Exhausted => again = 0,
             }
             turn += 1;
             if turn.is_multiple_of(WEIGHTS.len()) {

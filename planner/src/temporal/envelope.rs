@@ -51,7 +51,9 @@ pub(crate) fn in_one_go_suffices(world: &World) -> bool {
     world.ground.timed.is_empty()
         && durative.all(|(index, act)| {
             let kept = |variable: u32| {
-                written[variable as usize].is_empty() || alone[variable as usize] == Some(index as u32)
+                let writers = &written[variable as usize];
+                let derived = world.ground.variables[variable as usize].stratum.is_some();
+                !derived && (writers.is_empty() || alone[variable as usize] == Some(index as u32))
             };
             starts_late(world, kept, act) || ends_early(&locked, act)
         })

@@ -268,7 +268,7 @@ impl Run<'_, '_, '_> {
         let least = IMPROVEMENT_WORK / (self.space.world.acts.len() as u64).max(1);
         let shares = 1 + self.best.as_ref().map_or(0, |best| best.steps.len()) as u64 / STEPS_PER_SHARE;
         let budget = match self.limits.anytime {
-            true => u64::MAX,
+            true => self.limits.evaluations,
             false => before + (shares * least.clamp(100, 10_000)).max(IMPROVEMENT_FACTOR * spent),
         };
         self.progress.reason = Reason::Enough;

@@ -158,7 +158,7 @@ impl Relaxed {
             let act_index = index as u32;
             let seconds = seconds_of(world, index);
             if let Some(&(open, closed)) = relaxed.tokens.get(&act_index) {
-                let before = needs_at_start(act, act.start_effects);
+                let before = needs_at_start(world, act);
                 relaxed.operator(
                     world,
                     act_index,
@@ -172,7 +172,7 @@ impl Relaxed {
                 relaxed.operator(world, act_index, Part::End, &before, &[open], seconds);
                 relaxed.give(act_index, Part::End, closed);
             } else {
-                let before = needs_of_whole(act);
+                let before = needs_of_whole(world, act);
                 relaxed.operator(world, act_index, Part::Whole, &before, &[], seconds);
             }
         }
@@ -531,23 +531,39 @@ impl Merged {
     }
 }
 
-fn needs_at_start(act: &Act, given: &[Effect]) -> Merged {
-    let given = |fact: &Fact| given.iter().any(|effect| effect.outcome == Outcome::Set(*fact));
+/// Whether the start of an action may itself bring a fact about that is asked for after it.
+fn may_give(world: &World, act: &Act, fact: &Fact) -> bool {
+    let derived = world.ground.variables[fact.variable as usize].stratum.is_some();
+    let gives = |effect: &Effect| effect.outcome == Outcome::Set(*fact);
+    derived && !act.start_effects.is_empty() || act.start_effects.iter().any(gives)
+}
+
+/// Whether the start of an action changes something that a call reads.
+fn may_turn(world: &World, act: &Act, call: CallId) -> bool {
+    let (mut read, mut written) = (Touched::default(), Touched::default());
+    read.call(world, call);
+    act.start_effects
+        .iter()
+        .chain(act.flow_effects)
+        .for_each(|effect| written.outcome(world, &effect.outcome));
+    written.meets(&read)
+}
+
+fn needs_at_start(world: &World, act: &Act) -> Merged {
     let mut merged = Merged::of(&[act.at_start]);
-    merged.facts.extend(act.over_all.facts.iter().filter(|fact| !given(fact)));
+    merged.facts.extend(act.over_all.facts.iter().filter(|fact| !may_give(world, act, fact)));
     merged.facts.sort_unstable();
     merged.facts.dedup();
     merged
 }
 
-fn needs_of_whole(act: &Act) -> Merged {
-    let mut merged = needs_at_start(act, act.start_effects);
-    let given = |fact: &Fact| act.start_effects.iter().any(|effect| effect.outcome == Outcome::Set(*fact));
-    merged.facts.extend(act.at_end.facts.iter().filter(|fact| !given(fact)));
+fn needs_of_whole(world: &World, act: &Act) -> Merged {
+    let mut merged = needs_at_start(world, act);
+    merged.facts.extend(act.at_end.facts.iter().filter(|fact| !may_give(world, act, fact)));
     merged.facts.sort_unstable();
     merged.facts.dedup();
-    merged.calls.extend(&act.over_all.calls);
-    merged.calls.extend(&act.at_end.calls);
+    let calls = act.over_all.calls.iter().chain(&act.at_end.calls);
+    merged.calls.extend(calls.filter(|(call, _)| !may_turn(world, act, *call)));
     merged
 }
 

@@ -146,6 +146,8 @@ struct Times {
     mark: u64,
     /// Whether a timed effect happens before the end that has not been taken in yet.
     due: bool,
+    /// Whether one was taken in that comes after the end of the plan.
+    late: bool,
     /// By resource, when it is free.
     ready_s: Option<Vec<f64>>,
 }
@@ -293,18 +295,18 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         }
         let latest_s = track.latest_open_s();
         let exact = self.manner.exact.then(|| track.mark(self.space));
-        let mut due = false;
+        let (mut due, mut late) = (false, false);
         if open {
             track.close(self.space)?;
         } else {
-            due = track.next_timed_s(self.space).is_some_and(|time_s| time_s <= track.order.makespan_s());
+            (due, late) = track.timed_at_end(self.space);
             // What is given from outside comes later in every continuation: it must not be too early already.
             track.clone().pass_timed(self.space)?;
         }
         let makespan_s = track.order.makespan_s();
         let slack_s = latest_s.map_or(0.0, |start_s| makespan_s - start_s);
         let mark = exact.unwrap_or_else(|| u64::from((slack_s as f32).to_bits()));
-        Ok(Times { makespan_s, mark, due, ready_s: self.manner.timed.then(|| track.order.ready_s()) })
+        Ok(Times { makespan_s, mark, due, late, ready_s: self.manner.timed.then(|| track.order.ready_s()) })
     }
 
     /// Takes a situation in: forgets it if it is known or too dear, else evaluates and expands it.
@@ -337,7 +339,11 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             self.costs[node as usize] = costs;
         }
         if !times.due && self.space.world.is_goal(&situation)? {
-            return Ok(Some(End::Found(self.path(node))));
+            if !times.late {
+                return Ok(Some(End::Found(self.path(node))));
+            }
+            // Something that nobody needs might only have to last until then.
+            self.lossy = true;
         }
         self.expand(node, &situation, times.ready_s.as_deref())?;
         Ok(None)

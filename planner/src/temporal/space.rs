@@ -8,6 +8,7 @@ use rustc_hash::FxHasher;
 use crate::attachment::Level;
 use crate::calls::Failure;
 use crate::ground::{Expression, Values};
+use crate::validate::SEPARATION_S;
 
 use super::advance::{Accesses, Situation, Step};
 use super::order::{Clock, Inconsistent, Order};
@@ -173,6 +174,9 @@ impl<'w, 'a> Space<'w, 'a> {
     /// The same of a whole plan: `None` also if the goal is not fulfilled after it.
     pub fn replay_to_goal(&self, steps: &mut [Step]) -> Result<Option<(f64, Base)>, Failure> {
         let Some((measured, base)) = self.replay(steps)? else { return Ok(None) };
+        if self.tight && base.track.timed_at_end(self) != (false, false) {
+            return Ok(None);
+        }
         Ok(self.world.is_goal(&base.situation)?.then_some((measured, base)))
     }
 }
@@ -303,9 +307,12 @@ impl Track {
         Ok(())
     }
 
-    /// When the next timed effect happens that is not on the track yet.
-    pub fn next_timed_s(&self, space: &Space) -> Option<f64> {
-        space.world.ground.timed.get(self.timed).map(|timed| timed.time_s)
+    /// Whether the next timed effect happens before the end of the plan, and whether the last one happens after it.
+    pub fn timed_at_end(&self, space: &Space) -> (bool, bool) {
+        let timed = &space.world.ground.timed;
+        let end_s = self.order.makespan_s() + SEPARATION_S;
+        let due = timed.get(self.timed).is_some_and(|next| next.time_s < end_s);
+        (due, timed[..self.timed].last().is_some_and(|last| last.time_s >= end_s))
     }
 
     /// Lets every timed effect that is left happen.

@@ -1,0 +1,213 @@
+//! Planner, validator and monitor beside a second, plain account of what PDDL means, on random small tasks.
+
+#[path = "differential/generate.rs"]
+mod generate;
+#[path = "differential/oracle.rs"]
+mod oracle;
+#[path = "differential/task.rs"]
+mod task;
+
+use descry_planner::{Attachments, Options, Outcome, Plan, Source, Step, Task, monitor, plan, validate};
+
+use generate::{Chance, Kind};
+use oracle::{Found, Oracle};
+
+/// States that the plain searches look at, at most.
+const MOST_STATES: usize = 1_500;
+/// States that the planner evaluates, at most.
+const MOST_EVALUATED: u64 = 400;
+
+/// What came of the tasks that were compared.
+#[derive(Debug, Default)]
+struct Tally {
+    tasks: u64,
+    solved: u64,
+    unsolvable: u64,
+    undecided: u64,
+    plans_compared: u64,
+    valid: u64,
+    disagreements: Vec<String>,
+}
+
+struct Compared<'c> {
+    task: &'c task::Task,
+    read: &'c Task,
+    oracle: Oracle<'c>,
+    tally: &'c mut Tally,
+}
+
+impl Compared<'_> {
+    fn disagree(&mut self, what: &str, detail: String) {
+        let (domain, problem) = (self.task.domain(), self.task.problem());
+        self.tally.disagreements.push(format!("{what}\n{detail}\n{domain}\n{problem}"));
+    }
+
+    fn to_plan(&self, steps: &[oracle::Step], timed: bool) -> Plan {
+        let steps = steps.iter().map(|step| Step {
+            start_s: timed.then_some(step.start_s),
+            action: format!("a{}", step.action),
+            arguments: step.arguments.iter().map(|object| format!("o{object}")).collect(),
+            duration_s: step.duration_s,
+        });
+        Plan { steps: steps.collect(), cost: None }
+    }
+
+    /// Whether validator and monitor say of a plan what the plain account says.
+    fn compare_plan(&mut self, steps: &[oracle::Step], timed: bool) {
+        let plan = self.to_plan(steps, timed);
+        let last = self.oracle.replay(steps, timed).filter(|state| self.oracle.is_goal(state));
+        let verdict = validate(self.read, &Attachments::new(), &plan);
+        let monitored = monitor(self.read, &Attachments::new(), &plan).is_ok();
+        self.tally.plans_compared += 1;
+        self.tally.valid += u64::from(last.is_some());
+        if verdict.valid != last.is_some() || monitored != verdict.valid {
+            let said = format!("plain {}, validator {verdict:?}, monitor {monitored}", last.is_some());
+            self.disagree("validity", format!("{said}\n{plan}"));
+        } else if let Some(state) = last {
+            let metric = self.oracle.metric(&state);
+            if self.task.metric.is_some() && !same(metric, verdict.metric) {
+                self.disagree("metric", format!("{metric:?} {:?}\n{plan}", verdict.metric));
+            }
+        }
+    }
+
+    fn whole(&mut self, chance: &mut Chance) {
+        let timed = self.task.is_temporal();
+        let anytime = chance.percent(20);
+        let options =
+            Options { anytime, evaluation_limit: Some(MOST_EVALUATED), seed: 1, ..Options::default() };
+        let outcome = plan(self.read, &Attachments::new(), &options, &|| false, &mut |_| {});
+        let outcome = match outcome {
+            Ok(outcome) => outcome,
+            Err(error) => return self.disagree("error", error.to_string()),
+        };
+        let found =
+            if timed { self.oracle.search_timed(MOST_STATES) } else { self.oracle.search(MOST_STATES) };
+        self.solvability(&outcome, &found);
+        let mut known = Vec::new();
+        if let Some(plan) = outcome.plan() {
+            let steps = from_plan(plan);
+            let timed = plan.steps.iter().all(|step| step.start_s.is_some());
+            self.compare_plan(&steps, timed);
+            let best = matches!(&found, Found::Plan(best) if !timed && best.len() < steps.len());
+            if best && outcome.statistics().optimal && self.task.metric.is_none() {
+                self.disagree("optimality", format!("{found:?}\n{plan}"));
+            }
+            known = steps;
+        }
+        if let Found::Plan(steps) = &found {
+            self.compare_plan(steps, timed);
+            known = steps.clone();
+        }
+        for _ in 0..3 {
+            let steps = self.mutated(&known, timed, chance);
+            self.compare_plan(&steps, timed);
+        }
+    }
+
+    fn solvability(&mut self, outcome: &Outcome, found: &Found) {
+        match (outcome, found) {
+            (Outcome::Unsolvable { .. }, Found::Plan(steps)) => {
+                self.disagree("called unsolvable", format!("{steps:?}"));
+            }
+            (outcome, Found::Nothing) if outcome.plan().is_some() => {
+                self.disagree("called solvable", format!("{:?}", outcome.plan()));
+            }
+            (Outcome::Unsolvable { .. }, _) => self.tally.unsolvable += 1,
+            (outcome, _) if outcome.plan().is_some() => self.tally.solved += 1,
+            _ => self.tally.undecided += 1,
+        }
+    }
+
+    /// A plan with some steps taken out, put in or moved.
+    fn mutated(&self, known: &[oracle::Step], timed: bool, chance: &mut Chance) -> Vec<oracle::Step> {
+        let mut steps = known.to_vec();
+        for _ in 0..1 + chance.below(2) {
+            if !steps.is_empty() && chance.percent(40) {
+                steps.remove(chance.below(steps.len()));
+            } else if !self.oracle.instances.is_empty() {
+                let (action, arguments) =
+                    self.oracle.instances[chance.below(self.oracle.instances.len())].clone();
+                let duration_s = chance.of(&self.oracle.durations(action));
+                let at = chance.below(steps.len() + 1);
+                steps.insert(at, oracle::Step { start_s: 0.0, action, arguments, duration_s });
+            }
+        }
+        // No two happenings at one time: what may happen together is the validator's own question.
+        for (index, step) in steps.iter_mut().enumerate().take(9) {
+            let slot = if chance.percent(50) { step.start_s.floor() } else { chance.below(6) as f64 };
+            step.start_s = if timed {
+                slot + 0.1 * chance.below(10) as f64 + 0.01 * (index + 1) as f64
+            } else {
+                index as f64
+            };
+        }
+        steps.truncate(9);
+        steps.sort_by(|one, other| one.start_s.total_cmp(&other.start_s));
+        steps
+    }
+}
+
+fn same(one: Option<f64>, other: Option<f64>) -> bool {
+    match (one, other) {
+        (Some(one), Some(other)) => (one - other).abs() < 1e-6,
+        (one, other) => one.is_none() && other.is_none(),
+    }
+}
+
+fn from_plan(plan: &Plan) -> Vec<oracle::Step> {
+    let number = |name: &str| name[1..].parse().unwrap_or_else(|_| panic!("{name} is not ours"));
+    let step = |(index, step): (usize, &Step)| oracle::Step {
+        start_s: step.start_s.unwrap_or(index as f64),
+        action: number(&step.action),
+        arguments: step.arguments.iter().map(|name| number(name)).collect(),
+        duration_s: step.duration_s,
+    };
+    plan.steps.iter().enumerate().map(step).collect()
+}
+
+fn compare(seed: u64, tally: &mut Tally) {
+    let mut chance = Chance(seed);
+    let kind = chance.of(&[Kind::Classical, Kind::Numeric, Kind::Temporal]);
+    eprintln!("seed {seed}");
+    if std::env::var("SHOW").is_ok() {
+        let m = generate::task(&mut Chance(chance.0), kind);
+        eprintln!("{}\n{}", m.domain(), m.problem());
+    }
+    let made = generate::task(&mut chance, kind);
+    let (domain, problem) = (Source::new("domain", made.domain()), Source::new("problem", made.problem()));
+    let read = Task::read(&domain, &problem).unwrap_or_else(|findings| panic!("{seed}: {findings}"));
+    tally.tasks += 1;
+    let known = tally.disagreements.len();
+    Compared { task: &made, read: &read, oracle: Oracle::new(&made), tally }.whole(&mut chance);
+    for text in &mut tally.disagreements[known..] {
+        text.insert_str(0, &format!("task {seed}: "));
+    }
+}
+
+fn compare_all(seeds: std::ops::Range<u64>) {
+    let mut tally = Tally::default();
+    for seed in seeds {
+        compare(seed, &mut tally);
+        assert!(tally.disagreements.len() < 20, "{}", tally.disagreements.join("\n\n"));
+    }
+    assert!(tally.disagreements.is_empty(), "{tally:?}\n{}", tally.disagreements.join("\n\n"));
+    println!("{tally:?}");
+    assert!(
+        tally.solved > tally.tasks / 4
+            && tally.unsolvable > tally.tasks / 20
+            && tally.valid > tally.tasks / 4
+    );
+}
+
+#[test]
+fn random_tasks_mean_the_same_to_all() {
+    let from: u64 = std::env::var("FROM").ok().and_then(|f| f.parse().ok()).unwrap_or(0);
+    compare_all(from..from + 1_000);
+}
+
+#[test]
+#[ignore = "a hundred thousand tasks: minutes"]
+fn a_hundred_thousand_random_tasks_mean_the_same_to_all() {
+    compare_all(1_000..101_000);
+}

@@ -1,0 +1,299 @@
+//! Random small tasks.
+
+use crate::task::{Action, Change, Effect, Formula, Named, Number, Rule, Task, Term};
+
+/// Numbers by chance (splitmix64; Steele, Lea and Flood 2014).
+pub struct Chance(pub u64);
+
+impl Chance {
+    pub fn below(&mut self, limit: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((bits ^ (bits >> 31)) % limit as u64) as usize
+    }
+
+    pub fn percent(&mut self, percent: usize) -> bool {
+        self.below(100) < percent
+    }
+
+    pub fn of<T: Copy>(&mut self, list: &[T]) -> T {
+        list[self.below(list.len())]
+    }
+}
+
+/// What a task is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    Classical,
+    Numeric,
+    Temporal,
+}
+
+struct Maker<'c> {
+    chance: &'c mut Chance,
+    task: Task,
+    kind: Kind,
+    /// Types of the variables in scope, by number; those that were left are `usize::MAX`.
+    scope: Vec<usize>,
+    /// Predicates from here on may not be mentioned.
+    limit: usize,
+}
+
+/// A random task.
+pub fn task(chance: &mut Chance, kind: Kind) -> Task {
+    let objects = 1 + chance.below(3);
+    let mut predicates = vec![vec![], vec![], vec![0], vec![chance.below(2)]];
+    if chance.percent(40) {
+        predicates.push(vec![0, chance.below(2)]);
+    }
+    let derived = predicates.len();
+    for _ in 0..[0, 0, 0, 1, 2][chance.below(5)] {
+        predicates.push(if chance.percent(50) { vec![] } else { vec![0] });
+    }
+    let functions = match kind {
+        Kind::Numeric => vec![vec![], vec![0]],
+        Kind::Temporal if chance.percent(40) => vec![vec![], vec![0]],
+        _ => vec![],
+    };
+    let task = Task {
+        objects,
+        special: chance.below(objects + 1),
+        predicates,
+        derived,
+        functions,
+        rules: Vec::new(),
+        actions: Vec::new(),
+        facts: Vec::new(),
+        numbers: Vec::new(),
+        timed: Vec::new(),
+        goal: Formula::And(Vec::new()),
+        metric: None,
+    };
+    let mut maker = Maker { chance, task, kind, scope: Vec::new(), limit: 0 };
+    maker.fill();
+    maker.task
+}
+
+impl Maker<'_> {
+    fn fill(&mut self) {
+        self.rules();
+        self.limit = self.task.predicates.len();
+        for _ in 0..2 + self.chance.below(3) {
+            let action = self.action();
+            self.task.actions.push(action);
+        }
+        self.initial();
+        self.scope.clear();
+        self.task.goal = self.formula(2);
+        if !self.task.functions.is_empty() && self.chance.percent(30) {
+            self.task.metric = Some(Number::Fluent(Named { index: 0, terms: Vec::new() }));
+        }
+    }
+
+    /// Rules may use their own predicate, and the negation of those before it.
+    fn rules(&mut self) {
+        for predicate in self.task.derived..self.task.predicates.len() {
+            for _ in 0..1 + self.chance.below(2) {
+                self.scope = self.task.predicates[predicate].clone();
+                self.limit = predicate;
+                let mut body = self.formula(1);
+                if self.chance.percent(50) {
+                    let own = self.named(predicate, &self.task.predicates[predicate].clone());
+                    body = Formula::And(vec![body, self.atom_of_basic(), Formula::Atom(own)]);
+                }
+                self.task.rules.push(Rule { predicate, body });
+            }
+        }
+    }
+
+    fn atom_of_basic(&mut self) -> Formula {
+        let index = self.chance.below(self.task.derived);
+        let kinds = self.task.predicates[index].clone();
+        Formula::Atom(self.named(index, &kinds))
+    }
+
+    fn action(&mut self) -> Action {
+        let parameters: Vec<usize> = (0..self.chance.below(3)).map(|_| self.chance.below(2)).collect();
+        self.scope = parameters.clone();
+        let durative = self.kind == Kind::Temporal && self.chance.percent(80);
+        let duration = durative.then(|| self.duration());
+        let mut condition = [None, None, None];
+        condition[0] = self.chance.percent(75).then(|| self.formula(2));
+        if durative {
+            for part in &mut condition[1..] {
+                *part = self.chance.percent(30).then(|| self.formula(1));
+            }
+        }
+        let effects = (0..1 + self.chance.below(3)).map(|_| self.effect(durative)).collect();
+        Action { parameters, duration, condition, effects }
+    }
+
+    fn duration(&mut self) -> [Number; 2] {
+        let least = 1 + self.chance.below(3);
+        let most = if self.chance.percent(25) { least + 1 + self.chance.below(2) } else { least };
+        [least, most].map(|seconds| Number::Constant(seconds as f64))
+    }
+
+    fn effect(&mut self, durative: bool) -> Effect {
+        let before = self.scope.len();
+        let forall = self.chance.percent(20).then(|| {
+            let of = self.chance.below(2);
+            self.scope.push(of);
+            (before, of)
+        });
+        let at_end = durative && self.chance.percent(60);
+        let mut when = [None, None, None];
+        if self.chance.percent(30) {
+            let first = if at_end { self.chance.below(3) } else { 0 };
+            when[first] = Some(self.formula(1));
+            if at_end && self.chance.percent(30) {
+                when[2] = Some(self.formula(1));
+            }
+        }
+        let change = if !self.task.functions.is_empty() && self.chance.percent(45) {
+            self.numeric_change(durative)
+        } else {
+            let index = self.chance.below(self.task.derived);
+            let kinds = self.task.predicates[index].clone();
+            let atom = self.named(index, &kinds);
+            if self.chance.percent(60) { Change::Add(atom) } else { Change::Delete(atom) }
+        };
+        self.scope.truncate(before);
+        Effect { forall, when, at_end, change }
+    }
+
+    fn numeric_change(&mut self, durative: bool) -> Change {
+        let index = self.chance.below(self.task.functions.len());
+        let kinds = self.task.functions[index].clone();
+        let how = self.chance.of(&["increase", "increase", "decrease", "assign", "scale-up"]);
+        // What is assigned must not depend on the order of effects: constants of one value.
+        let amount = match how {
+            "assign" => Number::Constant(1.0),
+            "scale-up" => Number::Constant(2.0),
+            _ if durative && self.chance.percent(20) => Number::Duration,
+            _ if self.chance.percent(70) => Number::Constant(self.chance.of(&[1.0, 2.0, 0.1])),
+            _ => self.number(1),
+        };
+        Change::Number(how, self.named(index, &kinds), amount)
+    }
+
+    fn initial(&mut self) {
+        for predicate in 0..self.task.derived {
+            for arguments in tuples(&self.task, &self.task.predicates[predicate].clone()) {
+                if self.chance.percent(35) {
+                    self.task.facts.push((predicate, arguments));
+                }
+            }
+        }
+        for function in 0..self.task.functions.len() {
+            for arguments in tuples(&self.task, &self.task.functions[function].clone()) {
+                if self.chance.percent(85) {
+                    let value = self.chance.of(&[0.0, 0.0, 1.0, 2.0, 0.3]);
+                    self.task.numbers.push((function, arguments, value));
+                }
+            }
+        }
+        if self.kind != Kind::Temporal {
+            return;
+        }
+        for index in 0..[0, 0, 0, 1, 2][self.chance.below(5)] {
+            let predicate = self.chance.below(self.task.derived);
+            let all = tuples(&self.task, &self.task.predicates[predicate].clone());
+            if all.is_empty() {
+                continue;
+            }
+            let arguments = all[self.chance.below(all.len())].clone();
+            let time_s = (1 + self.chance.below(6)) as f64 + 0.005 * (1 + index) as f64;
+            self.task.timed.push((time_s, predicate, arguments, self.chance.percent(50)));
+        }
+    }
+
+    /// Arguments that fit as far as there are any; else the nullary predicate or function 0.
+    fn named(&mut self, index: usize, kinds: &[usize]) -> Named {
+        let mut terms = Vec::with_capacity(kinds.len());
+        for &kind in kinds {
+            let mut choices: Vec<Term> = self.task.of(kind).map(Term::Object).collect();
+            for (variable, &own) in self.scope.iter().enumerate() {
+                if own != usize::MAX && (kind == 0 || own == 1) {
+                    choices.extend([Term::Variable(variable); 3]);
+                }
+            }
+            if choices.is_empty() {
+                return Named { index: 0, terms: Vec::new() };
+            }
+            terms.push(self.chance.of(&choices));
+        }
+        Named { index, terms }
+    }
+
+    fn formula(&mut self, depth: usize) -> Formula {
+        if depth == 0 || self.chance.percent(35) {
+            return self.leaf();
+        }
+        match self.chance.below(10) {
+            0..=3 => Formula::And((0..1 + self.chance.below(3)).map(|_| self.formula(depth - 1)).collect()),
+            4..=5 => Formula::Or((0..1 + self.chance.below(3)).map(|_| self.formula(depth - 1)).collect()),
+            6 => Formula::Not(Box::new(self.formula(depth - 1))),
+            7 => Formula::Imply(Box::new([self.formula(depth - 1), self.formula(depth - 1)])),
+            _ => {
+                let (variable, of) = (self.scope.len(), self.chance.below(2));
+                self.scope.push(of);
+                let body = Box::new(self.formula(depth - 1));
+                self.scope[variable] = usize::MAX;
+                let all = self.chance.percent(50);
+                Formula::Quantified { all, variable, of, body }
+            }
+        }
+    }
+
+    fn leaf(&mut self) -> Formula {
+        let chosen = self.chance.below(100);
+        let objects: Vec<Term> = (0..self.scope.len())
+            .filter(|&variable| self.scope[variable] != usize::MAX)
+            .map(Term::Variable)
+            .chain((0..self.task.objects).map(Term::Object))
+            .collect();
+        let leaf = match chosen {
+            0..=7 => Formula::Same(self.chance.of(&objects), self.chance.of(&objects)),
+            8..=40 if !self.task.functions.is_empty() => {
+                let relation = self.chance.of(&["<", "<=", "=", ">=", ">"]);
+                Formula::Compare(relation, self.number(1), self.number(0))
+            }
+            _ => {
+                let index = self.chance.below(self.limit.max(self.task.derived));
+                let kinds = self.task.predicates[index].clone();
+                Formula::Atom(self.named(index, &kinds))
+            }
+        };
+        if self.chance.percent(30) { Formula::Not(Box::new(leaf)) } else { leaf }
+    }
+
+    fn number(&mut self, depth: usize) -> Number {
+        if depth > 0 && self.chance.percent(35) {
+            let operator = self.chance.of(&['+', '-', '*', '/', '+']);
+            return Number::Binary(operator, Box::new([self.number(depth - 1), self.number(depth - 1)]));
+        }
+        match self.chance.below(20) {
+            0..=7 => Number::Constant(self.chance.of(&[0.0, 1.0, 2.0, 3.0, 0.3])),
+            8 => Number::Negative(Box::new(Number::Constant(1.0))),
+            _ => {
+                let index = self.chance.below(self.task.functions.len());
+                let kinds = self.task.functions[index].clone();
+                Number::Fluent(self.named(index, &kinds))
+            }
+        }
+    }
+}
+
+/// All arguments of these types.
+pub fn tuples(task: &Task, kinds: &[usize]) -> Vec<Vec<usize>> {
+    kinds.iter().fold(vec![Vec::new()], |all, &kind| {
+        let longer = |tuple: &Vec<usize>| {
+            let tuple = tuple.clone();
+            task.of(kind).map(move |object| tuple.iter().copied().chain([object]).collect())
+        };
+        all.iter().flat_map(longer).collect()
+    })
+}

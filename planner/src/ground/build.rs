@@ -81,7 +81,8 @@ pub fn ground(
     let reached = relaxed::prune(&mut raw, &make.calls);
     let keep = !task.modules.is_empty() || !task.preferences.is_empty() || !task.constraints.is_empty();
     let signed = expression.map(|e| (task.metric.as_ref().is_none_or(|m| m.minimise), e));
-    let costs = metric::costs(&raw, &make.comparisons, make.numerics.len(), signed, keep);
+    let undefined: Vec<bool> = initial_numbers(&make).iter().map(|number| number.is_nan()).collect();
+    let costs = metric::costs(&raw, &make.comparisons, &undefined, signed, keep);
     for action in &mut raw.actions {
         action.cost = costs.of(action);
     }
@@ -106,7 +107,6 @@ pub fn ground(
         let valued: Vec<u32> = (0..make.atoms.len() as u32)
             .filter(|&atom| functions.contains(&(make.atoms.predicate(atom) as usize)))
             .collect();
-        let undefined: Vec<bool> = initial_numbers(&make).iter().map(|number| number.is_nan()).collect();
         relevant::prune(&mut raw, &make.comparisons, &make.calls, &undefined, &costs.read, &valued)
     };
     let mut ground = assemble(task, raw, make, reached, relevant, groups, costs.metric, goal_possible);

@@ -2,7 +2,7 @@
 
 use super::instantiate::Deed;
 use super::raw::{RawAction, RawTask};
-use super::relevant::reads;
+use super::relevant::{is_risky, reads};
 use super::task::{Change, Comparison, Expression, Metric};
 
 /// How the metric is made up.
@@ -47,9 +47,10 @@ fn linear(expression: &Expression, factor: f64, weights: &mut [f64], time: &mut 
     }
 }
 
-/// Numeric fluents that something besides the metric reads, or that are not only increased without condition.
-fn not_just_costs(task: &RawTask, comparisons: &[Comparison], count: usize) -> Vec<bool> {
-    let mut read = vec![false; count];
+/// Numeric fluents that something besides the metric reads, or that are not only increased without condition by amounts
+/// that are always defined.
+fn not_just_costs(task: &RawTask, comparisons: &[Comparison], undefined: &[bool]) -> Vec<bool> {
+    let mut read = vec![false; undefined.len()];
     let mark = |expression: &Expression, read: &mut Vec<bool>| {
         reads(expression, &mut |id| read[id as usize] = true, &mut |_| {});
     };
@@ -63,7 +64,8 @@ fn not_just_costs(task: &RawTask, comparisons: &[Comparison], count: usize) -> V
             if let Deed::Change(id, change, amount) = &effect.deed {
                 mark(amount, &mut read);
                 let adds = matches!(change, Change::Increase | Change::Decrease);
-                read[*id as usize] |= !adds || effect.when.is_some();
+                read[*id as usize] |=
+                    !adds || effect.when.is_some() || is_risky(*change, *id, amount, undefined);
             }
         }
         if let Some(later) = later {
@@ -88,11 +90,12 @@ fn not_just_costs(task: &RawTask, comparisons: &[Comparison], count: usize) -> V
 pub(super) fn costs(
     task: &RawTask,
     comparisons: &[Comparison],
-    count: usize,
+    undefined: &[bool],
     metric: Option<(bool, Expression)>,
     keep: bool,
 ) -> Costs {
-    let read = not_just_costs(task, comparisons, count);
+    let count = undefined.len();
+    let read = not_just_costs(task, comparisons, undefined);
     let mut weights = vec![0.0; count];
     let mut time_weight = 0.0;
     let Some((minimise, expression)) = metric else {

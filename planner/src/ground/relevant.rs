@@ -40,6 +40,14 @@ pub(super) fn reads(expression: &Expression, fluent: &mut dyn FnMut(u32), call: 
     }
 }
 
+/// Whether a change may find something undefined: then the action cannot be taken, whoever asks for the number.
+/// `undefined` says of the numeric fluents which have no value at first.
+pub(super) fn is_risky(change: Change, fluent: u32, amount: &Expression, undefined: &[bool]) -> bool {
+    let mut risky = change == Change::ScaleDown || change != Change::Assign && undefined[fluent as usize];
+    reads(amount, &mut |id| risky |= undefined[id as usize], &mut |_| {});
+    risky || may_fail(amount)
+}
+
 /// Whether an expression may be undefined although all that it reads is defined.
 fn may_fail(expression: &Expression) -> bool {
     match expression {
@@ -118,13 +126,6 @@ impl Work<'_> {
         }
     }
 
-    /// Whether a change may find something undefined: then the action cannot be taken, whoever asks for the number.
-    fn is_risky(&self, change: Change, fluent: u32, amount: &Expression) -> bool {
-        let mut undefined = change != Change::Assign && self.undefined[fluent as usize];
-        reads(amount, &mut |id| undefined |= self.undefined[id as usize], &mut |_| {});
-        undefined || change == Change::ScaleDown || may_fail(amount)
-    }
-
     /// Also what only harms must be followed once the action is kept.
     fn keeps(&self, deed: &Deed) -> bool {
         match deed {
@@ -132,7 +133,7 @@ impl Work<'_> {
                 self.relevant.wanted[*a as usize] || self.relevant.unwanted[*a as usize]
             }
             Deed::Change(id, change, amount) => {
-                self.relevant.numerics[*id as usize] || self.is_risky(*change, *id, amount)
+                self.relevant.numerics[*id as usize] || is_risky(*change, *id, amount, self.undefined)
             }
             other => self.touches(other),
         }

@@ -71,6 +71,9 @@ impl<'j, 'a> Join<'j, 'a> {
                     open.extend(parts);
                 }
                 Condition::Exists(variables, inner) => {
+                    if variables.iter().any(|variable| variable.parameter.objects.is_empty()) {
+                        return Ok(());
+                    }
                     for variable in variables {
                         self.binding.set(variable.slot, UNBOUND);
                         self.domains[variable.slot.index()] = Some(variable.parameter.objects.clone());

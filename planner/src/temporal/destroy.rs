@@ -181,19 +181,21 @@ fn derived_supports(world: &World) -> Vec<Option<Touched>> {
 fn spread_derived(supports: &[Option<Touched>], asked: &mut Asked) {
     let mut agenda: Vec<usize> =
         (0..supports.len()).filter(|&v| supports[v].is_some() && asked.facts[v].is_some()).collect();
+    let mut spread = agenda.clone();
     while let Some(variable) = agenda.pop() {
         let Some(touched) = &supports[variable] else { continue };
-        asked.facts[variable] = None;
         touched.numbers.iter().for_each(|&number| asked.numbers[number as usize] = true);
         for &read in &touched.variables {
             if asked.facts[read as usize] != Some(u32::MAX) {
                 asked.facts[read as usize] = Some(u32::MAX);
-                if supports[read as usize].is_some() {
+                if supports[read as usize].is_some() && !spread.contains(&(read as usize)) {
                     agenda.push(read as usize);
+                    spread.push(read as usize);
                 }
             }
         }
     }
+    spread.into_iter().for_each(|variable| asked.facts[variable] = None);
 }
 
 /// A part of a plan that may be kept while the rest is made anew: either its beginning, or what some of the goals need.

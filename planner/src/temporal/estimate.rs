@@ -339,8 +339,8 @@ impl Relaxed {
             Ok((world.evaluate(&comparison.left, moment)? - world.evaluate(&comparison.right, moment)?).abs())
         };
         let (before, after) = (gap(&Moment { state, ..moment })?, gap(&moment)?);
-        if before.is_nan() {
-            return Ok((!after.is_nan()).then_some(UNSURE));
+        if before.is_nan() || after.is_nan() {
+            return Ok(Some(UNSURE));
         }
         if after < before {
             return Ok(Some((before / (before - after)).ceil().clamp(1.0, 1e6)));

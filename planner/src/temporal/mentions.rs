@@ -5,11 +5,10 @@
 //! changes it must not happen at the same time. Before or after makes no difference, so the search knows nothing of
 //! this: in the schedule of a finished plan, such happenings are moved apart.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::ground::{Meaning, VariableId};
 use crate::solve::EPSILON_S;
-use crate::task::{Condition, Quantified, Term};
+use crate::task::{Action, Atom, Change, Condition, Effect, Quantified, Term};
 
 use super::advance::Step;
 use super::order::Inconsistent;
@@ -19,42 +18,46 @@ use super::world::World;
 /// Rounds of moving happenings apart, each of which may bring others together.
 const MOST_ROUNDS: usize = 100;
 
-/// A happening of a plan that mentions or changes a variable.
+/// A ground atom by its name: predicate and arguments.
+type Name = (u32, Vec<u32>);
+
+/// What a happening does with an atom.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+enum Use {
+    Mentions,
+    Adds,
+    Deletes,
+}
+
+/// What a happening does with which atoms.
+type Uses = FxHashSet<(Name, Use)>;
+
+/// A happening of a plan that mentions or changes an atom.
 #[derive(Clone, Copy)]
 struct Touch {
     happening: u32,
     step: usize,
+    does: Use,
 }
-
-/// By variable, the happenings that mention it and those that change it.
-type Touches = FxHashMap<VariableId, [Vec<Touch>; 2]>;
 
 /// Moves apart what happens at the same time where one changes what the other mentions.
 pub(super) fn keep_apart(space: &Space, steps: &[Step], track: &mut Track) -> Result<(), Inconsistent> {
-    if !space
-        .world
-        .task
-        .actions
-        .iter()
-        .any(|action| [&action.condition.start, &action.condition.end].into_iter().any(mentions_more))
-    {
+    if !space.world.task.actions.iter().any(mentions_more) {
         return Ok(());
     }
-    let touches = touches(space, steps, track);
+    let mut touches = touches(space, steps, track);
     for _ in 0..MOST_ROUNDS {
         let order = &track.order;
         let mut together: Vec<(u32, u32)> = Vec::new();
-        for [mentions, changes] in touches.values() {
-            for mention in mentions {
-                let at_once = |change: &&Touch| {
-                    let apart_s = order.earliest_s(change.happening) - order.earliest_s(mention.happening);
-                    change.step != mention.step && apart_s.abs() < EPSILON_S / 2.0
-                };
-                let pair = |change: &Touch| {
-                    let (one, other) = (mention.happening, change.happening);
-                    (one.min(other), one.max(other))
-                };
-                together.extend(changes.iter().filter(at_once).map(pair));
+        for touches in touches.values_mut() {
+            let time_s = |touch: &Touch| order.earliest_s(touch.happening);
+            touches.sort_by(|one, other| time_s(one).total_cmp(&time_s(other)));
+            for (index, one) in touches.iter().enumerate() {
+                let near = |other: &&Touch| time_s(other) - time_s(one) < EPSILON_S / 2.0;
+                let disturbs = |other: &&Touch| other.step != one.step && other.does != one.does;
+                let (one, others) =
+                    (one.happening, touches[index + 1..].iter().take_while(near).filter(disturbs));
+                together.extend(others.map(|other| (one.min(other.happening), one.max(other.happening))));
             }
         }
         if together.is_empty() {
@@ -67,107 +70,95 @@ pub(super) fn keep_apart(space: &Space, steps: &[Step], track: &mut Track) -> Re
     Ok(())
 }
 
-/// Whether a condition may mention more than its ground instances hold.
-fn mentions_more(condition: &Condition) -> bool {
-    match condition {
-        Condition::And(parts) => parts.iter().any(mentions_more),
-        other => matches!(other, Condition::Or(_) | Condition::Forall(..) | Condition::Exists(..)),
-    }
+/// Whether an action may mention more than its ground instances hold.
+fn mentions_more(action: &Action) -> bool {
+    let condition = |condition: &Condition| match condition {
+        Condition::And(parts) => parts.iter().any(is_compound),
+        other => is_compound(other),
+    };
+    let effects = action.effects.start.iter().chain(&action.effects.end);
+    let conditional = |effect: &Effect| {
+        !(effect.when.start.is_true() && effect.when.over_all.is_true() && effect.when.end.is_true())
+    };
+    [&action.condition.start, &action.condition.end].into_iter().any(condition)
+        || effects.into_iter().any(conditional)
 }
 
-fn touches(space: &Space, steps: &[Step], track: &Track) -> Touches {
-    let reader = Reader::new(space.world);
-    let mut touches = Touches::default();
-    let variables = space.world.ground.variables.len() as u32;
+fn is_compound(condition: &Condition) -> bool {
+    matches!(condition, Condition::Or(_) | Condition::Forall(..) | Condition::Exists(..))
+}
+
+/// By atom, the happenings that mention or change it, where they do different things with it.
+fn touches(space: &Space, steps: &[Step], track: &Track) -> FxHashMap<Name, Vec<Touch>> {
+    let mut touches: FxHashMap<Name, Vec<Touch>> = FxHashMap::default();
     for (step, action) in track.actions.iter().enumerate() {
         let &Some((start, end)) = action else { continue };
-        let act = steps[step].act;
-        let (at_start, at_end) = space.accesses.of(act);
-        let condition =
-            &space.world.task.actions[space.world.acts[act as usize].origin.schema as usize].condition;
-        let happenings =
-            [(Some(start), Some(at_start), &condition.start), (end, at_end.as_ref(), &condition.end)];
-        for (happening, access, condition) in happenings {
-            let (Some(happening), Some(access)) = (happening, access) else { continue };
-            let touch = Touch { happening, step };
-            for variable in reader.mentioned(space.world, act, condition) {
-                touches.entry(variable).or_default()[0].push(touch);
-            }
-            for &variable in access.writes.iter().filter(|&&resource| resource < variables) {
-                touches.entry(variable).or_default()[1].push(touch);
+        let [at_start, at_end] = uses(space.world, steps[step].act);
+        for (happening, uses) in [(Some(start), at_start), (end, at_end)] {
+            let Some(happening) = happening else { continue };
+            for (name, does) in uses {
+                touches.entry(name).or_default().push(Touch { happening, step, does });
             }
         }
     }
+    touches.retain(|_, touches| touches.iter().any(|touch| touch.does != touches[0].does));
     touches
 }
 
-/// Ground atoms by name.
-struct Reader {
-    variables: FxHashMap<(u32, Vec<u32>), VariableId>,
+/// What the start and the end of an action mention and change.
+fn uses(world: &World, act: u32) -> [Uses; 2] {
+    let origin = world.acts[act as usize].origin;
+    let action = &world.task.actions[origin.schema as usize];
+    let mut binding = vec![0; action.slots];
+    binding[..origin.arguments.len()].copy_from_slice(&origin.arguments);
+    let mut both = [Uses::default(), Uses::default()];
+    let halves =
+        [(&action.condition.start, &action.effects.start), (&action.condition.end, &action.effects.end)];
+    for (uses, (condition, effects)) in both.iter_mut().zip(halves) {
+        walk(condition, &mut binding, uses);
+        for effect in effects {
+            every(&effect.forall, &mut binding, &mut |binding| {
+                walk(&effect.when.start, binding, uses);
+                walk(&effect.when.end, binding, uses);
+                let (atom, does) = match &effect.change {
+                    Change::Add(atom) => (atom, Use::Adds),
+                    Change::Delete(atom) => (atom, Use::Deletes),
+                    _ => return,
+                };
+                uses.extend(name(atom, binding).map(|name| (name, does)));
+            });
+        }
+    }
+    both
 }
 
-impl Reader {
-    fn new(world: &World) -> Reader {
-        let mut variables = FxHashMap::default();
-        for (variable, declared) in world.ground.variables.iter().enumerate() {
-            for meaning in &declared.values {
-                if let Meaning::Atom { predicate, arguments } = meaning {
-                    variables.insert((*predicate, arguments.clone()), variable as VariableId);
-                }
-            }
-        }
-        Reader { variables }
-    }
+fn name(atom: &Atom, binding: &[u32]) -> Option<Name> {
+    let object = |term: &Term| match term {
+        Term::Variable(slot) => Some(binding[slot.index()]),
+        Term::Object(object) => Some(object.0),
+        Term::Function(_) => None,
+    };
+    Some((atom.predicate.0, atom.arguments.iter().map(object).collect::<Option<_>>()?))
+}
 
-    /// The variables that a condition of an action mentions; none where they are all in its ground condition.
-    fn mentioned(&self, world: &World, act: u32, condition: &Condition) -> Vec<VariableId> {
-        let mut found = Vec::new();
-        if mentions_more(condition) {
-            let origin = world.acts[act as usize].origin;
-            let mut binding = vec![0; world.task.actions[origin.schema as usize].slots];
-            binding[..origin.arguments.len()].copy_from_slice(&origin.arguments);
-            self.walk(condition, &mut binding, &mut found);
-            found.sort_unstable();
-            found.dedup();
+fn walk(condition: &Condition, binding: &mut [u32], into: &mut Uses) {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => {
+            parts.iter().for_each(|part| walk(part, binding, into));
         }
-        found
+        Condition::Not(inner) => walk(inner, binding, into),
+        Condition::Forall(variables, inner) | Condition::Exists(variables, inner) => {
+            every(variables, binding, &mut |binding| walk(inner, binding, into));
+        }
+        Condition::Atom(atom) => into.extend(name(atom, binding).map(|name| (name, Use::Mentions))),
+        Condition::Same(..) | Condition::Compare(..) | Condition::Call(_) => {}
     }
+}
 
-    fn walk(&self, condition: &Condition, binding: &mut [u32], into: &mut Vec<VariableId>) {
-        match condition {
-            Condition::And(parts) | Condition::Or(parts) => {
-                parts.iter().for_each(|part| self.walk(part, binding, into));
-            }
-            Condition::Not(inner) => self.walk(inner, binding, into),
-            Condition::Forall(variables, inner) | Condition::Exists(variables, inner) => {
-                self.every(variables, inner, binding, into);
-            }
-            Condition::Atom(atom) => {
-                let object = |term: &Term| match term {
-                    Term::Variable(slot) => Some(binding[slot.index()]),
-                    Term::Object(object) => Some(object.0),
-                    Term::Function(_) => None,
-                };
-                let arguments: Option<Vec<u32>> = atom.arguments.iter().map(object).collect();
-                let variable =
-                    arguments.and_then(|arguments| self.variables.get(&(atom.predicate.0, arguments)));
-                into.extend(variable);
-            }
-            Condition::Same(..) | Condition::Compare(..) | Condition::Call(_) => {}
-        }
-    }
-
-    fn every(
-        &self,
-        variables: &[Quantified],
-        inner: &Condition,
-        binding: &mut [u32],
-        into: &mut Vec<VariableId>,
-    ) {
-        let Some((first, others)) = variables.split_first() else { return self.walk(inner, binding, into) };
-        for object in first.parameter.objects.iter() {
-            binding[first.slot.index()] = object.0;
-            self.every(others, inner, binding, into);
-        }
+fn every(variables: &[Quantified], binding: &mut [u32], visit: &mut dyn FnMut(&mut [u32])) {
+    let Some((first, others)) = variables.split_first() else { return visit(binding) };
+    for object in first.parameter.objects.iter() {
+        binding[first.slot.index()] = object.0;
+        every(others, binding, visit);
     }
 }

@@ -39,6 +39,8 @@ struct Maker<'c> {
     scope: Vec<usize>,
     /// Predicates from here on may not be mentioned.
     limit: usize,
+    /// By function, how the action at hand changes it.
+    families: [&'static [&'static str]; 2],
 }
 
 /// A random task.
@@ -71,7 +73,7 @@ pub fn task(chance: &mut Chance, kind: Kind) -> Task {
         goal: Formula::And(Vec::new()),
         metric: None,
     };
-    let mut maker = Maker { chance, task, kind, scope: Vec::new(), limit: 0 };
+    let mut maker = Maker { chance, task, kind, scope: Vec::new(), limit: 0, families: [&[]; 2] };
     maker.fill();
     maker.task
 }
@@ -118,6 +120,14 @@ impl Maker<'_> {
         let parameters: Vec<usize> = (0..self.chance.below(3)).map(|_| self.chance.below(2)).collect();
         self.scope = parameters.clone();
         let durative = self.kind == Kind::Temporal && self.chance.percent(80);
+        self.families = [(); 2].map(|()| {
+            self.chance.of::<&[&str]>(&[
+                &["increase", "increase", "decrease"],
+                &["increase"],
+                &["assign"],
+                &["scale-up"],
+            ])
+        });
         let duration = durative.then(|| self.duration());
         let mut condition = [None, None, None];
         condition[0] = self.chance.percent(75).then(|| self.formula(2));
@@ -167,8 +177,8 @@ impl Maker<'_> {
     fn numeric_change(&mut self, durative: bool) -> Change {
         let index = self.chance.below(self.task.functions.len());
         let kinds = self.task.functions[index].clone();
-        let how = self.chance.of(&["increase", "increase", "decrease", "assign", "scale-up"]);
-        // What is assigned must not depend on the order of effects: constants of one value.
+        // What effects of one action make of a number must not depend on their order.
+        let how = self.chance.of(self.families[index]);
         let amount = match how {
             "assign" => Number::Constant(1.0),
             "scale-up" => Number::Constant(2.0),

@@ -8,7 +8,9 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::solve::EPSILON_S;
-use crate::task::{Action, Atom, Change, Condition, Effect, Quantified, Term};
+use crate::task::{
+    Action, Assignment, Atom, Change, Condition, Effect, Expression, Fluent, Quantified, Term,
+};
 
 use super::advance::Step;
 use super::order::Inconsistent;
@@ -18,15 +20,17 @@ use super::world::World;
 /// Rounds of moving happenings apart, each of which may bring others together.
 const MOST_ROUNDS: usize = 100;
 
-/// A ground atom by its name: predicate and arguments.
-type Name = (u32, Vec<u32>);
+/// A ground atom or number by its name: whether it is a number, predicate or function, arguments.
+type Name = (bool, u32, Vec<u32>);
 
-/// What a happening does with an atom.
+/// What a happening does with an atom or a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 enum Use {
     Mentions,
     Adds,
     Deletes,
+    /// Gives a number a value: not even two of the same kind may happen together.
+    Writes,
 }
 
 /// What a happening does with which atoms.
@@ -54,7 +58,9 @@ pub(super) fn keep_apart(space: &Space, steps: &[Step], track: &mut Track) -> Re
             touches.sort_by(|one, other| time_s(one).total_cmp(&time_s(other)));
             for (index, one) in touches.iter().enumerate() {
                 let near = |other: &&Touch| time_s(other) - time_s(one) < EPSILON_S / 2.0;
-                let disturbs = |other: &&Touch| other.step != one.step && other.does != one.does;
+                let disturbs = |other: &&Touch| {
+                    other.step != one.step && (other.does != one.does || one.does == Use::Writes)
+                };
                 let (one, others) =
                     (one.happening, touches[index + 1..].iter().take_while(near).filter(disturbs));
                 together.extend(others.map(|other| (one.min(other.happening), one.max(other.happening))));
@@ -77,11 +83,12 @@ fn mentions_more(action: &Action) -> bool {
         other => is_compound(other),
     };
     let effects = action.effects.start.iter().chain(&action.effects.end);
+    let numeric = |effect: &Effect| matches!(effect.change, Change::Number(..));
     let conditional = |effect: &Effect| {
         !(effect.when.start.is_true() && effect.when.over_all.is_true() && effect.when.end.is_true())
     };
     [&action.condition.start, &action.condition.end].into_iter().any(condition)
-        || effects.into_iter().any(conditional)
+        || effects.into_iter().any(|effect| conditional(effect) || numeric(effect))
 }
 
 fn is_compound(condition: &Condition) -> bool {
@@ -101,7 +108,9 @@ fn touches(space: &Space, steps: &[Step], track: &Track) -> FxHashMap<Name, Vec<
             }
         }
     }
-    touches.retain(|_, touches| touches.iter().any(|touch| touch.does != touches[0].does));
+    touches.retain(|_, touches| {
+        touches.iter().any(|touch| touch.does != touches[0].does || touch.does == Use::Writes)
+    });
     touches
 }
 
@@ -120,25 +129,61 @@ fn uses(world: &World, act: u32) -> [Uses; 2] {
             every(&effect.forall, &mut binding, &mut |binding| {
                 walk(&effect.when.start, binding, uses);
                 walk(&effect.when.end, binding, uses);
-                let (atom, does) = match &effect.change {
-                    Change::Add(atom) => (atom, Use::Adds),
-                    Change::Delete(atom) => (atom, Use::Deletes),
-                    _ => return,
-                };
-                uses.extend(name(atom, binding).map(|name| (name, does)));
+                change(&effect.change, binding, uses);
             });
         }
     }
     both
 }
 
+fn change(change: &Change, binding: &[u32], into: &mut Uses) {
+    let (name, does) = match change {
+        Change::Add(atom) => (name(atom, binding), Use::Adds),
+        Change::Delete(atom) => (name(atom, binding), Use::Deletes),
+        Change::Number(how, fluent, amount) => {
+            read(amount, binding, into);
+            let adds = matches!(how, Assignment::Increase | Assignment::Decrease);
+            (number(fluent, binding), if adds { Use::Adds } else { Use::Writes })
+        }
+        Change::Object(..) | Change::Call(_) => return,
+    };
+    into.extend(name.map(|name| (name, does)));
+}
+
 fn name(atom: &Atom, binding: &[u32]) -> Option<Name> {
+    Some((false, atom.predicate.0, objects(&atom.arguments, binding)?))
+}
+
+fn number(fluent: &Fluent, binding: &[u32]) -> Option<Name> {
+    Some((true, fluent.function.0, objects(&fluent.arguments, binding)?))
+}
+
+fn objects(terms: &[Term], binding: &[u32]) -> Option<Vec<u32>> {
     let object = |term: &Term| match term {
         Term::Variable(slot) => Some(binding[slot.index()]),
         Term::Object(object) => Some(object.0),
         Term::Function(_) => None,
     };
-    Some((atom.predicate.0, atom.arguments.iter().map(object).collect::<Option<_>>()?))
+    terms.iter().map(object).collect()
+}
+
+/// Notes the numbers that an expression reads.
+fn read(expression: &Expression, binding: &[u32], into: &mut Uses) {
+    match expression {
+        Expression::Fluent(fluent) => into.extend(number(fluent, binding).map(|name| (name, Use::Mentions))),
+        Expression::Add(parts) | Expression::Multiply(parts) => {
+            parts.iter().for_each(|part| read(part, binding, into));
+        }
+        Expression::Subtract(sides) | Expression::Divide(sides) => {
+            sides.iter().for_each(|side| read(side, binding, into));
+        }
+        Expression::Negative(inner) => read(inner, binding, into),
+        Expression::Number(_)
+        | Expression::Duration
+        | Expression::TotalTime
+        | Expression::Violated(_)
+        | Expression::Call(_) => {}
+    }
 }
 
 fn walk(condition: &Condition, binding: &mut [u32], into: &mut Uses) {
@@ -151,7 +196,8 @@ fn walk(condition: &Condition, binding: &mut [u32], into: &mut Uses) {
             every(variables, binding, &mut |binding| walk(inner, binding, into));
         }
         Condition::Atom(atom) => into.extend(name(atom, binding).map(|name| (name, Use::Mentions))),
-        Condition::Same(..) | Condition::Compare(..) | Condition::Call(_) => {}
+        Condition::Compare(_, sides, _) => sides.iter().for_each(|side| read(side, binding, into)),
+        Condition::Same(..) | Condition::Call(_) => {}
     }
 }
 

@@ -9,6 +9,7 @@ mod grouped;
 mod heuristics;
 mod invariants;
 mod landmarks;
+mod memory;
 mod model;
 pub mod pddl;
 pub mod plan;

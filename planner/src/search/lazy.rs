@@ -128,6 +128,8 @@ impl Counts {
     }
 }
 
+/// Bytes that an entry of an open list takes, with the room that its bucket grows by.
+pub(crate) const BYTES_AN_ENTRY: usize = 24;
 /// A fixed price of making and storing a state, in units of [`Relaxed::work`].
 const STATE_WORK: u64 = 20;
 
@@ -203,7 +205,7 @@ impl<'a, 's> Search<'a, 's> {
     /// Bytes taken.
     pub(crate) fn bytes(&self) -> usize {
         let entries: usize = self.lists.iter().map(OpenList::len).sum();
-        self.store.bytes() + entries * 12 + self.status.bytes() + self.relaxed.bytes()
+        self.store.bytes() + entries * BYTES_AN_ENTRY + self.status.bytes() + self.relaxed.bytes()
     }
 
     /// Makes the state behind an entry and visits it if that is worth while.

@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 use crate::heuristics::relaxed::{Counting, Relaxed};
 use crate::landmarks::Status;
 
-use super::lazy::{Allowed, Counts, End, Shared};
+use super::lazy::{Allowed, BYTES_AN_ENTRY, Counts, End, Shared};
 use super::open::OpenList;
 use super::store::{NO_STATE, Store};
 
@@ -207,7 +207,7 @@ impl<'a, 's> Search<'a, 's> {
             + self.status.bytes()
             + self.novelty.bytes
             + self.memory.capacity() * std::mem::size_of::<Memory>()
-            + self.open.len() * 12
+            + self.open.len() * BYTES_AN_ENTRY
             + self.anchors.iter().map(|a| a.len() * 4 + 24).sum::<usize>()
     }
 

@@ -1,5 +1,7 @@
 //! States met so far, packed into words, each once.
 
+use crate::memory::growing;
+
 use super::compiled::Compiled;
 
 /// No state.
@@ -94,7 +96,10 @@ impl Store {
 
     /// Bytes taken, with what growth may take.
     pub(crate) fn bytes(&self) -> usize {
-        self.packed.capacity() * 8 + self.table.len() * 4 + self.parents.capacity() * 13
+        let states = self.parents.len();
+        growing::<u64>(self.packed.len(), self.packed.capacity())
+            + growing::<u32>(states * 3 / 2, self.table.len())
+            + growing::<([u32; 3], bool)>(states, self.parents.capacity())
     }
 
     /// Number of the state and whether it is new. A new one gets the parent, operator and cost.

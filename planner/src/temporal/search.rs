@@ -12,6 +12,7 @@ use rustc_hash::FxHashMap;
 
 use crate::calls::Failure;
 use crate::ground::Values;
+use crate::memory::growing;
 
 use super::advance::{Gates, Open, Situation, Step};
 use super::estimate::{Estimate, From};
@@ -34,6 +35,8 @@ pub(crate) struct Manner {
     pub bound: f64,
     /// Stop after this many evaluated states.
     pub evaluations: u64,
+    /// Stop after this much work.
+    pub work: u64,
     /// Stop beyond this much memory.
     pub memory_bytes: usize,
     /// Decides between entries that rank the same; 0 for the order of their making.
@@ -94,6 +97,9 @@ struct Node {
 const NONE: u32 = u32::MAX;
 /// Marks states that a lookahead only passed through: the search may still come to them by itself.
 const PASSED: u64 = 1 << 63;
+/// Work of putting a step of a path in its time, and of making a state.
+const WORK_A_STEP: u64 = 20;
+const WORK_A_STATE: u64 = 50;
 /// How much more often the preferred queue is served after progress (Richter and Westphal 2010).
 const BOOST: i64 = 1000;
 
@@ -104,6 +110,8 @@ pub(crate) struct Counts {
     pub evaluated: u64,
     /// States expanded.
     pub expanded: u64,
+    /// Work done: what was looked at in estimates, states and times.
+    pub work: u64,
 }
 
 /// An action in progress as a key: action, proposal, bits of its duration, gates of its end.
@@ -124,6 +132,8 @@ pub(crate) struct Search<'s, 'w, 'a> {
     costs: Vec<f64>,
     phases: Vec<Phase>,
     phase_ids: FxHashMap<(Vec<OpenKey>, usize), u32>,
+    /// Actions in progress in all phases.
+    opened: usize,
     mark_ids: FxHashMap<u64, u32>,
     proposals: Vec<Arc<str>>,
     queues: [BinaryHeap<Reverse<(Rank, Entry)>>; 2],
@@ -177,6 +187,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             costs: Vec::new(),
             phases: Vec::new(),
             phase_ids: FxHashMap::default(),
+            opened: 0,
             mark_ids: FxHashMap::default(),
             proposals: Vec::new(),
             queues: Default::default(),
@@ -198,13 +209,14 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         }
         let mut taken: u64 = 0;
         loop {
-            if self.counts.evaluated >= self.manner.evaluations {
+            self.counts.work += self.relaxed.spent();
+            if self.counts.evaluated >= self.manner.evaluations || self.counts.work >= self.manner.work {
                 return Ok((End::Budget, self.counts));
             }
             if taken.is_multiple_of(32) && stop() {
                 return Ok((End::Stopped, self.counts));
             }
-            if taken.is_multiple_of(512) && self.bytes() > self.manner.memory_bytes {
+            if taken.is_multiple_of(64) && self.bytes() > self.manner.memory_bytes {
                 return Ok((End::Memory, self.counts));
             }
             taken += 1;
@@ -227,10 +239,13 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
     }
 
     fn bytes(&self) -> usize {
-        let entries: usize = self.queues.iter().map(BinaryHeap::capacity).sum();
+        let queue = |queue: &BinaryHeap<_>| growing::<(Rank, Entry)>(queue.len(), queue.capacity());
+        let key = size_of::<OpenKey>() + size_of::<Open>();
         self.store.bytes()
-            + self.nodes.capacity() * (size_of::<Node>() + size_of::<Step>() + 8)
-            + entries * size_of::<(Rank, Entry)>()
+            + growing::<(Node, Step, f64)>(self.nodes.len(), self.nodes.capacity())
+            + growing::<(Phase, [usize; 6])>(self.phases.len(), self.phases.capacity())
+            + self.opened * key
+            + self.queues.iter().map(queue).sum::<usize>()
     }
 
     fn take(&mut self) -> Option<Entry> {
@@ -276,12 +291,13 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
     }
 
     /// When things happen up to a new step; `Err` if the times do not fit.
-    fn times(&self, parent: u32, step: &Step, open: bool) -> Result<Times, Inconsistent> {
+    fn times(&mut self, parent: u32, step: &Step, open: bool) -> Result<Times, Inconsistent> {
         let wanted = self.manner.timed || self.bounded() && self.space.timed_measure();
         if !self.space.tight && !wanted {
             return Ok(Times::default());
         }
         let path = self.path(parent);
+        self.counts.work += WORK_A_STEP * path.len() as u64;
         let steps = path.iter().chain((parent != NONE).then_some(step));
         if !self.space.tight {
             let mut clock = self.base.clock.clone();
@@ -322,6 +338,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         if measured >= self.manner.bound {
             return Ok(None);
         }
+        self.counts.work += WORK_A_STATE + situation.state.values.len() as u64;
         let extra = self.extra(&situation, times.mark);
         let (node, new) = self.store.insert(&situation.state, extra);
         if new {
@@ -430,6 +447,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         let next = self.phases.len() as u32;
         let phase = *self.phase_ids.entry((key, situation.timed)).or_insert(next);
         if phase == next {
+            self.opened += situation.open.len();
             self.phases.push((situation.open.clone(), situation.timed));
         }
         let mark = match self.manner.exact {

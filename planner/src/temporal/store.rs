@@ -4,6 +4,7 @@ use rustc_hash::FxHasher;
 use std::hash::Hasher;
 
 use crate::ground::{GroundTask, Values};
+use crate::memory::growing;
 
 /// Where a variable's value stands in the words of a packed state.
 #[derive(Debug, Clone, Copy)]
@@ -95,7 +96,8 @@ impl Store {
 
     /// Bytes in use.
     pub fn bytes(&self) -> usize {
-        self.words.capacity() * 8 + self.table.capacity() * 4
+        let table = 2 * self.count as usize;
+        growing::<u64>(self.words.len(), self.words.capacity()) + growing::<u32>(table, self.table.len())
     }
 
     fn slot(&self, words: &[u64]) -> usize {

@@ -34,6 +34,8 @@ pub(crate) struct ClassicalOutcome {
     pub evaluated: u64,
     /// States expanded.
     pub expanded: u64,
+    /// Work done, as the heuristics count it.
+    pub work: u64,
 }
 
 /// Why a classical search ended.
@@ -57,7 +59,7 @@ pub(crate) fn solve(
     on_plan: &mut dyn FnMut(&[u32], f64),
 ) -> ClassicalOutcome {
     let _span = debug_span!("classical").entered();
-    let stopped = ClassicalOutcome { end: ClassicalEnd::Stopped, evaluated: 0, expanded: 0 };
+    let stopped = ClassicalOutcome { end: ClassicalEnd::Stopped, evaluated: 0, expanded: 0, work: 0 };
     let task = Compiled::new(ground);
     if stop() {
         return stopped;
@@ -87,7 +89,12 @@ pub(crate) fn solve(
     };
     let end = run.all();
     tracing::debug!(landmarks = landmarks.len(), run.counts.evaluated, run.counts.work);
-    ClassicalOutcome { end, evaluated: run.counts.evaluated, expanded: run.counts.expanded }
+    ClassicalOutcome {
+        end,
+        evaluated: run.counts.evaluated,
+        expanded: run.counts.expanded,
+        work: run.counts.work,
+    }
 }
 
 /// Work that every plan is improved for, however small the task.

@@ -16,13 +16,14 @@ use super::space::Space;
 use super::world::{Act, NOTHING, Span, World};
 
 /// A first plan by the classical search, with actions in one go, or with start and end apart where the space has them
-/// so; `None` where the task does not allow it, or where that search finds none. Durations are left out of it: what it
+/// so; `None` where the task does not allow it, or where that search finds none; with the states evaluated and the work done. Durations are left out of it: what it
 /// finds may not fit in time.
 pub(crate) fn classical_plan(
     space: &Space,
     memory_bytes: usize,
+    evaluations: u64,
     stop: &(dyn Fn() -> bool + Sync),
-) -> Option<(Vec<Step>, u64)> {
+) -> Option<(Vec<Step>, u64, u64)> {
     let (task, parts) = compressed(space)?;
     if !is_classical(&task) {
         return None;
@@ -31,7 +32,7 @@ pub(crate) fn classical_plan(
         anytime: false,
         bound: None,
         memory_limit_bytes: Some(memory_bytes),
-        evaluation_limit: space.tight.then_some(MOST_EVALUATED),
+        evaluation_limit: Some(if space.tight { evaluations.min(MOST_EVALUATED) } else { evaluations }),
     };
     // The first plan is enough: what is cheap one after the other need not be quick side by side.
     let found = AtomicBool::new(false);
@@ -47,7 +48,7 @@ pub(crate) fn classical_plan(
         let (act, part) = parts[action as usize];
         Step { act, part, proposal: None, span: nothing }
     };
-    Some((actions.iter().map(step).collect(), outcome.evaluated))
+    Some((actions.iter().map(step).collect(), outcome.evaluated, outcome.work))
 }
 
 /// States that the classical search evaluates at most where its plan may not fit in time.

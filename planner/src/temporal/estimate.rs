@@ -58,6 +58,8 @@ pub(super) struct Work {
     nearer: bool,
     /// By proposition, what is left at least to the goal: in costs, and in time; empty until it is asked for.
     remaining: [Vec<f64>; 2],
+    /// Propositions and operators looked at since the beginning: a measure of work that no clock is part of.
+    pub(super) spent: u64,
 }
 
 /// How far what an operator needs is reached.
@@ -83,6 +85,7 @@ impl Work {
             latest: f64::INFINITY,
             nearer: false,
             remaining: [Vec::new(), Vec::new()],
+            spent: 0,
         }
     }
 
@@ -192,7 +195,9 @@ impl Relaxed {
             if label + self.work.remaining[usize::from(timed)][proposition as usize] >= self.work.latest() {
                 continue;
             }
-            for position in self.needed_by.range(proposition) {
+            let waiters = self.needed_by.range(proposition);
+            self.work.spent += 4 + waiters.len() as u64;
+            for position in waiters {
                 let Waiter { operator, target, seconds, step } = self.needed_by.values[position];
                 let least = if timed { seconds } else { seconds + step };
                 // Whatever else it needs, it comes too late.
@@ -212,6 +217,7 @@ impl Relaxed {
     fn seed(&mut self, world: &World, from: &From) -> Result<(), Failure> {
         let work = &mut self.work;
         work.begin();
+        work.spent += (work.labels.len() / 4 + 16 * self.tests.len()) as u64;
         let ready_s = |resource: usize| from.ready_s.map_or(0.0, |ready_s| ready_s[resource]);
         for (variable, &value) in from.state.values.iter().enumerate() {
             work.reach(self.offsets[variable] + value, ready_s(variable), NOBODY, 1.0);

@@ -74,6 +74,8 @@ pub(crate) enum Reason {
 const IMPROVEMENT_WORK: u64 = 2_000_000;
 const STEPS_PER_SHARE: u64 = 16;
 const IMPROVEMENT_FACTOR: u64 = 20;
+/// Without `anytime`: work to spend on better plans is at most what the first plan took, or this.
+const LEAST_WORK: u64 = 50_000_000;
 /// Without `anytime`: repairs in a row that come to nothing before the plan is left as it is, for each of its steps.
 const PATIENCE: u64 = 10;
 /// Weights of the heuristic in the searches that improve a plan.
@@ -112,6 +114,7 @@ pub(crate) fn search_plans(
             base,
             exact,
             elsewhere: 0,
+            work: u64::MAX,
             limits,
             stop,
             progress,
@@ -142,6 +145,8 @@ struct Run<'r, 'w, 'a> {
     exact: bool,
     /// States that the classical search evaluated.
     elsewhere: u64,
+    /// Work that all searches together may do.
+    work: u64,
     limits: Limits,
     stop: &'r (dyn Fn() -> bool + Sync),
     progress: Progress,
@@ -169,6 +174,7 @@ impl Run<'_, '_, '_> {
             eager: true,
             bound,
             evaluations,
+            work: self.work.saturating_sub(self.progress.counts.work),
             memory_bytes: self.limits.memory_bytes,
             shuffle: 0,
             exact: self.exact,
@@ -181,6 +187,7 @@ impl Run<'_, '_, '_> {
             Search::new(self.space, &mut self.relaxed, base, manner).run(&|| (self.stop)())?;
         self.progress.counts.evaluated += counts.evaluated;
         self.progress.counts.expanded += counts.expanded;
+        self.progress.counts.work += counts.work;
         Ok(end)
     }
 
@@ -196,8 +203,12 @@ impl Run<'_, '_, '_> {
                 return Ok(());
             }
         }
-        if let Some((steps, evaluated)) = classical_plan(self.space, self.limits.memory_bytes, self.stop) {
+        let left = self.limits.evaluations.saturating_sub(self.progress.counts.evaluated);
+        if let Some((steps, evaluated, work)) =
+            classical_plan(self.space, self.limits.memory_bytes, left, self.stop)
+        {
             self.progress.counts.evaluated += evaluated;
+            self.progress.counts.work += work;
             self.elsewhere += evaluated;
             if self.take(steps)? {
                 return Ok(());
@@ -271,13 +282,16 @@ impl Run<'_, '_, '_> {
             true => self.limits.evaluations,
             false => before + (shares * least.clamp(100, 10_000)).max(IMPROVEMENT_FACTOR * spent),
         };
+        if !self.limits.anytime {
+            self.work = self.progress.counts.work + self.progress.counts.work.max(LEAST_WORK);
+        }
         self.progress.reason = Reason::Enough;
         let timed = self.space.is_makespan();
         // A greedy plan that watches the time, then restarts with falling weights, each with a share of the budget.
         let share = (least / 3).clamp(50, 3000);
         let mut proven = false;
         for weight in WEIGHTS.map(Some) {
-            if self.progress.counts.evaluated >= budget {
+            if self.progress.counts.evaluated >= budget || self.progress.counts.work >= self.work {
                 return Ok(());
             }
             loop {
@@ -318,7 +332,7 @@ impl Run<'_, '_, '_> {
         let mut idle = 0;
         let mut tries: u64 = 0;
         let mut fruitless: u64 = 0;
-        while self.progress.counts.evaluated < budget {
+        while self.progress.counts.evaluated < budget && self.progress.counts.work < self.work {
             if (self.stop)() {
                 return self.ended(Reason::Stopped);
             }

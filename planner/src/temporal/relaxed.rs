@@ -244,6 +244,11 @@ impl Relaxed {
         }
     }
 
+    /// The work done since this was asked last.
+    pub(super) fn spent(&mut self) -> u64 {
+        std::mem::take(&mut self.work.spent)
+    }
+
     fn test_of(&self, wanted: Test) -> Option<u32> {
         self.test_index.get(&wanted).copied()
     }

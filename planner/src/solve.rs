@@ -48,6 +48,8 @@ pub struct Statistics {
     pub actions: u64,
     /// Set where the plan is proven to be best.
     pub optimal: bool,
+    /// Set where the task has preferences: they score plans, and no search looks for those that keep more of them.
+    pub scored_only: bool,
     /// By attachment, for this call alone.
     pub attachments: BTreeMap<String, CallStatistics>,
 }
@@ -97,6 +99,15 @@ impl Outcome {
 
     /// What it took.
     pub fn statistics(&self) -> &Statistics {
+        match self {
+            Outcome::Solved { statistics, .. }
+            | Outcome::Unsolvable { statistics, .. }
+            | Outcome::OutOfTime { statistics, .. }
+            | Outcome::OutOfMemory { statistics, .. } => statistics,
+        }
+    }
+
+    fn statistics_mut(&mut self) -> &mut Statistics {
         match self {
             Outcome::Solved { statistics, .. }
             | Outcome::Unsolvable { statistics, .. }
@@ -162,6 +173,18 @@ pub fn plan(
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
+    let mut outcome = search(task, attachments, options, stop, on_plan)?;
+    outcome.statistics_mut().scored_only = !task.preferences.is_empty();
+    Ok(outcome)
+}
+
+fn search(
+    task: &Task,
+    attachments: &Attachments,
+    options: &Options,
+    stop: &(dyn Fn() -> bool + Sync),
+    on_plan: &mut dyn FnMut(&Plan),
+) -> Result<Outcome, PlanError> {
     let before = attachments.statistics();
     let memory_bytes =
         options.memory_limit_bytes.map_or(usize::MAX, |bytes| usize::try_from(bytes).unwrap_or(usize::MAX));
@@ -169,7 +192,8 @@ pub fn plan(
         Ok(grounded) => grounded,
         Err(error) => return grounding_ended(task, error),
     };
-    let memory_bytes = memory_bytes.saturating_sub(grounded.bytes());
+    // Every search has its own form of the grounded task beside it.
+    let memory_bytes = memory_bytes.saturating_sub(2 * grounded.bytes());
     if grounded.goal_reachable && is_classical(&grounded) {
         let check = |plan| checked(task, attachments, plan);
         let left = options.memory_limit_bytes.map(|_| memory_bytes as u64);

@@ -169,11 +169,6 @@ fn from_plan(plan: &Plan) -> Vec<oracle::Step> {
 fn compare(seed: u64, tally: &mut Tally) {
     let mut chance = Chance(seed);
     let kind = chance.of(&[Kind::Classical, Kind::Numeric, Kind::Temporal]);
-    eprintln!("seed {seed}");
-    if std::env::var("SHOW").is_ok() {
-        let m = generate::task(&mut Chance(chance.0), kind);
-        eprintln!("{}\n{}", m.domain(), m.problem());
-    }
     let made = generate::task(&mut chance, kind);
     let (domain, problem) = (Source::new("domain", made.domain()), Source::new("problem", made.problem()));
     let read = Task::read(&domain, &problem).unwrap_or_else(|findings| panic!("{seed}: {findings}"));
@@ -185,25 +180,29 @@ fn compare(seed: u64, tally: &mut Tally) {
     }
 }
 
-fn compare_all(seeds: std::ops::Range<u64>) {
+/// Compares all; what disagrees is shown as soon as it is found.
+fn compare_all(seeds: impl Iterator<Item = u64>) -> Tally {
     let mut tally = Tally::default();
     for seed in seeds {
+        let known = tally.disagreements.len();
         compare(seed, &mut tally);
-        assert!(tally.disagreements.len() < 20, "{}", tally.disagreements.join("\n\n"));
+        tally.disagreements[known..].iter().for_each(|text| println!("{text}\n"));
     }
-    assert!(tally.disagreements.is_empty(), "{tally:?}\n{}", tally.disagreements.join("\n\n"));
+    assert!(tally.disagreements.is_empty(), "{} tasks disagree", tally.disagreements.len());
     println!("{tally:?}");
-    assert!(
-        tally.solved > tally.tasks / 4
-            && tally.unsolvable > tally.tasks / 20
-            && tally.valid > tally.tasks / 4
-    );
+    tally
 }
+
+/// Tasks that showed a fault once.
+const FOUND: [u64; 19] = [
+    1114, 1408, 1467, 1893, 1980, 2238, 2754, 2887, 3084, 3342, 4036, 4103, 4891, 4904, 4999, 5566, 6621,
+    6638, 33987,
+];
 
 #[test]
 fn random_tasks_mean_the_same_to_all() {
-    let from: u64 = std::env::var("FROM").ok().and_then(|f| f.parse().ok()).unwrap_or(0);
-    compare_all(from..from + 1_000);
+    let tally = compare_all((0..250).chain(FOUND));
+    assert!(tally.solved > 100 && tally.unsolvable > 80 && tally.valid > 350, "{tally:?}");
 }
 
 #[test]

@@ -232,6 +232,21 @@ fn a_plan_that_breaks_a_constraint_on_the_way_is_refused_under_the_text() {
 }
 
 #[test]
+fn preferences_that_nothing_searches_for_are_said_to_be_so() {
+    let domain = Source::new(
+        "domain.pddl",
+        "(define (domain d) (:requirements :preferences) (:predicates (a) (b))
+      (:action one :parameters () :effect (a)) (:action two :parameters () :precondition (a) :effect (b)))",
+    );
+    for (goal, preferred) in [("(and (a) (preference p (b)))", true), ("(a)", false)] {
+        let problem = format!("(define (problem p) (:domain d) (:init) (:goal {goal}))");
+        let found = outcome(domain.clone(), Source::new("problem.pddl", problem));
+        assert_eq!(found.statistics().scored_only, preferred);
+        assert!(found.plan().is_some() && !(preferred && found.statistics().optimal));
+    }
+}
+
+#[test]
 fn what_a_condition_mentions_is_kept_apart_even_where_it_never_matters() {
     // The parts of an order are asked for all at once; those of another order are mentioned with them.
     let domain = "(define (domain d) (:requirements :adl :durative-actions :numeric-fluents) (:types order part)

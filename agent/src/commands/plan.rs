@@ -103,7 +103,8 @@ fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(),
         Outcome::Unsolvable { why, .. } => Some(why.to_string()),
         _ => None,
     };
-    let Statistics { evaluated, expanded, plans, actions, optimal, attachments } = outcome.statistics();
+    let Statistics { evaluated, expanded, plans, actions, optimal, scored_only, attachments } =
+        outcome.statistics();
     input::print_json(&json!({
         "status": status,
         "cost": plan.and_then(|p| p.cost),
@@ -115,6 +116,7 @@ fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(),
         "plans": plans,
         "actions": actions,
         "optimal": optimal,
+        "scored_only": scored_only,
         "attachments": attachments,
         "why": why,
         "plan": plan.map(|p| &p.steps),
@@ -142,6 +144,12 @@ fn show(
                 input::print_text(plan.to_string().trim_end())?;
             }
             input::narrate(&format!("{} ({time})", summary(plan)));
+            if outcome.statistics().scored_only {
+                input::narrate(
+                    "  preferences score this plan, but nothing searched for one that keeps more of them: \
+                     what must hold belongs in the goal",
+                );
+            }
         }
         _ if matches!(status, Status::OutOfMemory) => {
             input::narrate(&format!("out of memory, no plan yet ({time})"))

@@ -187,6 +187,9 @@ fn compare_all(seeds: impl Iterator<Item = u64>) -> Tally {
         let known = tally.disagreements.len();
         compare(seed, &mut tally);
         tally.disagreements[known..].iter().for_each(|text| println!("{text}\n"));
+        if tally.tasks.is_multiple_of(1_000) {
+            println!("{} tasks", tally.tasks);
+        }
     }
     assert!(tally.disagreements.is_empty(), "{} tasks disagree", tally.disagreements.len());
     println!("{tally:?}");

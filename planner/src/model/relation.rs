@@ -52,7 +52,7 @@ impl Relation {
             Relation::Equal => equal(left, right),
             Relation::AtLeast => left >= right || equal(left, right),
             Relation::Greater => left > right && !equal(left, right),
-            Relation::Unequal => (left < right || left > right) && !equal(left, right),
+            Relation::Unequal => !(left.is_nan() || right.is_nan() || equal(left, right)),
         }
     }
 

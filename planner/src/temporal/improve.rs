@@ -75,7 +75,7 @@ const IMPROVEMENT_WORK: u64 = 2_000_000;
 const STEPS_PER_SHARE: u64 = 16;
 const IMPROVEMENT_FACTOR: u64 = 20;
 /// Without `anytime`: work to spend on better plans is at most what the first plan took, or this.
-const LEAST_WORK: u64 = 50_000_000;
+const LEAST_WORK: u64 = 150_000_000;
 /// Without `anytime`: repairs in a row that come to nothing before the plan is left as it is, for each of its steps.
 const PATIENCE: u64 = 10;
 /// Weights of the heuristic in the searches that improve a plan.

@@ -126,7 +126,7 @@ pub(crate) fn conclude(
 }
 
 /// In an answer, `{changes <surface>}` stands for what has changed there since an earlier run.
-const CHANGES: &str = "changes";
+pub(crate) const CHANGES: &str = "changes";
 /// An object nearer than this to where one was is that one, metres.
 const SAME_M: f64 = 0.10;
 

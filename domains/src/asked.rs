@@ -64,7 +64,7 @@ impl Asked {
 }
 
 /// Every list of plain symbols in a condition: `(on cup-a ?s)`, `(confidence cup-a)`.
-fn mentions(condition: &str) -> Vec<Vec<String>> {
+pub(crate) fn mentions(condition: &str) -> Vec<Vec<String>> {
     let mut found = Vec::new();
     let mut open: Vec<Option<Vec<String>>> = Vec::new();
     let spaced = condition.to_lowercase().replace('(', " ( ").replace(')', " ) ");

@@ -98,10 +98,11 @@ pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, Goal
     let (words, wanted) = conditions(said, domain.config.thresholds.confidence)?;
     let mut nearest_miss = None;
     for phrase in &domain.config.goal {
-        let Some(slots) = match_phrase(&phrase.say, &words) else { continue };
-        match fill(lexicon, &slots) {
-            Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
-            Err(found) => nearest_miss = nearest_miss.or(Some(found)),
+        for slots in fits(&phrase.say, &words) {
+            match fill(lexicon, &slots) {
+                Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
+                Err(found) => nearest_miss = nearest_miss.or(Some(found)),
+            }
         }
     }
     let domain_name = domain.config.name.clone();
@@ -215,7 +216,7 @@ struct Wanted {
 fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Wanted), GoalError> {
     let mut words: Vec<String> = said
         .split_whitespace()
-        .map(|w| w.trim_matches(|c: char| "\"'.,!?".contains(c)).to_lowercase())
+        .map(|w| bare(w).to_lowercase())
         .filter(|w| !w.is_empty())
         .collect();
     let mut wanted = Wanted { confidence: default, deadline_s: None };
@@ -237,6 +238,11 @@ fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Wanted), GoalErr
     }
 }
 
+/// A word without the signs around it.
+pub(crate) fn bare(word: &str) -> &str {
+    word.trim_matches(|c: char| "\"'.,!?".contains(c))
+}
+
 /// "60", "60 s", "60 seconds", "1.5 minutes".
 fn seconds(said: &str) -> Option<f64> {
     let (number, unit) = said.split_once(' ').unwrap_or((said, "s"));
@@ -248,20 +254,27 @@ fn seconds(said: &str) -> Option<f64> {
     number.parse::<f64>().ok().map(|n| n * factor).filter(|s| *s > 0.0 && s.is_finite())
 }
 
-/// Matches words against a phrase with slots; a slot takes one word or more.
-fn match_phrase<'a>(say: &'a str, words: &[String]) -> Option<Vec<(&'a str, String)>> {
-    fn step<'a>(pattern: &[&'a str], words: &[String]) -> Option<Vec<(&'a str, String)>> {
-        let Some((&head, rest)) = pattern.split_first() else { return words.is_empty().then(Vec::new) };
-        if let Some(slot) = head.strip_prefix('<').and_then(|h| h.strip_suffix('>')) {
-            return (1..=words.len()).find_map(|n| {
-                let mut found = step(rest, &words[n..])?;
-                found.insert(0, (slot, words[..n].join(" ")));
-                Some(found)
-            });
-        }
-        (words.first()? == &head.to_lowercase()).then(|| step(rest, &words[1..]))?
+/// The ways in which words fit a phrase with slots, each slot with what it holds; a slot takes one word or more.
+fn fits<'a>(say: &'a str, words: &[String]) -> Vec<Vec<(&'a str, String)>> {
+    fn step<'a>(pattern: &[&'a str], words: &[String]) -> Vec<Vec<(&'a str, String)>> {
+        let Some((&head, rest)) = pattern.split_first() else {
+            return if words.is_empty() { vec![Vec::new()] } else { Vec::new() };
+        };
+        let Some(slot) = head.strip_prefix('<').and_then(|h| h.strip_suffix('>')) else {
+            let fits = words.first().is_some_and(|word| *word == head.to_lowercase());
+            return if fits { step(rest, &words[1..]) } else { Vec::new() };
+        };
+        let with = |n: usize| {
+            let held = (slot, words[..n].join(" "));
+            step(rest, &words[n..]).into_iter().map(move |mut found| {
+                found.insert(0, held.clone());
+                found
+            })
+        };
+        (1..=words.len()).flat_map(with).collect()
     }
-    step(&say.split_whitespace().collect::<Vec<_>>(), words)
+    let pattern: Vec<&str> = say.split_whitespace().map(bare).filter(|word| !word.is_empty()).collect();
+    step(&pattern, words)
 }
 
 fn fill(lexicon: &Lexicon, slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> {

@@ -182,10 +182,8 @@ impl Check<'_> {
         let parameters = self.domain.vocabulary.action(action).unwrap_or_default();
         let mut objects: Vec<(String, String)> =
             parameters.into_iter().map(|(name, of)| (format!("some-{}", &name[1..]), of)).collect();
-        let call = Call {
-            action: action.into(),
-            arguments: objects.iter().map(|(name, _)| name.clone()).collect(),
-        };
+        let call =
+            Call { action: action.into(), arguments: objects.iter().map(|(name, _)| name.clone()).collect() };
         let mut condition = substituted(self.domain, &call, &[text.to_string()]).concat();
         if condition.contains("?by") {
             condition = condition.replace("?by", "what-was-in-the-way");

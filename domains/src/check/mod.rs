@@ -119,7 +119,8 @@ impl Check<'_> {
         let is_file = |a: &&String| !a.starts_with('-') && std::path::Path::new(a).extension().is_some();
         if let Some(file) = arguments.first().filter(is_file).filter(|file| !folder.join(file).exists()) {
             let message = format!("there is no file {file} for `{command}` to run");
-            let help = format!("write {}; programs are run in the domain's folder", folder.join(file).display());
+            let help =
+                format!("write {}; programs are run in the domain's folder", folder.join(file).display());
             let place = self.toml.within(path, file);
             return Some(Diagnostic::error("no-program", message, place, "here").with_help(help));
         }

@@ -70,7 +70,8 @@ impl Check<'_> {
 
     /// Slots that nothing can fill, where that does not depend on the body.
     fn unnamed(&self, n: &str, filled: &[Filled]) -> Vec<Diagnostic> {
-        let is_body_s = |of: &str| ["surface", "room", "door"].contains(&of) && self.places.surfaces.is_empty();
+        let is_body_s =
+            |of: &str| ["surface", "room", "door"].contains(&of) && self.places.surfaces.is_empty();
         let is_empty = |f: &&Filled| {
             let of = type_of_slot(&f.slot);
             self.lexicon.of_type(of).is_empty() && !is_body_s(of)

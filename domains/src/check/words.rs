@@ -38,7 +38,8 @@ impl Check<'_> {
                 }
                 Ground::Fixed if !self.begins(&word) => {
                     let name = &word.name;
-                    let message = format!("nothing states `{name}`, and no action changes it: it never holds");
+                    let message =
+                        format!("nothing states `{name}`, and no action changes it: it never holds");
                     let help = format!(
                         "say what holds in the beginning, init = [\"({name} …)\"], or who states it: [word.{name}] program = […]"
                     );
@@ -58,7 +59,8 @@ impl Check<'_> {
                     list.push(self.error("no-word", message, self.toml.at(&["word", name]), help));
                 }
                 Some(word) if word.is_derived => {
-                    let message = format!("`{name}` is derived by the domain's rules; nothing else states it");
+                    let message =
+                        format!("`{name}` is derived by the domain's rules; nothing else states it");
                     let help = "leave this out, or the rule in domain.pddl";
                     list.push(self.error("derived", message, self.toml.at(&["word", name]), help));
                 }
@@ -128,7 +130,8 @@ impl Check<'_> {
         for (of, names) in &config.objects {
             let key = self.toml.at(&["objects", of]);
             if GIVEN.contains(&of.as_str()) {
-                let message = format!("objects of type `{of}` come from the map, from objects/ or from looks");
+                let message =
+                    format!("objects of type `{of}` come from the map, from objects/ or from looks");
                 let help = "a thing is a file in objects/, a surface a [[surface]] of the scene";
                 list.push(self.error("given-type", message, key, help));
                 continue;
@@ -140,7 +143,8 @@ impl Check<'_> {
             }
             for (n, name) in names.iter().enumerate() {
                 let other = taken.iter().find(|(known, _)| *known == symbol(name)).map(|(_, of)| *of);
-                let is_called = |of: &&&str| self.lexicon.of_type(of).iter().any(|k| k.symbol == symbol(name));
+                let is_called =
+                    |of: &&&str| self.lexicon.of_type(of).iter().any(|k| k.symbol == symbol(name));
                 let given = GIVEN.iter().find(is_called);
                 if let Some(other) = other.or(given.copied()) {
                     let message = format!("\"{name}\" is the name of a {other} already");

@@ -131,5 +131,6 @@ mod tests {
         check("(>= (completeness cup) 0.8)", &[], &["cup"], &[]);
         check("(>= (clarity table) 0.8)", &[], &[], &["table"]);
         check("(observed table-3 table)", &[], &[], &[]);
+        check("(and (observed table-3 table) (on cup-a table))", &[("cup-a", None)], &[], &[]);
     }
 }

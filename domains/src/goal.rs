@@ -214,11 +214,8 @@ struct Wanted {
 
 /// Takes "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.
 fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Wanted), GoalError> {
-    let mut words: Vec<String> = said
-        .split_whitespace()
-        .map(|w| bare(w).to_lowercase())
-        .filter(|w| !w.is_empty())
-        .collect();
+    let mut words: Vec<String> =
+        said.split_whitespace().map(|w| bare(w).to_lowercase()).filter(|w| !w.is_empty()).collect();
     let mut wanted = Wanted { confidence: default, deadline_s: None };
     loop {
         let confidence = words.windows(2).rposition(|w| w[0] == "with" && w[1] == "confidence");
@@ -377,5 +374,27 @@ mod tests {
         check("(c <thing>)", &[("thing", "a"), ("thing", "b")], Err("<first:thing>"));
         check("(c <cup>)", &[("thing", "a")], Err("no slot <cup>; it has <thing>"));
         check("(< (x) 3) ", &[], Ok("(< (x) 3) "));
+    }
+
+    #[test]
+    fn words_fit_a_phrase_in_every_way() {
+        let check = |say: &str, words: &str, expected: &[&[&str]]| {
+            let words: Vec<String> = words.split_whitespace().map(str::to_string).collect();
+            let found: Vec<Vec<String>> = fits(say, &words)
+                .into_iter()
+                .map(|way| way.into_iter().map(|(_, held)| held).collect())
+                .collect();
+            assert_eq!(found, expected, "{say}");
+        };
+        check("find <thing>", "find cup a", &[&["cup a"]]);
+        check("where is <thing>?", "where is cup a", &[&["cup a"]]);
+        check("Find, please, <thing>", "find please cup", &[&["cup"]]);
+        check("find <thing>", "find", &[]);
+        check("find", "find cup", &[]);
+        check(
+            "find both <thing> and <thing>",
+            "find both salt and pepper and a cup",
+            &[&["salt", "pepper and a cup"], &["salt and pepper", "a cup"]],
+        );
     }
 }

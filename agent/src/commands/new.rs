@@ -61,5 +61,8 @@ fn free(folder: &Path) -> Result<(), CommandError> {
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> CommandError {
-    CommandError::BadInput(format!("{}: {error}\n  a folder that can be written was expected", path.display()))
+    CommandError::BadInput(format!(
+        "{}: {error}\n  a folder that can be written was expected",
+        path.display()
+    ))
 }

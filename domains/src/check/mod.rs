@@ -38,7 +38,8 @@ pub fn findings(domain: &Domain) -> Findings {
     list.extend(check.objects());
     list.extend(check.phrases());
     list.extend(check.scenes());
-    Findings { sources: vec![domain.pddl.clone(), domain.toml.clone()], list }
+    let sources = [domain.pddl.clone(), domain.toml.clone()].into_iter().chain(scenes::scenes(domain));
+    Findings { sources: sources.collect(), list }
 }
 
 /// How each word, call and action of a domain is grounded, a line each.

@@ -1,10 +1,31 @@
 //! The scenes can be read, and the places that `domain.toml` names are in the usual one.
 
-use descry_planner::Diagnostic;
+use descry_planner::{Diagnostic, Source, Span};
 use descry_robots::sim::SceneSpec;
 
 use super::Check;
 use crate::lexicon::symbol;
+use crate::load::Domain;
+
+/// The number of the first scene among the sources of the findings, behind `domain.pddl` and `domain.toml`.
+const FIRST_SCENE: usize = 2;
+
+/// The scenes as sources of findings.
+pub(super) fn scenes(domain: &Domain) -> Vec<Source> {
+    let source = |(name, text): (&String, &String)| {
+        let path = format!("scenes/{name}.toml");
+        let shown = domain.files.get(&path).map_or(&path, |(shown, _)| shown);
+        Source::new(shown.clone(), text.clone())
+    };
+    domain.scenes.iter().map(source).collect()
+}
+
+/// The byte at a line and a column, both from 1.
+fn byte(text: &str, line: usize, column: usize) -> usize {
+    let before: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
+    let within = text[before..].char_indices().nth(column.saturating_sub(1));
+    within.map_or(before, |(at, _)| before + at)
+}
 
 impl Check<'_> {
     /// The usual scene is there; every scene can be read; surfaces, rooms and objects that are named are there.
@@ -16,11 +37,13 @@ impl Check<'_> {
             let help = self.known(&config.scene, domain.scenes.keys().map(String::as_str));
             list.push(self.error("no-scene", message, self.toml.at(&["scene"]), help));
         }
-        for (name, text) in &domain.scenes {
-            if let Err(wrong) = SceneSpec::parse(&format!("scenes/{name}.toml"), text) {
-                let message = format!("the scene \"{name}\" cannot be read");
-                list.push(self.error("scene", message, self.toml.at(&["scene"]), wrong.to_string()));
-            }
+        for (n, source) in scenes(domain).into_iter().enumerate() {
+            let Err(wrong) = SceneSpec::parse(&source.name, &source.text) else { continue };
+            let start = byte(&source.text, wrong.line, wrong.column);
+            let rest = source.text[start..].lines().next().map_or(0, |line| line.trim_end().len());
+            let at = |byte: usize| u32::try_from(byte).unwrap_or(u32::MAX);
+            let span = Span { source: at(FIRST_SCENE + n), start: at(start), end: at(start + rest) };
+            list.push(self.error("scene", wrong.problem, span, wrong.mend));
         }
         if self.places.surfaces.is_empty() {
             return list;

@@ -179,5 +179,5 @@ fn faults_of_scenes_and_places_are_found_at_their_place() {
         |what: &str, at: &str| format!("{scene}[[expect]]\nwhat = \"{what}\"\nat = \"{at}\"\nweight = 2.0\n");
     toml((scene, &expect("mug", "attic")), "no-place", "\"attic\"", &["known: table"]);
     toml((scene, &expect("spoon", "table")), "no-thing", "\"spoon\"", &["known: mug"]);
-    check("scenes/default.toml", ("[[surface]]", "[[surfaces]]"), "scene", "\"default\"", &["surfaces"]);
+    check("scenes/default.toml", ("[[surface]]", "[[surfaces]]"), "scene", "[[surfaces]]", &["surfaces"]);
 }

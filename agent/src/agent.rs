@@ -94,8 +94,8 @@ impl<'a> Agent<'a> {
         match self.monitor(world, round) {
             Ok(()) => self.keep()?,
             Err(because) => {
-                if let Some(why) = self.replan(world, round, because)? {
-                    return Ok(Some(Ended::NoPlan(why)));
+                if let Some(ended) = self.replan(world, round, because)? {
+                    return Ok(Some(ended));
                 }
             }
         }
@@ -119,16 +119,16 @@ impl<'a> Agent<'a> {
         }
     }
 
-    /// Makes a new plan. Returns the reason if there can be none.
+    /// Makes a new plan. Returns how it ends if there is none.
     fn replan(
         &mut self,
         world: &mut World<'_>,
         round: &Round,
         because: String,
-    ) -> Result<Option<String>, CommandError> {
+    ) -> Result<Option<Ended>, CommandError> {
         world.planned();
         match world.choice(round) {
-            Choice::Nothing(why) => return Ok(Some(why)),
+            Choice::Nothing(why) => return Ok(Some(Ended::Undecided(why))),
             Choice::Steps(plan) => return self.intend(round, plan, because, Vec::new()).map(|()| None),
             Choice::Planner => {}
         }
@@ -145,12 +145,13 @@ impl<'a> Agent<'a> {
         totals.planning_s = totals.planning_s.max(took_s - geometry_s);
         totals.geometry_s = totals.geometry_s.max(geometry_s);
         match planned {
-            Planned::Unsolvable { why, .. } => return Ok(Some(why.to_string())),
+            Planned::Unsolvable { why, .. } => return Ok(Some(Ended::NoPlan(why.to_string()))),
             Planned::Solved { plan, statistics } => self.adopt(round, plan, &statistics, because)?,
             Planned::OutOfTime { best, statistics } | Planned::OutOfMemory { best, statistics } => {
                 let because = format!("{because}; the search ended after {MOST_EVALUATED} states");
                 let plan = best.or_else(|| world.fallback(round));
-                let Some(plan) = plan else { return Ok(Some(String::new())) };
+                let why = || format!("the search ended after {MOST_EVALUATED} states");
+                let Some(plan) = plan else { return Ok(Some(Ended::Undecided(why()))) };
                 self.adopt(round, plan, &statistics, because)?;
             }
         }

@@ -82,11 +82,13 @@ impl fmt::Display for Event {
                     writeln!(f, "          {step}")?;
                 }
                 let calls: Vec<String> = calls.iter().map(|(name, n)| format!("{n} x {name}")).collect();
-                write!(f, "          {makespan_s:.1} s in all; asked of geometry: {}", calls.join(", "))
+                let asked = if calls.is_empty() { "nothing".into() } else { calls.join(", ") };
+                write!(f, "          {makespan_s:.1} s in all; asked of attachments: {asked}")
             }
             Event::Kept { left } => {
                 write!(f, "keep      the rest of the plan still reaches the goal ({left} steps left)")
             }
+            Event::Acting { call, because } if because.is_empty() => write!(f, "do        {call}"),
             Event::Acting { call, because } => write!(f, "do        {call}: {because}"),
             Event::Acted { call: _, outcome } => write!(f, "          {outcome}"),
             Event::Failed { call, because, therefore } => {

@@ -21,6 +21,8 @@ pub enum Ended {
     Reached,
     /// There is no plan, and why.
     NoPlan(String),
+    /// The search for a plan came to no end, and no single step is surely worth it.
+    Undecided(String),
     /// A limit was reached.
     Limit(String),
 }
@@ -98,7 +100,8 @@ pub(crate) fn conclude(
     let asker = Asker { goal, lexicon, mind, round, s };
     let (verdict, why) = match ended {
         Ended::Reached => asker.reached(),
-        Ended::NoPlan(planner_says) => asker.gave_up(planner_says),
+        Ended::NoPlan(why) => asker.gave_up(why, true),
+        Ended::Undecided(why) => asker.gave_up(why, false),
         Ended::Limit(why) => (Verdict::Failed, why.clone()),
     };
     let why = asker.worded(verdict).unwrap_or(why);
@@ -109,7 +112,7 @@ pub(crate) fn conclude(
         (_, _, Some(_)) => s.asked.iter().map(|&on| s.clarity(on)).fold(1.0, f64::min),
         _ => f64::from(u8::from(verdict == Verdict::Achieved)),
     };
-    let first = s.things.first().filter(|t| t.track.is_none());
+    let first = s.things.first().filter(|_| own == 1);
     let may_be = |thing: &Thing, t: &Track| thing.probability(t, &s.surfaces) > 1.0 - s.thresholds.confidence;
     let mut objects: Vec<Believed> = s.belief.tracks.iter().map(|t| asker.believed(t)).collect();
     objects.sort_by_key(|o| !o.asked);
@@ -126,7 +129,7 @@ pub(crate) fn conclude(
 }
 
 /// In an answer, `{changes <surface>}` stands for what has changed there since an earlier run.
-const CHANGES: &str = "changes";
+pub(crate) const CHANGES: &str = "changes";
 /// An object nearer than this to where one was is that one, metres.
 const SAME_M: f64 = 0.10;
 
@@ -143,8 +146,7 @@ impl Asker<'_> {
     /// The goal holds: what was asked for, and where.
     fn reached(&self) -> (Verdict, String) {
         let s = self.s;
-        let things: Vec<String> = self.own().map(|(_, t)| format!("{} {}", t.name, self.stands(t))).collect();
-        let mut said = things;
+        let mut said = self.surely();
         for kind in &s.kinds {
             let members = self.members(kind);
             if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {
@@ -159,18 +161,25 @@ impl Asker<'_> {
         for &on in &s.asked {
             said.push(format!("everything on the {} is identified", s.surfaces[on].name));
         }
-        if said.is_empty() {
-            said.push(format!("it holds that {}", self.goal.pddl));
+        if said.is_empty() || self.goal.asked.more {
+            said.insert(0, format!("it holds that {}", self.goal.pddl));
         }
         (Verdict::Achieved, said.join("; "))
     }
 
     /// No plan is left: what is known of what was asked for, and what keeps one from saying more.
-    fn gave_up(&self, planner_says: &str) -> (Verdict, String) {
+    fn gave_up(&self, planner_says: &str, is_proven: bool) -> (Verdict, String) {
         let s = self.s;
         let says = if planner_says.is_empty() { String::new() } else { format!(": {planner_says}") };
         let missing: Vec<usize> =
             self.own().map(|(n, _)| n).filter(|&n| s.confidence(n) < s.threshold).collect();
+        // Where looks could still settle what they can, it is something else that cannot be brought about.
+        let is_beyond_looks = self.goal.asked.more
+            && !missing.is_empty()
+            && missing.iter().all(|&n| s.doubt_about(n).can_be_settled(s));
+        if is_beyond_looks && is_proven {
+            return (Verdict::Impossible, self.impossible(&says));
+        }
         let open = missing.iter().find_map(|&n| Some((n, reasons::left_about(s, n)?)));
         if let Some((n, doubt)) = open {
             let asked = self.where_asked(&s.things[n]);
@@ -193,12 +202,29 @@ impl Asker<'_> {
                 format!("not everything could be identified{doubt}; {}{says}", self.looks()),
             );
         }
-        let known: Vec<String> = self.own().map(|(_, t)| format!("{} {}", t.name, self.stands(t))).collect();
+        if !is_proven {
+            let text = format!("no plan was found that brings about {}", self.goal.pddl);
+            return (Verdict::CannotTell, format!("{text}{says}"));
+        }
+        (Verdict::Impossible, self.impossible(&says))
+    }
+
+    fn impossible(&self, says: &str) -> String {
+        let known = self.surely();
         let known = if known.is_empty() { String::new() } else { format!("{}; ", known.join("; ")) };
-        (
-            Verdict::Impossible,
-            format!("{known}nothing that can be done brings about {}{says}", self.goal.pddl),
-        )
+        format!("{known}nothing that can be done brings about {}{says}", self.goal.pddl)
+    }
+
+    /// Where the things stand that were asked for by name, of those of which it is sure.
+    fn surely(&self) -> Vec<String> {
+        let is_sure = |what: usize| {
+            let anywhere = (0..self.s.surfaces.len()).map(|on| self.s.presence(what, on));
+            anywhere.fold(self.s.confidence(what), f64::max) >= self.s.threshold
+        };
+        self.own()
+            .filter(|(n, _)| is_sure(*n))
+            .map(|(_, t)| format!("{} {}", t.name, self.stands(t)))
+            .collect()
     }
 
     /// The things that were asked for by name.

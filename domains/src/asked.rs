@@ -1,5 +1,6 @@
 //! What a goal asks about: read off its condition, whatever words a phrase used for it.
 
+use crate::abilities::searching;
 use crate::vocabulary::Vocabulary;
 
 /// The objects that a goal's condition speaks of.
@@ -11,6 +12,8 @@ pub struct Asked {
     pub kinds: Vec<(String, Option<String>)>,
     /// Surfaces of which it is asked what stands there.
     pub surfaces: Vec<String>,
+    /// Whether it asks for more than looking can tell.
+    pub more: bool,
 }
 
 /// The function that says how sure it is that a thing is on a surface: a question about that surface alone.
@@ -24,6 +27,7 @@ impl Asked {
         let mut asked = Self::default();
         for mention in mentions(condition) {
             let Some(word) = mention.first().and_then(|name| vocabulary.word(name)) else { continue };
+            asked.more |= searching::ABILITY.facts.iter().all(|fact| fact.name != word.name);
             let arguments = || mention[1..].iter().zip(&word.types);
             let named = |wanted: &'static str| {
                 arguments().filter(move |(_, t)| vocabulary.is_a(t, wanted)).map(|(a, _)| a.clone())
@@ -64,7 +68,7 @@ impl Asked {
 }
 
 /// Every list of plain symbols in a condition: `(on cup-a ?s)`, `(confidence cup-a)`.
-fn mentions(condition: &str) -> Vec<Vec<String>> {
+pub(crate) fn mentions(condition: &str) -> Vec<Vec<String>> {
     let mut found = Vec::new();
     let mut open: Vec<Option<Vec<String>>> = Vec::new();
     let spaced = condition.to_lowercase().replace('(', " ( ").replace(')', " ) ");
@@ -105,6 +109,7 @@ mod tests {
                     things: things.iter().map(|(t, on)| (t.to_string(), on.map(own))).collect(),
                     kinds: own(kinds).into_iter().map(|kind| (kind, None)).collect(),
                     surfaces: own(surfaces),
+                    more: condition.contains("observed"),
                 };
                 assert_eq!(Asked::of(condition, &domain.vocabulary), expected, "{condition}");
             };
@@ -126,5 +131,6 @@ mod tests {
         check("(>= (completeness cup) 0.8)", &[], &["cup"], &[]);
         check("(>= (clarity table) 0.8)", &[], &[], &["table"]);
         check("(observed table-3 table)", &[], &[], &[]);
+        check("(and (observed table-3 table) (on cup-a table))", &[("cup-a", None)], &[], &[]);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use descry_planner::{Diagnostic, Findings, Source as Text, Span};
 use serde::Deserialize;
 
 use crate::load::LoadError;
@@ -131,7 +132,7 @@ pub struct ActionConfig {
 
 /// One step or several.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "a skill with the action's variables, or a list of them")]
 pub enum Steps {
     /// Nothing is said.
     #[default]
@@ -292,13 +293,15 @@ fn default_program_time_s() -> f64 {
 }
 
 /// Checks the numbers of a configuration.
-pub(crate) fn check(path: &str, config: &Config) -> Result<(), LoadError> {
+pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
     let value = |key: &str, value: f64, holds: bool, expected: &'static str| {
-        let error = || LoadError::Value {
-            path: path.into(),
-            key: key.into(),
-            found: value.to_string(),
-            expected: expected.into(),
+        let path: Vec<&str> = key.split('.').collect();
+        let error = || {
+            let place = crate::check::place::Places::of(&source.text).at(&path);
+            let message = format!("{key} is {value}");
+            let told = Diagnostic::error("value", message, Span { source: 0, ..place }, "here");
+            let list = vec![told.with_help(format!("expected: {expected}"))];
+            LoadError::Findings { findings: Findings { sources: vec![source.clone()], list } }
         };
         if holds { Ok(()) } else { Err(error()) }
     };
@@ -324,8 +327,14 @@ pub(crate) fn check(path: &str, config: &Config) -> Result<(), LoadError> {
         let (key, limit_s) = (format!("action.{name}.limit_s"), action.limit_s());
         value(&key, limit_s, limit_s > 0.0 && limit_s.is_finite(), "seconds, above 0")?;
     }
+    let programs = config.attachments.iter().map(|(name, p)| (format!("attachments.{name}"), p.time_limit_s));
+    let facts = config.word.iter().map(|(name, w)| (format!("word.{name}"), w.time_limit_s));
+    for (of, limit_s) in programs.chain(facts) {
+        let key = format!("{of}.time_limit_s");
+        value(&key, limit_s, limit_s > 0.0 && limit_s.is_finite(), "seconds, above 0")?;
+    }
     for (n, expectation) in config.expect.iter().enumerate() {
-        let (key, w) = (format!("expect[{n}].weight"), expectation.weight);
+        let (key, w) = (format!("expect.{n}.weight"), expectation.weight);
         value(&key, w, w > 0.0 && w.is_finite(), "a number above 0")?;
     }
     Ok(())

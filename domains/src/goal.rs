@@ -98,10 +98,11 @@ pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, Goal
     let (words, wanted) = conditions(said, domain.config.thresholds.confidence)?;
     let mut nearest_miss = None;
     for phrase in &domain.config.goal {
-        let Some(slots) = match_phrase(&phrase.say, &words) else { continue };
-        match fill(lexicon, &slots) {
-            Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
-            Err(found) => nearest_miss = nearest_miss.or(Some(found)),
+        for slots in fits(&phrase.say, &words) {
+            match fill(lexicon, &slots) {
+                Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
+                Err(found) => nearest_miss = nearest_miss.or(Some(found)),
+            }
         }
     }
     let domain_name = domain.config.name.clone();
@@ -213,11 +214,8 @@ struct Wanted {
 
 /// Takes "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.
 fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Wanted), GoalError> {
-    let mut words: Vec<String> = said
-        .split_whitespace()
-        .map(|w| w.trim_matches(|c: char| "\"'.,!?".contains(c)).to_lowercase())
-        .filter(|w| !w.is_empty())
-        .collect();
+    let mut words: Vec<String> =
+        said.split_whitespace().map(|w| bare(w).to_lowercase()).filter(|w| !w.is_empty()).collect();
     let mut wanted = Wanted { confidence: default, deadline_s: None };
     loop {
         let confidence = words.windows(2).rposition(|w| w[0] == "with" && w[1] == "confidence");
@@ -237,6 +235,11 @@ fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Wanted), GoalErr
     }
 }
 
+/// A word without the signs around it.
+pub(crate) fn bare(word: &str) -> &str {
+    word.trim_matches(|c: char| "\"'.,!?".contains(c))
+}
+
 /// "60", "60 s", "60 seconds", "1.5 minutes".
 fn seconds(said: &str) -> Option<f64> {
     let (number, unit) = said.split_once(' ').unwrap_or((said, "s"));
@@ -248,20 +251,27 @@ fn seconds(said: &str) -> Option<f64> {
     number.parse::<f64>().ok().map(|n| n * factor).filter(|s| *s > 0.0 && s.is_finite())
 }
 
-/// Matches words against a phrase with slots; a slot takes one word or more.
-fn match_phrase<'a>(say: &'a str, words: &[String]) -> Option<Vec<(&'a str, String)>> {
-    fn step<'a>(pattern: &[&'a str], words: &[String]) -> Option<Vec<(&'a str, String)>> {
-        let Some((&head, rest)) = pattern.split_first() else { return words.is_empty().then(Vec::new) };
-        if let Some(slot) = head.strip_prefix('<').and_then(|h| h.strip_suffix('>')) {
-            return (1..=words.len()).find_map(|n| {
-                let mut found = step(rest, &words[n..])?;
-                found.insert(0, (slot, words[..n].join(" ")));
-                Some(found)
-            });
-        }
-        (words.first()? == &head.to_lowercase()).then(|| step(rest, &words[1..]))?
+/// The ways in which words fit a phrase with slots, each slot with what it holds; a slot takes one word or more.
+fn fits<'a>(say: &'a str, words: &[String]) -> Vec<Vec<(&'a str, String)>> {
+    fn step<'a>(pattern: &[&'a str], words: &[String]) -> Vec<Vec<(&'a str, String)>> {
+        let Some((&head, rest)) = pattern.split_first() else {
+            return if words.is_empty() { vec![Vec::new()] } else { Vec::new() };
+        };
+        let Some(slot) = head.strip_prefix('<').and_then(|h| h.strip_suffix('>')) else {
+            let fits = words.first().is_some_and(|word| *word == head.to_lowercase());
+            return if fits { step(rest, &words[1..]) } else { Vec::new() };
+        };
+        let with = |n: usize| {
+            let held = (slot, words[..n].join(" "));
+            step(rest, &words[n..]).into_iter().map(move |mut found| {
+                found.insert(0, held.clone());
+                found
+            })
+        };
+        (1..=words.len()).flat_map(with).collect()
     }
-    step(&say.split_whitespace().collect::<Vec<_>>(), words)
+    let pattern: Vec<&str> = say.split_whitespace().map(bare).filter(|word| !word.is_empty()).collect();
+    step(&pattern, words)
 }
 
 fn fill(lexicon: &Lexicon, slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> {
@@ -364,5 +374,27 @@ mod tests {
         check("(c <thing>)", &[("thing", "a"), ("thing", "b")], Err("<first:thing>"));
         check("(c <cup>)", &[("thing", "a")], Err("no slot <cup>; it has <thing>"));
         check("(< (x) 3) ", &[], Ok("(< (x) 3) "));
+    }
+
+    #[test]
+    fn words_fit_a_phrase_in_every_way() {
+        let check = |say: &str, words: &str, expected: &[&[&str]]| {
+            let words: Vec<String> = words.split_whitespace().map(str::to_string).collect();
+            let found: Vec<Vec<String>> = fits(say, &words)
+                .into_iter()
+                .map(|way| way.into_iter().map(|(_, held)| held).collect())
+                .collect();
+            assert_eq!(found, expected, "{say}");
+        };
+        check("find <thing>", "find cup a", &[&["cup a"]]);
+        check("where is <thing>?", "where is cup a", &[&["cup a"]]);
+        check("Find, please, <thing>", "find please cup", &[&["cup"]]);
+        check("find <thing>", "find", &[]);
+        check("find", "find cup", &[]);
+        check(
+            "find both <thing> and <thing>",
+            "find both salt and pepper and a cup",
+            &[&["salt", "pepper and a cup"], &["salt and pepper", "a cup"]],
+        );
     }
 }

@@ -14,6 +14,7 @@ pub mod note;
 pub mod program;
 mod programs;
 pub mod situation;
+pub mod template;
 pub mod vocabulary;
 pub mod words;
 pub mod world;

@@ -76,9 +76,9 @@ pub enum LoadError {
         /// The error under the text.
         drawn: String,
     },
-    /// The PDDL text has faults.
+    /// The PDDL text has faults, or a value of `domain.toml` lies outside what makes sense.
     #[error("{}", .findings.render(false))]
-    Pddl {
+    Findings {
         /// Each with its place.
         findings: Findings,
     },
@@ -87,18 +87,6 @@ pub enum LoadError {
     Objects {
         /// Which, and what was expected.
         because: descry_perception::recognise::ModelError,
-    },
-    /// A value lies outside what makes sense.
-    #[error("{path}: {key} is {found}\n  expected: {expected}")]
-    Value {
-        /// The file.
-        path: String,
-        /// The key.
-        key: String,
-        /// Its value.
-        found: String,
-        /// What would do.
-        expected: String,
     },
 }
 
@@ -230,7 +218,7 @@ pub fn from_files(files: Files, folder: Option<PathBuf>) -> Result<Domain, LoadE
     let (config_name, config) = file("domain.toml")?;
     let toml = Source { name: config_name.clone(), text: config.clone() };
     let config: Config = parse(config_name, config)?;
-    config::check(config_name, &config)?;
+    config::check(&toml, &config)?;
     let under = |prefix: &'static str| files.iter().filter(move |(key, _)| key.starts_with(prefix));
     let objects = parse_objects(&files)?;
     let scenes = under("scenes/")
@@ -240,7 +228,7 @@ pub fn from_files(files: Files, folder: Option<PathBuf>) -> Result<Domain, LoadE
         })
         .collect();
     let pddl = Source { name: pddl_name.clone(), text: pddl.clone() };
-    let vocabulary = Vocabulary::read(&pddl).map_err(|findings| LoadError::Pddl { findings })?;
+    let vocabulary = Vocabulary::read(&pddl).map_err(|findings| LoadError::Findings { findings })?;
     Ok(Domain { pddl, vocabulary, toml, config, objects, scenes, folder, files, tape: None })
 }
 

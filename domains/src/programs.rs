@@ -76,7 +76,8 @@ impl Programs {
         for line in &lines {
             for (name, arguments, _) in words::read(line).map_err(|e| failed(format!("\"{line}\": {e}")))? {
                 let unknown = arguments.iter().find(|a| !objects.contains(a));
-                if name != word.name || arguments.len() != word.types.len() {
+                let is_value = line.trim_start_matches(['(', ' ']).starts_with('=');
+                if name != word.name || arguments.len() != word.types.len() || (is_value != word.is_number) {
                     return Err(failed(format!("\"{line}\" is not about ({})", word.name)));
                 }
                 if let Some(unknown) = unknown {

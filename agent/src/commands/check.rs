@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
 fn folder(name: &str, json: bool) -> Result<Exit, CommandError> {
     let domain = match Domain::load(name) {
         Ok(domain) => domain,
-        Err(LoadError::Pddl { findings }) => return say(&findings, &[], json),
+        Err(LoadError::Findings { findings }) => return say(&findings, &[], json),
         Err(other) => return Err(CommandError::bad_input(other)),
     };
     let mut findings = descry_planner::check(&domain.pddl, None);
@@ -64,7 +64,7 @@ fn folder(name: &str, json: bool) -> Result<Exit, CommandError> {
 fn say(findings: &Findings, grounding: &[String], json: bool) -> Result<Exit, CommandError> {
     if json {
         let errors = findings.has_errors();
-        input::print_json(&json!({ "errors": errors, "findings": findings.list, "grounding": grounding }))?;
+        input::print_json(&json!({ "errors": errors, "findings": findings, "grounding": grounding }))?;
     } else {
         if !grounding.is_empty() {
             input::print_text(&grounding.join("\n"))?;

@@ -117,7 +117,7 @@ pub(super) fn understood(said: &str, domain: &Domain, robot: &dyn Robot) -> Resu
 }
 
 fn begin(said: &str, with: &With) -> Result<(Report, Folder), CommandError> {
-    let domain = Domain::load(&with.domain).map_err(CommandError::bad_input)?;
+    let domain = input::domain(&with.domain)?;
     let body = body::open(&with.robot, with.scene.as_deref(), with.seed, &domain)?;
     let goal = understood(said, &domain, &*body.robot)?;
     let chooser = policies::named(&with.policy, with.seed, None).map_err(CommandError::bad_input)?;

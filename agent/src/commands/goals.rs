@@ -2,7 +2,7 @@
 
 use descry_domains::goal::spoken_types;
 use descry_domains::lexicon::{Lexicon, Places};
-use descry_domains::load::{DEFAULT, Domain};
+use descry_domains::load::DEFAULT;
 use serde_json::json;
 
 use crate::commands::input;
@@ -20,7 +20,7 @@ pub struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
-    let domain = Domain::load(&arguments.domain).map_err(CommandError::bad_input)?;
+    let domain = input::domain(&arguments.domain)?;
     let lexicon = Lexicon::new(&domain, &Places::of_scene(&domain));
     let names = |of: &str| -> Vec<Vec<String>> {
         lexicon.of_type(of).iter().map(|named| named.names.clone()).collect()

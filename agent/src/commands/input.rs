@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use descry_domains::check;
 use descry_domains::config::Program;
+use descry_domains::load::Domain;
 use descry_domains::program::ProgramAttachment;
 use descry_memory::Fault;
 use descry_planner::{Attachment, Attachments, Findings, Source};
@@ -26,6 +28,13 @@ pub fn source(path: &Path) -> Result<Source, CommandError> {
         CommandError::BadInput(format!("{name}: byte {at} is not UTF-8 text\n  a PDDL file was expected"))
     })?;
     Ok(Source { name, text })
+}
+
+/// A domain that makes sense as a whole, by its name or folder.
+pub fn domain(name: &str) -> Result<Domain, CommandError> {
+    let domain = Domain::load(name).map_err(CommandError::bad_input)?;
+    check::runnable(&domain).map_err(|findings| CommandError::BadInput(drawn(&findings)))?;
+    Ok(domain)
 }
 
 /// Findings as people read them: drawn under the text, in colour on a terminal.

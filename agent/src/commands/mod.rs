@@ -6,6 +6,7 @@ mod find;
 mod goals;
 mod input;
 mod memory;
+mod new;
 mod plan;
 mod recognise;
 mod replay;
@@ -27,6 +28,8 @@ pub enum Command {
     Find(find::FindArguments),
     /// Pursue a goal, in the words of a domain
     Do(find::DoArguments),
+    /// Write a small domain of your own into a folder: it runs, and is there to be changed
+    New(new::Arguments),
     /// List what may be said to a domain
     Goals(goals::Arguments),
     /// Plan: any PDDL domain and problem
@@ -66,6 +69,7 @@ pub fn run(command: &Command) -> Result<Exit, CommandError> {
         Command::Goals(arguments) => goals::run(arguments),
         Command::Plan(arguments) => plan::run(arguments),
         Command::Validate(arguments) => validate::run(arguments),
+        Command::New(arguments) => new::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Recognise(arguments) => recognise::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments),

@@ -1,0 +1,68 @@
+//! `descry new DIR`: a small domain that runs, to be changed.
+
+use std::path::{Path, PathBuf};
+
+use descry_domains::template;
+use serde_json::json;
+
+use crate::commands::input;
+use crate::exit::{CommandError, Exit};
+
+/// Arguments of `descry new`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The domain's folder; its last part is the domain's name
+    folder: PathBuf,
+    /// Print what was written as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    let folder = &arguments.folder;
+    free(folder)?;
+    let absolute = std::path::absolute(folder).map_err(|e| unwritable(folder, &e))?;
+    let name = absolute.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut written = Vec::new();
+    for (path, text) in template::files(&name) {
+        let path = folder.join(path);
+        let parent = path.parent().unwrap_or(folder);
+        std::fs::create_dir_all(parent).map_err(|e| unwritable(parent, &e))?;
+        std::fs::write(&path, text).map_err(|e| unwritable(&path, &e))?;
+        written.push(path.display().to_string());
+    }
+    if arguments.json {
+        input::print_json(&json!({ "folder": folder, "files": written }))?;
+    } else {
+        let shown = folder.display();
+        let next = [
+            format!("  descry check {shown}"),
+            format!("  descry goals --domain {shown}"),
+            format!("  descry find mug --domain {shown}"),
+        ];
+        input::print_text(&format!("{}\n\nnext:\n{}", written.join("\n"), next.join("\n")))?;
+    }
+    Ok(Exit::Done)
+}
+
+/// The folder is not there yet, or empty.
+fn free(folder: &Path) -> Result<(), CommandError> {
+    let bad = |because: &str, mend: &str| {
+        Err(CommandError::BadInput(format!("{}: {because}\n  {mend}", folder.display())))
+    };
+    match std::fs::read_dir(folder) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(e) => bad(&e.to_string(), "expected the name of a folder that is not there yet, or is empty"),
+        Ok(mut entries) => match entries.next() {
+            None => Ok(()),
+            Some(_) => bad("it holds something already", "name another folder; nothing was written"),
+        },
+    }
+}
+
+fn unwritable(path: &Path, error: &std::io::Error) -> CommandError {
+    CommandError::BadInput(format!(
+        "{}: {error}\n  a folder that can be written was expected",
+        path.display()
+    ))
+}

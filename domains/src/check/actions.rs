@@ -1,0 +1,236 @@
+//! Every action is carried out by something, every call is answered.
+
+use descry_planner::{Diagnostic, Span};
+use descry_skills::Call;
+
+use super::Check;
+use crate::abilities::{self, SkillWord};
+use crate::actions::substituted;
+use crate::config::ActionConfig;
+use crate::vocabulary::Ground;
+
+/// The kinds of failure that may teach something.
+const FAILURES: [&str; 12] = [
+    "unreachable",
+    "blocked",
+    "timed_out",
+    "cancelled",
+    "sensor_dropped",
+    "lost",
+    "slipped",
+    "unable",
+    "broken",
+    "program",
+    "meaningless",
+    "unmet",
+];
+
+impl Check<'_> {
+    /// Every action is carried out by a skill, several, or a program; what stands in `domain.toml` about it makes sense.
+    pub(super) fn actions(&self) -> Vec<Diagnostic> {
+        let mut list = Vec::new();
+        let actions = &self.domain.vocabulary.task.actions;
+        for action in actions {
+            let config = self.domain.config.action.get(&action.name).cloned().unwrap_or_default();
+            let parameters: Vec<&str> = action.parameters.iter().map(|p| p.name.as_str()).collect();
+            list.extend(self.performed(&action.name, &parameters, action.span, &config));
+            list.extend(self.configured(&action.name, &config));
+        }
+        let is_unknown = |name: &&String| actions.iter().all(|a| a.name != **name);
+        for name in self.domain.config.action.keys().filter(is_unknown) {
+            let help = self.known(name, actions.iter().map(|a| a.name.as_str()));
+            let message = format!("there is no action `{name}` in domain.pddl");
+            list.push(self.error("no-action", message, self.toml.at(&["action", name]), help));
+        }
+        list
+    }
+
+    /// Who carries an action out.
+    fn performed(
+        &self,
+        name: &str,
+        parameters: &[&str],
+        span: Span,
+        config: &ActionConfig,
+    ) -> Vec<Diagnostic> {
+        let texts = config.does.texts();
+        if let Some(program) = &config.program {
+            let both = (!texts.is_empty()).then(|| {
+                let message = format!("the action `{name}` has both a program and skills");
+                let help = "leave `program` or `does` out";
+                self.error("two-performers", message, self.toml.at(&["action", name]), help)
+            });
+            return both.into_iter().chain(self.program(&["action", name, "program"], program)).collect();
+        }
+        if texts.is_empty() {
+            let text = format!("{name} {}", parameters.join(" "));
+            return self.step(name, &text, span, "this action").into_iter().collect();
+        }
+        let step = |text: &&str| {
+            self.step(name, text, self.toml.within(&["action", name, "does"], text), "this step")
+        };
+        texts.iter().filter_map(step).collect()
+    }
+
+    /// One step of an action.
+    fn step(&self, action: &str, text: &str, span: Span, label: &str) -> Option<Diagnostic> {
+        let mut tokens = text.split_whitespace();
+        let name = tokens.next().unwrap_or_default();
+        let uses = &self.domain.config.uses;
+        let Some(skill) = abilities::skill(uses, name) else {
+            let message = if name == action {
+                format!("no skill carries out the action `{action}`")
+            } else {
+                format!("no skill is called `{name}`, to carry out the action `{action}`")
+            };
+            let skills = abilities::used(uses).flat_map(|a| a.skills).map(|s| s.name);
+            let help = format!(
+                "{}; or a program: [action.{action}] program = [\"python3\", \"{action}.py\"]",
+                self.known(name, skills)
+            );
+            return Some(Diagnostic::error("no-skill", message, span, label).with_help(help));
+        };
+        self.fits(action, skill, &tokens.collect::<Vec<_>>(), span, label)
+    }
+
+    fn fits(
+        &self,
+        action: &str,
+        skill: &SkillWord,
+        given: &[&str],
+        span: Span,
+        label: &str,
+    ) -> Option<Diagnostic> {
+        let expected: Vec<String> = skill.types.iter().map(|t| format!("?{t}")).collect();
+        let help = format!("it is `{} {}`: {}", skill.name, expected.join(" "), skill.about);
+        let fault = |message: String| {
+            Some(Diagnostic::error("skill-arguments", message, span, label).with_help(help.clone()))
+        };
+        if given.len() != skill.types.len() {
+            let (wanted, found) = (skill.types.len(), given.len());
+            return fault(format!("the skill `{}` takes {wanted} objects, not {found}", skill.name));
+        }
+        let vocabulary = &self.domain.vocabulary;
+        let parameters = vocabulary.action(action).unwrap_or_default();
+        for (argument, wanted) in given.iter().zip(skill.types) {
+            let Some(variable) = argument.strip_prefix('?') else { continue };
+            let found = parameters.iter().find(|(name, _)| name[1..] == *variable.to_lowercase());
+            match found {
+                None => return fault(format!("the action `{action}` has no parameter {argument}")),
+                Some((_, of)) if !vocabulary.is_a(of, wanted) => {
+                    let taken = format!("the skill `{}` takes a {wanted}", skill.name);
+                    return fault(format!("{taken} where {argument} is a {of}"));
+                }
+                Some(_) => {}
+            }
+        }
+        None
+    }
+
+    /// What a failure leaves behind, and what must hold afterwards, are conditions over the action's variables.
+    fn configured(&self, name: &str, config: &ActionConfig) -> Vec<Diagnostic> {
+        let mut list = Vec::new();
+        for (n, atom) in config.gives_up.iter().enumerate() {
+            list.extend(self.teaches(name, &["action", name, "gives_up", &n.to_string()], atom));
+        }
+        for (n, taught) in config.teaches.iter().enumerate() {
+            let n = n.to_string();
+            list.extend(self.teaches(name, &["action", name, "teaches", &n, "says"], &taught.says));
+            if !FAILURES.contains(&taught.when.as_str()) {
+                let message = format!("there is no kind of failure \"{}\"", taught.when);
+                let place = self.toml.at(&["action", name, "teaches", &n, "when"]);
+                list.push(self.error("no-failure", message, place, self.known(&taught.when, FAILURES)));
+            }
+        }
+        if let Some(check) = &config.check {
+            let (condition, objects) = self.over(name, check);
+            list.extend(self.condition(&["action", name, "check"], &condition, &objects));
+        }
+        list
+    }
+
+    /// What is said when an action fails is of a word that is remembered.
+    fn teaches(&self, action: &str, path: &[&str], atom: &str) -> Option<Diagnostic> {
+        let (condition, objects) = self.over(action, atom);
+        if let Some(fault) = self.condition(path, &condition, &objects) {
+            return Some(fault);
+        }
+        let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
+        let read = crate::words::read(&condition);
+        let Ok(instances) = read else {
+            let help = "expected (word ?variables), (not (word ?variables)) or (= (word ?variables) 3)";
+            return Some(self.error(
+                "no-atom",
+                format!("`{atom}` is more than one atom"),
+                self.toml.at(path),
+                help,
+            ));
+        };
+        let is_remembered = |word: &str| {
+            let ground = vocabulary.word(word).map(|w| vocabulary.ground(&w, config));
+            matches!(ground, Some(Ground::Remembered))
+        };
+        let (word, ..) = instances.iter().find(|(word, ..)| !is_remembered(word))?;
+        let message =
+            format!("what a failure of `{action}` teaches, `{word}`, is no word that is remembered");
+        let help = "name a predicate of domain.pddl that no ability states, as (given-up ?to)";
+        Some(self.error("not-remembered", message, self.toml.at(path), help))
+    }
+
+    /// A text over an action's variables with an object of its own in the place of each, and these objects with their types.
+    fn over(&self, action: &str, text: &str) -> (String, Vec<(String, String)>) {
+        let parameters = self.domain.vocabulary.action(action).unwrap_or_default();
+        let mut objects: Vec<(String, String)> =
+            parameters.into_iter().map(|(name, of)| (format!("some-{}", &name[1..]), of)).collect();
+        let call =
+            Call { action: action.into(), arguments: objects.iter().map(|(name, _)| name.clone()).collect() };
+        let mut condition = substituted(self.domain, &call, &[text.to_string()]).concat();
+        if condition.contains("?by") {
+            condition = condition.replace("?by", "what-was-in-the-way");
+            let of = self.type_where(&condition, "what-was-in-the-way");
+            objects.push(("what-was-in-the-way".into(), of));
+        }
+        (condition, objects)
+    }
+
+    /// Every call is answered, and what answers one is called.
+    pub(super) fn calls(&self) -> Vec<Diagnostic> {
+        let known: Vec<&str> =
+            abilities::used(&self.domain.config.uses).flat_map(|a| a.calls).map(|c| c.name).collect();
+        let programs = &self.domain.config.attachments;
+        let modules = &self.domain.vocabulary.task.modules;
+        let mut list = Vec::new();
+        for module in modules {
+            let name = module.name.as_str();
+            if known.contains(&name) || programs.contains_key(name) {
+                continue;
+            }
+            let help = format!(
+                "{}; or a program: [attachments.{name}] program = [\"python3\", \"{name}.py\"]",
+                self.known(name, known.iter().copied())
+            );
+            let message = format!("nothing answers the call [{name}]");
+            list.push(
+                Diagnostic::error("no-attachment", message, module.span, "this module").with_help(help),
+            );
+        }
+        for (name, program) in programs {
+            if modules.iter().all(|m| m.name != *name) {
+                let message = format!("no call of domain.pddl is named [{name}]");
+                let help = self.known(name, modules.iter().map(|m| m.name.as_str()));
+                list.push(self.error("no-module", message, self.toml.at(&["attachments", name]), help));
+            }
+            list.extend(self.program(&["attachments", name, "program"], &program.program));
+            for (n, word) in program.reads.iter().enumerate() {
+                if self.domain.vocabulary.word(&word.to_lowercase()).is_none() {
+                    let words: Vec<String> =
+                        self.domain.vocabulary.words().into_iter().map(|w| w.name).collect();
+                    let place = self.toml.at(&["attachments", name, "reads", &n.to_string()]);
+                    let help = self.known(word, words.iter().map(String::as_str));
+                    list.push(self.error("no-word", format!("there is no word `{word}`"), place, help));
+                }
+            }
+        }
+        list
+    }
+}

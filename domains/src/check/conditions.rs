@@ -1,0 +1,70 @@
+//! Conditions in `domain.toml`, held against the domain by the planner's own reading.
+
+use descry_planner::{Diagnostic, Severity, Source};
+
+use super::Check;
+use crate::asked::mentions;
+
+impl Check<'_> {
+    /// What is wrong with a condition over the domain's words, its objects and a few more (name and type).
+    pub(super) fn condition(
+        &self,
+        path: &[&str],
+        condition: &str,
+        more: &[(String, String)],
+    ) -> Option<Diagnostic> {
+        let vocabulary = &self.domain.vocabulary;
+        let mut known: Vec<String> = vocabulary.task.objects.iter().map(|o| o.name.clone()).collect();
+        let mut objects = String::new();
+        let mut declare = |name: &str, of: &str| {
+            if vocabulary.has_type(of) && !known.iter().any(|k| k == name) {
+                objects.push_str(&format!(" {name} - {of}"));
+                known.push(name.to_string());
+            }
+        };
+        more.iter().for_each(|(name, of)| declare(name, of));
+        // What is of a type is of its supertypes too: the narrowest counts.
+        let mut types: Vec<&descry_planner::task::Type> = vocabulary.task.types.iter().collect();
+        types.sort_by_key(|t| std::cmp::Reverse(t.ancestors.len()));
+        for of in types {
+            self.lexicon.of_type(&of.name).iter().for_each(|n| declare(&n.symbol, &of.name));
+        }
+        // Poses have their names from the body: one that a condition names may be there.
+        for mention in mentions(condition) {
+            let Some(word) = mention.first().and_then(|name| vocabulary.word(name)) else { continue };
+            let named = mention[1..].iter().zip(&word.types).filter(|(name, _)| !name.starts_with('?'));
+            named.filter(|(_, of)| *of == "pose").for_each(|(name, of)| declare(name, of));
+        }
+        let problem = format!(
+            "(define (problem p) (:domain {}) (:objects{objects}) (:init) (:goal {condition}))",
+            vocabulary.task.domain
+        );
+        let source = Source::new("condition", problem);
+        let findings = descry_planner::check(&self.domain.pddl, Some(&source));
+        // Nothing holds in this problem: what could never come about in it says nothing.
+        let is_here = |d: &&Diagnostic| {
+            let is_about_it = d.labels.first().is_some_and(|l| l.span.source == 1);
+            d.severity == Severity::Error && d.code != "unreachable-goal" && is_about_it
+        };
+        let fault = findings.list.iter().find(is_here)?;
+        let label = fault.labels.first()?;
+        let part = source.text.get(label.span.start as usize..label.span.end as usize).unwrap_or_default();
+        let mut told =
+            Diagnostic::error(fault.code, fault.message.clone(), self.toml.within(path, part), &label.text);
+        if let Some(help) = &fault.help {
+            told = told.with_help(help.clone());
+        }
+        Some(told)
+    }
+
+    /// The type that a condition wants of an object.
+    pub(super) fn type_where(&self, condition: &str, object: &str) -> String {
+        let vocabulary = &self.domain.vocabulary;
+        let of = |mention: Vec<String>| {
+            let word = vocabulary.word(mention.first()?)?;
+            let at = mention[1..].iter().position(|name| name == object)?;
+            word.types.get(at).cloned()
+        };
+        mentions(condition).into_iter().find_map(of).unwrap_or_else(|| "object".into())
+    }
+}

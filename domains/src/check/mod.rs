@@ -1,0 +1,149 @@
+//! Whether a domain's folder makes sense as a whole: every action is carried out by something, every call is answered, every
+//! phrase means something. Each finding is drawn under the text that it is about.
+
+mod actions;
+mod conditions;
+mod phrases;
+pub(crate) mod place;
+mod scenes;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use descry_planner::{Diagnostic, Findings, Severity, Span};
+
+use crate::abilities;
+use crate::lexicon::{Lexicon, Places};
+use crate::load::Domain;
+use crate::vocabulary::Ground;
+
+/// What keeps a domain from being run.
+///
+/// # Errors
+/// The findings that are faults.
+pub fn runnable(domain: &Domain) -> Result<(), Findings> {
+    let mut findings = findings(domain);
+    findings.list.retain(|f| f.severity == Severity::Error);
+    if findings.list.is_empty() { Ok(()) } else { Err(findings) }
+}
+
+/// Everything that is to be said about a domain's folder, faults and warnings.
+pub fn findings(domain: &Domain) -> Findings {
+    let places = Places::of_scene(domain);
+    let lexicon = Lexicon::new(domain, &places);
+    let check = Check { domain, toml: place::Places::of(&domain.toml.text), places, lexicon };
+    let mut list = check.actions();
+    list.extend(check.calls());
+    list.extend(check.words());
+    list.extend(check.objects());
+    list.extend(check.phrases());
+    list.extend(check.scenes());
+    let sources = [domain.pddl.clone(), domain.toml.clone()].into_iter().chain(scenes::scenes(domain));
+    Findings { sources: sources.collect(), list }
+}
+
+/// How each word, call and action of a domain is grounded, a line each.
+pub fn grounding(domain: &Domain) -> Vec<String> {
+    let vocabulary = &domain.vocabulary;
+    let mut lines = vec!["words:".to_string()];
+    for word in vocabulary.words() {
+        let how = match vocabulary.ground(&word, &domain.config) {
+            Ground::Sensed(fact) => format!("sensed: {}", fact.about),
+            Ground::SensedByProgram => "sensed: by a program".into(),
+            Ground::Remembered => "remembered: changes as carried-out actions say".into(),
+            Ground::Fixed => "fixed: as domain.toml says in init".into(),
+            Ground::Planned => "planned: changes within a plan alone".into(),
+            Ground::Derived => "derived by the domain's rules".into(),
+        };
+        let types: String = word.types.iter().map(|t| format!(" {t}")).collect();
+        lines.push(format!("  {:32} {how}", format!("({}{types})", word.name)));
+    }
+    lines.push("calls:".into());
+    for module in &vocabulary.task.modules {
+        let built_in =
+            abilities::used(&domain.config.uses).flat_map(|a| a.calls).find(|c| c.name == module.name);
+        let how = match (domain.config.attachments.get(&module.name), built_in) {
+            (Some(program), _) => format!("program: {}", program.program.join(" ")),
+            (None, Some(meaning)) => meaning.about.into(),
+            (None, None) => "nothing answers it".into(),
+        };
+        lines.push(format!("  {:32} {how}", format!("[{}]", module.name)));
+    }
+    lines.push("actions:".into());
+    for action in &vocabulary.task.actions {
+        let config = domain.config.action.get(&action.name).cloned().unwrap_or_default();
+        let how = match (&config.program, config.does.texts().as_slice()) {
+            (Some(program), _) => format!("program: {}", program.join(" ")),
+            (None, []) => abilities::skill(&domain.config.uses, &action.name)
+                .map_or_else(|| "nothing carries it out".into(), |s| format!("skill: {}", s.about)),
+            (None, steps) => format!("skills: {}", steps.join("; then ")),
+        };
+        let more = format!(
+            "{how} (limit {:.0} s, {} {}{})",
+            config.limit_s(),
+            config.retries() + 1,
+            if config.retries() == 0 { "try" } else { "tries" },
+            config.check.as_ref().map(|c| format!(", checked by {c}")).unwrap_or_default()
+        );
+        lines.push(format!("  {:32} {more}", format!("({})", action.name)));
+    }
+    lines
+}
+
+/// What checking needs.
+struct Check<'a> {
+    domain: &'a Domain,
+    toml: place::Places<'a>,
+    places: Places,
+    lexicon: Lexicon,
+}
+
+impl Check<'_> {
+    /// What could have been meant: the nearest of the names that are known, and all of them.
+    fn known<'n>(&self, found: &str, names: impl IntoIterator<Item = &'n str>) -> String {
+        let names: Vec<&str> = names.into_iter().collect();
+        let near = |name: &&&str| strsim::levenshtein(name, found) <= 3.min(found.len() / 2);
+        let nearest = names.iter().filter(near).min_by_key(|name| strsim::levenshtein(name, found));
+        let hint = nearest.map(|name| format!("did you mean `{name}`? ")).unwrap_or_default();
+        format!("{hint}known: {}", if names.is_empty() { "none".into() } else { names.join(", ") })
+    }
+
+    /// A program can be started: a command that is there, and the file that it is given.
+    fn program(&self, path: &[&str], program: &[String]) -> Option<Diagnostic> {
+        let here = self.toml.at(path);
+        let Some((command, arguments)) = program.split_first() else {
+            let told = Diagnostic::error("no-program", "this program is empty", here, "here");
+            return Some(told.with_help("name a command and its arguments, as [\"python3\", \"mine.py\"]"));
+        };
+        // A run that is lived through again has its answers on tape.
+        let folder = self.domain.folder.as_deref().filter(|_| self.domain.tape.is_none())?;
+        let is_file = |a: &&String| !a.starts_with('-') && std::path::Path::new(a).extension().is_some();
+        if let Some(file) = arguments.first().filter(is_file).filter(|file| !folder.join(file).exists()) {
+            let message = format!("there is no file {file} for `{command}` to run");
+            let help =
+                format!("write {}; programs are run in the domain's folder", folder.join(file).display());
+            let place = self.toml.within(path, file);
+            return Some(Diagnostic::error("no-program", message, place, "here").with_help(help));
+        }
+        let is_there = if command.contains('/') {
+            folder.join(command).exists()
+        } else {
+            let paths = std::env::var_os("PATH").unwrap_or_default();
+            std::env::split_paths(&paths).any(|place| place.join(command).exists())
+        };
+        if is_there {
+            return None;
+        }
+        let message = format!("the command `{command}` is not on this machine");
+        let place = self.toml.within(path, command);
+        Some(
+            Diagnostic::error("no-program", message, place, "here")
+                .with_help("install it, or name another; a path is taken from the domain's folder"),
+        )
+    }
+
+    /// A fault with a mend.
+    fn error(&self, code: &'static str, message: String, at: Span, help: impl Into<String>) -> Diagnostic {
+        Diagnostic::error(code, message, at, "here").with_help(help)
+    }
+}

@@ -1,0 +1,183 @@
+//! Faults put into the template, each with what is found and under which text.
+
+use std::path::Path;
+
+use super::*;
+use crate::load::{Files, from_files};
+use crate::template;
+
+/// The template with one text of a file replaced by another.
+fn changed(file: &str, from: &str, to: &str) -> Result<Domain, crate::load::LoadError> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("template");
+    let mut files = Files::new();
+    for (path, text) in template::files("mine") {
+        let path = path.display().to_string();
+        let text = if path == file {
+            assert!(text.contains(from), "{file} has no {from}");
+            text.replacen(from, to, 1)
+        } else {
+            text
+        };
+        files.insert(path.clone(), (path, text));
+    }
+    from_files(files, Some(folder))
+}
+
+/// Expects one finding of a code, at a place, with words in its message or mend.
+fn check(file: &str, (from, to): (&str, &str), code: &str, place: &str, words: &[&str]) {
+    let found = match changed(file, from, to) {
+        Ok(domain) => findings(&domain),
+        Err(crate::load::LoadError::Findings { findings }) => findings,
+        Err(other) => panic!("{to}: {other}"),
+    };
+    let codes: Vec<&str> = found.list.iter().map(|d| d.code).collect();
+    assert_eq!(codes, [code], "{to}:\n{found}");
+    let span = found.list[0].labels[0].span;
+    let text = &found.sources[span.source as usize].text[span.start as usize..span.end as usize];
+    assert_eq!(text, place, "{to}:\n{found}");
+    for word in words {
+        assert!(found.to_string().contains(word), "{to}: no {word} in\n{found}");
+    }
+}
+
+#[test]
+fn the_template_and_the_built_in_domains_are_faultless() {
+    let domain = changed("domain.toml", "", "").expect("the template loads");
+    assert!(findings(&domain).is_empty(), "{}", findings(&domain));
+    assert_eq!(domain.config.name, "mine");
+    for name in ["tabletop", "home"] {
+        let domain = Domain::load(name).expect("it loads");
+        assert!(findings(&domain).is_empty(), "{name}: {}", findings(&domain));
+    }
+}
+
+#[test]
+fn faults_of_actions_and_calls_are_found_at_their_place() {
+    let pddl = |change, code, place, words: &[&str]| check("domain.pddl", change, code, place, words);
+    let toml = |change, code, place, words: &[&str]| check("domain.toml", change, code, place, words);
+    let more = "[action.observe]";
+    toml(
+        ("\"move ?from ?to\"", "\"moev ?from ?to\""),
+        "no-skill",
+        "moev ?from ?to",
+        &["did you mean `move`", "python3"],
+    );
+    toml(("\"move ?from ?to\"", "\"move ?to\""), "skill-arguments", "move ?to", &["2 objects, not 1"]);
+    toml(
+        ("\"move ?from ?to\"", "\"move ?from ?there\""),
+        "skill-arguments",
+        "move ?from ?there",
+        &["?there"],
+    );
+    toml(
+        ("\"observe ?from ?on\"", "\"observe ?on ?from\""),
+        "skill-arguments",
+        "observe ?on ?from",
+        &["pose"],
+    );
+    toml((more, "[action.obsrve]\n\n[action.observe]"), "no-action", "obsrve", &["did you mean `observe`"]);
+    toml(
+        (more, "[attachments.path-csot]\nprogram = [\"sh\"]\n\n[action.observe]"),
+        "no-module",
+        "path-csot",
+        &["did you mean `path-cost`"],
+    );
+    pddl(
+        ("(can-see ?from", "(may-see ?from - pose ?on - surface conditionchecker x@y) (can-see ?from"),
+        "no-attachment",
+        "may-see",
+        &["[may-see]", "did you mean `can-see`"],
+    );
+    toml(("retries = 2\ngives_up", "program = [\"sh\"]\ngives_up"), "two-performers", "move", &["leave"]);
+    toml(
+        ("[\"(out-of-reach ?to)\"]", "[\"(out-of-raech ?to)\"]"),
+        "undeclared-predicate",
+        "out-of-raech",
+        &["out-of-reach"],
+    );
+    toml(("[\"(out-of-reach ?to)\"]", "[\"(at ?to)\"]"), "not-remembered", "\"(at ?to)\"", &["remembered"]);
+    toml(
+        ("retries = 2\n", "teaches = [{ when = \"bloked\", says = \"(out-of-reach ?to)\" }]\n"),
+        "no-failure",
+        "\"bloked\"",
+        &["did you mean `blocked`"],
+    );
+    toml(("retries = 2\n", "check = \"(att ?to)\"\n"), "undeclared-predicate", "att", &["`at`"]);
+    toml(("limit_s = 120.0", "limit_s = -1.0"), "value", "-1.0", &["seconds, above 0"]);
+}
+
+#[test]
+fn faults_of_programs_are_found_at_their_place() {
+    let toml = |program: &str, code, place, words: &[&str]| {
+        let to = format!("program = {program}");
+        check("domain.toml", ("does = \"move ?from ?to\"", &to), code, place, words);
+    };
+    toml("[]", "no-program", "[]", &["empty"]);
+    toml("[\"sh\", \"go.sh\"]", "no-program", "go.sh", &["template/go.sh"]);
+    toml("[\"no-such-command-here\"]", "no-program", "no-such-command-here", &["not on this machine"]);
+}
+
+#[test]
+fn faults_of_words_and_objects_are_found_at_their_place() {
+    let pddl = |change, code, place, words: &[&str]| check("domain.pddl", change, code, place, words);
+    let toml = |change, code, place, words: &[&str]| check("domain.toml", change, code, place, words);
+    let top = "scene = \"default\"\n";
+    let with = |text: &str| format!("{top}{text}\n");
+    pddl(
+        ("(on ?what - thing ?on - surface)", "(on ?what ?on - surface)"),
+        "word-types",
+        "on",
+        &["(on ?x - thing ?x - surface)"],
+    );
+    pddl(("(at ?where - pose) ", "(at ?where - pose) (rain)"), "never-holds", "rain", &["[word.rain]"]);
+    toml((top, &with("[word.obsrved]\nis = \"fixed\"")), "no-word", "obsrved", &["did you mean `observed`"]);
+    toml(
+        (top, &with("[word.observed]\nis = \"fixed\"\nprogram = [\"sh\"]")),
+        "two-sources",
+        "\"fixed\"",
+        &["leave"],
+    );
+    toml((top, &with("init = [\"(observed table\"]")), "init", "\"(observed table\"", &["expected"]);
+    toml((top, &with("init = [\"(at start)\"]")), "init", "\"(at start)\"", &["sensed"]);
+    toml((top, &with("init = [\"(observed table-1 shelf)\"]")), "undeclared-object", "shelf", &["table"]);
+    toml((top, &with("[objects]\nperson = [\"Anna\"]")), "no-type", "person", &[":types"]);
+    toml((top, &with("[objects]\nthing = [\"spoon\"]")), "given-type", "thing", &["objects/"]);
+    toml(("[\"searching\"]", "[\"serching\", \"searching\"]"), "no-ability", "\"serching\"", &["searching"]);
+}
+
+#[test]
+fn faults_of_phrases_are_found_at_their_place() {
+    let toml = |change, code, place, words: &[&str]| check("domain.toml", change, code, place, words);
+    let say = "say = \"find <thing>\"";
+    toml((say, "say = \"find <thng>\""), "unknown-slot", "<thng>", &["did you mean `thing`"]);
+    toml((say, "say = \"find <thing>s\""), "glued-slot", "<thing>", &["space"]);
+    toml((say, "say = \"find it\""), "slots", "<thing>", &["no slot <thing>; it has none"]);
+    let means = "(>= (confidence <thing>) <threshold>)";
+    toml(
+        (means, "(>= (confidnce <thing>) <threshold>)"),
+        "undeclared-function",
+        "confidnce",
+        &["confidence"],
+    );
+    toml((means, "(on <thing> tabel)"), "undeclared-object", "tabel", &["table"]);
+    let about = "about = \"look";
+    let answer = |text: &str| format!("answer.achieved = \"{text}\"\nabout = \"look");
+    toml((about, &answer("{(on <thing> ?}")), "answer", "(on <thing> ?", &["one question mark"]);
+    toml((about, &answer("{(onn <thing> ?)}")), "answer", "(onn <thing> ?)", &["did you mean `on`"]);
+    toml((about, &answer("{(on ? <thing>)}")), "argument-type", "(on ? <thing>)", &["thing"]);
+    toml((about, &answer("on {(on <thing> ?)")), "answer", "\"on {(on <thing> ?)\"", &["not closed"]);
+    toml((about, &answer("<cup>")), "slots", "<cup>", &["it has <thing>"]);
+}
+
+#[test]
+fn faults_of_scenes_and_places_are_found_at_their_place() {
+    let toml = |change, code, place, words: &[&str]| check("domain.toml", change, code, place, words);
+    let scene = "scene = \"default\"\n";
+    toml((scene, "scene = \"defualt\"\n"), "no-scene", "\"defualt\"", &["did you mean `default`"]);
+    toml((scene, "scene = \"default\"\nsurfaces = [\"shelf\"]\n"), "no-surface", "\"shelf\"", &["table"]);
+    let expect =
+        |what: &str, at: &str| format!("{scene}[[expect]]\nwhat = \"{what}\"\nat = \"{at}\"\nweight = 2.0\n");
+    toml((scene, &expect("mug", "attic")), "no-place", "\"attic\"", &["known: table"]);
+    toml((scene, &expect("spoon", "table")), "no-thing", "\"spoon\"", &["known: mug"]);
+    check("scenes/default.toml", ("[[surface]]", "[[surfaces]]"), "scene", "[[surfaces]]", &["surfaces"]);
+}

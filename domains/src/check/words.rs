@@ -1,0 +1,159 @@
+//! Every word has its value from somewhere; what is said of words and objects in `domain.toml` makes sense.
+
+use descry_planner::Diagnostic;
+
+use super::Check;
+use crate::abilities;
+use crate::lexicon::symbol;
+use crate::vocabulary::{Ground, Word};
+use crate::words;
+
+/// Types whose objects come from the body's map, from `objects/` and from what is seen.
+const GIVEN: [&str; 7] = ["pose", "surface", "room", "door", "thing", "kind", "obstacle"];
+
+impl Check<'_> {
+    /// Words that an ability states have its types; words that nothing states or changes begin somewhere.
+    pub(super) fn words(&self) -> Vec<Diagnostic> {
+        let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
+        let mut list = Vec::new();
+        for word in vocabulary.words() {
+            match vocabulary.ground(&word, config) {
+                Ground::Sensed(fact) => {
+                    let fits = word.types.len() == fact.types.len()
+                        && word.types.iter().zip(fact.types).all(|(own, of)| vocabulary.is_a(own, of));
+                    if !fits {
+                        let types: Vec<String> = fact.types.iter().map(|t| format!(" ?x - {t}")).collect();
+                        let message = format!("`{}` is stated by descry, for other arguments", word.name);
+                        let help = format!(
+                            "declare ({}{}): {}; or say where it comes from: [word.{}] is = \"remembered\"",
+                            fact.name,
+                            types.concat(),
+                            fact.about,
+                            word.name
+                        );
+                        list.push(
+                            Diagnostic::error("word-types", message, word.span, "this word").with_help(help),
+                        );
+                    }
+                }
+                Ground::Fixed if !self.begins(&word) => {
+                    let name = &word.name;
+                    let message =
+                        format!("nothing states `{name}`, and no action changes it: it never holds");
+                    let help = format!(
+                        "say what holds in the beginning, init = [\"({name} …)\"], or who states it: [word.{name}] program = […]"
+                    );
+                    list.push(
+                        Diagnostic::warning("never-holds", message, word.span, "this word").with_help(help),
+                    );
+                }
+                _ => {}
+            }
+        }
+        for (name, configured) in &config.word {
+            match vocabulary.word(name) {
+                None => {
+                    let words: Vec<String> = vocabulary.words().into_iter().map(|w| w.name).collect();
+                    let help = self.known(name, words.iter().map(String::as_str));
+                    let message = format!("there is no word `{name}` in domain.pddl");
+                    list.push(self.error("no-word", message, self.toml.at(&["word", name]), help));
+                }
+                Some(word) if word.is_derived => {
+                    let message =
+                        format!("`{name}` is derived by the domain's rules; nothing else states it");
+                    let help = "leave this out, or the rule in domain.pddl";
+                    list.push(self.error("derived", message, self.toml.at(&["word", name]), help));
+                }
+                Some(_) => {}
+            }
+            if let Some(program) = &configured.program {
+                list.extend(self.program(&["word", name, "program"], program));
+                if configured.is.is_some() {
+                    let message = format!("`{name}` is stated by a program: it is sensed");
+                    let place = self.toml.at(&["word", name, "is"]);
+                    list.push(self.error("two-sources", message, place, "leave `is` or `program` out"));
+                }
+            }
+        }
+        list.extend(self.init());
+        list
+    }
+
+    fn begins(&self, word: &Word) -> bool {
+        let lines = self.domain.config.init.iter().filter_map(|line| words::read(line).ok());
+        lines.flatten().any(|(name, ..)| name == word.name)
+    }
+
+    /// What holds in the beginning is about words that are not sensed, and about objects that there are.
+    fn init(&self) -> Vec<Diagnostic> {
+        let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
+        let mut list = Vec::new();
+        for (n, line) in config.init.iter().enumerate() {
+            let n = n.to_string();
+            let path = ["init", n.as_str()];
+            let instances = match words::read(line) {
+                Ok(instances) => instances,
+                Err(because) => {
+                    let message = format!("`{line}` cannot be read");
+                    list.push(self.error("init", message, self.toml.at(&path), because));
+                    continue;
+                }
+            };
+            if let Some(fault) = self.condition(&path, line, &[]) {
+                list.push(fault);
+                continue;
+            }
+            let is_sensed = |(name, ..): &&(String, Vec<String>, Option<f64>)| {
+                let ground = vocabulary.word(name).map(|w| vocabulary.ground(&w, config));
+                matches!(ground, Some(Ground::Sensed(_) | Ground::SensedByProgram | Ground::Derived))
+            };
+            if let Some((name, ..)) = instances.iter().find(is_sensed) {
+                let message = format!("`{name}` is sensed: nothing can be said of how it begins");
+                let help = "only what is remembered or fixed begins as init says";
+                list.push(self.error("init", message, self.toml.at(&path), help));
+            }
+        }
+        list
+    }
+
+    /// The abilities that are used, and the objects of the domain's own types.
+    pub(super) fn objects(&self) -> Vec<Diagnostic> {
+        let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
+        let mut list = Vec::new();
+        let abilities = || abilities::ALL.iter().map(|a| a.name);
+        for (n, name) in config.uses.iter().enumerate().filter(|(_, n)| abilities().all(|a| a != *n)) {
+            let message = format!("there is no ability \"{name}\"");
+            let place = self.toml.at(&["uses", &n.to_string()]);
+            list.push(self.error("no-ability", message, place, self.known(name, abilities())));
+        }
+        let mut taken: Vec<(String, &str)> = Vec::new();
+        for (of, names) in &config.objects {
+            let key = self.toml.at(&["objects", of]);
+            if GIVEN.contains(&of.as_str()) {
+                let message =
+                    format!("objects of type `{of}` come from the map, from objects/ or from looks");
+                let help = "a thing is a file in objects/, a surface a [[surface]] of the scene";
+                list.push(self.error("given-type", message, key, help));
+                continue;
+            }
+            if !vocabulary.has_type(of) {
+                let help = self.known(of, vocabulary.task.types.iter().map(|t| t.name.as_str()));
+                let message = format!("there is no type `{of}` in :types of domain.pddl");
+                list.push(self.error("no-type", message, key, help));
+            }
+            for (n, name) in names.iter().enumerate() {
+                let other = taken.iter().find(|(known, _)| *known == symbol(name)).map(|(_, of)| *of);
+                let is_called =
+                    |of: &&&str| self.lexicon.of_type(of).iter().any(|k| k.symbol == symbol(name));
+                let given = GIVEN.iter().find(is_called);
+                if let Some(other) = other.or(given.copied()) {
+                    let message = format!("\"{name}\" is the name of a {other} already");
+                    let place = self.toml.at(&["objects", of, &n.to_string()]);
+                    list.push(self.error("same-name", message, place, "give it another name"));
+                }
+                taken.push((symbol(name), of));
+            }
+        }
+        list
+    }
+}

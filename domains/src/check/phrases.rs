@@ -131,6 +131,9 @@ impl Check<'_> {
         filled: &[Filled],
         objects: &[(String, String)],
     ) -> Option<Diagnostic> {
+        if atom.split_whitespace().next() == Some(CHANGES) {
+            return None;
+        }
         let symbols = put_in(atom, filled, |f| f.symbol.clone()).ok()?;
         let mentions = mentions(&symbols);
         let [mention] = mentions.as_slice() else {
@@ -138,9 +141,6 @@ impl Check<'_> {
             let help = "expected an atom with at most one question mark, as in {(on <thing> ?)}";
             return Some(self.error("answer", message, self.toml.within(path, atom), help));
         };
-        if mention[0] == CHANGES {
-            return None;
-        }
         let vocabulary = &self.domain.vocabulary;
         let Some(word) = vocabulary.word(&mention[0]) else {
             let words: Vec<String> = vocabulary.words().into_iter().map(|w| w.name).collect();

@@ -95,7 +95,12 @@ fn faults_of_actions_and_calls_are_found_at_their_place() {
         "out-of-raech",
         &["out-of-reach"],
     );
-    toml(("[\"(out-of-reach ?to)\"]", "[\"(out-of-reach ?to)\", \"(at ?to)\"]"), "not-remembered", "\"(at ?to)\"", &["remembered"]);
+    toml(
+        ("[\"(out-of-reach ?to)\"]", "[\"(out-of-reach ?to)\", \"(at ?to)\"]"),
+        "not-remembered",
+        "\"(at ?to)\"",
+        &["remembered"],
+    );
     toml(
         ("retries = 2\n", "teaches = [{ when = \"bloked\", says = \"(out-of-reach ?to)\" }]\n"),
         "no-failure",

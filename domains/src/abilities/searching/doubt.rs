@@ -193,9 +193,16 @@ impl Doubt {
         uncovered >= negligible(situation, Some(what))
     }
 
-    /// The probability that hangs on a surface.
-    pub fn weight_on(&self, on: usize) -> f64 {
-        self.hypotheses.iter().filter(|h| h.on == on).map(|h| h.weight).sum()
+    /// The probability that hangs on what the best look at a surface would settle, of those that can be taken and have not been.
+    pub fn most_settled_on(&self, situation: &Situation, on: usize) -> f64 {
+        if self.anywhere {
+            return self.hidden;
+        }
+        let open = |look: &(usize, usize)| look.1 == on && !situation.observed.contains(look);
+        let looks = self.all_looks(situation, open, None);
+        let settled =
+            |told: &&[f64]| self.hypotheses.iter().zip(*told).map(|(h, told)| h.weight * told).sum::<f64>();
+        looks.iter().map(settled).fold(0.0, f64::max)
     }
 
     /// The share of the places on a surface where it could not stand unseen, 0 to 1; none if it is not asked about there or

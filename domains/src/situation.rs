@@ -165,7 +165,7 @@ pub struct Known {
     pub held: Option<Held>,
     /// What is remembered of earlier runs.
     pub past: Option<Past>,
-    /// How much more often each thing, then each kind, then anything is expected on each surface than elsewhere, by area.
+    /// How much more often each thing, then each kind, then anything is expected on each surface than on another.
     pub expected: Vec<Vec<f64>>,
 }
 

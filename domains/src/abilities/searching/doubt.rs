@@ -253,7 +253,8 @@ impl Doubt {
         })
     }
 
-    /// Where a body of a size may be hidden on some surfaces, each with how much more often it is expected there, by area.
+    /// Where a body of a size may be hidden on some surfaces, each with how much more often it is expected there than on another,
+    /// however large they are; on each, everywhere alike.
     fn hidden_on(situation: &Situation, surfaces: &[(usize, f64)], size_m: (f64, f64)) -> Self {
         let mut all = 0.0;
         let mut anywhere = false;
@@ -263,12 +264,16 @@ impl Doubt {
             let surface = &situation.surfaces[on];
             let places = grid(surface, size_m.1);
             anywhere |= places.is_empty() && surface.outline.is_empty();
-            all += expected * places.len() as f64;
+            if places.is_empty() {
+                continue;
+            }
+            all += expected;
+            let each = expected / places.len() as f64;
             count.insert(on, places.len());
             hypotheses.extend(places.iter().filter_map(|centre| {
                 around(surface, centre).find_map(|centre| {
                     let points = unseen_volume(situation, on, &centre, size_m)?;
-                    Some(Hypothesis { weight: expected, on, centre, points, facing: None })
+                    Some(Hypothesis { weight: each, on, centre, points, facing: None })
                 })
             }));
         }

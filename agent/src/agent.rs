@@ -4,12 +4,13 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use descry_domains::abilities::searching::reasons::one_then;
 use descry_domains::actions::Carried;
 use descry_domains::answer::{Conclusion, Ended};
 use descry_domains::note::Note;
 use descry_domains::world::{Choice, Job, Round, Setting, World, WorldError};
 use descry_memory::{Draft, Meta, Record, RecordId};
-use descry_planner::{Outcome as Planned, Plan, Statistics, Step};
+use descry_planner::{Outcome as Planned, Plan, Statistics, Step, Task};
 use descry_robots::{CancellationToken, Robot};
 use descry_skills::{Call, Context, SkillFailure};
 
@@ -127,24 +128,21 @@ impl<'a> Agent<'a> {
         because: String,
     ) -> Result<Option<Ended>, CommandError> {
         world.planned();
-        match world.choice(round) {
-            Choice::Nothing(why) => return Ok(Some(Ended::Undecided(why))),
-            Choice::Steps(plan) => return self.intend(round, plan, because, Vec::new()).map(|()| None),
-            Choice::Planner => {}
+        loop {
+            match world.choice(round)? {
+                Choice::Nothing(why) => return Ok(Some(Ended::Undecided(why))),
+                Choice::Steps(plan) => return self.intend(round, plan, because, Vec::new()).map(|()| None),
+                Choice::Planner => break,
+                Choice::Towards { task, then } => match self.plan(&task, round)? {
+                    Planned::Solved { plan, statistics } => {
+                        self.adopt(round, one_then(plan, then), &statistics, because)?;
+                        return Ok(None);
+                    }
+                    _ => world.bar(),
+                },
+            }
         }
-        let started = Instant::now();
-        let options = descry_planner::Options {
-            evaluation_limit: Some(MOST_EVALUATED),
-            ..descry_planner::Options::default()
-        };
-        let planned = descry_planner::plan(&round.task, &round.attachments, &options, &|| false, &mut |_| {})
-            .map_err(|e| WorldError::of_planner(&e))?;
-        let took_s = started.elapsed().as_secs_f64();
-        let geometry_s = planned.statistics().attachments.values().map(|asked| asked.time_s).sum();
-        let totals = &mut self.totals;
-        totals.planning_s = totals.planning_s.max(took_s - geometry_s);
-        totals.geometry_s = totals.geometry_s.max(geometry_s);
-        match planned {
+        match self.plan(&round.task, round)? {
             Planned::Unsolvable { why, .. } => return Ok(Some(Ended::NoPlan(why.to_string()))),
             Planned::Solved { plan, statistics } => self.adopt(round, plan, &statistics, because)?,
             Planned::OutOfTime { best, statistics } | Planned::OutOfMemory { best, statistics } => {
@@ -156,6 +154,23 @@ impl<'a> Agent<'a> {
             }
         }
         Ok(None)
+    }
+
+    /// Asks the planner, and notes how long it took.
+    fn plan(&mut self, task: &Task, round: &Round) -> Result<Planned, CommandError> {
+        let started = Instant::now();
+        let options = descry_planner::Options {
+            evaluation_limit: Some(MOST_EVALUATED),
+            ..descry_planner::Options::default()
+        };
+        let planned = descry_planner::plan(task, &round.attachments, &options, &|| false, &mut |_| {})
+            .map_err(|e| WorldError::of_planner(&e))?;
+        let took_s = started.elapsed().as_secs_f64();
+        let geometry_s = planned.statistics().attachments.values().map(|asked| asked.time_s).sum();
+        let totals = &mut self.totals;
+        totals.planning_s = totals.planning_s.max(took_s - geometry_s);
+        totals.geometry_s = totals.geometry_s.max(geometry_s);
+        Ok(planned)
     }
 
     fn adopt(

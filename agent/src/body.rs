@@ -35,8 +35,7 @@ pub struct TruePlace {
 
 impl Body {
     /// A simulated body, whose truth a report may show.
-    pub fn simulated(robot: SimRobot) -> Self {
-        let robot = Arc::new(robot);
+    pub fn simulated(robot: Arc<SimRobot>) -> Self {
         Self { robot: robot.clone(), scene: None, simulated: Some(robot) }
     }
 
@@ -58,11 +57,6 @@ impl Body {
                 room: o.room.clone(),
             })
             .min_by(|a, b| distance(&a.position_m).total_cmp(&distance(&b.position_m)))
-    }
-
-    /// The simulator, for experiments that score against the truth.
-    pub fn simulator(&self) -> Option<&Arc<SimRobot>> {
-        self.simulated.as_ref()
     }
 }
 
@@ -120,7 +114,8 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
 /// [`CommandError::BadInput`] if the scene cannot be arranged.
 pub fn simulate(spec: &SceneSpec, seed: u64, faults: FaultPlan) -> Result<Body, CommandError> {
     let scene = arrange(spec, seed).map_err(CommandError::bad_input)?;
-    Ok(Body::simulated(SimRobot::new(scene, SimOptions { seed, faults, ..SimOptions::default() })))
+    let options = SimOptions { seed, faults, ..SimOptions::default() };
+    Ok(Body::simulated(Arc::new(SimRobot::new(scene, options))))
 }
 
 /// A scene of the domain by its name, or any from a file.

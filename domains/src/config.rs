@@ -101,7 +101,7 @@ pub struct Expectation {
     pub what: Option<String>,
     /// A surface or a room.
     pub at: String,
-    /// How much more often it is there than anywhere else, by area.
+    /// How much more often it is there than on any other surface, however large they are.
     pub weight: f64,
 }
 

@@ -137,6 +137,8 @@ pub struct Known {
     pub candidates: Vec<Candidate>,
     /// The one at which the body stands.
     pub at: usize,
+    /// The one from which the last look was taken; in the beginning where the body stood.
+    pub looked_from: usize,
     /// What is looked for.
     pub things: Vec<Thing>,
     /// Of what all are looked for.
@@ -163,7 +165,7 @@ pub struct Known {
     pub held: Option<Held>,
     /// What is remembered of earlier runs.
     pub past: Option<Past>,
-    /// How much more often each thing, then each kind, then anything is expected on each surface than elsewhere, by area.
+    /// How much more often each thing, then each kind, then anything is expected on each surface than on another.
     pub expected: Vec<Vec<f64>>,
 }
 
@@ -188,7 +190,7 @@ struct Derived {
     on: Vec<OnceLock<Doubt>>,
     of: Vec<OnceLock<Doubt>>,
     about_on: Vec<OnceLock<Doubt>>,
-    going_on_s: OnceLock<f64>,
+    going_there_s: Vec<OnceLock<f64>>,
     obstacles: OnceLock<Vec<Obstacle>>,
 }
 
@@ -214,7 +216,7 @@ impl Situation {
             on: cells(known.surfaces.len()),
             of: cells(known.kinds.len()),
             about_on: cells(known.things.len() * known.surfaces.len()),
-            going_on_s: OnceLock::new(),
+            going_there_s: cells(known.surfaces.len()),
             obstacles: OnceLock::new(),
         };
         Self { known, thresholds, derived }
@@ -481,16 +483,18 @@ impl Situation {
         self.derived.about_on[what * self.surfaces.len() + on].get_or_init(|| Doubt::about_on(self, what, on))
     }
 
-    /// What going on to look elsewhere takes on average, seconds: a drive to another surface and a look. It is told from where the
-    /// body began, so that it stays the same while the body moves.
-    pub fn going_on_s(&self) -> f64 {
-        *self.derived.going_on_s.get_or_init(|| {
-            let to = |on: usize| {
-                let sees = (0..self.candidates.len()).filter(|&n| self.sees(n, on));
-                sees.map(|n| self.travel_past_s(0, n, &BTreeSet::new())).fold(f64::INFINITY, f64::min)
+    /// What going to a surface and looking at it takes, seconds, doors left out. It is told from where the last look was taken, so
+    /// that it stays the same while the body moves.
+    pub fn going_there_s(&self, on: usize) -> f64 {
+        *self.derived.going_there_s[on].get_or_init(|| {
+            let is_open = |n: &usize| self.sees(*n, on) && !self.observed.contains(&(*n, on));
+            let to = (0..self.candidates.len()).filter(is_open);
+            let way_s = |n| match n == self.looked_from {
+                true => 0.0,
+                false => self.travel_past_s(self.looked_from, n, &BTreeSet::new()),
             };
-            let all: Vec<f64> = (0..self.surfaces.len()).map(to).filter(|s| s.is_finite()).collect();
-            reasons::LOOK_S + all.iter().sum::<f64>() / all.len().max(1) as f64
+            let way_s = to.map(way_s).filter(|s| s.is_finite()).reduce(f64::min);
+            reasons::LOOK_S + way_s.unwrap_or_default()
         })
     }
 

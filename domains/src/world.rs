@@ -1,7 +1,7 @@
 //! A running domain: the problem now, what its calls mean, what an action is for the body, what an outcome teaches, what is
 //! answered. It is all that the loop sees of a domain.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -91,6 +91,10 @@ pub struct World<'a> {
     tries: BTreeMap<Call, usize>,
     seen_before: BTreeMap<String, usize>,
     given_up: Option<String>,
+    /// The look that a policy has chosen, candidate and surface.
+    heading_for: Option<(usize, usize)>,
+    /// Looks that no plan leads to.
+    barred: BTreeSet<(usize, usize)>,
 }
 
 /// The planning problem of one round, and what its calls are bound to.
@@ -113,6 +117,13 @@ pub enum Choice {
     Planner,
     /// Somebody has chosen these steps.
     Steps(Plan),
+    /// Somebody has chosen these steps; how to get to where they begin, the planner says.
+    Towards {
+        /// The round's problem with getting there for its goal.
+        task: Box<Task>,
+        /// What is done there.
+        then: Plan,
+    },
     /// Somebody gives up.
     Nothing(String),
 }
@@ -148,6 +159,7 @@ impl<'a> World<'a> {
             spaces: surfaces.iter().map(|_| Arc::default()).collect(),
             candidates: poses,
             at,
+            looked_from: at,
             things: asked.clone(),
             kinds: kinds(domain, goal, &surfaces),
             asked: goal.asked.surfaces.iter().map(index).collect::<Result<_, _>>()?,
@@ -179,6 +191,8 @@ impl<'a> World<'a> {
             tries: BTreeMap::new(),
             seen_before: BTreeMap::new(),
             given_up: None,
+            heading_for: None,
+            barred: BTreeSet::new(),
             setting,
         })
     }
@@ -276,27 +290,46 @@ impl<'a> World<'a> {
         attachments
     }
 
-    /// Who says what to do next: the planner, or a policy that has chosen.
-    pub fn choice(&mut self, round: &Round) -> Choice {
+    /// Who says what to do next: the planner, or while something is looked for a policy that has chosen.
+    ///
+    /// # Errors
+    /// [`WorldError::Domain`] if the domain has no word for being at a pose.
+    pub fn choice(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
+        self.heading_for = None;
         if self.chooser.first_look_here
             && self.mind.views == 0
             && let Some(look) = policies::here(s)
         {
-            return Choice::Steps(reasons::look(s, look.from, look.on));
+            return Ok(Choice::Steps(reasons::look(s, look.from, look.on)));
         }
-        match &mut self.chooser.by {
-            By::Planner => Choice::Planner,
-            By::Policy(policy) => match policies::next(&mut **policy, s) {
-                Some(look) => Choice::Steps(reasons::look(s, look.from, look.on)),
-                None => Choice::Nothing("no look that is left promises to settle anything".into()),
-            },
+        let policy = match &mut self.chooser.by {
+            By::Policy(policy) if policies::is_asked(s) => policy,
+            _ => return Ok(Choice::Planner),
+        };
+        let Some(look) = policies::next(&mut **policy, s, &self.barred) else {
+            return Ok(Choice::Nothing("no look that is left promises to settle anything".into()));
+        };
+        self.heading_for = Some((look.from, look.on));
+        if s.can_drive_to(look.from) {
+            return Ok(Choice::Steps(reasons::look(s, look.from, look.on)));
         }
+        let Setting { domain, goal, .. } = &self.setting;
+        let there = format!("(at {})", s.candidates[look.from].symbol);
+        let task =
+            words::with_goal(domain, &round.problem, &goal.pddl, &there).map_err(WorldError::Domain)?;
+        Ok(Choice::Towards { task: Box::new(task), then: reasons::look_there(s, look.from, look.on) })
     }
 
-    /// Whether steps are taken whatever they promise: a policy chooses one look at a time and does not say that it will be enough.
+    /// No plan leads to what was chosen: it is not chosen again.
+    pub fn bar(&mut self) {
+        self.barred.extend(self.heading_for.take());
+    }
+
+    /// Whether the steps are taken whatever they promise: a policy chooses one look at a time and does not say that it will be
+    /// enough.
     pub fn takes_steps_unasked(&self) -> bool {
-        matches!(self.chooser.by, By::Policy(_))
+        self.heading_for.is_some()
     }
 
     /// A step that is surely no waste, for when the planner has run out of states; none if there is none.
@@ -374,6 +407,8 @@ impl<'a> World<'a> {
         let steps = Plan { steps: done.iter().map(|d| d.step.clone()).collect(), ..Plan::default() };
         match after(&round.task, &round.attachments, &steps, &names) {
             Ok(readings) => self.mind.words.take_over(&initial(round, &names), &readings),
+            // A policy may look where nothing is promised: what was seen is believed all the same.
+            Err(_) if self.takes_steps_unasked() => {}
             Err(broken) => {
                 let because = format!("its effects are not taken over: {broken}");
                 return Ok(done

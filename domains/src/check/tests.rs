@@ -53,8 +53,10 @@ fn the_template_and_the_built_in_domains_are_faultless() {
 
 #[test]
 fn faults_of_actions_and_calls_are_found_at_their_place() {
-    let pddl = |change, code, place, words: &[&str]| check("domain.pddl", change, code, place, words);
-    let toml = |change, code, place, words: &[&str]| check("domain.toml", change, code, place, words);
+    let pddl =
+        |change: (&str, &str), code, place, words: &[&str]| check("domain.pddl", change, code, place, words);
+    let toml =
+        |change: (&str, &str), code, place, words: &[&str]| check("domain.toml", change, code, place, words);
     let more = "[action.observe]";
     toml(
         ("\"move ?from ?to\"", "\"moev ?from ?to\""),
@@ -124,8 +126,10 @@ fn faults_of_programs_are_found_at_their_place() {
 
 #[test]
 fn faults_of_words_and_objects_are_found_at_their_place() {
-    let pddl = |change, code, place, words: &[&str]| check("domain.pddl", change, code, place, words);
-    let toml = |change, code, place, words: &[&str]| check("domain.toml", change, code, place, words);
+    let pddl =
+        |change: (&str, &str), code, place, words: &[&str]| check("domain.pddl", change, code, place, words);
+    let toml =
+        |change: (&str, &str), code, place, words: &[&str]| check("domain.toml", change, code, place, words);
     let top = "scene = \"default\"\n";
     let with = |text: &str| format!("{top}{text}\n");
     pddl(
@@ -152,7 +156,8 @@ fn faults_of_words_and_objects_are_found_at_their_place() {
 
 #[test]
 fn faults_of_phrases_are_found_at_their_place() {
-    let toml = |change, code, place, words: &[&str]| check("domain.toml", change, code, place, words);
+    let toml =
+        |change: (&str, &str), code, place, words: &[&str]| check("domain.toml", change, code, place, words);
     let say = "say = \"find <thing>\"";
     toml((say, "say = \"find <thng>\""), "unknown-slot", "<thng>", &["did you mean `thing`"]);
     toml((say, "say = \"find <thing>s\""), "glued-slot", "<thing>", &["space"]);
@@ -176,7 +181,8 @@ fn faults_of_phrases_are_found_at_their_place() {
 
 #[test]
 fn faults_of_scenes_and_places_are_found_at_their_place() {
-    let toml = |change, code, place, words: &[&str]| check("domain.toml", change, code, place, words);
+    let toml =
+        |change: (&str, &str), code, place, words: &[&str]| check("domain.toml", change, code, place, words);
     let scene = "scene = \"default\"\n";
     toml((scene, "scene = \"defualt\"\n"), "no-scene", "\"defualt\"", &["did you mean `default`"]);
     toml((scene, "scene = \"default\"\nsurfaces = [\"shelf\"]\n"), "no-surface", "\"shelf\"", &["table"]);

@@ -162,7 +162,7 @@ impl Kind for Faults {
             domain: &self.domain,
             goal: &self.goal,
             spec: &self.spec,
-            target: &self.text.target,
+            targets: std::slice::from_ref(&self.text.target),
             present: ((n + 1.0) * share).floor() <= (n * share).floor(),
             seed: self.text.first_seed.wrapping_add(run as u64),
             faults: FaultPlan { faults: case.faults.clone() },

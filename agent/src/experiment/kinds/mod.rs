@@ -2,6 +2,7 @@
 
 mod faults;
 mod figure_4;
+mod tasks;
 mod trial;
 mod where_to_look;
 
@@ -60,8 +61,12 @@ pub struct Summary {
 type Reader = fn(&Source) -> Result<Box<dyn Kind>, ExperimentError>;
 
 /// Every kind by its name in experiment files.
-pub const ALL: &[(&str, Reader)] =
-    &[("figure-4", figure_4::read), ("where-to-look", where_to_look::read), ("faults", faults::read)];
+pub const ALL: &[(&str, Reader)] = &[
+    ("figure-4", figure_4::read),
+    ("where-to-look", where_to_look::read),
+    ("faults", faults::read),
+    ("tasks", tasks::read),
+];
 
 /// The kind of an experiment file, with everything that the file says checked.
 ///

@@ -2,8 +2,11 @@
 
 use super::*;
 
+/// A file of the tabletop by its name alone, of another domain with the domain before it.
 fn shipped(name: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../domains/tabletop/experiments").join(name);
+    let (domain, file) = name.split_once('/').unwrap_or(("tabletop", name));
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../domains").join(domain).join("experiments").join(file);
     std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
@@ -13,7 +16,16 @@ fn source(text: String) -> Source {
 
 #[test]
 fn shipped_files_are_read() {
-    for (name, jobs) in [("where-to-look.toml", 200 * 3 * 8), ("figure-4.toml", 104), ("faults.toml", 1000)] {
+    for (name, jobs) in [
+        ("where-to-look.toml", 200 * 3 * 8),
+        ("figure-4.toml", 104),
+        ("faults.toml", 1000),
+        ("two-tables.toml", 200 * 3),
+        ("home/find.toml", 4 * 300),
+        ("home/bring.toml", 4 * 300),
+        ("home/faults.toml", 2 * 300),
+        ("home/two-rooms.toml", 200 * 3),
+    ] {
         let kind = read(&source(shipped(name))).unwrap_or_else(|e| panic!("{name}: {e}"));
         let ids: std::collections::BTreeSet<String> = kind.jobs().into_iter().map(|job| job.id).collect();
         assert_eq!(ids.len(), jobs, "{name}");
@@ -36,7 +48,7 @@ fn mistakes_are_drawn_under_the_text() {
         look,
         "kind = \"where-to-look\"",
         "kind = \"dance\"",
-        &["e.toml:6", "\"dance\"", "figure-4, where-to-look, faults"],
+        &["e.toml:6", "\"dance\"", "figure-4, where-to-look, faults, tasks"],
     );
     check(look, "scenes = 200", "scenes = 0", &["scenes = 0", "1 to 1000000"]);
     check(look, "scenes = 200", "scenes = \"many\"", &["scenes = \"many\"", "^"]);
@@ -52,6 +64,12 @@ fn mistakes_are_drawn_under_the_text() {
         &["no recogniser is called \"neural\"", "descry, published"],
     );
     check("figure-4.toml", "\"mug\"]", "\"jug\"]", &["no object is called \"jug\"", "cup B"]);
+    let bring = "home/bring.toml";
+    check(bring, "\"sweep\"", "\"broom\"", &["no policy is called \"broom\"", "nearest-surface"]);
+    check(bring, "[\"cup A\"]", "[\"cup Q\"]", &["goal \"pick up cup A\"", "\"cup Q\"", "red cup 1"]);
+    check(bring, "surface = \"desk\"", "", &["on which surface", "add surface"]);
+    check(bring, "surface = \"desk\"", "surface = \"disk\"", &["no surface \"disk\"", "coffee table"]);
+    check(bring, "truly = \"held\"", "truly = \"hold\"", &["truly = \"hold\"", "all-stand"]);
     check("faults.toml", "chance = 0.3", "chance = 3", &["case \"blocked path\"", "between 0 and 1"]);
 }
 
@@ -114,4 +132,23 @@ fn two_views_are_scored() {
         (Some("merged"), Some(2), Some(4))
     );
     assert!(row["handled"].as_array().is_some_and(|handled| handled.len() == 1), "{row:?}");
+}
+
+#[test]
+fn a_policy_gets_through_a_shut_door_and_the_planner_does_the_rest() {
+    // The body starts in the kitchen, cup A stands in the study, the door between them is shut.
+    let text = shipped("home/two-rooms.toml").replace("\"plan\"", "\"nearest-surface\", \"oracle\"");
+    let bring = "[[goal]]\nsay = \"bring cup A to the counter\"\ntargets = [\"cup A\"]\ntruly = \"stands\"\nsurface = \"counter\"\n\
+                 stages = [\"open-door\", \"pick-up\"]\n\n[[case]]\nname = \"shut\"\n\
+                 fault = [{ kind = \"door_shut\", at = 1, door = \"study door\" }]\n";
+    let text = text.split("[[goal]]").next().unwrap_or_default().to_string() + bring;
+    let kind = read(&source(text)).unwrap_or_else(|e| panic!("{e}"));
+    let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
+    let once = kind.run(1, folder.path()).unwrap_or_else(|e| panic!("{e}"));
+    let row = &once.rows[0];
+    assert_eq!(
+        (&row["right"], &row["open-door done"], &row["pick-up done"]),
+        (&true.into(), &true.into(), &true.into()),
+        "{row:?}"
+    );
 }

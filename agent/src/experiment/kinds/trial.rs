@@ -1,11 +1,13 @@
 //! One run of the agent in a simulated scene, held against the truth.
 
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use descry_domains::goal::Goal;
 use descry_domains::load::Domain;
 use descry_robots::Place;
-use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
+use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, TrueObject, Truth, arrange};
 use serde_json::{Value, json};
 
 use crate::body::Body;
@@ -14,7 +16,7 @@ use crate::keeping::{Keeping, Kept};
 use descry_domains::abilities::searching::policies::{self, Foresight};
 use descry_domains::answer::Verdict;
 
-use crate::report::Report;
+use crate::report::{Event, Report};
 use crate::run::{self, Folder, Settings};
 
 /// Seeds tried for an arrangement that is as hidden as was asked for.
@@ -30,9 +32,9 @@ pub(super) struct Trial<'a> {
     pub goal: &'a Goal,
     /// The scene.
     pub spec: &'a SceneSpec,
-    /// What is looked for: name or kind in the scene.
-    pub target: &'a str,
-    /// Whether it is there.
+    /// What is looked for: names or kinds in the scene.
+    pub targets: &'a [String],
+    /// Whether they are there.
     pub present: bool,
     /// Fixes arrangement, noise, mishaps and random choices.
     pub seed: u64,
@@ -46,22 +48,45 @@ pub(super) struct Trial<'a> {
     pub tolerance_m: f64,
 }
 
-/// Carries a run out. Its record is kept in `scratch`.
+/// Carries a run out and holds it against how its target stands in the end. Its record is kept in `scratch`.
 pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path) -> Result<Outcome, String> {
+    let Lived { report, truth, share, clock, .. } = live(trial, scratch)?;
+    let mut row = measured(trial, &report);
+    row.insert("visible_from_start".into(), json!(share.map(|s| (s * 1e4).round() / 1e4)));
+    row.insert("mishaps".into(), json!(truth.events.len()));
+    Ok(Outcome { rows: vec![row], clock })
+}
+
+/// What came of a run.
+pub(super) struct Lived {
+    /// What it says.
+    pub report: Report,
+    /// How everything stands in the end.
+    pub truth: Truth,
+    /// How often each action was carried out to its end, by name.
+    pub carried: BTreeMap<String, usize>,
+    /// The share of the target that was seen from the start.
+    pub share: Option<f64>,
+    /// Times on the wall.
+    pub clock: Row,
+}
+
+/// Lets the agent live through a run.
+pub(super) fn live(trial: &Trial<'_>, scratch: &Path) -> Result<Lived, String> {
     let started = std::time::Instant::now();
-    let without = trial.spec.without(trial.target);
-    let arrangement = arrangement(trial)?;
+    let without = trial.targets.iter().fold(trial.spec.clone(), |spec, target| spec.without(target));
     // What hides an absent thing stands as it would if it were there.
-    let mut scene = arrangement;
+    let mut scene = arrangement(trial)?;
     if !trial.present {
         scene.objects.retain(|o| without.objects.iter().any(|kept| kept.name == o.name));
         scene.target = None;
     }
     let share = scene.target_visible_from_start;
     let options = SimOptions { seed: trial.seed, faults: trial.faults.clone(), ..SimOptions::default() };
-    let body = Body::simulated(SimRobot::new(scene, options));
+    let robot = Arc::new(SimRobot::new(scene, options));
+    let body = Body::simulated(Arc::clone(&robot));
     let arranged_s = started.elapsed().as_secs_f64();
-    let mut chooser = policies::named(trial.policy, trial.seed, foresight(&body, trial.target))
+    let mut chooser = policies::named(trial.policy, trial.seed, Some(foresight(&robot, trial.targets)))
         .map_err(|e| e.to_string())?;
     chooser.first_look_here = trial.first_look_here;
     let folder = Folder::made(scratch).map_err(|e| e.to_string())?;
@@ -75,12 +100,14 @@ pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path) -> Result<Outcome, St
         keeping: Keeping { durability: Some(Kept::Process), ..Keeping::default() },
         remember: None,
     };
-    let report = run::pursue(trial.domain, trial.goal, &body, &folder, &settings, chooser, &mut |_| {});
+    let mut carried = BTreeMap::new();
+    let report = run::pursue(trial.domain, trial.goal, &body, &folder, &settings, chooser, &mut |event| {
+        if let Event::Acted { call, .. } = event {
+            let action = call.trim_start_matches('(').split([' ', ')']).next().unwrap_or_default();
+            *carried.entry(action.to_string()).or_default() += 1;
+        }
+    });
     let report = report.map_err(|e| e.to_string())?;
-    let mut row = measured(trial, &report);
-    row.insert("visible_from_start".into(), json!(share.map(|s| (s * 1e4).round() / 1e4)));
-    let events = body.simulator().map_or(0, |robot| robot.truth().events.len());
-    row.insert("mishaps".into(), json!(events));
     let run_s = started.elapsed().as_secs_f64() - arranged_s;
     let mut clock = Row::new();
     clock.insert("arrange_s".into(), json!(arranged_s));
@@ -90,7 +117,7 @@ pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path) -> Result<Outcome, St
         clock.insert(format!("longest planning at {poses} poses, geometry apart"), json!(report.planning_s));
         clock.insert(format!("longest geometry of a plan at {poses} poses"), json!(report.geometry_s));
     }
-    Ok(Outcome { rows: vec![row], clock })
+    Ok(Lived { report, truth: robot.truth(), carried, share, clock })
 }
 
 fn arrangement(trial: &Trial<'_>) -> Result<descry_robots::sim::Scene, String> {
@@ -106,17 +133,20 @@ fn arrangement(trial: &Trial<'_>) -> Result<descry_robots::sim::Scene, String> {
     Err(last)
 }
 
-/// What a look would truly show, for the oracle.
-fn foresight(body: &Body, target: &str) -> Option<Foresight> {
-    let robot = body.simulator()?.clone();
-    let named = |o: &&descry_robots::sim::TrueObject| o.present && (o.name == target || o.kind == target);
-    let names: Vec<String> = robot.truth().objects.iter().filter(named).map(|o| o.name.clone()).collect();
-    Some(Box::new(move |place: &Place| match place {
-        Place::Pose(pose) => {
-            names.iter().map(|name| robot.true_visible_share(name, pose)).fold(0.0, f64::max)
-        }
-        Place::Station(_) => 0.0,
-    }))
+/// Whether an object is there and one of those that are named, by name or kind.
+pub(super) fn is_among(object: &TrueObject, targets: &[String]) -> bool {
+    object.present && targets.iter().any(|target| object.name == *target || object.kind == *target)
+}
+
+/// What a look would truly show of the target, for the oracle, as things stand when it asks.
+fn foresight(robot: &Arc<SimRobot>, targets: &[String]) -> Foresight {
+    let (robot, targets) = (Arc::clone(robot), targets.to_vec());
+    Box::new(move |place: &Place, on: &str| {
+        let Place::Pose(pose) = place else { return 0.0 };
+        let stands = |o: &&TrueObject| is_among(o, &targets) && o.surface.as_deref() == Some(on);
+        let shares = robot.truth().objects;
+        shares.iter().filter(stands).map(|o| robot.true_visible_share(&o.name, pose)).fold(0.0, f64::max)
+    })
 }
 
 /// What a report says, held against how everything stands in the end.
@@ -132,7 +162,7 @@ fn measured(trial: &Trial<'_>, report: &Report) -> Row {
     let stated = if report.verdict == Verdict::Achieved { Some(report.confidence) } else { report.remaining };
     let came_true = if report.verdict == Verdict::Achieved { found } else { present };
     let value = json!({
-        "target": trial.target,
+        "target": trial.targets.join(", "),
         "present": present,
         "verdict": report.verdict,
         "right": right,

@@ -193,9 +193,16 @@ impl Doubt {
         uncovered >= negligible(situation, Some(what))
     }
 
-    /// The probability that hangs on a surface.
-    pub fn weight_on(&self, on: usize) -> f64 {
-        self.hypotheses.iter().filter(|h| h.on == on).map(|h| h.weight).sum()
+    /// The probability that hangs on what the best look at a surface would settle, of those that can be taken and have not been.
+    pub fn most_settled_on(&self, situation: &Situation, on: usize) -> f64 {
+        if self.anywhere {
+            return self.hidden;
+        }
+        let open = |look: &(usize, usize)| look.1 == on && !situation.observed.contains(look);
+        let looks = self.all_looks(situation, open, None);
+        let settled =
+            |told: &&[f64]| self.hypotheses.iter().zip(*told).map(|(h, told)| h.weight * told).sum::<f64>();
+        looks.iter().map(settled).fold(0.0, f64::max)
     }
 
     /// The share of the places on a surface where it could not stand unseen, 0 to 1; none if it is not asked about there or
@@ -246,7 +253,8 @@ impl Doubt {
         })
     }
 
-    /// Where a body of a size may be hidden on some surfaces, each with how much more often it is expected there, by area.
+    /// Where a body of a size may be hidden on some surfaces, each with how much more often it is expected there than on another,
+    /// however large they are; on each, everywhere alike.
     fn hidden_on(situation: &Situation, surfaces: &[(usize, f64)], size_m: (f64, f64)) -> Self {
         let mut all = 0.0;
         let mut anywhere = false;
@@ -256,12 +264,16 @@ impl Doubt {
             let surface = &situation.surfaces[on];
             let places = grid(surface, size_m.1);
             anywhere |= places.is_empty() && surface.outline.is_empty();
-            all += expected * places.len() as f64;
+            if places.is_empty() {
+                continue;
+            }
+            all += expected;
+            let each = expected / places.len() as f64;
             count.insert(on, places.len());
             hypotheses.extend(places.iter().filter_map(|centre| {
                 around(surface, centre).find_map(|centre| {
                     let points = unseen_volume(situation, on, &centre, size_m)?;
-                    Some(Hypothesis { weight: expected, on, centre, points, facing: None })
+                    Some(Hypothesis { weight: each, on, centre, points, facing: None })
                 })
             }));
         }

@@ -82,6 +82,7 @@ pub fn remember(mind: &mut Mind, eyes: Eyes<'_>, on: usize, sensed: &Sensed) -> 
     region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id });
     region.taken += 1;
     mind.views += 1;
+    mind.known.looked_from = mind.known.at;
     // Every merge reads all views of its surface again.
     Ok(record.hold(&views(mind), "views")?)
 }

@@ -25,20 +25,28 @@ pub fn one_look(s: &Situation) -> Option<Plan> {
 
 /// A look as a plan in the words of *searching*: a drive if one is needed, then the look.
 pub fn look(s: &Situation, from: usize, on: usize) -> Plan {
-    let symbol = |n: usize| s.candidates[n].symbol.clone();
-    let step = |start_s: f64, action: &str, arguments: Vec<String>, duration_s: f64| Step {
-        start_s: Some(start_s),
-        action: action.into(),
-        arguments,
-        duration_s,
-    };
-    let drive_s = if from == s.at { 0.0 } else { s.travel_s(s.at, from) };
-    let mut steps = Vec::new();
-    if from != s.at {
-        steps.push(step(0.0, "move", vec![symbol(s.at), symbol(from)], drive_s));
+    if from == s.at {
+        return look_there(s, from, on);
     }
-    steps.push(step(drive_s, "observe", vec![symbol(from), s.surfaces[on].symbol.clone()], LOOK_S));
-    Plan { steps, ..Plan::default() }
+    let arguments = [s.at, from].map(|n| s.candidates[n].symbol.clone()).to_vec();
+    let drive =
+        Step { start_s: Some(0.0), action: "move".into(), arguments, duration_s: s.travel_s(s.at, from) };
+    one_then(Plan { steps: vec![drive], ..Plan::default() }, look_there(s, from, on))
+}
+
+/// A plan and then another, whose steps begin when those of the first have ended.
+pub fn one_then(mut first: Plan, second: Plan) -> Plan {
+    let ends_s = first.makespan_s().unwrap_or(0.0);
+    let later = |step: Step| Step { start_s: step.start_s.map(|start_s| start_s + ends_s), ..step };
+    first.steps.extend(second.steps.into_iter().map(later));
+    Plan { cost: None, ..first }
+}
+
+/// A look as a plan of the body that stands where it is taken from.
+pub fn look_there(s: &Situation, from: usize, on: usize) -> Plan {
+    let arguments = vec![s.candidates[from].symbol.clone(), s.surfaces[on].symbol.clone()];
+    let look = Step { start_s: Some(0.0), action: "observe".into(), arguments, duration_s: LOOK_S };
+    Plan { steps: vec![look], ..Plan::default() }
 }
 
 /// What a look is expected to settle.

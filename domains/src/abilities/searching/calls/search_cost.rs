@@ -1,6 +1,8 @@
 //! `[search-cost ?on]`: seconds that a look at a surface may turn out to have been in vain for, counted at the first look of a plan
-//! there: (1 - p) / p of what going on elsewhere takes, where p is the probability that what is asked for is there. Nothing where
-//! all surfaces must be looked at, and nothing where the time is limited: then only real seconds count.
+//! there: (1 - p) / p of what going there for a look takes, where p is the probability that this look finds what is asked for.
+//! With the way and the look itself that is their time by p, and surfaces are looked at in the order of that, as is best when each
+//! is looked at once. Nothing where all surfaces must be looked at, and nothing where the time is limited: then only real seconds
+//! count.
 
 use descry_planner::{Answer, Call, CallError};
 
@@ -18,7 +20,8 @@ pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallE
     if begun || open.is_empty() || situation.time_left_s.is_some() {
         return Ok(Answer::Number(0.0));
     }
-    let there = open.iter().map(|&n| situation.doubt_about(n).weight_on(on) + situation.presence(n, on));
-    let p = there.fold(0.0, f64::max).clamp(1e-6, 1.0);
-    Ok(Answer::Number(((1.0 - p) / p * situation.going_on_s()).min(MOST_S)))
+    let finds =
+        |&n: &usize| situation.doubt_about(n).most_settled_on(situation, on) + situation.presence(n, on);
+    let p = open.iter().map(finds).fold(0.0, f64::max).clamp(1e-6, 1.0);
+    Ok(Answer::Number(((1.0 - p) / p * situation.going_there_s(on)).min(MOST_S)))
 }

@@ -7,11 +7,14 @@
 mod gain_per_second;
 mod most_unknown;
 mod nearest;
+mod nearest_surface;
 mod oracle;
 mod random;
 mod rear_side;
 mod sweep;
 mod unseen;
+
+use std::collections::BTreeSet;
 
 use crate::abilities::searching::doubt::Taken;
 use crate::abilities::searching::reasons::LOOK_S;
@@ -47,8 +50,9 @@ pub trait Policy: Send {
     }
 }
 
-/// What a look from a place would truly show of what is sought, 0 to 1. Only experiments in simulation have it.
-pub type Foresight = Box<dyn Fn(&Place) -> f64 + Send>;
+/// What a look from a place at a surface, by its name, would truly show of what is sought, 0 to 1. Only experiments in simulation
+/// have it.
+pub type Foresight = Box<dyn Fn(&Place, &str) -> f64 + Send>;
 
 /// Who chooses in a run.
 pub struct Chooser {
@@ -76,9 +80,10 @@ impl From<By> for Chooser {
 type Make = fn(u64, Option<Foresight>) -> Option<Box<dyn Policy>>;
 
 /// Every policy by its name.
-const ALL: [(&str, Make); 7] = [
+const ALL: [(&str, Make); 8] = [
     ("sweep", |_, _| Some(Box::new(sweep::Sweep))),
     ("nearest", |_, _| Some(Box::new(nearest::Nearest))),
+    ("nearest-surface", |_, _| Some(Box::<nearest_surface::NearestSurface>::default())),
     ("random", |seed, _| Some(Box::new(random::Random::new(seed)))),
     ("most-unknown", |_, _| Some(Box::new(most_unknown::MostUnknown))),
     ("rear-side", |_, _| Some(Box::new(rear_side::RearSide))),
@@ -128,10 +133,25 @@ pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Choo
         .ok_or_else(|| PolicyError::NeedsForesight { name: name.into() })
 }
 
-/// The next look of a policy; none if it gives up.
-pub fn next(policy: &mut dyn Policy, situation: &Situation) -> Option<Look> {
+/// Whether it is a policy's turn: something that is asked for is looked for still, and the hands are free for it. All else is the
+/// planner's.
+pub fn is_asked(s: &Situation) -> bool {
+    let own: Vec<usize> = (0..s.things.len()).filter(|&n| s.things[n].track.is_none()).collect();
+    let unsure = own.iter().any(|&n| s.confidence(n) < s.threshold)
+        || (0..s.kinds.len()).any(|n| s.completeness(n) < s.threshold)
+        || s.asked.iter().any(|&on| s.clarity(on) < s.threshold);
+    s.held.is_none() && (unsure || own.is_empty() && s.kinds.is_empty() && s.asked.is_empty())
+}
+
+/// The next look of a policy, but for those that cannot be got to, candidate and surface; none if it gives up.
+pub fn next(
+    policy: &mut dyn Policy,
+    situation: &Situation,
+    barred: &BTreeSet<(usize, usize)>,
+) -> Option<Look> {
     let all = policy.looks_at_all();
-    let looks: Vec<Look> = open(situation).into_iter().filter(|look| all || look.gain > 0.0).collect();
+    let is_offered = |look: &Look| (all || look.gain > 0.0) && !barred.contains(&(look.from, look.on));
+    let looks: Vec<Look> = open(situation).into_iter().filter(is_offered).collect();
     if looks.is_empty() { None } else { policy.choose(situation, &looks) }
 }
 
@@ -141,19 +161,30 @@ pub fn here(situation: &Situation) -> Option<Look> {
     best(&looks, |look| look.gain)
 }
 
-/// Every look that can be taken and has not been, in the order of the candidates.
+/// Every look that can be taken, if need be by opening doors on the way, and has not been, in the order of the candidates.
 fn open(situation: &Situation) -> Vec<Look> {
-    let reachable = |from: usize| from == situation.at || !situation.out_of_reach.contains(&from);
     let looks = (0..situation.candidates.len())
         .flat_map(|from| (0..situation.surfaces.len()).map(move |on| (from, on)));
     looks
-        .filter(|look| reachable(look.0) && !situation.observed.contains(look))
-        .filter_map(|(from, on)| {
-            let travel_s = if from == situation.at { 0.0 } else { situation.travel_s(situation.at, from) };
-            let can = travel_s.is_finite() && situation.sees(from, on);
-            can.then(|| Look { from, on, travel_s, gain: gain(situation, from, on) })
+        .filter(|look| situation.can_reach(look.0) && !situation.observed.contains(look))
+        .filter(|&(from, on)| situation.sees(from, on))
+        .map(|(from, on)| Look {
+            from,
+            on,
+            travel_s: travel_s(situation, from),
+            gain: gain(situation, from, on),
         })
         .collect()
+}
+
+/// Seconds of driving to a candidate, through doors that would have to be opened first where no other way leads.
+fn travel_s(situation: &Situation, to: usize) -> f64 {
+    let through_all = || situation.travel_past_s(situation.at, to, &BTreeSet::new());
+    match situation.travel_s(situation.at, to) {
+        _ if to == situation.at => 0.0,
+        now if now.is_finite() => now,
+        _ => through_all(),
+    }
 }
 
 /// The share of what the goal leaves in doubt that a look would settle.
@@ -182,13 +213,13 @@ mod tests {
     #[test]
     fn names_and_errors() {
         for name in names() {
-            let made = named(name, 1, Some(Box::new(|_| 0.0)));
+            let made = named(name, 1, Some(Box::new(|_, _| 0.0)));
             assert!(made.is_ok(), "{name}");
         }
         let error = |name: &str| named(name, 1, None).err().map(|e| e.to_string()).unwrap_or_default();
         assert_eq!(
             error("best"),
-            "no policy is called \"best\"\n  expected one of: plan, sweep, nearest, random, most-unknown, rear-side, gain-per-second, oracle"
+            "no policy is called \"best\"\n  expected one of: plan, sweep, nearest, nearest-surface, random, most-unknown, rear-side, gain-per-second, oracle"
         );
         assert!(error("oracle").contains("experiments"), "{}", error("oracle"));
     }

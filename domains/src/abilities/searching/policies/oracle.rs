@@ -17,7 +17,10 @@ impl Oracle {
 
 impl Policy for Oracle {
     fn choose(&mut self, situation: &Situation, looks: &[Look]) -> Option<Look> {
-        let shown = |look: &Look| (self.foresight)(&situation.candidates[look.from].place);
+        let shown = |look: &Look| {
+            let surface = &situation.surfaces[look.on].name;
+            (self.foresight)(&situation.candidates[look.from].place, surface)
+        };
         let gain = best(looks, |look| look.gain);
         match best(looks, shown) {
             Some(look) if shown(&look) > 0.0 => Some(look),

@@ -1,0 +1,26 @@
+//! `nearest-surface`: optimistic, nearest first. It goes to the nearest surface where something is in doubt, looks there until no
+//! look there settles anything that is worth it, and then goes to the next.
+
+use crate::situation::Situation;
+
+use super::{Look, Policy, best};
+
+#[derive(Default)]
+pub(super) struct NearestSurface {
+    /// The surface that it is at.
+    on: Option<usize>,
+}
+
+impl Policy for NearestSurface {
+    fn choose(&mut self, situation: &Situation, looks: &[Look]) -> Option<Look> {
+        let left = situation.doubts().iter().map(|doubt| doubt.remaining()).fold(0.0, f64::max);
+        let is_worth_it = |look: &&Look| look.gain * left >= situation.thresholds.remaining;
+        let worth: Vec<Look> = looks.iter().filter(is_worth_it).copied().collect();
+        let here: Vec<Look> = worth.iter().filter(|look| Some(look.on) == self.on).copied().collect();
+        let look = best(&here, |look| look.gain)
+            .or_else(|| best(&worth, |look| -look.travel_s))
+            .or_else(|| best(looks, |look| look.gain))?;
+        self.on = Some(look.on);
+        Some(look)
+    }
+}

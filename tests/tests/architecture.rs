@@ -126,7 +126,8 @@ fn nouns() -> Vec<String> {
         nouns.extend(task.types.iter().map(|t| t.name.clone()));
         nouns.extend(domain.objects.iter().map(|o| o.name.clone()));
     }
-    nouns.retain(|n| n != "object");
+    // An object of a task and the confidence of an answer are nobody's own.
+    nouns.retain(|n| n != "object" && n != "confidence");
     nouns.sort_unstable();
     nouns.dedup();
     nouns

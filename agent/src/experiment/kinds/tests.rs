@@ -137,7 +137,9 @@ fn two_views_are_scored() {
 #[test]
 fn a_policy_gets_through_a_shut_door_and_the_planner_does_the_rest() {
     // The body starts in the kitchen, cup A stands in the study, the door between them is shut.
-    let text = shipped("home/two-rooms.toml").replace("\"plan\"", "\"nearest-surface\", \"oracle\"");
+    let text = shipped("home/two-rooms.toml")
+        .replace("\"plan\"", "\"nearest-surface\", \"oracle\"")
+        .replace("first_seed = 5001", "first_seed = 5004");
     let bring = "[[goal]]\nsay = \"bring cup A to the counter\"\ntargets = [\"cup A\"]\ntruly = \"stands\"\nsurface = \"counter\"\n\
                  stages = [\"open-door\", \"pick-up\"]\n\n[[case]]\nname = \"shut\"\n\
                  fault = [{ kind = \"door_shut\", at = 1, door = \"study door\" }]\n";

@@ -36,7 +36,7 @@ const SAME_M: f64 = 0.10;
 /// Points this near to a surface lie on it.
 const ON_SURFACE_M: f64 = 0.012;
 /// What lies so near to a wall of the map, or beyond it, is the wall, metres.
-const WALL_M: f64 = 0.04;
+const WALL_M: f64 = 0.015;
 /// How far beyond the hull of a surface points of it are looked for.
 const HULL_MARGIN_M: f64 = 0.02;
 

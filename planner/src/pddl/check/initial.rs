@@ -106,6 +106,9 @@ impl Checker<'_> {
                     self.unknown_function(*name);
                     return None;
                 };
+                if self.value_of_unknown_object(arguments) {
+                    return None;
+                }
                 let arguments =
                     self.ground_arguments("function", *name, Place::Function(function), arguments, *span)?;
                 let fluent = GroundFluent { function: FunctionId(function), arguments };
@@ -169,6 +172,25 @@ impl Checker<'_> {
             let finding = Diagnostic::warning("undeclared-function", message, name.span, label);
             self.push(finding.with_help("declare it in `(:functions …)` of the domain, or remove it here"));
         }
+    }
+
+    /// A value of a function on an object that is not declared is left out, and said so: published problems have such lines. A
+    /// fact about one is a fault.
+    fn value_of_unknown_object(&mut self, arguments: &[Name]) -> bool {
+        let unknown = arguments.iter().find(|name| self.objects[name.symbol.0 as usize].is_none());
+        let Some(&name) = unknown else { return false };
+        let written = self.name(name.symbol);
+        let near = nearest(written, self.task.objects.iter().map(|own| own.name.as_str()));
+        let message = format!("object `{written}` is not declared");
+        let label = "what is said with it is left out";
+        let help = match near {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => "declare it in `(:objects …)`, or remove it here".into(),
+        };
+        if self.left_out.insert(name.symbol) {
+            self.push(Diagnostic::warning("undeclared-object", message, name.span, label).with_help(help));
+        }
+        true
     }
 
     fn ground_arguments(

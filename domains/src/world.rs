@@ -1,11 +1,12 @@
 //! A running domain: the problem now, what its calls mean, what an action is for the body, what an outcome teaches, what is
 //! answered. It is all that the loop sees of a domain.
 
+mod grounds;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Instant;
 
-use descry_memory::belief::Belief;
 use descry_memory::remember::Remembered;
 use descry_memory::{Record, RecordId};
 use descry_perception::recognise::Recogniser;
@@ -27,13 +28,9 @@ use crate::load::Domain;
 use crate::mind::{Mind, Region};
 use crate::note::Note;
 use crate::programs::Programs;
-use crate::situation::{self, Candidate, Known, KnownDoor, Past, Situation, Thing};
+use crate::situation::{self, Candidate, Known, Past, Situation, Thing};
 use crate::words::{self, Words};
-
-/// What is remembered is believed at most so much, as a share of the confidence that is asked for.
-const RECALLED: f64 = 0.9;
-/// How far from a door the body stands to open it, metres.
-const BEFORE_DOOR_M: [f64; 4] = [0.8, 0.9, 0.7, 1.0];
+use grounds::{doors, expected, kinds, known_by_map, members, no_surface, objects, recalled};
 
 /// Why a world cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -589,127 +586,4 @@ fn domain_name(domain: &Domain) -> &str {
 /// What held of some words when a round began.
 fn initial(round: &Round, names: &[&str]) -> Vec<descry_planner::Reading> {
     after(&round.task, &round.attachments, &Plan::default(), names).unwrap_or_default()
-}
-
-/// The objects of the problem, by type.
-fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<(String, Vec<String>)> {
-    let mut objects: Vec<(String, Vec<String>)> = vec![
-        ("pose".into(), s.candidates.iter().map(|c| c.symbol.clone()).collect()),
-        ("surface".into(), s.surfaces.iter().map(|k| k.symbol.clone()).collect()),
-        ("thing".into(), s.things.iter().map(|t| t.symbol.clone()).collect()),
-        ("kind".into(), s.kinds.iter().map(|t| t.symbol.clone()).collect()),
-        ("obstacle".into(), s.obstacles().iter().map(|o| o.symbol.clone()).collect()),
-        ("door".into(), s.doors.iter().map(|d| d.symbol.clone()).collect()),
-        ("room".into(), lexicon.of_type("room").iter().map(|n| n.symbol.clone()).collect()),
-    ];
-    for (of, names) in &domain.config.objects {
-        objects.push((of.clone(), names.iter().map(|n| symbol(n)).collect()));
-    }
-    objects
-}
-
-/// Of what is remembered of earlier runs, what may still stand where it was seen: less than sure, so that it is looked at again.
-fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[situation::KnownSurface]) -> Belief {
-    let mut belief = Belief::default();
-    if let Some(past) = past {
-        let aged = past.remembered.aged(past.now_unix_s, RECALLED * goal.threshold);
-        belief.adopt(aged.into_iter().filter(|t| surfaces.iter().any(|s| s.symbol == t.on)));
-    }
-    belief
-}
-
-/// The kinds of which all are asked for, each on the surfaces of the room in which it is asked about.
-fn kinds(domain: &Domain, goal: &Goal, surfaces: &[situation::KnownSurface]) -> Vec<Thing> {
-    let of = |(kind, room): &(String, Option<String>)| {
-        let is_in = |n: &usize| surfaces[*n].room.as_deref().map(symbol).as_ref() == room.as_ref();
-        let on = room.as_ref().map(|_| (0..surfaces.len()).filter(is_in).collect());
-        Thing { on, ..situation::thing(domain, kind) }
-    };
-    goal.asked.kinds.iter().map(of).collect()
-}
-
-/// The objects that were seen and may be of a kind that is asked for, each as a thing of its own.
-fn members(known: &Known) -> Vec<Thing> {
-    let of = |kind: &Thing| -> Vec<Thing> {
-        let is = |t: &&descry_memory::belief::Track| t.probability_of(&kind.name) > 0.5;
-        let member = |t: &descry_memory::belief::Track| Thing {
-            symbol: format!("{}-{}", kind.symbol, t.id),
-            track: Some(t.id),
-            ..kind.clone()
-        };
-        known.belief.tracks.iter().filter(is).map(member).collect()
-    };
-    known.kinds.iter().flat_map(of).collect()
-}
-
-/// How much more often each thing, then each kind, is expected on each surface than elsewhere.
-fn expected(domain: &Domain, known: &Known) -> Vec<Vec<f64>> {
-    let weight = |what: &Thing, on: usize| -> f64 {
-        let surface = &known.surfaces[on];
-        let is_it = |e: &&crate::config::Expectation| {
-            let there = symbol(&e.at) == surface.symbol
-                || surface.room.as_ref().is_some_and(|r| symbol(r) == symbol(&e.at));
-            let kinds =
-                || what.models.iter().any(|m| e.what.as_ref().is_some_and(|w| symbol(w) == symbol(&m.kind)));
-            there && e.what.as_ref().is_none_or(|w| symbol(w) == what.symbol || kinds())
-        };
-        domain.config.expect.iter().filter(is_it).map(|e| e.weight).product()
-    };
-    let surfaces = 0..known.surfaces.len();
-    known
-        .things
-        .iter()
-        .chain(&known.kinds)
-        .map(|what| surfaces.clone().map(|on| weight(what, on)).collect())
-        .collect()
-}
-
-/// A surface that the domain names and the map, which knows others, does not have.
-fn known_by_map(domain: &Domain, surfaces: &[situation::KnownSurface]) -> Result<(), WorldError> {
-    if let [first, second, ..] = surfaces
-        && surfaces.iter().all(|s| !s.whole)
-    {
-        return Err(WorldError::Domain(format!(
-            "nothing tells the {} from the {} here: the body has no map of them\n  name one surface in domain.toml, or say where each is: [[surface]] in the recording's recording.toml",
-            first.name, second.name
-        )));
-    }
-    domain.config.surfaces.iter().try_for_each(|name| {
-        match surfaces.iter().any(|s| s.symbol == symbol(name)) {
-            true => Ok(()),
-            false => Err(no_surface(name, surfaces)),
-        }
-    })
-}
-
-fn no_surface(name: &str, surfaces: &[situation::KnownSurface]) -> WorldError {
-    let known: Vec<&str> = surfaces.iter().map(|s| s.name.as_str()).collect();
-    let known = if known.is_empty() { "none".into() } else { known.join(", ") };
-    WorldError::Domain(format!(
-        "there is no surface \"{name}\" here\n  the map has: {known}\n  name one of these, or give the scene a [[surface]] of that name"
-    ))
-}
-
-/// The doors that the map knows; poses on both sides of each are added to those that the body can be sent to.
-fn doors(robot: &dyn Robot, here: &PoseEstimate, poses: &mut Vec<Candidate>) -> Vec<KnownDoor> {
-    let mut known = Vec::new();
-    for door in robot.doors() {
-        let symbol = symbol(&door.name);
-        let across = descry_perception::nalgebra::Vector2::new(-door.along_rad.sin(), door.along_rad.cos());
-        for (side, sign) in [(1, 1.0), (2, -1.0)] {
-            let tries: Vec<descry_robots::Place> = BEFORE_DOOR_M
-                .iter()
-                .map(|d| {
-                    let at = door.centre_m + across * (sign * d);
-                    descry_robots::Place::Pose(descry_robots::Pose2::facing(at.x, at.y, &door.centre_m))
-                })
-                .collect();
-            let fits = robot.travel(&here.place(), &tries, &[]).iter().position(Result::is_ok);
-            poses.extend(
-                fits.map(|n| Candidate { symbol: format!("{symbol}-side-{side}"), place: tries[n].clone() }),
-            );
-        }
-        known.push(KnownDoor { symbol, door: door.clone() });
-    }
-    known
 }

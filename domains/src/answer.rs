@@ -6,6 +6,7 @@ use descry_perception::nalgebra::Vector3;
 use descry_planner::{FactValue, Plan, after};
 use serde::{Deserialize, Serialize};
 
+use crate::abilities::searching::doubt::Doubt;
 use crate::abilities::searching::reasons;
 use crate::config::Answers;
 use crate::goal::{Goal, put_in};
@@ -150,7 +151,7 @@ impl Asker<'_> {
         for kind in &s.kinds {
             let members = self.members(kind);
             if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {
-                let seen = self.seen_of(s.doubt_of(0));
+                let seen = self.seen_of(s.doubt_of(0), 1.0 - s.completeness(0));
                 return (Verdict::NotFound, format!("there is no {}: {seen}", kind.name));
             }
             said.push(match members.len() {
@@ -190,7 +191,7 @@ impl Asker<'_> {
             let thing = &s.things[n];
             let elsewhere = self.elsewhere(thing).map(|w| format!(", it {w}")).unwrap_or_default();
             let asked = self.where_asked(thing);
-            let seen = self.seen_of(s.doubt_about(n));
+            let seen = self.seen_of(s.doubt_about(n), s.chance_there(n));
             return (Verdict::NotFound, format!("{} is not {asked}{elsewhere}: {seen}", thing.name));
         }
         let unclear = s.kinds.iter().enumerate().any(|(n, _)| s.completeness(n) < s.threshold)
@@ -286,8 +287,8 @@ impl Asker<'_> {
         format!("after {} looks, with {poses} poses that can be reached", self.mind.views)
     }
 
-    fn seen_of(&self, doubt: &crate::abilities::searching::doubt::Doubt) -> String {
-        reasons::seen_of(self.s, doubt, |on| self.mind.regions[on].taken)
+    fn seen_of(&self, doubt: &Doubt, left: f64) -> String {
+        reasons::seen_of(self.s, doubt, left, |on| self.mind.regions[on].taken)
     }
 
     fn believed(&self, t: &Track) -> Believed {

@@ -223,16 +223,19 @@ pub struct Thresholds {
     pub confidence: f64,
     /// No look is worth it where no more than this could be settled.
     pub remaining: f64,
-    /// No more than this may hang on places that can be seen from nowhere, for an object to be called not there; and no more than both
-    /// on anything.
+    /// No more than this may hang on places that can be seen from nowhere, for an object to be called not there; and no more than this
+    /// and `remaining` together on all places.
     pub out_of_sight: f64,
+    /// An object is called not there where the probability that it is there after all, hidden or as one of the objects that were seen, is
+    /// no more than this.
+    pub not_there: f64,
     /// That a sought object is there, before the first look.
     pub prior: f64,
 }
 
 impl Default for Thresholds {
     fn default() -> Self {
-        Self { confidence: 0.8, remaining: 0.04, out_of_sight: 0.01, prior: 0.75 }
+        Self { confidence: 0.8, remaining: 0.04, out_of_sight: 0.01, not_there: 0.05, prior: 0.75 }
     }
 }
 
@@ -310,6 +313,7 @@ pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
         ("thresholds.confidence", t.confidence),
         ("thresholds.remaining", t.remaining),
         ("thresholds.out_of_sight", t.out_of_sight),
+        ("thresholds.not_there", t.not_there),
         ("thresholds.prior", t.prior),
     ] {
         value(key, p, p > 0.0 && p < 1.0, "a number above 0 and below 1")?;

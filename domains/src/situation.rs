@@ -58,14 +58,29 @@ impl KnownSurface {
 
     /// Whether a point lies over the outline widened by a margin in metres.
     pub(crate) fn covers(&self, point: &Point3<f64>, margin_m: f64) -> bool {
-        let n = self.outline.len();
-        n >= 3
-            && (0..n).all(|i| {
-                let (a, b) = (self.outline[i], self.outline[(i + 1) % n]);
-                let inward = self.up.cross(&(b - a));
-                inward.dot(&(point - a)) >= -margin_m * inward.norm()
-            })
+        is_over(&self.outline, &self.up, point, margin_m)
     }
+
+    /// Whether a point lies over what was measured of an object that stands here, or over the circle around its size.
+    pub(crate) fn is_of(&self, track: &Track, point: &Point3<f64>, margin_m: f64) -> bool {
+        if track.footprint_m.len() >= 3 {
+            return is_over(&track.footprint_m, &self.up, point, margin_m);
+        }
+        let d = point - track.position_m;
+        let aside_m = (d - self.up * d.dot(&self.up)).norm();
+        aside_m < track.size_m[0].max(track.size_m[1]) / 2.0 + margin_m
+    }
+}
+
+/// Whether a point lies over a convex outline, anticlockwise seen from above, widened by a margin in metres.
+fn is_over(outline: &[Point3<f64>], up: &Vector3<f64>, point: &Point3<f64>, margin_m: f64) -> bool {
+    let n = outline.len();
+    n >= 3
+        && (0..n).all(|i| {
+            let (a, b) = (outline[i], outline[(i + 1) % n]);
+            let inward = up.cross(&(b - a));
+            inward.dot(&(point - a)) >= -margin_m * inward.norm()
+        })
 }
 
 /// Something that is looked for: a known object, or a kind of them.

@@ -27,6 +27,9 @@ pub struct Track {
     pub position_sigma_m: f64,
     /// Longer and shorter side of its footprint and its height, metres.
     pub size_m: [f64; 3],
+    /// Convex outline of what was measured of it, seen from above, world frame, metres; empty where only its size is known.
+    #[serde(default)]
+    pub footprint_m: Vec<Point3<f64>>,
     /// Probability of each known object; with `unknown` they sum to one.
     pub probabilities: Vec<(String, f64)>,
     /// Probability of each kind.
@@ -54,6 +57,8 @@ pub struct Sighted<'a> {
     pub percept: &'a Percept,
     /// Cameras that saw it.
     pub viewpoints_m: &'a [Point3<f64>],
+    /// Convex outline of what was measured of it, seen from above, world frame, metres.
+    pub footprint_m: &'a [Point3<f64>],
 }
 
 /// Everything that is believed of the objects.
@@ -184,6 +189,7 @@ fn seen(on: &str, sighted: &Sighted<'_>, stamp_ns: i64, cites: &[RecordId]) -> T
         position_m: p.position_m,
         position_sigma_m: p.position_sigma_m,
         size_m: p.size_m,
+        footprint_m: sighted.footprint_m.to_vec(),
         probabilities: p.probabilities.clone(),
         kinds: p.kinds.clone(),
         unknown: p.unknown,
@@ -224,7 +230,7 @@ mod tests {
         for (places, stamp_ns) in merges.iter().zip(1..) {
             let percepts: Vec<Percept> = places.iter().map(|&x| percept(x, 0.5)).collect();
             let sighted: Vec<Sighted<'_>> =
-                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[] }).collect();
+                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] }).collect();
             belief.update("table", &sighted, stamp_ns, &[]);
         }
         let ids = |tracks: &[Track]| tracks.iter().map(|t| t.id).collect::<Vec<_>>();
@@ -253,7 +259,7 @@ mod tests {
         {
             let percepts: Vec<Percept> = places.iter().map(|&x| percept(x, 0.5)).collect();
             let sighted: Vec<Sighted<'_>> =
-                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[] }).collect();
+                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] }).collect();
             belief.update(on, &sighted, stamp_ns, &[]);
         }
         let there: Vec<(u64, &str)> = belief.tracks.iter().map(|t| (t.id, t.on.as_str())).collect();
@@ -268,7 +274,7 @@ mod tests {
         let mut blur = percept(0.03, 0.0);
         blur.size_m = [0.2, 0.15, 0.34];
         for (seen, stamp_ns) in [&cup, &blur, &cup].into_iter().zip(1..) {
-            belief.update("table", &[Sighted { percept: seen, viewpoints_m: &[] }], stamp_ns, &[]);
+            belief.update("table", &[Sighted { percept: seen, viewpoints_m: &[], footprint_m: &[] }], stamp_ns, &[]);
             let best = belief.tracks.iter().map(|t| t.probability_of("cup A")).fold(0.0, f64::max);
             assert_eq!((best, belief.tracks[0].id), (0.7, 0), "after merge {stamp_ns}");
         }
@@ -282,7 +288,7 @@ mod tests {
             let p = percept(0.0, cup);
             belief.update(
                 "table",
-                &[Sighted { percept: &p, viewpoints_m: &[Point3::origin()] }],
+                &[Sighted { percept: &p, viewpoints_m: &[Point3::origin()], footprint_m: &[] }],
                 stamp_ns,
                 &[RecordId(7)],
             );

@@ -146,7 +146,7 @@ mod tests {
             let percepts: Vec<Percept> =
                 places.iter().filter(|(on, ..)| *on == surface).map(|&(_, x, p)| cup(x, p)).collect();
             let sighted: Vec<Sighted<'_>> =
-                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[] }).collect();
+                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] }).collect();
             belief.update(surface, &sighted, 1, &[]);
         }
         belief

@@ -336,16 +336,17 @@ fn grid(surface: &KnownSurface, diameter_m: f64) -> Vec<Point3<f64>> {
         .collect()
 }
 
-/// A place of the grid, and the places around it that stand for the rest of its square.
+/// The places that stand for a square of the grid, nearest to its middle first.
 fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterator<Item = Point3<f64>> {
+    const STEPS: [f64; 4] = [-0.125, 0.125, -0.375, 0.375];
     let (e1, e2) = across(surface);
-    let (place, quarter) = (*place, GRID_M / 4.0);
-    [(0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
-        .into_iter()
-        .map(move |(a, b)| place + (e1 * a + e2 * b) * quarter)
+    let place = *place;
+    let steps = STEPS.into_iter().flat_map(|a| STEPS.into_iter().map(move |b| (a, b)));
+    steps.map(move |(a, b)| place + (e1 * a + e2 * b) * GRID_M)
 }
 
-/// The unseen points of an object that stood at a place, if it could stand there unnoticed.
+/// The unseen points of an object that stood at a place, if it could stand there unnoticed. What was measured there and belongs to no
+/// object that is believed in may be its own.
 fn unseen_volume(
     situation: &Situation,
     on: usize,
@@ -354,28 +355,38 @@ fn unseen_volume(
 ) -> Option<Vec<Point3<f64>>> {
     let (surface, space) = (&situation.surfaces[on], &*situation.spaces[on]);
     const COLUMNS: [(f64, f64); 5] = [(0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.0, 0.35), (0.0, -0.35)];
+    const LEVELS: [f64; 3] = [0.25, 0.6, 0.95];
+    let all = (COLUMNS.len() * LEVELS.len()) as f64;
     let (e1, e2) = across(surface);
+    let column = |(a, b): (f64, f64)| centre + (e1 * a + e2 * b) * diameter_m;
+    let explained = COLUMNS.map(|at| {
+        let point = column(at);
+        situation.on_surface(on).any(|track| surface.is_of(track, &point, space.voxel_m() / 2.0))
+    });
     let mut unseen = Vec::new();
-    let (mut all, mut free) = (0.0, 0.0);
-    for level in [0.25, 0.6, 0.95] {
-        for (a, b) in COLUMNS {
-            let point = centre + surface.up * (height_m * level) + (e1 * a + e2 * b) * diameter_m;
-            all += 1.0;
+    let mut free = 0.0;
+    for (n, &at) in COLUMNS.iter().enumerate() {
+        for level in LEVELS {
+            let point = column(at) + surface.up * (height_m * level);
             match space.cell(&point) {
                 Cell::Unseen => unseen.push(point),
-                Cell::Free => free += 1.0,
+                Cell::Occupied if !explained[n] => unseen.push(point),
                 Cell::Occupied => {}
+                Cell::Free => free += 1.0,
+            }
+            if free > FREE_SHARE * all {
+                return None;
             }
         }
     }
-    if free > FREE_SHARE * all || (unseen.len() as f64) < UNSEEN_SHARE * all {
+    if (unseen.len() as f64) < UNSEEN_SHARE * all {
         return None;
     }
-    let inside = |&&(a, b): &&(f64, f64)| {
-        let top = centre + surface.up * height_m + (e1 * a + e2 * b) * diameter_m;
-        is_roofed(space, &top, &surface.up)
+    let is_inside = |&n: &usize| {
+        let top = column(COLUMNS[n]) + surface.up * height_m;
+        explained[n] && is_roofed(space, &top, &surface.up)
     };
-    (COLUMNS.iter().filter(inside).count() <= GRAZED).then_some(unseen)
+    ((0..COLUMNS.len()).filter(is_inside).count() <= GRAZED).then_some(unseen)
 }
 
 /// Whether a measured surface lies over an unseen point, with nothing seen free between: it is within a solid body.

@@ -5,9 +5,11 @@ use std::sync::Arc;
 use descry_memory::belief::{Belief, Sighted, Track};
 use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
 use descry_perception::View;
+use descry_perception::hull::Hull;
 use descry_perception::locate::locate;
 use descry_perception::merge::{MergeOptions, Merged, merge};
 use descry_perception::nalgebra::{Point3, Unit, Vector3};
+use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment_on};
 use descry_perception::surface::{Region, Surface, SurfaceOptions, find_surface};
@@ -286,8 +288,10 @@ fn believe(
     let surface = mind.known.surfaces[on].clone();
     let viewpoints: Vec<Vec<Point3<f64>>> =
         percepts.iter().map(|p| seen_from(p, &surface.up, &merged.visibility)).collect();
-    let sighted: Vec<Sighted<'_>> =
-        percepts.iter().zip(&viewpoints).map(|(percept, v)| Sighted { percept, viewpoints_m: v }).collect();
+    let footprints: Vec<Vec<Point3<f64>>> = percepts.iter().map(|p| footprint(p, &surface.up, merged)).collect();
+    let sighted: Vec<Sighted<'_>> = (0..percepts.len())
+        .map(|n| Sighted { percept: &percepts[n], viewpoints_m: &viewpoints[n], footprint_m: &footprints[n] })
+        .collect();
     let cites: Vec<RecordId> = mind.regions[on].looks.iter().map(|look| look.record).collect();
     let belief = Arc::make_mut(&mut mind.known.belief);
     let unseen = set_aside_unseen(belief, &surface, &merged.visibility);
@@ -419,6 +423,13 @@ fn sightings(percepts: &[Percept]) -> Vec<Sighting> {
     let of = |p: &Percept| p.label.clone().map(|label| (p.probability_of(&label), label));
     let named = percepts.iter().filter_map(of);
     named.map(|(p, object)| Sighting { object, confidence: p.clamp(0.0, 1.0) }).collect()
+}
+
+/// The convex outline of what was measured of an object, seen from above, on what it stands on.
+fn footprint(p: &Percept, up: &Vector3<f64>, merged: &Merged) -> Vec<Point3<f64>> {
+    let below = Plane { normal: *up, offset_m: up.dot(&p.position_m.coords) };
+    let points = p.indices.iter().map(|&n| &merged.cloud.points[n as usize]);
+    Hull::around(below, points).map_or_else(Vec::new, |hull| hull.corners_in_space())
 }
 
 /// The cameras that saw an object: those that measured the side of its body which faces them.

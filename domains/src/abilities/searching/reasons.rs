@@ -83,12 +83,20 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     if doubt.can_be_settled(s) {
         return Some("there are looks that would settle it, and no plan leads through them".into());
     }
-    out_of_sight(s, doubt, "it").or_else(|| {
-        let (left, t) = (doubt.hidden, &s.thresholds);
-        (left > t.remaining + t.out_of_sight).then(|| {
-            format!("there is room for it where looks promised to settle that, and did not ({left:.2})")
-        })
-    })
+    let (left, t) = (doubt.hidden, &s.thresholds);
+    let unsettled = || {
+        let text = "there is room for it where looks promised to settle that, and did not";
+        (left > t.remaining + t.out_of_sight).then(|| format!("{text} ({left:.2})"))
+    };
+    let in_all = || {
+        let there = s.chance_there(what);
+        let most = best.filter(|track| p(track) > left);
+        let text = most.map_or("there is room for it".into(), |track| {
+            format!("what stands at {} is hardly it ({:.2}), but may be", place(&track.position_m), p(track))
+        });
+        (there > t.not_there).then(|| format!("{text}; {there:.2} is left in all"))
+    };
+    out_of_sight(s, doubt, "it").or_else(unsettled).or_else(in_all)
 }
 
 /// What keeps one from saying what everything is; none if nothing is known that does.
@@ -112,7 +120,8 @@ fn out_of_time(s: &Situation) -> Option<String> {
 }
 
 /// What was seen of where a thing could be: which share of which surfaces, and how much is left.
-pub fn seen_of(s: &Situation, doubt: &Doubt, looks: impl Fn(usize) -> usize) -> String {
+/// The latter is the probability that it is there after all.
+pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) -> usize) -> String {
     let of = |on: usize, surface: &KnownSurface| -> Option<String> {
         let share = doubt.share_seen(on)?;
         let places = looks(on);
@@ -123,7 +132,7 @@ pub fn seen_of(s: &Situation, doubt: &Doubt, looks: impl Fn(usize) -> usize) -> 
         })
     };
     let parts: Vec<String> = s.surfaces.iter().enumerate().filter_map(|(on, k)| of(on, k)).collect();
-    format!("{}; {:.3} is left", parts.join(", "), doubt.hidden.max(0.0))
+    format!("{}; {:.3} is left", parts.join(", "), left.max(0.0))
 }
 
 /// Where there is room for something that no look can show; none if too little hangs on it.

@@ -414,7 +414,7 @@ fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypoth
             .any(|eye| (eye - centre).normalize().dot(side) > std::f64::consts::FRAC_1_SQRT_2)
     };
     let open: Vec<Vector3<f64>> = sides.filter(|side| !seen_from(side)).collect();
-    let each = weight / SECTORS as f64;
+    let each = weight / open.len().max(1) as f64;
     let hypothesis = |side: &Vector3<f64>| Hypothesis {
         weight: each,
         on,

@@ -151,6 +151,9 @@ impl Asker<'_> {
         for kind in &s.kinds {
             let members = self.members(kind);
             if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {
+                if let Some(floor) = reasons::may_be_floor(s, kind) {
+                    return (Verdict::CannotTell, format!("it cannot be told whether there is a {}, {floor}", kind.name));
+                }
                 let seen = self.seen_of(s.doubt_of(0), 1.0 - s.completeness(0));
                 return (Verdict::NotFound, format!("there is no {}: {seen}", kind.name));
             }
@@ -251,7 +254,10 @@ impl Asker<'_> {
             Some(on) => {
                 let surface = &self.s.surfaces[on];
                 let room = surface.room.as_ref().map(|room| format!(" in the {room}")).unwrap_or_default();
-                format!("stands on the {}{room}", surface.name)
+                let is_found = !surface.whole && self.s.surfaces.len() > 1;
+                let at = surface.centre().filter(|_| is_found);
+                let at = at.map(|p| format!(" at {}", reasons::place(&p))).unwrap_or_default();
+                format!("stands on the {}{room}{at}", surface.name)
             }
             None => "is in the hand".into(),
         }

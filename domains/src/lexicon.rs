@@ -119,6 +119,15 @@ impl Lexicon {
         Self { by_type }
     }
 
+    /// Something has turned up that has a name.
+    pub fn learn(&mut self, of: &str, name: &str) {
+        let list = self.by_type.entry(of.into()).or_default();
+        let named = Named::of(name);
+        if list.iter().all(|known| known.symbol != named.symbol) {
+            list.push(named);
+        }
+    }
+
     /// Everything of a type.
     pub fn of_type(&self, name: &str) -> &[Named] {
         self.by_type.get(name).map_or(&[], Vec::as_slice)

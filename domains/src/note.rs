@@ -26,6 +26,15 @@ pub enum Note {
         /// What the last view changed in the belief.
         changed: Vec<String>,
     },
+    /// A surface that no map knows has come into view.
+    Surface {
+        /// As it is called from now on.
+        name: String,
+        /// The middle of what is seen of it, in the map.
+        at_m: [f64; 3],
+        /// Area of that, square metres.
+        area_m2: f64,
+    },
     /// Somebody has moved something: what was seen before the last view no longer holds.
     Changed {
         /// What shows it.
@@ -50,6 +59,9 @@ impl fmt::Display for Note {
                 )?;
                 let lines = left_out.iter().chain(objects).chain(changed);
                 lines.into_iter().try_for_each(|text| write!(f, "\n          {text}"))
+            }
+            Note::Surface { name, at_m: [x, y, z], area_m2 } => {
+                write!(f, "see       another surface to stand things on, the {name}: {area_m2:.2} m² at ({x:.2}, {y:.2}, {z:.2}) m")
             }
             Note::Changed { because } => write!(f, "changed   {because}; only the last view still holds"),
             Note::Nothing { because } => write!(f, "see       nothing yet: {because}"),

@@ -44,6 +44,8 @@ pub struct KnownSurface {
     pub up: Vector3<f64>,
     /// Whether the outline is all of it (from the map) or what has been seen so far.
     pub whole: bool,
+    /// Why it may be the floor, if it may.
+    pub doubtful: Option<String>,
 }
 
 impl KnownSurface {

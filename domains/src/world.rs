@@ -230,6 +230,7 @@ impl<'a> World<'a> {
             if domain.vocabulary.word("is").is_some() { members(&self.mind.known) } else { Vec::new() };
         self.mind.known.things = self.asked.iter().cloned().chain(members).collect();
         self.mind.known.expected = expected(domain, &self.mind.known);
+        self.mind.known.surfaces.iter().for_each(|surface| self.lexicon.learn("surface", &surface.name));
         self.mind.attend();
     }
 

@@ -208,7 +208,14 @@ pub fn find_surface(
     seen: &Visibility,
     options: &SurfaceOptions,
 ) -> Result<Surface, SurfaceError> {
-    let surfaces = find_surfaces(cloud, seen, options)?;
+    best(find_surfaces(cloud, seen, options)?, options)
+}
+
+/// The surface to stand things on among those that [`find_surfaces`] found, in its order.
+///
+/// # Errors
+/// If there is none, with the reason.
+pub fn best(surfaces: Vec<Surface>, options: &SurfaceOptions) -> Result<Surface, SurfaceError> {
     let tried = surfaces.len();
     let best = surfaces.into_iter().find(|surface| options.wants(surface));
     let best = best.ok_or_else(|| SurfaceError::NotFound { tried, wanted: wanted(options) })?;

@@ -71,6 +71,7 @@ pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
         whole: true,
         outline: hint.outline_m.iter().map(|p| Point3::new(p.x, p.y, hint.height_m)).collect(),
         up,
+        doubtful: None,
     });
     let named =
         domain.config.surfaces.iter().filter(|_| robot.surfaces().is_empty()).map(|name| KnownSurface {
@@ -80,6 +81,7 @@ pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
             whole: false,
             outline: Vec::new(),
             up,
+            doubtful: None,
         });
     on_map.chain(named).collect()
 }

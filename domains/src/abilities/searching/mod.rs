@@ -3,6 +3,7 @@
 mod calls;
 pub mod candidates;
 pub mod change;
+mod discover;
 pub mod doubt;
 mod facts;
 pub mod obstacle;
@@ -68,7 +69,7 @@ pub const ABILITY: Ability = Ability {
 fn seen(
     mind: &mut Mind,
     eyes: Eyes<'_>,
-    _: &Situation,
+    s: &Situation,
     arguments: &[&str],
     outcome: &Outcome,
     notes: &mut Vec<Note>,
@@ -76,11 +77,23 @@ fn seen(
     let Outcome::Seen(sensed) = outcome else { return Err(WorldError::strange(outcome)) };
     let on = mind.known.surfaces.iter().position(|s| s.symbol == arguments[1]);
     let on = on.ok_or_else(|| WorldError::Bug(format!("`{}` is no surface", arguments[1])))?;
-    perceive::remember(mind, eyes, on, sensed)?;
-    let here = mind.known.candidates[mind.known.at].symbol.clone();
-    mind.words.set("observed", vec![here, arguments[1].into()], Some(1.0));
+    // Without a map a view is one of every surface in it.
+    let at = mind.known.at;
+    let is_shown = |&n: &usize| n == on || !s.surfaces[on].whole && !s.surfaces[n].whole && s.sees(at, n);
+    let shown: Vec<usize> = (0..s.surfaces.len()).filter(is_shown).collect();
+    perceive::remember(mind, eyes, &shown, sensed)?;
+    let here = mind.known.candidates[at].symbol.clone();
+    let shown: Vec<String> = shown.into_iter().map(|n| s.surfaces[n].symbol.clone()).collect();
+    for surface in &shown {
+        mind.words.set("observed", vec![here.clone(), surface.clone()], Some(1.0));
+    }
     mind.attend();
-    perceive::perceive(mind, eyes, on, notes)?;
+    for surface in shown {
+        // Of those without a map two may turn out to be one.
+        if let Some(n) = mind.known.surfaces.iter().position(|s| s.symbol == surface) {
+            perceive::perceive(mind, eyes, n, notes)?;
+        }
+    }
     Ok(String::new())
 }
 

@@ -12,13 +12,14 @@ use descry_perception::nalgebra::{Point3, Unit, Vector3};
 use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment_on};
-use descry_perception::surface::{Region, Surface, SurfaceOptions, find_surface};
+use descry_perception::surface::{Region, Role, Surface, SurfaceOptions, find_surface};
 use descry_perception::visibility::{DepthMap, Seen, Visibility};
 use descry_robots::{Robot, Sensed};
 use serde::Serialize;
 use serde_json::json;
 
 use super::change::Change;
+use super::discover;
 use crate::lexicon::symbol;
 use crate::mind::{Look, Mind};
 use crate::note::Note;
@@ -55,9 +56,14 @@ pub struct Eyes<'a> {
     pub robot: &'a dyn Robot,
 }
 
-/// Puts a view into the record: its transforms and colours, then its cloud, so that a cloud is never without its place. When
-/// this returns it survives a crash.
-pub fn remember(mind: &mut Mind, eyes: Eyes<'_>, on: usize, sensed: &Sensed) -> Result<(), WorldError> {
+/// Puts a view of some surfaces into the record: its transforms and colours, then its cloud, so that a cloud is never without its
+/// place. When this returns it survives a crash.
+pub fn remember(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    shown: &[usize],
+    sensed: &Sensed,
+) -> Result<(), WorldError> {
     let record = eyes.record;
     for t in &sensed.transforms {
         record.put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
@@ -73,16 +79,19 @@ pub fn remember(mind: &mut Mind, eyes: Eyes<'_>, on: usize, sensed: &Sensed) -> 
     };
     let known = &mind.known;
     let from = &known.candidates[known.at].symbol;
+    let on: Vec<&String> = shown.iter().map(|&n| &known.surfaces[n].symbol).collect();
     let meta = Meta {
         seen_from_m: Some(eye.into()),
         covers_m: extent(sensed),
-        body: json!({ "from": from, "on": known.surfaces[on].symbol }),
+        body: json!({ "from": from, "on": on }),
         ..Meta::default()
     };
     let id = record.put_cloud(sensed.stamp_ns, frame, &sensed.cloud, &sensing, meta)?;
-    let region = &mut mind.regions[on];
-    region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id });
-    region.taken += 1;
+    for &n in shown {
+        let region = &mut mind.regions[n];
+        region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id });
+        region.taken += 1;
+    }
     mind.views += 1;
     mind.known.looked_from = mind.known.at;
     // Every merge reads all views of its surface again.
@@ -115,10 +124,14 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     let (merging, seeking) = options(eyes.robot, Some(&mind.known.surfaces[on].symbol));
     let seeking = seeking_at(seeking, &mind.known.surfaces[on]);
     let seen = merge(&views, &merging).map_err(|nothing| nothing.to_string()).and_then(|merged| {
-        let surface = find_surface(&merged.cloud, &merged.visibility, &seeking.surface);
-        surface.map(|surface| (merged, surface)).map_err(|nothing| nothing.to_string())
+        let (surfaces, options) = (&mind.known.surfaces, &seeking.surface);
+        let found = match surfaces[on].whole {
+            true => find_surface(&merged.cloud, &merged.visibility, options).map(|s| (s, Vec::new())),
+            false => discover::look(&merged, options, surfaces, on),
+        };
+        found.map(|(surface, others)| (merged, surface, others)).map_err(|nothing| nothing.to_string())
     });
-    let (merged, surface) = match seen {
+    let (merged, surface, others) = match seen {
         Ok(seen) => seen,
         Err(because) => {
             mind.regions[on].nothing = Some(because.clone());
@@ -135,9 +148,15 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     }
     let scene = segment_on(&merged.cloud, &merged.visibility, surface, &seeking);
     let percepts = eyes.recogniser.recognise(&scene, &merged.visibility, eyes.objects);
+    if !mind.known.surfaces[on].whole {
+        discover::join(mind, on, &scene.surface);
+    }
     note_surface(&mut mind.known.surfaces[on], &scene);
     let gone_before = mind.known.belief.gone.len();
     notes.push(believe(mind, eyes, on, &merged, &percepts)?);
+    for new in discover::adopt(mind, on, others, &merged, notes) {
+        perceive(mind, eyes, new, notes)?;
+    }
     match newest.and_then(|newest| taken_away(mind, on, gone_before, &newest)) {
         Some(because) => {
             notes.push(Note::Changed { because });
@@ -264,9 +283,10 @@ pub fn pushed(
     something_moved(mind, eyes.record, obstacle.on, change)
 }
 
-/// What the surface turned out to be: its height and tilt, and where the map knows none its outline.
+/// What the surface turned out to be: its height and tilt, and where the map knows none its outline, and whether it may be the floor.
 fn note_surface(known: &mut KnownSurface, scene: &Scene) {
     let seen = &scene.surface;
+    known.doubtful = (!known.whole && seen.role == Role::Untold).then(|| seen.because.to_string());
     known.up = seen.up.into_inner();
     if known.whole {
         let onto_plane = |p: &Point3<f64>| p - seen.up.into_inner() * seen.height_m(p);

@@ -5,7 +5,7 @@ use descry_perception::nalgebra::{self, Point3, Vector3};
 use descry_planner::{Plan, Step};
 
 use super::doubt::{Doubt, Taken};
-use crate::situation::{KnownSurface, Situation};
+use crate::situation::{KnownSurface, Situation, Thing};
 
 /// What a look takes, as in the domain.
 pub(crate) const LOOK_S: f64 = 2.0;
@@ -79,6 +79,9 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     if let Some(track) = best.filter(|t| p(t) > 1.0 - s.thresholds.confidence) {
         return Some(format!("what stands at {} may be it ({:.2})", place(&track.position_m), p(track)));
     }
+    if let Some(floor) = may_be_floor(s, thing) {
+        return Some(floor);
+    }
     let doubt = s.doubt_about(what);
     if doubt.can_be_settled(s) {
         return Some("there are looks that would settle it, and no plan leads through them".into());
@@ -97,6 +100,15 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
         (there > t.not_there).then(|| format!("{text}; {there:.2} is left in all"))
     };
     out_of_sight(s, doubt, "it").or_else(unsettled).or_else(in_all)
+}
+
+/// What was looked at for a thing and may be no surface to stand things on at all.
+pub fn may_be_floor(s: &Situation, thing: &Thing) -> Option<String> {
+    let asked = s.surfaces.iter().enumerate().filter(|(n, _)| thing.may_be_on(*n));
+    asked.into_iter().find_map(|(_, k)| {
+        let because = k.doubtful.as_ref()?;
+        Some(format!("what was taken for the {} may be the floor: {because}", k.name))
+    })
 }
 
 /// What keeps one from saying what everything is; none if nothing is known that does.

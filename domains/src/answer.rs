@@ -152,7 +152,10 @@ impl Asker<'_> {
             let members = self.members(kind);
             if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {
                 if let Some(floor) = reasons::may_be_floor(s, kind) {
-                    return (Verdict::CannotTell, format!("it cannot be told whether there is a {}, {floor}", kind.name));
+                    return (
+                        Verdict::CannotTell,
+                        format!("it cannot be told whether there is a {}, {floor}", kind.name),
+                    );
                 }
                 let seen = self.seen_of(s.doubt_of(0), 1.0 - s.completeness(0));
                 return (Verdict::NotFound, format!("there is no {}: {seen}", kind.name));

@@ -61,7 +61,10 @@ impl fmt::Display for Note {
                 lines.into_iter().try_for_each(|text| write!(f, "\n          {text}"))
             }
             Note::Surface { name, at_m: [x, y, z], area_m2 } => {
-                write!(f, "see       another surface to stand things on, the {name}: {area_m2:.2} m² at ({x:.2}, {y:.2}, {z:.2}) m")
+                write!(
+                    f,
+                    "see       another surface to stand things on, the {name}: {area_m2:.2} m² at ({x:.2}, {y:.2}, {z:.2}) m"
+                )
             }
             Note::Changed { because } => write!(f, "changed   {because}; only the last view still holds"),
             Note::Nothing { because } => write!(f, "see       nothing yet: {because}"),

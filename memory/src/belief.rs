@@ -229,8 +229,10 @@ mod tests {
         let mut belief = Belief::default();
         for (places, stamp_ns) in merges.iter().zip(1..) {
             let percepts: Vec<Percept> = places.iter().map(|&x| percept(x, 0.5)).collect();
-            let sighted: Vec<Sighted<'_>> =
-                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] }).collect();
+            let sighted: Vec<Sighted<'_>> = percepts
+                .iter()
+                .map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] })
+                .collect();
             belief.update("table", &sighted, stamp_ns, &[]);
         }
         let ids = |tracks: &[Track]| tracks.iter().map(|t| t.id).collect::<Vec<_>>();
@@ -258,8 +260,10 @@ mod tests {
             [("table", &[0.0, 1.0][..], 1), ("shelf", &[0.0], 2), ("shelf", &[], 3), ("table", &[0.0], 4)]
         {
             let percepts: Vec<Percept> = places.iter().map(|&x| percept(x, 0.5)).collect();
-            let sighted: Vec<Sighted<'_>> =
-                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] }).collect();
+            let sighted: Vec<Sighted<'_>> = percepts
+                .iter()
+                .map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] })
+                .collect();
             belief.update(on, &sighted, stamp_ns, &[]);
         }
         let there: Vec<(u64, &str)> = belief.tracks.iter().map(|t| (t.id, t.on.as_str())).collect();
@@ -274,7 +278,12 @@ mod tests {
         let mut blur = percept(0.03, 0.0);
         blur.size_m = [0.2, 0.15, 0.34];
         for (seen, stamp_ns) in [&cup, &blur, &cup].into_iter().zip(1..) {
-            belief.update("table", &[Sighted { percept: seen, viewpoints_m: &[], footprint_m: &[] }], stamp_ns, &[]);
+            belief.update(
+                "table",
+                &[Sighted { percept: seen, viewpoints_m: &[], footprint_m: &[] }],
+                stamp_ns,
+                &[],
+            );
             let best = belief.tracks.iter().map(|t| t.probability_of("cup A")).fold(0.0, f64::max);
             assert_eq!((best, belief.tracks[0].id), (0.7, 0), "after merge {stamp_ns}");
         }

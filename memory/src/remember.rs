@@ -145,8 +145,10 @@ mod tests {
         for surface in ["desk", "shelf"] {
             let percepts: Vec<Percept> =
                 places.iter().filter(|(on, ..)| *on == surface).map(|&(_, x, p)| cup(x, p)).collect();
-            let sighted: Vec<Sighted<'_>> =
-                percepts.iter().map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] }).collect();
+            let sighted: Vec<Sighted<'_>> = percepts
+                .iter()
+                .map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] })
+                .collect();
             belief.update(surface, &sighted, 1, &[]);
         }
         belief

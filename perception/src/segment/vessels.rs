@@ -1,6 +1,6 @@
 //! Vessels in one piece: their near outside and far inside meet only in a thin rim, which no camera resolves.
 
-use super::{Segment, bounds, hull_from_above, most_within, top_m};
+use super::{Segment, bounds, hull_from_above, middle, most_within, top_m};
 use crate::outline;
 use crate::round::{self, Round};
 use crate::surface::range_sigma_m;
@@ -19,6 +19,11 @@ const ON_BODY: f64 = 0.85;
 const ON_MOST: f64 = 0.55;
 /// Bodies are in one place if their axes are nearer than this share of the smaller radius.
 const ONE_PLACE: f64 = 0.5;
+/// Widest vessel that has a handle, metres of radius; how wide a handle with its noise is and how far it reaches, and how far from the
+/// wall its nearest part is measured, metres.
+const GRASPED_M: f64 = 0.06;
+const HANDLE_M: (f64, f64) = (0.045, 0.055);
+const TOUCHES_M: f64 = 0.015;
 /// The smaller part has at least this share of the points.
 const LEAST_SHARE: f64 = 0.08;
 
@@ -92,7 +97,8 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
         return false;
     }
     let inside = small.top_m < large.top_m + 0.005 && footprint_inside(large, small);
-    if inside && large.fitted(viewpoints).is_some_and(|f| f.is_tight(&large.segment.points)) {
+    let fitted = large.fitted(viewpoints).filter(|f| f.is_tight(&large.segment.points));
+    if inside && fitted.is_some() || fitted.is_some_and(|f| is_handle(&f.body, large, small)) {
         return true;
     }
     if (large.top_m - small.top_m).abs() > LEVEL_M || (m as f64) < LEAST_SHARE * n as f64 {
@@ -162,6 +168,25 @@ fn in_one_place(a: &Candidate, b: &Candidate, viewpoints: &[Point3<f64>]) -> boo
     apart_m < ONE_PLACE * one.body.radius_m.min(other.body.radius_m)
         && one.is_placed(&a.segment.points)
         && other.is_placed(&b.segment.points)
+}
+
+/// Whether a part is what sticks out of a vessel's side: it begins at the wall, is no wider than a handle, reaches no further, and ends
+/// below the rim.
+fn is_handle(body: &Round, large: &Candidate, small: &Candidate) -> bool {
+    let points = &small.segment.points;
+    let [x, y] = middle(points);
+    let (dx, dy) = (x - body.x, y - body.y);
+    let far_m = dx.hypot(dy);
+    if body.radius_m > GRASPED_M || far_m < body.radius_m / 2.0 || small.top_m > large.top_m + LEVEL_M {
+        return false;
+    }
+    let out = |p: &Point3<f64>| ((p.x - body.x) * dx + (p.y - body.y) * dy) / far_m - body.radius_m;
+    let aside = |p: &Point3<f64>| ((p.x - body.x) * dy - (p.y - body.y) * dx) / far_m;
+    let mut outs: Vec<f64> = points.iter().map(out).collect();
+    outs.sort_by(f64::total_cmp);
+    let (first, last) = (outs[outs.len() / 20], outs[outs.len() - 1 - outs.len() / 20]);
+    let within = points.iter().filter(|p| aside(p).abs() < HANDLE_M.0 / 2.0).count();
+    first < TOUCHES_M && last < HANDLE_M.1 && within * 10 >= points.len() * 9
 }
 
 fn share_on(body: &Round, part: &Segment) -> f64 {

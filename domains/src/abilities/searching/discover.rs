@@ -102,7 +102,8 @@ pub(super) fn adopt(
 /// Two of those taken up may turn out to be one: the later is given up, and what stood on it is looked for on the other.
 pub(super) fn join(mind: &mut Mind, on: usize, surface: &Surface) {
     let known = &mind.known.surfaces;
-    let Some(last) = (on + 1..known.len()).rev().find(|&n| !known[n].whole && is_one(surface, &known[n])) else {
+    let Some(last) = (on + 1..known.len()).rev().find(|&n| !known[n].whole && is_one(surface, &known[n]))
+    else {
         return;
     };
     // A later one is known by no index but its own: those that the goal names come first.

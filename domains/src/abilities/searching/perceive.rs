@@ -58,12 +58,7 @@ pub struct Eyes<'a> {
 
 /// Puts a view of some surfaces into the record: its transforms and colours, then its cloud, so that a cloud is never without its
 /// place. When this returns it survives a crash.
-pub fn remember(
-    mind: &mut Mind,
-    eyes: Eyes<'_>,
-    shown: &[usize],
-    sensed: &Sensed,
-) -> Result<(), WorldError> {
+pub fn remember(mind: &mut Mind, eyes: Eyes<'_>, shown: &[usize], sensed: &Sensed) -> Result<(), WorldError> {
     let record = eyes.record;
     for t in &sensed.transforms {
         record.put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
@@ -308,7 +303,8 @@ fn believe(
     let surface = mind.known.surfaces[on].clone();
     let viewpoints: Vec<Vec<Point3<f64>>> =
         percepts.iter().map(|p| seen_from(p, &surface.up, &merged.visibility)).collect();
-    let footprints: Vec<Vec<Point3<f64>>> = percepts.iter().map(|p| footprint(p, &surface.up, merged)).collect();
+    let footprints: Vec<Vec<Point3<f64>>> =
+        percepts.iter().map(|p| footprint(p, &surface.up, merged)).collect();
     let sighted: Vec<Sighted<'_>> = (0..percepts.len())
         .map(|n| Sighted { percept: &percepts[n], viewpoints_m: &viewpoints[n], footprint_m: &footprints[n] })
         .collect();

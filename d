@@ -1,0 +1,2 @@
+#!/bin/bash
+exec /work/wt/shapes/target/debug/descry "$@"

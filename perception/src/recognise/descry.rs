@@ -332,6 +332,8 @@ fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
 fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     /// Irregular things miss both forms by about this much, metres.
     const IRREGULAR_M: f64 = 0.006;
+    /// Views that lie so far apart tell a form half as sharply as they would if only the noise of each point counted, metres.
+    const SHARED_M: f64 = 0.003;
     /// The miss of what no circle fits at all.
     const NONE_M: f64 = 0.02;
     // No form is measured more sharply than merged views of one surface lie apart.
@@ -342,7 +344,9 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
         Some(Shape::Box) => m.rectangle.map_or(NONE_M, |r| r.residual_m),
         None => IRREGULAR_M,
     };
-    -m.independent * miss.hypot(floor).ln()
+    // What lies beside each other by an error that whole views share tells the same again and again.
+    let independent = m.independent / (1.0 + (apart / SHARED_M).powi(2));
+    -independent * miss.hypot(floor).ln()
 }
 
 fn top_log(top: Top, m: &Measured) -> f64 {

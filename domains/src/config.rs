@@ -71,6 +71,9 @@ pub struct GoalPhrase {
     /// Whether the answer is yes or no.
     #[serde(default)]
     pub question: bool,
+    /// The confidence that is asked for where the goal says none; none: that of the thresholds.
+    #[serde(default)]
+    pub confidence: Option<f64>,
     /// What the agent will do, in a line.
     #[serde(default)]
     pub about: String,
@@ -308,6 +311,10 @@ pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
         };
         if holds { Ok(()) } else { Err(error()) }
     };
+    for (n, phrase) in config.goal.iter().enumerate() {
+        let p = phrase.confidence.unwrap_or(0.5);
+        value(&format!("goal.{n}.confidence"), p, p > 0.0 && p < 1.0, "a number above 0 and below 1")?;
+    }
     let t = &config.thresholds;
     for (key, p) in [
         ("thresholds.confidence", t.confidence),

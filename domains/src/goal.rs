@@ -95,7 +95,7 @@ pub enum GoalError {
 /// # Errors
 /// [`GoalError`] names what could have been said instead.
 pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, GoalError> {
-    let (words, wanted) = conditions(said, domain.config.thresholds.confidence)?;
+    let (words, wanted) = conditions(said)?;
     let mut nearest_miss = None;
     for phrase in &domain.config.goal {
         for slots in fits(&phrase.say, &words) {
@@ -189,7 +189,9 @@ fn goal_of(
     domain: &Domain,
 ) -> Result<Goal, GoalError> {
     let bad = |because: String| GoalError::BadPhrase { phrase: phrase.say.clone(), because };
-    let means = phrase.means.replace("<threshold>", &wanted.confidence.to_string());
+    let usual = phrase.confidence.unwrap_or(domain.config.thresholds.confidence);
+    let threshold = wanted.confidence.unwrap_or(usual);
+    let means = phrase.means.replace("<threshold>", &threshold.to_string());
     let pddl = put_in(&means, &slots, |f| f.symbol.clone()).map_err(bad)?;
     let asked = Asked::of(&pddl, &domain.vocabulary);
     Ok(Goal {
@@ -200,7 +202,7 @@ fn goal_of(
         slots,
         question: phrase.question,
         answer: phrase.answer.clone(),
-        threshold: wanted.confidence,
+        threshold,
         deadline_s: wanted.deadline_s,
     })
 }
@@ -208,15 +210,15 @@ fn goal_of(
 /// How sure, and how soon.
 #[derive(Clone, Copy)]
 struct Wanted {
-    confidence: f64,
+    confidence: Option<f64>,
     deadline_s: Option<f64>,
 }
 
 /// Takes "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.
-fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Wanted), GoalError> {
+fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError> {
     let mut words: Vec<String> =
         said.split_whitespace().map(|w| bare(w).to_lowercase()).filter(|w| !w.is_empty()).collect();
-    let mut wanted = Wanted { confidence: default, deadline_s: None };
+    let mut wanted = Wanted { confidence: None, deadline_s: None };
     loop {
         let confidence = words.windows(2).rposition(|w| w[0] == "with" && w[1] == "confidence");
         let within = words.iter().rposition(|w| w == "within");
@@ -224,7 +226,7 @@ fn conditions(said: &str, default: f64) -> Result<(Vec<String>, Wanted), GoalErr
             (Some(at), within) if within.is_none_or(|w| w < at) => {
                 let found = words.split_off(at)[2..].join(" ");
                 let probability = found.parse::<f64>().ok().filter(|c| *c > 0.0 && *c < 1.0);
-                wanted.confidence = probability.ok_or(GoalError::BadConfidence { found })?;
+                wanted.confidence = Some(probability.ok_or(GoalError::BadConfidence { found })?);
             }
             (_, Some(at)) => {
                 let found = words.split_off(at)[1..].join(" ");

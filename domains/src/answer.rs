@@ -187,7 +187,8 @@ impl Asker<'_> {
         if is_beyond_looks && is_proven {
             return (Verdict::Impossible, self.impossible(&says));
         }
-        let open = missing.iter().find_map(|&n| Some((n, reasons::left_about(s, n)?)));
+        let left = |n: usize| self.nothing_seen(&s.things[n]).or_else(|| reasons::left_about(s, n));
+        let open = missing.iter().find_map(|&n| Some((n, left(n)?)));
         if let Some((n, doubt)) = open {
             let asked = self.where_asked(&s.things[n]);
             let text = format!("it cannot be told whether {} is {asked}, {doubt}", s.things[n].name);
@@ -214,6 +215,14 @@ impl Asker<'_> {
             return (Verdict::CannotTell, format!("{text}{says}"));
         }
         (Verdict::Impossible, self.impossible(&says))
+    }
+
+    /// Why looks for a thing have shown nothing that it could stand on.
+    fn nothing_seen(&self, thing: &Thing) -> Option<String> {
+        let regions = self.mind.regions.iter().enumerate().filter(|(on, _)| thing.may_be_on(*on));
+        let named =
+            |(on, because): (usize, &String)| format!("no {} was seen: {because}", self.s.surfaces[on].name);
+        regions.filter_map(|(on, region)| Some((on, region.nothing.as_ref()?))).map(named).next()
     }
 
     fn impossible(&self, says: &str) -> String {

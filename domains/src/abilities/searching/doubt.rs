@@ -148,7 +148,7 @@ impl Doubt {
             return if before.looks.is_empty() { 1.0 } else { 0.0 };
         }
         let total = self.within_reach(situation, before.moved);
-        if total.weight < negligible(situation, before.moved) {
+        if !self.is_worth_it(situation, total.weight, before.moved) {
             return 0.0;
         }
         let told = |look: (usize, usize)| self.told(situation, look, before.moved);
@@ -178,7 +178,14 @@ impl Doubt {
 
     /// Whether looking alone can settle anything that matters.
     pub fn can_be_settled(&self, situation: &Situation) -> bool {
-        self.anywhere || self.within_reach(situation, None).weight >= negligible(situation, None)
+        self.anywhere || self.is_worth_it(situation, self.within_reach(situation, None).weight, None)
+    }
+
+    /// Whether looks that settle so much matter: by themselves, or because with them it could be said that nothing is hidden.
+    fn is_worth_it(&self, situation: &Situation, weight: f64, moved: Option<usize>) -> bool {
+        let t = &situation.thresholds;
+        let most = t.remaining + t.out_of_sight;
+        weight >= negligible(situation, moved) || (self.hidden > most && self.hidden - weight <= most)
     }
 
     /// Whether looks would settle enough once an obstacle is moved, of what no look shows now.

@@ -1,0 +1,135 @@
+//! Recordings that say nothing of surfaces: every surface in view is one to stand things on, and none that may be the floor proves
+//! anything.
+
+mod binary;
+
+use std::fs;
+use std::path::Path;
+
+use binary::check;
+use descry_robots::image::{ImageBuffer, Luma};
+use descry_robots::nalgebra::Point3;
+use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};
+use descry_robots::{Place, Pose2, Robot, Watch};
+use tempfile::TempDir;
+
+const TABLES: &str = r#"
+title = "Two tables side by side, one higher"
+[room]
+size_m = [8.0, 8.0]
+[[surface]]
+name = "low"
+position_m = [-0.75, 0.0]
+size_m = [1.0, 0.8]
+height_m = 0.60
+[[surface]]
+name = "high"
+position_m = [0.75, 0.0]
+size_m = [0.9, 0.7]
+height_m = 0.90
+[start]
+position_m = [0.0, -2.2]
+[[object]]
+name = "mug"
+on = "low"
+shape.mug = { diameter_m = 0.080, height_m = 0.095 }
+[[object]]
+name = "box"
+on = "high"
+shape.box = { size_m = [0.07, 0.07, 0.20] }
+"#;
+
+const CUP: &str = r#"
+[[object]]
+name = "cup A"
+on = "high"
+shape.cup = { diameter_m = 0.070, height_m = 0.104 }
+"#;
+
+/// A plane that goes on beyond every view: a large table, or the floor.
+const PLANE: &str = r#"
+title = "A level plane without an edge"
+[room]
+size_m = [12.0, 12.0]
+[[surface]]
+name = "plane"
+position_m = [0.0, 0.6]
+size_m = [9.0, 6.0]
+height_m = 0.10
+[start]
+position_m = [0.0, -2.9]
+[[object]]
+name = "mug"
+on = "plane"
+position_m = [0.0, -1.8]
+shape.mug = { diameter_m = 0.080, height_m = 0.095 }
+"#;
+
+/// Writes what the simulated camera sees from some places, each turned to a point, as a recording.
+fn record(folder: &Path, scene: &str, looks: &[([f64; 2], [f64; 3])]) {
+    let spec = SceneSpec::parse("scene.toml", scene).expect("the scene is right");
+    let options = SimOptions { seed: 1, ..SimOptions::default() };
+    let robot = SimRobot::new(arrange(&spec, 1).expect("it can be laid out"), options);
+    let watch = Watch::default();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+    fs::create_dir(folder).expect("a folder can be made");
+    for (k, (from, at)) in looks.iter().enumerate() {
+        let at = Point3::from(*at);
+        let sensed = runtime.block_on(async {
+            robot
+                .drive_to(&Place::Pose(Pose2::facing(from[0], from[1], &at.xy())), &watch)
+                .await
+                .expect("a way");
+            robot.look_at(&at, &watch).await.expect("it turns");
+            robot.sense(&watch).await.expect("it sees")
+        });
+        let c = sensed.intrinsics;
+        let millimetres = |u: u32, v: u32| (sensed.depth_m[v as usize * c.width + u as usize] * 1e3) as u16;
+        let depth = ImageBuffer::from_fn(c.width as u32, c.height as u32, |u, v| Luma([millimetres(u, v)]));
+        depth.save(folder.join(format!("frame-{k}.depth.png"))).expect("it is written");
+        let pose: Vec<String> = sensed
+            .map_from_camera
+            .to_homogeneous()
+            .row_iter()
+            .map(|r| format!("{} {} {} {}", r[0], r[1], r[2], r[3]))
+            .collect();
+        fs::write(folder.join(format!("frame-{k}.pose.txt")), pose.join("\n")).expect("it is written");
+        let matrix = format!("{} 0 {}\n0 {} {}\n0 0 1\n", c.fx, c.cx, c.fy, c.cy);
+        fs::write(folder.join("camera-intrinsics.txt"), matrix).expect("it is written");
+    }
+    fs::write(folder.join("recording.toml"), "up = [0.0, 0.0, 1.0]\n").expect("it is written");
+}
+
+fn both_tables() -> Vec<([f64; 2], [f64; 3])> {
+    let places = [[0.0, -2.2], [2.2, -1.4], [2.3, 1.2], [0.0, 2.2], [-2.2, 1.4], [-2.2, -1.3]];
+    places.map(|from| (from, [0.0, 0.0, 0.75])).to_vec()
+}
+
+#[test]
+fn every_surface_in_view_is_looked_at() {
+    let folder = TempDir::new().expect("a folder can be made");
+    record(&folder.path().join("with"), &format!("{TABLES}{CUP}"), &both_tables());
+    let said = check(folder.path(), &["find", "cup A", "--robot", "recorded:with", "--json"], 0);
+    let height_m = said["position_m"][2].as_f64().expect("a position");
+    assert!((height_m - 0.952).abs() < 0.02, "it stands on the higher one: {said}");
+    assert!(said["on"].as_str().is_some_and(|on| on.contains("table")), "{said}");
+
+    record(&folder.path().join("without"), TABLES, &both_tables());
+    let said = check(folder.path(), &["find", "cup A", "--robot", "recorded:without", "--json"], 1);
+    let why = said["why"].as_str().unwrap_or_default();
+    assert!(
+        why.contains("of the table was seen from") && why.contains("of the second table was seen from"),
+        "{why}"
+    );
+}
+
+#[test]
+fn what_may_be_the_floor_proves_nothing() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let looks = [[0.0, -2.9], [-1.0, -2.9], [1.0, -2.9]].map(|from| (from, [0.0, -1.2, 0.1]));
+    record(&folder.path().join("plane"), PLANE, &looks);
+    let said = check(folder.path(), &["find", "cup A", "--robot", "recorded:plane", "--json"], 1);
+    let why = said["why"].as_str().unwrap_or_default();
+    assert_eq!(said["verdict"], "cannot_tell", "{said}");
+    assert!(why.contains("may be the floor") || why.contains("is the floor"), "{why}");
+}

@@ -151,14 +151,7 @@ impl Asker<'_> {
         for kind in &s.kinds {
             let members = self.members(kind);
             if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {
-                if let Some(floor) = reasons::may_be_floor(s, kind) {
-                    return (
-                        Verdict::CannotTell,
-                        format!("it cannot be told whether there is a {}, {floor}", kind.name),
-                    );
-                }
-                let seen = self.seen_of(s.doubt_of(0), 1.0 - s.completeness(0));
-                return (Verdict::NotFound, format!("there is no {}: {seen}", kind.name));
+                return self.none_of(kind);
             }
             said.push(match members.len() {
                 0 => format!("there is no {}", kind.name),
@@ -172,6 +165,21 @@ impl Asker<'_> {
             said.insert(0, format!("it holds that {}", self.goal.pddl));
         }
         (Verdict::Achieved, said.join("; "))
+    }
+
+    /// None of a kind was seen, as sure as was asked for that all of it is known.
+    fn none_of(&self, kind: &Thing) -> (Verdict, String) {
+        let s = self.s;
+        let left = 1.0 - s.completeness(0);
+        let seen = self.seen_of(s.doubt_of(0), left);
+        let open = reasons::may_be_floor(s, kind)
+            .or_else(|| (left > s.thresholds.not_there).then(|| format!("none was seen: {seen}")));
+        match open {
+            Some(open) => {
+                (Verdict::CannotTell, format!("it cannot be told whether there is a {}, {open}", kind.name))
+            }
+            None => (Verdict::NotFound, format!("there is no {}: {seen}", kind.name)),
+        }
     }
 
     /// No plan is left: what is known of what was asked for, and what keeps one from saying more.

@@ -100,8 +100,8 @@ impl<'a> Agent<'a> {
                 }
             }
         }
-        if let Some(limit) = world.exhausted(round) {
-            return Ok(Some(Ended::Limit(limit)));
+        if let Some(ended) = world.exhausted(round) {
+            return Ok(Some(ended));
         }
         let steps = self.next_steps();
         self.act(world, round, steps).await?;

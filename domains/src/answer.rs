@@ -24,8 +24,10 @@ pub enum Ended {
     NoPlan(String),
     /// The search for a plan came to no end, and no single step is surely worth it.
     Undecided(String),
-    /// A limit was reached.
+    /// A limit of looks, plans or time was reached.
     Limit(String),
+    /// What is done fails for good, or changes nothing.
+    Failed(String),
 }
 
 /// How a run ended.
@@ -40,7 +42,7 @@ pub enum Verdict {
     CannotTell,
     /// What was asked for is known, and nothing that the body can do brings it about.
     Impossible,
-    /// The body or the store failed, or a limit was reached.
+    /// The body or the store failed, or what is done changes nothing.
     Failed,
 }
 
@@ -103,7 +105,8 @@ pub(crate) fn conclude(
         Ended::Reached => asker.reached(),
         Ended::NoPlan(why) => asker.gave_up(why, true),
         Ended::Undecided(why) => asker.gave_up(why, false),
-        Ended::Limit(why) => (Verdict::Failed, why.clone()),
+        Ended::Limit(why) => (Verdict::CannotTell, format!("it cannot be told: {why}")),
+        Ended::Failed(why) => (Verdict::Failed, why.clone()),
     };
     let why = asker.worded(verdict).unwrap_or(why);
     let own = s.things.iter().filter(|t| t.track.is_none()).count();

@@ -524,28 +524,34 @@ impl<'a> World<'a> {
         });
     }
 
-    /// The limit that the run has reached, if it has.
-    pub fn exhausted(&mut self, round: &Round) -> Option<String> {
+    /// Why the run cannot go on, if it cannot: a limit is reached, or what is done fails for good or changes nothing.
+    pub fn exhausted(&mut self, round: &Round) -> Option<Ended> {
         if let Some(why) = self.given_up.take() {
-            return Some(why);
+            return Some(Ended::Failed(why));
         }
         let limits = &self.setting.domain.config.limits;
         if self.mind.views >= limits.views {
-            return Some(format!("{} looks were taken and it is still in doubt", limits.views));
+            return Some(Ended::Limit(format!("{} looks were taken and it is still in doubt", limits.views)));
         }
         if self.plans >= limits.plans {
-            return Some(format!("{} plans were made and the goal is not reached", limits.plans));
+            return Some(Ended::Limit(format!(
+                "{} plans were made and the goal is not reached",
+                limits.plans
+            )));
         }
         let gone_s = (self.setting.robot.now_ns() - self.began_ns) as f64 * 1e-9;
         if gone_s >= limits.seconds {
-            return Some(format!("{:.0} s are over, the most that a run may take", limits.seconds));
+            return Some(Ended::Limit(format!(
+                "{:.0} s are over, the most that a run may take",
+                limits.seconds
+            )));
         }
         // A failure that is tried again is progress of a kind: it is counted elsewhere.
         let tries: usize = self.tries.values().sum();
         let times = self.seen_before.entry(format!("{tries} {}", round.problem.text)).or_insert(0);
         *times += 1;
-        (*times > limits.repeats)
-            .then(|| format!("the same situation has come back {times} times: what is done changes nothing"))
+        let why = || format!("the same situation has come back {times} times: what is done changes nothing");
+        (*times > limits.repeats).then(|| Ended::Failed(why()))
     }
 
     /// What is to be remembered after this run, if anything is.

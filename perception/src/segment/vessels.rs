@@ -207,3 +207,47 @@ fn footprint_inside(large: &Candidate, small: &Candidate) -> bool {
     points.iter().filter(beside).count() * 10 <= points.len() * 3
         && most_within(large.hull(), points, |p| [p.x, p.y])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on the outside of a cup of 4 cm radius and 10 cm height around the origin.
+    fn cup() -> Vec<Point3<f64>> {
+        let at = |k: usize| {
+            let angle = std::f64::consts::TAU * (k % 90) as f64 / 90.0;
+            Point3::new(0.04 * angle.cos(), 0.04 * angle.sin(), 0.1 * (k / 90) as f64 / 40.0)
+        };
+        (0..3600).map(at).collect()
+    }
+
+    /// Points of an upright bar of a width that begins so far from the axis and is so deep.
+    fn bar(from_m: f64, deep_m: f64, wide_m: f64, top_m: f64) -> Vec<Point3<f64>> {
+        let at = |k: usize| {
+            let share = |n: usize| (k / n % 10) as f64 / 9.0;
+            let aside = wide_m * (share(10) - 0.5);
+            Point3::new(from_m + deep_m * share(1), aside, 0.02 + (top_m - 0.02) * share(100))
+        };
+        (0..1000).map(at).collect()
+    }
+
+    fn check(beside: Vec<Point3<f64>>, parts: usize) {
+        let body = cup();
+        let n = body.len() as u32;
+        let own = Segment { indices: (0..n).collect(), points: body, base_m: 0.0 };
+        let what = format!("{:?} to {:?}", beside.first(), beside.last());
+        let other = Segment { indices: (n..n + beside.len() as u32).collect(), points: beside, base_m: 0.0 };
+        let eyes = [Point3::new(1.0, 0.3, 0.8), Point3::new(-0.7, 0.8, 0.8)];
+        assert_eq!(whole(vec![own, other], &eyes).len(), parts, "{what}");
+    }
+
+    #[test]
+    fn a_handle_that_was_cut_off_is_put_back() {
+        check(bar(0.044, 0.03, 0.012, 0.08), 1);
+        // Too far from the wall, too wide, too far out, too high: something that stands beside the cup.
+        check(bar(0.065, 0.03, 0.012, 0.08), 2);
+        check(bar(0.044, 0.03, 0.07, 0.08), 2);
+        check(bar(0.044, 0.09, 0.012, 0.08), 2);
+        check(bar(0.044, 0.03, 0.012, 0.16), 2);
+    }
+}

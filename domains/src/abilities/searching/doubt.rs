@@ -269,6 +269,7 @@ impl Doubt {
         let mut count = BTreeMap::new();
         for &(on, expected) in surfaces {
             let surface = &situation.surfaces[on];
+            let standing: Vec<&Track> = situation.on_surface(on).collect();
             let places = grid(surface, size_m.1);
             anywhere |= places.is_empty() && surface.outline.is_empty();
             if places.is_empty() {
@@ -279,7 +280,7 @@ impl Doubt {
             count.insert(on, places.len());
             hypotheses.extend(places.iter().filter_map(|centre| {
                 around(surface, centre).find_map(|centre| {
-                    let points = unseen_volume(situation, on, &centre, size_m)?;
+                    let points = unseen_volume(surface, &situation.spaces[on], &standing, &centre, size_m)?;
                     Some(Hypothesis { weight: each, on, centre, points, facing: None })
                 })
             }));
@@ -355,12 +356,12 @@ fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterator<Item = P
 /// The unseen points of an object that stood at a place, if it could stand there unnoticed. What was measured there and belongs to no
 /// object that is believed in may be its own.
 fn unseen_volume(
-    situation: &Situation,
-    on: usize,
+    surface: &KnownSurface,
+    space: &Space,
+    standing: &[&Track],
     centre: &Point3<f64>,
     (height_m, diameter_m): (f64, f64),
 ) -> Option<Vec<Point3<f64>>> {
-    let (surface, space) = (&situation.surfaces[on], &*situation.spaces[on]);
     const COLUMNS: [(f64, f64); 5] = [(0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.0, 0.35), (0.0, -0.35)];
     const LEVELS: [f64; 3] = [0.25, 0.6, 0.95];
     let all = (COLUMNS.len() * LEVELS.len()) as f64;
@@ -368,7 +369,7 @@ fn unseen_volume(
     let column = |(a, b): (f64, f64)| centre + (e1 * a + e2 * b) * diameter_m;
     let explained = COLUMNS.map(|at| {
         let point = column(at);
-        situation.on_surface(on).any(|track| surface.is_of(track, &point, space.voxel_m() / 2.0))
+        standing.iter().any(|track| surface.is_of(track, &point, space.voxel_m() / 2.0))
     });
     let mut unseen = Vec::new();
     let mut free = 0.0;
@@ -430,4 +431,85 @@ fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypoth
         facing: Some(*side),
     };
     open.iter().map(hypothesis).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use descry_memory::RecordId;
+    use descry_perception::Intrinsics;
+    use descry_perception::nalgebra::{Isometry3, Translation3, UnitQuaternion};
+    use descry_perception::recognise::Evidence;
+    use descry_perception::visibility::DepthMap;
+
+    use super::*;
+
+    /// What a camera two metres above a table has seen of a disc of 7 cm at a height: what is below it is unseen.
+    fn seen_from_above(disc_m: f64) -> Space {
+        let intrinsics = Intrinsics { width: 320, height: 240, fx: 500.0, fy: 500.0, cx: 160.0, cy: 120.0 };
+        let depth_m = |n: usize| {
+            let (u, v) = ((n % 320) as f64 - 160.0, (n / 320) as f64 - 120.0);
+            let above = 2.0 - disc_m;
+            if (u * above / 500.0).hypot(v * above / 500.0) < 0.035 { above as f32 } else { 2.0 }
+        };
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let world_from_camera = Isometry3::from_parts(Translation3::new(0.0, 0.0, 2.0), down);
+        let depths_m = (0..320 * 240).map(depth_m).collect();
+        let mut space = Space::default();
+        space.integrate(&DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m });
+        space
+    }
+
+    fn table() -> KnownSurface {
+        let corners = [(-0.5, -0.4), (0.5, -0.4), (0.5, 0.4), (-0.5, 0.4)];
+        KnownSurface {
+            symbol: "table".into(),
+            name: "table".into(),
+            room: None,
+            outline: corners.map(|(x, y)| Point3::new(x, y, 0.0)).to_vec(),
+            up: Vector3::z(),
+            whole: true,
+            doubtful: None,
+        }
+    }
+
+    /// An object of which the disc is the top.
+    fn disc() -> Track {
+        let round = |k: usize| {
+            let angle = std::f64::consts::TAU * k as f64 / 12.0;
+            Point3::new(0.04 * angle.cos(), 0.04 * angle.sin(), 0.0)
+        };
+        Track {
+            id: 0,
+            on: "table".into(),
+            position_m: Point3::origin(),
+            position_sigma_m: 0.002,
+            size_m: [0.07, 0.07, 0.1],
+            footprint_m: (0..12).map(round).collect(),
+            probabilities: vec![("cup A".into(), 0.01)],
+            kinds: vec![("cup".into(), 0.01)],
+            unknown: 0.99,
+            seen_fraction: 0.5,
+            viewpoints_m: vec![],
+            evidence: Evidence::default(),
+            cites: vec![RecordId(1)],
+            first_ns: 0,
+            last_ns: 0,
+        }
+    }
+
+    /// Whether a cup of 7 cm may stand unnoticed under what was seen.
+    fn check(disc_m: f64, cup_m: f64, standing: &[&Track], expected: bool) {
+        let hidden =
+            unseen_volume(&table(), &seen_from_above(disc_m), standing, &Point3::origin(), (cup_m, 0.07));
+        assert_eq!(hidden.is_some(), expected, "disc at {disc_m} m, {} objects", standing.len());
+    }
+
+    #[test]
+    fn a_rim_that_no_object_explains_may_be_its_own() {
+        check(0.104, 0.104, &[], true);
+        check(0.104, 0.104, &[&disc()], false);
+        // What stands under a roof that is an object stands within a solid body.
+        check(0.20, 0.104, &[&disc()], false);
+        check(0.0, 0.104, &[], false);
+    }
 }

@@ -22,7 +22,7 @@ const HEAD: [&str; 11] = [
     "metres",
     "seconds",
     "replans",
-    "greatest error, cm",
+    "greatest error of the right, cm",
 ];
 
 /// A finished run.
@@ -70,7 +70,11 @@ impl Figures {
             errors: runs.iter().filter(|run| run.row.is_none()).count(),
             shares: SHARES.map(share),
             means: MEANS.map(mean),
-            error_m: runs.iter().filter_map(|run| run.number("position_error_m")).reduce(f64::max),
+            error_m: runs
+                .iter()
+                .filter(|run| run.is("right"))
+                .filter_map(|run| run.number("position_error_m"))
+                .reduce(f64::max),
         }
     }
 

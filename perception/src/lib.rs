@@ -11,6 +11,7 @@ pub mod hull;
 pub mod laser;
 mod lattice;
 pub mod locate;
+pub mod mapping;
 pub mod merge;
 pub mod neighbours;
 pub mod noise;

@@ -1,0 +1,130 @@
+//! Section 3: errors of single steps, and what is left when the drive comes back to where it began.
+
+use super::corridor::{Building, Rig, around, field_of_view, with_people};
+use super::tabletop::Draws;
+use descry_perception::mapping::{
+    ClosureOptions, Matcher, RectifyOptions, Station, chained, closures, correct_drive, rectify_drive,
+    rectify_pair,
+};
+use descry_perception::nalgebra::Isometry2;
+
+const LONG_M: f64 = 40.0;
+const SHORT_M: f64 = 20.0;
+
+/// What matches, by a short name.
+const MATCHERS: [(&str, Matcher); 5] = [
+    ("odometry", Matcher::Odometry),
+    ("ICP, all points", Matcher::Icp),
+    ("ICP, shared view", Matcher::IcpShared),
+    ("ICP-EM, split (paper)", Matcher::IcpEmSplit),
+    ("ICP-EM, together", Matcher::IcpEm),
+];
+
+pub fn options(matcher: Matcher) -> RectifyOptions {
+    RectifyOptions { matcher, field: field_of_view(), ..RectifyOptions::default() }
+}
+
+/// Shift (metres) and turn (degrees) between two poses.
+fn off(found: &Isometry2<f64>, truth: &Isometry2<f64>) -> (f64, f64) {
+    let apart = (found.translation.vector - truth.translation.vector).norm();
+    (apart, found.rotation.angle_to(&truth.rotation).abs().to_degrees())
+}
+
+fn mean_and_most(values: &mut [f64]) -> (f64, f64) {
+    values.sort_by(f64::total_cmp);
+    let at = values.len() * 95 / 100;
+    (values.iter().sum::<f64>() / values.len() as f64, values[at.min(values.len() - 1)])
+}
+
+/// Errors of single steps against the share of outliers.
+pub fn pairs(seed: u64) {
+    let building = Building::corridor_loop(LONG_M, SHORT_M, seed);
+    let rig = Rig::default();
+    let truths = around(LONG_M, SHORT_M, 0.0, 0.8);
+    let stations = building.drive(&truths, &rig, seed);
+    println!(
+        "steps of a drive of {} stops: turn off (degrees, mean and 95 of 100), way off (cm, the same), by the share of points on people who walk",
+        truths.len()
+    );
+    for share in [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6] {
+        let mut draws = Draws(seed + 77);
+        let seen: Vec<Station> = stations
+            .iter()
+            .map(|s| Station { points: with_people(&s.points, share, &mut draws), ..s.clone() })
+            .collect();
+        for (name, matcher) in MATCHERS {
+            let options = options(matcher);
+            let (mut ways, mut turns): (Vec<f64>, Vec<f64>) = (1..seen.len())
+                .map(|i| {
+                    let fit = rectify_pair(&seen[i - 1], &seen[i], &options);
+                    off(&fit.before_from_after, &truths[i - 1].inv_mul(&truths[i]))
+                })
+                .unzip();
+            let (turn, most_turn) = mean_and_most(&mut turns);
+            let (way, most_way) = mean_and_most(&mut ways);
+            println!(
+                "{:>3.0} %  {name:<22} {turn:>6.2} {most_turn:>6.2}   {:>6.1} {:>6.1}",
+                100.0 * share,
+                100.0 * way,
+                100.0 * most_way
+            );
+        }
+    }
+}
+
+/// What is left at closure.
+pub fn loops(seed: u64) -> Result<(), String> {
+    println!(
+        "\nonce around {:.0} m: way (m) and turn (degrees) off where the drive came back; farthest and mean pose off the truth (m)",
+        2.0 * (LONG_M + SHORT_M)
+    );
+    for seed in seed..seed + 3 {
+        let building = Building::corridor_loop(LONG_M, SHORT_M, seed);
+        let truths = around(LONG_M, SHORT_M, 6.0, 0.8);
+        let stations = building.drive(&truths, &Rig::default(), seed);
+        let row = |name: &str, poses: &[Isometry2<f64>]| {
+            let from_first: Vec<_> = truths.iter().map(|t| truths[0].inv_mul(t)).collect();
+            let last = truths.len() - 1;
+            let (way, turn) = off(&poses[last], &from_first[last]);
+            let offs: Vec<f64> = poses.iter().zip(&from_first).map(|(p, t)| off(p, t).0).collect();
+            let most = offs.iter().copied().fold(0.0, f64::max);
+            let mean = offs.iter().sum::<f64>() / offs.len() as f64;
+            println!("seed {seed}  {name:<28} {way:>6.2} {turn:>6.2}   {most:>6.2} {mean:>6.2}");
+        };
+        for (name, matcher) in MATCHERS {
+            row(name, &chained(&rectify_drive(&stations, &options(matcher))));
+        }
+        let rectify = options(Matcher::IcpEm);
+        let pairs = rectify_drive(&stations, &rectify);
+        let found = closures(&stations, &chained(&pairs), &rectify, &ClosureOptions::default());
+        let settled = correct_drive(&pairs, &found).map_err(|e| e.to_string())?;
+        row("closed", &settled.poses);
+        let wrong = found
+            .iter()
+            .filter(|c| off(&c.fit.before_from_after, &truths[c.from].inv_mul(&truths[c.to])).0 > 0.3);
+        let steps = settled.squares[..pairs.len()].iter().sum::<f64>() / pairs.len() as f64;
+        println!(
+            "        {} closures, {} of them off by more than 30 cm; squares a step {steps:.2}, {} rounds, converged {}",
+            found.len(),
+            wrong.count(),
+            settled.rounds,
+            settled.converged
+        );
+        for (c, (s, w)) in
+            found.iter().zip(settled.squares[pairs.len()..].iter().zip(&settled.weights[pairs.len()..]))
+        {
+            let o = off(&c.fit.before_from_after, &truths[c.from].inv_mul(&truths[c.to]));
+            println!(
+                "   {} {} off {:.3} {:.2} expl {:.2} sq {s:.1} w {w:.2} info {:.0} {:.0}",
+                c.from,
+                c.to,
+                o.0,
+                o.1,
+                c.fit.explained,
+                c.fit.information[(0, 0)],
+                c.fit.information[(1, 1)]
+            );
+        }
+    }
+    Ok(())
+}

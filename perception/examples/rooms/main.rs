@@ -3,18 +3,23 @@
 
 #[path = "../../tests/corridor/mod.rs"]
 mod corridor;
+mod plot;
 mod poses;
 #[path = "../../tests/tabletop/mod.rs"]
 mod tabletop;
+mod walls;
 
 use std::path::Path;
 use std::process::ExitCode;
 
-fn run(seed: u64, _out: Option<&Path>) -> Result<(), String> {
+fn run(seed: u64, out: Option<&Path>) -> Result<(), String> {
     if seed > 100 {
         poses::pairs(seed);
     }
-    poses::loops(seed)?;
+    if seed > 10 {
+        poses::loops(seed)?;
+    }
+    walls::walls(seed, out)?;
     Ok(())
 }
 

@@ -8,8 +8,8 @@ use descry_perception::mapping::{
 };
 use descry_perception::nalgebra::Isometry2;
 
-const LONG_M: f64 = 40.0;
-const SHORT_M: f64 = 20.0;
+pub const LONG_M: f64 = 40.0;
+pub const SHORT_M: f64 = 20.0;
 
 /// What matches, by a short name.
 const MATCHERS: [(&str, Matcher); 5] = [

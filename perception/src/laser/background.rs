@@ -4,11 +4,13 @@ use super::scan::{Scan, ScanError};
 use super::shape::{ObjectScan, PosedScan};
 use crate::cluster::{ClusterError, euclidean};
 use nalgebra::{Point2, Point3, Vector2};
+use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
 
 /// What a cell of a map holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Space {
     /// Nothing known.
     #[default]
@@ -20,7 +22,7 @@ pub enum Space {
 }
 
 /// An occupancy grid: the environment without the things that come and go.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Occupancy {
     /// The corner of the first cell that has the least coordinates, in the map.
     pub origin: Point2<f64>,

@@ -2,6 +2,8 @@
 
 #![allow(dead_code)]
 
+pub mod measure;
+
 use super::tabletop::Draws;
 use descry_perception::Intrinsics;
 use descry_perception::mapping::{FieldOfView, Station};

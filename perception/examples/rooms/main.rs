@@ -5,8 +5,11 @@
 mod corridor;
 mod plot;
 mod poses;
+mod recorded;
 #[path = "../../tests/tabletop/mod.rs"]
 mod tabletop;
+mod times;
+mod variations;
 mod walls;
 
 use std::path::Path;
@@ -20,6 +23,9 @@ fn run(seed: u64, out: Option<&Path>) -> Result<(), String> {
         poses::loops(seed)?;
     }
     walls::walls(seed, out)?;
+    variations::print(seed);
+    recorded::rooms(out)?;
+    times::print(seed);
     Ok(())
 }
 

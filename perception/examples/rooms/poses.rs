@@ -25,7 +25,7 @@ pub fn options(matcher: Matcher) -> RectifyOptions {
 }
 
 /// Shift (metres) and turn (degrees) between two poses.
-fn off(found: &Isometry2<f64>, truth: &Isometry2<f64>) -> (f64, f64) {
+pub fn off(found: &Isometry2<f64>, truth: &Isometry2<f64>) -> (f64, f64) {
     let apart = (found.translation.vector - truth.translation.vector).norm();
     (apart, found.rotation.angle_to(&truth.rotation).abs().to_degrees())
 }

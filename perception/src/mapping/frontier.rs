@@ -31,7 +31,7 @@ impl Default for ExploreOptions {
             radius_m: 0.3,
             least_squares: 6,
             seconds: (2.0, 1.0, 1.0),
-            occupied: 0.04,
+            occupied: 0.1,
         }
     }
 }

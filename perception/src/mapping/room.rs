@@ -39,10 +39,12 @@ pub struct MapOptions {
     pub constrained: bool,
     /// How patches are joined; `None`: not at all.
     pub fuse: Option<FuseOptions>,
-    /// Smaller surfaces are left out, square metres …
+    /// Smaller walls are left out, square metres …
     pub least_area_m2: f64,
-    /// … and upright ones that are lower, metres: they are things, not walls.
+    /// … and lower ones, metres: they are things, not walls.
     pub least_height_m: f64,
+    /// Smaller level surfaces are left out, square metres.
+    pub least_level_m2: f64,
     /// Walls leave open what is open at these heights, metres …
     pub opening_band_m: RangeInclusive<f64>,
     /// … and at least so wide, metres.
@@ -61,6 +63,7 @@ impl Default for MapOptions {
             fuse: Some(FuseOptions::default()),
             least_area_m2: 0.3,
             least_height_m: 1.0,
+            least_level_m2: 0.15,
             opening_band_m: 0.3..=1.8,
             opening_m: 0.6,
         }
@@ -290,7 +293,7 @@ fn levels(facets: &[Facet], options: &MapOptions, edge_m: f64) -> Vec<Level> {
                 .map(|p| ((p.x / edge_m).floor() as i32, (p.y / edge_m).floor() as i32))
                 .collect();
             let area_m2 = squares.len() as f64 * edge_m * edge_m;
-            if area_m2 >= options.least_area_m2 {
+            if area_m2 >= options.least_level_m2 {
                 let mut heights: Vec<f64> = patch.iter().map(|&m| facets[m as usize].at.z).collect();
                 let middle = heights.len() / 2;
                 let height_m = *heights.select_nth_unstable_by(middle, f64::total_cmp).1;

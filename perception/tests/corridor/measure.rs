@@ -1,6 +1,6 @@
 //! How well a map's walls agree with a building.
 
-use super::{Building, CAMERA_HEIGHT_M};
+use super::{Building, CAMERA_HEIGHT_M, Opening};
 use descry_perception::mapping::{Station, Survey, Wall};
 use descry_perception::nalgebra::{Isometry2, Point2, Rotation2, Vector2};
 
@@ -67,8 +67,15 @@ fn between(a: &(Point2<f64>, Point2<f64>), b: &(Point2<f64>, Point2<f64>)) -> f6
     u.perp(&v).abs().asin()
 }
 
-/// Holds walls to a building; they agree if nearer than `within_m`.
-pub fn score(walls: &[Wall], building: &Building, within_m: f64) -> Score {
+/// Holds walls to a building; they agree if nearer than `within_m`. A door is looked for where the stop of the drive nearest to it has it: `poses` and
+/// `truths` are of the same stops.
+pub fn score(
+    walls: &[Wall],
+    building: &Building,
+    within_m: f64,
+    poses: &[Isometry2<f64>],
+    truths: &[Isometry2<f64>],
+) -> Score {
     const ALIKE_RAD: f64 = 0.3;
     let found: Vec<(Point2<f64>, Point2<f64>)> =
         walls.iter().flat_map(|w| w.feet().collect::<Vec<_>>()).collect();
@@ -92,6 +99,10 @@ pub fn score(walls: &[Wall], building: &Building, within_m: f64) -> Score {
         (hit + f64::from(u8::from(is_found)), all + 1.0)
     });
     let kept = building.openings.iter().filter(|opening| {
+        let away = |t: &Isometry2<f64>| (t.translation.vector - opening.a.coords).norm();
+        let near = (0..truths.len()).min_by(|&a, &b| away(&truths[a]).total_cmp(&away(&truths[b])));
+        let local = near.map_or(Isometry2::identity(), |i| poses[i] * truths[i].inverse());
+        let opening = Opening { a: local * opening.a, b: local * opening.b };
         let along = opening.b - opening.a;
         let gap = (opening.a + along * 0.3, opening.b - along * 0.3);
         !samples(gap).any(|at| {

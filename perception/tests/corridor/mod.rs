@@ -263,7 +263,12 @@ impl Building {
             }
             _ if flat < FAR_M => {
                 let p = place(flat);
-                is_textured(self.panels.len() + usize::from(up > 0.0), 0.5, p.x, p.y).then_some(flat)
+                let (id, share) = match (flat < ground, up > 0.0) {
+                    (true, _) => (2, 0.8),
+                    (false, true) => (1, 0.5),
+                    (false, false) => (0, 0.5),
+                };
+                is_textured(self.panels.len() + id, share, p.x, p.y).then_some(flat)
             }
             _ => None,
         }

@@ -1,0 +1,61 @@
+//! Time and memory against the number of points, and how both grow.
+
+use super::corridor::measure::{BODY_M, MAP_FAR_M};
+use super::corridor::{Building, CAMERA_HEIGHT_M, Rig, around};
+use super::poses::{LONG_M, SHORT_M, options};
+use descry_perception::mapping::{MapOptions, Matcher, Station, Survey, rectify_drive};
+use std::time::Instant;
+
+/// Most memory that the program had until now, megabytes; and how much it has.
+fn memory_mb() -> (f64, f64) {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let of = |key: &str| {
+        let line = status.lines().find(|l| l.starts_with(key));
+        line.and_then(|l| l.split_whitespace().nth(1)).and_then(|v| v.parse::<f64>().ok()).unwrap_or(f64::NAN)
+            / 1024.0
+    };
+    (of("VmHWM:"), of("VmRSS:"))
+}
+
+/// Prints them for drives of 0.1 to 16 million points: once around, with more pixels.
+pub fn print(seed: u64) {
+    println!(
+        "\none pass, one thread: points (millions), seconds for the steps (ICP-EM), to take all in, for the planes; cells (thousands), store (MB), memory taken by the pass itself (MB)"
+    );
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
+    let building = Building::corridor_loop(LONG_M, SHORT_M, seed);
+    let truths = around(LONG_M, SHORT_M, 6.0, 0.8);
+    for (stride, times) in [(16, 1), (8, 1), (4, 1), (2, 1), (2, 2), (1, 1), (1, 2)] {
+        let rig = Rig { stride, ..Rig::default() };
+        let mut stations: Vec<Station> = Vec::new();
+        for time in 0..times {
+            stations.extend(building.drive(&truths, &rig, seed + time));
+        }
+        let points: usize = stations.iter().map(|s| s.points.len()).sum();
+        pool.install(|| {
+            let before = Instant::now();
+            let pairs = rectify_drive(&stations, &options(Matcher::IcpEm));
+            let steps_s = before.elapsed().as_secs_f64();
+            let (_, had_mb) = memory_mb();
+            let before = Instant::now();
+            let mut survey = Survey::new(0.1).expect("a length");
+            for (i, station) in stations.iter().enumerate() {
+                survey.add(station, &truths[i % truths.len()], CAMERA_HEIGHT_M, MAP_FAR_M, &BODY_M);
+            }
+            let add_s = before.elapsed().as_secs_f64();
+            let before = Instant::now();
+            let map = survey.map(&MapOptions::default());
+            let planes_s = before.elapsed().as_secs_f64();
+            let (_, has_mb) = memory_mb();
+            println!(
+                "{:>6.2}   {steps_s:>6.2} {add_s:>6.2} {planes_s:>6.2}   {:>5.0} {:>6.1}  {:>6.1}   ({} fits, {} walls)",
+                points as f64 / 1e6,
+                survey.cells().len() as f64 / 1e3,
+                survey.cells().len() as f64 * 60.0 / 1e6,
+                has_mb - had_mb,
+                pairs.len(),
+                map.walls.len()
+            );
+        });
+    }
+}

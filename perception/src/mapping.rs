@@ -21,7 +21,7 @@ mod room;
 mod station;
 
 pub use cells::{Cells, CellsError, Facet, NormalOptions, by_regions};
-pub use closure::{Closure, ClosureOptions, closures, correct_drive};
+pub use closure::{Closure, ClosureOptions, closures, correct_drive, relocate};
 pub use frontier::{ExploreOptions, Frontier, NextPose, frontiers, next_poses};
 pub use fuse::FuseOptions;
 pub use graph::{Edge, GraphError, PoseGraph, Settled};

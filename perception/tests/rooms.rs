@@ -291,13 +291,13 @@ fn the_next_pose_shows_what_is_not_known_yet() {
     let field = FieldOfView { far_m: MAP_FAR_M, ..field_of_view() };
     let options = ExploreOptions { field, ..ExploreOptions::default() };
     let part = survey(&stations[..4], &truths[..4]).map(&MapOptions::default()).grid.unwrap();
-    let next = next_poses(&part, &truths[3], &options);
+    let next = next_poses(&part, &truths[..4], &options);
     let away = next.iter().find(|n| n.way_m > 1.0).unwrap();
     let ahead = truths[3].inv_mul(&away.pose).translation.vector;
     println!("{} poses, the first {:?}; {ahead:?} from here {away:?}", next.len(), next[0]);
     assert!(ahead.x > 1.0, "the corridor goes on ahead: {away:?}");
     let whole = seen().map(&MapOptions::default()).grid.unwrap();
-    let left = next_poses(&whole, &truths[3], &options);
+    let left = next_poses(&whole, &truths[..4], &options);
     let gain = |poses: &[descry_perception::mapping::NextPose]| poses.first().map_or(0.0, |p| p.rate());
     assert!(gain(&left) < gain(&next), "{} {}", gain(&left), gain(&next));
 }

@@ -3,6 +3,7 @@
 
 #[path = "../../tests/corridor/mod.rs"]
 mod corridor;
+mod exploring;
 mod plot;
 mod poses;
 mod recorded;
@@ -22,10 +23,19 @@ fn run(seed: u64, out: Option<&Path>) -> Result<(), String> {
     if seed > 10 {
         poses::loops(seed)?;
     }
-    walls::walls(seed, out)?;
-    variations::print(seed);
-    recorded::rooms(out)?;
-    times::print(seed);
+    if seed > 10 {
+        walls::walls(seed, out)?;
+    }
+    if seed > 10 {
+        variations::print(seed);
+    }
+    if seed > 10 {
+        recorded::rooms(out)?;
+    }
+    exploring::print(seed);
+    if seed > 10 {
+        times::print(seed);
+    }
     Ok(())
 }
 

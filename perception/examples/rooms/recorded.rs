@@ -2,13 +2,16 @@
 
 use super::plot::{Sheet, write};
 use descry_perception::cloud::Cloud;
-use descry_perception::mapping::{MapOptions, RoomMap, Station, Survey};
+use descry_perception::mapping::{
+    ClosureOptions, FieldOfView, MapOptions, RectifyOptions, RoomMap, Station, Survey, relocate,
+};
 use descry_perception::nalgebra::{
     Isometry2, Isometry3, Point2, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3,
 };
 use descry_perception::plane::{self, PlaneOptions};
 use descry_perception::register::{self, Method, Prepared, RegisterOptions};
 use descry_perception::{Intrinsics, files, voxel};
+use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -122,33 +125,50 @@ fn scans(folder: &Path, out: Option<&Path>) -> Result<(), String> {
     }
     let [first, second] = prepared.as_slice() else { return Err("no floor in a room scan".to_owned()) };
     let before = Instant::now();
+    let station =
+        |cloud: &Cloud| Station { points: cloud.points.clone(), odom_from_level: Isometry2::identity() };
+    let field = FieldOfView { right_rad: -PI, left_rad: PI, near_m: 0.3, far_m: 10.0 };
+    let rectify = RectifyOptions { field, thin_m: 0.1, ..RectifyOptions::default() };
+    let options =
+        ClosureOptions { most_m: 4.0, heading_drift_rad: PI, explained: 0.4, ..ClosureOptions::default() };
+    let here = [Isometry2::identity()];
+    let plan =
+        relocate((&[station(second)], &here), (&[station(first)], &here), &here[0], &rectify, &options)
+            .ok_or("the plans of the scans do not register")?;
+    let found = plan.before_from_after;
+    println!(
+        "room_scan1 on room_scan2, plans from nothing: {:.0} % explained, shifted {:.2} {:.2} m, turned {:.1}°, {:.2} s",
+        100.0 * plan.explained,
+        found.translation.x,
+        found.translation.y,
+        found.rotation.angle().to_degrees(),
+        before.elapsed().as_secs_f64()
+    );
+    let before = Instant::now();
     let thin = |cloud: &Cloud| voxel::downsample(cloud, 0.05).map_err(|e| e.to_string());
     let ready = |cloud: &Cloud| Prepared::with_normals(&cloud.points, 20).map_err(|e| e.to_string());
-    let (target, source) = (ready(&thin(second)?)?, ready(&thin(first)?)?);
-    // Any heading: both floors are level, so that one turn is left; the best of twelve starts.
-    let fits = (0..12).filter_map(|i| {
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), f64::from(i) * 0.523_599);
-        let mut options = RegisterOptions {
-            method: Method::PointToPlane,
-            start_target_from_source: Isometry3::from_parts(Translation3::identity(), turn),
-            within_m: 1.0,
-            robust_m: Some(0.1),
-            ..RegisterOptions::default()
-        };
-        options.start_target_from_source =
-            register::align(&source, &target, &options).ok()?.target_from_source;
-        options.within_m = 0.2;
-        options.robust_m = Some(0.03);
-        register::align(&source, &target, &options).ok()
-    });
-    let best = fits.max_by_key(|f| f.matched).ok_or("the scans do not register")?;
+    let options = RegisterOptions {
+        method: Method::PointToPlane,
+        start_target_from_source: Isometry3::new(
+            found.translation.vector.push(0.0),
+            Vector3::z() * found.rotation.angle(),
+        ),
+        within_m: 0.2,
+        robust_m: Some(0.03),
+        ..RegisterOptions::default()
+    };
+    let best = register::align(&ready(&thin(first)?)?, &ready(&thin(second)?)?, &options)
+        .map_err(|e| e.to_string())?;
     let pose = best.target_from_source;
+    let shift = pose.translation.vector;
     println!(
-        "room_scan1 on room_scan2: {} of {} points matched within 20 cm, residual {:.1} mm, shifted {:.2} m, turned {:.1}°, {}, {:.2} s",
+        "    then all points: {} of {} matched within 20 cm, residual {:.1} mm, shifted {:.2} {:.2} {:.2} m, turned {:.1}°, {}, {:.2} s",
         best.matched,
         best.of,
         1e3 * best.residual_m,
-        pose.translation.vector.norm(),
+        shift.x,
+        shift.y,
+        shift.z,
         pose.rotation.angle().to_degrees(),
         best.ending,
         before.elapsed().as_secs_f64()

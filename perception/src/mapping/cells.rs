@@ -94,8 +94,10 @@ pub struct Facet {
 /// How normals are found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalOptions {
-    /// A cube with fewer points is noise, and no region.
+    /// A cube with fewer points is noise, and no region …
     pub least_points: u32,
+    /// … and so is one with less than this share of the points of the fullest cube within reach: the edges of surfaces are blurred along the line of sight.
+    pub least_share: f64,
     /// Regions reach so many cubes to each side of the point's own.
     pub reach: i64,
     /// Fewest regions that are evidence enough.
@@ -106,7 +108,7 @@ pub struct NormalOptions {
 
 impl Default for NormalOptions {
     fn default() -> Self {
-        NormalOptions { least_points: 3, reach: 2, least_regions: 6, agreement: 0.6 }
+        NormalOptions { least_points: 3, least_share: 0.1, reach: 2, least_regions: 6, agreement: 0.6 }
     }
 }
 
@@ -188,7 +190,15 @@ impl Cells {
             }
             let at = self.centroid(sums);
             let towards = Vector3::from(sums.towards).cast();
-            let normal = by_regions(&at, &self.regions(sums, options), &towards, options)?;
+            let around = self.around(sums, options.reach);
+            let fullest = around.iter().map(|s| s.count).max().unwrap_or(0).max(sums.count);
+            let least = f64::from(options.least_points).max(options.least_share * f64::from(fullest));
+            if f64::from(sums.count) < least {
+                return None;
+            }
+            let full = around.into_iter().filter(|s| f64::from(s.count) >= least);
+            let regions: Vec<Point3<f64>> = full.map(|s| self.centroid(s)).collect();
+            let normal = by_regions(&at, &regions, &towards, options)?;
             Some((sums.cube, Facet { at, normal, points: sums.count }))
         };
         let mut found: Vec<_> = self.sums.par_iter().filter_map(facet).collect();
@@ -202,19 +212,14 @@ impl Cells {
         Point3::new(axis(0), axis(1), axis(2))
     }
 
-    /// Centroids of the cubes around one.
-    fn regions(&self, own: &Sums, options: &NormalOptions) -> Vec<Point3<f64>> {
-        let span = || -options.reach..=options.reach;
-        let mut regions = Vec::new();
-        for (x, y, z) in span().flat_map(|x| span().flat_map(move |y| span().map(move |z| (x, y, z)))) {
-            let [a, b, c] = own.cube.map(i64::from);
-            let number = voxel::key([a + x, b + y, c + z]).and_then(|key| self.table.find(key));
-            let region = number.map(|n| &self.sums[n as usize]).filter(|s| s.count >= options.least_points);
-            if let Some(region) = region.filter(|_| (x, y, z) != (0, 0, 0)) {
-                regions.push(self.centroid(region));
-            }
-        }
-        regions
+    /// The cubes around one.
+    fn around(&self, own: &Sums, reach: i64) -> Vec<&Sums> {
+        let span = || -reach..=reach;
+        let [a, b, c] = own.cube.map(i64::from);
+        let others = span().flat_map(|x| span().flat_map(move |y| span().map(move |z| (x, y, z))));
+        let keys =
+            others.filter(|o| *o != (0, 0, 0)).filter_map(|(x, y, z)| voxel::key([a + x, b + y, c + z]));
+        keys.filter_map(|key| self.table.find(key)).map(|number| &self.sums[number as usize]).collect()
     }
 }
 

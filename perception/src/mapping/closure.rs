@@ -56,6 +56,8 @@ pub struct Closure {
 
 /// Spread of the field in which a start is looked for, metres; steps of the search, metres and radians.
 const COARSE: (f64, f64, f64) = (0.2, 0.1, 0.03);
+/// Spots by which starts are judged, about.
+const SOME: usize = 400;
 /// Half the spread of a start that the search found: what it may be off by, metres and radians.
 const START: (f64, f64) = (0.15, 0.05);
 /// Another place that fits nearly as well (mean logarithm of density) and lies farther than this (metres) makes the first doubtful.
@@ -112,14 +114,20 @@ impl Stretch {
         rectify: &RectifyOptions,
         options: &ClosureOptions,
     ) -> Stretch {
-        let near: Vec<usize> =
-            (0..poses.len()).filter(|&i| (ways[i] - ways[at]).abs() <= 0.5 * options.stretch_m).collect();
-        let here_from_level: Vec<_> = near.iter().map(|&i| poses[at].inv_mul(&poses[i])).collect();
-        let put = near
-            .iter()
-            .zip(&here_from_level)
-            .flat_map(|(&i, pose)| plans[i].iter().map(move |s| Spot { at: pose * s.at, weight: s.weight }));
-        Stretch { spots: thinned(put, rectify.thin_m), here_from_level, field: rectify.field }
+        let near = (0..poses.len()).filter(|&i| (ways[i] - ways[at]).abs() <= 0.5 * options.stretch_m);
+        Stretch::of(near.map(|i| (&plans[i], poses[at].inv_mul(&poses[i]))), rectify)
+    }
+
+    /// Plans and where they were seen from.
+    fn of<'a>(
+        plans: impl Iterator<Item = (&'a Vec<Spot>, Isometry2<f64>)> + Clone,
+        rectify: &RectifyOptions,
+    ) -> Stretch {
+        let put = plans
+            .clone()
+            .flat_map(|(plan, pose)| plan.iter().map(move |s| Spot { at: pose * s.at, weight: s.weight }));
+        let spots = thinned(put, rectify.thin_m);
+        Stretch { spots, here_from_level: plans.map(|(_, pose)| pose).collect(), field: rectify.field }
     }
 
     /// True for places that one of the stations could see.
@@ -131,6 +139,23 @@ impl Stretch {
     fn shared(&self, other_from_here: &Isometry2<f64>, other: &Stretch) -> Vec<Spot> {
         self.spots.iter().filter(|s| other.sees(&(other_from_here * s.at))).copied().collect()
     }
+}
+
+/// Where what was seen on one drive lies in what was seen on another, from a rough pose: within `options.most_m` and `options.heading_drift_rad` of it.
+/// Stations come with their poses in the frame of their drive. `None` if too little fits, or several places do.
+pub fn relocate(
+    before: (&[Station], &[Isometry2<f64>]),
+    after: (&[Station], &[Isometry2<f64>]),
+    start: &Isometry2<f64>,
+    rectify: &RectifyOptions,
+    options: &ClosureOptions,
+) -> Option<PairFit> {
+    let stretch = |(stations, poses): (&[Station], &[Isometry2<f64>])| {
+        let plans: Vec<Vec<Spot>> =
+            stations.par_iter().map(|s| s.plan(&rectify.band_m, &rectify.field, rectify.thin_m)).collect();
+        Stretch::of(plans.iter().zip(poses.iter().copied()), rectify)
+    };
+    searched(&stretch(before), &stretch(after), start, options.most_m, rectify, options)
 }
 
 /// Poses of a drive after its pairs and closures have been brought together.
@@ -227,19 +252,15 @@ fn scores(
     field.look(|place| before.sees(place));
     let (shift, turn) =
         ((reach_m / COARSE.1).ceil() as i32, (options.heading_drift_rad / COARSE.2).ceil() as i32);
-    let mut scores: Vec<(f64, Isometry2<f64>)> = Vec::new();
-    for k in -turn..=turn {
-        for (i, j) in (-shift..=shift).flat_map(|i| (-shift..=shift).map(move |j| (i, j))) {
-            let by = Vector2::new(f64::from(i), f64::from(j)) * COARSE.1;
-            if by.norm() > reach_m {
-                continue;
-            }
-            let angle = start.rotation.angle() + f64::from(k) * COARSE.2;
-            let pose = Isometry2::new(start.translation.vector + by, angle);
-            if let Some(mean) = field.mean_of_seen(&after.spots, &pose) {
-                scores.push((mean, pose));
-            }
-        }
-    }
-    Some(scores)
+    let some: Vec<Spot> = after.spots.iter().step_by(after.spots.len() / SOME + 1).copied().collect();
+    let at_heading = |k: i32| {
+        let angle = start.rotation.angle() + f64::from(k) * COARSE.2;
+        let shifts = (-shift..=shift).flat_map(|i| (-shift..=shift).map(move |j| (i, j)));
+        let bys = shifts.map(|(i, j)| Vector2::new(f64::from(i), f64::from(j)) * COARSE.1);
+        let poses = bys
+            .filter(|by| by.norm() <= reach_m)
+            .map(|by| Isometry2::new(start.translation.vector + by, angle));
+        poses.filter_map(|pose| Some((field.mean_of_seen(&some, &pose)?, pose))).collect::<Vec<_>>()
+    };
+    Some((-turn..=turn).into_par_iter().flat_map_iter(at_heading).collect())
 }

@@ -7,7 +7,7 @@ use nalgebra::{Isometry2, Point2, Vector2};
 use rustc_hash::FxHashSet;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// How the next pose is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,8 @@ pub struct ExploreOptions {
     pub seconds: (f64, f64, f64),
     /// How likely an unknown square is occupied: what lies behind many of them is seldom seen.
     pub occupied: f64,
+    /// How likely a square that a look should have shown, and that is still unknown, is shown by the next: bare walls never are.
+    pub again: f64,
 }
 
 impl Default for ExploreOptions {
@@ -32,6 +34,7 @@ impl Default for ExploreOptions {
             least_squares: 6,
             seconds: (2.0, 1.0, 1.0),
             occupied: 0.1,
+            again: 0.3,
         }
     }
 }
@@ -67,6 +70,8 @@ impl NextPose {
 
 /// Headings tried at a place.
 const HEADINGS: usize = 12;
+/// Rays all around a place.
+const RAYS: usize = 180;
 /// Places that are tried lie so far apart, metres.
 const PLACES_M: f64 = 0.6;
 /// Places are tried within this of a frontier, metres.
@@ -84,12 +89,22 @@ struct Floor<'a> {
     grid: &'a Occupancy,
     width: i64,
     height: i64,
+    /// Squares beyond the grid on each side that a look may reach.
+    margin: i64,
 }
 
 impl<'a> Floor<'a> {
-    fn of(grid: &'a Occupancy) -> Floor<'a> {
+    fn of(grid: &'a Occupancy, far_m: f64) -> Floor<'a> {
         let width = grid.width.max(1);
-        Floor { grid, width: width as i64, height: (grid.cells.len() / width) as i64 }
+        let margin = (far_m / grid.cell_m).ceil() as i64 + 1;
+        Floor { grid, width: width as i64, height: (grid.cells.len() / width) as i64, margin }
+    }
+
+    /// Number of a square of the grid or of the margin around it.
+    fn index_beyond(&self, (column, row): (i64, i64)) -> Option<usize> {
+        let (column, row) = (column + self.margin, row + self.margin);
+        let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
+        (column >= 0 && row >= 0 && column < width && row < height).then(|| (row * width + column) as usize)
     }
 
     fn space(&self, (column, row): (i64, i64)) -> Space {
@@ -168,45 +183,79 @@ impl<'a> Floor<'a> {
         ways
     }
 
-    /// Unknown floor that a look from a pose is expected to show, square metres.
-    fn gain_m2(&self, pose: &Isometry2<f64>, options: &ExploreOptions) -> f64 {
-        let field = &options.field;
-        let step = self.grid.cell_m / field.far_m;
-        let rays = ((field.left_rad - field.right_rad) / step).ceil().max(1.0) as usize;
-        let mut seen: FxHashSet<(i64, i64)> = FxHashSet::default();
-        let mut gain = 0.0;
-        for ray in 0..=rays {
-            let bearing = field.right_rad + (field.left_rad - field.right_rad) * ray as f64 / rays as f64;
-            let along = pose.rotation * Vector2::new(1.0, bearing.tan());
-            let mut likely = 1.0;
-            let mut last = (i64::MIN, 0);
-            let steps = ((field.far_m - field.near_m) / (0.5 * self.grid.cell_m)) as usize;
-            for k in 0..=steps {
-                let depth = field.near_m + 0.5 * self.grid.cell_m * k as f64;
-                let square = self.square(&Point2::from(pose.translation.vector + along * depth));
-                if square == last {
-                    continue;
-                }
-                last = square;
-                match self.space(square) {
-                    Space::Occupied => break,
-                    Space::Free => {}
-                    Space::Unknown => {
-                        if seen.insert(square) {
-                            gain += likely;
-                        }
-                        likely *= 1.0 - options.occupied;
-                    }
+    /// Calls `found` with the range and the index of each unknown square along a ray, and how likely nothing is before it.
+    fn ray(
+        &self,
+        from: &Vector2<f64>,
+        angle_rad: f64,
+        options: &ExploreOptions,
+        mut found: impl FnMut(f64, usize, f64),
+    ) {
+        let along = Vector2::new(angle_rad.cos(), angle_rad.sin());
+        let (near_m, far_m) = (options.field.near_m, options.field.far_m);
+        let steps = ((far_m - near_m) / self.grid.cell_m).max(0.0) as usize;
+        let mut likely = 1.0;
+        for k in 0..=steps {
+            let range_m = near_m + self.grid.cell_m * k as f64;
+            let square = self.square(&Point2::from(from + along * range_m));
+            match self.space(square) {
+                Space::Occupied => break,
+                Space::Free => {}
+                Space::Unknown => {
+                    let Some(index) = self.index_beyond(square) else { break };
+                    found(range_m, index, likely);
+                    likely *= 1.0 - options.occupied;
                 }
             }
         }
-        gain * self.grid.cell_m * self.grid.cell_m
     }
+
+    /// For each square how likely another look shows it, after those that should have.
+    fn missed(&self, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<f64> {
+        let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
+        let mut missed = vec![1.0; (width * height) as usize];
+        let mut last = vec![0; missed.len()];
+        for (number, pose) in (1..).zip(looked) {
+            let heading = pose.rotation.angle();
+            for ray in (0..RAYS).filter(|r| is_ahead(*r, heading, &options.field)) {
+                self.ray(&pose.translation.vector, bearing_rad(ray), options, |_, index, likely| {
+                    if std::mem::replace(&mut last[index], number) != number {
+                        missed[index] *= 1.0 - likely * (1.0 - options.again);
+                    }
+                });
+            }
+        }
+        missed
+    }
+
+    /// Unknown floor that each ray from a place is expected to show, square metres.
+    fn gains_m2(&self, place: &Point2<f64>, missed: &[f64], options: &ExploreOptions) -> Vec<f64> {
+        let width = TAU / RAYS as f64 * self.grid.cell_m;
+        let gain = |ray: usize| {
+            let mut sum = 0.0;
+            self.ray(&place.coords, bearing_rad(ray), options, |range_m, index, likely| {
+                sum += likely * missed[index] * range_m * width;
+            });
+            sum
+        };
+        (0..RAYS).map(gain).collect()
+    }
+}
+
+/// Direction of a ray in the map, radians.
+fn bearing_rad(ray: usize) -> f64 {
+    TAU * (ray as f64 + 0.5) / RAYS as f64
+}
+
+/// True if a camera with a heading sees along a ray.
+fn is_ahead(ray: usize, heading_rad: f64, field: &FieldOfView) -> bool {
+    let off = (bearing_rad(ray) - heading_rad + PI).rem_euclid(TAU) - PI;
+    off >= field.right_rad && off <= field.left_rad
 }
 
 /// Frontiers of a grid, the longest first.
 pub fn frontiers(grid: &Occupancy, options: &ExploreOptions) -> Vec<Frontier> {
-    let floor = Floor::of(grid);
+    let floor = Floor::of(grid, options.field.far_m);
     let borders = |s: (i64, i64)| {
         let around = STEPS[..4].iter().map(|(dx, dy, _)| (s.0 + dx, s.1 + dy));
         floor.space(s) == Space::Free && around.into_iter().any(|o| floor.space(o) == Space::Unknown)
@@ -239,42 +288,26 @@ pub fn frontiers(grid: &Occupancy, options: &ExploreOptions) -> Vec<Frontier> {
 }
 
 /// Poses from which more would be seen, those that are expected to show most for their cost first. None: all that can be reached is known.
-pub fn next_poses(grid: &Occupancy, from: &Isometry2<f64>, options: &ExploreOptions) -> Vec<NextPose> {
+///
+/// `looked`: the poses looked from so far; the body stands at the last. What they should have shown and did not is expected less.
+pub fn next_poses(grid: &Occupancy, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<NextPose> {
     let _span = tracing::debug_span!("next poses", squares = grid.cells.len()).entered();
-    let floor = Floor::of(grid);
-    let ways = floor.ways_m(&Point2::from(from.translation.vector), options.radius_m);
-    let stride = (PLACES_M / grid.cell_m).ceil().max(1.0) as i64;
-    let around = (AROUND_M / grid.cell_m).ceil() as i64;
-    let mut places: FxHashSet<(i64, i64)> = FxHashSet::default();
-    for frontier in frontiers(grid, options) {
-        for square in frontier.squares.iter().map(|p| floor.square(p)) {
-            let snap = |c: i64| (c.div_euclid(stride)) * stride;
-            let steps = || (-around..=around).step_by(stride as usize);
-            places
-                .extend(steps().flat_map(|x| steps().map(move |y| (snap(square.0 + x), snap(square.1 + y)))));
-        }
-    }
-    let mut places: Vec<(i64, i64)> = places
-        .into_iter()
-        .filter(|s| {
-            s.0 >= 0
-                && s.1 >= 0
-                && s.0 < floor.width
-                && s.1 < floor.height
-                && ways[floor.index(*s)].is_finite()
-        })
-        .collect();
-    places.push(floor.square(&Point2::from(from.translation.vector)));
-    places.sort_unstable();
-    places.dedup();
+    let Some(from) = looked.last() else { return Vec::new() };
+    let floor = Floor::of(grid, options.field.far_m);
+    let start = Point2::from(from.translation.vector);
+    let ways = floor.ways_m(&start, options.radius_m);
+    let missed = floor.missed(looked, options);
     let (metre_s, radian_s, look_s) = options.seconds;
     let mut found: Vec<NextPose> = Vec::new();
-    for square in places {
-        let way_m = if floor.space(square) == Space::Unknown { 0.0 } else { ways[floor.index(square)] };
+    for place in places(&floor, &ways, &start, options) {
+        let square = floor.square(&place);
+        let way_m = if place == start { 0.0 } else { ways[floor.index(square)] };
+        let gains = floor.gains_m2(&place, &missed, options);
         for heading in (0..HEADINGS).map(|h| TAU * h as f64 / HEADINGS as f64) {
-            let pose = Isometry2::new(floor.middle(square).coords, heading);
-            let gain_m2 = floor.gain_m2(&pose, options);
-            if gain_m2 >= LEAST_M2 && way_m.is_finite() {
+            let pose = Isometry2::new(place.coords, heading);
+            let ahead = (0..RAYS).filter(|r| is_ahead(*r, heading, &options.field));
+            let gain_m2: f64 = ahead.map(|r| gains[r]).sum();
+            if gain_m2 >= LEAST_M2 {
                 let turn = from.rotation.angle_to(&pose.rotation).abs();
                 found.push(NextPose {
                     pose,
@@ -287,6 +320,26 @@ pub fn next_poses(grid: &Occupancy, from: &Isometry2<f64>, options: &ExploreOpti
     }
     found.sort_by(|a, b| b.rate().total_cmp(&a.rate()));
     found
+}
+
+/// Where the body stands, and places around frontiers that it can reach.
+fn places(floor: &Floor, ways: &[f64], start: &Point2<f64>, options: &ExploreOptions) -> Vec<Point2<f64>> {
+    let stride = (PLACES_M / floor.grid.cell_m).ceil().max(1.0) as i64;
+    let around = (AROUND_M / floor.grid.cell_m).ceil() as i64;
+    let mut squares: FxHashSet<(i64, i64)> = FxHashSet::default();
+    for frontier in frontiers(floor.grid, options) {
+        for square in frontier.squares.iter().map(|p| floor.square(p)) {
+            let snap = |c: i64| c.div_euclid(stride) * stride;
+            let steps = || (-around..=around).step_by(stride as usize);
+            squares
+                .extend(steps().flat_map(|x| steps().map(move |y| (snap(square.0 + x), snap(square.1 + y)))));
+        }
+    }
+    let inside = |s: &(i64, i64)| s.0 >= 0 && s.1 >= 0 && s.0 < floor.width && s.1 < floor.height;
+    let mut squares: Vec<(i64, i64)> =
+        squares.into_iter().filter(|s| inside(s) && ways[floor.index(*s)].is_finite()).collect();
+    squares.sort_unstable();
+    std::iter::once(*start).chain(squares.into_iter().map(|s| floor.middle(s))).collect()
 }
 
 #[cfg(test)]
@@ -321,7 +374,7 @@ mod tests {
         let found = frontiers(&open, &options());
         assert_eq!(found.len(), 1, "{found:?}");
         assert!((found[0].middle - Point2::new(5.25, 1.25)).norm() < 0.1);
-        let next = next_poses(&open, &Isometry2::new(Vector2::new(0.75, 1.25), 0.0), &options());
+        let next = next_poses(&open, &[Isometry2::new(Vector2::new(0.75, 1.25), 3.0)], &options());
         let first = &next[0];
         assert!(first.pose.rotation.angle().abs() < 0.6 && first.gain_m2 > 1.0, "{first:?}");
         assert!(next.iter().all(|n| n.cost_s > 0.0 && n.way_m.is_finite()));
@@ -332,14 +385,23 @@ mod tests {
         let closed = grid(&["######", "#....#", "#....#", "######"]);
         let from = Isometry2::new(Vector2::new(1.25, 0.75), 0.0);
         assert!(
-            frontiers(&closed, &options()).is_empty() && next_poses(&closed, &from, &options()).is_empty()
+            frontiers(&closed, &options()).is_empty() && next_poses(&closed, &[from], &options()).is_empty()
         );
         let walled = grid(&["#######.... ", "#....##.... ", "#....##.... ", "#######.... "]);
         assert!(!frontiers(&walled, &options()).is_empty());
-        let next = next_poses(&walled, &from, &options());
+        let next = next_poses(&walled, &[from], &options());
         assert!(next.iter().all(|n| n.pose.translation.x < 3.0), "{next:?}");
         // Outside of the grid nothing is known: there is nowhere to go.
         let outside = Isometry2::new(Vector2::new(-5.0, 0.0), 0.0);
-        assert!(next_poses(&closed, &outside, &options()).iter().all(|n| n.way_m == 0.0));
+        assert!(next_poses(&closed, &[outside], &options()).iter().all(|n| n.way_m == 0.0));
+        assert!(next_poses(&closed, &[], &options()).is_empty());
+    }
+
+    #[test]
+    fn what_looks_did_not_show_is_expected_less() {
+        let open = grid(&["########    ", "#.......    ", "#.......    ", "########    "]);
+        let from = Isometry2::new(Vector2::new(2.75, 1.0), 0.0);
+        let best = |looks: usize| next_poses(&open, &vec![from; looks], &options())[0].gain_m2;
+        assert!(best(2) < 0.6 * best(1), "{} {}", best(2), best(1));
     }
 }

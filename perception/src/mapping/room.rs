@@ -157,6 +157,11 @@ impl Survey {
         self.lines.add(station, map_from_level, band_m, far_m, self.cells.edge_m());
     }
 
+    /// What is open by lines of sight alone, without the walls; `None` if nothing was seen.
+    pub fn grid(&self) -> Option<Occupancy> {
+        self.lines.occupancy(self.cells.edge_m())
+    }
+
     /// The map of what was seen so far.
     pub fn map(&self, options: &MapOptions) -> RoomMap {
         let _span = tracing::debug_span!("map", cells = self.cells.len()).entered();
@@ -165,7 +170,7 @@ impl Survey {
         let (patches, main_rad) = upright(&facets, options, edge_m);
         let mut walls: Vec<Wall> = patches.iter().filter_map(|p| wall(p, &facets, options, edge_m)).collect();
         walls.sort_by(|a, b| b.area_m2.total_cmp(&a.area_m2));
-        let mut grid = self.lines.occupancy(edge_m);
+        let mut grid = self.grid();
         if let Some(grid) = &mut grid {
             walls.iter().for_each(|wall| draw(wall, grid));
         }

@@ -4,6 +4,7 @@ use crate::cloud::is_finite;
 use crate::view::View;
 use nalgebra::{Isometry2, Isometry3, Point2, Point3, Rotation3, UnitQuaternion, Vector2, Vector3};
 use rustc_hash::FxHashMap;
+use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
 /// A stop of the drive. The *level* frame has its origin on the floor under the camera, x ahead, y to the left, z up.
@@ -102,7 +103,7 @@ pub struct FieldOfView {
     pub right_rad: f64,
     /// Its left end, radians.
     pub left_rad: f64,
-    /// Its nearest depth, metres.
+    /// Its nearest depth, metres; of more than half a turn, its nearest range.
     pub near_m: f64,
     /// Its farthest depth that is used, metres: noise grows with its square.
     pub far_m: f64,
@@ -118,7 +119,8 @@ impl FieldOfView {
     /// True for places of the level frame within it.
     pub fn sees(&self, place: &Point2<f64>) -> bool {
         let bearing = place.y.atan2(place.x);
-        (self.near_m..=self.far_m).contains(&place.x) && bearing >= self.right_rad && bearing <= self.left_rad
+        let depth = if self.left_rad - self.right_rad > PI { place.coords.norm() } else { place.x };
+        (self.near_m..=self.far_m).contains(&depth) && bearing >= self.right_rad && bearing <= self.left_rad
     }
 }
 

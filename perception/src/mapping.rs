@@ -9,6 +9,7 @@
 
 mod cells;
 mod closure;
+mod error;
 mod field;
 mod frontier;
 mod fuse;
@@ -22,6 +23,7 @@ mod station;
 
 pub use cells::{Cells, CellsError, Facet, NormalOptions, by_regions};
 pub use closure::{Closure, ClosureOptions, closures, correct_drive, relocate};
+pub use error::MappingError;
 pub use frontier::{ExploreOptions, Frontier, NextPose, frontiers, next_poses};
 pub use fuse::FuseOptions;
 pub use graph::{Edge, GraphError, PoseGraph, Settled};

@@ -7,9 +7,9 @@ use corridor::measure::{BODY_M, MAP_FAR_M, score, survey};
 use corridor::{Building, CAMERA_HEIGHT_M, Rig, along, around, field_of_view, with_people};
 use descry_perception::laser::Space;
 use descry_perception::mapping::{
-    Cells, CellsError, ClosureOptions, ExploreOptions, FieldOfView, Fit, MapOptions, Matcher, NormalOptions,
-    PairFit, RectifyOptions, RoomMap, Station, Survey, by_regions, chained, closures, correct_drive,
-    next_poses, rectify_drive, rectify_pair,
+    Cells, CellsError, ClosureOptions, ExploreOptions, FieldOfView, Fit, MapOptions, MappingError, Matcher,
+    NormalOptions, PairFit, RectifyOptions, RoomMap, Station, Survey, by_regions, chained, closures,
+    correct_drive, next_poses, rectify_drive, rectify_pair,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, Point3, Vector3};
 use std::f64::consts::{FRAC_PI_4, TAU};
@@ -42,7 +42,7 @@ fn options(matcher: Matcher) -> RectifyOptions {
 
 fn pairs() -> &'static [PairFit] {
     static PAIRS: OnceLock<Vec<PairFit>> = OnceLock::new();
-    PAIRS.get_or_init(|| rectify_drive(&drive().stations, &options(Matcher::IcpEm)))
+    PAIRS.get_or_init(|| rectify_drive(&drive().stations, &options(Matcher::IcpEm)).unwrap())
 }
 
 fn root_mean_square(values: impl Iterator<Item = f64> + Clone) -> f64 {
@@ -54,7 +54,7 @@ fn turns_off_rad(stations: &[Station], matcher: Matcher) -> f64 {
     let truths = &drive().truths;
     let off: Vec<f64> = (1..stations.len())
         .map(|i| {
-            let fit = rectify_pair(&stations[i - 1], &stations[i], &options(matcher));
+            let fit = rectify_pair(&stations[i - 1], &stations[i], &options(matcher)).unwrap();
             let truth = truths[i - 1].inv_mul(&truths[i]);
             fit.before_from_after.rotation.angle_to(&truth.rotation)
         })
@@ -82,13 +82,13 @@ fn expectations_turn_better_than_odometry_and_closest_points() {
 fn the_loop_closes() {
     let Drive { stations, truths, .. } = drive();
     let chain = chained(pairs());
-    let found = closures(stations, &chain, &options(Matcher::IcpEm), &ClosureOptions::default());
+    let found = closures(stations, &chain, &options(Matcher::IcpEm), &ClosureOptions::default()).unwrap();
     let settled = correct_drive(pairs(), &found).unwrap();
     let off_m = |poses: &[Isometry2<f64>]| {
         let off = poses.iter().zip(truths).map(|(pose, truth)| {
             (pose.translation.vector - truths[0].inv_mul(truth).translation.vector).norm()
         });
-        (off.clone().last().unwrap(), root_mean_square(off))
+        (off.clone().next_back().unwrap(), root_mean_square(off))
     };
     let (before, after) = (off_m(&chain), off_m(&settled.poses));
     println!("{} closures: off {before:?} m before, {after:?} after", found.len());
@@ -103,7 +103,7 @@ fn nothing_seen_leaves_odometry() {
     let next = Station { odom_from_level: Isometry2::new([0.8, 0.1].into(), 0.05), ..bare.clone() };
     for matcher in [Matcher::Odometry, Matcher::Icp, Matcher::IcpShared, Matcher::IcpEmSplit, Matcher::IcpEm]
     {
-        let fit = rectify_pair(&bare, &next, &options(matcher));
+        let fit = rectify_pair(&bare, &next, &options(matcher)).unwrap();
         assert_eq!(fit.before_from_after, next.odom_from_level, "{matcher:?}");
         assert_eq!((fit.explained, fit.shared), (0.0, (0, 0)), "{matcher:?}");
     }
@@ -114,7 +114,7 @@ fn nothing_seen_leaves_odometry() {
 fn the_same_drive_gives_the_same_poses() {
     let by = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| rectify_drive(&drive().stations[..20], &options(Matcher::IcpEm)))
+        pool.install(|| rectify_drive(&drive().stations[..20], &options(Matcher::IcpEm)).unwrap())
     };
     assert_eq!(by(1), by(3));
 }
@@ -163,7 +163,7 @@ fn walls_stand_where_they_are_and_doors_stay_open() {
         (Fit::LeastSquares, false, 0.8, 0.02),
         (Fit::LeastSquares, true, 0.2, 0.01),
     ] {
-        let map = seen().map(&MapOptions { fit, constrained, ..MapOptions::default() });
+        let map = seen().map(&MapOptions { fit, constrained, ..MapOptions::default() }).unwrap();
         let score = score(&map.walls, building, 0.15, truths, truths);
         println!("{fit:?}, constrained {constrained}: {score:?}");
         assert!(score.precision > 0.95 && score.recall > 0.9, "{fit:?} {constrained}: {score:?}");
@@ -178,7 +178,7 @@ fn walls_stand_where_they_are_and_doors_stay_open() {
 
 #[test]
 fn floor_ceiling_and_tables_are_level_surfaces() {
-    let map = seen().map(&MapOptions::default());
+    let map = seen().map(&MapOptions::default()).unwrap();
     let at = |height_m: f64, faces_up: bool| {
         let near =
             map.levels.iter().filter(|l| (l.height_m - height_m).abs() < 0.03 && l.faces_up == faces_up);
@@ -202,7 +202,7 @@ fn floor_ceiling_and_tables_are_level_surfaces() {
 #[test]
 fn the_grid_is_open_where_the_camera_went_and_closed_at_walls() {
     let Drive { building, truths, .. } = drive();
-    let grid = seen().map(&MapOptions::default()).grid.unwrap();
+    let grid = seen().map(&MapOptions::default()).unwrap().grid.unwrap();
     assert!(truths.iter().all(|t| grid.at(&t.translation.vector.into()) != Space::Occupied));
     let free = truths.iter().filter(|t| grid.at(&t.translation.vector.into()) == Space::Free).count();
     assert!(free * 10 > truths.len() * 9, "{free} of {}", truths.len());
@@ -231,9 +231,10 @@ fn a_survey_is_saved_loaded_and_extended() {
     let mut later: Survey = serde_json::from_str(&stored).unwrap();
     assert_eq!(serde_json::to_string(&later).unwrap(), stored);
     for (station, pose) in stations[half..].iter().zip(&truths[half..]) {
-        later.add(station, pose, CAMERA_HEIGHT_M, MAP_FAR_M, &BODY_M);
+        later.add(station, pose, CAMERA_HEIGHT_M, MAP_FAR_M, &BODY_M).unwrap();
     }
-    let (whole, joined) = (seen().map(&MapOptions::default()), later.map(&MapOptions::default()));
+    let (whole, joined) =
+        (seen().map(&MapOptions::default()).unwrap(), later.map(&MapOptions::default()).unwrap());
     assert_eq!(whole, joined);
     let map: RoomMap = serde_json::from_str(&serde_json::to_string(&whole).unwrap()).unwrap();
     assert_eq!(map, whole);
@@ -271,7 +272,7 @@ fn rooms_that_are_not_square() {
         let more = building.drive(&full, &Rig { stride: 5, ..Rig::default() }, 3);
         let all: Vec<Station> = stations.into_iter().chain(more).collect();
         let poses: Vec<Isometry2<f64>> = truths.iter().chain(&full).copied().collect();
-        let map = survey(&all, &poses).map(&MapOptions::default());
+        let map = survey(&all, &poses).map(&MapOptions::default()).unwrap();
         let score = score(&map.walls, &building, 0.2, &poses, &poses);
         println!("{name}: {score:?}, main {:?}", map.main_rad);
         assert!(map.walls.len() >= least && score.precision > 0.9 && score.recall > 0.7, "{name}: {score:?}");
@@ -290,14 +291,41 @@ fn the_next_pose_shows_what_is_not_known_yet() {
     let Drive { stations, truths, .. } = drive();
     let field = FieldOfView { far_m: MAP_FAR_M, ..field_of_view() };
     let options = ExploreOptions { field, ..ExploreOptions::default() };
-    let part = survey(&stations[..4], &truths[..4]).map(&MapOptions::default()).grid.unwrap();
+    let part = survey(&stations[..4], &truths[..4]).map(&MapOptions::default()).unwrap().grid.unwrap();
     let next = next_poses(&part, &truths[..4], &options);
     let away = next.iter().find(|n| n.way_m > 1.0).unwrap();
     let ahead = truths[3].inv_mul(&away.pose).translation.vector;
     println!("{} poses, the first {:?}; {ahead:?} from here {away:?}", next.len(), next[0]);
     assert!(ahead.x > 1.0, "the corridor goes on ahead: {away:?}");
-    let whole = seen().map(&MapOptions::default()).grid.unwrap();
+    let whole = seen().map(&MapOptions::default()).unwrap().grid.unwrap();
     let left = next_poses(&whole, &truths[..4], &options);
     let gain = |poses: &[descry_perception::mapping::NextPose]| poses.first().map_or(0.0, |p| p.rate());
     assert!(gain(&left) < gain(&next), "{} {}", gain(&left), gain(&next));
+}
+
+/// What cannot be used is told, and nothing of it gets into a map.
+#[test]
+fn bad_options_and_poses_are_told() {
+    let stations = &drive().stations[..2];
+    let with = |change: fn(&mut RectifyOptions)| {
+        let mut options = options(Matcher::IcpEm);
+        change(&mut options);
+        rectify_drive(stations, &options).unwrap_err().to_string()
+    };
+    assert!(with(|o| o.thin_m = 0.0).starts_with("thin_m is 0: give a number from"));
+    assert!(with(|o| o.sigma_m.1 = f64::NAN).contains("sigma_m is NaN"));
+    assert!(with(|o| o.field.far_m = f64::INFINITY).contains("field of view"));
+    let mut astray = stations.to_vec();
+    astray[1].odom_from_level.translation.x = f64::NAN;
+    let error = rectify_drive(&astray, &options(Matcher::IcpEm)).unwrap_err();
+    assert_eq!(error, MappingError::Pose { what: "station", index: 1 });
+    let mut survey = Survey::new(0.1).unwrap();
+    assert!(survey.add(&stations[0], &astray[1].odom_from_level, 1.2, 5.0, &BODY_M).is_err());
+    assert!(survey.cells().is_empty() && survey.grid().is_none());
+    let far =
+        Station { points: vec![Point3::new(1e30, 1.0, 1.0); 9], odom_from_level: Isometry2::identity() };
+    survey.add(&far, &far.odom_from_level, 1.2, f64::INFINITY, &BODY_M).unwrap();
+    let map = survey.map(&MapOptions::default()).unwrap();
+    assert!(map.walls.is_empty() && map.levels.is_empty() && map.main_rad.is_none());
+    assert!(survey.map(&MapOptions { grow_m: 0.0, ..MapOptions::default() }).is_err());
 }

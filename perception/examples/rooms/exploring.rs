@@ -75,7 +75,9 @@ fn explore(policy: Policy, building: &Building, start: &Isometry2<f64>, enough: 
     while run.looks < MOST_LOOKS {
         let at = looked[looked.len() - 1];
         let points = building.look(&at, &Rig { stride: 6, ..Rig::default() }, &mut draws);
-        survey.add(&Station { points, odom_from_level: at }, &at, CAMERA_HEIGHT_M, MAP_FAR_M, &BODY_M);
+        survey
+            .add(&Station { points, odom_from_level: at }, &at, CAMERA_HEIGHT_M, MAP_FAR_M, &BODY_M)
+            .expect("a pose");
         run.looks += 1;
         let Some(grid) = survey.grid() else { break };
         run.known = known(building, &grid);

@@ -1,12 +1,17 @@
 //! Section 3: errors of single steps, and what is left when the drive comes back to where it began.
 
+use super::corridor::measure::survey;
 use super::corridor::{Building, Rig, around, field_of_view, with_people};
 use super::tabletop::Draws;
+use descry_perception::cloud::Cloud;
+use descry_perception::files::pcd;
 use descry_perception::mapping::{
-    ClosureOptions, Matcher, RectifyOptions, Station, chained, closures, correct_drive, rectify_drive,
-    rectify_pair,
+    Closure, ClosureOptions, MapOptions, Matcher, PairFit, RectifyOptions, Station, chained, closures,
+    correct_drive, rectify_drive, rectify_pair,
 };
 use descry_perception::nalgebra::Isometry2;
+use std::path::Path;
+use std::time::Instant;
 
 pub const LONG_M: f64 = 40.0;
 pub const SHORT_M: f64 = 20.0;
@@ -36,6 +41,20 @@ fn mean_and_most(values: &mut [f64]) -> (f64, f64) {
     (values.iter().sum::<f64>() / values.len() as f64, values[at.min(values.len() - 1)])
 }
 
+/// The fits of a drive's steps.
+pub fn steps(stations: &[Station], rectify: &RectifyOptions) -> Result<Vec<PairFit>, String> {
+    rectify_drive(stations, rectify).map_err(|e| e.to_string())
+}
+
+/// Where it came by again.
+pub fn again(
+    stations: &[Station],
+    poses: &[Isometry2<f64>],
+    rectify: &RectifyOptions,
+) -> Result<Vec<Closure>, String> {
+    closures(stations, poses, rectify, &ClosureOptions::default()).map_err(|e| e.to_string())
+}
+
 /// Errors of single steps against the share of outliers.
 pub fn pairs(seed: u64) {
     let building = Building::corridor_loop(LONG_M, SHORT_M, seed);
@@ -56,7 +75,7 @@ pub fn pairs(seed: u64) {
             let options = options(matcher);
             let (mut ways, mut turns): (Vec<f64>, Vec<f64>) = (1..seen.len())
                 .map(|i| {
-                    let fit = rectify_pair(&seen[i - 1], &seen[i], &options);
+                    let fit = rectify_pair(&seen[i - 1], &seen[i], &options).expect("sound options");
                     off(&fit.before_from_after, &truths[i - 1].inv_mul(&truths[i]))
                 })
                 .unzip();
@@ -92,39 +111,67 @@ pub fn loops(seed: u64) -> Result<(), String> {
             println!("seed {seed}  {name:<28} {way:>6.2} {turn:>6.2}   {most:>6.2} {mean:>6.2}");
         };
         for (name, matcher) in MATCHERS {
-            row(name, &chained(&rectify_drive(&stations, &options(matcher))));
+            row(name, &chained(&steps(&stations, &options(matcher))?));
         }
         let rectify = options(Matcher::IcpEm);
-        let pairs = rectify_drive(&stations, &rectify);
-        let found = closures(&stations, &chained(&pairs), &rectify, &ClosureOptions::default());
+        let pairs = steps(&stations, &rectify)?;
+        let found = again(&stations, &chained(&pairs), &rectify)?;
         let settled = correct_drive(&pairs, &found).map_err(|e| e.to_string())?;
         row("closed", &settled.poses);
         let wrong = found
             .iter()
             .filter(|c| off(&c.fit.before_from_after, &truths[c.from].inv_mul(&truths[c.to])).0 > 0.3);
-        let steps = settled.squares[..pairs.len()].iter().sum::<f64>() / pairs.len() as f64;
+        let squares = settled.squares[..pairs.len()].iter().sum::<f64>() / pairs.len() as f64;
         println!(
-            "        {} closures, {} of them off by more than 30 cm; squares a step {steps:.2}, {} rounds, converged {}",
+            "        {} closures, {} of them off by more than 30 cm; squares a step {squares:.2}, {} rounds, converged {}",
             found.len(),
             wrong.count(),
             settled.rounds,
             settled.converged
         );
-        for (c, (s, w)) in
-            found.iter().zip(settled.squares[pairs.len()..].iter().zip(&settled.weights[pairs.len()..]))
-        {
-            let o = off(&c.fit.before_from_after, &truths[c.from].inv_mul(&truths[c.to]));
-            println!(
-                "   {} {} off {:.3} {:.2} expl {:.2} sq {s:.1} w {w:.2} info {:.0} {:.0}",
-                c.from,
-                c.to,
-                o.0,
-                o.1,
-                c.fit.explained,
-                c.fit.information[(0, 0)],
-                c.fit.information[(1, 1)]
-            );
-        }
     }
     Ok(())
+}
+
+/// Writes a drive for other programs: a cloud a stop, poses (x y heading by odometry, true, rectified, closed) and the true walls (x y x y); prints what ours take.
+pub fn export(seed: u64, dir: &Path) -> Result<(), String> {
+    let building = Building::corridor_loop(LONG_M, SHORT_M, seed);
+    let truths = around(LONG_M, SHORT_M, 6.0, 0.8);
+    let stations = building.drive(&truths, &Rig::default(), seed);
+    let rectify = options(Matcher::IcpEm);
+    let before = Instant::now();
+    let pairs = steps(&stations, &rectify)?;
+    let steps_s = before.elapsed().as_secs_f64();
+    let chain = chained(&pairs);
+    let found = again(&stations, &chain, &rectify)?;
+    let closures_s = before.elapsed().as_secs_f64() - steps_s;
+    let settled = correct_drive(&pairs, &found).map_err(|e| e.to_string())?;
+    let all_s = before.elapsed().as_secs_f64();
+    let before = Instant::now();
+    let survey = survey(&stations, &truths);
+    let map = survey.map(&MapOptions::default()).map_err(|e| e.to_string())?;
+    println!(
+        "\nours on the drive of seed {seed}: steps {steps_s:.2} s, closures {closures_s:.2} s, graph {:.3} s; survey and {} walls {:.2} s",
+        all_s - steps_s - closures_s,
+        map.walls.len(),
+        before.elapsed().as_secs_f64()
+    );
+    let folder = dir.join("drive");
+    std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let save = |name: String, bytes: &[u8]| {
+        std::fs::write(folder.join(&name), bytes).map_err(|e| format!("{name}: {e}"))
+    };
+    let mut poses = String::new();
+    for (i, station) in stations.iter().enumerate() {
+        let cloud = Cloud::from_points(station.points.clone());
+        save(format!("{i:03}.pcd"), &pcd::write(&cloud, pcd::Encoding::Binary))?;
+        for pose in [&station.odom_from_level, &truths[i], &chain[i], &settled.poses[i]] {
+            poses += &format!("{} {} {} ", pose.translation.x, pose.translation.y, pose.rotation.angle());
+        }
+        poses.push('\n');
+    }
+    save("poses.txt".to_owned(), poses.as_bytes())?;
+    let walls: String =
+        building.walls.iter().map(|(a, b)| format!("{} {} {} {}\n", a.x, a.y, b.x, b.y)).collect();
+    save("walls.txt".to_owned(), walls.as_bytes())
 }

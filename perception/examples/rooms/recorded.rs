@@ -102,9 +102,9 @@ fn map(views: &[(Vec<Point3<f32>>, Point3<f64>)], edge_m: f64) -> Result<RoomMap
             odom_from_level: Isometry2::identity(),
         };
         let pose = Isometry2::new(eye.xy().coords, 0.0);
-        survey.add(&station, &pose, eye.z, f64::INFINITY, &(0.15..=1.6));
+        survey.add(&station, &pose, eye.z, f64::INFINITY, &(0.15..=1.6)).map_err(|e| e.to_string())?;
     }
-    Ok(survey.map(&MapOptions::default()))
+    survey.map(&MapOptions::default()).map_err(|e| e.to_string())
 }
 
 fn scans(folder: &Path, out: Option<&Path>) -> Result<(), String> {
@@ -134,6 +134,7 @@ fn scans(folder: &Path, out: Option<&Path>) -> Result<(), String> {
     let here = [Isometry2::identity()];
     let plan =
         relocate((&[station(second)], &here), (&[station(first)], &here), &here[0], &rectify, &options)
+            .map_err(|e| e.to_string())?
             .ok_or("the plans of the scans do not register")?;
     let found = plan.before_from_after;
     println!(

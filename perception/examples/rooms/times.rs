@@ -38,17 +38,17 @@ pub fn print(seed: u64) {
         let points: usize = stations.iter().map(|s| s.points.len()).sum();
         pool.install(|| {
             let before = Instant::now();
-            let pairs = rectify_drive(&stations, &options(Matcher::IcpEm));
+            let pairs = rectify_drive(&stations, &options(Matcher::IcpEm)).expect("sound options");
             let steps_s = before.elapsed().as_secs_f64();
             let (_, had_mb) = memory_mb();
             let before = Instant::now();
             let mut survey = Survey::new(0.1).expect("a length");
             for (i, station) in stations.iter().enumerate() {
-                survey.add(station, &truths[i], CAMERA_HEIGHT_M, MAP_FAR_M, &BODY_M);
+                survey.add(station, &truths[i], CAMERA_HEIGHT_M, MAP_FAR_M, &BODY_M).expect("a pose");
             }
             let add_s = before.elapsed().as_secs_f64();
             let before = Instant::now();
-            let map = survey.map(&MapOptions::default());
+            let map = survey.map(&MapOptions::default()).expect("sound options");
             let planes_s = before.elapsed().as_secs_f64();
             let (_, has_mb) = memory_mb();
             let s = score(&map.walls, &building, 0.15, &truths, &truths);

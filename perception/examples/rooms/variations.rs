@@ -2,8 +2,8 @@
 
 use super::corridor::measure::{score, survey};
 use super::corridor::{Building, Panel, Rig, along};
-use super::poses::{off, options};
-use descry_perception::mapping::{MapOptions, Matcher, RoomMap, chained, rectify_drive};
+use super::poses::{off, options, steps};
+use descry_perception::mapping::{MapOptions, Matcher, RoomMap, chained};
 use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use std::f64::consts::TAU;
 
@@ -15,15 +15,15 @@ fn looking_round(places: &[(f64, f64)]) -> Vec<Isometry2<f64>> {
     places.iter().copied().flat_map(turn).collect()
 }
 
-fn told(name: &str, building: &Building, truths: &[Isometry2<f64>], seed: u64) -> RoomMap {
+fn told(name: &str, building: &Building, truths: &[Isometry2<f64>], seed: u64) -> Result<RoomMap, String> {
     let stations = building.drive(truths, &Rig::default(), seed);
-    let pairs = rectify_drive(&stations, &options(Matcher::IcpEm));
+    let pairs = steps(&stations, &options(Matcher::IcpEm))?;
     let chain = chained(&pairs);
     let last = truths.len() - 1;
     let (way, turn) = off(&chain[last], &truths[0].inv_mul(&truths[last]));
     let odometry = stations[0].odom_from_level.inv_mul(&stations[last].odom_from_level);
     let (way_before, turn_before) = off(&odometry, &truths[0].inv_mul(&truths[last]));
-    let map = survey(&stations, truths).map(&MapOptions::default());
+    let map = survey(&stations, truths).map(&MapOptions::default()).map_err(|e| e.to_string())?;
     let s = score(&map.walls, building, 0.15, truths, truths);
     println!(
         "{name:<34} last pose off {:>5.2} m {:>5.1}° by odometry, {way:>5.2} m {turn:>5.1}° rectified; walls {:>2} (truth {:>2}), precision {:>5.1}, recall {:>5.1} %, angle {:.2}°, main direction {}",
@@ -36,7 +36,7 @@ fn told(name: &str, building: &Building, truths: &[Isometry2<f64>], seed: u64) -
         s.angle_deg,
         map.main_rad.map_or("none".to_owned(), |m| format!("{:.1}°", m.to_degrees()))
     );
-    map
+    Ok(map)
 }
 
 /// A corridor 20 m long with doors left out.
@@ -48,7 +48,7 @@ fn bare(left: f64, right: f64) -> (Building, Vec<Isometry2<f64>>) {
 }
 
 /// Prints what comes out.
-pub fn print(seed: u64) {
+pub fn print(seed: u64) -> Result<(), String> {
     let at = Point2::new;
     println!("\nother buildings: poses by the wheels and rectified, walls at true poses");
     let square = [at(3.0, -2.5), at(3.0, 2.5), at(-3.0, 2.5), at(-3.0, -2.5)];
@@ -56,15 +56,15 @@ pub fn print(seed: u64) {
     let round: Vec<Point2<f64>> =
         (0..72).map(|i| TAU * f64::from(i) / 72.0).map(|a| at(3.0 * a.cos(), 3.0 * a.sin())).collect();
     let places = [(0.5, 0.2), (-1.0, -0.6)];
-    told("square room", &Building::room(&square, |_| 0.5), &looking_round(&places), seed);
-    told("a diagonal wall", &Building::room(&cut, |_| 0.5), &looking_round(&places), seed);
-    told("round room", &Building::room(&round, |_| 0.5), &looking_round(&places), seed);
+    told("square room", &Building::room(&square, |_| 0.5), &looking_round(&places), seed)?;
+    told("a diagonal wall", &Building::room(&cut, |_| 0.5), &looking_round(&places), seed)?;
+    told("round room", &Building::room(&round, |_| 0.5), &looking_round(&places), seed)?;
     let both = bare(0.5, 0.5);
-    told("corridor without doors", &both.0, &both.1, seed);
+    told("corridor without doors", &both.0, &both.1, seed)?;
     let one = bare(0.5, 0.0);
-    told("the same, bare on one side", &one.0, &one.1, seed);
+    told("the same, bare on one side", &one.0, &one.1, seed)?;
     let none = bare(0.0, 0.0);
-    told("the same, bare on both sides", &none.0, &none.1, seed);
+    told("the same, bare on both sides", &none.0, &none.1, seed)?;
     // Glass: the camera sees through it, now and then its frame.
     let mut glass = Building::room(&square, |i| if i == 1 { 0.0 } else { 0.5 });
     let (a, b) = (at(3.0, 2.5), at(-3.0, 2.5));
@@ -74,7 +74,7 @@ pub fn print(seed: u64) {
         glass.panels.push(Panel { a: post, b: post + Vector2::new(-0.06, 0.0), z: (0.0, 2.6), texture: 0.9 });
     }
     glass.panels.push(Panel { a: at(6.0, 5.5), b: at(-6.0, 5.5), z: (0.0, 2.6), texture: 0.5 });
-    let map = told("a glass wall (3 m behind it a wall)", &glass, &looking_round(&places), seed);
+    let map = told("a glass wall (3 m behind it a wall)", &glass, &looking_round(&places), seed)?;
     let stood = |y: f64| {
         map.walls
             .iter()
@@ -89,4 +89,5 @@ pub fn print(seed: u64) {
         stood(2.5),
         stood(5.5)
     );
+    Ok(())
 }

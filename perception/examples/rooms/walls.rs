@@ -3,11 +3,8 @@
 use super::corridor::measure::{MAP_FAR_M, on_truth, score, survey};
 use super::corridor::{Building, Rig, around};
 use super::plot::{Sheet, write};
-use super::poses::{LONG_M, SHORT_M, options};
-use descry_perception::mapping::{
-    ClosureOptions, Fit, FuseOptions, MapOptions, Matcher, Station, chained, closures, correct_drive,
-    rectify_drive,
-};
+use super::poses::{LONG_M, SHORT_M, again, options, steps};
+use descry_perception::mapping::{Fit, FuseOptions, MapOptions, Matcher, Station, chained, correct_drive};
 use descry_perception::nalgebra::Isometry2;
 use std::path::Path;
 
@@ -35,8 +32,8 @@ pub fn walls(seed: u64, out: Option<&Path>) -> Result<(), String> {
     let truths = around(LONG_M, SHORT_M, 6.0, 0.8);
     let stations = building.drive(&truths, &Rig::default(), seed);
     let rectify = options(Matcher::IcpEm);
-    let pairs = rectify_drive(&stations, &rectify);
-    let found = closures(&stations, &chained(&pairs), &rectify, &ClosureOptions::default());
+    let pairs = steps(&stations, &rectify)?;
+    let found = again(&stations, &chained(&pairs), &rectify)?;
     let settled = correct_drive(&pairs, &found).map_err(|e| e.to_string())?;
     let odometry: Vec<Isometry2<f64>> = stations.iter().map(|s| s.odom_from_level).collect();
     println!(
@@ -53,7 +50,7 @@ pub fn walls(seed: u64, out: Option<&Path>) -> Result<(), String> {
     ] {
         let survey = survey(&stations, &poses);
         for (way, options) in ways() {
-            let map = survey.map(&options);
+            let map = survey.map(&options).map_err(|e| e.to_string())?;
             let s = score(&map.walls, &building, within_m, &poses, &truths);
             let upright = &map.walls;
             let tilt: f64 =
@@ -72,7 +69,7 @@ pub fn walls(seed: u64, out: Option<&Path>) -> Result<(), String> {
             );
         }
         if name == "true" {
-            let map = survey.map(&MapOptions::default());
+            let map = survey.map(&MapOptions::default()).map_err(|e| e.to_string())?;
             let tables = map.levels.iter().filter(|l| l.faces_up && l.height_m > 0.3);
             let told: Vec<String> =
                 tables.map(|l| format!("{:.2} m high, {:.2} m²", l.height_m, l.area_m2)).collect();
@@ -103,7 +100,7 @@ fn draw(
     };
     let clouds = [("odometry", sheet(odometry)), ("ICP-EM", sheet(chain)), ("closed", sheet(closed))];
     write(dir, "drive.svg", &clouds)?;
-    let map = survey(stations, closed).map(&MapOptions::default());
+    let map = survey(stations, closed).map(&MapOptions::default()).map_err(|e| e.to_string())?;
     let mut walls = Sheet::around(closed.iter().map(|p| p.translation.vector.into()), 2.0 * SCALE).grown(3.0);
     if let Some(grid) = &map.grid {
         walls.grid(grid);

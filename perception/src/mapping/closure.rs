@@ -1,5 +1,6 @@
 //! Where the drive came by again, and all its poses together: the global correction that the paper leaves open (its Fig. 9).
 
+use super::error::{MappingError, check, check_pose};
 use super::field::Field;
 use super::graph::{Edge, GraphError, PoseGraph, Settled};
 use super::pair::{PairFit, Prior, RectifyOptions, chained, fit_cut};
@@ -43,6 +44,19 @@ impl Default for ClosureOptions {
     }
 }
 
+impl ClosureOptions {
+    fn check(&self) -> Result<(), MappingError> {
+        check(&[
+            ("apart_m", self.apart_m, 0.0, 1e6),
+            ("drift", self.drift, 0.0, 1.0),
+            ("most_m", self.most_m, 0.0, 50.0),
+            ("heading_drift_rad", self.heading_drift_rad, 0.0, 4.0),
+            ("stretch_m", self.stretch_m, 0.0, 1e3),
+            ("every_m", self.every_m, 0.0, 1e6),
+        ])
+    }
+}
+
 /// A station that shows what one long before it showed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Closure {
@@ -63,14 +77,19 @@ const START: (f64, f64) = (0.15, 0.05);
 /// Another place that fits nearly as well (mean logarithm of density) and lies farther than this (metres) makes the first doubtful.
 const RIVAL: (f64, f64) = (0.1, 0.5);
 
-/// Looks for stations that show what an earlier one showed, from where a chain of fits put them.
+/// Looks for stations that show what an earlier one showed, from where a chain of fits put them: a pose a station.
+///
+/// # Errors
+/// If an option or a pose cannot be used.
 pub fn closures(
     stations: &[Station],
     poses: &[Isometry2<f64>],
     rectify: &RectifyOptions,
     options: &ClosureOptions,
-) -> Vec<Closure> {
+) -> Result<Vec<Closure>, MappingError> {
     let _span = tracing::debug_span!("closures", stations = stations.len()).entered();
+    checked(poses, rectify, options)?;
+    let poses = &poses[..poses.len().min(stations.len())];
     let plans: Vec<Vec<Spot>> =
         stations.par_iter().map(|s| s.plan(&rectify.band_m, &rectify.field, rectify.thin_m)).collect();
     let ways = ways_m(poses);
@@ -82,7 +101,17 @@ pub fn closures(
         let fit = searched(&around(from), &around(to), &start, reach_m, rectify, options)?;
         Some(Closure { from, to, fit })
     };
-    looked_at(&ways, options).into_par_iter().filter_map(close).collect()
+    Ok(looked_at(&ways, options).into_par_iter().filter_map(close).collect())
+}
+
+fn checked(
+    poses: &[Isometry2<f64>],
+    rectify: &RectifyOptions,
+    options: &ClosureOptions,
+) -> Result<(), MappingError> {
+    rectify.check()?;
+    options.check()?;
+    poses.iter().enumerate().try_for_each(|(i, pose)| check_pose("station", i, pose))
 }
 
 /// Stations that are held against earlier ones: one every so many metres.
@@ -143,19 +172,25 @@ impl Stretch {
 
 /// Where what was seen on one drive lies in what was seen on another, from a rough pose: within `options.most_m` and `options.heading_drift_rad` of it.
 /// Stations come with their poses in the frame of their drive. `None` if too little fits, or several places do.
+///
+/// # Errors
+/// If an option or a pose cannot be used.
 pub fn relocate(
     before: (&[Station], &[Isometry2<f64>]),
     after: (&[Station], &[Isometry2<f64>]),
     start: &Isometry2<f64>,
     rectify: &RectifyOptions,
     options: &ClosureOptions,
-) -> Option<PairFit> {
+) -> Result<Option<PairFit>, MappingError> {
+    checked(before.1, rectify, options)?;
+    checked(after.1, rectify, options)?;
+    check_pose("start", 0, start)?;
     let stretch = |(stations, poses): (&[Station], &[Isometry2<f64>])| {
         let plans: Vec<Vec<Spot>> =
             stations.par_iter().map(|s| s.plan(&rectify.band_m, &rectify.field, rectify.thin_m)).collect();
         Stretch::of(plans.iter().zip(poses.iter().copied()), rectify)
     };
-    searched(&stretch(before), &stretch(after), start, options.most_m, rectify, options)
+    Ok(searched(&stretch(before), &stretch(after), start, options.most_m, rectify, options))
 }
 
 /// Poses of a drive after its pairs and closures have been brought together.

@@ -70,6 +70,8 @@ impl NextPose {
 
 /// Headings tried at a place.
 const HEADINGS: usize = 12;
+/// Most squares along a ray.
+const MOST_STEPS: usize = 2000;
 /// Rays all around a place.
 const RAYS: usize = 180;
 /// Places that are tried lie so far apart, metres.
@@ -96,7 +98,7 @@ struct Floor<'a> {
 impl<'a> Floor<'a> {
     fn of(grid: &'a Occupancy, far_m: f64) -> Floor<'a> {
         let width = grid.width.max(1);
-        let margin = (far_m / grid.cell_m).ceil() as i64 + 1;
+        let margin = ((far_m / grid.cell_m).ceil() as i64).clamp(0, MOST_STEPS as i64) + 1;
         Floor { grid, width: width as i64, height: (grid.cells.len() / width) as i64, margin }
     }
 
@@ -117,7 +119,8 @@ impl<'a> Floor<'a> {
     }
 
     fn square(&self, place: &Point2<f64>) -> (i64, i64) {
-        let at = (place - self.grid.origin) / self.grid.cell_m;
+        // Far outside is far outside, and so is what is no place.
+        let at = ((place - self.grid.origin) / self.grid.cell_m).map(|c| c.clamp(-1e9, 1e9));
         (at.x.floor() as i64, at.y.floor() as i64)
     }
 
@@ -193,7 +196,7 @@ impl<'a> Floor<'a> {
     ) {
         let along = Vector2::new(angle_rad.cos(), angle_rad.sin());
         let (near_m, far_m) = (options.field.near_m, options.field.far_m);
-        let steps = ((far_m - near_m) / self.grid.cell_m).max(0.0) as usize;
+        let steps = (((far_m - near_m) / self.grid.cell_m).max(0.0) as usize).min(MOST_STEPS);
         let mut likely = 1.0;
         for k in 0..=steps {
             let range_m = near_m + self.grid.cell_m * k as f64;
@@ -283,7 +286,7 @@ pub fn frontiers(grid: &Occupancy, options: &ExploreOptions) -> Vec<Frontier> {
         let nearest = squares.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)));
         found.extend(nearest.map(|middle| Frontier { squares, middle }));
     }
-    found.sort_by(|a, b| b.squares.len().cmp(&a.squares.len()));
+    found.sort_by_key(|f| Reverse(f.squares.len()));
     found
 }
 

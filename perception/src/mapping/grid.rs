@@ -35,6 +35,10 @@ impl From<Sightlines> for Vec<(i32, i32, u32, u32)> {
 
 /// Bearings into which what a station saw is sorted.
 const BEARINGS: usize = 720;
+/// Lines of sight are followed no farther, metres.
+const FARTHEST_M: f64 = 100.0;
+/// Most squares of a grid.
+const MOST_SQUARES: usize = 1 << 28;
 /// Share of the points of a bearing that may lie nearer than what ends it: mismatches.
 const STRAY: f64 = 0.1;
 /// Points of a station in a square that are something.
@@ -60,6 +64,9 @@ impl Sightlines {
         let mut points: FxHashMap<(i32, i32), u32> = FxHashMap::default();
         for p in station.points.iter().filter(|p| is_finite(p) && f64::from(p.x) <= far_m) {
             let place = Point2::new(f64::from(p.x), f64::from(p.y));
+            if place.coords.norm() > FARTHEST_M {
+                continue;
+            }
             let bearing = ((place.y.atan2(place.x) + PI) / TAU * BEARINGS as f64) as usize % BEARINGS;
             let z = f64::from(p.z);
             if band_m.contains(&z) {
@@ -99,8 +106,12 @@ impl Sightlines {
             .squares
             .keys()
             .fold((*first, *first), |(l, h), k| ((l.0.min(k.0), l.1.min(k.1)), (h.0.max(k.0), h.1.max(k.1))));
-        let (width, height) = ((high.0 - low.0) as usize + 3, (high.1 - low.1) as usize + 3);
-        let origin = Point2::new(f64::from(low.0 - 1), f64::from(low.1 - 1)) * edge_m;
+        let span = |low: i32, high: i32| (i64::from(high) - i64::from(low)) as usize + 3;
+        let (width, height) = (span(low.0, high.0), span(low.1, high.1));
+        if width.saturating_mul(height) > MOST_SQUARES {
+            return None;
+        }
+        let origin = Point2::new(f64::from(low.0) - 1.0, f64::from(low.1) - 1.0) * edge_m;
         let mut cells = vec![Space::Unknown; width * height];
         for (key, (through, ended)) in &self.squares {
             let (column, row) = ((key.0 - low.0) as usize + 1, (key.1 - low.1) as usize + 1);

@@ -8,6 +8,7 @@
 //! A wrong heading moves what is seen ahead sideways, about the camera and not about a centroid. [`Matcher::IcpEm`] therefore looks for the best
 //! heading first and then finds rotation and translation together for the same expectations.
 
+use super::error::{MappingError, check, check_pose};
 use super::field::{Field, OUTLIERS, REACH};
 use super::station::{FieldOfView, Spot, Station, shared};
 use crate::register::{self, Method, Prepared, RegisterOptions};
@@ -70,6 +71,26 @@ impl Default for RectifyOptions {
     }
 }
 
+impl RectifyOptions {
+    /// That all can be used.
+    ///
+    /// # Errors
+    /// Names the first that cannot.
+    pub fn check(&self) -> Result<(), MappingError> {
+        check(&[
+            ("the nearest depth of the field of view (m)", self.field.near_m, 0.0, 1e3),
+            ("the farthest depth of the field of view (m)", self.field.far_m, 1e-3, 1e3),
+            ("thin_m", self.thin_m, 1e-3, 10.0),
+            ("the first of sigma_m", self.sigma_m.0, 1e-3, 10.0),
+            ("the second of sigma_m", self.sigma_m.1, 1e-2, 10.0),
+            ("the first of way_sigma", self.way_sigma.0, 0.0, 10.0),
+            ("the second of way_sigma (m)", self.way_sigma.1, 1e-6, 1e3),
+            ("turn_sigma_rad", self.turn_sigma_rad, 1e-6, 10.0),
+            ("looks", self.looks, 1e-3, 1e9),
+        ])
+    }
+}
+
 /// Where the second of two stations is in the frame of the first, and how far to trust it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairFit {
@@ -104,16 +125,35 @@ const STRAYED: f64 = 4.0;
 const PROBE: (f64, f64) = (0.03, 0.015);
 
 /// Rectifies the step between two stations in a row.
-pub fn rectify_pair(before: &Station, after: &Station, options: &RectifyOptions) -> PairFit {
-    let plan = |s: &Station| s.plan(&options.band_m, &options.field, options.thin_m);
-    let step = before.odom_from_level.inv_mul(&after.odom_from_level);
-    fit(&plan(before), &plan(after), &step, options)
+///
+/// # Errors
+/// If an option or a pose of odometry cannot be used.
+pub fn rectify_pair(
+    before: &Station,
+    after: &Station,
+    options: &RectifyOptions,
+) -> Result<PairFit, MappingError> {
+    options.check()?;
+    check_pose("station", 0, &before.odom_from_level)?;
+    check_pose("station", 1, &after.odom_from_level)?;
+    Ok(step(before, after, options))
 }
 
 /// Rectifies each step of a drive: one fit fewer than stations.
-pub fn rectify_drive(stations: &[Station], options: &RectifyOptions) -> Vec<PairFit> {
+///
+/// # Errors
+/// If an option or a pose of odometry cannot be used.
+pub fn rectify_drive(stations: &[Station], options: &RectifyOptions) -> Result<Vec<PairFit>, MappingError> {
     let _span = tracing::debug_span!("rectify", stations = stations.len()).entered();
-    stations.par_windows(2).map(|pair| rectify_pair(&pair[0], &pair[1], options)).collect()
+    options.check()?;
+    stations.iter().enumerate().try_for_each(|(i, s)| check_pose("station", i, &s.odom_from_level))?;
+    Ok(stations.par_windows(2).map(|pair| step(&pair[0], &pair[1], options)).collect())
+}
+
+fn step(before: &Station, after: &Station, options: &RectifyOptions) -> PairFit {
+    let plan = |s: &Station| s.plan(&options.band_m, &options.field, options.thin_m);
+    let odometry = before.odom_from_level.inv_mul(&after.odom_from_level);
+    fit(&plan(before), &plan(after), &odometry, options)
 }
 
 /// Poses of the stations in the frame of the first, one step after the other.
@@ -128,12 +168,7 @@ pub fn chained(pairs: &[PairFit]) -> Vec<Isometry2<f64>> {
 }
 
 /// Fits the plan of one station onto that of another, from where odometry has it.
-pub(super) fn fit(
-    before: &[Spot],
-    after: &[Spot],
-    odometry: &Isometry2<f64>,
-    options: &RectifyOptions,
-) -> PairFit {
+fn fit(before: &[Spot], after: &[Spot], odometry: &Isometry2<f64>, options: &RectifyOptions) -> PairFit {
     let seen = shared(before, &odometry.inverse(), &options.field);
     let moved = shared(after, odometry, &options.field);
     if options.matcher == Matcher::Icp {

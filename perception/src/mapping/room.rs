@@ -1,6 +1,7 @@
 //! The map: walls with their openings, level surfaces, and the grid of what is open.
 
 use super::cells::{Cells, CellsError, Facet, NormalOptions};
+use super::error::{MappingError, check, check_pose};
 use super::fuse::{FuseOptions, fuse};
 use super::grid::Sightlines;
 use super::orientation::{OrientationOptions, orientations};
@@ -145,6 +146,9 @@ impl Survey {
 
     /// Adds what was seen from a station at a pose, by a camera `height_m` above the floor, no deeper than `far_m`; `band_m`: heights at which something is
     /// in a body's way.
+    ///
+    /// # Errors
+    /// If the pose is none; nothing is added then.
     pub fn add(
         &mut self,
         station: &Station,
@@ -152,19 +156,29 @@ impl Survey {
         height_m: f64,
         far_m: f64,
         band_m: &RangeInclusive<f64>,
-    ) {
+    ) -> Result<(), MappingError> {
+        check_pose("station", 0, map_from_level)?;
+        check(&[("height_m", height_m, -1e3, 1e3)])?;
         self.cells.add(&station.points, map_from_level, height_m, far_m);
         self.lines.add(station, map_from_level, band_m, far_m, self.cells.edge_m());
+        Ok(())
     }
 
-    /// What is open by lines of sight alone, without the walls; `None` if nothing was seen.
+    /// What is open by lines of sight alone, without the walls; `None` if nothing was seen, or what was lies too far apart for one grid.
     pub fn grid(&self) -> Option<Occupancy> {
         self.lines.occupancy(self.cells.edge_m())
     }
 
     /// The map of what was seen so far.
-    pub fn map(&self, options: &MapOptions) -> RoomMap {
+    ///
+    /// # Errors
+    /// If an option cannot be used.
+    pub fn map(&self, options: &MapOptions) -> Result<RoomMap, MappingError> {
         let _span = tracing::debug_span!("map", cells = self.cells.len()).entered();
+        check(&[
+            ("grow_m", options.grow_m, 1e-3, 1e3),
+            ("the reach of normals", options.normals.reach as f64, 1.0, 10.0),
+        ])?;
         let edge_m = self.cells.edge_m();
         let facets = self.cells.facets(&options.normals);
         let (patches, main_rad) = upright(&facets, options, edge_m);
@@ -174,7 +188,7 @@ impl Survey {
         if let Some(grid) = &mut grid {
             walls.iter().for_each(|wall| draw(wall, grid));
         }
-        RoomMap { walls, levels: levels(&facets, options, edge_m), main_rad, grid }
+        Ok(RoomMap { walls, levels: levels(&facets, options, edge_m), main_rad, grid })
     }
 }
 

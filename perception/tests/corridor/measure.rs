@@ -31,7 +31,7 @@ pub struct Score {
 pub fn survey(stations: &[Station], poses: &[Isometry2<f64>]) -> Survey {
     let mut survey = Survey::new(0.1).expect("a length");
     for (station, pose) in stations.iter().zip(poses) {
-        survey.add(station, pose, CAMERA_HEIGHT_M, MAP_FAR_M, &BODY_M);
+        survey.add(station, pose, CAMERA_HEIGHT_M, MAP_FAR_M, &BODY_M).expect("a pose");
     }
     survey
 }

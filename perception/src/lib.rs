@@ -16,6 +16,7 @@ pub mod merge;
 pub mod neighbours;
 pub mod noise;
 pub mod normals;
+pub mod occupancy;
 pub mod outliers;
 mod outline;
 pub mod picture;

@@ -27,7 +27,6 @@ pub use error::MappingError;
 pub use frontier::{ExploreOptions, Frontier, NextPose, frontiers, next_poses};
 pub use fuse::FuseOptions;
 pub use graph::{Edge, GraphError, PoseGraph, Settled};
-pub use grid::Sightlines;
 pub use orientation::{OrientationOptions, Orientations, orientations};
 pub use pair::{Matcher, PairFit, RectifyOptions, chained, rectify_drive, rectify_pair};
 pub use patch::{Constraints, Fit};

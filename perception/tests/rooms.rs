@@ -5,13 +5,13 @@ mod tabletop;
 
 use corridor::measure::{BODY_M, MAP_FAR_M, score, survey};
 use corridor::{Building, CAMERA_HEIGHT_M, Rig, along, around, field_of_view, with_people};
-use descry_perception::laser::Space;
 use descry_perception::mapping::{
     Cells, CellsError, ClosureOptions, ExploreOptions, FieldOfView, Fit, MapOptions, MappingError, Matcher,
     NormalOptions, PairFit, RectifyOptions, RoomMap, Station, Survey, by_regions, chained, closures,
     correct_drive, next_poses, rectify_drive, rectify_pair,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, Point3, Vector3};
+use descry_perception::occupancy::Space;
 use std::f64::consts::{FRAC_PI_4, TAU};
 use std::sync::OnceLock;
 use tabletop::Draws;

@@ -3,11 +3,11 @@
 use super::corridor::measure::{BODY_M, MAP_FAR_M};
 use super::corridor::{Building, CAMERA_HEIGHT_M, Rig, field_of_view};
 use super::tabletop::Draws;
-use descry_perception::laser::{Occupancy, Space};
 use descry_perception::mapping::{
     ExploreOptions, FieldOfView, NextPose, Station, Survey, frontiers, next_poses,
 };
 use descry_perception::nalgebra::{Isometry2, Point2};
+use descry_perception::occupancy::{Occupancy, Space};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Policy {

@@ -1,8 +1,8 @@
 //! Plots: the points from above, walls, and the grid, as SVG.
 
-use descry_perception::laser::{Occupancy, Space};
 use descry_perception::mapping::{RoomMap, Station, Wall};
 use descry_perception::nalgebra::{Isometry2, Point2};
+use descry_perception::occupancy::{Occupancy, Space};
 use std::fmt::Write;
 use std::path::Path;
 

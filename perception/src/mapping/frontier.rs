@@ -2,7 +2,7 @@
 //! show and what the way there costs.
 
 use super::station::FieldOfView;
-use crate::laser::{Occupancy, Space};
+use crate::occupancy::{Occupancy, Space};
 use nalgebra::{Isometry2, Point2, Vector2};
 use rustc_hash::FxHashSet;
 use std::cmp::Reverse;

@@ -2,7 +2,7 @@
 
 use super::station::Station;
 use crate::cloud::is_finite;
-use crate::laser::{Occupancy, Space};
+use crate::occupancy::{Occupancy, Space};
 use nalgebra::{Isometry2, Point2, Vector2};
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use std::ops::RangeInclusive;
 /// Counts of stations that looked through squares of the floor, and that saw something in them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Vec<(i32, i32, u32, u32)>", into = "Vec<(i32, i32, u32, u32)>")]
-pub struct Sightlines {
+pub(super) struct Sightlines {
     squares: FxHashMap<(i32, i32), (u32, u32)>,
 }
 

@@ -8,7 +8,7 @@ use super::orientation::{OrientationOptions, orientations};
 use super::patch::{Constraints, Fit, Growth, Patch, grow, main_direction, through};
 use super::station::Station;
 use crate::hull::convex;
-use crate::laser::{Occupancy, Space};
+use crate::occupancy::{Occupancy, Space};
 use crate::plane::Plane;
 use nalgebra::{Isometry2, Point2, Vector2, Vector3};
 use rustc_hash::FxHashSet;

@@ -54,8 +54,8 @@ fn floored(
 
 fn print(name: &str, map: &RoomMap, points: usize, seconds: f64) {
     println!(
-        "{name}: {points} points, {seconds:.2} s; main direction {:?}°",
-        map.main_rad.map(|m| (m.to_degrees() * 10.0).round() / 10.0)
+        "{name}: {points} points, {seconds:.2} s; main direction {}",
+        map.main_rad.map_or("none".to_owned(), |m| format!("{:.1}°", m.to_degrees()))
     );
     for wall in map.walls.iter().take(8) {
         println!(
@@ -177,8 +177,9 @@ fn scans(folder: &Path, out: Option<&Path>) -> Result<(), String> {
     let moved = first.transformed(&pose).points;
     let eyes = [pose * Point3::new(0.0, 0.0, 1.0), Point3::new(0.0, 0.0, 1.0)];
     let views = [(moved, eyes[0]), (second.points.clone(), eyes[1])];
+    let before = Instant::now();
     let both = map(&views, 0.1)?;
-    print("both scans", &both, views.iter().map(|v| v.0.len()).sum(), 0.0);
+    print("both scans", &both, views.iter().map(|v| v.0.len()).sum(), before.elapsed().as_secs_f64());
     if let Some(dir) = out {
         let stations: Vec<Station> = views
             .into_iter()

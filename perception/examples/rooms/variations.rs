@@ -81,7 +81,7 @@ pub fn print(seed: u64) -> Result<(), String> {
             .flat_map(|w| w.feet().collect::<Vec<_>>())
             .filter(|(a, b)| (a.y - y).abs() < 0.3 && (b.y - y).abs() < 0.3)
             .map(|(a, b)| (b - a).norm())
-            .sum::<f64>()
+            .fold(0.0, |sum, length: f64| sum + length)
     };
     println!(
         "{:<34} {:.1} m of wall where the glass is, {:.1} m where the wall behind it is: glass is not seen, and the grid says it is open",

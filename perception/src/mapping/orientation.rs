@@ -33,7 +33,7 @@ pub struct Orientations {
 const BINS: usize = 90;
 /// Spread by which the histogram is smoothed, bins.
 const SMOOTH: f64 = 2.0;
-/// A peak stands out if it is so many times as high as the mean of the histogram: a round room has none.
+/// A peak stands out if it is so many times as high as the median of the histogram: a round room has none.
 const STANDS_OUT: f64 = 1.7;
 const MOST: usize = 8;
 const ROUNDS: usize = 30;
@@ -94,13 +94,16 @@ fn peaks(directions_rad: &[f64], options: &OrientationOptions) -> Vec<f64> {
         .collect();
     let half = (options.within_rad / PI * BINS as f64) as i64;
     let share = |bin: usize| (-half..=half).map(|by| histogram[around(bin, by)]).sum::<f64>() / all;
+    let mut sorted = smooth.clone();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted[BINS / 2];
     let is_peak = |bin: &usize| {
         let height = smooth[*bin];
         let highest = (-half..=half).all(|by| {
             let other = smooth[around(*bin, by)];
             other < height || (other == height && by >= 0)
         });
-        highest && height > STANDS_OUT * all / BINS as f64 && share(*bin) >= options.least_share
+        highest && height > STANDS_OUT * median && share(*bin) >= options.least_share
     };
     let mut found: Vec<usize> = (0..BINS).filter(is_peak).collect();
     found.sort_by(|&a, &b| smooth[b].total_cmp(&smooth[a]));

@@ -103,13 +103,22 @@ pub fn score(
         let near = (0..truths.len()).min_by(|&a, &b| away(&truths[a]).total_cmp(&away(&truths[b])));
         let local = near.map_or(Isometry2::identity(), |i| poses[i] * truths[i].inverse());
         let opening = Opening { a: local * opening.a, b: local * opening.b };
-        let along = opening.b - opening.a;
-        let gap = (opening.a + along * 0.3, opening.b - along * 0.3);
-        !samples(gap).any(|at| {
-            found
-                .iter()
-                .any(|f| between(f, &gap) < ALIKE_RAD && distance_m(&at, f) < 0.5 * along.norm().min(0.4))
-        })
+        let along = (opening.b - opening.a).normalize();
+        let is_closed = |at: &Point2<f64>| {
+            let covers = |f: &&(Point2<f64>, Point2<f64>)| {
+                let (way, to) = (f.1 - f.0, at - f.0);
+                let share = to.dot(&way) / way.norm_squared().max(1e-12);
+                (0.0..=1.0).contains(&share) && distance_m(at, f) < 0.3
+            };
+            found.iter().filter(covers).any(|f| between(f, &(opening.a, opening.b)) < ALIKE_RAD)
+        };
+        // Half a metre in a row without a wall, no farther than 35 cm from where the door is.
+        let (mut open_m, mut widest_m) = (0.0_f64, 0.0_f64);
+        for at in samples((opening.a - along * 0.35, opening.b + along * 0.35)) {
+            open_m = if is_closed(&at) { 0.0 } else { open_m + STEP_M };
+            widest_m = widest_m.max(open_m);
+        }
+        widest_m + 1e-9 >= 0.5
     });
     Score {
         precision: right / f64::max(all, 1.0),

@@ -19,8 +19,9 @@ mod simplex;
 mod solve;
 mod violation;
 
+pub use crate::occupancy::{Occupancy, Space};
 pub use align::{Alignment, align, align_consistent};
-pub use background::{Ignored, Observation, ObserveError, ObserveOptions, Occupancy, Space, observe};
+pub use background::{Ignored, Observation, ObserveError, ObserveOptions, observe};
 pub use features::{FeatureClass, Features, Nearest, classes, groups, nearest};
 pub use fit::{FitOptions, ModelFit, Start, fit, localise};
 pub use known::{Candidate, KnownShape, RecogniseOptions, Recognition, Verdict, recognise, recognise_scan};

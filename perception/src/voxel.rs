@@ -34,7 +34,7 @@ const HALF_RANGE: i64 = 1 << 20;
 
 /// The whole number below. The standard one is a call where the processor's oldest instruction set is aimed at.
 #[inline(always)]
-fn floor(value: f64) -> i64 {
+pub(crate) fn floor(value: f64) -> i64 {
     let toward_zero = value as i64;
     toward_zero.saturating_sub(i64::from(toward_zero as f64 > value))
 }
@@ -127,9 +127,8 @@ pub fn assign(points: &[Point3<f32>], edge_m: f32) -> Result<Assigned, VoxelErro
             voxel.push(NONE);
             continue;
         }
-        let axis = |c: f32| floor(f64::from(c) * per_m).saturating_add(HALF_RANGE) as u64;
-        let [x, y, z] = [axis(p.x), axis(p.y), axis(p.z)];
-        if (x | y | z) >= 2 * HALF_RANGE as u64 {
+        let axis = |c: f32| floor(f64::from(c) * per_m);
+        let Some(key) = key([axis(p.x), axis(p.y), axis(p.z)]) else {
             let distance_m = p.coords.amax();
             return Err(VoxelError::TooFar {
                 index,
@@ -137,8 +136,7 @@ pub fn assign(points: &[Point3<f32>], edge_m: f32) -> Result<Assigned, VoxelErro
                 edge_m,
                 farthest_m: HALF_RANGE as f32 * edge_m,
             });
-        }
-        let key = x << 42 | y << 21 | z;
+        };
         if key != last.0 {
             last = (key, table.number(key));
         }
@@ -147,20 +145,29 @@ pub fn assign(points: &[Point3<f32>], edge_m: f32) -> Result<Assigned, VoxelErro
     Ok(Assigned { voxel, voxels: table.len as usize })
 }
 
+/// Key of the voxel at three whole coordinates; `None` if they lie beyond what an axis can count.
+#[inline(always)]
+pub(crate) fn key([x, y, z]: [i64; 3]) -> Option<u64> {
+    let axis = |c: i64| c.saturating_add(HALF_RANGE) as u64;
+    let [x, y, z] = [axis(x), axis(y), axis(z)];
+    ((x | y | z) < 2 * HALF_RANGE as u64).then_some(x << 42 | y << 21 | z)
+}
+
 /// Numbers keys in order of first occurrence: open addressing, linear probing.
-struct Table {
+#[derive(Clone, Debug)]
+pub(crate) struct Table {
     slots: Vec<(u64, u32)>,
     mask: usize,
     len: u32,
 }
 
 impl Table {
-    fn with_room_for(keys: usize) -> Table {
+    pub(crate) fn with_room_for(keys: usize) -> Table {
         let size = (2 * keys).next_power_of_two().max(1 << 10);
         Table { slots: vec![(u64::MAX, 0); size], mask: size - 1, len: 0 }
     }
 
-    fn number(&mut self, key: u64) -> u32 {
+    pub(crate) fn number(&mut self, key: u64) -> u32 {
         let mut at = self.home(key);
         loop {
             let (found, number) = self.slots[at];
@@ -179,6 +186,21 @@ impl Table {
             self.grow();
         }
         number
+    }
+
+    /// The number that a key has.
+    pub(crate) fn find(&self, key: u64) -> Option<u32> {
+        let mut at = self.home(key);
+        loop {
+            let (found, number) = self.slots[at];
+            if found == key {
+                return Some(number);
+            }
+            if found == u64::MAX {
+                return None;
+            }
+            at = (at + 1) & self.mask;
+        }
     }
 
     fn home(&self, key: u64) -> usize {

@@ -1,0 +1,34 @@
+//! The map of a building from a drive with a range camera (Viejo and Cazorla, *Construcción de mapas 3D y extracción de primitivas geométricas
+//! del entorno*).
+//!
+//! The pipeline, a file a step: what the camera saw at each stop of the drive, levelled ([`Station`]), and its plan without floor and ceiling;
+//! how two stops in a row lie to each other ([`rectify_pair`]: ICP-EM, Eq. 1 to 3); where the drive came by again ([`closures`]) and all poses
+//! together ([`PoseGraph`]), which the paper leaves open; all points as small pieces of surface ([`Cells`], normals by regions: Eq. 4); the
+//! orientations of walls ([`orientations`]: k-means); patches grown and planes put through them ([`Fit`], [`Constraints`]) and joined
+//! ([`FuseOptions`]); the map of walls, level surfaces and open floor ([`Survey`], [`RoomMap`]); where to go next to see more of it ([`next_poses`]).
+
+mod cells;
+mod closure;
+mod error;
+mod field;
+mod frontier;
+mod fuse;
+mod graph;
+mod grid;
+mod orientation;
+mod pair;
+mod patch;
+mod room;
+mod station;
+
+pub use cells::{Cells, CellsError, Facet, NormalOptions, by_regions};
+pub use closure::{Closure, ClosureOptions, closures, correct_drive, relocate};
+pub use error::MappingError;
+pub use frontier::{ExploreOptions, Frontier, NextPose, frontiers, next_poses};
+pub use fuse::FuseOptions;
+pub use graph::{Edge, GraphError, PoseGraph, Settled};
+pub use orientation::{OrientationOptions, Orientations, orientations};
+pub use pair::{Matcher, PairFit, RectifyOptions, chained, rectify_drive, rectify_pair};
+pub use patch::{Constraints, Fit};
+pub use room::{Level, MapOptions, RoomMap, Survey, Wall};
+pub use station::{FieldOfView, Station, StationError};

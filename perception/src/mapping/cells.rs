@@ -1,0 +1,250 @@
+//! All that was seen of a building, by cubes: as many as there is surface, however many points there are. And normals by regions (section 4.1).
+
+use crate::cloud::is_finite;
+use crate::voxel::{self, Table};
+use nalgebra::{Isometry2, Point3, Vector2, Vector3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Sums over the points of cubes, and over the ways back to the camera. Points come in station by station and need not be kept.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(try_from = "Stored", into = "Stored")]
+pub struct Cells {
+    edge_m: f64,
+    table: Table,
+    sums: Vec<Sums>,
+}
+
+/// A cube that holds points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Sums {
+    /// Whole coordinates.
+    cube: [i32; 3],
+    count: u32,
+    /// Of the points, from the cube's corner, metres.
+    sum: [f32; 3],
+    /// Of unit vectors towards the camera.
+    towards: [f32; 3],
+}
+
+/// Cells as they stand in a file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored {
+    edge_m: f64,
+    cells: Vec<Sums>,
+}
+
+/// Cells that cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CellsError {
+    /// The edge is no positive length.
+    #[error("cells with an edge of {edge_m} m: give a positive length, such as 0.1")]
+    Edge {
+        /// What was given.
+        edge_m: f64,
+    },
+    /// A stored cell holds what no cell can.
+    #[error(
+        "cell {index} of the stored ones is damaged (its count is {count}, or a sum is no number, or it occurs twice): store the map anew"
+    )]
+    Damaged {
+        /// Which.
+        index: usize,
+        /// Its points.
+        count: u32,
+    },
+}
+
+impl From<Cells> for Stored {
+    fn from(cells: Cells) -> Stored {
+        Stored { edge_m: cells.edge_m, cells: cells.sums }
+    }
+}
+
+impl TryFrom<Stored> for Cells {
+    type Error = CellsError;
+
+    fn try_from(stored: Stored) -> Result<Cells, CellsError> {
+        let mut cells = Cells::new(stored.edge_m)?;
+        for (index, sums) in stored.cells.into_iter().enumerate() {
+            let key = voxel::key(sums.cube.map(i64::from));
+            let number = key.map(|key| cells.table.number(key) as usize);
+            let is_finite = sums.sum.iter().chain(&sums.towards).all(|v| v.is_finite());
+            if sums.count == 0 || !is_finite || number != Some(index) {
+                return Err(CellsError::Damaged { index, count: sums.count });
+            }
+            cells.sums.push(sums);
+        }
+        Ok(cells)
+    }
+}
+
+/// A small piece of surface: the points of a cube, and the normal there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facet {
+    /// Centroid, in the map, metres.
+    pub at: Point3<f64>,
+    /// Unit normal, towards where it was seen from.
+    pub normal: Vector3<f64>,
+    /// Points in the cube.
+    pub points: u32,
+}
+
+/// How normals are found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NormalOptions {
+    /// A cube with fewer points is noise, and no region …
+    pub least_points: u32,
+    /// … and so is one with less than this share of the points of the fullest cube within reach: the edges of surfaces are blurred along the line of sight.
+    pub least_share: f64,
+    /// Regions reach so many cubes to each side of the point's own.
+    pub reach: i64,
+    /// Fewest regions that are evidence enough.
+    pub least_regions: usize,
+    /// Least length of the mean of the products (Eq. 4) against the mean of their lengths: less, and they do not agree on a direction.
+    pub agreement: f64,
+}
+
+impl Default for NormalOptions {
+    fn default() -> Self {
+        NormalOptions { least_points: 3, least_share: 0.1, reach: 2, least_regions: 6, agreement: 0.6 }
+    }
+}
+
+impl Cells {
+    /// No cell yet.
+    ///
+    /// # Errors
+    /// If the edge is no positive length.
+    pub fn new(edge_m: f64) -> Result<Cells, CellsError> {
+        if !(edge_m > 0.0 && edge_m.is_finite()) {
+            return Err(CellsError::Edge { edge_m });
+        }
+        Ok(Cells { edge_m, table: Table::with_room_for(0), sums: Vec::new() })
+    }
+
+    /// Edge of a cell, metres.
+    pub fn edge_m(&self) -> f64 {
+        self.edge_m
+    }
+
+    /// Cells that hold points.
+    pub fn len(&self) -> usize {
+        self.sums.len()
+    }
+
+    /// True if nothing was added.
+    pub fn is_empty(&self) -> bool {
+        self.sums.is_empty()
+    }
+
+    /// Points that were added.
+    pub fn points(&self) -> u64 {
+        self.sums.iter().map(|s| u64::from(s.count)).sum()
+    }
+
+    /// Adds what was seen from a station: points in its level frame, seen from `height_m` above its origin, no deeper than `far_m`.
+    ///
+    /// Points that are not finite, or farther out than a million cells, are passed over.
+    pub fn add(
+        &mut self,
+        points: &[Point3<f32>],
+        map_from_level: &Isometry2<f64>,
+        height_m: f64,
+        far_m: f64,
+    ) {
+        let per_m = 1.0 / self.edge_m;
+        let turn = map_from_level.rotation.to_rotation_matrix();
+        let shift = map_from_level.translation.vector;
+        let mut last = (u64::MAX, 0);
+        for p in points.iter().filter(|p| is_finite(p) && f64::from(p.x) <= far_m) {
+            let plan = turn * Vector2::new(f64::from(p.x), f64::from(p.y));
+            let at = [plan.x + shift.x, plan.y + shift.y, f64::from(p.z)];
+            let cube = at.map(|c| voxel::floor(c * per_m));
+            let Some(key) = voxel::key(cube) else { continue };
+            if key != last.0 {
+                last = (key, self.table.number(key) as usize);
+                if last.1 == self.sums.len() {
+                    let cube = cube.map(|c| c as i32);
+                    self.sums.push(Sums { cube, count: 0, sum: [0.0; 3], towards: [0.0; 3] });
+                }
+            }
+            let sums = &mut self.sums[last.1];
+            let back = [-plan.x, -plan.y, height_m - at[2]];
+            let per = 1.0 / (back[0] * back[0] + back[1] * back[1] + back[2] * back[2]).sqrt().max(1e-9);
+            sums.count = sums.count.saturating_add(1);
+            for k in 0..3 {
+                sums.sum[k] += (at[k] - cube[k] as f64 * self.edge_m) as f32;
+                sums.towards[k] += (back[k] * per) as f32;
+            }
+        }
+    }
+
+    /// The surface in each cell, where there is evidence of one, in the order of the cells.
+    pub fn facets(&self, options: &NormalOptions) -> Vec<Facet> {
+        let _span = tracing::debug_span!("normals by regions", cells = self.len()).entered();
+        let facet = |sums: &Sums| {
+            if sums.count < options.least_points {
+                return None;
+            }
+            let at = self.centroid(sums);
+            let towards = Vector3::from(sums.towards).cast();
+            let around = self.around(sums, options.reach);
+            let fullest = around.iter().map(|s| s.count).max().unwrap_or(0).max(sums.count);
+            let least = f64::from(options.least_points).max(options.least_share * f64::from(fullest));
+            if f64::from(sums.count) < least {
+                return None;
+            }
+            let full = around.into_iter().filter(|s| f64::from(s.count) >= least);
+            let regions: Vec<Point3<f64>> = full.map(|s| self.centroid(s)).collect();
+            let normal = by_regions(&at, &regions, &towards, options)?;
+            Some((sums.cube, Facet { at, normal, points: sums.count }))
+        };
+        let mut found: Vec<_> = self.sums.par_iter().filter_map(facet).collect();
+        found.sort_unstable_by_key(|(cube, _)| *cube);
+        found.into_iter().map(|(_, facet)| facet).collect()
+    }
+
+    fn centroid(&self, sums: &Sums) -> Point3<f64> {
+        let axis =
+            |k: usize| f64::from(sums.cube[k]) * self.edge_m + f64::from(sums.sum[k]) / f64::from(sums.count);
+        Point3::new(axis(0), axis(1), axis(2))
+    }
+
+    /// The cubes around one.
+    fn around(&self, own: &Sums, reach: i64) -> Vec<&Sums> {
+        let span = || -reach..=reach;
+        let [a, b, c] = own.cube.map(i64::from);
+        let others = span().flat_map(|x| span().flat_map(move |y| span().map(move |z| (x, y, z))));
+        let keys =
+            others.filter(|o| *o != (0, 0, 0)).filter_map(|(x, y, z)| voxel::key([a + x, b + y, c + z]));
+        keys.filter_map(|key| self.table.find(key)).map(|number| &self.sums[number as usize]).collect()
+    }
+}
+
+/// The normal at `at` from the centroids of regions around it (Eq. 4): the mean of the products of all pairs of ways to them; `None` where they are too
+/// few or do not agree.
+///
+/// Written as it stands, products of pairs on opposite sides cancel: each is turned to the side it was seen from first, `towards` the camera.
+pub fn by_regions(
+    at: &Point3<f64>,
+    regions: &[Point3<f64>],
+    towards: &Vector3<f64>,
+    options: &NormalOptions,
+) -> Option<Vector3<f64>> {
+    if regions.len() < options.least_regions.max(2) {
+        return None;
+    }
+    let ways: Vec<Vector3<f64>> = regions.iter().map(|r| r - at).collect();
+    let (mut sum, mut lengths) = (Vector3::zeros(), 0.0);
+    for (i, a) in ways.iter().enumerate() {
+        for b in &ways[i + 1..] {
+            let product = a.cross(b);
+            lengths += product.norm();
+            sum += if product.dot(towards) < 0.0 { -product } else { product };
+        }
+    }
+    let length = sum.norm();
+    (length > options.agreement * lengths && length > 0.0).then(|| sum / length)
+}

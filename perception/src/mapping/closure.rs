@@ -1,0 +1,301 @@
+//! Where the drive came by again, and all its poses together: the global correction that the paper leaves open (its Fig. 9).
+
+use super::error::{MappingError, check, check_pose};
+use super::field::Field;
+use super::graph::{Edge, GraphError, PoseGraph, Settled};
+use super::pair::{PairFit, Prior, RectifyOptions, chained, fit_cut};
+use super::station::{FieldOfView, Spot, Station, thinned};
+use nalgebra::{Isometry2, Matrix2, Matrix3, Point2, Vector2};
+use rayon::prelude::*;
+
+/// Where to look for places come by again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClosureOptions {
+    /// Stations on a shorter way are neighbours anyhow, metres.
+    pub apart_m: f64,
+    /// Poses may have drifted by this share of the way between two stations, and …
+    pub drift: f64,
+    /// … by no more than this, metres.
+    pub most_m: f64,
+    /// Headings of two stations that may show the same differ by no more, radians.
+    pub turn_rad: f64,
+    /// Headings may have drifted by so much, radians.
+    pub heading_drift_rad: f64,
+    /// Least share of what both fields of view see that must lie on each other.
+    pub explained: f64,
+    /// What is seen on so long a stretch of the drive is held against another, metres.
+    pub stretch_m: f64,
+    /// From one stretch to the next, metres.
+    pub every_m: f64,
+}
+
+impl Default for ClosureOptions {
+    fn default() -> Self {
+        ClosureOptions {
+            apart_m: 15.0,
+            drift: 0.04,
+            most_m: 3.0,
+            turn_rad: 0.35,
+            heading_drift_rad: 0.2,
+            explained: 0.75,
+            stretch_m: 8.0,
+            every_m: 1.5,
+        }
+    }
+}
+
+impl ClosureOptions {
+    fn check(&self) -> Result<(), MappingError> {
+        check(&[
+            ("apart_m", self.apart_m, 0.0, 1e6),
+            ("drift", self.drift, 0.0, 1.0),
+            ("most_m", self.most_m, 0.0, 50.0),
+            ("heading_drift_rad", self.heading_drift_rad, 0.0, 4.0),
+            ("stretch_m", self.stretch_m, 0.0, 1e3),
+            ("every_m", self.every_m, 0.0, 1e6),
+        ])
+    }
+}
+
+/// A station that shows what one long before it showed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Closure {
+    /// The earlier station.
+    pub from: usize,
+    /// The later.
+    pub to: usize,
+    /// How they lie to each other.
+    pub fit: PairFit,
+}
+
+/// Spread of the field in which a start is looked for, metres; steps of the search, metres and radians.
+const COARSE: (f64, f64, f64) = (0.2, 0.1, 0.03);
+/// Spots by which starts are judged, about.
+const SOME: usize = 400;
+/// Half the spread of a start that the search found: what it may be off by, metres and radians.
+const START: (f64, f64) = (0.15, 0.05);
+/// Another place that fits nearly as well (mean logarithm of density) and lies farther than this (metres) makes the first doubtful.
+const RIVAL: (f64, f64) = (0.1, 0.5);
+
+/// Looks for stations that show what an earlier one showed, from where a chain of fits put them: a pose a station.
+///
+/// # Errors
+/// If an option or a pose cannot be used.
+pub fn closures(
+    stations: &[Station],
+    poses: &[Isometry2<f64>],
+    rectify: &RectifyOptions,
+    options: &ClosureOptions,
+) -> Result<Vec<Closure>, MappingError> {
+    let _span = tracing::debug_span!("closures", stations = stations.len()).entered();
+    checked(poses, rectify, options)?;
+    let poses = &poses[..poses.len().min(stations.len())];
+    let plans: Vec<Vec<Spot>> =
+        stations.par_iter().map(|s| s.plan(&rectify.band_m, &rectify.field, rectify.thin_m)).collect();
+    let ways = ways_m(poses);
+    let around = |at: usize| Stretch::around(at, &plans, poses, &ways, rectify, options);
+    let close = |to: usize| {
+        let from = candidate(poses, &ways, to, options)?;
+        let reach_m = reach_m(ways[to] - ways[from], options);
+        let start = poses[from].inv_mul(&poses[to]);
+        let fit = searched(&around(from), &around(to), &start, reach_m, rectify, options)?;
+        Some(Closure { from, to, fit })
+    };
+    Ok(looked_at(&ways, options).into_par_iter().filter_map(close).collect())
+}
+
+fn checked(
+    poses: &[Isometry2<f64>],
+    rectify: &RectifyOptions,
+    options: &ClosureOptions,
+) -> Result<(), MappingError> {
+    rectify.check()?;
+    options.check()?;
+    poses.iter().enumerate().try_for_each(|(i, pose)| check_pose("station", i, pose))
+}
+
+/// Stations that are held against earlier ones: one every so many metres.
+fn looked_at(ways: &[f64], options: &ClosureOptions) -> Vec<usize> {
+    let mut last = 0.0;
+    (0..ways.len())
+        .filter(|&i| {
+            let due = ways[i] - last >= options.every_m;
+            last = if due { ways[i] } else { last };
+            due
+        })
+        .collect()
+}
+
+/// What was seen on some metres of the drive, in the frame of the station in the middle.
+struct Stretch {
+    spots: Vec<Spot>,
+    /// The stations.
+    here_from_level: Vec<Isometry2<f64>>,
+    field: FieldOfView,
+}
+
+impl Stretch {
+    fn around(
+        at: usize,
+        plans: &[Vec<Spot>],
+        poses: &[Isometry2<f64>],
+        ways: &[f64],
+        rectify: &RectifyOptions,
+        options: &ClosureOptions,
+    ) -> Stretch {
+        let near = (0..poses.len()).filter(|&i| (ways[i] - ways[at]).abs() <= 0.5 * options.stretch_m);
+        Stretch::of(near.map(|i| (&plans[i], poses[at].inv_mul(&poses[i]))), rectify)
+    }
+
+    /// Plans and where they were seen from.
+    fn of<'a>(
+        plans: impl Iterator<Item = (&'a Vec<Spot>, Isometry2<f64>)> + Clone,
+        rectify: &RectifyOptions,
+    ) -> Stretch {
+        let put = plans
+            .clone()
+            .flat_map(|(plan, pose)| plan.iter().map(move |s| Spot { at: pose * s.at, weight: s.weight }));
+        let spots = thinned(put, rectify.thin_m);
+        Stretch { spots, here_from_level: plans.map(|(_, pose)| pose).collect(), field: rectify.field }
+    }
+
+    /// True for places that one of the stations could see.
+    fn sees(&self, place: &Point2<f64>) -> bool {
+        self.here_from_level.iter().any(|pose| self.field.sees(&pose.inverse_transform_point(place)))
+    }
+
+    /// The spots that the other could see too, once they are put by a pose.
+    fn shared(&self, other_from_here: &Isometry2<f64>, other: &Stretch) -> Vec<Spot> {
+        self.spots.iter().filter(|s| other.sees(&(other_from_here * s.at))).copied().collect()
+    }
+}
+
+/// Where what was seen on one drive lies in what was seen on another, from a rough pose: within `options.most_m` and `options.heading_drift_rad` of it.
+/// Stations come with their poses in the frame of their drive. `None` if too little fits, or several places do.
+///
+/// # Errors
+/// If an option or a pose cannot be used.
+pub fn relocate(
+    before: (&[Station], &[Isometry2<f64>]),
+    after: (&[Station], &[Isometry2<f64>]),
+    start: &Isometry2<f64>,
+    rectify: &RectifyOptions,
+    options: &ClosureOptions,
+) -> Result<Option<PairFit>, MappingError> {
+    checked(before.1, rectify, options)?;
+    checked(after.1, rectify, options)?;
+    check_pose("start", 0, start)?;
+    let stretch = |(stations, poses): (&[Station], &[Isometry2<f64>])| {
+        let plans: Vec<Vec<Spot>> =
+            stations.par_iter().map(|s| s.plan(&rectify.band_m, &rectify.field, rectify.thin_m)).collect();
+        Stretch::of(plans.iter().zip(poses.iter().copied()), rectify)
+    };
+    Ok(searched(&stretch(before), &stretch(after), start, options.most_m, rectify, options))
+}
+
+/// Poses of a drive after its pairs and closures have been brought together.
+///
+/// # Errors
+/// If there are not as many pairs as steps between the stations that closures name, or a fit is not finite.
+pub fn correct_drive(pairs: &[PairFit], closures: &[Closure]) -> Result<Settled, GraphError> {
+    let edge = |from: usize, to: usize, fit: &PairFit, doubtful: bool| Edge {
+        from,
+        to,
+        from_from_to: fit.before_from_after,
+        information: fit.information,
+        doubtful,
+    };
+    let steps = pairs.iter().enumerate().map(|(i, fit)| edge(i, i + 1, fit, false));
+    let again = closures.iter().map(|c| edge(c.from, c.to, &c.fit, true));
+    PoseGraph { poses: chained(pairs), edges: steps.chain(again).collect() }.settle()
+}
+
+/// Way driven up to each pose, metres.
+fn ways_m(poses: &[Isometry2<f64>]) -> Vec<f64> {
+    let mut way = 0.0;
+    let mut last = poses.first().map_or(Vector2::zeros(), |p| p.translation.vector);
+    let up_to = |pose: &Isometry2<f64>| {
+        way += (pose.translation.vector - last).norm();
+        last = pose.translation.vector;
+        way
+    };
+    poses.iter().map(up_to).collect()
+}
+
+fn reach_m(way_m: f64, options: &ClosureOptions) -> f64 {
+    (0.3 + options.drift * way_m).min(options.most_m)
+}
+
+/// The nearest earlier station that may show what this one shows.
+fn candidate(poses: &[Isometry2<f64>], ways: &[f64], to: usize, options: &ClosureOptions) -> Option<usize> {
+    let apart = |from: usize| (poses[from].translation.vector - poses[to].translation.vector).norm();
+    let near = (0..to)
+        .filter(|&from| ways[to] - ways[from] > options.apart_m)
+        .filter(|&from| apart(from) < reach_m(ways[to] - ways[from], options))
+        .filter(|&from| poses[from].rotation.angle_to(&poses[to].rotation).abs() < options.turn_rad);
+    near.min_by(|&a, &b| apart(a).total_cmp(&apart(b)))
+}
+
+/// The fit from the best of all starts within reach; `None` if it explains too little. Where starts along a line do as well, a bare corridor, the fit
+/// says nothing along that line; where starts all around do, there is none.
+fn searched(
+    before: &Stretch,
+    after: &Stretch,
+    start: &Isometry2<f64>,
+    reach_m: f64,
+    rectify: &RectifyOptions,
+    options: &ClosureOptions,
+) -> Option<PairFit> {
+    let scores = scores(before, after, start, reach_m, options)?;
+    let (score, best) = scores.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let near = RectifyOptions { way_sigma: (0.0, START.0), turn_sigma_rad: START.1, ..rectify.clone() };
+    let (seen, moved) = (before.shared(&best.inverse(), after), after.shared(&best, before));
+    let mut found = fit_cut(&seen, &moved, &best, &near);
+    if found.explained < options.explained {
+        return None;
+    }
+    // What was only a start is no measurement.
+    found.information -= Prior::of(&best, &near).information();
+    let rivals = scores.iter().filter(|(s, _)| *s > score - RIVAL.0);
+    let off = rivals.map(|(_, pose)| pose.translation.vector - best.translation.vector);
+    let spread = off.clone().fold(Matrix2::zeros(), |sum, d| sum + d * d.transpose());
+    let eigen = spread.symmetric_eigen();
+    let along = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    let (longest_m, widest_m) = off.fold((0.0_f64, 0.0_f64), |(long, wide), d| {
+        (long.max(d.dot(&along).abs()), wide.max(d.perp(&along).abs()))
+    });
+    if widest_m > RIVAL.1 {
+        return None;
+    }
+    if longest_m > RIVAL.1 {
+        let along = along.push(0.0);
+        let across = Matrix3::identity() - along * along.transpose();
+        found.information = across * found.information * across;
+    }
+    Some(found)
+}
+
+/// How well two stretches fit, what both could see of them, at all starts within reach.
+fn scores(
+    before: &Stretch,
+    after: &Stretch,
+    start: &Isometry2<f64>,
+    reach_m: f64,
+    options: &ClosureOptions,
+) -> Option<Vec<(f64, Isometry2<f64>)>> {
+    let mut field = Field::of(&before.spots, COARSE.0)?;
+    field.look(|place| before.sees(place));
+    let (shift, turn) =
+        ((reach_m / COARSE.1).ceil() as i32, (options.heading_drift_rad / COARSE.2).ceil() as i32);
+    let some: Vec<Spot> = after.spots.iter().step_by(after.spots.len() / SOME + 1).copied().collect();
+    let at_heading = |k: i32| {
+        let angle = start.rotation.angle() + f64::from(k) * COARSE.2;
+        let shifts = (-shift..=shift).flat_map(|i| (-shift..=shift).map(move |j| (i, j)));
+        let bys = shifts.map(|(i, j)| Vector2::new(f64::from(i), f64::from(j)) * COARSE.1);
+        let poses = bys
+            .filter(|by| by.norm() <= reach_m)
+            .map(|by| Isometry2::new(start.translation.vector + by, angle));
+        poses.filter_map(|pose| Some((field.mean_of_seen(&some, &pose)?, pose))).collect::<Vec<_>>()
+    };
+    Some((-turn..=turn).into_par_iter().flat_map_iter(at_heading).collect())
+}

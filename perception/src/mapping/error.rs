@@ -1,0 +1,54 @@
+//! What cannot be mapped.
+
+use nalgebra::Isometry2;
+
+/// Options or poses that cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MappingError {
+    /// An option that is no positive length, or none that can be.
+    #[error("{name} is {value}: give a number from {least} to {most}")]
+    Option {
+        /// Which.
+        name: &'static str,
+        /// What was given.
+        value: f64,
+        /// The least that can be.
+        least: f64,
+        /// The greatest that can be.
+        most: f64,
+    },
+    /// A pose that is no pose.
+    #[error(
+        "the pose of {what} {index} is not finite, or farther out than {FARTHEST_M} m: mend the localisation that it came from"
+    )]
+    Pose {
+        /// `station`.
+        what: &'static str,
+        /// Which.
+        index: usize,
+    },
+}
+
+/// Farthest that a station may be from the origin, metres.
+pub(super) const FARTHEST_M: f64 = 1e5;
+
+/// That numbers lie within bounds.
+pub(super) fn check(options: &[(&'static str, f64, f64, f64)]) -> Result<(), MappingError> {
+    for &(name, value, least, most) in options {
+        if !(value >= least && value <= most) {
+            return Err(MappingError::Option { name, value, least, most });
+        }
+    }
+    Ok(())
+}
+
+/// That a pose is one.
+pub(super) fn check_pose(
+    what: &'static str,
+    index: usize,
+    pose: &Isometry2<f64>,
+) -> Result<(), MappingError> {
+    let near = pose.translation.vector.iter().all(|c| c.abs() <= FARTHEST_M);
+    let turn = pose.rotation.complex().norm();
+    if near && (turn - 1.0).abs() < 1e-6 { Ok(()) } else { Err(MappingError::Pose { what, index }) }
+}

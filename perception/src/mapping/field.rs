@@ -1,0 +1,115 @@
+//! How likely each place of a plan is to hold a point, as a picture: the mixture of Gaussians around the spots of another plan.
+
+use super::station::Spot;
+use nalgebra::{Isometry2, Point2, Vector2};
+
+/// How far from its spot a point that belongs to it lies, in spreads: farther out it is an outlier.
+pub(super) const REACH: f64 = 3.0;
+/// Density of outliers against that of a spot of usual weight: that of a Gaussian at `REACH` spreads.
+pub(super) const OUTLIERS: f64 = 0.011;
+
+/// Logarithms of densities at the corners of squares.
+pub(super) struct Field {
+    low: Point2<f64>,
+    per_m: f64,
+    width: usize,
+    height: usize,
+    logs: Vec<f32>,
+    /// Which of them were looked at; empty if that was not asked.
+    seen: Vec<bool>,
+    /// Where there is no spot near.
+    nothing: f64,
+}
+
+impl Field {
+    /// The field around spots with a spread; `None` without spots.
+    pub fn of(spots: &[Spot], sigma_m: f64) -> Option<Field> {
+        let first = spots.first()?.at;
+        let (low, high) = spots.iter().fold((first, first), |(l, h), s| (l.inf(&s.at), h.sup(&s.at)));
+        let reach_m = REACH * sigma_m;
+        let per_m = 2.0 / sigma_m;
+        let low = low - Vector2::repeat(reach_m);
+        let cells = |from: f64, to: f64| ((to - from + reach_m) * per_m).ceil() as usize + 2;
+        let (width, height) = (cells(low.x, high.x), cells(low.y, high.y));
+        let usual = spots.iter().map(|s| s.weight).sum::<f64>() / spots.len() as f64;
+        let mut sums = vec![OUTLIERS as f32; width * height];
+        for spot in spots {
+            let middle = (spot.at - low) * per_m;
+            let span = |c: f64, count: usize| {
+                (c - REACH * 2.0).ceil().max(0.0) as usize..count.min((c + REACH * 2.0) as usize + 1)
+            };
+            for row in span(middle.y, height) {
+                for column in span(middle.x, width) {
+                    let off = (Vector2::new(column as f64, row as f64) - middle) / (per_m * sigma_m);
+                    sums[row * width + column] +=
+                        (spot.weight / usual * (-0.5 * off.norm_squared()).exp()) as f32;
+                }
+            }
+        }
+        sums.iter_mut().for_each(|s| *s = s.ln());
+        Some(Field { low, per_m, width, height, logs: sums, seen: Vec::new(), nothing: OUTLIERS.ln() })
+    }
+
+    /// The logarithm of the density at a place, between the corners around it.
+    fn at(&self, place: &Point2<f64>) -> f64 {
+        let (x, y) = ((place.x - self.low.x) * self.per_m, (place.y - self.low.y) * self.per_m);
+        if !(x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64) {
+            return self.nothing;
+        }
+        let (column, row) = (x as usize, y as usize);
+        let (u, v) = (x - column as f64, y - row as f64);
+        let at = row * self.width + column;
+        let [a, b, c, d] =
+            [at, at + 1, at + self.width, at + self.width + 1].map(|i| f64::from(self.logs[i]));
+        (a * (1.0 - u) + b * u) * (1.0 - v) + (c * (1.0 - u) + d * u) * v
+    }
+
+    /// Mean logarithm over spots put by a pose: how well they lie on the field's own.
+    pub fn mean(&self, spots: &[Spot], pose: &Isometry2<f64>) -> f64 {
+        let (sum, weight) = spots.iter().fold((0.0, 0.0), |(sum, weight), s| {
+            (sum + s.weight * self.at(&(pose * s.at)), weight + s.weight)
+        });
+        sum / weight.max(f64::MIN_POSITIVE)
+    }
+
+    /// Notes which places of the field were looked at: elsewhere nothing is known.
+    pub fn look(&mut self, is_seen: impl Fn(&Point2<f64>) -> bool) {
+        self.seen = (0..self.logs.len())
+            .map(|i| {
+                let corner = Vector2::new((i % self.width) as f64, (i / self.width) as f64);
+                is_seen(&(self.low + corner / self.per_m))
+            })
+            .collect();
+    }
+
+    /// The mean over the spots that lie where it was looked; `None` if they are fewer than half.
+    pub fn mean_of_seen(&self, spots: &[Spot], pose: &Isometry2<f64>) -> Option<f64> {
+        let (mut sum, mut weight, mut all) = (0.0, 0.0, 0.0);
+        for spot in spots {
+            all += spot.weight;
+            let corner = ((pose * spot.at - self.low) * self.per_m).map(f64::round);
+            let inside = corner.x >= 0.0
+                && corner.y >= 0.0
+                && corner.x < self.width as f64
+                && corner.y < self.height as f64;
+            if inside {
+                let at = corner.y as usize * self.width + corner.x as usize;
+                if self.seen[at] {
+                    sum += spot.weight * f64::from(self.logs[at]);
+                    weight += spot.weight;
+                }
+            }
+        }
+        (weight > 0.5 * all).then(|| sum / weight)
+    }
+
+    /// Share of the spots, put by a pose, that lie nearer than two spreads to one of the field's.
+    pub fn explained(&self, spots: &[Spot], pose: &Isometry2<f64>) -> f64 {
+        let limit = (OUTLIERS + (-2.0_f64).exp()).ln();
+        let (near, all) = spots.iter().fold((0.0, 0.0), |(near, all), s| {
+            let is_near = self.at(&(pose * s.at)) >= limit;
+            (near + if is_near { s.weight } else { 0.0 }, all + s.weight)
+        });
+        near / f64::max(all, f64::MIN_POSITIVE)
+    }
+}

@@ -1,0 +1,410 @@
+//! Where to go next to see more of a building: frontiers between open and unknown floor (Yamauchi 1997), and for poses around, what each is expected to
+//! show and what the way there costs.
+
+use super::station::FieldOfView;
+use crate::occupancy::{Occupancy, Space};
+use nalgebra::{Isometry2, Point2, Vector2};
+use rustc_hash::FxHashSet;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::f64::consts::{PI, TAU};
+
+/// How the next pose is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExploreOptions {
+    /// What the camera sees of the plan.
+    pub field: FieldOfView,
+    /// The body keeps so far from what is occupied, metres.
+    pub radius_m: f64,
+    /// Frontiers with fewer squares are left alone.
+    pub least_squares: usize,
+    /// Seconds a metre of the way takes, and a radian of the turn at its end, and a look.
+    pub seconds: (f64, f64, f64),
+    /// How likely an unknown square is occupied: what lies behind many of them is seldom seen.
+    pub occupied: f64,
+    /// How likely a square that a look should have shown, and that is still unknown, is shown by the next: bare walls never are.
+    pub again: f64,
+}
+
+impl Default for ExploreOptions {
+    fn default() -> Self {
+        ExploreOptions {
+            field: FieldOfView::default(),
+            radius_m: 0.3,
+            least_squares: 6,
+            seconds: (2.0, 1.0, 1.0),
+            occupied: 0.1,
+            again: 0.3,
+        }
+    }
+}
+
+/// Open squares in a row that border on unknown ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frontier {
+    /// Middles of its squares, metres.
+    pub squares: Vec<Point2<f64>>,
+    /// The square nearest to their middle.
+    pub middle: Point2<f64>,
+}
+
+/// A pose that may be next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NextPose {
+    /// Where, in the map.
+    pub pose: Isometry2<f64>,
+    /// Floor that is unknown now and expected to be seen, square metres.
+    pub gain_m2: f64,
+    /// Length of the way there, metres.
+    pub way_m: f64,
+    /// What going there and looking takes, seconds.
+    pub cost_s: f64,
+}
+
+impl NextPose {
+    /// What is expected to be seen for a second.
+    pub fn rate(&self) -> f64 {
+        self.gain_m2 / self.cost_s
+    }
+}
+
+/// Headings tried at a place.
+const HEADINGS: usize = 12;
+/// Most squares along a ray.
+const MOST_STEPS: usize = 2000;
+/// Rays all around a place.
+const RAYS: usize = 180;
+/// Places that are tried lie so far apart, metres.
+const PLACES_M: f64 = 0.6;
+/// Places are tried within this of a frontier, metres.
+const AROUND_M: f64 = 2.0;
+/// Least gain that makes a pose worth a look, square metres.
+const LEAST_M2: f64 = 0.2;
+/// Ways to neighbouring squares, and their lengths in squares.
+const STEPS: [(i64, i64, f64); 8] = {
+    const D: f64 = std::f64::consts::SQRT_2;
+    [(1, 0, 1.0), (-1, 0, 1.0), (0, 1, 1.0), (0, -1, 1.0), (1, 1, D), (1, -1, D), (-1, 1, D), (-1, -1, D)]
+};
+
+/// A grid, read by columns and rows.
+struct Floor<'a> {
+    grid: &'a Occupancy,
+    width: i64,
+    height: i64,
+    /// Squares beyond the grid on each side that a look may reach.
+    margin: i64,
+}
+
+impl<'a> Floor<'a> {
+    fn of(grid: &'a Occupancy, far_m: f64) -> Floor<'a> {
+        let width = grid.width.max(1);
+        let margin = ((far_m / grid.cell_m).ceil() as i64).clamp(0, MOST_STEPS as i64) + 1;
+        Floor { grid, width: width as i64, height: (grid.cells.len() / width) as i64, margin }
+    }
+
+    /// Number of a square of the grid or of the margin around it.
+    fn index_beyond(&self, (column, row): (i64, i64)) -> Option<usize> {
+        let (column, row) = (column + self.margin, row + self.margin);
+        let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
+        (column >= 0 && row >= 0 && column < width && row < height).then(|| (row * width + column) as usize)
+    }
+
+    fn space(&self, (column, row): (i64, i64)) -> Space {
+        let inside = column >= 0 && row >= 0 && column < self.width && row < self.height;
+        if inside { self.grid.cells[(row * self.width + column) as usize] } else { Space::Unknown }
+    }
+
+    fn index(&self, (column, row): (i64, i64)) -> usize {
+        (row * self.width + column) as usize
+    }
+
+    fn square(&self, place: &Point2<f64>) -> (i64, i64) {
+        // Far outside is far outside, and so is what is no place.
+        let at = ((place - self.grid.origin) / self.grid.cell_m).map(|c| c.clamp(-1e9, 1e9));
+        (at.x.floor() as i64, at.y.floor() as i64)
+    }
+
+    fn middle(&self, (column, row): (i64, i64)) -> Point2<f64> {
+        self.grid.origin + Vector2::new(column as f64 + 0.5, row as f64 + 0.5) * self.grid.cell_m
+    }
+
+    fn squares(&self) -> impl Iterator<Item = (i64, i64)> + use<> {
+        let width = self.width;
+        (0..self.height).flat_map(move |row| (0..width).map(move |column| (column, row)))
+    }
+
+    /// Squares on which the middle of the body may be: open, and nothing occupied near.
+    fn standable(&self, radius_m: f64) -> Vec<bool> {
+        let mut free: Vec<bool> = self.squares().map(|s| self.space(s) == Space::Free).collect();
+        let reach = (radius_m / self.grid.cell_m).ceil() as i64;
+        let limit = (radius_m / self.grid.cell_m).powi(2);
+        for (column, row) in self.squares().filter(|s| self.space(*s) == Space::Occupied) {
+            for (dx, dy) in (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| (x, y))) {
+                let other = (column + dx, row + dy);
+                let inside = other.0 >= 0 && other.1 >= 0 && other.0 < self.width && other.1 < self.height;
+                if inside && (dx * dx + dy * dy) as f64 <= limit {
+                    free[self.index(other)] = false;
+                }
+            }
+        }
+        free
+    }
+
+    /// Length of the shortest way to each square over squares where the body may be, metres; infinite where there is none.
+    fn ways_m(&self, from: &Point2<f64>, radius_m: f64) -> Vec<f64> {
+        let free = self.standable(radius_m);
+        let mut ways = vec![f64::INFINITY; free.len()];
+        // The body stands where it stands, however near to something.
+        let start = self.square(from);
+        let slack = (radius_m / self.grid.cell_m).ceil() as i64 + 1;
+        let near = |s: (i64, i64)| (s.0 - start.0).abs() <= slack && (s.1 - start.1).abs() <= slack;
+        if !(start.0 >= 0 && start.1 >= 0 && start.0 < self.width && start.1 < self.height) {
+            return ways;
+        }
+        let mut open = BinaryHeap::new();
+        ways[self.index(start)] = 0.0;
+        // Non-negative floats order as their bits do.
+        open.push(Reverse((0_u64, start)));
+        while let Some(Reverse((bits, square))) = open.pop() {
+            let way = f64::from_bits(bits);
+            if way > ways[self.index(square)] {
+                continue;
+            }
+            for (dx, dy, length) in STEPS {
+                let next = (square.0 + dx, square.1 + dy);
+                if self.space(next) != Space::Free {
+                    continue;
+                }
+                let index = self.index(next);
+                let there = way + length * self.grid.cell_m;
+                if (free[index] || near(next)) && there < ways[index] {
+                    ways[index] = there;
+                    open.push(Reverse((there.to_bits(), next)));
+                }
+            }
+        }
+        ways
+    }
+
+    /// Calls `found` with the range and the index of each unknown square along a ray, and how likely nothing is before it.
+    fn ray(
+        &self,
+        from: &Vector2<f64>,
+        angle_rad: f64,
+        options: &ExploreOptions,
+        mut found: impl FnMut(f64, usize, f64),
+    ) {
+        let along = Vector2::new(angle_rad.cos(), angle_rad.sin());
+        let (near_m, far_m) = (options.field.near_m, options.field.far_m);
+        let steps = (((far_m - near_m) / self.grid.cell_m).max(0.0) as usize).min(MOST_STEPS);
+        let mut likely = 1.0;
+        for k in 0..=steps {
+            let range_m = near_m + self.grid.cell_m * k as f64;
+            let square = self.square(&Point2::from(from + along * range_m));
+            match self.space(square) {
+                Space::Occupied => break,
+                Space::Free => {}
+                Space::Unknown => {
+                    let Some(index) = self.index_beyond(square) else { break };
+                    found(range_m, index, likely);
+                    likely *= 1.0 - options.occupied;
+                }
+            }
+        }
+    }
+
+    /// For each square how likely another look shows it, after those that should have.
+    fn missed(&self, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<f64> {
+        let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
+        let mut missed = vec![1.0; (width * height) as usize];
+        let mut last = vec![0; missed.len()];
+        for (number, pose) in (1..).zip(looked) {
+            let heading = pose.rotation.angle();
+            for ray in (0..RAYS).filter(|r| is_ahead(*r, heading, &options.field)) {
+                self.ray(&pose.translation.vector, bearing_rad(ray), options, |_, index, likely| {
+                    if std::mem::replace(&mut last[index], number) != number {
+                        missed[index] *= 1.0 - likely * (1.0 - options.again);
+                    }
+                });
+            }
+        }
+        missed
+    }
+
+    /// Unknown floor that each ray from a place is expected to show, square metres.
+    fn gains_m2(&self, place: &Point2<f64>, missed: &[f64], options: &ExploreOptions) -> Vec<f64> {
+        let width = TAU / RAYS as f64 * self.grid.cell_m;
+        let gain = |ray: usize| {
+            let mut sum = 0.0;
+            self.ray(&place.coords, bearing_rad(ray), options, |range_m, index, likely| {
+                sum += likely * missed[index] * range_m * width;
+            });
+            sum
+        };
+        (0..RAYS).map(gain).collect()
+    }
+}
+
+/// Direction of a ray in the map, radians.
+fn bearing_rad(ray: usize) -> f64 {
+    TAU * (ray as f64 + 0.5) / RAYS as f64
+}
+
+/// True if a camera with a heading sees along a ray.
+fn is_ahead(ray: usize, heading_rad: f64, field: &FieldOfView) -> bool {
+    let off = (bearing_rad(ray) - heading_rad + PI).rem_euclid(TAU) - PI;
+    off >= field.right_rad && off <= field.left_rad
+}
+
+/// Frontiers of a grid, the longest first.
+pub fn frontiers(grid: &Occupancy, options: &ExploreOptions) -> Vec<Frontier> {
+    let floor = Floor::of(grid, options.field.far_m);
+    let borders = |s: (i64, i64)| {
+        let around = STEPS[..4].iter().map(|(dx, dy, _)| (s.0 + dx, s.1 + dy));
+        floor.space(s) == Space::Free && around.into_iter().any(|o| floor.space(o) == Space::Unknown)
+    };
+    let mut left: FxHashSet<(i64, i64)> = floor.squares().filter(|s| borders(*s)).collect();
+    let mut found: Vec<Frontier> = Vec::new();
+    for first in floor.squares() {
+        if !left.remove(&first) {
+            continue;
+        }
+        let mut squares = vec![first];
+        let mut next = 0;
+        while next < squares.len() {
+            let (column, row) = squares[next];
+            next += 1;
+            squares
+                .extend(STEPS.iter().map(|(dx, dy, _)| (column + dx, row + dy)).filter(|s| left.remove(s)));
+        }
+        if squares.len() < options.least_squares {
+            continue;
+        }
+        let squares: Vec<Point2<f64>> = squares.into_iter().map(|s| floor.middle(s)).collect();
+        let mean = squares.iter().map(|s| s.coords).sum::<Vector2<f64>>() / squares.len() as f64;
+        let off = |s: &Point2<f64>| (s.coords - mean).norm_squared();
+        let nearest = squares.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)));
+        found.extend(nearest.map(|middle| Frontier { squares, middle }));
+    }
+    found.sort_by_key(|f| Reverse(f.squares.len()));
+    found
+}
+
+/// Poses from which more would be seen, those that are expected to show most for their cost first. None: all that can be reached is known.
+///
+/// `looked`: the poses looked from so far; the body stands at the last. What they should have shown and did not is expected less.
+pub fn next_poses(grid: &Occupancy, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<NextPose> {
+    let _span = tracing::debug_span!("next poses", squares = grid.cells.len()).entered();
+    let Some(from) = looked.last() else { return Vec::new() };
+    let floor = Floor::of(grid, options.field.far_m);
+    let start = Point2::from(from.translation.vector);
+    let ways = floor.ways_m(&start, options.radius_m);
+    let missed = floor.missed(looked, options);
+    let (metre_s, radian_s, look_s) = options.seconds;
+    let mut found: Vec<NextPose> = Vec::new();
+    for place in places(&floor, &ways, &start, options) {
+        let square = floor.square(&place);
+        let way_m = if place == start { 0.0 } else { ways[floor.index(square)] };
+        let gains = floor.gains_m2(&place, &missed, options);
+        for heading in (0..HEADINGS).map(|h| TAU * h as f64 / HEADINGS as f64) {
+            let pose = Isometry2::new(place.coords, heading);
+            let ahead = (0..RAYS).filter(|r| is_ahead(*r, heading, &options.field));
+            let gain_m2: f64 = ahead.map(|r| gains[r]).sum();
+            if gain_m2 >= LEAST_M2 {
+                let turn = from.rotation.angle_to(&pose.rotation).abs();
+                found.push(NextPose {
+                    pose,
+                    gain_m2,
+                    way_m,
+                    cost_s: metre_s * way_m + radian_s * turn + look_s,
+                });
+            }
+        }
+    }
+    found.sort_by(|a, b| b.rate().total_cmp(&a.rate()));
+    found
+}
+
+/// Where the body stands, and places around frontiers that it can reach.
+fn places(floor: &Floor, ways: &[f64], start: &Point2<f64>, options: &ExploreOptions) -> Vec<Point2<f64>> {
+    let stride = (PLACES_M / floor.grid.cell_m).ceil().max(1.0) as i64;
+    let around = (AROUND_M / floor.grid.cell_m).ceil() as i64;
+    let mut squares: FxHashSet<(i64, i64)> = FxHashSet::default();
+    for frontier in frontiers(floor.grid, options) {
+        for square in frontier.squares.iter().map(|p| floor.square(p)) {
+            let snap = |c: i64| c.div_euclid(stride) * stride;
+            let steps = || (-around..=around).step_by(stride as usize);
+            squares
+                .extend(steps().flat_map(|x| steps().map(move |y| (snap(square.0 + x), snap(square.1 + y)))));
+        }
+    }
+    let inside = |s: &(i64, i64)| s.0 >= 0 && s.1 >= 0 && s.0 < floor.width && s.1 < floor.height;
+    let mut squares: Vec<(i64, i64)> =
+        squares.into_iter().filter(|s| inside(s) && ways[floor.index(*s)].is_finite()).collect();
+    squares.sort_unstable();
+    std::iter::once(*start).chain(squares.into_iter().map(|s| floor.middle(s))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `#` occupied, `.` open, blank unknown; the first row is the lowest.
+    fn grid(rows: &[&str]) -> Occupancy {
+        let cells = rows.iter().flat_map(|row| {
+            row.chars().map(|c| match c {
+                '#' => Space::Occupied,
+                '.' => Space::Free,
+                _ => Space::Unknown,
+            })
+        });
+        Occupancy { origin: Point2::origin(), cell_m: 0.5, width: rows[0].len(), cells: cells.collect() }
+    }
+
+    fn options() -> ExploreOptions {
+        ExploreOptions { radius_m: 0.2, least_squares: 2, ..ExploreOptions::default() }
+    }
+
+    #[test]
+    fn the_open_end_is_the_frontier_and_the_next_pose_looks_there() {
+        let open = grid(&[
+            "############    ",
+            "#..........     ",
+            "#..........     ",
+            "#..........     ",
+            "############    ",
+        ]);
+        let found = frontiers(&open, &options());
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!((found[0].middle - Point2::new(5.25, 1.25)).norm() < 0.1);
+        let next = next_poses(&open, &[Isometry2::new(Vector2::new(0.75, 1.25), 3.0)], &options());
+        let first = &next[0];
+        assert!(first.pose.rotation.angle().abs() < 0.6 && first.gain_m2 > 1.0, "{first:?}");
+        assert!(next.iter().all(|n| n.cost_s > 0.0 && n.way_m.is_finite()));
+    }
+
+    #[test]
+    fn a_closed_room_has_none_and_what_cannot_be_reached_is_no_pose() {
+        let closed = grid(&["######", "#....#", "#....#", "######"]);
+        let from = Isometry2::new(Vector2::new(1.25, 0.75), 0.0);
+        assert!(
+            frontiers(&closed, &options()).is_empty() && next_poses(&closed, &[from], &options()).is_empty()
+        );
+        let walled = grid(&["#######.... ", "#....##.... ", "#....##.... ", "#######.... "]);
+        assert!(!frontiers(&walled, &options()).is_empty());
+        let next = next_poses(&walled, &[from], &options());
+        assert!(next.iter().all(|n| n.pose.translation.x < 3.0), "{next:?}");
+        // Outside of the grid nothing is known: there is nowhere to go.
+        let outside = Isometry2::new(Vector2::new(-5.0, 0.0), 0.0);
+        assert!(next_poses(&closed, &[outside], &options()).iter().all(|n| n.way_m == 0.0));
+        assert!(next_poses(&closed, &[], &options()).is_empty());
+    }
+
+    #[test]
+    fn what_looks_did_not_show_is_expected_less() {
+        let open = grid(&["########    ", "#.......    ", "#.......    ", "########    "]);
+        let from = Isometry2::new(Vector2::new(2.75, 1.0), 0.0);
+        let best = |looks: usize| next_poses(&open, &vec![from; looks], &options())[0].gain_m2;
+        assert!(best(2) < 0.6 * best(1), "{} {}", best(2), best(1));
+    }
+}

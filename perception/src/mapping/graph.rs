@@ -1,0 +1,377 @@
+//! All poses of a drive together: what each pair of stations says of the way between them, in one least-squares problem (Lu and Milios 1997), by
+//! Gauss's and Newton's method on a matrix whose rows are kept from their first entry on.
+
+use nalgebra::{Isometry2, Matrix2x3, Matrix3, UnitComplex, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// What is known of how two stations lie to each other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Edge {
+    /// Number of a station.
+    pub from: usize,
+    /// Number of the other.
+    pub to: usize,
+    /// Where the other is in its frame.
+    pub from_from_to: Isometry2<f64>,
+    /// Inverse covariance of that pose: shift in the frame of `from` (metres), and turn (radians).
+    pub information: Matrix3<f64>,
+    /// True if it may be wrong altogether: a place taken for another. It then loses weight the less it fits (Cauchy).
+    pub doubtful: bool,
+}
+
+/// Stations and what is known between them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseGraph {
+    /// Poses to start from; the first stays where it is.
+    pub poses: Vec<Isometry2<f64>>,
+    /// What is known.
+    pub edges: Vec<Edge>,
+}
+
+/// Where the poses came to rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settled {
+    /// The poses.
+    pub poses: Vec<Isometry2<f64>>,
+    /// Squared error of each edge, in spreads: about three if spreads are right.
+    pub squares: Vec<f64>,
+    /// Weight of each edge, from 0 (taken for wrong) to 1.
+    pub weights: Vec<f64>,
+    /// Steps taken.
+    pub rounds: usize,
+    /// False if the last step still moved poses.
+    pub converged: bool,
+}
+
+/// A graph that cannot be solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GraphError {
+    /// An edge names a station that is not there, or itself.
+    #[error(
+        "edge {edge} goes from station {from} to {to}, of {stations}: name two different stations, counted from 0"
+    )]
+    Station {
+        /// Which edge.
+        edge: usize,
+        /// Its first end.
+        from: usize,
+        /// Its second end.
+        to: usize,
+        /// How many stations there are.
+        stations: usize,
+    },
+    /// Poses or edges hold numbers that are no numbers.
+    #[error("{what} {index} is not finite: mend the fit that it came from")]
+    NotFinite {
+        /// `pose` or `edge`.
+        what: &'static str,
+        /// Which.
+        index: usize,
+    },
+    /// Some station hangs on nothing.
+    #[error("station {station} is held by no edge: give each the step from the one before it")]
+    Loose {
+        /// Which.
+        station: usize,
+    },
+}
+
+const MOST_ROUNDS: usize = 60;
+/// A step that moves no pose farther than this, metres and radians, is the last.
+const SETTLED: f64 = 1e-4;
+/// Errors of doubtful edges beyond so many spreads lose weight, from round to round fewer: at first all are believed, for a long way drifts far.
+const DOUBT: (f64, f64, f64) = (1e4, 0.5, 3.0);
+
+impl PoseGraph {
+    /// Moves the poses until the edges agree as well as they can.
+    ///
+    /// # Errors
+    /// If an edge names no station, a number is not finite, or a station is held by nothing.
+    pub fn settle(&self) -> Result<Settled, GraphError> {
+        let _span =
+            tracing::debug_span!("pose graph", poses = self.poses.len(), edges = self.edges.len()).entered();
+        self.check()?;
+        let mut poses = self.poses.clone();
+        let mut doubt = DOUBT.0;
+        let mut settled = Settled {
+            poses: Vec::new(),
+            squares: Vec::new(),
+            weights: Vec::new(),
+            rounds: 0,
+            converged: false,
+        };
+        while settled.rounds < MOST_ROUNDS {
+            settled.rounds += 1;
+            let (squares, weights) = self.weighed(&poses, doubt);
+            let moved = self.step(&mut poses, &weights)?;
+            (settled.squares, settled.weights) = (squares, weights);
+            if doubt <= DOUBT.2 && moved < SETTLED {
+                settled.converged = true;
+                break;
+            }
+            doubt = (doubt * DOUBT.1).max(DOUBT.2);
+        }
+        (settled.squares, settled.weights) = self.weighed(&poses, DOUBT.2);
+        settled.poses = poses;
+        Ok(settled)
+    }
+
+    fn check(&self) -> Result<(), GraphError> {
+        let stations = self.poses.len();
+        let is_finite = |pose: &Isometry2<f64>| {
+            let turn = pose.rotation.complex();
+            pose.translation.vector.iter().all(|c| c.is_finite()) && (turn.norm() - 1.0).abs() < 1e-6
+        };
+        if let Some(index) = self.poses.iter().position(|p| !is_finite(p)) {
+            return Err(GraphError::NotFinite { what: "pose", index });
+        }
+        for (edge, e) in self.edges.iter().enumerate() {
+            if e.from >= stations || e.to >= stations || e.from == e.to {
+                return Err(GraphError::Station { edge, from: e.from, to: e.to, stations });
+            }
+            if !is_finite(&e.from_from_to) || !e.information.iter().all(|v| v.is_finite()) {
+                return Err(GraphError::NotFinite { what: "edge", index: edge });
+            }
+        }
+        Ok(())
+    }
+
+    /// Squared errors and weights of the edges.
+    fn weighed(&self, poses: &[Isometry2<f64>], doubt: f64) -> (Vec<f64>, Vec<f64>) {
+        let weigh = |edge: &Edge| {
+            let error = edge.error(poses);
+            let square = error.dot(&(edge.information * error));
+            (square, if edge.doubtful { 1.0 / (1.0 + square / (doubt * doubt)) } else { 1.0 })
+        };
+        self.edges.iter().map(weigh).unzip()
+    }
+
+    /// One step of Gauss and Newton; how far it moved.
+    fn step(&self, poses: &mut [Isometry2<f64>], weights: &[f64]) -> Result<f64, GraphError> {
+        let mut normal = Envelope::of(poses.len(), &self.edges);
+        let mut right = vec![0.0; 3 * poses.len()];
+        for (edge, weight) in self.edges.iter().zip(weights) {
+            let error = edge.error(poses);
+            let information = edge.information * *weight;
+            let slopes = edge.slopes(poses);
+            for (a, slope) in &slopes {
+                let pull = slope.transpose() * information * error;
+                (0..3).for_each(|k| right[3 * a + k] -= pull[k]);
+                for (b, other) in &slopes {
+                    normal.add(3 * a, 3 * b, &(slope.transpose() * information * other));
+                }
+            }
+        }
+        // The first station stays.
+        (0..3).for_each(|k| normal.hold(k));
+        normal.solve(&mut right).map_err(|row| GraphError::Loose { station: row / 3 })?;
+        let mut moved = 0.0_f64;
+        for (pose, by) in poses.iter_mut().zip(right.chunks_exact(3)) {
+            pose.translation.vector += Vector2::new(by[0], by[1]);
+            pose.rotation = UnitComplex::new(pose.rotation.angle() + by[2]);
+            moved = by.iter().fold(moved, |m, v| m.max(v.abs()));
+        }
+        Ok(moved)
+    }
+}
+
+impl Edge {
+    /// Shift and turn by which the poses are off from what the edge says.
+    fn error(&self, poses: &[Isometry2<f64>]) -> Vector3<f64> {
+        let (from, to) = (&poses[self.from], &poses[self.to]);
+        let seen = from.inv_mul(to);
+        let shift = seen.translation.vector - self.from_from_to.translation.vector;
+        shift.push(self.from_from_to.rotation.angle_to(&seen.rotation))
+    }
+
+    /// How the error grows with the poses of both ends.
+    fn slopes(&self, poses: &[Isometry2<f64>]) -> [(usize, Matrix3<f64>); 2] {
+        let (from, to) = (&poses[self.from], &poses[self.to]);
+        let back = from.rotation.inverse().to_rotation_matrix().into_inner();
+        let seen = back * (to.translation.vector - from.translation.vector);
+        let with = |sign: f64, turn: Vector2<f64>| {
+            let mut slope = Matrix3::zeros();
+            slope.fixed_view_mut::<2, 3>(0, 0).copy_from(&Matrix2x3::from_columns(&[
+                back.column(0) * sign,
+                back.column(1) * sign,
+                turn.column(0).into_owned(),
+            ]));
+            slope[(2, 2)] = sign;
+            slope
+        };
+        [(self.from, with(-1.0, Vector2::new(seen.y, -seen.x))), (self.to, with(1.0, Vector2::zeros()))]
+    }
+}
+
+/// A symmetric matrix, each row from its first entry to the diagonal: what Cholesky's method fills lies there too.
+struct Envelope {
+    first: Vec<usize>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Envelope {
+    fn of(poses: usize, edges: &[Edge]) -> Envelope {
+        let mut first: Vec<usize> = (0..poses).collect();
+        for edge in edges {
+            let (low, high) = (edge.from.min(edge.to), edge.from.max(edge.to));
+            first[high] = first[high].min(low);
+        }
+        let first: Vec<usize> = first.iter().flat_map(|f| [3 * f; 3]).collect();
+        let rows = first.iter().enumerate().map(|(row, from)| vec![0.0; row + 1 - from]).collect();
+        Envelope { first, rows }
+    }
+
+    /// Adds the part of a block that lies in the lower half.
+    fn add(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
+        for i in 0..3 {
+            for j in 0..3 {
+                let (r, c) = (row + i, column + j);
+                if c <= r {
+                    self.rows[r][c - self.first[r]] += block[(i, j)];
+                }
+            }
+        }
+    }
+
+    /// Makes an unknown next to nothing.
+    fn hold(&mut self, row: usize) {
+        let at = row - self.first[row];
+        self.rows[row][at] += 1e12;
+    }
+
+    /// Replaces the right side by the solution; the row that nothing holds, if there is one.
+    fn solve(&mut self, right: &mut [f64]) -> Result<(), usize> {
+        for row in 0..self.rows.len() {
+            let (above, rest) = self.rows.split_at_mut(row);
+            let own = &mut rest[0];
+            let first = self.first[row];
+            for column in first..row {
+                let other = &above[column];
+                let from = first.max(self.first[column]);
+                let a = &own[from - first..column - first];
+                let b = &other[from - self.first[column]..column - self.first[column]];
+                let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+                own[column - first] = (own[column - first] - dot) / other[column - self.first[column]];
+            }
+            let (diagonal, before) = own.split_last_mut().ok_or(row)?;
+            let left = *diagonal - before.iter().map(|v| v * v).sum::<f64>();
+            if left.is_nan() || left <= 1e-9 {
+                return Err(row);
+            }
+            *diagonal = left.sqrt();
+        }
+        for row in 0..self.rows.len() {
+            let (own, first) = (&self.rows[row], self.first[row]);
+            let dot: f64 = own.iter().zip(&right[first..row]).map(|(a, b)| a * b).sum();
+            right[row] = (right[row] - dot) / own[row - first];
+        }
+        for row in (0..self.rows.len()).rev() {
+            let (own, first) = (&self.rows[row], self.first[row]);
+            right[row] /= own[row - first];
+            let value = right[row];
+            right[first..row].iter_mut().zip(own).for_each(|(r, a)| *r -= a * value);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square_loop(wrong: bool) -> (PoseGraph, Vec<Isometry2<f64>>) {
+        let step = Isometry2::new(Vector2::new(1.0, 0.0), 0.1);
+        let truth: Vec<_> = (0..63)
+            .scan(Isometry2::identity(), |p, _| {
+                let at = *p;
+                *p *= step;
+                Some(at)
+            })
+            .collect();
+        let off = Isometry2::new(Vector2::new(1.02, 0.01), 0.104);
+        let spread = |way: f64, turn: f64| {
+            Matrix3::from_diagonal(&Vector3::new(way.powi(-2), way.powi(-2), turn.powi(-2)))
+        };
+        let mut edges: Vec<Edge> = (1..63)
+            .map(|to| Edge {
+                from: to - 1,
+                to,
+                from_from_to: off,
+                information: spread(0.03, 0.01),
+                doubtful: false,
+            })
+            .collect();
+        for (from, to) in [(0, 60), (1, 61), (2, 62)] {
+            let from_from_to = truth[from].inv_mul(&truth[to]);
+            edges.push(Edge { from, to, from_from_to, information: spread(0.02, 0.005), doubtful: true });
+        }
+        if wrong {
+            let from_from_to = Isometry2::new(Vector2::new(0.4, 0.2), 0.3);
+            edges.push(Edge {
+                from: 10,
+                to: 40,
+                from_from_to,
+                information: spread(0.02, 0.005),
+                doubtful: true,
+            });
+        }
+        let poses = (0..63)
+            .scan(Isometry2::identity(), |p, _| {
+                let at = *p;
+                *p *= off;
+                Some(at)
+            })
+            .collect();
+        (PoseGraph { poses, edges }, truth)
+    }
+
+    #[test]
+    fn a_closed_loop_comes_right_though_one_closure_is_wrong() {
+        for wrong in [false, true] {
+            let (graph, truth) = square_loop(wrong);
+            let settled = graph.settle().unwrap();
+            assert!(settled.converged, "{settled:?}");
+            let off = |poses: &[Isometry2<f64>]| {
+                let apart = poses
+                    .iter()
+                    .zip(&truth)
+                    .map(|(a, b)| (a.translation.vector - b.translation.vector).norm());
+                apart.fold(0.0, f64::max)
+            };
+            assert!(
+                off(&graph.poses) > 0.8 && off(&settled.poses) < 0.5,
+                "{} {}",
+                off(&graph.poses),
+                off(&settled.poses)
+            );
+            if wrong {
+                assert!(
+                    settled.weights[65] < 0.05 && settled.weights[62] > 0.5,
+                    "{:?}",
+                    &settled.weights[62..]
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_bad_graph_is_told() {
+        let (good, _) = square_loop(false);
+        let with =
+            |edge: Edge| PoseGraph { poses: good.poses.clone(), edges: vec![edge] }.settle().unwrap_err();
+        let edge = good.edges[0].clone();
+        assert_eq!(
+            with(Edge { to: 63, ..edge.clone() }),
+            GraphError::Station { edge: 0, from: 0, to: 63, stations: 63 }
+        );
+        assert_eq!(
+            with(Edge { to: 0, ..edge.clone() }),
+            GraphError::Station { edge: 0, from: 0, to: 0, stations: 63 }
+        );
+        assert_eq!(
+            with(Edge { information: Matrix3::repeat(f64::NAN), ..edge.clone() }),
+            GraphError::NotFinite { what: "edge", index: 0 }
+        );
+        assert_eq!(with(edge), GraphError::Loose { station: 2 });
+    }
+}

@@ -1,0 +1,145 @@
+//! The orientations of walls: k-means of the directions of upright normals (section 4.2), as many as the histogram has peaks.
+
+use nalgebra::Vector2;
+use std::f64::consts::{PI, TAU};
+
+/// How orientations are found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OrientationOptions {
+    /// How many there are (the paper: two); `None`: as many as stand out.
+    pub count: Option<usize>,
+    /// What is turned farther from every orientation has none, radians.
+    pub within_rad: f64,
+    /// An orientation holds at least this share of all.
+    pub least_share: f64,
+}
+
+impl Default for OrientationOptions {
+    fn default() -> Self {
+        OrientationOptions { count: None, within_rad: 0.3, least_share: 0.04 }
+    }
+}
+
+/// Orientations, and what has which.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Orientations {
+    /// Direction of the normal, modulo half a turn, radians from 0 to π.
+    pub centres_rad: Vec<f64>,
+    /// For each direction given the number of its orientation, if it has one.
+    pub of: Vec<Option<u32>>,
+}
+
+/// Bins of the histogram over half a turn.
+const BINS: usize = 90;
+/// Spread by which the histogram is smoothed, bins.
+const SMOOTH: f64 = 2.0;
+/// A peak stands out if it is so many times as high as the median of the histogram: a round room has none.
+const STANDS_OUT: f64 = 1.7;
+const MOST: usize = 8;
+const ROUNDS: usize = 30;
+
+/// Groups directions of normals in the plane (radians); opposite ones are the same.
+pub fn orientations(directions_rad: &[f64], options: &OrientationOptions) -> Orientations {
+    let mut starts = peaks(directions_rad, options);
+    starts.truncate(options.count.unwrap_or(MOST).min(MOST));
+    let vectors: Vec<Vector2<f64>> = directions_rad.iter().map(|d| doubled(*d)).collect();
+    let mut centres: Vec<Vector2<f64>> = starts.into_iter().map(doubled).collect();
+    let within = (2.0 * options.within_rad).cos();
+    let nearest = |centres: &[Vector2<f64>], v: &Vector2<f64>| {
+        let best = (0..centres.len()).max_by(|&a, &b| centres[a].dot(v).total_cmp(&centres[b].dot(v)));
+        best.filter(|&c| centres[c].dot(v) >= within).map(|c| c as u32)
+    };
+    let mut of = vec![None; vectors.len()];
+    for _ in 0..ROUNDS {
+        let found: Vec<Option<u32>> = vectors.iter().map(|v| nearest(&centres, v)).collect();
+        let same = found == of;
+        of = found;
+        if same {
+            break;
+        }
+        let mut sums = vec![Vector2::zeros(); centres.len()];
+        of.iter().zip(&vectors).for_each(|(c, v)| {
+            if let Some(c) = c {
+                sums[*c as usize] += v;
+            }
+        });
+        for (centre, sum) in centres.iter_mut().zip(sums) {
+            *centre = sum.try_normalize(1e-9).unwrap_or(*centre);
+        }
+    }
+    let centres_rad = centres.iter().map(|c| (0.5 * c.y.atan2(c.x)).rem_euclid(PI)).collect();
+    Orientations { centres_rad, of }
+}
+
+/// A direction modulo half a turn as a direction modulo a whole one.
+fn doubled(direction_rad: f64) -> Vector2<f64> {
+    let (sin, cos) = (2.0 * direction_rad).sin_cos();
+    Vector2::new(cos, sin)
+}
+
+/// Directions at the peaks of the smoothed histogram, the highest first.
+fn peaks(directions_rad: &[f64], options: &OrientationOptions) -> Vec<f64> {
+    let mut histogram = [0.0; BINS];
+    for direction in directions_rad.iter().filter(|d| d.is_finite()) {
+        histogram[((direction.rem_euclid(PI) / PI * BINS as f64) as usize).min(BINS - 1)] += 1.0;
+    }
+    let all: f64 = histogram.iter().sum();
+    let reach = (3.0 * SMOOTH) as i64;
+    let around = |bin: usize, by: i64| (bin as i64 + by).rem_euclid(BINS as i64) as usize;
+    let smooth: Vec<f64> = (0..BINS)
+        .map(|bin| {
+            let weight = |by: i64| (-0.5 * (by as f64 / SMOOTH).powi(2)).exp() / (SMOOTH * TAU.sqrt());
+            (-reach..=reach).map(|by| weight(by) * histogram[around(bin, by)]).sum()
+        })
+        .collect();
+    let half = (options.within_rad / PI * BINS as f64) as i64;
+    let share = |bin: usize| (-half..=half).map(|by| histogram[around(bin, by)]).sum::<f64>() / all;
+    let mut sorted = smooth.clone();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted[BINS / 2];
+    let is_peak = |bin: &usize| {
+        let height = smooth[*bin];
+        let highest = (-half..=half).all(|by| {
+            let other = smooth[around(*bin, by)];
+            other < height || (other == height && by >= 0)
+        });
+        highest && height > STANDS_OUT * median && share(*bin) >= options.least_share
+    };
+    let mut found: Vec<usize> = (0..BINS).filter(is_peak).collect();
+    found.sort_by(|&a, &b| smooth[b].total_cmp(&smooth[a]));
+    found.into_iter().map(|bin| (bin as f64 + 0.5) / BINS as f64 * PI).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Directions, how many of each, and the orientations that come out, degrees.
+    fn check(given: &[(f64, usize)], expected_deg: &[f64]) {
+        let wobble = |i: usize| 4.0 * (i as f64 * 2.399_963).sin();
+        let directions: Vec<f64> = given
+            .iter()
+            .flat_map(|&(deg, count)| {
+                (0..count).map(move |i| (deg + wobble(i) + if i % 2 == 0 { 180.0 } else { 0.0 }).to_radians())
+            })
+            .collect();
+        let found = orientations(&directions, &OrientationOptions::default());
+        let mut deg: Vec<f64> = found.centres_rad.iter().map(|c| c.to_degrees()).collect();
+        deg.sort_by(f64::total_cmp);
+        assert_eq!(deg.len(), expected_deg.len(), "{deg:?}");
+        assert!(
+            deg.iter().zip(expected_deg).all(|(a, b)| (a - b).abs() < 1.5),
+            "{deg:?} for {expected_deg:?}"
+        );
+    }
+
+    #[test]
+    fn as_many_as_there_are() {
+        check(&[(10.0, 400), (100.0, 300)], &[10.0, 100.0]);
+        check(&[(30.0, 400)], &[30.0]);
+        check(&[(10.0, 400), (100.0, 300), (55.0, 90)], &[10.0, 55.0, 100.0]);
+        let all_round: Vec<(f64, usize)> = (0..90).map(|i| (2.0 * f64::from(i), 10)).collect();
+        check(&all_round, &[]);
+        check(&[], &[]);
+    }
+}

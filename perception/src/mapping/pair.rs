@@ -1,0 +1,484 @@
+//! How two stops in a row lie to each other (section 3).
+//!
+//! Both plans are cut to what both fields of view see and share one centroid, about which the rotation is found by ICP-EM: every spot of one plan is
+//! expected to be each of the other's with a probability (Eq. 3), computed anew after each turn. The translation is where, around odometry, the
+//! error is least. Spots that fit none are outliers, as likely as one three spreads off, and odometry counts as a measurement, so that a bare corridor,
+//! along which nothing is seen to move, leaves the way to it.
+//!
+//! A wrong heading moves what is seen ahead sideways, about the camera and not about a centroid. [`Matcher::IcpEm`] therefore looks for the best
+//! heading first and then finds rotation and translation together for the same expectations.
+
+use super::error::{MappingError, check, check_pose};
+use super::field::{Field, OUTLIERS, REACH};
+use super::station::{FieldOfView, Spot, Station, shared};
+use crate::register::{self, Method, Prepared, RegisterOptions};
+use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, Point3, Rotation2, UnitComplex, Vector2, Vector3};
+use rayon::prelude::*;
+use std::ops::RangeInclusive;
+
+/// How two plans are matched.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Matcher {
+    /// Odometry as it is.
+    Odometry,
+    /// Iterative closest point (Besl and McKay 1992) on all that was seen within the band of heights: the paper's peer.
+    Icp,
+    /// The same, on what both fields of view see.
+    IcpShared,
+    /// The paper's: expectations over all correspondences, the rotation about one centroid, then the translation around odometry.
+    IcpEmSplit,
+    /// The same expectations, rotation and translation together, from the best heading.
+    #[default]
+    IcpEm,
+}
+
+/// How a drive is rectified.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RectifyOptions {
+    /// What matches.
+    pub matcher: Matcher,
+    /// Heights between floor and ceiling that are kept, metres.
+    pub band_m: RangeInclusive<f64>,
+    /// The camera's field of view.
+    pub field: FieldOfView,
+    /// Squares of the plan that are one point, metres.
+    pub thin_m: f64,
+    /// Spread of points around where they belong, at the first and the last of the expectations, metres.
+    pub sigma_m: (f64, f64),
+    /// Spread of odometry's way: a part of the step, and metres besides.
+    pub way_sigma: (f64, f64),
+    /// Spread of odometry's turn a step, radians.
+    pub turn_sigma_rad: f64,
+    /// Least share of the second plan that must lie on the first where [`Matcher::IcpEm`] is to be believed: else odometry is.
+    pub explained: f64,
+    /// As many independent points a plan is worth: neighbours err together.
+    pub looks: f64,
+}
+
+impl Default for RectifyOptions {
+    fn default() -> Self {
+        RectifyOptions {
+            matcher: Matcher::IcpEm,
+            band_m: 0.2..=2.2,
+            field: FieldOfView::default(),
+            thin_m: 0.05,
+            sigma_m: (0.25, 0.05),
+            way_sigma: (0.05, 0.01),
+            turn_sigma_rad: 0.035,
+            explained: 0.5,
+            looks: 100.0,
+        }
+    }
+}
+
+impl RectifyOptions {
+    /// That all can be used.
+    ///
+    /// # Errors
+    /// Names the first that cannot.
+    pub fn check(&self) -> Result<(), MappingError> {
+        check(&[
+            ("the nearest depth of the field of view (m)", self.field.near_m, 0.0, 1e3),
+            ("the farthest depth of the field of view (m)", self.field.far_m, 1e-3, 1e3),
+            ("thin_m", self.thin_m, 1e-3, 10.0),
+            ("the first of sigma_m", self.sigma_m.0, 1e-3, 10.0),
+            ("the second of sigma_m", self.sigma_m.1, 1e-2, 10.0),
+            ("the first of way_sigma", self.way_sigma.0, 0.0, 10.0),
+            ("the second of way_sigma (m)", self.way_sigma.1, 1e-6, 1e3),
+            ("turn_sigma_rad", self.turn_sigma_rad, 1e-6, 10.0),
+            ("looks", self.looks, 1e-3, 1e9),
+        ])
+    }
+}
+
+/// Where the second of two stations is in the frame of the first, and how far to trust it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PairFit {
+    /// The pose found.
+    pub before_from_after: Isometry2<f64>,
+    /// Share of the second plan that lies on the first, of what both fields of view see.
+    pub explained: f64,
+    /// Spots of the two plans that both fields of view see.
+    pub shared: (usize, usize),
+    /// Inverse covariance of the pose, by shift (metres, in the frame of the first) and turn (radians) about the second's origin.
+    pub information: Matrix3<f64>,
+}
+
+/// Fewest spots of a plan with which the camera has a say beside odometry.
+const FEWEST: usize = 12;
+/// Expectations at each spread.
+const EXPECTATIONS: usize = 3;
+/// Translation and both together are found so many times in turns at the end.
+const ROUNDS: usize = 2;
+/// Headings are looked for in such steps, radians, in a field of this spread, metres.
+const HEADING_STEP_RAD: f64 = 0.01;
+const HEADING_SIGMA_M: f64 = 0.12;
+/// From one spread to the next.
+const COOLING: f64 = 0.7;
+/// Steps in which the translation is looked for: coarse, and fine, metres.
+const STEPS_M: [f64; 2] = [0.03, 0.006];
+/// The translation is looked for within so many spreads of odometry.
+const WINDOW: f64 = 3.0;
+/// A fit farther from odometry, in spreads, is not believed.
+const STRAYED: f64 = 4.0;
+/// Steps by which the curvature at the pose found is measured: metres, radians.
+const PROBE: (f64, f64) = (0.03, 0.015);
+
+/// Rectifies the step between two stations in a row.
+///
+/// # Errors
+/// If an option or a pose of odometry cannot be used.
+pub fn rectify_pair(
+    before: &Station,
+    after: &Station,
+    options: &RectifyOptions,
+) -> Result<PairFit, MappingError> {
+    options.check()?;
+    check_pose("station", 0, &before.odom_from_level)?;
+    check_pose("station", 1, &after.odom_from_level)?;
+    Ok(step(before, after, options))
+}
+
+/// Rectifies each step of a drive: one fit fewer than stations.
+///
+/// # Errors
+/// If an option or a pose of odometry cannot be used.
+pub fn rectify_drive(stations: &[Station], options: &RectifyOptions) -> Result<Vec<PairFit>, MappingError> {
+    let _span = tracing::debug_span!("rectify", stations = stations.len()).entered();
+    options.check()?;
+    stations.iter().enumerate().try_for_each(|(i, s)| check_pose("station", i, &s.odom_from_level))?;
+    Ok(stations.par_windows(2).map(|pair| step(&pair[0], &pair[1], options)).collect())
+}
+
+fn step(before: &Station, after: &Station, options: &RectifyOptions) -> PairFit {
+    let plan = |s: &Station| s.plan(&options.band_m, &options.field, options.thin_m);
+    let odometry = before.odom_from_level.inv_mul(&after.odom_from_level);
+    fit(&plan(before), &plan(after), &odometry, options)
+}
+
+/// Poses of the stations in the frame of the first, one step after the other.
+pub fn chained(pairs: &[PairFit]) -> Vec<Isometry2<f64>> {
+    let mut poses = vec![Isometry2::identity()];
+    for pair in pairs {
+        let mut next = poses[poses.len() - 1] * pair.before_from_after;
+        next.rotation.renormalize();
+        poses.push(next);
+    }
+    poses
+}
+
+/// Fits the plan of one station onto that of another, from where odometry has it.
+fn fit(before: &[Spot], after: &[Spot], odometry: &Isometry2<f64>, options: &RectifyOptions) -> PairFit {
+    let seen = shared(before, &odometry.inverse(), &options.field);
+    let moved = shared(after, odometry, &options.field);
+    if options.matcher == Matcher::Icp {
+        fit_cut(before, after, odometry, options)
+    } else {
+        fit_cut(&seen, &moved, odometry, options)
+    }
+}
+
+/// The same for plans that are cut to what both show.
+pub(super) fn fit_cut(
+    seen: &[Spot],
+    moved: &[Spot],
+    odometry: &Isometry2<f64>,
+    options: &RectifyOptions,
+) -> PairFit {
+    let shared = (seen.len(), moved.len());
+    let prior = Prior::of(odometry, options);
+    let field = Field::of(seen, options.sigma_m.1);
+    let (Some(field), true) = (field, shared.0 >= FEWEST && shared.1 >= FEWEST) else {
+        return PairFit {
+            before_from_after: *odometry,
+            explained: 0.0,
+            shared,
+            information: prior.information(),
+        };
+    };
+    let problem = Problem::of(seen, moved, &field, &prior, options);
+    let pose = match options.matcher {
+        Matcher::Odometry => *odometry,
+        Matcher::Icp | Matcher::IcpShared => icp(seen, moved, odometry, options),
+        Matcher::IcpEmSplit => problem.split(),
+        Matcher::IcpEm => problem.joint(),
+    };
+    let explained = field.explained(moved, &pose);
+    let kept = explained >= options.explained && prior.cost(&pose) < 0.5 * STRAYED * STRAYED;
+    if options.matcher == Matcher::IcpEm && !kept {
+        return PairFit { before_from_after: *odometry, explained, shared, information: prior.information() };
+    }
+    PairFit { before_from_after: pose, explained, shared, information: problem.information(&pose) }
+}
+
+/// What odometry says of a step.
+pub(super) struct Prior {
+    pose: Isometry2<f64>,
+    way_sigma_m: f64,
+    turn_sigma_rad: f64,
+}
+
+impl Prior {
+    pub fn of(odometry: &Isometry2<f64>, options: &RectifyOptions) -> Prior {
+        let (share, least_m) = options.way_sigma;
+        let way_sigma_m = share * odometry.translation.vector.norm() + least_m;
+        Prior { pose: *odometry, way_sigma_m, turn_sigma_rad: options.turn_sigma_rad }
+    }
+
+    pub fn information(&self) -> Matrix3<f64> {
+        let way = self.way_sigma_m.powi(-2);
+        Matrix3::from_diagonal(&Vector3::new(way, way, self.turn_sigma_rad.powi(-2)))
+    }
+
+    /// Half the squared distance from it, in spreads.
+    fn cost(&self, pose: &Isometry2<f64>) -> f64 {
+        let way = (pose.translation.vector - self.pose.translation.vector).norm() / self.way_sigma_m;
+        let turn = self.pose.rotation.angle_to(&pose.rotation) / self.turn_sigma_rad;
+        0.5 * (way * way + turn * turn)
+    }
+}
+
+struct Problem<'a> {
+    /// Sorted by x.
+    before: Vec<Spot>,
+    after: &'a [Spot],
+    field: &'a Field,
+    prior: &'a Prior,
+    options: &'a RectifyOptions,
+    /// The one centroid of both plans, in the frame of the first.
+    centroid: Point2<f64>,
+    /// Density of outliers.
+    outliers: f64,
+}
+
+impl<'a> Problem<'a> {
+    fn of(
+        before: &[Spot],
+        after: &'a [Spot],
+        field: &'a Field,
+        prior: &'a Prior,
+        options: &'a RectifyOptions,
+    ) -> Problem<'a> {
+        let mut before = before.to_vec();
+        before.sort_by(|a, b| a.at.x.total_cmp(&b.at.x).then(a.at.y.total_cmp(&b.at.y)));
+        let put = after.iter().map(|s| (prior.pose * s.at, s.weight));
+        let all = before.iter().map(|s| (s.at, s.weight)).chain(put);
+        let (sum, weight) =
+            all.fold((Vector2::zeros(), 0.0), |(s, w), (p, weight)| (s + p.coords * weight, w + weight));
+        let usual = before.iter().map(|s| s.weight).sum::<f64>() / before.len() as f64;
+        Problem {
+            before,
+            after,
+            field,
+            prior,
+            options,
+            centroid: (sum / weight).into(),
+            outliers: OUTLIERS * usual,
+        }
+    }
+
+    /// Rotation, then translation (section 3).
+    fn split(&self) -> Isometry2<f64> {
+        let turned = self.annealed(self.prior.pose, |pose, sigma_m| self.turned(pose, sigma_m));
+        // The rotation is applied to the plan as it was, which turns about the camera.
+        self.shifted(&Isometry2::from_parts(self.prior.pose.translation, turned.rotation))
+    }
+
+    /// Both together, from the best heading.
+    fn joint(&self) -> Isometry2<f64> {
+        let mut pose = self.annealed(self.headed(), |pose, sigma_m| self.moved(pose, sigma_m));
+        for _ in 0..ROUNDS {
+            pose = self.shifted(&pose);
+            pose = (0..EXPECTATIONS).fold(pose, |pose, _| self.moved(&pose, self.options.sigma_m.1));
+        }
+        pose
+    }
+
+    /// Expectations at ever smaller spreads.
+    fn annealed(
+        &self,
+        start: Isometry2<f64>,
+        step: impl Fn(&Isometry2<f64>, f64) -> Isometry2<f64>,
+    ) -> Isometry2<f64> {
+        let (first_m, last_m) = self.options.sigma_m;
+        let (mut pose, mut sigma_m) = (start, first_m.max(last_m));
+        loop {
+            pose = (0..EXPECTATIONS).fold(pose, |pose, _| step(&pose, sigma_m));
+            if sigma_m <= last_m {
+                return pose;
+            }
+            sigma_m = (sigma_m * COOLING).max(last_m);
+        }
+    }
+
+    /// The heading around odometry's under which the plans fit best, roughly.
+    fn headed(&self) -> Isometry2<f64> {
+        let start = self.prior.pose;
+        let Some(field) = Field::of(&self.before, self.options.sigma_m.0.min(HEADING_SIGMA_M)) else {
+            return start;
+        };
+        let steps = (WINDOW * self.prior.turn_sigma_rad / HEADING_STEP_RAD).ceil() as i32;
+        let headings = (-steps..=steps).map(|i| {
+            let turn = UnitComplex::new(start.rotation.angle() + f64::from(i) * HEADING_STEP_RAD);
+            let pose = Isometry2::from_parts(start.translation, turn);
+            (self.prior.cost(&pose) - self.options.looks * field.mean(self.after, &pose), pose)
+        });
+        headings.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(start, |best| best.1)
+    }
+
+    /// Where a spot of the second plan is expected to belong: calls `found` with each partner and its probability (z of Eq. 3).
+    fn expected(&self, at: &Point2<f64>, sigma_m: f64, mut found: impl FnMut(f64, &Point2<f64>)) {
+        let (reach_m, per) = (REACH * sigma_m, 0.5 / (sigma_m * sigma_m));
+        let from = self.before.partition_point(|b| b.at.x < at.x - reach_m);
+        let to = from + self.before[from..].partition_point(|b| b.at.x <= at.x + reach_m);
+        let density = |b: &Spot| {
+            let apart = (b.at - at).norm_squared();
+            if apart < reach_m * reach_m { b.weight * (-apart * per).exp() } else { 0.0 }
+        };
+        let sum = self.outliers + self.before[from..to].iter().map(density).sum::<f64>();
+        for b in &self.before[from..to] {
+            let z = density(b) / sum;
+            if z > 0.0 {
+                found(z, &b.at);
+            }
+        }
+    }
+
+    /// What one unit of weight of the second plan is worth: the plan as a whole so many looks.
+    fn worth(&self, sigma_m: f64) -> f64 {
+        let all: f64 = self.after.iter().map(|s| s.weight).sum();
+        self.options.looks / (all * sigma_m * sigma_m)
+    }
+
+    /// One expectation and the rotation about the centroid that is best for it (Eq. 3).
+    fn turned(&self, pose: &Isometry2<f64>, sigma_m: f64) -> Isometry2<f64> {
+        let (mut along, mut across) = (0.0, 0.0);
+        for spot in self.after {
+            let at = pose * spot.at;
+            let arm = at - self.centroid;
+            self.expected(&at, sigma_m, |z, partner| {
+                let partner = partner - self.centroid;
+                along += spot.weight * z * arm.dot(&partner);
+                across += spot.weight * z * arm.perp(&partner);
+            });
+        }
+        let (worth, prior) = (self.worth(sigma_m), self.prior.turn_sigma_rad.powi(-2));
+        let off = self.prior.pose.rotation.angle_to(&pose.rotation);
+        let turn = (worth * across - prior * off) / (worth * along.max(0.0) + prior);
+        self.about_centroid(pose, turn.clamp(-0.2, 0.2))
+    }
+
+    /// One expectation and the rotation and translation that are best for it.
+    fn moved(&self, pose: &Isometry2<f64>, sigma_m: f64) -> Isometry2<f64> {
+        let worth = self.worth(sigma_m);
+        let prior = self.prior.information();
+        let shift = pose.translation.vector - self.prior.pose.translation.vector;
+        let mut normal = prior;
+        let mut right = -prior * shift.push(self.prior.pose.rotation.angle_to(&pose.rotation));
+        for spot in self.after {
+            let at = pose * spot.at;
+            let arm = at.coords - pose.translation.vector;
+            let (mut all, mut pull) = (0.0, Vector2::zeros());
+            self.expected(&at, sigma_m, |z, partner| {
+                all += z;
+                pull += (partner - at) * z;
+            });
+            let (all, pull) = (worth * spot.weight * all, pull * (worth * spot.weight));
+            let side = Vector2::new(-arm.y, arm.x);
+            right += pull.push(side.dot(&pull));
+            normal[(0, 0)] += all;
+            normal[(1, 1)] += all;
+            for k in 0..2 {
+                normal[(k, 2)] += all * side[k];
+                normal[(2, k)] += all * side[k];
+            }
+            normal[(2, 2)] += all * side.norm_squared();
+        }
+        let Some(by) = normal.cholesky().map(|c| c.solve(&right)) else { return *pose };
+        let turn = UnitComplex::new(pose.rotation.angle() + by.z.clamp(-0.2, 0.2));
+        Isometry2::from_parts((pose.translation.vector + by.xy()).into(), turn)
+    }
+
+    fn about_centroid(&self, pose: &Isometry2<f64>, turn: f64) -> Isometry2<f64> {
+        let shift =
+            Rotation2::new(turn) * (pose.translation.vector - self.centroid.coords) + self.centroid.coords;
+        Isometry2::from_parts(shift.into(), UnitComplex::new(pose.rotation.angle() + turn))
+    }
+
+    /// The translation around odometry of which the error is least.
+    fn shifted(&self, pose: &Isometry2<f64>) -> Isometry2<f64> {
+        let at = |shift: Vector2<f64>| Isometry2::from_parts(shift.into(), pose.rotation);
+        let mut best = (self.cost(pose), pose.translation.vector);
+        let mut middle = self.prior.pose.translation.vector;
+        let mut window_m = WINDOW * self.prior.way_sigma_m;
+        for step_m in STEPS_M {
+            let steps = (window_m / step_m).ceil().min(40.0) as i32;
+            for (i, j) in (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (i, j))) {
+                let shift = middle + Vector2::new(f64::from(i), f64::from(j)) * step_m;
+                let cost = self.cost(&at(shift));
+                if cost < best.0 {
+                    best = (cost, shift);
+                }
+            }
+            middle = best.1;
+            window_m = step_m;
+        }
+        at(best.1)
+    }
+
+    fn cost(&self, pose: &Isometry2<f64>) -> f64 {
+        self.prior.cost(pose) - self.options.looks * self.field.mean(self.after, pose)
+    }
+
+    /// Curvature of the cost, no less than what odometry says.
+    fn information(&self, pose: &Isometry2<f64>) -> Matrix3<f64> {
+        let cost = |by: Vector3<f64>| {
+            let at = Isometry2::new(pose.translation.vector + by.xy(), pose.rotation.angle() + by.z);
+            -self.options.looks * self.field.mean(self.after, &at)
+        };
+        let step = |i: usize| {
+            let size = if i < 2 { PROBE.0 } else { PROBE.1 };
+            Vector3::from_fn(|k, _| if k == i { size } else { 0.0 })
+        };
+        let here = cost(Vector3::zeros());
+        let curvature = Matrix3::from_fn(|i, j| {
+            let (a, b) = (step(i), step(j));
+            let bent = if i == j {
+                cost(a) + cost(-a) - 2.0 * here
+            } else {
+                0.25 * (cost(a + b) + cost(-a - b) - cost(a - b) - cost(b - a))
+            };
+            bent / (a[i] * b[j])
+        });
+        let eigen = (0.5 * (curvature + curvature.transpose())).symmetric_eigen();
+        let held = Matrix3::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0)));
+        eigen.eigenvectors * held * eigen.eigenvectors.transpose() + self.prior.information()
+    }
+}
+
+/// Iterative closest point from odometry.
+fn icp(
+    before: &[Spot],
+    after: &[Spot],
+    odometry: &Isometry2<f64>,
+    options: &RectifyOptions,
+) -> Isometry2<f64> {
+    let flat = |spots: &[Spot]| -> Vec<Point3<f32>> {
+        spots.iter().map(|s| Point3::new(s.at.x as f32, s.at.y as f32, 0.0)).collect()
+    };
+    let turn = UnitComplex::from(odometry.rotation);
+    let start = Isometry3::new(odometry.translation.vector.push(0.0), Vector3::z() * turn.angle());
+    let options = RegisterOptions {
+        method: Method::PointToPoint,
+        start_target_from_source: start,
+        within_m: (2.0 * options.sigma_m.0) as f32,
+        ..RegisterOptions::default()
+    };
+    let prepared = |spots: &[Spot]| Prepared::new(&flat(spots)).ok();
+    let fit = prepared(after).zip(prepared(before)).and_then(|(s, t)| register::align(&s, &t, &options).ok());
+    fit.map_or(*odometry, |f| {
+        let pose = f.target_from_source;
+        let ahead = pose.rotation * Vector3::x();
+        Isometry2::new(pose.translation.vector.xy(), ahead.y.atan2(ahead.x))
+    })
+}

@@ -1,0 +1,325 @@
+//! The map: walls with their openings, level surfaces, and the grid of what is open.
+
+use super::cells::{Cells, CellsError, Facet, NormalOptions};
+use super::error::{MappingError, check, check_pose};
+use super::fuse::{FuseOptions, fuse};
+use super::grid::Sightlines;
+use super::orientation::{OrientationOptions, orientations};
+use super::patch::{Constraints, Fit, Growth, Patch, grow, main_direction, through};
+use super::station::Station;
+use crate::hull::convex;
+use crate::occupancy::{Occupancy, Space};
+use crate::plane::Plane;
+use nalgebra::{Isometry2, Point2, Vector2, Vector3};
+use rustc_hash::FxHashSet;
+use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
+
+/// All that was seen of a building so far: what a later drive adds to.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Survey {
+    cells: Cells,
+    lines: Sightlines,
+}
+
+/// How a map is made of a survey.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapOptions {
+    /// How normals are found.
+    pub normals: NormalOptions,
+    /// How orientations are found.
+    pub orientations: OrientationOptions,
+    /// Facets of one patch are no farther apart (λ), metres.
+    pub grow_m: f64,
+    /// Normals of walls are tilted by no more, those of level surfaces from the plumb line, radians.
+    pub tilt_rad: f64,
+    /// How planes are fitted.
+    pub fit: Fit,
+    /// True: walls are upright, and parallel or square to most others where they nearly are.
+    pub constrained: bool,
+    /// How patches are joined; `None`: not at all.
+    pub fuse: Option<FuseOptions>,
+    /// Smaller walls are left out, square metres …
+    pub least_area_m2: f64,
+    /// … and lower ones, metres: they are things, not walls.
+    pub least_height_m: f64,
+    /// Smaller level surfaces are left out, square metres.
+    pub least_level_m2: f64,
+    /// Walls leave open what is open at these heights, metres …
+    pub opening_band_m: RangeInclusive<f64>,
+    /// … and at least so wide, metres.
+    pub opening_m: f64,
+}
+
+impl Default for MapOptions {
+    fn default() -> Self {
+        MapOptions {
+            normals: NormalOptions::default(),
+            orientations: OrientationOptions::default(),
+            grow_m: 0.25,
+            tilt_rad: 0.35,
+            fit: Fit::LeastSquares,
+            constrained: true,
+            fuse: Some(FuseOptions::default()),
+            least_area_m2: 0.3,
+            least_height_m: 1.0,
+            least_level_m2: 0.15,
+            opening_band_m: 0.3..=1.8,
+            opening_m: 0.6,
+        }
+    }
+}
+
+/// An upright plane with ends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wall {
+    /// The plane; its normal points to where it was seen from.
+    pub plane: Plane,
+    /// One end of its foot, metres.
+    pub from: Point2<f64>,
+    /// The other.
+    pub to: Point2<f64>,
+    /// Heights between which it was seen, metres.
+    pub heights_m: (f64, f64),
+    /// Area that was seen, square metres.
+    pub area_m2: f64,
+    /// Where it stands, from one end to the other, metres from `from`; between them it is open.
+    pub stretches_m: Vec<(f64, f64)>,
+}
+
+impl Wall {
+    /// The feet of its stretches.
+    pub fn feet(&self) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> {
+        let along = (self.to - self.from).try_normalize(0.0).unwrap_or_else(Vector2::x);
+        self.stretches_m.iter().map(move |(a, b)| (self.from + along * *a, self.from + along * *b))
+    }
+
+    /// Its length from end to end, metres.
+    pub fn length_m(&self) -> f64 {
+        (self.to - self.from).norm()
+    }
+}
+
+/// A level surface: the floor, a table, the ceiling.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Level {
+    /// Its height, metres.
+    pub height_m: f64,
+    /// True if it was seen from above.
+    pub faces_up: bool,
+    /// Corners of its convex hull, anticlockwise, metres.
+    pub outline: Vec<Point2<f64>>,
+    /// Area that was seen, square metres.
+    pub area_m2: f64,
+}
+
+/// The map of a building.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RoomMap {
+    /// Walls, the largest first.
+    pub walls: Vec<Wall>,
+    /// Level surfaces, the largest first.
+    pub levels: Vec<Level>,
+    /// Direction of the normals of most walls, modulo a quarter turn, radians.
+    pub main_rad: Option<f64>,
+    /// What is open; walls are drawn into what no line of sight has settled.
+    pub grid: Option<Occupancy>,
+}
+
+impl Survey {
+    /// Nothing seen yet; cells of `edge_m` metres.
+    ///
+    /// # Errors
+    /// If the edge is no positive length.
+    pub fn new(edge_m: f64) -> Result<Survey, CellsError> {
+        Ok(Survey { cells: Cells::new(edge_m)?, lines: Sightlines::default() })
+    }
+
+    /// What was seen, by cubes.
+    pub fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// Adds what was seen from a station at a pose, by a camera `height_m` above the floor, no deeper than `far_m`; `band_m`: heights at which something is
+    /// in a body's way.
+    ///
+    /// # Errors
+    /// If the pose is none; nothing is added then.
+    pub fn add(
+        &mut self,
+        station: &Station,
+        map_from_level: &Isometry2<f64>,
+        height_m: f64,
+        far_m: f64,
+        band_m: &RangeInclusive<f64>,
+    ) -> Result<(), MappingError> {
+        check_pose("station", 0, map_from_level)?;
+        check(&[("height_m", height_m, -1e3, 1e3)])?;
+        self.cells.add(&station.points, map_from_level, height_m, far_m);
+        self.lines.add(station, map_from_level, band_m, far_m, self.cells.edge_m());
+        Ok(())
+    }
+
+    /// What is open by lines of sight alone, without the walls; `None` if nothing was seen, or what was lies too far apart for one grid.
+    pub fn grid(&self) -> Option<Occupancy> {
+        self.lines.occupancy(self.cells.edge_m())
+    }
+
+    /// The map of what was seen so far.
+    ///
+    /// # Errors
+    /// If an option cannot be used.
+    pub fn map(&self, options: &MapOptions) -> Result<RoomMap, MappingError> {
+        let _span = tracing::debug_span!("map", cells = self.cells.len()).entered();
+        check(&[
+            ("grow_m", options.grow_m, 1e-3, 1e3),
+            ("the reach of normals", options.normals.reach as f64, 1.0, 10.0),
+        ])?;
+        let edge_m = self.cells.edge_m();
+        let facets = self.cells.facets(&options.normals);
+        let (patches, main_rad) = upright(&facets, options, edge_m);
+        let mut walls: Vec<Wall> = patches.iter().filter_map(|p| wall(p, &facets, options, edge_m)).collect();
+        walls.sort_by(|a, b| b.area_m2.total_cmp(&a.area_m2));
+        let mut grid = self.grid();
+        if let Some(grid) = &mut grid {
+            walls.iter().for_each(|wall| draw(wall, grid));
+        }
+        Ok(RoomMap { walls, levels: levels(&facets, options, edge_m), main_rad, grid })
+    }
+}
+
+/// Patches of upright facets, joined, and the direction that most have.
+fn upright(facets: &[Facet], options: &MapOptions, edge_m: f64) -> (Vec<Patch>, Option<f64>) {
+    let members: Vec<u32> = (0u32..)
+        .zip(facets)
+        .filter(|(_, f)| f.normal.z.abs() <= options.tilt_rad.sin())
+        .map(|(i, _)| i)
+        .collect();
+    let directions: Vec<f64> =
+        members.iter().map(|&m| facets[m as usize].normal).map(|n| n.y.atan2(n.x)).collect();
+    let found = orientations(&directions, &options.orientations);
+    let growth = Growth {
+        within_m: options.grow_m,
+        across_m: edge_m,
+        turned_rad: 2.0 * options.orientations.within_rad,
+    };
+    let group = |number: Option<u32>| -> Vec<u32> {
+        members.iter().zip(&found.of).filter(|(_, of)| **of == number).map(|(m, _)| *m).collect()
+    };
+    let mut grown: Vec<Vec<u32>> = Vec::new();
+    for (number, centre) in (0u32..).zip(&found.centres_rad) {
+        let normal = Vector3::new(centre.cos(), centre.sin(), 0.0);
+        grown.extend(grow(facets, &group(Some(number)), Some(normal), &growth));
+    }
+    let alone = Growth { turned_rad: options.orientations.within_rad, ..growth };
+    grown.extend(grow(facets, &group(None), None, &alone));
+    let least = options.least_area_m2.min(0.1) / (edge_m * edge_m);
+    grown.retain(|patch| patch.len() as f64 >= least);
+    let within_rad = options.orientations.within_rad.min(0.2);
+    let mut constraints = Constraints { upright: options.constrained, main_rad: None, within_rad };
+    let fit = |constraints: &Constraints| -> Vec<Patch> {
+        grown
+            .iter()
+            .map(|members| through(facets, members.clone(), options.fit, constraints, edge_m))
+            .collect()
+    };
+    let mut patches = fit(&constraints);
+    if options.constrained {
+        // Long walls tell the direction best: it is asked of what has been joined, and then kept to from the fit on.
+        let joined =
+            fuse(facets, patches.clone(), options.fit, &constraints, &FuseOptions::default(), edge_m);
+        constraints.main_rad = main_direction(&joined, within_rad);
+        patches = fit(&constraints);
+    }
+    if let Some(how) = &options.fuse {
+        patches = fuse(facets, patches, options.fit, &constraints, how, edge_m);
+    }
+    (patches, constraints.main_rad)
+}
+
+/// A patch as a wall with its openings; `None` if it is too small.
+fn wall(patch: &Patch, facets: &[Facet], options: &MapOptions, edge_m: f64) -> Option<Wall> {
+    let [(left, right), (low, high)] = patch.limits_m;
+    if patch.area_m2 < options.least_area_m2 || high - low < options.least_height_m {
+        return None;
+    }
+    let foot = |along: f64| (patch.middle + patch.along * along).xy();
+    let mut seen: Vec<f64> = patch
+        .facets
+        .iter()
+        .map(|&m| facets[m as usize].at)
+        .filter(|at| options.opening_band_m.contains(&at.z))
+        .map(|at| (at - patch.middle).dot(&patch.along) - left)
+        .collect();
+    seen.sort_by(f64::total_cmp);
+    let mut stretches_m: Vec<(f64, f64)> = Vec::new();
+    for at in seen {
+        match stretches_m.last_mut() {
+            Some(last) if at - last.1 < options.opening_m => last.1 = at,
+            _ => stretches_m.push((at, at)),
+        }
+    }
+    stretches_m.retain(|(from, to)| to - from >= edge_m);
+    let z = patch.middle.z;
+    Some(Wall {
+        plane: patch.plane,
+        from: foot(left),
+        to: foot(right),
+        heights_m: (z + low, z + high),
+        area_m2: patch.area_m2,
+        stretches_m,
+    })
+}
+
+/// Marks the squares under a wall's stretches, but where lines of sight went through.
+fn draw(wall: &Wall, grid: &mut Occupancy) {
+    for (from, to) in wall.feet() {
+        let steps = ((to - from).norm() / (0.5 * grid.cell_m)).ceil() as usize;
+        for i in 0..=steps {
+            let at = from + (to - from) * (i as f64 / steps.max(1) as f64);
+            let square = ((at - grid.origin) / grid.cell_m).map(f64::floor);
+            let rows = grid.cells.len() / grid.width.max(1);
+            if square.x >= 0.0
+                && square.y >= 0.0
+                && (square.x as usize) < grid.width
+                && (square.y as usize) < rows
+            {
+                let cell = &mut grid.cells[square.y as usize * grid.width + square.x as usize];
+                if *cell == Space::Unknown {
+                    *cell = Space::Occupied;
+                }
+            }
+        }
+    }
+}
+
+/// Level surfaces.
+fn levels(facets: &[Facet], options: &MapOptions, edge_m: f64) -> Vec<Level> {
+    let growth = Growth { within_m: options.grow_m, across_m: 0.5 * edge_m, turned_rad: options.tilt_rad };
+    let mut found: Vec<Level> = Vec::new();
+    for faces_up in [true, false] {
+        let normal = Vector3::z() * if faces_up { 1.0 } else { -1.0 };
+        let is_level = |f: &Facet| f.normal.dot(&normal) >= options.tilt_rad.cos();
+        let members: Vec<u32> = (0u32..).zip(facets).filter(|(_, f)| is_level(f)).map(|(i, _)| i).collect();
+        for patch in grow(facets, &members, Some(normal), &growth) {
+            let places: Vec<Point2<f64>> = patch.iter().map(|&m| facets[m as usize].at.xy()).collect();
+            let squares: FxHashSet<(i32, i32)> = places
+                .iter()
+                .map(|p| ((p.x / edge_m).floor() as i32, (p.y / edge_m).floor() as i32))
+                .collect();
+            let area_m2 = squares.len() as f64 * edge_m * edge_m;
+            if area_m2 >= options.least_level_m2 {
+                let mut heights: Vec<f64> = patch.iter().map(|&m| facets[m as usize].at.z).collect();
+                let middle = heights.len() / 2;
+                let height_m = *heights.select_nth_unstable_by(middle, f64::total_cmp).1;
+                found.push(Level { height_m, faces_up, outline: convex(places), area_m2 });
+            }
+        }
+    }
+    found.sort_by(|a, b| b.area_m2.total_cmp(&a.area_m2));
+    found
+}

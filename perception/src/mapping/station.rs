@@ -1,0 +1,157 @@
+//! What a camera saw at a stop of the drive, and its plan: floor and ceiling removed, heights dropped.
+
+use crate::cloud::is_finite;
+use crate::view::View;
+use nalgebra::{Isometry2, Isometry3, Point2, Point3, Rotation3, UnitQuaternion, Vector2, Vector3};
+use rustc_hash::FxHashMap;
+use std::f64::consts::PI;
+use std::ops::RangeInclusive;
+
+/// A stop of the drive. The *level* frame has its origin on the floor under the camera, x ahead, y to the left, z up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Station {
+    /// What the camera saw, in the level frame, metres. Points that are not finite are passed over.
+    pub points: Vec<Point3<f32>>,
+    /// Where odometry has the station; only the step from one station to the next is used.
+    pub odom_from_level: Isometry2<f64>,
+}
+
+/// A view that is no station.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StationError {
+    /// The pose is no pose.
+    #[error("the pose of the camera is not finite: give metres and a unit quaternion")]
+    Pose,
+    /// The camera looks along the plumb line.
+    #[error(
+        "the camera looks straight up or down, so that nothing is ahead: give a view whose optical axis is not upright"
+    )]
+    Upright,
+}
+
+impl Station {
+    /// A view whose world has z up and the floor at zero.
+    ///
+    /// # Errors
+    /// If the pose is not finite or the camera looks straight up or down.
+    pub fn of(view: &View) -> Result<Station, StationError> {
+        let pose = &view.world_from_camera;
+        let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+        if !numbers.copied().all(f64::is_finite) {
+            return Err(StationError::Pose);
+        }
+        let ahead = (pose.rotation * Vector3::z()).xy();
+        if ahead.norm() < 1e-3 {
+            return Err(StationError::Upright);
+        }
+        let heading = ahead.y.atan2(ahead.x);
+        let at = pose.translation.vector;
+        let unturn =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(&Vector3::z_axis(), -heading));
+        let level_from_camera =
+            Isometry3::from_parts(Vector3::new(0.0, 0.0, at.z).into(), unturn * pose.rotation);
+        let finite = view.cloud.points.iter().filter(|p| is_finite(p));
+        Ok(Station {
+            points: finite.map(|p| (level_from_camera * p.cast::<f64>()).cast()).collect(),
+            odom_from_level: Isometry2::new(at.xy(), heading),
+        })
+    }
+
+    /// The plan: points of the heights in `band_m` and of the field of view, thinned to squares of `thin_m`.
+    pub(super) fn plan(&self, band_m: &RangeInclusive<f64>, field: &FieldOfView, thin_m: f64) -> Vec<Spot> {
+        let kept = self.points.iter().filter(|p| is_finite(p) && band_m.contains(&f64::from(p.z)));
+        let places = kept.map(|p| Spot { at: Point2::new(f64::from(p.x), f64::from(p.y)), weight: 1.0 });
+        let mut spots = thinned(places.filter(|s| field.sees(&s.at)), thin_m);
+        spots.retain(|s| s.weight >= FEWEST);
+        spots.iter_mut().for_each(|s| s.weight = s.weight.min(MOST));
+        spots
+    }
+}
+
+/// One spot a square that holds any, at their centroid, with the weight of all, in the order of the squares.
+pub(super) fn thinned(spots: impl Iterator<Item = Spot>, edge_m: f64) -> Vec<Spot> {
+    let mut squares: FxHashMap<(i32, i32), (Vector2<f64>, f64)> = FxHashMap::default();
+    for spot in spots {
+        let key = ((spot.at.x / edge_m).floor() as i32, (spot.at.y / edge_m).floor() as i32);
+        let square = squares.entry(key).or_default();
+        square.0 += spot.at.coords * spot.weight;
+        square.1 += spot.weight;
+    }
+    let mut keyed: Vec<_> = squares.into_iter().collect();
+    keyed.sort_unstable_by_key(|(key, _)| *key);
+    keyed.into_iter().map(|(_, (sum, weight))| Spot { at: (sum / weight).into(), weight }).collect()
+}
+
+/// Fewer points in a square are noise.
+const FEWEST: f64 = 2.0;
+/// More points in a square do not make it weigh more: they are of one place.
+const MOST: f64 = 8.0;
+
+/// A square of the plan that holds points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Spot {
+    /// Their centroid, metres.
+    pub at: Point2<f64>,
+    /// How much it counts.
+    pub weight: f64,
+}
+
+/// What a camera sees of the plan: a sector around the direction ahead.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FieldOfView {
+    /// Its right end, anticlockwise from ahead: negative, radians.
+    pub right_rad: f64,
+    /// Its left end, radians.
+    pub left_rad: f64,
+    /// Its nearest depth, metres; of more than half a turn, its nearest range.
+    pub near_m: f64,
+    /// Its farthest depth that is used, metres: noise grows with its square.
+    pub far_m: f64,
+}
+
+impl Default for FieldOfView {
+    fn default() -> Self {
+        FieldOfView { right_rad: -0.5, left_rad: 0.5, near_m: 0.5, far_m: 6.0 }
+    }
+}
+
+impl FieldOfView {
+    /// True for places of the level frame within it.
+    pub fn sees(&self, place: &Point2<f64>) -> bool {
+        let bearing = place.y.atan2(place.x);
+        let depth = if self.left_rad - self.right_rad > PI { place.coords.norm() } else { place.x };
+        (self.near_m..=self.far_m).contains(&depth) && bearing >= self.right_rad && bearing <= self.left_rad
+    }
+}
+
+/// The spots that the other field of view sees too, once they are moved into its frame.
+pub(super) fn shared(spots: &[Spot], other_from_here: &Isometry2<f64>, field: &FieldOfView) -> Vec<Spot> {
+    spots.iter().filter(|s| field.sees(&(other_from_here * s.at))).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::Cloud;
+    use nalgebra::Translation3;
+
+    #[test]
+    fn a_view_is_levelled() {
+        // Looks along +y, tilted down by 0.3, 1.5 m up.
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -0.3 - std::f64::consts::FRAC_PI_2);
+        let mut view = View::alone(Cloud::from_points(vec![
+            Point3::new(0.0, 0.0, 2.0),
+            Point3::new(f32::NAN, 0.0, 1.0),
+        ]));
+        view.world_from_camera = Isometry3::from_parts(Translation3::new(3.0, 1.0, 1.5), down);
+        let station = Station::of(&view).unwrap();
+        assert!((station.odom_from_level.rotation.angle() - std::f64::consts::FRAC_PI_2).abs() < 1e-9);
+        let expected = Point3::new(2.0 * 0.3_f32.cos(), 0.0, 1.5 - 2.0 * 0.3_f32.sin());
+        assert_eq!(station.points.len(), 1);
+        assert!((station.points[0] - expected).norm() < 1e-5, "{:?}", station.points);
+        view.world_from_camera = Isometry3::identity();
+        assert_eq!(Station::of(&view), Err(StationError::Upright));
+        view.world_from_camera = Translation3::new(f64::NAN, 0.0, 0.0).into();
+        assert_eq!(Station::of(&view), Err(StationError::Pose));
+    }
+}

@@ -1,0 +1,67 @@
+//! A map as cells that are open, occupied or unknown.
+
+use nalgebra::{Point2, Vector2};
+use serde::{Deserialize, Serialize};
+
+/// What a cell of a map holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Space {
+    /// Nothing known.
+    #[default]
+    Unknown,
+    /// Reliably empty.
+    Free,
+    /// Reliably occupied.
+    Occupied,
+}
+
+/// An occupancy grid: the environment without the things that come and go.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Occupancy {
+    /// The corner of the first cell that has the least coordinates, in the map.
+    pub origin: Point2<f64>,
+    /// Edge of a cell, metres.
+    pub cell_m: f64,
+    /// Cells along x.
+    pub width: usize,
+    /// Cells along x, row by row in ascending y. Cells that are missing are unknown.
+    pub cells: Vec<Space>,
+}
+
+impl Occupancy {
+    /// What lies at a place of the map.
+    pub fn at(&self, place: &Point2<f64>) -> Space {
+        let cell = (place - self.origin) / self.cell_m;
+        self.cell(cell.x.floor(), cell.y.floor())
+    }
+
+    fn cell(&self, column: f64, row: f64) -> Space {
+        if column >= 0.0 && row >= 0.0 && column < self.width as f64 {
+            let index = row as usize * self.width + column as usize;
+            return self.cells.get(index).copied().unwrap_or_default();
+        }
+        Space::Unknown
+    }
+
+    /// True unless the place is free and farther than `margin_m` from any occupied cell: a reading there may be of the environment.
+    pub fn is_background(&self, place: &Point2<f64>, margin_m: f64) -> bool {
+        if self.at(place) != Space::Free {
+            return true;
+        }
+        let middle = (place - self.origin) / self.cell_m;
+        let reach = margin_m / self.cell_m;
+        let span = |c: f64, count: usize| {
+            (c - reach).max(0.0) as usize..count.min(((c + reach).max(-1.0) + 1.0) as usize)
+        };
+        span(middle.y, self.cells.len() / self.width + 1).any(|row| {
+            span(middle.x, self.width).any(|column| {
+                let nearest = Vector2::new(
+                    middle.x.clamp(column as f64, column as f64 + 1.0),
+                    middle.y.clamp(row as f64, row as f64 + 1.0),
+                );
+                (nearest - middle).norm() <= reach && self.cell(column as f64, row as f64) == Space::Occupied
+            })
+        })
+    }
+}

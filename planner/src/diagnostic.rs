@@ -1,5 +1,7 @@
 //! What is wrong with a text, where, and how to mend it.
 
+mod excerpt;
+
 use serde::Serialize;
 
 /// A named text: a domain, a problem or a plan. The name is what messages call it, usually the path.
@@ -138,21 +140,39 @@ impl Findings {
 }
 
 impl Findings {
-    /// The findings drawn under the texts that they are about, with or without colour.
+    /// The findings drawn under the texts that they are about, with or without colour. Of a very long line, what is near
+    /// the place alone.
     pub fn render(&self, colour: bool) -> String {
         let mut drawn = Vec::new();
         let names: Vec<String> = self.sources.iter().map(|source| source.name.clone()).collect();
-        let texts = self.sources.iter().map(|source| (source.name.clone(), source.text.clone()));
-        let mut cache = ariadne::sources(texts.collect::<Vec<_>>());
+        let (short, long): (Vec<&Diagnostic>, Vec<&Diagnostic>) =
+            self.list.iter().partition(|finding| !excerpt::is_needed(&self.sources, finding));
+        let wanted = |index: usize| {
+            short.iter().any(|finding| finding.labels.iter().any(|label| label.span.source as usize == index))
+        };
+        let texts = self.sources.iter().enumerate().filter(|(index, _)| wanted(*index));
+        let texts: Vec<_> = texts.map(|(_, source)| (source.name.clone(), source.text.clone())).collect();
+        let mut cache = ariadne::sources(texts);
         for finding in &self.list {
             if !drawn.is_empty() {
                 drawn.push(b'\n');
             }
-            // Writing to memory does not fail.
-            let _ = report(finding, &names, colour).write(&mut cache, &mut drawn);
+            if long.iter().any(|other| std::ptr::eq(*other, finding)) {
+                drawn.extend(excerpt::draw(&self.sources, finding).bytes());
+            } else {
+                // Writing to memory does not fail.
+                let _ = report(finding, &names, colour).write(&mut cache, &mut drawn);
+            }
         }
         let text = String::from_utf8_lossy(&drawn);
         text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
+    }
+
+    /// File, line and column of a place, both from 1.
+    fn place(&self, span: Span) -> (&str, usize, usize) {
+        let Some(source) = self.sources.get(span.source as usize) else { return ("", 1, 1) };
+        let (line, column) = excerpt::line_and_column(&source.text, span.start as usize);
+        (&source.name, line, column)
     }
 }
 
@@ -176,12 +196,6 @@ impl Serialize for Findings {
             labels: Vec<Place<'f>>,
             help: Option<&'f str>,
         }
-        let place = |label: &Label| -> Option<(usize, usize)> {
-            let text = &self.sources.get(label.span.source as usize)?.text;
-            let before = text.get(..label.span.start as usize)?;
-            let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
-            Some((before.matches('\n').count() + 1, before[line_start..].chars().count() + 1))
-        };
         serializer.collect_seq(self.list.iter().map(|finding| {
             One {
                 severity: finding.severity,
@@ -191,9 +205,7 @@ impl Serialize for Findings {
                     .labels
                     .iter()
                     .map(|label| {
-                        let (line, column) = place(label).unwrap_or((1, 1));
-                        let file =
-                            self.sources.get(label.span.source as usize).map_or("", |source| &source.name);
+                        let (file, line, column) = self.place(label.span);
                         Place {
                             file,
                             line,

@@ -1,5 +1,6 @@
 //! Why there is no plan.
 
+mod core;
 mod sites;
 
 use std::collections::BTreeMap;
@@ -10,11 +11,13 @@ use serde::Serialize;
 use crate::attachment::{Attachments, CallKind};
 use crate::diagnostic::{Diagnostic, Findings, Span};
 use crate::ground::{GroundTask, MissingAtom, Obstacle};
+use crate::model::walk::{self, Part};
 use crate::semantics::{Binding, Semantics};
 use crate::task::{
     Action, Atom, Change, Condition, Expression, FunctionId, GroundChange, ModuleId, PredicateId, Task, Term,
 };
 
+pub(crate) use self::core::{is_open, narrowed};
 pub(crate) use self::sites::sites;
 
 /// Why a task has no plan: findings that point at the goal, at what nobody achieves, and at who said no.
@@ -66,22 +69,47 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
         }
     }
     let untold = |obstacle: &&Obstacle| !told.iter().any(|predicate| predicate.0 == obstacle.predicate);
-    list.extend(ground.obstacles.iter().filter(untold).map(|obstacle| finding(task, obstacle, &parts)));
+    list.extend(
+        ground
+            .obstacles
+            .iter()
+            .filter(untold)
+            .map(|obstacle| finding(task, obstacle, &ground.obstacles, &parts)),
+    );
     for (&(module, wanted), calls) in refusals {
         list.extend(refused(task, ModuleId(module), wanted, calls));
     }
     if list.is_empty() {
-        list.push(together(task, parts.len()));
+        list.push(together(task, &parts, false));
     }
     Explanation { findings: Findings { sources: task.sources.to_vec(), list } }
 }
 
-/// Each part of the goal can be had if nothing is ever taken away: what may be in the way of all.
-fn together(task: &Task, parts: usize) -> Diagnostic {
-    let message = "every state that can be reached was seen, and none fulfils the whole goal";
-    let span = first_span(&task.goal.body).unwrap_or_default();
-    let mut finding = Diagnostic::error("unsolvable", message, span, "this goal");
-    let mut reasons = vec![match parts {
+/// What is said where no relaxation knows better.
+const UNREACHED: &str = "every state that can be reached was seen, and none fulfils the whole goal";
+
+/// Each part of the goal can be had if nothing is ever taken away: what may be in the way of all. `narrowed` where these
+/// parts alone cannot be had.
+fn together(task: &Task, parts: &[&Condition], narrowed: bool) -> Diagnostic {
+    let message = match (narrowed, parts.len()) {
+        (false, _) => UNREACHED.to_string(),
+        (true, 1) => {
+            "every state that can be reached was seen, and none fulfils this part of the goal".into()
+        }
+        (true, count) => {
+            format!(
+                "every state that can be reached was seen, and none fulfils these {count} parts of the goal"
+            )
+        }
+    };
+    let mut spans = parts.iter().filter_map(|part| first_span(part));
+    let span = spans.next().unwrap_or_default();
+    let label = if parts.len() > 1 { "this and the others exclude each other" } else { "this goal" };
+    let mut finding = Diagnostic::error("unsolvable", message, span, label);
+    for span in spans.take(SHOWN) {
+        finding = finding.with_label(span, "this too");
+    }
+    let mut reasons = vec![match parts.len() {
         0 | 1 => "some of what it needs excludes the rest",
         _ => "some parts of the goal exclude each other",
     }];
@@ -348,18 +376,13 @@ fn refused(task: &Task, module: ModuleId, wanted: bool, calls: &[String]) -> Opt
     Some(finding.with_help(help))
 }
 
+/// The functions that an expression reads.
 fn fluents(expression: &Expression, functions: &mut Vec<FunctionId>) {
-    match expression {
-        Expression::Fluent(fluent) => functions.push(fluent.function),
-        Expression::Add(parts) | Expression::Multiply(parts) => {
-            parts.iter().for_each(|part| fluents(part, functions))
+    walk::expression(expression, &mut |part| {
+        if let Part::Expression(Expression::Fluent(fluent)) = part {
+            functions.push(fluent.function);
         }
-        Expression::Subtract(sides) | Expression::Divide(sides) => {
-            sides.iter().for_each(|side| fluents(side, functions))
-        }
-        Expression::Negative(inner) => fluents(inner, functions),
-        _ => {}
-    }
+    });
 }
 
 fn changes(task: &Task, action: &Action, function: FunctionId) -> bool {
@@ -403,23 +426,35 @@ fn first_span(condition: &Condition) -> Option<Span> {
     }
 }
 
-/// The part of the goal that asks for an atom.
-fn asked(parts: &[&Condition], obstacle: &Obstacle) -> Option<Span> {
+/// Where a condition asks for an atom.
+fn asked(condition: &Condition, (predicate, arguments): (u32, &[Option<u32>])) -> Option<Span> {
     let same = |term: &Term, object: &Option<u32>| match term {
-        Term::Object(own) => Some(own.0) == *object,
+        Term::Object(own) => object.is_none_or(|object| own.0 == object),
         Term::Variable(_) | Term::Function(_) => true,
     };
-    parts.iter().find_map(|part| match part {
-        Condition::Atom(atom) => {
-            let own = atom.predicate.0 == obstacle.predicate
-                && atom.arguments.iter().zip(&obstacle.arguments).all(|(term, object)| same(term, object));
-            own.then_some(atom.span)
+    let mut found = None;
+    walk::condition(condition, &mut |part| {
+        if let Part::Condition(Condition::Atom(atom)) = part {
+            let own = atom.predicate.0 == predicate
+                && atom.arguments.iter().zip(arguments).all(|(term, object)| same(term, object));
+            found = found.or(own.then_some(atom.span));
         }
-        _ => None,
-    })
+    });
+    found
 }
 
-fn finding(task: &Task, obstacle: &Obstacle, goal: &[&Condition]) -> Diagnostic {
+/// Where an action asks for the first of some atoms.
+fn needed(action: &Action, missing: &[MissingAtom]) -> Option<Span> {
+    let condition = &action.condition;
+    let asks = |(predicate, arguments): &MissingAtom| {
+        [&condition.start, &condition.over_all, &condition.end]
+            .into_iter()
+            .find_map(|part| asked(part, (*predicate, arguments)))
+    };
+    missing.iter().find_map(asks)
+}
+
+fn finding(task: &Task, obstacle: &Obstacle, chain: &[Obstacle], goal: &[&Condition]) -> Diagnostic {
     let atom = named(task, &(obstacle.predicate, obstacle.arguments.clone()));
     let predicates = task.predicates.len();
     let declared = match (obstacle.predicate as usize).checked_sub(predicates) {
@@ -432,13 +467,27 @@ fn finding(task: &Task, obstacle: &Obstacle, goal: &[&Condition]) -> Diagnostic 
     } else {
         format!("{atom} never holds: nothing that could bring it about can ever be applied")
     };
-    let mut finding = match asked(goal, obstacle) {
+    let wanted = (obstacle.predicate, obstacle.arguments.as_slice());
+    let by_goal = goal.iter().find_map(|part| asked(part, wanted));
+    let missing = [(obstacle.predicate, obstacle.arguments.clone())];
+    let by_action = || {
+        let achievers = chain.iter().flat_map(|earlier| &earlier.achievers);
+        let lacks = achievers.filter(|(_, lacks)| lacks.contains(&missing[0]));
+        let mut actions = lacks.map(|(schema, _)| &task.actions[*schema as usize]);
+        actions.find_map(|action| Some((needed(action, &missing)?, &action.name)))
+    };
+    let mut finding = match by_goal {
         Some(span) => Diagnostic::error("out-of-reach", message, span, "the goal asks for it"),
-        None => Diagnostic::error("out-of-reach", message, declared, "declared here"),
+        None => match by_action() {
+            Some((span, name)) => {
+                Diagnostic::error("out-of-reach", message, span, format!("`{name}` asks for it"))
+            }
+            None => Diagnostic::error("out-of-reach", message, declared, "declared here"),
+        },
     };
     let actions = obstacle.achievers.iter().map(|(schema, missing)| {
         let action = &task.actions[*schema as usize];
-        (action.span, format!("`{}`", action.name), missing)
+        (needed(action, missing).unwrap_or(action.span), format!("`{}`", action.name), missing)
     });
     let rules = obstacle
         .rules

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::attachment::{AttachmentError, Attachments, CallStatistics};
 use crate::calls::{Calls, report};
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::explain::{Explanation, explain};
+use crate::explain::{Explanation, explain, is_open, narrowed};
 use crate::ground::{Expression, GroundError, GroundTask, ground};
 use crate::plan::Plan;
 use crate::search::classical::plan_classical;
@@ -175,8 +175,30 @@ pub fn plan(
 ) -> Result<Outcome, PlanError> {
     let mut outcome = search(task, attachments, options, stop, on_plan)?;
     outcome.statistics_mut().scored_only = !task.preferences.is_empty();
+    if let Outcome::Unsolvable { why, statistics } = &mut outcome
+        && options.bound.is_none()
+        && task.modules.is_empty()
+        && statistics.actions <= MOST_ACTIONS_TAKEN_APART
+        && is_open(why)
+    {
+        let limit = statistics.evaluated.max(LEAST_EVALUATIONS);
+        let options =
+            Options { evaluation_limit: Some(limit), anytime: false, bound: None, ..options.clone() };
+        let mut unsolvable = |task: &Task| {
+            let found = search(task, attachments, &options, stop, &mut |_| {});
+            !stop() && matches!(found, Ok(Outcome::Unsolvable { .. }))
+        };
+        if let Some(narrowed) = narrowed(task, &mut unsolvable) {
+            *why = narrowed;
+        }
+    }
     Ok(outcome)
 }
+
+/// Goals of tasks with more ground actions than this are not taken apart to find out which parts are to blame.
+const MOST_ACTIONS_TAKEN_APART: u64 = 5_000;
+/// Evaluated states that a part of a goal may always take.
+const LEAST_EVALUATIONS: u64 = 1_000;
 
 fn search(
     task: &Task,

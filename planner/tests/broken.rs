@@ -40,11 +40,35 @@ fn each_fault_is_drawn_where_it_is() {
         ("swapped-files", "base-problem.pddl", Some("base-domain.pddl")),
         ("goal-about-nothing", "base-domain.pddl", Some("goal-about-nothing.pddl")),
         ("faulty-problem", "base-domain.pddl", Some("faulty-problem.pddl")),
+        ("contradiction", "base-domain.pddl", Some("contradiction.pddl")),
+        ("guessed-name", "guessed-name.pddl", None),
     ] {
         let findings = findings(domain, problem);
         assert!(findings.has_errors(), "{name} should have a fault");
         insta::assert_snapshot!(name, findings.render(false));
     }
+}
+
+#[test]
+fn what_deserves_a_look_is_drawn_where_it_is() {
+    for (name, domain, problem) in [
+        ("gaps", "gaps-domain.pddl", Some("gaps-problem.pddl")),
+        ("division-by-zero", "division-by-zero.pddl", None),
+    ] {
+        let findings = findings(domain, problem);
+        assert!(!findings.has_errors(), "{findings}");
+        insta::assert_snapshot!(name, findings.render(false));
+    }
+}
+
+#[test]
+fn of_a_long_line_what_is_near_the_place_is_drawn() {
+    let facts = " (on mug table)".repeat(100_000);
+    let text = format!(
+        "(define (problem p) (:domain kitchen) (:objects mug - cup table - place)\n (:init{facts} (on mug tabel){facts})\n (:goal (on mug table)))"
+    );
+    let drawn = check(&source("base-domain.pddl"), Some(&Source::new("long", text))).render(false);
+    insta::assert_snapshot!("long-line", drawn);
 }
 
 #[test]

@@ -144,10 +144,42 @@ fn deep_nesting_is_a_finding_and_no_overflow() {
 }
 
 #[test]
+fn what_is_nested_too_deep_is_reported_as_that_alone() {
+    for deep in [200, 300, 5_000] {
+        let formula = format!("{}(p){}", "(not ".repeat(deep), ")".repeat(deep));
+        let text = format!(
+            "(define (domain d) (:requirements :adl) (:predicates (p)) (:action a :precondition {formula} :effect (p)))"
+        );
+        let findings = check(&Source::new("deep", text), None);
+        let codes: Vec<&str> = findings.list.iter().map(|finding| finding.code).collect();
+        assert_eq!(codes, ["too-deep"], "{deep}");
+    }
+}
+
+#[test]
+fn words_of_old_module_domains_are_read() {
+    let domain = "(define (domain d) (:requirements :modules :fluents :object-fluents :durative-actions)
+      (:oplinit setUp@libRobot.so (more@libRobot.so -scene Table.xml))
+      (:types pose - object) (:predicates (change ?p ?q - pose) (there)) (:functions (at) - pose (level))
+      (:durative-action go :parameters (?p ?q - pose) :duration (= ?duration 1) :condition (at start (= (at) ?p))
+        :effect (and (at end (change (at) ?q)) (at end (change (level) 2)) (at end (change ?p ?q))
+                     (at end (there)))))";
+    let problem = "(define (problem p) (:domain d) (:objects a b - pose)
+      (:init (= (at) a) (= (level) 0) (at 5 (= (level) 7)) (at 6 (= (at) b))) (:goal (there)))";
+    let (domain, problem) = (Source::new("domain", domain), Source::new("problem", problem));
+    let task = Task::read(&domain, &problem).unwrap_or_else(|findings| panic!("{findings}"));
+    let options: Vec<&str> = task.module_options.iter().map(|option| option.function.as_str()).collect();
+    assert_eq!(options, ["setUp@libRobot.so", "more@libRobot.so"]);
+    assert_eq!(task.module_options[1].arguments, ["-scene", "Table.xml"]);
+    assert_eq!((task.actions[0].effects.end.len(), task.init.timed.len()), (4, 2));
+}
+
+#[test]
 fn nesting_as_deep_as_allowed_is_read() {
     let deep = format!("{}(p){}", "(or (p) ".repeat(190), ")".repeat(190));
-    let text =
-        format!("(define (domain d) (:predicates (p)) (:action a :precondition {deep} :effect (not (p))))");
+    let text = format!(
+        "(define (domain d) (:requirements :adl) (:predicates (p)) (:action a :precondition {deep} :effect (not (p))))"
+    );
     let findings = check(&Source::new("deep", text), None);
     assert!(findings.is_empty(), "{findings}");
 }

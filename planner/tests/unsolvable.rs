@@ -79,6 +79,12 @@ const GAUGE: &str = "  (:requirements :durative-actions :numeric-fluents)
     :effect (at end (increase (level) 1)))
 ";
 
+const TANK: &str = "  (:requirements :numeric-fluents)
+  (:predicates (lit)) (:functions (fuel) (cap))
+  (:action fill :parameters () :precondition (< (fuel) (cap)) :effect (increase (fuel) 1))
+  (:action light :parameters () :precondition (> (fuel) 1) :effect (and (lit) (decrease (fuel) 1)))
+";
+
 const FAILING: &str = "  (:requirements :typing :durative-actions :modules)
   (:types thing)
   (:modules (broken ?t - thing conditionchecker broken@house))
@@ -92,7 +98,14 @@ fn each_reason_is_drawn_where_it_stands() {
     for (name, domain, problem) in [
         ("no-door", HOUSE, format!("{HOUSE_PROBLEM}  (:goal (in cup attic))")),
         ("nothing-to-scrub-with", HOUSE, format!("{HOUSE_PROBLEM}  (:goal (clean cup))")),
-        ("excluding-each-other", HOUSE, format!("{HOUSE_PROBLEM}  (:goal (and (carried cup) (in cup hall)))")),
+        ("a-way-back-that-is-not-there", HOUSE, format!("{HOUSE_PROBLEM}  (:goal (and (carried cup) (in cup hall)))")),
+        (
+            "excluding-each-other",
+            HOUSE,
+            "  (:objects cup - thing hall kitchen - room) (:init (robot-in hall) (door hall kitchen) (in cup hall))
+  (:goal (and (carried cup) (robot-in kitchen) (in cup kitchen)))"
+                .to_string(),
+        ),
         ("too-short-a-light", LIGHT, "  (:init (match)) (:goal (mended))".to_string()),
         ("too-early-a-deadline", SHOP, "  (:init (home) (open) (at 6 (not (open)))) (:goal (bought))".to_string()),
         (
@@ -111,6 +124,13 @@ fn each_reason_is_drawn_where_it_stands() {
             GAUGE,
             "  (:init (= (level) 0) (= (room) 9)) (:goal (and (>= (level) 3) (>= (room) 1)))".to_string(),
         ),
+        (
+            "a-number-out-of-reach",
+            TANK,
+            "  (:init (= (fuel) 3) (= (cap) 5))
+  (:goal (and (lit) (> (fuel) 8) (< (fuel) 100)))".to_string(),
+        ),
+        ("needed-by-a-rule-of-some", HOUSE, format!("{HOUSE_PROBLEM}  (:goal (exists (?t - thing) (and (clean ?t) (brush ?t))))")),
     ] {
         insta::assert_snapshot!(name, why(domain, &problem));
     }

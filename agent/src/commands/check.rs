@@ -26,7 +26,7 @@ pub struct Arguments {
 #[derive(serde::Serialize)]
 struct Report<'a> {
     errors: bool,
-    findings: &'a [descry_planner::Diagnostic],
+    findings: &'a Findings,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
@@ -38,7 +38,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let problem = arguments.problem.as_deref().map(input::source).transpose()?;
     let findings = descry_planner::check(&domain, problem.as_ref());
     if arguments.json {
-        input::print_json(&Report { errors: findings.has_errors(), findings: &findings.list })?;
+        input::print_json(&Report { errors: findings.has_errors(), findings: &findings })?;
     } else if findings.is_empty() {
         input::narrate("no finding");
     } else {

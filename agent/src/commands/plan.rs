@@ -100,7 +100,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
 fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(), CommandError> {
     let plan = outcome.plan();
     let why = match outcome {
-        Outcome::Unsolvable { why, .. } => Some(why.to_string()),
+        Outcome::Unsolvable { why, .. } => Some(why),
         _ => None,
     };
     let Statistics { evaluated, expanded, plans, actions, optimal, scored_only, attachments } =
@@ -118,7 +118,8 @@ fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(),
         "optimal": optimal,
         "scored_only": scored_only,
         "attachments": attachments,
-        "why": why,
+        "why": why.map(|why| why.to_string()),
+        "findings": why.map(|why| &why.findings),
         "plan": plan.map(|p| &p.steps),
     }))
 }

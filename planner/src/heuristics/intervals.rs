@@ -193,6 +193,12 @@ impl Intervals {
             for number in change.amount.as_ref().map_or_else(Vec::new, |a| reads(&[a])) {
                 self.amounts_on[number as usize].push(node);
             }
+            // What a factor makes of a number depends on the number too; nothing can be added to an undefined one.
+            let scales = matches!(change.change, Some(Change::ScaleUp | Change::ScaleDown));
+            let undefined = self.numbers.initial[change.number as usize].is_nan();
+            if scales || undefined && change.change != Some(Change::Assign) {
+                self.amounts_on[change.number as usize].push(node);
+            }
         }
         self.moves.push(moves);
     }

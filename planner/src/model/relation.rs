@@ -5,7 +5,7 @@ use crate::task::Comparison;
 /// Numbers this near to each other are equal.
 const TOLERANCE: f64 = 1e-7;
 /// So are large ones that differ by no more than this part of the larger.
-const RELATIVE_TOLERANCE: f64 = 1e-10;
+const RELATIVE_TOLERANCE: f64 = 1e-12;
 
 /// How two numbers compare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -124,6 +124,7 @@ mod tests {
             (0.1 + 0.2, 0.3, true),
             (1.1 * 1.1, 1.21, true),
             (1e7, 1e7 + 1.0, false),
+            (1e11, 1e11 + 1.0, false),
             (1e9 * 1.1, 1.1e9 + 1e-3, true),
             (0.0, 1e-6, false),
         ] {

@@ -338,6 +338,8 @@ pub struct Domain {
     pub requirements: Vec<Name>,
     /// Declared types.
     pub types: Vec<Typed>,
+    /// `:oplinit`: what the modules are set up with, whatever the problem.
+    pub module_options: Vec<ModuleOption>,
     /// Declared semantic modules.
     pub modules: Vec<ModuleDeclaration>,
     /// Declared constants.

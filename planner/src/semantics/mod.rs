@@ -8,7 +8,7 @@ mod conditions;
 mod derive;
 mod describe;
 pub(crate) mod effects;
-mod reads;
+pub(crate) mod reads;
 
 use std::sync::Arc;
 

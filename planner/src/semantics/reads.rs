@@ -164,37 +164,9 @@ impl Semantics<'_> {
 
     fn fact_read(&self, predicate: PredicateId, arguments: Vec<ObjectId>, touched: &mut Touched) {
         if self.task.predicate(predicate).stratum.is_some() {
-            self.depends_on(predicate, &mut touched.predicates);
+            depends_on(self.task, predicate, &mut touched.predicates);
         }
         touched.facts.insert(Fact { predicate, arguments: arguments.into() });
-    }
-
-    /// All predicates that a derived one depends on.
-    fn depends_on(&self, derived: PredicateId, into: &mut FxHashSet<PredicateId>) {
-        if !into.insert(derived) {
-            return;
-        }
-        for rule in self.task.rules.iter().filter(|rule| rule.predicate == derived) {
-            self.predicates_in(&rule.body, into);
-        }
-    }
-
-    fn predicates_in(&self, condition: &Condition, into: &mut FxHashSet<PredicateId>) {
-        match condition {
-            Condition::And(parts) | Condition::Or(parts) => {
-                parts.iter().for_each(|part| self.predicates_in(part, into));
-            }
-            Condition::Not(inner) | Condition::Forall(_, inner) | Condition::Exists(_, inner) => {
-                self.predicates_in(inner, into);
-            }
-            Condition::Atom(atom) if self.task.predicate(atom.predicate).stratum.is_some() => {
-                self.depends_on(atom.predicate, into);
-            }
-            Condition::Atom(atom) => {
-                into.insert(atom.predicate);
-            }
-            Condition::Same(..) | Condition::Compare(..) | Condition::Call(_) => {}
-        }
     }
 
     fn terms_read(&self, state: &State, terms: &[Term], binding: &Binding, touched: &mut Touched) {
@@ -246,6 +218,34 @@ impl Semantics<'_> {
                 }
             }
         }
+    }
+}
+
+/// All predicates that a derived one depends on.
+pub(crate) fn depends_on(task: &Task, derived: PredicateId, into: &mut FxHashSet<PredicateId>) {
+    if !into.insert(derived) {
+        return;
+    }
+    for rule in task.rules.iter().filter(|rule| rule.predicate == derived) {
+        predicates_in(task, &rule.body, into);
+    }
+}
+
+fn predicates_in(task: &Task, condition: &Condition, into: &mut FxHashSet<PredicateId>) {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => {
+            parts.iter().for_each(|part| predicates_in(task, part, into));
+        }
+        Condition::Not(inner) | Condition::Forall(_, inner) | Condition::Exists(_, inner) => {
+            predicates_in(task, inner, into);
+        }
+        Condition::Atom(atom) if task.predicate(atom.predicate).stratum.is_some() => {
+            depends_on(task, atom.predicate, into);
+        }
+        Condition::Atom(atom) => {
+            into.insert(atom.predicate);
+        }
+        Condition::Same(..) | Condition::Compare(..) | Condition::Call(_) => {}
     }
 }
 

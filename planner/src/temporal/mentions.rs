@@ -3,17 +3,20 @@
 //! Where a static fact decides a part of a quantified or disjunctive condition, grounding leaves the rest of that part
 //! out. PDDL 2.1 (section 8.1) takes all that a condition mentions for what it reads, and so do strict validators: what
 //! changes it must not happen at the same time. Before or after makes no difference, so the search knows nothing of
-//! this: in the schedule of a finished plan, such happenings are moved apart.
+//! this: in the schedule of a finished plan, such happenings are moved apart. So it is with a derived fact: it reads
+//! every instance of what its rules mention, while grounding keeps those instances that decide it.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::semantics::reads::depends_on;
 use crate::solve::EPSILON_S;
 use crate::task::{
-    Action, Assignment, Atom, Change, Condition, Effect, Expression, Fluent, Quantified, Term,
+    Action, Assignment, Atom, Change, Condition, Effect, Expression, Fluent, GroundChange, ObjectId,
+    PredicateId, Quantified, Task, Term,
 };
 
 use super::advance::Step;
-use super::order::Inconsistent;
+use super::order::{Access, Inconsistent};
 use super::space::{Space, Track};
 use super::world::World;
 
@@ -23,12 +26,19 @@ const MOST_ROUNDS: usize = 100;
 /// A ground atom or number by its name: whether it is a number, predicate or function, arguments.
 type Name = (bool, u32, Vec<u32>);
 
+/// In place of arguments: all instances of a predicate.
+const ALL: u32 = u32::MAX;
+/// In place of a step: a timed literal.
+const GIVEN: usize = usize::MAX;
+
 /// What a happening does with an atom or a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 enum Use {
     Mentions,
     Adds,
     Deletes,
+    /// Adds or deletes one of several.
+    Changes,
     /// Gives a number a value: not even two of the same kind may happen together.
     Writes,
 }
@@ -46,10 +56,11 @@ struct Touch {
 
 /// Moves apart what happens at the same time where one changes what the other mentions.
 pub(super) fn keep_apart(space: &Space, steps: &[Step], track: &mut Track) -> Result<(), Inconsistent> {
-    if !space.world.task.actions.iter().any(mentions_more) {
+    let task = space.world.task;
+    if task.rules.is_empty() && !task.actions.iter().any(mentions_more) {
         return Ok(());
     }
-    let mut touches = touches(space, steps, track);
+    let mut touches = touches(space, steps, track)?;
     for _ in 0..MOST_ROUNDS {
         let order = &track.order;
         let mut together: Vec<(u32, u32)> = Vec::new();
@@ -61,9 +72,8 @@ pub(super) fn keep_apart(space: &Space, steps: &[Step], track: &mut Track) -> Re
                 let disturbs = |other: &&Touch| {
                     other.step != one.step && (other.does != one.does || one.does == Use::Writes)
                 };
-                let (one, others) =
-                    (one.happening, touches[index + 1..].iter().take_while(near).filter(disturbs));
-                together.extend(others.map(|other| (one.min(other.happening), one.max(other.happening))));
+                let others = touches[index + 1..].iter().take_while(near).filter(disturbs);
+                together.extend(others.map(|other| in_order(one, other)));
             }
         }
         if together.is_empty() {
@@ -74,6 +84,12 @@ pub(super) fn keep_apart(space: &Space, steps: &[Step], track: &mut Track) -> Re
         track.order.separate(&together)?;
     }
     Ok(())
+}
+
+/// Two happenings, the one that shall come first before the other: what is given cannot be moved.
+fn in_order(one: &Touch, other: &Touch) -> (u32, u32) {
+    let key = |touch: &Touch| (touch.step != GIVEN, touch.happening);
+    if key(one) < key(other) { (one.happening, other.happening) } else { (other.happening, one.happening) }
 }
 
 /// Whether an action may mention more than its ground instances hold.
@@ -96,58 +112,135 @@ fn is_compound(condition: &Condition) -> bool {
 }
 
 /// By atom, the happenings that mention or change it, where they do different things with it.
-fn touches(space: &Space, steps: &[Step], track: &Track) -> FxHashMap<Name, Vec<Touch>> {
+fn touches(
+    space: &Space,
+    steps: &[Step],
+    track: &mut Track,
+) -> Result<FxHashMap<Name, Vec<Touch>>, Inconsistent> {
     let mut touches: FxHashMap<Name, Vec<Touch>> = FxHashMap::default();
+    let mut note = |happening: u32, step: usize, uses: Uses| {
+        for (name, does) in uses {
+            touches.entry(name).or_default().push(Touch { happening, step, does });
+        }
+    };
+    let named = Named::new(space.world.task);
     for (step, action) in track.actions.iter().enumerate() {
         let &Some((start, end)) = action else { continue };
-        let [at_start, at_end] = uses(space.world, steps[step].act);
-        for (happening, uses) in [(Some(start), at_start), (end, at_end)] {
-            let Some(happening) = happening else { continue };
-            for (name, does) in uses {
-                touches.entry(name).or_default().push(Touch { happening, step, does });
-            }
+        let [at_start, at_end] = named.uses(space.world, steps[step].act);
+        note(start, step, at_start);
+        if let Some(end) = end {
+            note(end, step, at_end);
         }
+    }
+    for timed in &space.world.task.init.timed {
+        let mut uses = Uses::default();
+        match &timed.change {
+            GroundChange::Add(fact) => named.changed(fact.predicate, &fact.arguments, Use::Adds, &mut uses),
+            GroundChange::Delete(fact) => {
+                named.changed(fact.predicate, &fact.arguments, Use::Deletes, &mut uses);
+            }
+            GroundChange::Number(fluent, _) => {
+                let arguments = fluent.arguments.iter().map(|object| object.0).collect();
+                uses.insert(((true, fluent.function.0, arguments), Use::Writes));
+            }
+            GroundChange::Object(..) => {}
+        }
+        let happening = track.order.push_fixed(&Access::default(), timed.time_s)?;
+        note(happening, GIVEN, uses);
     }
     touches.retain(|_, touches| {
         touches.iter().any(|touch| touch.does != touches[0].does || touch.does == Use::Writes)
     });
-    touches
+    Ok(touches)
 }
 
-/// What the start and the end of an action mention and change.
-fn uses(world: &World, act: u32) -> [Uses; 2] {
-    let origin = world.acts[act as usize].origin;
-    let action = &world.task.actions[origin.schema as usize];
-    let mut binding = vec![0; action.slots];
-    binding[..origin.arguments.len()].copy_from_slice(&origin.arguments);
-    let mut both = [Uses::default(), Uses::default()];
-    let halves =
-        [(&action.condition.start, &action.effects.start), (&action.condition.end, &action.effects.end)];
-    for (uses, (condition, effects)) in both.iter_mut().zip(halves) {
-        walk(condition, &mut binding, uses);
-        for effect in effects {
-            every(&effect.forall, &mut binding, &mut |binding| {
-                walk(&effect.when.start, binding, uses);
-                walk(&effect.when.end, binding, uses);
-                change(&effect.change, binding, uses);
-            });
+/// Names things that are mentioned and changed.
+struct Named {
+    /// By derived predicate, the predicates that it depends on; by any other, none.
+    roots: Vec<Vec<u32>>,
+}
+
+impl Named {
+    fn new(task: &Task) -> Named {
+        let roots = |index: usize| {
+            let predicate = PredicateId(index as u32);
+            let mut roots = FxHashSet::default();
+            if task.predicate(predicate).stratum.is_some() {
+                depends_on(task, predicate, &mut roots);
+            }
+            let mut roots: Vec<u32> = roots.into_iter().map(|root| root.0).collect();
+            roots.sort_unstable();
+            roots
+        };
+        Named { roots: (0..task.predicates.len()).map(roots).collect() }
+    }
+
+    /// What the start and the end of an action mention and change.
+    fn uses(&self, world: &World, act: u32) -> [Uses; 2] {
+        let origin = world.acts[act as usize].origin;
+        let action = &world.task.actions[origin.schema as usize];
+        let mut binding = vec![0; action.slots];
+        binding[..origin.arguments.len()].copy_from_slice(&origin.arguments);
+        let mut both = [Uses::default(), Uses::default()];
+        let halves =
+            [(&action.condition.start, &action.effects.start), (&action.condition.end, &action.effects.end)];
+        for (uses, (condition, effects)) in both.iter_mut().zip(halves) {
+            self.walk(condition, &mut binding, uses);
+            for effect in effects {
+                every(&effect.forall, &mut binding, &mut |binding| {
+                    self.walk(&effect.when.start, binding, uses);
+                    self.walk(&effect.when.end, binding, uses);
+                    self.change(&effect.change, binding, uses);
+                });
+            }
+        }
+        both
+    }
+
+    fn change(&self, change: &Change, binding: &[u32], into: &mut Uses) {
+        let (atom, does) = match change {
+            Change::Add(atom) => (atom, Use::Adds),
+            Change::Delete(atom) => (atom, Use::Deletes),
+            Change::Number(how, fluent, amount) => {
+                read(amount, binding, into);
+                let adds = matches!(how, Assignment::Increase | Assignment::Decrease);
+                let does = if adds { Use::Adds } else { Use::Writes };
+                into.extend(number(fluent, binding).map(|name| (name, does)));
+                return;
+            }
+            Change::Object(..) | Change::Call(_) => return,
+        };
+        if let Some(arguments) = objects(&atom.arguments, binding) {
+            let arguments: Vec<ObjectId> = arguments.into_iter().map(ObjectId).collect();
+            self.changed(atom.predicate, &arguments, does, into);
         }
     }
-    both
-}
 
-fn change(change: &Change, binding: &[u32], into: &mut Uses) {
-    let (name, does) = match change {
-        Change::Add(atom) => (name(atom, binding), Use::Adds),
-        Change::Delete(atom) => (name(atom, binding), Use::Deletes),
-        Change::Number(how, fluent, amount) => {
-            read(amount, binding, into);
-            let adds = matches!(how, Assignment::Increase | Assignment::Decrease);
-            (number(fluent, binding), if adds { Use::Adds } else { Use::Writes })
+    /// Notes a change of a fact, and of all instances of its predicate where they are read as one.
+    fn changed(&self, predicate: PredicateId, arguments: &[ObjectId], does: Use, into: &mut Uses) {
+        let arguments = arguments.iter().map(|object| object.0).collect();
+        into.insert(((false, predicate.0, arguments), does));
+        into.insert(((false, predicate.0, vec![ALL]), Use::Changes));
+    }
+
+    fn walk(&self, condition: &Condition, binding: &mut [u32], into: &mut Uses) {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                parts.iter().for_each(|part| self.walk(part, binding, into));
+            }
+            Condition::Not(inner) => self.walk(inner, binding, into),
+            Condition::Forall(variables, inner) | Condition::Exists(variables, inner) => {
+                every(variables, binding, &mut |binding| self.walk(inner, binding, into));
+            }
+            Condition::Atom(atom) => {
+                into.extend(name(atom, binding).map(|name| (name, Use::Mentions)));
+                let roots = self.roots[atom.predicate.index()].iter();
+                into.extend(roots.map(|&root| ((false, root, vec![ALL]), Use::Mentions)));
+            }
+            Condition::Compare(_, sides, _) => sides.iter().for_each(|side| read(side, binding, into)),
+            Condition::Same(..) | Condition::Call(_) => {}
         }
-        Change::Object(..) | Change::Call(_) => return,
-    };
-    into.extend(name.map(|name| (name, does)));
+    }
 }
 
 fn name(atom: &Atom, binding: &[u32]) -> Option<Name> {
@@ -183,21 +276,6 @@ fn read(expression: &Expression, binding: &[u32], into: &mut Uses) {
         | Expression::TotalTime
         | Expression::Violated(_)
         | Expression::Call(_) => {}
-    }
-}
-
-fn walk(condition: &Condition, binding: &mut [u32], into: &mut Uses) {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            parts.iter().for_each(|part| walk(part, binding, into));
-        }
-        Condition::Not(inner) => walk(inner, binding, into),
-        Condition::Forall(variables, inner) | Condition::Exists(variables, inner) => {
-            every(variables, binding, &mut |binding| walk(inner, binding, into));
-        }
-        Condition::Atom(atom) => into.extend(name(atom, binding).map(|name| (name, Use::Mentions))),
-        Condition::Compare(_, sides, _) => sides.iter().for_each(|side| read(side, binding, into)),
-        Condition::Same(..) | Condition::Call(_) => {}
     }
 }
 

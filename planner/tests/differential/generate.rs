@@ -215,7 +215,7 @@ impl Maker<'_> {
                 continue;
             }
             let arguments = all[self.chance.below(all.len())].clone();
-            let time_s = (1 + self.chance.below(6)) as f64 + 0.005 * (1 + index) as f64;
+            let time_s = (1 + self.chance.below(6)) as f64 + 0.003 * (1 + index) as f64;
             self.task.timed.push((time_s, predicate, arguments, self.chance.percent(50)));
         }
     }

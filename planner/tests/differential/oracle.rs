@@ -66,6 +66,8 @@ pub struct Oracle<'t> {
 
 /// Numbers nearer than this are equal.
 const TOLERANCE: f64 = 1e-7;
+/// So are large ones that differ by no more than this part.
+const RELATIVE_TOLERANCE: f64 = 1e-12;
 /// Events nearer than this are at one time.
 const TOGETHER_S: f64 = 1e-4;
 /// How far apart the search keeps what it starts.
@@ -165,7 +167,8 @@ impl<'t> Oracle<'t> {
                 let (left, right) =
                     (self.number(left, state, binding, 0.0), self.number(right, state, binding, 0.0));
                 let (Some(left), Some(right)) = (left, right) else { return false };
-                let equal = (left - right).abs() <= TOLERANCE;
+                let larger = left.abs().max(right.abs());
+                let equal = (left - right).abs() <= TOLERANCE.max(RELATIVE_TOLERANCE * larger);
                 let holds = match *relation {
                     "<" => left < right && !equal,
                     "<=" => left < right || equal,

@@ -353,7 +353,11 @@ impl Checker<'_> {
             }
         };
         let Some(types) = result else {
-            return Some(Change::Number(assignment, fluent, self.expression(value, place, scope)?));
+            let amount = self.expression(value, place, scope)?;
+            if assignment == Assignment::ScaleDown {
+                self.divides(&amount, span_of(value));
+            }
+            return Some(Change::Number(assignment, fluent, amount));
         };
         if assignment != Assignment::Assign {
             let message = format!("`{}` is not a number", self.task.function(fluent.function).name);

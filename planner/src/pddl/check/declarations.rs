@@ -141,6 +141,15 @@ impl Checker<'_> {
             };
             let known = &mut self.task.objects[first.index()];
             if types.iter().all(|own| known.types.contains(own)) {
+                // Many problems list the constants of their domain again.
+                if known.span.source == typed.name.span.source {
+                    let (message, place) = (format!("object `{}` is declared twice", known.name), known.span);
+                    self.push(
+                        Diagnostic::warning("duplicate", message, typed.name.span, "declared again here")
+                            .with_label(place, "first declared here")
+                            .with_help("remove one of them; if two objects are meant, rename one"),
+                    );
+                }
                 continue;
             }
             // Several competitions give an object more than one type like this.

@@ -1,5 +1,6 @@
 //! Terms and numeric expressions: arguments counted and typed, functions told apart by what they yield.
 
+use super::conditions::constant;
 use super::{Checker, Scope};
 use crate::attachment::CallKind;
 use crate::diagnostic::{Diagnostic, Span};
@@ -207,6 +208,10 @@ impl Checker<'_> {
         span: Span,
     ) {
         let written = self.name(name.symbol);
+        // Of a name that is only guessed, that finding says enough.
+        if !self.written(declared).eq_ignore_ascii_case(written) {
+            return;
+        }
         let plural = if wanted == 1 { "argument" } else { "arguments" };
         let message = format!("{kind} `{written}` takes {wanted} {plural}, found {found}");
         let difference = if found > wanted {
@@ -336,6 +341,9 @@ impl Checker<'_> {
             Arithmetic::Subtract if all.len() == 1 => Expression::Negative(Box::new(all.pop()?)),
             Arithmetic::Subtract | Arithmetic::Divide => {
                 let (right, left) = (all.pop()?, all.pop()?);
+                if operator == Arithmetic::Divide {
+                    self.divides(&right, operands.last().map(span_of).unwrap_or_default());
+                }
                 let both = Box::new([left, right]);
                 if operator == Arithmetic::Divide {
                     Expression::Divide(both)
@@ -344,6 +352,15 @@ impl Checker<'_> {
                 }
             }
         })
+    }
+
+    /// A constant divisor must not be zero.
+    pub(super) fn divides(&mut self, divisor: &Expression, span: Span) {
+        if constant(divisor) == Some(0.0) {
+            let finding =
+                Diagnostic::warning("division-by-zero", "a division by zero", span, "this is always zero");
+            self.push(finding.with_help("what has no value fulfils no condition, and no action may take it"));
+        }
     }
 
     fn total_time(&mut self, span: Span, place: Place) -> Option<Expression> {

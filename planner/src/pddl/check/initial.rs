@@ -1,6 +1,8 @@
 //! The initial state, timed literals included.
 
-use rustc_hash::FxHashSet;
+use std::collections::hash_map::Entry;
+
+use rustc_hash::FxHashMap;
 
 use super::Checker;
 use crate::diagnostic::{Diagnostic, Span};
@@ -13,8 +15,9 @@ use crate::task::{
 impl Checker<'_> {
     pub(super) fn initial(&mut self, all: &[Initial]) {
         let mut init = Init::default();
-        let mut facts: FxHashSet<Fact> = FxHashSet::default();
-        let mut values: rustc_hash::FxHashMap<GroundFluent, (usize, Span)> = rustc_hash::FxHashMap::default();
+        let mut facts: FxHashMap<Fact, Span> = FxHashMap::default();
+        let mut denied: Vec<(Fact, Span)> = Vec::new();
+        let mut values: FxHashMap<GroundFluent, (usize, Span)> = FxHashMap::default();
         init.facts.reserve(all.len());
         facts.reserve(all.len());
         for one in all {
@@ -29,12 +32,13 @@ impl Checker<'_> {
             }
             match change {
                 GroundChange::Add(fact) => {
-                    if facts.insert(fact.clone()) {
-                        init.facts.push(fact);
+                    if let Entry::Vacant(new) = facts.entry(fact) {
+                        init.facts.push(new.key().clone());
+                        new.insert(span);
                     }
                 }
                 // Everything that is not said to be true is false.
-                GroundChange::Delete(_) => {}
+                GroundChange::Delete(fact) => denied.push((fact, span)),
                 GroundChange::Number(fluent, value) => match values.get(&fluent) {
                     Some(&(at, first)) => {
                         let before = std::mem::replace(&mut init.numbers[at].1, value);
@@ -65,6 +69,16 @@ impl Checker<'_> {
             let fluent = GroundFluent { function, arguments: Box::default() };
             if !values.contains_key(&fluent) {
                 init.numbers.push((fluent, 0.0));
+            }
+        }
+        for (fact, span) in denied {
+            if let Some(&stated) = facts.get(&fact) {
+                let message = format!("`{}` is true and false at the beginning", self.written(stated));
+                self.push(
+                    Diagnostic::error("contradiction", message, span, "false here")
+                        .with_label(stated, "true here")
+                        .with_help("remove one of them"),
+                );
             }
         }
         init.timed.sort_by(|one, other| one.time_s.total_cmp(&other.time_s));

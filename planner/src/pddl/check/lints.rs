@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashSet;
 
-use super::Checker;
+use super::{Checker, usage};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::task::{
     Atom, Change, Condition, Effect, Fact, GroundChange, ObjectId, Parameter, Task, Term, Written,
@@ -23,6 +23,9 @@ impl Checker<'_> {
         }
         self.findings.append(&mut findings);
         self.task.goal.body = goal;
+        let mut unused = usage::unused(&self.task);
+        unused.extend(usage::without_value(&self.task));
+        self.findings.append(&mut unused);
     }
 }
 

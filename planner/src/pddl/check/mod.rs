@@ -8,7 +8,9 @@ mod goals;
 mod initial;
 mod lints;
 mod names;
+mod requirements;
 mod strata;
+mod usage;
 
 use std::sync::Arc;
 
@@ -43,29 +45,34 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
     let mut list = Vec::new();
     let domain_tree = parse::domain(&domain.text, 0, &mut symbols, &mut list);
     let problem_tree = problem.map(|problem| parse::problem(&problem.text, 1, &mut symbols, &mut list));
-    let torn: Vec<Span> = list
-        .iter()
-        .filter(|finding| finding.code == "unbalanced")
-        .map(|finding| finding.labels[0].span)
-        .collect();
+    let torn: Vec<Span> =
+        list.iter().filter(|finding| is_torn(finding)).map(|finding| finding.labels[0].span).collect();
     let mut checker = Checker::new(&sources, &symbols, list);
     checker.domain(&domain_tree, problem_tree.as_ref());
     if let Some(problem) = &problem_tree {
         checker.problem(problem, &domain_tree);
     }
     let readable = checker.findings.iter().all(|finding| finding.severity != Severity::Error);
-    if lints && readable && problem_tree.is_some() {
-        checker.lints();
+    if lints && readable {
+        checker.requirements(&domain_tree, problem_tree.as_ref());
+        if problem_tree.is_some() {
+            checker.lints();
+        }
     }
     let Checker { task, mut findings, .. } = checker;
-    // What follows from a missing parenthesis is no finding of its own.
+    // What follows from a missing parenthesis, or from what is not read, is no finding of its own.
     findings.retain(|finding| {
         let place = finding.labels.first().map_or(Span::default(), |label| label.span);
-        finding.code == "unbalanced" || !torn.iter().any(|&span| same_section(&sources, span, place))
+        is_torn(finding) || !torn.iter().any(|&span| same_section(&sources, span, place))
     });
     // Stable: findings at one place stay in the order in which they were made.
     findings.sort_by_key(|finding: &Diagnostic| finding.labels.first().map(|label| label.span));
     (task, Findings { sources, list: findings })
+}
+
+/// Whether a text could not be read as the lists that were meant.
+fn is_torn(finding: &Diagnostic) -> bool {
+    matches!(finding.code, "unbalanced" | "too-deep")
 }
 
 /// Whether two places are in one section, which begins with `(:` at the start of a line.
@@ -191,6 +198,7 @@ impl<'a> Checker<'a> {
         for constraint in &domain.constraints {
             self.constraint(constraint);
         }
+        self.task.module_options = self.options(&domain.module_options);
     }
 
     fn problem(&mut self, problem: &ast::Problem, domain: &ast::Domain) {
@@ -208,7 +216,7 @@ impl<'a> Checker<'a> {
         if let Some(metric) = &problem.metric {
             self.metric(metric);
         }
-        self.task.module_options = self.options(&problem.module_options);
+        self.task.module_options.extend(self.options(&problem.module_options));
         self.task.module_exit_options = self.options(&problem.module_exit_options);
     }
 

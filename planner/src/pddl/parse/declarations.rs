@@ -287,7 +287,12 @@ impl Parser<'_> {
     }
 
     pub(super) fn module_options(&mut self, section: usize, into: &mut Vec<ModuleOption>) {
-        for node in self.children(section).skip(1) {
+        let nodes: Vec<usize> = self.children(section).skip(1).collect();
+        self.options_of(&nodes, into);
+    }
+
+    fn options_of(&mut self, nodes: &[usize], into: &mut Vec<ModuleOption>) {
+        for &node in nodes {
             let words: Vec<usize> = self.children(node).collect();
             let Some((&first, rest)) = words.split_first().filter(|_| self.is_list(node)) else {
                 self.expected("an option", node, "for example `(init@libmodule.so argument)`");
@@ -304,6 +309,17 @@ impl Parser<'_> {
             }
             into.push(ModuleOption { function, arguments });
         }
+    }
+
+    /// `(:oplinit init@lib.so)`: words by themselves, or options.
+    pub(super) fn module_setup(&mut self, section: usize, into: &mut Vec<ModuleOption>) {
+        let (lists, words): (Vec<usize>, Vec<usize>) =
+            self.children(section).skip(1).partition(|&node| self.is_list(node));
+        for node in words {
+            let function = self.name(node, "the function that sets modules up");
+            into.extend(function.map(|function| ModuleOption { function, arguments: Vec::new() }));
+        }
+        self.options_of(&lists, into);
     }
 
     pub(super) fn derived(&mut self, section: usize) -> Option<Derived> {

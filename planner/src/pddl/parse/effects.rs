@@ -72,11 +72,18 @@ impl Parser<'_> {
                 self.expected("an effect", node, "to give a fluent a value write `(assign (f ?x) value)`");
                 None
             }
+            // A predicate may have the old name of `assign`.
+            "change" if !self.gives_value(rest) => self.literal(node, false, node),
             _ => match assignment(head) {
                 Some(kind) => self.assignment(node, kind, head, rest),
                 None => self.literal(node, false, node),
             },
         }
+    }
+
+    /// Whether these may be a fluent and its new value.
+    fn gives_value(&self, rest: &[usize]) -> bool {
+        rest.len() == 2 && self.word(rest[0]).is_none_or(|word| !word.starts_with('?'))
     }
 
     fn timed_effect(

@@ -47,6 +47,7 @@ struct Parser<'a> {
 
 const DOMAIN_SECTIONS: &[&str] = &[
     ":requirements",
+    ":oplinit",
     ":types",
     ":modules",
     ":constants",
@@ -242,6 +243,7 @@ impl<'a> Parser<'a> {
             ":predicates" => self.predicates(section, &mut domain.predicates),
             ":functions" => self.functions(section, &mut domain.functions),
             ":modules" => self.modules(section, &mut domain.modules),
+            ":oplinit" => self.module_setup(section, &mut domain.module_options),
             ":constraints" => domain.constraints.extend(self.constraints(section)),
             ":derived" => domain.derived.extend(self.derived(section)),
             ":action" | ":durative-action" => domain.actions.extend(self.action(section, keyword)),

@@ -1,0 +1,81 @@
+//! Findings on very long lines: what is near the place, not the whole line.
+
+use std::fmt::Write;
+use std::ops::Range;
+
+use super::{Diagnostic, Severity, Source, Span};
+
+/// Lines with more bytes than this are not drawn whole.
+const LONG_LINE_BYTES: usize = 400;
+/// Characters shown before and after a place.
+const AROUND: usize = 40;
+/// Characters of a place that are shown.
+const MOST_SHOWN: usize = 60;
+
+/// Line and column of a byte, both from 1.
+pub(super) fn line_and_column(text: &str, byte: usize) -> (usize, usize) {
+    let Some(before) = text.get(..byte) else { return (1, 1) };
+    let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+    (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+}
+
+/// Whether a finding points into a line that is too long to draw.
+pub(super) fn is_needed(sources: &[Source], finding: &Diagnostic) -> bool {
+    finding.labels.iter().any(|label| {
+        let line = sources.get(label.span.source as usize).map(|source| line_of(&source.text, label.span));
+        line.is_some_and(|line| line.len() > LONG_LINE_BYTES)
+    })
+}
+
+/// The line in which a place begins; a place over many lines is as long as it is.
+fn line_of(text: &str, span: Span) -> Range<usize> {
+    let at = (span.start as usize).min(text.len());
+    let (before, after) = (text.as_bytes()[..at].iter(), text.as_bytes()[at..].iter());
+    let start = before.rev().position(|&byte| byte == b'\n').map_or(0, |back| at - back);
+    let end = after.copied().position(|byte| byte == b'\n').map_or(text.len(), |ahead| at + ahead);
+    start..end
+}
+
+/// A finding with what is near each of its places.
+pub(super) fn draw(sources: &[Source], finding: &Diagnostic) -> String {
+    let kind = match finding.severity {
+        Severity::Error => "Error",
+        Severity::Warning => "Warning",
+    };
+    let mut drawn = format!("[{}] {kind}: {}\n", finding.code, finding.message);
+    for (number, label) in finding.labels.iter().enumerate() {
+        let Some(source) = sources.get(label.span.source as usize) else { continue };
+        let (line, column) = line_and_column(&source.text, label.span.start as usize);
+        let corner = if number == 0 { "╭" } else { "├" };
+        let (shown, indent, width) = excerpt(&source.text, label.span);
+        let _ = writeln!(drawn, "   {corner}─[ {}:{line}:{column} ]\n   │", source.name);
+        let _ = writeln!(drawn, "   │ {shown}\n   │ {}{}", " ".repeat(indent), "─".repeat(width));
+        let _ = writeln!(drawn, "   │ {}╰── {}\n   │", " ".repeat(indent), label.text);
+    }
+    if let Some(help) = &finding.help {
+        let _ = writeln!(drawn, "   │ Help: {help}");
+    }
+    drawn.push_str("───╯\n");
+    drawn
+}
+
+/// What is near a place, on one line, with where the place begins in it and how wide it is.
+fn excerpt(text: &str, span: Span) -> (String, usize, usize) {
+    let line = line_of(text, span);
+    let start = (span.start as usize).clamp(line.start, line.end);
+    let end = (span.end as usize).clamp(start, line.end);
+    let (Some(before), Some(place), Some(after)) =
+        (text.get(line.start..start), text.get(start..end), text.get(end..line.end))
+    else {
+        return (String::new(), 0, 1);
+    };
+    let from = before.char_indices().rev().nth(AROUND).map(|(at, _)| at);
+    let before = from.map_or(before.to_string(), |at| format!("…{}", &before[at..]));
+    let cut = |text: &str, most: usize| match text.char_indices().nth(most) {
+        Some((at, _)) => format!("{}…", &text[..at]),
+        None => text.to_string(),
+    };
+    let (place, after) = (cut(place, MOST_SHOWN), cut(after, AROUND));
+    let (indent, width) = (before.chars().count(), place.chars().count().max(1));
+    (format!("{before}{place}{after}").replace('\t', " "), indent, width)
+}

@@ -1,0 +1,34 @@
+//! Which parts of a goal are to blame: a smallest set of them that cannot be had together.
+
+use crate::diagnostic::Findings;
+use crate::task::{Condition, Task};
+
+use super::{Explanation, UNREACHED, together};
+
+/// Goals with more parts than this are not taken apart.
+const MOST_PARTS: usize = 24;
+
+/// Whether every state was seen and nothing more can be said about why none will do.
+pub(crate) fn is_open(why: &Explanation) -> bool {
+    matches!(why.findings.list.as_slice(), [only] if only.message == UNREACHED)
+}
+
+/// Leaves out what need not be in the goal for it to stay out of reach, as far as `unsolvable` proves; and tells what
+/// is left. Nothing of it can be left out, where every question is answered.
+pub(crate) fn narrowed(task: &Task, unsolvable: &mut dyn FnMut(&Task) -> bool) -> Option<Explanation> {
+    let Condition::And(parts) = &task.goal.body else { return None };
+    if parts.len() > MOST_PARTS {
+        return None;
+    }
+    let mut left = parts.clone();
+    for part in parts {
+        let others: Vec<Condition> = left.iter().filter(|other| *other != part).cloned().collect();
+        let mut without = task.clone();
+        without.goal.body = Condition::And(others.clone());
+        if !others.is_empty() && unsolvable(&without) {
+            left = others;
+        }
+    }
+    let list = vec![together(task, &left.iter().collect::<Vec<_>>(), left.len() < parts.len())];
+    Some(Explanation { findings: Findings { sources: task.sources.to_vec(), list } })
+}

@@ -1,0 +1,111 @@
+//! Walking over what a task says: conditions, expressions, calls and terms, each part before what it is made of.
+
+use crate::task::{Action, Call, Change, Condition, Effect, Expression, Fluent, Task, Term, Timed};
+
+/// A part of what is said.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Part<'t> {
+    Condition(&'t Condition),
+    Expression(&'t Expression),
+    Call(&'t Call),
+    /// The value of a function, read or changed.
+    Fluent(&'t Fluent),
+    /// What an effect changes.
+    Change(&'t Change),
+}
+
+/// Visits a condition.
+pub(crate) fn condition<'t>(own: &'t Condition, visit: &mut dyn FnMut(Part<'t>)) {
+    visit(Part::Condition(own));
+    match own {
+        Condition::And(parts) | Condition::Or(parts) => {
+            parts.iter().for_each(|part| condition(part, visit));
+        }
+        Condition::Not(inner) | Condition::Forall(_, inner) | Condition::Exists(_, inner) => {
+            condition(inner, visit);
+        }
+        Condition::Atom(atom) => terms(&atom.arguments, visit),
+        Condition::Same(both, _) => terms(&**both, visit),
+        Condition::Compare(_, sides, _) => sides.iter().for_each(|side| expression(side, visit)),
+        Condition::Call(own) => call(own, visit),
+    }
+}
+
+/// Visits an expression.
+pub(crate) fn expression<'t>(own: &'t Expression, visit: &mut dyn FnMut(Part<'t>)) {
+    visit(Part::Expression(own));
+    match own {
+        Expression::Fluent(own) => fluent(own, visit),
+        Expression::Add(parts) | Expression::Multiply(parts) => {
+            parts.iter().for_each(|part| expression(part, visit));
+        }
+        Expression::Subtract(sides) | Expression::Divide(sides) => {
+            sides.iter().for_each(|side| expression(side, visit));
+        }
+        Expression::Negative(inner) => expression(inner, visit),
+        Expression::Call(own) => call(own, visit),
+        Expression::Number(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {}
+    }
+}
+
+fn call<'t>(own: &'t Call, visit: &mut dyn FnMut(Part<'t>)) {
+    visit(Part::Call(own));
+    terms(&own.arguments, visit);
+}
+
+fn terms<'t>(all: &'t [Term], visit: &mut dyn FnMut(Part<'t>)) {
+    for term in all {
+        if let Term::Function(own) = term {
+            fluent(own, visit);
+        }
+    }
+}
+
+fn fluent<'t>(own: &'t Fluent, visit: &mut dyn FnMut(Part<'t>)) {
+    visit(Part::Fluent(own));
+    terms(&own.arguments, visit);
+}
+
+fn timed<'t>(own: &'t Timed<Condition>, visit: &mut dyn FnMut(Part<'t>)) {
+    [&own.start, &own.over_all, &own.end].into_iter().for_each(|part| condition(part, visit));
+}
+
+fn effect<'t>(own: &'t Effect, visit: &mut dyn FnMut(Part<'t>)) {
+    timed(&own.when, visit);
+    visit(Part::Change(&own.change));
+    match &own.change {
+        Change::Add(atom) | Change::Delete(atom) => terms(&atom.arguments, visit),
+        Change::Number(_, own, value) => {
+            fluent(own, visit);
+            expression(value, visit);
+        }
+        Change::Object(own, value) => {
+            fluent(own, visit);
+            terms(value.as_slice(), visit);
+        }
+        Change::Call(own) => call(own, visit),
+    }
+}
+
+/// Visits all that an action says.
+pub(crate) fn action<'t>(own: &'t Action, visit: &mut dyn FnMut(Part<'t>)) {
+    own.grounding.iter().for_each(|own| call(own, visit));
+    own.duration.iter().flatten().for_each(|bound| expression(&bound.value, visit));
+    timed(&own.condition, visit);
+    own.effects.start.iter().chain(&own.effects.end).for_each(|own| effect(own, visit));
+    for rate in &own.continuous {
+        fluent(&rate.fluent, visit);
+        expression(&rate.per_second, visit);
+    }
+    own.preferences.iter().for_each(|(_, preferred)| timed(preferred, visit));
+}
+
+/// Visits all that a task says of its goal, and of the way there.
+pub(crate) fn aims<'t>(task: &'t Task, visit: &mut dyn FnMut(Part<'t>)) {
+    condition(&task.goal.body, visit);
+    let constraints = task.constraints.iter().flat_map(|constraint| &constraint.conditions);
+    let preferred =
+        task.preferences.iter().flat_map(|preference| &preference.goals).map(|goal| &goal.condition);
+    constraints.chain(preferred).for_each(|own| condition(own, visit));
+    task.metric.iter().for_each(|metric| expression(&metric.value, visit));
+}

@@ -1,0 +1,5 @@
+(define (problem tidy)
+  (:domain kitchen)
+  (:objects mug - cup table shelf - place)
+  (:init (on mug table) (hand-free) (not (on mug table)))
+  (:goal (on mug shelf)))

@@ -1,0 +1,5 @@
+(define (problem tidy)
+  (:domain kitchen)
+  (:objects mug cup mug - dish table - place)
+  (:init (on mug table) (on cup table) (= (water) 9) (= (weight mug) 2))
+  (:goal (and (clean mug) (<= (weight cup) 3))))

@@ -2,8 +2,10 @@
 
 use async_trait::async_trait;
 use descry_robots::{
-    CancellationToken, Driven, Failure, Grasped, Hand, Opened, Placed, Progress, Pushed, Robot, Sensed, Watch,
+    CancellationToken, Driven, Failure, Grasped, Hand, Opened, Placed, Progress, Pushed, Robot, Scanned, Sensed,
+    Watch,
 };
+use descry_robots::perception::laser::Alignment;
 
 /// One action of a plan, with the names of its objects.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,6 +52,10 @@ pub enum Outcome {
     Driven(Driven),
     /// A view was taken.
     Seen(Box<Sensed>),
+    /// The laser has swept.
+    Scanned(Box<Scanned>),
+    /// Scans were brought together.
+    Aligned(Box<Alignment>),
     /// Something was moved.
     Pushed(Pushed),
     /// A door is open.

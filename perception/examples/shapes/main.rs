@@ -5,6 +5,7 @@
 mod lab;
 mod plot;
 mod scanning;
+mod strangers;
 mod tables;
 #[path = "../../tests/tabletop/mod.rs"]
 mod tabletop;
@@ -32,7 +33,8 @@ fn options(method: usize) -> SolverOptions {
 
 fn run(seed: u64, out: Option<&Path>) -> Result<(), String> {
     let learnt = models(seed, &Run::default(), &options(0));
-    out.map_or(Ok(()), |dir| plot::write(seed, &learnt, dir))?;
+    out.filter(|o| o.as_os_str()!="S").map_or(Ok(()), |dir| plot::write(seed, &learnt, dir))?;
+    if out.is_some_and(|o| o.as_os_str()=="S") { strangers::print(seed,&learnt); return Ok(()); }
     tables::alignment(seed);
     tables::features(&learnt);
     tables::f_c(&learnt);
@@ -41,6 +43,7 @@ fn run(seed: u64, out: Option<&Path>) -> Result<(), String> {
     tables::single_scans(&learnt);
     variations::print(seed, &learnt);
     scanning::print(seed, &learnt);
+    strangers::print(seed, &learnt);
     times::print(seed, &learnt);
     Ok(())
 }

@@ -73,6 +73,8 @@ pub const ABILITY: Ability = Ability {
             failed: put_down_failed,
         },
     ],
+    begins: None,
+    answers: None,
 };
 
 /// `(holding ?thing)`.

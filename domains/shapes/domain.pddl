@@ -68,6 +68,7 @@
       (at start (not (at ?from)))
       (at end (at ?to))))
 
+  ; There is no use in one more scan of what is known from all sides.
   (:durative-action scan
     :parameters (?from - pose ?what - spot)
     :duration (= ?duration 0.5)
@@ -75,6 +76,7 @@
       (over all (time-left))
       (at start (at ?from))
       (at start (not (scanned ?from)))
+      (at start (> (looseness ?what) 0.015))
       (at start ([can-scan ?from ?what])))
     :effect (and
       (at start (not (at ?from)))
@@ -117,7 +119,7 @@
     :duration (= ?duration 0.1)
     :condition (and
       (over all (time-left))
-      (at start (<= (looseness ?what) 0.012)))
+      (at start (<= (looseness ?what) 0.015)))
     :effect (and
       (at end (aligned ?what))
       (at end (learned ?name)))))

@@ -73,11 +73,11 @@ fn planned(s: &Situation, call: &Call, thing: &Thing) -> Vec<usize> {
 fn expected_tightening(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let Some(thing) = named(s, call, 1)? else { return Ok(Answer::Number(NOTHING_KNOWN_M)) };
     let mut scans = planned(s, call, thing);
-    let before_m = thing.looseness_m(&scans);
+    let before_m = thing.hoped_looseness_m(&scans);
     let pose = argument(call, 0)?;
     scans.extend(thing.ring.iter().position(|p| p == pose));
     // Of what no scan has shown, one will show about half.
-    let after_m = if thing.outline.is_some() { thing.looseness_m(&scans) } else { 0.5 * before_m };
+    let after_m = if thing.outline.is_some() { thing.hoped_looseness_m(&scans) } else { 0.5 * before_m };
     Ok(Answer::Number((before_m - after_m).max(0.0)))
 }
 
@@ -122,7 +122,7 @@ pub(super) fn hope_of_scan(s: &Situation, arguments: &[&str]) -> String {
     let Some(pose) = thing.ring.iter().position(|p| p == arguments[0]) else { return String::new() };
     match &thing.outline {
         Some(_) => {
-            let (now_m, then_m) = (thing.looseness_m(&[]), thing.looseness_m(&[pose]));
+            let (now_m, then_m) = (thing.looseness_m(), thing.hoped_looseness_m(&[pose]));
             format!(
                 "it may reach {:.1} cm beyond what was met of it, after this perhaps {:.1} cm",
                 1e2 * now_m,

@@ -47,7 +47,7 @@ fn on_floor(s: &Situation) -> Vec<String> {
 
 fn looseness(s: &Situation) -> Vec<String> {
     let mut lines: Vec<String> =
-        s.floor.things.iter().map(|t| format!("(= (looseness {}) {:.5})", t.symbol, t.looseness_m(&[]))).collect();
+        s.floor.things.iter().map(|t| format!("(= (looseness {}) {:.5})", t.symbol, t.looseness_m())).collect();
     if s.floor.thing(THIS).is_none() {
         lines.push(format!("(= (looseness {THIS}) {NOTHING_KNOWN_M})"));
     }

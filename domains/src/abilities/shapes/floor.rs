@@ -104,10 +104,19 @@ impl Floor {
 }
 
 impl Thing {
-    /// How far on average it may reach beyond what was met of it, once it has been scanned from more poses around it, metres.
-    pub fn looseness_m(&self, more: &[usize]) -> f64 {
-        let hope_m = |outline: &Arc<Outline>| outline.outlook.looseness_m(more).min(0.9 * NOTHING_KNOWN_M);
-        self.outline.as_ref().map_or(NOTHING_KNOWN_M, hope_m)
+    /// How far on average it may reach beyond what was met of it, metres.
+    pub fn looseness_m(&self) -> f64 {
+        let known = |outline: &Arc<Outline>| outline.outlook.looseness_m(&[]).min(0.9 * NOTHING_KNOWN_M);
+        self.outline.as_ref().map_or(NOTHING_KNOWN_M, known)
+    }
+
+    /// The same as one may hope for after scans from more poses around it: from all of them nothing would stay open.
+    pub fn hoped_looseness_m(&self, more: &[usize]) -> f64 {
+        let Some(outlook) = self.outline.as_ref().map(|o| &o.outlook) else { return NOTHING_KNOWN_M };
+        let all: Vec<usize> = (0..self.ring.len()).collect();
+        let [now, after, least] = [&[], more, &all[..]].map(|poses| outlook.leaves_m2(poses));
+        let share = if now > least { (after - least) / (now - least) } else { 1.0 };
+        self.looseness_m() * share
     }
 
     /// The name of the one known shape that it fits.
@@ -131,9 +140,9 @@ impl Thing {
     pub fn sureness(&self, known: usize) -> f64 {
         match self.taken_for.as_ref().map(|r| &r.verdict) {
             None | Some(Verdict::OneOf(_)) => 0.0,
-            Some(Verdict::Is(_)) => sure_of_name(self.looseness_m(&[]), known),
+            Some(Verdict::Is(_)) => sure_of_name(self.looseness_m(), known),
             Some(Verdict::Unknown) => {
-                let told = (1.0 - by_chance(self.looseness_m(&[]), known)) * STRANGER;
+                let told = (1.0 - by_chance(self.looseness_m(), known)) * STRANGER;
                 told / (told + MISSED * (1.0 - STRANGER))
             }
         }
@@ -141,7 +150,7 @@ impl Thing {
 
     /// How sure one may hope to be of it after scans from more poses around it.
     pub fn hoped(&self, more: &[usize], known: usize) -> f64 {
-        sure_of_name(self.looseness_m(more), known).max(self.sureness(known))
+        sure_of_name(self.hoped_looseness_m(more), known).max(self.sureness(known))
     }
 }
 

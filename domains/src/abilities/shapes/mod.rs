@@ -167,7 +167,7 @@ fn aligned(
     _: &mut Vec<Note>,
 ) -> Result<String, WorldError> {
     let Outcome::Aligned(alignment) = outcome else { return Err(WorldError::strange(outcome)) };
-    let loose_m = s.floor.thing(arguments[0]).map_or(floor::NOTHING_KNOWN_M, |t| t.looseness_m(&[]));
+    let loose_m = s.floor.thing(arguments[0]).map_or(floor::NOTHING_KNOWN_M, |t| t.looseness_m());
     let recognition = taken::recognise(s, alignment, loose_m);
     let known = s.floor.known.len();
     let of = Arc::make_mut(&mut mind.known.floor).things.iter_mut().find(|t| t.symbol == arguments[0]);

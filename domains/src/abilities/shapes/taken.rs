@@ -249,7 +249,7 @@ fn note(floor: &Floor, from: &str) -> Note {
         let why = t.ignored.iter().filter(|(pose, _)| pose == from);
         let why: String = why.map(|(_, why)| format!("; this one is left out: {why}")).collect();
         let loose = match &t.outline {
-            Some(_) => format!(", may reach {:.1} cm beyond what was met", 1e2 * t.looseness_m(&[])),
+            Some(_) => format!(", may reach {:.1} cm beyond what was met", 1e2 * t.looseness_m()),
             None => String::new(),
         };
         format!("{} at ({:.2}, {:.2}) m: {}{loose}{why}", t.symbol, middle.x, middle.y, scans(t))

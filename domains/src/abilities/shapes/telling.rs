@@ -168,7 +168,7 @@ impl<'a> Teller<'a> {
         if thing.ring.len() < poses {
             parts.push(format!("{} of {poses} poses around it cannot be reached", poses - thing.ring.len()));
         }
-        let loose_m = thing.looseness_m(&[]);
+        let loose_m = thing.looseness_m();
         if loose_m > OPEN_M && thing.outline.is_some() {
             parts.push(format!("it was not scanned from all sides, and may reach {:.0} cm beyond what was met on average", 1e2 * loose_m));
         }

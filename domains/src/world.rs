@@ -15,12 +15,12 @@ use descry_robots::{PoseEstimate, Robot};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::json;
 
+use crate::abilities;
 use crate::abilities::searching::candidates;
 use crate::abilities::searching::perceive::{self, Eyes};
 pub use crate::abilities::searching::policies::Chooser;
 use crate::abilities::searching::policies::{self, By};
 use crate::abilities::searching::reasons;
-use crate::abilities;
 use crate::actions::{self, Carried, Grounded};
 use crate::answer::{self, Conclusion, Ended};
 use crate::goal::Goal;
@@ -179,7 +179,9 @@ impl<'a> World<'a> {
         let words = Words::begin(domain).map_err(|e| WorldError::Domain(format!("domain.toml: {e}")))?;
         let mut mind = Mind { known, words, regions, views: 0, pushes: 0, distance_m: 0.0 };
         mind.attend();
-        abilities::used(&domain.config.uses).filter_map(|a| a.begins).for_each(|begins| begins(&mut mind, domain, goal));
+        abilities::used(&domain.config.uses)
+            .filter_map(|a| a.begins)
+            .for_each(|begins| begins(&mut mind, domain, goal));
         Ok(Self {
             chooser,
             lexicon: Lexicon::new(domain, &Places::of_body(&**robot)),
@@ -335,7 +337,8 @@ impl<'a> World<'a> {
 
     /// A step that is surely no waste, for when the planner has run out of states; none if there is none.
     pub fn fallback(&self, round: &Round) -> Option<Plan> {
-        reasons::one_look(&round.situation)
+        let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.fallback);
+        own.map_or_else(|| reasons::one_look(&round.situation), |fallback| fallback(&round.situation))
     }
 
     /// A plan was made.

@@ -74,15 +74,23 @@ mod tests {
     fn a_sweep_comes_back_and_an_uneven_one_is_refused() {
         let pose = Isometry2::new(nalgebra::Vector2::new(1.0, 2.0), 0.3);
         let scan = |angles_rad: Vec<f64>| Scan {
-            ranges_m: [1.25, f64::INFINITY, f64::NAN, 0.0].into_iter().cycle().take(angles_rad.len()).collect(),
+            ranges_m: [1.25, f64::INFINITY, f64::NAN, 0.0]
+                .into_iter()
+                .cycle()
+                .take(angles_rad.len())
+                .collect(),
             angles_rad,
             map_from_laser: pose,
         };
         let check = |angles_rad: Vec<f64>, fits: bool| {
             let scan = scan(angles_rad);
             let Ok(blob) = encode(&scan) else { return assert!(!fits, "{:?}", scan.angles_rad) };
-            let info =
-                BlobInfo { name: blob.name, form: blob.form, bytes: blob.data.len() as u64, layout: blob.layout };
+            let info = BlobInfo {
+                name: blob.name,
+                form: blob.form,
+                bytes: blob.data.len() as u64,
+                layout: blob.layout,
+            };
             let back = decode(&info, &blob.data, pose).unwrap();
             let bits = |s: &Scan| s.ranges_m.iter().map(|r| r.to_bits()).collect::<Vec<_>>();
             assert!(fits && bits(&back) == bits(&scan) && back.map_from_laser == pose);

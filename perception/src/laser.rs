@@ -25,7 +25,9 @@ pub use background::{
 };
 pub use features::{FeatureClass, Features, Nearest, classes, groups, nearest};
 pub use fit::{FitOptions, ModelFit, Start, fit, fit_scans, localise};
-pub use known::{Candidate, KnownShape, RecogniseOptions, Recognition, Verdict, recognise, recognise_scan, recognise_scans};
+pub use known::{
+    Candidate, KnownShape, RecogniseOptions, Recognition, Verdict, recognise, recognise_scan, recognise_scans,
+};
 pub use next::{NextOptions, NextScan, Outlook, next_scan, undetermined_m2};
 pub use scan::{Scan, ScanError};
 pub use shape::{ObjectScan, PosedScan, ShapeError, ShapeModel};

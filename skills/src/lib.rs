@@ -12,9 +12,9 @@ mod put_down;
 mod scan;
 mod skill;
 
-pub use descry_robots;
 pub use align::Align;
 pub use circle::Circle;
+pub use descry_robots;
 pub use r#move::Move;
 pub use observe::Observe;
 pub use open_door::OpenDoor;

@@ -1,11 +1,11 @@
 //! What every skill is: it has its arguments in the units of the body, can be stopped, and ends in time.
 
 use async_trait::async_trait;
-use descry_robots::{
-    CancellationToken, Driven, Failure, Grasped, Hand, Opened, Placed, Progress, Pushed, Robot, Scanned, Sensed,
-    Watch,
-};
 use descry_robots::perception::laser::Alignment;
+use descry_robots::{
+    CancellationToken, Driven, Failure, Grasped, Hand, Opened, Placed, Progress, Pushed, Robot, Scanned,
+    Sensed, Watch,
+};
 
 /// One action of a plan, with the names of its objects.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

@@ -5,7 +5,7 @@ pub mod moving;
 pub mod searching;
 pub mod shapes;
 
-use descry_planner::{Answer, Call, CallError};
+use descry_planner::{Answer, Call, CallError, Plan};
 use descry_skills::{Outcome, Skill, SkillFailure};
 
 use crate::abilities::searching::perceive::Eyes;
@@ -32,6 +32,8 @@ pub struct Ability {
     pub skills: &'static [SkillWord],
     /// What it prepares when a run begins, if anything.
     pub begins: Option<Begins>,
+    /// Steps that are surely no waste when no plan is found, where it has some of its own.
+    pub fallback: Option<Fallback>,
     /// What it answers in the end, where it has an answer of its own.
     pub answers: Option<Answers>,
 }
@@ -94,6 +96,9 @@ pub type Failed =
 
 /// Prepares a run.
 pub type Begins = fn(&mut Mind, &Domain, &Goal);
+
+/// Steps that are surely no waste; none if nothing that can be done promises anything.
+pub type Fallback = fn(&Situation) -> Option<Plan>;
 
 /// Answers in the end, by the situation of the last round.
 pub type Answers = fn(&Goal, &Mind, &Situation, &Ended) -> Conclusion;

@@ -33,8 +33,7 @@ fn options(method: usize) -> SolverOptions {
 
 fn run(seed: u64, out: Option<&Path>) -> Result<(), String> {
     let learnt = models(seed, &Run::default(), &options(0));
-    out.filter(|o| o.as_os_str()!="S").map_or(Ok(()), |dir| plot::write(seed, &learnt, dir))?;
-    if out.is_some_and(|o| o.as_os_str()=="S") { strangers::print(seed,&learnt); return Ok(()); }
+    out.map_or(Ok(()), |dir| plot::write(seed, &learnt, dir))?;
     tables::alignment(seed);
     tables::features(&learnt);
     tables::f_c(&learnt);

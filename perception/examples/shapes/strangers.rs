@@ -33,8 +33,12 @@ pub fn stranger(draws: &mut Draws) -> Outline {
 pub fn print(seed: u64, learnt: &[Alignment]) {
     let known: Vec<KnownShape> =
         (0..NAMES.len()).map(|k| KnownShape::new(NAMES[k], learnt[k * INSTANCES].model.clone())).collect();
-    println!("\n{THINGS} known things and {THINGS} strangers against 5 models, whatever sides were scanned; poses off by 3 cm and 2°");
-    println!("known: right, several, unknown, wrong | strangers: -, several, unknown, named; for what fits within 10, 7, 5 mm a pair of scans");
+    println!(
+        "\n{THINGS} known things and {THINGS} strangers against 5 models, whatever sides were scanned; poses off by 3 cm and 2°"
+    );
+    println!(
+        "known: right, several, unknown, wrong | strangers: -, several, unknown, named; for what fits within 10, 7, 5 mm a pair of scans"
+    );
     let run = Run { pose_sigma_m: 0.03, pose_sigma_rad: 0.035, ..Run::default() };
     let mut by_scans = [[[Count::default(); 2]; SAME_M.len()]; MOST];
     let mut by_looseness = [[[Count::default(); 2]; SAME_M.len()]; BINS.len()];

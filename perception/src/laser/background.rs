@@ -229,8 +229,7 @@ fn readings_near(
 ) -> Result<Option<Vec<usize>>, ObserveError> {
     let found = clusters(scan, is_background, options)?;
     let reachable = found.into_iter().map(|c| ((c.middle - near).norm(), c));
-    let nearest =
-        reachable.filter(|(d, _)| *d <= options.within_m).min_by(|a, b| a.0.total_cmp(&b.0));
+    let nearest = reachable.filter(|(d, _)| *d <= options.within_m).min_by(|a, b| a.0.total_cmp(&b.0));
     Ok(nearest.map(|(_, cluster)| cluster.readings))
 }
 

@@ -7,7 +7,9 @@ use crate::route::Router;
 use crate::sim::body::{self, SAFETY_M};
 use crate::sim::noise::{mix, share};
 use crate::sim::render::visible_share;
-use crate::sim::scene::{DoorSpec, DoorState, ObjectSpec, ObstacleSpec, RoomSpec, SceneSpec, SurfaceSpec, TargetSpec};
+use crate::sim::scene::{
+    DoorSpec, DoorState, ObjectSpec, ObstacleSpec, RoomSpec, SceneSpec, SurfaceSpec, TargetSpec,
+};
 use crate::sim::shape::Outline;
 use crate::sim::walls::walls;
 use crate::sim::world::{HungDoor, LABEL_OBJECT, Object, Scene, Stand, upright};
@@ -90,8 +92,9 @@ fn stand_on_floor(spec: &SceneSpec, seed: u64) -> Result<Vec<ObstacleSpec>, Inpu
             o.position_m[0] += x * (rng.random::<f64>() - 0.5);
             o.position_m[1] += y * (rng.random::<f64>() - 0.5);
             o.yaw_deg = rng.random_range(0.0..360.0);
-            let apart =
-                |other: &ObstacleSpec| gap_between(&outline(&o), &at(&o), &outline(other), &at(other)) >= o.gap_m;
+            let apart = |other: &ObstacleSpec| {
+                gap_between(&outline(&o), &at(&o), &outline(other), &at(other)) >= o.gap_m
+            };
             placed.iter().all(apart).then_some(o)
         })
     };

@@ -315,7 +315,8 @@ impl SimRobot {
         let number = self.trigger(&mut state, SWEEP_S)?;
         let part = self.options.laser.part();
         let map_from_base = state.estimate.isometry();
-        let pose = |map_from_base: &Isometry3<f64>| Pose2::from_isometry(&(map_from_base * part.base_from_laser));
+        let pose =
+            |map_from_base: &Isometry3<f64>| Pose2::from_isometry(&(map_from_base * part.base_from_laser));
         let (truly, stated) = (pose(&state.map_from_base()), pose(&map_from_base));
         let mut rng = ChaCha8Rng::seed_from_u64(noise::mix(noise::mix(self.options.seed ^ 0x5ca9) ^ number));
         let scan = laser::sweep(&state.scene, &self.options.laser, &truly, &stated, &mut rng);

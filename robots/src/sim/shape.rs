@@ -439,9 +439,9 @@ fn rounded_hit(
     corner_m: f64,
 ) -> Option<Hit> {
     let (x, y) = (high.x - corner_m, high.y - corner_m);
-    let boxes = [(x, high.y), (high.x, y)].into_iter().filter_map(|(x, y)| {
-        cuboid_hit(o, d, before, &Point3::new(-x, -y, 0.0), &Point3::new(x, y, high.z))
-    });
+    let boxes = [(x, high.y), (high.x, y)]
+        .into_iter()
+        .filter_map(|(x, y)| cuboid_hit(o, d, before, &Point3::new(-x, -y, 0.0), &Point3::new(x, y, high.z)));
     let edge = [
         Part::frustum(corner_m, corner_m, 0.0, high.z),
         Part::Disc { z_m: high.z, inner_m: 0.0, outer_m: corner_m },

@@ -9,7 +9,7 @@ use crate::sim::arrange::fits;
 use crate::sim::drive::{self, Localisation};
 use crate::sim::faults::{Fault, FaultKind};
 use crate::sim::routes::{Doors, Routes};
-use crate::sim::scene::{SurfaceSpec, headroom_m};
+use crate::sim::scene::{ObstacleSpec, SurfaceSpec, headroom_m};
 use crate::sim::truth::Event;
 use crate::sim::world::{HungDoor, MAP_RESOLUTION_M, Scene, Stand, upright};
 use descry_perception::laser::Scan;
@@ -95,14 +95,21 @@ impl State {
         }
     }
 
-    /// The first step at which the footprint touches something that the map does not show, and which obstacle that is.
+    /// The first step that brings the footprint into something that the map does not show, and which obstacle that is. What it touches already stops
+    /// only what goes nearer.
     pub fn first_bump(&self, steps: &[drive::Step], radius_m: f64) -> Option<(usize, usize)> {
-        steps.iter().enumerate().find_map(|(i, step)| {
+        let mut before = self.map_from_base().translation.vector.xy().into();
+        for (i, step) in steps.iter().enumerate() {
             let at = self.really(&step.pose).translation.vector.xy().into();
-            let bumps = |o: &&crate::sim::scene::ObstacleSpec| !o.on_map && o.touches(&at, radius_m);
-            let obstacle = self.scene.obstacles.iter().position(|o| bumps(&o))?;
-            Some((i, obstacle))
-        })
+            let bumps = |o: &ObstacleSpec| {
+                !o.on_map && o.touches(&at, radius_m) && o.distance_m(&at) < o.distance_m(&before)
+            };
+            if let Some(obstacle) = self.scene.obstacles.iter().position(bumps) {
+                return Some((i, obstacle));
+            }
+            before = at;
+        }
+        None
     }
 
     /// The object in the hand.
@@ -176,7 +183,8 @@ impl State {
     pub fn notice(&mut self, scan: &Scan, map: &OccupancyGrid) {
         let on_map = |p: &Point2<f64>| {
             (-1..=1).any(|i| {
-                (-1..=1).any(|k| map.is_occupied(&(p + Vector2::new(f64::from(i), f64::from(k)) * NEAR_WALL_M)))
+                (-1..=1)
+                    .any(|k| map.is_occupied(&(p + Vector2::new(f64::from(i), f64::from(k)) * NEAR_WALL_M)))
             })
         };
         let met = (0..scan.ranges_m.len()).filter(|&i| scan.ranges_m[i] <= NOTICED_M);

@@ -241,7 +241,11 @@ impl ObstacleSpec {
                     Part::Cuboid { low: outer.inf(&inner), high: outer.sup(&inner) + Vector3::z() * under_m }
                 };
                 let seat = Part::Cuboid { low: Point3::new(low.x, low.y, under_m), high };
-                [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(leg).into_iter().chain([seat]).collect()
+                [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                    .map(leg)
+                    .into_iter()
+                    .chain([seat])
+                    .collect()
             }
             None if self.corner_m > 0.0 => vec![Part::Rounded { high, corner_m: self.corner_m }],
             None => vec![Part::Cuboid { low, high }],
@@ -251,9 +255,14 @@ impl ObstacleSpec {
 
     /// True if a disc on the floor touches it.
     pub fn touches(&self, p: &Point2<f64>, radius_m: f64) -> bool {
+        self.distance_m(p) < radius_m
+    }
+
+    /// From a point of the floor to the box around it; 0 inside.
+    pub fn distance_m(&self, p: &Point2<f64>) -> f64 {
         let local = self.map_from_obstacle().inverse_transform_point(&Point3::new(p.x, p.y, 0.0));
         let gap = |at: f64, size: f64| (at.abs() - 0.5 * size).max(0.0);
-        gap(local.x, self.size_m[0]).hypot(gap(local.y, self.size_m[1])) < radius_m
+        gap(local.x, self.size_m[0]).hypot(gap(local.y, self.size_m[1]))
     }
 }
 

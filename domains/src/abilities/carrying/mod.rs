@@ -74,6 +74,7 @@ pub const ABILITY: Ability = Ability {
         },
     ],
     begins: None,
+    fallback: None,
     answers: None,
 };
 

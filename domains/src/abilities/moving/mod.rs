@@ -79,6 +79,7 @@ pub const ABILITY: Ability = Ability {
         },
     ],
     begins: None,
+    fallback: None,
     answers: None,
 };
 

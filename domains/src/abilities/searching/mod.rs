@@ -64,6 +64,7 @@ pub const ABILITY: Ability = Ability {
         },
     ],
     begins: None,
+    fallback: None,
     answers: None,
 };
 

@@ -7,7 +7,12 @@ use crate::situation::Situation;
 
 /// Every fact.
 pub(super) const ALL: &[Fact] = &[
-    Fact { name: "around", types: &["pose", "spot"], about: "the pose is one of those around it", states: around },
+    Fact {
+        name: "around",
+        types: &["pose", "spot"],
+        about: "the pose is one of those around it",
+        states: around,
+    },
     Fact { name: "on-floor", types: &["pose"], about: "the pose is around nothing", states: on_floor },
     Fact {
         name: "looseness",
@@ -15,7 +20,12 @@ pub(super) const ALL: &[Fact] = &[
         about: "how far on average it may reach beyond what was met of it, metres",
         states: looseness,
     },
-    Fact { name: "aligned", types: &["spot"], about: "all scans of it are brought together", states: aligned },
+    Fact {
+        name: "aligned",
+        types: &["spot"],
+        about: "all scans of it are brought together",
+        states: aligned,
+    },
     Fact {
         name: "sureness",
         types: &["spot"],
@@ -46,8 +56,12 @@ fn on_floor(s: &Situation) -> Vec<String> {
 }
 
 fn looseness(s: &Situation) -> Vec<String> {
-    let mut lines: Vec<String> =
-        s.floor.things.iter().map(|t| format!("(= (looseness {}) {:.5})", t.symbol, t.looseness_m())).collect();
+    let mut lines: Vec<String> = s
+        .floor
+        .things
+        .iter()
+        .map(|t| format!("(= (looseness {}) {:.5})", t.symbol, t.looseness_m()))
+        .collect();
     if s.floor.thing(THIS).is_none() {
         lines.push(format!("(= (looseness {THIS}) {NOTHING_KNOWN_M})"));
     }
@@ -61,8 +75,12 @@ fn aligned(s: &Situation) -> Vec<String> {
 
 fn sureness(s: &Situation) -> Vec<String> {
     let known = s.floor.known.len();
-    let mut lines: Vec<String> =
-        s.floor.things.iter().map(|t| format!("(= (sureness {}) {:.5})", t.symbol, t.sureness(known))).collect();
+    let mut lines: Vec<String> = s
+        .floor
+        .things
+        .iter()
+        .map(|t| format!("(= (sureness {}) {:.5})", t.symbol, t.sureness(known)))
+        .collect();
     if s.floor.thing(THIS).is_none() {
         lines.push(format!("(= (sureness {THIS}) 0)"));
     }

@@ -3,9 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use descry_perception::laser::{
-    Alignment, Ignored, KnownShape, Outlook, PosedScan, Recognition, Verdict,
-};
+use descry_perception::laser::{Alignment, Ignored, KnownShape, Outlook, PosedScan, Recognition, Verdict};
 use descry_perception::nalgebra::{Point2, Vector2};
 
 use super::unseen::Unseen;
@@ -162,7 +160,8 @@ fn sure_of_name(loose_m: f64, known: usize) -> f64 {
 
 /// The probability that a stranger fits one of so many known shapes.
 fn by_chance(loose_m: f64, known: usize) -> f64 {
-    let of_five = TAKEN_FOR_KNOWN.iter().find(|(edge_m, _)| loose_m < *edge_m).map_or(1.0, |(_, share)| *share);
+    let of_five =
+        TAKEN_FOR_KNOWN.iter().find(|(edge_m, _)| loose_m < *edge_m).map_or(1.0, |(_, share)| *share);
     1.0 - (1.0 - of_five).powf(known as f64 / MEASURED_WITH)
 }
 

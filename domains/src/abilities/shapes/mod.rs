@@ -83,6 +83,7 @@ pub const ABILITY: Ability = Ability {
         },
     ],
     begins: Some(begins),
+    fallback: Some(calls::fallback),
     answers: Some(telling::answer),
 };
 
@@ -106,7 +107,13 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
         known: domain.shapes.iter().cloned().chain(remembered).collect(),
         names,
         unseen: robot.map().map(Unseen::of).unwrap_or_default(),
-        promising: mind.known.candidates.iter().filter(|_| sought.is_some()).map(|c| c.symbol.clone()).collect(),
+        promising: mind
+            .known
+            .candidates
+            .iter()
+            .filter(|_| sought.is_some())
+            .map(|c| c.symbol.clone())
+            .collect(),
         sought,
         poses: domain.config.candidates,
         ..Floor::default()
@@ -173,7 +180,8 @@ fn aligned(
     let of = Arc::make_mut(&mut mind.known.floor).things.iter_mut().find(|t| t.symbol == arguments[0]);
     let thing = of.ok_or_else(|| WorldError::Bug(format!("`{}` is gone", arguments[0])))?;
     let best = recognition.candidates.first().map(|c| c.fit.between.per_pair_m());
-    let fits = best.map_or(String::new(), |m| format!(" (the best fits to {:.1} mm a pair of scans)", 1e3 * m));
+    let fits =
+        best.map_or(String::new(), |m| format!(" (the best fits to {:.1} mm a pair of scans)", 1e3 * m));
     let said = match &recognition.verdict {
         Verdict::Is(name) => format!("it fits {name} alone{fits}"),
         Verdict::OneOf(names) => format!("it fits {}{fits}", names.join(" and ")),

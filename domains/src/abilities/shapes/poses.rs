@@ -35,9 +35,10 @@ pub(super) fn survey(mind: &mut Mind, robot: &dyn Robot) {
     let size_m = Vector2::new(map.width as f64, map.height as f64) * map.resolution_m;
     let count = size_m.map(|s| (s / SURVEY_M).ceil().max(1.0) as usize);
     let step_m = size_m.component_div(&count.map(|n| n as f64));
-    let middles = (0..count.y).flat_map(|row| (0..count.x).map(move |column| (column, row))).map(|(column, row)| {
-        map.origin_m + Vector2::new((column as f64 + 0.5) * step_m.x, (row as f64 + 0.5) * step_m.y)
-    });
+    let middles =
+        (0..count.y).flat_map(|row| (0..count.x).map(move |column| (column, row))).map(|(column, row)| {
+            map.origin_m + Vector2::new((column as f64 + 0.5) * step_m.x, (row as f64 + 0.5) * step_m.y)
+        });
     let poses: Vec<Place> = middles
         .flat_map(|p| [0.0, std::f64::consts::PI].map(|yaw| Place::Pose(Pose2::new(p.x, p.y, yaw))))
         .collect();
@@ -78,7 +79,8 @@ pub(super) fn way(s: &Situation, from: usize, to: usize, thing: &Thing) -> Optio
         Some(way)
     };
     let ways = [1, n - 1].into_iter().filter_map(there);
-    ways.filter(|w| seconds(s, from, w).is_finite()).min_by(|a, b| seconds(s, from, a).total_cmp(&seconds(s, from, b)))
+    ways.filter(|w| seconds(s, from, w).is_finite())
+        .min_by(|a, b| seconds(s, from, a).total_cmp(&seconds(s, from, b)))
 }
 
 /// What a way takes, seconds.

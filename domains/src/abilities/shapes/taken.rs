@@ -59,7 +59,8 @@ pub(super) fn take(
         map.as_ref().is_none_or(|map| map.is_background(p, BEFORE_MAP_M + 2.0 * off_m))
     };
     let strange = |e: ObserveError| WorldError::Bug(format!("a sweep of the laser: {e}"));
-    let options = ObserveOptions::default();
+    // A single reading before what the map shows is of something, too.
+    let options = ObserveOptions { least: 1, ..ObserveOptions::default() };
     let clusters = things(&scan, is_background, &options).map_err(strange)?;
     let mut changed: Vec<usize> = Vec::new();
     for cluster in nearest_first(clusters, &laser) {
@@ -71,7 +72,8 @@ pub(super) fn take(
             continue;
         }
         let only = ObserveOptions { within_m: 1e-3, ..options };
-        let seen = observe(std::slice::from_ref(&scan), &cluster.middle, is_background, &only).map_err(strange)?;
+        let seen =
+            observe(std::slice::from_ref(&scan), &cluster.middle, is_background, &only).map_err(strange)?;
         let thing = &mut Arc::make_mut(&mut mind.known.floor).things[index];
         thing.ignored.extend(seen.ignored.into_iter().map(|(_, why)| (from.to_string(), why)));
         for posed in seen.scans {
@@ -96,7 +98,8 @@ fn remember(mind: &mut Mind, eyes: Eyes<'_>, from: &str, scanned: &Scanned) -> R
     record.sync()?;
     let frame = body.laser.as_ref().map_or("laser", |laser| laser.frame.as_str());
     let at = scanned.scan.map_from_laser.translation.vector;
-    let meta = Meta { seen_from_m: Some([at.x, at.y, 0.0]), body: json!({ "from": from }), ..Meta::default() };
+    let meta =
+        Meta { seen_from_m: Some([at.x, at.y, 0.0]), body: json!({ "from": from }), ..Meta::default() };
     let id = record.put_scan(scanned.stamp_ns, frame, &scanned.scan, meta)?;
     mind.views += 1;
     let floor = Arc::make_mut(&mut mind.known.floor);
@@ -125,9 +128,7 @@ fn occupancy(grid: &OccupancyGrid) -> Occupancy {
 }
 
 fn nearest_first(mut clusters: Vec<Cluster>, laser: &Vector2<f64>) -> Vec<Cluster> {
-    clusters.sort_by(|a, b| {
-        (a.middle.coords - laser).norm().total_cmp(&(b.middle.coords - laser).norm())
-    });
+    clusters.sort_by(|a, b| (a.middle.coords - laser).norm().total_cmp(&(b.middle.coords - laser).norm()));
     clusters
 }
 
@@ -173,7 +174,9 @@ fn make_ring(mind: &mut Mind, eyes: Eyes<'_>, index: usize) -> bool {
 fn bring_together(mind: &mut Mind, eyes: Eyes<'_>, index: usize) {
     let thing = &mind.known.floor.things[index];
     let scans: Vec<_> = thing.scans.iter().map(|(_, posed)| posed.clone()).collect();
-    let Ok(alignment) = align_consistent(&scans, LONGEST_M, &solver(eyes.robot.description())) else { return };
+    let Ok(alignment) = align_consistent(&scans, LONGEST_M, &solver(eyes.robot.description())) else {
+        return;
+    };
     let known = &mind.known;
     let pose = |symbol: &String| known.candidates.iter().find(|c| c.symbol == *symbol);
     let lasers: Vec<Isometry2<f64>> = thing

@@ -55,11 +55,13 @@ impl<'a> Teller<'a> {
     fn cut(&self, ended: &Ended) -> Option<(Verdict, String)> {
         match ended {
             Ended::Limit(why) => Some((Verdict::Failed, why.clone())),
-            Ended::Undecided(why) => Some((Verdict::CannotTell, why.clone())),
-            Ended::NoPlan(_) if self.s.time_left_s.is_some_and(|left_s| left_s <= 0.0) => {
+            Ended::NoPlan(_) | Ended::Undecided(_)
+                if self.s.time_left_s.is_some_and(|left_s| left_s <= 0.0) =>
+            {
                 Some((Verdict::CannotTell, "there is no time left".into()))
             }
-            Ended::Reached | Ended::NoPlan(_) => None,
+            // Nothing that can be done promises anything.
+            Ended::Reached | Ended::NoPlan(_) | Ended::Undecided(_) => None,
         }
     }
 
@@ -77,16 +79,23 @@ impl<'a> Teller<'a> {
         }
         let at = self.at(thing);
         let told = match (thing.taken_for.as_ref().map(|r| &r.verdict), ended) {
-            (Some(Taken::Is(name)), Ended::Reached) => (Verdict::Achieved, format!("this is {}, {at}", article(name))),
-            (Some(Taken::Unknown), Ended::Reached) => {
-                (Verdict::NotFound, format!("this is something unknown, {at}: it fits none of the {known} known shapes"))
+            (Some(Taken::Is(name)), Ended::Reached) => {
+                (Verdict::Achieved, format!("this is {}, {at}", article(name)))
             }
+            (Some(Taken::Unknown), Ended::Reached) => (
+                Verdict::NotFound,
+                format!("this is something unknown, {at}: it fits none of the {known} known shapes"),
+            ),
             (Some(Taken::OneOf(names)), _) => {
                 (Verdict::CannotTell, format!("this is {at}, and may be {}", names.join(" or ")))
             }
-            (Some(Taken::Is(name)), _) => {
-                (Verdict::CannotTell, format!("this is {at}, and may be {}, or something unknown that looks like it from where it could be scanned", article(name)))
-            }
+            (Some(Taken::Is(name)), _) => (
+                Verdict::CannotTell,
+                format!(
+                    "this is {at}, and may be {}, or something unknown that looks like it from where it could be scanned",
+                    article(name)
+                ),
+            ),
             _ => (Verdict::CannotTell, format!("it cannot be told what this is, {at}")),
         };
         (told.0, format!("{}; {scans}", told.1), Some(thing))
@@ -102,7 +111,10 @@ impl<'a> Teller<'a> {
                 (Verdict::Achieved, format!("the shape of {} is learned, {size}", article(&shape.name)))
             }
             _ => self.cut(ended).unwrap_or_else(|| {
-                let text = format!("the shape of what is {} is not learned: too much of its outline is open", self.at(thing));
+                let text = format!(
+                    "the shape of what is {} is not learned: too much of its outline is open",
+                    self.at(thing)
+                );
                 (Verdict::CannotTell, text)
             }),
         };
@@ -112,7 +124,10 @@ impl<'a> Teller<'a> {
     fn where_is(&self, shape: &str, ended: &Ended) -> Told<'a> {
         let (floor, name) = (&self.s.floor, self.name(shape));
         if !floor.knows(shape) {
-            let text = format!("nobody has learned what {} looks like; stand before one and say: learn {name}", article(&name));
+            let text = format!(
+                "nobody has learned what {} looks like; stand before one and say: learn {name}",
+                article(&name)
+            );
             return (Verdict::CannotTell, text, None);
         }
         let found: Vec<&Thing> =
@@ -135,17 +150,25 @@ impl<'a> Teller<'a> {
         }
         if !open.is_empty() {
             let places: Vec<String> = open.iter().map(|t| format!("what is {}", self.at(t))).collect();
-            let text = format!("{} may be it, and nothing that can be scanned settles it; {seen}", places.join(" and "));
+            let text = format!(
+                "{} may be it, and nothing that can be scanned settles it; {seen}",
+                places.join(" and ")
+            );
             return (Verdict::CannotTell, text, best);
         }
         if let Some(first) = floor.room.first() {
             let text = format!(
                 "{} is nowhere that could be scanned, and there is room for it where no sweep passed, as near ({:.2}, {:.2}) m; {seen}",
-                article(&name), first.x, first.y
+                article(&name),
+                first.x,
+                first.y
             );
             return (Verdict::CannotTell, text, None);
         }
-        let text = format!("there is no {name} on the floor: {seen}, and the laser passed over all the rest in {} sweeps", self.mind.views);
+        let text = format!(
+            "there is no {name} on the floor: {seen}, and the laser passed over all the rest in {} sweeps",
+            self.mind.views
+        );
         (Verdict::NotFound, text, None)
     }
 
@@ -170,7 +193,10 @@ impl<'a> Teller<'a> {
         }
         let loose_m = thing.looseness_m();
         if loose_m > OPEN_M && thing.outline.is_some() {
-            parts.push(format!("it was not scanned from all sides, and may reach {:.0} cm beyond what was met on average", 1e2 * loose_m));
+            parts.push(format!(
+                "it was not scanned from all sides, and may reach {:.0} cm beyond what was met on average",
+                1e2 * loose_m
+            ));
         }
         parts.join("; ")
     }
@@ -196,7 +222,10 @@ impl<'a> Teller<'a> {
     }
 }
 
-fn within(outline: &[descry_perception::nalgebra::Point2<f64>], p: &descry_perception::nalgebra::Point2<f64>) -> bool {
+fn within(
+    outline: &[descry_perception::nalgebra::Point2<f64>],
+    p: &descry_perception::nalgebra::Point2<f64>,
+) -> bool {
     let n = outline.len();
     n >= 3 && (0..n).all(|i| (outline[(i + 1) % n] - outline[i]).perp(&(p - outline[i])) >= 0.0)
 }

@@ -59,12 +59,15 @@ impl Unseen {
             .filter(|(column, row)| column * column + row * row <= reach * reach)
             .collect();
         let open = |column: isize, row: isize| {
-            let inside = column >= 0 && row >= 0 && column < grid.width as isize && row < grid.height as isize;
+            let inside =
+                column >= 0 && row >= 0 && column < grid.width as isize && row < grid.height as isize;
             inside && self.open[row as usize * grid.width + column as usize]
         };
         let cells = (0..grid.height as isize).flat_map(|row| (0..grid.width as isize).map(move |c| (c, row)));
         cells
-            .filter(|(column, row)| open(*column, *row) && disc.iter().all(|(dc, dr)| open(column + dc, row + dr)))
+            .filter(|(column, row)| {
+                open(*column, *row) && disc.iter().all(|(dc, dr)| open(column + dc, row + dr))
+            })
             .map(|(column, row)| grid.centre(column as usize, row as usize))
             .collect()
     }
@@ -108,7 +111,15 @@ mod tests {
         let all = count(&unseen);
         let angles_rad: Vec<f64> = (-90..=90).map(|d| f64::from(d).to_radians()).collect();
         // A wall a metre ahead over the left half, nothing within reach on the right, no reading straight ahead.
-        let range = |a: &f64| if a.abs() < 1e-9 { f64::NAN } else if *a > 0.0 { 1.0 } else { f64::INFINITY };
+        let range = |a: &f64| {
+            if a.abs() < 1e-9 {
+                f64::NAN
+            } else if *a > 0.0 {
+                1.0
+            } else {
+                f64::INFINITY
+            }
+        };
         let scan = Scan {
             ranges_m: angles_rad.iter().map(range).collect(),
             angles_rad,
@@ -118,7 +129,8 @@ mod tests {
         let left = unseen.room_for(0.15);
         assert!(left.len() < all && left.iter().any(|p| p.x < -0.5));
         assert!(left.iter().all(|p| p.x < 0.2 || p.y > 0.0 && p.coords.norm() > 0.9), "{left:?}");
-        let behind = |u: &Unseen| u.would_pass(&Point2::new(0.0, 0.0), &-Vector2::x(), 8.0, &u.room_for(0.15), &[]);
+        let behind =
+            |u: &Unseen| u.would_pass(&Point2::new(0.0, 0.0), &-Vector2::x(), 8.0, &u.room_for(0.15), &[]);
         assert!(behind(&unseen));
         unseen.know(&Point2::new(0.0, 0.0), 4.0);
         assert_eq!(count(&unseen), 0);

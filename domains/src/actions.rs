@@ -122,6 +122,13 @@ pub(crate) fn outcome(outcome: &Outcome) -> Value {
     match outcome {
         Outcome::Driven(d) => json!({ "distance_m": d.distance_m, "duration_s": d.duration_s }),
         Outcome::Seen(s) => json!({ "stamp_ns": s.stamp_ns }),
+        Outcome::Scanned(s) => json!({ "stamp_ns": s.stamp_ns }),
+        Outcome::Aligned(a) => json!({
+            "boundary_before_m2": a.before.boundary_m2,
+            "boundary_after_m2": a.after.boundary_m2,
+            "longest_m": a.longest_m(),
+            "left_out": a.left_out,
+        }),
         Outcome::Pushed(p) => json!({ "moved_m": p.moved_m, "duration_s": p.duration_s }),
         Outcome::Opened(o) => json!({ "duration_s": o.duration_s }),
         Outcome::Grasped(g, hand) => {

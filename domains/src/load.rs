@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use descry_perception::laser::KnownShape;
 use descry_perception::recognise::{ObjectModel, check_models};
 use descry_planner::{Findings, Source};
 use include_dir::{Dir, include_dir};
@@ -14,9 +15,10 @@ use crate::program::Tape;
 use crate::vocabulary::Vocabulary;
 
 /// The domains that come with the program.
-static BUILT_IN: [(&str, Dir<'_>); 2] = [
+static BUILT_IN: [(&str, Dir<'_>); 3] = [
     ("tabletop", include_dir!("$CARGO_MANIFEST_DIR/tabletop")),
     ("home", include_dir!("$CARGO_MANIFEST_DIR/home")),
+    ("shapes", include_dir!("$CARGO_MANIFEST_DIR/shapes")),
 ];
 
 /// The domain that is used when none is named.
@@ -35,6 +37,8 @@ pub struct Domain {
     pub config: Config,
     /// `objects/*.toml`, in the order of their file names.
     pub objects: Vec<ObjectModel>,
+    /// `shapes/*.json`, in the order of their file names.
+    pub shapes: Vec<KnownShape>,
     /// `scenes/*.toml`: name and text.
     pub scenes: BTreeMap<String, String>,
     /// The folder, or none for a built-in domain.
@@ -170,7 +174,7 @@ fn on_disk(folder: &Path) -> Result<Files, LoadError> {
     for name in ["domain.pddl", "domain.toml"] {
         read_file(&folder.join(name), name.to_string(), &mut files)?;
     }
-    for sub in ["objects", "scenes"] {
+    for sub in ["objects", "scenes", "shapes"] {
         if folder.join(sub).is_dir() {
             read_folder(&folder.join(sub), sub, &mut files)?;
         }
@@ -181,7 +185,7 @@ fn on_disk(folder: &Path) -> Result<Files, LoadError> {
 fn read_folder(folder: &Path, key: &str, files: &mut Files) -> Result<(), LoadError> {
     let entries = std::fs::read_dir(folder).map_err(|e| unreadable(folder, &e))?;
     for entry in entries.flatten() {
-        if entry.path().extension().is_some_and(|e| e == "toml") {
+        if entry.path().extension().is_some_and(|e| e == "toml" || e == "json") {
             read_file(&entry.path(), format!("{key}/{}", entry.file_name().to_string_lossy()), files)?;
         }
     }
@@ -227,9 +231,19 @@ pub fn from_files(files: Files, folder: Option<PathBuf>) -> Result<Domain, LoadE
             (name.to_string(), text.clone())
         })
         .collect();
+    let shapes = under("shapes/").map(|(_, (name, text))| shape(name, text)).collect::<Result<_, _>>()?;
     let pddl = Source { name: pddl_name.clone(), text: pddl.clone() };
     let vocabulary = Vocabulary::read(&pddl).map_err(|findings| LoadError::Findings { findings })?;
-    Ok(Domain { pddl, vocabulary, toml, config, objects, scenes, folder, files, tape: None })
+    Ok(Domain { pddl, vocabulary, toml, config, objects, shapes, scenes, folder, files, tape: None })
+}
+
+/// A shape as a run has learned it.
+fn shape(path: &str, text: &str) -> Result<KnownShape, LoadError> {
+    serde_json::from_str(text).map_err(|e| LoadError::File {
+        path: path.into(),
+        because: e.to_string(),
+        expected: "a shape with its name, as `descry memory query STORE --kind remembered` prints those that were learned",
+    })
 }
 
 fn parse<T: for<'de> Deserialize<'de>>(path: &str, text: &str) -> Result<T, LoadError> {

@@ -35,6 +35,11 @@ pub enum Note {
         /// Area of that, square metres.
         area_m2: f64,
     },
+    /// The laser has swept.
+    Swept {
+        /// What is on the floor, and what is known of its shape.
+        things: Vec<String>,
+    },
     /// Somebody has moved something: what was seen before the last view no longer holds.
     Changed {
         /// What shows it.
@@ -65,6 +70,10 @@ impl fmt::Display for Note {
                     f,
                     "see       another surface to stand things on, the {name}: {area_m2:.2} m² at ({x:.2}, {y:.2}, {z:.2}) m"
                 )
+            }
+            Note::Swept { things } => {
+                write!(f, "sweep     {} things on the floor", things.len())?;
+                things.iter().try_for_each(|text| write!(f, "\n          {text}"))
             }
             Note::Changed { because } => write!(f, "changed   {because}; only the last view still holds"),
             Note::Nothing { because } => write!(f, "see       nothing yet: {because}"),

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::abilities::searching::doubt::{Doubt, Hypothesis, Taken};
 use crate::abilities::searching::obstacle::{self, Obstacle};
 use crate::abilities::searching::reasons;
+use crate::abilities::shapes::floor::Floor;
 use crate::config::Thresholds;
 use crate::lexicon::symbol;
 use crate::load::Domain;
@@ -182,6 +183,8 @@ pub struct Known {
     pub held: Option<Held>,
     /// What is remembered of earlier runs.
     pub past: Option<Past>,
+    /// What the laser has found on the floor.
+    pub floor: Arc<Floor>,
     /// How much more often each thing, then each kind, then anything is expected on each surface than on another.
     pub expected: Vec<Vec<f64>>,
 }

@@ -15,6 +15,7 @@ use descry_robots::{PoseEstimate, Robot};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::json;
 
+use crate::abilities;
 use crate::abilities::searching::candidates;
 use crate::abilities::searching::perceive::{self, Eyes};
 pub use crate::abilities::searching::policies::Chooser;
@@ -170,6 +171,7 @@ impl<'a> World<'a> {
             shut: Default::default(),
             held: None,
             past: setting.past.clone(),
+            floor: Arc::default(),
             expected: Vec::new(),
             surfaces,
         };
@@ -177,6 +179,9 @@ impl<'a> World<'a> {
         let words = Words::begin(domain).map_err(|e| WorldError::Domain(format!("domain.toml: {e}")))?;
         let mut mind = Mind { known, words, regions, views: 0, pushes: 0, distance_m: 0.0 };
         mind.attend();
+        abilities::used(&domain.config.uses)
+            .filter_map(|a| a.begins)
+            .for_each(|begins| begins(&mut mind, domain, goal));
         Ok(Self {
             chooser,
             lexicon: Lexicon::new(domain, &Places::of_body(&**robot)),
@@ -278,7 +283,7 @@ impl<'a> World<'a> {
     fn bind(&self, situation: &Arc<Situation>) -> Attachments {
         let started = Instant::now();
         let mut attachments = Attachments::new().with_clock(move || started.elapsed().as_secs_f64());
-        for ability in crate::abilities::used(&self.setting.domain.config.uses) {
+        for ability in abilities::used(&self.setting.domain.config.uses) {
             for meaning in ability.calls {
                 attachments
                     .insert(meaning.name, actions::Bound { situation: Arc::clone(situation), meaning });
@@ -332,7 +337,8 @@ impl<'a> World<'a> {
 
     /// A step that is surely no waste, for when the planner has run out of states; none if there is none.
     pub fn fallback(&self, round: &Round) -> Option<Plan> {
-        reasons::one_look(&round.situation)
+        let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.fallback);
+        own.map_or_else(|| reasons::one_look(&round.situation), |fallback| fallback(&round.situation))
     }
 
     /// A plan was made.
@@ -562,12 +568,17 @@ impl<'a> World<'a> {
             .filter(|&on| self.mind.regions[on].taken > 0 && self.mind.regions[on].nothing.is_none())
             .map(|on| known.surfaces[on].symbol.clone())
             .collect();
-        let before = Remembered::clone(&past.remembered);
+        let mut before = Remembered::clone(&past.remembered);
+        before.shapes.extend(known.floor.learned.iter().cloned());
         Some(before.after(&known.belief, &looked_at, past.now_unix_s))
     }
 
     /// What is answered in the end.
     pub fn answer(&self, round: &Round, ended: &Ended) -> Conclusion {
+        let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.answers);
+        if let Some(answers) = own {
+            return answers(self.setting.goal, &self.mind, &round.situation, ended);
+        }
         answer::conclude(self.setting.goal, &self.lexicon, &self.mind, round, ended)
     }
 }

@@ -60,6 +60,8 @@ pub struct Meta {
 pub enum Form {
     /// Points, packed as [`BlobInfo::layout`] says (`foxglove.PointCloud`).
     PointCloud,
+    /// A sweep of a laser in a plane (`foxglove.LaserScan`).
+    LaserScan,
     /// A PNG or JPEG (`foxglove.CompressedImage`).
     CompressedImage,
     /// Plain pixels (`foxglove.RawImage`).
@@ -93,7 +95,7 @@ pub struct BlobInfo {
 pub struct Document {
     /// Its number.
     pub id: RecordId,
-    /// What it is: `cloud`, `image`, `transforms`, `log`, or any word.
+    /// What it is: `cloud`, `scan`, `image`, `transforms`, `log`, or any word.
     pub kind: String,
     /// When, nanoseconds in the clock of the recording.
     pub stamp_ns: i64,

@@ -34,6 +34,7 @@ pub(crate) fn document_schema() -> Schema {
 pub(crate) fn schema(form: Form) -> Schema {
     let name = match form {
         Form::PointCloud => "foxglove.PointCloud",
+        Form::LaserScan => "foxglove.LaserScan",
         Form::CompressedImage => "foxglove.CompressedImage",
         Form::RawImage => "foxglove.RawImage",
         Form::FrameTransforms => "foxglove.FrameTransforms",
@@ -48,6 +49,7 @@ pub(crate) fn topic(document: &Document, blob: &BlobInfo) -> String {
     let frame = document.frame.trim_start_matches('/');
     let stem = match blob.form {
         Form::PointCloud => "cloud",
+        Form::LaserScan => "scan",
         Form::CompressedImage | Form::RawImage => "image",
         Form::FrameTransforms => return "/tf".into(),
         Form::Log => return "/log".into(),
@@ -83,6 +85,18 @@ pub(crate) fn prefix(document: &Document, blob: &BlobInfo) -> Vec<u8> {
                     f.varint(3, numeric_type(field.get("type").and_then(Value::as_str).unwrap_or("")));
                 });
             }
+            out.bytes_header(6, blob.bytes);
+        }
+        Form::LaserScan => {
+            let angle = |key: &str| blob.layout.get(key).and_then(Value::as_f64).unwrap_or(0.0);
+            out.timestamp(1, document.stamp_ns);
+            out.text(2, &document.frame);
+            out.message(3, |pose| {
+                pose.message(1, |_| ());
+                pose.message(2, |q| q.double(4, 1.0));
+            });
+            out.double(4, angle("first_rad"));
+            out.double(5, angle("last_rad"));
             out.bytes_header(6, blob.bytes);
         }
         Form::CompressedImage => {

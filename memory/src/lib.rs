@@ -10,6 +10,7 @@ mod foxglove;
 mod record;
 pub mod remember;
 mod retrace;
+mod scans;
 pub mod space;
 pub mod stores;
 pub mod transforms;

@@ -8,10 +8,12 @@ use crate::error::Error;
 use crate::flusher::{Flusher, Group};
 use crate::foxglove::{self, LogLevel};
 use crate::retrace::Retrace;
+use crate::scans;
 use crate::stores::local::{Durability, LocalOptions, LocalStore, Recovery};
 use crate::stores::{Fault, Report, Retention, Stats, Store};
 use crate::transforms::{self, Reach, Sample};
 use descry_perception::Cloud;
+use descry_perception::laser::Scan;
 use nalgebra::Isometry3;
 use recall::named;
 use serde_json::{Value, json};
@@ -23,6 +25,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub mod kind {
     /// A point cloud.
     pub const CLOUD: &str = "cloud";
+    /// A sweep of a laser.
+    pub const SCAN: &str = "scan";
     /// An image.
     pub const IMAGE: &str = "image";
     /// Transforms of one child frame over some time.
@@ -212,6 +216,15 @@ impl Record {
         cloud.check().map_err(|e| Error::Input { what: e.to_string(), mend: "mend the cloud".into() })?;
         let blobs = vec![clouds::encode(cloud, sensing)];
         self.put(Draft { frame: frame.into(), meta, blobs, ..Draft::new(kind::CLOUD, stamp_ns) })
+    }
+
+    /// Records a sweep of a laser, in `frame`; where it was taken from, the transforms of its time say.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if it is unsound, or its angles are not at even steps; [`Error::Full`].
+    pub fn put_scan(&self, stamp_ns: i64, frame: &str, scan: &Scan, meta: Meta) -> Result<RecordId, Error> {
+        let blobs = vec![scans::encode(scan)?];
+        self.put(Draft { frame: frame.into(), meta, blobs, ..Draft::new(kind::SCAN, stamp_ns) })
     }
 
     /// Records an image, in `frame`.

@@ -1,5 +1,6 @@
 //! What outlasts a run: where things were seen last, and when. A later run begins with it, as far as time has not worn it.
 
+use descry_perception::laser::KnownShape;
 use serde::{Deserialize, Serialize};
 
 use crate::Meta;
@@ -31,6 +32,9 @@ pub struct Remembered {
     pub present: Vec<Recollection>,
     /// What stood somewhere and was not there when it was looked again, the oldest first.
     pub gone: Vec<Recollection>,
+    /// Shapes that were learned, the oldest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shapes: Vec<KnownShape>,
 }
 
 impl Remembered {
@@ -73,7 +77,7 @@ impl Remembered {
         gone.drain(..gone.len().saturating_sub(MOST_GONE));
         let now = belief.tracks.iter().filter(|t| looked_at.contains(&t.on));
         let seen = now.map(|track| Recollection { seen_unix_s: now_unix_s, track: track.clone() });
-        Self { present: elsewhere.into_iter().chain(seen).collect(), gone }
+        Self { present: elsewhere.into_iter().chain(seen).collect(), gone, ..self }
     }
 
     /// What may be believed of it now: probabilities worn by time, and below `most`, so that nothing is taken for sure that was not

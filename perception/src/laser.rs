@@ -21,11 +21,13 @@ mod violation;
 
 pub use crate::occupancy::{Occupancy, Space};
 pub use align::{Alignment, align, align_consistent};
-pub use background::{Ignored, Observation, ObserveError, ObserveOptions, observe};
+pub use background::{Cluster, Ignored, Observation, ObserveError, ObserveOptions, observe, things};
 pub use features::{FeatureClass, Features, Nearest, classes, groups, nearest};
-pub use fit::{FitOptions, ModelFit, Start, fit, localise};
-pub use known::{Candidate, KnownShape, RecogniseOptions, Recognition, Verdict, recognise, recognise_scan};
-pub use next::{NextOptions, NextScan, next_scan, undetermined_m2};
+pub use fit::{FitOptions, ModelFit, Start, fit, fit_scans, localise};
+pub use known::{
+    Candidate, KnownShape, RecogniseOptions, Recognition, Verdict, recognise, recognise_scan, recognise_scans,
+};
+pub use next::{NextOptions, NextScan, Outlook, next_scan, undetermined_m2};
 pub use scan::{Scan, ScanError};
 pub use shape::{ObjectScan, PosedScan, ShapeError, ShapeModel};
 pub use solve::{Objective, Solver, SolverOptions};

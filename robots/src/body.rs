@@ -4,6 +4,7 @@
 
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
+use descry_perception::laser::Scan;
 use descry_perception::{Cloud, Intrinsics, View};
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
@@ -149,6 +150,23 @@ impl Default for Frames {
     }
 }
 
+/// A laser that sweeps in a plane level with the floor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Laser {
+    /// Name of its frame, x straight ahead.
+    pub frame: String,
+    /// Where it is on the base; it does not move there.
+    pub base_from_laser: Isometry3<f64>,
+    /// Angle of the first reading, anticlockwise from straight ahead, radians.
+    pub first_rad: f64,
+    /// Angle from one reading to the next, radians.
+    pub step_rad: f64,
+    /// Readings in a sweep.
+    pub readings: usize,
+    /// Nothing farther returns, metres.
+    pub reach_m: f64,
+}
+
 /// What a body is and can do. Does not change while it lives.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Description {
@@ -173,6 +191,9 @@ pub struct Description {
     /// The widest thing that the hand takes, metres; `None` if there is no hand for [`Robot::grasp`].
     #[serde(default)]
     pub hand_opening_m: Option<f64>,
+    /// The laser; `None` if there is none for [`Robot::scan`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<Laser>,
     /// Direction of "up" in the map, if it is known.
     pub up: Option<Vector3<f64>>,
     /// Standard deviation of localisation along each axis, metres.
@@ -330,6 +351,21 @@ impl Sensed {
             pose_sigma_rad: self.pose_sigma_rad,
         }
     }
+}
+
+/// One sweep of the laser with all that is needed to place it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scanned {
+    /// When.
+    pub stamp_ns: Stamp,
+    /// The readings, and where the laser was as the body believes.
+    pub scan: Scan,
+    /// The chain map -> base -> laser at that time, as the body believes it.
+    pub transforms: Vec<StampedTransform>,
+    /// Standard deviation of that position along each axis, metres.
+    pub pose_sigma_m: f64,
+    /// Standard deviation of that orientation about each axis, radians.
+    pub pose_sigma_rad: f64,
 }
 
 /// A push against one object, so that what is behind it can be seen.
@@ -497,6 +533,16 @@ pub trait Robot: Send + Sync {
     /// # Errors
     /// [`Failure::SensorDropped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
     async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure>;
+
+    /// Sweeps the laser once.
+    ///
+    /// # Errors
+    /// [`Failure::Unable`] without [`Description::laser`]; [`Failure::SensorDropped`], [`Failure::TimedOut`],
+    /// [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
+    async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {
+        let _ = watch;
+        Err(Failure::Unable { because: format!("{} has no laser", self.description().name) })
+    }
 
     /// Pushes an object aside.
     ///

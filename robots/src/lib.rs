@@ -14,8 +14,8 @@ pub mod sim;
 pub use async_trait::async_trait;
 pub use body::{
     CancellationToken, Colour, Description, Door, Driven, Footprint, Frames, Grasp, Grasped, Hand, Head,
-    Looked, Opened, Place, Placed, Placing, Pose2, PoseEstimate, Progress, Push, Pushed, Robot, Room, Sensed,
-    Speeds, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
+    Laser, Looked, Opened, Place, Placed, Placing, Pose2, PoseEstimate, Progress, Push, Pushed, Robot, Room,
+    Scanned, Sensed, Speeds, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
 };
 pub use descry_perception as perception;
 pub use failure::Failure;

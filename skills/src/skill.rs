@@ -1,8 +1,10 @@
 //! What every skill is: it has its arguments in the units of the body, can be stopped, and ends in time.
 
 use async_trait::async_trait;
+use descry_robots::perception::laser::Alignment;
 use descry_robots::{
-    CancellationToken, Driven, Failure, Grasped, Hand, Opened, Placed, Progress, Pushed, Robot, Sensed, Watch,
+    CancellationToken, Driven, Failure, Grasped, Hand, Opened, Placed, Progress, Pushed, Robot, Scanned,
+    Sensed, Watch,
 };
 
 /// One action of a plan, with the names of its objects.
@@ -50,6 +52,10 @@ pub enum Outcome {
     Driven(Driven),
     /// A view was taken.
     Seen(Box<Sensed>),
+    /// The laser has swept.
+    Scanned(Box<Scanned>),
+    /// Scans were brought together.
+    Aligned(Box<Alignment>),
     /// Something was moved.
     Pushed(Pushed),
     /// A door is open.

@@ -96,6 +96,7 @@ fn description(known: Option<&Known>, camera: Intrinsics, sensing: &Sensing, pla
         frames: Frames::default(),
         reach_m: None,
         hand_opening_m: None,
+        laser: None,
         up: None,
         pose_sigma_m: sensing.pose_sigma_m,
         pose_sigma_rad: sensing.pose_sigma_rad,

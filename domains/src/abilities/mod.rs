@@ -3,11 +3,15 @@
 pub mod carrying;
 pub mod moving;
 pub mod searching;
+pub mod shapes;
 
-use descry_planner::{Answer, Call, CallError};
+use descry_planner::{Answer, Call, CallError, Plan};
 use descry_skills::{Outcome, Skill, SkillFailure};
 
 use crate::abilities::searching::perceive::Eyes;
+use crate::answer::{Conclusion, Ended};
+use crate::goal::Goal;
+use crate::load::Domain;
 use crate::mind::Mind;
 use crate::note::Note;
 use crate::situation::Situation;
@@ -26,6 +30,12 @@ pub struct Ability {
     pub calls: &'static [Meaning],
     /// What it can carry out.
     pub skills: &'static [SkillWord],
+    /// What it prepares when a run begins, if anything.
+    pub begins: Option<Begins>,
+    /// Steps that are surely no waste when no plan is found, where it has some of its own.
+    pub fallback: Option<Fallback>,
+    /// What it answers in the end, where it has an answer of its own.
+    pub answers: Option<Answers>,
 }
 
 /// A word whose value an ability states.
@@ -84,8 +94,17 @@ pub type Learn =
 pub type Failed =
     fn(&mut Mind, Eyes<'_>, &Situation, &[&str], &SkillFailure) -> Result<Option<String>, WorldError>;
 
+/// Prepares a run.
+pub type Begins = fn(&mut Mind, &Domain, &Goal);
+
+/// Steps that are surely no waste; none if nothing that can be done promises anything.
+pub type Fallback = fn(&Situation) -> Option<Plan>;
+
+/// Answers in the end, by the situation of the last round.
+pub type Answers = fn(&Goal, &Mind, &Situation, &Ended) -> Conclusion;
+
 /// Every ability; the first is that of every body and needs no naming.
-pub const ALL: &[&Ability] = &[&moving::ABILITY, &searching::ABILITY, &carrying::ABILITY];
+pub const ALL: &[&Ability] = &[&moving::ABILITY, &searching::ABILITY, &carrying::ABILITY, &shapes::ABILITY];
 
 /// The abilities that a domain uses.
 pub fn used(names: &[String]) -> impl Iterator<Item = &'static Ability> + '_ {

@@ -3,7 +3,7 @@
 use super::wire::Wire;
 
 /// Messages and their fields, in the words of `.proto` files. A field of another message needs that message's file.
-const MESSAGES: [(&str, &str); 12] = [
+const MESSAGES: [(&str, &str); 13] = [
     ("google.protobuf.Timestamp", "int64 seconds = 1; int32 nanos = 2"),
     ("foxglove.Vector3", "double x = 1; double y = 2; double z = 3"),
     ("foxglove.Quaternion", "double x = 1; double y = 2; double z = 3; double w = 4"),
@@ -16,6 +16,11 @@ const MESSAGES: [(&str, &str); 12] = [
         "foxglove.PointCloud",
         "google.protobuf.Timestamp timestamp = 1; string frame_id = 2; foxglove.Pose pose = 3; fixed32 point_stride = 4; \
          repeated foxglove.PackedElementField fields = 5; bytes data = 6",
+    ),
+    (
+        "foxglove.LaserScan",
+        "google.protobuf.Timestamp timestamp = 1; string frame_id = 2; foxglove.Pose pose = 3; double start_angle = 4; \
+         double end_angle = 5; repeated double ranges = 6; repeated double intensities = 7",
     ),
     (
         "foxglove.CompressedImage",

@@ -5,10 +5,12 @@ use crate::clouds::{self, CLOUD, Sensing};
 use crate::document::{Document, Form, Query, RecordId};
 use crate::error::Error;
 use crate::foxglove;
+use crate::scans::{self, SCAN};
 use crate::stores::no_blob;
 use crate::transforms::{Sample, Transforms};
+use descry_perception::laser::Scan;
 use descry_perception::{Cloud, View};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry2, Isometry3, Vector3};
 use serde_json::Value;
 use std::sync::PoisonError;
 
@@ -49,6 +51,26 @@ impl Record {
     pub fn view_at(&self, stamp_ns: i64, world: &str) -> Result<View, Error> {
         let document = self.nearest(kind::CLOUD, stamp_ns, self.options.view_tolerance_ns)?;
         self.view(&document, world)
+    }
+
+    /// The sweep of a laser at a time, and where the laser stood in `world` then.
+    ///
+    /// # Errors
+    /// [`Error::NotNear`] without a sweep of that very time; a missing link or gap of the transforms of that time; [`Error::Damaged`].
+    pub fn scan_at(&self, stamp_ns: i64, world: &str) -> Result<Scan, Error> {
+        let document = self.nearest(kind::SCAN, stamp_ns, 0)?;
+        let info = document.blobs.iter().find(|b| b.name == SCAN && b.form == Form::LaserScan);
+        let info = info.ok_or_else(|| no_blob(&document, SCAN))?;
+        let data = self.store.blob(document.id, SCAN)?;
+        let world_from_laser = self.pose_of(&document, world)?;
+        let heading = world_from_laser.rotation * Vector3::x();
+        let turn = heading.y.atan2(heading.x);
+        let on_floor = Isometry2::new(world_from_laser.translation.vector.xy(), turn);
+        scans::decode(info, &data, on_floor).map_err(|what| Error::Damaged {
+            place: format!("record {}", document.id).into(),
+            at: 0,
+            what,
+        })
     }
 
     /// The view that a recorded cloud is, with the transforms of its time.
@@ -133,13 +155,13 @@ impl Record {
         Ok(around)
     }
 
-    /// These records, and for clouds among them the transforms up to their time and the images of their moment: what it takes to
+    /// These records, and for clouds and sweeps among them the transforms up to their time and the images of their moment: what it takes to
     /// place and to colour them again.
     pub(super) fn with_their_place(&self, ids: &[RecordId]) -> Result<Vec<RecordId>, Error> {
         let mut all = ids.to_vec();
         for id in ids {
             let document = self.store.get(*id)?;
-            if document.kind != kind::CLOUD {
+            if ![kind::CLOUD, kind::SCAN].contains(&document.kind.as_str()) {
                 continue;
             }
             let of = |kind: &str| Query { robot: named(&document.robot), ..Query::of_kind(kind) };

@@ -5,6 +5,7 @@
 mod lab;
 mod plot;
 mod scanning;
+mod strangers;
 mod tables;
 #[path = "../../tests/tabletop/mod.rs"]
 mod tabletop;
@@ -41,6 +42,7 @@ fn run(seed: u64, out: Option<&Path>) -> Result<(), String> {
     tables::single_scans(&learnt);
     variations::print(seed, &learnt);
     scanning::print(seed, &learnt);
+    strangers::print(seed, &learnt);
     times::print(seed, &learnt);
     Ok(())
 }

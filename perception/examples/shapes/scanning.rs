@@ -13,10 +13,11 @@ use std::f64::consts::TAU;
 
 /// Bearings from which the thing can be scanned.
 const PLACES: usize = 16;
-const MOST: usize = 8;
+pub const MOST: usize = 8;
 
+/// Who says from where.
 #[derive(Clone, Copy, PartialEq)]
-enum Policy {
+pub enum Policy {
     Settling,
     Circle,
     Chance,
@@ -88,7 +89,8 @@ fn after_each(seed: u64, policy: Policy, known: &[KnownShape]) -> [Sum; MOST] {
     sums
 }
 
-fn next_bearing(
+/// From where the next scan is taken.
+pub fn next_bearing(
     policy: Policy,
     bearing: f64,
     first: f64,

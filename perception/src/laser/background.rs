@@ -108,6 +108,56 @@ pub fn observe(
     Ok(observation)
 }
 
+/// Readings of one thing in a scan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cluster {
+    /// Their indices, ascending.
+    pub readings: Vec<usize>,
+    /// The middle of where they ended, in the map.
+    pub middle: Point2<f64>,
+}
+
+/// Everything in a scan that is no background, a cluster a thing; in the order of their first readings.
+///
+/// # Errors
+/// If the scan is unsound, or `step_m` is no length.
+pub fn things(
+    scan: &Scan,
+    is_background: impl Fn(&Point2<f64>) -> bool,
+    options: &ObserveOptions,
+) -> Result<Vec<Cluster>, ObserveError> {
+    scan.check().map_err(|why| ObserveError::Scan { index: 0, why })?;
+    Ok(clusters(scan, is_background, options)?)
+}
+
+fn clusters(
+    scan: &Scan,
+    is_background: impl Fn(&Point2<f64>) -> bool,
+    options: &ObserveOptions,
+) -> Result<Vec<Cluster>, ClusterError> {
+    let foreground = |index: usize| {
+        let place = scan.map_from_laser * scan.endpoint(index)?;
+        (!is_background(&place)).then_some((index, place))
+    };
+    let (index, places): (Vec<usize>, Vec<Point2<f64>>) =
+        (0..scan.ranges_m.len()).filter_map(foreground).unzip();
+    // Told from where the laser stands, so that single precision is fine everywhere on a large map.
+    let from = scan.map_from_laser.translation.vector;
+    let flat: Vec<Point3<f32>> =
+        places.iter().map(|p| Point3::new((p.x - from.x) as f32, (p.y - from.y) as f32, 0.0)).collect();
+    let cluster = |members: Vec<u32>| {
+        let sum: Vector2<f64> = members.iter().map(|&i| places[i as usize].coords).sum();
+        let middle = Point2::from(sum / members.len() as f64);
+        let mut readings: Vec<usize> = members.iter().map(|&i| index[i as usize]).collect();
+        readings.sort_unstable();
+        Cluster { readings, middle }
+    };
+    let mut found: Vec<Cluster> =
+        euclidean(&flat, options.step_m, options.least)?.into_iter().map(cluster).collect();
+    found.sort_by_key(|c| c.readings.first().copied());
+    Ok(found)
+}
+
 /// The cluster of readings, no background, whose middle is nearest to a place.
 fn readings_near(
     scan: &Scan,
@@ -115,23 +165,10 @@ fn readings_near(
     is_background: impl Fn(&Point2<f64>) -> bool,
     options: &ObserveOptions,
 ) -> Result<Option<Vec<usize>>, ObserveError> {
-    let foreground = |index: usize| {
-        let place = scan.map_from_laser * scan.endpoint(index)?;
-        (!is_background(&place)).then_some((index, place))
-    };
-    let (index, places): (Vec<usize>, Vec<Point2<f64>>) =
-        (0..scan.ranges_m.len()).filter_map(foreground).unzip();
-    // Told from the place that is looked at, so that single precision is fine everywhere on a large map.
-    let flat: Vec<Point3<f32>> =
-        places.iter().map(|p| Point3::new((p.x - near.x) as f32, (p.y - near.y) as f32, 0.0)).collect();
-    let clusters = euclidean(&flat, options.step_m, options.least)?;
-    let distance = |cluster: &Vec<u32>| {
-        let sum: Vector2<f64> = cluster.iter().map(|&i| places[i as usize] - near).sum();
-        (sum / cluster.len() as f64).norm()
-    };
-    let reachable = clusters.iter().map(|c| (distance(c), c)).filter(|(d, _)| *d <= options.within_m);
-    let nearest = reachable.min_by(|a, b| a.0.total_cmp(&b.0));
-    Ok(nearest.map(|(_, cluster)| cluster.iter().map(|&i| index[i as usize]).collect()))
+    let found = clusters(scan, is_background, options)?;
+    let reachable = found.into_iter().map(|c| ((c.middle - near).norm(), c));
+    let nearest = reachable.filter(|(d, _)| *d <= options.within_m).min_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(nearest.map(|(_, cluster)| cluster.readings))
 }
 
 /// The thing of these readings with its angles.

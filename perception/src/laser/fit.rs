@@ -78,6 +78,18 @@ pub fn localise(model: &ShapeModel, scan: &ObjectScan, start: Start, options: &F
     follow(model, std::slice::from_ref(&posed), &starts, options)
 }
 
+/// Brings scans of one thing, in one frame but from one side perhaps, onto a model of all of it: from every angle, the nearest reading of the scan that
+/// met the thing most often put on the side of the hull that faces it.
+pub fn fit_scans(model: &ShapeModel, scans: &ShapeModel, options: &FitOptions) -> ModelFit {
+    let _span = tracing::debug_span!("fit_scans", scans = scans.scans().len()).entered();
+    let most = scans.scans().iter().max_by_key(|s| s.scan.points.len());
+    let starts: Vec<Isometry2<f64>> = most.map_or_else(Vec::new, |posed| {
+        let laser_from_scans = posed.model_from_laser.inverse();
+        facing(model, &posed.scan, options.starts).iter().map(|laser| laser * laser_from_scans).collect()
+    });
+    follow(model, scans.scans(), &starts, options)
+}
+
 fn turns(count: usize) -> impl Iterator<Item = f64> {
     (0..count.max(1)).map(move |i| TAU * i as f64 / count.max(1) as f64)
 }

@@ -1,7 +1,7 @@
 //! Recognition in two steps: hull features leave few of the known shapes, model alignment decides among these.
 
 use super::features::{Features, USUAL_SPREAD};
-use super::fit::{FitOptions, ModelFit, Start, fit, localise};
+use super::fit::{FitOptions, ModelFit, Start, fit, fit_scans, localise};
 use super::scan::direction;
 use super::shape::{ObjectScan, ShapeModel};
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,10 @@ impl KnownShape {
 pub struct RecogniseOptions {
     /// Shapes whose features, or width, are off by more spreads are not aligned.
     pub gate: f64,
+    /// Features of a hull count where its outline is known to so much, metres.
+    pub tight_m: f64,
+    /// Scans constrain each other's poses where the outline is known to so much, metres; else each is held against a shape by itself.
+    pub rigid_m: f64,
     /// A shape fits if the root of the boundary violation a pair of scans stays below, metres: the precision of the paper's laser.
     pub same_m: f64,
     /// What fits by so much less well than the best is told from it, metres: more than models of one thing differ among themselves.
@@ -64,7 +68,14 @@ pub struct RecogniseOptions {
 
 impl Default for RecogniseOptions {
     fn default() -> Self {
-        RecogniseOptions { gate: 4.0, same_m: 0.01, apart_m: 0.003, fit: FitOptions::default() }
+        RecogniseOptions {
+            gate: 4.0,
+            tight_m: 0.01,
+            rigid_m: 0.16,
+            same_m: 0.01,
+            apart_m: 0.003,
+            fit: FitOptions::default(),
+        }
     }
 }
 
@@ -129,6 +140,42 @@ pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &Recogni
         }
     }
     decide(candidates, known, options)
+}
+
+/// Takes what several scans show, from one side perhaps, for one of the shapes known. `loose_m` says how far on average the thing may reach beyond what was
+/// met of it ([`super::Outlook::looseness_m`]): the features of its hull count where that is little, else only what is too wide or too narrow for one of the scans.
+pub fn recognise_scans(
+    scans: &ShapeModel,
+    loose_m: f64,
+    known: &[KnownShape],
+    options: &RecogniseOptions,
+) -> Recognition {
+    let _span = tracing::debug_span!("recognise_scans", known = known.len()).entered();
+    let features = (loose_m <= options.tight_m).then(|| scans.features());
+    let fit = |shape: &KnownShape| match loose_m <= options.rigid_m {
+        true => fit_scans(&shape.model, scans, &options.fit),
+        false => worst_fit(&shape.model, scans, &options.fit),
+    };
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for (index, shape) in known.iter().enumerate() {
+        let apart_m = scans.scans().iter().map(|s| width_apart_m(&s.scan, &shape.model)).fold(0.0, f64::max);
+        let by_features = features.as_ref().map_or(0.0, |f| apart(f, &shape.features));
+        let distance = by_features.max(apart_m / USUAL_SPREAD.1);
+        if distance <= options.gate {
+            candidates.push(Candidate { index, distance, fit: fit(shape) });
+        }
+    }
+    decide(candidates, known, options)
+}
+
+/// How the scan lies on a model that lies on it worst, each by itself.
+fn worst_fit(model: &ShapeModel, scans: &ShapeModel, options: &FitOptions) -> ModelFit {
+    let each = scans.scans().iter().map(|posed| {
+        let fit = localise(model, &posed.scan, Start::AllAngles, options);
+        ModelFit { model_from_other: fit.model_from_other * posed.model_from_laser.inverse(), ..fit }
+    });
+    let worst = each.max_by(|a, b| a.between.per_pair_m().total_cmp(&b.between.per_pair_m()));
+    worst.unwrap_or_else(|| fit_scans(model, scans, options))
 }
 
 /// By how much a shape is too wide, from every side, for the bounds of a scan, or too narrow for its readings, metres.

@@ -46,23 +46,62 @@ pub fn undetermined_m2(model: &ShapeModel, options: &NextOptions) -> f64 {
     undetermined(model, &model.hull(), options).len() as f64 * options.cell_m * options.cell_m
 }
 
+/// What scans from poses are expected to settle of what is undetermined, together and each by itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outlook {
+    /// Round the hull of what was met, metres.
+    pub perimeter_m: f64,
+    cell_m2: f64,
+    open: usize,
+    /// For each pose the undetermined cells that a scan from there is expected to settle.
+    settles: Vec<Vec<u32>>,
+}
+
+impl Outlook {
+    /// What is undetermined of a model, and which of it scans from these poses of the laser in the model's frame would settle.
+    pub fn new(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> Outlook {
+        let _span = tracing::debug_span!("outlook", poses = poses.len()).entered();
+        let hull = model.hull();
+        let open = undetermined(model, &hull, options);
+        let settled = |pose: &Isometry2<f64>| {
+            let laser = origin(pose);
+            let cells = (0u32..).zip(&open).filter(|(_, cell)| settles(&laser, cell, &hull, options));
+            cells.map(|(index, _)| index).collect()
+        };
+        Outlook {
+            perimeter_m: hull.perimeter_m(),
+            cell_m2: options.cell_m * options.cell_m,
+            open: open.len(),
+            settles: poses.iter().map(settled).collect(),
+        }
+    }
+
+    /// The undetermined area after scans from some of the poses, square metres.
+    pub fn leaves_m2(&self, poses: &[usize]) -> f64 {
+        let mut settled = vec![false; self.open];
+        for &cell in poses.iter().flat_map(|&pose| &self.settles[pose]) {
+            settled[cell as usize] = true;
+        }
+        settled.iter().filter(|is| !**is).count() as f64 * self.cell_m2
+    }
+
+    /// How far on average the thing may reach beyond what was met of it, after scans from some of the poses, metres.
+    pub fn looseness_m(&self, poses: &[usize]) -> f64 {
+        self.leaves_m2(poses) / self.perimeter_m
+    }
+}
+
 /// Ranks poses of the laser in the model's frame: the one whose scan is expected to settle most comes first, equals by their place in the list.
 ///
 /// Whether a pose can be reached, and what that costs, is for the caller to weigh.
 pub fn next_scan(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> Vec<NextScan> {
-    let _span = tracing::debug_span!("next_scan", poses = poses.len()).entered();
-    let hull = model.hull();
-    let open = undetermined(model, &hull, options);
-    let area = |cells: usize| cells as f64 * options.cell_m * options.cell_m;
-    let mut ranked: Vec<NextScan> = poses
-        .iter()
-        .enumerate()
-        .map(|(index, pose)| {
-            let laser = origin(pose);
-            let settled = open.iter().filter(|cell| settles(&laser, cell, &hull, options)).count();
-            NextScan { index, settles_m2: area(settled), leaves_m2: area(open.len() - settled) }
-        })
-        .collect();
+    let outlook = Outlook::new(model, poses, options);
+    let all_m2 = outlook.leaves_m2(&[]);
+    let of = |index: usize| {
+        let leaves_m2 = outlook.leaves_m2(&[index]);
+        NextScan { index, settles_m2: all_m2 - leaves_m2, leaves_m2 }
+    };
+    let mut ranked: Vec<NextScan> = (0..poses.len()).map(of).collect();
     ranked.sort_by(|a, b| b.settles_m2.total_cmp(&a.settles_m2).then(a.index.cmp(&b.index)));
     ranked
 }

@@ -1,13 +1,17 @@
 //! One sweep of a planar laser.
 
 use nalgebra::{Isometry2, Point2, Vector2};
+use serde::{Deserialize, Serialize};
 
 /// One sweep: a distance at each of a set of angles, and where the laser was said to be.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Scan {
     /// Ascending, anticlockwise from the laser's x axis, over no more than a full turn.
     pub angles_rad: Vec<f64>,
-    /// One an angle. Infinite: nothing within reach. NaN, zero or less: no reading, which tells nothing.
+    /// One an angle. Infinite: nothing within reach. NaN, zero or less: no reading, which tells nothing. Written as null where nothing is within reach, and
+    /// as 0 where there is no reading.
+    #[serde(with = "ranges")]
     pub ranges_m: Vec<f64>,
     /// Where localisation says that the laser was.
     pub map_from_laser: Isometry2<f64>,
@@ -68,6 +72,24 @@ impl Scan {
     pub fn endpoint(&self, index: usize) -> Option<Point2<f64>> {
         let (angle, range) = (*self.angles_rad.get(index)?, *self.ranges_m.get(index)?);
         (range > 0.0 && range.is_finite()).then(|| Point2::from(direction(angle) * range))
+    }
+}
+
+/// Ranges where numbers must be finite.
+mod ranges {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn serialize<S: Serializer>(ranges_m: &[f64], to: S) -> Result<S::Ok, S::Error> {
+        let written = |r: &f64| match *r {
+            r if r.is_nan() => Some(0.0),
+            r => r.is_finite().then_some(r),
+        };
+        to.collect_seq(ranges_m.iter().map(written))
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+        let written: Vec<Option<f64>> = Vec::deserialize(from)?;
+        Ok(written.into_iter().map(|r| r.unwrap_or(f64::INFINITY)).collect())
     }
 }
 

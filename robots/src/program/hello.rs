@@ -262,6 +262,7 @@ impl Hello {
             frames: Frames { map: self.frames.map, base: self.frames.base, camera: c.frame },
             reach_m: self.arm.as_ref().map(|a| a.reach_m),
             hand_opening_m: self.arm.as_ref().and_then(|a| a.hand_opening_m),
+            laser: None,
             up: self.up.map(|up| up.normalize()),
             pose_sigma_m: self.pose_sigma_m,
             pose_sigma_rad: self.pose_sigma_rad,

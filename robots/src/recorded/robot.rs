@@ -65,6 +65,7 @@ impl RecordedRobot {
             frames: Frames::default(),
             reach_m: None,
             hand_opening_m: None,
+            laser: None,
             up: settings.up.map(|[x, y, z]| Vector3::new(x, y, z).normalize()),
             pose_sigma_m: settings.pose_sigma_m,
             pose_sigma_rad: settings.pose_sigma_deg.to_radians(),
@@ -97,7 +98,7 @@ impl RecordedRobot {
     /// an arm or a map that is known does not count.
     pub fn of(known: Known, start: usize, frames: Box<dyn Footage>) -> RecordedRobot {
         let description =
-            Description { head: None, reach_m: None, hand_opening_m: None, ..known.description };
+            Description { head: None, reach_m: None, hand_opening_m: None, laser: None, ..known.description };
         let stations = known.stations.unwrap_or_default();
         let state = State { at: start.min(stations.len().saturating_sub(1)), now_ns: known.now_ns };
         RecordedRobot { description, surfaces: known.surfaces, stations, frames, state: Mutex::new(state) }

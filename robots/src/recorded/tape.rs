@@ -2,7 +2,7 @@
 
 use crate::body::{
     Colour, Description, Door, Driven, Grasp, Grasped, Hand, Opened, Place, Placed, Placing, PoseEstimate,
-    Push, Pushed, Room, Sensed, Stamp, StampedTransform, Station, SurfaceHint, Travel,
+    Push, Pushed, Room, Scanned, Sensed, Stamp, StampedTransform, Station, SurfaceHint, Travel,
 };
 use crate::body::{Looked, Robot};
 use crate::failure::Failure;
@@ -59,6 +59,8 @@ pub enum Request {
     LookAt(Point3<f64>),
     /// [`Robot::sense`].
     Sense,
+    /// [`Robot::scan`].
+    Scan,
     /// [`Robot::push_aside`].
     PushAside(Push),
     /// [`Robot::open_door`].
@@ -78,6 +80,7 @@ impl std::fmt::Display for Request {
             Request::DriveTo(place) => write!(f, "drive to {place}"),
             Request::LookAt(p) => write!(f, "look at ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z),
             Request::Sense => write!(f, "take a frame"),
+            Request::Scan => write!(f, "sweep its laser"),
             Request::PushAside(push) => write!(f, "push what stands at {}", push.object),
             Request::OpenDoor(door) => write!(f, "open {door}"),
             Request::Grasp(grasp) => write!(f, "take what stands at {}", grasp.object),
@@ -99,6 +102,8 @@ pub enum Answer {
     Looked(Looked),
     /// To [`Request::Sense`].
     Sensed(Exposure),
+    /// To [`Request::Scan`].
+    Scanned(Scanned),
     /// To [`Request::PushAside`].
     Pushed(Pushed),
     /// To [`Request::OpenDoor`].

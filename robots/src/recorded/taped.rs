@@ -3,7 +3,7 @@
 use super::tape::{Answer, Entry, Exposure, Known, Question, Reply, Request, Tape};
 use crate::body::{
     Description, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, PoseEstimate,
-    Push, Pushed, Robot, Room, Sensed, Stamp, Station, SurfaceHint, Travel, Watch,
+    Push, Pushed, Robot, Room, Scanned, Sensed, Stamp, Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
@@ -239,6 +239,7 @@ async fn perform(body: &dyn Robot, request: &Request, watch: &Watch<'_>) -> (Ans
         Request::Pose => body.pose().await.map(Answer::Pose),
         Request::DriveTo(place) => body.drive_to(place, watch).await.map(Answer::Driven),
         Request::LookAt(point) => body.look_at(point, watch).await.map(Answer::Looked),
+        Request::Scan => body.scan(watch).await.map(Answer::Scanned),
         Request::PushAside(push) => body.push_aside(push, watch).await.map(Answer::Pushed),
         Request::OpenDoor(door) => body.open_door(door, watch).await.map(Answer::Opened),
         Request::Grasp(grasp) => body.grasp(grasp, watch).await.map(Answer::Grasped),
@@ -334,6 +335,13 @@ impl Robot for TapedRobot {
                 let pixels = self.tape.pixels(exposure.stamp_ns);
                 Ok(exposure.with(pixels.map_err(|because| Failure::Broken { because })?))
             }
+            (other, _) => mixed_up(other),
+        }
+    }
+
+    async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {
+        match self.ask(Request::Scan, watch).await? {
+            (Answer::Scanned(scanned), _) => Ok(scanned),
             (other, _) => mixed_up(other),
         }
     }

@@ -7,7 +7,9 @@ use crate::route::Router;
 use crate::sim::body::{self, SAFETY_M};
 use crate::sim::noise::{mix, share};
 use crate::sim::render::visible_share;
-use crate::sim::scene::{DoorSpec, DoorState, ObjectSpec, RoomSpec, SceneSpec, SurfaceSpec, TargetSpec};
+use crate::sim::scene::{
+    DoorSpec, DoorState, ObjectSpec, ObstacleSpec, RoomSpec, SceneSpec, SurfaceSpec, TargetSpec,
+};
 use crate::sim::shape::Outline;
 use crate::sim::walls::walls;
 use crate::sim::world::{HungDoor, LABEL_OBJECT, Object, Scene, Stand, upright};
@@ -42,7 +44,7 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
         walls: walls(&spec.rooms, &doorways),
         doors,
         surfaces: spec.surfaces.clone(),
-        obstacles: spec.obstacles.clone(),
+        obstacles: stand_on_floor(spec, seed)?,
         start: Pose2::new(
             spec.start.position_m[0],
             spec.start.position_m[1],
@@ -74,6 +76,42 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
         }
     }
     Err(failures.report(spec, seed))
+}
+
+/// Things on the floor in their places; they draw by themselves, as doors do.
+fn stand_on_floor(spec: &SceneSpec, seed: u64) -> Result<Vec<ObstacleSpec>, InputError> {
+    let mut rng = ChaCha8Rng::seed_from_u64(mix(seed ^ 0xf100));
+    let outline = |o: &ObstacleSpec| Outline::Rectangle { half_m: [0.5 * o.size_m[0], 0.5 * o.size_m[1]] };
+    let at = |o: &ObstacleSpec| {
+        Isometry2::new(Vector2::new(o.position_m[0], o.position_m[1]), o.yaw_deg.to_radians())
+    };
+    let mut tries = |spec: &ObstacleSpec, placed: &[ObstacleSpec]| {
+        let Some([x, y]) = spec.spread_m else { return Some(spec.clone()) };
+        (0..PLACES).find_map(|_| {
+            let mut o = spec.clone();
+            o.position_m[0] += x * (rng.random::<f64>() - 0.5);
+            o.position_m[1] += y * (rng.random::<f64>() - 0.5);
+            o.yaw_deg = rng.random_range(0.0..360.0);
+            let apart = |other: &ObstacleSpec| {
+                gap_between(&outline(&o), &at(&o), &outline(other), &at(other)) >= o.gap_m
+            };
+            placed.iter().all(apart).then_some(o)
+        })
+    };
+    for _ in 0..ROUNDS {
+        let mut placed: Vec<ObstacleSpec> = Vec::new();
+        while let Some(o) = spec.obstacles.get(placed.len()).and_then(|o| tries(o, &placed)) {
+            placed.push(o);
+        }
+        if placed.len() == spec.obstacles.len() {
+            return Ok(placed);
+        }
+    }
+    Err(InputError::whole(
+        title_of(spec),
+        format!("its obstacles found no room in {ROUNDS} arrangements (seed {seed})"),
+        "take fewer, a larger `spread_m` or a smaller `gap_m`",
+    ))
 }
 
 /// Each door draws by itself: an arrangement does not depend on how many doors there are.

@@ -1,6 +1,7 @@
 //! The body in the simulated room: a round base with a pan-tilt head that carries a Kinect, and an arm with a hand.
 
 use crate::body::{Description, Footprint, Frames, Head, Speeds};
+use crate::sim::laser::Laser;
 use descry_perception::Intrinsics;
 use nalgebra::{Point3, Vector3};
 
@@ -49,6 +50,7 @@ pub fn description() -> Description {
         frames: Frames::default(),
         reach_m: Some(REACH_M),
         hand_opening_m: Some(HAND_OPENING_M),
+        laser: Some(Laser::default().part()),
         up: Some(Vector3::z()),
         pose_sigma_m: 0.03,
         pose_sigma_rad: 2f64.to_radians(),

@@ -1,6 +1,6 @@
 //! A planar laser in the scene: level rays against room and solids at one height, and the noise of a SICK LMS 200.
 
-use crate::body::Pose2;
+use crate::body::{self, Pose2};
 use crate::sim::scene::RoomSpec;
 use crate::sim::world::{Scene, Solid};
 use descry_perception::laser::Scan;
@@ -38,6 +38,20 @@ impl Default for Laser {
             reach_m: 8.0,
             sigma_m: 0.005,
             precision_m: 0.01,
+        }
+    }
+}
+
+impl Laser {
+    /// The laser as a part of a body, above the middle of its base.
+    pub fn part(&self) -> body::Laser {
+        body::Laser {
+            frame: "laser".into(),
+            base_from_laser: Isometry3::translation(0.0, 0.0, self.height_m),
+            first_rad: self.first_rad,
+            step_rad: self.step_rad,
+            readings: self.readings,
+            reach_m: self.reach_m,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::body::{
     CancellationToken, Colour, Description, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place,
-    Placed, Placing, Pose2, PoseEstimate, Progress, Push, Pushed, Robot, Room, Sensed, Stamp,
+    Placed, Placing, Pose2, PoseEstimate, Progress, Push, Pushed, Robot, Room, Scanned, Sensed, Stamp,
     StampedTransform, Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
@@ -11,6 +11,7 @@ use crate::head::{self, Gaze};
 use crate::sim::body::{self, HEAD_SPEED_RAD_S, SAFETY_M};
 use crate::sim::drive::{self, Localisation};
 use crate::sim::faults::{Fault, FaultKind, FaultPlan};
+use crate::sim::laser::{self, Laser};
 use crate::sim::noise::{self, DepthNoise};
 use crate::sim::render::{Frame, render, visible_share};
 use crate::sim::routes::{Doors, Routes};
@@ -26,6 +27,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// From the trigger to the frame, seconds.
 const FRAME_S: f64 = 0.1;
 
+/// From the trigger to the sweep, seconds.
+const SWEEP_S: f64 = 0.03;
+
 /// What a run of the simulator is made with besides the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SimOptions {
@@ -37,6 +41,8 @@ pub struct SimOptions {
     pub localisation: Localisation,
     /// How the camera falls short.
     pub noise: DepthNoise,
+    /// The laser.
+    pub laser: Laser,
 }
 
 /// A simulated body in a scene. The truth is asked of [`SimRobot::truth`]; the [`Robot`] trait shows only what a real body would.
@@ -74,6 +80,7 @@ impl SimRobot {
         let mut description = body::description();
         description.pose_sigma_m = options.localisation.sigma_m;
         description.pose_sigma_rad = options.localisation.sigma_rad;
+        description.laser = Some(options.laser.part());
         let map = scene.map();
         let doorways = scene.doors.iter().map(|d| d.doorway.clone()).collect();
         let radius_m = description.footprint.radius_m() + SAFETY_M;
@@ -290,9 +297,9 @@ impl SimRobot {
         Ok(Looked { duration_s, miss_rad })
     }
 
-    fn expose(&self) -> Result<Sensed, Failure> {
-        let mut state = self.lock();
-        state.pass(FRAME_S);
+    /// The number of a frame or a sweep that is due after `seconds`, unless it is lost.
+    fn trigger(&self, state: &mut State, seconds: f64) -> Result<u64, Failure> {
+        state.pass(seconds);
         state.frames += 1;
         let (number, stamp_ns) = (state.frames, state.now_ns);
         if self.strikes(FaultKind::DroppedFrame, number).is_some() {
@@ -300,6 +307,44 @@ impl SimRobot {
             let because = format!("frame {number} was triggered and did not come");
             return Err(Failure::SensorDropped { because, stamp_ns });
         }
+        Ok(number)
+    }
+
+    fn sweep(&self) -> Result<Scanned, Failure> {
+        let mut state = self.lock();
+        let number = self.trigger(&mut state, SWEEP_S)?;
+        let part = self.options.laser.part();
+        let map_from_base = state.estimate.isometry();
+        let pose =
+            |map_from_base: &Isometry3<f64>| Pose2::from_isometry(&(map_from_base * part.base_from_laser));
+        let (truly, stated) = (pose(&state.map_from_base()), pose(&map_from_base));
+        let mut rng = ChaCha8Rng::seed_from_u64(noise::mix(noise::mix(self.options.seed ^ 0x5ca9) ^ number));
+        let scan = laser::sweep(&state.scene, &self.options.laser, &truly, &stated, &mut rng);
+        state.notice(&scan, &self.map);
+        let frames = &self.description.frames;
+        let stamp_ns = state.now_ns;
+        let link = |parent: &str, child: &str, parent_from_child| StampedTransform {
+            stamp_ns,
+            parent: parent.into(),
+            child: child.into(),
+            parent_from_child,
+        };
+        Ok(Scanned {
+            stamp_ns,
+            scan,
+            transforms: vec![
+                link(&frames.map, &frames.base, map_from_base),
+                link(&frames.base, &part.frame, part.base_from_laser),
+            ],
+            pose_sigma_m: self.description.pose_sigma_m,
+            pose_sigma_rad: self.description.pose_sigma_rad,
+        })
+    }
+
+    fn expose(&self) -> Result<Sensed, Failure> {
+        let mut state = self.lock();
+        let number = self.trigger(&mut state, FRAME_S)?;
+        let stamp_ns = state.now_ns;
         let frame = self.render(&state);
         let base_from_camera = self.base_from_camera(&state.gaze);
         let map_from_base = state.estimate.isometry();
@@ -451,6 +496,15 @@ impl Robot for SimRobot {
             return Err(timed_out("taking a frame", watch.time_limit_s));
         }
         self.expose()
+    }
+
+    #[tracing::instrument(level = "debug", skip_all)]
+    async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {
+        go_on(&watch.cancel, "a sweep of the laser")?;
+        if watch.time_limit_s < SWEEP_S {
+            return Err(timed_out("a sweep of the laser", watch.time_limit_s));
+        }
+        self.sweep()
     }
 
     #[tracing::instrument(level = "debug", skip_all)]

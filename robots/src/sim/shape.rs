@@ -294,6 +294,13 @@ pub enum Part {
         /// Half the thickness of the rod.
         minor_m: f64,
     },
+    /// A box around the z axis that stands on z = 0, its upright edges rounded.
+    Rounded {
+        /// Greatest corner of the box around it.
+        high: Point3<f64>,
+        /// Radius of the edges.
+        corner_m: f64,
+    },
     /// A box.
     Cuboid {
         /// Least corner.
@@ -341,6 +348,7 @@ impl Part {
                     .then_some(Hit { t, normal: Vector3::z() })
             }
             Part::Handle { centre, major_m, minor_m } => handle_hit(o, d, before, &centre, major_m, minor_m),
+            Part::Rounded { high, corner_m } => rounded_hit(o, d, before, &high, corner_m),
             Part::Cuboid { low, high } => cuboid_hit(o, d, before, &low, &high),
         }
     }
@@ -420,6 +428,29 @@ fn cuboid_hit(
     let mut normal = Vector3::zeros();
     normal[axis] = 1.0;
     Some(Hit { t, normal })
+}
+
+/// The body is convex, two boxes and four cylinders together: from outside a ray enters it where it enters the first of them.
+fn rounded_hit(
+    o: &Point3<f64>,
+    d: &Vector3<f64>,
+    before: f64,
+    high: &Point3<f64>,
+    corner_m: f64,
+) -> Option<Hit> {
+    let (x, y) = (high.x - corner_m, high.y - corner_m);
+    let boxes = [(x, high.y), (high.x, y)]
+        .into_iter()
+        .filter_map(|(x, y)| cuboid_hit(o, d, before, &Point3::new(-x, -y, 0.0), &Point3::new(x, y, high.z)));
+    let edge = [
+        Part::frustum(corner_m, corner_m, 0.0, high.z),
+        Part::Disc { z_m: high.z, inner_m: 0.0, outer_m: corner_m },
+    ];
+    let edges = [(x, y), (-x, y), (-x, -y), (x, -y)].into_iter().flat_map(|(x, y)| {
+        let from_edge = o - Vector3::new(x, y, 0.0);
+        edge.each_ref().map(|part| part.hit(&from_edge, d, before)).into_iter().flatten()
+    });
+    boxes.chain(edges).min_by(|a, b| a.t.total_cmp(&b.t))
 }
 
 /// Sphere tracing: the distance to half a torus is known exactly, so no step can pass through it.

@@ -2,21 +2,26 @@
 
 use crate::body::{Pose2, Stamp};
 use crate::failure::Failure;
+use crate::grid::OccupancyGrid;
 use crate::head::Gaze;
 use crate::route::Route;
 use crate::sim::arrange::fits;
 use crate::sim::drive::{self, Localisation};
 use crate::sim::faults::{Fault, FaultKind};
 use crate::sim::routes::{Doors, Routes};
-use crate::sim::scene::{SurfaceSpec, headroom_m};
+use crate::sim::scene::{ObstacleSpec, SurfaceSpec, headroom_m};
 use crate::sim::truth::Event;
 use crate::sim::world::{HungDoor, MAP_RESOLUTION_M, Scene, Stand, upright};
-use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use descry_perception::laser::Scan;
+use nalgebra::{Isometry3, Point2, Point3, Translation3, Vector2, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 /// What stops the base is seen by its own scanner up to this far around it, metres.
 const SCANNER_M: f64 = 0.8;
+/// What the laser meets up to this far from it is kept in mind, metres; and not so near to a wall that it may be the wall.
+const NOTICED_M: f64 = 2.5;
+const NEAR_WALL_M: f64 = 0.2;
 /// Goals within this distance of one that was found unreachable are unreachable too, metres.
 const SAME_GOAL_M: f64 = 0.1;
 /// Directions tried for an object that somebody moves.
@@ -90,14 +95,21 @@ impl State {
         }
     }
 
-    /// The first step at which the footprint touches something that the map does not show, and which obstacle that is.
+    /// The first step that brings the footprint into something that the map does not show, and which obstacle that is. What it touches already stops
+    /// only what goes nearer.
     pub fn first_bump(&self, steps: &[drive::Step], radius_m: f64) -> Option<(usize, usize)> {
-        steps.iter().enumerate().find_map(|(i, step)| {
+        let mut before = self.map_from_base().translation.vector.xy().into();
+        for (i, step) in steps.iter().enumerate() {
             let at = self.really(&step.pose).translation.vector.xy().into();
-            let bumps = |o: &&crate::sim::scene::ObstacleSpec| !o.on_map && o.touches(&at, radius_m);
-            let obstacle = self.scene.obstacles.iter().position(|o| bumps(&o))?;
-            Some((i, obstacle))
-        })
+            let bumps = |o: &ObstacleSpec| {
+                !o.on_map && o.touches(&at, radius_m) && o.distance_m(&at) < o.distance_m(&before)
+            };
+            if let Some(obstacle) = self.scene.obstacles.iter().position(bumps) {
+                return Some((i, obstacle));
+            }
+            before = at;
+        }
+        None
     }
 
     /// The object in the hand.
@@ -165,6 +177,25 @@ impl State {
             let there = (really * Point3::new(p.x, p.y, 0.0)).xy();
             (p - here).norm() <= SCANNER_M && obstacle.touches(&there, 0.5 * MAP_RESOLUTION_M)
         });
+    }
+
+    /// Keeps in mind, on the body's own map, what its laser meets nearby that the map of the room does not show.
+    pub fn notice(&mut self, scan: &Scan, map: &OccupancyGrid) {
+        let on_map = |p: &Point2<f64>| {
+            (-1..=1).any(|i| {
+                (-1..=1)
+                    .any(|k| map.is_occupied(&(p + Vector2::new(f64::from(i), f64::from(k)) * NEAR_WALL_M)))
+            })
+        };
+        let met = (0..scan.ranges_m.len()).filter(|&i| scan.ranges_m[i] <= NOTICED_M);
+        let met: Vec<Point2<f64>> = met
+            .filter_map(|i| scan.endpoint(i))
+            .map(|end| scan.map_from_laser * end)
+            .filter(|p| !on_map(p))
+            .collect();
+        if !met.is_empty() {
+            self.routes.occupy(|cell| met.iter().any(|p| (p - cell).amax() <= 0.5 * MAP_RESOLUTION_M));
+        }
     }
 
     /// Stops where the base means to be; draws by how much it misses that and by how much it is wrong about where it is.

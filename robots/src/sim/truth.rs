@@ -13,7 +13,7 @@ pub struct Truth {
     pub stamp_ns: Stamp,
     /// Where the base is.
     pub base: Pose2,
-    /// Every object of the scene, in the order of the scene file.
+    /// Every object of the scene, in the order of the scene file; then the obstacles that the map does not show.
     pub objects: Vec<TrueObject>,
     /// Every door, in the order of the scene file.
     #[serde(default)]
@@ -96,10 +96,26 @@ impl Truth {
                 size_m: (high - low).into(),
             }
         });
+        // What the map does not show is for the body to find out.
+        let on_floor = scene.obstacles.iter().filter(|o| !o.on_map).map(|o| {
+            let map_from_object = o.map_from_obstacle();
+            let centre_m = map_from_object * Point3::new(0.0, 0.0, 0.5 * o.size_m[2]);
+            TrueObject {
+                name: o.name.clone(),
+                kind: o.name.clone(),
+                surface: None,
+                room: scene.room_at(&centre_m.xy()).map(String::from),
+                in_hand: false,
+                present: true,
+                map_from_object,
+                centre_m,
+                size_m: o.size_m,
+            }
+        });
         Truth {
             stamp_ns,
             base: Pose2::from_isometry(map_from_base),
-            objects: objects.collect(),
+            objects: objects.chain(on_floor).collect(),
             doors: scene
                 .doors
                 .iter()

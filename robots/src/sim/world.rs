@@ -172,6 +172,8 @@ const LEG_M: f64 = 0.05;
 const UPRIGHT_M: f64 = 0.02;
 /// Thickness of a door's panel, metres.
 const PANEL_M: f64 = 0.04;
+/// Thickness of a seat on legs, metres.
+const SEAT_M: f64 = 0.06;
 /// Of every wall.
 pub const WALL_COLOUR: [u8; 3] = [205, 205, 195];
 const PANEL_COLOUR: [u8; 3] = [140, 90, 60];
@@ -227,11 +229,40 @@ impl ObstacleSpec {
         upright(self.position_m[0], self.position_m[1], 0.0, self.yaw_deg.to_radians())
     }
 
+    fn solid(&self) -> Solid {
+        let (low, high) = Shape::Box(Cuboid { size_m: self.size_m }).bounds();
+        let parts = match self.legs_m {
+            Some(legs_m) => {
+                let thick = Vector3::new(legs_m, legs_m, 0.0);
+                let under_m = (high.z - SEAT_M).max(0.5 * high.z);
+                let leg = |(sx, sy): (f64, f64)| {
+                    let outer = Point3::new(sx * high.x, sy * high.y, 0.0);
+                    let inner = outer - Vector3::new(sx, sy, 0.0).component_mul(&thick);
+                    Part::Cuboid { low: outer.inf(&inner), high: outer.sup(&inner) + Vector3::z() * under_m }
+                };
+                let seat = Part::Cuboid { low: Point3::new(low.x, low.y, under_m), high };
+                [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                    .map(leg)
+                    .into_iter()
+                    .chain([seat])
+                    .collect()
+            }
+            None if self.corner_m > 0.0 => vec![Part::Rounded { high, corner_m: self.corner_m }],
+            None => vec![Part::Cuboid { low, high }],
+        };
+        Solid { parts, ..Solid::cuboid(self.map_from_obstacle(), low, high, self.colour) }
+    }
+
     /// True if a disc on the floor touches it.
     pub fn touches(&self, p: &Point2<f64>, radius_m: f64) -> bool {
+        self.distance_m(p) < radius_m
+    }
+
+    /// From a point of the floor to the box around it; 0 inside.
+    pub fn distance_m(&self, p: &Point2<f64>) -> f64 {
         let local = self.map_from_obstacle().inverse_transform_point(&Point3::new(p.x, p.y, 0.0));
         let gap = |at: f64, size: f64| (at.abs() - 0.5 * size).max(0.0);
-        gap(local.x, self.size_m[0]).hypot(gap(local.y, self.size_m[1])) < radius_m
+        gap(local.x, self.size_m[0]).hypot(gap(local.y, self.size_m[1]))
     }
 }
 
@@ -242,11 +273,7 @@ impl Scene {
         let shut = self.doors.iter().filter(|d| d.shut).map(HungDoor::panel);
         let surfaces = self.surfaces.iter().flat_map(SurfaceSpec::solids);
         let mut solids: Vec<Solid> = walls.chain(shut).chain(surfaces).collect();
-        for o in &self.obstacles {
-            let box_ = Shape::Box(Cuboid { size_m: o.size_m });
-            let (low, high) = box_.bounds();
-            solids.push(Solid::cuboid(o.map_from_obstacle(), low, high, o.colour));
-        }
+        solids.extend(self.obstacles.iter().map(ObstacleSpec::solid));
         for (label, o) in (LABEL_OBJECT..).zip(&self.objects) {
             if o.is_in_place() {
                 solids.push(o.solid(label));

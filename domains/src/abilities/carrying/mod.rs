@@ -73,6 +73,9 @@ pub const ABILITY: Ability = Ability {
             failed: put_down_failed,
         },
     ],
+    begins: None,
+    fallback: None,
+    answers: None,
 };
 
 /// `(holding ?thing)`.

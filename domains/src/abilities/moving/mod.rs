@@ -78,10 +78,13 @@ pub const ABILITY: Ability = Ability {
             failed: |_, _, _, _, _| Ok(None),
         },
     ],
+    begins: None,
+    fallback: None,
+    answers: None,
 };
 
 /// A drive ended: the body stands where it was to go.
-fn driven(
+pub(super) fn driven(
     mind: &mut Mind,
     _: Eyes<'_>,
     situation: &Situation,

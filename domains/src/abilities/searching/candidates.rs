@@ -44,7 +44,12 @@ fn station_symbol(name: &str) -> String {
 }
 
 /// Poses around a point that face it, numbered from 1; where no distance fits, the pose is left out.
-fn ring(robot: &dyn Robot, from: &Place, centre: &Point3<f64>, config: &Candidates) -> Vec<(usize, Place)> {
+pub(crate) fn ring(
+    robot: &dyn Robot,
+    from: &Place,
+    centre: &Point3<f64>,
+    config: &Candidates,
+) -> Vec<(usize, Place)> {
     let pose = |k: usize, outwards_m: f64| {
         let angle = std::f64::consts::TAU * k as f64 / config.poses as f64;
         let distance_m = config.distance_m + outwards_m;

@@ -63,6 +63,9 @@ pub const ABILITY: Ability = Ability {
             failed: push_failed,
         },
     ],
+    begins: None,
+    fallback: None,
+    answers: None,
 };
 
 /// A look ended: record the view, and believe what it shows with the others.

@@ -24,6 +24,15 @@
 //! position_m = [2.6, -1.5]
 //! size_m = [0.5, 1.0, 1.8]
 //!
+//! [[obstacle]]
+//! name = "garbage can"
+//! on_map = false
+//! position_m = [0.5, 0.0]
+//! spread_m = [4.0, 3.0]             # somewhere in this rectangle around its position, turned by the seed
+//! gap_m = 1.5                       # from all obstacles above it
+//! size_m = [0.32, 0.32, 0.6]
+//! corner_m = 0.12                   # radius of its upright edges; `legs_m = 0.03` makes a seat on four legs
+//!
 //! [start]
 //! position_m = [-2.2, 0.0]
 //! yaw_deg = 0.0

@@ -51,7 +51,7 @@ pub struct SurfaceSpec {
     pub colour: [u8; 3],
 }
 
-/// A box on the floor.
+/// A box on the floor, its corners rounded perhaps, or a seat on four legs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObstacleSpec {
@@ -59,11 +59,23 @@ pub struct ObstacleSpec {
     pub name: String,
     /// Centre, in the map.
     pub position_m: [f64; 2],
+    /// The seed moves it within this rectangle around that, and turns it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spread_m: Option<[f64; 2]>,
+    /// Least gap to the other obstacles where the seed places it.
+    #[serde(default)]
+    pub gap_m: f64,
     /// Counter-clockwise.
     #[serde(default)]
     pub yaw_deg: f64,
     /// Along its own x and y, and its height.
     pub size_m: [f64; 3],
+    /// Radius of its upright edges.
+    #[serde(default)]
+    pub corner_m: f64,
+    /// A seat on four legs this thick, not a box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub legs_m: Option<f64>,
     /// True if the robot's map shows it.
     #[serde(default = "default_true")]
     pub on_map: bool,
@@ -150,6 +162,22 @@ impl SceneSpec {
     pub(super) fn check_obstacle(&self, i: usize, o: &ObstacleSpec) -> Result<(), Objection> {
         let at = |key| [Step::Key("obstacle"), Step::Index(i), Step::Key(key)];
         positive(&o.size_m, &at("size_m"))?;
+        let half_m = 0.5 * o.size_m[0].min(o.size_m[1]);
+        if !(0.0..=half_m).contains(&o.corner_m) {
+            let problem = format!("edges with a radius of {} m do not fit \"{}\"", o.corner_m, o.name);
+            return Err(object(&at("corner_m"), problem, format!("0 to {half_m:.4}")));
+        }
+        if let Some(legs_m) = o.legs_m {
+            positive(&[legs_m], &at("legs_m"))?;
+            if legs_m > half_m {
+                let problem = format!("legs {legs_m} m thick leave nothing between them");
+                return Err(object(&at("legs_m"), problem, format!("at most {half_m:.4}")));
+            }
+        }
+        if let Some(spread_m) = o.spread_m {
+            positive(&spread_m, &at("spread_m"))?;
+        }
+        finite(&[o.gap_m], &at("gap_m"))?;
         finite(&[o.position_m[0], o.position_m[1], o.yaw_deg], &at("position_m"))
     }
 }

@@ -1,0 +1,61 @@
+//! Things on the floor: learned, named, found, and called unknown where nobody has learned them.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn run(goal: &str, scene: &str, seed: u64, folder: &Path, remember: Option<&Path>) -> Value {
+    let mut command = Command::cargo_bin("descry").unwrap();
+    let run = folder.join(format!("{scene}-{seed}-{}", goal.replace(' ', "-")));
+    command.args(["do", goal, "--domain", "shapes", "--scene", scene, "--json", "--seed"]);
+    command.arg(seed.to_string()).arg("--run").arg(run);
+    if let Some(store) = remember {
+        command.arg("--remember").arg(store);
+    }
+    let output = command.output().unwrap();
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{goal}: {e}\n{}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// What is said of a scene: the verdict, the name if one is given, and where it is to a hand's breadth.
+fn check(
+    goal: &str,
+    scene: &str,
+    seed: u64,
+    folder: &Path,
+    store: Option<&Path>,
+    said: (&str, Option<&str>),
+) {
+    let report = run(goal, scene, seed, folder, store);
+    let found = (report["verdict"].as_str().unwrap(), report["object"].as_str());
+    assert_eq!(found, said, "{goal} in {scene}, seed {seed}: {}", report["why"]);
+    let at = |key: &str, axis: usize| report[key][axis].as_f64();
+    if said.1.is_some() && at("true_position_m", 0).is_some() {
+        for axis in 0..2 {
+            let off_m = (at("position_m", axis).unwrap() - at("true_position_m", axis).unwrap()).abs();
+            assert!(off_m < 0.15, "{goal} in {scene}, seed {seed}: {off_m} m off");
+        }
+    }
+}
+
+#[test]
+fn what_is_known_is_named_and_what_is_not_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let which = "which object is this";
+    check(which, "garbage-can", 1, folder, None, ("achieved", Some("garbage can")));
+    check(which, "dell-box", 2, folder, None, ("achieved", Some("dell box")));
+    check(which, "stranger", 300, folder, None, ("not_found", None));
+    check(which, "stool", 300, folder, None, ("not_found", None));
+}
+
+#[test]
+fn what_was_learned_is_known_after_a_restart() {
+    let folder = tempfile::tempdir().unwrap();
+    let (folder, store) = (folder.path(), folder.path().join("store"));
+    check("where is the stool", "stool", 301, folder, Some(&store), ("cannot_tell", None));
+    let report = run("learn stool", "stool", 302, folder, Some(&store));
+    assert_eq!(report["verdict"], "achieved", "{}", report["why"]);
+    check("where is the stool", "stool", 303, folder, Some(&store), ("achieved", Some("stool")));
+}

@@ -1,0 +1,204 @@
+//! The calls that *shapes* answers: what a scan from a pose is expected to bring, and what it costs to get there.
+
+use descry_planner::{Answer, Call, CallError, Plan, Step};
+
+use super::floor::{NOTHING_KNOWN_M, THIS, Thing, thing};
+use super::poses;
+use crate::abilities::{Meaning, argument};
+use crate::lexicon::symbol;
+use crate::situation::{Situation, holding};
+
+const SCANS: &[&str] = &["scanned"];
+
+/// Every call.
+pub(super) const ALL: &[Meaning] = &[
+    Meaning {
+        name: "circle-cost",
+        reads: &[],
+        about: "seconds that the drive around it takes; infinite where no way leads",
+        answers: circle_cost,
+    },
+    Meaning { name: "can-scan", reads: &[], about: "whether a scan from there shows it", answers: can_scan },
+    Meaning {
+        name: "expected-tightening",
+        reads: SCANS,
+        about: "by how much a scan would lessen how far it may reach beyond what was met",
+        answers: expected_tightening,
+    },
+    Meaning {
+        name: "expected-sureness",
+        reads: SCANS,
+        about: "by how much surer one may be what it is once its scans are aligned",
+        answers: expected_sureness,
+    },
+    Meaning {
+        name: "expected-found",
+        reads: SCANS,
+        about: "by how much surer one may be that it has that shape once its scans are aligned",
+        answers: expected_found,
+    },
+    Meaning {
+        name: "expected-discovery",
+        reads: &[],
+        about: "whether a sweep from there passes over floor on which something of that shape may stand",
+        answers: expected_discovery,
+    },
+];
+
+fn named<'a>(s: &'a Situation, call: &Call, n: usize) -> Result<Option<&'a Thing>, CallError> {
+    thing(s, argument(call, n)?).map_err(CallError::Failed)
+}
+
+fn circle_cost(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let (from, to) = (s.candidate(argument(call, 0)?)?, s.candidate(argument(call, 1)?)?);
+    let way = named(s, call, 2)?.and_then(|t| poses::way(s, from, to, t));
+    Ok(Answer::Number(way.map_or(f64::INFINITY, |way| poses::seconds(s, from, &way))))
+}
+
+/// A thing is scanned from the poses around it; what stands before the body, from where it stands first.
+fn can_scan(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let pose = argument(call, 0)?;
+    Ok(Answer::Truth(match named(s, call, 1)? {
+        Some(thing) => thing.ring.iter().any(|p| p == pose),
+        None => s.floor.sweeps.is_empty() && s.candidate(pose)? == s.at,
+    }))
+}
+
+/// Numbers of the poses around a thing from which the plan scans it before a call.
+fn planned(s: &Situation, call: &Call, thing: &Thing) -> Vec<usize> {
+    let taken = |pose: &str| s.floor.sweeps.iter().any(|(_, from)| from == pose);
+    let poses = holding(call, "scanned").filter_map(|r| r.arguments.first());
+    poses
+        .filter(|pose| !taken(pose))
+        .filter_map(|pose| thing.ring.iter().position(|p| **p == **pose))
+        .collect()
+}
+
+fn expected_tightening(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let Some(thing) = named(s, call, 1)? else { return Ok(Answer::Number(NOTHING_KNOWN_M)) };
+    let mut scans = planned(s, call, thing);
+    let before_m = thing.hoped_looseness_m(&scans);
+    let pose = argument(call, 0)?;
+    scans.extend(thing.ring.iter().position(|p| p == pose));
+    // Of what no scan has shown, one will show about half.
+    let after_m = if thing.outline.is_some() { thing.hoped_looseness_m(&scans) } else { 0.5 * before_m };
+    Ok(Answer::Number((before_m - after_m).max(0.0)))
+}
+
+fn expected_sureness(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let Some(thing) = named(s, call, 0)? else { return Ok(Answer::Number(1.0)) };
+    Ok(Answer::Number(hope(s, call, thing)))
+}
+
+/// How much surer one may be of a thing after the scans that a plan takes.
+fn hope(s: &Situation, call: &Call, thing: &Thing) -> f64 {
+    let (known, scans) = (s.floor.known.len(), planned(s, call, thing));
+    if scans.is_empty() && thing.taken_for.is_some() {
+        return 0.0;
+    }
+    thing.hoped(&scans, known) - thing.sureness(known)
+}
+
+fn expected_found(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let shape = argument(call, 1)?;
+    let Some(thing) = named(s, call, 0)? else { return Ok(Answer::Number(0.0)) };
+    let may_be = thing.may_be().is_none_or(|names| names.iter().any(|n| symbol(n) == shape));
+    if !may_be || !s.floor.knows(shape) {
+        return Ok(Answer::Number(0.0));
+    }
+    let hope = if thing.outline.is_some() { hope(s, call, thing) } else { 1.0 };
+    Ok(Answer::Number(hope))
+}
+
+fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let (from, shape) = (s.candidate(argument(call, 0)?)?, argument(call, 1)?);
+    let passes = s.floor.sought.as_deref() == Some(shape)
+        && s.floor.knows(shape)
+        && s.floor.promising.contains(&s.candidates[from].symbol);
+    Ok(Answer::Number(if passes { 1.0 } else { 0.0 }))
+}
+
+/// A scan is worth its way if it promises to lessen by so much how far a thing may reach beyond what was met of it, metres.
+const WORTH_M: f64 = 0.001;
+
+/// The quickest of the single scans and alignments that promise anything for what is asked.
+pub(super) fn fallback(s: &Situation) -> Option<Plan> {
+    let is_open = |t: &&Thing| match &s.floor.sought {
+        Some(shape) => {
+            t.sureness(s.floor.known.len()) < s.threshold
+                && s.floor.knows(shape)
+                && t.may_be().is_none_or(|names| names.iter().any(|n| symbol(n) == *shape))
+        }
+        None => t.symbol == THIS,
+    };
+    let open: Vec<&Thing> = s.floor.things.iter().filter(is_open).collect();
+    if let Some(thing) = open.iter().find(|t| t.outline.is_some() && t.taken_for.is_none()) {
+        return Some(steps(&[("align", vec![thing.symbol.clone()], ALIGN_S)]));
+    }
+    let pose = |n: usize| s.candidates[n].symbol.clone();
+    let here = pose(s.at);
+    let untried = |p: &String| s.floor.sweeps.iter().all(|(_, from)| from != p);
+    let scans = open.iter().flat_map(|t| (0..t.ring.len()).map(move |k| (*t, k))).filter_map(|(t, k)| {
+        let to = s.candidate(&t.ring[k]).ok().filter(|to| !s.out_of_reach.contains(to))?;
+        let promises = t.outline.is_none() || t.looseness_m() - t.hoped_looseness_m(&[k]) > WORTH_M;
+        let way_s = if to == s.at { 0.0 } else { poses::seconds(s, s.at, &poses::way(s, s.at, to, t)?) };
+        (promises && untried(&t.ring[k]) && way_s.is_finite()).then_some((way_s, to, Some(t)))
+    });
+    let surveys = s.floor.promising.iter().filter_map(|p| {
+        let to = s.candidate(p).ok()?;
+        let is_around = s.floor.things.iter().any(|t| t.ring.contains(p));
+        (!is_around && untried(p) && s.can_drive_to(to)).then(|| (s.travel_s(s.at, to), to, None))
+    });
+    let (way_s, to, thing) = scans.chain(surveys).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let drive = match thing {
+        Some(t) => ("circle", vec![here, pose(to), t.symbol.clone()], way_s),
+        None => ("move", vec![here, pose(to)], way_s),
+    };
+    let sweep = match thing {
+        Some(t) => ("scan", vec![pose(to), t.symbol.clone()], SWEEP_S),
+        None => ("survey", vec![pose(to)], SWEEP_S),
+    };
+    Some(if to == s.at { steps(&[sweep]) } else { steps(&[drive, sweep]) })
+}
+
+/// What a sweep and an alignment take, as in the domain.
+const SWEEP_S: f64 = 0.5;
+const ALIGN_S: f64 = 0.1;
+
+/// Steps one after the other.
+fn steps(all: &[(&str, Vec<String>, f64)]) -> Plan {
+    let mut start_s = 0.0;
+    let step = |(action, arguments, duration_s): &(&str, Vec<String>, f64)| {
+        let begins_s = start_s;
+        start_s += duration_s + GAP_S;
+        Step {
+            start_s: Some(begins_s),
+            action: (*action).into(),
+            arguments: arguments.clone(),
+            duration_s: *duration_s,
+        }
+    };
+    Plan { steps: all.iter().map(step).collect(), ..Plan::default() }
+}
+
+/// Between the end of a step and the begin of the next, seconds.
+const GAP_S: f64 = 0.001;
+
+/// Why a scan is taken from there.
+pub(super) fn hope_of_scan(s: &Situation, arguments: &[&str]) -> String {
+    let Ok(Some(thing)) = thing(s, arguments[1]) else {
+        return format!("nothing is known yet of what {THIS} is");
+    };
+    let Some(pose) = thing.ring.iter().position(|p| p == arguments[0]) else { return String::new() };
+    match &thing.outline {
+        Some(_) => {
+            let (now_m, then_m) = (thing.looseness_m(), thing.hoped_looseness_m(&[pose]));
+            format!(
+                "it may reach {:.1} cm beyond what was met of it, after this perhaps {:.1} cm",
+                1e2 * now_m,
+                1e2 * then_m
+            )
+        }
+        None => "no scan shows both ends of it yet".into(),
+    }
+}

@@ -1,0 +1,105 @@
+//! The words that *shapes* states.
+
+use super::floor::{NOTHING_KNOWN_M, THIS};
+use crate::abilities::Fact;
+use crate::lexicon::symbol;
+use crate::situation::Situation;
+
+/// Every fact.
+pub(super) const ALL: &[Fact] = &[
+    Fact {
+        name: "around",
+        types: &["pose", "spot"],
+        about: "the pose is one of those around it",
+        states: around,
+    },
+    Fact { name: "on-floor", types: &["pose"], about: "the pose is around nothing", states: on_floor },
+    Fact {
+        name: "looseness",
+        types: &["spot"],
+        about: "how far on average it may reach beyond what was met of it, metres",
+        states: looseness,
+    },
+    Fact {
+        name: "aligned",
+        types: &["spot"],
+        about: "all scans of it are brought together",
+        states: aligned,
+    },
+    Fact {
+        name: "sureness",
+        types: &["spot"],
+        about: "how sure it is what it is, or that it is none of the known",
+        states: sureness,
+    },
+    Fact { name: "may-be", types: &["spot", "shape"], about: "its scans fit that shape", states: may_be },
+    Fact {
+        name: "found",
+        types: &["shape"],
+        about: "how sure it is that something on the floor has that shape",
+        states: found,
+    },
+    Fact { name: "learned", types: &["shape"], about: "its shape was learned in this run", states: learned },
+];
+
+fn around(s: &Situation) -> Vec<String> {
+    let of = |t: &super::floor::Thing| {
+        t.ring.iter().map(|pose| format!("(around {pose} {})", t.symbol)).collect::<Vec<_>>()
+    };
+    s.floor.things.iter().flat_map(of).collect()
+}
+
+fn on_floor(s: &Situation) -> Vec<String> {
+    let is_around = |pose: &String| s.floor.things.iter().any(|t| t.ring.contains(pose));
+    let open = s.candidates.iter().filter(|c| !is_around(&c.symbol));
+    open.map(|c| format!("(on-floor {})", c.symbol)).collect()
+}
+
+fn looseness(s: &Situation) -> Vec<String> {
+    let mut lines: Vec<String> = s
+        .floor
+        .things
+        .iter()
+        .map(|t| format!("(= (looseness {}) {:.5})", t.symbol, t.looseness_m()))
+        .collect();
+    if s.floor.thing(THIS).is_none() {
+        lines.push(format!("(= (looseness {THIS}) {NOTHING_KNOWN_M})"));
+    }
+    lines
+}
+
+fn aligned(s: &Situation) -> Vec<String> {
+    let aligned = s.floor.things.iter().filter(|t| t.taken_for.is_some());
+    aligned.map(|t| format!("(aligned {})", t.symbol)).collect()
+}
+
+fn sureness(s: &Situation) -> Vec<String> {
+    let known = s.floor.known.len();
+    let mut lines: Vec<String> = s
+        .floor
+        .things
+        .iter()
+        .map(|t| format!("(= (sureness {}) {:.5})", t.symbol, t.sureness(known)))
+        .collect();
+    if s.floor.thing(THIS).is_none() {
+        lines.push(format!("(= (sureness {THIS}) 0)"));
+    }
+    lines
+}
+
+fn may_be(s: &Situation) -> Vec<String> {
+    let of = |t: &super::floor::Thing| {
+        let names = t.may_be().unwrap_or_default();
+        names.into_iter().map(|name| format!("(may-be {} {})", t.symbol, symbol(name))).collect::<Vec<_>>()
+    };
+    s.floor.things.iter().flat_map(of).collect()
+}
+
+fn found(s: &Situation) -> Vec<String> {
+    let sure = |name: &String| s.floor.found(name).first().map_or(0.0, |(_, sure)| *sure);
+    s.floor.names.iter().map(|(name, _)| format!("(= (found {name}) {:.5})", sure(name))).collect()
+}
+
+fn learned(s: &Situation) -> Vec<String> {
+    s.floor.learned.iter().map(|k| format!("(learned {})", symbol(&k.name))).collect()
+}

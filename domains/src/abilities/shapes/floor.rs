@@ -1,0 +1,208 @@
+//! What the laser has found on the floor that the map does not show, and the shapes that have a name.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use descry_perception::laser::{Alignment, Ignored, KnownShape, Outlook, PosedScan, Recognition, Verdict};
+use descry_perception::nalgebra::{Point2, Vector2};
+
+use super::unseen::Unseen;
+use crate::config::Candidates;
+use crate::lexicon::symbol;
+use crate::situation::Situation;
+
+/// The symbol of what stands nearest before the body when it first scans.
+pub const THIS: &str = "this";
+/// How loose a shape counts of which no scan says anything, metres.
+pub const NOTHING_KNOWN_M: f64 = 1.0;
+/// That a thing is none of those known, before the first scan.
+const STRANGER: f64 = 0.5;
+/// A known shape whose scans fit none: measured one in three hundred; see `perception/examples/shapes`.
+const MISSED: f64 = 0.01;
+/// Strangers that scans take for one of five known shapes, as measured: up to so loose a shape (metres), such a share.
+const TAKEN_FOR_KNOWN: [(f64, f64); 3] = [(0.02, 0.10), (0.16, 0.15), (f64::INFINITY, 0.70)];
+/// How many were known where that was measured.
+const MEASURED_WITH: f64 = 5.0;
+
+/// See the module.
+#[derive(Clone, Default)]
+pub struct Floor {
+    /// Shapes that have a name: those of the domain, then those that were learned.
+    pub known: Vec<KnownShape>,
+    /// Those that were learned in this run.
+    pub learned: Vec<KnownShape>,
+    /// What was found.
+    pub things: Vec<Thing>,
+    /// When each sweep was taken, and the pose.
+    pub sweeps: Vec<(i64, String)>,
+    /// Records of the sweeps.
+    pub records: Vec<descry_memory::RecordId>,
+    /// The floor that no sweep has passed over.
+    pub unseen: Unseen,
+    /// The shape whose place is asked for, by its symbol; none: it is about [`THIS`].
+    pub sought: Option<String>,
+    /// What shapes are called, by their symbols.
+    pub names: Vec<(String, String)>,
+    /// Middles of places where something of the sought shape may stand unseen.
+    pub room: Vec<Point2<f64>>,
+    /// Poses from which some of these can be seen.
+    pub promising: BTreeSet<String>,
+    /// The poses that are made around a thing.
+    pub poses: Candidates,
+}
+
+/// A thing on the floor.
+#[derive(Clone)]
+pub struct Thing {
+    /// Its PDDL symbol.
+    pub symbol: String,
+    /// About where its middle is, in the map.
+    pub near: Point2<f64>,
+    /// Scans in which it is bounded on both sides, posed in the map, and from where each was taken.
+    pub scans: Vec<(String, PosedScan)>,
+    /// Scans that say nothing of its shape, from where each was taken, and why.
+    pub ignored: Vec<(String, Ignored)>,
+    /// Poses around it.
+    pub ring: Vec<String>,
+    /// What its scans say together, as soon as there is one.
+    pub outline: Option<Arc<Outline>>,
+    /// What it was taken for when its scans were last aligned; none since a new one came.
+    pub taken_for: Option<Arc<Recognition>>,
+}
+
+/// What the scans of a thing say together.
+pub struct Outline {
+    /// The scans brought together, in the map.
+    pub alignment: Alignment,
+    /// What scans from the poses around it would settle, in their order.
+    pub outlook: Outlook,
+}
+
+impl Floor {
+    /// The thing of a symbol.
+    pub fn thing(&self, name: &str) -> Option<&Thing> {
+        self.things.iter().find(|t| t.symbol == name)
+    }
+
+    /// Whether a shape of that name is known.
+    pub fn knows(&self, shape: &str) -> bool {
+        self.known.iter().any(|k| symbol(&k.name) == shape)
+    }
+
+    /// Of the things that are surely one of the known, those of a name, the surest first.
+    pub fn found<'a>(&'a self, shape: &'a str) -> Vec<(&'a Thing, f64)> {
+        let sure = |t: &'a Thing| {
+            let is = t.is()?;
+            (symbol(is) == shape).then(|| (t, t.sureness(self.known.len())))
+        };
+        let mut found: Vec<(&Thing, f64)> = self.things.iter().filter_map(sure).collect();
+        found.sort_by(|a, b| b.1.total_cmp(&a.1));
+        found
+    }
+}
+
+impl Thing {
+    /// How far on average it may reach beyond what was met of it, metres.
+    pub fn looseness_m(&self) -> f64 {
+        let known = |outline: &Arc<Outline>| outline.outlook.looseness_m(&[]).min(0.9 * NOTHING_KNOWN_M);
+        self.outline.as_ref().map_or(NOTHING_KNOWN_M, known)
+    }
+
+    /// The same as one may hope for after scans from more poses around it: from all of them nothing would stay open.
+    pub fn hoped_looseness_m(&self, more: &[usize]) -> f64 {
+        let Some(outlook) = self.outline.as_ref().map(|o| &o.outlook) else { return NOTHING_KNOWN_M };
+        let all: Vec<usize> = (0..self.ring.len()).collect();
+        let [now, after, least] = [&[], more, &all[..]].map(|poses| outlook.leaves_m2(poses));
+        let share = if now > least { (after - least) / (now - least) } else { 1.0 };
+        self.looseness_m() * share
+    }
+
+    /// The name of the one known shape that it fits.
+    pub fn is(&self) -> Option<&str> {
+        match &self.taken_for.as_ref()?.verdict {
+            Verdict::Is(name) => Some(name),
+            Verdict::OneOf(_) | Verdict::Unknown => None,
+        }
+    }
+
+    /// The names that it may have, as far as its scans tell; none: any.
+    pub fn may_be(&self) -> Option<Vec<&str>> {
+        Some(match &self.taken_for.as_ref()?.verdict {
+            Verdict::Is(name) => vec![name],
+            Verdict::OneOf(names) => names.iter().map(String::as_str).collect(),
+            Verdict::Unknown => Vec::new(),
+        })
+    }
+
+    /// How sure it is what it is taken for, 0 to 1.
+    pub fn sureness(&self, known: usize) -> f64 {
+        match self.taken_for.as_ref().map(|r| &r.verdict) {
+            None | Some(Verdict::OneOf(_)) => 0.0,
+            Some(Verdict::Is(_)) => sure_of_name(self.looseness_m(), known),
+            Some(Verdict::Unknown) => {
+                let told = (1.0 - by_chance(self.looseness_m(), known)) * STRANGER;
+                told / (told + MISSED * (1.0 - STRANGER))
+            }
+        }
+    }
+
+    /// How sure one may hope to be of it after scans from more poses around it.
+    pub fn hoped(&self, more: &[usize], known: usize) -> f64 {
+        sure_of_name(self.hoped_looseness_m(more), known).max(self.sureness(known))
+    }
+}
+
+/// The probability that a thing is what it alone fits among so many known shapes.
+fn sure_of_name(loose_m: f64, known: usize) -> f64 {
+    let is = 1.0 - STRANGER;
+    is / (is + by_chance(loose_m, known) * STRANGER)
+}
+
+/// The probability that a stranger fits one of so many known shapes.
+fn by_chance(loose_m: f64, known: usize) -> f64 {
+    let of_five =
+        TAKEN_FOR_KNOWN.iter().find(|(edge_m, _)| loose_m < *edge_m).map_or(1.0, |(_, share)| *share);
+    1.0 - (1.0 - of_five).powf(known as f64 / MEASURED_WITH)
+}
+
+/// A thing on the floor of a situation.
+pub(super) fn thing<'a>(s: &'a Situation, name: &str) -> Result<Option<&'a Thing>, String> {
+    match s.floor.thing(name) {
+        None if name != THIS => Err(format!("`{name}` is nothing that was found on the floor")),
+        found => Ok(found),
+    }
+}
+
+/// Where the middle of a thing is believed to be, and its greatest width, in the map, metres: by the shape that it is if it has a name, else by what was
+/// met of it.
+pub(super) fn place(floor: &Floor, thing: &Thing) -> (Point2<f64>, f64) {
+    let fitted = thing.taken_for.as_ref().filter(|_| thing.is().is_some()).and_then(|r| r.candidates.first());
+    if let Some(candidate) = fitted {
+        let shape = &floor.known[candidate.index];
+        let map_from_model = candidate.fit.model_from_other.inverse();
+        return (map_from_model * shape.features().centre, width_m(&shape.model.hull().corners));
+    }
+    match &thing.outline {
+        Some(outline) => {
+            let hull = outline.alignment.model.hull();
+            (hull.centre(), width_m(&hull.corners))
+        }
+        None => (thing.near, 0.0),
+    }
+}
+
+/// The greatest distance between corners.
+pub(super) fn width_m(corners: &[Point2<f64>]) -> f64 {
+    let apart = |a: &Point2<f64>| corners.iter().map(|b| (a - b).norm()).fold(0.0, f64::max);
+    corners.iter().map(apart).fold(0.0, f64::max)
+}
+
+/// The least width of a convex outline.
+pub(super) fn least_width_m(corners: &[Point2<f64>]) -> f64 {
+    let n = corners.len();
+    let across = |i: usize| {
+        let side: Vector2<f64> = (corners[(i + 1) % n] - corners[i]).normalize();
+        corners.iter().map(|c| side.perp(&(c - corners[i])).abs()).fold(0.0, f64::max)
+    };
+    (0..n).map(across).fold(f64::INFINITY, f64::min)
+}

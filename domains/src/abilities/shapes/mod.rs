@@ -1,0 +1,226 @@
+//! *shapes*: a laser finds what stands on the floor, scans around it make its shape, and the shape says what it is (Modayil and Kuipers, *Autonomous Shape
+//! Model Learning for Object Localization and Recognition*).
+
+mod calls;
+mod facts;
+pub mod floor;
+mod poses;
+mod taken;
+mod telling;
+mod unseen;
+
+use std::sync::Arc;
+
+use descry_perception::laser::{KnownShape, Verdict};
+use descry_skills::{Align, Circle, Outcome, Scan, SkillFailure};
+
+use super::{Ability, SkillWord, moving};
+use crate::abilities::searching::perceive::Eyes;
+use crate::goal::Goal;
+use crate::lexicon::symbol;
+use crate::load::Domain;
+use crate::mind::Mind;
+use crate::note::Note;
+use crate::situation::Situation;
+use crate::world::WorldError;
+use floor::{Floor, Outline, thing};
+use unseen::Unseen;
+
+/// See the module.
+pub const ABILITY: Ability = Ability {
+    name: "shapes",
+    about: "scans what stands on the floor with a laser, learns its shape, names it by its shape",
+    facts: facts::ALL,
+    calls: calls::ALL,
+    skills: &[
+        SkillWord {
+            name: "scan",
+            types: &["pose", "spot"],
+            about: "sweeps the laser from a pose around it",
+            ground: |_, _| Ok(Box::new(Scan)),
+            because: calls::hope_of_scan,
+            learn: scanned,
+            failed: nothing_more,
+        },
+        SkillWord {
+            name: "survey",
+            types: &["pose"],
+            about: "sweeps the laser over floor that was not seen yet",
+            ground: |_, _| Ok(Box::new(Scan)),
+            because: |s, _| format!("there are {} places left where it may stand", s.floor.room.len()),
+            learn: scanned,
+            failed: nothing_more,
+        },
+        SkillWord {
+            name: "circle",
+            types: &["pose", "pose", "spot"],
+            about: "drives around it from one pose to another",
+            ground: |s, arguments| Ok(Box::new(Circle { way: way(s, arguments)? })),
+            because: |s, arguments| match way(s, arguments) {
+                Ok(way) => format!("around {}, by {} of the poses there", arguments[2], way.len()),
+                Err(because) => because,
+            },
+            learn: moving::driven,
+            failed: nothing_more,
+        },
+        SkillWord {
+            name: "align",
+            types: &["spot"],
+            about: "brings all scans of it together, and takes the shape for one of those known, or for none",
+            ground: |s, arguments| Ok(Box::new(aligning(s, arguments[0])?)),
+            because: |s, _| format!("{} shapes are known", s.floor.known.len()),
+            learn: aligned,
+            failed: nothing_more,
+        },
+        SkillWord {
+            name: "learn",
+            types: &["spot", "shape"],
+            about: "brings all scans of it together, and keeps the shape under that name",
+            ground: |s, arguments| Ok(Box::new(aligning(s, arguments[0])?)),
+            because: |_, arguments| format!("its outline is known well enough to be {}", arguments[1]),
+            learn: learned,
+            failed: nothing_more,
+        },
+    ],
+    begins: Some(begins),
+    fallback: Some(calls::fallback),
+    answers: Some(telling::answer),
+};
+
+/// What is known when a run begins: the shapes with a name, and what is asked.
+fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
+    let robot = Arc::clone(&mind.known.robot);
+    let remembered = mind.known.past.as_ref().map(|p| p.remembered.shapes.clone()).unwrap_or_default();
+    let names: Vec<(String, String)> = domain
+        .config
+        .objects
+        .get("shape")
+        .map(|names| names.iter().map(|name| (symbol(name), name.clone())).collect())
+        .unwrap_or_default();
+    let sought = crate::asked::mentions(&goal.pddl)
+        .into_iter()
+        .find_map(|m| m.strip_prefix(&["found".to_string()]).and_then(|rest| rest.first().cloned()));
+    if sought.is_some() {
+        poses::survey(mind, &*robot);
+    }
+    mind.known.floor = Arc::new(Floor {
+        known: domain.shapes.iter().cloned().chain(remembered).collect(),
+        names,
+        unseen: robot.map().map(Unseen::of).unwrap_or_default(),
+        promising: mind
+            .known
+            .candidates
+            .iter()
+            .filter(|_| sought.is_some())
+            .map(|c| c.symbol.clone())
+            .collect(),
+        sought,
+        poses: domain.config.candidates,
+        ..Floor::default()
+    });
+}
+
+fn nothing_more(
+    _: &mut Mind,
+    _: Eyes<'_>,
+    _: &Situation,
+    _: &[&str],
+    _: &SkillFailure,
+) -> Result<Option<String>, WorldError> {
+    Ok(None)
+}
+
+/// The places on the way around a thing.
+fn way(s: &Situation, arguments: &[&str]) -> Result<Vec<descry_robots::Place>, String> {
+    let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
+    let to = s.candidate(arguments[1]).map_err(|e| e.to_string())?;
+    let around = thing(s, arguments[2])?.ok_or("it is not known where that stands")?;
+    let way = poses::way(s, from, to, around).ok_or("no way leads around it")?;
+    Ok(way.into_iter().map(|n| s.candidates[n].place.clone()).collect())
+}
+
+/// The alignment of all scans of a thing.
+fn aligning(s: &Situation, name: &str) -> Result<Align, String> {
+    let thing = thing(s, name)?.filter(|t| !t.scans.is_empty());
+    let thing = thing.ok_or_else(|| format!("no scan shows both ends of {name}"))?;
+    Ok(Align {
+        scans: thing.scans.iter().map(|(_, posed)| posed.clone()).collect(),
+        longest_m: taken::LONGEST_M,
+        options: taken::solver(s.robot.description()),
+    })
+}
+
+/// The laser has swept.
+fn scanned(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    _: &Situation,
+    arguments: &[&str],
+    outcome: &Outcome,
+    notes: &mut Vec<Note>,
+) -> Result<String, WorldError> {
+    let Outcome::Scanned(scanned) = outcome else { return Err(WorldError::strange(outcome)) };
+    notes.push(taken::take(mind, eyes, arguments[0], scanned)?);
+    Ok(String::new())
+}
+
+/// Scans were brought together: what their shape is taken for.
+fn aligned(
+    mind: &mut Mind,
+    _: Eyes<'_>,
+    s: &Situation,
+    arguments: &[&str],
+    outcome: &Outcome,
+    _: &mut Vec<Note>,
+) -> Result<String, WorldError> {
+    let Outcome::Aligned(alignment) = outcome else { return Err(WorldError::strange(outcome)) };
+    let loose_m = s.floor.thing(arguments[0]).map_or(floor::NOTHING_KNOWN_M, |t| t.looseness_m());
+    let recognition = taken::recognise(s, alignment, loose_m);
+    let known = s.floor.known.len();
+    let of = Arc::make_mut(&mut mind.known.floor).things.iter_mut().find(|t| t.symbol == arguments[0]);
+    let thing = of.ok_or_else(|| WorldError::Bug(format!("`{}` is gone", arguments[0])))?;
+    let best = recognition.candidates.first().map(|c| c.fit.between.per_pair_m());
+    let fits =
+        best.map_or(String::new(), |m| format!(" (the best fits to {:.1} mm a pair of scans)", 1e3 * m));
+    let said = match &recognition.verdict {
+        Verdict::Is(name) => format!("it fits {name} alone{fits}"),
+        Verdict::OneOf(names) => format!("it fits {}{fits}", names.join(" and ")),
+        Verdict::Unknown => format!("it fits none of the {known} known shapes{fits}"),
+    };
+    if let Some(outline) = &thing.outline {
+        let outlook = outline.outlook.clone();
+        thing.outline = Some(Arc::new(Outline { alignment: (**alignment).clone(), outlook }));
+    }
+    thing.taken_for = Some(Arc::new(recognition));
+    let left_out = match alignment.left_out.len() {
+        0 => String::new(),
+        n => format!("; {n} scans contradict the others and are left out"),
+    };
+    Ok(format!("{said}: {:.2} sure{left_out}", thing.sureness(known)))
+}
+
+/// The same, and it is kept under a name.
+fn learned(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    s: &Situation,
+    arguments: &[&str],
+    outcome: &Outcome,
+    notes: &mut Vec<Note>,
+) -> Result<String, WorldError> {
+    let Outcome::Aligned(alignment) = outcome else { return Err(WorldError::strange(outcome)) };
+    let before = aligned(mind, eyes, s, arguments, outcome, notes)?;
+    let floor = Arc::make_mut(&mut mind.known.floor);
+    let name = floor.names.iter().find(|(symbol, _)| symbol == arguments[1]);
+    let name = name.map_or(arguments[1], |(_, name)| name.as_str());
+    let shape = KnownShape::new(name, alignment.model.clone());
+    let f = *shape.features();
+    floor.learned.push(shape.clone());
+    floor.known.push(shape);
+    Ok(format!(
+        "{name} is learned from {} scans: {:.0} cm², {:.0} cm around; before, {before}",
+        alignment.model.scans().len(),
+        1e4 * f.area_m2,
+        1e2 * f.perimeter_m
+    ))
+}

@@ -1,0 +1,261 @@
+//! What happens with a sweep of the laser: recorded, read back by its timestamp, told from the map, each thing's readings brought together with its others.
+
+use std::sync::Arc;
+
+use descry_memory::{Meta, RecordId};
+use descry_perception::laser::{
+    Alignment, Cluster, FitOptions, NextOptions, Objective, ObserveError, ObserveOptions, Occupancy, Outlook,
+    RecogniseOptions, Recognition, Scan, SolverOptions, Space, Verdict, align_consistent, observe,
+    recognise_scans, things,
+};
+use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
+use descry_robots::{Description, OccupancyGrid, Place, Scanned};
+use serde_json::json;
+
+use super::floor::{Floor, Outline, THIS, Thing, least_width_m, place};
+use super::poses;
+use crate::abilities::searching::perceive::Eyes;
+use crate::lexicon::symbol;
+use crate::mind::Mind;
+use crate::note::Note;
+use crate::situation::Situation;
+use crate::world::WorldError;
+
+/// A reading is of a thing if it ended so far before what the map shows, and twice as far as localisation may be off besides, metres.
+const BEFORE_MAP_M: f64 = 0.1;
+/// A scan tells of a thing's shape from no farther off, metres, and with no fewer readings of it.
+const NEAR_M: f64 = 3.0;
+const LEAST_READINGS: usize = 5;
+/// Readings so near to the believed outline of a thing are of that thing, metres.
+const SAME_M: f64 = 0.5;
+/// Half the width of a thing of which only few readings are known, metres.
+const USUAL_RADIUS_M: f64 = 0.2;
+/// Beyond an error so long scans contradict each other: twice the laser's precision, metres.
+pub(super) const LONGEST_M: f64 = 0.02;
+/// A shape fits if the root of the violation a pair of scans stays below, metres: at most 2.2 mm for the same thing and at least 10.6 mm for another of
+/// the five, see `perception/examples/shapes`.
+const SAME_SHAPE_M: f64 = 0.005;
+
+/// How scans are brought together, by how well the body knows where it is.
+pub(super) fn solver(body: &Description) -> SolverOptions {
+    let objective =
+        Objective::Centred { pose_sigma_m: body.pose_sigma_m, pose_sigma_rad: body.pose_sigma_rad };
+    SolverOptions { objective, ..SolverOptions::default() }
+}
+
+/// Takes a sweep in: it is in the record when this returns.
+pub(super) fn take(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    from: &str,
+    scanned: &Scanned,
+) -> Result<Note, WorldError> {
+    let scan = remember(mind, eyes, from, scanned)?;
+    let body = eyes.robot.description();
+    let map = eyes.robot.map().map(occupancy);
+    let laser = scan.map_from_laser.translation.vector;
+    let is_background = |p: &Point2<f64>| {
+        let off_m = body.pose_sigma_m + (p.coords - laser).norm() * body.pose_sigma_rad;
+        map.as_ref().is_none_or(|map| map.is_background(p, BEFORE_MAP_M + 2.0 * off_m))
+    };
+    let strange = |e: ObserveError| WorldError::Bug(format!("a sweep of the laser: {e}"));
+    // A single reading before what the map shows is of something, too.
+    let options = ObserveOptions { least: 1, ..ObserveOptions::default() };
+    let clusters = things(&scan, is_background, &options).map_err(strange)?;
+    let mut changed: Vec<usize> = Vec::new();
+    for cluster in nearest_first(clusters, &laser) {
+        let index = assign(&mut mind.known.floor, &cluster, &laser);
+        if make_ring(mind, eyes, index) {
+            changed.push(index);
+        }
+        if (cluster.middle.coords - laser).norm() > NEAR_M || cluster.readings.len() < LEAST_READINGS {
+            continue;
+        }
+        let only = ObserveOptions { within_m: 1e-3, ..options };
+        let seen =
+            observe(std::slice::from_ref(&scan), &cluster.middle, is_background, &only).map_err(strange)?;
+        let thing = &mut Arc::make_mut(&mut mind.known.floor).things[index];
+        thing.ignored.extend(seen.ignored.into_iter().map(|(_, why)| (from.to_string(), why)));
+        for posed in seen.scans {
+            thing.scans.push((from.to_string(), posed));
+            thing.taken_for = None;
+            changed.push(index);
+        }
+    }
+    for index in changed {
+        bring_together(mind, eyes, index);
+    }
+    look_over_floor(mind, eyes, &scan);
+    Ok(note(&mind.known.floor, from))
+}
+
+/// Puts a sweep into the record, its transforms first, and reads it back by its timestamp.
+fn remember(mind: &mut Mind, eyes: Eyes<'_>, from: &str, scanned: &Scanned) -> Result<Scan, WorldError> {
+    let (record, body) = (eyes.record, eyes.robot.description());
+    for t in &scanned.transforms {
+        record.put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
+    }
+    record.sync()?;
+    let frame = body.laser.as_ref().map_or("laser", |laser| laser.frame.as_str());
+    let at = scanned.scan.map_from_laser.translation.vector;
+    let meta =
+        Meta { seen_from_m: Some([at.x, at.y, 0.0]), body: json!({ "from": from }), ..Meta::default() };
+    let id = record.put_scan(scanned.stamp_ns, frame, &scanned.scan, meta)?;
+    mind.views += 1;
+    let floor = Arc::make_mut(&mut mind.known.floor);
+    floor.sweeps.push((scanned.stamp_ns, from.into()));
+    floor.records.push(id);
+    let records: &[RecordId] = &floor.records;
+    record.hold(records, "scans")?;
+    Ok(record.scan_at(scanned.stamp_ns, &body.frames.map)?)
+}
+
+/// The map of the body as perception takes it; all around it is occupied.
+fn occupancy(grid: &OccupancyGrid) -> Occupancy {
+    let width = grid.width + 2;
+    let taken = |row: usize, column: usize| {
+        let edge = row == 0 || column == 0 || row > grid.height || column > grid.width;
+        edge || grid.occupied[(row - 1) * grid.width + column - 1]
+    };
+    let cells = (0..grid.height + 2).flat_map(|row| (0..width).map(move |column| (row, column)));
+    let space = |(row, column)| if taken(row, column) { Space::Occupied } else { Space::Free };
+    Occupancy {
+        origin: grid.origin_m - Vector2::repeat(grid.resolution_m),
+        cell_m: grid.resolution_m,
+        width,
+        cells: cells.map(space).collect(),
+    }
+}
+
+fn nearest_first(mut clusters: Vec<Cluster>, laser: &Vector2<f64>) -> Vec<Cluster> {
+    clusters.sort_by(|a, b| (a.middle.coords - laser).norm().total_cmp(&(b.middle.coords - laser).norm()));
+    clusters
+}
+
+/// The thing that readings are of: one that was found there before, or a new one.
+fn assign(floor: &mut Arc<Floor>, cluster: &Cluster, laser: &Vector2<f64>) -> usize {
+    let off_m = |t: &Thing| {
+        let (middle, width_m) = place(floor, t);
+        (middle - cluster.middle).norm() - 0.5 * width_m
+    };
+    let nearest = floor.things.iter().enumerate().map(|(n, t)| (n, off_m(t)));
+    if let Some((n, _)) = nearest.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, off_m)| *off_m <= SAME_M) {
+        return n;
+    }
+    let floor = Arc::make_mut(floor);
+    let behind = (cluster.middle.coords - laser).try_normalize(1e-9).unwrap_or_default() * USUAL_RADIUS_M;
+    let number = floor.things.len() + 1;
+    floor.things.push(Thing {
+        symbol: if number == 1 { THIS.into() } else { format!("thing-{number}") },
+        near: cluster.middle + behind,
+        scans: Vec::new(),
+        ignored: Vec::new(),
+        ring: Vec::new(),
+        outline: None,
+        taken_for: None,
+    });
+    number - 1
+}
+
+/// Makes poses around a thing, if it is asked about and there are none yet.
+fn make_ring(mind: &mut Mind, eyes: Eyes<'_>, index: usize) -> bool {
+    let thing = &mind.known.floor.things[index];
+    let is_asked = mind.known.floor.sought.is_some() || thing.symbol == THIS;
+    if !is_asked || !thing.ring.is_empty() {
+        return false;
+    }
+    let (name, near, config) = (thing.symbol.clone(), thing.near, mind.known.floor.poses);
+    let ring = poses::around(mind, eyes.robot, &config, &name, &near);
+    Arc::make_mut(&mut mind.known.floor).things[index].ring = ring;
+    true
+}
+
+/// Brings the scans of a thing together, and asks what scans from around it would settle.
+fn bring_together(mind: &mut Mind, eyes: Eyes<'_>, index: usize) {
+    let thing = &mind.known.floor.things[index];
+    let scans: Vec<_> = thing.scans.iter().map(|(_, posed)| posed.clone()).collect();
+    let Ok(alignment) = align_consistent(&scans, LONGEST_M, &solver(eyes.robot.description())) else {
+        return;
+    };
+    let known = &mind.known;
+    let pose = |symbol: &String| known.candidates.iter().find(|c| c.symbol == *symbol);
+    let lasers: Vec<Isometry2<f64>> = thing
+        .ring
+        .iter()
+        .filter_map(|p| match &pose(p)?.place {
+            Place::Pose(pose) => Some(Isometry2::new(pose.point().coords, pose.yaw_rad)),
+            Place::Station(_) => None,
+        })
+        .collect();
+    let outlook = Outlook::new(&alignment.model, &lasers, &NextOptions::default());
+    let thing = &mut Arc::make_mut(&mut mind.known.floor).things[index];
+    thing.outline = Some(Arc::new(Outline { alignment, outlook }));
+}
+
+/// What a shape is taken for.
+pub(super) fn recognise(s: &Situation, alignment: &Alignment, loose_m: f64) -> Recognition {
+    let options = RecogniseOptions {
+        same_m: SAME_SHAPE_M,
+        fit: FitOptions { solver: solver(s.robot.description()), ..FitOptions::default() },
+        ..RecogniseOptions::default()
+    };
+    if alignment.longest_m() > LONGEST_M {
+        // What contradicts itself is nothing that anybody has learned: more scans must tell.
+        let names = s.floor.known.iter().map(|k| k.name.clone()).collect();
+        return Recognition { verdict: Verdict::OneOf(names), candidates: Vec::new(), ruled_out: 0 };
+    }
+    recognise_scans(&alignment.model, loose_m, &s.floor.known, &options)
+}
+
+/// What of the floor is still to be looked at, and from where.
+fn look_over_floor(mind: &mut Mind, eyes: Eyes<'_>, scan: &Scan) {
+    let reach_m = eyes.robot.description().laser.as_ref().map_or(0.0, |laser| laser.reach_m);
+    let known = &mut mind.known;
+    let floor = Arc::make_mut(&mut known.floor);
+    floor.unseen.pass(scan, reach_m);
+    let places: Vec<(Point2<f64>, f64)> = floor.things.iter().map(|t| place(floor, t)).collect();
+    for (middle, width_m) in &places {
+        floor.unseen.know(middle, 0.5 * width_m);
+    }
+    let Some(radius_m) = floor.sought_radius_m() else { return };
+    floor.room = floor.unseen.room_for(radius_m);
+    let discs: Vec<_> = places.iter().map(|(middle, width_m)| (*middle, 0.4 * width_m)).collect();
+    let passes = |place: &Place| match place {
+        Place::Pose(pose) => {
+            let heading = Vector2::new(pose.yaw_rad.cos(), pose.yaw_rad.sin());
+            floor.unseen.would_pass(&pose.point(), &heading, reach_m, &floor.room, &discs)
+        }
+        Place::Station(_) => false,
+    };
+    floor.promising =
+        known.candidates.iter().filter(|c| passes(&c.place)).map(|c| c.symbol.clone()).collect();
+}
+
+impl Floor {
+    /// The radius of the smallest disc that something of the sought shape covers, a little less for how well it is known.
+    fn sought_radius_m(&self) -> Option<f64> {
+        let sought = self.sought.as_ref()?;
+        let of = self.known.iter().filter(|k| symbol(&k.name) == *sought);
+        let least = of.map(|k| least_width_m(&k.model.hull().corners)).reduce(f64::min)?;
+        Some(0.4 * least)
+    }
+}
+
+fn note(floor: &Floor, from: &str) -> Note {
+    let scans = |t: &Thing| match t.scans.len() {
+        0 => "seen from afar".into(),
+        1 => "1 scan".to_string(),
+        n => format!("{n} scans"),
+    };
+    let line = |t: &Thing| {
+        let (middle, _) = place(floor, t);
+        let why = t.ignored.iter().filter(|(pose, _)| pose == from);
+        let why: String = why.map(|(_, why)| format!("; this one is left out: {why}")).collect();
+        let loose = match &t.outline {
+            Some(_) => format!(", may reach {:.1} cm beyond what was met", 1e2 * t.looseness_m()),
+            None => String::new(),
+        };
+        format!("{} at ({:.2}, {:.2}) m: {}{loose}{why}", t.symbol, middle.x, middle.y, scans(t))
+    };
+    Note::Swept { things: floor.things.iter().map(line).collect() }
+}

@@ -1,0 +1,235 @@
+//! What is answered in the end: what a thing is and where, and what could not be scanned.
+
+use descry_perception::laser::Verdict as Taken;
+
+use super::floor::{THIS, Thing, place};
+use crate::answer::{Believed, Conclusion, Ended, Verdict};
+use crate::asked::mentions;
+use crate::goal::Goal;
+use crate::lexicon::symbol;
+use crate::mind::Mind;
+use crate::situation::Situation;
+
+/// So much of an outline may be open before it is said, metres.
+const OPEN_M: f64 = 0.02;
+
+/// See the module. `s` is the last round's.
+pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Conclusion {
+    let teller = Teller { mind, s };
+    let is_to_learn = mentions(&goal.pddl).iter().any(|m| m[0] == "learned");
+    let (verdict, why, thing) = match &s.floor.sought {
+        Some(shape) => teller.where_is(shape, ended),
+        None if is_to_learn => teller.learned(ended),
+        None => teller.which(ended),
+    };
+    let believed: Vec<Believed> = s.floor.things.iter().map(|t| teller.believed(t)).collect();
+    let found = thing.and_then(|t| s.floor.things.iter().position(|o| o.symbol == t.symbol));
+    let found = found.map(|n| believed[n].clone());
+    Conclusion {
+        verdict,
+        why,
+        confidence: thing.map_or(0.0, |t| t.sureness(s.floor.known.len())),
+        remaining: None,
+        object: found.as_ref().and_then(|b| b.label.clone()),
+        found,
+        objects: believed,
+        remembered: None,
+    }
+}
+
+struct Teller<'a> {
+    mind: &'a Mind,
+    s: &'a Situation,
+}
+
+type Told<'a> = (Verdict, String, Option<&'a Thing>);
+
+impl<'a> Teller<'a> {
+    fn name(&self, shape: &str) -> String {
+        let floor = &self.s.floor;
+        let known = floor.names.iter().find(|(symbol, _)| symbol == shape).map(|(_, name)| name.clone());
+        known.unwrap_or_else(|| shape.into())
+    }
+
+    /// Why the run ended before it was sure.
+    fn cut(&self, ended: &Ended) -> Option<(Verdict, String)> {
+        match ended {
+            Ended::Limit(why) | Ended::Failed(why) => Some((Verdict::Failed, why.clone())),
+            Ended::NoPlan(_) | Ended::Undecided(_)
+                if self.s.time_left_s.is_some_and(|left_s| left_s <= 0.0) =>
+            {
+                Some((Verdict::CannotTell, "there is no time left".into()))
+            }
+            // Nothing that can be done promises anything.
+            Ended::Reached | Ended::NoPlan(_) | Ended::Undecided(_) => None,
+        }
+    }
+
+    fn nothing(&self) -> Told<'a> {
+        let text = "nothing stands before the robot that its map does not show";
+        (Verdict::CannotTell, format!("{text}, after {} sweeps", self.mind.views), None)
+    }
+
+    fn which(&self, ended: &Ended) -> Told<'a> {
+        let known = self.s.floor.known.len();
+        let Some(thing) = self.s.floor.thing(THIS) else { return self.nothing() };
+        let scans = self.scans(thing);
+        if let Some((verdict, why)) = self.cut(ended) {
+            return (verdict, format!("it cannot be told what this is: {why}; {scans}"), Some(thing));
+        }
+        let at = self.at(thing);
+        let told = match (thing.taken_for.as_ref().map(|r| &r.verdict), ended) {
+            (Some(Taken::Is(name)), Ended::Reached) => {
+                (Verdict::Achieved, format!("this is {}, {at}", article(name)))
+            }
+            (Some(Taken::Unknown), Ended::Reached) => (
+                Verdict::NotFound,
+                format!("this is something unknown, {at}: it fits none of the {known} known shapes"),
+            ),
+            (Some(Taken::OneOf(names)), _) => {
+                (Verdict::CannotTell, format!("this is {at}, and may be {}", names.join(" or ")))
+            }
+            (Some(Taken::Is(name)), _) => (
+                Verdict::CannotTell,
+                format!(
+                    "this is {at}, and may be {}, or something unknown that looks like it from where it could be scanned",
+                    article(name)
+                ),
+            ),
+            _ => (Verdict::CannotTell, format!("it cannot be told what this is, {at}")),
+        };
+        (told.0, format!("{}; {scans}", told.1), Some(thing))
+    }
+
+    fn learned(&self, ended: &Ended) -> Told<'a> {
+        let Some(thing) = self.s.floor.thing(THIS) else { return self.nothing() };
+        let scans = self.scans(thing);
+        let told = match (ended, self.s.floor.learned.last()) {
+            (Ended::Reached, Some(shape)) => {
+                let f = shape.features();
+                let size = format!("{:.0} cm², {:.0} cm around", 1e4 * f.area_m2, 1e2 * f.perimeter_m);
+                (Verdict::Achieved, format!("the shape of {} is learned, {size}", article(&shape.name)))
+            }
+            _ => self.cut(ended).unwrap_or_else(|| {
+                let text = format!(
+                    "the shape of what is {} is not learned: too much of its outline is open",
+                    self.at(thing)
+                );
+                (Verdict::CannotTell, text)
+            }),
+        };
+        (told.0, format!("{}; {scans}", told.1), Some(thing))
+    }
+
+    fn where_is(&self, shape: &str, ended: &Ended) -> Told<'a> {
+        let (floor, name) = (&self.s.floor, self.name(shape));
+        if !floor.knows(shape) {
+            let text = format!(
+                "nobody has learned what {} looks like; stand before one and say: learn {name}",
+                article(&name)
+            );
+            return (Verdict::CannotTell, text, None);
+        }
+        let found: Vec<&Thing> =
+            floor.things.iter().filter(|t| t.is().is_some_and(|is| symbol(is) == shape)).collect();
+        let sure = |t: &Thing| t.sureness(floor.known.len());
+        let best = found.iter().copied().max_by(|a, b| sure(a).total_cmp(&sure(b)));
+        if let (Ended::Reached, Some(thing)) = (ended, best) {
+            let text = format!("{} stands {}; {}", article(&name), self.at(thing), self.scans(thing));
+            return (Verdict::Achieved, text, Some(thing));
+        }
+        let may_be = |t: &&Thing| {
+            t.may_be().is_none_or(|names| names.iter().any(|n| symbol(n) == shape))
+                || t.sureness(floor.known.len()) < self.s.threshold
+        };
+        let open: Vec<&Thing> = floor.things.iter().filter(may_be).collect();
+        let others = floor.things.len() - open.len();
+        let seen = format!("{others} things on the floor are something else");
+        if let Some((verdict, why)) = self.cut(ended) {
+            return (verdict, format!("it cannot be told where {} is: {why}; {seen}", article(&name)), best);
+        }
+        if !open.is_empty() {
+            let places: Vec<String> = open.iter().map(|t| format!("what is {}", self.at(t))).collect();
+            let text = format!(
+                "{} may be it, and nothing that can be scanned settles it; {seen}",
+                places.join(" and ")
+            );
+            return (Verdict::CannotTell, text, best);
+        }
+        if let Some(first) = floor.room.first() {
+            let text = format!(
+                "{} is nowhere that could be scanned, and there is room for it where no sweep passed, as near ({:.2}, {:.2}) m; {seen}",
+                article(&name),
+                first.x,
+                first.y
+            );
+            return (Verdict::CannotTell, text, None);
+        }
+        let text = format!(
+            "there is no {name} on the floor: {seen}, and the laser passed over all the rest in {} sweeps",
+            self.mind.views
+        );
+        (Verdict::NotFound, text, None)
+    }
+
+    fn at(&self, thing: &Thing) -> String {
+        let (middle, _) = place(&self.s.floor, thing);
+        format!("at ({:.2}, {:.2}) m", middle.x, middle.y)
+    }
+
+    /// What a shape rests on, and what could not be scanned.
+    fn scans(&self, thing: &Thing) -> String {
+        let used = thing.outline.as_ref().map_or(0, |o| o.alignment.model.scans().len());
+        let mut parts = vec![format!("from {used} scans")];
+        for (pose, why) in &thing.ignored {
+            parts.push(format!("the one from {pose} is left out: {why}"));
+        }
+        if let Some(n) = thing.outline.as_ref().map(|o| o.alignment.left_out.len()).filter(|n| *n > 0) {
+            parts.push(format!("{n} that contradict the others are left out"));
+        }
+        let poses = self.s.floor.poses.poses;
+        if thing.ring.len() < poses {
+            parts.push(format!("{} of {poses} poses around it cannot be reached", poses - thing.ring.len()));
+        }
+        let loose_m = thing.looseness_m();
+        if loose_m > OPEN_M && thing.outline.is_some() {
+            parts.push(format!(
+                "it was not scanned from all sides, and may reach {:.0} cm beyond what was met on average",
+                1e2 * loose_m
+            ));
+        }
+        parts.join("; ")
+    }
+
+    fn believed(&self, thing: &Thing) -> Believed {
+        let s = self.s;
+        let (middle, width_m) = place(&s.floor, thing);
+        let label = thing.is().map(str::to_string);
+        let room = s.robot.rooms().iter().find(|r| within(&r.outline_m, &middle)).map(|r| r.name.clone());
+        Believed {
+            asked: match &s.floor.sought {
+                Some(shape) => label.as_ref().is_some_and(|l| symbol(l) == *shape),
+                None => thing.symbol == THIS,
+            },
+            kind: label.clone(),
+            label,
+            confidence: thing.sureness(s.floor.known.len()),
+            position_m: [middle.x, middle.y, 0.0],
+            size_m: [width_m, width_m, 0.0],
+            on: None,
+            room,
+        }
+    }
+}
+
+fn within(
+    outline: &[descry_perception::nalgebra::Point2<f64>],
+    p: &descry_perception::nalgebra::Point2<f64>,
+) -> bool {
+    let n = outline.len();
+    n >= 3 && (0..n).all(|i| (outline[(i + 1) % n] - outline[i]).perp(&(p - outline[i])) >= 0.0)
+}
+
+fn article(name: &str) -> String {
+    format!("the {name}")
+}

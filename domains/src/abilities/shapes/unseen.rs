@@ -1,0 +1,139 @@
+//! The floor that no sweep of the laser has passed over: there may be something on it.
+
+use descry_perception::laser::Scan;
+use descry_perception::nalgebra::{Point2, Vector2};
+use descry_robots::OccupancyGrid;
+
+/// A sweep is believed up to so far before it ended: its reading is of something, metres.
+const BEFORE_M: f64 = 0.05;
+/// Of many places that may hold something, so many are asked whether they can be seen.
+const ASKED: usize = 200;
+
+/// See the module.
+#[derive(Clone, Default)]
+pub struct Unseen {
+    grid: Option<OccupancyGrid>,
+    /// Cells of the grid that are free by the map and were not passed over.
+    open: Vec<bool>,
+}
+
+impl Unseen {
+    /// All of the floor that the map has free.
+    pub fn of(map: &OccupancyGrid) -> Self {
+        Unseen { open: map.occupied.iter().map(|taken| !taken).collect(), grid: Some(map.clone()) }
+    }
+
+    /// A sweep passed over some of it.
+    pub fn pass(&mut self, scan: &Scan, reach_m: f64) {
+        let Some(grid) = &self.grid else { return };
+        let from = scan.map_from_laser.translation.vector;
+        let step_m = 0.5 * grid.resolution_m;
+        for (angle, range) in scan.angles_rad.iter().zip(&scan.ranges_m) {
+            if range.is_nan() || *range <= 0.0 {
+                continue;
+            }
+            let along = scan.map_from_laser.rotation * Vector2::new(angle.cos(), angle.sin());
+            let until_m = range.min(reach_m) - BEFORE_M;
+            for k in 0..(until_m / step_m).max(0.0) as usize {
+                if let Some((column, row)) = grid.cell(&Point2::from(from + along * (k as f64 * step_m))) {
+                    self.open[row * grid.width + column] = false;
+                }
+            }
+        }
+    }
+
+    /// A disc of the floor is known: something that was found stands there.
+    pub fn know(&mut self, middle: &Point2<f64>, radius_m: f64) {
+        let Some(grid) = &self.grid else { return };
+        for (index, open) in self.open.iter_mut().enumerate() {
+            *open &= (grid.centre(index % grid.width, index / grid.width) - middle).norm() > radius_m;
+        }
+    }
+
+    /// Middles of the discs of a radius on which something may stand.
+    pub fn room_for(&self, radius_m: f64) -> Vec<Point2<f64>> {
+        let Some(grid) = &self.grid else { return Vec::new() };
+        let reach = (radius_m / grid.resolution_m).floor() as isize;
+        let disc: Vec<(isize, isize)> = (-reach..=reach)
+            .flat_map(|row| (-reach..=reach).map(move |column| (column, row)))
+            .filter(|(column, row)| column * column + row * row <= reach * reach)
+            .collect();
+        let open = |column: isize, row: isize| {
+            let inside =
+                column >= 0 && row >= 0 && column < grid.width as isize && row < grid.height as isize;
+            inside && self.open[row as usize * grid.width + column as usize]
+        };
+        let cells = (0..grid.height as isize).flat_map(|row| (0..grid.width as isize).map(move |c| (c, row)));
+        cells
+            .filter(|(column, row)| {
+                open(*column, *row) && disc.iter().all(|(dc, dr)| open(column + dc, row + dr))
+            })
+            .map(|(column, row)| grid.centre(column as usize, row as usize))
+            .collect()
+    }
+
+    /// Whether a sweep from a place towards a heading, half a turn wide, would pass over any of these middles, as far as the map and discs on the floor
+    /// tell.
+    pub fn would_pass(
+        &self,
+        from: &Point2<f64>,
+        heading: &Vector2<f64>,
+        reach_m: f64,
+        middles: &[Point2<f64>],
+        discs: &[(Point2<f64>, f64)],
+    ) -> bool {
+        let Some(grid) = &self.grid else { return false };
+        let blocked = |p: &Point2<f64>| {
+            grid.is_occupied(p) || discs.iter().any(|(middle, radius_m)| (p - middle).norm() < *radius_m)
+        };
+        let seen = |p: &Point2<f64>| {
+            let way = p - from;
+            let steps = (way.norm() / grid.resolution_m).ceil().max(1.0);
+            way.norm() < reach_m
+                && way.dot(heading) > 0.0
+                && (0..steps as usize).all(|k| !blocked(&(from + way * (k as f64 / steps))))
+        };
+        let every = middles.len().div_ceil(ASKED).max(1);
+        middles.iter().step_by(every).any(seen)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use descry_perception::nalgebra::Isometry2;
+
+    #[test]
+    fn what_a_sweep_passes_over_is_known() {
+        let map = OccupancyGrid::covering(Point2::new(-2.0, -2.0), Point2::new(2.0, 2.0), 0.05);
+        let mut unseen = Unseen::of(&map);
+        let count = |u: &Unseen| u.room_for(0.15).len();
+        let all = count(&unseen);
+        let angles_rad: Vec<f64> = (-90..=90).map(|d| f64::from(d).to_radians()).collect();
+        // A wall a metre ahead over the left half, nothing within reach on the right, no reading straight ahead.
+        let range = |a: &f64| {
+            if a.abs() < 1e-9 {
+                f64::NAN
+            } else if *a > 0.0 {
+                1.0
+            } else {
+                f64::INFINITY
+            }
+        };
+        let scan = Scan {
+            ranges_m: angles_rad.iter().map(range).collect(),
+            angles_rad,
+            map_from_laser: Isometry2::identity(),
+        };
+        unseen.pass(&scan, 8.0);
+        let left = unseen.room_for(0.15);
+        assert!(left.len() < all && left.iter().any(|p| p.x < -0.5));
+        assert!(left.iter().all(|p| p.x < 0.2 || p.y > 0.0 && p.coords.norm() > 0.9), "{left:?}");
+        let behind =
+            |u: &Unseen| u.would_pass(&Point2::new(0.0, 0.0), &-Vector2::x(), 8.0, &u.room_for(0.15), &[]);
+        assert!(behind(&unseen));
+        unseen.know(&Point2::new(0.0, 0.0), 4.0);
+        assert_eq!(count(&unseen), 0);
+        assert!(!behind(&unseen));
+    }
+}

@@ -1,0 +1,106 @@
+//! Sweeps of a laser as bytes and back, ranges bit for bit.
+
+use crate::document::{Blob, BlobInfo, Form};
+use crate::error::Error;
+use descry_perception::laser::Scan;
+use nalgebra::Isometry2;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+/// The name of a sweep's blob.
+pub(crate) const SCAN: &str = "scan";
+/// Angles may be off from even steps by so much, radians.
+const EVEN_RAD: f64 = 1e-6;
+
+/// How a sweep is packed: a range after the other as f64, at even steps between two angles.
+#[derive(Serialize, Deserialize)]
+struct Layout {
+    first_rad: f64,
+    last_rad: f64,
+    readings: usize,
+}
+
+impl Layout {
+    fn angle_rad(&self, index: usize) -> f64 {
+        let steps = self.readings.saturating_sub(1).max(1) as f64;
+        self.first_rad + (self.last_rad - self.first_rad) * index as f64 / steps
+    }
+}
+
+/// A sweep as a blob; its pose is not part of it.
+///
+/// # Errors
+/// [`Error::Input`] if it is unsound, or its angles are not at even steps.
+pub(crate) fn encode(scan: &Scan) -> Result<Blob<'static>, Error> {
+    let fail = |what: String| Error::Input { what, mend: "give one range an angle, at even steps".into() };
+    scan.check().map_err(|e| fail(e.to_string()))?;
+    let (first, last) = (scan.angles_rad.first(), scan.angles_rad.last());
+    let (Some(&first_rad), Some(&last_rad)) = (first, last) else {
+        return Err(fail("a sweep without a reading".into()));
+    };
+    let layout = Layout { first_rad, last_rad, readings: scan.angles_rad.len() };
+    let odd = |(i, angle): (usize, &f64)| (layout.angle_rad(i) - angle).abs() > EVEN_RAD;
+    if let Some(at) = scan.angles_rad.iter().enumerate().position(odd) {
+        return Err(fail(format!("angle {at} of a sweep is not at an even step")));
+    }
+    let data: Vec<u8> = scan.ranges_m.iter().flat_map(|r| r.to_le_bytes()).collect();
+    Ok(Blob { name: SCAN.into(), form: Form::LaserScan, layout: json!(layout), data: data.into() })
+}
+
+/// A sweep from its blob, taken from a pose.
+///
+/// # Errors
+/// What of the layout does not fit, in words.
+pub(crate) fn decode(info: &BlobInfo, data: &[u8], map_from_laser: Isometry2<f64>) -> Result<Scan, String> {
+    let layout: Layout =
+        Layout::deserialize(&info.layout).map_err(|e| format!("its layout cannot be read: {e}"))?;
+    if layout.readings.checked_mul(8) != Some(data.len()) {
+        return Err(format!("{} readings do not make {} bytes", layout.readings, data.len()));
+    }
+    let scan = Scan {
+        angles_rad: (0..layout.readings).map(|i| layout.angle_rad(i)).collect(),
+        ranges_m: data.as_chunks().0.iter().map(|word| f64::from_le_bytes(*word)).collect(),
+        map_from_laser,
+    };
+    scan.check().map_err(|e| e.to_string())?;
+    Ok(scan)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sweep_comes_back_and_an_uneven_one_is_refused() {
+        let pose = Isometry2::new(nalgebra::Vector2::new(1.0, 2.0), 0.3);
+        let scan = |angles_rad: Vec<f64>| Scan {
+            ranges_m: [1.25, f64::INFINITY, f64::NAN, 0.0]
+                .into_iter()
+                .cycle()
+                .take(angles_rad.len())
+                .collect(),
+            angles_rad,
+            map_from_laser: pose,
+        };
+        let check = |angles_rad: Vec<f64>, fits: bool| {
+            let scan = scan(angles_rad);
+            let Ok(blob) = encode(&scan) else { return assert!(!fits, "{:?}", scan.angles_rad) };
+            let info = BlobInfo {
+                name: blob.name,
+                form: blob.form,
+                bytes: blob.data.len() as u64,
+                layout: blob.layout,
+            };
+            let back = decode(&info, &blob.data, pose).unwrap();
+            let bits = |s: &Scan| s.ranges_m.iter().map(|r| r.to_bits()).collect::<Vec<_>>();
+            assert!(fits && bits(&back) == bits(&scan) && back.map_from_laser == pose);
+            assert!(back.angles_rad.iter().zip(&scan.angles_rad).all(|(a, b)| (a - b).abs() < 1e-12));
+            assert!(decode(&info, &blob.data[1..], pose).is_err());
+        };
+        check((-90..=90).map(|d| f64::from(d).to_radians()).collect(), true);
+        check(vec![0.5], true);
+        check(vec![0.0, 0.1, 0.3], false);
+        check(vec![], false);
+        check(vec![0.1, 0.0], false);
+    }
+}

@@ -1,0 +1,16 @@
+//! `scan`: sweeps the laser.
+
+use async_trait::async_trait;
+
+use crate::skill::{Context, Outcome, Skill, SkillFailure};
+
+/// Sweeps the laser once from where the body stands.
+pub struct Scan;
+
+#[async_trait]
+impl Skill for Scan {
+    async fn perform(&self, context: &Context<'_>) -> Result<Outcome, SkillFailure> {
+        let scanned = context.robot.scan(&context.watch()).await?;
+        Ok(Outcome::Scanned(Box::new(scanned)))
+    }
+}

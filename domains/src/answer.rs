@@ -175,7 +175,9 @@ impl Asker<'_> {
         let s = self.s;
         let left = 1.0 - s.completeness(0);
         let seen = self.seen_of(s.doubt_of(0), left);
-        let open = reasons::may_be_floor(s, kind)
+        let open = self
+            .nothing_seen(kind)
+            .or_else(|| reasons::may_be_floor(s, kind))
             .or_else(|| (left > s.thresholds.not_there).then(|| format!("none was seen: {seen}")));
         match open {
             Some(open) => {
@@ -228,9 +230,13 @@ impl Asker<'_> {
         (Verdict::Impossible, self.impossible(&says))
     }
 
-    /// Why looks for a thing have shown nothing that it could stand on.
+    /// Why looks for a thing prove nothing: they showed nothing that it could stand on, or contradict each other.
     fn nothing_seen(&self, thing: &Thing) -> Option<String> {
-        let regions = self.mind.regions.iter().enumerate().filter(|(on, _)| thing.may_be_on(*on));
+        let asked = || self.mind.regions.iter().enumerate().filter(|(on, _)| thing.may_be_on(*on));
+        if let Some((on, _)) = asked().find(|(_, region)| region.disputed) {
+            return Some(format!("views of the {} contradict each other", self.s.surfaces[on].name));
+        }
+        let regions = asked();
         let named =
             |(on, because): (usize, &String)| format!("no {} was seen: {because}", self.s.surfaces[on].name);
         regions.filter_map(|(on, region)| Some((on, region.nothing.as_ref()?))).map(named).next()

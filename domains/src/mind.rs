@@ -35,6 +35,8 @@ pub struct Region {
     pub taken: usize,
     /// Why the last look showed no surface; none if it did.
     pub nothing: Option<String>,
+    /// As many of its views as agree contradict them: which are wrong is not known.
+    pub disputed: bool,
 }
 
 /// A view that was taken and recorded.

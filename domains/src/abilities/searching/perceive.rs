@@ -30,8 +30,10 @@ use crate::world::WorldError;
 const SIDE_TOLERANCE_M: f64 = 0.03;
 /// What is sought and was at least so probable is missed when it is gone.
 const PERHAPS: f64 = 0.2;
-/// How far a surface may be from the height at which the map has it.
+/// How far from the height at which the map has a surface points are merged that may be of it.
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
+/// How far a level surface may be from there to be that one: farther, it is another, or the body is not where it believes to be.
+const SAME_HEIGHT_M: f64 = 0.08;
 /// How far beside the outline on the map points of a surface may lie: localisation errs by centimetres and degrees.
 const BESIDE_M: f64 = 0.25;
 /// What is remembered of an object that was seen again nearer than this is that one, metres.
@@ -135,6 +137,8 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         }
     };
     mind.regions[on].nothing = None;
+    let agreeing = merged.fits.iter().filter(|fit| fit.used).count();
+    mind.regions[on].disputed = merged.fits.len() >= 2 * agreeing;
     let (merged, surface) = lay_on_map(eyes.robot, &mind.known.surfaces[on], merged, surface);
     let merged = without_walls(eyes.robot, &mind.known.surfaces[on], merged);
     let newest = newest(&views, &merged);
@@ -415,10 +419,10 @@ pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptio
         let (low, high) = band.unwrap_or((h, h));
         Some((low.min(h), high.max(h)))
     });
-    let height_band_m = band.map(|(low, high)| (low - HEIGHT_TOLERANCE_M, high + HEIGHT_TOLERANCE_M));
-    let surface = SurfaceOptions { up, height_band_m, ..SurfaceOptions::default() };
+    let within = |m: f64| band.map(|(low, high)| (low - m, high + m));
+    let surface = SurfaceOptions { up, height_band_m: within(SAME_HEIGHT_M), ..SurfaceOptions::default() };
     let scene = SceneOptions { surface, ..SceneOptions::default() };
-    let height_band_m = height_band_m.map(|(low, high)| (low, high + scene.tallest_m));
+    let height_band_m = within(HEIGHT_TOLERANCE_M).map(|(low, high)| (low, high + scene.tallest_m));
     (MergeOptions { up, height_band_m, ..MergeOptions::default() }, scene)
 }
 

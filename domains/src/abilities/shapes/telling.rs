@@ -54,7 +54,8 @@ impl<'a> Teller<'a> {
     /// Why the run ended before it was sure.
     fn cut(&self, ended: &Ended) -> Option<(Verdict, String)> {
         match ended {
-            Ended::Limit(why) | Ended::Failed(why) => Some((Verdict::Failed, why.clone())),
+            Ended::Limit(why) => Some((Verdict::CannotTell, why.clone())),
+            Ended::Failed(why) => Some((Verdict::Failed, why.clone())),
             Ended::NoPlan(_) | Ended::Undecided(_)
                 if self.s.time_left_s.is_some_and(|left_s| left_s <= 0.0) =>
             {

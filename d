@@ -1,2 +1,0 @@
-#!/bin/bash
-exec /work/wt/shapes/target/debug/descry "$@"

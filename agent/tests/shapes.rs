@@ -57,5 +57,12 @@ fn what_was_learned_is_known_after_a_restart() {
     check("where is the stool", "stool", 301, folder, Some(&store), ("cannot_tell", None));
     let report = run("learn stool", "stool", 302, folder, Some(&store));
     assert_eq!(report["verdict"], "achieved", "{}", report["why"]);
-    check("where is the stool", "stool", 303, folder, Some(&store), ("achieved", Some("stool")));
+    check(
+        "where is the stool with confidence 0.8",
+        "stool",
+        303,
+        folder,
+        Some(&store),
+        ("achieved", Some("stool")),
+    );
 }

@@ -280,7 +280,10 @@ fn distinct(surfaces: Vec<Surface>, samples: &[Sample]) -> Vec<Surface> {
 impl SurfaceOptions {
     /// True if a surface lies at the height and in the region that are asked for, whatever it is.
     pub fn wants(&self, surface: &Surface) -> bool {
-        let height = self.height_band_m.is_none_or(|(low, high)| (low..=high).contains(&surface.offset_m));
+        let up = self.up.unwrap_or(surface.up);
+        // A tilted plane has its height where the surface is, not where the world begins.
+        let height_m = up.dot(&surface.middle().coords);
+        let height = self.height_band_m.is_none_or(|(low, high)| (low..=high).contains(&height_m));
         height
             && surface.area_m2 >= self.least_area_m2
             && self.region.as_ref().is_none_or(|r| r.holds(surface))

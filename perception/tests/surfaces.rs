@@ -281,3 +281,25 @@ fn what_lies_on_a_shelf_above_is_not_on_the_table() {
         assert_eq!(things(&scene), 1, "at {height_m} m: {:?}", bounds(&scene));
     }
 }
+
+#[test]
+fn a_tilted_surface_has_its_height_where_it_is() {
+    let up = Some(Unit::new_normalize(Vector3::z()));
+    let looks = Looks { room: &small_room(), eyes: &AROUND, target: [0.0, 0.0, 0.7], mirrored: 0.0 };
+    let (cloud, seen) = looks.take(5);
+    let level = find_surface(&cloud, &seen, &SurfaceOptions { up, ..SurfaceOptions::default() });
+    let level = level.expect("a table");
+    let options =
+        SurfaceOptions { up, height_band_m: Some((0.64, 0.80)), region: None, ..SurfaceOptions::default() };
+    let far = Translation3::new(4.0, 3.0, 0.0);
+    // (tilt about its middle, how much higher, whether it lies between the heights)
+    for (tilt_rad, higher_m, expected) in
+        [(0.0, 0.0, true), (0.07, 0.0, true), (-0.07, 0.0, true), (0.03, 0.12, false), (-0.03, 0.12, false)]
+    {
+        let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt_rad);
+        let up_there = Translation3::new(0.0, 0.0, 0.72 + higher_m);
+        let there = Isometry3::from_parts(far * up_there, tilt) * Translation3::new(0.0, 0.0, -0.72);
+        let found = options.wants(&level.moved(&there));
+        assert_eq!(found, expected, "tilted by {tilt_rad}, {higher_m} m higher");
+    }
+}

@@ -34,6 +34,8 @@ const PERHAPS: f64 = 0.2;
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
 /// How far a level surface may be from there to be that one: farther, it is another, or the body is not where it believes to be.
 const SAME_HEIGHT_M: f64 = 0.08;
+/// Most angle between a surface of the map and level, as seen: localisation and the camera's mounting err by degrees.
+const LEVEL_RAD: f64 = 0.09;
 /// How far beside the outline on the map points of a surface may lie: localisation errs by centimetres and degrees.
 const BESIDE_M: f64 = 0.25;
 /// What is remembered of an object that was seen again nearer than this is that one, metres.
@@ -169,7 +171,8 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
 /// The same, for a surface that the map has: it is looked for where its outline is.
 fn seeking_at(seeking: SceneOptions, surface: &KnownSurface) -> SceneOptions {
     let region = surface.whole.then(|| Region { corners: surface.outline.clone(), margin_m: BESIDE_M });
-    SceneOptions { surface: SurfaceOptions { region, ..seeking.surface.clone() }, ..seeking }
+    let tilt_rad = if surface.whole { LEVEL_RAD } else { seeking.surface.tilt_rad };
+    SceneOptions { surface: SurfaceOptions { region, tilt_rad, ..seeking.surface.clone() }, ..seeking }
 }
 
 /// What was sought and believed to stand where the newest view looks through: somebody has moved it. In words; none if nothing.

@@ -11,11 +11,12 @@ use descry_domains::note::Note;
 use descry_domains::world::{Choice, Job, Round, Setting, World, WorldError};
 use descry_memory::{Draft, Meta, Record, RecordId};
 use descry_planner::{Outcome as Planned, Plan, Statistics, Step, Task};
-use descry_robots::{CancellationToken, Robot};
+use descry_robots::Robot;
 use descry_skills::{Call, Context, SkillFailure};
 
 use crate::exit::CommandError;
 use crate::report::Event;
+use crate::stop::Stop;
 
 /// A planning call ends after so many evaluated states; then the best plan so far, or one good look, has to do.
 const MOST_EVALUATED: u64 = 2_500;
@@ -24,7 +25,7 @@ const MOST_EVALUATED: u64 = 2_500;
 pub struct Agent<'a> {
     robot: Arc<dyn Robot>,
     record: &'a Record,
-    cancel: CancellationToken,
+    stop: Stop,
     tell: &'a mut dyn FnMut(&Event),
     plan: Option<Plan>,
     totals: Totals,
@@ -49,14 +50,14 @@ pub struct Totals {
 type Performed = (usize, Result<(), SkillFailure>);
 
 impl<'a> Agent<'a> {
-    /// An agent with a body and a record. `tell` hears of everything that happens; `cancel` stops it.
+    /// An agent with a body and a record. `tell` hears of everything that happens; `stop` ends it, the body first.
     pub fn new(
         robot: Arc<dyn Robot>,
         record: &'a Record,
-        cancel: CancellationToken,
+        stop: Stop,
         tell: &'a mut dyn FnMut(&Event),
     ) -> Self {
-        Self { robot, record, cancel, tell, plan: None, totals: Totals::default() }
+        Self { robot, record, stop, tell, plan: None, totals: Totals::default() }
     }
 
     /// Pursues a goal until it is achieved, until nothing can help any more, or until a limit is reached.
@@ -103,6 +104,7 @@ impl<'a> Agent<'a> {
         if let Some(ended) = world.exhausted(round) {
             return Ok(Some(ended));
         }
+        self.check_stopped()?;
         let steps = self.next_steps();
         self.act(world, round, steps).await?;
         Ok(None)
@@ -163,8 +165,11 @@ impl<'a> Agent<'a> {
             evaluation_limit: Some(MOST_EVALUATED),
             ..descry_planner::Options::default()
         };
-        let planned = descry_planner::plan(task, &round.attachments, &options, &|| false, &mut |_| {})
+        let stop = self.stop.clone();
+        let is_stopped = || stop.is_asked();
+        let planned = descry_planner::plan(task, &round.attachments, &options, &is_stopped, &mut |_| {})
             .map_err(|e| WorldError::of_planner(&e))?;
+        self.check_stopped()?;
         let took_s = started.elapsed().as_secs_f64();
         let geometry_s = planned.statistics().attachments.values().map(|asked| asked.time_s).sum();
         let totals = &mut self.totals;
@@ -318,7 +323,7 @@ impl<'a> Agent<'a> {
     async fn execute(&self, job: Job) -> Result<descry_skills::Outcome, SkillFailure> {
         let context = Context {
             robot: &*self.robot,
-            cancel: self.cancel.clone(),
+            cancel: self.stop.token().clone(),
             time_limit_s: job.limit_s,
             progress: &|_| {},
         };
@@ -353,6 +358,7 @@ impl<'a> Agent<'a> {
         part: usize,
         failure: &SkillFailure,
     ) -> Result<(), CommandError> {
+        self.check_stopped()?;
         self.plan = None;
         let therefore = world.learn_from_failure(round, call, part, failure)?;
         if let SkillFailure::Body(body) = failure
@@ -367,6 +373,14 @@ impl<'a> Agent<'a> {
         let here = self.robot.pose().await.map_err(CommandError::broken)?;
         world.stands_at(&here);
         Ok(())
+    }
+
+    /// Ends the run where somebody wants it to stop: the body stands by now, and nothing more is asked of it.
+    fn check_stopped(&self) -> Result<(), CommandError> {
+        match self.stop.is_asked() {
+            true => Err(CommandError::Stopped { said: "stopped".into(), signal: self.stop.signal() }),
+            false => Ok(()),
+        }
     }
 
     /// Tells of an event, and records it.

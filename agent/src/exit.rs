@@ -19,8 +19,25 @@ pub enum Exit {
     OutOfTime = 4,
     /// The robot or a store failed for good.
     Broken = 5,
+    /// Its terminal is gone.
+    HungUp = 129,
+    /// Stopped by Ctrl-C.
+    Interrupted = 130,
+    /// Told to end.
+    Terminated = 143,
     /// A bug of descry.
     Bug = 70,
+}
+
+impl Exit {
+    /// How a command ends that a signal stopped.
+    pub fn of_signal(signal: u8) -> Self {
+        match signal {
+            1 => Self::HungUp,
+            15 => Self::Terminated,
+            _ => Self::Interrupted,
+        }
+    }
 }
 
 impl From<Exit> for ExitCode {
@@ -38,6 +55,14 @@ pub enum CommandError {
     /// The robot or a store failed for good.
     #[error("{0}")]
     Broken(String),
+    /// Somebody stopped it; the text says how to go on.
+    #[error("{said}")]
+    Stopped {
+        /// What is kept, and how to go on.
+        said: String,
+        /// The signal that stopped it.
+        signal: u8,
+    },
     /// A fault of descry itself.
     #[error("{0}\n  this is a bug of descry; please report it with the command and its input")]
     Bug(String),
@@ -59,6 +84,7 @@ impl CommandError {
         match self {
             Self::BadInput(_) => Exit::BadInput,
             Self::Broken(_) => Exit::Broken,
+            Self::Stopped { signal, .. } => Exit::of_signal(*signal),
             Self::Bug(_) => Exit::Bug,
         }
     }

@@ -8,3 +8,4 @@ pub mod experiment;
 pub mod keeping;
 pub mod report;
 pub mod run;
+pub mod stop;

@@ -5,6 +5,8 @@ use std::process::ExitCode;
 use clap::Parser;
 use descry_agent::commands::{self, Command};
 use descry_agent::exit::Exit;
+use descry_agent::stop::Stop;
+use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::filter::LevelFilter;
 
@@ -27,7 +29,8 @@ const EXIT_CODES: &str = "Exit codes:
   3   proven unsolvable
   4   out of time or memory
   5   the robot or a store failed for good
-  70  a bug of descry";
+  70  a bug of descry
+  130, 143, 129  stopped by Ctrl-C, by SIGTERM, by the end of its terminal";
 
 fn main() -> ExitCode {
     std::panic::set_hook(Box::new(|panic| {
@@ -38,7 +41,11 @@ fn main() -> ExitCode {
     warn_people();
     let outcome = std::panic::catch_unwind(|| {
         let arguments = Arguments::parse();
-        commands::run(&arguments.command)
+        let stop = Stop::default();
+        if arguments.command.can_be_stopped() {
+            listen(&stop);
+        }
+        commands::run(&arguments.command, &stop)
     });
     match outcome {
         Ok(Ok(exit)) => exit.into(),
@@ -48,6 +55,37 @@ fn main() -> ExitCode {
         }
         Err(_) => Exit::Bug.into(),
     }
+}
+
+/// Lets signals ask to stop; the second Ctrl-C ends the program at once.
+fn listen(stop: &Stop) {
+    let stop = stop.clone();
+    let thread = std::thread::Builder::new().name("signals".into());
+    if let Err(e) = thread.spawn(move || hear(&stop)) {
+        tracing::warn!("Ctrl-C will end the program at once: {e}");
+    }
+}
+
+fn hear(stop: &Stop) -> std::io::Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build()?;
+    runtime.block_on(async {
+        let mut interrupt = signal(SignalKind::interrupt())?;
+        let mut terminate = signal(SignalKind::terminate())?;
+        let mut hangup = signal(SignalKind::hangup())?;
+        loop {
+            let (by, kind) = tokio::select! {
+                _ = interrupt.recv() => (2, "Ctrl-C"),
+                _ = terminate.recv() => (15, "SIGTERM"),
+                _ = hangup.recv() => (1, "the end of the terminal"),
+            };
+            if !stop.is_asked() {
+                stop.ask(by);
+                commands::narrate(&format!("descry: {kind}: stopping the body; Ctrl-C again ends at once"));
+            } else if by == 2 {
+                std::process::exit(i32::from(Exit::Interrupted as u8));
+            }
+        }
+    })
 }
 
 /// Lets warnings reach people, on standard error; `RUST_LOG` asks for more or less.

@@ -17,8 +17,8 @@ use descry_domains::situation::Past;
 use descry_domains::world::{Chooser, Setting};
 use descry_memory::remember::Remembered;
 use descry_memory::{Fault, Query, Record};
+use descry_robots::Robot;
 use descry_robots::recorded::TapedRobot;
-use descry_robots::{CancellationToken, Robot};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -28,6 +28,7 @@ use crate::body::tape::{self, RecordTape};
 use crate::exit::CommandError;
 use crate::keeping::Keeping;
 use crate::report::{Event, Report};
+use crate::stop::Stop;
 pub use beginning::Beginning;
 pub use files::{finish, header, keep_header, report};
 pub use folder::Folder;
@@ -91,6 +92,7 @@ pub fn pursue(
     folder: &Folder,
     settings: &Settings,
     chooser: Chooser,
+    stop: &Stop,
     tell: &mut dyn FnMut(&Event),
 ) -> Result<Report, CommandError> {
     let header = Header {
@@ -110,7 +112,7 @@ pub fn pursue(
     let robot = Arc::new(TapedRobot::begin(Arc::clone(&body.robot), tape));
     let kept = programs::on_record(domain, &record, None, &robot, true)?;
     let task = Task { domain: &kept.domain, goal, past: past.as_ref() };
-    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), tell)?;
+    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), stop, tell)?;
     remember(settings, remembered.as_ref())?;
     show_true_position(&mut report, body);
     Ok(report)
@@ -139,6 +141,7 @@ pub fn go_on(
     record: Record,
     settings: &Settings,
     chooser: Chooser,
+    stop: &Stop,
     tell: &mut dyn FnMut(&Event),
 ) -> Result<Report, CommandError> {
     let record = Arc::new(record);
@@ -147,7 +150,7 @@ pub fn go_on(
     let robot = Arc::new(TapedRobot::go_on(Arc::clone(&body.robot), tape, entries));
     let kept = programs::on_record(task.domain, &record, Some(&record), &robot, true)?;
     let task = Task { domain: &kept.domain, ..task };
-    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), tell)?;
+    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), stop, tell)?;
     remember(settings, remembered.as_ref())?;
     show_true_position(&mut report, body);
     Ok(report)
@@ -163,6 +166,7 @@ pub fn live_through(
     record: &Record,
     chooser: Chooser,
     folder: &Path,
+    stop: &Stop,
     tell: &mut dyn FnMut(&Event),
 ) -> Result<(Report, Option<Remembered>), CommandError> {
     let Task { domain, goal, past } = task;
@@ -173,19 +177,13 @@ pub fn live_through(
         .map_err(|e| CommandError::broken(format!("the runtime could not be started: {e}")))?;
     let recogniser = descry_perception::recognise::Descry::default();
     let start_ns = robot.now_ns();
-    let cancel = CancellationToken::new();
-    let (conclusion, totals) = runtime.block_on(async {
-        let stop = cancel.clone();
-        tokio::spawn(async move {
-            if tokio::signal::ctrl_c().await.is_ok() {
-                stop.cancel();
-            }
-        });
+    let lived = runtime.block_on(async {
         let body: Arc<dyn Robot> = Arc::clone(robot) as _;
         let (robot, past) = (Arc::clone(&body), past.cloned());
         let setting = Setting { domain, goal, robot, record, recogniser: &recogniser, past };
-        Agent::new(body, record, cancel, tell).pursue(setting, chooser).await
-    })?;
+        Agent::new(body, record, stop.clone(), tell).pursue(setting, chooser).await
+    });
+    let (conclusion, totals) = lived.map_err(|error| how_to_go_on(error, folder))?;
     robot.finish().map_err(CommandError::broken)?;
     let mut report = Report::begin(goal, folder.display().to_string());
     report.answer = goal.question.then(|| answer(conclusion.verdict).to_string());
@@ -194,6 +192,15 @@ pub fn live_through(
     files::put_report(record, robot.now_ns(), &report)?;
     record.sync().map_err(CommandError::broken)?;
     Ok((report, remembered))
+}
+
+/// Says of a run that was stopped how it goes on.
+fn how_to_go_on(error: CommandError, folder: &Path) -> CommandError {
+    let CommandError::Stopped { signal, .. } = error else { return error };
+    let folder = folder.display();
+    let said =
+        format!("stopped; everything until here is in {folder}\n  go on with: descry do --resume {folder}");
+    CommandError::Stopped { said, signal }
 }
 
 /// Where the thing is; simulation only.

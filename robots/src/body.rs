@@ -480,6 +480,12 @@ pub trait Robot: Send + Sync {
     /// The room as known from mapping; `None` if the body has no map (a recording).
     fn map(&self) -> Option<&OccupancyGrid>;
 
+    /// True of a simulation or a recording in this process: opened again, it stands where it stood, and does the same when it is asked
+    /// the same. Any other body is where it is, and nothing is asked of it twice.
+    fn begins_again(&self) -> bool {
+        false
+    }
+
     /// Surfaces that the map knows.
     fn surfaces(&self) -> &[SurfaceHint];
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
 use crate::experiment::{self, Ended, ExperimentError, Options, Shard, Source};
+use crate::stop::Stop;
 
 /// Arguments of `descry experiment`.
 #[derive(clap::Args)]
@@ -28,7 +29,7 @@ pub struct Arguments {
     json: bool,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandError> {
     let source = Source::read(&arguments.file).map_err(CommandError::bad_input)?;
     let stem = arguments.file.file_stem().map_or_else(|| "experiment".into(), |stem| stem.to_os_string());
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -37,8 +38,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         shard: arguments.shard,
         merge: arguments.merge.clone(),
         threads: arguments.jobs.unwrap_or(cores).max(1),
+        stop: stop.clone(),
     };
     match experiment::run(&source, &options).map_err(failed)? {
+        Ended::Part { done, all, .. } if stop.is_asked() => {
+            let said = format!("stopped; {done} of {all} jobs are done\n  go on with the same command");
+            Err(CommandError::Stopped { said, signal: stop.signal() })
+        }
         Ended::Part { done, all, folder } => {
             input::narrate(&format!(
                 "{done} of {all} jobs are done; this shard's are in {}",

@@ -18,6 +18,7 @@ use descry_domains::answer::Verdict;
 
 use crate::report::{Event, Report};
 use crate::run::{self, Beginning, Folder, Settings, Task, programs};
+use crate::stop::Stop;
 
 /// Arguments of `descry find`.
 #[derive(clap::Args)]
@@ -78,20 +79,20 @@ pub struct With {
     json: bool,
 }
 
-pub(super) fn find(arguments: &FindArguments) -> Result<Exit, CommandError> {
-    carry_out(&arguments.thing, "find ", &arguments.with)
+pub(super) fn find(arguments: &FindArguments, stop: &Stop) -> Result<Exit, CommandError> {
+    carry_out(&arguments.thing, "find ", &arguments.with, stop)
 }
 
-pub(super) fn pursue(arguments: &DoArguments) -> Result<Exit, CommandError> {
-    carry_out(&arguments.goal, "", &arguments.with)
+pub(super) fn pursue(arguments: &DoArguments, stop: &Stop) -> Result<Exit, CommandError> {
+    carry_out(&arguments.goal, "", &arguments.with, stop)
 }
 
-fn carry_out(words: &[String], verb: &str, with: &With) -> Result<Exit, CommandError> {
+fn carry_out(words: &[String], verb: &str, with: &With, stop: &Stop) -> Result<Exit, CommandError> {
     let started = Instant::now();
     let said = format!("{verb}{}", words.join(" "));
     let (mut report, folder) = match &with.resume {
-        Some(folder) => go_on(folder, (!words.is_empty()).then_some(&said), with.allow_programs)?,
-        None => begin(&said, with)?,
+        Some(folder) => go_on(folder, (!words.is_empty()).then_some(&said), with.allow_programs, stop)?,
+        None => begin(&said, with, stop)?,
     };
     report.wall_s = started.elapsed().as_secs_f64();
     run::finish(folder.path(), &report)?;
@@ -116,7 +117,7 @@ pub(super) fn understood(said: &str, domain: &Domain, robot: &dyn Robot) -> Resu
     goal::read(said, domain, &lexicon).map_err(CommandError::bad_input)
 }
 
-fn begin(said: &str, with: &With) -> Result<(Report, Folder), CommandError> {
+fn begin(said: &str, with: &With, stop: &Stop) -> Result<(Report, Folder), CommandError> {
     let domain = input::domain(&with.domain)?;
     let body = body::open(&with.robot, with.scene.as_deref(), with.seed, &domain)?;
     let goal = understood(said, &domain, &*body.robot)?;
@@ -131,7 +132,7 @@ fn begin(said: &str, with: &With) -> Result<(Report, Folder), CommandError> {
         keeping: with.keeping.of_new_run(folder.path())?,
         remember: with.remember.clone(),
     };
-    let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, &mut tell)?;
+    let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, stop, &mut tell)?;
     Ok((report, folder))
 }
 
@@ -139,6 +140,7 @@ fn go_on(
     folder: &Path,
     said: Option<&String>,
     allow_programs: bool,
+    stop: &Stop,
 ) -> Result<(Report, Folder), CommandError> {
     let header = run::header(folder)?;
     if let Some(said) = said.filter(|said| **said != header.goal) {
@@ -157,7 +159,7 @@ fn go_on(
         Some(beginning) => beginning.domain()?,
         None => Domain::load(&header.settings.domain).map_err(CommandError::bad_input)?,
     };
-    programs::check_allowed(&domain, &folder.display().to_string(), allow_programs)?;
+    programs::check_allowed(&domain, &header.settings.robot, &folder.display().to_string(), allow_programs)?;
     let settings = &header.settings;
     let body = body::open(&settings.robot, settings.scene.as_deref(), settings.seed, &domain)?;
     let goal = understood(&header.goal, &domain, &*body.robot)?;
@@ -167,6 +169,6 @@ fn go_on(
     }
     let past = beginning.as_ref().and_then(|b| b.past.as_ref());
     let task = Task { domain: &domain, goal: &goal, past };
-    let report = run::go_on(task, &body, &claimed, record, settings, chooser, &mut tell)?;
+    let report = run::go_on(task, &body, &claimed, record, settings, chooser, stop, &mut tell)?;
     Ok((report, claimed))
 }

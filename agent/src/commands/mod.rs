@@ -20,6 +20,7 @@ use clap::Subcommand;
 pub use input::{drawn, is_coloured, narrate};
 
 use crate::exit::{CommandError, Exit};
+use crate::stop::Stop;
 
 /// What descry can be asked to do.
 #[derive(Subcommand)]
@@ -58,21 +59,28 @@ pub enum Command {
     Export(memory::ExportArguments),
 }
 
-/// Carries a command out.
+impl Command {
+    /// Whether it ends in order when it is asked to stop; others may be ended at any time.
+    pub fn can_be_stopped(&self) -> bool {
+        matches!(self, Self::Find(_) | Self::Do(_) | Self::Experiment(_))
+    }
+}
+
+/// Carries a command out; `stop` ends it early, if it can be stopped.
 ///
 /// # Errors
 /// [`CommandError`] with its text ready to be shown.
-pub fn run(command: &Command) -> Result<Exit, CommandError> {
+pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
     match command {
-        Command::Find(arguments) => find::find(arguments),
-        Command::Do(arguments) => find::pursue(arguments),
+        Command::Find(arguments) => find::find(arguments, stop),
+        Command::Do(arguments) => find::pursue(arguments, stop),
         Command::Goals(arguments) => goals::run(arguments),
         Command::Plan(arguments) => plan::run(arguments),
         Command::Validate(arguments) => validate::run(arguments),
         Command::New(arguments) => new::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Recognise(arguments) => recognise::run(arguments),
-        Command::Experiment(arguments) => experiment::run(arguments),
+        Command::Experiment(arguments) => experiment::run(arguments, stop),
         Command::Robot(arguments) => robot::run(arguments),
         Command::Show(arguments) => show::run(arguments),
         Command::Replay(arguments) => replay::run(arguments),

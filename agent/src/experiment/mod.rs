@@ -11,6 +11,7 @@ pub mod statistics;
 pub mod table;
 mod write;
 
+use crate::stop::Stop;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -135,6 +136,8 @@ pub struct Options {
     pub merge: Vec<PathBuf>,
     /// How many jobs at a time.
     pub threads: usize,
+    /// Ends it early.
+    pub stop: Stop,
 }
 
 /// How far it came.
@@ -322,7 +325,7 @@ fn perform(
     let todo: Vec<usize> =
         (0..jobs.len()).filter(mine).filter(|&n| !done.contains_key(&jobs[n].id)).collect();
     let scratch = folder.join("scratch");
-    let finished = runner::run(kind, jobs, &todo, options.threads, &scratch, &mut journal)?;
+    let finished = runner::run(kind, jobs, &todo, options.threads, &scratch, &options.stop, &mut journal)?;
     done.extend(finished.into_iter().map(|job| (job.job.clone(), job)));
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! Does jobs on all cores. What a job gives does not depend on which thread does it, or when.
 
+use crate::stop::Stop;
 use std::any::Any;
 use std::io::IsTerminal;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -19,7 +20,7 @@ const STACK_BYTES: usize = 16 << 20;
 const LINE_EVERY: Duration = Duration::from_secs(15);
 
 /// Does the jobs of these numbers and writes each into the journal. Runs keep what they record under `scratch`, which is
-/// emptied. Gives the finished jobs in the order in which they ended.
+/// emptied. Where it is stopped, jobs under way are not done. Gives the finished jobs in the order in which they ended.
 ///
 /// # Errors
 /// [`ExperimentError::File`] if the journal cannot be written; no further job is begun then.
@@ -29,14 +30,17 @@ pub fn run(
     todo: &[usize],
     threads: usize,
     scratch: &Path,
+    stop: &Stop,
     journal: &mut Journal,
 ) -> Result<Vec<Finished>, ExperimentError> {
-    let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let (next, ended) = (AtomicUsize::new(0), AtomicBool::new(false));
     let (send, receive) = channel();
     let work = |send: Sender<Finished>| {
-        while !stop.load(Ordering::Relaxed) {
+        while !ended.load(Ordering::Relaxed) {
             let Some(&number) = todo.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-            if send.send(finish(kind, jobs, number, scratch)).is_err() {
+            let finished = finish(kind, jobs, number, scratch, stop);
+            // A job that was under way when the batch was stopped is not done.
+            if stop.is_asked() || send.send(finished).is_err() {
                 break;
             }
         }
@@ -52,7 +56,7 @@ pub fn run(
             Ok(()) => collect(&receive, todo.len(), journal),
             Err(e) => Err(ExperimentError::Threads { because: e.to_string() }),
         };
-        stop.store(true, Ordering::Relaxed);
+        ended.store(true, Ordering::Relaxed);
         result
     });
     // What a run has left behind is of no more use; that it cannot be removed is no reason to lose the results.
@@ -61,11 +65,11 @@ pub fn run(
 }
 
 /// Does one job. A job that panics is a row like any other that failed.
-fn finish(kind: &dyn Kind, jobs: &[Job], number: usize, scratch: &Path) -> Finished {
+fn finish(kind: &dyn Kind, jobs: &[Job], number: usize, scratch: &Path, stop: &Stop) -> Finished {
     let scratch = scratch.join(number.to_string());
     // What a batch that was cut off has left there is no run that could go on.
     let _ = std::fs::remove_dir_all(&scratch);
-    let outcome = catch_unwind(AssertUnwindSafe(|| kind.run(number, &scratch)));
+    let outcome = catch_unwind(AssertUnwindSafe(|| kind.run(number, &scratch, stop)));
     let _ = std::fs::remove_dir_all(&scratch);
     let outcome = outcome.unwrap_or_else(|panic| Err(format!("panic: {}", said(&*panic))));
     Finished::new(&jobs[number], outcome)

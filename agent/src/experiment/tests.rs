@@ -1,5 +1,6 @@
 //! The whole way from a kind of experiment to its results, with a kind that only counts.
 
+use crate::stop::Stop;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::json;
@@ -37,7 +38,7 @@ impl Kind for Squares {
             .collect()
     }
 
-    fn run(&self, number: usize, scratch: &Path) -> Result<Outcome, String> {
+    fn run(&self, number: usize, scratch: &Path, _stop: &Stop) -> Result<Outcome, String> {
         self.done.fetch_add(1, Ordering::Relaxed);
         std::fs::create_dir_all(scratch).map_err(|e| e.to_string())?;
         match number {
@@ -62,7 +63,7 @@ fn source() -> Source {
 }
 
 fn options(out: &Path, shard: Option<Shard>, threads: usize) -> Options {
-    Options { out: out.to_path_buf(), shard, merge: vec![], threads }
+    Options { out: out.to_path_buf(), shard, merge: vec![], threads, stop: Stop::default() }
 }
 
 /// Every file of the results, without the journals.

@@ -125,13 +125,13 @@ pub fn on_record(
 ///
 /// # Errors
 /// [`CommandError::BadInput`] names them, unless it is `allowed` or there are none.
-pub fn check_allowed(domain: &Domain, place: &str, allowed: bool) -> Result<(), CommandError> {
-    let programs = domain.programs();
-    if allowed || programs.is_empty() {
+pub fn check_allowed(domain: &Domain, robot: &str, place: &str, allowed: bool) -> Result<(), CommandError> {
+    let one = |(name, command): &(&str, &[String])| format!("\n    {name}: {}", command.join(" "));
+    let body = robot.strip_prefix("program:").map(|command| format!("\n    the body: {command}"));
+    let all: String = body.into_iter().chain(domain.programs().iter().map(one)).collect();
+    if allowed || all.is_empty() {
         return Ok(());
     }
-    let one = |(name, command): &(&str, &[String])| format!("\n    {name}: {}", command.join(" "));
-    let all: String = programs.iter().map(one).collect();
     let text = format!(
         "{place}: its record names programs that would be run here:{all}\n  allow that with --allow-programs, if you trust them"
     );

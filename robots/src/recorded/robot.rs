@@ -195,6 +195,10 @@ impl Robot for RecordedRobot {
         &self.description
     }
 
+    fn begins_again(&self) -> bool {
+        true
+    }
+
     fn now_ns(&self) -> Stamp {
         self.lock().now_ns
     }

@@ -135,6 +135,35 @@ pub struct Exposure {
     pub pose_sigma_rad: f64,
 }
 
+impl Answer {
+    /// The same on a clock that is so much ahead.
+    pub(super) fn later(mut self, by_ns: Stamp) -> Self {
+        match &mut self {
+            Answer::Pose(pose) => pose.stamp_ns += by_ns,
+            Answer::Sensed(exposure) => {
+                exposure.stamp_ns += by_ns;
+                exposure.transforms.iter_mut().for_each(|t| t.stamp_ns += by_ns);
+            }
+            Answer::Scanned(scanned) => {
+                scanned.stamp_ns += by_ns;
+                scanned.transforms.iter_mut().for_each(|t| t.stamp_ns += by_ns);
+            }
+            Answer::Failed(Failure::SensorDropped { stamp_ns, .. }) => *stamp_ns += by_ns,
+            _ => {}
+        }
+        self
+    }
+
+    /// Where the base is, if it says.
+    pub(super) fn place(&self) -> Option<&Isometry3<f64>> {
+        match self {
+            Answer::Pose(pose) => Some(&pose.map_from_base),
+            Answer::Driven(driven) => Some(&driven.map_from_base),
+            _ => None,
+        }
+    }
+}
+
 impl Exposure {
     /// All of a frame but its pixels.
     pub fn of(sensed: &Sensed) -> Self {

@@ -18,7 +18,7 @@ use std::time::Duration;
 /// |---|---|---|
 /// | begins | none | there |
 /// | is played again | all | none |
-/// | goes on | those before it was cut off | there, and does again what the tape says that it did |
+/// | goes on | those before it was cut off | there: it does again what the tape says that it did if it [begins again](Robot::begins_again), else it is asked where it is |
 pub struct TapedRobot {
     known: Known,
     live: Option<Arc<dyn Robot>>,
@@ -28,6 +28,10 @@ pub struct TapedRobot {
     state: Mutex<State>,
 }
 
+/// A body that stands so near to where it was left has not moved, beyond what localisation errs.
+const SAME_PLACE_M: f64 = 0.05;
+const SAME_PLACE_RAD: f64 = 0.05;
+
 struct State {
     now_ns: Stamp,
     played: VecDeque<Entry>,
@@ -36,6 +40,12 @@ struct State {
     /// Questions with news since the last answer.
     pending: Vec<(Question, Reply)>,
     ended: Option<String>,
+    /// Where the base was last, as it said.
+    at: Option<Isometry3<f64>>,
+    /// Whether the live body was asked where it is, since the tape ended.
+    met: bool,
+    /// How much the run's clock is ahead of the live body's.
+    ahead_ns: Stamp,
 }
 
 impl TapedRobot {
@@ -44,7 +54,9 @@ impl TapedRobot {
         Self::go_on(live, tape, Vec::new())
     }
 
-    /// A body that goes on where the tape ends. `live` stands where it stood when the tape began.
+    /// A body that goes on where the tape ends. `live` stands where it stood when the tape began, or where it is by now. In that case its clock
+    /// is taken to go on where the tape ends, and if it stands elsewhere than where the tape leaves it, the first request fails with
+    /// [`Failure::Lost`].
     pub fn go_on(live: Arc<dyn Robot>, tape: Arc<dyn Tape>, entries: Vec<Entry>) -> Self {
         Self::new(Known::of(&*live), Some(live), tape, entries)
     }
@@ -61,7 +73,11 @@ impl TapedRobot {
             replies: BTreeMap::new(),
             pending: Vec::new(),
             ended: None,
+            at: None,
+            met: live.as_ref().is_none_or(|live| live.begins_again()),
+            ahead_ns: 0,
         };
+        state.met |= state.played.is_empty();
         state.hear_replies();
         TapedRobot { known, live, tape, speed: None, state: Mutex::new(state) }
     }
@@ -154,7 +170,11 @@ impl TapedRobot {
         self.wait_until(entry.now_ns).await;
         self.lock().now_ns = entry.now_ns;
         match entry.done {
-            Some((_, answer)) => Ok((answer, sensed)),
+            Some((_, answer)) => {
+                let mut state = self.lock();
+                state.at = answer.place().copied().or(state.at);
+                Ok((answer, sensed))
+            }
             None => Err(Failure::Broken { because: "an answer without its request".into() }),
         }
     }
@@ -167,18 +187,49 @@ impl TapedRobot {
         let Some(live) = &self.live else {
             return Err(Failure::Broken { because: "there is no live body".into() });
         };
-        let (answer, sensed) = perform(&**live, &request, watch).await;
+        if let Some(lost) = self.meet(&**live).await?
+            && request != Request::Pose
+        {
+            let replies = std::mem::take(&mut self.lock().pending);
+            let now_ns = self.lock().now_ns;
+            return Ok((Entry { replies, done: Some((request, Answer::Failed(lost))), now_ns }, None));
+        }
+        let (answer, mut sensed) = perform(&**live, &request, watch).await;
         // Where somebody stopped the run, it goes on as if that had not been asked.
         if let Answer::Failed(failure @ Failure::Cancelled { .. }) = answer {
             return Err(failure);
         }
         let replies = std::mem::take(&mut self.lock().pending);
-        Ok((Entry { replies, done: Some((request, answer)), now_ns: live.now_ns() }, sensed))
+        let ahead_ns = self.lock().ahead_ns;
+        if let Some(sensed) = &mut sensed {
+            sensed.stamp_ns += ahead_ns;
+            sensed.transforms.iter_mut().for_each(|t| t.stamp_ns += ahead_ns);
+        }
+        let done = Some((request, answer.later(ahead_ns)));
+        Ok((Entry { replies, done, now_ns: live.now_ns() + ahead_ns }, sensed))
     }
 
-    /// The live body does again what the tape says that it did.
+    /// Asks a body that is where it is, once, where that is. Returns what is wrong if the tape leaves it elsewhere.
+    async fn meet(&self, live: &dyn Robot) -> Result<Option<Failure>, Failure> {
+        if std::mem::replace(&mut self.lock().met, true) {
+            return Ok(None);
+        }
+        let here = live.pose().await?;
+        let mut state = self.lock();
+        state.ahead_ns = (state.now_ns - live.now_ns()).max(0);
+        let Some(left) = state.at else { return Ok(None) };
+        let apart_m = (here.map_from_base.translation.vector - left.translation.vector).norm();
+        let apart_rad = here.map_from_base.rotation.angle_to(&left.rotation);
+        let same =
+            apart_m < SAME_PLACE_M + 3.0 * here.sigma_m && apart_rad < SAME_PLACE_RAD + 3.0 * here.sigma_rad;
+        let because =
+            || format!("it stands {apart_m:.2} m and {apart_rad:.2} rad from where the record leaves it");
+        Ok((!same).then(|| Failure::Lost { because: because() }))
+    }
+
+    /// A body that begins again does again what the tape says that it did.
     async fn follow(&self, request: &Request, entry: Entry, watch: &Watch<'_>) -> Result<Entry, Failure> {
-        let Some(live) = &self.live else { return Ok(entry) };
+        let Some(live) = self.live.as_ref().filter(|live| live.begins_again()) else { return Ok(entry) };
         perform(&**live, request, watch).await;
         if live.now_ns() == entry.now_ns {
             return Ok(entry);

@@ -398,6 +398,10 @@ impl Robot for SimRobot {
         &self.description
     }
 
+    fn begins_again(&self) -> bool {
+        true
+    }
+
     fn now_ns(&self) -> Stamp {
         self.lock().now_ns
     }

@@ -1,5 +1,6 @@
 //! Runs in which things go wrong on purpose: whether the verdict is right all the same, and that every run ends.
 
+use crate::stop::Stop;
 use std::path::Path;
 
 use descry_domains::goal::{self, Goal};
@@ -155,7 +156,7 @@ impl Kind for Faults {
         settings.map(|(case, run)| Job::new([("case", json!(case.name)), ("run", json!(run))])).collect()
     }
 
-    fn run(&self, number: usize, scratch: &Path) -> Result<Outcome, String> {
+    fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String> {
         let (case, run) = self.setting(number);
         let (n, share) = (run as f64, self.text.absent_share);
         let trial = Trial {
@@ -170,7 +171,7 @@ impl Kind for Faults {
             first_look_here: false,
             tolerance_m: self.text.position_tolerance_m,
         };
-        trial::carry_out(&trial, scratch)
+        trial::carry_out(&trial, scratch, stop)
     }
 
     fn summarise(&self, finished: &[Finished]) -> Summary {

@@ -5,6 +5,7 @@
 //! the first k views in one cloud. A percept that is called the kind counts as right if it stands where a thing of the kind
 //! stands in truth, each thing once. Recall is over all things of the kind, hidden or not.
 
+use crate::stop::Stop;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -164,7 +165,7 @@ impl Kind for Figure4 {
         self.jobs.iter().map(|(set, seed)| Job::new([("set", json!(set)), ("seed", json!(seed))])).collect()
     }
 
-    fn run(&self, number: usize, _scratch: &Path) -> Result<Outcome, String> {
+    fn run(&self, number: usize, _scratch: &Path, _stop: &Stop) -> Result<Outcome, String> {
         let (_, seed) = &self.jobs[number];
         let started = std::time::Instant::now();
         let taken = views::take(&self.spec, *seed, self.text.poses, self.text.distance_m)?;

@@ -6,6 +6,7 @@ mod tasks;
 mod trial;
 mod where_to_look;
 
+use crate::stop::Stop;
 use std::path::Path;
 
 use descry_robots::input::{self, Objection, Step};
@@ -30,7 +31,7 @@ pub trait Kind: Sync {
     ///
     /// # Errors
     /// A text for people; it becomes a row.
-    fn run(&self, number: usize, scratch: &Path) -> Result<Outcome, String>;
+    fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String>;
 
     /// What the finished jobs, in the order of [`Kind::jobs`], say.
     fn summarise(&self, finished: &[Finished]) -> Summary;

@@ -1,6 +1,7 @@
 //! Tasks in a place with several surfaces: whatever may be said to a domain, by several policies, with and without mishaps. What
 //! is answered and done is held against how everything stands in the end.
 
+use crate::stop::Stop;
 use std::path::Path;
 
 use descry_domains::abilities::searching::policies;
@@ -221,7 +222,7 @@ impl Kind for Tasks {
         (0..runs * goals.len() * cases.len() * policies.len()).map(job).collect()
     }
 
-    fn run(&self, number: usize, scratch: &Path) -> Result<Outcome, String> {
+    fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String> {
         let Setting { goal, case, policy, run } = self.setting(number);
         let said = &self.text.goals[goal];
         let (n, share) = (run as f64, said.absent_share);
@@ -238,7 +239,7 @@ impl Kind for Tasks {
             first_look_here: false,
             tolerance_m: self.text.position_tolerance_m,
         };
-        let lived = trial::live(&trial, scratch)?;
+        let lived = trial::live(&trial, scratch, stop)?;
         let row = score::row(said, trial.tolerance_m, present, &lived);
         Ok(Outcome { rows: vec![row], clock: lived.clock })
     }

@@ -1,6 +1,7 @@
 //! Experiment files as people write them, and each kind on a small scale.
 
 use super::*;
+use crate::stop::Stop;
 
 /// A file of the tabletop by its name alone, of another domain with the domain before it.
 fn shipped(name: &str) -> String {
@@ -89,8 +90,9 @@ fn every_fourth_scene_of_each_level_is_without_the_target() {
 fn one_job(text: String, number: usize) -> Row {
     let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
     let kind = read(&source(text)).unwrap_or_else(|e| panic!("{e}"));
-    let once = kind.run(number, &folder.path().join("a")).unwrap_or_else(|e| panic!("{e}"));
-    let again = kind.run(number, &folder.path().join("b")).unwrap_or_else(|e| panic!("{e}"));
+    let once = kind.run(number, &folder.path().join("a"), &Stop::default()).unwrap_or_else(|e| panic!("{e}"));
+    let again =
+        kind.run(number, &folder.path().join("b"), &Stop::default()).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(once.rows, again.rows, "a job gives the same again");
     once.rows.into_iter().last().unwrap_or_default()
 }
@@ -146,7 +148,7 @@ fn a_policy_gets_through_a_shut_door_and_the_planner_does_the_rest() {
     let text = text.split("[[goal]]").next().unwrap_or_default().to_string() + bring;
     let kind = read(&source(text)).unwrap_or_else(|e| panic!("{e}"));
     let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
-    let once = kind.run(1, folder.path()).unwrap_or_else(|e| panic!("{e}"));
+    let once = kind.run(1, folder.path(), &Stop::default()).unwrap_or_else(|e| panic!("{e}"));
     let row = &once.rows[0];
     assert_eq!(
         (&row["right"], &row["open-door done"], &row["pick-up done"]),

@@ -1,5 +1,6 @@
 //! One run of the agent in a simulated scene, held against the truth.
 
+use crate::stop::Stop;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -49,8 +50,8 @@ pub(super) struct Trial<'a> {
 }
 
 /// Carries a run out and holds it against how its target stands in the end. Its record is kept in `scratch`.
-pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path) -> Result<Outcome, String> {
-    let Lived { report, truth, share, clock, .. } = live(trial, scratch)?;
+pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Outcome, String> {
+    let Lived { report, truth, share, clock, .. } = live(trial, scratch, stop)?;
     let mut row = measured(trial, &report);
     row.insert("visible_from_start".into(), json!(share.map(|s| (s * 1e4).round() / 1e4)));
     row.insert("mishaps".into(), json!(truth.events.len()));
@@ -72,7 +73,7 @@ pub(super) struct Lived {
 }
 
 /// Lets the agent live through a run.
-pub(super) fn live(trial: &Trial<'_>, scratch: &Path) -> Result<Lived, String> {
+pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Lived, String> {
     let started = std::time::Instant::now();
     let without = trial.targets.iter().fold(trial.spec.clone(), |spec, target| spec.without(target));
     // What hides an absent thing stands as it would if it were there.
@@ -101,12 +102,13 @@ pub(super) fn live(trial: &Trial<'_>, scratch: &Path) -> Result<Lived, String> {
         remember: None,
     };
     let mut carried = BTreeMap::new();
-    let report = run::pursue(trial.domain, trial.goal, &body, &folder, &settings, chooser, &mut |event| {
+    let mut count = |event: &Event| {
         if let Event::Acted { call, .. } = event {
             let action = call.trim_start_matches('(').split([' ', ')']).next().unwrap_or_default();
             *carried.entry(action.to_string()).or_default() += 1;
         }
-    });
+    };
+    let report = run::pursue(trial.domain, trial.goal, &body, &folder, &settings, chooser, stop, &mut count);
     let report = report.map_err(|e| e.to_string())?;
     let run_s = started.elapsed().as_secs_f64() - arranged_s;
     let mut clock = Row::new();

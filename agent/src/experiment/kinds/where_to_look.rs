@@ -1,6 +1,7 @@
 //! Policies against each other: how many looks, metres and seconds each takes to the right verdict on a target that is more
 //! or less hidden, or not there at all, with more or fewer poses to look from.
 
+use crate::stop::Stop;
 use std::path::Path;
 
 use descry_domains::goal::{self, Goal};
@@ -231,7 +232,7 @@ impl Kind for WhereToLook {
         self.jobs.iter().map(job).collect()
     }
 
-    fn run(&self, number: usize, scratch: &Path) -> Result<Outcome, String> {
+    fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String> {
         let setting = &self.jobs[number];
         let mut domain = self.domain.clone();
         domain.config.candidates.poses = setting.poses;
@@ -247,7 +248,7 @@ impl Kind for WhereToLook {
             first_look_here: self.text.first_look_from_start,
             tolerance_m: self.text.position_tolerance_m,
         };
-        trial::carry_out(&trial, scratch)
+        trial::carry_out(&trial, scratch, stop)
     }
 
     fn summarise(&self, finished: &[Finished]) -> Summary {

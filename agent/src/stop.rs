@@ -1,0 +1,39 @@
+//! Being told to stop. Whoever listens for it (a signal handler, a button) asks once; everything that runs sees it soon.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use descry_robots::CancellationToken;
+
+/// Whether somebody wants a run to stop, and by which signal. Clones are of one and the same.
+#[derive(Debug, Clone, Default)]
+pub struct Stop {
+    token: CancellationToken,
+    signal: Arc<AtomicU8>,
+}
+
+impl Stop {
+    /// Asks to stop, by a signal's number.
+    pub fn ask(&self, signal: u8) {
+        self.signal.store(signal, Ordering::Relaxed);
+        self.token.cancel();
+    }
+
+    /// Whether it was asked for.
+    pub fn is_asked(&self) -> bool {
+        self.token.is_cancelled()
+    }
+
+    /// The signal by which it was asked for; 2, that of Ctrl-C, before.
+    pub fn signal(&self) -> u8 {
+        match self.signal.load(Ordering::Relaxed) {
+            0 => 2,
+            signal => signal,
+        }
+    }
+
+    /// What skills and bodies wait on.
+    pub fn token(&self) -> &CancellationToken {
+        &self.token
+    }
+}

@@ -1,0 +1,164 @@
+//! Signals: the body is stopped first and asked nothing more, the record stays whole, and the run goes on where it was.
+
+mod binary;
+
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use binary::{check, outcome, start};
+use tempfile::TempDir;
+
+/// A body that writes down what it is asked, in time that a test can follow: drives to the table of the template's room.
+const BODY: &str = r#"
+import os, sys, time
+sys.path.insert(0, "PYTHON")
+import descry_robot as descry, template
+
+heard = open("heard", "a", buffering=1)
+plain = descry.Request.feedback
+
+def feedback(request, *done):
+    time.sleep(0.01)
+    plain(request, *done)
+
+descry.Request.feedback = feedback
+
+def told(name):
+    def asked(robot, request, **given):
+        heard.write(f"{name}\n")
+        done = getattr(template.Template, name)(robot, request, **given)
+        heard.write(f"{name} done {given}\n")
+        return done
+    return asked
+
+kinds = {name: told(name) for name in ("drive_to", "look_at", "sense")}
+body = type("Body", (template.Template,), {**kinds, "stop": lambda robot: heard.write("stop\n")})()
+if os.path.exists("stands"):
+    body.at = tuple(float(number) for number in open("stands").read().split())
+drive = body.drive_to
+def driven(request, **given):
+    try:
+        return drive(request, **given)
+    finally:
+        open("stands", "w").write(" ".join(map(str, body.at)))
+body.drive_to = driven
+descry.serve(body)
+"#;
+
+fn has_python() -> bool {
+    Command::new("python3").arg("--version").output().is_ok()
+}
+
+fn signal(name: &str, process: u32) {
+    let sent = Command::new("sh").args(["-c", &format!("kill -{name} {process}")]).status();
+    assert!(sent.is_ok_and(|status| status.success()), "{name} could not be sent");
+}
+
+fn heard(folder: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(folder.join("heard")).unwrap_or_default();
+    text.lines().map(str::to_string).collect()
+}
+
+/// Waits until the body has heard something so often.
+fn wait_for(folder: &Path, word: &str, times: usize) {
+    let began = Instant::now();
+    while heard(folder).iter().filter(|line| *line == word).count() < times {
+        assert!(
+            began.elapsed() < Duration::from_secs(60),
+            "{word} was not heard {times} times: {:?}",
+            heard(folder)
+        );
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Sends a signal when the body has been asked for something so often. Expects an exit code, `stop` as the last that the body heard, a whole
+/// record, and that the run goes on to its end without doing again what was done.
+fn check_stopped(name: &str, exit: i32, word: &str, times: usize) {
+    let folder = TempDir::new().expect("a folder can be made");
+    let folder = folder.path();
+    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/python");
+    let body = BODY.replace("PYTHON", &python.display().to_string());
+    std::fs::write(folder.join("body.py"), body).expect("the folder is writable");
+    let goal = ["find", "cup A", "--robot", "program:python3 body.py", "--run", "run"];
+    let child = start(folder, &goal);
+    wait_for(folder, word, times);
+    signal(name, child.id());
+    let ended = child.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&ended.stderr);
+    let context = format!("{name} at {word} {times}: {:?}\n{said}", heard(folder));
+    assert_eq!(ended.status.code(), Some(exit), "{context}");
+    assert!(said.contains("do --resume run"), "{context}");
+    wait_for(folder, "stop", 1);
+    assert_eq!(heard(folder).last().map(String::as_str), Some("stop"), "{context}");
+    assert_eq!(check(folder, &["memory", "verify", "run", "--json"], 0)["whole"], true, "{context}");
+    let refused = outcome(folder, &["do", "--resume", "run"]);
+    assert_eq!(refused.status.code(), Some(2), "a record runs no program unless it is allowed");
+    let report = check(folder, &["do", "--resume", "run", "--allow-programs", "--json"], 1);
+    assert_ne!(report["verdict"], "failed", "{context}\n{report}");
+    let mut done: Vec<String> =
+        heard(folder).into_iter().filter(|l| l.starts_with("drive_to done")).collect();
+    let all = done.len();
+    done.sort();
+    done.dedup();
+    assert_eq!(done.len(), all, "no drive that ended is asked for again: {:?}", heard(folder));
+    let again = check(folder, &["replay", "run", "--json"], 0);
+    assert_eq!(again["same"], true, "{context}\n{again}");
+}
+
+#[test]
+fn a_signal_stops_the_body_first_and_the_run_goes_on() {
+    if !has_python() {
+        eprintln!("SKIPPED: there is no python3");
+        return;
+    }
+    for (name, exit, word, times) in [
+        ("INT", 130, "drive_to", 1),
+        ("TERM", 143, "drive_to", 2),
+        ("HUP", 129, "sense", 1),
+        ("TERM", 143, "look_at", 2),
+    ] {
+        check_stopped(name, exit, word, times);
+    }
+}
+
+const BATCH: &str = r#"
+name = "batch"
+kind = "tasks"
+about = "A few runs"
+domain = "tabletop"
+scene = "default"
+runs = 12
+first_seed = 1
+policies = ["plan"]
+
+[[goal]]
+say = "find cup A"
+targets = ["cup A"]
+truly = "found"
+"#;
+
+#[test]
+fn a_batch_that_is_stopped_goes_on_with_the_same_command() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let folder = folder.path();
+    std::fs::write(folder.join("batch.toml"), BATCH).expect("the folder is writable");
+    let batch = ["experiment", "batch.toml", "--out", "out", "--jobs", "2"];
+    let mut child = start(folder, &batch);
+    let lines = || std::fs::read_to_string(folder.join("out/jobs.jsonl")).unwrap_or_default();
+    let began = Instant::now();
+    while lines().lines().count() < 3 {
+        assert!(began.elapsed() < Duration::from_secs(120), "no job ended");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    signal("INT", child.id());
+    assert_eq!(child.wait().expect("it ends").code(), Some(130));
+    let done = lines();
+    assert!(
+        !done.contains("\"error\"") && done.lines().count() < 13,
+        "what was under way is not done: {done}"
+    );
+    assert_eq!(outcome(folder, &batch).status.code(), Some(0));
+    assert!(lines().starts_with(&done) && lines().lines().count() == 13, "{}", lines());
+}

@@ -161,6 +161,21 @@ fn only_memory_writes_what_was_seen() {
 }
 
 #[test]
+fn signals_are_heard_in_main_alone() {
+    for folder in [
+        "planner/src",
+        "perception/src",
+        "memory/src",
+        "robots/src",
+        "skills/src",
+        "domains/src",
+        "agent/src",
+    ] {
+        check_absent(folder, &["tokio::signal", "ctrl_c", "SignalKind"], &["agent/src/main.rs"]);
+    }
+}
+
+#[test]
 fn versions_are_written_once() {
     for package in ["planner", "perception", "memory", "robots", "skills", "domains", "agent", "tests"] {
         let text =

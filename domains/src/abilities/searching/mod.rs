@@ -10,6 +10,7 @@ pub mod obstacle;
 pub mod perceive;
 pub mod policies;
 pub mod reasons;
+mod vanished;
 
 use descry_skills::{Observe, Outcome, PushAside, SkillFailure};
 

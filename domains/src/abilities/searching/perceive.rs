@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use descry_memory::belief::{Belief, Sighted, Track};
+use descry_memory::belief::{Sighted, Track};
 use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
 use descry_perception::View;
 use descry_perception::hull::Hull;
@@ -20,6 +20,7 @@ use serde_json::json;
 
 use super::change::Change;
 use super::discover;
+use super::vanished::{keep_unrefuted, set_aside_unseen, taken_away};
 use crate::lexicon::symbol;
 use crate::mind::{Look, Mind};
 use crate::note::Note;
@@ -27,9 +28,7 @@ use crate::situation::{KnownSurface, Situation};
 use crate::world::WorldError;
 
 /// A side counts as seen if a surface was measured this near to where it should be.
-const SIDE_TOLERANCE_M: f64 = 0.03;
-/// What is sought and was at least so probable is missed when it is gone.
-const PERHAPS: f64 = 0.2;
+pub(super) const SIDE_TOLERANCE_M: f64 = 0.03;
 /// How far from the height at which the map has a surface points are merged that may be of it.
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
 /// How far a level surface may be from there to be that one: farther, it is another, or the body is not where it believes to be.
@@ -41,7 +40,7 @@ const BESIDE_M: f64 = 0.25;
 /// What is remembered of an object that was seen again nearer than this is that one, metres.
 const SAME_M: f64 = 0.10;
 /// Points this near to a surface lie on it.
-const ON_SURFACE_M: f64 = 0.012;
+pub(super) const ON_SURFACE_M: f64 = 0.012;
 /// What lies so near to a wall of the map, or beyond it, is the wall, metres.
 const WALL_M: f64 = 0.015;
 /// How far beyond the hull of a surface points of it are looked for.
@@ -154,7 +153,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     }
     note_surface(&mut mind.known.surfaces[on], &scene);
     let gone_before = mind.known.belief.gone.len();
-    notes.push(believe(mind, eyes, on, &merged, &percepts)?);
+    notes.push(believe(mind, eyes, on, (&merged, newest.as_ref()), &percepts)?);
     for new in discover::adopt(mind, on, others, &merged, notes) {
         perceive(mind, eyes, new, notes)?;
     }
@@ -173,23 +172,6 @@ fn seeking_at(seeking: SceneOptions, surface: &KnownSurface) -> SceneOptions {
     let region = surface.whole.then(|| Region { corners: surface.outline.clone(), margin_m: BESIDE_M });
     let tilt_rad = if surface.whole { LEVEL_RAD } else { seeking.surface.tilt_rad };
     SceneOptions { surface: SurfaceOptions { region, tilt_rad, ..seeking.surface.clone() }, ..seeking }
-}
-
-/// What was sought and believed to stand where the newest view looks through: somebody has moved it. In words; none if nothing.
-fn taken_away(mind: &Mind, on: usize, gone_before: usize, newest: &DepthMap) -> Option<String> {
-    let known = &mind.known;
-    let up = known.surfaces[on].up;
-    mind.known.belief.gone[gone_before..].iter().find_map(|track| {
-        let (p, name) = known
-            .things
-            .iter()
-            .chain(&known.kinds)
-            .map(|thing| (track.probability_of(&thing.name), &thing.name))
-            .max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let [x, y, z] = track.position_m.into();
-        (p > PERHAPS && looked_through(track, &up, newest))
-            .then(|| format!("{name} ({p:.2}) stood at ({x:.2}, {y:.2}, {z:.2}) m and is gone"))
-    })
 }
 
 /// Things on a surface were moved while nobody looked: only its newest view still holds, and looks at it may be taken again.
@@ -302,7 +284,7 @@ fn believe(
     mind: &mut Mind,
     eyes: Eyes<'_>,
     on: usize,
-    merged: &Merged,
+    (merged, newest): (&Merged, Option<&DepthMap>),
     percepts: &[Percept],
 ) -> Result<Note, WorldError> {
     let before = confidences(mind);
@@ -318,7 +300,11 @@ fn believe(
     let cites: Vec<RecordId> = mind.regions[on].looks.iter().map(|look| look.record).collect();
     let belief = Arc::make_mut(&mut mind.known.belief);
     let unseen = set_aside_unseen(belief, &surface, &merged.visibility);
+    let gone_before = belief.gone.len();
     belief.update(&surface.symbol, &sighted, stamp_ns, &cites);
+    let asked: Vec<&str> =
+        mind.known.things.iter().chain(&mind.known.kinds).map(|t| t.name.as_str()).collect();
+    keep_unrefuted(belief, gone_before, &surface, newest, &asked);
     let is_one = |old: &Track| {
         let reach_m = SAME_M.max(old.size_m[0].max(old.size_m[1]) / 2.0);
         belief.tracks.iter().any(|t| t.on == old.on && (t.position_m - old.position_m).norm() < reach_m)
@@ -350,20 +336,6 @@ fn believe(
     let held: Vec<RecordId> = views(mind).into_iter().chain([percepts, belief]).collect();
     eyes.record.hold(&held, "belief")?;
     Ok(note)
-}
-
-/// Takes out of a belief what is remembered of earlier runs on a surface and stands where no view has looked yet: of that the views
-/// say nothing.
-fn set_aside_unseen(belief: &mut Belief, surface: &KnownSurface, visibility: &Visibility) -> Vec<Track> {
-    let is_unseen = |t: &Track| {
-        let middle = t.position_m + surface.up * (t.size_m[2] / 2.0);
-        t.on == surface.symbol
-            && t.cites.is_empty()
-            && matches!(visibility.look(&middle, SIDE_TOLERANCE_M), Seen::Never | Seen::Hidden)
-    };
-    let (unseen, rest) = std::mem::take(&mut belief.tracks).into_iter().partition(is_unseen);
-    belief.tracks = rest;
-    unseen
 }
 
 /// Records a document.
@@ -402,15 +374,6 @@ pub fn in_a_line(p: &Percept) -> String {
 fn newest(views: &[View], merged: &Merged) -> Option<DepthMap> {
     let (fit, view) = merged.fits.last().filter(|fit| fit.used).zip(views.last())?;
     DepthMap::from_view(view, &fit.world_from_camera)
-}
-
-/// Whether a camera saw through the middle of an object's place, low and high.
-fn looked_through(track: &Track, up: &Vector3<f64>, map: &DepthMap) -> bool {
-    let free = |share: f64| {
-        let place = track.position_m + up * (track.size_m[2] * share);
-        map.look(&place, SIDE_TOLERANCE_M) == Seen::Free
-    };
-    [0.3, 0.5, 0.7].into_iter().all(free)
 }
 
 /// How a body's views of a surface (a symbol; none: of any) are merged and looked through. It is looked for where the map has it,

@@ -9,7 +9,7 @@ use descry_domains::actions::Carried;
 use descry_domains::answer::{Conclusion, Ended};
 use descry_domains::note::Note;
 use descry_domains::world::{Choice, Job, Round, Setting, World, WorldError};
-use descry_memory::{Draft, Meta, Record, RecordId};
+use descry_memory::{Draft, LogLevel, Meta, Record, RecordId, viewer};
 use descry_planner::{Outcome as Planned, Plan, Statistics, Step, Task};
 use descry_robots::Robot;
 use descry_skills::{Call, Context, SkillFailure};
@@ -388,7 +388,9 @@ impl<'a> Agent<'a> {
         (self.tell)(event);
         let body = serde_json::to_value(event).map_err(|e| CommandError::Bug(e.to_string()))?;
         let meta = Meta { body, ..Meta::default() };
-        let draft = Draft { meta, ..Draft::new("event", self.robot.now_ns()) };
+        let stamp_ns = self.robot.now_ns();
+        let blobs = vec![viewer::log(stamp_ns, LogLevel::Info, "descry", &event.to_string())];
+        let draft = Draft { meta, blobs, ..Draft::new("event", stamp_ns) };
         self.record.put(draft).map_err(CommandError::broken)
     }
 }

@@ -70,6 +70,12 @@ pub enum Form {
     FrameTransforms,
     /// One line of the log (`foxglove.Log`).
     Log,
+    /// Boxes with labels (`foxglove.SceneUpdate`).
+    SceneUpdate,
+    /// Cells of a map (`foxglove.Grid`).
+    Grid,
+    /// How a camera projects (`foxglove.CameraCalibration`).
+    CameraCalibration,
     /// Bytes without a form that viewers know (`descry.Blob`).
     Bytes,
 }

@@ -4,7 +4,7 @@
 //! them follows from the document alone and the bytes themselves lie in the file as one piece.
 
 mod descriptor;
-mod wire;
+pub(crate) mod wire;
 
 use crate::document::{BlobInfo, Document, Form};
 use crate::transforms::Sample;
@@ -39,6 +39,9 @@ pub(crate) fn schema(form: Form) -> Schema {
         Form::RawImage => "foxglove.RawImage",
         Form::FrameTransforms => "foxglove.FrameTransforms",
         Form::Log => "foxglove.Log",
+        Form::SceneUpdate => "foxglove.SceneUpdate",
+        Form::Grid => "foxglove.Grid",
+        Form::CameraCalibration => "foxglove.CameraCalibration",
         Form::Bytes => "descry.Blob",
     };
     Schema { name, encoding: PROTOBUF, data: descriptor::set(name) }
@@ -53,6 +56,9 @@ pub(crate) fn topic(document: &Document, blob: &BlobInfo) -> String {
         Form::CompressedImage | Form::RawImage => "image",
         Form::FrameTransforms => return "/tf".into(),
         Form::Log => return "/log".into(),
+        Form::SceneUpdate => return format!("/{}", blob.name),
+        Form::Grid => "grid",
+        Form::CameraCalibration => "calibration",
         Form::Bytes => return format!("/blob/{}/{}", document.kind, blob.name),
     };
     let own = if blob.name == stem { String::new() } else { format!("/{}", blob.name) };
@@ -119,7 +125,7 @@ pub(crate) fn prefix(document: &Document, blob: &BlobInfo) -> Vec<u8> {
             out.text(2, &blob.name);
             out.bytes_header(3, blob.bytes);
         }
-        Form::FrameTransforms | Form::Log => (),
+        Form::FrameTransforms | Form::Log | Form::SceneUpdate | Form::Grid | Form::CameraCalibration => (),
     }
     out.0
 }

@@ -14,6 +14,7 @@ mod scans;
 pub mod space;
 pub mod stores;
 pub mod transforms;
+pub mod viewer;
 
 pub use clouds::Sensing;
 pub use descry_perception as perception;

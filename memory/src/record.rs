@@ -6,12 +6,13 @@ use crate::clouds::{self, Sensing};
 use crate::document::{Blob, Document, Draft, Form, Meta, Query, RecordId};
 use crate::error::Error;
 use crate::flusher::{Flusher, Group};
-use crate::foxglove::{self, LogLevel};
+use crate::foxglove::LogLevel;
 use crate::retrace::Retrace;
 use crate::scans;
 use crate::stores::local::{Durability, LocalOptions, LocalStore, Recovery};
 use crate::stores::{Fault, Report, Retention, Stats, Store};
 use crate::transforms::{self, Reach, Sample};
+use crate::viewer;
 use descry_perception::Cloud;
 use descry_perception::laser::Scan;
 use nalgebra::Isometry3;
@@ -214,7 +215,8 @@ impl Record {
         meta: Meta,
     ) -> Result<RecordId, Error> {
         cloud.check().map_err(|e| Error::Input { what: e.to_string(), mend: "mend the cloud".into() })?;
-        let blobs = vec![clouds::encode(cloud, sensing)];
+        let camera = sensing.intrinsics.as_ref().map(|camera| viewer::calibration(stamp_ns, frame, camera));
+        let blobs = std::iter::once(clouds::encode(cloud, sensing)).chain(camera).collect();
         self.put(Draft { frame: frame.into(), meta, blobs, ..Draft::new(kind::CLOUD, stamp_ns) })
     }
 
@@ -334,13 +336,11 @@ impl Record {
         name: &str,
         message: &str,
     ) -> Result<RecordId, Error> {
-        let data = foxglove::log(stamp_ns, level, name, message);
         let meta = Meta {
             body: json!({ "level": format!("{level:?}").to_lowercase(), "name": name, "message": message }),
             ..Meta::default()
         };
-        let blobs =
-            vec![Blob { name: "log".into(), form: Form::Log, layout: Value::Null, data: data.into() }];
+        let blobs = vec![viewer::log(stamp_ns, level, name, message)];
         self.put(Draft { meta, blobs, ..Draft::new(kind::LOG, stamp_ns) })
     }
 

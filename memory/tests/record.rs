@@ -2,6 +2,7 @@
 
 use descry_memory::perception::{Cloud, Grid, Intrinsics};
 use descry_memory::transforms::TransformError;
+use descry_memory::viewer::{self, Labelled};
 use descry_memory::{
     Blob, Draft, Error, Form, Image, LogLevel, Meta, Options, Query, Record, Retention, Sensing, kind,
 };
@@ -136,6 +137,21 @@ fn one_of_each(place: &Path) -> Record {
         .put_log(3 * S, LogLevel::Warning, "agent", "cup A is hidden: \u{201c}behind\u{201d} the box")
         .unwrap();
     record.put_document("plan", 4 * S, json!({ "steps": ["(move a b)", null, 0.1] }), vec![]).unwrap();
+    let cup = Labelled {
+        id: "7".into(),
+        text: "cup A 0.98".into(),
+        frame_from_box: Isometry3::translation(1.0, 2.0, 0.77),
+        size_m: Vector3::new(0.07, 0.08, 0.104),
+        colour: [0.2, 0.8, 0.3, 0.5],
+    };
+    let blobs = vec![
+        viewer::boxes(5 * S, "map", "objects", &[cup]),
+        viewer::grid(5 * S, "map", [-2.5, -1.0], 0.05, 3, &[0, 1, 0, 0, 0, 1]),
+    ];
+    record.put(Draft { blobs, frame: "map".into(), ..Draft::new("belief", 5 * S) }).unwrap();
+    let camera = Intrinsics { width: 640, height: 480, fx: 525.0, fy: 526.0, cx: 319.5, cy: 239.5 };
+    let sensing = Sensing { intrinsics: Some(camera), ..Sensing::default() };
+    record.put_cloud(5 * S, "left", &cloud(0.0), &sensing, Meta::default()).unwrap();
     for i in 0..200 {
         let points = (0..100).map(|k| Point3::new(k as f32, i as f32, 0.0)).collect();
         let coloured = Cloud { colours: Some(vec![[1, 2, 3]; 100]), ..Cloud::from_points(points) };
@@ -181,9 +197,12 @@ fn segments_are_mcap_to_another_reader() {
     let expected = [
         ("/cloud/camera", "foxglove.PointCloud"),
         ("/cloud/side", "foxglove.PointCloud"),
+        ("/calibration/left", "foxglove.CameraCalibration"),
         ("/document/plan", "descry.Document"),
+        ("/grid/map", "foxglove.Grid"),
         ("/image/eye", "foxglove.RawImage"),
         ("/log", "foxglove.Log"),
+        ("/objects", "foxglove.SceneUpdate"),
         ("/tf", "foxglove.FrameTransforms"),
     ];
     for (topic, schema) in expected {
@@ -314,8 +333,29 @@ for path in sorted(glob.glob(sys.argv[1] + "/segments/*.mcap")):
                 assert (decoded.width, decoded.height, decoded.step, decoded.encoding) == (3, 2, 6, "16UC1")
             elif schema.name == "foxglove.CompressedImage":
                 assert decoded.format == "png" and decoded.data[1:4] == b"PNG"
+            elif schema.name == "foxglove.SceneUpdate":
+                assert [d.type for d in decoded.deletions] == [1]
+                (cup,) = decoded.entities
+                assert (cup.frame_id, cup.texts[0].text, cup.cubes[0].size.y) == ("map", "cup A 0.98", 0.08)
+                assert cup.cubes[0].pose.position.z == 0.77 and cup.cubes[0].pose.orientation.w == 1 and cup.cubes[0].color.g == 0.8
+            elif schema.name == "foxglove.Grid":
+                assert (decoded.column_count, decoded.cell_size.x, decoded.row_stride, decoded.cell_stride) == (3, 0.05, 3, 1)
+                assert decoded.pose.position.x == -2.5 and bytes(decoded.data) == bytes([0, 1, 0, 0, 0, 1])
+            elif schema.name == "foxglove.CameraCalibration":
+                assert channel.topic == "/calibration/" + decoded.frame_id and len(decoded.P) == 12 and len(decoded.R) == 9
+                if decoded.frame_id == "left":
+                    assert (decoded.width, decoded.height) == (640, 480)
+                    assert list(decoded.K) == [525, 0, 319.5, 0, 526, 239.5, 0, 0, 1]
             else:
                 raise SystemExit("unexpected " + schema.name)
+            try:
+                # The viewers' own schemas read the same bytes as the same.
+                module = __import__("foxglove_schemas_protobuf." + schema.name.split(".")[1] + "_pb2", fromlist=["x"])
+                official = getattr(module, schema.name.split(".")[1])()
+                official.ParseFromString(message.data)
+                assert str(official) == str(decoded), schema.name
+            except ImportError:
+                pass
 print(documents, clouds["/cloud/side"])
 "#;
     let out = Command::new(&python).args(["-c", script]).arg(dir.path()).output().unwrap();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use descry_memory::{Blob, Draft, Error, Form, Query, Record, kind};
+use descry_memory::{Blob, Draft, Error, Form, Query, Record, kind, viewer};
 use descry_robots::image::RgbImage;
 use descry_robots::recorded::{Answer, Entry, Known, Pixels, Tape};
 use descry_robots::{Colour, OccupancyGrid, Stamp};
@@ -84,7 +84,13 @@ pub fn put_known(record: &Record, known: &Known) -> Result<(), CommandError> {
     let body = serde_json::to_value(Known { map: None, ..known.clone() }).map_err(text)?;
     let blob =
         |data: Vec<u8>| Blob { name: MAP.into(), form: Form::Bytes, layout: Value::Null, data: data.into() };
-    let blobs = map.map(blob).into_iter().collect();
+    let shown = known.map.as_ref().map(|map| {
+        let cells: Vec<u8> = map.occupied.iter().map(|&occupied| u8::from(occupied)).collect();
+        let origin_m = [map.origin_m.x, map.origin_m.y];
+        let frame = &known.description.frames.map;
+        viewer::grid(known.now_ns.max(0), frame, origin_m, map.resolution_m, map.width, &cells)
+    });
+    let blobs = map.map(blob).into_iter().chain(shown).collect();
     let mut draft = Draft { blobs, kept: true, ..Draft::new(BODY, known.now_ns.max(0)) };
     draft.meta.body = body;
     record.put(draft).map(|_| ()).map_err(CommandError::broken)

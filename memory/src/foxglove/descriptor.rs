@@ -3,7 +3,7 @@
 use super::wire::Wire;
 
 /// Messages and their fields, in the words of `.proto` files. A field of another message needs that message's file.
-const MESSAGES: [(&str, &str); 13] = [
+const MESSAGES: [(&str, &str); 22] = [
     ("google.protobuf.Timestamp", "int64 seconds = 1; int32 nanos = 2"),
     ("foxglove.Vector3", "double x = 1; double y = 2; double z = 3"),
     ("foxglove.Quaternion", "double x = 1; double y = 2; double z = 3; double w = 4"),
@@ -42,16 +42,50 @@ const MESSAGES: [(&str, &str); 13] = [
         "google.protobuf.Timestamp timestamp = 1; enum foxglove.LogLevel level = 2; string message = 3; string name = 4; \
          string file = 5; fixed32 line = 6",
     ),
+    ("foxglove.Vector2", "double x = 1; double y = 2"),
+    ("foxglove.Color", "double r = 1; double g = 2; double b = 3; double a = 4"),
+    ("foxglove.CubePrimitive", "foxglove.Pose pose = 1; foxglove.Vector3 size = 2; foxglove.Color color = 3"),
+    (
+        "foxglove.TextPrimitive",
+        "foxglove.Pose pose = 1; bool billboard = 2; double font_size = 3; bool scale_invariant = 4; foxglove.Color color = 5; \
+         string text = 6",
+    ),
+    (
+        "foxglove.SceneEntityDeletion",
+        "google.protobuf.Timestamp timestamp = 1; enum foxglove.SceneEntityDeletion.Type type = 2; string id = 3",
+    ),
+    // Of the primitives of an entity, those that are written.
+    (
+        "foxglove.SceneEntity",
+        "google.protobuf.Timestamp timestamp = 1; string frame_id = 2; string id = 3; bool frame_locked = 5; \
+         repeated foxglove.CubePrimitive cubes = 8; repeated foxglove.TextPrimitive texts = 13",
+    ),
+    (
+        "foxglove.SceneUpdate",
+        "repeated foxglove.SceneEntityDeletion deletions = 1; repeated foxglove.SceneEntity entities = 2",
+    ),
+    (
+        "foxglove.Grid",
+        "google.protobuf.Timestamp timestamp = 1; string frame_id = 2; foxglove.Pose pose = 3; fixed32 column_count = 4; \
+         foxglove.Vector2 cell_size = 5; fixed32 row_stride = 6; fixed32 cell_stride = 7; \
+         repeated foxglove.PackedElementField fields = 8; bytes data = 9",
+    ),
+    (
+        "foxglove.CameraCalibration",
+        "google.protobuf.Timestamp timestamp = 1; string frame_id = 9; fixed32 width = 2; fixed32 height = 3; \
+         string distortion_model = 4; repeated double D = 5; repeated double K = 6; repeated double R = 7; repeated double P = 8",
+    ),
     ("descry.Blob", "google.protobuf.Timestamp timestamp = 1; string name = 2; bytes data = 3"),
 ];
 
 const NUMERIC_TYPES: [&str; 9] =
     ["UNKNOWN", "UINT8", "INT8", "UINT16", "INT16", "UINT32", "INT32", "FLOAT32", "FLOAT64"];
+const DELETIONS: [&str; 2] = ["MATCHING_ID", "ALL"];
 const LOG_LEVELS: [&str; 6] = ["UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL"];
 
 /// Scalar types by their numbers in `descriptor.proto`.
-const SCALARS: [(&str, u64); 6] =
-    [("double", 1), ("int64", 3), ("int32", 5), ("fixed32", 7), ("string", 9), ("bytes", 12)];
+const SCALARS: [(&str, u64); 7] =
+    [("bool", 8), ("double", 1), ("int64", 3), ("int32", 5), ("fixed32", 7), ("string", 9), ("bytes", 12)];
 const MESSAGE: u64 = 11;
 const ENUM: u64 = 14;
 
@@ -132,6 +166,9 @@ fn write_file(file: &mut Wire, name: &str) {
         }
         if name == "foxglove.PackedElementField" {
             m.message(4, |e| write_enum(e, "NumericType", &NUMERIC_TYPES));
+        }
+        if name == "foxglove.SceneEntityDeletion" {
+            m.message(4, |e| write_enum(e, "Type", &DELETIONS));
         }
     });
     if name == "foxglove.Log" {

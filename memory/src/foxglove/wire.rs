@@ -2,7 +2,7 @@
 
 /// Writes protocol buffers.
 #[derive(Default)]
-pub(super) struct Wire(pub Vec<u8>);
+pub(crate) struct Wire(pub Vec<u8>);
 
 impl Wire {
     fn raw_varint(&mut self, mut value: u64) {
@@ -35,21 +35,30 @@ impl Wire {
         self.0.extend_from_slice(&value.to_le_bytes());
     }
 
+    /// Every one, zeros too.
+    pub fn doubles(&mut self, number: u32, values: &[f64]) {
+        self.bytes_header(number, 8 * values.len() as u64);
+        values.iter().for_each(|value| self.0.extend_from_slice(&value.to_le_bytes()));
+    }
+
+    pub fn bytes(&mut self, number: u32, value: &[u8]) {
+        self.bytes_header(number, value.len() as u64);
+        self.0.extend_from_slice(value);
+    }
+
     pub fn bytes_header(&mut self, number: u32, length: u64) {
         self.tag(number, 2);
         self.raw_varint(length);
     }
 
     pub fn text(&mut self, number: u32, value: &str) {
-        self.bytes_header(number, value.len() as u64);
-        self.0.extend_from_slice(value.as_bytes());
+        self.bytes(number, value.as_bytes());
     }
 
     pub fn message(&mut self, number: u32, write: impl FnOnce(&mut Wire)) {
         let mut inner = Wire::default();
         write(&mut inner);
-        self.bytes_header(number, inner.0.len() as u64);
-        self.0.extend_from_slice(&inner.0);
+        self.bytes(number, &inner.0);
     }
 
     pub fn timestamp(&mut self, number: u32, stamp_ns: i64) {

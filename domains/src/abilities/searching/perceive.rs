@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use descry_memory::belief::{Sighted, Track};
+use descry_memory::viewer::{self, Labelled};
 use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
 use descry_perception::View;
 use descry_perception::hull::Hull;
 use descry_perception::locate::locate;
 use descry_perception::merge::{MergeOptions, Merged, merge};
-use descry_perception::nalgebra::{Point3, Unit, Vector3};
+use descry_perception::nalgebra::{Point3, Translation3, Unit, Vector3};
 use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment_on};
@@ -331,11 +332,32 @@ fn believe(
     let seen = json!({ "on": surface.symbol, "percepts": seen, "fits": merged.fits, "steps": merged.steps });
     let meta = Meta { objects: sightings(percepts), body: seen, ..Meta::default() };
     let percepts = eyes.record.put(Draft { meta, ..Draft::new("percepts", stamp_ns) })?;
-    let belief = put(eyes.record, "belief", stamp_ns, &*mind.known.belief)?;
+    let boxes: Vec<Labelled> = mind.known.belief.tracks.iter().map(|t| labelled(t, &surface.up)).collect();
+    let frame = &eyes.robot.description().frames.map;
+    let blobs = vec![viewer::boxes(stamp_ns, frame, "objects", &boxes)];
+    let belief = serde_json::to_value(&*mind.known.belief).map_err(|e| WorldError::Bug(e.to_string()))?;
+    let meta = Meta { body: belief, ..Meta::default() };
+    let belief = eyes.record.put(Draft { meta, blobs, ..Draft::new("belief", stamp_ns) })?;
     // What the belief rests on outlasts any limit of the record.
     let held: Vec<RecordId> = views(mind).into_iter().chain([percepts, belief]).collect();
     eyes.record.hold(&held, "belief")?;
     Ok(note)
+}
+
+/// An object as viewers show it: known things green, others grey.
+fn labelled(track: &Track, up: &Vector3<f64>) -> Labelled {
+    let middle = track.position_m + up * (track.size_m[2] / 2.0);
+    let (name, p) = match track.label() {
+        Some(label) => (label, track.probability_of(label)),
+        None => ("unknown", track.unknown),
+    };
+    Labelled {
+        id: track.id.to_string(),
+        text: format!("{name} {p:.2}"),
+        frame_from_box: Translation3::from(middle).into(),
+        size_m: track.size_m.into(),
+        colour: if track.label().is_some() { [0.2, 0.8, 0.3, 0.5] } else { [0.6, 0.6, 0.6, 0.5] },
+    }
 }
 
 /// Records a document.

@@ -1,0 +1,121 @@
+//! What robotics viewers show of a record beside what was sensed: labelled boxes, the map, how the camera projects, lines of a log. Each is a blob
+//! beside the record whose content it shows.
+
+use crate::document::{Blob, Form};
+use crate::foxglove::wire::Wire;
+use crate::foxglove::{LogLevel, log as line};
+use descry_perception::Intrinsics;
+use nalgebra::{Isometry3, Vector3};
+use serde_json::Value;
+
+/// A box with a label.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Labelled {
+    /// The same for the same object, from one set of boxes to the next.
+    pub id: String,
+    /// What stands over it.
+    pub text: String,
+    /// The middle of the box, in the frame of all.
+    pub frame_from_box: Isometry3<f64>,
+    /// Its sides, metres.
+    pub size_m: Vector3<f64>,
+    /// Red, green, blue and opacity, 0 to 1.
+    pub colour: [f64; 4],
+}
+
+fn blob(name: &str, form: Form, data: Vec<u8>) -> Blob<'static> {
+    Blob { name: name.into(), form, layout: Value::Null, data: data.into() }
+}
+
+fn pose(out: &mut Wire, number: u32, of: &Isometry3<f64>) {
+    out.message(number, |pose| {
+        pose.message(1, |v| (1..).zip(of.translation.vector.iter()).for_each(|(n, x)| v.double(n, *x)));
+        pose.message(2, |v| (1..).zip(of.rotation.coords.iter()).for_each(|(n, x)| v.double(n, *x)));
+    });
+}
+
+fn colour(out: &mut Wire, number: u32, of: &[f64; 4]) {
+    out.message(number, |c| (1..).zip(of).for_each(|(n, x)| c.double(n, *x)));
+}
+
+/// A line of the log.
+pub fn log(stamp_ns: i64, level: LogLevel, name: &str, message: &str) -> Blob<'static> {
+    blob("log", Form::Log, line(stamp_ns, level, name, message))
+}
+
+/// All boxes that there are now, in a frame: those of before are no longer shown.
+pub fn boxes(stamp_ns: i64, frame: &str, name: &str, boxes: &[Labelled]) -> Blob<'static> {
+    const ALL: u64 = 1;
+    let mut out = Wire::default();
+    out.message(1, |deletion| {
+        deletion.timestamp(1, stamp_ns);
+        deletion.varint(2, ALL);
+    });
+    for one in boxes {
+        out.message(2, |entity| {
+            entity.timestamp(1, stamp_ns);
+            entity.text(2, frame);
+            entity.text(3, &one.id);
+            entity.message(8, |cube| {
+                pose(cube, 1, &one.frame_from_box);
+                cube.message(2, |v| (1..).zip(one.size_m.iter()).for_each(|(n, x)| v.double(n, *x)));
+                colour(cube, 3, &one.colour);
+            });
+            entity.message(13, |text| {
+                let mut over = one.frame_from_box;
+                over.translation.vector +=
+                    one.frame_from_box.rotation * Vector3::z() * (one.size_m.z / 2.0 + 0.03);
+                pose(text, 1, &over);
+                text.varint(2, 1);
+                text.double(3, 0.03);
+                colour(text, 5, &[1.0; 4]);
+                text.text(6, &one.text);
+            });
+        });
+    }
+    blob(name, Form::SceneUpdate, out.0)
+}
+
+/// How a camera without distortion projects.
+pub fn calibration(stamp_ns: i64, frame: &str, camera: &Intrinsics) -> Blob<'static> {
+    let Intrinsics { width, height, fx, fy, cx, cy } = *camera;
+    let mut out = Wire::default();
+    out.timestamp(1, stamp_ns);
+    out.fixed32(2, width as u32);
+    out.fixed32(3, height as u32);
+    out.doubles(6, &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]);
+    out.doubles(7, &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    out.doubles(8, &[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    out.text(9, frame);
+    blob("calibration", Form::CameraCalibration, out.0)
+}
+
+/// Cells of a map, row by row (x fastest), one byte each; `origin_m` is the outer corner of the first, in the frame.
+pub fn grid(
+    stamp_ns: i64,
+    frame: &str,
+    origin_m: [f64; 2],
+    cell_m: f64,
+    columns: usize,
+    cells: &[u8],
+) -> Blob<'static> {
+    const UINT8: u64 = 1;
+    let mut out = Wire::default();
+    out.timestamp(1, stamp_ns);
+    out.text(2, frame);
+    pose(&mut out, 3, &Isometry3::translation(origin_m[0], origin_m[1], 0.0));
+    out.fixed32(4, columns as u32);
+    out.message(5, |size| {
+        size.double(1, cell_m);
+        size.double(2, cell_m);
+    });
+    out.fixed32(6, columns as u32);
+    out.fixed32(7, 1);
+    out.message(8, |field| {
+        field.text(1, "occupied");
+        field.fixed32(2, 0);
+        field.varint(3, UINT8);
+    });
+    out.bytes(9, cells);
+    blob("grid", Form::Grid, out.0)
+}

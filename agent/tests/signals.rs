@@ -1,63 +1,19 @@
 //! Signals: the body is stopped first and asked nothing more, the record stays whole, and the run goes on where it was.
 
 mod binary;
+mod body;
 
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
 use binary::{check, outcome, start};
+use body::{body_in, check_nothing_twice, has_python, heard};
 use tempfile::TempDir;
-
-/// A body that writes down what it is asked, in time that a test can follow: drives to the table of the template's room.
-const BODY: &str = r#"
-import os, sys, time
-sys.path.insert(0, "PYTHON")
-import descry_robot as descry, template
-
-heard = open("heard", "a", buffering=1)
-plain = descry.Request.feedback
-
-def feedback(request, *done):
-    time.sleep(0.01)
-    plain(request, *done)
-
-descry.Request.feedback = feedback
-
-def told(name):
-    def asked(robot, request, **given):
-        heard.write(f"{name}\n")
-        done = getattr(template.Template, name)(robot, request, **given)
-        heard.write(f"{name} done {given}\n")
-        return done
-    return asked
-
-kinds = {name: told(name) for name in ("drive_to", "look_at", "sense")}
-body = type("Body", (template.Template,), {**kinds, "stop": lambda robot: heard.write("stop\n")})()
-if os.path.exists("stands"):
-    body.at = tuple(float(number) for number in open("stands").read().split())
-drive = body.drive_to
-def driven(request, **given):
-    try:
-        return drive(request, **given)
-    finally:
-        open("stands", "w").write(" ".join(map(str, body.at)))
-body.drive_to = driven
-descry.serve(body)
-"#;
-
-fn has_python() -> bool {
-    Command::new("python3").arg("--version").output().is_ok()
-}
 
 fn signal(name: &str, process: u32) {
     let sent = Command::new("sh").args(["-c", &format!("kill -{name} {process}")]).status();
     assert!(sent.is_ok_and(|status| status.success()), "{name} could not be sent");
-}
-
-fn heard(folder: &Path) -> Vec<String> {
-    let text = std::fs::read_to_string(folder.join("heard")).unwrap_or_default();
-    text.lines().map(str::to_string).collect()
 }
 
 /// Waits until the body has heard something so often.
@@ -78,10 +34,8 @@ fn wait_for(folder: &Path, word: &str, times: usize) {
 fn check_stopped(name: &str, exit: i32, word: &str, times: usize) {
     let folder = TempDir::new().expect("a folder can be made");
     let folder = folder.path();
-    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/python");
-    let body = BODY.replace("PYTHON", &python.display().to_string());
-    std::fs::write(folder.join("body.py"), body).expect("the folder is writable");
-    let goal = ["find", "cup A", "--robot", "program:python3 body.py", "--run", "run"];
+    let robot = body_in(folder);
+    let goal = ["find", "cup A", "--robot", robot, "--run", "run"];
     let child = start(folder, &goal);
     wait_for(folder, word, times);
     signal(name, child.id());
@@ -97,12 +51,7 @@ fn check_stopped(name: &str, exit: i32, word: &str, times: usize) {
     assert_eq!(refused.status.code(), Some(2), "a record runs no program unless it is allowed");
     let report = check(folder, &["do", "--resume", "run", "--allow-programs", "--json"], 1);
     assert_ne!(report["verdict"], "failed", "{context}\n{report}");
-    let mut done: Vec<String> =
-        heard(folder).into_iter().filter(|l| l.starts_with("drive_to done")).collect();
-    let all = done.len();
-    done.sort();
-    done.dedup();
-    assert_eq!(done.len(), all, "no drive that ended is asked for again: {:?}", heard(folder));
+    check_nothing_twice(folder);
     let again = check(folder, &["replay", "run", "--json"], 0);
     assert_eq!(again["same"], true, "{context}\n{again}");
 }

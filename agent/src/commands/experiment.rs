@@ -39,6 +39,7 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
         merge: arguments.merge.clone(),
         threads: arguments.jobs.unwrap_or(cores).max(1),
         stop: stop.clone(),
+        tell: input::narrate,
     };
     match experiment::run(&source, &options).map_err(failed)? {
         Ended::Part { done, all, .. } if stop.is_asked() => {

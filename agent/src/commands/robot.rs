@@ -48,25 +48,26 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         .build()
         .map_err(|e| CommandError::Bug(e.to_string()))?;
     let mut report = Report { robot: body.robot.description().name.clone(), kept: Vec::new(), broken: None };
-    eprintln!("checking \"{}\"", report.robot);
+    input::narrate(&format!("checking \"{}\"", report.robot));
     for (check, begin) in conformance::CHECKS {
         match runtime.block_on(begin(&*body.robot)) {
             Ok(()) => {
-                eprintln!("{check} ... ok");
+                input::narrate(&format!("{check} ... ok"));
                 report.kept.push(check);
             }
             Err(breach) => {
-                eprintln!(
+                input::narrate(&format!(
                     "{check} ... FAILED\n\n  every body: {}\n  this one:   {}\n",
                     breach.promise, breach.found
-                );
+                ));
                 report.broken = Some(Broken { check, promise: breach.promise, found: breach.found });
                 break;
             }
         }
     }
     let (kept, all) = (report.kept.len(), conformance::CHECKS.len());
-    eprintln!("{}: {kept} of {all} checks passed", if report.broken.is_none() { "ok" } else { "FAILED" });
+    let verdict = if report.broken.is_none() { "ok" } else { "FAILED" };
+    input::narrate(&format!("{verdict}: {kept} of {all} checks passed"));
     if arguments.json {
         input::print_json(&report)?;
     }

@@ -138,6 +138,8 @@ pub struct Options {
     pub threads: usize,
     /// Ends it early.
     pub stop: Stop,
+    /// Hears how far it has got, a line now and then where there is no terminal for a bar.
+    pub tell: fn(&str),
 }
 
 /// How far it came.
@@ -315,7 +317,7 @@ fn perform(
     let folder = own_folder(options);
     let (mut journal, mut own, unreadable) = Journal::open(&folder, header)?;
     if unreadable > 0 {
-        eprintln!(
+        tracing::warn!(
             "{unreadable} lines of {} cannot be read; their jobs are done again",
             folder.join(journal::FILE).display()
         );
@@ -325,7 +327,15 @@ fn perform(
     let todo: Vec<usize> =
         (0..jobs.len()).filter(mine).filter(|&n| !done.contains_key(&jobs[n].id)).collect();
     let scratch = folder.join("scratch");
-    let finished = runner::run(kind, jobs, &todo, options.threads, &scratch, &options.stop, &mut journal)?;
+    let finished = runner::run(
+        kind,
+        jobs,
+        &todo,
+        options.threads,
+        &scratch,
+        (&options.stop, options.tell),
+        &mut journal,
+    )?;
     done.extend(finished.into_iter().map(|job| (job.job.clone(), job)));
     Ok(())
 }

@@ -30,7 +30,7 @@ pub fn run(
     todo: &[usize],
     threads: usize,
     scratch: &Path,
-    stop: &Stop,
+    (stop, tell): (&Stop, fn(&str)),
     journal: &mut Journal,
 ) -> Result<Vec<Finished>, ExperimentError> {
     let (next, ended) = (AtomicUsize::new(0), AtomicBool::new(false));
@@ -53,7 +53,7 @@ pub fn run(
         });
         drop(send);
         let result = match started {
-            Ok(()) => collect(&receive, todo.len(), journal),
+            Ok(()) => collect(&receive, todo.len(), journal, tell),
             Err(e) => Err(ExperimentError::Threads { because: e.to_string() }),
         };
         ended.store(true, Ordering::Relaxed);
@@ -84,8 +84,9 @@ fn collect(
     done: &Receiver<Finished>,
     all: usize,
     journal: &mut Journal,
+    tell: fn(&str),
 ) -> Result<Vec<Finished>, ExperimentError> {
-    let mut progress = Progress::new(all);
+    let mut progress = Progress::new(all, tell);
     let mut finished = Vec::with_capacity(all);
     for job in done {
         journal.append(&job)?;
@@ -104,10 +105,11 @@ struct Progress {
     failed: usize,
     began: Instant,
     last_line: Instant,
+    tell: fn(&str),
 }
 
 impl Progress {
-    fn new(all: usize) -> Self {
+    fn new(all: usize, tell: fn(&str)) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(all as u64);
             let style = ProgressStyle::with_template("{bar:40} {pos}/{len} jobs, {eta} left {msg}");
@@ -115,7 +117,7 @@ impl Progress {
             bar.enable_steady_tick(Duration::from_millis(500));
             bar
         });
-        Self { bar, all, done: 0, failed: 0, began: Instant::now(), last_line: Instant::now() }
+        Self { bar, all, done: 0, failed: 0, began: Instant::now(), last_line: Instant::now(), tell }
     }
 
     fn one_more(&mut self, failed: bool) {
@@ -130,7 +132,8 @@ impl Progress {
             self.last_line = Instant::now();
             let left_s =
                 self.began.elapsed().as_secs_f64() / self.done as f64 * (self.all - self.done) as f64;
-            eprintln!("{}/{} jobs, {} failed, about {left_s:.0} s left", self.done, self.all, self.failed);
+            let (done, all, failed) = (self.done, self.all, self.failed);
+            (self.tell)(&format!("{done}/{all} jobs, {failed} failed, about {left_s:.0} s left"));
         }
     }
 

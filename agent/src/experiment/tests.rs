@@ -63,7 +63,7 @@ fn source() -> Source {
 }
 
 fn options(out: &Path, shard: Option<Shard>, threads: usize) -> Options {
-    Options { out: out.to_path_buf(), shard, merge: vec![], threads, stop: Stop::default() }
+    Options { out: out.to_path_buf(), shard, merge: vec![], threads, stop: Stop::default(), tell: |_| () }
 }
 
 /// Every file of the results, without the journals.

@@ -90,6 +90,12 @@ impl Track {
         (best.1 > self.unknown).then_some(best.0.as_str())
     }
 
+    /// Whether a view may have blurred the object into another over its place: it is a known one, and that an unknown thing, much larger.
+    pub fn may_be_blurred_into(&self, label: Option<&str>, size_m: &[f64; 3]) -> bool {
+        let volume = |size_m: &[f64; 3]| size_m.iter().product::<f64>();
+        self.label().is_some() && label.is_none() && volume(size_m) > MUCH_LARGER * volume(&self.size_m)
+    }
+
     /// How sure it is what the object is, *none of the known* among the answers, 0 to 1. Which of a kind does not count:
     /// the kind does.
     pub fn certainty(&self) -> f64 {
@@ -173,11 +179,8 @@ struct Association {
 
 /// Whether a percept is an unknown thing, much larger than a known object, that stands over its place.
 fn swallows(percept: &Percept, track: &Track) -> bool {
-    let volume = |size_m: &[f64; 3]| size_m.iter().product::<f64>();
     let reach_m = percept.size_m[0].max(percept.size_m[1]) / 2.0;
-    track.label().is_some()
-        && percept.label.is_none()
-        && volume(&percept.size_m) > MUCH_LARGER * volume(&track.size_m)
+    track.may_be_blurred_into(percept.label.as_deref(), &percept.size_m)
         && (track.position_m - percept.position_m).norm() < reach_m
 }
 

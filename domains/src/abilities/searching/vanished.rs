@@ -49,7 +49,8 @@ pub(super) fn set_aside_unseen(
 }
 
 /// Takes back into a belief what may be something that is asked about and was not found in the merge, though the newest view does not look
-/// through its place and nothing that was found stands there: views that lie beside each other rub it out.
+/// through its place and nothing that was found stands there, but a large thing into which it may be blurred: views that lie beside each
+/// other rub it out.
 pub(super) fn keep_unrefuted(
     belief: &mut Belief,
     gone_before: usize,
@@ -61,10 +62,11 @@ pub(super) fn keep_unrefuted(
     let (kept, gone): (Vec<Track>, Vec<Track>) = vanished.into_iter().partition(|track| {
         asked.iter().any(|name| track.probability_of(name) > UNLIKELY)
             && !newest.is_some_and(|newest| looked_through(track, &surface.up, newest))
-            && !belief
-                .tracks
-                .iter()
-                .any(|other| other.on == track.on && surface.is_of(other, &track.position_m, ON_SURFACE_M))
+            && !belief.tracks.iter().any(|other| {
+                other.on == track.on
+                    && surface.is_of(other, &track.position_m, ON_SURFACE_M)
+                    && !track.may_be_blurred_into(other.label(), &other.size_m)
+            })
     });
     belief.gone.extend(gone);
     belief.tracks.extend(kept);
@@ -98,15 +100,15 @@ mod tests {
         DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m }
     }
 
-    fn track(id: u64, x: f64, cup: f64) -> Track {
+    fn track(id: u64, x: f64, cup: f64, side_m: f64) -> Track {
         Track {
             id,
             on: "table".into(),
             position_m: Point3::new(x, 0.0, 0.0),
             position_sigma_m: 0.002,
-            size_m: [0.07, 0.07, 0.12],
+            size_m: [side_m, side_m, 0.12],
             footprint_m: vec![],
-            probabilities: vec![],
+            probabilities: vec![("cup A".into(), cup)],
             kinds: vec![("cup".into(), cup)],
             unknown: 1.0 - cup,
             seen_fraction: 0.5,
@@ -118,8 +120,9 @@ mod tests {
         }
     }
 
-    /// Whether an object is still believed in that no merge found again: what it may be, what the newest view shows there, where another was found.
-    fn check(cup: f64, newest_m: Option<f64>, other: Option<f64>, kept: bool) {
+    /// Whether an object is still believed in that no merge found again: what it may be, what the newest view shows there, where another was found
+    /// and how wide that is.
+    fn check(cup: f64, newest_m: Option<f64>, other: Option<(f64, f64)>, kept: bool) {
         let table = KnownSurface {
             symbol: "table".into(),
             name: "table".into(),
@@ -130,8 +133,8 @@ mod tests {
             doubtful: None,
         };
         let mut belief = Belief::default();
-        belief.gone = vec![track(0, 0.0, 1.0), track(1, 0.0, cup)];
-        belief.tracks = other.map(|x| track(2, x, 0.1)).into_iter().collect();
+        belief.gone = vec![track(0, 0.0, 1.0, 0.07), track(1, 0.0, cup, 0.07)];
+        belief.tracks = other.map(|(x, side_m)| track(2, x, 0.1, side_m)).into_iter().collect();
         let newest = newest_m.map(seen_from_above);
         keep_unrefuted(&mut belief, 1, &table, newest.as_ref(), &["cup A", "cup"]);
         let still = belief.tracks.iter().any(|t| t.id == 1);
@@ -146,7 +149,10 @@ mod tests {
         check(0.4, Some(0.1), None, true);
         check(0.4, Some(0.0), None, false);
         check(0.01, None, None, false);
-        check(0.4, None, Some(0.02), false);
-        check(0.4, None, Some(0.09), true);
+        check(0.4, None, Some((0.02, 0.07)), false);
+        check(0.4, None, Some((0.09, 0.07)), true);
+        check(0.4, None, Some((0.09, 0.25)), false);
+        check(0.6, None, Some((0.09, 0.25)), true);
+        check(0.6, None, Some((0.02, 0.07)), false);
     }
 }

@@ -34,9 +34,14 @@ pub struct TruePlace {
 }
 
 impl Body {
+    /// Any body; the example `own_body` is one from beginning to end.
+    pub fn new(robot: Arc<dyn Robot>) -> Self {
+        Self { robot, scene: None, simulated: None }
+    }
+
     /// A simulated body, whose truth a report may show.
     pub fn simulated(robot: Arc<SimRobot>) -> Self {
-        Self { robot: robot.clone(), scene: None, simulated: Some(robot) }
+        Self { simulated: Some(Arc::clone(&robot)), ..Self::new(robot) }
     }
 
     /// Where an object of that name or kind stands in truth, the one nearest to where it is believed to stand if there are
@@ -90,7 +95,7 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
             } else {
                 descry_robots::recorded::RecordedRobot::open(path).map_err(CommandError::bad_input)?
             };
-            Ok(Body { robot: Arc::new(robot), scene: None, simulated: None })
+            Ok(Body::new(Arc::new(robot)))
         }
         Some(("program", command)) => {
             if let Some(scene) = scene {
@@ -100,7 +105,7 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
                 return Err(CommandError::BadInput(text));
             }
             let robot = ProgramRobot::start(command, Limits::default()).map_err(CommandError::broken)?;
-            Ok(Body { robot: Arc::new(robot), simulated: None, scene: None })
+            Ok(Body::new(Arc::new(robot)))
         }
         _ => Err(CommandError::BadInput(format!(
             "--robot {robot}\n  expected: sim, recorded:DIR or program:COMMAND"

@@ -3,7 +3,7 @@
 mod tabletop;
 
 use descry_perception::merge::{MergeOptions, merge};
-use descry_perception::nalgebra::{Point3, Unit, Vector3};
+use descry_perception::nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use descry_perception::recognise::{Descry, Handle, Published, Range, Top, check_models};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::surface::{SurfaceError, SurfaceOptions};
@@ -130,6 +130,47 @@ fn views_that_lie_beside_each_other_show_one_thing_with_its_handle() {
         let found = Descry::default().recognise(&scene, &seen, &[cup_a()]);
         let said: Vec<_> = found.iter().map(|p| (p.size_m, p.evidence.handle)).collect();
         assert!(matches!(said[..], [(_, Sighting::Seen)]), "the last view {off_m:?} m off: {said:?}");
+    }
+}
+
+/// A carton as high as the white cylinder: some circle fits a part of its side.
+#[test]
+fn a_carton_in_one_piece_is_no_cylinder_however_its_views_lie() {
+    let carton = Thing::Block { x: 0.0, y: 0.0, half: [0.035, 0.095], height: 0.28, turn_rad: 0.3 };
+    let exactly = |x: f64| Range { low: x, high: x };
+    let cylinder = ObjectModel {
+        name: "white cylinder".into(),
+        kind: "cylinder".into(),
+        height_m: exactly(0.277),
+        diameter_m: Some(exactly(0.106)),
+        top: Top::Any,
+        ..cup_a()
+    };
+    for angle in [1.045, 1.463, 4.18, 4.598] {
+        for (off_m, turned_rad) in [(0.0, 0.0), (-0.004, 0.01), (0.008, 0.03), (-0.008, 0.03)] {
+            let mut draws = Draws(7);
+            let mut view = |angle: f64, off_m: f64, turned_rad: f64| {
+                let pose = on_ring(angle, 1.6, 1.4);
+                let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turned_rad);
+                let mut stated = turn * pose;
+                stated.translation.vector += Vector3::new(off_m, -off_m, 0.0);
+                look(&[carton], &pose, &stated, &mut draws)
+            };
+            let views = [view(angle, 0.0, 0.0), view(angle + 0.9, off_m, turned_rad)];
+            let clouds = views.iter().map(|v| v.cloud.transformed(&v.world_from_camera));
+            let cloud = Cloud::from_points(clouds.flat_map(|c| c.points).collect());
+            let seen = Visibility::from_views(&views);
+            let scene = segment(&cloud, &seen, &options()).expect("there is a table");
+            for found in Descry::default().recognise(&scene, &seen, std::slice::from_ref(&cylinder)) {
+                let p = found.probability_of("white cylinder");
+                assert!(
+                    p < 0.5 || found.size_m[0] < 0.15,
+                    "from {angle}, {off_m} m and {turned_rad} rad off: {p}, {:?} {:?}",
+                    found.size_m,
+                    found.evidence
+                );
+            }
+        }
     }
 }
 

@@ -326,7 +326,19 @@ fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     let best = all.into_iter().fold(f64::NEG_INFINITY, f64::max);
     // However round what is there: a camera that looked through the rest of the side says that it is not.
     let through = if shape == Some(Shape::Round) { -60.0 * (m.looked_through - 0.15).max(0.0) } else { 0.0 };
-    (raw_form_log(shape, m) - best).max(LEAST) + through
+    let beside = if shape == Some(Shape::Round) { beside_log(m) } else { 0.0 };
+    (raw_form_log(shape, m) - best).max(LEAST) + through + beside
+}
+
+/// However well a circle fits a part of the side: a round body has nothing beside it but a handle, and what views blur.
+fn beside_log(m: &Measured) -> f64 {
+    /// So far a handle, or views that lie beside each other, reach out of the body, metres.
+    const REACH_M: f64 = 0.04;
+    const SIGMA_M: f64 = 0.01;
+    const LEAST: f64 = -20.0;
+    let Some(round) = m.round else { return 0.0 };
+    let beside_m = (m.footprint_m[0] - 2.0 * round.radius_m - REACH_M).max(0.0);
+    (-0.5 * (beside_m / SIGMA_M).powi(2)).max(LEAST)
 }
 
 fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {

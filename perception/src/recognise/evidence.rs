@@ -24,6 +24,8 @@ const HANDLE_M: (f64, f64) = (0.014, 0.06);
 const HANDLE_SPREADS: f64 = 4.0;
 /// A circle whose radius is known no better than this is no circle to go by, metres.
 const VAGUE_M: f64 = 0.015;
+/// A circle on which less than this share of the side lies is no circle of it: any bent or straight face has some that fits.
+const MOST: f64 = 0.5;
 /// What is this far out of the body is no longer the body itself, metres.
 const CLEAR_M: f64 = 0.007;
 /// Greatest width of a handle across, metres.
@@ -136,7 +138,8 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
     }
     if let Some(first) = measured.round {
         let edges = silhouettes(&first, segment, &asker, base_m, height_m);
-        measured.round = round::refit(&first, &segment.points, &edges, base_m, top, sigma_m);
+        let round = round::refit(&first, &segment.points, &edges, base_m, top, sigma_m);
+        measured.round = round.filter(|round| round.inliers >= MOST);
     }
     if let Some(round) = measured.round {
         measure_round(&mut measured, &round, segment, &asker, (base_m, top));

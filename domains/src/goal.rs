@@ -99,7 +99,7 @@ pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, Goal
     let mut nearest_miss = None;
     for phrase in &domain.config.goal {
         for slots in fits(&phrase.say, &words) {
-            match fill(lexicon, &slots) {
+            match fill(lexicon, &domain.config.open, &slots) {
                 Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
                 Err(found) => nearest_miss = nearest_miss.or(Some(found)),
             }
@@ -276,19 +276,22 @@ fn fits<'a>(say: &'a str, words: &[String]) -> Vec<Vec<(&'a str, String)>> {
     step(&pattern, words)
 }
 
-fn fill(lexicon: &Lexicon, slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> {
+fn fill(lexicon: &Lexicon, open: &[String], slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> {
     let mut filled: Vec<Filled> = Vec::new();
     for (slot, found) in slots {
         let (of_type, wanted) = (type_of_slot(slot), without_article(found));
         let is_called = |n: &&Named| n.names.iter().any(|name| symbol(name) == symbol(wanted));
-        let Some(named) = lexicon.of_type(of_type).iter().find(is_called) else {
-            return Err(Miss { of_type: of_type.into(), found: wanted.into() });
+        let is_free = || open.iter().any(|of| of == of_type) && lexicon.is_free(&symbol(wanted));
+        let (called, name) = match lexicon.of_type(of_type).iter().find(is_called) {
+            Some(named) => (named.symbol.clone(), lexicon.name_of(&named.symbol).to_string()),
+            None if is_free() => (symbol(wanted), wanted.to_string()),
+            None => return Err(Miss { of_type: of_type.into(), found: wanted.into() }),
         };
         filled.push(Filled {
             slot: (*slot).into(),
             number: filled.iter().filter(|f| f.slot == *slot).count(),
-            symbol: named.symbol.clone(),
-            name: lexicon.name_of(&named.symbol).into(),
+            symbol: called,
+            name,
         });
     }
     Ok(filled)

@@ -221,24 +221,39 @@ fn a_single_scan_leaves_the_right_object() {
     }
 }
 
-/// Scans whose ends were taken for background contradict the rest, which says so and does without them.
-#[test]
-fn scans_that_contradict_the_others_are_left_out() {
-    let map = map_of_the_lab(&mut Draws(EXPERIMENT));
-    let mut scans = circled(&object(1), &Run::default(), &map, 3).1.scans;
-    let scan = &mut scans[2].scan;
-    // The left third of the readings is gone, and the bound lies on the object.
-    scan.left_object_rad -= (scan.left_object_rad - scan.right_object_rad) / 3.0;
+/// Cuts readings and bound of a scan on its left: the end of the thing was taken for background, and the bound lies on it.
+fn cut_left(posed: &mut PosedScan, share: f64) {
+    let scan = &mut posed.scan;
+    scan.left_object_rad -= share * (scan.left_object_rad - scan.right_object_rad);
     scan.left_bound_rad = scan.left_object_rad + 0.017;
     let bound = scan.left_object_rad;
     scan.points.retain(|p| p.y.atan2(p.x) <= bound);
+}
+
+/// Ends that were taken for background contradict the other scans; the model does without them and says which they are.
+#[test]
+fn ends_that_contradict_the_others_are_opened() {
     let options = SolverOptions::default();
-    let all = align(&scans, &options).unwrap();
-    assert!(all.longest_m() > 0.02 && all.left_out.is_empty(), "{:?}", all.after);
-    let rest = align_consistent(&scans, 0.02, &options).unwrap();
-    assert!(rest.longest_m() < 0.02, "{:?}", rest.after);
-    assert_eq!(rest.left_out, [2]);
-    assert_eq!(align_consistent(&scans[1..3], 1e-9, &options).unwrap().left_out, [0usize; 0]);
+    let map = map_of_the_lab(&mut Draws(EXPERIMENT));
+    let check = |outline: &lab::Outline, seed: u64, cut: &[usize]| {
+        let mut scans = circled(outline, &Run::default(), &map, seed).1.scans;
+        cut.iter().for_each(|&index| cut_left(&mut scans[index], 1.0 / 3.0));
+        let all = align(&scans, &options).unwrap();
+        assert!(all.longest_m() > 0.02 && all.opened.is_empty(), "{seed} {cut:?}: {:?}", all.after);
+        let rest = align_consistent(&scans, 0.02, &options).unwrap();
+        assert!(rest.longest_m() <= 0.02, "{seed} {cut:?}: {:?}", rest.after);
+        let mut opened: Vec<usize> = rest.opened.iter().map(|(index, _)| *index).collect();
+        opened.extend(&rest.left_out);
+        opened.sort_unstable();
+        assert_eq!(opened, cut, "{seed}: {:?} {:?}", rest.opened, rest.left_out);
+    };
+    check(&object(1), 3, &[2]);
+    check(&object(1), 3, &[0, 4]);
+    check(&object(3), 4, &[1, 3]);
+    check(&four_legs(45.0, 3.0), 5, &[2]);
+    let scans = circled(&object(1), &Run::default(), &map, 3).1.scans;
+    let two = align_consistent(&scans[1..3], 1e-9, &options).unwrap();
+    assert!(two.opened.is_empty() && two.left_out.is_empty());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::lab::{INSTANCES, NAMES, Run, circled, four_legs, map_of_the_lab, object, seed_of};
 use super::options;
 use super::tabletop::Draws;
-use super::variations::by_icp;
+use super::variations::{FAR, by_icp};
 use descry_perception::laser::{Alignment, PosedScan, ShapeModel, align};
 use descry_perception::nalgebra::{Point2, Vector2};
 use std::fmt::Write;
@@ -146,7 +146,7 @@ pub fn write(seed: u64, learnt: &[Alignment], dir: &Path) -> Result<(), String> 
     for (name, outline, k) in things {
         let seen = circled(&outline, &Run::default(), &map, seed_of(seed, k, 0)).1.scans;
         let aligned = align(&seen, &options(0)).map_err(|e| e.to_string())?;
-        let icp = by_icp(&seen);
+        let icp = by_icp(&seen, FAR);
         let rows = [("as localised", seen), ("aligned", aligned.model.scans().to_vec()), ("by ICP", icp)];
         save(&format!("{name}.svg"), side_by_side(&rows[..2], 4.2, 180.0, true))?;
         save(&format!("{name}-near.svg"), side_by_side(&rows, 1.2, 400.0, false))?;

@@ -127,7 +127,7 @@ fn follow(
     let (mut iterations, mut evaluations) = (0, starts.len());
     let mut settle = |from: &Isometry2<f64>, solve: fn(&Problem, &SolverOptions) -> Solved| {
         let start = poses(from);
-        let solved = solve(&Problem::onto(&assembly, &start, options.solver.objective), &options.solver);
+        let solved = solve(&Problem::onto(&assembly, &start, &options.solver), &options.solver);
         iterations += solved.iterations;
         evaluations += solved.evaluations;
         solved

@@ -125,9 +125,11 @@ impl<'a> Teller<'a> {
     fn where_is(&self, shape: &str, ended: &Ended) -> Told<'a> {
         let (floor, name) = (&self.s.floor, self.name(shape));
         if !floor.knows(shape) {
+            let known: Vec<&str> = floor.known.iter().map(|k| k.name.as_str()).collect();
             let text = format!(
-                "nobody has learned what {} looks like; stand before one and say: learn {name}",
-                article(&name)
+                "nobody has learned what {} looks like; stand before one and say: learn {name}; known are: {}",
+                article(&name),
+                known.join(", ")
             );
             return (Verdict::CannotTell, text, None);
         }
@@ -139,11 +141,8 @@ impl<'a> Teller<'a> {
             let text = format!("{} stands {}; {}", article(&name), self.at(thing), self.scans(thing));
             return (Verdict::Achieved, text, Some(thing));
         }
-        let may_be = |t: &&Thing| {
-            t.may_be().is_none_or(|names| names.iter().any(|n| symbol(n) == shape))
-                || t.sureness(floor.known.len()) < self.s.threshold
-        };
-        let open: Vec<&Thing> = floor.things.iter().filter(may_be).collect();
+        let open: Vec<&Thing> =
+            floor.things.iter().filter(|t| t.may_have(shape, floor.known.len(), self.s.threshold)).collect();
         let others = floor.things.len() - open.len();
         let seen = format!("{others} things on the floor are something else");
         if let Some((verdict, why)) = self.cut(ended) {

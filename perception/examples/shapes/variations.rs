@@ -204,7 +204,8 @@ pub fn by_icp(scans: &[PosedScan], spreads: f64) -> Vec<PosedScan> {
         let usual = Run::default();
         let is_near = |moved: &Isometry2<f64>| {
             let shift_m = ((moved * pose).translation.vector - pose.translation.vector).norm();
-            shift_m <= spreads * usual.pose_sigma_m && moved.rotation.angle().abs() <= spreads * usual.pose_sigma_rad
+            shift_m <= spreads * usual.pose_sigma_m
+                && moved.rotation.angle().abs() <= spreads * usual.pose_sigma_rad
         };
         let moved = fit.map(|fit| planar(&fit.target_from_source)).filter(is_near).unwrap_or_default();
         let posed = PosedScan { scan: scan.scan.clone(), model_from_laser: moved * scan.model_from_laser };

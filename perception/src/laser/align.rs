@@ -174,7 +174,8 @@ fn contradictions(
     let mut found = Contradictions::default();
     found.ends.extend(beyond.iter().filter(|(_, by)| by.len() > 1).map(|(end, _)| *end));
     // A scan of which an end is false lacks what lies there.
-    let lacks = |scan: &usize| [Side::Left, Side::Right].iter().any(|side| found.ends.contains(&(*scan, *side)));
+    let lacks =
+        |scan: &usize| [Side::Left, Side::Right].iter().any(|side| found.ends.contains(&(*scan, *side)));
     short.values_mut().for_each(|by| by.retain(|scan| !lacks(scan)));
     let far: Vec<(usize, Side)> = short.iter().filter(|(_, by)| by.len() > 1).map(|(end, _)| *end).collect();
     found.ends.extend(far);

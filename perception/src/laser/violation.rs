@@ -6,6 +6,7 @@ use super::scan::direction;
 use super::shape::PosedScan;
 use crate::hull::convex;
 use nalgebra::{Isometry2, Point2, Vector2};
+use serde::Serialize;
 
 /// How far poses violate the angular constraints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,7 +44,8 @@ struct Part {
 const FAR_RAD: f64 = 0.2;
 
 /// An end of the thing, as a scan sees it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Side {
     /// The left.
     Left,

@@ -198,11 +198,8 @@ fn aligned(
         thing.outline = Some(Arc::new(Outline { alignment: (**alignment).clone(), outlook }));
     }
     thing.taken_for = Some(Arc::new(recognition));
-    let left_out = match alignment.left_out.len() {
-        0 => String::new(),
-        n => format!("; {n} scans contradict the others and are left out"),
-    };
-    Ok(format!("{said}: {:.2} sure{left_out}", thing.sureness(known)))
+    let contradict = taken::contradict(alignment);
+    Ok(format!("{said}: {:.2} sure{contradict}", thing.sureness(known)))
 }
 
 /// The same, and it is kept under a name.

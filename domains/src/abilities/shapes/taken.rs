@@ -204,6 +204,19 @@ pub(super) fn recognise(s: &Situation, alignment: &Alignment, loose_m: f64) -> R
     recognise_scans(&alignment.model, loose_m, &s.floor.known, &options)
 }
 
+/// What of the scans contradicts the others, to be said after something else.
+pub(super) fn contradict(alignment: &Alignment) -> String {
+    let scans = match alignment.left_out.len() {
+        0 => String::new(),
+        n => format!("; {n} scans contradict the others and are left out"),
+    };
+    let ends = match alignment.opened.len() {
+        0 => String::new(),
+        n => format!("; {n} ends of scans contradict the others and bound nothing"),
+    };
+    scans + &ends
+}
+
 /// What of the floor is still to be looked at, and from where.
 fn look_over_floor(mind: &mut Mind, eyes: Eyes<'_>, scan: &Scan) {
     let reach_m = eyes.robot.description().laser.as_ref().map_or(0.0, |laser| laser.reach_m);

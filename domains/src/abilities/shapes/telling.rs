@@ -3,6 +3,7 @@
 use descry_perception::laser::Verdict as Taken;
 
 use super::floor::{THIS, Thing, place};
+use super::taken::contradict;
 use crate::answer::{Believed, Conclusion, Ended, Verdict};
 use crate::asked::mentions;
 use crate::goal::Goal;
@@ -184,9 +185,6 @@ impl<'a> Teller<'a> {
         for (pose, why) in &thing.ignored {
             parts.push(format!("the one from {pose} is left out: {why}"));
         }
-        if let Some(n) = thing.outline.as_ref().map(|o| o.alignment.left_out.len()).filter(|n| *n > 0) {
-            parts.push(format!("{n} that contradict the others are left out"));
-        }
         let poses = self.s.floor.poses.poses;
         if thing.ring.len() < poses {
             parts.push(format!("{} of {poses} poses around it cannot be reached", poses - thing.ring.len()));
@@ -198,7 +196,7 @@ impl<'a> Teller<'a> {
                 1e2 * loose_m
             ));
         }
-        parts.join("; ")
+        parts.join("; ") + &thing.outline.as_ref().map_or(String::new(), |o| contradict(&o.alignment))
     }
 
     fn believed(&self, thing: &Thing) -> Believed {

@@ -15,6 +15,7 @@ use lab::{
     seed_of,
 };
 use std::f64::consts::{PI, TAU};
+use std::path::Path;
 use std::sync::OnceLock;
 use tabletop::Draws;
 
@@ -36,6 +37,35 @@ fn known() -> Vec<KnownShape> {
 
 fn mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
     values.clone().sum::<f64>() / values.count() as f64
+}
+
+/// The table of the paper's cells, `lab/paper.rs`, holds what its text says.
+#[test]
+fn the_table_is_that_of_the_paper() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/papers");
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let texts = files.filter_map(|path| std::fs::read_to_string(path).ok());
+    let Some(text) = texts.into_iter().find(|text| text.starts_with("Autonomous Shape Model Learning"))
+    else {
+        println!("skipped: no paper in ../shared/papers beside the workspace");
+        return;
+    };
+    // The numbers of each row below a heading; what is no number parts them.
+    let rows = |heading: &str| -> Vec<Vec<f64>> {
+        let below = text.lines().skip_while(|line| !line.starts_with(heading)).skip(1);
+        let rows = below.take_while(|line| line.contains('\t')).map(|line| {
+            let cells = line.split('\t').skip(1).flat_map(|cell| cell.split(['-', '–']));
+            cells.filter_map(|cell| cell.parse().ok()).collect()
+        });
+        rows.filter(|row: &Vec<f64>| !row.is_empty()).collect()
+    };
+    let features: Vec<Vec<f64>> = paper::FEATURES.iter().map(|row| row.to_vec()).collect();
+    assert_eq!(rows("Feature Reliability"), features);
+    let f_c: Vec<Vec<f64>> =
+        paper::F_C.iter().map(|row| row.iter().flat_map(|&(low, high)| [low, high]).collect()).collect();
+    assert_eq!(rows("f_C error"), f_c);
+    let localisation: Vec<Vec<f64>> = paper::LOCALISATION.iter().flatten().map(|row| row.to_vec()).collect();
+    assert_eq!(rows("Error\tLocalization"), localisation);
 }
 
 /// Fig. 5.

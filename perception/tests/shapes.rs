@@ -447,7 +447,7 @@ fn few_scans_and_few_readings_are_no_panic() {
             let found = align(&vec![posed.clone(); count], &options).unwrap();
             assert!(found.converged && found.after.boundary_m2 < 1e-6, "{solver:?}: {found:?}");
             assert_eq!(found.model.features().area_m2, 0.0);
-            let fit = FitOptions { solver: options, starts: 0, followed: 0 };
+            let fit = FitOptions { solver: options, starts: 0, followed: 0, ..FitOptions::default() };
             assert!(localise(&found.model, &one, Start::AllAngles, &fit).f_c_m2.is_finite());
             assert!(undetermined_m2(&found.model, &NextOptions::default()) > 0.0);
         }

@@ -7,6 +7,8 @@ use super::shape::{ObjectScan, ShapeModel};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
+/// A fit that, roughly settled, violates by so many times what rules a shape out does not come down to it.
+const HOPELESS: f64 = 3.0;
 /// Directions in which the width of a shape is measured.
 const WIDTHS: usize = 18;
 
@@ -84,6 +86,13 @@ impl Default for RecogniseOptions {
     }
 }
 
+impl RecogniseOptions {
+    /// How models are brought onto each other, and no farther than tells that they do not fit.
+    fn fits(&self) -> FitOptions {
+        FitOptions { hopeless_m: self.fit.hopeless_m.min(HOPELESS * self.other_m), ..self.fit }
+    }
+}
+
 /// A known shape that features or width did not rule out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
@@ -127,7 +136,7 @@ pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &Recognis
     for (index, shape) in known.iter().enumerate() {
         let distance = apart(&features, &shape.features);
         if distance <= options.gate {
-            candidates.push(Candidate { index, distance, fit: fit(&shape.model, instance, &options.fit) });
+            candidates.push(Candidate { index, distance, fit: fit(&shape.model, instance, &options.fits()) });
         }
     }
     decide(candidates, known, options)
@@ -142,7 +151,7 @@ pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &Recogni
     for (index, shape) in known.iter().enumerate() {
         let distance = width_apart_m(scan, &shape.model) / USUAL_SPREAD.1;
         if distance <= options.gate {
-            let fit = localise(&shape.model, scan, Start::AllAngles, &options.fit);
+            let fit = localise(&shape.model, scan, Start::AllAngles, &options.fits());
             candidates.push(Candidate { index, distance, fit });
         }
     }
@@ -160,8 +169,8 @@ pub fn recognise_scans(
     let _span = tracing::debug_span!("recognise_scans", known = known.len()).entered();
     let features = (loose_m <= options.tight_m).then(|| scans.features());
     let fit = |shape: &KnownShape| match loose_m <= options.rigid_m {
-        true => fit_scans(&shape.model, scans, &options.fit),
-        false => worst_fit(&shape.model, scans, &options.fit),
+        true => fit_scans(&shape.model, scans, &options.fits()),
+        false => worst_fit(&shape.model, scans, &options.fits()),
     };
     let mut candidates: Vec<Candidate> = Vec::new();
     for (index, shape) in known.iter().enumerate() {

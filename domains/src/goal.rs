@@ -402,4 +402,21 @@ mod tests {
             &[&["salt", "pepper and a cup"], &["salt and pepper", "a cup"]],
         );
     }
+
+    #[test]
+    fn a_shape_has_any_name_that_is_no_other() {
+        let check = |domain: &str, said: &str, expected: Option<(&str, &str)>| {
+            let domain = Domain::load(domain).unwrap();
+            let lexicon = Lexicon::new(&domain, &crate::lexicon::Places::default());
+            let goal = read(said, &domain, &lexicon);
+            let found = goal.as_ref().ok().map(|g| (g.pddl.as_str(), g.slots[0].name.as_str()));
+            assert_eq!(found, expected, "{said}: {goal:?}");
+        };
+        check("shapes", "learn the coffee table", Some(("(learned coffee-table)", "coffee table")));
+        check("shapes", "learn dell box", Some(("(learned dell-box)", "dell box")));
+        check("shapes", "where is Bob's bin?", Some(("(>= (found bob-s-bin) 0.9)", "bob's bin")));
+        check("shapes", "learn this", None);
+        check("shapes", "learn !", None);
+        check("tabletop", "find coffee table", None);
+    }
 }

@@ -1,7 +1,7 @@
-//! Shapes of the things in a robot's log, in CARMEN's format with corrected poses:
-//! `cargo run --release -p descry-perception --example shapes_log -- LOG [DIR]`. Plots are written to DIR as SVG.
+//! Shapes of the things in the logs of robots, in CARMEN's format with corrected poses:
+//! `cargo run --release -p descry-perception --example shapes_log -- LOG… [--plots DIR]`. Plots are SVG.
 //!
-//! Things are what stands apart and was scanned from most sides. Each has two models, of scans that have none in common: whether the second is nearest to
+//! Things are what stands apart and was scanned from five directions or more. Each has two models, of scans that have none in common: whether the second is nearest to
 //! the first of all is the test of recognition.
 
 mod carmen;
@@ -32,17 +32,19 @@ impl Seen {
     }
 }
 
-fn run(log: &Path, out: Option<&Path>) -> Result<(), String> {
-    let scans = carmen::read(log)?;
-    let found = things::find(&scans).map_err(|e| e.to_string())?;
-    println!("{}: {} scans, {} things that stand apart", log.display(), scans.len(), found.len());
+fn run(logs: &[String], out: Option<&Path>) -> Result<(), String> {
     let mut seen: Vec<Seen> = Vec::new();
-    for thing in &found {
-        let Some(sets) = things::two_sets(&scans, thing).map_err(|e| e.to_string())? else { continue };
-        let model = |set: &[PosedScan]| align_consistent(set, CONTRADICTS_M, &SolverOptions::default());
-        let models = [model(&sets[0]), model(&sets[1])];
-        let [Ok(a), Ok(b)] = models else { continue };
-        seen.push(Seen { scans: sets, models: [a, b] });
+    for log in logs {
+        let scans = carmen::read(Path::new(log))?;
+        let found = things::find(&scans).map_err(|e| e.to_string())?;
+        println!("{log}: {} scans, {} things that stand apart", scans.len(), found.len());
+        for thing in &found {
+            let Some(sets) = things::two_sets(&scans, thing).map_err(|e| e.to_string())? else { continue };
+            let model = |set: &[PosedScan]| align_consistent(set, CONTRADICTS_M, &SolverOptions::default());
+            let models = [model(&sets[0]), model(&sets[1])];
+            let [Ok(a), Ok(b)] = models else { continue };
+            seen.push(Seen { scans: sets, models: [a, b] });
+        }
     }
     table(&seen);
     let sound: Vec<&Seen> = seen.iter().filter(|s| s.agrees()).collect();
@@ -51,10 +53,7 @@ fn run(log: &Path, out: Option<&Path>) -> Result<(), String> {
 }
 
 fn table(seen: &[Seen]) {
-    println!(
-        "{} of them scanned from two thirds of all sides or more, twice; the first model of each:",
-        seen.len()
-    );
+    println!("{} of them scanned from five directions or more; the first model of each:", seen.len());
     println!(
         "   at (m)             scans  BV before   after (m²)  exterior (cm)  opened  out  area (cm²)  around (cm)  loose (cm)"
     );
@@ -138,9 +137,9 @@ fn draw_all(seen: &[&Seen], dir: &Path) -> Result<(), String> {
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let result = match arguments.as_slice() {
-        [log] => run(Path::new(log), None),
-        [log, dir] => run(Path::new(log), Some(Path::new(dir))),
-        _ => Err("usage: shapes_log LOG [DIR]".to_owned()),
+        [] => Err("usage: shapes_log LOG... [--plots DIR]".to_owned()),
+        [logs @ .., plots, dir] if plots == "--plots" => run(logs, Some(Path::new(dir))),
+        logs => run(logs, None),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

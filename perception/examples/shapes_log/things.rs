@@ -17,10 +17,11 @@ const WIDTH_M: (f64, f64) = (0.15, 1.2);
 /// Readings so far around a thing are of it: poses may be off by as much, metres.
 const AROUND_M: f64 = 0.2;
 /// Scans count from so near, metres.
-const NEAR_M: f64 = 3.0;
-/// Directions in which scans are sorted, and in how many of them a thing must have been scanned, twice.
-const SECTORS: usize = 12;
-const LEAST_SECTORS: usize = 8;
+const NEAR_M: f64 = 4.0;
+/// Directions in which scans are sorted; a thing must have been scanned from so many, and from so many twice.
+const SECTORS: usize = 24;
+const LEAST_SECTORS: usize = 5;
+const LEAST_TWICE: usize = 4;
 
 /// Where a thing stands.
 pub struct Thing {
@@ -51,7 +52,7 @@ pub fn find(scans: &[Scan]) -> Result<Vec<Thing>, ObserveError> {
     Ok(euclidean(&flat, APART_M, 4)?.into_iter().filter_map(of).collect())
 }
 
-/// Two sets of scans of a thing from the same sides, which have none in common; none if it was not scanned twice from most sides.
+/// Two sets of scans of a thing that have none in common; none if it was not scanned from enough sides.
 pub fn two_sets(scans: &[Scan], thing: &Thing) -> Result<Option<[Vec<PosedScan>; 2]>, ObserveError> {
     let far_m = |scan: &Scan| (scan.map_from_laser.translation.vector - thing.middle.coords).norm();
     let near: Vec<Scan> = scans.iter().filter(|s| far_m(s) < NEAR_M).cloned().collect();
@@ -68,10 +69,8 @@ pub fn two_sets(scans: &[Scan], thing: &Thing) -> Result<Option<[Vec<PosedScan>;
     for sector in &mut sectors {
         // Those with the most readings of it first.
         sector.sort_by_key(|posed| std::cmp::Reverse(posed.scan.points.len()));
-        if let [first, second, ..] = sector.as_slice() {
-            sets[0].push(first.clone());
-            sets[1].push(second.clone());
-        }
+        sets[0].extend(sector.first().cloned());
+        sets[1].extend(sector.get(1).cloned());
     }
-    Ok((sets[0].len() >= LEAST_SECTORS).then_some(sets))
+    Ok((sets[0].len() >= LEAST_SECTORS && sets[1].len() >= LEAST_TWICE).then_some(sets))
 }

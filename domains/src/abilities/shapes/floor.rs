@@ -17,7 +17,7 @@ pub const THIS: &str = "this";
 pub const NOTHING_KNOWN_M: f64 = 1.0;
 /// That a thing is none of those known, before the first scan.
 const STRANGER: f64 = 0.5;
-/// Known shapes whose scans fit none, up to so loose a shape (metres): measured one in three hundred, see `perception/examples/shapes`. Scans of an open
+/// Known shapes whose scans fit none, up to so loose a shape (metres): measured one in a hundred, see `perception/examples/shapes`. Scans of an open
 /// outline hold each other in place less well than they fit each other: such a shape is not called unknown before it has been scanned once more.
 const MISSED: [(f64, f64); 2] = [(0.02, 0.01), (f64::INFINITY, 0.1)];
 /// Strangers that scans take for one of five known shapes, as measured: up to so loose a shape (metres), such a share.

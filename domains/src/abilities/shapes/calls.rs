@@ -104,14 +104,8 @@ fn expected_found(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     if !thing.may_have(shape, s.floor.known.len(), s.threshold) || !s.floor.knows(shape) {
         return Ok(Answer::Number(0.0));
     }
-    let scans = planned(s, call, thing);
-    let hope = match &thing.outline {
-        None => 1.0,
-        Some(_) if scans.is_empty() && thing.taken_for.is_some() => 0.0,
-        // Whatever else it is taken for now.
-        Some(_) => thing.hoped_of_name(&scans, s.floor.known.len()) - s.floor.surest(shape),
-    };
-    Ok(Answer::Number(hope.max(0.0)))
+    let hope = if thing.outline.is_some() { hope(s, call, thing) } else { 1.0 };
+    Ok(Answer::Number(hope))
 }
 
 fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {

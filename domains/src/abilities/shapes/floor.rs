@@ -17,7 +17,7 @@ pub const THIS: &str = "this";
 pub const NOTHING_KNOWN_M: f64 = 1.0;
 /// That a thing is none of those known, before the first scan.
 const STRANGER: f64 = 0.5;
-/// A known shape whose scans fit none: measured one in three hundred; see `perception/examples/shapes`.
+/// A known shape whose scans fit none: measured one in a hundred; see `perception/examples/shapes`.
 const MISSED: f64 = 0.01;
 /// Strangers that scans take for one of five known shapes, as measured: up to so loose a shape (metres), such a share.
 const TAKEN_FOR_KNOWN: [(f64, f64); 3] = [(0.02, 0.10), (0.16, 0.15), (f64::INFINITY, 0.70)];

@@ -1,7 +1,7 @@
 //! Scan-alignment: poses of all scans that violate their angular constraints least (section III).
 
 use super::shape::{PosedScan, ShapeError, ShapeModel};
-use super::solve::{Problem, SolverOptions, solve};
+use super::solve::{Objective, Problem, SolverOptions, solve};
 use super::violation::{Assembly, Kind, Side, Violation};
 use nalgebra::Isometry2;
 use std::collections::{BTreeMap, BTreeSet};
@@ -36,6 +36,12 @@ impl Alignment {
     /// The longest error of either kind after alignment, metres: beyond twice the laser's precision the scans contradict each other.
     pub fn longest_m(&self) -> f64 {
         self.after.exterior_m.max(self.after.interior_m)
+    }
+
+    /// Whether a scan ended too far from where it was said to be taken for that to be so; never, if nothing is known of how well poses are stated.
+    fn strays(&self, options: &SolverOptions) -> bool {
+        let Objective::Centred { pose_sigma_m, pose_sigma_rad } = options.objective else { return false };
+        self.moved.iter().any(|(m, rad)| *m > FAR * pose_sigma_m || rad.abs() > FAR * pose_sigma_rad)
     }
 }
 
@@ -78,6 +84,8 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
 
 /// Fewest scans that can tell which of them is wrong: two contradict each other, a third decides.
 const FEWEST: usize = 3;
+/// A scan that was moved by more spreads of its stated pose is not where it was taken.
+const FAR: f64 = 4.0;
 /// By how much an end is opened, radians: then the bound lies far beside the thing, and tells nothing.
 const OPEN_RAD: f64 = 0.5;
 
@@ -85,7 +93,7 @@ const OPEN_RAD: f64 = 0.5;
 ///
 /// While an error is longer than `longest_m`, scans are aligned with such errors as outliers ([`SolverOptions::outlier_m`]); ends that two or more of the
 /// others contradict are opened, and scans that contradict two or more ends are left out. If fewer than three scans, or no more than half of all scans or
-/// of their ends, agree, nothing is left out, and [`Alignment::longest_m`] says that they do not go together.
+/// of their ends, agree, or these only far from their stated poses, nothing is left out, and [`Alignment::longest_m`] says that they do not go together.
 ///
 /// # Errors
 /// As [`align`].
@@ -115,6 +123,10 @@ pub fn align_consistent(
             return Ok(all);
         }
         best = align(&kept.iter().map(|(_, scan)| scan.clone()).collect::<Vec<_>>(), options)?;
+    }
+    let is_whole = kept.len() == scans.len() && opened.is_empty();
+    if !is_whole && best.strays(options) {
+        return Ok(all);
     }
     best.left_out = (0..scans.len()).filter(|i| kept.iter().all(|(index, _)| index != i)).collect();
     best.opened = opened;

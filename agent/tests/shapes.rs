@@ -51,6 +51,17 @@ fn what_is_known_is_named_and_what_is_not_is_not() {
 }
 
 #[test]
+fn what_is_there_is_found_and_what_is_not_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    // The body comes to stand in touch of a thing that it has not seen from that side.
+    check("where is the garbage can", "default", 308, folder, None, ("achieved", Some("garbage can")));
+    check("where is the dell box", "recycle-bin", 501, folder, None, ("not_found", None));
+    check("where is the recycle bin", "garbage-can", 502, folder, None, ("not_found", None));
+    check("where is the coffee table", "garbage-can", 503, folder, None, ("cannot_tell", None));
+}
+
+#[test]
 fn what_was_learned_is_known_after_a_restart() {
     let folder = tempfile::tempdir().unwrap();
     let (folder, store) = (folder.path(), folder.path().join("store"));

@@ -128,6 +128,7 @@ pub(crate) fn outcome(outcome: &Outcome) -> Value {
             "boundary_after_m2": a.after.boundary_m2,
             "longest_m": a.longest_m(),
             "left_out": a.left_out,
+            "opened": a.opened,
         }),
         Outcome::Pushed(p) => json!({ "moved_m": p.moved_m, "duration_s": p.duration_s }),
         Outcome::Opened(o) => json!({ "duration_s": o.duration_s }),

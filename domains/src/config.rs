@@ -48,6 +48,9 @@ pub struct Config {
     /// Objects of the domain's own types, by type.
     #[serde(default)]
     pub objects: BTreeMap<String, Vec<String>>,
+    /// Types whose objects a person may name as he likes: a slot of such a type holds any words that are no other name.
+    #[serde(default)]
+    pub open: Vec<String>,
     /// What holds in the beginning of words that are remembered or fixed: PDDL atoms and values.
     #[serde(default)]
     pub init: Vec<String>,

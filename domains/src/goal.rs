@@ -99,7 +99,7 @@ pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, Goal
     let mut nearest_miss = None;
     for phrase in &domain.config.goal {
         for slots in fits(&phrase.say, &words) {
-            match fill(lexicon, &slots) {
+            match fill(lexicon, &domain.config.open, &slots) {
                 Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
                 Err(found) => nearest_miss = nearest_miss.or(Some(found)),
             }
@@ -276,19 +276,22 @@ fn fits<'a>(say: &'a str, words: &[String]) -> Vec<Vec<(&'a str, String)>> {
     step(&pattern, words)
 }
 
-fn fill(lexicon: &Lexicon, slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> {
+fn fill(lexicon: &Lexicon, open: &[String], slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> {
     let mut filled: Vec<Filled> = Vec::new();
     for (slot, found) in slots {
         let (of_type, wanted) = (type_of_slot(slot), without_article(found));
         let is_called = |n: &&Named| n.names.iter().any(|name| symbol(name) == symbol(wanted));
-        let Some(named) = lexicon.of_type(of_type).iter().find(is_called) else {
-            return Err(Miss { of_type: of_type.into(), found: wanted.into() });
+        let is_free = || open.iter().any(|of| of == of_type) && lexicon.is_free(&symbol(wanted));
+        let (called, name) = match lexicon.of_type(of_type).iter().find(is_called) {
+            Some(named) => (named.symbol.clone(), lexicon.name_of(&named.symbol).to_string()),
+            None if is_free() => (symbol(wanted), wanted.to_string()),
+            None => return Err(Miss { of_type: of_type.into(), found: wanted.into() }),
         };
         filled.push(Filled {
             slot: (*slot).into(),
             number: filled.iter().filter(|f| f.slot == *slot).count(),
-            symbol: named.symbol.clone(),
-            name: lexicon.name_of(&named.symbol).into(),
+            symbol: called,
+            name,
         });
     }
     Ok(filled)
@@ -398,5 +401,22 @@ mod tests {
             "find both salt and pepper and a cup",
             &[&["salt", "pepper and a cup"], &["salt and pepper", "a cup"]],
         );
+    }
+
+    #[test]
+    fn a_shape_has_any_name_that_is_no_other() {
+        let check = |domain: &str, said: &str, expected: Option<(&str, &str)>| {
+            let domain = Domain::load(domain).unwrap();
+            let lexicon = Lexicon::new(&domain, &crate::lexicon::Places::default());
+            let goal = read(said, &domain, &lexicon);
+            let found = goal.as_ref().ok().map(|g| (g.pddl.as_str(), g.slots[0].name.as_str()));
+            assert_eq!(found, expected, "{said}: {goal:?}");
+        };
+        check("shapes", "learn the coffee table", Some(("(learned coffee-table)", "coffee table")));
+        check("shapes", "learn dell box", Some(("(learned dell-box)", "dell box")));
+        check("shapes", "where is Bob's bin?", Some(("(>= (found bob-s-bin) 0.9)", "bob's bin")));
+        check("shapes", "learn this", None);
+        check("shapes", "learn !", None);
+        check("tabletop", "find coffee table", None);
     }
 }

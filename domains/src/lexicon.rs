@@ -128,6 +128,11 @@ impl Lexicon {
         }
     }
 
+    /// Whether a symbol is one, and nothing has it yet.
+    pub fn is_free(&self, symbol: &str) -> bool {
+        !symbol.is_empty() && self.by_type.values().flatten().all(|known| known.symbol != symbol)
+    }
+
     /// Everything of a type.
     pub fn of_type(&self, name: &str) -> &[Named] {
         self.by_type.get(name).map_or(&[], Vec::as_slice)

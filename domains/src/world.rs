@@ -236,6 +236,7 @@ impl<'a> World<'a> {
         self.mind.known.things = self.asked.iter().cloned().chain(members).collect();
         self.mind.known.expected = expected(domain, &self.mind.known);
         self.mind.known.surfaces.iter().for_each(|surface| self.lexicon.learn("surface", &surface.name));
+        self.mind.known.floor.names.iter().for_each(|(_, name)| self.lexicon.learn("shape", name));
         self.mind.attend();
     }
 

@@ -31,4 +31,4 @@ pub use next::{NextOptions, NextScan, Outlook, next_scan, undetermined_m2};
 pub use scan::{Scan, ScanError};
 pub use shape::{ObjectScan, PosedScan, ShapeError, ShapeModel};
 pub use solve::{Objective, Solver, SolverOptions};
-pub use violation::Violation;
+pub use violation::{Side, Violation};

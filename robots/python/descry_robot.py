@@ -10,6 +10,7 @@ import json
 import math
 import os
 import select
+import struct
 import sys
 
 PROTOCOL = 1
@@ -56,6 +57,10 @@ class Robot:
         """`{"map_from_base": transform, "base_from_camera": transform}` and the bytes of the frame."""
         raise NotImplementedError
 
+    def scan(self, request):
+        """`{"map_from_base": transform}` and the bytes of the ranges: `ranges(metres)`."""
+        raise Failure("unable", "there is no laser")
+
     def push_aside(self, request, object, direction, distance_m):
         """`{"moved_m": distance}`."""
         raise Failure("unable", "there is no arm")
@@ -80,7 +85,7 @@ class Robot:
         """Comes to a halt at once: called when a request was stopped and when nobody is left to ask."""
 
 
-REQUESTS = ("pose", "drive_to", "look_at", "sense", "push_aside", "open_door", "grasp", "place", "hand")
+REQUESTS = ("pose", "drive_to", "look_at", "sense", "scan", "push_aside", "open_door", "grasp", "place", "hand")
 
 
 class Request:
@@ -205,6 +210,11 @@ def _accept(listen):
     server.close()
     fd = connection.detach()
     return fd, fd
+
+
+def ranges(metres):
+    """The bytes of a sweep: a float each, `inf` where nothing is within reach, 0 where there is no reading."""
+    return struct.pack(f"<{len(metres)}f", *metres)
 
 
 # Geometry in a few lines: poses on the floor and the pan-tilt head as descry reckons with it.

@@ -1,4 +1,4 @@
-"""A whole robot in a hundred lines: a disc on wheels with a pan-tilt depth camera, alone in a room with an empty table.
+"""A whole robot in a hundred lines: a disc on wheels with a pan-tilt depth camera and a laser, alone in a room with an empty table.
 
 Copy it, and put your driver where its small simulation is. It passes `descry robot check "program:python3 template.py"`.
 """
@@ -11,6 +11,8 @@ import descry_robot as descry
 ROOM, CELL, TABLE, TABLE_TOP = 2.5, 0.05, (0.8, 0.4), 0.72  # half sides of the room and the table, metres
 SPEED, TURN = 0.4, 0.8  # metres and radians a second
 WIDTH, HEIGHT, FOCAL = 64, 48, 58.0
+LEVEL = [0.0, 0.0, 0.0, 1.0]
+LASER = {"base_from_laser": {"translation": [0.0, 0.0, 0.4], "rotation": LEVEL}, "first_rad": -1.57, "step_rad": 0.0175, "readings": 180, "reach_m": 8.0}
 HEAD = {"base_from_head": [0.0, 0.0, 1.4], "pan_limit_rad": 2.6, "tilt_down_rad": 1.2, "tilt_up_rad": 0.8}
 
 
@@ -27,7 +29,7 @@ class Template(descry.Robot):
         occupied = bytes(abs(x) < TABLE[0] and abs(y) < TABLE[1] for y in middle for x in middle)
         corners = [[i * TABLE[0], j * TABLE[1]] for i, j in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
         return {
-            "name": "template", "simulated": True, "up": [0, 0, 1], "pose_sigma_m": 0.03, "pose_sigma_rad": 0.03, "head": HEAD,
+            "name": "template", "simulated": True, "up": [0, 0, 1], "pose_sigma_m": 0.03, "pose_sigma_rad": 0.03, "head": HEAD, "laser": LASER,
             "base": {"footprint": {"disc": {"radius_m": 0.25}}, "linear_m_s": SPEED, "angular_rad_s": TURN},
             "camera": {"width": WIDTH, "height": HEIGHT, "fx": FOCAL, "fy": FOCAL, "cx": 31.5, "cy": 23.5, "range_m": [0.4, 6.0]},
             "map": {"resolution_m": CELL, "origin_m": [-ROOM, -ROOM], "width": cells, "height": cells},
@@ -70,6 +72,16 @@ class Template(descry.Robot):
         self.clock_s += 0.1
         chain = {"map_from_base": descry.planar(*self.at), "base_from_camera": descry.base_from_camera(HEAD, *self.gaze)}
         return chain, array.array("H", self.depths_mm()).tobytes()
+
+    def scan(self, request):
+        self.clock_s += 0.1
+        return {"map_from_base": descry.planar(*self.at)}, descry.ranges([self.wall_m(k) for k in range(LASER["readings"])])
+
+    def wall_m(self, k):
+        """How far a level ray goes to the walls, below the table. A real robot reads its laser here."""
+        x, y, yaw = self.at
+        angle = yaw + LASER["first_rad"] + k * LASER["step_rad"]
+        return min((math.copysign(ROOM, d) - p) / d for p, d in ((x, math.cos(angle)), (y, math.sin(angle))) if abs(d) > 1e-9)
 
     def depths_mm(self):
         """What the camera sees, row by row: floor and table; 0 where nothing returns. A real robot reads its camera here."""

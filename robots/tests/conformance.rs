@@ -8,7 +8,7 @@ use descry_robots::recorded::RecordedRobot;
 use descry_robots::sim::{SimOptions, SimRobot};
 use descry_robots::{
     Description, Driven, Failure, Grasp, Grasped, Hand, Looked, OccupancyGrid, Place, Placed, Placing,
-    PoseEstimate, Robot, Sensed, Stamp, Station, SurfaceHint, Travel, Watch, async_trait, nalgebra,
+    PoseEstimate, Robot, Scanned, Sensed, Stamp, Station, SurfaceHint, Travel, Watch, async_trait, nalgebra,
 };
 
 fn simulated(seed: u64) -> SimRobot {
@@ -56,6 +56,8 @@ enum Lie {
     Moody,
     Numb,
     Greedy,
+    ShortSweep,
+    Blind,
 }
 
 #[async_trait]
@@ -115,6 +117,16 @@ impl Robot for Liar {
         }
         Ok(sensed)
     }
+    async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {
+        let mut scanned = self.honest.scan(watch).await?;
+        if self.lie == Lie::ShortSweep {
+            scanned.scan.ranges_m.pop();
+        }
+        match self.lie {
+            Lie::Blind => Err(Failure::Unable { because: "there is no laser".into() }),
+            _ => Ok(scanned),
+        }
+    }
     async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
         match self.honest.grasp(grasp, watch).await {
             Err(Failure::Slipped { .. }) if self.lie == Lie::Greedy => {
@@ -139,6 +151,8 @@ async fn broken_promises_are_found() {
         (Lie::WrongChain, "the chain is map, base, camera"),
         (Lie::Everywhere, "a place that is none is unreachable, with a reason"),
         (Lie::Moody, "each question about a route has an answer"),
+        (Lie::ShortSweep, "angles, ranges and pose of a sweep go together"),
+        (Lie::Blind, "a body with a laser sweeps it"),
         (Lie::Numb, "a hand feels whether it holds something"),
         (Lie::Greedy, "a hand that closes on nothing says so"),
     ] {

@@ -67,6 +67,7 @@ fn what_is_no_robot_is_refused_with_the_reason() {
     check_refused("another version", &["protocol 2", "protocol 1"]);
     check_refused("unknown part", &["unknown field `camra`"]);
     check_refused("no focal length", &["camera.fx is 0"]);
+    check_refused("laser beyond a turn", &["laser: 1000 readings", "a full turn at most"]);
     check_refused("two tables of one name", &["two surfaces are called \"table\""]);
     check_refused("short map", &["9999 bytes follow the hello", "10000 cells"]);
     check_refused("no map", &["neither a map nor stations"]);
@@ -82,6 +83,9 @@ async fn check_rogue(what: &str, kind: &str, words: &[&str]) {
     }
     if failure.is_none() {
         failure = robot.sense(&watch).await.err();
+    }
+    if failure.is_none() {
+        failure = robot.scan(&watch).await.err();
     }
     if failure.is_none() {
         failure = robot.drive_to(&far(), &watch).await.err();
@@ -128,6 +132,8 @@ async fn a_rogue_program_is_a_failure_with_its_reason() {
     check_rogue("no rotation", "broken", &["a transform with the quaternion"]).await;
     check_rogue("short frame", "broken", &["a frame of 6142 bytes, expected 6144"]).await;
     check_rogue("frame of tomorrow", "broken", &["a frame of"]).await;
+    check_rogue("short sweep", "broken", &["a sweep of 716 bytes, expected 720"]).await;
+    check_rogue("sweep of yesterday", "broken", &["a sweep of -1 ns"]).await;
 }
 
 /// What a program may do: it answers, and what is asked next is answered too.

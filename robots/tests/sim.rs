@@ -207,6 +207,25 @@ async fn an_unknown_obstacle_stops_the_base_and_is_driven_around_then() {
     assert!((robot.truth().base.point() - nalgebra_point(0.3, 1.6)).norm() < 0.2);
 }
 
+/// What the base touches already holds it only in the direction of what it touches: it turns on the spot and drives away.
+#[tokio::test]
+async fn a_base_that_touches_an_obstacle_gets_away() {
+    for seed in 0..20 {
+        let crate_m = [-1.62, 0.1];
+        let text = format!(
+            "{SCENE}[[obstacle]]\nname = \"crate\"\nposition_m = {crate_m:?}\nsize_m = [0.3, 0.3, 0.5]\nyaw_deg = 20\non_map = false\n"
+        );
+        let robot = robot_in(&text, seed, "");
+        let goal = at(-1.0, 1.6);
+        let mut tries = 0;
+        while let Err(failure) = drive(&robot, &goal).await {
+            assert!(matches!(failure, Failure::Blocked { .. }), "seed {seed}: {failure}");
+            tries += 1;
+            assert!(tries < 8, "seed {seed}: it never gets away, and stands at {:?}", robot.truth().base);
+        }
+    }
+}
+
 fn nalgebra_point(x: f64, y: f64) -> descry_robots::nalgebra::Point2<f64> {
     descry_robots::nalgebra::Point2::new(x, y)
 }

@@ -119,7 +119,7 @@ fn nouns() -> Vec<String> {
         nouns.extend(ability.calls.iter().map(|c| c.name.to_string()));
         nouns.extend(ability.skills.iter().map(|s| s.name.to_string()));
     }
-    for name in ["tabletop", "home"] {
+    for name in ["tabletop", "home", "shapes"] {
         let domain = descry_domains::load::Domain::load(name).expect("a built-in domain loads");
         let task = &domain.vocabulary.task;
         nouns.extend(task.actions.iter().map(|a| a.name.clone()));

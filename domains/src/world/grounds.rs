@@ -23,6 +23,7 @@ pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<
         ("kind".into(), s.kinds.iter().map(|t| t.symbol.clone()).collect()),
         ("obstacle".into(), s.obstacles().iter().map(|o| o.symbol.clone()).collect()),
         ("spot".into(), s.floor.things.iter().map(|t| t.symbol.clone()).collect()),
+        ("shape".into(), s.floor.names.iter().map(|(symbol, _)| symbol.clone()).collect()),
         ("door".into(), s.doors.iter().map(|d| d.symbol.clone()).collect()),
         ("room".into(), lexicon.of_type("room").iter().map(|n| n.symbol.clone()).collect()),
     ];

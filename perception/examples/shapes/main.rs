@@ -1,6 +1,7 @@
 //! The experiment of Modayil and Kuipers in a simulated lab, beside the figures of their paper, and what they did not try:
 //! `cargo run --release -p descry-perception --example shapes -- [SEED] [DIR]`. Plots are written to DIR as SVG.
 
+mod draw;
 #[path = "../../tests/lab/mod.rs"]
 mod lab;
 mod plot;

@@ -73,18 +73,16 @@ pub fn print(seed: u64, learnt: &[Alignment]) {
             let fit = FitOptions { solver: SolverOptions { solver, ..options(0) }, ..FitOptions::default() };
             let gate = if everything { f64::INFINITY } else { RecogniseOptions::default().gate };
             let options = RecogniseOptions { fit, gate, ..RecogniseOptions::default() };
-            let mut found = (0, 0, 0);
-            let name_all = || {
-                instances.iter().map(|&i| recognise(&learnt[i].model, &known, &options)).collect::<Vec<_>>()
-            };
-            for (recognition, &i) in name_all().iter().zip(&instances) {
-                match &recognition.verdict {
+            let (mut found, mut ms) = ((0, 0, 0), 0.0);
+            for &i in &instances {
+                let name = || recognise(&learnt[i].model, &known, &options);
+                match name().verdict {
                     Verdict::Is(name) if name == NAMES[i / INSTANCES] => found.0 += 1,
                     Verdict::Is(_) => found.2 += 1,
                     _ => found.1 += 1,
                 }
+                ms += least_ms(name) / instances.len() as f64;
             }
-            let ms = least_ms(name_all) / instances.len() as f64;
             println!("  {count:>3} known, {name:<36} {ms:>8.2}   {found:?}");
         }
     }

@@ -63,13 +63,13 @@ const CONTRADICTS_M: f64 = 0.02;
 
 fn case(seed: u64, name: &str, outlines: &[Outline], run: &Run, known: &[KnownShape]) {
     let map = map_of_the_lab(&mut Draws(seed));
-    let mut tallies: Vec<(&str, Tally)> = ["as localised", "ICP"]
+    let mut tallies: Vec<(&str, Tally)> = ["as localised", "ICP", "ICP, none moved far"]
         .into_iter()
         .chain(METHODS.iter().map(|m| m.0))
         .chain(["the first, consistent scans"])
         .map(|name| (name, Tally::default()))
         .collect();
-    let (mut ignored, mut left_out) = (0, 0);
+    let (mut ignored, mut left_out, mut opened) = (0, 0, 0);
     for (k, i) in (0..outlines.len()).flat_map(|k| (0..INSTANCES).map(move |i| (k, i))) {
         let (_, seen) = circled(&outlines[k], run, &map, seed_of(seed + 1000, k, i));
         ignored += seen.ignored;
@@ -79,7 +79,7 @@ fn case(seed: u64, name: &str, outlines: &[Outline], run: &Run, known: &[KnownSh
             name: (outlines.len() == NAMES.len()).then_some(NAMES[k]),
         };
         let mut rows = tallies.iter_mut().map(|row| &mut row.1);
-        for scans in [seen.scans.clone(), by_icp(&seen.scans)] {
+        for scans in [seen.scans.clone(), by_icp(&seen.scans, f64::INFINITY), by_icp(&seen.scans, FAR)] {
             rows.next().into_iter().for_each(|row| row.add(&scans, None, &truth, known));
         }
         let mut all: Vec<_> = (0..METHODS.len()).map(|m| align(&seen.scans, &options(m))).collect();
@@ -87,9 +87,12 @@ fn case(seed: u64, name: &str, outlines: &[Outline], run: &Run, known: &[KnownSh
         for (row, alignment) in rows.zip(all.iter().flatten()) {
             row.add(alignment.model.scans(), Some(alignment), &truth, known);
         }
-        left_out += all.last().and_then(|a| a.as_ref().ok()).map_or(0, |a| a.left_out.len());
+        if let Some(Ok(consistent)) = all.last() {
+            left_out += consistent.left_out.len();
+            opened += consistent.opened.len();
+        }
     }
-    println!("{name} ({ignored} scans ignored, {left_out} left out by the last)");
+    println!("{name} ({ignored} scans ignored; by the last {left_out} left out, {opened} ends opened)");
     for (method, tally) in &tallies {
         tally.print(method);
     }
@@ -176,8 +179,11 @@ pub fn off_m(scans: &[PosedScan], truth: &[Isometry2<f64>]) -> f64 {
     (squares / n).sqrt()
 }
 
-/// Scan after scan onto all before it, point to point.
-pub fn by_icp(scans: &[PosedScan]) -> Vec<PosedScan> {
+/// So many spreads of a stated pose are far.
+pub const FAR: f64 = 3.0;
+
+/// Scan after scan onto all before it, point to point; one that would be moved by more spreads of its stated pose stays there.
+pub fn by_icp(scans: &[PosedScan], spreads: f64) -> Vec<PosedScan> {
     let flat = |p: Point2<f64>| Point3::new(p.x as f32, p.y as f32, 0.0);
     let mut placed: Vec<PosedScan> = Vec::new();
     let mut target: Vec<Point3<f32>> = Vec::new();
@@ -194,7 +200,14 @@ pub fn by_icp(scans: &[PosedScan]) -> Vec<PosedScan> {
         let fit = prepared(&source)
             .zip(prepared(&target))
             .and_then(|(s, t)| register::align(&s, &t, &options).ok());
-        let moved = fit.map_or(Isometry2::identity(), |fit| planar(&fit.target_from_source));
+        let pose = &scan.model_from_laser;
+        let usual = Run::default();
+        let is_near = |moved: &Isometry2<f64>| {
+            let shift_m = ((moved * pose).translation.vector - pose.translation.vector).norm();
+            shift_m <= spreads * usual.pose_sigma_m
+                && moved.rotation.angle().abs() <= spreads * usual.pose_sigma_rad
+        };
+        let moved = fit.map(|fit| planar(&fit.target_from_source)).filter(is_near).unwrap_or_default();
         let posed = PosedScan { scan: scan.scan.clone(), model_from_laser: moved * scan.model_from_laser };
         target.extend(posed.scan.points.iter().map(|p| flat(posed.model_from_laser * p)));
         placed.push(posed);

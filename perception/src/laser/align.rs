@@ -1,9 +1,11 @@
 //! Scan-alignment: poses of all scans that violate their angular constraints least (section III).
 
 use super::shape::{PosedScan, ShapeError, ShapeModel};
-use super::solve::{Problem, SolverOptions, solve};
-use super::violation::{Assembly, Violation};
+use super::solve::{Objective, Problem, SolverOptions, solve};
+use super::violation::{Assembly, Kind, Side, Violation};
 use nalgebra::Isometry2;
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::PI;
 
 /// A shape model made of scans, and how well they go together.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,12 +28,20 @@ pub struct Alignment {
     pub moved: Vec<(f64, f64)>,
     /// Scans that contradict the others and are no part of the model, by their index; only [`align_consistent`] leaves out any.
     pub left_out: Vec<usize>,
+    /// Ends that contradict the others, by the index of the scan: in the model that scan is open on that side. Only [`align_consistent`] opens any.
+    pub opened: Vec<(usize, Side)>,
 }
 
 impl Alignment {
     /// The longest error of either kind after alignment, metres: beyond twice the laser's precision the scans contradict each other.
     pub fn longest_m(&self) -> f64 {
         self.after.exterior_m.max(self.after.interior_m)
+    }
+
+    /// Whether a scan ended too far from where it was said to be taken for that to be so; never, if nothing is known of how well poses are stated.
+    fn strays(&self, options: &SolverOptions) -> bool {
+        let Objective::Centred { pose_sigma_m, pose_sigma_rad } = options.objective else { return false };
+        self.moved.iter().any(|(m, rad)| *m > FAR * pose_sigma_m || rad.abs() > FAR * pose_sigma_rad)
     }
 }
 
@@ -48,7 +58,7 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
         .collect();
     let assembly = Assembly::new(unposed.iter().map(std::slice::from_ref));
     let start: Vec<Isometry2<f64>> = model.scans().iter().map(|s| s.model_from_laser).collect();
-    let solved = solve(&Problem::free(&assembly, &start, options.objective), options);
+    let solved = solve(&Problem::free(&assembly, &start, options), options);
     let moved = start.iter().zip(&solved.poses).map(|(from, to)| {
         ((to.translation.vector - from.translation.vector).norm(), from.rotation.angle_to(&to.rotation))
     });
@@ -61,6 +71,7 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
         evaluations: solved.evaluations,
         moved: moved.collect(),
         left_out: Vec::new(),
+        opened: Vec::new(),
         model: ShapeModel::new(
             unposed
                 .into_iter()
@@ -73,11 +84,16 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
 
 /// Fewest scans that can tell which of them is wrong: two contradict each other, a third decides.
 const FEWEST: usize = 3;
+/// A scan that was moved by more spreads of its stated pose is not where it was taken.
+const FAR: f64 = 4.0;
+/// By how much an end is opened, radians: then the bound lies far beside the thing, and tells nothing.
+const OPEN_RAD: f64 = 0.5;
 
-/// Aligns scans of which some may be wrong: where the end of the thing was taken for background, a bound lies on the thing and contradicts all other scans.
+/// Aligns scans of which some may be wrong: where an end of the thing was taken for background, the bound lies on the thing and contradicts other scans.
 ///
-/// While an error is longer than `longest_m`, the scan is left out without which the rest go together best. If no three scans, or no more than half of
-/// all, agree, none is left out, and [`Alignment::longest_m`] says that they do not go together.
+/// While an error is longer than `longest_m`, scans are aligned with such errors as outliers ([`SolverOptions::outlier_m`]); ends that two or more of the
+/// others contradict are opened, and scans that contradict two or more ends are left out. If fewer than three scans, or no more than half of all scans or
+/// of their ends, agree, or these only far from their stated poses, nothing is left out, and [`Alignment::longest_m`] says that they do not go together.
 ///
 /// # Errors
 /// As [`align`].
@@ -87,26 +103,102 @@ pub fn align_consistent(
     options: &SolverOptions,
 ) -> Result<Alignment, ShapeError> {
     let all = align(scans, options)?;
-    let mut kept: Vec<usize> = (0..scans.len()).collect();
     let mut best = all.clone();
+    let mut kept: Vec<(usize, PosedScan)> = scans.iter().cloned().enumerate().collect();
+    let mut opened: Vec<(usize, Side)> = Vec::new();
     while best.longest_m() > longest_m {
-        if kept.len() <= FEWEST.max(scans.len() / 2 + 1) {
+        let rest: Vec<PosedScan> = kept.iter().map(|(_, scan)| scan.clone()).collect();
+        let found = contradictions(&rest, longest_m, options)?;
+        for (at, side) in &found.ends {
+            let (index, posed) = &mut kept[*at];
+            open(posed, *side);
+            opened.push((*index, *side));
+        }
+        let is_left_out: Vec<usize> = found.scans.iter().map(|&at| kept[at].0).collect();
+        kept.retain(|(index, _)| !is_left_out.contains(index));
+        opened.retain(|(index, _)| !is_left_out.contains(index));
+        let ends = 2 * kept.len() - opened.len();
+        let agree = kept.len() >= FEWEST.max(scans.len() / 2 + 1) && ends > scans.len();
+        if found.is_none() || !agree {
             return Ok(all);
         }
-        let mut without: Option<(f64, usize, Alignment)> = None;
-        for out in 0..kept.len() {
-            let rest: Vec<PosedScan> =
-                (0..kept.len()).filter(|&i| i != out).map(|i| scans[kept[i]].clone()).collect();
-            let alignment = align(&rest, options)?;
-            let cost = alignment.objective_m2;
-            if without.as_ref().is_none_or(|(least, ..)| cost < *least) {
-                without = Some((cost, out, alignment));
-            }
-        }
-        let Some((_, out, alignment)) = without else { return Ok(all) };
-        kept.remove(out);
-        best = alignment;
+        best = align(&kept.iter().map(|(_, scan)| scan.clone()).collect::<Vec<_>>(), options)?;
     }
-    best.left_out = (0..scans.len()).filter(|i| !kept.contains(i)).collect();
+    let is_whole = kept.len() == scans.len() && opened.is_empty();
+    if !is_whole && best.strays(options) {
+        return Ok(all);
+    }
+    best.left_out = (0..scans.len()).filter(|i| kept.iter().all(|(index, _)| index != i)).collect();
+    best.opened = opened;
     Ok(best)
+}
+
+/// Moves the bound of a scan far away from the thing on one side.
+fn open(posed: &mut PosedScan, side: Side) {
+    let scan = &mut posed.scan;
+    let most = |other: f64| (other.abs() - 1e-3).min(OPEN_RAD);
+    match side {
+        Side::Left => {
+            let room = PI - (scan.left_object_rad - scan.right_bound_rad);
+            scan.left_bound_rad = scan.left_object_rad + most(room);
+        }
+        Side::Right => {
+            let room = PI - (scan.left_bound_rad - scan.right_object_rad);
+            scan.right_bound_rad = scan.right_object_rad - most(room);
+        }
+    }
+}
+
+/// What of some scans contradicts the others, by their place in the list.
+#[derive(Default)]
+struct Contradictions {
+    ends: BTreeSet<(usize, Side)>,
+    scans: BTreeSet<usize>,
+}
+
+impl Contradictions {
+    fn is_none(&self) -> bool {
+        self.ends.is_empty() && self.scans.is_empty()
+    }
+}
+
+/// Two against one: an end that two other scans contradict is false, a scan that contradicts two ends which nobody else does has false points, or lacks some.
+fn contradictions(
+    scans: &[PosedScan],
+    longest_m: f64,
+    options: &SolverOptions,
+) -> Result<Contradictions, ShapeError> {
+    let robust = align(scans, &SolverOptions { outlier_m: longest_m, ..*options })?;
+    let assembly = Assembly::new(robust.model.scans().iter().map(std::slice::from_ref));
+    let placed = assembly.placed(&vec![Isometry2::identity(); scans.len()]);
+    let mut beyond: BTreeMap<(usize, Side), BTreeSet<usize>> = BTreeMap::new();
+    let mut short: BTreeMap<(usize, Side), BTreeSet<usize>> = BTreeMap::new();
+    assembly.residuals(&placed, 0.0, |r| {
+        let of = match r.kind {
+            Kind::Exterior => &mut beyond,
+            Kind::Interior => &mut short,
+            Kind::Slack => return,
+        };
+        if r.value_m > longest_m {
+            of.entry((r.line, r.side)).or_default().insert(r.point);
+        }
+    });
+    let mut found = Contradictions::default();
+    found.ends.extend(beyond.iter().filter(|(_, by)| by.len() > 1).map(|(end, _)| *end));
+    // A scan of which an end is false lacks what lies there.
+    let lacks =
+        |scan: &usize| [Side::Left, Side::Right].iter().any(|side| found.ends.contains(&(*scan, *side)));
+    short.values_mut().for_each(|by| by.retain(|scan| !lacks(scan)));
+    let far: Vec<(usize, Side)> = short.iter().filter(|(_, by)| by.len() > 1).map(|(end, _)| *end).collect();
+    found.ends.extend(far);
+    let mut accused: BTreeMap<usize, usize> = BTreeMap::new();
+    for (_, by) in beyond.iter().chain(&short).filter(|(end, _)| !found.ends.contains(*end)) {
+        by.iter().for_each(|scan| *accused.entry(*scan).or_default() += 1);
+    }
+    found.scans.extend(accused.iter().filter(|(_, times)| **times > 1).map(|(scan, _)| *scan));
+    if found.is_none() {
+        // One against one: the end goes, which loses less than a scan.
+        found.ends.extend(beyond.keys().chain(short.keys().filter(|end| !short[end].is_empty())));
+    }
+    Ok(found)
 }

@@ -16,11 +16,13 @@ pub struct FitOptions {
     pub starts: usize,
     /// Of the starts that violate less than their neighbours, so many are followed to the end.
     pub followed: usize,
+    /// Where the best of these, roughly settled, violates by more, metres as [`Violation::per_pair_m`], it is left at that.
+    pub hopeless_m: f64,
 }
 
 impl Default for FitOptions {
     fn default() -> Self {
-        FitOptions { solver: SolverOptions::default(), starts: 36, followed: 6 }
+        FitOptions { solver: SolverOptions::default(), starts: 36, followed: 6, hopeless_m: f64::INFINITY }
     }
 }
 
@@ -127,7 +129,7 @@ fn follow(
     let (mut iterations, mut evaluations) = (0, starts.len());
     let mut settle = |from: &Isometry2<f64>, solve: fn(&Problem, &SolverOptions) -> Solved| {
         let start = poses(from);
-        let solved = solve(&Problem::onto(&assembly, &start, options.solver.objective), &options.solver);
+        let solved = solve(&Problem::onto(&assembly, &start, &options.solver), &options.solver);
         iterations += solved.iterations;
         evaluations += solved.evaluations;
         solved
@@ -136,7 +138,8 @@ fn follow(
     let promising = promising(&violations, options.followed);
     let mut ends: Vec<Solved> = promising.map(|start| settle(&starts[start], solve_roughly)).collect();
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    for end in ends.iter_mut().take(SETTLED) {
+    let is_hopeless = assembly.violation(&ends[0].poses).per_pair_m() > options.hopeless_m;
+    for end in ends.iter_mut().take(if is_hopeless { 0 } else { SETTLED }) {
         *end = settle(&end.poses[1], solve);
     }
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));

@@ -7,6 +7,8 @@ use super::shape::{ObjectScan, ShapeModel};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
+/// A fit that, roughly settled, violates by so many times what rules a shape out does not come down to it.
+const HOPELESS: f64 = 3.0;
 /// Directions in which the width of a shape is measured.
 const WIDTHS: usize = 18;
 
@@ -58,8 +60,12 @@ pub struct RecogniseOptions {
     pub tight_m: f64,
     /// Scans constrain each other's poses where the outline is known to so much, metres; else each is held against a shape by itself.
     pub rigid_m: f64,
-    /// A shape fits if the root of the boundary violation a pair of scans stays below, metres: the precision of the paper's laser.
+    /// A shape fits if the root of the boundary violation a pair of scans stays below, metres: measured at most 2.2 mm for the same thing, from seven
+    /// scans; see `examples/shapes`.
     pub same_m: f64,
+    /// It is ruled out if that is more than this, metres, the precision of the paper's laser: measured at least 10.6 mm for another of the paper's things.
+    /// Between the two it may be it.
+    pub other_m: f64,
     /// What fits by so much less well than the best is told from it, metres: more than models of one thing differ among themselves.
     pub apart_m: f64,
     /// How models are brought onto each other.
@@ -72,10 +78,18 @@ impl Default for RecogniseOptions {
             gate: 4.0,
             tight_m: 0.01,
             rigid_m: 0.16,
-            same_m: 0.01,
+            same_m: 0.005,
+            other_m: 0.01,
             apart_m: 0.003,
             fit: FitOptions::default(),
         }
+    }
+}
+
+impl RecogniseOptions {
+    /// How models are brought onto each other, and no farther than tells that they do not fit.
+    fn fits(&self) -> FitOptions {
+        FitOptions { hopeless_m: self.fit.hopeless_m.min(HOPELESS * self.other_m), ..self.fit }
     }
 }
 
@@ -95,9 +109,9 @@ pub struct Candidate {
 pub enum Verdict {
     /// One name fits.
     Is(String),
-    /// Several names fit: more scans, or other features, must tell them apart.
+    /// Several names fit, or none fits and these are not ruled out: more scans, or other features, must tell.
     OneOf(Vec<String>),
-    /// No known shape fits.
+    /// Every known shape is ruled out.
     Unknown,
 }
 
@@ -110,6 +124,8 @@ pub struct Recognition {
     pub candidates: Vec<Candidate>,
     /// Known shapes that features or width ruled out.
     pub ruled_out: usize,
+    /// Names that are not ruled out, the best fit first, whether or not they fit as well as the best.
+    pub may_be: Vec<String>,
 }
 
 /// Takes a shape for one of those known.
@@ -120,7 +136,7 @@ pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &Recognis
     for (index, shape) in known.iter().enumerate() {
         let distance = apart(&features, &shape.features);
         if distance <= options.gate {
-            candidates.push(Candidate { index, distance, fit: fit(&shape.model, instance, &options.fit) });
+            candidates.push(Candidate { index, distance, fit: fit(&shape.model, instance, &options.fits()) });
         }
     }
     decide(candidates, known, options)
@@ -135,7 +151,7 @@ pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &Recogni
     for (index, shape) in known.iter().enumerate() {
         let distance = width_apart_m(scan, &shape.model) / USUAL_SPREAD.1;
         if distance <= options.gate {
-            let fit = localise(&shape.model, scan, Start::AllAngles, &options.fit);
+            let fit = localise(&shape.model, scan, Start::AllAngles, &options.fits());
             candidates.push(Candidate { index, distance, fit });
         }
     }
@@ -153,8 +169,8 @@ pub fn recognise_scans(
     let _span = tracing::debug_span!("recognise_scans", known = known.len()).entered();
     let features = (loose_m <= options.tight_m).then(|| scans.features());
     let fit = |shape: &KnownShape| match loose_m <= options.rigid_m {
-        true => fit_scans(&shape.model, scans, &options.fit),
-        false => worst_fit(&shape.model, scans, &options.fit),
+        true => fit_scans(&shape.model, scans, &options.fits()),
+        false => worst_fit(&shape.model, scans, &options.fits()),
     };
     let mut candidates: Vec<Candidate> = Vec::new();
     for (index, shape) in known.iter().enumerate() {
@@ -201,20 +217,25 @@ fn decide(mut candidates: Vec<Candidate>, known: &[KnownShape], options: &Recogn
     let ruled_out = known.len() - candidates.len();
     candidates.sort_by(|a, b| a.fit.between.per_pair_m().total_cmp(&b.fit.between.per_pair_m()));
     let best_m = candidates.first().map_or(0.0, |c| c.fit.between.per_pair_m());
-    let limit_m = options.same_m.min(best_m + options.apart_m);
-    let mut names: Vec<String> = Vec::new();
-    for candidate in candidates.iter().filter(|c| c.fit.between.per_pair_m() <= limit_m) {
-        let name = &known[candidate.index].name;
-        if !names.contains(name) {
-            names.push(name.clone());
+    let within = |limit_m: f64| {
+        let mut names: Vec<String> = Vec::new();
+        for candidate in candidates.iter().filter(|c| c.fit.between.per_pair_m() <= limit_m) {
+            let name = &known[candidate.index].name;
+            if !names.contains(name) {
+                names.push(name.clone());
+            }
         }
-    }
+        names
+    };
+    let may_be = within(options.other_m);
+    let mut names = within(options.same_m.min(best_m + options.apart_m));
     let verdict = match names.len() {
-        0 => Verdict::Unknown,
+        0 if may_be.is_empty() => Verdict::Unknown,
+        0 => Verdict::OneOf(may_be.clone()),
         1 => Verdict::Is(names.swap_remove(0)),
         _ => Verdict::OneOf(names),
     };
-    Recognition { verdict, candidates, ruled_out }
+    Recognition { verdict, candidates, ruled_out, may_be }
 }
 
 /// How far features of two models are apart, in spreads of such a difference: the larger of area's and perimeter's.

@@ -3,8 +3,8 @@
 use super::solve::{Problem, Solved, SolverOptions};
 use nalgebra::{DMatrix, DVector, Isometry2, Point2, Vector3};
 
-/// Softness of the farthest points, metres, one round after the other: the last is the objective itself.
-const SOFTNESS_M: [f64; 3] = [0.03, 0.006, 0.0];
+/// One round after the other: the softness of the farthest points, metres, and how many times as long outliers are; the last is the objective itself.
+const ROUNDS: [(f64, f64); 3] = [(0.03, 10.0), (0.006, 3.0), (0.0, 1.0)];
 /// A turn of one radian about the middle of a thing counts as a shift by so much, metres: about its radius.
 const RADIUS_M: f64 = 0.3;
 /// An objective below this is nothing, square metres.
@@ -14,21 +14,21 @@ const DAMPING: (f64, f64) = (1e-3, 1e1);
 
 /// One round, as soft as can be.
 pub(super) fn roughly(problem: &Problem, options: &SolverOptions) -> Solved {
-    rounds(problem, options, &SOFTNESS_M[..1])
+    rounds(problem, options, &ROUNDS[..1])
 }
 
 /// Damped least squares, ever less soft; the least of all that was come by is kept.
 pub(super) fn least_squares(problem: &Problem, options: &SolverOptions) -> Solved {
-    rounds(problem, options, &SOFTNESS_M)
+    rounds(problem, options, &ROUNDS)
 }
 
-fn rounds(problem: &Problem, options: &SolverOptions, softness_m: &[f64]) -> Solved {
+fn rounds(problem: &Problem, options: &SolverOptions, rounds: &[(f64, f64)]) -> Solved {
     let start = problem.start().to_vec();
     let cost = problem.cost(&start);
     let mut poses = start.clone();
     let mut solved = Solved { poses: start, cost, converged: false, iterations: 0, evaluations: 1 };
-    for &soft_m in softness_m {
-        solved.converged = descend(problem, options, soft_m, &mut poses, &mut solved);
+    for &round in rounds {
+        solved.converged = descend(problem, options, round, &mut poses, &mut solved);
         let cost = problem.cost(&poses);
         solved.evaluations += 1;
         if cost < solved.cost {
@@ -47,11 +47,11 @@ fn rounds(problem: &Problem, options: &SolverOptions, softness_m: &[f64]) -> Sol
 fn descend(
     problem: &Problem,
     options: &SolverOptions,
-    soft_m: f64,
+    round: (f64, f64),
     poses: &mut Vec<Isometry2<f64>>,
     count: &mut Solved,
 ) -> bool {
-    let mut linear = linearise(problem, poses, soft_m);
+    let mut linear = linearise(problem, poses, round);
     count.evaluations += 1;
     let mut damping = DAMPING.0;
     for _ in 0..options.most_iterations {
@@ -64,7 +64,7 @@ fn descend(
             continue;
         };
         let stepped = problem.moved(poses, step.as_slice());
-        let next = linearise(problem, &stepped, soft_m);
+        let next = linearise(problem, &stepped, round);
         count.evaluations += 1;
         if next.cost < linear.cost {
             let settled = linear.cost - next.cost <= options.settle * linear.cost;
@@ -87,7 +87,7 @@ struct Linear {
     right: DVector<f64>,
 }
 
-fn linearise(problem: &Problem, poses: &[Isometry2<f64>], soft_m: f64) -> Linear {
+fn linearise(problem: &Problem, poses: &[Isometry2<f64>], (soft_m, wider): (f64, f64)) -> Linear {
     let assembly = problem.assembly();
     let n = 3 * problem.movable().len();
     let mut linear = Linear { cost: 0.0, normal: DMatrix::zeros(n, n), right: DVector::zeros(n) };
@@ -102,8 +102,8 @@ fn linearise(problem: &Problem, poses: &[Isometry2<f64>], soft_m: f64) -> Linear
         }
     }
     assembly.residuals(&assembly.placed(poses), soft_m, |r| {
-        let weight = problem.weight(&r);
-        linear.cost += weight * r.value_m * r.value_m;
+        let (cost, weight) = problem.costs(&r, wider);
+        linear.cost += cost;
         // How the error grows with shift and turn of the group that carries the point; with the group that carries the line it falls by as much.
         let slopes = [(r.point, 1.0), (r.line, -1.0)].map(|(group, sign)| {
             rows[group].map(|(row, pivot)| {
@@ -135,7 +135,6 @@ fn step(linear: &Linear, damping: f64) -> Option<DVector<f64>> {
 #[cfg(test)]
 mod tests {
     use super::super::shape::{ObjectScan, PosedScan};
-    use super::super::solve::Objective;
     use super::super::violation::Assembly;
     use super::*;
 
@@ -164,20 +163,22 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_the_cost() {
         let scans = [scan(0.0, 0.10), scan(2.0, 0.14), scan(4.1, 0.12)];
-        for (onto, groups) in
-            [(false, vec![&scans[..1], &scans[1..2], &scans[2..]]), (true, vec![&scans[..2], &scans[2..]])]
-        {
+        let free = vec![&scans[..1], &scans[1..2], &scans[2..]];
+        for (onto, groups, outlier_m) in [
+            (false, free.clone(), f64::INFINITY),
+            (false, free, 0.03),
+            (true, vec![&scans[..2], &scans[2..]], f64::INFINITY),
+        ] {
             let assembly = Assembly::new(groups.iter().copied());
             let start = vec![Isometry2::identity(); groups.len()];
-            let objective = Objective::default();
-            let problem = if onto {
-                Problem::onto(&assembly, &start, objective)
-            } else {
-                Problem::free(&assembly, &start, objective)
+            let options = SolverOptions { outlier_m, ..SolverOptions::default() };
+            let problem = match onto {
+                true => Problem::onto(&assembly, &start, &options),
+                false => Problem::free(&assembly, &start, &options),
             };
             let away: Vec<f64> = (0..3 * problem.movable().len()).map(|i| 0.02 * (i as f64).sin()).collect();
             let poses = problem.moved(&start, &away);
-            let linear = linearise(&problem, &poses, 0.0);
+            let linear = linearise(&problem, &poses, (0.0, 1.0));
             assert!(linear.cost > 1e-4 && (linear.cost - problem.cost(&poses)).abs() < 1e-12);
             for i in 0..away.len() {
                 let cost = |by: f64| {

@@ -57,6 +57,9 @@ pub struct SolverOptions {
     pub settle: f64,
     /// First steps of the simplex: metres, and radians.
     pub simplex_steps: (f64, f64),
+    /// Errors that are much longer count as if they were no longer, metres (the weights of Geman and McClure 1987): a few false ends of scans then leave
+    /// the others in place. Infinite: all count by their squares, as in Eq. 3.
+    pub outlier_m: f64,
 }
 
 impl Default for SolverOptions {
@@ -68,6 +71,7 @@ impl Default for SolverOptions {
             most_evaluations: 400,
             settle: 1e-5,
             simplex_steps: (0.03, 0.02),
+            outlier_m: f64::INFINITY,
         }
     }
 }
@@ -93,26 +97,28 @@ pub(super) struct Problem<'a> {
     slack: f64,
     /// Weights of a group's shift (twice) and turn from its start.
     prior: [f64; 3],
+    /// See [`SolverOptions::outlier_m`].
+    outlier_m: f64,
 }
 
 impl<'a> Problem<'a> {
     /// Scans that are all free to move, from where localisation put them.
-    pub fn free(assembly: &'a Assembly, start: &'a [Isometry2<f64>], objective: Objective) -> Problem<'a> {
+    pub fn free(assembly: &'a Assembly, start: &'a [Isometry2<f64>], options: &SolverOptions) -> Problem<'a> {
         let movable = (0..start.len()).collect();
-        let (slack, prior) = match objective {
+        let (slack, prior) = match options.objective {
             Objective::Violation => (0.0, [0.0; 3]),
             Objective::Centred { pose_sigma_m, pose_sigma_rad } => {
                 let weight = |sigma: f64| CENTRED * (GAP_SIGMA_M / sigma.max(1e-6)).powi(2);
                 (CENTRED, [weight(pose_sigma_m), weight(pose_sigma_m), weight(pose_sigma_rad)])
             }
         };
-        Problem { assembly, start, movable, slack, prior }
+        Problem { assembly, start, movable, slack, prior, outlier_m: options.outlier_m }
     }
 
     /// The last group moves onto the others; nothing is known of where it belongs.
-    pub fn onto(assembly: &'a Assembly, start: &'a [Isometry2<f64>], objective: Objective) -> Problem<'a> {
+    pub fn onto(assembly: &'a Assembly, start: &'a [Isometry2<f64>], options: &SolverOptions) -> Problem<'a> {
         let movable = vec![start.len() - 1];
-        Problem { movable, prior: [0.0; 3], ..Problem::free(assembly, start, objective) }
+        Problem { movable, prior: [0.0; 3], ..Problem::free(assembly, start, options) }
     }
 
     pub fn assembly(&self) -> &Assembly {
@@ -127,8 +133,11 @@ impl<'a> Problem<'a> {
         &self.movable
     }
 
-    pub fn weight(&self, r: &Residual) -> f64 {
-        if r.kind == Kind::Slack { self.slack } else { 1.0 }
+    /// What an error costs, square metres, and the weight of its square that makes the cost fall as fast; outliers are `wider` times as long as at the end.
+    pub fn costs(&self, r: &Residual, wider: f64) -> (f64, f64) {
+        let weight = if r.kind == Kind::Slack { self.slack } else { 1.0 };
+        let share = 1.0 / (1.0 + (r.value_m / (wider * self.outlier_m)).powi(2));
+        (weight * share * r.value_m * r.value_m, weight * share * share)
     }
 
     /// How far a group is from its start, shift and turn, each with the weight of its square.
@@ -157,7 +166,7 @@ impl<'a> Problem<'a> {
     pub fn cost(&self, poses: &[Isometry2<f64>]) -> f64 {
         let mut sum = 0.0;
         let placed = self.assembly.placed(poses);
-        self.assembly.residuals(&placed, 0.0, |r| sum += r.value_m * r.value_m * self.weight(&r));
+        self.assembly.residuals(&placed, 0.0, |r| sum += self.costs(&r, 1.0).0);
         let strayed = self.movable.iter().flat_map(|&group| self.strayed(poses, group));
         sum + strayed.map(|(off, weight)| weight * off * off).sum::<f64>()
     }

@@ -6,6 +6,7 @@ use super::scan::direction;
 use super::shape::PosedScan;
 use crate::hull::convex;
 use nalgebra::{Isometry2, Point2, Vector2};
+use serde::Serialize;
 
 /// How far poses violate the angular constraints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,6 +36,21 @@ struct Part {
     /// Its corners in `Assembly::corners`.
     begin: usize,
     end: usize,
+    /// False if its laser looked past the thing only far beside it on either side: it may have missed an end, and need not reach what others saw.
+    is_whole: bool,
+}
+
+/// A bound so far beside the last reading of the thing tells nothing of where it ends, radians.
+const FAR_RAD: f64 = 0.2;
+
+/// An end of the thing, as a scan sees it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// The left.
+    Left,
+    /// The right.
+    Right,
 }
 
 /// Where a scan was taken from and its lines: unit normals that point away from the thing.
@@ -66,13 +82,13 @@ impl Rays {
 
     /// The object ray that a scan from `other` must reach, the one on its side (Eq. 2), and the bound beside it; none if it looks from between the bounds,
     /// for then it need not see either end of what this scan saw.
-    fn facing(&self, other: &Point2<f64>) -> Option<(Vector2<f64>, Vector2<f64>)> {
+    fn facing(&self, other: &Point2<f64>) -> Option<(Side, Vector2<f64>, Vector2<f64>)> {
         let towards = other - self.laser;
         let side = self.middle.perp(&towards);
         if side < 0.0 && self.right_bound.dot(&towards) > 0.0 {
-            Some((self.right_object, self.right_bound))
+            Some((Side::Right, self.right_object, self.right_bound))
         } else if side > 0.0 && self.left_bound.dot(&towards) > 0.0 {
-            Some((self.left_object, self.left_bound))
+            Some((Side::Left, self.left_object, self.left_bound))
         } else {
             None
         }
@@ -110,6 +126,8 @@ pub(super) enum Kind {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Residual {
     pub kind: Kind,
+    /// Of the scan whose line it is.
+    pub side: Side,
     pub value_m: f64,
     pub normal: Vector2<f64>,
     pub at: Point2<f64>,
@@ -144,7 +162,10 @@ impl Assembly {
         let (scan, pose) = (&posed.scan, &posed.model_from_laser);
         let begin = self.corners.len();
         self.corners.extend(convex(scan.points.clone()).iter().map(|p| pose * p));
-        self.parts.push(Part { group, begin, end: self.corners.len() });
+        let gap_rad =
+            (scan.left_bound_rad - scan.left_object_rad).max(scan.right_object_rad - scan.right_bound_rad);
+        let is_whole = gap_rad < FAR_RAD;
+        self.parts.push(Part { group, begin, end: self.corners.len(), is_whole });
         let left = |angle: f64| direction(angle + std::f64::consts::FRAC_PI_2);
         let rays = Rays {
             laser: Point2::origin(),
@@ -183,9 +204,11 @@ impl Assembly {
             for (of_points, other) in self.parts.iter().zip(&placed.rays) {
                 if of_line.group != of_points.group {
                     let corners = &placed.corners[of_points.begin..of_points.end];
-                    errors(rays, &other.laser, corners, soft_m, |kind, value_m, normal, at| {
+                    let from = of_points.is_whole.then_some(&other.laser);
+                    errors(rays, from, corners, soft_m, |(kind, side), value_m, normal, at| {
                         each(Residual {
                             kind,
+                            side,
                             value_m,
                             normal,
                             at,
@@ -214,31 +237,31 @@ impl Assembly {
     }
 }
 
-/// The errors of points that were seen from `other` against the lines of a scan; nought is not told.
+/// The errors of points against the lines of a scan; nought is not told. The points were seen from `whole`, or by a scan that may have missed an end.
 #[inline(always)]
 fn errors(
     rays: &Rays,
-    other: &Point2<f64>,
+    whole: Option<&Point2<f64>>,
     corners: &[Point2<f64>],
     soft_m: f64,
-    mut each: impl FnMut(Kind, f64, Vector2<f64>, Point2<f64>),
+    mut each: impl FnMut((Kind, Side), f64, Vector2<f64>, Point2<f64>),
 ) {
     // Eq. 1, left and right: the point farthest beyond the bound.
-    for bound in [rays.left_bound, rays.right_bound] {
+    for (side, bound) in [(Side::Left, rays.left_bound), (Side::Right, rays.right_bound)] {
         let (beyond, at) = farthest(&bound, &rays.laser, corners, soft_m);
         if beyond > 0.0 {
-            each(Kind::Exterior, beyond, bound, at);
+            each((Kind::Exterior, side), beyond, bound, at);
         }
     }
     // Eq. 2: some point must reach the object ray; the one that lacks least.
-    if let Some((object, bound)) = rays.facing(other) {
+    if let Some((side, object, bound)) = whole.and_then(|other| rays.facing(other)) {
         let (beyond, at) = farthest(&object, &rays.laser, corners, soft_m);
         if beyond < 0.0 {
-            each(Kind::Interior, -beyond, -object, at);
+            each((Kind::Interior, side), -beyond, -object, at);
         }
         let between = (object + bound).normalize();
         let (beyond, at) = farthest(&between, &rays.laser, corners, soft_m);
-        each(Kind::Slack, beyond, between, at);
+        each((Kind::Slack, side), beyond, between, at);
     }
 }
 

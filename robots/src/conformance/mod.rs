@@ -1,10 +1,11 @@
 //! What every body promises, as one check that any implementation of [`Robot`] can run in its tests.
 //!
-//! The body is driven, looks and takes frames; it needs one place besides its own that it can reach, open doors, an empty hand, and no
+//! The body is driven, looks, takes frames and sweeps its laser; it needs one place besides its own that it can reach, open doors, an empty hand, and no
 //! mishaps. [`check_carrying`] is for bodies with a hand and needs to be told of an object.
 
 mod doors;
 mod hand;
+mod laser;
 
 pub use hand::check_carrying;
 
@@ -45,7 +46,7 @@ type Checking<'a> = Pin<Box<dyn Future<Output = Result<(), Breach>> + Send + 'a>
 type Check = for<'a> fn(&'a dyn Robot) -> Checking<'a>;
 
 /// Every check by its name, in the order in which a body goes through them.
-pub const CHECKS: [(&str, Check); 9] = [
+pub const CHECKS: [(&str, Check); 10] = [
     ("what it is", |robot| Box::pin(async { check_description(robot).and_then(|()| check_stations(robot)) })),
     ("a frame", |robot| Box::pin(check_frame(robot))),
     ("routes and a drive", |robot| {
@@ -55,6 +56,7 @@ pub const CHECKS: [(&str, Check); 9] = [
         })
     }),
     ("a frame after the drive", |robot| Box::pin(check_frame(robot))),
+    ("a sweep of the laser", |robot| Box::pin(laser::check_scan(robot))),
     ("what it refuses", |robot| Box::pin(check_refusals(robot))),
     ("doors", |robot| Box::pin(doors::check_doors(robot))),
     ("the hand", |robot| Box::pin(hand::check_hand(robot))),

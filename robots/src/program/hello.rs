@@ -1,6 +1,8 @@
 //! The first message: what the body is and what its map knows.
 
-use crate::body::{Description, Door, Footprint, Frames, Head, Room, Speeds, Stamp, Station, SurfaceHint};
+use crate::body::{
+    self, Description, Door, Footprint, Frames, Head, Room, Speeds, Stamp, Station, SurfaceHint,
+};
 use crate::grid::OccupancyGrid;
 use crate::program::message;
 use crate::recorded::Known;
@@ -12,6 +14,8 @@ use serde::Deserialize;
 pub const PROTOCOL: u32 = 1;
 /// Most pixels of an image, and most cells of a map.
 const MOST_CELLS: usize = 1 << 25;
+/// Most readings of a sweep: a tenth of a millimetre apart at a metre all around.
+const MOST_READINGS: usize = 65_536;
 /// Most surfaces, rooms, doors or stations.
 const MOST_NAMES: usize = 10_000;
 
@@ -31,6 +35,7 @@ pub(super) struct Hello {
     camera: Camera,
     head: Option<Head>,
     arm: Option<Arm>,
+    laser: Option<Laser>,
     #[serde(default)]
     frames: BodyFrames,
     up: Option<Vector3<f64>>,
@@ -94,6 +99,22 @@ fn default_camera_frame() -> String {
 struct Arm {
     reach_m: f64,
     hand_opening_m: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Laser {
+    base_from_laser: Isometry3<f64>,
+    first_rad: f64,
+    step_rad: f64,
+    readings: usize,
+    reach_m: f64,
+    #[serde(default = "default_laser_frame")]
+    frame: String,
+}
+
+fn default_laser_frame() -> String {
+    "laser".into()
 }
 
 #[derive(Deserialize)]
@@ -206,6 +227,9 @@ impl Hello {
                 ("arm.hand_opening_m", arm.hand_opening_m.unwrap_or(1.0)),
             ])?;
         }
+        if let Some(laser) = &self.laser {
+            laser.check()?;
+        }
         match self.up {
             Some(up) if !(up.norm().is_finite() && up.norm() > 0.0) => {
                 Err(format!("up is {up}, no direction"))
@@ -262,7 +286,7 @@ impl Hello {
             frames: Frames { map: self.frames.map, base: self.frames.base, camera: c.frame },
             reach_m: self.arm.as_ref().map(|a| a.reach_m),
             hand_opening_m: self.arm.as_ref().and_then(|a| a.hand_opening_m),
-            laser: None,
+            laser: self.laser.map(Laser::part),
             up: self.up.map(|up| up.normalize()),
             pose_sigma_m: self.pose_sigma_m,
             pose_sigma_rad: self.pose_sigma_rad,
@@ -285,6 +309,29 @@ impl Hello {
             clearance_m: self.base.clearance_m,
             pixels: PixelFormat { unit_m: c.unit_m, colour: c.colour },
         }
+    }
+}
+
+impl Laser {
+    fn check(&self) -> Result<(), String> {
+        above_zero(&[("laser.step_rad", self.step_rad), ("laser.reach_m", self.reach_m)])?;
+        let around = (1..=MOST_READINGS).contains(&self.readings)
+            && self.step_rad * (self.readings - 1) as f64 <= std::f64::consts::TAU;
+        if !(around && self.first_rad.is_finite()) {
+            return Err(format!(
+                "laser: {} readings from {} rad in steps of {} rad, expected 1 to {MOST_READINGS} over a full turn at most",
+                self.readings, self.first_rad, self.step_rad
+            ));
+        }
+        message::transform(&self.base_from_laser)
+            .map(|_| ())
+            .map_err(|e| format!("laser.base_from_laser: {e}"))
+    }
+
+    fn part(self) -> body::Laser {
+        let Laser { base_from_laser, first_rad, step_rad, readings, reach_m, frame } = self;
+        let base_from_laser = message::transform(&base_from_laser).unwrap_or(Isometry3::identity());
+        body::Laser { frame, base_from_laser, first_rad, step_rad, readings, reach_m }
     }
 }
 

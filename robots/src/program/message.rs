@@ -123,6 +123,14 @@ pub(super) struct SensedSaid {
     pub base_from_camera: Isometry3<f64>,
 }
 
+/// What `scan` is answered with; the ranges follow as bytes.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ScannedSaid {
+    pub stamp_ns: Option<Stamp>,
+    pub map_from_base: Isometry3<f64>,
+}
+
 /// What `push_aside` is answered with.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

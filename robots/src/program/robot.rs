@@ -1,9 +1,9 @@
 //! The body that a program is.
 
 use crate::body::{
-    Colour, Description, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing,
-    PoseEstimate, Progress, Push, Pushed, Robot, Room, Sensed, Stamp, StampedTransform, Station, SurfaceHint,
-    Travel, Watch,
+    Colour, Description, Door, Driven, Grasp, Grasped, Hand, Laser, Looked, Opened, Place, Placed, Placing,
+    Pose2, PoseEstimate, Progress, Push, Pushed, Robot, Room, Scanned, Sensed, Stamp, StampedTransform,
+    Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
@@ -14,8 +14,9 @@ use crate::program::places::{self, Places};
 use crate::program::process::Process;
 use crate::program::talk::{Done, Talk};
 use crate::recorded::{Exposure, Known, Pixels};
+use descry_perception::laser::Scan;
 use image::RgbImage;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry2, Isometry3, Point3, Vector2};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 use tokio::sync::Mutex;
@@ -73,7 +74,8 @@ impl ProgramRobot {
             .and_then(|(link, first)| Ok((link, read_hello(&first)?.check(&first.bytes)?)));
         let (link, greeting) = opened.map_err(|because| broken(format!("{because}{}", process.epitaph())))?;
         let camera = &greeting.known.description.camera;
-        link.allow_bytes(greeting.pixels.bytes(camera.width * camera.height));
+        let readings = greeting.known.description.laser.as_ref().map_or(0, |laser| laser.readings);
+        link.allow_bytes(greeting.pixels.bytes(camera.width * camera.height).max(4 * readings));
         Ok(ProgramRobot {
             places: Places::new(greeting.clearance_m),
             pixels: greeting.pixels,
@@ -115,28 +117,16 @@ impl ProgramRobot {
 
     fn sensed(&self, done: Done) -> Result<Sensed, String> {
         let said: message::SensedSaid = answer("sense", done.said)?;
-        let stamp_ns = said.stamp_ns.unwrap_or(done.now_ns);
-        if !(done.before_ns..=done.now_ns).contains(&stamp_ns) {
-            return Err(format!(
-                "a frame of {stamp_ns} ns, taken between {} and {} ns",
-                done.before_ns, done.now_ns
-            ));
-        }
+        let stamp_ns = stamp("a frame", said.stamp_ns, (done.before_ns, done.now_ns))?;
         let (map_from_base, base_from_camera) =
             (transform(&said.map_from_base)?, transform(&said.base_from_camera)?);
         let d = &self.known.description;
-        let link = |parent: &str, child: &str, parent_from_child| StampedTransform {
-            stamp_ns,
-            parent: parent.into(),
-            child: child.into(),
-            parent_from_child,
-        };
         let exposure = Exposure {
             stamp_ns,
             intrinsics: d.camera,
             transforms: vec![
-                link(&d.frames.map, &d.frames.base, map_from_base),
-                link(&d.frames.base, &d.frames.camera, base_from_camera),
+                link(stamp_ns, &d.frames.map, &d.frames.base, map_from_base),
+                link(stamp_ns, &d.frames.base, &d.frames.camera, base_from_camera),
             ],
             map_from_camera: map_from_base * base_from_camera,
             pose_sigma_m: d.pose_sigma_m,
@@ -144,6 +134,60 @@ impl ProgramRobot {
         };
         Ok(exposure.with(read_pixels(d, self.pixels, &done.bytes)?))
     }
+
+    fn scanned(&self, laser: &Laser, done: Done) -> Result<Scanned, String> {
+        let said: message::ScannedSaid = answer("scan", done.said)?;
+        let stamp_ns = stamp("a sweep", said.stamp_ns, (done.before_ns, done.now_ns))?;
+        let map_from_base = transform(&said.map_from_base)?;
+        let d = &self.known.description;
+        Ok(Scanned {
+            stamp_ns,
+            scan: Scan {
+                angles_rad: (0..laser.readings)
+                    .map(|i| laser.first_rad + laser.step_rad * i as f64)
+                    .collect(),
+                ranges_m: read_ranges(laser, &done.bytes)?,
+                map_from_laser: level(&(map_from_base * laser.base_from_laser)),
+            },
+            transforms: vec![
+                link(stamp_ns, &d.frames.map, &d.frames.base, map_from_base),
+                link(stamp_ns, &d.frames.base, &laser.frame, laser.base_from_laser),
+            ],
+            pose_sigma_m: d.pose_sigma_m,
+            pose_sigma_rad: d.pose_sigma_rad,
+        })
+    }
+}
+
+/// The stamp that was said, or else when the request was done.
+fn stamp(what: &str, said_ns: Option<Stamp>, (before_ns, now_ns): (Stamp, Stamp)) -> Result<Stamp, String> {
+    let stamp_ns = said_ns.unwrap_or(now_ns);
+    match (before_ns..=now_ns).contains(&stamp_ns) {
+        true => Ok(stamp_ns),
+        false => Err(format!("{what} of {stamp_ns} ns, taken between {before_ns} and {now_ns} ns")),
+    }
+}
+
+fn link(stamp_ns: Stamp, parent: &str, child: &str, parent_from_child: Isometry3<f64>) -> StampedTransform {
+    StampedTransform { stamp_ns, parent: parent.into(), child: child.into(), parent_from_child }
+}
+
+/// A pose as it is in the plane of the floor.
+fn level(pose: &Isometry3<f64>) -> Isometry2<f64> {
+    let Pose2 { x_m, y_m, yaw_rad } = Pose2::from_isometry(pose);
+    Isometry2::new(Vector2::new(x_m, y_m), yaw_rad)
+}
+
+/// Four bytes a reading, a float, little endian. What is beyond the reach is nothing within reach.
+fn read_ranges(laser: &Laser, bytes: &[u8]) -> Result<Vec<f64>, String> {
+    if bytes.len() != 4 * laser.readings {
+        return Err(format!("a sweep of {} bytes, expected {}", bytes.len(), 4 * laser.readings));
+    }
+    let metres = |b: &[u8]| match f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])) {
+        range_m if range_m > laser.reach_m => f64::INFINITY,
+        range_m => range_m,
+    };
+    Ok(bytes.chunks_exact(4).map(metres).collect())
 }
 
 fn read_hello(first: &Message) -> Result<Hello, String> {
@@ -286,6 +330,12 @@ impl Robot for ProgramRobot {
     async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure> {
         let done = self.ask("sense", Arguments::Nothing {}, watch).await?;
         self.hold(self.sensed(done)).await
+    }
+
+    async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {
+        let Some(laser) = &self.known.description.laser else { return Err(self.lacks("laser")) };
+        let done = self.ask("scan", Arguments::Nothing {}, watch).await?;
+        self.hold(self.scanned(laser, done)).await
     }
 
     async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {

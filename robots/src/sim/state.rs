@@ -96,13 +96,14 @@ impl State {
     }
 
     /// The first step that brings the footprint into something that the map does not show, and which obstacle that is. What it touches already stops
-    /// only what goes nearer.
+    /// only what goes nearer, and no turn on the spot: a turn moves where a base with a wrong estimate really is, and not the base.
     pub fn first_bump(&self, steps: &[drive::Step], radius_m: f64) -> Option<(usize, usize)> {
         let mut before = self.map_from_base().translation.vector.xy().into();
         for (i, step) in steps.iter().enumerate() {
             let at = self.really(&step.pose).translation.vector.xy().into();
             let bumps = |o: &ObstacleSpec| {
-                !o.on_map && o.touches(&at, radius_m) && o.distance_m(&at) < o.distance_m(&before)
+                let nears = step.metres > 0.0 && o.distance_m(&at) < o.distance_m(&before);
+                !o.on_map && o.touches(&at, radius_m) && nears
             };
             if let Some(obstacle) = self.scene.obstacles.iter().position(bumps) {
                 return Some((i, obstacle));

@@ -36,6 +36,8 @@ class Rogue(Template):
             hello["camra"] = {}
         if WHAT == "no focal length":
             hello["camera"]["fx"] = 0
+        if WHAT == "laser beyond a turn":
+            hello["laser"] = dict(hello["laser"], readings=1000)
         if WHAT == "two tables of one name":
             hello["surfaces"] *= 2
         return hello, cells
@@ -104,6 +106,14 @@ class Rogue(Template):
         if WHAT == "frame of tomorrow":
             return dict(chain, stamp_ns=self.now_ns() + 1), depths
         return chain, depths
+
+    def scan(self, request):
+        chain, ranges = super().scan(request)
+        if WHAT == "short sweep":
+            return chain, ranges[4:]
+        if WHAT == "sweep of yesterday":
+            return dict(chain, stamp_ns=-1), ranges
+        return chain, ranges
 
 
 if WHAT == "no hello":

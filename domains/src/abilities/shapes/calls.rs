@@ -5,7 +5,6 @@ use descry_planner::{Answer, Call, CallError, Plan, Step};
 use super::floor::{NOTHING_KNOWN_M, THIS, Thing, thing};
 use super::poses;
 use crate::abilities::{Meaning, argument};
-use crate::lexicon::symbol;
 use crate::situation::{Situation, holding};
 
 const SCANS: &[&str] = &["scanned"];
@@ -102,8 +101,7 @@ fn hope(s: &Situation, call: &Call, thing: &Thing) -> f64 {
 fn expected_found(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let shape = argument(call, 1)?;
     let Some(thing) = named(s, call, 0)? else { return Ok(Answer::Number(0.0)) };
-    let may_be = thing.may_be().is_none_or(|names| names.iter().any(|n| symbol(n) == shape));
-    if !may_be || !s.floor.knows(shape) {
+    if !thing.may_have(shape, s.floor.known.len(), s.threshold) || !s.floor.knows(shape) {
         return Ok(Answer::Number(0.0));
     }
     let hope = if thing.outline.is_some() { hope(s, call, thing) } else { 1.0 };
@@ -124,11 +122,7 @@ const WORTH_M: f64 = 0.001;
 /// The quickest of the single scans and alignments that promise anything for what is asked.
 pub(super) fn fallback(s: &Situation) -> Option<Plan> {
     let is_open = |t: &&Thing| match &s.floor.sought {
-        Some(shape) => {
-            t.sureness(s.floor.known.len()) < s.threshold
-                && s.floor.knows(shape)
-                && t.may_be().is_none_or(|names| names.iter().any(|n| symbol(n) == *shape))
-        }
+        Some(shape) => s.floor.knows(shape) && t.may_have(shape, s.floor.known.len(), s.threshold),
         None => t.symbol == THIS,
     };
     let open: Vec<&Thing> = s.floor.things.iter().filter(is_open).collect();

@@ -90,7 +90,7 @@ fn sureness(s: &Situation) -> Vec<String> {
 fn may_be(s: &Situation) -> Vec<String> {
     let of = |t: &super::floor::Thing| {
         let names = t.may_be().unwrap_or_default();
-        names.into_iter().map(|name| format!("(may-be {} {})", t.symbol, symbol(name))).collect::<Vec<_>>()
+        names.iter().map(|name| format!("(may-be {} {})", t.symbol, symbol(name))).collect::<Vec<_>>()
     };
     s.floor.things.iter().flat_map(of).collect()
 }

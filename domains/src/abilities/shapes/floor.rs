@@ -17,7 +17,7 @@ pub const THIS: &str = "this";
 pub const NOTHING_KNOWN_M: f64 = 1.0;
 /// That a thing is none of those known, before the first scan.
 const STRANGER: f64 = 0.5;
-/// A known shape whose scans fit none: measured one in three hundred; see `perception/examples/shapes`.
+/// A known shape whose scans fit none: measured one in a hundred; see `perception/examples/shapes`.
 const MISSED: f64 = 0.01;
 /// Strangers that scans take for one of five known shapes, as measured: up to so loose a shape (metres), such a share.
 const TAKEN_FOR_KNOWN: [(f64, f64); 3] = [(0.02, 0.10), (0.16, 0.15), (f64::INFINITY, 0.70)];
@@ -125,13 +125,16 @@ impl Thing {
         }
     }
 
-    /// The names that it may have, as far as its scans tell; none: any.
-    pub fn may_be(&self) -> Option<Vec<&str>> {
-        Some(match &self.taken_for.as_ref()?.verdict {
-            Verdict::Is(name) => vec![name],
-            Verdict::OneOf(names) => names.iter().map(String::as_str).collect(),
-            Verdict::Unknown => Vec::new(),
-        })
+    /// The names that its scans do not rule out; none: any.
+    pub fn may_be(&self) -> Option<&[String]> {
+        Some(&self.taken_for.as_ref()?.may_be)
+    }
+
+    /// Whether it may be of a shape, as far as its scans tell: it is none where it is surely another.
+    pub fn may_have(&self, shape: &str, known: usize, threshold: f64) -> bool {
+        let surely_another =
+            self.is().is_some_and(|is| symbol(is) != shape) && self.sureness(known) >= threshold;
+        !surely_another && self.may_be().is_none_or(|names| names.iter().any(|n| symbol(n) == shape))
     }
 
     /// How sure it is what it is taken for, 0 to 1.

@@ -16,7 +16,7 @@ use descry_skills::{Align, Circle, Outcome, Scan, SkillFailure};
 
 use super::{Ability, SkillWord, moving};
 use crate::abilities::searching::perceive::Eyes;
-use crate::goal::Goal;
+use crate::goal::{Goal, type_of_slot};
 use crate::lexicon::symbol;
 use crate::load::Domain;
 use crate::mind::Mind;
@@ -87,16 +87,22 @@ pub const ABILITY: Ability = Ability {
     answers: Some(telling::answer),
 };
 
+/// The type of names of shapes.
+const SHAPE: &str = "shape";
+
 /// What is known when a run begins: the shapes with a name, and what is asked.
 fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
     let robot = Arc::clone(&mind.known.robot);
     let remembered = mind.known.past.as_ref().map(|p| p.remembered.shapes.clone()).unwrap_or_default();
-    let names: Vec<(String, String)> = domain
-        .config
-        .objects
-        .get("shape")
-        .map(|names| names.iter().map(|name| (symbol(name), name.clone())).collect())
-        .unwrap_or_default();
+    let known: Vec<KnownShape> = domain.shapes.iter().cloned().chain(remembered).collect();
+    let listed = domain.config.objects.get(SHAPE).into_iter().flatten();
+    let said = goal.slots.iter().filter(|f| type_of_slot(&f.slot) == SHAPE).map(|f| &f.name);
+    let mut names: Vec<(String, String)> = Vec::new();
+    for name in listed.chain(known.iter().map(|k| &k.name)).chain(said) {
+        if names.iter().all(|(listed, _)| *listed != symbol(name)) {
+            names.push((symbol(name), name.clone()));
+        }
+    }
     let sought = crate::asked::mentions(&goal.pddl)
         .into_iter()
         .find_map(|m| m.strip_prefix(&["found".to_string()]).and_then(|rest| rest.first().cloned()));
@@ -104,7 +110,7 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
         poses::survey(mind, &*robot);
     }
     mind.known.floor = Arc::new(Floor {
-        known: domain.shapes.iter().cloned().chain(remembered).collect(),
+        known,
         names,
         unseen: robot.map().map(Unseen::of).unwrap_or_default(),
         promising: mind
@@ -192,11 +198,8 @@ fn aligned(
         thing.outline = Some(Arc::new(Outline { alignment: (**alignment).clone(), outlook }));
     }
     thing.taken_for = Some(Arc::new(recognition));
-    let left_out = match alignment.left_out.len() {
-        0 => String::new(),
-        n => format!("; {n} scans contradict the others and are left out"),
-    };
-    Ok(format!("{said}: {:.2} sure{left_out}", thing.sureness(known)))
+    let contradict = taken::contradict(alignment);
+    Ok(format!("{said}: {:.2} sure{contradict}", thing.sureness(known)))
 }
 
 /// The same, and it is kept under a name.

@@ -32,9 +32,6 @@ const SAME_M: f64 = 0.5;
 const USUAL_RADIUS_M: f64 = 0.2;
 /// Beyond an error so long scans contradict each other: twice the laser's precision, metres.
 pub(super) const LONGEST_M: f64 = 0.02;
-/// A shape fits if the root of the violation a pair of scans stays below, metres: at most 2.2 mm for the same thing and at least 10.6 mm for another of
-/// the five, see `perception/examples/shapes`.
-const SAME_SHAPE_M: f64 = 0.005;
 
 /// How scans are brought together, by how well the body knows where it is.
 pub(super) fn solver(body: &Description) -> SolverOptions {
@@ -195,16 +192,29 @@ fn bring_together(mind: &mut Mind, eyes: Eyes<'_>, index: usize) {
 /// What a shape is taken for.
 pub(super) fn recognise(s: &Situation, alignment: &Alignment, loose_m: f64) -> Recognition {
     let options = RecogniseOptions {
-        same_m: SAME_SHAPE_M,
         fit: FitOptions { solver: solver(s.robot.description()), ..FitOptions::default() },
         ..RecogniseOptions::default()
     };
     if alignment.longest_m() > LONGEST_M {
         // What contradicts itself is nothing that anybody has learned: more scans must tell.
-        let names = s.floor.known.iter().map(|k| k.name.clone()).collect();
-        return Recognition { verdict: Verdict::OneOf(names), candidates: Vec::new(), ruled_out: 0 };
+        let may_be: Vec<String> = s.floor.known.iter().map(|k| k.name.clone()).collect();
+        let verdict = Verdict::OneOf(may_be.clone());
+        return Recognition { verdict, candidates: Vec::new(), ruled_out: 0, may_be };
     }
     recognise_scans(&alignment.model, loose_m, &s.floor.known, &options)
+}
+
+/// What of the scans contradicts the others, to be said after something else.
+pub(super) fn contradict(alignment: &Alignment) -> String {
+    let scans = match alignment.left_out.len() {
+        0 => String::new(),
+        n => format!("; {n} scans contradict the others and are left out"),
+    };
+    let ends = match alignment.opened.len() {
+        0 => String::new(),
+        n => format!("; {n} ends of scans contradict the others and bound nothing"),
+    };
+    scans + &ends
 }
 
 /// What of the floor is still to be looked at, and from where.

@@ -3,6 +3,7 @@
 use descry_perception::laser::Verdict as Taken;
 
 use super::floor::{THIS, Thing, place};
+use super::taken::contradict;
 use crate::answer::{Believed, Conclusion, Ended, Verdict};
 use crate::asked::mentions;
 use crate::goal::Goal;
@@ -125,9 +126,11 @@ impl<'a> Teller<'a> {
     fn where_is(&self, shape: &str, ended: &Ended) -> Told<'a> {
         let (floor, name) = (&self.s.floor, self.name(shape));
         if !floor.knows(shape) {
+            let known: Vec<&str> = floor.known.iter().map(|k| k.name.as_str()).collect();
             let text = format!(
-                "nobody has learned what {} looks like; stand before one and say: learn {name}",
-                article(&name)
+                "nobody has learned what {} looks like; stand before one and say: learn {name}; known are: {}",
+                article(&name),
+                known.join(", ")
             );
             return (Verdict::CannotTell, text, None);
         }
@@ -139,11 +142,8 @@ impl<'a> Teller<'a> {
             let text = format!("{} stands {}; {}", article(&name), self.at(thing), self.scans(thing));
             return (Verdict::Achieved, text, Some(thing));
         }
-        let may_be = |t: &&Thing| {
-            t.may_be().is_none_or(|names| names.iter().any(|n| symbol(n) == shape))
-                || t.sureness(floor.known.len()) < self.s.threshold
-        };
-        let open: Vec<&Thing> = floor.things.iter().filter(may_be).collect();
+        let open: Vec<&Thing> =
+            floor.things.iter().filter(|t| t.may_have(shape, floor.known.len(), self.s.threshold)).collect();
         let others = floor.things.len() - open.len();
         let seen = format!("{others} things on the floor are something else");
         if let Some((verdict, why)) = self.cut(ended) {
@@ -185,9 +185,6 @@ impl<'a> Teller<'a> {
         for (pose, why) in &thing.ignored {
             parts.push(format!("the one from {pose} is left out: {why}"));
         }
-        if let Some(n) = thing.outline.as_ref().map(|o| o.alignment.left_out.len()).filter(|n| *n > 0) {
-            parts.push(format!("{n} that contradict the others are left out"));
-        }
         let poses = self.s.floor.poses.poses;
         if thing.ring.len() < poses {
             parts.push(format!("{} of {poses} poses around it cannot be reached", poses - thing.ring.len()));
@@ -199,7 +196,7 @@ impl<'a> Teller<'a> {
                 1e2 * loose_m
             ));
         }
-        parts.join("; ")
+        parts.join("; ") + &thing.outline.as_ref().map_or(String::new(), |o| contradict(&o.alignment))
     }
 
     fn believed(&self, thing: &Thing) -> Believed {

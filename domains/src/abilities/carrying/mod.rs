@@ -22,6 +22,9 @@ use crate::world::WorldError;
 const TOUCHED_M: f64 = 0.03;
 /// What slipped out of the hand may lie so far from where it stood, metres.
 const SLIPPED_M: f64 = 0.15;
+/// How many standard deviations localisation may be off, and from how far away things are looked at, metres.
+const ASTRAY: f64 = 2.0;
+const FROM_M: f64 = 1.2;
 
 /// See the module.
 pub const ABILITY: Ability = Ability {
@@ -158,11 +161,14 @@ fn place(s: &Situation, arguments: &[&str]) -> Result<Point3<f64>, String> {
 /// Voids what was seen of the place of an object.
 fn void(mind: &mut Mind, eyes: Eyes<'_>, track: &Track, more_m: f64) -> Result<(), WorldError> {
     let Some(on) = mind.known.surfaces.iter().position(|k| k.symbol == track.on) else { return Ok(()) };
+    let body = eyes.robot.description();
+    // Where the hand was, and where a view was taken from, localisation says.
+    let astray_m = ASTRAY * (body.pose_sigma_m + body.pose_sigma_rad * FROM_M);
     let change = Change {
         stamp_ns: eyes.robot.now_ns(),
         foot: track.position_m,
         up: mind.known.surfaces[on].up,
-        radius_m: 0.5 * track.size_m[0].max(track.size_m[1]) + more_m,
+        radius_m: 0.5 * track.size_m[0].max(track.size_m[1]) + more_m + astray_m,
         height_m: track.size_m[2] + TOUCHED_M,
     };
     perceive::something_moved(mind, eyes.record, on, change)

@@ -1,7 +1,9 @@
 //! What several poses would show together, so that a plan can weigh them against each other: a few poses from which all that can be seen of the unknown
 //! floor would be seen. And what explorers usually do instead: go to the nearest frontier.
 
-use super::frontier::{ExploreOptions, Floor, LEAST_M2, NextPose, RAYS, bearing_rad, frontiers, is_ahead, next_poses};
+use super::frontier::{
+    ExploreOptions, Floor, LEAST_M2, NextPose, RAYS, bearing_rad, frontiers, is_ahead, next_poses,
+};
 use crate::occupancy::{Occupancy, Space};
 use nalgebra::{Isometry2, Point2};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -80,7 +82,8 @@ pub fn outlooks(
         // What others show already is never shown again: what promises too little now is left out for good.
         open.retain(|(look, _)| unseen.gain_m2(look) >= LEAST_M2);
         let rate = |(look, cost_s): &(Outlook, f64)| unseen.gain_m2(look) / cost_s;
-        let Some(best) = (0..open.len()).max_by(|&a, &b| rate(&open[a]).total_cmp(&rate(&open[b])).then(b.cmp(&a)))
+        let Some(best) =
+            (0..open.len()).max_by(|&a, &b| rate(&open[a]).total_cmp(&rate(&open[b])).then(b.cmp(&a)))
         else {
             break;
         };
@@ -99,7 +102,13 @@ impl Floor<'_> {
         ways.get(index).copied().unwrap_or(f64::INFINITY)
     }
 
-    fn outlook(&self, pose: &Isometry2<f64>, way_m: f64, missed: &[f64], options: &ExploreOptions) -> Outlook {
+    fn outlook(
+        &self,
+        pose: &Isometry2<f64>,
+        way_m: f64,
+        missed: &[f64],
+        options: &ExploreOptions,
+    ) -> Outlook {
         let mut shows: FxHashMap<usize, f64> = FxHashMap::default();
         let heading = pose.rotation.angle();
         for ray in (0..RAYS).filter(|r| is_ahead(*r, heading, &options.field)) {
@@ -136,8 +145,7 @@ pub fn nearest_frontier(
         let seen: Vec<f64> = beside.map(|index| missed[index]).collect();
         seen.iter().sum::<f64>() > LEFT * seen.len() as f64
     });
-    let squares: FxHashSet<(i64, i64)> =
-        open.flat_map(|f| f.squares).map(|p| floor.square(&p)).collect();
+    let squares: FxHashSet<(i64, i64)> = open.flat_map(|f| f.squares).map(|p| floor.square(&p)).collect();
     let (mut goal, mut way_m) = (None, f64::INFINITY);
     for square in floor.squares().filter(|s| squares.contains(s)) {
         // The body's middle may not come that near to what is occupied: as near as it comes.

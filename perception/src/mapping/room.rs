@@ -5,8 +5,8 @@ use super::error::{MappingError, check, check_pose};
 use super::fuse::{FuseOptions, fuse};
 use super::grid::Sightlines;
 use super::orientation::{OrientationOptions, orientations};
-use super::patch::{Constraints, Fit, Growth, Patch, grow, main_direction, through};
 use super::pair::{PairFit, RectifyOptions, fit_cut};
+use super::patch::{Constraints, Fit, Growth, Patch, grow, main_direction, through};
 use super::station::{Station, shared};
 use crate::hull::convex;
 use crate::occupancy::{Occupancy, Space};
@@ -140,7 +140,8 @@ impl RoomMap {
     /// around poses), occupied under walls and under level surfaces lower than it.
     pub fn floor(&self, stood: &[Isometry2<f64>], radius_m: f64, height_m: f64) -> Option<Occupancy> {
         let mut grid = self.grid.clone()?;
-        let tables = self.levels.iter().filter(|l| l.faces_up && l.height_m > STEP_M && l.height_m < height_m);
+        let tables =
+            self.levels.iter().filter(|l| l.faces_up && l.height_m > STEP_M && l.height_m < height_m);
         let tables: Vec<&Level> = tables.collect();
         let off = Vector2::repeat(0.5 * grid.cell_m);
         for (index, cell) in grid.cells.iter_mut().enumerate() {

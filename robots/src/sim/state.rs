@@ -103,9 +103,8 @@ impl State {
         let mut before = self.map_from_base().translation.vector.xy().into();
         for (i, step) in steps.iter().enumerate() {
             let at = self.really(&step.pose).translation.vector.xy().into();
-            let bumps = |o: &ObstacleSpec| {
-                o.touches(&at, radius_m) && o.distance_m(&at) < o.distance_m(&before)
-            };
+            let bumps =
+                |o: &ObstacleSpec| o.touches(&at, radius_m) && o.distance_m(&at) < o.distance_m(&before);
             if let Some(obstacle) = self.unknown.iter().position(bumps) {
                 return Some((i, obstacle));
             }

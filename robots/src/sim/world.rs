@@ -360,7 +360,8 @@ impl Scene {
             ([x, y - across], [length_m, thick_m]),
             ([x, y + across], [length_m, thick_m]),
         ];
-        let around = around.map(|(at, [a, b])| ObstacleSpec::block("wall", at, [a, b, self.room.wall_height_m]));
+        let around =
+            around.map(|(at, [a, b])| ObstacleSpec::block("wall", at, [a, b, self.room.wall_height_m]));
         self.obstacles.iter().cloned().chain(surfaces).chain(walls).chain(around).collect()
     }
 

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use descry_memory::RecordId;
 use descry_memory::remember::Surveyed;
 use descry_perception::mapping::{
-    ExploreOptions, FieldOfView, Level, MapOptions, Outlook, RectifyOptions, RoomMap, Survey, Unseen, outlooks, standable,
+    ExploreOptions, FieldOfView, Level, MapOptions, Outlook, RectifyOptions, RoomMap, Survey, Unseen,
+    outlooks, standable,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, Point3, Vector3};
 use descry_perception::occupancy::{Occupancy, Space};
@@ -105,7 +106,12 @@ impl Chart {
     }
 
     /// Finds the poses from which more would be seen: those that were found before keep their symbols as long as they promise anything.
-    pub(super) fn look_out(&mut self, here: &Isometry2<f64>, body: &Description, given_up: impl Fn(&str) -> bool) {
+    pub(super) fn look_out(
+        &mut self,
+        here: &Isometry2<f64>,
+        body: &Description,
+        given_up: impl Fn(&str) -> bool,
+    ) {
         let Some(floor) = self.floor(body) else { return };
         let mut looked = self.stood.clone();
         looked.push(*here);
@@ -204,7 +210,8 @@ impl Chart {
         let (Place::Pose(from), Place::Pose(to)) = (from, to) else { return None };
         let route = self.router.as_ref()?.route(from, to).ok()?;
         let heading = |a: &Point2<f64>, b: &Point2<f64>| (b.y - a.y).atan2(b.x - a.x);
-        let turns = route.points_m.windows(2).map(|leg| Pose2::new(leg[1].x, leg[1].y, heading(&leg[0], &leg[1])));
+        let turns =
+            route.points_m.windows(2).map(|leg| Pose2::new(leg[1].x, leg[1].y, heading(&leg[0], &leg[1])));
         let mut way: Vec<Place> = turns.map(Place::Pose).collect();
         way.pop();
         way.push(Place::Pose(*to));

@@ -23,12 +23,7 @@ const MAP: &str = "map";
 const MOVED_M: f64 = 0.15;
 
 /// Takes a look in: it is in the record when this returns, and so is the map as it is then.
-pub(super) fn take(
-    mind: &mut Mind,
-    eyes: Eyes<'_>,
-    from: &str,
-    sensed: &Sensed,
-) -> Result<Note, WorldError> {
+pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed) -> Result<Note, WorldError> {
     let body = eyes.robot.description();
     let id = perceive::remember(mind, eyes, &[], sensed)?;
     let view = eyes.record.view_at(sensed.stamp_ns, &body.frames.map)?;
@@ -110,7 +105,8 @@ fn replace(mind: &mut Mind, of: impl Fn(&str) -> bool, by: Vec<Candidate>) {
 fn keep(mind: &mut Mind, eyes: Eyes<'_>, stamp_ns: i64) -> Result<(), WorldError> {
     let chart = &mind.known.chart;
     let Some(map) = &chart.map else { return Ok(()) };
-    let body = json!({ "rests_on": chart.records, "stood": chart.stood, "surfaces": chart.surfaces, "map": **map });
+    let body =
+        json!({ "rests_on": chart.records, "stood": chart.stood, "surfaces": chart.surfaces, "map": **map });
     let meta = Meta { body, ..Meta::default() };
     let id = eyes.record.put(Draft { meta, ..Draft::new(MAP, stamp_ns) })?;
     let data = picture::png(chart, map).map_err(|e| WorldError::Bug(format!("a picture of the map: {e}")))?;

@@ -22,7 +22,9 @@ pub(super) fn answer(_: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Opt
     let left = format!("{:.1} m² that may be floor are left", chart.unseen_m2());
     let (verdict, why) = match ended {
         Ended::Reached => (Verdict::Achieved, format!("the room is mapped: {known}")),
-        Ended::Limit(why) => (Verdict::CannotTell, format!("the room is not mapped whole: {why}; {known}; {left}")),
+        Ended::Limit(why) => {
+            (Verdict::CannotTell, format!("the room is not mapped whole: {why}; {known}; {left}"))
+        }
         Ended::Failed(why) => (Verdict::Failed, format!("{why}; {known}; {left}")),
         Ended::NoPlan(_) | Ended::Undecided(_) => {
             let text = "the room is not mapped whole: nothing that is left to be seen can be reached";

@@ -43,14 +43,20 @@ fn a_room_is_mapped_and_the_cup_is_found_on_that_map_after_a_restart() {
 
     let maps = descry(&["memory", "query", &mapped, "--kind", "map", "--json"]);
     let map = &maps["records"].as_array().unwrap().last().unwrap()["body"];
+    let number = |value: &Value| value.as_f64().unwrap();
+    let pose = |key: &str, axis: usize| number(&map["map_from_chart"][key][axis]);
+    // A place in the frame of what was seen first, in the body's map.
+    let put = |p: &Value| {
+        let (x, y) = (number(&p[0]), number(&p[1]));
+        let (cos, sin) = (pose("rotation", 0), pose("rotation", 1));
+        [cos * x - sin * y + pose("translation", 0), sin * x + cos * y + pose("translation", 1)]
+    };
     let mut length_m = 0.0;
     for wall in map["map"]["walls"].as_array().unwrap() {
-        let end = |key: &str, axis: usize| wall[key][axis].as_f64().unwrap();
-        let on = |(axis, at): &(usize, f64)| {
-            (end("from", *axis) - at).abs() < 0.12 && (end("to", *axis) - at).abs() < 0.12
-        };
+        let ends = ["from", "to"].map(|key| put(&wall[key]));
+        let on = |(axis, at): &(usize, f64)| ends.iter().all(|end| (end[*axis] - at).abs() < 0.12);
         assert!(SIDES_M.iter().any(on), "no side of the room: {wall}");
-        length_m += (end("from", 0) - end("to", 0)).hypot(end("from", 1) - end("to", 1));
+        length_m += (ends[0][0] - ends[1][0]).hypot(ends[0][1] - ends[1][1]);
     }
     assert!(length_m > 14.0, "{length_m} m of walls, of 16.8");
     assert_eq!(map["surfaces"].as_array().unwrap().len(), 1, "{}", map["surfaces"]);

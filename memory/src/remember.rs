@@ -32,8 +32,10 @@ pub struct Recollection {
 pub struct Surveyed {
     /// All that was seen, by cubes: what a later run adds to.
     pub survey: Survey,
-    /// Where it was looked from, in the map.
+    /// Where it was looked from, by what was seen.
     pub stood: Vec<Isometry2<f64>>,
+    /// Where the body believed to stand then, in its own map.
+    pub believed: Vec<Isometry2<f64>>,
     /// Level surfaces to put things on, by the names that they were given.
     pub surfaces: Vec<(String, Level)>,
 }

@@ -9,7 +9,7 @@ use descry_perception::mapping::{
     ExploreOptions, FieldOfView, Level, MapOptions, Outlook, RectifyOptions, RoomMap, Survey, Unseen,
     outlooks, standable,
 };
-use descry_perception::nalgebra::{Isometry2, Point2, Point3, Vector3};
+use descry_perception::nalgebra::{Isometry2, Point2, UnitComplex, Vector2, Vector3};
 use descry_perception::occupancy::{Occupancy, Space};
 use descry_robots::route::Router;
 use descry_robots::{Description, Failure, OccupancyGrid, Place, Pose2, Robot, Travel};
@@ -43,8 +43,12 @@ const SAME_HEIGHT_M: f64 = 0.08;
 #[derive(Clone, Default)]
 pub struct Chart {
     survey: Option<Survey>,
-    /// Where it was looked from, in this run and those before it; the body stands at the last or has driven on.
+    /// Where it was looked from, in this run and those before it, by what was seen: in the frame of what was seen first.
     pub(super) stood: Vec<Isometry2<f64>>,
+    /// Where the body believed to stand then, in its own map.
+    pub(super) believed: Vec<Isometry2<f64>>,
+    /// Where what was seen first lies in the body's map: the body erred by some degrees when it looked first.
+    pub(super) map_from_chart: Isometry2<f64>,
     /// Walls, surfaces and open floor, once something was seen.
     pub(super) map: Option<Arc<RoomMap>>,
     router: Option<Arc<Router>>,
@@ -69,6 +73,7 @@ impl Chart {
         if let Some(kept) = kept.filter(|_| is_used && robot.map().is_none()) {
             chart.survey = Some(kept.survey.clone());
             chart.stood.clone_from(&kept.stood);
+            chart.believed.clone_from(&kept.believed);
             chart.surfaces.clone_from(&kept.surfaces);
             chart.read(robot.description());
         }
@@ -78,7 +83,8 @@ impl Chart {
     /// What a later run begins with; none if nothing was seen.
     pub(crate) fn kept(&self) -> Option<Surveyed> {
         let survey = self.survey.clone()?;
-        Some(Surveyed { survey, stood: self.stood.clone(), surfaces: self.surfaces.clone() })
+        let (stood, believed) = (self.stood.clone(), self.believed.clone());
+        Some(Surveyed { survey, stood, believed, surfaces: self.surfaces.clone() })
     }
 
     /// What was seen so far.
@@ -89,8 +95,22 @@ impl Chart {
         self.survey.as_mut().ok_or_else(|| "nothing was seen".into())
     }
 
+    /// Lays the poses found by what was seen onto those that the body believed in: its errors average out.
+    fn settle(&mut self) {
+        let pairs = || self.believed.iter().zip(&self.stood);
+        let count = self.stood.len().min(self.believed.len()).max(1) as f64;
+        let turns = pairs().map(|(b, s)| *(b.rotation * s.rotation.inverse()));
+        let turn = turns
+            .reduce(|sum, turn| sum + turn)
+            .map_or_else(UnitComplex::identity, UnitComplex::from_complex);
+        let shifts = pairs().map(|(b, s)| b.translation.vector - turn * s.translation.vector);
+        let shift = shifts.fold(Vector2::zeros(), |sum, shift| sum + shift) / count;
+        self.map_from_chart = Isometry2::from_parts(shift.into(), turn);
+    }
+
     /// Reads walls, surfaces, open floor and ways from what was seen.
     pub(super) fn read(&mut self, body: &Description) {
+        self.settle();
         let Some(map) = self.survey.as_ref().and_then(|s| s.map(&MapOptions::default()).ok()) else { return };
         let floor = map.floor(&self.stood, body.footprint.radius_m() + CELL_M, *BODY_M.end());
         // The grid leaves the body's room out already.
@@ -114,7 +134,7 @@ impl Chart {
     ) {
         let Some(floor) = self.floor(body) else { return };
         let mut looked = self.stood.clone();
-        looked.push(*here);
+        looked.push(self.map_from_chart.inv_mul(here));
         let options = explore(body);
         self.open.retain(|(symbol, _)| !given_up(symbol));
         let keep: Vec<Isometry2<f64>> = self.open.iter().map(|(_, look)| look.pose).collect();
@@ -143,8 +163,8 @@ impl Chart {
     /// The poses from which more would be seen, as places to go to.
     pub(super) fn poses(&self) -> impl Iterator<Item = Candidate> + '_ {
         self.open.iter().map(|(symbol, look)| {
-            let at = look.pose.translation.vector;
-            let place = Place::Pose(Pose2::new(at.x, at.y, look.pose.rotation.angle()));
+            let at = self.map_from_chart * look.pose;
+            let place = Place::Pose(Pose2::new(at.translation.x, at.translation.y, at.rotation.angle()));
             Candidate { symbol: symbol.clone(), place }
         })
     }
@@ -190,11 +210,12 @@ impl Chart {
         let (Some(router), Place::Pose(from)) = (&self.router, from) else {
             return robot.travel(from, to, shut);
         };
+        let chart_from_map = self.map_from_chart.inverse();
         let pose = |place: &Place| match place {
-            Place::Pose(pose) => *pose,
+            Place::Pose(pose) => put(&chart_from_map, pose),
             Place::Station(_) => Pose2::new(f64::NAN, f64::NAN, f64::NAN),
         };
-        let to: Vec<Pose2> = to.iter().map(pose).collect();
+        let (from, to) = (&put(&chart_from_map, from), to.iter().map(pose).collect::<Vec<Pose2>>());
         let mut found = router.travel_to_each(from, &to);
         for (travel, to) in found.iter_mut().zip(&to) {
             // To turn where it stands needs no floor.
@@ -208,11 +229,13 @@ impl Chart {
     /// The places to drive to one after the other on the way on this map; none without a map, or where no way leads.
     pub(crate) fn way(&self, from: &Place, to: &Place) -> Option<Vec<Place>> {
         let (Place::Pose(from), Place::Pose(to)) = (from, to) else { return None };
-        let route = self.router.as_ref()?.route(from, to).ok()?;
+        let chart_from_map = self.map_from_chart.inverse();
+        let (start, end) = (put(&chart_from_map, from), put(&chart_from_map, to));
+        let route = self.router.as_ref()?.route(&start, &end).ok()?;
         let heading = |a: &Point2<f64>, b: &Point2<f64>| (b.y - a.y).atan2(b.x - a.x);
         let turns =
             route.points_m.windows(2).map(|leg| Pose2::new(leg[1].x, leg[1].y, heading(&leg[0], &leg[1])));
-        let mut way: Vec<Place> = turns.map(Place::Pose).collect();
+        let mut way: Vec<Place> = turns.map(|pose| Place::Pose(put(&self.map_from_chart, &pose))).collect();
         way.pop();
         way.push(Place::Pose(*to));
         Some(way)
@@ -225,6 +248,7 @@ impl Chart {
 
     /// Whether a wall of this map stands between two places.
     pub(crate) fn hides(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
+        let [from, to] = &[from, to].map(|p| self.map_from_chart.inverse_transform_point(p));
         let side = |a: &Point2<f64>, b: &Point2<f64>, p: &Point2<f64>| (b - a).perp(&(p - a));
         let crosses = |a: &Point2<f64>, b: &Point2<f64>| {
             side(a, b, from) * side(a, b, to) < 0.0 && side(from, to, a) * side(from, to, b) < 0.0
@@ -234,20 +258,26 @@ impl Chart {
 
     /// The surfaces as searching takes them: as far as they were seen.
     pub(crate) fn known_surfaces(&self) -> impl Iterator<Item = KnownSurface> + '_ {
-        self.surfaces.iter().map(|(name, level)| known_surface(name, level))
+        self.surfaces.iter().map(|(name, level)| KnownSurface {
+            symbol: symbol(name),
+            name: name.clone(),
+            room: None,
+            outline: level
+                .outline
+                .iter()
+                .map(|p| (self.map_from_chart * p).coords.push(level.height_m).into())
+                .collect(),
+            up: Vector3::z(),
+            whole: false,
+            doubtful: None,
+        })
     }
 }
 
-pub(super) fn known_surface(name: &str, level: &Level) -> KnownSurface {
-    KnownSurface {
-        symbol: symbol(name),
-        name: name.into(),
-        room: None,
-        outline: level.outline.iter().map(|p| Point3::new(p.x, p.y, level.height_m)).collect(),
-        up: Vector3::z(),
-        whole: false,
-        doubtful: None,
-    }
+/// A pose in another frame.
+fn put(other_from_here: &Isometry2<f64>, pose: &Pose2) -> Pose2 {
+    let at = other_from_here * pose.point();
+    Pose2::new(at.x, at.y, pose.yaw_rad + other_from_here.rotation.angle())
 }
 
 fn turn_s(robot: &dyn Robot, from: &Pose2, to: &Pose2) -> f64 {
@@ -262,7 +292,7 @@ fn is_surface(level: &Level) -> bool {
 fn is_one(a: &Level, b: &Level) -> bool {
     let middle = |l: &Level| {
         let n = l.outline.len().max(1) as f64;
-        Point2::from(l.outline.iter().fold(Vector3::zeros().xy(), |sum, p| sum + p.coords) / n)
+        Point2::from(l.outline.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / n)
     };
     let holds = |l: &Level, p: &Point2<f64>| {
         let n = l.outline.len();

@@ -8,7 +8,7 @@ use descry_perception::nalgebra::Isometry2;
 use descry_robots::{Place, Robot, Sensed};
 use serde_json::json;
 
-use super::chart::{BODY_M, Chart, far_m, known_surface, rectify};
+use super::chart::{BODY_M, Chart, far_m, rectify};
 use super::picture;
 use crate::abilities::searching::candidates::ring;
 use crate::abilities::searching::perceive::{self, Eyes};
@@ -29,15 +29,16 @@ pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed)
     let view = eyes.record.view_at(sensed.stamp_ns, &body.frames.map)?;
     let strange = |e: String| WorldError::Bug(format!("a look that maps: {e}"));
     let station = Station::of(&view).map_err(|e| strange(e.to_string()))?;
-    let believed = station.odom_from_level;
     let height_m = view.world_from_camera.translation.z;
     let chart = Arc::make_mut(&mut mind.known.chart);
     chart.records.push(id);
+    let believed = chart.map_from_chart.inv_mul(&station.odom_from_level);
     let survey = chart.survey().map_err(strange)?;
     let fit = survey.locate(&station, &believed, &rectify(body)).map_err(|e| strange(e.to_string()))?;
     let at = fit.before_from_after;
     survey.add(&station, &at, height_m, far_m(body), &BODY_M).map_err(|e| strange(e.to_string()))?;
     chart.stood.push(at);
+    chart.believed.push(station.odom_from_level);
     chart.read(body);
     meet_surfaces(mind, eyes.robot);
     look_out(mind, eyes.robot, from);
@@ -47,8 +48,7 @@ pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed)
 
 /// Makes the surfaces of the map known, with poses around them if anything is looked for.
 fn meet_surfaces(mind: &mut Mind, robot: &dyn Robot) {
-    for (name, level) in mind.known.chart.surfaces.clone() {
-        let fresh = known_surface(&name, &level);
+    for fresh in mind.known.chart.known_surfaces().collect::<Vec<_>>() {
         let known = mind.known.surfaces.iter().position(|s| s.symbol == fresh.symbol);
         let moved = match known {
             Some(n) if mind.regions[n].taken > 0 => continue,
@@ -105,8 +105,13 @@ fn replace(mind: &mut Mind, of: impl Fn(&str) -> bool, by: Vec<Candidate>) {
 fn keep(mind: &mut Mind, eyes: Eyes<'_>, stamp_ns: i64) -> Result<(), WorldError> {
     let chart = &mind.known.chart;
     let Some(map) = &chart.map else { return Ok(()) };
-    let body =
-        json!({ "rests_on": chart.records, "stood": chart.stood, "surfaces": chart.surfaces, "map": **map });
+    let body = json!({
+        "rests_on": chart.records,
+        "map_from_chart": chart.map_from_chart,
+        "stood": chart.stood,
+        "surfaces": chart.surfaces,
+        "map": **map,
+    });
     let meta = Meta { body, ..Meta::default() };
     let id = eyes.record.put(Draft { meta, ..Draft::new(MAP, stamp_ns) })?;
     let data = picture::png(chart, map).map_err(|e| WorldError::Bug(format!("a picture of the map: {e}")))?;

@@ -125,8 +125,8 @@ impl Floor<'_> {
 
 /// A frontier is looked at from no farther than this share of the camera's reach …
 const IN_RANGE: f64 = 0.9;
-/// … and left alone once looks should have shown what lies behind it: less than this is likely to be shown by another.
-const LEFT: f64 = 0.5;
+/// … and left alone once two looks should have shown what lies behind it: less than this is likely to be shown by another.
+const LEFT: f64 = 0.2;
 
 /// The nearest frontier that can be reached, from as soon on the way there as it is in range and nothing stands before it, facing it (Yamauchi 1997).
 /// `None` if no frontier is left.
@@ -140,12 +140,10 @@ pub fn nearest_frontier(
     let start = Point2::from(from.translation.vector);
     let ways = floor.ways_m(&start, options.radius_m);
     let missed = floor.missed(looked, options);
-    let open = frontiers(grid, options).into_iter().filter(|f| {
-        let beside = f.squares.iter().flat_map(|s| floor.unknown_beside(s));
-        let seen: Vec<f64> = beside.map(|index| missed[index]).collect();
-        seen.iter().sum::<f64>() > LEFT * seen.len() as f64
-    });
-    let squares: FxHashSet<(i64, i64)> = open.flat_map(|f| f.squares).map(|p| floor.square(&p)).collect();
+    let is_left =
+        |square: &(i64, i64)| floor.unknown_beside(*square).iter().any(|&index| missed[index] > LEFT);
+    let of_frontiers = frontiers(grid, options).into_iter().flat_map(|f| f.squares);
+    let squares: FxHashSet<(i64, i64)> = of_frontiers.map(|p| floor.square(&p)).filter(is_left).collect();
     let (mut goal, mut way_m) = (None, f64::INFINITY);
     for square in floor.squares().filter(|s| squares.contains(s)) {
         // The body's middle may not come that near to what is occupied: as near as it comes.
@@ -171,8 +169,7 @@ pub fn nearest_frontier(
 }
 
 impl Floor<'_> {
-    fn unknown_beside(&self, place: &Point2<f64>) -> Vec<usize> {
-        let (column, row) = self.square(place);
+    fn unknown_beside(&self, (column, row): (i64, i64)) -> Vec<usize> {
         let around = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(x, y)| (column + x, row + y));
         let unknown = around.into_iter().filter(|s| self.space(*s) == Space::Unknown);
         unknown.filter_map(|s| self.index_beyond(s)).collect()

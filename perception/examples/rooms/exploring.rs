@@ -47,17 +47,16 @@ fn flat(seed: u64) -> (Building, Isometry2<f64>) {
     };
     let (x, y) = (cuts(columns, 3.0, 2.0), cuts(2, 3.0, 1.5));
     let at = Point2::new;
-    for row in 0..3 {
-        for column in 0..columns {
-            let door = row == 1;
-            level(&mut building, at(x[column], y[row]), at(x[column + 1], y[row]), door, &mut draws);
+    for (row, &along) in y.iter().enumerate() {
+        for ends in x.windows(2) {
+            wall(&mut building, at(ends[0], along), at(ends[1], along), row == 1, &mut draws);
         }
     }
-    for column in 0..=columns {
-        for row in 0..2 {
+    for (column, &across) in x.iter().enumerate() {
+        for (row, ends) in y.windows(2).enumerate() {
             let inner = column > 0 && column < columns;
             let door = inner && (row == 0 || draws.next() < 0.4);
-            level(&mut building, at(x[column], y[row]), at(x[column], y[row + 1]), door, &mut draws);
+            wall(&mut building, at(across, ends[0]), at(across, ends[1]), door, &mut draws);
         }
     }
     for (column, row) in (0..columns).flat_map(|c| [(c, 0), (c, 1)]) {
@@ -69,7 +68,7 @@ fn flat(seed: u64) -> (Building, Isometry2<f64>) {
 }
 
 /// A wall, with a door if it has one.
-fn level(building: &mut Building, a: Point2<f64>, b: Point2<f64>, door: bool, draws: &mut Draws) {
+fn wall(building: &mut Building, a: Point2<f64>, b: Point2<f64>, door: bool, draws: &mut Draws) {
     let along = (b - a).normalize();
     let length = (b - a).norm();
     let texture = 0.3 + 0.3 * draws.next();

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use descry_agent::body::{self, Body};
 use descry_domains::abilities::searching::{candidates, perceive, policies};
+use descry_domains::abilities::surveying::chart::Chart;
 use descry_domains::goal::{self, Goal};
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
@@ -52,7 +53,8 @@ fn looked() -> Looked {
     let stamps_ns = runtime.block_on(async {
         let surfaces = candidates::surfaces(&domain, &*robot);
         let here = robot.pose().await.expect("it knows where it is");
-        let (poses, _) = candidates::candidates(&*robot, &surfaces, &domain.config.candidates, &here);
+        let (ring, chart) = (&domain.config.candidates, Chart::default());
+        let (poses, _) = candidates::candidates(&*robot, &chart, &surfaces, ring, &here);
         let watch = Watch::default();
         let mut stamps = Vec::new();
         for pose in poses.iter().step_by(2) {

@@ -15,10 +15,11 @@ use crate::program::Tape;
 use crate::vocabulary::Vocabulary;
 
 /// The domains that come with the program.
-static BUILT_IN: [(&str, Dir<'_>); 3] = [
+static BUILT_IN: [(&str, Dir<'_>); 4] = [
     ("tabletop", include_dir!("$CARGO_MANIFEST_DIR/tabletop")),
     ("home", include_dir!("$CARGO_MANIFEST_DIR/home")),
     ("shapes", include_dir!("$CARGO_MANIFEST_DIR/shapes")),
+    ("survey", include_dir!("$CARGO_MANIFEST_DIR/survey")),
 ];
 
 /// The domain that is used when none is named.

@@ -40,6 +40,23 @@ pub enum Note {
         /// What is on the floor, and what is known of its shape.
         things: Vec<String>,
     },
+    /// A look was taken into the map.
+    Charted {
+        /// Walls of the map.
+        walls: usize,
+        /// How long they are together, openings left out, metres.
+        walls_m: f64,
+        /// Open floor, square metres.
+        open_m2: f64,
+        /// Floor that is unknown and may be seen from somewhere, square metres.
+        unseen_m2: f64,
+        /// Level surfaces to put things on.
+        surfaces: Vec<String>,
+        /// By how much the body stands elsewhere than it believed, by what it sees, metres and radians.
+        moved_m: f64,
+        /// See there.
+        turned_rad: f64,
+    },
     /// Somebody has moved something: what was seen before the last view no longer holds.
     Changed {
         /// What shows it.
@@ -74,6 +91,14 @@ impl fmt::Display for Note {
             Note::Swept { things } => {
                 write!(f, "sweep     {} things on the floor", things.len())?;
                 things.iter().try_for_each(|text| write!(f, "\n          {text}"))
+            }
+            Note::Charted { walls, walls_m, open_m2, unseen_m2, surfaces, moved_m, turned_rad } => {
+                let (cm, degrees) = (1e2 * moved_m, turned_rad.to_degrees());
+                write!(
+                    f,
+                    "map       {walls} walls of {walls_m:.1} m, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; stood {cm:.1} cm and {degrees:.1}° off"
+                )?;
+                surfaces.iter().try_for_each(|text| write!(f, "\n          {text}"))
             }
             Note::Changed { because } => write!(f, "changed   {because}; only the last view still holds"),
             Note::Nothing { because } => write!(f, "see       nothing yet: {because}"),

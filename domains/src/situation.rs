@@ -17,6 +17,7 @@ use crate::abilities::searching::doubt::{Doubt, Hypothesis, Taken};
 use crate::abilities::searching::obstacle::{self, Obstacle};
 use crate::abilities::searching::reasons;
 use crate::abilities::shapes::floor::Floor;
+use crate::abilities::surveying::chart::Chart;
 use crate::config::Thresholds;
 use crate::lexicon::symbol;
 use crate::load::Domain;
@@ -185,6 +186,8 @@ pub struct Known {
     pub past: Option<Past>,
     /// What the laser has found on the floor.
     pub floor: Arc<Floor>,
+    /// The map that the body has made itself.
+    pub chart: Arc<Chart>,
     /// How much more often each thing, then each kind, then anything is expected on each surface than on another.
     pub expected: Vec<Vec<f64>>,
 }
@@ -299,7 +302,7 @@ impl Situation {
     fn travel_row(&self, from: usize, shut: &BTreeSet<usize>) -> Vec<f64> {
         let places: Vec<Place> = self.candidates.iter().map(|c| c.place.clone()).collect();
         let shut: Vec<String> = shut.iter().map(|&n| self.doors[n].door.name.clone()).collect();
-        let travel = self.robot.travel(&self.candidates[from].place, &places, &shut);
+        let travel = self.chart.travel(&*self.robot, &self.candidates[from].place, &places, &shut);
         travel.into_iter().map(|t| t.map_or(f64::INFINITY, |t| t.duration_s)).collect()
     }
 
@@ -374,7 +377,12 @@ impl Situation {
         let surface = &self.surfaces[on];
         let Some(centre) = surface.centre() else { return true };
         let Some(camera) = self.camera(from, on) else { return false };
-        if surface.whole && self.clearness(from, on) < CLEAR_ENOUGH {
+        let is_charted = self.chart.has(&surface.symbol);
+        if (surface.whole || is_charted) && self.clearness(from, on) < CLEAR_ENOUGH {
+            return false;
+        }
+        let eye = Point3::from(camera.translation.vector).xy();
+        if is_charted && self.chart.hides(&eye, &centre.xy()) {
             return false;
         }
         let halfway = surface.outline.iter().map(|p| nalgebra_middle(p, &centre));

@@ -21,6 +21,7 @@ use crate::abilities::searching::perceive::{self, Eyes};
 pub use crate::abilities::searching::policies::Chooser;
 use crate::abilities::searching::policies::{self, By};
 use crate::abilities::searching::reasons;
+use crate::abilities::surveying::chart::Chart;
 use crate::actions::{self, Carried, Grounded};
 use crate::answer::{self, Conclusion, Ended};
 use crate::goal::Goal;
@@ -134,8 +135,10 @@ impl<'a> World<'a> {
     pub fn begin(setting: Setting<'a>, chooser: Chooser, here: &PoseEstimate) -> Result<Self, WorldError> {
         let Setting { domain, goal, robot, .. } = &setting;
         crate::check::runnable(domain).map_err(|f| WorldError::Domain(f.render(false)))?;
-        let surfaces = candidates::surfaces(domain, &**robot);
+        let mut surfaces = candidates::surfaces(domain, &**robot);
         known_by_map(domain, &surfaces)?;
+        let chart = Chart::begin(domain, setting.past.as_ref(), &**robot);
+        surfaces.extend(chart.known_surfaces());
         let index = |name: &String| {
             surfaces.iter().position(|s| s.symbol == *name).ok_or_else(|| no_surface(name, &surfaces))
         };
@@ -149,7 +152,8 @@ impl<'a> World<'a> {
                 Ok(Thing { on, ..situation::thing(domain, name) })
             })
             .collect::<Result<_, WorldError>>()?;
-        let (mut poses, at) = candidates::candidates(&**robot, &surfaces, &domain.config.candidates, here);
+        let ring = &domain.config.candidates;
+        let (mut poses, at) = candidates::candidates(&**robot, &chart, &surfaces, ring, here);
         let doors = doors(&**robot, here, &mut poses);
         let known = Known {
             robot: Arc::clone(robot),
@@ -172,6 +176,7 @@ impl<'a> World<'a> {
             held: None,
             past: setting.past.clone(),
             floor: Arc::default(),
+            chart: Arc::new(chart),
             expected: Vec::new(),
             surfaces,
         };
@@ -571,16 +576,16 @@ impl<'a> World<'a> {
             .collect();
         let mut before = Remembered::clone(&past.remembered);
         before.shapes.extend(known.floor.learned.iter().cloned());
+        before.surveyed = known.chart.kept().or(before.surveyed);
         Some(before.after(&known.belief, &looked_at, past.now_unix_s))
     }
 
     /// What is answered in the end.
     pub fn answer(&self, round: &Round, ended: &Ended) -> Conclusion {
         let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.answers);
-        if let Some(answers) = own {
-            return answers(self.setting.goal, &self.mind, &round.situation, ended);
-        }
-        answer::conclude(self.setting.goal, &self.lexicon, &self.mind, round, ended)
+        let goal = self.setting.goal;
+        own.and_then(|answers| answers(goal, &self.mind, &round.situation, ended))
+            .unwrap_or_else(|| answer::conclude(goal, &self.lexicon, &self.mind, round, ended))
     }
 }
 

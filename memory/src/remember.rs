@@ -1,6 +1,8 @@
 //! What outlasts a run: where things were seen last, and when. A later run begins with it, as far as time has not worn it.
 
 use descry_perception::laser::KnownShape;
+use descry_perception::mapping::{Level, Survey};
+use descry_perception::nalgebra::Isometry2;
 use serde::{Deserialize, Serialize};
 
 use crate::Meta;
@@ -25,6 +27,19 @@ pub struct Recollection {
     pub track: Track,
 }
 
+/// The map that a body has made itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Surveyed {
+    /// All that was seen, by cubes: what a later run adds to.
+    pub survey: Survey,
+    /// Where it was looked from, by what was seen.
+    pub stood: Vec<Isometry2<f64>>,
+    /// Where the body believed to stand then, in its own map.
+    pub believed: Vec<Isometry2<f64>>,
+    /// Level surfaces to put things on, by the names that they were given.
+    pub surfaces: Vec<(String, Level)>,
+}
+
 /// What is remembered of all earlier runs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Remembered {
@@ -35,6 +50,9 @@ pub struct Remembered {
     /// Shapes that were learned, the oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<KnownShape>,
+    /// The map, if one was made.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surveyed: Option<Surveyed>,
 }
 
 impl Remembered {

@@ -7,10 +7,10 @@ use corridor::measure::{BODY_M, MAP_FAR_M, score, survey};
 use corridor::{Building, CAMERA_HEIGHT_M, Rig, along, around, field_of_view, with_people};
 use descry_perception::mapping::{
     Cells, CellsError, ClosureOptions, ExploreOptions, FieldOfView, Fit, MapOptions, MappingError, Matcher,
-    NormalOptions, PairFit, RectifyOptions, RoomMap, Station, Survey, by_regions, chained, closures,
-    correct_drive, next_poses, rectify_drive, rectify_pair,
+    NormalOptions, PairFit, RectifyOptions, RoomMap, Station, Survey, Unseen, by_regions, chained, closures,
+    correct_drive, nearest_frontier, next_poses, outlooks, rectify_drive, rectify_pair, standable,
 };
-use descry_perception::nalgebra::{Isometry2, Point2, Point3, Vector3};
+use descry_perception::nalgebra::{Isometry2, Point2, Point3, Vector2, Vector3};
 use descry_perception::occupancy::Space;
 use std::f64::consts::{FRAC_PI_4, TAU};
 use std::sync::OnceLock;
@@ -301,6 +301,59 @@ fn the_next_pose_shows_what_is_not_known_yet() {
     let left = next_poses(&whole, &truths[..4], &options);
     let gain = |poses: &[descry_perception::mapping::NextPose]| poses.first().map_or(0.0, |p| p.rate());
     assert!(gain(&left) < gain(&next), "{} {}", gain(&left), gain(&next));
+}
+
+/// A few poses show together what can be seen; each shows less once the others were taken; those that are kept stay.
+#[test]
+fn a_few_outlooks_show_what_can_be_seen() {
+    let truths = &drive().truths;
+    let map = seen().map(&MapOptions::default()).unwrap();
+    let floor = map.floor(&truths[..1], 0.35, 1.6).unwrap();
+    let options = ExploreOptions { field: field_of_view(), ..ExploreOptions::default() };
+    let found = outlooks(&floor, &truths[..4], &[], 6, &options);
+    assert!(!found.is_empty() && found.len() <= 6);
+    let mut unseen = Unseen::default();
+    for look in &found {
+        let gain_m2 = unseen.gain_m2(look);
+        assert!(gain_m2 >= 0.2 && gain_m2 <= Unseen::default().gain_m2(look) + 1e-9);
+        unseen.look(look);
+        assert!(unseen.gain_m2(look) < 0.9 * gain_m2);
+    }
+    let keep: Vec<Isometry2<f64>> = found.iter().rev().take(2).map(|look| look.pose).collect();
+    let again = outlooks(&floor, &truths[..4], &keep, 6, &options);
+    assert!(keep.iter().zip(&again).all(|(pose, look)| *pose == look.pose));
+    let next = nearest_frontier(&floor, &truths[..4], &options).unwrap();
+    assert!(next.way_m.is_finite());
+    let may = standable(&floor, 0.3);
+    let free = floor.cells.iter().filter(|c| **c == Space::Free).count();
+    let stands = may.iter().filter(|may| **may).count();
+    assert!(stands > 0 && stands < free);
+    assert!(map.levels.iter().filter(|l| l.faces_up && l.height_m > 0.3).all(|table| {
+        let middle =
+            table.outline.iter().map(|p| p.coords).sum::<Vector2<f64>>() / table.outline.len() as f64;
+        floor.at(&middle.into()) == Space::Occupied
+    }));
+}
+
+/// What a station shows of what was seen before says where it stands; where it shows nothing of it, the body is believed.
+#[test]
+fn a_station_is_located_in_a_survey() {
+    let Drive { stations, truths, .. } = drive();
+    let rectify = RectifyOptions { way_sigma: (0.0, 0.06), turn_sigma_rad: 0.04, ..options(Matcher::IcpEm) };
+    let (mut before, mut after) = (0.0, 0.0);
+    for k in (10..60).step_by(5) {
+        let off = Isometry2::new(Vector2::new(0.05, -0.04), if k % 2 == 0 { 0.04 } else { -0.04 });
+        let believed = truths[k] * off;
+        let fit = seen().locate(&stations[k], &believed, &rectify).unwrap();
+        before += truths[k].rotation.angle_to(&believed.rotation).abs();
+        after += truths[k].rotation.angle_to(&fit.before_from_after.rotation).abs();
+    }
+    assert!(after < 0.4 * before, "{after} of {before} rad");
+    let elsewhere = Isometry2::translation(500.0, 0.0);
+    let fit = seen().locate(&stations[0], &elsewhere, &rectify).unwrap();
+    assert_eq!(fit.before_from_after, elsewhere);
+    let nowhere = Isometry2::translation(f64::NAN, 0.0);
+    assert!(seen().locate(&stations[0], &nowhere, &rectify).is_err());
 }
 
 /// What cannot be used is told, and nothing of it gets into a map.

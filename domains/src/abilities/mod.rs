@@ -4,6 +4,7 @@ pub mod carrying;
 pub mod moving;
 pub mod searching;
 pub mod shapes;
+pub mod surveying;
 
 use descry_planner::{Answer, Call, CallError, Plan};
 use descry_skills::{Outcome, Skill, SkillFailure};
@@ -100,11 +101,12 @@ pub type Begins = fn(&mut Mind, &Domain, &Goal);
 /// Steps that are surely no waste; none if nothing that can be done promises anything.
 pub type Fallback = fn(&Situation) -> Option<Plan>;
 
-/// Answers in the end, by the situation of the last round.
-pub type Answers = fn(&Goal, &Mind, &Situation, &Ended) -> Conclusion;
+/// Answers in the end, by the situation of the last round; none where searching answers.
+pub type Answers = fn(&Goal, &Mind, &Situation, &Ended) -> Option<Conclusion>;
 
 /// Every ability; the first is that of every body and needs no naming.
-pub const ALL: &[&Ability] = &[&moving::ABILITY, &searching::ABILITY, &carrying::ABILITY, &shapes::ABILITY];
+pub const ALL: &[&Ability] =
+    &[&moving::ABILITY, &searching::ABILITY, &carrying::ABILITY, &shapes::ABILITY, &surveying::ABILITY];
 
 /// The abilities that a domain uses.
 pub fn used(names: &[String]) -> impl Iterator<Item = &'static Ability> + '_ {

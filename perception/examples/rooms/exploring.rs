@@ -1,19 +1,24 @@
-//! A building mapped without a list of stops: the next pose by what it is expected to show and what the way costs, beside the nearest frontier.
+//! Flats mapped without a list of stops: the next pose by what it is expected to show and what the way costs, beside going to the nearest frontier.
 
 use super::corridor::measure::{BODY_M, MAP_FAR_M};
-use super::corridor::{Building, CAMERA_HEIGHT_M, Rig, field_of_view};
+use super::corridor::{Building, CAMERA_HEIGHT_M, DOOR_WIDE_M, Opening, Panel, Rig, Table, field_of_view};
 use super::tabletop::Draws;
 use descry_perception::mapping::{
-    ExploreOptions, FieldOfView, NextPose, Station, Survey, frontiers, next_poses,
+    ExploreOptions, FieldOfView, NextPose, Station, Survey, nearest_frontier, next_poses,
 };
-use descry_perception::nalgebra::{Isometry2, Point2};
+use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use descry_perception::occupancy::{Occupancy, Space};
+
+/// Flats that are made.
+const FLATS: u64 = 12;
+/// Walls are known when this share of them is.
+const ENOUGH: f64 = 0.95;
+const MOST_LOOKS: usize = 250;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Policy {
     Expected,
     NearestFrontier,
-    Greedy,
 }
 
 /// Metres driven, looks taken and share of the walls known when it was enough, or at the end.
@@ -29,7 +34,64 @@ fn options() -> ExploreOptions {
     ExploreOptions { field, ..ExploreOptions::default() }
 }
 
-/// Share of the corridor's walls of which the grid knows a square nearby.
+/// Two rows of two or three rooms, doors between them, a table in each; and the middle of the first room.
+fn flat(seed: u64) -> (Building, Isometry2<f64>) {
+    let mut draws = Draws(seed);
+    let mut building = Building::default();
+    let columns = if draws.next() < 0.5 { 2 } else { 3 };
+    let mut cuts = |count: usize, least: f64, spread: f64| {
+        (0..count).fold(vec![0.0], |mut cuts: Vec<f64>, _| {
+            cuts.push(cuts[cuts.len() - 1] + least + spread * draws.next());
+            cuts
+        })
+    };
+    let (x, y) = (cuts(columns, 3.0, 2.0), cuts(2, 3.0, 1.5));
+    let at = Point2::new;
+    for (row, &along) in y.iter().enumerate() {
+        for ends in x.windows(2) {
+            wall(&mut building, at(ends[0], along), at(ends[1], along), row == 1, &mut draws);
+        }
+    }
+    for (column, &across) in x.iter().enumerate() {
+        for (row, ends) in y.windows(2).enumerate() {
+            let inner = column > 0 && column < columns;
+            let door = inner && (row == 0 || draws.next() < 0.4);
+            wall(&mut building, at(across, ends[0]), at(across, ends[1]), door, &mut draws);
+        }
+    }
+    for (column, row) in (0..columns).flat_map(|c| [(c, 0), (c, 1)]) {
+        let corner = at(x[column] + 0.2, if row == 0 { y[0] + 0.2 } else { y[2] - 0.9 });
+        table(&mut building, corner, Vector2::new(0.9 + 0.4 * draws.next(), 0.7));
+    }
+    let start = Isometry2::new(Vector2::new(0.5 * x[1] + 0.3, 0.5 * y[1] + 0.2), 6.0 * draws.next());
+    (building, start)
+}
+
+/// A wall, with a door if it has one.
+fn wall(building: &mut Building, a: Point2<f64>, b: Point2<f64>, door: bool, draws: &mut Draws) {
+    let along = (b - a).normalize();
+    let length = (b - a).norm();
+    let texture = 0.3 + 0.3 * draws.next();
+    if !door {
+        return building.wall(a, b, texture);
+    }
+    let from = 1.2 + (length - 2.4 - DOOR_WIDE_M).max(0.0) * draws.next();
+    let (p, q) = (a + along * from, a + along * (from + DOOR_WIDE_M));
+    building.wall(a, p, texture);
+    building.wall(q, b, texture);
+    building.openings.push(Opening { a: p, b: q });
+}
+
+fn table(building: &mut Building, low: Point2<f64>, size: Vector2<f64>) {
+    let middle = low + 0.5 * size;
+    let corners = [low, low + Vector2::new(size.x, 0.0), low + size, low + Vector2::new(0.0, size.y)];
+    for i in 0..4 {
+        building.panels.push(Panel { a: corners[i], b: corners[(i + 1) % 4], z: (0.0, 0.74), texture: 0.7 });
+    }
+    building.tables.push(Table { middle, half: [0.5 * size.x, 0.5 * size.y], height: 0.74 });
+}
+
+/// Share of the walls of which the grid knows a square nearby.
 fn known(building: &Building, grid: &Occupancy) -> f64 {
     let (mut hit, mut all) = (0, 0);
     for (a, b) in &building.walls {
@@ -49,25 +111,13 @@ fn known(building: &Building, grid: &Occupancy) -> f64 {
 }
 
 fn choose(policy: Policy, grid: &Occupancy, looked: &[Isometry2<f64>]) -> Option<NextPose> {
-    let poses = next_poses(grid, looked, &options());
     match policy {
-        Policy::Expected => poses.into_iter().next(),
-        Policy::Greedy => poses.into_iter().max_by(|a, b| a.gain_m2.total_cmp(&b.gain_m2)),
-        Policy::NearestFrontier => {
-            // Of the poses that look at the middle of a frontier, the nearest.
-            let fronts = frontiers(grid, &options());
-            let looks_at = |pose: &NextPose| {
-                let sees = |p: &Point2<f64>| options().field.sees(&pose.pose.inverse_transform_point(p));
-                fronts.iter().any(|f| sees(&f.middle))
-            };
-            let near = |a: &NextPose, b: &NextPose| (a.way_m, a.cost_s).partial_cmp(&(b.way_m, b.cost_s));
-            poses.into_iter().filter(looks_at).min_by(|a, b| near(a, b).unwrap_or(std::cmp::Ordering::Equal))
-        }
+        Policy::Expected => next_poses(grid, looked, &options()).into_iter().next(),
+        Policy::NearestFrontier => nearest_frontier(grid, looked, &options()),
     }
 }
 
-fn explore(policy: Policy, building: &Building, start: &Isometry2<f64>, enough: f64, seed: u64) -> Run {
-    const MOST_LOOKS: usize = 250;
+fn explore(policy: Policy, building: &Building, start: &Isometry2<f64>, seed: u64) -> Run {
     let mut draws = Draws(seed);
     let mut survey = Survey::new(0.1).expect("a length");
     let mut looked = vec![*start];
@@ -81,7 +131,7 @@ fn explore(policy: Policy, building: &Building, start: &Isometry2<f64>, enough: 
         run.looks += 1;
         let Some(grid) = survey.grid() else { break };
         run.known = known(building, &grid);
-        if run.known >= enough {
+        if run.known >= ENOUGH {
             break;
         }
         let Some(next) = choose(policy, &grid, &looked) else { break };
@@ -94,33 +144,35 @@ fn explore(policy: Policy, building: &Building, start: &Isometry2<f64>, enough: 
 
 /// Prints metres until 95 % of the walls are known.
 pub fn print(seed: u64) {
-    const ENOUGH: f64 = 0.95;
     println!(
-        "\nexplored at true poses until 95 % of the walls are known: metres, looks, seconds, share known at the end (%)"
+        "\n{FLATS} flats explored at true poses until 95 % of the walls are known: metres, looks, seconds, share known at the end (%)"
     );
-    for (name, building, start) in [
-        ("corridor 20 x 10 m", Building::corridor_loop(20.0, 10.0, seed), Isometry2::translation(0.0, -5.0)),
-        (
-            "corridor 28 x 14 m",
-            Building::corridor_loop(28.0, 14.0, seed + 1),
-            Isometry2::translation(0.0, -7.0),
-        ),
-        (
-            "corridor 16 x 8 m",
-            Building::corridor_loop(16.0, 8.0, seed + 2),
-            Isometry2::translation(2.0, -4.0),
-        ),
-    ] {
-        for policy in [Policy::Expected, Policy::NearestFrontier, Policy::Greedy] {
-            let run = explore(policy, &building, &start, ENOUGH, seed);
-            println!(
-                "{name:<20} {:<18} {:>6.1} m {:>4} looks {:>6.0} s {:>5.1}",
-                format!("{policy:?}"),
-                run.metres,
-                run.looks,
-                run.seconds,
-                100.0 * run.known
-            );
+    let policies = [Policy::Expected, Policy::NearestFrontier];
+    let mut sums = [(0.0, 0, 0.0, 0); 2];
+    let mut both = [0.0; 2];
+    for k in 0..FLATS {
+        let (building, start) = flat(1000 * seed + k);
+        let runs = policies.map(|policy| explore(policy, &building, &start, 1000 * seed + k));
+        let told = runs.each_ref().map(|run| {
+            let Run { metres, looks, known, seconds } = run;
+            format!("{metres:>6.1} m {looks:>4} looks {seconds:>5.0} s {:>5.1}", 100.0 * known)
+        });
+        println!("flat {k:>2}   {:?} {}   {:?} {}", policies[0], told[0], policies[1], told[1]);
+        for (sum, run) in sums.iter_mut().zip(&runs) {
+            let done = usize::from(run.known >= ENOUGH);
+            *sum = (sum.0 + run.metres, sum.1 + run.looks, sum.2 + run.seconds, sum.3 + done);
+        }
+        if runs.iter().all(|run| run.known >= ENOUGH) {
+            (0..2).for_each(|i| both[i] += runs[i].metres);
         }
     }
+    for (policy, (metres, looks, seconds, done)) in policies.iter().zip(sums) {
+        println!("{policy:?}: {done} of {FLATS} known, {metres:.1} m, {looks} looks, {seconds:.0} s in all");
+    }
+    println!(
+        "where both came to the end: {:.1} m against {:.1} m, ratio {:.2}",
+        both[0],
+        both[1],
+        both[0] / both[1]
+    );
 }

@@ -1,6 +1,6 @@
 //! The drive of Viejo and Cazorla in a simulated building, and what they did not try:
-//! `cargo run --release -p descry-perception --example rooms -- [SEED] [DIR]`. Plots are written to DIR as SVG,
-//! and the drive as clouds, on which `peers.py` beside this file runs what others offer.
+//! `cargo run --release -p descry-perception --example rooms -- [SEED] [DIR] [PART]`. Plots are written to DIR as SVG,
+//! and the drive as clouds, on which `peers.py` beside this file runs what others offer. PART is one of them alone, by the name of its file.
 
 #[path = "../../tests/corridor/mod.rs"]
 mod corridor;
@@ -17,24 +17,41 @@ mod walls;
 use std::path::Path;
 use std::process::ExitCode;
 
-fn run(seed: u64, out: Option<&Path>) -> Result<(), String> {
-    poses::pairs(seed);
-    poses::loops(seed)?;
-    walls::walls(seed, out)?;
-    variations::print(seed)?;
-    recorded::rooms(out)?;
-    out.map_or(Ok(()), |dir| poses::export(seed, dir))?;
-    exploring::print(seed);
-    times::print(seed);
+fn run(seed: u64, out: Option<&Path>, part: Option<&str>) -> Result<(), String> {
+    let is_asked = |name: &str| part.is_none_or(|part| part == name);
+    if is_asked("poses") {
+        poses::pairs(seed);
+        poses::loops(seed)?;
+        out.map_or(Ok(()), |dir| poses::export(seed, dir))?;
+    }
+    if is_asked("walls") {
+        walls::walls(seed, out)?;
+    }
+    if is_asked("variations") {
+        variations::print(seed)?;
+    }
+    if is_asked("recorded") {
+        recorded::rooms(out)?;
+    }
+    if is_asked("exploring") {
+        exploring::print(seed);
+    }
+    if is_asked("times") {
+        times::print(seed);
+    }
     Ok(())
 }
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let seed = arguments.first().map_or(Ok(1), |text| text.parse());
+    let parts = ["poses", "walls", "variations", "recorded", "exploring", "times"];
+    let part = arguments.get(2).map(String::as_str);
     let result = match (seed, arguments.len()) {
-        (Ok(seed), 0..=2) => run(seed, arguments.get(1).map(Path::new)),
-        _ => Err("usage: rooms [SEED] [DIR]".to_owned()),
+        (Ok(seed), 0..=3) if part.is_none_or(|part| parts.contains(&part)) => {
+            run(seed, arguments.get(1).map(Path::new), part)
+        }
+        _ => Err(format!("usage: rooms [SEED] [DIR] [PART]\n  PART is one of {}", parts.join(", "))),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,10 +1,12 @@
 //! All that was seen of a building, by cubes: as many as there is surface, however many points there are. And normals by regions (section 4.1).
 
+use super::station::{Spot, thinned};
 use crate::cloud::is_finite;
 use crate::voxel::{self, Table};
 use nalgebra::{Isometry2, Point3, Vector2, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// Sums over the points of cubes, and over the ways back to the camera. Points come in station by station and need not be kept.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -54,6 +56,12 @@ pub enum CellsError {
         /// Its points.
         count: u32,
     },
+}
+
+impl PartialEq for Cells {
+    fn eq(&self, other: &Self) -> bool {
+        self.edge_m == other.edge_m && self.sums == other.sums
+    }
 }
 
 impl From<Cells> for Stored {
@@ -204,6 +212,14 @@ impl Cells {
         let mut found: Vec<_> = self.sums.par_iter().filter_map(facet).collect();
         found.sort_unstable_by_key(|(cube, _)| *cube);
         found.into_iter().map(|(_, facet)| facet).collect()
+    }
+
+    /// The plan of what was seen at some heights: cells that lie over each other are one spot.
+    pub(super) fn plan(&self, band_m: &RangeInclusive<f64>, least_points: u32, thin_m: f64) -> Vec<Spot> {
+        let kept = self.sums.iter().filter(|s| s.count >= least_points);
+        let at = kept.map(|s| (self.centroid(s), f64::from(s.count)));
+        let spots = at.filter(|(at, _)| band_m.contains(&at.z));
+        thinned(spots.map(|(at, weight)| Spot { at: at.xy(), weight }), thin_m)
     }
 
     fn centroid(&self, sums: &Sums) -> Point3<f64> {

@@ -73,13 +73,13 @@ const HEADINGS: usize = 12;
 /// Most squares along a ray.
 const MOST_STEPS: usize = 2000;
 /// Rays all around a place.
-const RAYS: usize = 180;
+pub(super) const RAYS: usize = 180;
 /// Places that are tried lie so far apart, metres.
 const PLACES_M: f64 = 0.6;
 /// Places are tried within this of a frontier, metres.
 const AROUND_M: f64 = 2.0;
 /// Least gain that makes a pose worth a look, square metres.
-const LEAST_M2: f64 = 0.2;
+pub(super) const LEAST_M2: f64 = 0.2;
 /// Ways to neighbouring squares, and their lengths in squares.
 const STEPS: [(i64, i64, f64); 8] = {
     const D: f64 = std::f64::consts::SQRT_2;
@@ -87,8 +87,8 @@ const STEPS: [(i64, i64, f64); 8] = {
 };
 
 /// A grid, read by columns and rows.
-struct Floor<'a> {
-    grid: &'a Occupancy,
+pub(super) struct Floor<'a> {
+    pub(super) grid: &'a Occupancy,
     width: i64,
     height: i64,
     /// Squares beyond the grid on each side that a look may reach.
@@ -96,39 +96,39 @@ struct Floor<'a> {
 }
 
 impl<'a> Floor<'a> {
-    fn of(grid: &'a Occupancy, far_m: f64) -> Floor<'a> {
+    pub(super) fn of(grid: &'a Occupancy, far_m: f64) -> Floor<'a> {
         let width = grid.width.max(1);
         let margin = ((far_m / grid.cell_m).ceil() as i64).clamp(0, MOST_STEPS as i64) + 1;
         Floor { grid, width: width as i64, height: (grid.cells.len() / width) as i64, margin }
     }
 
     /// Number of a square of the grid or of the margin around it.
-    fn index_beyond(&self, (column, row): (i64, i64)) -> Option<usize> {
+    pub(super) fn index_beyond(&self, (column, row): (i64, i64)) -> Option<usize> {
         let (column, row) = (column + self.margin, row + self.margin);
         let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
         (column >= 0 && row >= 0 && column < width && row < height).then(|| (row * width + column) as usize)
     }
 
-    fn space(&self, (column, row): (i64, i64)) -> Space {
+    pub(super) fn space(&self, (column, row): (i64, i64)) -> Space {
         let inside = column >= 0 && row >= 0 && column < self.width && row < self.height;
         if inside { self.grid.cells[(row * self.width + column) as usize] } else { Space::Unknown }
     }
 
-    fn index(&self, (column, row): (i64, i64)) -> usize {
+    pub(super) fn index(&self, (column, row): (i64, i64)) -> usize {
         (row * self.width + column) as usize
     }
 
-    fn square(&self, place: &Point2<f64>) -> (i64, i64) {
+    pub(super) fn square(&self, place: &Point2<f64>) -> (i64, i64) {
         // Far outside is far outside, and so is what is no place.
         let at = ((place - self.grid.origin) / self.grid.cell_m).map(|c| c.clamp(-1e9, 1e9));
         (at.x.floor() as i64, at.y.floor() as i64)
     }
 
-    fn middle(&self, (column, row): (i64, i64)) -> Point2<f64> {
+    pub(super) fn middle(&self, (column, row): (i64, i64)) -> Point2<f64> {
         self.grid.origin + Vector2::new(column as f64 + 0.5, row as f64 + 0.5) * self.grid.cell_m
     }
 
-    fn squares(&self) -> impl Iterator<Item = (i64, i64)> + use<> {
+    pub(super) fn squares(&self) -> impl Iterator<Item = (i64, i64)> + use<> {
         let width = self.width;
         (0..self.height).flat_map(move |row| (0..width).map(move |column| (column, row)))
     }
@@ -151,7 +151,7 @@ impl<'a> Floor<'a> {
     }
 
     /// Length of the shortest way to each square over squares where the body may be, metres; infinite where there is none.
-    fn ways_m(&self, from: &Point2<f64>, radius_m: f64) -> Vec<f64> {
+    pub(super) fn ways_m(&self, from: &Point2<f64>, radius_m: f64) -> Vec<f64> {
         let free = self.standable(radius_m);
         let mut ways = vec![f64::INFINITY; free.len()];
         // The body stands where it stands, however near to something.
@@ -187,7 +187,7 @@ impl<'a> Floor<'a> {
     }
 
     /// Calls `found` with the range and the index of each unknown square along a ray, and how likely nothing is before it.
-    fn ray(
+    pub(super) fn ray(
         &self,
         from: &Vector2<f64>,
         angle_rad: f64,
@@ -214,7 +214,7 @@ impl<'a> Floor<'a> {
     }
 
     /// For each square how likely another look shows it, after those that should have.
-    fn missed(&self, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<f64> {
+    pub(super) fn missed(&self, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<f64> {
         let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
         let mut missed = vec![1.0; (width * height) as usize];
         let mut last = vec![0; missed.len()];
@@ -246,14 +246,19 @@ impl<'a> Floor<'a> {
 }
 
 /// Direction of a ray in the map, radians.
-fn bearing_rad(ray: usize) -> f64 {
+pub(super) fn bearing_rad(ray: usize) -> f64 {
     TAU * (ray as f64 + 0.5) / RAYS as f64
 }
 
 /// True if a camera with a heading sees along a ray.
-fn is_ahead(ray: usize, heading_rad: f64, field: &FieldOfView) -> bool {
+pub(super) fn is_ahead(ray: usize, heading_rad: f64, field: &FieldOfView) -> bool {
     let off = (bearing_rad(ray) - heading_rad + PI).rem_euclid(TAU) - PI;
     off >= field.right_rad && off <= field.left_rad
+}
+
+/// Squares of a grid on which the middle of a body may be: open, and nothing occupied nearer than `radius_m`; in the order of its cells.
+pub fn standable(grid: &Occupancy, radius_m: f64) -> Vec<bool> {
+    Floor::of(grid, 0.0).standable(radius_m)
 }
 
 /// Frontiers of a grid, the longest first.

@@ -5,8 +5,9 @@ use super::error::{MappingError, check, check_pose};
 use super::fuse::{FuseOptions, fuse};
 use super::grid::Sightlines;
 use super::orientation::{OrientationOptions, orientations};
+use super::pair::{PairFit, RectifyOptions, fit_cut};
 use super::patch::{Constraints, Fit, Growth, Patch, grow, main_direction, through};
-use super::station::Station;
+use super::station::{Station, shared};
 use crate::hull::convex;
 use crate::occupancy::{Occupancy, Space};
 use crate::plane::Plane;
@@ -16,12 +17,16 @@ use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
 /// All that was seen of a building so far: what a later drive adds to.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Survey {
     cells: Cells,
     lines: Sightlines,
 }
+
+/// Cells with fewer points say nothing of where a station stands; what lies farther than this from all of them is new, metres.
+const LEAST_KNOWN: u32 = 4;
+const NEAR_M: f64 = 0.3;
 
 /// How a map is made of a survey.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,6 +135,39 @@ pub struct RoomMap {
     pub grid: Option<Occupancy>,
 }
 
+impl RoomMap {
+    /// The floor as a body that is up to `height_m` high must take it: open where it was seen open or where the body has stood (discs of `radius_m`
+    /// around poses), occupied under walls and under level surfaces lower than it.
+    pub fn floor(&self, stood: &[Isometry2<f64>], radius_m: f64, height_m: f64) -> Option<Occupancy> {
+        let mut grid = self.grid.clone()?;
+        let tables =
+            self.levels.iter().filter(|l| l.faces_up && l.height_m > STEP_M && l.height_m < height_m);
+        let tables: Vec<&Level> = tables.collect();
+        let off = Vector2::repeat(0.5 * grid.cell_m);
+        for (index, cell) in grid.cells.iter_mut().enumerate() {
+            let corner = Vector2::new((index % grid.width) as f64, (index / grid.width) as f64) * grid.cell_m;
+            let middle = grid.origin + corner + off;
+            if tables.iter().any(|t| holds(&t.outline, &middle)) {
+                *cell = Space::Occupied;
+            }
+            let here = |p: &Isometry2<f64>| (p.translation.vector - middle.coords).norm() < radius_m;
+            if *cell != Space::Free && stood.iter().any(here) {
+                *cell = Space::Free;
+            }
+        }
+        Some(grid)
+    }
+}
+
+/// True if a convex outline, anticlockwise, holds a place.
+fn holds(outline: &[Point2<f64>], place: &Point2<f64>) -> bool {
+    let n = outline.len();
+    n >= 3 && (0..n).all(|i| (outline[(i + 1) % n] - outline[i]).perp(&(place - outline[i])) >= 0.0)
+}
+
+/// What lies no higher is floor, metres.
+const STEP_M: f64 = 0.1;
+
 impl Survey {
     /// Nothing seen yet; cells of `edge_m` metres.
     ///
@@ -167,6 +205,30 @@ impl Survey {
     /// What is open by lines of sight alone, without the walls; `None` if nothing was seen, or what was lies too far apart for one grid.
     pub fn grid(&self) -> Option<Occupancy> {
         self.lines.occupancy(self.cells.edge_m())
+    }
+
+    /// Where a station stands, by what it shows of what was seen before, from where the body believes to be. It stays there as far as nothing says more.
+    ///
+    /// # Errors
+    /// If an option or the pose cannot be used.
+    pub fn locate(
+        &self,
+        station: &Station,
+        believed: &Isometry2<f64>,
+        options: &RectifyOptions,
+    ) -> Result<PairFit, MappingError> {
+        options.check()?;
+        check_pose("station", 0, believed)?;
+        let known = self.cells.plan(&options.band_m, LEAST_KNOWN, options.thin_m);
+        let coarse = |p: &Point2<f64>| ((p.x / NEAR_M).floor() as i64, (p.y / NEAR_M).floor() as i64);
+        let around = |p: &Point2<f64>| {
+            let (x, y) = coarse(p);
+            (-1..=1).flat_map(move |i| (-1..=1).map(move |j| (x + i, y + j)))
+        };
+        let near: FxHashSet<(i64, i64)> = known.iter().map(|s| coarse(&s.at)).collect();
+        let mut moved = station.plan(&options.band_m, &options.field, options.thin_m);
+        moved.retain(|s| around(&(believed * s.at)).any(|square| near.contains(&square)));
+        Ok(fit_cut(&shared(&known, &believed.inverse(), &options.field), &moved, believed, options))
     }
 
     /// The map of what was seen so far.

@@ -53,6 +53,8 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
         objects: Vec::new(),
         target: spec.target.clone(),
         target_visible_from_start: None,
+        mapped: spec.mapped,
+        stereo: spec.stereo,
     };
     let description = body::description();
     let router = Router::new(&scene.map(), description.footprint.radius_m() + SAFETY_M, description.speeds);

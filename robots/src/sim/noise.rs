@@ -46,7 +46,7 @@ fn steepness(cosine: f32) -> f32 {
 }
 
 /// A standard normal number from 21 bits, by the quantiles of the distribution (interpolated, cut at 3.3 σ).
-fn normal(bits: u64) -> f32 {
+pub(crate) fn normal(bits: u64) -> f32 {
     const CELLS: usize = 2048;
     static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
     let table = TABLE.get_or_init(|| {

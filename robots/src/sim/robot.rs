@@ -15,10 +15,10 @@ use crate::sim::laser::{self, Laser};
 use crate::sim::noise::{self, DepthNoise};
 use crate::sim::render::{Frame, render, visible_share};
 use crate::sim::routes::{Doors, Routes};
-use crate::sim::scene::SurfaceSpec;
+use crate::sim::scene::{RoomSpec, SurfaceSpec};
 use crate::sim::state::{End, State};
 use crate::sim::truth::Truth;
-use crate::sim::world::{LABEL_OBJECT, Scene};
+use crate::sim::world::{LABEL_OBJECT, LABEL_ROOM, Scene};
 use nalgebra::{Isometry3, Point3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -53,6 +53,7 @@ pub struct SimRobot {
     surfaces: Vec<SurfaceHint>,
     rooms: Vec<Room>,
     doors: Vec<Door>,
+    mapped: bool,
     state: Mutex<State>,
 }
 
@@ -81,7 +82,7 @@ impl SimRobot {
         description.pose_sigma_m = options.localisation.sigma_m;
         description.pose_sigma_rad = options.localisation.sigma_rad;
         description.laser = Some(options.laser.part());
-        let map = scene.map();
+        let map = scene.known_map();
         let doorways = scene.doors.iter().map(|d| d.doorway.clone()).collect();
         let radius_m = description.footprint.radius_m() + SAFETY_M;
         let routes = Routes::new(map.clone(), doorways, radius_m, description.speeds);
@@ -91,10 +92,16 @@ impl SimRobot {
             height_m: s.height_m,
             room: scene.room_at(&s.centre_m()).map(String::from),
         };
-        let surfaces = scene.surfaces.iter().map(hint).collect();
-        let rooms = scene.rooms.iter().map(|r| Room { name: r.name.clone(), outline_m: r.outline_m() });
-        let rooms = rooms.collect();
-        let doors = scene.doors.iter().map(|d| d.doorway.hint()).collect();
+        let is_known = |_: &usize| scene.mapped;
+        let known = |count: usize| (0..count).filter(is_known);
+        let surfaces = known(scene.surfaces.len()).map(|i| hint(&scene.surfaces[i])).collect();
+        let room = |r: &RoomSpec| Room { name: r.name.clone(), outline_m: r.outline_m() };
+        let rooms = known(scene.rooms.len()).map(|i| room(&scene.rooms[i])).collect();
+        let doors = known(scene.doors.len()).map(|i| scene.doors[i].doorway.hint()).collect();
+        if let Some(stereo) = &scene.stereo {
+            description.range_m = stereo.range_m;
+        }
+        let mapped = scene.mapped;
         let mut rng = ChaCha8Rng::seed_from_u64(noise::mix(options.seed));
         let error = options.localisation.error(&mut rng);
         let state = State {
@@ -111,9 +118,10 @@ impl SimRobot {
             frames: 0,
             grasps: 0,
             unreachable: Vec::new(),
+            unknown: scene.unknown(),
             scene,
         };
-        SimRobot { description, options, map, surfaces, rooms, doors, state: Mutex::new(state) }
+        SimRobot { description, options, map, surfaces, rooms, doors, mapped, state: Mutex::new(state) }
     }
 
     /// How everything really is. For scoring and reports: nothing that decides may ask.
@@ -248,7 +256,7 @@ impl SimRobot {
                 timed_out("the drive", watch.time_limit_s)
             }
             End::Obstacle(obstacle) => {
-                let name = state.scene.obstacles.get(*obstacle).map_or("", |o| &o.name).to_string();
+                let name = state.unknown.get(*obstacle).map_or("", |o| &o.name).to_string();
                 state.note(format!("the base meets \"{name}\", which its map does not show"));
                 Failure::Blocked {
                     because: "something stands in the way that the map does not show".into(),
@@ -348,9 +356,13 @@ impl SimRobot {
         let frame = self.render(&state);
         let base_from_camera = self.base_from_camera(&state.gaze);
         let map_from_base = state.estimate.isometry();
+        let truly = state.map_from_base() * base_from_camera;
+        let (stereo, seed) = (state.scene.stereo, self.options.seed);
         drop(state);
-        let depth_m =
-            noise::observe(&frame, &self.options.noise, self.description.range_m, self.options.seed, number);
+        let depth_m = match stereo {
+            Some(stereo) => stereo.observe(&frame, &truly, |label| label == LABEL_ROOM, seed, number),
+            None => noise::observe(&frame, &self.options.noise, self.description.range_m, seed, number),
+        };
         let intrinsics = self.description.camera;
         let mut cloud = intrinsics
             .cloud_from_depth(&depth_m)
@@ -407,7 +419,7 @@ impl Robot for SimRobot {
     }
 
     fn map(&self) -> Option<&OccupancyGrid> {
-        Some(&self.map)
+        self.mapped.then_some(&self.map)
     }
 
     fn surfaces(&self) -> &[SurfaceHint] {

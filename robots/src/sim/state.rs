@@ -44,6 +44,8 @@ pub(crate) struct State {
     pub frames: u64,
     pub grasps: u64,
     pub unreachable: Vec<Pose2>,
+    /// What the base may bump into: its map does not show it.
+    pub unknown: Vec<ObstacleSpec>,
 }
 
 /// What ends a drive on its way.
@@ -103,9 +105,9 @@ impl State {
             let at = self.really(&step.pose).translation.vector.xy().into();
             let bumps = |o: &ObstacleSpec| {
                 let nears = step.metres > 0.0 && o.distance_m(&at) < o.distance_m(&before);
-                !o.on_map && o.touches(&at, radius_m) && nears
+                o.touches(&at, radius_m) && nears
             };
-            if let Some(obstacle) = self.scene.obstacles.iter().position(bumps) {
+            if let Some(obstacle) = self.unknown.iter().position(bumps) {
                 return Some((i, obstacle));
             }
             before = at;
@@ -169,7 +171,7 @@ impl State {
                 self.seen_shut.insert(*door);
                 return;
             }
-            End::Obstacle(obstacle) => self.scene.obstacles.get(*obstacle),
+            End::Obstacle(obstacle) => self.unknown.get(*obstacle),
             End::Person | End::Stuck => None,
         };
         let Some(obstacle) = obstacle.cloned() else { return };

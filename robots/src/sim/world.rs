@@ -4,8 +4,9 @@ use crate::body::Pose2;
 use crate::grid::OccupancyGrid;
 use crate::sim::scene::{Doorway, ObstacleSpec, RoomSpec, SurfaceKind, SurfaceSpec, TargetSpec};
 use crate::sim::shape::{Cuboid, Hit, Part, Shape};
+use crate::sim::stereo::Stereo;
 use crate::sim::walls::Wall;
-use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Side of a cell of the robot's map, metres.
@@ -102,6 +103,10 @@ pub struct Scene {
     pub target: Option<TargetSpec>,
     /// Share of the target that the camera sees from the start.
     pub target_visible_from_start: Option<f64>,
+    /// False if the body has no map of it.
+    pub mapped: bool,
+    /// The pair of cameras, if the body has one instead of the depth camera.
+    pub stereo: Option<Stereo>,
 }
 
 /// What a pixel shows.
@@ -172,6 +177,8 @@ const LEG_M: f64 = 0.05;
 const UPRIGHT_M: f64 = 0.02;
 /// Thickness of a door's panel, metres.
 const PANEL_M: f64 = 0.04;
+/// A body without a map may think of going so far beyond the walls, metres.
+const BEYOND_M: f64 = 10.0;
 /// Thickness of a seat on legs, metres.
 const SEAT_M: f64 = 0.06;
 /// Of every wall.
@@ -224,6 +231,22 @@ impl HungDoor {
 }
 
 impl ObstacleSpec {
+    /// A box that no map shows.
+    fn block(name: &str, position_m: [f64; 2], size_m: [f64; 3]) -> ObstacleSpec {
+        ObstacleSpec {
+            name: name.into(),
+            position_m,
+            size_m,
+            spread_m: None,
+            gap_m: 0.0,
+            yaw_deg: 0.0,
+            corner_m: 0.0,
+            legs_m: None,
+            on_map: false,
+            colour: WALL_COLOUR,
+        }
+    }
+
     /// Frame at the centre of its base.
     pub fn map_from_obstacle(&self) -> Isometry3<f64> {
         upright(self.position_m[0], self.position_m[1], 0.0, self.yaw_deg.to_radians())
@@ -302,6 +325,44 @@ impl Scene {
             grid.occupy_near(&o.position_m.into(), reach_m, |p| o.touches(p, grown));
         }
         grid
+    }
+
+    /// What the body knows of the floor when it begins: the rooms, or without a map nothing, far beyond all walls.
+    pub fn known_map(&self) -> OccupancyGrid {
+        if self.mapped {
+            return self.map();
+        }
+        let beyond = Vector2::repeat(BEYOND_M);
+        OccupancyGrid::covering(self.room.low() - beyond, self.room.high() + beyond, MAP_RESOLUTION_M)
+    }
+
+    /// What stands on the floor that the body's map does not show, as boxes: what it may bump into. Without a map that is everything.
+    pub fn unknown(&self) -> Vec<ObstacleSpec> {
+        if self.mapped {
+            return self.obstacles.iter().filter(|o| !o.on_map).cloned().collect();
+        }
+        let surface = |s: &SurfaceSpec| ObstacleSpec {
+            yaw_deg: s.yaw_deg,
+            ..ObstacleSpec::block(&s.name, s.position_m, [s.size_m[0], s.size_m[1], s.height_m])
+        };
+        let wall = |w: &Wall| {
+            let (middle, size) = (nalgebra::center(&w.low, &w.high), w.high - w.low);
+            ObstacleSpec::block("wall", [middle.x, middle.y], size.into())
+        };
+        let surfaces = self.surfaces.iter().map(surface);
+        let walls = self.walls.iter().filter(|w| w.low.z <= 0.0).map(wall);
+        let ([x, y], [length_m, width_m]) = (self.room.position_m, self.room.size_m);
+        let thick_m = 2.0 * BEYOND_M;
+        let (along, across) = (0.5 * (length_m + thick_m), 0.5 * (width_m + thick_m));
+        let around = [
+            ([x - along, y], [thick_m, width_m + thick_m]),
+            ([x + along, y], [thick_m, width_m + thick_m]),
+            ([x, y - across], [length_m, thick_m]),
+            ([x, y + across], [length_m, thick_m]),
+        ];
+        let around =
+            around.map(|(at, [a, b])| ObstacleSpec::block("wall", at, [a, b, self.room.wall_height_m]));
+        self.obstacles.iter().cloned().chain(surfaces).chain(walls).chain(around).collect()
     }
 
     /// The named room that holds a point of the floor.

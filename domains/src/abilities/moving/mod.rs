@@ -4,7 +4,7 @@ mod at;
 mod path_cost;
 mod time_left;
 
-use descry_skills::{Move, OpenDoor, Outcome};
+use descry_skills::{Circle, Move, OpenDoor, Outcome};
 
 use super::{Ability, Fact, Meaning, SkillWord};
 use crate::abilities::searching::perceive::Eyes;
@@ -51,7 +51,11 @@ pub const ABILITY: Ability = Ability {
             about: "drives from one pose to the other",
             ground: |s, arguments| {
                 let to = s.candidate(arguments[1]).map_err(|e| e.to_string())?;
-                Ok(Box::new(Move { to: s.candidates[to].place.clone() }))
+                let to = s.candidates[to].place.clone();
+                Ok(match s.chart.way(&s.candidates[s.at].place, &to) {
+                    Some(way) => Box::new(Circle { way }),
+                    None => Box::new(Move { to }),
+                })
             },
             because: |s, arguments| match (s.candidate(arguments[0]), s.candidate(arguments[1])) {
                 (Ok(from), Ok(to)) => {

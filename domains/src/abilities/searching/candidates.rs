@@ -3,6 +3,7 @@
 use descry_perception::nalgebra::{Point2, Point3, Vector3};
 use descry_robots::{Place, Pose2, PoseEstimate, Robot};
 
+use crate::abilities::surveying::chart::Chart;
 use crate::config::Candidates;
 use crate::lexicon::symbol;
 use crate::load::Domain;
@@ -14,6 +15,7 @@ const OUTWARDS_M: [f64; 7] = [0.0, 0.1, 0.2, -0.1, 0.3, -0.2, 0.4];
 /// The poses to look from, and which of them the body stands at.
 pub fn candidates(
     robot: &dyn Robot,
+    chart: &Chart,
     surfaces: &[KnownSurface],
     config: &Candidates,
     here: &PoseEstimate,
@@ -29,7 +31,7 @@ pub fn candidates(
     let mut all = vec![Candidate { symbol: "start".into(), place: here.place() }];
     for surface in surfaces {
         let Some(centre) = surface.centre() else { continue };
-        let ring = ring(robot, &here.place(), &centre, config);
+        let ring = ring(robot, chart, &here.place(), &centre, config);
         all.extend(
             ring.into_iter().map(|(k, place)| Candidate { symbol: format!("{}-{k}", surface.symbol), place }),
         );
@@ -46,6 +48,7 @@ fn station_symbol(name: &str) -> String {
 /// Poses around a point that face it, numbered from 1; where no distance fits, the pose is left out.
 pub(crate) fn ring(
     robot: &dyn Robot,
+    chart: &Chart,
     from: &Place,
     centre: &Point3<f64>,
     config: &Candidates,
@@ -59,7 +62,7 @@ pub(crate) fn ring(
     (0..config.poses)
         .filter_map(|k| {
             let tries: Vec<Place> = OUTWARDS_M.iter().map(|&d| pose(k, d)).collect();
-            let travel = robot.travel(from, &tries, &[]);
+            let travel = chart.travel(robot, from, &tries, &[]);
             let fits = travel.iter().position(Result::is_ok)?;
             Some((k + 1, tries[fits].clone()))
         })

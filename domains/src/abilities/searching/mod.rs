@@ -83,7 +83,8 @@ fn seen(
     let on = on.ok_or_else(|| WorldError::Bug(format!("`{}` is no surface", arguments[1])))?;
     // Without a map a view is one of every surface in it.
     let at = mind.known.at;
-    let is_shown = |&n: &usize| n == on || !s.surfaces[on].whole && !s.surfaces[n].whole && s.sees(at, n);
+    let is_mapped = |n: usize| s.surfaces[n].whole || s.chart.has(&s.surfaces[n].symbol);
+    let is_shown = |&n: &usize| n == on || !is_mapped(on) && !is_mapped(n) && s.sees(at, n);
     let shown: Vec<usize> = (0..s.surfaces.len()).filter(is_shown).collect();
     perceive::remember(mind, eyes, &shown, sensed)?;
     let here = mind.known.candidates[at].symbol.clone();

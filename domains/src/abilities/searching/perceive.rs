@@ -62,7 +62,12 @@ pub struct Eyes<'a> {
 
 /// Puts a view of some surfaces into the record: its transforms and colours, then its cloud, so that a cloud is never without its
 /// place. When this returns it survives a crash.
-pub fn remember(mind: &mut Mind, eyes: Eyes<'_>, shown: &[usize], sensed: &Sensed) -> Result<(), WorldError> {
+pub fn remember(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    shown: &[usize],
+    sensed: &Sensed,
+) -> Result<RecordId, WorldError> {
     let record = eyes.record;
     for t in &sensed.transforms {
         record.put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
@@ -94,7 +99,8 @@ pub fn remember(mind: &mut Mind, eyes: Eyes<'_>, shown: &[usize], sensed: &Sense
     mind.views += 1;
     mind.known.looked_from = mind.known.at;
     // Every merge reads all views of its surface again.
-    Ok(record.hold(&views(mind), "views")?)
+    record.hold(&views(mind), "views")?;
+    Ok(id)
 }
 
 /// Records the colours of a frame, if it has some.

@@ -21,7 +21,7 @@ pub(super) fn around(
     middle: &Point2<f64>,
 ) -> Vec<String> {
     let from = mind.known.candidates[mind.known.at].place.clone();
-    let found = ring(robot, &from, &middle.coords.push(0.0).into(), config);
+    let found = ring(robot, &mind.known.chart, &from, &middle.coords.push(0.0).into(), config);
     let poses = found.into_iter().map(|(k, place)| Candidate { symbol: format!("{name}-{k}"), place });
     let first = mind.known.candidates.len();
     mind.known.candidates.extend(poses);

@@ -15,7 +15,7 @@ use crate::situation::Situation;
 const OPEN_M: f64 = 0.02;
 
 /// See the module. `s` is the last round's.
-pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Conclusion {
+pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Option<Conclusion> {
     let teller = Teller { mind, s };
     let is_to_learn = mentions(&goal.pddl).iter().any(|m| m[0] == "learned");
     let (verdict, why, thing) = match &s.floor.sought {
@@ -26,7 +26,7 @@ pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> 
     let believed: Vec<Believed> = s.floor.things.iter().map(|t| teller.believed(t)).collect();
     let found = thing.and_then(|t| s.floor.things.iter().position(|o| o.symbol == t.symbol));
     let found = found.map(|n| believed[n].clone());
-    Conclusion {
+    Some(Conclusion {
         verdict,
         why,
         confidence: thing.map_or(0.0, |t| t.sureness(s.floor.known.len())),
@@ -35,7 +35,7 @@ pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> 
         found,
         objects: believed,
         remembered: None,
-    }
+    })
 }
 
 struct Teller<'a> {

@@ -57,6 +57,15 @@
 //! visible_from_some = 0.6           # and what some pose around the surface sees at least
 //! ```
 //!
+//! Before all that may stand `mapped = false`: the body knows nothing of the scene but where it stands in it. And it may have a pair of cameras:
+//!
+//! ```toml
+//! [stereo]
+//! baseline_m = 0.1
+//! disparity_sigma_px = 0.3          # depth is off by z²·0.3/(f·0.1)
+//! textured = 0.5                    # share of floor and walls on which anything can be matched
+//! ```
+//!
 //! A flat has several rooms instead of the one. What lies between them is wall, as high as the highest; doors are openings in it:
 //!
 //! ```toml
@@ -91,7 +100,8 @@ pub(crate) use surface::headroom_m;
 pub use surface::{ObstacleSpec, SurfaceKind, SurfaceSpec};
 
 use crate::input::{self, InputError, Objection, Step};
-use check::{finite, object};
+use crate::sim::stereo::Stereo;
+use check::{finite, object, positive};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
@@ -125,6 +135,16 @@ pub struct SceneSpec {
     /// What the arrangement must show and hide.
     #[serde(default)]
     pub target: Option<TargetSpec>,
+    /// False if the body has no map of it.
+    #[serde(default = "default_true")]
+    pub mapped: bool,
+    /// A pair of cameras instead of the depth camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stereo: Option<Stereo>,
+}
+
+fn default_true() -> bool {
+    true
 }
 
 /// Where the robot stands first.
@@ -190,7 +210,20 @@ impl SceneSpec {
         for (i, o) in self.objects.iter().enumerate() {
             self.check_object(i, o)?;
         }
+        self.check_stereo()?;
         self.check_target()
+    }
+
+    fn check_stereo(&self) -> Result<(), Objection> {
+        let Some(stereo) = &self.stereo else { return Ok(()) };
+        let at = |key| [Step::Key("stereo"), Step::Key(key)];
+        positive(&[stereo.baseline_m], &at("baseline_m"))?;
+        finite(&[stereo.disparity_sigma_px], &at("disparity_sigma_px"))?;
+        if !(0.0..=1.0).contains(&stereo.textured) {
+            let problem = format!("found {}, expected a share", stereo.textured);
+            return Err(object(&at("textured"), problem, "0 to 1".into()));
+        }
+        positive(&[stereo.range_m.0, stereo.range_m.1 - stereo.range_m.0], &at("range_m"))
     }
 
     fn check_start(&self) -> Result<(), Objection> {

@@ -1,0 +1,86 @@
+//! The calls that *surveying* answers, and what is done where the planner finds no plan.
+
+use descry_perception::mapping::Unseen;
+use descry_planner::{Answer, Call, CallError, Plan, Step};
+
+use super::chart::{LOOK_S, NOTHING_SEEN_M2};
+use crate::abilities::searching::reasons;
+use crate::abilities::{Meaning, argument};
+use crate::situation::{Situation, holding};
+
+/// Every call.
+pub(super) const ALL: &[Meaning] = &[
+    Meaning {
+        name: "expected-view",
+        reads: &["charted"],
+        about: "unknown floor that a look from there is expected to show beyond those before it, square metres",
+        answers: expected_view,
+    },
+    Meaning {
+        name: "expected-discovery",
+        reads: &["charted"],
+        about: "by how much it would raise the confidence in a thing if that stood on what is not known yet",
+        answers: expected_discovery,
+    },
+];
+
+fn expected_view(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    gain_m2(s, call).map(Answer::Number)
+}
+
+/// The share of all that is still unknown and can be seen, of all that confidence lacks: what is known already and left to be searched is worth more.
+fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let what = s.thing(argument(call, 1)?)?;
+    let all_m2 = s.chart.unseen_m2();
+    let share = if all_m2 > 0.0 { (gain_m2(s, call)? / all_m2).min(1.0) } else { 0.0 };
+    Ok(Answer::Number((1.0 - s.confidence(what)) * share))
+}
+
+fn gain_m2(s: &Situation, call: &Call) -> Result<f64, CallError> {
+    let from = argument(call, 0)?;
+    if s.chart.map.is_none() {
+        return Ok(if from == s.candidates[s.at].symbol { NOTHING_SEEN_M2 } else { 0.0 });
+    }
+    let Some(look) = s.chart.outlook(from) else { return Ok(0.0) };
+    let mut unseen = Unseen::default();
+    for earlier in holding(call, "charted").filter_map(|r| s.chart.outlook(r.arguments.first()?)) {
+        unseen.look(earlier);
+    }
+    Ok(unseen.gain_m2(look))
+}
+
+/// Why a look is taken from there.
+pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
+    match s.chart.outlook(arguments[0]) {
+        Some(look) => format!(
+            "{:.1} m² of floor that is unknown may be seen from there, of {:.1}",
+            Unseen::default().gain_m2(look),
+            s.chart.unseen_m2()
+        ),
+        None => "nothing was seen yet".into(),
+    }
+}
+
+/// The look that shows most of the unknown floor for its time, if any does; else one at a surface.
+pub(super) fn fallback(s: &Situation) -> Option<Plan> {
+    let rate = |(symbol, look): &(String, descry_perception::mapping::Outlook)| {
+        let to = s.candidate(symbol).ok().filter(|to| s.can_drive_to(*to))?;
+        let way_s = if to == s.at { 0.0 } else { s.travel_s(s.at, to) };
+        Some((Unseen::default().gain_m2(look) / (way_s + LOOK_S), to, way_s))
+    };
+    let best = s.chart.open.iter().filter_map(rate).max_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, to, way_s)) = best else { return reasons::one_look(s) };
+    let symbol = |n: usize| s.candidates[n].symbol.clone();
+    let step = |start_s, action: &str, arguments, duration_s| Step {
+        start_s: Some(start_s),
+        action: action.into(),
+        arguments,
+        duration_s,
+    };
+    let look = step(way_s + GAP_S, "chart", vec![symbol(to)], LOOK_S);
+    let drive = (to != s.at).then(|| step(0.0, "move", vec![symbol(s.at), symbol(to)], way_s));
+    Some(Plan { steps: drive.into_iter().chain([look]).collect(), ..Plan::default() })
+}
+
+/// Between the end of a step and the begin of the next, seconds.
+const GAP_S: f64 = 0.001;

@@ -1,0 +1,351 @@
+//! The map that a body without one makes itself: what was seen so far, the walls, surfaces and open floor in it, ways over that floor, and from where
+//! more of it would be seen.
+
+use std::sync::Arc;
+
+use descry_memory::RecordId;
+use descry_memory::remember::Surveyed;
+use descry_perception::mapping::{
+    ExploreOptions, FieldOfView, Level, MapOptions, Outlook, RectifyOptions, RoomMap, Survey, Unseen,
+    outlooks, standable,
+};
+use descry_perception::nalgebra::{Isometry2, Point2, UnitComplex, Vector2, Vector3};
+use descry_perception::occupancy::{Occupancy, Space};
+use descry_robots::route::Router;
+use descry_robots::{Description, Failure, OccupancyGrid, Place, Pose2, Robot, Travel};
+
+use crate::config::Candidates;
+use crate::lexicon::symbol;
+use crate::load::Domain;
+use crate::situation::{Candidate, KnownSurface, Past};
+
+/// Edge of the cells in which what was seen is kept, metres.
+const CELL_M: f64 = 0.1;
+/// Depths beyond this are not used for the map, metres: the noise of a stereo camera grows with their square.
+const FAR_M: f64 = 5.0;
+/// Heights at which something is in the body's way, metres.
+pub(super) const BODY_M: std::ops::RangeInclusive<f64> = 0.15..=1.6;
+/// Heights of level surfaces on which people put things, metres, and how large these are at least, square metres.
+const SURFACE_M: std::ops::RangeInclusive<f64> = 0.3..=1.4;
+const SURFACE_M2: f64 = 0.15;
+/// Kept between the body and what the map shows beyond its footprint, metres: half a cell, and what the poses may be off.
+const CLEAR_M: f64 = 0.08;
+/// Poses that a plan weighs against each other.
+const WEIGHED: usize = 7;
+/// A look takes so long, seconds.
+pub(super) const LOOK_S: f64 = 2.0;
+/// Floor that counts as unknown before the first look, square metres.
+pub(super) const NOTHING_SEEN_M2: f64 = 100.0;
+/// A level surface is one that was there before if it is level with it and holds its middle.
+const SAME_HEIGHT_M: f64 = 0.08;
+
+/// See the module.
+#[derive(Clone, Default)]
+pub struct Chart {
+    survey: Option<Survey>,
+    /// Where it was looked from, in this run and those before it, by what was seen: in the frame of what was seen first.
+    pub(super) stood: Vec<Isometry2<f64>>,
+    /// Where the body believed to stand then, in its own map.
+    pub(super) believed: Vec<Isometry2<f64>>,
+    /// Where what was seen first lies in the body's map: the body erred by some degrees when it looked first.
+    pub(super) map_from_chart: Isometry2<f64>,
+    /// Walls, surfaces and open floor, once something was seen.
+    pub(super) map: Option<Arc<RoomMap>>,
+    router: Option<Arc<Router>>,
+    /// Poses from which more would be seen, by their symbols.
+    pub(super) open: Vec<(String, Outlook)>,
+    /// Level surfaces to put things on: names, and what was seen of them.
+    pub(super) surfaces: Vec<(String, Level)>,
+    /// Symbols that were given to poses so far.
+    given: usize,
+    /// Where to look at a surface from.
+    pub(super) poses: Candidates,
+    /// Records of what it rests on.
+    pub(super) records: Vec<RecordId>,
+}
+
+impl Chart {
+    /// The map with which a run begins: what an earlier one has left, if the domain uses it and the body has none of its own.
+    pub(crate) fn begin(domain: &Domain, past: Option<&Past>, robot: &dyn Robot) -> Self {
+        let is_used = domain.config.uses.iter().any(|name| name == super::ABILITY.name);
+        let mut chart = Chart { poses: domain.config.candidates, ..Chart::default() };
+        let kept = past.and_then(|p| p.remembered.surveyed.as_ref());
+        if let Some(kept) = kept.filter(|_| is_used && robot.map().is_none()) {
+            chart.survey = Some(kept.survey.clone());
+            chart.stood.clone_from(&kept.stood);
+            chart.believed.clone_from(&kept.believed);
+            chart.surfaces.clone_from(&kept.surfaces);
+            chart.read(robot.description());
+        }
+        chart
+    }
+
+    /// What a later run begins with; none if nothing was seen.
+    pub(crate) fn kept(&self) -> Option<Surveyed> {
+        let survey = self.survey.clone()?;
+        let (stood, believed) = (self.stood.clone(), self.believed.clone());
+        Some(Surveyed { survey, stood, believed, surfaces: self.surfaces.clone() })
+    }
+
+    /// What was seen so far.
+    pub(super) fn survey(&mut self) -> Result<&mut Survey, String> {
+        if self.survey.is_none() {
+            self.survey = Some(Survey::new(CELL_M).map_err(|e| e.to_string())?);
+        }
+        self.survey.as_mut().ok_or_else(|| "nothing was seen".into())
+    }
+
+    /// Lays the poses found by what was seen onto those that the body believed in: its errors average out.
+    fn settle(&mut self) {
+        let pairs = || self.believed.iter().zip(&self.stood);
+        let count = self.stood.len().min(self.believed.len()).max(1) as f64;
+        let turns = pairs().map(|(b, s)| *(b.rotation * s.rotation.inverse()));
+        let turn = turns
+            .reduce(|sum, turn| sum + turn)
+            .map_or_else(UnitComplex::identity, UnitComplex::from_complex);
+        let shifts = pairs().map(|(b, s)| b.translation.vector - turn * s.translation.vector);
+        let shift = shifts.fold(Vector2::zeros(), |sum, shift| sum + shift) / count;
+        self.map_from_chart = Isometry2::from_parts(shift.into(), turn);
+    }
+
+    /// Reads walls, surfaces, open floor and ways from what was seen.
+    pub(super) fn read(&mut self, body: &Description) {
+        self.settle();
+        let Some(map) = self.survey.as_ref().and_then(|s| s.map(&MapOptions::default()).ok()) else { return };
+        let floor = map.floor(&self.stood, body.footprint.radius_m() + CELL_M, *BODY_M.end());
+        // The grid leaves the body's room out already.
+        let room_m = body.footprint.radius_m() + CLEAR_M;
+        self.router = floor.map(|floor| Arc::new(Router::new(&grid(&floor, room_m), 0.0, body.speeds)));
+        for level in map.levels.iter().filter(|l| is_surface(l)) {
+            match self.surfaces.iter_mut().find(|(_, known)| is_one(known, level)) {
+                Some((_, known)) => known.clone_from(level),
+                None => self.surfaces.push((format!("surface {}", self.surfaces.len() + 1), level.clone())),
+            }
+        }
+        self.map = Some(Arc::new(map));
+    }
+
+    /// Finds the poses from which more would be seen: those that were found before keep their symbols as long as they promise anything.
+    pub(super) fn look_out(
+        &mut self,
+        here: &Isometry2<f64>,
+        body: &Description,
+        given_up: impl Fn(&str) -> bool,
+    ) {
+        let Some(floor) = self.floor(body) else { return };
+        let mut looked = self.stood.clone();
+        looked.push(self.map_from_chart.inv_mul(here));
+        let options = explore(body);
+        self.open.retain(|(symbol, _)| !given_up(symbol));
+        let keep: Vec<Isometry2<f64>> = self.open.iter().map(|(_, look)| look.pose).collect();
+        // The body's own ways decide: what its footprint does not fit is no pose.
+        let found = outlooks(&floor, &looked, &keep, WEIGHED, &options);
+        let fits = |look: &Outlook| {
+            let pose = Pose2::new(look.pose.translation.x, look.pose.translation.y, 0.0);
+            look.way_m == 0.0 || self.router.as_ref().is_some_and(|r| r.fits(&pose.point()).is_ok())
+        };
+        let mut open = Vec::new();
+        for look in found.into_iter().filter(|look| fits(look)) {
+            let known = self.open.iter().find(|(_, known)| known.pose == look.pose);
+            let symbol = known.map(|(symbol, _)| symbol.clone()).unwrap_or_else(|| {
+                self.given += 1;
+                format!("view-{}", self.given)
+            });
+            open.push((symbol, look));
+        }
+        self.open = open;
+    }
+
+    fn floor(&self, body: &Description) -> Option<Occupancy> {
+        self.map.as_ref()?.floor(&self.stood, body.footprint.radius_m() + CELL_M, *BODY_M.end())
+    }
+
+    /// The poses from which more would be seen, as places to go to.
+    pub(super) fn poses(&self) -> impl Iterator<Item = Candidate> + '_ {
+        self.open.iter().map(|(symbol, look)| {
+            let at = self.map_from_chart * look.pose;
+            let place = Place::Pose(Pose2::new(at.translation.x, at.translation.y, at.rotation.angle()));
+            Candidate { symbol: symbol.clone(), place }
+        })
+    }
+
+    /// The outlook of a symbol.
+    pub(super) fn outlook(&self, symbol: &str) -> Option<&Outlook> {
+        self.open.iter().find(|(name, _)| name == symbol).map(|(_, look)| look)
+    }
+
+    /// Floor that is unknown and expected to be seen from the poses that are left, square metres.
+    pub(super) fn unseen_m2(&self) -> f64 {
+        if self.map.is_none() {
+            return NOTHING_SEEN_M2;
+        }
+        let mut unseen = Unseen::default();
+        let gain = |(_, look): &(String, Outlook)| {
+            let gain_m2 = unseen.gain_m2(look);
+            unseen.look(look);
+            gain_m2
+        };
+        self.open.iter().map(gain).sum()
+    }
+
+    /// Floor that is known to be open, square metres.
+    pub(super) fn open_m2(&self) -> f64 {
+        let grid = self.map.as_ref().and_then(|m| m.grid.as_ref());
+        grid.map_or(0.0, |g| {
+            g.cells.iter().filter(|c| **c == Space::Free).count() as f64 * g.cell_m * g.cell_m
+        })
+    }
+
+    /// What going from one place to each of the others takes: on this map if there is one, else on the body's own.
+    ///
+    /// # Errors
+    /// Each entry by itself, as [`Robot::travel`].
+    pub(crate) fn travel(
+        &self,
+        robot: &dyn Robot,
+        from: &Place,
+        to: &[Place],
+        shut: &[String],
+    ) -> Vec<Result<Travel, Failure>> {
+        let (Some(router), Place::Pose(from)) = (&self.router, from) else {
+            return robot.travel(from, to, shut);
+        };
+        let chart_from_map = self.map_from_chart.inverse();
+        let pose = |place: &Place| match place {
+            Place::Pose(pose) => put(&chart_from_map, pose),
+            Place::Station(_) => Pose2::new(f64::NAN, f64::NAN, f64::NAN),
+        };
+        let (from, to) = (&put(&chart_from_map, from), to.iter().map(pose).collect::<Vec<Pose2>>());
+        let mut found = router.travel_to_each(from, &to);
+        for (travel, to) in found.iter_mut().zip(&to) {
+            // To turn where it stands needs no floor.
+            if travel.is_err() && (to.point() - from.point()).norm() < 1e-9 {
+                *travel = Ok(Travel { distance_m: 0.0, duration_s: turn_s(robot, from, to) });
+            }
+        }
+        found
+    }
+
+    /// The places to drive to one after the other on the way on this map; none without a map, or where no way leads.
+    pub(crate) fn way(&self, from: &Place, to: &Place) -> Option<Vec<Place>> {
+        let (Place::Pose(from), Place::Pose(to)) = (from, to) else { return None };
+        let chart_from_map = self.map_from_chart.inverse();
+        let (start, end) = (put(&chart_from_map, from), put(&chart_from_map, to));
+        let route = self.router.as_ref()?.route(&start, &end).ok()?;
+        let heading = |a: &Point2<f64>, b: &Point2<f64>| (b.y - a.y).atan2(b.x - a.x);
+        let turns =
+            route.points_m.windows(2).map(|leg| Pose2::new(leg[1].x, leg[1].y, heading(&leg[0], &leg[1])));
+        let mut way: Vec<Place> = turns.map(|pose| Place::Pose(put(&self.map_from_chart, &pose))).collect();
+        way.pop();
+        way.push(Place::Pose(*to));
+        Some(way)
+    }
+
+    /// Whether a surface is one of this map.
+    pub(crate) fn has(&self, surface: &str) -> bool {
+        self.surfaces.iter().any(|(name, _)| symbol(name) == surface)
+    }
+
+    /// Whether a wall of this map stands between two places.
+    pub(crate) fn hides(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
+        let [from, to] = &[from, to].map(|p| self.map_from_chart.inverse_transform_point(p));
+        let side = |a: &Point2<f64>, b: &Point2<f64>, p: &Point2<f64>| (b - a).perp(&(p - a));
+        let crosses = |a: &Point2<f64>, b: &Point2<f64>| {
+            side(a, b, from) * side(a, b, to) < 0.0 && side(from, to, a) * side(from, to, b) < 0.0
+        };
+        self.map.as_ref().is_some_and(|m| m.walls.iter().flat_map(|w| w.feet()).any(|(a, b)| crosses(&a, &b)))
+    }
+
+    /// The surfaces as searching takes them: as far as they were seen.
+    pub(crate) fn known_surfaces(&self) -> impl Iterator<Item = KnownSurface> + '_ {
+        self.surfaces.iter().map(|(name, level)| KnownSurface {
+            symbol: symbol(name),
+            name: name.clone(),
+            room: None,
+            outline: level
+                .outline
+                .iter()
+                .map(|p| (self.map_from_chart * p).coords.push(level.height_m).into())
+                .collect(),
+            up: Vector3::z(),
+            whole: false,
+            doubtful: None,
+        })
+    }
+}
+
+/// A pose in another frame.
+fn put(other_from_here: &Isometry2<f64>, pose: &Pose2) -> Pose2 {
+    let at = other_from_here * pose.point();
+    Pose2::new(at.x, at.y, pose.yaw_rad + other_from_here.rotation.angle())
+}
+
+fn turn_s(robot: &dyn Robot, from: &Pose2, to: &Pose2) -> f64 {
+    let turn = (to.yaw_rad - from.yaw_rad).sin().atan2((to.yaw_rad - from.yaw_rad).cos());
+    turn.abs() / robot.description().speeds.angular_rad_s
+}
+
+fn is_surface(level: &Level) -> bool {
+    level.faces_up && SURFACE_M.contains(&level.height_m) && level.area_m2 >= SURFACE_M2
+}
+
+fn is_one(a: &Level, b: &Level) -> bool {
+    let middle = |l: &Level| {
+        let n = l.outline.len().max(1) as f64;
+        Point2::from(l.outline.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / n)
+    };
+    let holds = |l: &Level, p: &Point2<f64>| {
+        let n = l.outline.len();
+        (0..n).all(|i| (l.outline[(i + 1) % n] - l.outline[i]).perp(&(p - l.outline[i])) >= 0.0)
+    };
+    (a.height_m - b.height_m).abs() < SAME_HEIGHT_M && (holds(a, &middle(b)) || holds(b, &middle(a)))
+}
+
+/// A grid in which only that is free where the middle of the body may be.
+fn grid(floor: &Occupancy, radius_m: f64) -> OccupancyGrid {
+    let width = floor.width.max(1);
+    OccupancyGrid {
+        resolution_m: floor.cell_m,
+        origin_m: floor.origin,
+        width,
+        height: floor.cells.len() / width,
+        occupied: standable(floor, radius_m).into_iter().map(|may| !may).collect(),
+    }
+}
+
+/// What the camera sees of the floor plan.
+fn field(body: &Description) -> FieldOfView {
+    let c = &body.camera;
+    FieldOfView {
+        right_rad: -((c.width as f64 - c.cx) / c.fx).atan(),
+        left_rad: (c.cx / c.fx).atan(),
+        near_m: body.range_m.0,
+        far_m: far_m(body),
+    }
+}
+
+/// The farthest depth that is used, metres.
+pub(super) fn far_m(body: &Description) -> f64 {
+    body.range_m.1.min(FAR_M)
+}
+
+fn explore(body: &Description) -> ExploreOptions {
+    let seconds = (1.0 / body.speeds.linear_m_s, 1.0 / body.speeds.angular_rad_s, LOOK_S);
+    ExploreOptions {
+        field: field(body),
+        radius_m: body.footprint.radius_m() + CLEAR_M,
+        seconds,
+        ..ExploreOptions::default()
+    }
+}
+
+/// How poses are rectified against what was seen before: from where the body believes to be, give or take what it says.
+pub(super) fn rectify(body: &Description) -> RectifyOptions {
+    RectifyOptions {
+        band_m: BODY_M,
+        field: field(body),
+        way_sigma: (0.0, body.pose_sigma_m.max(1e-3)),
+        turn_sigma_rad: body.pose_sigma_rad.max(1e-3),
+        ..RectifyOptions::default()
+    }
+}

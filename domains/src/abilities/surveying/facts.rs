@@ -1,0 +1,31 @@
+//! The words that *surveying* states.
+
+use crate::abilities::Fact;
+use crate::situation::Situation;
+
+/// Every fact.
+pub(super) const ALL: &[Fact] = &[
+    Fact {
+        name: "outlook",
+        types: &["pose"],
+        about: "a look from there would show floor that is not known yet",
+        states: outlook,
+    },
+    Fact {
+        name: "unseen",
+        types: &[],
+        about: "floor that is unknown and expected to be seen from somewhere, square metres",
+        states: unseen,
+    },
+];
+
+fn outlook(s: &Situation) -> Vec<String> {
+    if s.chart.map.is_none() {
+        return vec![format!("(outlook {})", s.candidates[s.at].symbol)];
+    }
+    s.chart.open.iter().map(|(symbol, _)| format!("(outlook {symbol})")).collect()
+}
+
+fn unseen(s: &Situation) -> Vec<String> {
+    vec![format!("(= (unseen) {:.4})", s.chart.unseen_m2())]
+}

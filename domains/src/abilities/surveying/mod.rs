@@ -1,0 +1,86 @@
+//! *surveying*: a body without a map makes one, look by look (Viejo and Cazorla, *Construcción de mapas 3D y extracción de primitivas geométricas del
+//! entorno*): walls, surfaces and open floor, on which it then plans its ways.
+
+mod calls;
+pub mod chart;
+mod facts;
+mod picture;
+mod taken;
+mod telling;
+
+use std::sync::Arc;
+
+use descry_robots::Place;
+use descry_robots::nalgebra::Point3;
+use descry_skills::{Observe, Outcome, SkillFailure};
+
+use super::{Ability, SkillWord};
+use crate::abilities::searching::perceive::Eyes;
+use crate::goal::Goal;
+use crate::load::Domain;
+use crate::mind::Mind;
+use crate::note::Note;
+use crate::situation::Situation;
+use crate::world::WorldError;
+
+/// A look that maps goes to a place so far ahead and so high, metres: the floor begins near the body, and walls are seen up to the height of a man.
+const AHEAD_M: (f64, f64) = (3.0, 0.35);
+
+/// See the module.
+pub const ABILITY: Ability = Ability {
+    name: "surveying",
+    about: "maps the room that it is in: walls, surfaces and open floor, and drives on that map",
+    facts: facts::ALL,
+    calls: calls::ALL,
+    skills: &[SkillWord {
+        name: "chart",
+        types: &["pose"],
+        about: "looks straight ahead, and takes what it sees into the map",
+        ground: |s, _| Ok(Box::new(Observe { at: ahead(s) })),
+        because: calls::hope,
+        learn: charted,
+        failed: nothing_more,
+    }],
+    begins: Some(begins),
+    fallback: Some(calls::fallback),
+    answers: Some(telling::answer),
+};
+
+/// A run begins: with a map from an earlier one, what of it is left to be seen.
+fn begins(mind: &mut Mind, _: &Domain, _: &Goal) {
+    let robot = Arc::clone(&mind.known.robot);
+    taken::look_out(mind, &*robot, "");
+}
+
+/// What a look that maps goes to.
+fn ahead(s: &Situation) -> Option<Point3<f64>> {
+    let Place::Pose(pose) = &s.candidates[s.at].place else { return None };
+    let (ahead_m, height_m) = AHEAD_M;
+    let (sin, cos) = pose.yaw_rad.sin_cos();
+    Some(Point3::new(pose.x_m + ahead_m * cos, pose.y_m + ahead_m * sin, height_m))
+}
+
+/// A look was taken.
+fn charted(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    _: &Situation,
+    arguments: &[&str],
+    outcome: &Outcome,
+    notes: &mut Vec<Note>,
+) -> Result<String, WorldError> {
+    let Outcome::Seen(sensed) = outcome else { return Err(WorldError::strange(outcome)) };
+    notes.push(taken::take(mind, eyes, arguments[0], sensed)?);
+    Ok(String::new())
+}
+
+/// What failed there is no longer looked at from there.
+fn nothing_more(
+    _: &mut Mind,
+    _: Eyes<'_>,
+    _: &Situation,
+    _: &[&str],
+    _: &SkillFailure,
+) -> Result<Option<String>, WorldError> {
+    Ok(None)
+}

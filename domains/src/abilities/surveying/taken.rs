@@ -1,0 +1,142 @@
+//! What happens with a look that maps: recorded, read back by its timestamp, put where it fits what was seen before, and taken into the map.
+
+use std::sync::Arc;
+
+use descry_memory::{Draft, Image, Meta};
+use descry_perception::mapping::{PairFit, Station};
+use descry_perception::nalgebra::Isometry2;
+use descry_robots::{Place, Robot, Sensed};
+use serde_json::json;
+
+use super::chart::{BODY_M, Chart, far_m, rectify};
+use super::picture;
+use crate::abilities::searching::candidates::ring;
+use crate::abilities::searching::perceive::{self, Eyes};
+use crate::mind::{Mind, Region};
+use crate::note::Note;
+use crate::situation::Candidate;
+use crate::world::WorldError;
+
+/// The kind under which the map is recorded.
+const MAP: &str = "map";
+/// A ring of poses follows a surface of which more was seen, if its middle has moved by more, metres.
+const MOVED_M: f64 = 0.15;
+
+/// Takes a look in: it is in the record when this returns, and so is the map as it is then.
+pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed) -> Result<Note, WorldError> {
+    let body = eyes.robot.description();
+    let id = perceive::remember(mind, eyes, &[], sensed)?;
+    let view = eyes.record.view_at(sensed.stamp_ns, &body.frames.map)?;
+    let strange = |e: String| WorldError::Bug(format!("a look that maps: {e}"));
+    let station = Station::of(&view).map_err(|e| strange(e.to_string()))?;
+    let height_m = view.world_from_camera.translation.z;
+    let chart = Arc::make_mut(&mut mind.known.chart);
+    chart.records.push(id);
+    let believed = chart.map_from_chart.inv_mul(&station.odom_from_level);
+    let survey = chart.survey().map_err(strange)?;
+    let fit = survey.locate(&station, &believed, &rectify(body)).map_err(|e| strange(e.to_string()))?;
+    let at = fit.before_from_after;
+    survey.add(&station, &at, height_m, far_m(body), &BODY_M).map_err(|e| strange(e.to_string()))?;
+    chart.stood.push(at);
+    chart.believed.push(station.odom_from_level);
+    chart.read(body);
+    meet_surfaces(mind, eyes.robot);
+    look_out(mind, eyes.robot, from);
+    keep(mind, eyes, sensed.stamp_ns)?;
+    Ok(note(&mind.known.chart, &fit, &believed))
+}
+
+/// Makes the surfaces of the map known, with poses around them if anything is looked for.
+fn meet_surfaces(mind: &mut Mind, robot: &dyn Robot) {
+    for fresh in mind.known.chart.known_surfaces().collect::<Vec<_>>() {
+        let known = mind.known.surfaces.iter().position(|s| s.symbol == fresh.symbol);
+        let moved = match known {
+            Some(n) if mind.regions[n].taken > 0 => continue,
+            Some(n) => {
+                let before = std::mem::replace(&mut mind.known.surfaces[n], fresh.clone());
+                let off = before.centre().zip(fresh.centre()).map(|(a, b)| (a - b).norm());
+                off.is_none_or(|off_m| off_m > MOVED_M)
+            }
+            None => {
+                mind.known.surfaces.push(fresh.clone());
+                mind.known.spaces.push(Arc::default());
+                mind.regions.push(Region::default());
+                true
+            }
+        };
+        let is_sought = !(mind.known.things.is_empty() && mind.known.kinds.is_empty());
+        if let Some(centre) = fresh.centre().filter(|_| moved && is_sought) {
+            let of = format!("{}-", fresh.symbol);
+            let here = mind.known.candidates[mind.known.at].place.clone();
+            let found = ring(robot, &mind.known.chart, &here, &centre, &mind.known.chart.poses);
+            let around = found.into_iter().map(|(k, place)| Candidate { symbol: format!("{of}{k}"), place });
+            let around: Vec<Candidate> = around.collect();
+            replace(mind, |symbol| symbol.starts_with(&of), around);
+        }
+    }
+}
+
+/// Finds from where more would be seen; those poses take the place of the ones before them.
+pub(super) fn look_out(mind: &mut Mind, robot: &dyn Robot, from: &str) {
+    let Place::Pose(here) = mind.known.candidates[mind.known.at].place else { return };
+    let here = Isometry2::new(here.point().coords, here.yaw_rad);
+    let given_up = |symbol: &str| {
+        symbol == from || mind.words.instances("out-of-reach").any(|a| a.first().is_some_and(|s| s == symbol))
+    };
+    Arc::make_mut(&mut mind.known.chart).look_out(&here, robot.description(), given_up);
+    let open: Vec<Candidate> = mind.known.chart.poses().collect();
+    replace(mind, |symbol| symbol.starts_with("view-"), open);
+}
+
+/// Puts poses in the place of some; those at which the body stands and last looked from stay.
+fn replace(mind: &mut Mind, of: impl Fn(&str) -> bool, by: Vec<Candidate>) {
+    let known = &mut mind.known;
+    let [at, looked_from] = [known.at, known.looked_from].map(|n| known.candidates[n].clone());
+    known.candidates.retain(|c| !of(&c.symbol) || *c == at || *c == looked_from);
+    let fresh: Vec<Candidate> =
+        by.into_iter().filter(|c| known.candidates.iter().all(|k| k.symbol != c.symbol)).collect();
+    known.candidates.extend(fresh);
+    let find = |c: &Candidate| known.candidates.iter().position(|k| k == c).unwrap_or(0);
+    (known.at, known.looked_from) = (find(&at), find(&looked_from));
+    mind.attend();
+}
+
+/// Puts the map and a picture of it into the record.
+fn keep(mind: &mut Mind, eyes: Eyes<'_>, stamp_ns: i64) -> Result<(), WorldError> {
+    let chart = &mind.known.chart;
+    let Some(map) = &chart.map else { return Ok(()) };
+    let body = json!({
+        "rests_on": chart.records,
+        "map_from_chart": chart.map_from_chart,
+        "stood": chart.stood,
+        "surfaces": chart.surfaces,
+        "map": **map,
+    });
+    let meta = Meta { body, ..Meta::default() };
+    let id = eyes.record.put(Draft { meta, ..Draft::new(MAP, stamp_ns) })?;
+    let data = picture::png(chart, map).map_err(|e| WorldError::Bug(format!("a picture of the map: {e}")))?;
+    let image = Image::Compressed { format: "png", data: &data };
+    let drawn = eyes.record.put_image(stamp_ns, MAP, image, Meta::default())?;
+    let mut held = chart.records.clone();
+    held.extend([id, drawn]);
+    Ok(eyes.record.hold(&held, MAP)?)
+}
+
+fn note(chart: &Chart, fit: &PairFit, believed: &Isometry2<f64>) -> Note {
+    let off = believed.inv_mul(&fit.before_from_after);
+    let walls = chart.map.as_ref().map_or(&[][..], |m| &m.walls);
+    let length = |w: &descry_perception::mapping::Wall| w.stretches_m.iter().map(|(a, b)| b - a).sum::<f64>();
+    Note::Charted {
+        walls: walls.len(),
+        walls_m: walls.iter().map(length).sum(),
+        open_m2: chart.open_m2(),
+        unseen_m2: chart.unseen_m2(),
+        surfaces: chart
+            .surfaces
+            .iter()
+            .map(|(name, level)| format!("{name}: {:.2} m², {:.2} m high", level.area_m2, level.height_m))
+            .collect(),
+        moved_m: off.translation.vector.norm(),
+        turned_rad: off.rotation.angle(),
+    }
+}

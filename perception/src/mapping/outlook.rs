@@ -1,0 +1,193 @@
+//! What several poses would show together, so that a plan can weigh them against each other: a few poses from which all that can be seen of the unknown
+//! floor would be seen. And what explorers usually do instead: go to the nearest frontier.
+
+use super::frontier::{
+    ExploreOptions, Floor, LEAST_M2, NextPose, RAYS, bearing_rad, frontiers, is_ahead, next_poses,
+};
+use crate::occupancy::{Occupancy, Space};
+use nalgebra::{Isometry2, Point2};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// A pose, and what a look from there is expected to show.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outlook {
+    /// Where, in the map.
+    pub pose: Isometry2<f64>,
+    /// Length of the way there from where the body stands, metres.
+    pub way_m: f64,
+    /// Squares of floor that are unknown now, and how likely a look from there shows each.
+    shows: Vec<(usize, f64)>,
+    /// Area of a square, square metres.
+    square_m2: f64,
+}
+
+/// The floor that some looks have left unknown, as far as it can be told before they are taken.
+#[derive(Clone, Debug, Default)]
+pub struct Unseen {
+    /// How likely a square is still unknown; those that are not named surely are.
+    left: FxHashMap<usize, f64>,
+}
+
+impl Unseen {
+    /// Floor that a look is expected to show beyond those before it, square metres.
+    pub fn gain_m2(&self, look: &Outlook) -> f64 {
+        let left = |index: &usize| self.left.get(index).copied().unwrap_or(1.0);
+        look.shows.iter().map(|(index, likely)| left(index) * likely).sum::<f64>() * look.square_m2
+    }
+
+    /// The look is taken.
+    pub fn look(&mut self, look: &Outlook) {
+        for (index, likely) in &look.shows {
+            *self.left.entry(*index).or_insert(1.0) *= 1.0 - likely;
+        }
+    }
+}
+
+/// Of the poses that promise most for their cost, so many are held against each other.
+const COMPARED: usize = 240;
+
+/// Poses, no more than `most`, that together show most of what can be seen of the unknown floor: first those to keep as far as they still promise
+/// anything, then each time the one that promises most beyond those before it for its cost.
+///
+/// `looked`: the poses looked from so far; the body stands at the last.
+pub fn outlooks(
+    grid: &Occupancy,
+    looked: &[Isometry2<f64>],
+    keep: &[Isometry2<f64>],
+    most: usize,
+    options: &ExploreOptions,
+) -> Vec<Outlook> {
+    let _span = tracing::debug_span!("outlooks", squares = grid.cells.len()).entered();
+    let Some(from) = looked.last() else { return Vec::new() };
+    let floor = Floor::of(grid, options.field.far_m);
+    let ways = floor.ways_m(&Point2::from(from.translation.vector), options.radius_m);
+    let missed = floor.missed(looked, options);
+    let mut unseen = Unseen::default();
+    let mut chosen: Vec<Outlook> = Vec::new();
+    for pose in keep {
+        let way_m = floor.way_m(&ways, &pose.translation.vector.into());
+        let look = floor.outlook(pose, way_m, &missed, options);
+        if way_m.is_finite() && unseen.gain_m2(&look) >= LEAST_M2 && chosen.len() < most {
+            unseen.look(&look);
+            chosen.push(look);
+        }
+    }
+    let found = next_poses(grid, looked, options);
+    // Those that promise most for their cost, and some of all the others.
+    let every = found.len().div_ceil(COMPARED).max(1);
+    let compared = found.iter().take(COMPARED).chain(found.iter().skip(COMPARED).step_by(every));
+    let mut open: Vec<(Outlook, f64)> =
+        compared.map(|p| (floor.outlook(&p.pose, p.way_m, &missed, options), p.cost_s)).collect();
+    while chosen.len() < most {
+        // What others show already is never shown again: what promises too little now is left out for good.
+        open.retain(|(look, _)| unseen.gain_m2(look) >= LEAST_M2);
+        let rate = |(look, cost_s): &(Outlook, f64)| unseen.gain_m2(look) / cost_s;
+        let Some(best) =
+            (0..open.len()).max_by(|&a, &b| rate(&open[a]).total_cmp(&rate(&open[b])).then(b.cmp(&a)))
+        else {
+            break;
+        };
+        let (look, _) = open.swap_remove(best);
+        unseen.look(&look);
+        chosen.push(look);
+    }
+    chosen
+}
+
+impl Floor<'_> {
+    fn way_m(&self, ways: &[f64], place: &Point2<f64>) -> f64 {
+        let (column, row) = self.square(place);
+        let inside = column >= 0 && row >= 0 && column < self.grid.width as i64;
+        let index = if inside { self.index((column, row)) } else { usize::MAX };
+        ways.get(index).copied().unwrap_or(f64::INFINITY)
+    }
+
+    fn outlook(
+        &self,
+        pose: &Isometry2<f64>,
+        way_m: f64,
+        missed: &[f64],
+        options: &ExploreOptions,
+    ) -> Outlook {
+        let mut shows: FxHashMap<usize, f64> = FxHashMap::default();
+        let heading = pose.rotation.angle();
+        for ray in (0..RAYS).filter(|r| is_ahead(*r, heading, &options.field)) {
+            self.ray(&pose.translation.vector, bearing_rad(ray), options, |_, index, likely| {
+                let known = shows.entry(index).or_insert(0.0);
+                *known = known.max(likely * missed[index]);
+            });
+        }
+        let mut shows: Vec<(usize, f64)> = shows.into_iter().collect();
+        shows.sort_unstable_by_key(|(index, _)| *index);
+        Outlook { pose: *pose, way_m, shows, square_m2: self.grid.cell_m * self.grid.cell_m }
+    }
+}
+
+/// A frontier is looked at from no farther than this share of the camera's reach …
+const IN_RANGE: f64 = 0.9;
+/// … and left alone once two looks should have shown what lies behind it: less than this is likely to be shown by another.
+const LEFT: f64 = 0.2;
+
+/// The nearest frontier that can be reached, from as soon on the way there as it is in range and nothing stands before it, facing it (Yamauchi 1997).
+/// `None` if no frontier is left.
+pub fn nearest_frontier(
+    grid: &Occupancy,
+    looked: &[Isometry2<f64>],
+    options: &ExploreOptions,
+) -> Option<NextPose> {
+    let from = looked.last()?;
+    let floor = Floor::of(grid, options.field.far_m);
+    let start = Point2::from(from.translation.vector);
+    let ways = floor.ways_m(&start, options.radius_m);
+    let missed = floor.missed(looked, options);
+    let is_left =
+        |square: &(i64, i64)| floor.unknown_beside(*square).iter().any(|&index| missed[index] > LEFT);
+    let of_frontiers = frontiers(grid, options).into_iter().flat_map(|f| f.squares);
+    let squares: FxHashSet<(i64, i64)> = of_frontiers.map(|p| floor.square(&p)).filter(is_left).collect();
+    let (mut goal, mut way_m) = (None, f64::INFINITY);
+    for square in floor.squares().filter(|s| squares.contains(s)) {
+        // The body's middle may not come that near to what is occupied: as near as it comes.
+        let near = floor.nearest_way_m(&ways, square, options.radius_m);
+        if near < way_m {
+            (goal, way_m) = (Some(floor.middle(square)), near);
+        }
+    }
+    let goal = goal?;
+    let reach_m = IN_RANGE * options.field.far_m;
+    let sees = |p: &Point2<f64>| (goal - p).norm() <= reach_m && floor.is_clear(p, &goal);
+    let stands = std::iter::once((start, 0.0)).chain(
+        floor.squares().map(|s| (floor.middle(s), ways[floor.index(s)])).filter(|(_, way)| way.is_finite()),
+    );
+    let on_way = stands.filter(|(p, way)| *way <= way_m && sees(p));
+    let (at, way_m) = on_way.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let ahead = goal - at;
+    let pose = Isometry2::new(at.coords, ahead.y.atan2(ahead.x));
+    let turn = from.rotation.angle_to(&pose.rotation).abs();
+    let (metre_s, radian_s, look_s) = options.seconds;
+    let gain_m2 = Unseen::default().gain_m2(&floor.outlook(&pose, way_m, &missed, options));
+    Some(NextPose { pose, gain_m2, way_m, cost_s: metre_s * way_m + radian_s * turn + look_s })
+}
+
+impl Floor<'_> {
+    fn unknown_beside(&self, (column, row): (i64, i64)) -> Vec<usize> {
+        let around = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(x, y)| (column + x, row + y));
+        let unknown = around.into_iter().filter(|s| self.space(*s) == Space::Unknown);
+        unknown.filter_map(|s| self.index_beyond(s)).collect()
+    }
+
+    /// The shortest way to a square no farther from it than the body's radius and a square.
+    fn nearest_way_m(&self, ways: &[f64], (column, row): (i64, i64), radius_m: f64) -> f64 {
+        let reach = (radius_m / self.grid.cell_m).ceil() as i64 + 1;
+        let around = (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| (column + x, row + y)));
+        let there = around.filter(|s| self.space(*s) == Space::Free);
+        there.map(|s| ways[self.index(s)]).fold(f64::INFINITY, f64::min)
+    }
+
+    /// True if all squares on the line between two places are open.
+    fn is_clear(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
+        let steps = ((to - from).norm() / (0.5 * self.grid.cell_m)).ceil().max(1.0) as usize;
+        (0..=steps).all(|k| {
+            self.space(self.square(&(from + (to - from) * (k as f64 / steps as f64)))) == Space::Free
+        })
+    }
+}

@@ -20,7 +20,7 @@ pub struct Arguments {
     /// Give up after so many seconds
     #[arg(long, value_name = "S")]
     time_limit: Option<f64>,
-    /// Give up beyond so much memory
+    /// Give up before the process takes more memory than this
     #[arg(long, value_name = "MB")]
     memory_limit: Option<u64>,
     /// Go on improving the plan until the time limit
@@ -63,6 +63,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         anytime: arguments.anytime,
         seed: arguments.seed,
         memory_limit_bytes: arguments.memory_limit.map(|mb| mb << 20),
+        memory_used: resident_bytes().map(|_| (|| resident_bytes().unwrap_or(0)) as fn() -> u64),
         ..descry_planner::Options::default()
     };
     let mut unwritten = Ok(());
@@ -95,6 +96,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         show(&status, &outcome, arguments.out.is_some(), started, stop())?;
     }
     Ok(exit)
+}
+
+/// What the process has in main memory, where the system tells.
+fn resident_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kilobytes << 10)
 }
 
 fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(), CommandError> {

@@ -15,7 +15,7 @@ use crate::attachment::{
 use crate::diagnostic::{Diagnostic, Findings};
 use crate::explain::{Refusals, sites};
 use crate::ground::{CallId, GroundTask, Meaning, NumericId, Place, Values, VariableId};
-use crate::solve::PlanError;
+use crate::outcome::PlanError;
 use crate::task::{Module, ModuleId, Task};
 
 use self::terms::{Origin, Sources, Terms};

@@ -2,19 +2,21 @@
 
 mod attachment;
 mod calls;
+mod classical;
 pub mod diagnostic;
 mod explain;
 pub mod ground;
 mod grouped;
 mod heuristics;
-mod invariants;
-mod landmarks;
 mod memory;
 mod model;
+mod outcome;
 pub mod pddl;
 pub mod plan;
 mod search;
 pub mod semantics;
+#[cfg(test)]
+mod small;
 mod solve;
 pub mod state;
 pub mod task;
@@ -27,10 +29,11 @@ pub use attachment::{
 };
 pub use diagnostic::{Diagnostic, Findings, Label, Severity, Source, Span};
 pub use explain::Explanation;
+pub use outcome::{Options, Outcome, PlanError, Statistics};
 pub use pddl::check;
-pub use plan::{Plan, Step};
+pub use plan::{EPSILON_S, Plan, Step};
 pub use semantics::Semantics;
-pub use solve::{EPSILON_S, Options, Outcome, PlanError, Statistics, plan};
+pub use solve::plan;
 pub use state::State;
 pub use task::Task;
 pub use validate::{Broken, SEPARATION_S, Verdict, after, monitor, validate};

@@ -1,19 +1,260 @@
-//! What growing lists take in memory.
+//! How much memory is in use, how much may be, and lists that grow without being copied.
 
-/// Bytes of a list of this length and capacity, with what its next growth takes once little room is left: until all is
-/// copied, a list is there twice.
-pub(crate) fn growing<T>(length: usize, capacity: usize) -> usize {
-    let grows = length + length / 8 >= capacity;
-    capacity * size_of::<T>() * if grows { 3 } else { 1 }
+use std::ops::{Index, IndexMut};
+
+/// How much memory planning may take.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MemoryLimit {
+    bytes: usize,
+    /// What the process has in use, where somebody can tell.
+    used: Option<fn() -> u64>,
+}
+
+/// The part of the limit that is left for what is taken between two looks.
+const RESERVE: usize = 32;
+
+impl MemoryLimit {
+    /// `None` for no limit; `used` tells what the whole process has in use.
+    pub(crate) fn new(bytes: Option<u64>, used: Option<fn() -> u64>) -> MemoryLimit {
+        let bytes = bytes.map_or(usize::MAX, |bytes| usize::try_from(bytes).unwrap_or(usize::MAX));
+        MemoryLimit { bytes: bytes - bytes / RESERVE, used: used.filter(|_| bytes != usize::MAX) }
+    }
+
+    /// What the caller may take if only what is counted can be told; `None` where the process tells what it has in use.
+    pub(crate) fn counted(&self) -> Option<usize> {
+        (self.used.is_none() && self.bytes != usize::MAX).then_some(self.bytes)
+    }
+
+    /// The same limit beside something else that takes so much.
+    pub(crate) fn beside(self, others: usize) -> MemoryLimit {
+        match self.used {
+            Some(_) => self,
+            None => MemoryLimit { bytes: self.bytes.saturating_sub(others), ..self },
+        }
+    }
+
+    /// Whether there is room for so many more bytes beside those `counted`.
+    pub(crate) fn has_room(&self, counted: impl FnOnce() -> usize, more: usize) -> bool {
+        let used = match self.used {
+            Some(used) => usize::try_from(used()).unwrap_or(usize::MAX),
+            None => counted(),
+        };
+        used.saturating_add(more) <= self.bytes
+    }
+}
+
+/// Whether a list of this length and capacity grows soon.
+pub(crate) fn soon(length: usize, capacity: usize) -> bool {
+    length + length / 8 >= capacity
+}
+
+/// Bytes of a piece of a list.
+const PIECE_BYTES: usize = 1 << 20;
+
+/// Rows of the same length one after another, kept in pieces: growing copies nothing, and takes one piece at a time.
+#[derive(Debug)]
+pub(crate) struct Rows<T> {
+    pieces: Vec<Vec<T>>,
+    width: usize,
+    /// Binary logarithm of the rows in a piece.
+    shift: u32,
+    len: usize,
+}
+
+impl<T> Rows<T> {
+    /// No rows; each will have so many items.
+    pub(crate) fn new(width: usize) -> Rows<T> {
+        let fitting = PIECE_BYTES / (width * size_of::<T>()).max(1);
+        Rows { pieces: Vec::new(), width, shift: fitting.max(1).ilog2(), len: 0 }
+    }
+
+    /// How many rows.
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Forgets all rows.
+    pub(crate) fn clear(&mut self) {
+        self.pieces.truncate(1);
+        self.pieces.iter_mut().for_each(Vec::clear);
+        self.len = 0;
+    }
+
+    /// Bytes taken.
+    pub(crate) fn bytes(&self) -> usize {
+        self.pieces.iter().map(|piece| piece.capacity() * size_of::<T>()).sum()
+    }
+
+    /// The piece that the next row belongs to. The first one grows as lists do: most are never filled.
+    fn last(&mut self) -> &mut Vec<T> {
+        let at = self.len >> self.shift;
+        if at == self.pieces.len() {
+            let room = if at == 0 { 0 } else { self.width << self.shift };
+            self.pieces.push(Vec::with_capacity(room));
+        }
+        self.len += 1;
+        &mut self.pieces[at]
+    }
+
+    /// One row.
+    #[inline]
+    pub(crate) fn row(&self, index: usize) -> &[T] {
+        let start = (index & ((1 << self.shift) - 1)) * self.width;
+        &self.pieces[index >> self.shift][start..start + self.width]
+    }
+
+    /// One row, to be changed.
+    #[inline]
+    pub(crate) fn row_mut(&mut self, index: usize) -> &mut [T] {
+        let start = (index & ((1 << self.shift) - 1)) * self.width;
+        &mut self.pieces[index >> self.shift][start..start + self.width]
+    }
+
+    /// Appends a row of one item.
+    pub(crate) fn push(&mut self, item: T) {
+        debug_assert_eq!(self.width, 1);
+        self.last().push(item);
+    }
+
+    /// Takes the last row, of one item.
+    pub(crate) fn pop(&mut self) -> Option<T> {
+        debug_assert_eq!(self.width, 1);
+        self.len = self.len.checked_sub(1)?;
+        self.pieces.truncate((self.len >> self.shift) + 1);
+        self.pieces.last_mut()?.pop()
+    }
+}
+
+impl<T: Clone> Rows<T> {
+    /// Appends a row.
+    pub(crate) fn push_row(&mut self, row: &[T]) {
+        debug_assert_eq!(self.width, row.len());
+        self.last().extend_from_slice(row);
+    }
+}
+
+impl<T> Default for Rows<T> {
+    fn default() -> Self {
+        Rows::new(1)
+    }
+}
+
+impl<T> Index<usize> for Rows<T> {
+    type Output = T;
+
+    fn index(&self, index: usize) -> &T {
+        &self.row(index)[0]
+    }
+}
+
+impl<T> IndexMut<usize> for Rows<T> {
+    fn index_mut(&mut self, index: usize) -> &mut T {
+        &mut self.row_mut(index)[0]
+    }
+}
+
+/// A queue that gives the least item first.
+#[derive(Debug)]
+pub(crate) struct Heap<T> {
+    items: Rows<T>,
+}
+
+impl<T> Default for Heap<T> {
+    fn default() -> Self {
+        Heap { items: Rows::default() }
+    }
+}
+
+impl<T: Ord + Copy> Heap<T> {
+    /// Whether nothing is left.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.items.len() == 0
+    }
+
+    /// Bytes taken.
+    pub(crate) fn bytes(&self) -> usize {
+        self.items.bytes()
+    }
+
+    /// Adds an item.
+    pub(crate) fn push(&mut self, item: T) {
+        let mut at = self.items.len();
+        self.items.push(item);
+        while at > 0 {
+            let above = (at - 1) / 2;
+            if self.items[above] <= item {
+                break;
+            }
+            self.items[at] = self.items[above];
+            at = above;
+        }
+        self.items[at] = item;
+    }
+
+    /// Takes the least item.
+    pub(crate) fn pop(&mut self) -> Option<T> {
+        let last = self.items.pop()?;
+        let len = self.items.len();
+        if len == 0 {
+            return Some(last);
+        }
+        let least = self.items[0];
+        let mut at = 0;
+        loop {
+            let mut below = 2 * at + 1;
+            if below >= len {
+                break;
+            }
+            if below + 1 < len && self.items[below + 1] < self.items[below] {
+                below += 1;
+            }
+            if last <= self.items[below] {
+                break;
+            }
+            self.items[at] = self.items[below];
+            at = below;
+        }
+        self.items[at] = last;
+        Some(least)
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::growing;
+    use super::{Heap, MemoryLimit, Rows};
 
     #[test]
-    fn a_full_list_counts_with_its_next_growth() {
-        assert_eq!(growing::<u64>(100, 1000), 8000);
-        assert_eq!(growing::<u64>(950, 1000), 24_000);
+    fn rows_are_found_again_in_every_piece() {
+        for width in [0, 1, 3, 70_000] {
+            let mut rows = Rows::<u64>::new(width);
+            let count = if width > 1000 { 9 } else { 300_000 };
+            for row in 0..count {
+                rows.push_row(&vec![row as u64; width]);
+            }
+            assert_eq!(rows.len(), count);
+            assert!((0..count).all(|row| rows.row(row).iter().all(|&item| item == row as u64)), "{width}");
+            assert!(rows.bytes() <= count * width * 8 + (2 << 20), "{width}: {}", rows.bytes());
+        }
+    }
+
+    #[test]
+    fn a_heap_gives_the_least_first() {
+        let mut heap = Heap::default();
+        let mixed = |n: u64| (n.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40, n);
+        (0..200_000).for_each(|n| heap.push(mixed(n)));
+        let mut expected: Vec<_> = (0..200_000).map(mixed).collect();
+        expected.sort_unstable();
+        assert!(expected.iter().all(|&item| heap.pop() == Some(item)));
+        assert!(heap.pop().is_none() && heap.is_empty());
+    }
+
+    #[test]
+    fn a_limit_asks_the_process_where_it_can() {
+        let counted = MemoryLimit::new(Some(3200), None);
+        assert!(counted.has_room(|| 3000, 100) && !counted.has_room(|| 3000, 101));
+        assert!(!counted.beside(1).has_room(|| 3000, 100));
+        let told = MemoryLimit::new(Some(3200), Some(|| 1000));
+        assert!(told.beside(3000).has_room(|| 9000, 2100) && !told.has_room(|| 0, 2101));
+        assert!(MemoryLimit::new(None, Some(|| 1000)).has_room(|| 0, usize::MAX / 2));
     }
 }

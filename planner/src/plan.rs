@@ -4,6 +4,9 @@ use std::fmt;
 
 use crate::diagnostic::{Diagnostic, Findings, Source, Span};
 
+/// The least time between two happenings of which one disturbs the other, in seconds.
+pub const EPSILON_S: f64 = 0.001;
+
 /// One step of a plan.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Step {

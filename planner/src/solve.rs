@@ -1,161 +1,21 @@
 //! The way in: [`plan`] takes a task to a timed plan, or says why there is none.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use serde::Serialize;
-
-use crate::attachment::{AttachmentError, Attachments, CallStatistics};
+use crate::attachment::{Attachments, CallStatistics};
 use crate::calls::{Calls, report};
+use crate::classical::compiled::is_classical;
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::explain::{Explanation, explain, is_open, narrowed};
+use crate::explain::{explain, is_open, narrowed};
 use crate::ground::{Expression, GroundError, GroundTask, ground};
+use crate::memory::MemoryLimit;
+use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::plan::Plan;
 use crate::search::classical::plan_classical;
-use crate::search::compiled::is_classical;
 use crate::task::Task;
 use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans};
 use crate::validate::validate;
-
-/// The least time between two happenings of which one disturbs the other, in seconds.
-pub const EPSILON_S: f64 = 0.001;
-
-/// How to plan.
-#[derive(Debug, Clone, Default)]
-pub struct Options {
-    /// Keep improving until stopped, or until the best plan is proven best. Otherwise stop after the first plan and a
-    /// short improvement whose length is fixed by the task alone.
-    pub anytime: bool,
-    /// Accept only plans whose metric (makespan or cost where there is none) is below this.
-    pub bound: Option<f64>,
-    /// Decides every choice that is left to chance; the search for plans without times leaves none.
-    pub seed: u64,
-    /// Give up beyond this much memory for the grounded task and the search.
-    pub memory_limit_bytes: Option<u64>,
-    /// Give up, or stop improving, after this many evaluated states.
-    pub evaluation_limit: Option<u64>,
-}
-
-/// What planning took.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Statistics {
-    /// States evaluated by a heuristic.
-    pub evaluated: u64,
-    /// States whose successors were made.
-    pub expanded: u64,
-    /// Plans found, each better than the one before.
-    pub plans: u64,
-    /// Ground actions.
-    pub actions: u64,
-    /// Set where the plan is proven to be best.
-    pub optimal: bool,
-    /// Set where the task has preferences: they score plans, and no search looks for those that keep more of them.
-    pub scored_only: bool,
-    /// By attachment, for this call alone.
-    pub attachments: BTreeMap<String, CallStatistics>,
-}
-
-/// How planning ended.
-#[derive(Debug, Clone)]
-pub enum Outcome {
-    /// A plan, validated.
-    Solved {
-        /// The best plan found.
-        plan: Plan,
-        /// What it took.
-        statistics: Statistics,
-    },
-    /// Proven to have no plan.
-    Unsolvable {
-        /// Why.
-        why: Explanation,
-        /// What it took.
-        statistics: Statistics,
-    },
-    /// Stopped before a plan was found, or (anytime) before the best one was proven best: then with a plan.
-    OutOfTime {
-        /// The best plan so far.
-        best: Option<Plan>,
-        /// What it took.
-        statistics: Statistics,
-    },
-    /// The memory limit was reached.
-    OutOfMemory {
-        /// The best plan so far.
-        best: Option<Plan>,
-        /// What it took.
-        statistics: Statistics,
-    },
-}
-
-impl Outcome {
-    /// The plan, if there is one.
-    pub fn plan(&self) -> Option<&Plan> {
-        match self {
-            Outcome::Solved { plan, .. } => Some(plan),
-            Outcome::OutOfTime { best, .. } | Outcome::OutOfMemory { best, .. } => best.as_ref(),
-            Outcome::Unsolvable { .. } => None,
-        }
-    }
-
-    /// What it took.
-    pub fn statistics(&self) -> &Statistics {
-        match self {
-            Outcome::Solved { statistics, .. }
-            | Outcome::Unsolvable { statistics, .. }
-            | Outcome::OutOfTime { statistics, .. }
-            | Outcome::OutOfMemory { statistics, .. } => statistics,
-        }
-    }
-
-    fn statistics_mut(&mut self) -> &mut Statistics {
-        match self {
-            Outcome::Solved { statistics, .. }
-            | Outcome::Unsolvable { statistics, .. }
-            | Outcome::OutOfTime { statistics, .. }
-            | Outcome::OutOfMemory { statistics, .. } => statistics,
-        }
-    }
-}
-
-/// Why there is no answer at all.
-#[derive(Debug, Clone, thiserror::Error)]
-#[non_exhaustive]
-pub enum PlanError {
-    /// The task asks for something that cannot be done: a module without an attachment, or a part of the language that
-    /// no search here handles. Each finding points at its place.
-    #[error("{}", first_message(.0))]
-    Refused(Findings),
-    /// An attachment failed; the finding points at the call in the domain.
-    #[error("{error}")]
-    Attachment {
-        /// The failed call.
-        error: Box<AttachmentError>,
-        /// The same, under the text.
-        findings: Findings,
-    },
-    /// The search's plan does not pass validation: a fault of this crate.
-    #[error("internal error: a plan that was found is not valid: {reason}\n{plan}")]
-    Internal {
-        /// What the validator said.
-        reason: String,
-        /// The plan.
-        plan: Plan,
-    },
-}
-
-impl PlanError {
-    /// What can be drawn under the text of the domain, if it is the domain's fault.
-    pub fn findings(&self) -> Option<&Findings> {
-        match self {
-            PlanError::Refused(findings) | PlanError::Attachment { findings, .. } => Some(findings),
-            PlanError::Internal { .. } => None,
-        }
-    }
-}
-
-fn first_message(findings: &Findings) -> &str {
-    findings.list.first().map_or("the task is refused", |finding: &Diagnostic| finding.message.as_str())
-}
 
 /// Plans.
 ///
@@ -197,6 +57,8 @@ pub fn plan(
 
 /// Goals of tasks with more ground actions than this are not taken apart to find out which parts are to blame.
 const MOST_ACTIONS_TAKEN_APART: u64 = 5_000;
+/// Bytes that a search's own form of the task takes, as a multiple of the grounded task's.
+const FORMS: usize = 2;
 /// Evaluated states that a part of a goal may always take.
 const LEAST_EVALUATIONS: u64 = 1_000;
 
@@ -208,19 +70,28 @@ fn search(
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
     let before = attachments.statistics();
-    let memory_bytes =
-        options.memory_limit_bytes.map_or(usize::MAX, |bytes| usize::try_from(bytes).unwrap_or(usize::MAX));
-    let grounded = match ground(task, options.memory_limit_bytes.map(|_| memory_bytes), stop) {
+    let memory = MemoryLimit::new(options.memory_limit_bytes, options.memory_used);
+    let full = AtomicBool::new(false);
+    let halt = || {
+        let room = memory.counted().is_some() || memory.has_room(|| 0, 0);
+        full.fetch_or(!room, Ordering::Relaxed);
+        !room || stop()
+    };
+    let out_of_memory = || Ok(Outcome::OutOfMemory { best: None, statistics: Statistics::default() });
+    let grounded = match ground(task, memory.counted(), &halt) {
         Ok(grounded) => grounded,
+        Err(GroundError::Stopped) if full.load(Ordering::Relaxed) => return out_of_memory(),
         Err(error) => return grounding_ended(task, error),
     };
     // Every search has its own form of the grounded task beside it.
-    let memory_bytes = memory_bytes.saturating_sub(2 * grounded.bytes());
+    let compiled = FORMS * grounded.bytes();
+    if grounded.goal_reachable && !memory.has_room(|| grounded.bytes(), compiled) {
+        return out_of_memory();
+    }
+    let memory = memory.beside(compiled);
     if grounded.goal_reachable && is_classical(&grounded) {
         let check = |plan| checked(task, attachments, plan);
-        let left = options.memory_limit_bytes.map(|_| memory_bytes as u64);
-        let options = Options { memory_limit_bytes: left, ..options.clone() };
-        return plan_classical(task, &grounded, &options, stop, &check, on_plan);
+        return plan_classical(task, &grounded, options, memory, stop, &check, on_plan);
     }
     let calls = Calls::bind(task, &grounded, attachments)?;
     configure(task, attachments)?;
@@ -233,7 +104,7 @@ fn search(
         anytime: options.anytime,
         bound: options.bound.unwrap_or(f64::INFINITY),
         evaluations: options.evaluation_limit.unwrap_or(u64::MAX),
-        memory_bytes,
+        memory,
         seed: options.seed,
     };
     let mut best: Option<Plan> = None;

@@ -1,6 +1,7 @@
 //! `descry plan DOMAIN PROBLEM`: a plan, or why there is none.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use descry_planner::{Outcome, Plan, PlanError, Statistics, Task};
@@ -20,7 +21,7 @@ pub struct Arguments {
     /// Give up after so many seconds
     #[arg(long, value_name = "S")]
     time_limit: Option<f64>,
-    /// Give up beyond so much memory
+    /// Give up before the process takes more memory than this
     #[arg(long, value_name = "MB")]
     memory_limit: Option<u64>,
     /// Go on improving the plan until the time limit
@@ -63,6 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         anytime: arguments.anytime,
         seed: arguments.seed,
         memory_limit_bytes: arguments.memory_limit.map(|mb| mb << 20),
+        memory_used: used_bytes().map(|_| (|| used_bytes().unwrap_or(0)) as fn() -> u64),
         ..descry_planner::Options::default()
     };
     let mut unwritten = Ok(());
@@ -95,6 +97,31 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         show(&status, &outcome, arguments.out.is_some(), started, stop())?;
     }
     Ok(exit)
+}
+
+/// What the process has in use: what lies in main memory, or no more to be had once its address space is nearly used up.
+/// `None` where the system does not tell.
+fn used_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let kilobytes = |name: &str| {
+        let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+        line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()
+    };
+    let (resident, addresses) = (kilobytes("VmRSS:")? << 10, kilobytes("VmSize:")? << 10);
+    let most = *ADDRESS_SPACE_BYTES.get_or_init(address_space_bytes);
+    let used_up = most.is_some_and(|most| addresses > most - most / ADDRESS_RESERVE);
+    Some(if used_up { u64::MAX } else { resident })
+}
+
+/// The part of the address space that is kept for what is taken between two looks.
+const ADDRESS_RESERVE: u64 = 16;
+static ADDRESS_SPACE_BYTES: OnceLock<Option<u64>> = OnceLock::new();
+
+/// The limit of the address space, where there is one.
+fn address_space_bytes() -> Option<u64> {
+    let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    line.split_whitespace().next()?.parse().ok()
 }
 
 fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(), CommandError> {

@@ -3,7 +3,7 @@
 use rustc_hash::FxHashMap;
 use tracing::debug_span;
 
-use crate::invariants::{AtomNames, Transitions, mutex_groups};
+use super::invariants::{AtomNames, Transitions, mutex_groups};
 use crate::task::Task;
 
 use super::atoms::Atoms;

@@ -5,6 +5,7 @@ mod atoms;
 mod build;
 mod groups;
 mod instantiate;
+mod invariants;
 mod metric;
 mod normal;
 mod obstacles;

@@ -192,6 +192,19 @@ pub enum Change {
     ScaleDown,
 }
 
+impl Change {
+    /// Changes a number.
+    pub fn apply(self, number: &mut f64, amount: f64) {
+        match self {
+            Change::Assign => *number = amount,
+            Change::Increase => *number += amount,
+            Change::Decrease => *number -= amount,
+            Change::ScaleUp => *number *= amount,
+            Change::ScaleDown => *number /= amount,
+        }
+    }
+}
+
 /// What one effect does.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {

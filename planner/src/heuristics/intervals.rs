@@ -8,9 +8,9 @@
 
 use std::sync::Arc;
 
+use crate::classical::compiled::{Compiled, Lists};
+use crate::classical::numbers::{NumberChange, Numbers, reads, repetitions};
 use crate::ground::{Change, Expression, Relation};
-use crate::search::compiled::{Compiled, Lists};
-use crate::search::numbers::{NumberChange, Numbers, reads, repetitions};
 
 use super::relaxed::Relevant;
 
@@ -374,5 +374,40 @@ impl Intervals {
         }
         let movers = self.numbers.reads[comparison].iter().map(|&n| self.mover[n as usize]);
         out.extend(movers.filter(|&m| m != NONE));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::classical::compiled::Compiled;
+    use crate::heuristics::relaxed::{Counting, Relaxed};
+    use crate::small;
+
+    /// The estimate and how often each step of the relaxed plan is repeated.
+    fn check(effect: &str, init: f64, goal: &str, expected: Option<(u32, &[u32])>) {
+        let domain = format!(
+            "(define (domain d) (:requirements :numeric-fluents) (:predicates (p)) (:functions (n) (m))
+              (:action step :parameters () :precondition () :effect {effect}))"
+        );
+        let problem =
+            format!("(define (problem q) (:domain d) (:init (= (n) {init}) (= (m) 2)) (:goal {goal}))");
+        let (_, grounded) = small::read(&domain, &problem);
+        let compiled = Compiled::new(&grounded);
+        let mut relaxed = Relaxed::new(&compiled, Counting::Steps);
+        let estimate = relaxed.evaluate(&compiled, &compiled.initial);
+        let times: Vec<u32> = relaxed.plan.iter().map(|relevant| relevant.times).collect();
+        assert_eq!(estimate, expected.map(|(estimate, _)| estimate), "{effect} {goal}");
+        if let Some((_, repeated)) = expected {
+            assert_eq!(times, repeated, "{effect} {goal}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_moved_as_often_as_it_takes() {
+        check("(increase (n) 3)", 0.0, "(>= (n) 10)", Some((4, &[4])));
+        check("(increase (n) (m))", 0.0, "(>= (n) 10)", Some((5, &[5])));
+        check("(decrease (n) 1)", 0.0, "(<= (n) -2)", Some((2, &[2])));
+        check("(assign (n) 7)", 0.0, "(= (n) 7)", Some((1, &[1])));
+        check("(decrease (n) 1)", 0.0, "(>= (n) 1)", None);
     }
 }

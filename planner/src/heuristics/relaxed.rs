@@ -1,9 +1,9 @@
 //! The additive heuristic and the relaxed plan that its best supporters make (h_FF with h_add supporters;
 //! Bonet and Geffner 2001, Keyder and Geffner 2008).
 
+use crate::classical::compiled::{Compiled, Lists};
+use crate::classical::numbers::NumberChange;
 use crate::ground::Fact;
-use crate::search::compiled::{Compiled, Lists};
-use crate::search::numbers::NumberChange;
 
 use super::intervals::Intervals;
 use super::queue::RadixHeap;

@@ -2,17 +2,19 @@
 
 use crate::explain::{Refusals, explain};
 use crate::ground::GroundTask;
+use crate::memory::MemoryLimit;
+use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::plan::{Plan, Step};
-use crate::solve::{Options, Outcome, PlanError, Statistics};
 use crate::task::Task;
 
 use super::run::{ClassicalEnd, ClassicalOptions, solve};
 
-/// Plans for a task that is [`super::compiled::is_classical`]; `check` validates each plan.
+/// Plans for a task that is [`crate::classical::compiled::is_classical`]; `check` validates each plan.
 pub(crate) fn plan_classical(
     task: &Task,
     grounded: &GroundTask,
     options: &Options,
+    memory: MemoryLimit,
     stop: &(dyn Fn() -> bool + Sync),
     check: &dyn Fn(Plan) -> Result<Plan, PlanError>,
     on_plan: &mut dyn FnMut(&Plan),
@@ -20,7 +22,7 @@ pub(crate) fn plan_classical(
     let classical = ClassicalOptions {
         anytime: options.anytime,
         bound: options.bound,
-        memory_limit_bytes: options.memory_limit_bytes.map(|b| usize::try_from(b).unwrap_or(usize::MAX)),
+        memory,
         evaluation_limit: options.evaluation_limit,
     };
     let mut statistics = Statistics { actions: grounded.actions.len() as u64, ..Statistics::default() };

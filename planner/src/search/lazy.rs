@@ -1,14 +1,15 @@
 //! Lazy best-first search with several open lists, preferred operators and lookahead; greedy or weighted A*
 //! (Richter and Westphal 2010, sections 5 and 6).
 
+use crate::classical::compiled::Compiled;
+use crate::classical::successor::Successors;
+use crate::heuristics::landmarks::{Landmarks, Status};
 use crate::heuristics::relaxed::{Counting, Relaxed};
-use crate::landmarks::{Landmarks, Status};
+use crate::memory::MemoryLimit;
 
-use super::compiled::Compiled;
 use super::lookahead::Lookahead;
 use super::open::OpenList;
 use super::store::{NO_STATE, Store};
-use super::successor::Successors;
 
 /// How far preferred operators get ahead when a heuristic makes progress.
 const BOOST: i64 = 1000;
@@ -62,7 +63,7 @@ pub(crate) struct Shared<'a> {
     pub task: &'a Compiled,
     pub successors: &'a Successors,
     pub landmarks: &'a Landmarks,
-    pub memory_limit: usize,
+    pub memory: MemoryLimit,
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
@@ -73,8 +74,8 @@ pub(crate) struct Allowed {
     pub work: u64,
     /// States evaluated.
     pub evaluations: u64,
-    /// Bytes taken.
-    pub memory: usize,
+    /// Memory taken.
+    pub memory: MemoryLimit,
 }
 
 /// A search, which can be gone on with after it ended with [`End::Limit`].
@@ -93,6 +94,8 @@ pub(crate) struct Search<'a, 's> {
     /// By state: landmarks accepted so far.
     status: Status,
     counts: Counts,
+    /// Entries made since memory was looked at.
+    unseen: usize,
     state: Vec<u32>,
     next: Vec<u32>,
     applicable: Vec<u32>,
@@ -105,7 +108,7 @@ pub(crate) struct Search<'a, 's> {
 pub(crate) fn search(shared: &Shared<'_>, strategy: Strategy, counts: &mut Counts) -> End {
     let mut search = Search::new(shared, strategy);
     let (work, evaluations) = (strategy.work_limit, strategy.evaluation_limit);
-    let end = search.run(Allowed { work, evaluations, memory: shared.memory_limit });
+    let end = search.run(Allowed { work, evaluations, memory: shared.memory });
     counts.add(search.counts());
     end
 }
@@ -128,8 +131,9 @@ impl Counts {
     }
 }
 
-/// Bytes that an entry of an open list takes, with the room that its bucket grows by.
-pub(crate) const BYTES_AN_ENTRY: usize = 24;
+/// Memory is looked at after so many entries, of which a round counts for some.
+pub(crate) const MOST_UNSEEN: usize = 4096;
+pub(crate) const UNSEEN_A_ROUND: usize = 16;
 /// A fixed price of making and storing a state, in units of [`Relaxed::work`].
 const STATE_WORK: u64 = 20;
 
@@ -149,6 +153,7 @@ impl<'a, 's> Search<'a, 's> {
             best: [u32::MAX; 2],
             status: Status::new(shared.landmarks),
             counts: Counts::default(),
+            unseen: 0,
             state: Vec::new(),
             next: Vec::new(),
             applicable: Vec::new(),
@@ -186,9 +191,11 @@ impl<'a, 's> Search<'a, 's> {
             if self.stopped || (round.is_multiple_of(64) && (self.shared.stop)()) {
                 return End::Stopped;
             }
-            if round.is_multiple_of(256) && self.bytes() > allowed.memory {
+            self.unseen += UNSEEN_A_ROUND;
+            if self.unseen > MOST_UNSEEN && !self.has_room(&allowed.memory) {
                 return End::Memory;
             }
+            self.unseen %= MOST_UNSEEN;
             if self.work() > allowed.work || self.counts.evaluated >= allowed.evaluations {
                 return End::Limit;
             }
@@ -204,8 +211,12 @@ impl<'a, 's> Search<'a, 's> {
 
     /// Bytes taken.
     pub(crate) fn bytes(&self) -> usize {
-        let entries: usize = self.lists.iter().map(OpenList::len).sum();
-        self.store.bytes() + entries * BYTES_AN_ENTRY + self.status.bytes() + self.relaxed.bytes()
+        let lists: usize = self.lists.iter().map(OpenList::bytes).sum();
+        self.store.bytes()[0] + lists + self.status.bytes() + self.relaxed.bytes()
+    }
+
+    fn has_room(&self, memory: &MemoryLimit) -> bool {
+        memory.has_room(|| self.bytes(), self.store.bytes()[1])
     }
 
     /// Makes the state behind an entry and visits it if that is worth while.
@@ -303,6 +314,7 @@ impl<'a, 's> Search<'a, 's> {
             let more: Vec<u32> = self.applicable.iter().filter(ahead).copied().collect();
             self.preferred.extend(more);
         }
+        self.unseen += self.applicable.len();
         let cost = self.store.cost(id);
         let key = |h: u32| match self.strategy.weight {
             None => h,

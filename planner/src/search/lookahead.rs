@@ -1,9 +1,9 @@
 //! Lookahead states: as much of a relaxed plan as can really be applied, mended where an operator no longer fits
 //! (Vidal 2004, "A lookahead strategy for heuristic search planning").
 
+use crate::classical::compiled::{Compiled, Lists};
 use crate::heuristics::relaxed::{REFILL, Relevant};
 
-use super::compiled::{Compiled, Lists};
 use super::steer::movers;
 
 /// Working memory of the lookahead.

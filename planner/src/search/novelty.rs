@@ -4,10 +4,11 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::heuristics::landmarks::Status;
 use crate::heuristics::relaxed::{Counting, Relaxed};
-use crate::landmarks::Status;
+use crate::memory::{MemoryLimit, Rows};
 
-use super::lazy::{Allowed, BYTES_AN_ENTRY, Counts, End, Shared};
+use super::lazy::{Allowed, Counts, End, MOST_UNSEEN, Shared, UNSEEN_A_ROUND};
 use super::open::OpenList;
 use super::store::{NO_STATE, Store};
 
@@ -91,7 +92,7 @@ pub(crate) struct Search<'a, 's> {
     started: bool,
     store: Store,
     status: Status,
-    memory: Vec<Memory>,
+    memory: Rows<Memory>,
     /// Relaxed plans that are followed: their facts.
     anchors: Vec<Vec<u32>>,
     relaxed: Relaxed,
@@ -99,6 +100,8 @@ pub(crate) struct Search<'a, 's> {
     open: OpenList,
     facts: Vec<u32>,
     counts: Counts,
+    /// States made since memory was looked at.
+    unseen: usize,
 }
 
 impl<'a, 's> Search<'a, 's> {
@@ -111,13 +114,14 @@ impl<'a, 's> Search<'a, 's> {
             started: false,
             store: Store::new(task),
             status: Status::new(shared.landmarks),
-            memory: Vec::new(),
+            memory: Rows::default(),
             anchors: Vec::new(),
             relaxed: Relaxed::new(task, Counting::Steps),
             novelty: Novelty { facts: task.facts, pairs: true, seen: FxHashMap::default(), bytes: 0 },
             open: OpenList::default(),
             facts: Vec::new(),
             counts: Counts::default(),
+            unseen: 0,
         }
     }
 
@@ -156,9 +160,11 @@ impl<'a, 's> Search<'a, 's> {
             if round.is_multiple_of(64) && (self.shared.stop)() {
                 return End::Stopped;
             }
-            if round.is_multiple_of(256) && self.bytes() > allowed.memory {
+            self.unseen += UNSEEN_A_ROUND;
+            if self.unseen > MOST_UNSEEN && !self.has_room(&allowed.memory) {
                 return End::Memory;
             }
+            self.unseen %= MOST_UNSEEN;
             if self.work() > allowed.work || self.counts.evaluated >= allowed.evaluations {
                 return End::Limit;
             }
@@ -181,6 +187,7 @@ impl<'a, 's> Search<'a, 's> {
         self.counts.expanded += 1;
         applicable.clear();
         self.shared.successors.applicable(task, state, applicable);
+        self.unseen += applicable.len();
         for &operator in applicable.iter() {
             let cost = self.store.cost(id).saturating_add(task.costs[operator as usize]);
             if cost >= self.bound {
@@ -203,12 +210,16 @@ impl<'a, 's> Search<'a, 's> {
 
     /// Bytes taken.
     pub(crate) fn bytes(&self) -> usize {
-        self.store.bytes()
+        self.store.bytes()[0]
             + self.status.bytes()
             + self.novelty.bytes
-            + self.memory.capacity() * std::mem::size_of::<Memory>()
-            + self.open.len() * BYTES_AN_ENTRY
+            + self.memory.bytes()
+            + self.open.bytes()
             + self.anchors.iter().map(|a| a.len() * 4 + 24).sum::<usize>()
+    }
+
+    fn has_room(&self, memory: &MemoryLimit) -> bool {
+        memory.has_room(|| self.bytes(), self.store.bytes()[1])
     }
 
     /// Follows a new relaxed plan from this state; `None` if there is none.
@@ -266,5 +277,30 @@ impl<'a, 's> Search<'a, 's> {
             (changed.len() * if self.novelty.pairs { self.facts.len() } else { 1 }) as u64 / 8;
         let key = (novelty - 1).saturating_mul(1 << 20).saturating_add(left);
         self.open.push(key, (child, 0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rustc_hash::FxHashMap;
+
+    use super::Novelty;
+
+    #[test]
+    fn a_fact_is_new_once_and_then_its_pairs_are() {
+        let mut novelty = Novelty { facts: 4, pairs: true, seen: FxHashMap::default(), bytes: 0 };
+        let key = (1, 0);
+        for (state, changed, expected) in [
+            (&[0, 2], &[0, 2][..], 1),
+            (&[0, 2], &[0, 2], 3),
+            (&[0, 3], &[3], 1),
+            (&[1, 2], &[1], 1),
+            (&[1, 3], &[1], 2),
+            (&[1, 3], &[3], 3),
+            (&[0, 3], &[], 3),
+        ] {
+            assert_eq!(novelty.of(key, state, changed), expected, "{state:?} {changed:?}");
+        }
+        assert_eq!(novelty.of((2, 0), &[1, 3], &[3]), 1, "states of another kind are not compared");
     }
 }

@@ -8,12 +8,48 @@ pub(crate) type Entry = (u32, u32);
 /// Keys below this have a bucket each; others share a map.
 const BUCKETS: usize = 1 << 14;
 
+/// Entries of a piece of a queue.
+const PIECE: usize = 4096;
+
+/// Entries in the order of their coming, in pieces: a queue that grows is not copied.
+#[derive(Default)]
+struct Queue {
+    pieces: VecDeque<VecDeque<Entry>>,
+}
+
+impl Queue {
+    fn push(&mut self, entry: Entry) {
+        match self.pieces.back_mut() {
+            Some(last) if last.len() < PIECE => last.push_back(entry),
+            _ => self.pieces.push_back(VecDeque::from([entry])),
+        }
+    }
+
+    /// The first entry, or the `newest`.
+    fn pop(&mut self, newest: bool) -> Option<Entry> {
+        let piece = if newest { self.pieces.back_mut() } else { self.pieces.front_mut() }?;
+        let entry = if newest { piece.pop_back() } else { piece.pop_front() };
+        if piece.is_empty() && self.pieces.len() > 1 {
+            if newest {
+                self.pieces.pop_back()
+            } else {
+                self.pieces.pop_front()
+            };
+        }
+        entry
+    }
+
+    fn is_empty(&self) -> bool {
+        self.pieces.iter().all(VecDeque::is_empty)
+    }
+}
+
 /// One open list.
 #[derive(Default)]
 pub(crate) struct OpenList {
-    buckets: Vec<VecDeque<Entry>>,
+    buckets: Vec<Queue>,
     lowest: usize,
-    beyond: BTreeMap<u32, VecDeque<Entry>>,
+    beyond: BTreeMap<u32, Queue>,
     len: usize,
     /// The lower, the sooner this list is asked next.
     pub priority: i64,
@@ -25,32 +61,30 @@ impl OpenList {
         self.len += 1;
         let bucket = key as usize;
         if bucket >= BUCKETS {
-            self.beyond.entry(key).or_default().push_back(entry);
+            self.beyond.entry(key).or_default().push(entry);
             return;
         }
         if bucket >= self.buckets.len() {
-            self.buckets.resize_with(bucket + 1, VecDeque::new);
+            self.buckets.resize_with(bucket + 1, Queue::default);
         }
-        self.buckets[bucket].push_back(entry);
+        self.buckets[bucket].push(entry);
         self.lowest = self.lowest.min(bucket);
     }
 
     /// Takes an entry with the least key: the first one that came, or (`newest`) the last.
     pub(crate) fn pop(&mut self, newest: bool) -> Option<Entry> {
-        let take =
-            |entries: &mut VecDeque<Entry>| if newest { entries.pop_back() } else { entries.pop_front() };
         if self.len == 0 {
             return None;
         }
         self.len -= 1;
         while self.lowest < self.buckets.len() {
-            if let Some(entry) = take(&mut self.buckets[self.lowest]) {
+            if let Some(entry) = self.buckets[self.lowest].pop(newest) {
                 return Some(entry);
             }
             self.lowest += 1;
         }
         let mut first = self.beyond.first_entry()?;
-        let entry = take(first.get_mut());
+        let entry = first.get_mut().pop(newest);
         if first.get().is_empty() {
             first.remove();
         }
@@ -60,5 +94,10 @@ impl OpenList {
     /// Number of entries.
     pub(crate) fn len(&self) -> usize {
         self.len
+    }
+
+    /// Bytes taken: entries, with the room that pieces have beyond what they hold.
+    pub(crate) fn bytes(&self) -> usize {
+        self.buckets.len() * size_of::<Queue>() + self.len * size_of::<Entry>() * 3 / 2
     }
 }

@@ -2,15 +2,16 @@
 
 use tracing::debug_span;
 
+use crate::classical::compiled::Compiled;
+use crate::classical::successor::Successors;
 use crate::ground::GroundTask;
+use crate::heuristics::landmarks::Landmarks;
 use crate::heuristics::relaxed::Counting;
-use crate::landmarks::Landmarks;
+use crate::memory::MemoryLimit;
 
-use super::compiled::Compiled;
 use super::improve::Improve;
 use super::lazy::{self, Allowed, Counts, End, Shared, Strategy, search};
 use super::novelty;
-use super::successor::Successors;
 
 /// How a classical task is to be solved.
 #[derive(Clone, Debug)]
@@ -19,8 +20,8 @@ pub(crate) struct ClassicalOptions {
     pub anytime: bool,
     /// Only plans whose cost is below this.
     pub bound: Option<f64>,
-    /// Bytes that the search may take.
-    pub memory_limit_bytes: Option<usize>,
+    /// What the search may take.
+    pub memory: MemoryLimit,
     /// States to evaluate at most.
     pub evaluation_limit: Option<u64>,
 }
@@ -51,7 +52,7 @@ pub(crate) enum ClassicalEnd {
     Memory,
 }
 
-/// Solves a task that is [`super::compiled::is_classical`].
+/// Solves a task that is [`crate::classical::compiled::is_classical`].
 pub(crate) fn solve(
     ground: &GroundTask,
     options: &ClassicalOptions,
@@ -69,13 +70,8 @@ pub(crate) fn solve(
         return stopped;
     }
     let landmarks = debug_span!("landmarks").in_scope(|| Landmarks::new(&task, &ground.mutex_groups, stop));
-    let shared = Shared {
-        task: &task,
-        successors: &successors,
-        landmarks: &landmarks,
-        memory_limit: options.memory_limit_bytes.unwrap_or(usize::MAX),
-        stop,
-    };
+    let shared =
+        Shared { task: &task, successors: &successors, landmarks: &landmarks, memory: options.memory, stop };
     let bound = options.bound.filter(|_| task.measure.is_sum()).map_or(u32::MAX, |bound| task.scaled(bound));
     let mut run = Run {
         task: &task,
@@ -247,7 +243,7 @@ impl<'a, 's> Run<'a, 's> {
             .map_or(u64::MAX, |limit| limit.saturating_sub(self.counts.evaluated));
         let search = kept[place].get_or_insert_with(|| Kept::new(self.shared, place, self.bound));
         let (before, own) = (search.counts(), search.bytes());
-        let memory = self.shared.memory_limit.saturating_sub(others - own.min(others));
+        let memory = self.shared.memory.beside(others - own.min(others));
         let end = search.run(Allowed {
             work: before.work.saturating_add(work),
             evaluations: before.evaluated.saturating_add(evaluations),

@@ -1,9 +1,10 @@
 //! Lookahead over numbers: what a relaxed plan wants next is made applicable by moving numbers towards its conditions,
 //! in whatever direction they lie by then.
 
-use super::compiled::{Compiled, Lists};
+use crate::classical::compiled::{Compiled, Lists};
+use crate::classical::numbers::repetitions;
+
 use super::lookahead::{Lookahead, MOST_STEPS};
-use super::numbers::repetitions;
 
 /// How many operators may be made applicable one for another.
 const DEPTH: u32 = 4;

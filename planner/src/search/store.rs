@@ -1,8 +1,7 @@
 //! States met so far, packed into words, each once.
 
-use crate::memory::growing;
-
-use super::compiled::Compiled;
+use crate::classical::compiled::Compiled;
+use crate::memory::{Rows, soon};
 
 /// No state.
 pub(crate) const NO_STATE: u32 = u32::MAX;
@@ -20,18 +19,24 @@ pub(crate) struct Store {
     places: Vec<Place>,
     /// Words of the packed variables; the numbers follow, one word each.
     packed_words: usize,
-    words: usize,
     /// Where the numbers begin in an unpacked state.
     numbers: usize,
-    packed: Vec<u64>,
+    packed: Rows<u64>,
     /// Open addressing: state numbers, `NO_STATE` for free.
     table: Vec<u32>,
-    parents: Vec<u32>,
-    operators: Vec<u32>,
-    /// Cost from the first state, in the search's costs.
-    costs: Vec<u32>,
-    expanded: Vec<bool>,
+    ways: Rows<Way>,
     scratch: Vec<u64>,
+}
+
+/// What led to a state.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    parent: u32,
+    operator: u32,
+    /// From the first state, in the search's costs.
+    cost: u32,
+    /// Whether the successors were made.
+    expanded: bool,
 }
 
 fn hash(words: &[u64]) -> u64 {
@@ -68,14 +73,10 @@ impl Store {
         Store {
             places,
             packed_words,
-            words,
             numbers: task.domains.len(),
-            packed: Vec::new(),
+            packed: Rows::new(words),
             table: vec![NO_STATE; 1024],
-            parents: Vec::new(),
-            operators: Vec::new(),
-            costs: Vec::new(),
-            expanded: Vec::new(),
+            ways: Rows::default(),
             scratch: vec![0; words],
         }
     }
@@ -88,18 +89,14 @@ impl Store {
             self.table.fill(NO_STATE);
         }
         self.packed.clear();
-        self.parents.clear();
-        self.operators.clear();
-        self.costs.clear();
-        self.expanded.clear();
+        self.ways.clear();
     }
 
-    /// Bytes taken, with what growth may take.
-    pub(crate) fn bytes(&self) -> usize {
-        let states = self.parents.len();
-        growing::<u64>(self.packed.len(), self.packed.capacity())
-            + growing::<u32>(states * 3 / 2, self.table.len())
-            + growing::<([u32; 3], bool)>(states, self.parents.capacity())
+    /// Bytes taken, and those that the next growth of the table takes where it is near.
+    pub(crate) fn bytes(&self) -> [usize; 2] {
+        let table = size_of_val(&self.table[..]);
+        let next = if soon(self.ways.len() * 3 / 2, self.table.len()) { 2 * table } else { 0 };
+        [self.packed.bytes() + self.ways.bytes() + table, next]
     }
 
     /// Number of the state and whether it is new. A new one gets the parent, operator and cost.
@@ -116,19 +113,16 @@ impl Store {
         let mut slot = hash(&self.scratch) as usize & mask;
         while self.table[slot] != NO_STATE {
             let id = self.table[slot] as usize;
-            if self.packed[id * self.words..(id + 1) * self.words] == self.scratch[..] {
+            if self.packed.row(id) == &self.scratch[..] {
                 return (id as u32, false);
             }
             slot = (slot + 1) & mask;
         }
-        let id = self.parents.len() as u32;
+        let id = self.ways.len() as u32;
         self.table[slot] = id;
-        self.packed.extend_from_slice(&self.scratch);
-        self.parents.push(parent);
-        self.operators.push(operator);
-        self.costs.push(cost);
-        self.expanded.push(false);
-        if self.parents.len() * 3 > self.table.len() * 2 {
+        self.packed.push_row(&self.scratch);
+        self.ways.push(Way { parent, operator, cost, expanded: false });
+        if self.ways.len() * 3 > self.table.len() * 2 {
             self.grow();
         }
         (id, true)
@@ -136,10 +130,10 @@ impl Store {
 
     fn grow(&mut self) {
         let size = self.table.len() * 2;
-        self.table.clear();
-        self.table.resize(size, NO_STATE);
-        for (id, words) in self.packed.chunks_exact(self.words).enumerate() {
-            let mut slot = hash(words) as usize & (size - 1);
+        self.table = Vec::new();
+        self.table = vec![NO_STATE; size];
+        for id in 0..self.packed.len() {
+            let mut slot = hash(self.packed.row(id)) as usize & (size - 1);
             while self.table[slot] != NO_STATE {
                 slot = (slot + 1) & (size - 1);
             }
@@ -149,7 +143,7 @@ impl Store {
 
     /// Unpacks a state, derived variables included.
     pub(crate) fn load(&self, task: &Compiled, id: u32, state: &mut Vec<u32>) {
-        let words = &self.packed[id as usize * self.words..(id as usize + 1) * self.words];
+        let words = self.packed.row(id as usize);
         state.clear();
         state.extend(self.places.iter().map(|p| (words[p.word as usize] >> p.shift & p.mask) as u32));
         state.resize(task.domains.len(), 1);
@@ -162,32 +156,31 @@ impl Store {
 
     /// Cost from the first state.
     pub(crate) fn cost(&self, id: u32) -> u32 {
-        self.costs[id as usize]
+        self.ways[id as usize].cost
     }
 
     /// Gives a state a cheaper way to it.
     pub(crate) fn improve(&mut self, id: u32, parent: u32, operator: u32, cost: u32) {
-        self.parents[id as usize] = parent;
-        self.operators[id as usize] = operator;
-        self.costs[id as usize] = cost;
+        let way = &mut self.ways[id as usize];
+        *way = Way { parent, operator, cost, ..*way };
     }
 
     /// Whether its successors were made.
     pub(crate) fn is_expanded(&self, id: u32) -> bool {
-        self.expanded[id as usize]
+        self.ways[id as usize].expanded
     }
 
     /// Notes that its successors were made, or (`false`) must be made again.
     pub(crate) fn set_expanded(&mut self, id: u32, expanded: bool) {
-        self.expanded[id as usize] = expanded;
+        self.ways[id as usize].expanded = expanded;
     }
 
     /// The operators from the first state to this one.
     pub(crate) fn plan_to(&self, mut id: u32) -> Vec<u32> {
         let mut plan = Vec::new();
-        while self.parents[id as usize] != NO_STATE {
-            plan.push(self.operators[id as usize]);
-            id = self.parents[id as usize];
+        while self.ways[id as usize].parent != NO_STATE {
+            plan.push(self.ways[id as usize].operator);
+            id = self.ways[id as usize].parent;
         }
         plan.reverse();
         plan

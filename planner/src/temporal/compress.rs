@@ -4,10 +4,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rustc_hash::FxHashMap;
 
+use crate::classical::compiled::is_classical;
 use crate::ground::{
     Action, Conjunction, Effect, Expression, Fact, GroundTask, Meaning, Metric, Outcome, Variable,
 };
-use crate::search::compiled::is_classical;
+use crate::memory::MemoryLimit;
 use crate::search::run::{ClassicalOptions, solve};
 
 use super::advance::Step;
@@ -20,7 +21,7 @@ use super::world::{Act, NOTHING, Span, World};
 /// finds may not fit in time.
 pub(crate) fn classical_plan(
     space: &Space,
-    memory_bytes: usize,
+    memory: MemoryLimit,
     evaluations: u64,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<(Vec<Step>, u64, u64)> {
@@ -31,7 +32,7 @@ pub(crate) fn classical_plan(
     let options = ClassicalOptions {
         anytime: false,
         bound: None,
-        memory_limit_bytes: Some(memory_bytes),
+        memory,
         evaluation_limit: Some(if space.tight { evaluations.min(MOST_EVALUATED) } else { evaluations }),
     };
     // The first plan is enough: what is cheap one after the other need not be quick side by side.
@@ -188,4 +189,31 @@ fn in_one_go(act: &Act, seconds: f64) -> Option<Action> {
         return None;
     }
     Some(Action { origin: act.origin.clone(), condition, effects, cost: Expression::Constant(seconds) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::classical_plan;
+    use crate::attachment::Attachments;
+    use crate::calls::Calls;
+    use crate::memory::MemoryLimit;
+    use crate::small;
+    use crate::temporal::envelope::envelopes;
+    use crate::temporal::relaxed::Part;
+    use crate::temporal::space::{Measure, Space};
+    use crate::temporal::world::World;
+
+    #[test]
+    fn a_start_and_its_end_enclose_what_needs_them() {
+        let (task, grounded) = small::read(small::CELLAR, small::FUSES);
+        let nobody = Attachments::default();
+        let calls = Calls::bind(&task, &grounded, &nobody).expect("nothing to bind");
+        let world = World::new(&task, &grounded, calls);
+        let space = Space::new(&world, envelopes(&world), Measure::Makespan);
+        let found = classical_plan(&space, MemoryLimit::new(None, None), 1000, &|| false);
+        let (steps, _, _) = found.expect("the classical search finds a plan");
+        let parts: Vec<Part> = steps.iter().map(|step| step.part).collect();
+        assert_eq!(parts, [Part::Start, Part::Whole, Part::Whole, Part::End]);
+        assert_eq!(steps[0].act, steps[3].act);
+    }
 }

@@ -183,3 +183,35 @@ fn undone(fact: Fact, end: &[Effect]) -> bool {
     end.iter().any(|effect| sets(effect).is_some_and(|other| other.value != fact.value))
         && !end.iter().any(|effect| sets(effect) == Some(fact))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{all_apart, envelopes, in_one_go_suffices};
+    use crate::attachment::Attachments;
+    use crate::calls::Calls;
+    use crate::small;
+    use crate::temporal::World;
+
+    /// By schema, whether its start and end are apart; and whether done in one go, everything can be reached.
+    fn check(domain: &str, expected: &[(&str, bool)], suffices: bool) {
+        let (task, grounded) = small::read(domain, small::FUSES);
+        let nobody = Attachments::default();
+        let calls = Calls::bind(&task, &grounded, &nobody).expect("nothing to bind");
+        let world = World::new(&task, &grounded, calls);
+        for (act, apart) in world.acts.iter().zip(envelopes(&world)) {
+            let name = &task.actions[act.origin.schema as usize].name;
+            let own = expected.iter().find(|(expected, _)| expected == name);
+            assert_eq!(own.map(|own| own.1), Some(apart), "{name}");
+        }
+        assert!(all_apart(&world).iter().all(|apart| *apart));
+        assert_eq!(in_one_go_suffices(&world), suffices);
+    }
+
+    #[test]
+    fn what_gives_something_while_it_lasts_is_apart() {
+        check(small::CELLAR, &[("burn", true), ("mend", false)], false);
+        // Light that stays needs nobody inside.
+        let lasting = small::CELLAR.replace(" (at end (not (light)))", "");
+        check(&lasting, &[("burn", false), ("mend", false)], true);
+    }
+}

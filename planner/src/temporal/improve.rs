@@ -5,6 +5,7 @@
 //! of the plan is taken out, what is left is kept, and the goal is reached again from there within the bound.
 
 use crate::calls::Failure;
+use crate::memory::MemoryLimit;
 
 use super::advance::{Situation, Step};
 use super::compress::classical_plan;
@@ -27,7 +28,7 @@ pub(crate) struct Limits {
     /// States evaluated at most.
     pub evaluations: u64,
     /// Memory at most.
-    pub memory_bytes: usize,
+    pub memory: MemoryLimit,
     /// Decides every choice that is left open.
     pub seed: u64,
 }
@@ -175,7 +176,7 @@ impl Run<'_, '_, '_> {
             bound,
             evaluations,
             work: self.work.saturating_sub(self.progress.counts.work),
-            memory_bytes: self.limits.memory_bytes,
+            memory: self.limits.memory,
             shuffle: 0,
             exact: self.exact,
         }
@@ -205,7 +206,7 @@ impl Run<'_, '_, '_> {
         }
         let left = self.limits.evaluations.saturating_sub(self.progress.counts.evaluated);
         if let Some((steps, evaluated, work)) =
-            classical_plan(self.space, self.limits.memory_bytes, left, self.stop)
+            classical_plan(self.space, self.limits.memory, left, self.stop)
         {
             self.progress.counts.evaluated += evaluated;
             self.progress.counts.work += work;

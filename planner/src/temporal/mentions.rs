@@ -8,8 +8,8 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use crate::plan::EPSILON_S;
 use crate::semantics::reads::depends_on;
-use crate::solve::EPSILON_S;
 use crate::task::{
     Action, Assignment, Atom, Change, Condition, Effect, Expression, Fluent, GroundChange, ObjectId,
     PredicateId, Quantified, Task, Term,

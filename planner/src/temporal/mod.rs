@@ -22,4 +22,4 @@ mod world;
 pub(crate) use improve::{Limits, Progress, Reason, Timed, search_plans};
 pub(crate) use search::Counts;
 pub(crate) use space::Measure;
-pub(crate) use world::{World, change_number};
+pub(crate) use world::World;

@@ -6,7 +6,7 @@
 //! keeps the order too, but may happen at the same time. Durations and timed effects bound the distance from above;
 //! the whole is a simple temporal network whose earliest solution is kept up to date by propagation.
 
-use crate::solve::EPSILON_S;
+use crate::plan::EPSILON_S;
 
 use super::world::Span;
 

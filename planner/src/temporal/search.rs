@@ -4,15 +4,13 @@
 //! heuristic evaluated, only when it is taken from the queue. Preferred steps have a queue of their own, which is
 //! served more often after progress.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
 use crate::calls::Failure;
 use crate::ground::Values;
-use crate::memory::growing;
+use crate::memory::{Heap, MemoryLimit, Rows, soon};
 
 use super::advance::{Gates, Open, Situation, Step};
 use super::estimate::{Estimate, From};
@@ -38,7 +36,7 @@ pub(crate) struct Manner {
     /// Stop after this much work.
     pub work: u64,
     /// Stop beyond this much memory.
-    pub memory_bytes: usize,
+    pub memory: MemoryLimit,
     /// Decides between entries that rank the same; 0 for the order of their making.
     pub shuffle: u64,
     /// Whether equal states are told apart wherever their times leave different possibilities: then nothing is lost,
@@ -100,6 +98,9 @@ const PASSED: u64 = 1 << 63;
 /// Work of putting a step of a path in its time, and of making a state.
 const WORK_A_STEP: u64 = 20;
 const WORK_A_STATE: u64 = 50;
+/// Memory is looked at after so many entries, of which a state counts for some.
+const MOST_UNSEEN: usize = 4096;
+const UNSEEN_A_STATE: usize = 64;
 /// How much more often the preferred queue is served after progress (Richter and Westphal 2010).
 const BOOST: i64 = 1000;
 
@@ -127,20 +128,22 @@ pub(crate) struct Search<'s, 'w, 'a> {
     base: &'s Base,
     manner: Manner,
     store: Store,
-    nodes: Vec<Node>,
-    steps: Vec<Step>,
-    costs: Vec<f64>,
-    phases: Vec<Phase>,
+    nodes: Rows<Node>,
+    steps: Rows<Step>,
+    costs: Rows<f64>,
+    phases: Rows<Phase>,
     phase_ids: FxHashMap<(Vec<OpenKey>, usize), u32>,
     /// Actions in progress in all phases.
     opened: usize,
     mark_ids: FxHashMap<u64, u32>,
     proposals: Vec<Arc<str>>,
-    queues: [BinaryHeap<Reverse<(Rank, Entry)>>; 2],
+    queues: [Heap<(Rank, Entry)>; 2],
     lead: [i64; 2],
     sequence: u64,
     best_heuristic: f64,
     counts: Counts,
+    /// Entries made since memory was looked at.
+    unseen: usize,
     /// Whether something was left out that might have led to a plan.
     lossy: bool,
     /// What the relaxed plan of the state evaluated last leads to, to be looked at next.
@@ -182,10 +185,10 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             relaxed,
             base,
             manner,
-            nodes: Vec::new(),
-            steps: Vec::new(),
-            costs: Vec::new(),
-            phases: Vec::new(),
+            nodes: Rows::default(),
+            steps: Rows::default(),
+            costs: Rows::default(),
+            phases: Rows::default(),
             phase_ids: FxHashMap::default(),
             opened: 0,
             mark_ids: FxHashMap::default(),
@@ -195,6 +198,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             sequence: 0,
             best_heuristic: f64::INFINITY,
             counts: Counts::default(),
+            unseen: 0,
             lossy: false,
             ahead: None,
         }
@@ -216,10 +220,12 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             if taken.is_multiple_of(32) && stop() {
                 return Ok((End::Stopped, self.counts));
             }
-            if taken.is_multiple_of(64) && self.bytes() > self.manner.memory_bytes {
+            if self.unseen > MOST_UNSEEN && !self.has_room() {
                 return Ok((End::Memory, self.counts));
             }
+            self.unseen %= MOST_UNSEEN;
             taken += 1;
+            self.unseen += UNSEEN_A_STATE;
             if let Some(ahead) = self.ahead.take() {
                 if let Some(end) = self.look_ahead(ahead)? {
                     return Ok((end, self.counts));
@@ -239,13 +245,21 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
     }
 
     fn bytes(&self) -> usize {
-        let queue = |queue: &BinaryHeap<_>| growing::<(Rank, Entry)>(queue.len(), queue.capacity());
         let key = size_of::<OpenKey>() + size_of::<Open>();
-        self.store.bytes()
-            + growing::<(Node, Step, f64)>(self.nodes.len(), self.nodes.capacity())
-            + growing::<(Phase, [usize; 6])>(self.phases.len(), self.phases.capacity())
+        self.store.bytes()[0]
+            + self.nodes.bytes()
+            + self.steps.bytes()
+            + self.costs.bytes()
+            + self.phases.bytes()
+            + self.phase_ids.capacity() * size_of::<[usize; 6]>()
             + self.opened * key
-            + self.queues.iter().map(queue).sum::<usize>()
+            + self.queues.iter().map(Heap::bytes).sum::<usize>()
+    }
+
+    fn has_room(&self) -> bool {
+        let phases = self.phase_ids.capacity();
+        let next = if soon(self.phase_ids.len(), phases) { 2 * phases * size_of::<[usize; 6]>() } else { 0 };
+        self.manner.memory.has_room(|| self.bytes(), next + self.store.bytes()[1])
     }
 
     fn take(&mut self) -> Option<Entry> {
@@ -256,7 +270,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             (false, false) => usize::from(self.lead[1] <= self.lead[0]),
         };
         self.lead[queue] += 1;
-        self.queues[queue].pop().map(|Reverse((_, entry))| entry)
+        self.queues[queue].pop().map(|(_, entry)| entry)
     }
 
     fn situation(&self, node: u32) -> Situation {
@@ -509,10 +523,11 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         let add = |search: &mut Self, act: u32, part: Part, proposal: u32| {
             let entry = Entry { parent: node, act, part, proposal };
             search.sequence += 1;
+            search.unseen += 1;
             let rank = Rank(key, shuffled(search.sequence, search.manner.shuffle));
-            search.queues[0].push(Reverse((rank, entry)));
+            search.queues[0].push((rank, entry));
             if part == Part::Free || estimate.preferred.binary_search(&(act, part)).is_ok() {
-                search.queues[1].push(Reverse((rank, entry)));
+                search.queues[1].push((rank, entry));
             }
         };
         for open in &situation.open {

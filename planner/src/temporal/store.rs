@@ -1,10 +1,11 @@
 //! Packed states, each stored once.
 
-use rustc_hash::FxHasher;
 use std::hash::Hasher;
 
+use rustc_hash::FxHasher;
+
 use crate::ground::{GroundTask, Values};
-use crate::memory::growing;
+use crate::memory::{Rows, soon};
 
 /// Where a variable's value stands in the words of a packed state.
 #[derive(Debug, Clone, Copy)]
@@ -20,8 +21,8 @@ struct Field {
 pub(crate) struct Store {
     fields: Vec<Field>,
     value_words: usize,
-    stride: usize,
-    words: Vec<u64>,
+    words: Rows<u64>,
+    scratch: Vec<u64>,
     table: Vec<u32>,
     count: u32,
 }
@@ -44,35 +45,35 @@ impl Store {
         }
         let value_words = if fields.is_empty() { 0 } else { word as usize + 1 };
         let stride = value_words + ground.numerics.len() + 1;
-        Store { fields, value_words, stride, words: Vec::new(), table: vec![EMPTY; 1024], count: 0 }
+        let (words, scratch) = (Rows::new(stride), vec![0; stride]);
+        Store { fields, value_words, words, scratch, table: vec![EMPTY; 1024], count: 0 }
     }
 
     /// The number of the state, and whether it is new.
     pub fn insert(&mut self, state: &Values, extra: u64) -> (u32, bool) {
-        let start = self.words.len();
-        self.words.resize(start + self.stride, 0);
+        self.scratch.fill(0);
         for (field, &value) in self.fields.iter().zip(&state.values) {
-            self.words[start + field.word as usize] |= u64::from(value) << field.shift;
+            self.scratch[field.word as usize] |= u64::from(value) << field.shift;
         }
-        for (index, number) in state.numbers.iter().enumerate() {
+        let (numbers, last) = self.scratch.split_at_mut(self.value_words + state.numbers.len());
+        for (word, number) in numbers[self.value_words..].iter_mut().zip(&state.numbers) {
             // Adding zero makes -0.0 and 0.0 one state.
-            self.words[start + self.value_words + index] = (number + 0.0).to_bits();
+            *word = (number + 0.0).to_bits();
         }
-        self.words[start + self.stride - 1] = extra;
-        let mut slot = self.slot(&self.words[start..]);
+        last[0] = extra;
+        let mut slot = self.slot(&self.scratch);
         loop {
             let found = self.table[slot];
             if found == EMPTY {
                 break;
             }
-            let other = found as usize * self.stride;
-            if self.words[other..other + self.stride] == self.words[start..] {
-                self.words.truncate(start);
+            if self.words.row(found as usize) == &self.scratch[..] {
                 return (found, false);
             }
             slot = (slot + 1) & (self.table.len() - 1);
         }
         self.table[slot] = self.count;
+        self.words.push_row(&self.scratch);
         self.count += 1;
         if self.count as usize * 2 > self.table.len() {
             self.grow();
@@ -82,22 +83,22 @@ impl Store {
 
     /// The state of a number, and its extra word.
     pub fn get(&self, index: u32, into: &mut Values) -> u64 {
-        let start = index as usize * self.stride;
-        let words = &self.words[start..start + self.stride];
+        let words = self.words.row(index as usize);
         into.values.clear();
         into.values.extend(
             self.fields.iter().map(|field| ((words[field.word as usize] >> field.shift) & field.mask) as u32),
         );
         into.numbers.clear();
         into.numbers
-            .extend(words[self.value_words..self.stride - 1].iter().map(|&bits| f64::from_bits(bits)));
-        words[self.stride - 1]
+            .extend(words[self.value_words..words.len() - 1].iter().map(|&bits| f64::from_bits(bits)));
+        words[words.len() - 1]
     }
 
-    /// Bytes in use.
-    pub fn bytes(&self) -> usize {
-        let table = 2 * self.count as usize;
-        growing::<u64>(self.words.len(), self.words.capacity()) + growing::<u32>(table, self.table.len())
+    /// Bytes in use, and those that the next growth of the table takes where it is near.
+    pub fn bytes(&self) -> [usize; 2] {
+        let table = size_of_val(&self.table[..]);
+        let next = if soon(2 * self.count as usize, self.table.len()) { 2 * table } else { 0 };
+        [self.words.bytes() + table, next]
     }
 
     fn slot(&self, words: &[u64]) -> usize {
@@ -108,10 +109,11 @@ impl Store {
     }
 
     fn grow(&mut self) {
-        self.table = vec![EMPTY; self.table.len() * 2];
+        let size = self.table.len() * 2;
+        self.table = Vec::new();
+        self.table = vec![EMPTY; size];
         for index in 0..self.count {
-            let start = index as usize * self.stride;
-            let mut slot = self.slot(&self.words[start..start + self.stride]);
+            let mut slot = self.slot(self.words.row(index as usize));
             while self.table[slot] != EMPTY {
                 slot = (slot + 1) & (self.table.len() - 1);
             }

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use crate::attachment::Level;
 use crate::calls::{Calls, Failure};
 use crate::ground::{
-    Axiom, Change, ComparisonId, Conjunction, DurationBound, Effect, Expression, GroundTask, Origin, Outcome,
+    Axiom, ComparisonId, Conjunction, DurationBound, Effect, Expression, GroundTask, Origin, Outcome,
     Relation, Values,
 };
 use crate::model::relation::quotient;
-use crate::solve::EPSILON_S;
+use crate::plan::EPSILON_S;
 use crate::task::{Task, Term};
 
 use super::together::some_only_together;
@@ -285,7 +285,7 @@ impl<'a> World<'a> {
                 Outcome::Set(fact) => into.values[fact.variable as usize] = fact.value,
                 Outcome::Change { fluent, change, amount } => {
                     let amount = self.evaluate(amount, moment)?;
-                    change_number(&mut into.numbers[*fluent as usize], *change, amount);
+                    change.apply(&mut into.numbers[*fluent as usize], amount);
                     if !into.numbers[*fluent as usize].is_finite() {
                         return Ok(false);
                     }
@@ -355,17 +355,6 @@ fn mentions_duration(expression: &Expression) -> bool {
         }
         Expression::Negative(inner) => mentions_duration(inner),
         _ => false,
-    }
-}
-
-/// Changes a number.
-pub(crate) fn change_number(number: &mut f64, change: Change, amount: f64) {
-    match change {
-        Change::Assign => *number = amount,
-        Change::Increase => *number += amount,
-        Change::Decrease => *number -= amount,
-        Change::ScaleUp => *number *= amount,
-        Change::ScaleDown => *number /= amount,
     }
 }
 

@@ -4,10 +4,10 @@ use super::timeline::{Event, Happening, happenings};
 use super::{Fault, Replayed, SEPARATION_S};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::relation::Relation;
+use crate::plan::EPSILON_S;
 use crate::plan::Plan;
 use crate::semantics::effects::Clash;
 use crate::semantics::{Binding, CallFailure, Changes, Pending, Semantics, Touched, Why, value_text};
-use crate::solve::EPSILON_S;
 use crate::state::State;
 use crate::task::{Action, ActionId, Comparison, GroundChange, Timed, When};
 

@@ -6,8 +6,8 @@
 
 use rustc_hash::FxHashMap;
 
-use super::super::compiled::Compiled;
 use super::Improve;
+use crate::classical::compiled::Compiled;
 
 /// So many steps of one kind cancel others at most.
 const MOST_TOGETHER: u32 = 6;
@@ -57,7 +57,7 @@ fn shift(task: &Compiled, operator: u32) -> Option<(Vec<u32>, Vec<f64>)> {
     if changes.is_empty() || !task.effects.get(operator as usize).is_empty() {
         return None;
     }
-    let gain = |change: &super::super::numbers::NumberChange| {
+    let gain = |change: &crate::classical::numbers::NumberChange| {
         let gain = change.constant_gain().filter(|_| change.conditions.is_empty());
         Some((change.number, gain?))
     };

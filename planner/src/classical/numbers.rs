@@ -5,7 +5,6 @@
 
 use crate::ground::{Change, Comparison, Conjunction, Expression, Fact, GroundTask, Outcome, Relation};
 use crate::model::relation::quotient;
-use crate::temporal::change_number;
 
 use super::compiled::Lists;
 
@@ -217,7 +216,7 @@ impl Numbers {
             let (Some(how), Some(amount)) = (change.change, &change.amount) else { continue };
             if change.conditions.iter().all(|f| state[f.variable as usize] == f.value) {
                 let mut number = self.get(next, change.number);
-                change_number(&mut number, how, self.value(amount, state));
+                how.apply(&mut number, self.value(amount, state));
                 self.set(next, change.number, number);
             }
         }

@@ -5,8 +5,9 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::classical::compiled::{Compiled, Lists};
 use crate::ground::Fact;
-use crate::search::compiled::{Compiled, Lists};
+use crate::memory::Rows;
 
 /// Most facts of a disjunctive landmark.
 const MOST_ALTERNATIVES: usize = 4;
@@ -381,24 +382,23 @@ fn precedes(all: &[Landmark], first: u32, second: u32, work: &mut usize) -> bool
 
 /// Which landmarks each state of a search has seen on its way.
 pub(crate) struct Status {
-    words: usize,
-    accepted: Vec<u64>,
+    accepted: Rows<u64>,
     scratch: Vec<u64>,
 }
 
 impl Status {
     /// Empty.
     pub(crate) fn new(landmarks: &Landmarks) -> Status {
-        Status { words: landmarks.words, accepted: Vec::new(), scratch: vec![0; landmarks.words] }
+        Status { accepted: Rows::new(landmarks.words), scratch: vec![0; landmarks.words] }
     }
 
     /// Bytes taken.
     pub(crate) fn bytes(&self) -> usize {
-        self.accepted.capacity() * 8
+        self.accepted.bytes()
     }
 
     fn of(&self, id: u32) -> &[u64] {
-        &self.accepted[id as usize * self.words..(id as usize + 1) * self.words]
+        self.accepted.row(id as usize)
     }
 
     fn has(bits: &[u64], landmark: u32) -> bool {
@@ -413,7 +413,7 @@ impl Status {
                 self.scratch[l as usize / 64] |= 1 << (l % 64);
             }
         }
-        self.accepted.extend_from_slice(&self.scratch);
+        self.accepted.push_row(&self.scratch);
     }
 
     /// Sets the status of a state reached from another; where it was known already, only what both ways have seen
@@ -427,10 +427,8 @@ impl Status {
         new: bool,
     ) {
         let (parent, id) = step;
-        let words = self.words;
-        let from = parent as usize * words;
-        self.scratch.copy_from_slice(&self.accepted[from..from + words]);
-        let parent = &self.accepted[from..from + words];
+        let parent = self.accepted.row(parent as usize);
+        self.scratch.copy_from_slice(parent);
         for (word, &held) in parent.iter().enumerate() {
             let mut open = !held;
             while open != 0 {
@@ -445,10 +443,9 @@ impl Status {
             }
         }
         if new {
-            self.accepted.extend_from_slice(&self.scratch);
+            self.accepted.push_row(&self.scratch);
         } else {
-            let place = id as usize * words;
-            for (held, now) in self.accepted[place..place + words].iter_mut().zip(&self.scratch) {
+            for (held, now) in self.accepted.row_mut(id as usize).iter_mut().zip(&self.scratch) {
                 *held &= now;
             }
         }
@@ -482,5 +479,32 @@ impl Status {
                 !Self::has(bits, l) && landmarks.all[l as usize].before.iter().all(|&b| Self::has(bits, b))
             })
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Landmarks;
+    use crate::classical::compiled::Compiled;
+    use crate::ground::Fact;
+    use crate::small;
+
+    #[test]
+    fn what_every_plan_passes_is_found() {
+        let (task, grounded) = small::read(small::SHUTTLE, small::ROW);
+        let compiled = Compiled::new(&grounded);
+        let landmarks = Landmarks::new(&compiled, &grounded.mutex_groups, &|| false);
+        let variable = |id: u32| compiled.variables[id as usize];
+        let named = |id: u32| {
+            let value = id - compiled.offsets[variable(id) as usize];
+            small::fact(&task, &grounded, Fact { variable: variable(id), value })
+        };
+        let single = landmarks.all.iter().filter(|landmark| landmark.facts.len() == 1);
+        let found: Vec<String> = single.map(|landmark| named(landmark.facts[0])).collect();
+        for expected in ["(lies x c)", "(in x)", "(at c)", "(at b)"] {
+            assert!(found.iter().any(|name| name == expected), "{expected} is not among {found:?}");
+        }
+        let goals = landmarks.all.iter().filter(|landmark| landmark.goal);
+        assert_eq!(goals.map(|landmark| named(landmark.facts[0])).collect::<Vec<_>>(), ["(lies x c)"]);
     }
 }

@@ -1,0 +1,151 @@
+//! How planning is asked for, and how it ends.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::attachment::{AttachmentError, CallStatistics};
+use crate::diagnostic::{Diagnostic, Findings};
+use crate::explain::Explanation;
+use crate::plan::Plan;
+
+/// How to plan.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Keep improving until stopped, or until the best plan is proven best. Otherwise stop after the first plan and a
+    /// short improvement whose length is fixed by the task alone.
+    pub anytime: bool,
+    /// Accept only plans whose metric (makespan or cost where there is none) is below this.
+    pub bound: Option<f64>,
+    /// Decides every choice that is left to chance; the search for plans without times leaves none.
+    pub seed: u64,
+    /// Give up beyond this much memory for the grounded task and the search; with `memory_used`, for the whole process.
+    pub memory_limit_bytes: Option<u64>,
+    /// Tells how many bytes the process has in use, which is asked now and then. Without it, only what the searches keep
+    /// is counted.
+    pub memory_used: Option<fn() -> u64>,
+    /// Give up, or stop improving, after this many evaluated states.
+    pub evaluation_limit: Option<u64>,
+}
+
+/// What planning took.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Statistics {
+    /// States evaluated by a heuristic.
+    pub evaluated: u64,
+    /// States whose successors were made.
+    pub expanded: u64,
+    /// Plans found, each better than the one before.
+    pub plans: u64,
+    /// Ground actions.
+    pub actions: u64,
+    /// Set where the plan is proven to be best.
+    pub optimal: bool,
+    /// Set where the task has preferences: they score plans, and no search looks for those that keep more of them.
+    pub scored_only: bool,
+    /// By attachment, for this call alone.
+    pub attachments: BTreeMap<String, CallStatistics>,
+}
+
+/// How planning ended.
+#[derive(Debug, Clone)]
+pub enum Outcome {
+    /// A plan, validated.
+    Solved {
+        /// The best plan found.
+        plan: Plan,
+        /// What it took.
+        statistics: Statistics,
+    },
+    /// Proven to have no plan.
+    Unsolvable {
+        /// Why.
+        why: Explanation,
+        /// What it took.
+        statistics: Statistics,
+    },
+    /// Stopped before a plan was found, or (anytime) before the best one was proven best: then with a plan.
+    OutOfTime {
+        /// The best plan so far.
+        best: Option<Plan>,
+        /// What it took.
+        statistics: Statistics,
+    },
+    /// The memory limit was reached.
+    OutOfMemory {
+        /// The best plan so far.
+        best: Option<Plan>,
+        /// What it took.
+        statistics: Statistics,
+    },
+}
+
+impl Outcome {
+    /// The plan, if there is one.
+    pub fn plan(&self) -> Option<&Plan> {
+        match self {
+            Outcome::Solved { plan, .. } => Some(plan),
+            Outcome::OutOfTime { best, .. } | Outcome::OutOfMemory { best, .. } => best.as_ref(),
+            Outcome::Unsolvable { .. } => None,
+        }
+    }
+
+    /// What it took.
+    pub fn statistics(&self) -> &Statistics {
+        match self {
+            Outcome::Solved { statistics, .. }
+            | Outcome::Unsolvable { statistics, .. }
+            | Outcome::OutOfTime { statistics, .. }
+            | Outcome::OutOfMemory { statistics, .. } => statistics,
+        }
+    }
+
+    pub(crate) fn statistics_mut(&mut self) -> &mut Statistics {
+        match self {
+            Outcome::Solved { statistics, .. }
+            | Outcome::Unsolvable { statistics, .. }
+            | Outcome::OutOfTime { statistics, .. }
+            | Outcome::OutOfMemory { statistics, .. } => statistics,
+        }
+    }
+}
+
+/// Why there is no answer at all.
+#[derive(Debug, Clone, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// The task asks for something that cannot be done: a module without an attachment, or a part of the language that
+    /// no search here handles. Each finding points at its place.
+    #[error("{}", first_message(.0))]
+    Refused(Findings),
+    /// An attachment failed; the finding points at the call in the domain.
+    #[error("{error}")]
+    Attachment {
+        /// The failed call.
+        error: Box<AttachmentError>,
+        /// The same, under the text.
+        findings: Findings,
+    },
+    /// The search's plan does not pass validation: a fault of this crate.
+    #[error("internal error: a plan that was found is not valid: {reason}\n{plan}")]
+    Internal {
+        /// What the validator said.
+        reason: String,
+        /// The plan.
+        plan: Plan,
+    },
+}
+
+impl PlanError {
+    /// What can be drawn under the text of the domain, if it is the domain's fault.
+    pub fn findings(&self) -> Option<&Findings> {
+        match self {
+            PlanError::Refused(findings) | PlanError::Attachment { findings, .. } => Some(findings),
+            PlanError::Internal { .. } => None,
+        }
+    }
+}
+
+fn first_message(findings: &Findings) -> &str {
+    findings.list.first().map_or("the task is refused", |finding: &Diagnostic| finding.message.as_str())
+}

@@ -24,8 +24,8 @@ const HANDLE_M: (f64, f64) = (0.014, 0.06);
 const HANDLE_SPREADS: f64 = 4.0;
 /// A circle whose radius is known no better than this is no circle to go by, metres.
 const VAGUE_M: f64 = 0.015;
-/// A circle on which less than this share of the side lies is no circle of it: any bent or straight face has some that fits.
-const MOST: f64 = 0.5;
+/// A circle on which no more than this share of the side lies is no circle of it: any face has some that fits a third of it.
+const MOST: f64 = 0.34;
 /// What is this far out of the body is no longer the body itself, metres.
 const CLEAR_M: f64 = 0.007;
 /// Greatest width of a handle across, metres.

@@ -81,6 +81,14 @@ pub struct Task<'a> {
     pub past: Option<&'a Past>,
 }
 
+/// Who watches over a run.
+pub struct Watcher<'a> {
+    /// Ends it, the body first.
+    pub stop: &'a Stop,
+    /// Hears of everything that happens.
+    pub tell: &'a mut dyn FnMut(&Event),
+}
+
 /// Pursues a goal and reports.
 ///
 /// # Errors
@@ -92,8 +100,7 @@ pub fn pursue(
     folder: &Folder,
     settings: &Settings,
     chooser: Chooser,
-    stop: &Stop,
-    tell: &mut dyn FnMut(&Event),
+    watcher: Watcher<'_>,
 ) -> Result<Report, CommandError> {
     let header = Header {
         version: env!("CARGO_PKG_VERSION").into(),
@@ -112,7 +119,7 @@ pub fn pursue(
     let robot = Arc::new(TapedRobot::begin(Arc::clone(&body.robot), tape));
     let kept = programs::on_record(domain, &record, None, &robot, true)?;
     let task = Task { domain: &kept.domain, goal, past: past.as_ref() };
-    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), stop, tell)?;
+    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), watcher)?;
     remember(settings, remembered.as_ref())?;
     show_true_position(&mut report, body);
     Ok(report)
@@ -141,8 +148,7 @@ pub fn go_on(
     record: Record,
     settings: &Settings,
     chooser: Chooser,
-    stop: &Stop,
-    tell: &mut dyn FnMut(&Event),
+    watcher: Watcher<'_>,
 ) -> Result<Report, CommandError> {
     let record = Arc::new(record);
     let entries = tape::entries(&record)?;
@@ -150,7 +156,7 @@ pub fn go_on(
     let robot = Arc::new(TapedRobot::go_on(Arc::clone(&body.robot), tape, entries));
     let kept = programs::on_record(task.domain, &record, Some(&record), &robot, true)?;
     let task = Task { domain: &kept.domain, ..task };
-    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), stop, tell)?;
+    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), watcher)?;
     remember(settings, remembered.as_ref())?;
     show_true_position(&mut report, body);
     Ok(report)
@@ -166,8 +172,7 @@ pub fn live_through(
     record: &Record,
     chooser: Chooser,
     folder: &Path,
-    stop: &Stop,
-    tell: &mut dyn FnMut(&Event),
+    watcher: Watcher<'_>,
 ) -> Result<(Report, Option<Remembered>), CommandError> {
     let Task { domain, goal, past } = task;
     tape::put_known(record, robot.known())?;
@@ -181,7 +186,7 @@ pub fn live_through(
         let body: Arc<dyn Robot> = Arc::clone(robot) as _;
         let (robot, past) = (Arc::clone(&body), past.cloned());
         let setting = Setting { domain, goal, robot, record, recogniser: &recogniser, past };
-        Agent::new(body, record, stop.clone(), tell).pursue(setting, chooser).await
+        Agent::new(body, record, watcher.stop.clone(), watcher.tell).pursue(setting, chooser).await
     });
     let (conclusion, totals) = lived.map_err(|error| how_to_go_on(error, folder))?;
     robot.finish().map_err(CommandError::broken)?;

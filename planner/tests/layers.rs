@@ -28,7 +28,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
 
 fn layer(part: &str) -> usize {
     let holds = |layer: &&str| layer.split(' ').any(|own| own == part);
-    LAYERS.iter().position(|layer| holds(&layer)).unwrap_or_else(|| panic!("{part} is in no layer"))
+    LAYERS.iter().position(holds).unwrap_or_else(|| panic!("{part} is in no layer"))
 }
 
 #[test]

@@ -17,7 +17,7 @@ use descry_domains::abilities::searching::policies;
 use descry_domains::answer::Verdict;
 
 use crate::report::{Event, Report};
-use crate::run::{self, Beginning, Folder, Settings, Task, programs};
+use crate::run::{self, Beginning, Folder, Settings, Task, Watcher, programs};
 use crate::stop::Stop;
 
 /// Arguments of `descry find`.
@@ -132,7 +132,8 @@ fn begin(said: &str, with: &With, stop: &Stop) -> Result<(Report, Folder), Comma
         keeping: with.keeping.of_new_run(folder.path())?,
         remember: with.remember.clone(),
     };
-    let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, stop, &mut tell)?;
+    let watcher = Watcher { stop, tell: &mut tell };
+    let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, watcher)?;
     Ok((report, folder))
 }
 
@@ -169,6 +170,7 @@ fn go_on(
     }
     let past = beginning.as_ref().and_then(|b| b.past.as_ref());
     let task = Task { domain: &domain, goal: &goal, past };
-    let report = run::go_on(task, &body, &claimed, record, settings, chooser, stop, &mut tell)?;
+    let watcher = Watcher { stop, tell: &mut tell };
+    let report = run::go_on(task, &body, &claimed, record, settings, chooser, watcher)?;
     Ok((report, claimed))
 }

@@ -14,7 +14,7 @@ use crate::commands::input;
 use crate::exit::{CommandError, Exit};
 use crate::keeping::{self, Keeping, RECORD};
 use crate::report::{Event, Report};
-use crate::run::{self, Beginning, Task, programs};
+use crate::run::{self, Beginning, Task, Watcher, programs};
 use crate::stop::Stop;
 use descry_domains::abilities::searching::policies;
 
@@ -91,8 +91,8 @@ fn replay(arguments: &Arguments, source: &Arc<Record>) -> Result<Replayed, Comma
     let chooser = chooser.map_err(CommandError::bad_input)?;
     let mut tell = |event: &Event| input::narrate(&event.to_string());
     let task = Task { domain: &kept.domain, goal: &goal, past: beginning.past.as_ref() };
-    let lived =
-        run::live_through(task, &robot, &record, chooser, &scratch.folder, &Stop::default(), &mut tell);
+    let watcher = Watcher { stop: &Stop::default(), tell: &mut tell };
+    let lived = run::live_through(task, &robot, &record, chooser, &scratch.folder, watcher);
     let ended = robot.ended().or_else(|| kept.ended());
     let report = match (lived, &ended) {
         (_, Some(_)) => None,

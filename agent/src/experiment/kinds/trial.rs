@@ -18,7 +18,7 @@ use descry_domains::abilities::searching::policies::{self, Foresight};
 use descry_domains::answer::Verdict;
 
 use crate::report::{Event, Report};
-use crate::run::{self, Folder, Settings};
+use crate::run::{self, Folder, Settings, Watcher};
 
 /// Seeds tried for an arrangement that is as hidden as was asked for.
 const ARRANGEMENTS: u64 = 20;
@@ -108,7 +108,8 @@ pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Liv
             *carried.entry(action.to_string()).or_default() += 1;
         }
     };
-    let report = run::pursue(trial.domain, trial.goal, &body, &folder, &settings, chooser, stop, &mut count);
+    let watcher = Watcher { stop, tell: &mut count };
+    let report = run::pursue(trial.domain, trial.goal, &body, &folder, &settings, chooser, watcher);
     let report = report.map_err(|e| e.to_string())?;
     let run_s = started.elapsed().as_secs_f64() - arranged_s;
     let mut clock = Row::new();

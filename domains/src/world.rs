@@ -1,6 +1,7 @@
 //! A running domain: the problem now, what its calls mean, what an action is for the body, what an outcome teaches, what is
 //! answered. It is all that the loop sees of a domain.
 
+mod error;
 mod grounds;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,7 +11,7 @@ use std::time::Instant;
 use descry_memory::remember::Remembered;
 use descry_memory::{Record, RecordId};
 use descry_perception::recognise::Recogniser;
-use descry_planner::{Attachments, Plan, PlanError, Source, Task, after, monitor};
+use descry_planner::{Attachments, Plan, Source, Task, after, monitor};
 use descry_robots::{PoseEstimate, Robot};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::json;
@@ -32,33 +33,8 @@ use crate::note::Note;
 use crate::programs::Programs;
 use crate::situation::{self, Candidate, Known, Past, Situation, Thing};
 use crate::words::{self, Words};
+pub use error::WorldError;
 use grounds::{doors, expected, kinds, known_by_map, members, no_surface, objects, recalled};
-
-/// Why a world cannot go on.
-#[derive(Debug, thiserror::Error)]
-pub enum WorldError {
-    /// The store failed for good.
-    #[error("{0}")]
-    Store(#[from] descry_memory::Error),
-    /// The domain cannot be used; the text points at the place and offers a mend.
-    #[error("{0}")]
-    Domain(String),
-    /// A fault of descry itself.
-    #[error("{0}")]
-    Bug(String),
-}
-
-impl WorldError {
-    /// A skill came back with what another brings about.
-    pub(crate) fn strange(outcome: &Outcome) -> Self {
-        WorldError::Bug(format!("a skill came back with {outcome:?}"))
-    }
-
-    /// The planner could not read the task, or an attachment failed.
-    pub fn of_planner(error: &PlanError) -> Self {
-        error.findings().map_or_else(|| Self::Domain(error.to_string()), |f| Self::Domain(f.render(false)))
-    }
-}
 
 /// What a world is made of.
 #[derive(Clone)]

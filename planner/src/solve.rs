@@ -100,13 +100,6 @@ fn search(
         actions: (grounded.actions.len() + grounded.durative.len()) as u64,
         ..Statistics::default()
     };
-    let limits = Limits {
-        anytime: options.anytime,
-        bound: options.bound.unwrap_or(f64::INFINITY),
-        evaluations: options.evaluation_limit.unwrap_or(u64::MAX),
-        memory,
-        seed: options.seed,
-    };
     let mut best: Option<Plan> = None;
     let mut invalid: Option<PlanError> = None;
     let mut hear = |timed: &[Timed]| {
@@ -121,7 +114,7 @@ fn search(
         Ok(())
     };
     let found = match grounded.goal_reachable {
-        true => search_plans(&world, &measure(&grounded), limits, stop, &mut hear),
+        true => search_plans(&world, &measure(&grounded), limits(options, memory), stop, &mut hear),
         false => Ok(Progress { reason: Reason::Exhausted, counts: Counts::default(), plans: 0 }),
     };
     let progress = found.map_err(|failure| world.calls.report(failure))?;
@@ -146,6 +139,16 @@ fn search(
         (best, Reason::Stopped | Reason::Unproven) => Outcome::OutOfTime { best, statistics },
         (best, Reason::Memory) => Outcome::OutOfMemory { best, statistics },
     })
+}
+
+fn limits(options: &Options, memory: MemoryLimit) -> Limits {
+    Limits {
+        anytime: options.anytime,
+        bound: options.bound.unwrap_or(f64::INFINITY),
+        evaluations: options.evaluation_limit.unwrap_or(u64::MAX),
+        memory,
+        seed: options.seed,
+    }
 }
 
 fn grounding_ended(task: &Task, error: GroundError) -> Result<Outcome, PlanError> {

@@ -1,0 +1,30 @@
+//! Why a world cannot go on.
+
+use descry_planner::PlanError;
+use descry_skills::Outcome;
+
+/// Why a world cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum WorldError {
+    /// The store failed for good.
+    #[error("{0}")]
+    Store(#[from] descry_memory::Error),
+    /// The domain cannot be used; the text points at the place and offers a mend.
+    #[error("{0}")]
+    Domain(String),
+    /// A fault of descry itself.
+    #[error("{0}")]
+    Bug(String),
+}
+
+impl WorldError {
+    /// A skill came back with what another brings about.
+    pub(crate) fn strange(outcome: &Outcome) -> Self {
+        WorldError::Bug(format!("a skill came back with {outcome:?}"))
+    }
+
+    /// The planner could not read the task, or an attachment failed.
+    pub fn of_planner(error: &PlanError) -> Self {
+        error.findings().map_or_else(|| Self::Domain(error.to_string()), |f| Self::Domain(f.render(false)))
+    }
+}

@@ -1,0 +1,75 @@
+//! Places: poses on the floor, and stations that a body knows by name.
+
+use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// A pose on the floor, in the map.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pose2 {
+    /// Metres.
+    pub x_m: f64,
+    /// Metres.
+    pub y_m: f64,
+    /// Heading, counter-clockwise from the map's x.
+    pub yaw_rad: f64,
+}
+
+impl Pose2 {
+    /// A pose on the floor.
+    pub fn new(x_m: f64, y_m: f64, yaw_rad: f64) -> Self {
+        Pose2 { x_m, y_m, yaw_rad }
+    }
+
+    /// The pose at (`x_m`, `y_m`) that faces `point`.
+    pub fn facing(x_m: f64, y_m: f64, point: &Point2<f64>) -> Self {
+        Pose2 { x_m, y_m, yaw_rad: (point.y - y_m).atan2(point.x - x_m) }
+    }
+
+    /// Where it stands.
+    pub fn point(&self) -> Point2<f64> {
+        Point2::new(self.x_m, self.y_m)
+    }
+
+    /// The same in space: z is zero, upright.
+    pub fn isometry(&self) -> Isometry3<f64> {
+        Isometry3::from_parts(
+            Translation3::new(self.x_m, self.y_m, 0.0),
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw_rad),
+        )
+    }
+
+    /// The pose in space laid on the floor: height, roll and pitch are dropped.
+    pub fn from_isometry(map_from_base: &Isometry3<f64>) -> Self {
+        let forward = map_from_base.rotation * Vector3::x();
+        let at = map_from_base.translation.vector;
+        Pose2 { x_m: at.x, y_m: at.y, yaw_rad: forward.y.atan2(forward.x) }
+    }
+}
+
+/// Somewhere a body can be asked to go.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// Any pose on the floor.
+    Pose(Pose2),
+    /// One of [`Robot::stations`], by name.
+    Station(String),
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Place::Pose(p) => write!(f, "({:.2} m, {:.2} m, {:.0}°)", p.x_m, p.y_m, p.yaw_rad.to_degrees()),
+            Place::Station(name) => write!(f, "{name}"),
+        }
+    }
+}
+
+/// A pose that the body knows by name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Station {
+    /// Unique among the stations of the body.
+    pub name: String,
+    /// Where the base stands there.
+    pub map_from_base: Isometry3<f64>,
+}

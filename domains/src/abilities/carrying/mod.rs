@@ -6,16 +6,17 @@ use std::sync::Arc;
 
 use descry_memory::belief::Track;
 use descry_perception::nalgebra::{Point3, Vector3};
-use descry_planner::{Answer, Call, CallError};
+use descry_planner::{Answer, Call, CallError, Plan, Step};
 use descry_robots::{Failure, Grasp, Place, Placing};
 use descry_skills::{Outcome, PickUp, PutDown, SkillFailure};
 
 use super::{Ability, Fact, Meaning, SkillWord, argument};
 use crate::abilities::searching::change::Change;
 use crate::abilities::searching::perceive::{self, Eyes};
+use crate::abilities::searching::reasons;
 use crate::mind::Mind;
 use crate::note::Note;
-use crate::situation::{Held, Situation};
+use crate::situation::{Held, Situation, Thing};
 use crate::world::WorldError;
 
 /// A hand may touch what stands so near to what it takes, metres.
@@ -25,6 +26,9 @@ const SLIPPED_M: f64 = 0.15;
 /// How many standard deviations localisation may be off, and from how far away things are looked at, metres.
 const ASTRAY: f64 = 2.0;
 const FROM_M: f64 = 1.2;
+
+/// What putting down takes, as in the domain, seconds.
+const PUT_DOWN_S: f64 = 10.0;
 
 /// See the module.
 pub const ABILITY: Ability = Ability {
@@ -77,18 +81,39 @@ pub const ABILITY: Ability = Ability {
         },
     ],
     begins: None,
-    fallback: None,
+    fallback: Some(fallback),
     answers: None,
 };
+
+/// The look that tells most a second; with something in the hand, it is put down first, where that takes least.
+fn fallback(s: &Situation) -> Option<Plan> {
+    let Some(track) = held(s) else { return reasons::one_look(s) };
+    let thing = s.things.iter().find(|thing| is_held(s, thing, track))?;
+    let poses = (0..s.candidates.len()).filter(|&from| s.can_drive_to(from));
+    let spots = poses.flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));
+    let free = spots.filter(|&(from, on)| spot::free(s, from, on, spot::USUAL_RADIUS_M, true).is_some());
+    let nearest =
+        |a: &(usize, usize), b: &(usize, usize)| s.travel_s(s.at, a.0).total_cmp(&s.travel_s(s.at, b.0));
+    let (from, on) = free.min_by(nearest)?;
+    let arguments =
+        vec![s.candidates[from].symbol.clone(), thing.symbol.clone(), s.surfaces[on].symbol.clone()];
+    let step = Step { start_s: Some(0.0), action: "put-down".into(), arguments, duration_s: PUT_DOWN_S };
+    Some(reasons::from_there(s, from, Plan { steps: vec![step], ..Plan::default() }))
+}
 
 /// `(holding ?thing)`.
 fn holding(s: &Situation) -> Vec<String> {
     let Some(track) = held(s) else { return Vec::new() };
-    let is = |t: &&crate::situation::Thing| match t.track {
+    let held = s.things.iter().filter(|thing| is_held(s, thing, track));
+    held.map(|thing| format!("(holding {})", thing.symbol)).collect()
+}
+
+/// Whether what is in the hand is that thing.
+fn is_held(s: &Situation, thing: &Thing, track: &Track) -> bool {
+    match thing.track {
         Some(id) => id == track.id,
-        None => track.probability_of(&t.name) >= s.threshold,
-    };
-    s.things.iter().filter(is).map(|t| format!("(holding {})", t.symbol)).collect()
+        None => track.probability_of(&thing.name) >= s.threshold,
+    }
 }
 
 /// `(hand-free)`.

@@ -23,12 +23,20 @@ const UNSEEN_SHARE: f64 = 0.6;
 const FREE_SHARE: f64 = 0.15;
 /// So many of the five columns of an object may seem to lie within a solid body where it only stands close to it.
 const GRAZED: usize = 2;
+/// Share of an object's volume in which something was measured that no object explains, for it to be likely that one stands there.
+const MEASURED_SHARE: f64 = 1.0 / 3.0;
+/// How many times more likely an object stands at such a place than at one of which nothing is known: what was measured there is
+/// something, if not what is asked about.
+const MEASURED_WEIGHT: f64 = 50.0;
 /// How far above an unseen place the top of a body that fills it is looked for, metres.
 const ROOF_M: f64 = 0.5;
 /// Sides from which an object is looked at.
 const SECTORS: usize = 8;
 /// An object that is believed less than this to be the thing is no longer asked about.
 const NEGLIGIBLE: f64 = 0.02;
+/// The columns of an object's volume that are asked for, in diameters from its middle, and the levels, in heights from its foot.
+const COLUMNS: [(f64, f64); 5] = [(0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.0, 0.35), (0.0, -0.35)];
+const LEVELS: [f64; 3] = [0.25, 0.6, 0.95];
 /// Size of an object of which nothing is known: a small cup, height and diameter.
 const SMALL_M: (f64, f64) = (0.10, 0.07);
 
@@ -280,8 +288,10 @@ impl Doubt {
             count.insert(on, places.len());
             hypotheses.extend(places.iter().filter_map(|centre| {
                 around(surface, centre).find_map(|centre| {
-                    let points = unseen_volume(surface, &situation.spaces[on], &standing, &centre, size_m)?;
-                    Some(Hypothesis { weight: each, on, centre, points, facing: None })
+                    let space = &situation.spaces[on];
+                    let points = unseen_volume(surface, space, &standing, &centre, size_m)?;
+                    let weight = each * if is_measured(space, &points) { MEASURED_WEIGHT } else { 1.0 };
+                    Some(Hypothesis { weight, on, centre, points, facing: None })
                 })
             }));
         }
@@ -362,8 +372,6 @@ fn unseen_volume(
     centre: &Point3<f64>,
     (height_m, diameter_m): (f64, f64),
 ) -> Option<Vec<Point3<f64>>> {
-    const COLUMNS: [(f64, f64); 5] = [(0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.0, 0.35), (0.0, -0.35)];
-    const LEVELS: [f64; 3] = [0.25, 0.6, 0.95];
     let all = (COLUMNS.len() * LEVELS.len()) as f64;
     let (e1, e2) = across(surface);
     let column = |(a, b): (f64, f64)| centre + (e1 * a + e2 * b) * diameter_m;
@@ -395,6 +403,12 @@ fn unseen_volume(
         explained[n] && is_roofed(space, &top, &surface.up)
     };
     ((0..COLUMNS.len()).filter(is_inside).count() <= GRAZED).then_some(unseen)
+}
+
+/// Whether so much was measured among the unseen points of an object, by no object that is believed in, that one may well stand there.
+fn is_measured(space: &Space, unseen: &[Point3<f64>]) -> bool {
+    let measured = unseen.iter().filter(|point| space.cell(point) == Cell::Occupied).count();
+    measured as f64 >= MEASURED_SHARE * (COLUMNS.len() * LEVELS.len()) as f64
 }
 
 /// Whether a measured surface lies over an unseen point, with nothing seen free between: it is within a solid body.

@@ -34,16 +34,18 @@ pub(super) const SIDE_TOLERANCE_M: f64 = 0.03;
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
 /// How far a level surface may be from there to be that one: farther, it is another, or the body is not where it believes to be.
 const SAME_HEIGHT_M: f64 = 0.08;
-/// Most angle between a surface of the map and level, as seen: localisation and the camera's mounting err by degrees.
-const LEVEL_RAD: f64 = 0.09;
+/// Most angle between a surface of the map and level, as seen: localisation and the camera's mounting err by a degree or two. A
+/// steeper plane cuts through the wall behind a board and through what stands on it.
+const LEVEL_RAD: f64 = 0.045;
 /// How far beside the outline on the map points of a surface may lie: localisation errs by centimetres and degrees.
 const BESIDE_M: f64 = 0.25;
 /// What is remembered of an object that was seen again nearer than this is that one, metres.
 const SAME_M: f64 = 0.10;
 /// Points this near to a surface lie on it.
 pub(super) const ON_SURFACE_M: f64 = 0.012;
-/// What lies so near to a wall of the map, or beyond it, is the wall, metres.
-const WALL_M: f64 = 0.015;
+/// What lies so near to a wall of the map, or beyond it, is the wall, metres: localisation along a surface errs by two or three
+/// centimetres.
+const WALL_M: f64 = 0.03;
 /// How far beyond the hull of a surface points of it are looked for.
 const HULL_MARGIN_M: f64 = 0.02;
 

@@ -25,13 +25,18 @@ pub fn one_look(s: &Situation) -> Option<Plan> {
 
 /// A look as a plan in the words of *searching*: a drive if one is needed, then the look.
 pub fn look(s: &Situation, from: usize, on: usize) -> Plan {
+    from_there(s, from, look_there(s, from, on))
+}
+
+/// A plan of the body that stands at a candidate, after the drive there if one is needed.
+pub fn from_there(s: &Situation, from: usize, then: Plan) -> Plan {
     if from == s.at {
-        return look_there(s, from, on);
+        return then;
     }
     let arguments = [s.at, from].map(|n| s.candidates[n].symbol.clone()).to_vec();
     let drive =
         Step { start_s: Some(0.0), action: "move".into(), arguments, duration_s: s.travel_s(s.at, from) };
-    one_then(Plan { steps: vec![drive], ..Plan::default() }, look_there(s, from, on))
+    one_then(Plan { steps: vec![drive], ..Plan::default() }, then)
 }
 
 /// A plan and then another, whose steps begin when those of the first have ended.

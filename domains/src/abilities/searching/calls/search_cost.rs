@@ -17,7 +17,8 @@ pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallE
     let begun = situation.planned_looks(call).iter().any(|look| look.1 == on);
     let open: Vec<usize> =
         (0..situation.things.len()).filter(|&n| situation.confidence(n) < situation.threshold).collect();
-    if begun || open.is_empty() || situation.time_left_s.is_some() {
+    let all = open.is_empty() || !situation.kinds.is_empty();
+    if begun || all || situation.time_left_s.is_some() {
         return Ok(Answer::Number(0.0));
     }
     let finds =

@@ -128,7 +128,28 @@ pub fn left_in_all(s: &Situation) -> Option<String> {
     if !places.is_empty() {
         return Some(format!("what stands at {} looks the same from every side", places.join(" and at ")));
     }
-    s.doubts().into_iter().find_map(|doubt| out_of_sight(s, doubt, "more"))
+    s.doubts().into_iter().find_map(|doubt| out_of_sight(s, doubt, "more")).or_else(|| left_of_kinds(s))
+}
+
+/// What keeps one from saying that all of a kind are found: the least sure object, and what may stand where nothing was seen.
+fn left_of_kinds(s: &Situation) -> Option<String> {
+    let open = (0..s.kinds.len()).find(|&of| s.completeness(of) < s.threshold)?;
+    let kind = &s.kinds[open];
+    let p = |track: &Track| kind.probability(track, &s.surfaces);
+    let sure = |track: &&Track| p(track).max(1.0 - p(track));
+    let least = s.belief.tracks.iter().min_by(|a, b| sure(a).total_cmp(&sure(b)));
+    let least = least.filter(|track| sure(track) < s.threshold);
+    let is_one =
+        |track: &Track| format!(", what stands at {} is one with {:.2}", place(&track.position_m), p(track));
+    let hidden = s.doubt_of(open).hidden;
+    let more = format!(", there may be more where nothing was seen ({hidden:.2})");
+    let more = if hidden > 1.0 - s.threshold || least.is_none() { more } else { String::new() };
+    let all = s.completeness(open);
+    Some(format!(
+        "all of {} are found with {all:.2} only{}{more}",
+        kind.name,
+        least.map(is_one).unwrap_or_default()
+    ))
 }
 
 fn out_of_time(s: &Situation) -> Option<String> {

@@ -6,6 +6,7 @@ pub mod commands;
 pub mod exit;
 pub mod experiment;
 pub mod keeping;
+pub mod page;
 pub mod report;
 pub mod run;
 pub mod stop;

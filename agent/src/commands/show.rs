@@ -13,6 +13,9 @@ use crate::report::Event;
 pub struct Arguments {
     /// The run's folder
     run: PathBuf,
+    /// Write the run as one page instead: map, plans, what was seen, and what was said, moment by moment
+    #[arg(long, value_name = "FILE", conflicts_with = "json")]
+    html: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -28,7 +31,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         Ok(report) => (report, None),
         Err(e) => (None, Some(e)),
     };
-    if arguments.json {
+    if let Some(page) = &arguments.html {
+        let text = crate::page::of_run(&record, report.as_ref())?;
+        std::fs::write(page, text).map_err(|e| CommandError::broken(format!("{}: {e}", page.display())))?;
+        input::print_text(&page.display().to_string())?;
+    } else if arguments.json {
         input::print_json(&json!({
             "run": folder.display().to_string(), "events": events, "report": report, "lost": lost,
         }))?;

@@ -337,7 +337,10 @@ fn believe(
         changed,
     };
     let seen = serde_json::to_value(percepts).map_err(|e| WorldError::Bug(e.to_string()))?;
-    let seen = json!({ "on": surface.symbol, "percepts": seen, "fits": merged.fits, "steps": merged.steps });
+    let (views_of_it, fits, steps) = (&cites, &merged.fits, &merged.steps);
+    let seen = json!({
+        "on": surface.symbol, "percepts": seen, "views": views_of_it, "fits": fits, "steps": steps,
+    });
     let meta = Meta { objects: sightings(percepts), body: seen, ..Meta::default() };
     let percepts = eyes.record.put(Draft { meta, ..Draft::new("percepts", stamp_ns) })?;
     let boxes: Vec<Labelled> = mind.known.belief.tracks.iter().map(|t| labelled(t, &surface.up)).collect();

@@ -1,0 +1,87 @@
+//! `descry show RUN --html FILE`: one page that holds everything, and that a browser draws.
+
+mod binary;
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+/// The page of a run in a folder.
+fn page(folder: &Path) -> String {
+    let shown = binary::outcome(folder, &["show", "run", "--html", "page.html"]);
+    assert!(shown.status.success(), "{}", String::from_utf8_lossy(&shown.stderr));
+    std::fs::read_to_string(folder.join("page.html")).expect("the page is there")
+}
+
+/// What the page tells, as its script reads it.
+fn story(page: &str) -> Value {
+    let begin = "<script type=\"application/json\" id=\"story\">";
+    let (_, rest) = page.split_once(begin).expect("the story is in it");
+    let (told, _) = rest.split_once("</script>").expect("it ends");
+    serde_json::from_str(&told.replace("<\\/", "</")).expect("it is JSON")
+}
+
+fn count(story: &Value, name: &str) -> usize {
+    story[name].as_array().map_or(0, Vec::len)
+}
+
+#[test]
+fn a_page_stands_alone_and_tells_the_run() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = binary::outcome(folder.path(), &["find", "cup A", "--seed", "3", "--run", "run"]);
+    assert!(run.status.success());
+    let page = page(folder.path());
+    for outside in ["http://", "https://", "src=", "@import", "{{"] {
+        let used = page.replace("http://www.w3.org/2000/svg", "");
+        assert!(!used.contains(outside), "{outside} is in the page");
+    }
+    let story = story(&page);
+    assert_eq!(story["report"]["verdict"], "achieved");
+    let looks = count(&story, "looks");
+    assert_eq!(story["report"]["views"], looks);
+    assert_eq!(count(&story, "stands"), looks);
+    assert_eq!(count(&story, "beliefs"), looks, "one belief a look at one table");
+    assert_eq!(count(&story, "plans"), story["report"]["replans"].as_u64().unwrap_or(0) as usize + 1);
+    let deeds = story["deeds"].as_array().expect("deeds");
+    assert!(deeds.iter().all(|deed| deed["from_s"].as_f64() <= deed["to_s"].as_f64()), "{deeds:?}");
+    assert_eq!(
+        deeds.iter().filter(|deed| deed["call"].as_str().is_some_and(|c| c.contains("observe"))).count(),
+        looks
+    );
+    assert!(page.len() < 1_000_000 * (looks + 1), "{} bytes for {looks} looks", page.len());
+    in_a_browser(folder.path());
+}
+
+/// What Chromium makes of it, where it is installed.
+fn in_a_browser(folder: &Path) {
+    let mut chromium = Command::new("chromium");
+    chromium.args([
+        "--headless=new",
+        "--no-sandbox",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+    ]);
+    chromium
+        .args(["--virtual-time-budget=4000", "--dump-dom"])
+        .arg(format!("file://{}", folder.join("page.html").display()));
+    let Ok(drawn) = chromium.output() else {
+        println!("SKIPPED: the page was not drawn: there is no chromium");
+        return;
+    };
+    let drawn = String::from_utf8_lossy(&drawn.stdout);
+    for part in ["<b>achieved</b>", "<title>cup A ", "<polyline", "class=\"see now\""] {
+        assert!(drawn.contains(part), "{part} is not drawn");
+    }
+}
+
+#[test]
+fn a_run_that_was_killed_is_told_as_far_as_it_went() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut child = binary::start(folder.path(), &["find", "cup A", "--seed", "2", "--run", "run"]);
+    binary::first_line(&mut child);
+    child.kill().expect("it is killed");
+    child.wait().expect("it has ended");
+    let story = story(&page(folder.path()));
+    assert_eq!((&story["goal"], &story["report"]), (&Value::from("find cup A"), &Value::Null));
+}

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use descry_memory::RecordId;
+use descry_perception::nalgebra::Isometry3;
 
 use crate::abilities::searching::change::Change;
 use crate::situation::Known;
@@ -46,6 +47,8 @@ pub struct Look {
     pub stamp_ns: i64,
     /// Its record.
     pub record: RecordId,
+    /// What lays what it alone shows of a surface of the map on the outline there, from where localisation had it; none: not yet told.
+    pub map_from_localised: Option<Isometry3<f64>>,
 }
 
 impl Mind {

@@ -8,6 +8,7 @@ pub mod doubt;
 mod facts;
 pub mod obstacle;
 pub mod perceive;
+mod placing;
 pub mod policies;
 pub mod reasons;
 mod vanished;

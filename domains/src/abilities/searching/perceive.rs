@@ -7,13 +7,12 @@ use descry_memory::viewer::{self, Labelled};
 use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
 use descry_perception::View;
 use descry_perception::hull::Hull;
-use descry_perception::locate::locate;
 use descry_perception::merge::{MergeOptions, Merged, merge};
 use descry_perception::nalgebra::{Point3, Translation3, Unit, Vector3};
 use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment_on};
-use descry_perception::surface::{Region, Role, Surface, SurfaceOptions, find_surface};
+use descry_perception::surface::{Region, Role, SurfaceOptions, find_surface};
 use descry_perception::visibility::{DepthMap, Seen, Visibility};
 use descry_robots::{Robot, Sensed};
 use serde::Serialize;
@@ -21,6 +20,7 @@ use serde_json::json;
 
 use super::change::Change;
 use super::discover;
+use super::placing;
 use super::vanished::{keep_unrefuted, set_aside_unseen, taken_away};
 use crate::lexicon::symbol;
 use crate::mind::{Look, Mind};
@@ -46,8 +46,6 @@ pub(super) const ON_SURFACE_M: f64 = 0.012;
 /// What lies so near to a wall of the map, or beyond it, is the wall, metres: localisation along a surface errs by two or three
 /// centimetres.
 const WALL_M: f64 = 0.03;
-/// How far beyond the hull of a surface points of it are looked for.
-const HULL_MARGIN_M: f64 = 0.02;
 
 /// What perceiving needs besides what is known.
 #[derive(Clone, Copy)]
@@ -95,7 +93,7 @@ pub fn remember(
     let id = record.put_cloud(sensed.stamp_ns, frame, &sensed.cloud, &sensing, meta)?;
     for &n in shown {
         let region = &mut mind.regions[n];
-        region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id });
+        region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id, map_from_localised: None });
         region.taken += 1;
     }
     mind.views += 1;
@@ -127,9 +125,10 @@ fn views(mind: &Mind) -> Vec<RecordId> {
 /// The multi-view perception of paper 004, section V, on one surface: restore its views by their timestamps, merge, recognise,
 /// believe.
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
-    let views = restore(mind, eyes, on)?;
     let (merging, seeking) = options(eyes.robot, Some(&mind.known.surfaces[on].symbol));
     let seeking = seeking_at(seeking, &mind.known.surfaces[on]);
+    place_looks(mind, eyes, on, (&merging, &seeking.surface))?;
+    let views = restore(mind, eyes, on)?;
     let seen = merge(&views, &merging).map_err(|nothing| nothing.to_string()).and_then(|merged| {
         let (surfaces, options) = (&mind.known.surfaces, &seeking.surface);
         let found = match surfaces[on].whole {
@@ -149,7 +148,8 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     mind.regions[on].nothing = None;
     let agreeing = merged.fits.iter().filter(|fit| fit.used).count();
     mind.regions[on].disputed = merged.fits.len() >= 2 * agreeing;
-    let (merged, surface) = lay_on_map(eyes.robot, &mind.known.surfaces[on], merged, surface);
+    let (merged, surface) =
+        placing::lay_on_map(eyes.robot.description(), &mind.known.surfaces[on], merged, surface);
     let merged = without_walls(eyes.robot, &mind.known.surfaces[on], merged);
     let newest = newest(&views, &merged);
     if let Some(map) = &newest {
@@ -196,27 +196,6 @@ fn begin_again(mind: &mut Mind, on: usize) {
     mind.attend();
 }
 
-/// Lays the surface on the outline that the map has of it: that mends what is left of localisation's error.
-fn lay_on_map(
-    robot: &dyn Robot,
-    known: &KnownSurface,
-    merged: Merged,
-    surface: Surface,
-) -> (Merged, Surface) {
-    if !known.whole {
-        return (merged, surface);
-    }
-    let body = robot.description();
-    let outline = surface.outline();
-    let on_it =
-        |p: &Point3<f64>| surface.height_m(p).abs() < ON_SURFACE_M && outline.covers(p, HULL_MARGIN_M);
-    let points: Vec<Point3<f64>> = merged.cloud.points.iter().map(|p| p.cast()).filter(on_it).collect();
-    let (sigma_m, sigma_rad) = (body.pose_sigma_m, body.pose_sigma_rad);
-    let is_past = |p: &Point3<f64>| merged.visibility.looked_past(p, ON_SURFACE_M);
-    let located = locate(&points, &surface.up, &known.outline, sigma_m, sigma_rad, is_past);
-    (merged.moved(&located.map_from_world), surface.moved(&located.map_from_world))
-}
-
 /// Takes the walls of the surface's room out of a merged cloud, as the map has them: what stands against a wall is not one with it.
 fn without_walls(robot: &dyn Robot, known: &KnownSurface, mut merged: Merged) -> Merged {
     let room = robot.rooms().iter().find(|room| Some(&room.name) == known.room.as_ref());
@@ -227,6 +206,26 @@ fn without_walls(robot: &dyn Robot, known: &KnownSurface, mut merged: Merged) ->
     merged
 }
 
+/// Lays each new view of a surface that the map has on its outline by itself. Views of a long surface from its two ends share little
+/// that would hold them together along it; the ends that each shows do.
+fn place_looks(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    on: usize,
+    options: (&MergeOptions, &SurfaceOptions),
+) -> Result<(), WorldError> {
+    let known = &mind.known.surfaces[on];
+    if !known.whole {
+        return Ok(());
+    }
+    let description = eyes.robot.description();
+    for look in mind.regions[on].looks.iter_mut().filter(|look| look.map_from_localised.is_none()) {
+        let view = eyes.record.view_at(look.stamp_ns, &description.frames.map)?;
+        look.map_from_localised = Some(placing::of_view(description, known, view, options));
+    }
+    Ok(())
+}
+
 /// Reads the views of a surface back from the record by their timestamps, with the transforms of those times. What a view shows
 /// of a place where something has moved since is left out.
 fn restore(mind: &Mind, eyes: Eyes<'_>, on: usize) -> Result<Vec<View>, WorldError> {
@@ -234,6 +233,9 @@ fn restore(mind: &Mind, eyes: Eyes<'_>, on: usize) -> Result<Vec<View>, WorldErr
     let region = &mind.regions[on];
     let restored = |look: &Look| -> Result<View, WorldError> {
         let mut view = eyes.record.view_at(look.stamp_ns, map)?;
+        if let Some(map_from_localised) = look.map_from_localised {
+            view.world_from_camera = map_from_localised * view.world_from_camera;
+        }
         let since = region.changes.iter().filter(|c| c.stamp_ns >= look.stamp_ns);
         since.for_each(|change| change.blank(&mut view));
         Ok(view)

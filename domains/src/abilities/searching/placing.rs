@@ -1,0 +1,50 @@
+//! Where what was seen of a surface lies on the map: its outline there mends localisation's error.
+
+use descry_perception::View;
+use descry_perception::locate::locate;
+use descry_perception::merge::{MergeOptions, Merged, merge};
+use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::surface::{Surface, SurfaceOptions, find_surface};
+use descry_robots::Description;
+
+use super::perceive::ON_SURFACE_M;
+use crate::situation::KnownSurface;
+
+/// How far beyond the hull of a surface points of it are looked for.
+const HULL_MARGIN_M: f64 = 0.02;
+
+/// Lays a merged surface on the outline that the map has of it: that mends what is left of localisation's error.
+pub(super) fn lay_on_map(
+    body: &Description,
+    known: &KnownSurface,
+    merged: Merged,
+    surface: Surface,
+) -> (Merged, Surface) {
+    if !known.whole {
+        return (merged, surface);
+    }
+    let map_from_world = located(body, known, &merged, &surface);
+    (merged.moved(&map_from_world), surface.moved(&map_from_world))
+}
+
+/// What lays a view on the outline of a surface that the map has; nothing is moved where the view shows no such surface.
+pub(super) fn of_view(
+    body: &Description,
+    known: &KnownSurface,
+    view: View,
+    (merging, seeking): (&MergeOptions, &SurfaceOptions),
+) -> Isometry3<f64> {
+    let Ok(merged) = merge(&[view], merging) else { return Isometry3::identity() };
+    let found = find_surface(&merged.cloud, &merged.visibility, seeking);
+    found.map_or_else(|_| Isometry3::identity(), |surface| located(body, known, &merged, &surface))
+}
+
+fn located(body: &Description, known: &KnownSurface, merged: &Merged, surface: &Surface) -> Isometry3<f64> {
+    let outline = surface.outline();
+    let on_it =
+        |p: &Point3<f64>| surface.height_m(p).abs() < ON_SURFACE_M && outline.covers(p, HULL_MARGIN_M);
+    let points: Vec<Point3<f64>> = merged.cloud.points.iter().map(|p| p.cast()).filter(on_it).collect();
+    let is_past = |p: &Point3<f64>| merged.visibility.looked_past(p, ON_SURFACE_M);
+    let sigmas = (body.pose_sigma_m, body.pose_sigma_rad);
+    locate(&points, &surface.up, &known.outline, sigmas.0, sigmas.1, is_past).map_from_world
+}

@@ -519,6 +519,18 @@ mod tests {
     }
 
     #[test]
+    fn what_was_measured_and_no_object_explains_is_likely_something() {
+        let likely = |disc_m: f64, standing: &[&Track]| {
+            let space = seen_from_above(disc_m);
+            let points = unseen_volume(&table(), &space, standing, &Point3::origin(), (0.104, 0.07));
+            points.map(|points| is_measured(&space, &points))
+        };
+        assert_eq!(likely(0.104, &[]), Some(true));
+        assert_eq!(likely(0.20, &[]), Some(false), "it stands below what was measured");
+        assert_eq!(likely(0.104, &[&disc()]), None);
+    }
+
+    #[test]
     fn a_rim_that_no_object_explains_may_be_its_own() {
         check(0.104, 0.104, &[], true);
         check(0.104, 0.104, &[&disc()], false);

@@ -7,6 +7,7 @@ mod story;
 use descry_memory::Record;
 
 use crate::exit::CommandError;
+use crate::experiment::table::escaped;
 use crate::report::Report;
 
 const HTML: &str = include_str!("page/page.html");
@@ -30,10 +31,6 @@ fn laid_out(title: &str, told: &str) -> String {
     let page = parts.into_iter().fold(HTML.to_owned(), |page, (name, part)| page.replace(name, part));
     // Within a script nothing may look like its end.
     page.replace("{{story}}", &told.replace("</", "<\\/"))
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]

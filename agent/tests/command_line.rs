@@ -299,6 +299,15 @@ fn real_clouds_are_recognised() {
     let seen = &said["clouds"][0];
     assert!(seen["table"]["area_m2"].as_f64() > Some(0.1), "{said}");
     assert!(seen["objects"].as_array().is_some_and(|objects| objects.len() >= 4), "{said}");
+    let folder = TempDir::new().expect("a folder can be made");
+    let (cloud, picture) =
+        (cloud.display().to_string(), folder.path().join("seen.svg").display().to_string());
+    check(&["recognise", &cloud, "--picture", &picture], 0, &["table"]);
+    let drawn = std::fs::read_to_string(&picture).expect("the picture is there");
+    let objects = seen["objects"].as_array().map_or(0, Vec::len);
+    assert!(drawn.contains("data:image/png;base64,"), "no pixels");
+    assert_eq!(drawn.matches("<text").count(), objects, "a name an object");
+    check(&["recognise", &cloud, &cloud, "--picture", &picture], 2, &["--picture draws one cloud"]);
 }
 
 #[test]

@@ -33,6 +33,9 @@ pub struct Arguments {
     /// Write the plan to a file (with --anytime, each better one replaces it)
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Draw the plan as a Gantt chart, as SVG
+    #[arg(long, value_name = "FILE")]
+    gantt: Option<PathBuf>,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
@@ -90,6 +93,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     };
     if let (Some(path), Some(plan)) = (&arguments.out, outcome.plan()) {
         write_plan(path, plan)?;
+    }
+    if let (Some(path), Some(plan)) = (&arguments.gantt, outcome.plan()) {
+        let drawn = std::fs::write(path, crate::gantt::svg(plan));
+        drawn.map_err(|e| CommandError::BadInput(format!("--gantt {}: {e}", path.display())))?;
     }
     if arguments.json {
         print_json(status, &outcome, started)?;

@@ -8,7 +8,7 @@ use descry_perception::files::read_cloud;
 use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::{Descry, ObjectModel, Percept, Published, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment};
-use descry_perception::{View, Visibility};
+use descry_perception::{Cloud, View, Visibility};
 use serde_json::{Value, json};
 
 use crate::commands::input;
@@ -26,6 +26,9 @@ pub struct Arguments {
     /// Recogniser: descry, or published (the score of paper 004)
     #[arg(long, default_value = "descry", value_parser = ["descry", "published"])]
     recogniser: String,
+    /// Draw the cloud with each object tinted and named, as SVG; of one cloud
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -39,6 +42,7 @@ struct Seen {
     path: String,
     points: usize,
     notes: Vec<String>,
+    cloud: Cloud,
     found: Result<(Scene, Vec<Percept>), String>,
 }
 
@@ -54,6 +58,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     };
     let seen: Vec<Seen> =
         arguments.clouds.iter().map(|path| look(path, recogniser, &objects)).collect::<Result<_, _>>()?;
+    if let Some(path) = &arguments.picture {
+        draw(path, &seen)?;
+    }
     if arguments.json {
         input::print_json(&json!({ "clouds": seen.iter().map(as_json).collect::<Vec<_>>() }))?;
     } else {
@@ -87,7 +94,17 @@ fn look(path: &Path, recogniser: &dyn Recogniser, objects: &[ObjectModel]) -> Re
             (scene, percepts)
         })
         .map_err(|e| e.to_string());
-    Ok(Seen { path: shown, points, notes: loaded.notes, found })
+    Ok(Seen { path: shown, points, notes: loaded.notes, cloud: view.cloud, found })
+}
+
+fn draw(path: &Path, seen: &[Seen]) -> Result<(), CommandError> {
+    let [only] = seen else {
+        return Err(CommandError::BadInput("--picture draws one cloud: name one".into()));
+    };
+    let Ok((scene, percepts)) = &only.found else { return Ok(()) };
+    let drawn = crate::picture::svg(&only.cloud, &scene.surface, percepts)?;
+    std::fs::write(path, drawn)
+        .map_err(|e| CommandError::BadInput(format!("--picture {}: {e}", path.display())))
 }
 
 fn as_json(seen: &Seen) -> Value {

@@ -389,7 +389,10 @@ impl<'a> Agent<'a> {
         let body = serde_json::to_value(event).map_err(|e| CommandError::Bug(e.to_string()))?;
         let meta = Meta { body, ..Meta::default() };
         let stamp_ns = self.robot.now_ns();
-        let blobs = vec![viewer::log(stamp_ns, LogLevel::Info, "descry", &event.to_string())];
+        let mut blobs = vec![viewer::log(stamp_ns, LogLevel::Info, "descry", &event.to_string())];
+        if let Event::Planned { steps, .. } = event {
+            blobs.push(viewer::plan(stamp_ns, &steps.join("\n")));
+        }
         let draft = Draft { meta, blobs, ..Draft::new("event", stamp_ns) };
         self.record.put(draft).map_err(CommandError::broken)
     }

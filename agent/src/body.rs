@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use descry_domains::load::Domain;
 use descry_robots::Robot;
-use descry_robots::program::{Limits, ProgramRobot};
 use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
+use descry_robots::truth::Truth;
 
 use crate::exit::CommandError;
 use crate::keeping;
 
+pub mod program;
 mod recorded;
 pub mod tape;
 
@@ -19,7 +20,13 @@ pub struct Body {
     pub robot: Arc<dyn Robot>,
     /// Name and text of the scene that it stands in, if it was read from one.
     pub scene: Option<(String, String)>,
-    simulated: Option<Arc<SimRobot>>,
+    truth: Option<Told>,
+}
+
+/// Who says how everything really stands.
+enum Told {
+    Simulator(Arc<SimRobot>),
+    Program(program::TruthFile),
 }
 
 /// Where something is in truth.
@@ -36,18 +43,30 @@ pub struct TruePlace {
 impl Body {
     /// Any body; the example `own_body` is one from beginning to end.
     pub fn new(robot: Arc<dyn Robot>) -> Self {
-        Self { robot, scene: None, simulated: None }
+        Self { robot, scene: None, truth: None }
     }
 
     /// A simulated body, whose truth a report may show.
     pub fn simulated(robot: Arc<SimRobot>) -> Self {
-        Self { simulated: Some(Arc::clone(&robot)), ..Self::new(robot) }
+        Self { truth: Some(Told::Simulator(Arc::clone(&robot))), ..Self::new(robot) }
+    }
+
+    /// How everything stands now, for reports; none of a body that is no simulation, or does not say.
+    ///
+    /// # Errors
+    /// If what a program wrote of it cannot be read.
+    pub fn truth(&self) -> Result<Option<Truth>, String> {
+        match &self.truth {
+            None => Ok(None),
+            Some(Told::Simulator(robot)) => Ok(Some(robot.truth())),
+            Some(Told::Program(file)) => Truth::read(file.path()).map(Some),
+        }
     }
 
     /// Where an object of that name or kind stands in truth, the one nearest to where it is believed to stand if there are
     /// several. None without a simulation, or if it is not there.
     pub fn true_place(&self, name: &str, believed_m: Option<[f64; 3]>) -> Option<TruePlace> {
-        let truth = self.simulated.as_ref()?.truth();
+        let truth = self.truth().ok().flatten()?;
         let distance = |at: &[f64; 3]| {
             let believed = believed_m.unwrap_or(*at);
             at.iter().zip(&believed).map(|(a, b)| (a - b).powi(2)).sum::<f64>()
@@ -65,7 +84,8 @@ impl Body {
     }
 }
 
-/// Opens the body of `--robot`: `sim`, `recorded:DIR` with a folder of frames or the record of a run, or `program:COMMAND`.
+/// Opens the body of `--robot`: `sim`, `recorded:DIR` with a folder of frames or the record of a run, `program:COMMAND`,
+/// or `socket:HOST:PORT` or `socket:PATH`.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] names the place and what was expected; [`CommandError::Broken`] if a program says no hello.
@@ -97,18 +117,17 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
             };
             Ok(Body::new(Arc::new(robot)))
         }
-        Some(("program", command)) => {
+        Some((kind @ ("program" | "socket"), at)) => {
             if let Some(scene) = scene {
                 let text = format!(
                     "--scene {scene}: a program has its own world\n  leave --scene out, or say it in the program's command line"
                 );
                 return Err(CommandError::BadInput(text));
             }
-            let robot = ProgramRobot::start(command, Limits::default()).map_err(CommandError::broken)?;
-            Ok(Body::new(Arc::new(robot)))
+            if kind == "program" { program::open(at, seed, &[]) } else { program::connect(at) }
         }
         _ => Err(CommandError::BadInput(format!(
-            "--robot {robot}\n  expected: sim, recorded:DIR or program:COMMAND"
+            "--robot {robot}\n  expected: sim, recorded:DIR, program:COMMAND, or socket:HOST:PORT or socket:PATH"
         ))),
     }
 }

@@ -1,10 +1,11 @@
-//! What robotics viewers show of a record beside what was sensed: labelled boxes, the map, how the camera projects, lines of a log. Each is a blob
-//! beside the record whose content it shows.
+//! What robotics viewers show of a record beside what was sensed: labelled boxes, merged clouds, the map, how the camera projects, the plan, lines
+//! of a log. Each is a blob beside the record whose content it shows.
 
+use crate::clouds::{self, Sensing};
 use crate::document::{Blob, Form};
 use crate::foxglove::wire::Wire;
 use crate::foxglove::{LogLevel, log as line};
-use descry_perception::Intrinsics;
+use descry_perception::{Cloud, Intrinsics};
 use nalgebra::{Isometry3, Vector3};
 use serde_json::Value;
 
@@ -41,6 +42,16 @@ fn colour(out: &mut Wire, number: u32, of: &[f64; 4]) {
 /// A line of the log.
 pub fn log(stamp_ns: i64, level: LogLevel, name: &str, message: &str) -> Blob<'static> {
     blob("log", Form::Log, line(stamp_ns, level, name, message))
+}
+
+/// A plan, in the words in which it is shown: a log of its own.
+pub fn plan(stamp_ns: i64, steps: &str) -> Blob<'static> {
+    blob("plan", Form::Log, line(stamp_ns, LogLevel::Info, "plan", steps))
+}
+
+/// A cloud that no sensor gave, in the frame of its document: `merged`, for one.
+pub fn cloud<'a>(name: &str, cloud: &'a Cloud) -> Blob<'a> {
+    Blob { name: name.into(), ..clouds::encode(cloud, &Sensing::default()) }
 }
 
 /// All boxes that there are now, in a frame: those of before are no longer shown.

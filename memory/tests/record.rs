@@ -149,6 +149,11 @@ fn one_of_each(place: &Path) -> Record {
         viewer::grid(5 * S, "map", [-2.5, -1.0], 0.05, 3, &[0, 1, 0, 0, 0, 1]),
     ];
     record.put(Draft { blobs, frame: "map".into(), ..Draft::new("belief", 5 * S) }).unwrap();
+    let merged = Cloud { colours: Some(vec![[9, 8, 7]; 4]), ..cloud(0.25) };
+    let blobs = vec![viewer::cloud("merged", &merged)];
+    record.put(Draft { blobs, frame: "map".into(), ..Draft::new("percepts", 5 * S) }).unwrap();
+    let blobs = vec![viewer::plan(5 * S, "0.000: (move a b) [3.200]\n3.201: (observe b table) [9.000]")];
+    record.put(Draft { blobs, ..Draft::new("event", 5 * S) }).unwrap();
     let camera = Intrinsics { width: 640, height: 480, fx: 525.0, fy: 526.0, cx: 319.5, cy: 239.5 };
     let sensing = Sensing { intrinsics: Some(camera), ..Sensing::default() };
     record.put_cloud(5 * S, "left", &cloud(0.0), &sensing, Meta::default()).unwrap();
@@ -197,12 +202,14 @@ fn segments_are_mcap_to_another_reader() {
     let expected = [
         ("/cloud/camera", "foxglove.PointCloud"),
         ("/cloud/side", "foxglove.PointCloud"),
+        ("/cloud/map/merged", "foxglove.PointCloud"),
         ("/calibration/left", "foxglove.CameraCalibration"),
         ("/document/plan", "descry.Document"),
         ("/grid/map", "foxglove.Grid"),
         ("/image/eye", "foxglove.RawImage"),
         ("/log", "foxglove.Log"),
         ("/objects", "foxglove.SceneUpdate"),
+        ("/plan", "foxglove.Log"),
         ("/tf", "foxglove.FrameTransforms"),
     ];
     for (topic, schema) in expected {
@@ -324,9 +331,15 @@ for path in sorted(glob.glob(sys.argv[1] + "/segments/*.mcap")):
                 assert len(decoded.data) % decoded.point_stride == 0
                 assert [f.name for f in decoded.fields][:3] == ["x", "y", "z"] and decoded.pose.orientation.w == 1
                 clouds[channel.topic] = struct.unpack_from("<3f", decoded.data)
+                if channel.topic == "/cloud/map/merged":
+                    assert decoded.frame_id == "map" and len(decoded.data) == 4 * decoded.point_stride
+                    assert [f.name for f in decoded.fields][3:] == ["red", "green", "blue", "alpha"]
             elif schema.name == "foxglove.FrameTransforms":
                 assert all(t.parent_frame_id and t.child_frame_id for t in decoded.transforms)
                 assert decoded.transforms[0].timestamp.seconds * 10**9 + decoded.transforms[0].timestamp.nanos == message.log_time
+            elif channel.topic == "/plan":
+                assert schema.name == "foxglove.Log" and (decoded.level, decoded.name) == (2, "plan")
+                assert [line.split()[1] for line in decoded.message.splitlines()] == ["(move", "(observe"]
             elif schema.name == "foxglove.Log":
                 assert decoded.level == 3 and "cup A" in decoded.message
             elif schema.name == "foxglove.RawImage":

@@ -1,6 +1,7 @@
 """A robot for descry in Python: subclass `Robot`, call `serve`. Python 3.8 or newer, nothing else.
 
-    python3 my_robot.py                              # speaks over standard input and output: --robot "program:python3 my_robot.py"
+    python3 my_robot.py              # serve(robot): over standard input and output, --robot "program:python3 my_robot.py"
+                                     # serve(robot, "/tmp/robot"): over a socket, --robot socket:/tmp/robot
 
 The protocol is `robots/PROTOCOL.md`. Frames: map (the room, z up), base (x forward), camera (optical: x right, y down, z forward).
 A transform is `{"translation": [x, y, z], "rotation": [x, y, z, w]}`; its name says `parent_from_child`.
@@ -10,6 +11,7 @@ import json
 import math
 import os
 import select
+import socket
 import struct
 import sys
 
@@ -152,11 +154,25 @@ class Wire:
 
 
 def serve(robot, listen=None):
-    """Answers until nobody asks any more: over standard input and output, or to whoever connects to `listen` first.
+    """Answers until nobody asks any more: over standard input and output, or to whoever connects to `listen`, one after the other.
 
-    `listen` is "HOST:PORT", or the path of a Unix socket.
+    `listen` is "HOST:PORT", or the path of a Unix socket; both ends trust each other, so take one that others cannot reach.
     """
-    wire = Wire(*(_accept(listen) if listen else _standard()))
+    if not listen:
+        return _answer(robot, Wire(*_standard()))
+    server = _listen(listen)
+    while True:
+        connection, _ = server.accept()
+        if connection.family != socket.AF_UNIX:
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # a request is a line that is waited for
+        try:
+            _answer(robot, Wire(connection.fileno(), connection.fileno()))
+        except OSError as error:  # who asked is gone; the next one may come
+            print(f"the connection broke: {error}", file=sys.stderr)
+        connection.close()
+
+
+def _answer(robot, wire):
     hello = robot.hello()
     hello, cells = hello if isinstance(hello, tuple) else (hello, b"")
     wire.say({"hello": dict(hello, protocol=PROTOCOL, now_ns=robot.now_ns())}, bytes(cells))
@@ -196,20 +212,20 @@ def _standard():
     return 0, out
 
 
-def _accept(listen):
-    import socket
-
+def _listen(listen):
     host, _, port = listen.rpartition(":")
-    if port.isdigit():
-        server = socket.create_server((host or "127.0.0.1", int(port)))
-    else:
-        server = socket.socket(socket.AF_UNIX)
+    if port.isdigit() and "/" not in listen:
+        return socket.create_server((host or "127.0.0.1", int(port)))
+    server = socket.socket(socket.AF_UNIX)
+    try:
         server.bind(listen)
-        server.listen(1)
-    connection, _ = server.accept()
-    server.close()
-    fd = connection.detach()
-    return fd, fd
+    except OSError:  # what an earlier robot left behind, if nobody answers there
+        if socket.socket(socket.AF_UNIX).connect_ex(listen) == 0:
+            raise
+        os.unlink(listen)
+        server.bind(listen)
+    server.listen()
+    return server
 
 
 def ranges(metres):

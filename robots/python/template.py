@@ -5,6 +5,7 @@ Copy it, and put your driver where its small simulation is. It passes `descry ro
 
 import array
 import math
+import sys
 
 import descry_robot as descry
 
@@ -103,4 +104,4 @@ class Template(descry.Robot):
 
 
 if __name__ == "__main__":
-    descry.serve(Template())
+    descry.serve(Template(), *sys.argv[1:])  # over standard input and output, or over the socket that is named

@@ -10,6 +10,7 @@ pub mod program;
 pub mod recorded;
 pub mod route;
 pub mod sim;
+pub mod truth;
 
 pub use async_trait::async_trait;
 pub use body::{

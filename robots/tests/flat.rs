@@ -3,7 +3,8 @@
 use descry_robots::conformance;
 use descry_robots::nalgebra::{Point2, Point3};
 use descry_robots::sim::world::LABEL_ROOM;
-use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, TrueObject, arrange};
+use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
+use descry_robots::truth::TrueObject;
 use descry_robots::{Failure, Grasp, Place, Placing, Pose2, Robot, Travel, Watch};
 
 const FLAT: &str = r#"

@@ -1,8 +1,9 @@
 //! Programs as bodies: the template conforms; whatever a program does that it must not is a failure with its reason.
 
 use descry_robots::conformance;
+use descry_robots::nalgebra::{Point3, Vector2};
 use descry_robots::program::{Limits, ProgramRobot};
-use descry_robots::{CancellationToken, Failure, Place, Pose2, Robot, Watch};
+use descry_robots::{CancellationToken, Failure, Grasp, Place, Pose2, Push, Robot, Watch};
 use std::path::Path;
 use std::time::Duration;
 
@@ -32,6 +33,103 @@ fn rogue(what: &str) -> String {
 
 fn far() -> Place {
     Place::Pose(Pose2::new(-2.0, 1.5, 1.0))
+}
+
+/// A program that has been started by somebody else.
+struct Elsewhere(std::process::Child);
+
+impl Drop for Elsewhere {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Starts a Python file that listens there, and connects once it does.
+fn reached(
+    file: &str,
+    what: &[&str],
+    address: &str,
+    limits: Limits,
+) -> (Elsewhere, Result<ProgramRobot, Failure>) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+    let started = std::process::Command::new("python3").arg(file).args(what).arg(address).spawn();
+    let program = Elsewhere(started.unwrap());
+    for _ in 0..400 {
+        match ProgramRobot::connect(address, limits) {
+            Err(Failure::Broken { because }) if because.contains("nobody answers there") => {
+                std::thread::sleep(Duration::from_millis(50));
+            }
+            answer => return (program, answer),
+        }
+    }
+    panic!("nobody ever listened on {address}");
+}
+
+fn free_port() -> String {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    listener.local_addr().unwrap().to_string()
+}
+
+#[tokio::test]
+async fn the_template_conforms_over_sockets_to_one_after_the_other() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let unix = folder.path().join("robot").display().to_string();
+    for address in [unix, free_port()] {
+        let (_program, robot) = reached("python/template.py", &[], &address, Limits::default());
+        conformance::check(&robot.unwrap()).await.unwrap();
+        let again = ProgramRobot::connect(&address, Limits::default()).unwrap();
+        assert!(again.now_ns() > 0, "it is the same body, and its clock has gone on");
+        again.pose().await.unwrap();
+    }
+}
+
+#[test]
+fn where_nobody_listens_the_reason_says_so() {
+    let check = |address: &str, words: &str| {
+        let failure = ProgramRobot::connect(address, HURRIED).map(|_| ()).unwrap_err();
+        assert!(failure.kind() == "broken" && failure.because().contains(words), "{address}: {failure}");
+    };
+    check("/nowhere/robot", "nobody answers there");
+    check(&free_port(), "start the robot first");
+    check("robot", "expected HOST:PORT");
+}
+
+/// The same over a socket as over pipes, but that nothing is known of how a program ended.
+#[tokio::test]
+async fn a_rogue_program_on_a_socket_is_a_failure_with_its_reason() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for (at, (what, kind, words)) in [
+        ("hangs", "broken", "it was told to stop drive_to and did not within 1 s"),
+        ("silent", "timed_out", "nothing was heard of drive_to for 2 s"),
+        ("dies", "broken", "it has closed the connection"),
+        ("endless line", "broken", "a line has more than 4194304 bytes"),
+        ("endless feedback", "broken", "501 messages of feedback"),
+        ("huge frame", "broken", "announced 1099511627776 bytes"),
+        ("clock goes back", "broken", "its clock went from"),
+        ("another request", "broken", "answered request 6 while 1 was open"),
+        ("no rotation", "broken", "a transform with the quaternion"),
+        ("short frame", "broken", "a frame of 6142 bytes, expected 6144"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let address = folder.path().join(at.to_string()).display().to_string();
+        let (_program, robot) = reached("tests/programs/rogue.py", &[what], &address, HURRIED);
+        check_rogue_body(&robot.unwrap(), what, kind, &[words]).await;
+    }
+    let address = folder.path().join("mute");
+    let mute = std::os::unix::net::UnixListener::bind(&address).unwrap();
+    let limits = Limits { hello_s: 0.3, ..HURRIED };
+    let failure = ProgramRobot::connect(&address.display().to_string(), limits).map(|_| ()).unwrap_err();
+    assert!(failure.because().contains("no hello came within 0.3 s"), "{failure}");
+    drop(mute);
 }
 
 #[tokio::test]
@@ -70,12 +168,16 @@ fn what_is_no_robot_is_refused_with_the_reason() {
     check_refused("laser beyond a turn", &["laser: 1000 readings", "a full turn at most"]);
     check_refused("two tables of one name", &["two surfaces are called \"table\""]);
     check_refused("short map", &["9999 bytes follow the hello", "10000 cells"]);
+    check_refused("two cameras", &["camera.base_from_camera", "there is a head"]);
     check_refused("no map", &["neither a map nor stations"]);
 }
 
 /// What a program does when it is asked; the kind of failure that comes of it, and what the reason says.
 async fn check_rogue(what: &str, kind: &str, words: &[&str]) {
-    let robot = ProgramRobot::start(&rogue(what), HURRIED).unwrap();
+    check_rogue_body(&ProgramRobot::start(&rogue(what), HURRIED).unwrap(), what, kind, words).await;
+}
+
+async fn check_rogue_body(robot: &ProgramRobot, what: &str, kind: &str, words: &[&str]) {
     let watch = Watch { time_limit_s: 1.0, ..Watch::default() };
     let mut failure = robot.pose().await.err();
     if failure.is_none() {
@@ -134,6 +236,33 @@ async fn a_rogue_program_is_a_failure_with_its_reason() {
     check_rogue("frame of tomorrow", "broken", &["a frame of"]).await;
     check_rogue("short sweep", "broken", &["a sweep of 716 bytes, expected 720"]).await;
     check_rogue("sweep of yesterday", "broken", &["a sweep of -1 ns"]).await;
+}
+
+/// What a body does not have is refused with the reason, and its program never hears of it.
+#[tokio::test]
+async fn a_body_without_head_arm_and_laser_conforms_and_says_what_it_lacks() {
+    if !has_python() {
+        return;
+    }
+    let robot = ProgramRobot::start(&rogue("bare"), HURRIED).unwrap();
+    conformance::check(&robot).await.unwrap();
+    let watch = Watch::default();
+    let lacks = |failure: Failure, part: &str| {
+        assert_eq!(failure, Failure::Unable { because: format!("template has no {part}") });
+    };
+    lacks(robot.scan(&watch).await.unwrap_err(), "laser");
+    let push = Push { object: Point3::origin(), direction: Vector2::x(), distance_m: 0.1 };
+    lacks(robot.push_aside(&push, &watch).await.unwrap_err(), "arm");
+    let grasp = Grasp { object: Point3::origin(), width_m: 0.05 };
+    lacks(robot.grasp(&grasp, &watch).await.unwrap_err(), "hand");
+    lacks(robot.hand().await.unwrap_err(), "hand");
+    // It looks 0.4 rad down and 0.1 rad to the left of where the base faces, whatever it is told.
+    let here = robot.pose().await.unwrap().map_from_base;
+    let ahead = here * Point3::new(3.0 * 0.1_f64.cos(), 3.0 * 0.1_f64.sin(), 1.4 - 3.0 * 0.4_f64.tan());
+    let looked = robot.look_at(&ahead, &watch).await.unwrap();
+    assert!(looked.miss_rad < 1e-6 && looked.duration_s == 0.0, "{looked:?}");
+    let behind = here * Point3::new(-1.0, 0.0, 1.4);
+    assert!(robot.look_at(&behind, &watch).await.unwrap().miss_rad > 2.0);
 }
 
 /// What a program may do: it answers, and what is asked next is answered too.

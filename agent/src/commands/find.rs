@@ -50,7 +50,7 @@ pub struct With {
     #[arg(long)]
     scene: Option<String>,
     /// The body: sim; recorded:DIR for a folder of depth frames or of an earlier run (also recorded:mongodb://HOST/DATABASE#RUN);
-    /// or program:COMMAND for a program that is a robot
+    /// program:COMMAND for a program that is a robot; socket:HOST:PORT or socket:PATH for one that runs already
     #[arg(long, default_value = "sim")]
     robot: String,
     /// Fixes the arrangement, the noise and every choice

@@ -18,7 +18,7 @@ pub enum Arguments {
 /// Arguments of `descry robot check`.
 #[derive(clap::Args)]
 pub struct CheckArguments {
-    /// The body: sim, recorded:DIR, or program:COMMAND
+    /// The body: sim, recorded:DIR, program:COMMAND, or socket:HOST:PORT or socket:PATH
     robot: String,
     /// Print the result as one JSON object
     #[arg(long)]

@@ -127,13 +127,14 @@ pub fn on_record(
 /// [`CommandError::BadInput`] names them, unless it is `allowed` or there are none.
 pub fn check_allowed(domain: &Domain, robot: &str, place: &str, allowed: bool) -> Result<(), CommandError> {
     let one = |(name, command): &(&str, &[String])| format!("\n    {name}: {}", command.join(" "));
-    let body = robot.strip_prefix("program:").map(|command| format!("\n    the body: {command}"));
+    let elsewhere = robot.split_once(':').filter(|(kind, _)| ["program", "socket"].contains(kind));
+    let body = elsewhere.map(|(_, at)| format!("\n    the body: {at}"));
     let all: String = body.into_iter().chain(domain.programs().iter().map(one)).collect();
     if allowed || all.is_empty() {
         return Ok(());
     }
     let text = format!(
-        "{place}: its record names programs that would be run here:{all}\n  allow that with --allow-programs, if you trust them"
+        "{place}: its record names programs that would be run or spoken with:{all}\n  allow that with --allow-programs, if you trust them"
     );
     Err(CommandError::BadInput(text))
 }

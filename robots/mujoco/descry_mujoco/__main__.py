@@ -27,7 +27,7 @@ def pose_error(text: str) -> tuple[float, float]:
 
 
 def arguments() -> argparse.Namespace:
-    from .scenes import SCENES
+    from .stage import SCENES
 
     parser = argparse.ArgumentParser(prog="descry_mujoco", description="A simulated room on MuJoCo, for descry.")
     commands = parser.add_subparsers(dest="command", required=True)
@@ -39,8 +39,11 @@ def arguments() -> argparse.Namespace:
     serve.add_argument("--pose-error", type=pose_error, default=(0.03, 2.0), metavar="METRES,DEGREES", help="standard deviations of localisation")
     serve.add_argument("--truth", type=Path, help="write there how everything really stands, for reports")
     serve.add_argument("--listen", metavar="HOST:PORT", help="wait for who connects, instead of standard input and output")
+    serve.add_argument("--without", default="", metavar="KINDS", help="kinds of things that are taken away first, with commas between")
     for command in (record, serve):
-        command.add_argument("--scene", choices=sorted(SCENES), default="search")
+        # A recording goes round tables that stand together.
+        known = sorted(name for name in SCENES if command is serve or name != "home")
+        command.add_argument("--scene", choices=known, default="search")
         command.add_argument("--seed", type=int, default=1)
         command.add_argument("--holes", type=share, default=0.002, help="share of pixels without a return, 0 to 0.1; more on steep sides")
         command.add_argument("--noise", type=float, default=1.0, help="factor on the errors of disparity")
@@ -65,6 +68,7 @@ def serve(given: argparse.Namespace) -> None:
 
     scene = stage.arrange(given.scene, given.seed)
     scene.start = stage.start_pose(scene)
+    scene = scene.without(given.without.split(","))
     metres, degrees = given.pose_error
     settings = body.Settings(given.seed, metres, math.radians(degrees), given.holes, given.noise, given.truth)
     descry_robot.serve(body.Body(scene, settings), given.listen)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ import descry_robot as descry
 import mujoco
 import numpy as np
 
-from . import machine, recording
+from . import machine, recording, truth
 from .hand import Hand
 from .localisation import Localisation, Pose, apply, turn
 from .noise import DepthNoise
@@ -23,12 +22,14 @@ LINEAR_M_S, ANGULAR_RAD_S, HEAD_RAD_S, REACH_M, OPENING_M = 0.4, 0.8, 1.0, 1.6, 
 # How quickly the base gains speed and brakes.
 GAIN_M_S2, GAIN_RAD_S2 = 4.0, 10.0
 HEAD = {"base_from_head": [0.0, 0.0, machine.HEAD_HEIGHT_M], "pan_limit_rad": 2.6, "tilt_down_rad": 1.2, "tilt_up_rad": 0.8}
-CELL_M, CLEARANCE_M = 0.05, 0.05
+CELL_M, CLEARANCE_M = 0.05, 0.1
 FRAME_S = 0.1
 # Between two commands to the motors; and how long a base may stand still before it counts as blocked.
 TICK_S, STUCK_S = 0.02, 1.5
 # The base is still this long after it was told to stand.
 HALT_S = 0.1
+# How far from the middle of a door the base stands at most to open it, and how fast the leaf goes.
+DOOR_REACH_M, DOOR_M_S = 1.2, 0.3
 # A point of the route that is nearer than this is not driven to.
 NEAR_M = 0.02
 
@@ -56,6 +57,9 @@ class Body(descry.Robot):
         self.gaze, self.frames = (0.0, 0.0), 0
         self.arm = Hand(self.stage, self.run)
         machine.place(self.model, self.data, scene.start)
+        for door in scene.doors:
+            self._slide(door.name, 0.0 if door.shut else door.width_m)
+            self.data.joint(door.name).qpos[0] = 0.0 if door.shut else door.width_m
         self.run(0.6)
         # What has settled is where the clock begins.
         self.data.time = 0.0
@@ -82,21 +86,25 @@ class Body(descry.Robot):
             },
             "head": HEAD, "arm": {"reach_m": REACH_M, "hand_opening_m": OPENING_M},
             "map": {"resolution_m": CELL_M, "origin_m": origin, "width": width, "height": height},
-            "surfaces": [{"name": t.name, "outline_m": t.outline_m(), "height_m": t.height_m} for t in self.scene.tables],
+            "surfaces": [{"name": t.name, "outline_m": t.outline_m(), "height_m": t.height_m, "room": t.room} for t in self.scene.tables],
+            "rooms": [{"name": r.name, "outline_m": r.outline_m()} for r in self.scene.rooms],
+            "doors": [
+                {"name": d.name, "centre_m": d.centre_m, "along_rad": d.along_rad, "width_m": d.width_m, "between": d.between}
+                for d in self.scene.doors
+            ],
         }, self._cells(width, height, origin)
 
     def _cells(self, width: int, height: int, origin: list[float]) -> bytes:
-        """The floor under tables is occupied; the walls are the edge of the map."""
+        """The floor under tables is occupied, and what is no room's floor and no door's."""
         x = origin[0] + (np.arange(width) + 0.5) * CELL_M
         y = origin[1] + (np.arange(height) + 0.5) * CELL_M
         x, y = np.meshgrid(x, y)
-        occupied = (np.abs(x) > 0.5 * self.scene.room_m[0]) | (np.abs(y) > 0.5 * self.scene.room_m[1])
+        inside = (np.abs(x) <= 0.5 * self.scene.room_m[0]) & (np.abs(y) <= 0.5 * self.scene.room_m[1])
+        floors = [part.holds(x, y) for part in [*self.scene.rooms, *self.scene.doors]]
+        free = np.logical_or.reduce(floors) & inside if floors else inside
         for table in self.scene.tables:
-            c, s = math.cos(table.yaw_rad), math.sin(table.yaw_rad)
-            dx, dy = x - table.position_m[0], y - table.position_m[1]
-            a, b = np.abs(c * dx + s * dy), np.abs(c * dy - s * dx)
-            occupied |= (a <= 0.5 * table.size_m[0]) & (b <= 0.5 * table.size_m[1])
-        return occupied.astype(np.uint8).tobytes()
+            free &= ~table.has_below(x, y)
+        return (~free).astype(np.uint8).tobytes()
 
     # Where it is.
 
@@ -122,8 +130,7 @@ class Body(descry.Robot):
     def tell_truth(self) -> None:
         """For reports: what no answer of the body says."""
         if self.settings.truth is not None:
-            truth = {"now_ns": self.now_ns(), "target": self.scene.target, "base": self.truth(), "objects": recording.objects(self.stage)}
-            self.settings.truth.write_text(json.dumps(truth) + "\n")
+            truth.tell(self.settings.truth, self.stage, self.now_ns(), self.truth(), self.arm.held)
 
     # The base.
 
@@ -150,6 +157,14 @@ class Body(descry.Robot):
         self.localisation.share = 1.0
         self._halt()
         return {"distance_m": trip.driven_m, "map_from_base": descry.planar(*self.stands)}
+
+    def blocked(self) -> descry.Failure:
+        """What the base says that does not come on."""
+        doors = self.arm.felt(machine.BASE) & {d.name for d in self.scene.doors}
+        if doors:
+            name = doors.pop()
+            return descry.Failure("blocked", f"the {name} is shut", by=name)
+        return descry.Failure("blocked", "the base pushes against something and does not move")
 
     def _go_straight(self, trip: Trip, point: np.ndarray) -> None:
         x, y, yaw = self.believed()
@@ -220,7 +235,32 @@ class Body(descry.Robot):
         self._reach(object)
         to_truth = self.localisation.truth_from_map(self.truth())
         way = apply((0.0, 0.0, to_truth[2]), np.array([*direction, 0.0]))
-        return {"moved_m": self.arm.push(request, apply(to_truth, np.array(object)), way / np.linalg.norm(way), distance_m)}
+        moved_m = self.arm.push(request, apply(to_truth, np.array(object)), way / np.linalg.norm(way), distance_m)
+        self.tell_truth()
+        return {"moved_m": moved_m}
+
+    def open_door(self, request, door):
+        way = next((d for d in self.scene.doors if d.name == door), None)
+        if way is None:
+            raise descry.Failure("unreachable", f"there is no {door}")
+        away = math.dist(self.stands[:2], way.centre_m)
+        if away > DOOR_REACH_M:
+            raise descry.Failure("unreachable", f"the {door} is {away:.2f} m away, and it is opened from {DOOR_REACH_M:.2f} m")
+        start = float(self.data.joint(door).qpos[0])
+        ticks = max(1, math.ceil(way.width_m / (DOOR_M_S * TICK_S)))
+        for k in range(1, ticks + 1):
+            self._slide(door, start + (way.width_m - start) * k / ticks)
+            self.run(TICK_S)
+            request.feedback(k / ticks)
+        self.run(1.0)
+        if truth.is_shut(self.stage, door):
+            raise descry.Failure("slipped", f"the {door} is jammed", moved_m=0.0)
+        self.tell_truth()
+        return {}
+
+    def _slide(self, door: str, at_m: float) -> None:
+        """Where the leaf of a door is to be: 0 is shut."""
+        self.data.actuator(door).ctrl[0] = at_m
 
     def grasp(self, request, object, width_m):
         if self.arm.held is not None:
@@ -229,13 +269,16 @@ class Body(descry.Robot):
             raise descry.Failure("unable", f"it is {width_m:.3f} m wide and the hand opens {OPENING_M:.3f} m")
         self._reach(object)
         at = apply(self.localisation.truth_from_map(self.truth()), np.array(object))
-        return {"width_m": self.arm.grasp(request, at, OPENING_M)}
+        held_m = self.arm.grasp(request, at, OPENING_M)
+        self.tell_truth()
+        return {"width_m": held_m}
 
     def place(self, request, foot):
         if self.arm.held is None:
             raise descry.Failure("unable", "the hand is empty")
         self._reach(foot)
         self.arm.place(request, apply(self.localisation.truth_from_map(self.truth()), np.array(foot)))
+        self.tell_truth()
         return {}
 
     def hand(self, request):
@@ -273,7 +316,7 @@ class Trip:
         done = moved + 0.3 * abs(turn(before[2], after[2]))
         self._stuck_s = self._stuck_s + TICK_S if done < 0.2 * wanted else 0.0
         if self._stuck_s > STUCK_S:
-            raise descry.Failure("blocked", "the base pushes against something and does not move")
+            raise body.blocked()
         self._ticks += 1
         if self._ticks % 10 == 0:
             self.request.feedback(0.99 * body.localisation.share, self.driven_m)

@@ -23,8 +23,8 @@ SLIPPED_SHARE = 0.5
 ABOVE_M, ASIDE_M = 0.45, 0.03
 # What stops higher than this above where it was to stand, stands on something else.
 STANDS_M = 0.02
-# Where what is held is carried: in the base's frame, beside what the camera sees.
-CARRIED_M = (0.0, -0.3, 1.0)
+# Where what is held is carried: in the base's frame, beside what the camera sees and above the base.
+CARRIED_M = (0.0, -0.2, 1.0)
 
 
 class Hand:
@@ -57,7 +57,7 @@ class Hand:
         self._put(np.array(machine.PARKED_M), 0.0)
         self._run(0.5)
 
-    def _felt(self, body: str = machine.HAND) -> set[str]:
+    def felt(self, body: str = machine.HAND) -> set[str]:
         """The bodies that a body touches; the room is "world"."""
         number, felt = self.model.body(body).id, set()
         for contact in self.data.contact[: self.data.ncon]:
@@ -93,7 +93,7 @@ class Hand:
                 gone += step
                 self._put(start + gone * way, self._yaw)
                 self._run(TICK_S)
-                moved += step if self._felt() else 0.0
+                moved += step if self.felt() else 0.0
                 request.feedback(min(moved / distance_m, 1.0))
         finally:
             self._park()
@@ -110,7 +110,7 @@ class Hand:
             start = np.array([*(at - behind * way)[:2], height])
             self._put(start, math.atan2(way[1], way[0]))
             mujoco.mj_forward(self.model, self.data)
-            if not self._felt():
+            if not self.felt():
                 return start
         self._put(np.array(machine.PARKED_M), 0.0)
         mujoco.mj_forward(self.model, self.data)
@@ -121,7 +121,7 @@ class Hand:
         self._put(at + [0.0, 0.0, ABOVE_M], 0.0)
         self._busy = True
         try:
-            self._move(request, at, PUSH_M_S, until=self._felt)
+            self._move(request, at, PUSH_M_S, until=self.felt)
             thing = self._under(at, opening_m)
             self._hold(thing.name)
             self._move(request, self._at + [0.0, 0.0, ABOVE_M], PUSH_M_S)
@@ -134,7 +134,7 @@ class Hand:
     def _under(self, at: np.ndarray, opening_m: float):
         """The thing that the hand has come down on."""
         things = {p.thing.name: p.thing for p in self.scene.placed}
-        felt = self._felt() & set(things)
+        felt = self.felt() & set(things)
         if len(felt) != 1:
             because = "the hand closed on nothing" if not felt else f"{len(felt)} things are in its way"
             raise descry.Failure("slipped", because, moved_m=0.0)
@@ -167,7 +167,7 @@ class Hand:
             self._move(request, np.array([*self._at[:2], height]), MOVE_M_S)
             self._move(request, np.array([*over[:2], height]), MOVE_M_S)
             down = over - [0.0, 0.0, ABOVE_M - 0.001]
-            arrived = self._move(request, down, PUSH_M_S, until=lambda: bool(self._felt(held) - {machine.HAND}))
+            arrived = self._move(request, down, PUSH_M_S, until=lambda: bool(self.felt(held) - {machine.HAND}))
             if not arrived and self.data.body(held).xpos[2] - foot[2] > STANDS_M:
                 self._move(request, self._at + [0.0, 0.0, ABOVE_M], MOVE_M_S)
                 raise descry.Failure("blocked", "something stands there")

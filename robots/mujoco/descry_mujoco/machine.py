@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from .scenes import Scene
-from .world import FELT, yaw_quat
+from .world import FELT, padded, yaw_quat
 
 RADIUS_M, HEAD_HEIGHT_M = 0.25, 1.4
 HEAD_CAMERA, HAND, BASE = "head camera", "hand", "base"
@@ -26,8 +26,8 @@ def add(spec: mujoco.MjSpec, scene: Scene, width: int, height: int, focal_px: fl
         base.add_joint(name=name, type=kind, axis=axis, ref=0.0, damping=1.0)
         gain = 4000.0 if kind == slide else 400.0
         spec.add_actuator(
-            name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, gainprm=_padded(gain), biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-            biasprm=_padded(0.0, 0.0, -gain), forcelimited=True, forcerange=[-600.0, 600.0],
+            name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, gainprm=padded(gain), biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            biasprm=padded(0.0, 0.0, -gain), forcelimited=True, forcerange=[-600.0, 600.0],
         )
     # A little above the floor, so that it does not rub.
     base.add_geom(type=cylinder, size=[RADIUS_M, 0.15, 0], pos=[0, 0, 0.17], mass=40.0, group=FELT, rgba=[0.2, 0.2, 0.25, 1])
@@ -38,8 +38,8 @@ def add(spec: mujoco.MjSpec, scene: Scene, width: int, height: int, focal_px: fl
         body.add_joint(name=name, type=hinge, axis=axis, damping=6.0)
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0, 0], mass=0.5, group=FELT, contype=0, conaffinity=0)
         spec.add_actuator(
-            name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, gainprm=_padded(60.0), biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-            biasprm=_padded(0.0, -60.0, -1.0),
+            name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, gainprm=padded(60.0), biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            biasprm=padded(0.0, -60.0, -1.0),
         )
     # A camera looks along its -z with y up: along the base's x when the head is level.
     tilt.add_camera(name=HEAD_CAMERA, fovy=float(np.degrees(2.0 * np.arctan(0.5 * height / focal_px))), quat=[0.5, 0.5, -0.5, -0.5])
@@ -51,10 +51,6 @@ def add(spec: mujoco.MjSpec, scene: Scene, width: int, height: int, focal_px: fl
             name1=HAND, name2=placed.thing.name, active=False,
         )
         weld.solref = [0.01, 1.0]
-
-
-def _padded(*numbers: float) -> list[float]:
-    return [*numbers, *[0.0] * (10 - len(numbers))]
 
 
 def place(model: mujoco.MjModel, data: mujoco.MjData, pose: tuple[float, float, float]) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Callable
 
 import numpy as np
 
@@ -28,6 +29,8 @@ class Table:
     # Four legs; a closed body below the top (a sideboard) if zero.
     leg_m: float = 0.05
     colour: tuple[float, float, float] = (0.6, 0.45, 0.3)
+    # The room that it stands in, where rooms have names.
+    room: str | None = None
 
     def to_map(self, x: float, y: float) -> tuple[float, float]:
         c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
@@ -39,6 +42,49 @@ class Table:
 
     def centre_m(self) -> np.ndarray:
         return np.array([*self.position_m, self.height_m])
+
+    def has_below(self, x, y):
+        """Whether its top is above (or below) a point of the map, or each of an array of them."""
+        c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        dx, dy = x - self.position_m[0], y - self.position_m[1]
+        return (abs(c * dx + s * dy) <= 0.5 * self.size_m[0]) & (abs(c * dy - s * dx) <= 0.5 * self.size_m[1])
+
+
+@dataclass
+class Room:
+    """A floor between walls, its sides along the map's axes. Metres."""
+
+    name: str
+    centre_m: tuple[float, float]
+    size_m: tuple[float, float]
+
+    def outline_m(self) -> list[tuple[float, float]]:
+        (x, y), (a, b) = self.centre_m, (0.5 * side for side in self.size_m)
+        return [(x + i * a, y + j * b) for i, j in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+
+    def holds(self, x, y):
+        """Whether a point of the map, or each of an array of them, is in it."""
+        return (abs(x - self.centre_m[0]) <= 0.5 * self.size_m[0]) & (abs(y - self.centre_m[1]) <= 0.5 * self.size_m[1])
+
+
+@dataclass
+class Doorway:
+    """An opening in the wall between two rooms, with a leaf that slides along the wall. Metres."""
+
+    name: str
+    centre_m: tuple[float, float]
+    # Along the wall, anticlockwise from the map's x.
+    along_rad: float
+    width_m: float
+    wall_m: float
+    between: tuple[str, str]
+    shut: bool
+
+    def holds(self, x, y):
+        """Whether a point of the map, or each of an array of them, is in the opening."""
+        c, s = math.cos(self.along_rad), math.sin(self.along_rad)
+        dx, dy = x - self.centre_m[0], y - self.centre_m[1]
+        return (abs(c * dx + s * dy) <= 0.5 * self.width_m) & (abs(c * dy - s * dx) <= 0.5 * self.wall_m + 0.01)
 
 
 @dataclass
@@ -71,6 +117,13 @@ class Scene:
     # Shares of the target that the view shows which hides it most, and the view that hides it least.
     target_from_start: tuple[float, float] = (0.0, 1.0)
     target_from_best: tuple[float, float] = (0.0, 1.0)
+    # Rooms with names, and doors between them; none in a single room.
+    rooms: list[Room] = field(default_factory=list)
+    doors: list[Doorway] = field(default_factory=list)
+
+    def without(self, kinds: list[str]) -> "Scene":
+        """The same with all of some kinds taken away; the others stand where they stood."""
+        return replace(self, placed=[p for p in self.placed if p.thing.kind not in kinds])
 
     def table(self, name: str) -> Table:
         return next(t for t in self.tables if t.name == name)
@@ -110,20 +163,21 @@ class Arranger:
         return all(gap_m(outline, at, p.thing.outline(), (p.x_m, p.y_m, p.yaw_rad)) >= gap for p in others)
 
 
-def _wood(rng: np.random.Generator) -> tuple[float, float, float]:
+def wood(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Some colour between light and dark."""
     tone = rng.uniform(0.25, 0.9)
     return tone, tone * rng.uniform(0.7, 1.0), tone * rng.uniform(0.5, 1.0)
 
 
 def _room(name: str, seed: int, rng: np.random.Generator, tables: list[Table]) -> Scene:
     room = (float(rng.uniform(5.4, 6.6)), float(rng.uniform(5.0, 6.0)))
-    return Scene(name, seed, room, tables, floor_colour=_wood(rng), wall_colour=_wood(rng))
+    return Scene(name, seed, room, tables, floor_colour=wood(rng), wall_colour=wood(rng))
 
 
 def _table(rng: np.random.Generator, **given) -> Table:
     usual = dict(
         name="table", size_m=(float(rng.uniform(1.3, 1.7)), float(rng.uniform(0.75, 0.95))), height_m=float(rng.uniform(0.70, 0.76)),
-        yaw_rad=float(rng.uniform(-0.4, 0.4)), leg_m=float(rng.uniform(0.04, 0.07)), top_m=float(rng.uniform(0.02, 0.04)), colour=_wood(rng),
+        yaw_rad=float(rng.uniform(-0.4, 0.4)), leg_m=float(rng.uniform(0.04, 0.07)), top_m=float(rng.uniform(0.02, 0.04)), colour=wood(rng),
     )
     return Table(**{**usual, **given})
 
@@ -200,12 +254,19 @@ def search(seed: int, rng: np.random.Generator) -> Scene:
     return scene
 
 
-SCENES = {"floor": floor, "two-tables": two_tables, "absent": absent, "present": present, "search": search}
+def four_cups(seed: int, rng: np.random.Generator) -> Scene:
+    """Two of each known cup, a mug, a white cylinder and boxes that hide them, and one or two things of other shapes."""
+    scene = _room("four-cups", seed, rng, [_table(rng, size_m=(1.6, 0.8), yaw_rad=0.0)])
+    make, put = Maker(rng), Arranger(scene, rng)
+    things = [make.cup_a(), make.cup_a(), make.cup_b(), make.cup_b(), make.white_cylinder(), make.mug(), make.tall_box(), make.small_box()]
+    things += [make.any_of("bottle canister bowl") for _ in range(int(rng.integers(1, 3)))]
+    for thing in sorted(things, key=lambda t: -t.radius_m):
+        put.put(thing, scene.tables[0], (1.5, 0.7))
+    return scene
 
 
-def arrange(name: str, seed: int, suits=lambda scene: True) -> Scene:
+def arrange(make: Callable[[int, np.random.Generator], Scene], seed: int, suits=lambda scene: True) -> Scene:
     """The first arrangement of a seed that has room for everything and `suits`."""
-    make = SCENES[name]
     for attempt in range(ROUNDS):
         rng = np.random.default_rng([seed, attempt, 1])
         try:
@@ -214,7 +275,7 @@ def arrange(name: str, seed: int, suits=lambda scene: True) -> Scene:
             continue
         if suits(scene):
             return scene
-    raise SystemExit(f"scene {name}, seed {seed}: none of {ROUNDS} arrangements suits; take another seed")
+    raise SystemExit(f"seed {seed}: none of {ROUNDS} arrangements of {make.__name__} suits; take another seed")
 
 
 def ring(scene: Scene, count: int, rng: np.random.Generator) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -5,10 +5,14 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from . import machine, noise, scenes, world
+from . import home, machine, noise, scenes, world
 from .camera import FOCAL_PX, HEIGHT, WIDTH, Camera, Frame, aim_eye
 from .scenes import Scene
 
+SCENES = {
+    "floor": scenes.floor, "two-tables": scenes.two_tables, "absent": scenes.absent, "present": scenes.present,
+    "search": scenes.search, "four-cups": scenes.four_cups, "home": home.home,
+}
 # Visibility is measured on small images.
 SHARE_SCALE = 4
 RING_VIEWS = 12
@@ -92,11 +96,13 @@ def target_shares(stage: Stage, views: list[np.ndarray]) -> list[float]:
 
 def hides_its_target(scene: Scene, views: list[np.ndarray]) -> bool:
     """Whether some view hides the target as far as asked for, and the best one shows as much of it as asked for."""
+    (low, high), (least, most) = scene.target_from_start, scene.target_from_best
+    if (low, high) == (least, most) == (0.0, 1.0):
+        return True
     with small_stage(scene) as stage:
         shares = target_shares(stage, views)
     if not shares:
         return True
-    (low, high), (least, most) = scene.target_from_start, scene.target_from_best
     return low <= min(shares) <= high and least <= max(shares) <= most
 
 
@@ -115,11 +121,13 @@ def ring_poses(scene: Scene, count: int, seed: int) -> list[np.ndarray]:
 
 def arrange(name: str, seed: int, views: int = RING_VIEWS) -> Scene:
     """The scene of a seed, its target hidden as it asks for from views all round."""
-    return scenes.arrange(name, seed, lambda scene: hides_its_target(scene, ring_poses(scene, views, seed)))
+    return scenes.arrange(SCENES[name], seed, lambda scene: hides_its_target(scene, ring_poses(scene, views, seed)))
 
 
 def start_pose(scene: Scene) -> tuple[float, float, float]:
-    """Where a base may stand and sees least of the target: on a ring round the tables, facing them."""
+    """Where the base starts among rooms; in one room where it may stand and sees least of the target: on a ring round the tables."""
+    if scene.rooms:
+        return scene.start
     middle = np.mean([t.centre_m() for t in scene.tables], axis=0)
     reach = max(float(np.linalg.norm(np.array(c) - middle[:2])) for t in scene.tables for c in t.outline_m()) + START_GAP_M
     poses, views = [], []

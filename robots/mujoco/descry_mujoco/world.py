@@ -7,7 +7,7 @@ import math
 import mujoco
 import numpy as np
 
-from .scenes import Placed, Scene, Table
+from .scenes import Doorway, Placed, Scene, Table
 from .things import HANDLED
 
 # Groups of geoms: what is drawn, and what only collides.
@@ -15,6 +15,8 @@ SEEN, FELT = 0, 3
 # Planes between which depth is drawn, metres; beyond the far one nothing is seen.
 NEAR_M, FAR_M = 0.1, 12.0
 WALL_HEIGHT_M, WALL_M = 2.5, 0.1
+# The leaf of a door: its height, its thickness, and how far it hangs from wall and floor, metres.
+LEAF_M, LEAF_THICK_M, LEAF_GAP_M = 2.0, 0.04, 0.01
 EYE = "eye"
 
 
@@ -40,6 +42,8 @@ def specification(scene: Scene, width: int, height: int, focal_px: float) -> muj
     world = spec.worldbody
     world.add_light(pos=[0.7, -1.2, 2.4], dir=[-0.3, 0.5, -0.9], diffuse=[0.4] * 3, castshadow=False)
     _add_room(world, scene)
+    for door in scene.doors:
+        _add_wall_with_door(spec, scene, door)
     for table in scene.tables:
         _add_table(world, table)
     for placed in scene.placed:
@@ -61,6 +65,35 @@ def _add_room(world, scene: Scene) -> None:
             name=f"wall {k}", type=box, size=[*size, 0.5 * WALL_HEIGHT_M], pos=[*at, 0.5 * WALL_HEIGHT_M],
             rgba=[*scene.wall_colour, 1], group=SEEN,
         )
+
+
+def _add_wall_with_door(spec: mujoco.MjSpec, scene: Scene, door: Doorway) -> None:
+    """The wall from one side of the house to the other, what is above the opening, and the leaf that slides along the wall."""
+    box, (x, y), half_wall, half_door = mujoco.mjtGeom.mjGEOM_BOX, door.centre_m, 0.5 * door.wall_m, 0.5 * door.width_m
+    frame = spec.worldbody.add_body(name=f"wall of {door.name}", pos=[x, y, 0.0], quat=yaw_quat(door.along_rad))
+    rgba = [*scene.wall_colour, 1]
+    # Along the wall; it runs along y.
+    ends = (-0.5 * scene.room_m[1] - y, 0.5 * scene.room_m[1] - y)
+    for low, high in ((ends[0], -half_door), (half_door, ends[1])):
+        size = [0.5 * (high - low), half_wall, 0.5 * WALL_HEIGHT_M]
+        frame.add_geom(type=box, size=size, pos=[0.5 * (low + high), 0, 0.5 * WALL_HEIGHT_M], rgba=rgba, group=SEEN)
+    above = 0.5 * (WALL_HEIGHT_M - LEAF_M)
+    frame.add_geom(type=box, size=[half_door, half_wall, above], pos=[0, 0, WALL_HEIGHT_M - above], rgba=rgba, group=SEEN)
+    aside = -(half_wall + LEAF_GAP_M + 0.5 * LEAF_THICK_M)
+    leaf = frame.add_body(name=door.name, pos=[0.0, aside, LEAF_GAP_M])
+    leaf.add_joint(name=door.name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1, 0, 0], damping=20.0)
+    half = [half_door + 0.02, 0.5 * LEAF_THICK_M, 0.5 * LEAF_M]
+    leaf.add_geom(type=box, size=half, pos=[0, 0, half[2]], mass=20.0, rgba=[*(0.8 * c for c in scene.wall_colour), 1], group=SEEN)
+    gain = 2000.0
+    spec.add_actuator(
+        name=door.name, target=door.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, gainprm=padded(gain),
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE, biasprm=padded(0.0, -gain, -400.0),
+    )
+
+
+def padded(*numbers: float) -> list[float]:
+    """The ten parameters of an actuator, zero from where they are not given."""
+    return [*numbers, *[0.0] * (10 - len(numbers))]
 
 
 def _add_table(world, table: Table) -> None:

@@ -1,14 +1,17 @@
 """What the body does in its room."""
 
+import json
 import math
+import tempfile
 import unittest
+from pathlib import Path
 
 from installed import MISSING, needs_mujoco
 
 if not MISSING:
     import descry_robot as descry
     import numpy as np
-    from descry_mujoco import body, scenes
+    from descry_mujoco import body, stage
 
 
 class Asked:
@@ -28,12 +31,24 @@ class Asked:
 
 
 def body_in(scene_name, seed, start=(1.5, 0.5, math.pi), **settings):
-    scene = scenes.arrange(scene_name, seed)
+    scene = stage.arrange(scene_name, seed)
     scene.start = start
     return body.Body(scene, body.Settings(seed, **settings))
 
 
 EXACT = dict(sigma_m=0.0, sigma_rad=0.0)
+
+
+def body_in_home(shut, start_at=None, **settings):
+    """Before the door, or within reach of a thing."""
+    scene = stage.arrange("home", 1)
+    scene.doors[0].shut = shut
+    x, y = scene.doors[0].centre_m
+    scene.start = (x - 0.8, y, 0.0)
+    if start_at:
+        thing = next(p for p in scene.placed if p.thing.name == start_at)
+        scene.start = (thing.x_m + 1.0, thing.y_m, math.pi)
+    return body.Body(scene, body.Settings(1, **EXACT, **settings))
 
 
 @needs_mujoco
@@ -92,6 +107,40 @@ class Body(unittest.TestCase):
             here.place(Asked(), [other.x_m, other.y_m, other.z_m])
         self.assertIn("blocked", failed.exception.said)
         self.assertTrue(here.hand(Asked())["holds"])
+
+    def test_a_shut_door_blocks_and_is_opened(self):
+        here = body_in_home(shut=True)
+        (door,) = here.scene.doors
+        x, y = door.centre_m
+        through = dict(to={"pose": {"x_m": x + 0.8, "y_m": y, "yaw_rad": 0.0}}, route_m=[[x - 0.8, y], [x + 0.8, y]])
+        with self.assertRaises(descry.Failure) as failed:
+            here.drive_to(Asked(), **through)
+        self.assertEqual(failed.exception.said["blocked"]["by"], door.name)
+        here.stop()
+        with self.assertRaises(descry.Failure) as failed:
+            here.open_door(Asked(), "another door")
+        self.assertIn("unreachable", failed.exception.said)
+        here.open_door(Asked(), door.name)
+        here.drive_to(Asked(), **through)
+        self.assertLess(abs(here.truth()[0] - x - 0.8), 0.02)
+
+    def test_the_truth_says_what_stands_where_and_is_kept_from_answers(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "truth.json"
+            here = body_in_home(shut=False, truth=file, start_at="cup A")
+            cup = lambda: next(o for o in json.loads(file.read_text())["objects"] if o["kind"] == "cup A")
+            before = cup()
+            self.assertEqual(before["surface"], next(p.surface for p in here.scene.placed if p.thing.kind == "cup A"))
+            here.grasp(Asked(), before["centre_m"], 0.08)
+            self.assertTrue(cup()["in_hand"] and cup()["surface"] is None)
+            self.assertNotIn("cup A", json.dumps(here.hello()[0]))
+            self.assertFalse(json.loads(file.read_text())["doors"][0]["shut"])
+
+    def test_what_is_left_out_is_gone_and_all_else_stands_where_it_stood(self):
+        whole = stage.arrange("home", 3)
+        without = whole.without(["cup A", "cup B"])
+        self.assertEqual([p for p in whole.placed if p.thing.kind not in ("cup A", "cup B")], without.placed)
+        self.assertEqual(len(whole.placed) - len(without.placed), 2)
 
     def test_the_same_seed_gives_the_same_frames(self):
         frames = []

@@ -76,7 +76,7 @@ class Pictures(unittest.TestCase):
     def test_depth_lies_on_the_floor_and_the_table(self):
         from descry_mujoco import scenes, stage, world
 
-        scene = scenes.arrange("floor", 1)
+        scene = scenes.arrange(scenes.floor, 1)
         pose = world.looking(np.array([-1.6, -1.0, 1.4]), np.array([0.0, 0.0, 0.72]))
         with stage.Stage(scene) as here:
             depth = here.look(pose).depth_m

@@ -84,6 +84,8 @@ struct Camera {
     colour: bool,
     #[serde(default = "default_camera_frame")]
     frame: String,
+    /// Where it is, if no head turns it; the base's own pose if nothing is said.
+    base_from_camera: Option<Isometry3<f64>>,
 }
 
 fn default_unit_m() -> f64 {
@@ -144,6 +146,8 @@ struct Map {
 pub(super) struct Greeting {
     pub known: Known,
     pub clearance_m: f64,
+    /// Of a camera that no head turns.
+    pub base_from_camera: Isometry3<f64>,
     pub pixels: PixelFormat,
 }
 
@@ -206,6 +210,14 @@ impl Hello {
         }
         if !(c.range_m.0 >= 0.0 && c.range_m.0 < c.range_m.1 && c.range_m.1.is_finite()) {
             return Err(format!("camera.range_m is {:?}, expected least and greatest depth", c.range_m));
+        }
+        if let Some(fixed) = &c.base_from_camera {
+            message::transform(fixed).map_err(|e| format!("camera.base_from_camera: {e}"))?;
+            if self.head.is_some() {
+                return Err(
+                    "camera.base_from_camera is of a camera that no head turns, and there is a head".into()
+                );
+            }
         }
         let radius_m = self.base.footprint.radius_m();
         if !(radius_m.is_finite() && radius_m >= 0.0) {
@@ -275,6 +287,8 @@ impl Hello {
 
     fn greeting(self, map: Option<OccupancyGrid>) -> Greeting {
         let c = self.camera;
+        let fixed = c.base_from_camera.and_then(|fixed| message::transform(&fixed).ok());
+        let fixed = fixed.unwrap_or(Isometry3::identity());
         let description = Description {
             name: self.name,
             simulated: self.simulated,
@@ -307,6 +321,7 @@ impl Hello {
         Greeting {
             known,
             clearance_m: self.base.clearance_m,
+            base_from_camera: fixed,
             pixels: PixelFormat { unit_m: c.unit_m, colour: c.colour },
         }
     }

@@ -7,9 +7,11 @@
 mod hello;
 mod link;
 mod message;
+mod peer;
 mod places;
 mod process;
 mod robot;
+mod socket;
 mod talk;
 
 pub use hello::PROTOCOL;

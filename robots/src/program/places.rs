@@ -7,7 +7,7 @@ use crate::grid::OccupancyGrid;
 use crate::head;
 use crate::recorded::Known;
 use crate::route::Router;
-use nalgebra::{Isometry3, Point2, Point3, Rotation2};
+use nalgebra::{Isometry3, Point2, Point3, Rotation2, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,6 +17,8 @@ const MOST_ROUTERS: usize = 64;
 /// The map of a program's hello, with the routes on it.
 pub(super) struct Places {
     clearance_m: f64,
+    /// Of a camera that no head turns.
+    base_from_camera: Isometry3<f64>,
     /// Doors that ended a drive and were not opened since.
     shut: Mutex<BTreeSet<String>>,
     /// By the doors that count as shut.
@@ -25,8 +27,8 @@ pub(super) struct Places {
 
 impl Places {
     /// Nothing is computed before it is asked for.
-    pub fn new(clearance_m: f64) -> Self {
-        Places { clearance_m, shut: Mutex::default(), routers: Mutex::default() }
+    pub fn new(clearance_m: f64, base_from_camera: Isometry3<f64>) -> Self {
+        Places { clearance_m, base_from_camera, shut: Mutex::default(), routers: Mutex::default() }
     }
 
     /// Keeps in mind whether a door is shut.
@@ -106,6 +108,24 @@ impl Places {
         };
         Ok(found?.points_m)
     }
+
+    /// See [`Robot::camera_at`](crate::Robot::camera_at).
+    pub fn camera_at(
+        &self,
+        known: &Known,
+        place: &Place,
+        look_at: Option<&Point3<f64>>,
+    ) -> Result<Isometry3<f64>, Failure> {
+        let base = stand(known, place)?;
+        let turned = known.description.head.as_ref().map(|h| head::camera_towards(h, &base, look_at));
+        Ok(turned.unwrap_or(base * self.base_from_camera))
+    }
+
+    /// By what angle a camera that no head turns misses a point, radians.
+    pub fn miss_rad(&self, map_from_base: &Isometry3<f64>, point: &Point3<f64>) -> f64 {
+        let seen = (map_from_base * self.base_from_camera).inverse_transform_point(point);
+        seen.coords.angle(&Vector3::z())
+    }
 }
 
 /// Where the base stands at a place.
@@ -131,16 +151,6 @@ pub(super) fn stand(known: &Known, place: &Place) -> Result<Isometry3<f64>, Fail
         (Place::Pose(p), None) => return Ok(p.isometry()),
     };
     Err(Failure::Unreachable { because })
-}
-
-/// See [`Robot::camera_at`](crate::Robot::camera_at).
-pub(super) fn camera_at(
-    known: &Known,
-    place: &Place,
-    look_at: Option<&Point3<f64>>,
-) -> Result<Isometry3<f64>, Failure> {
-    let base = stand(known, place)?;
-    Ok(known.description.head.as_ref().map_or(base, |h| head::camera_towards(h, &base, look_at)))
 }
 
 /// A straight line at constant speed while turning: max(ds/v, dθ/ω).

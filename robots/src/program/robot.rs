@@ -10,13 +10,16 @@ use crate::grid::OccupancyGrid;
 use crate::program::hello::{Hello, PROTOCOL, PixelFormat};
 use crate::program::link::{Link, Message};
 use crate::program::message::{self, Arguments, amount, answer, transform};
+use crate::program::peer::Peer;
 use crate::program::places::{self, Places};
 use crate::program::process::Process;
+use crate::program::socket::Socket;
 use crate::program::talk::{Done, Talk};
 use crate::recorded::{Exposure, Known, Pixels};
 use descry_perception::laser::Scan;
 use image::RgbImage;
 use nalgebra::{Isometry2, Isometry3, Point3, Vector2};
+use std::io::{Read, Write};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 use tokio::sync::Mutex;
@@ -51,6 +54,12 @@ impl Default for Limits {
     }
 }
 
+impl Limits {
+    fn hello(&self) -> Duration {
+        Duration::try_from_secs_f64(self.hello_s).unwrap_or(Duration::MAX)
+    }
+}
+
 /// A program as a robot. When it is dropped the program is told by the end of its input, and killed with all that it has started.
 pub struct ProgramRobot {
     known: Known,
@@ -67,20 +76,39 @@ impl ProgramRobot {
     /// [`Failure::Broken`] if it does not start, or its hello does not come or hold.
     pub fn start(command_line: &str, limits: Limits) -> Result<ProgramRobot, Failure> {
         let broken = |because: String| Failure::Broken { because: format!("`{command_line}`: {because}") };
-        let (mut process, stdin, stdout) =
-            Process::start(command_line, limits.memory_bytes).map_err(broken)?;
-        let hello_limit = Duration::try_from_secs_f64(limits.hello_s).unwrap_or(Duration::MAX);
-        let opened = Link::open(stdout, stdin, hello_limit)
+        let (process, stdin, stdout) = Process::start(command_line, limits.memory_bytes).map_err(broken)?;
+        Self::greet(Peer::Started(process), stdout, stdin, limits).map_err(broken)
+    }
+
+    /// Connects to a robot that runs already, at `HOST:PORT` or the path of a Unix socket, and hears what it is. When it is dropped the
+    /// connection is closed. What is said there is neither encrypted nor does anybody show who they are.
+    ///
+    /// # Errors
+    /// [`Failure::Broken`] if nobody answers there, or its hello does not come or hold.
+    pub fn connect(address: &str, limits: Limits) -> Result<ProgramRobot, Failure> {
+        let broken = |because: String| Failure::Broken { because: format!("{address}: {because}") };
+        let socket = Socket::connect(address, limits.hello()).map_err(broken)?;
+        let (from, to) = socket.ways().map_err(broken)?;
+        Self::greet(Peer::Reached(socket), from, to, limits).map_err(broken)
+    }
+
+    fn greet(
+        mut peer: Peer,
+        from: impl Read + Send + 'static,
+        to: impl Write + Send + 'static,
+        limits: Limits,
+    ) -> Result<ProgramRobot, String> {
+        let opened = Link::open(from, to, limits.hello())
             .and_then(|(link, first)| Ok((link, read_hello(&first)?.check(&first.bytes)?)));
-        let (link, greeting) = opened.map_err(|because| broken(format!("{because}{}", process.epitaph())))?;
+        let (link, greeting) = opened.map_err(|because| format!("{because}{}", peer.epitaph()))?;
         let camera = &greeting.known.description.camera;
         let readings = greeting.known.description.laser.as_ref().map_or(0, |laser| laser.readings);
         link.allow_bytes(greeting.pixels.bytes(camera.width * camera.height).max(4 * readings));
         Ok(ProgramRobot {
-            places: Places::new(greeting.clearance_m),
+            places: Places::new(greeting.clearance_m, greeting.base_from_camera),
             pixels: greeting.pixels,
             now_ns: AtomicI64::new(greeting.known.now_ns),
-            talk: Mutex::new(Talk::new(link, process, limits, greeting.known.now_ns)),
+            talk: Mutex::new(Talk::new(link, peer, limits, greeting.known.now_ns)),
             known: greeting.known,
         })
     }
@@ -267,7 +295,7 @@ impl Robot for ProgramRobot {
     }
 
     fn camera_at(&self, place: &Place, look_at: Option<&Point3<f64>>) -> Result<Isometry3<f64>, Failure> {
-        places::camera_at(&self.known, place, look_at)
+        self.places.camera_at(&self.known, place, look_at)
     }
 
     async fn pose(&self) -> Result<PoseEstimate, Failure> {
@@ -318,6 +346,14 @@ impl Robot for ProgramRobot {
     async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
         if !point.iter().all(|x| x.is_finite()) {
             return Err(Failure::Unreachable { because: format!("{point} is no point to look at") });
+        }
+        if self.known.description.head.is_none() {
+            if watch.cancel.is_cancelled() {
+                return Err(Failure::Cancelled { because: "look_at was not begun".into() });
+            }
+            // Nothing is there to be turned: the program is not asked.
+            let here = self.pose().await?.map_from_base;
+            return Ok(Looked { duration_s: 0.0, miss_rad: self.places.miss_rad(&here, point) });
         }
         let done = self.ask("look_at", Arguments::LookAt { point_m: point }, watch).await?;
         let duration_s = done.duration_s();

@@ -4,7 +4,7 @@ use crate::body::{Stamp, Watch};
 use crate::failure::Failure;
 use crate::program::link::{Ended, Lines, Link, Message, start_of};
 use crate::program::message::{Arguments, Ask, Cancel, Said, What};
-use crate::program::process::Process;
+use crate::program::peer::Peer;
 use crate::program::robot::Limits;
 use std::time::Duration;
 use tokio::time::{Instant, timeout_at};
@@ -34,7 +34,7 @@ impl Done {
 
 /// The exchange with a program.
 pub(super) struct Talk {
-    line: Option<(Link, Process)>,
+    line: Option<(Link, Peer)>,
     ended: String,
     limits: Limits,
     pub now_ns: Stamp,
@@ -72,15 +72,15 @@ struct Stopping {
 }
 
 impl Talk {
-    pub fn new(link: Link, process: Process, limits: Limits, now_ns: Stamp) -> Self {
-        Talk { line: Some((link, process)), ended: String::new(), limits, now_ns, next_id: 1, open: None }
+    pub fn new(link: Link, peer: Peer, limits: Limits, now_ns: Stamp) -> Self {
+        Talk { line: Some((link, peer)), ended: String::new(), limits, now_ns, next_id: 1, open: None }
     }
 
-    /// The program did what it must not, or is gone: it is killed, and stays broken.
+    /// The program did what it must not, or is gone: it is killed (a connection is closed), and stays broken.
     pub fn end(&mut self, because: String) -> Failure {
-        if let Some((link, mut process)) = self.line.take() {
+        if let Some((link, mut peer)) = self.line.take() {
             drop(link);
-            self.ended = format!("{because}{}", process.epitaph());
+            self.ended = format!("{because}{}", peer.epitaph());
         }
         Failure::Broken { because: self.ended.clone() }
     }
@@ -219,7 +219,7 @@ impl Talk {
 
     /// The next message. A program that has ended is noticed even if something that it has started holds its output open.
     async fn message(&mut self, by: Instant) -> Result<Message, Silence> {
-        let Some((link, process)) = &mut self.line else { return Err(Silence::Gone) };
+        let Some((link, peer)) = &mut self.line else { return Err(Silence::Gone) };
         let mut gone = false;
         loop {
             match timeout_at(by.min(Instant::now() + GLANCE), link.next()).await {
@@ -227,7 +227,7 @@ impl Talk {
                 Err(_) if gone => return Err(Silence::Ended(Ended::Closed)),
                 Err(_) if Instant::now() >= by => return Err(Silence::Late),
                 // What it said last may still be on its way.
-                Err(_) => gone = process.has_ended(),
+                Err(_) => gone = peer.has_ended(),
             }
         }
     }
@@ -240,7 +240,10 @@ impl Talk {
         let message = match self.message(by).await {
             Ok(message) => message,
             Err(Silence::Gone) => return Err(Failure::Broken { because: self.ended.clone() }),
-            Err(Silence::Ended(Ended::Closed)) => return Err(self.end("the program has ended".into())),
+            Err(Silence::Ended(Ended::Closed)) => {
+                let farewell = self.line.as_ref().map_or("", |(_, peer)| peer.farewell());
+                return Err(self.end(farewell.into()));
+            }
             Err(Silence::Ended(Ended::Breach(because))) => return Err(self.end(because)),
             Err(Silence::Late) if complaint.is_empty() => {
                 return Err(Failure::TimedOut { because: String::new() });

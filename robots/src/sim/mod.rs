@@ -17,7 +17,7 @@ pub mod scene;
 pub mod shape;
 mod state;
 pub mod stereo;
-pub mod truth;
+mod truth;
 pub mod walls;
 pub mod world;
 
@@ -27,5 +27,4 @@ pub use noise::DepthNoise;
 pub use robot::{SimOptions, SimRobot};
 pub use scene::SceneSpec;
 pub use stereo::Stereo;
-pub use truth::{Event, TrueDoor, TrueObject, Truth};
 pub use world::{HungDoor, Object, Scene, Stand};

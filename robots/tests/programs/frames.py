@@ -25,4 +25,4 @@ class Frames(Template):
         return chain, FRAME
 
 
-descry.serve(Frames())
+descry.serve(Frames(), *sys.argv[1:])

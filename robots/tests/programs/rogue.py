@@ -1,4 +1,4 @@
-"""The template robot, but for one thing that a program must not do: `python3 rogue.py WHAT`."""
+"""The template robot, but for one thing that a program must not do: `python3 rogue.py WHAT [SOCKET]`."""
 
 import json
 import os
@@ -16,7 +16,16 @@ WHAT = sys.argv[1]
 def raw(data):
     view = memoryview(data)
     while view:
-        view = view[os.write(1, view) :]
+        view = view[os.write(OUT, view) :]
+
+
+def wired(wire, read_fd, write_fd, plain=descry.Wire.__init__):
+    global OUT
+    OUT = write_fd
+    plain(wire, read_fd, write_fd)
+
+
+descry.Wire.__init__ = wired
 
 
 def last_words(text, code):
@@ -36,6 +45,10 @@ class Rogue(Template):
             hello["camra"] = {}
         if WHAT == "no focal length":
             hello["camera"]["fx"] = 0
+        if WHAT in ("bare", "two cameras"):
+            hello["camera"]["base_from_camera"] = descry.base_from_camera(hello["head"], 0.1, 0.4)
+        if WHAT == "bare":
+            del hello["head"], hello["laser"]
         if WHAT == "laser beyond a turn":
             hello["laser"] = dict(hello["laser"], readings=1000)
         if WHAT == "two tables of one name":
@@ -81,6 +94,11 @@ class Rogue(Template):
             raise descry.Failure("unable", f"holds {len(hold)} bytes")
         return super().drive_to(request, to, route_m)
 
+    def look_at(self, request, point_m):
+        if WHAT == "bare":
+            last_words("nobody may ask a head that is not there", 9)
+        return super().look_at(request, point_m)
+
     def pose(self, request):
         if WHAT == "another request":
             raw(json.dumps({"id": request.id + 5, "now_ns": self.now_ns(), "done": {}}).encode() + b"\n")
@@ -100,6 +118,8 @@ class Rogue(Template):
         return super().pose(request)
 
     def sense(self, request):
+        if WHAT == "bare":
+            self.gaze = 0.1, 0.4
         chain, depths = super().sense(request)
         if WHAT == "short frame":
             return chain, depths[2:]
@@ -124,6 +144,4 @@ if WHAT == "chatters":
     print("my robot 1.0", flush=True)
 if WHAT == "another version":
     descry.PROTOCOL = 2
-# The wire takes standard output away; what is said raw goes there all the same.
-os.dup2 = lambda *_: None
-descry.serve(Rogue())
+descry.serve(Rogue(), *sys.argv[2:])

@@ -163,6 +163,7 @@ impl Kind for Faults {
             domain: &self.domain,
             goal: &self.goal,
             spec: &self.spec,
+            program: None,
             targets: std::slice::from_ref(&self.text.target),
             present: ((n + 1.0) * share).floor() <= (n * share).floor(),
             seed: self.text.first_seed.wrapping_add(run as u64),

@@ -16,8 +16,8 @@ use descry_robots::sim::SceneSpec;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::{Head, Kind, Summary, parse, refuse};
-use crate::body;
+use super::{Head, Kind, OtherBody, Summary, parse, refuse};
+use crate::body::{self, program};
 use crate::experiment::{ExperimentError, Finished, Job, Outcome, Row, Source};
 
 mod score;
@@ -61,6 +61,9 @@ struct Set {
     name: String,
     first_seed: u64,
     arrangements: u64,
+    /// Instead of our simulator: `program:COMMAND`, in a world of its own that has things of the same kinds.
+    #[serde(default)]
+    robot: Option<OtherBody>,
 }
 
 fn default_domain() -> String {
@@ -89,8 +92,8 @@ struct Figure4 {
     spec: SceneSpec,
     models: Vec<ObjectModel>,
     recognisers: Vec<Box<dyn Recogniser>>,
-    /// Set and seed of each job.
-    jobs: Vec<(String, u64)>,
+    /// Set, by its number, and seed of each job.
+    jobs: Vec<(usize, u64)>,
 }
 
 pub(super) fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
@@ -117,7 +120,8 @@ pub(super) fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
     let jobs = text
         .sets
         .iter()
-        .flat_map(|set| (0..set.arrangements).map(|n| (set.name.clone(), set.first_seed.wrapping_add(n))));
+        .enumerate()
+        .flat_map(|(at, set)| (0..set.arrangements).map(move |n| (at, set.first_seed.wrapping_add(n))));
     let head = Head { name: text.name.clone(), kind: text.kind.clone(), about: text.about.clone() };
     let jobs = jobs.collect();
     let inputs = vec![("scene".into(), format!("{spec:?}")), ("models".into(), format!("{models:?}"))];
@@ -162,13 +166,22 @@ impl Kind for Figure4 {
     }
 
     fn jobs(&self) -> Vec<Job> {
-        self.jobs.iter().map(|(set, seed)| Job::new([("set", json!(set)), ("seed", json!(seed))])).collect()
+        let job = |&(set, seed): &(usize, u64)| {
+            Job::new([("set", json!(self.text.sets[set].name)), ("seed", json!(seed))])
+        };
+        self.jobs.iter().map(job).collect()
     }
 
     fn run(&self, number: usize, _scratch: &Path, _stop: &Stop) -> Result<Outcome, String> {
-        let (_, seed) = &self.jobs[number];
+        let (set, seed) = self.jobs[number];
         let started = std::time::Instant::now();
-        let taken = views::take(&self.spec, *seed, self.text.poses, self.text.distance_m)?;
+        let staged = match &self.text.sets[set].robot {
+            None => views::simulated(&self.spec, seed)?,
+            Some(robot) => {
+                views::Staged::of(program::open(robot.command(), seed, &[]).map_err(|e| e.to_string())?)
+            }
+        };
+        let taken = views::take(&staged, self.text.poses, self.text.distance_m)?;
         let rows = score::rows(self, &taken);
         let clock = json!({ "arrangement_s": started.elapsed().as_secs_f64() });
         Ok(Outcome { rows, clock: clock.as_object().cloned().unwrap_or_default() })

@@ -14,6 +14,7 @@ use serde::Deserialize;
 
 use super::page::Section;
 use super::{ExperimentError, Finished, Job, Outcome, Row, Source};
+use crate::body::program;
 
 /// A kind of experiment, bound to what a file says of it.
 pub trait Kind: Sync {
@@ -47,6 +48,33 @@ pub struct Head {
     /// What it is to show, in a line.
     #[serde(default)]
     pub about: String,
+}
+
+/// A body other than our simulator, as an experiment file names it: `program:COMMAND`. Its runs differ by seed and are held against
+/// the truth, so the command takes both.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(try_from = "String")]
+struct OtherBody(String);
+
+impl OtherBody {
+    /// The program's command line, with places for seed and truth.
+    fn command(&self) -> &str {
+        &self.0
+    }
+}
+
+impl TryFrom<String> for OtherBody {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let command = text.strip_prefix("program:").ok_or("expected program:COMMAND")?;
+        match [program::SEED, program::TRUTH].into_iter().find(|place| !command.contains(place)) {
+            Some(place) => {
+                Err(format!("the command has no {place}, such as --seed {{seed}} --truth {{truth}}"))
+            }
+            None => Ok(Self(command.to_string())),
+        }
+    }
 }
 
 /// What the jobs together say.

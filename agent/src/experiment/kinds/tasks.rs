@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::trial::{self, Trial};
-use super::{Head, Kind, Summary, parse, refuse};
+use super::{Head, Kind, OtherBody, Summary, parse, refuse};
 use crate::body;
 use crate::experiment::{ExperimentError, Finished, Job, Outcome, Source};
 
@@ -74,11 +74,14 @@ struct GoalText {
     stages: Vec<String>,
 }
 
-/// Mishaps that come together.
+/// Mishaps that come together, or another body.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Case {
     name: String,
+    /// Instead of our simulator: `program:COMMAND`, whose world has the places and things of the scene.
+    #[serde(default)]
+    robot: Option<OtherBody>,
     #[serde(default, rename = "fault")]
     faults: Vec<Fault>,
 }
@@ -92,7 +95,7 @@ fn default_tolerance_m() -> f64 {
 }
 
 fn nothing_goes_wrong() -> Vec<Case> {
-    vec![Case { name: "nothing".into(), faults: Vec::new() }]
+    vec![Case { name: "nothing".into(), robot: None, faults: Vec::new() }]
 }
 
 /// The experiment.
@@ -152,6 +155,13 @@ fn check(source: &Source, text: &Text) -> Result<(), ExperimentError> {
         let plan = FaultPlan { faults: case.faults.clone() };
         plan.check()
             .map_err(|o| refuse(source, "case", format!("case \"{}\": {}", case.name, o.problem), o.mend))?;
+        let ours = case.robot.is_none() || case.faults.is_empty();
+        wrong(ours, "case", "mishaps befall our simulator only", "leave robot or fault out")?;
+        let foresee = text.policies.iter().find(|p| policies::named(p, 1, None).is_err());
+        if let (Some(_), Some(policy)) = (&case.robot, foresee) {
+            let problem = format!("\"{policy}\" asks our simulator what a look would show");
+            return Err(refuse(source, "policies", problem, "leave it out, or every case with a robot"));
+        }
     }
     Ok(())
 }
@@ -231,6 +241,7 @@ impl Kind for Tasks {
             domain: &self.domain,
             goal: &self.goals[goal],
             spec: &self.spec,
+            program: case.robot.as_ref().map(OtherBody::command),
             targets: &said.targets,
             present,
             seed: self.text.first_seed.wrapping_add(run as u64),

@@ -34,6 +34,62 @@ fn shipped_files_are_read() {
 }
 
 #[test]
+fn files_that_name_other_bodies_are_read() {
+    for (name, jobs) in [("home.toml", 10 * 3 * 2), ("two-tables.toml", 20 * 2 * 2), ("figure-4.toml", 200)] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/mujoco").join(name);
+        let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let kind = read(&source(text)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(kind.jobs().len(), jobs, "{name}");
+    }
+}
+
+/// The template robot, and a file that says how its room is in truth: there is nothing that the camera could not see, or a cup A
+/// that it does not show.
+const TELLING: &str = r#"
+import json, sys
+sys.path.insert(0, "PYTHON")
+import descry_robot as descry, template
+seed, truth, without = sys.argv[1:]
+still = {"translation": [0, 0, 0.72], "rotation": [0, 0, 0, 1]}
+cup = {"name": "cup A", "kind": "cup A", "surface": "table", "present": True, "map_from_object": still,
+       "centre_m": [0, 0, 0.77], "size_m": [0.07, 0.07, 0.104]}
+base = {"x_m": -2, "y_m": 0, "yaw_rad": 0}
+with open(truth, "w") as file:
+    json.dump({"stamp_ns": int(seed), "base": base, "objects": [] if without == "cup A" else [cup]}, file)
+descry.serve(template.Template())
+"#;
+
+#[test]
+fn a_run_with_a_program_is_held_against_the_truth_that_it_tells() {
+    if std::process::Command::new("python3").arg("--version").output().is_err() {
+        println!("SKIPPED: python3 is not here");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
+    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/python");
+    let body = folder.path().join("body.py");
+    let written = std::fs::write(&body, TELLING.replace("PYTHON", &python.display().to_string()));
+    written.unwrap_or_else(|e| panic!("{e}"));
+    let text = format!(
+        "name = \"own\"\nkind = \"tasks\"\ndomain = \"tabletop\"\nscene = \"two-tables\"\nruns = 2\npolicies = [\"plan\"]\n\
+         [[goal]]\nsay = \"find cup A\"\ntargets = [\"cup A\"]\ntruly = \"found\"\nabsent_share = 0.5\n\
+         [[case]]\nname = \"own body\"\nrobot = \"program:python3 '{}' {{seed}} {{truth}} {{without}}\"\n",
+        body.display()
+    );
+    for (number, present) in [(0, true), (1, false)] {
+        let row = one_job(text.clone(), number);
+        assert_eq!(row["present"], present, "{row:?}");
+        assert!(row["verdict"] != "achieved" && row["views"].as_u64() > Some(0), "{row:?}");
+        let said_no = row["verdict"] == "not_found";
+        assert_eq!(
+            (&row["false_yes"], &row["false_not_there"]),
+            (&false.into(), &(said_no && present).into()),
+            "{row:?}"
+        );
+    }
+}
+
+#[test]
 fn mistakes_are_drawn_under_the_text() {
     let check = |file: &str, from: &str, to: &str, expected: &[&str]| {
         let text = shipped(file);
@@ -71,6 +127,23 @@ fn mistakes_are_drawn_under_the_text() {
     check(bring, "surface = \"desk\"", "", &["on which surface", "add surface"]);
     check(bring, "surface = \"desk\"", "surface = \"disk\"", &["no surface \"disk\"", "coffee table"]);
     check(bring, "truly = \"held\"", "truly = \"hold\"", &["truly = \"hold\"", "all-stand"]);
+    let other = |robot: &str| format!("[[case]]\nname = \"other\"\n{robot}\n\n[[goal]]");
+    let rooms = "home/two-rooms.toml";
+    check(
+        rooms,
+        "[[goal]]",
+        &other("robot = \"program:x {seed}\""),
+        &["other", "no {truth}", "--truth {truth}"],
+    );
+    check(rooms, "[[goal]]", &other("robot = \"sim\""), &["expected program:COMMAND"]);
+    let both = "robot = \"program:x {seed} {truth}\"\nfault = [{ kind = \"grasp_slips\", at = 1 }]";
+    check(rooms, "[[goal]]", &other(both), &["befall our simulator only"]);
+    check(
+        bring,
+        "[[goal]]",
+        &other("robot = \"program:x {seed} {truth}\""),
+        &["\"oracle\" asks our simulator"],
+    );
     check("faults.toml", "chance = 0.3", "chance = 3", &["case \"blocked path\"", "between 0 and 1"]);
 }
 

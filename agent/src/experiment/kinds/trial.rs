@@ -1,17 +1,19 @@
-//! One run of the agent in a simulated scene, held against the truth.
+//! One run of the agent in a simulated world, ours or a program's, held against the truth.
 
 use crate::stop::Stop;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use descry_domains::goal::Goal;
+use descry_domains::goal::{self, Goal};
+use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;
 use descry_robots::Place;
-use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, TrueObject, Truth, arrange};
+use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
+use descry_robots::truth::{TrueObject, Truth};
 use serde_json::{Value, json};
 
-use crate::body::Body;
+use crate::body::{Body, program};
 use crate::experiment::{Outcome, Row};
 use crate::keeping::{Keeping, Kept};
 use descry_domains::abilities::searching::policies::{self, Foresight};
@@ -31,8 +33,10 @@ pub(super) struct Trial<'a> {
     pub domain: &'a Domain,
     /// What is pursued.
     pub goal: &'a Goal,
-    /// The scene.
+    /// The scene; its places and things have the same names in a program's world.
     pub spec: &'a SceneSpec,
+    /// The command line of a program with a world of its own; none: our simulator.
+    pub program: Option<&'a str>,
     /// What is looked for: names or kinds in the scene.
     pub targets: &'a [String],
     /// Whether they are there.
@@ -75,24 +79,16 @@ pub(super) struct Lived {
 /// Lets the agent live through a run.
 pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Lived, String> {
     let started = std::time::Instant::now();
-    let without = trial.targets.iter().fold(trial.spec.clone(), |spec, target| spec.without(target));
-    // What hides an absent thing stands as it would if it were there.
-    let mut scene = arrangement(trial)?;
-    if !trial.present {
-        scene.objects.retain(|o| without.objects.iter().any(|kept| kept.name == o.name));
-        scene.target = None;
-    }
-    let share = scene.target_visible_from_start;
-    let options = SimOptions { seed: trial.seed, faults: trial.faults.clone(), ..SimOptions::default() };
-    let robot = Arc::new(SimRobot::new(scene, options));
-    let body = Body::simulated(Arc::clone(&robot));
+    let Staged { body, goal, share, foresight } = match trial.program {
+        None => simulated(trial)?,
+        Some(command) => run_by_program(trial, command)?,
+    };
     let arranged_s = started.elapsed().as_secs_f64();
-    let mut chooser = policies::named(trial.policy, trial.seed, Some(foresight(&robot, trial.targets)))
-        .map_err(|e| e.to_string())?;
+    let mut chooser = policies::named(trial.policy, trial.seed, foresight).map_err(|e| e.to_string())?;
     chooser.first_look_here = trial.first_look_here;
     let folder = Folder::made(scratch).map_err(|e| e.to_string())?;
     let settings = Settings {
-        robot: "sim".into(),
+        robot: trial.program.map_or_else(|| "sim".into(), |command| format!("program:{command}")),
         scene: None,
         seed: trial.seed,
         domain: trial.domain.config.name.clone(),
@@ -109,7 +105,7 @@ pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Liv
         }
     };
     let watcher = Watcher { stop, tell: &mut count };
-    let report = run::pursue(trial.domain, trial.goal, &body, &folder, &settings, chooser, watcher);
+    let report = run::pursue(trial.domain, &goal, &body, &folder, &settings, chooser, watcher);
     let report = report.map_err(|e| e.to_string())?;
     let run_s = started.elapsed().as_secs_f64() - arranged_s;
     let mut clock = Row::new();
@@ -120,7 +116,41 @@ pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Liv
         clock.insert(format!("longest planning at {poses} poses, geometry apart"), json!(report.planning_s));
         clock.insert(format!("longest geometry of a plan at {poses} poses"), json!(report.geometry_s));
     }
-    Ok(Lived { report, truth: robot.truth(), carried, share, clock })
+    let truth = body.truth()?.ok_or("the body does not say how everything really stands")?;
+    Ok(Lived { report, truth, carried, share, clock })
+}
+
+/// A body in its world, before a run.
+struct Staged {
+    body: Body,
+    /// As it is understood there.
+    goal: Goal,
+    /// The share of the target that is seen from the start.
+    share: Option<f64>,
+    foresight: Option<Foresight>,
+}
+
+fn simulated(trial: &Trial<'_>) -> Result<Staged, String> {
+    let without = trial.targets.iter().fold(trial.spec.clone(), |spec, target| spec.without(target));
+    // What hides an absent thing stands as it would if it were there.
+    let mut scene = arrangement(trial)?;
+    if !trial.present {
+        scene.objects.retain(|o| without.objects.iter().any(|kept| kept.name == o.name));
+        scene.target = None;
+    }
+    let share = scene.target_visible_from_start;
+    let options = SimOptions { seed: trial.seed, faults: trial.faults.clone(), ..SimOptions::default() };
+    let robot = Arc::new(SimRobot::new(scene, options));
+    let foresight = Some(foresight(&robot, trial.targets));
+    Ok(Staged { body: Body::simulated(robot), goal: trial.goal.clone(), share, foresight })
+}
+
+fn run_by_program(trial: &Trial<'_>, command: &str) -> Result<Staged, String> {
+    let without = if trial.present { &[] } else { trial.targets };
+    let body = program::open(command, trial.seed, without).map_err(|e| e.to_string())?;
+    let lexicon = Lexicon::new(trial.domain, &Places::of_body(&*body.robot));
+    let goal = goal::read(&trial.goal.said, trial.domain, &lexicon).map_err(|e| e.to_string())?;
+    Ok(Staged { body, goal, share: None, foresight: None })
 }
 
 fn arrangement(trial: &Trial<'_>) -> Result<descry_robots::sim::Scene, String> {

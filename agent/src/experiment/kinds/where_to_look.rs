@@ -240,6 +240,7 @@ impl Kind for WhereToLook {
             domain: &domain,
             goal: &self.goal,
             spec: &self.specs[setting.occlusion],
+            program: None,
             targets: std::slice::from_ref(&self.text.target),
             present: setting.present,
             seed: self.text.first_seed.wrapping_add(setting.scene as u64),

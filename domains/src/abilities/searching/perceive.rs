@@ -344,9 +344,11 @@ fn believe(
         "on": surface.symbol, "percepts": seen, "views": views_of_it, "fits": fits, "steps": steps,
     });
     let meta = Meta { objects: sightings(percepts), body: seen, ..Meta::default() };
-    let percepts = eyes.record.put(Draft { meta, ..Draft::new("percepts", stamp_ns) })?;
-    let boxes: Vec<Labelled> = mind.known.belief.tracks.iter().map(|t| labelled(t, &surface.up)).collect();
     let frame = &eyes.robot.description().frames.map;
+    let blobs = vec![viewer::cloud("merged", &merged.cloud)];
+    let draft = Draft { meta, blobs, frame: frame.clone(), ..Draft::new("percepts", stamp_ns) };
+    let percepts = eyes.record.put(draft)?;
+    let boxes: Vec<Labelled> = mind.known.belief.tracks.iter().map(|t| labelled(t, &surface.up)).collect();
     let blobs = vec![viewer::boxes(stamp_ns, frame, "objects", &boxes)];
     let belief = serde_json::to_value(&*mind.known.belief).map_err(|e| WorldError::Bug(e.to_string()))?;
     let meta = Meta { body: belief, ..Meta::default() };

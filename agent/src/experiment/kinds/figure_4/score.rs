@@ -7,7 +7,7 @@ use descry_perception::nalgebra::Isometry3;
 use descry_perception::recognise::Percept;
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::{Scene, View};
-use descry_robots::sim::TrueObject;
+use descry_robots::truth::TrueObject;
 use serde_json::{Value, json};
 
 use super::views::Taken;

@@ -1,15 +1,18 @@
-//! The views of one arrangement: the simulated body drives around the surface and looks.
+//! The views of one arrangement: a body drives around the surface and looks.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use descry_perception::View;
 use descry_perception::merge::MergeOptions;
 use descry_perception::nalgebra::{Isometry3, Point3};
 use descry_perception::segment::SceneOptions;
 use descry_robots::sim::world::LABEL_OBJECT;
-use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, Truth, arrange};
+use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};
+use descry_robots::truth::Truth;
 use descry_robots::{Place, Pose2, Robot, SurfaceHint, Watch};
 
+use crate::body::Body;
 use descry_domains::abilities::searching::perceive;
 
 /// Tried in turn where the footprint does not fit.
@@ -23,7 +26,8 @@ pub(super) struct Taken {
     pub views: Vec<View>,
     /// Where the camera was in truth for each view.
     pub map_from_camera: Vec<Isometry3<f64>>,
-    /// Pixels of the handle of each object in each view, as an ideal camera sees them; no entry for what has no handle.
+    /// Pixels of the handle of each object in each view, as an ideal camera sees them; no entry for what has no handle,
+    /// nor for a body other than our simulator.
     pub handles: BTreeMap<String, Vec<usize>>,
     /// How everything stands.
     pub truth: Truth,
@@ -31,44 +35,67 @@ pub(super) struct Taken {
     pub options: (MergeOptions, SceneOptions),
 }
 
-/// Drives around the first surface of an arrangement and looks at its middle from every pose.
-pub(super) fn take(spec: &SceneSpec, seed: u64, poses: usize, distance_m: f64) -> Result<Taken, String> {
+/// A body before an arrangement.
+pub(super) struct Staged {
+    body: Body,
+    /// Our simulator, which shows what an ideal camera sees, and the things with a handle: number and name.
+    ideal: Option<(Arc<SimRobot>, Vec<(usize, String)>)>,
+}
+
+impl Staged {
+    /// Any body that says how everything really stands.
+    pub fn of(body: Body) -> Self {
+        Self { body, ideal: None }
+    }
+
+    fn truth(&self) -> Result<Truth, String> {
+        self.body.truth()?.ok_or_else(|| "the body does not say how everything really stands".into())
+    }
+}
+
+/// Our simulator in an arrangement of a scene.
+pub(super) fn simulated(spec: &SceneSpec, seed: u64) -> Result<Staged, String> {
     let scene = arrange(spec, seed).map_err(|e| e.to_string())?;
-    let handled: Vec<(usize, String)> = (0..)
-        .zip(&scene.objects)
-        .filter(|(_, o)| has_handle(&o.shape))
-        .map(|(i, o)| (i, o.name.clone()))
-        .collect();
-    let robot = SimRobot::new(scene, SimOptions { seed, ..SimOptions::default() });
+    let handled = (0..).zip(&scene.objects).filter(|(_, o)| has_handle(&o.shape));
+    let handled = handled.map(|(i, o)| (i, o.name.clone())).collect();
+    let robot = Arc::new(SimRobot::new(scene, SimOptions { seed, ..SimOptions::default() }));
+    Ok(Staged { body: Body::simulated(Arc::clone(&robot)), ideal: Some((robot, handled)) })
+}
+
+/// Drives around the body's first surface and looks at its middle from every pose.
+pub(super) fn take(staged: &Staged, poses: usize, distance_m: f64) -> Result<Taken, String> {
+    let robot = &*staged.body.robot;
     let surface = robot.surfaces().first().cloned().ok_or("the scene has no surface to look at")?;
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_time().build().map_err(|e| e.to_string())?;
     let mut taken = Taken {
         views: Vec::new(),
         map_from_camera: Vec::new(),
-        handles: handled.iter().map(|(_, name)| (name.clone(), Vec::new())).collect(),
-        truth: robot.truth(),
-        options: perceive::options(&robot, None),
+        handles: BTreeMap::new(),
+        truth: staged.truth()?,
+        options: perceive::options(robot, None),
     };
     runtime.block_on(async {
         let watch = Watch::default();
         let middle = middle(&surface);
         for k in 0..poses {
-            let place = place(&robot, &middle, k, poses, distance_m).await?;
+            let place = place(robot, &middle, k, poses, distance_m).await?;
             robot.drive_to(&place, &watch).await.map_err(|e| e.to_string())?;
             robot.look_at(&middle, &watch).await.map_err(|e| e.to_string())?;
             let sensed = robot.sense(&watch).await.map_err(|e| e.to_string())?;
             let believed = robot.pose().await.map_err(|e| e.to_string())?.map_from_base;
-            let truth = robot.truth();
+            let truth = staged.truth()?;
             let map_from_camera = truth.base.isometry() * believed.inverse() * sensed.map_from_camera;
-            for (index, name) in &handled {
-                let pixels = handle_pixels(&robot, &truth, *index, &map_from_camera);
+            for (simulator, (index, name)) in
+                staged.ideal.iter().flat_map(|(s, of)| of.iter().map(move |h| (s, h)))
+            {
+                let pixels = handle_pixels(simulator, &truth, *index, &map_from_camera);
                 taken.handles.entry(name.clone()).or_default().push(pixels);
             }
             taken.map_from_camera.push(map_from_camera);
             taken.views.push(sensed.view());
         }
-        taken.truth = robot.truth();
+        taken.truth = staged.truth()?;
         Ok(taken)
     })
 }
@@ -85,7 +112,7 @@ fn middle(surface: &SurfaceHint) -> Point3<f64> {
 
 /// The k-th of the poses around the middle, the first one on the side where the body stands first.
 async fn place(
-    robot: &SimRobot,
+    robot: &dyn Robot,
     middle: &Point3<f64>,
     k: usize,
     poses: usize,

@@ -1,7 +1,7 @@
 //! Whether a goal is truly so, whatever was said, and whether what was said is so.
 
 use descry_domains::answer::Verdict;
-use descry_robots::sim::{TrueObject, Truth};
+use descry_robots::truth::{TrueObject, Truth};
 use serde::Deserialize;
 use serde_json::json;
 

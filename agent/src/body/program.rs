@@ -1,0 +1,69 @@
+//! A program as a body: what its command line leaves open is filled in when it is started.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use descry_robots::program::{Limits, ProgramRobot};
+
+use super::{Body, Told};
+use crate::exit::CommandError;
+
+/// Stands in a command line for the seed.
+pub const SEED: &str = "{seed}";
+/// Stands there for a file to which the program writes how everything really stands.
+pub const TRUTH: &str = "{truth}";
+/// Stands there for what is not to be in its world: kinds, with commas between, in quotes.
+pub const WITHOUT: &str = "{without}";
+
+/// A file that a program writes for reports. It is removed with its body.
+pub struct TruthFile(PathBuf);
+
+impl TruthFile {
+    fn new() -> Self {
+        static FILES: AtomicUsize = AtomicUsize::new(0);
+        let number = FILES.fetch_add(1, Ordering::Relaxed);
+        Self(std::env::temp_dir().join(format!("descry-truth-{}-{number}.json", std::process::id())))
+    }
+
+    /// Where it is, once it has been written.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for TruthFile {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+/// Starts a command line of the shell as a body, with [`SEED`], [`TRUTH`] and [`WITHOUT`] filled in.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the program says no hello.
+pub fn open(command: &str, seed: u64, without: &[String]) -> Result<Body, CommandError> {
+    let truth = command.contains(TRUTH).then(TruthFile::new);
+    let file = truth.as_ref().map(|t| t.path().display().to_string()).unwrap_or_default();
+    let command = command
+        .replace(SEED, &seed.to_string())
+        .replace(TRUTH, &quoted(&file))
+        .replace(WITHOUT, &quoted(&without.join(",")));
+    let robot = ProgramRobot::start(&command, Limits::default()).map_err(CommandError::broken)?;
+    Ok(Body { truth: truth.map(Told::Program), ..Body::new(Arc::new(robot)) })
+}
+
+/// A robot that runs already, at `HOST:PORT` or the path of a Unix socket.
+///
+/// # Errors
+/// [`CommandError::Broken`] if nobody answers there, or says no hello.
+pub fn connect(address: &str) -> Result<Body, CommandError> {
+    ProgramRobot::connect(address, Limits::default())
+        .map(|r| Body::new(Arc::new(r)))
+        .map_err(CommandError::broken)
+}
+
+/// As one word of the shell.
+fn quoted(text: &str) -> String {
+    format!("'{}'", text.replace('\'', "'\\''"))
+}

@@ -107,7 +107,13 @@ fn only_the_simulator_reads_the_truth_and_only_a_report_shows_it() {
     check_absent(
         "agent/src",
         &words,
-        &["agent/src/report", "agent/src/commands/experiment", "agent/src/experiment", "agent/src/body.rs", "agent/src/body/program.rs"],
+        &[
+            "agent/src/report",
+            "agent/src/commands/experiment",
+            "agent/src/experiment",
+            "agent/src/body.rs",
+            "agent/src/body/program.rs",
+        ],
     );
 }
 

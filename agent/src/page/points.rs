@@ -73,7 +73,11 @@ pub fn pack(view: &View, map_from_camera: &Isometry3<f64>, near: &[Near], most: 
 fn mixed<T: Copy>(points: Vec<T>) -> Vec<T> {
     const STRIDE: usize = 7919;
     let count = points.len();
-    if count % STRIDE == 0 { points } else { (0..count).map(|n| points[n * STRIDE % count]).collect() }
+    if count.is_multiple_of(STRIDE) {
+        points
+    } else {
+        (0..count).map(|n| points[n * STRIDE % count]).collect()
+    }
 }
 
 /// One point of each cell, the first.
@@ -87,7 +91,8 @@ fn thinned(
     let mut kept = Vec::new();
     for (n, point) in view.cloud.points.iter().enumerate() {
         let point = point.cast::<f64>();
-        if !(point.coords.norm() < FAR_M) {
+        let range_m = point.coords.norm();
+        if range_m.is_nan() || range_m >= FAR_M {
             continue;
         }
         let place = map_from_camera * point;

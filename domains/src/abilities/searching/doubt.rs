@@ -289,8 +289,9 @@ impl Doubt {
             hypotheses.extend(places.iter().filter_map(|centre| {
                 around(surface, centre).find_map(|centre| {
                     let space = &situation.spaces[on];
-                    let points = unseen_volume(surface, space, &standing, &centre, size_m)?;
-                    let weight = each * if is_measured(space, &points) { MEASURED_WEIGHT } else { 1.0 };
+                    let Unseen { points, likely } =
+                        unseen_volume(surface, space, &standing, &centre, size_m)?;
+                    let weight = each * if likely { MEASURED_WEIGHT } else { 1.0 };
                     Some(Hypothesis { weight, on, centre, points, facing: None })
                 })
             }));
@@ -363,15 +364,23 @@ fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterator<Item = P
     steps.map(move |(a, b)| place + (e1 * a + e2 * b) * GRID_M)
 }
 
-/// The unseen points of an object that stood at a place, if it could stand there unnoticed. What was measured there and belongs to no
-/// object that is believed in may be its own.
+/// An object that could stand at a place unnoticed.
+struct Unseen {
+    /// Its points that no view settled.
+    points: Vec<Point3<f64>>,
+    /// Whether so much was measured there, apart from all objects that are believed in, that something does stand there.
+    likely: bool,
+}
+
+/// An object that stood at a place, if it could stand there unnoticed. What was measured there and belongs to no object that is believed
+/// in may be its own; close to one it may as well be that one's.
 fn unseen_volume(
     surface: &KnownSurface,
     space: &Space,
     standing: &[&Track],
     centre: &Point3<f64>,
     (height_m, diameter_m): (f64, f64),
-) -> Option<Vec<Point3<f64>>> {
+) -> Option<Unseen> {
     let all = (COLUMNS.len() * LEVELS.len()) as f64;
     let (e1, e2) = across(surface);
     let column = |(a, b): (f64, f64)| centre + (e1 * a + e2 * b) * diameter_m;
@@ -402,13 +411,9 @@ fn unseen_volume(
         let top = column(COLUMNS[n]) + surface.up * height_m;
         explained[n] && is_roofed(space, &top, &surface.up)
     };
-    ((0..COLUMNS.len()).filter(is_inside).count() <= GRAZED).then_some(unseen)
-}
-
-/// Whether so much was measured among the unseen points of an object, by no object that is believed in, that one may well stand there.
-fn is_measured(space: &Space, unseen: &[Point3<f64>]) -> bool {
-    let measured = unseen.iter().filter(|point| space.cell(point) == Cell::Occupied).count();
-    measured as f64 >= MEASURED_SHARE * (COLUMNS.len() * LEVELS.len()) as f64
+    let measured = unseen.iter().filter(|point| space.cell(point) == Cell::Occupied).count() as f64;
+    let likely = measured >= MEASURED_SHARE * all && !explained.contains(&true);
+    ((0..COLUMNS.len()).filter(is_inside).count() <= GRAZED).then_some(Unseen { points: unseen, likely })
 }
 
 /// Whether a measured surface lies over an unseen point, with nothing seen free between: it is within a solid body.
@@ -522,8 +527,8 @@ mod tests {
     fn what_was_measured_and_no_object_explains_is_likely_something() {
         let likely = |disc_m: f64, standing: &[&Track]| {
             let space = seen_from_above(disc_m);
-            let points = unseen_volume(&table(), &space, standing, &Point3::origin(), (0.104, 0.07));
-            points.map(|points| is_measured(&space, &points))
+            let hidden = unseen_volume(&table(), &space, standing, &Point3::origin(), (0.104, 0.07));
+            hidden.map(|hidden| hidden.likely)
         };
         assert_eq!(likely(0.104, &[]), Some(true));
         assert_eq!(likely(0.20, &[]), Some(false), "it stands below what was measured");

@@ -30,7 +30,7 @@ fn main() -> Anyhow<()> {
     let unix =
         std::env::temp_dir().join(format!("descry-throughput-{}", std::process::id())).display().to_string();
     for (name, address) in [("Unix socket", unix), ("TCP on loopback", "127.0.0.1:47319".into())] {
-        let mut program = Command::new("python3").args([BODY, &address]).spawn()?;
+        let mut program = Command::new("python3").args([BODY, address.as_str()]).spawn()?;
         let measured =
             reach(&address).and_then(|robot| runtime.block_on(measure(name, &robot, frames, bare_s)));
         end(&mut program);

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import machine
 from .stage import Stage
+from .world import FELT
 
 TICK_S, PUSH_M_S, MOVE_M_S, CARRY_M_S = 0.02, 0.1, 0.4, 1.0
 # A push starts this far behind the middle of an object, at the first of these where the hand has room.
@@ -21,6 +22,8 @@ PUSH_HEIGHT_M = 0.035
 SLIPPED_SHARE = 0.5
 # Over things on its way, and beside the middle of what it is to lift, metres.
 ABOVE_M, ASIDE_M = 0.45, 0.03
+# The range sensor in the wrist looks down on so much around a point, in steps; and for so long, seconds.
+FIND_M, FIND_STEP_M, FIND_S = 0.08, 0.01, 0.2
 # What stops higher than this above where it was to stand, stands on something else.
 STANDS_M = 0.02
 # Where what is held is carried: in the base's frame, beside what the camera sees and above the base.
@@ -121,6 +124,8 @@ class Hand:
         self._put(at + [0.0, 0.0, ABOVE_M], 0.0)
         self._busy = True
         try:
+            self._run(FIND_S)
+            at = self._found(at)
             self._move(request, at, PUSH_M_S, until=self.felt)
             thing = self._under(at, opening_m)
             self._hold(thing.name)
@@ -130,6 +135,26 @@ class Hand:
             if self.held is None:
                 self._park()
         return min(2.0 * thing.radius_m, opening_m)
+
+    def _found(self, at: np.ndarray) -> np.ndarray:
+        """The middle of the top that is nearest to a point, of those that reach above it, as ranges from above show it; localisation
+        errs by more than the hand may. The point itself if there is none."""
+        steps = round(FIND_M / FIND_STEP_M)
+        cells = [(i, j) for i in range(-steps, steps + 1) for j in range(-steps, steps + 1)]
+        tops = {cell for cell in cells if self._height_under(self._cell(at, cell) + [0.0, 0.0, ABOVE_M]) > at[2]}
+        middles = [np.mean([self._cell(at, cell) for cell in top], axis=0) for top in connected(tops)]
+        return min(middles, key=lambda m: float(np.linalg.norm(m - at)), default=at)
+
+    @staticmethod
+    def _cell(at: np.ndarray, cell: tuple[int, int]) -> np.ndarray:
+        return at + [FIND_STEP_M * cell[0], FIND_STEP_M * cell[1], 0.0]
+
+    def _height_under(self, eye: np.ndarray) -> float:
+        """What a ray straight down meets of things that can move; the depths if nothing."""
+        groups, geom = np.zeros(6, dtype=np.uint8), np.zeros(1, dtype=np.int32)
+        groups[FELT] = 1
+        away = mujoco.mj_ray(self.model, self.data, eye, np.array([0.0, 0.0, -1.0]), groups, 0, self.model.body(machine.HAND).id, geom)
+        return float(eye[2] - away) if away >= 0.0 else -math.inf
 
     def _under(self, at: np.ndarray, opening_m: float):
         """The thing that the hand has come down on."""
@@ -176,3 +201,18 @@ class Hand:
         finally:
             self._busy = False
         self._park()
+
+
+def connected(cells: set[tuple[int, int]]) -> list[set[tuple[int, int]]]:
+    """Cells that hang together by their sides."""
+    left, parts = set(cells), []
+    while left:
+        part, edge = set(), [min(left)]
+        while edge:
+            i, j = edge.pop()
+            if (i, j) in left:
+                left.remove((i, j))
+                part.add((i, j))
+                edge += [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
+        parts.append(part)
+    return parts

@@ -98,6 +98,15 @@ class Body(unittest.TestCase):
         self.assertFalse(here.hand(Asked())["holds"])
         self.assertLess(np.linalg.norm(here.stage.pose_of("cup A")[:3, 3] - at), 0.01)
 
+    def test_the_hand_finds_what_localisation_misses_and_nothing_farther_off(self):
+        here = body_in("floor", 5, **EXACT)
+        at = here.stage.pose_of("cup A")[:3, 3] + [0.0, 0.0, 0.05]
+        with self.assertRaises(descry.Failure) as failed:
+            here.grasp(Asked(), list(at + [0.0, 0.0, 0.3]), 0.08)
+        self.assertIn("slipped", failed.exception.said)
+        here.grasp(Asked(), list(at + [0.03, -0.04, 0.0]), 0.08)
+        self.assertEqual(here.arm.held, "cup A")
+
     def test_what_is_put_down_on_something_is_blocked(self):
         here = body_in("floor", 5, start=(0.0, 1.0, 0.0), **EXACT)
         at = here.stage.pose_of("cup A")[:3, 3].copy()

@@ -129,12 +129,7 @@ fn mistakes_are_drawn_under_the_text() {
     check(bring, "truly = \"held\"", "truly = \"hold\"", &["truly = \"hold\"", "all-stand"]);
     let other = |robot: &str| format!("[[case]]\nname = \"other\"\n{robot}\n\n[[goal]]");
     let rooms = "home/two-rooms.toml";
-    check(
-        rooms,
-        "[[goal]]",
-        &other("robot = \"program:x {seed}\""),
-        &["other", "no {truth}", "--truth {truth}"],
-    );
+    check(rooms, "[[goal]]", &other("robot = \"program:x {seed}\""), &["no {truth}", "--truth {truth}"]);
     check(rooms, "[[goal]]", &other("robot = \"sim\""), &["expected program:COMMAND"]);
     let both = "robot = \"program:x {seed} {truth}\"\nfault = [{ kind = \"grasp_slips\", at = 1 }]";
     check(rooms, "[[goal]]", &other(both), &["befall our simulator only"]);

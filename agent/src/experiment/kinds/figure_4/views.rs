@@ -38,9 +38,11 @@ pub(super) struct Taken {
 /// A body before an arrangement.
 pub(super) struct Staged {
     body: Body,
-    /// Our simulator, which shows what an ideal camera sees, and the things with a handle: number and name.
-    ideal: Option<(Arc<SimRobot>, Vec<(usize, String)>)>,
+    ideal: Option<Ideal>,
 }
+
+/// Our simulator, which shows what an ideal camera sees, and the things with a handle: number and name.
+type Ideal = (Arc<SimRobot>, Vec<(usize, String)>);
 
 impl Staged {
     /// Any body that says how everything really stands.

@@ -76,7 +76,7 @@
       (over all (time-left))
       (at start (at ?from))
       (at start (not (scanned ?from)))
-      (at start (> (looseness ?what) 0.015))
+      (at start (> (looseness ?what) 0.01))
       (at start ([can-scan ?from ?what])))
     :effect (and
       (at start (not (at ?from)))

@@ -323,7 +323,11 @@ impl Asker<'_> {
     }
 
     fn seen_of(&self, doubt: &Doubt, left: f64) -> String {
-        reasons::seen_of(self.s, doubt, left, |on| self.mind.regions[on].taken)
+        let seen = reasons::seen_of(self.s, doubt, left, |on| self.mind.regions[on].taken);
+        match self.s.chart.goes_on(self.s.robot.description()) {
+            Some(goes_on) => format!("{seen}; {goes_on}"),
+            None => seen,
+        }
     }
 
     fn believed(&self, t: &Track) -> Believed {

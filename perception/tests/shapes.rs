@@ -231,6 +231,22 @@ fn what_is_known_is_named_and_what_is_not_is_not() {
     check(instance(2, 3), &twice, &both);
 }
 
+/// What is two centimetres wider or narrower than a known thing may be it, as far as the laser tells, and is not named.
+#[test]
+fn what_is_like_a_known_thing_is_not_named() {
+    let map = map_of_the_lab(&mut Draws(EXPERIMENT));
+    let check = |outline: &lab::Outline, like: &str| {
+        let scans = circled(outline, &Run::default(), &map, 9).1.scans;
+        let model = align(&scans, &SolverOptions::default()).unwrap().model;
+        let found = recognise(&model, &known(), &RecogniseOptions::default());
+        assert_eq!(found.verdict, Verdict::OneOf(vec![like.into()]), "{:?}", found.candidates);
+    };
+    check(&lab::rounded(57.5, 57.5, 14.8), "big-chair");
+    check(&lab::rounded(61.0, 61.0, 14.8), "big-chair");
+    check(&lab::rounded(48.0, 48.0, 17.6), "red-chair");
+    check(&lab::rounded(52.0, 52.0, 17.6), "red-chair");
+}
+
 /// A single scan never names another object with certainty, and the right one is among those that it leaves.
 #[test]
 fn a_single_scan_leaves_the_right_object() {

@@ -6,7 +6,7 @@ pub mod searching;
 pub mod shapes;
 pub mod surveying;
 
-use descry_planner::{Answer, Call, CallError, Plan};
+use descry_planner::{Answer, Call, CallError, Plan, Step};
 use descry_skills::{Outcome, Skill, SkillFailure};
 
 use crate::abilities::searching::perceive::Eyes;
@@ -95,6 +95,9 @@ pub type Learn =
 pub type Failed =
     fn(&mut Mind, Eyes<'_>, &Situation, &[&str], &SkillFailure) -> Result<Option<String>, WorldError>;
 
+/// Nothing more follows from a failure.
+pub(crate) const NOTHING_MORE: Failed = |_, _, _, _, _| Ok(None);
+
 /// Prepares a run.
 pub type Begins = fn(&mut Mind, &Domain, &Goal);
 
@@ -125,6 +128,25 @@ pub fn fact(uses: &[String], name: &str) -> Option<&'static Fact> {
 /// The skill of a name.
 pub fn skill(uses: &[String], name: &str) -> Option<&'static SkillWord> {
     used(uses).flat_map(|a| a.skills).find(|s| s.name == name)
+}
+
+/// Between the end of a step and the begin of the next, seconds.
+const GAP_S: f64 = 0.001;
+
+/// A plan of steps: action, arguments, and how long it takes, seconds.
+pub(crate) fn one_after_another(all: &[(&str, Vec<String>, f64)]) -> Plan {
+    let mut start_s = 0.0;
+    let step = |(action, arguments, duration_s): &(&str, Vec<String>, f64)| {
+        let begins_s = start_s;
+        start_s += duration_s + GAP_S;
+        Step {
+            start_s: Some(begins_s),
+            action: (*action).into(),
+            arguments: arguments.clone(),
+            duration_s: *duration_s,
+        }
+    };
+    Plan { steps: all.iter().map(step).collect(), ..Plan::default() }
 }
 
 /// The `n`-th argument of a call, by name.

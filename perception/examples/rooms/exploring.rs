@@ -149,7 +149,7 @@ pub fn print(seed: u64) {
     );
     let policies = [Policy::Expected, Policy::NearestFrontier];
     let mut sums = [(0.0, 0, 0.0, 0); 2];
-    let mut both = [0.0; 2];
+    let mut both = [(0.0, 0.0); 2];
     for k in 0..FLATS {
         let (building, start) = flat(1000 * seed + k);
         let runs = policies.map(|policy| explore(policy, &building, &start, 1000 * seed + k));
@@ -163,16 +163,22 @@ pub fn print(seed: u64) {
             *sum = (sum.0 + run.metres, sum.1 + run.looks, sum.2 + run.seconds, sum.3 + done);
         }
         if runs.iter().all(|run| run.known >= ENOUGH) {
-            (0..2).for_each(|i| both[i] += runs[i].metres);
+            for (both, run) in both.iter_mut().zip(&runs) {
+                *both = (both.0 + run.metres, both.1 + run.seconds);
+            }
         }
     }
     for (policy, (metres, looks, seconds, done)) in policies.iter().zip(sums) {
         println!("{policy:?}: {done} of {FLATS} known, {metres:.1} m, {looks} looks, {seconds:.0} s in all");
     }
+    let [ours, nearest] = both;
     println!(
-        "where both came to the end: {:.1} m against {:.1} m, ratio {:.2}",
-        both[0],
-        both[1],
-        both[0] / both[1]
+        "where both came to the end: {:.1} m against {:.1} m, ratio {:.2}; {:.0} s against {:.0} s, ratio {:.2}",
+        ours.0,
+        nearest.0,
+        ours.0 / nearest.0,
+        ours.1,
+        nearest.1,
+        ours.1 / nearest.1
     );
 }

@@ -1,9 +1,10 @@
 //! The drive of Viejo and Cazorla in a simulated building, and what they did not try:
 //! `cargo run --release -p descry-perception --example rooms -- [SEED] [DIR] [PART]`. Plots are written to DIR as SVG,
-//! and the drive as clouds, on which `peers.py` beside this file runs what others offer. PART is one of them alone, by the name of its file.
+//! and the drive as clouds (PART `drive`), on which `peers.py` beside this file runs what others offer. PART is one of them alone, by the name of its file.
 
 #[path = "../../tests/corridor/mod.rs"]
 mod corridor;
+mod drive;
 mod exploring;
 mod plot;
 mod poses;
@@ -22,7 +23,9 @@ fn run(seed: u64, out: Option<&Path>, part: Option<&str>) -> Result<(), String> 
     if is_asked("poses") {
         poses::pairs(seed);
         poses::loops(seed)?;
-        out.map_or(Ok(()), |dir| poses::export(seed, dir))?;
+    }
+    if is_asked("drive") {
+        out.map_or(Ok(()), |dir| drive::export(seed, dir))?;
     }
     if is_asked("walls") {
         walls::walls(seed, out)?;
@@ -45,7 +48,7 @@ fn run(seed: u64, out: Option<&Path>, part: Option<&str>) -> Result<(), String> 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let seed = arguments.first().map_or(Ok(1), |text| text.parse());
-    let parts = ["poses", "walls", "variations", "recorded", "exploring", "times"];
+    let parts = ["poses", "drive", "walls", "variations", "recorded", "exploring", "times"];
     let part = arguments.get(2).map(String::as_str);
     let result = match (seed, arguments.len()) {
         (Ok(seed), 0..=3) if part.is_none_or(|part| parts.contains(&part)) => {

@@ -4,9 +4,10 @@
   peers.py DIR/drive
 
 Prints, with processor seconds, errors of single steps, what is left where the drive came back before and after Open3D's pose graph (multiway registration), the walls that
-Open3D's planar patches and repeated RANSAC planes give at true poses, and times. Ours, read from poses.txt, are measured in the same way.
+Open3D's planar patches and repeated RANSAC planes give at true poses, times and the ratio to ours, and memory. Ours, read from the drive, are measured
+in the same way.
 """
-import glob, os, sys, time
+import glob, os, resource, sys, time
 os.environ.update(OMP_NUM_THREADS='1')
 import numpy as np, open3d as o3d, small_gicp
 
@@ -14,6 +15,9 @@ drive = sys.argv[1]
 clouds = [o3d.io.read_point_cloud(f) for f in sorted(glob.glob(f'{drive}/*.pcd'))]
 table = np.loadtxt(f'{drive}/poses.txt').reshape(len(clouds), 4, 3)
 walls = np.loadtxt(f'{drive}/walls.txt')
+steps_s, closed_s, walls_s, ours_mb = np.loadtxt(f'{drive}/took.txt')
+memory_mb = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+had_mb = memory_mb()
 
 def pose(x, y, a):
     m = np.eye(4); m[:2, :2] = [[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]; m[:2, 3] = x, y
@@ -25,16 +29,18 @@ way = lambda m: np.linalg.norm(m[:2, 3])
 turn = lambda m: np.degrees(abs(np.arctan2(m[1, 0], m[0, 0])))
 steps = range(1, len(clouds))
 
+told = lambda seconds, ours_s: f'{seconds:6.2f} s, {seconds / max(ours_s, .01):5.1f} times ours' if seconds else ''
+
 def of_steps(name, found, seconds):
     off = [np.linalg.inv(step(truth, i)) @ found[i - 1] for i in steps]
     t, w = sorted(map(turn, off)), sorted(map(way, off))
     q = int(.95 * len(off))
-    print(f'{name:34} turn off {np.mean(t):5.2f} {t[q]:5.2f} deg, way off {100 * np.mean(w):5.1f} {100 * w[q]:5.1f} cm, {seconds:6.2f} s')
+    print(f'{name:34} turn off {np.mean(t):5.2f} {t[q]:5.2f} deg, way off {100 * np.mean(w):5.1f} {100 * w[q]:5.1f} cm, {told(seconds, steps_s)}')
 
 def of_poses(name, poses, seconds):
     first = np.linalg.inv(poses[0]); true = np.linalg.inv(truth[0])
     off = [np.linalg.inv(true @ t) @ (first @ p) for p, t in zip(poses, truth)]
-    print(f'{name:34} at the end {way(off[-1]):5.2f} m {turn(off[-1]):5.2f} deg, farthest {max(map(way, off)):5.2f}, mean {np.mean([way(o) for o in off]):5.2f} m, {seconds:6.2f} s')
+    print(f'{name:34} at the end {way(off[-1]):5.2f} m {turn(off[-1]):5.2f} deg, farthest {max(map(way, off)):5.2f}, mean {np.mean([way(o) for o in off]):5.2f} m, {told(seconds, steps_s + closed_s)}')
 
 def chained(found):
     poses = [np.eye(4)]
@@ -42,7 +48,7 @@ def chained(found):
     return poses
 
 of_steps('odometry', [step(odometry, i) for i in steps], 0)
-of_steps('ours (ICP-EM)', [step(chain, i) for i in steps], 0)
+of_steps('ours (ICP-EM)', [step(chain, i) for i in steps], steps_s)
 
 # Between floor and ceiling, as ours.
 def body(c):
@@ -70,7 +76,7 @@ for kind in ('ICP', 'PLANE_ICP', 'GICP'):
     of_poses('  chained', chained(found), 0)
 
 print()
-of_poses('odometry', odometry, 0); of_poses('ours, chained', chain, 0); of_poses('ours, closed', closed, 0)
+of_poses('odometry', odometry, 0); of_poses('ours, chained', chain, 0); of_poses('ours, closed', closed, steps_s + closed_s)
 of_poses('Open3D, chained', chained([p[0] for p in pairs]), open3d_s)
 # The pose graph on the better steps, those of the last of small_gicp's.
 seconds = time.process_time()
@@ -83,9 +89,11 @@ for i, f in zip(steps, found):
 ways = np.cumsum([0] + [way(step(truth, i)) for i in steps])
 loops = 0
 for to in range(len(clouds)):
-    near = [f for f in range(to) if ways[to] - ways[f] > 15 and way(np.linalg.inv(poses[f]) @ poses[to]) < 3.3 and turn(np.linalg.inv(poses[f]) @ poses[to]) < 20]
+    # As far off as the chain may have drifted.
+    between = {f: np.linalg.inv(poses[f]) @ poses[to] for f in range(to) if ways[to] - ways[f] > 15}
+    near = sorted((f for f, m in between.items() if way(m) < max(3.3, .08 * (ways[to] - ways[f])) and turn(m) < 30), key=lambda f: way(between[f]))
     for f in near[:3]:
-        again, information = icp(small[to], small[f], np.linalg.inv(poses[f]) @ poses[to], (2., .5, .15))
+        again, information = icp(small[to], small[f], between[f], (8., 2., .5, .15))
         graph.edges.append(reg.PoseGraphEdge(to, f, again, information, uncertain=True)); loops += 1
 reg.global_optimization(graph, reg.GlobalOptimizationLevenbergMarquardt(), reg.GlobalOptimizationConvergenceCriteria(),
                         reg.GlobalOptimizationOption(max_correspondence_distance=.15, edge_prune_threshold=.25, reference_node=0))
@@ -116,10 +124,14 @@ def held(name, planes, seconds):
         for t in np.arange(.05, l, .1):
             q = w[:2] + v * t; everything += 1
             hit += any(abs(u[0] * v[1] - u[1] * v[0]) < np.sin(.3) and abs((q - at[:2]) @ (n[:2] / np.hypot(*n[:2]))) < .15 and low - .15 < (q - at[:2]) @ u < high + .15 for u, n, at, low, high in found)
-    print(f'{name:34} {len(planes):3} walls, precision {100 * right / max(total, 1):5.1f}, recall {100 * hit / everything:5.1f} %, angle {angle / max(right, 1):.2f} deg, offset {100 * offset / max(right, 1):.1f} cm, {seconds:6.2f} s')
+    print(f'{name:34} {len(planes):3} walls, precision {100 * right / max(total, 1):5.1f}, recall {100 * hit / everything:5.1f} %, angle {angle / max(right, 1):.2f} deg, offset {100 * offset / max(right, 1):.1f} cm, {told(seconds, walls_s)}')
 def extent(points, n):
     at = points.mean(0); u = np.array([-n[1], n[0]]) / np.hypot(n[0], n[1]); x = (points[:, :2] - at[:2]) @ u
     return n, at, x.min(), x.max()
+def of_feet(x, y, u, v):
+    along = np.array([u - x, v - y]); half = np.linalg.norm(along) / 2
+    return np.array([-along[1], along[0], 0]) / (2 * half), np.array([(x + u) / 2, (y + v) / 2, 0]), -half, half
+held('ours', [of_feet(*feet) for feet in np.loadtxt(f'{drive}/ours.txt') if np.hypot(*(feet[2:] - feet[:2])) > 0], walls_s)
 seconds = time.process_time()
 thin = whole.voxel_down_sample(.05); thin.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(.3, 50))
 boxes = thin.detect_planar_patches(normal_variance_threshold_deg=60, coplanarity_deg=75, outlier_ratio=.75, min_plane_edge_length=.5, min_num_points=50, search_param=o3d.geometry.KDTreeSearchParamKNN(30))
@@ -137,3 +149,4 @@ for _ in range(25):
     if abs(c) < .3 and np.ptp(points[:, 2]) > 1: upright.append(extent(points, n))
     rest = rest.select_by_index(inside, invert=True)
 held('Open3D, RANSAC one after another', upright, time.process_time() - seconds)
+print(f'\nmost memory beyond the clouds: {memory_mb() - had_mb:.0f} MB, ours {ours_mb:.0f} MB')

@@ -1,17 +1,12 @@
 //! Section 3: errors of single steps, and what is left when the drive comes back to where it began.
 
-use super::corridor::measure::survey;
 use super::corridor::{Building, Rig, around, field_of_view, with_people};
 use super::tabletop::Draws;
-use descry_perception::cloud::Cloud;
-use descry_perception::files::pcd;
 use descry_perception::mapping::{
-    Closure, ClosureOptions, MapOptions, Matcher, PairFit, RectifyOptions, Station, chained, closures,
-    correct_drive, rectify_drive, rectify_pair,
+    Closure, ClosureOptions, Matcher, PairFit, RectifyOptions, Station, chained, closures, correct_drive,
+    rectify_drive, rectify_pair,
 };
 use descry_perception::nalgebra::Isometry2;
-use std::path::Path;
-use std::time::Instant;
 
 pub const LONG_M: f64 = 40.0;
 pub const SHORT_M: f64 = 20.0;
@@ -132,47 +127,4 @@ pub fn loops(seed: u64) -> Result<(), String> {
         );
     }
     Ok(())
-}
-
-/// Writes a drive for other programs: a cloud a stop, poses (x y heading by odometry, true, rectified, closed) and the true walls (x y x y); prints what ours take.
-pub fn export(seed: u64, dir: &Path) -> Result<(), String> {
-    let building = Building::corridor_loop(LONG_M, SHORT_M, seed);
-    let truths = around(LONG_M, SHORT_M, 6.0, 0.8);
-    let stations = building.drive(&truths, &Rig::default(), seed);
-    let rectify = options(Matcher::IcpEm);
-    let before = Instant::now();
-    let pairs = steps(&stations, &rectify)?;
-    let steps_s = before.elapsed().as_secs_f64();
-    let chain = chained(&pairs);
-    let found = again(&stations, &chain, &rectify)?;
-    let closures_s = before.elapsed().as_secs_f64() - steps_s;
-    let settled = correct_drive(&pairs, &found).map_err(|e| e.to_string())?;
-    let all_s = before.elapsed().as_secs_f64();
-    let before = Instant::now();
-    let survey = survey(&stations, &truths);
-    let map = survey.map(&MapOptions::default()).map_err(|e| e.to_string())?;
-    println!(
-        "\nours on the drive of seed {seed}: steps {steps_s:.2} s, closures {closures_s:.2} s, graph {:.3} s; survey and {} walls {:.2} s",
-        all_s - steps_s - closures_s,
-        map.walls.len(),
-        before.elapsed().as_secs_f64()
-    );
-    let folder = dir.join("drive");
-    std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let save = |name: String, bytes: &[u8]| {
-        std::fs::write(folder.join(&name), bytes).map_err(|e| format!("{name}: {e}"))
-    };
-    let mut poses = String::new();
-    for (i, station) in stations.iter().enumerate() {
-        let cloud = Cloud::from_points(station.points.clone());
-        save(format!("{i:03}.pcd"), &pcd::write(&cloud, pcd::Encoding::Binary))?;
-        for pose in [&station.odom_from_level, &truths[i], &chain[i], &settled.poses[i]] {
-            poses += &format!("{} {} {} ", pose.translation.x, pose.translation.y, pose.rotation.angle());
-        }
-        poses.push('\n');
-    }
-    save("poses.txt".to_owned(), poses.as_bytes())?;
-    let walls: String =
-        building.walls.iter().map(|(a, b)| format!("{} {} {} {}\n", a.x, a.y, b.x, b.y)).collect();
-    save("walls.txt".to_owned(), walls.as_bytes())
 }

@@ -119,23 +119,42 @@ fn scans(folder: &Path, out: Option<&Path>) -> Result<(), String> {
         let before = Instant::now();
         let room = map(&[(points.clone(), eyes[0])], 0.1)?;
         print(name, &room, points.len(), before.elapsed().as_secs_f64());
-        let station = Station { points: points.clone(), odom_from_level: Isometry2::identity() };
-        sheets.push((name, sheet(&room, &[station], 50.0)));
+        sheets.push((name, sheet(&room, &[level_station(points.clone())], 50.0)));
         prepared.push(Cloud::from_points(points));
     }
     let [first, second] = prepared.as_slice() else { return Err("no floor in a room scan".to_owned()) };
+    let plan = by_plans(first, second)?;
+    let pose = by_all_points(first, second, &plan)?;
+    let moved = first.transformed(&pose).points;
+    let eyes = [pose * Point3::new(0.0, 0.0, 1.0), Point3::new(0.0, 0.0, 1.0)];
+    let views = [(moved, eyes[0]), (second.points.clone(), eyes[1])];
     let before = Instant::now();
-    let station =
-        |cloud: &Cloud| Station { points: cloud.points.clone(), odom_from_level: Isometry2::identity() };
+    let both = map(&views, 0.1)?;
+    print("both scans", &both, views.iter().map(|v| v.0.len()).sum(), before.elapsed().as_secs_f64());
+    if let Some(dir) = out {
+        let stations: Vec<Station> = views.into_iter().map(|(points, _)| level_station(points)).collect();
+        sheets.push(("both", sheet(&both, &stations, 50.0)));
+        write(dir, "room-scans.svg", &sheets)?;
+    }
+    Ok(())
+}
+
+fn level_station(points: Vec<Point3<f32>>) -> Station {
+    Station { points, odom_from_level: Isometry2::identity() }
+}
+
+/// Where the first scan lies on the second, by their plans alone and from nothing.
+fn by_plans(first: &Cloud, second: &Cloud) -> Result<Isometry2<f64>, String> {
+    let before = Instant::now();
+    let station = |cloud: &Cloud| [level_station(cloud.points.clone())];
     let field = FieldOfView { right_rad: -PI, left_rad: PI, near_m: 0.3, far_m: 10.0 };
     let rectify = RectifyOptions { field, thin_m: 0.1, ..RectifyOptions::default() };
     let options =
         ClosureOptions { most_m: 4.0, heading_drift_rad: PI, explained: 0.4, ..ClosureOptions::default() };
     let here = [Isometry2::identity()];
-    let plan =
-        relocate((&[station(second)], &here), (&[station(first)], &here), &here[0], &rectify, &options)
-            .map_err(|e| e.to_string())?
-            .ok_or("the plans of the scans do not register")?;
+    let plan = relocate((&station(second), &here), (&station(first), &here), &here[0], &rectify, &options)
+        .map_err(|e| e.to_string())?
+        .ok_or("the plans of the scans do not register")?;
     let found = plan.before_from_after;
     println!(
         "room_scan1 on room_scan2, plans from nothing: {:.0} % explained, shifted {:.2} {:.2} m, turned {:.1}°, {:.2} s",
@@ -145,23 +164,25 @@ fn scans(folder: &Path, out: Option<&Path>) -> Result<(), String> {
         found.rotation.angle().to_degrees(),
         before.elapsed().as_secs_f64()
     );
+    Ok(found)
+}
+
+/// The same with all points, from there.
+fn by_all_points(first: &Cloud, second: &Cloud, plan: &Isometry2<f64>) -> Result<Isometry3<f64>, String> {
     let before = Instant::now();
     let thin = |cloud: &Cloud| voxel::downsample(cloud, 0.05).map_err(|e| e.to_string());
     let ready = |cloud: &Cloud| Prepared::with_normals(&cloud.points, 20).map_err(|e| e.to_string());
+    let start = Isometry3::new(plan.translation.vector.push(0.0), Vector3::z() * plan.rotation.angle());
     let options = RegisterOptions {
         method: Method::PointToPlane,
-        start_target_from_source: Isometry3::new(
-            found.translation.vector.push(0.0),
-            Vector3::z() * found.rotation.angle(),
-        ),
+        start_target_from_source: start,
         within_m: 0.2,
         robust_m: Some(0.03),
         ..RegisterOptions::default()
     };
     let best = register::align(&ready(&thin(first)?)?, &ready(&thin(second)?)?, &options)
         .map_err(|e| e.to_string())?;
-    let pose = best.target_from_source;
-    let shift = pose.translation.vector;
+    let shift = best.target_from_source.translation.vector;
     println!(
         "    then all points: {} of {} matched within 20 cm, residual {:.1} mm, shifted {:.2} {:.2} {:.2} m, turned {:.1}°, {}, {:.2} s",
         best.matched,
@@ -170,25 +191,11 @@ fn scans(folder: &Path, out: Option<&Path>) -> Result<(), String> {
         shift.x,
         shift.y,
         shift.z,
-        pose.rotation.angle().to_degrees(),
+        best.target_from_source.rotation.angle().to_degrees(),
         best.ending,
         before.elapsed().as_secs_f64()
     );
-    let moved = first.transformed(&pose).points;
-    let eyes = [pose * Point3::new(0.0, 0.0, 1.0), Point3::new(0.0, 0.0, 1.0)];
-    let views = [(moved, eyes[0]), (second.points.clone(), eyes[1])];
-    let before = Instant::now();
-    let both = map(&views, 0.1)?;
-    print("both scans", &both, views.iter().map(|v| v.0.len()).sum(), before.elapsed().as_secs_f64());
-    if let Some(dir) = out {
-        let stations: Vec<Station> = views
-            .into_iter()
-            .map(|(points, _)| Station { points, odom_from_level: Isometry2::identity() })
-            .collect();
-        sheets.push(("both", sheet(&both, &stations, 50.0)));
-        write(dir, "room-scans.svg", &sheets)?;
-    }
-    Ok(())
+    Ok(best.target_from_source)
 }
 
 fn dining_room(folder: &Path, out: Option<&Path>) -> Result<(), String> {

@@ -129,7 +129,8 @@ const IN_RANGE: f64 = 0.9;
 const LEFT: f64 = 0.2;
 
 /// The nearest frontier that can be reached, from as soon on the way there as it is in range and nothing stands before it, facing it (Yamauchi 1997).
-/// `None` if no frontier is left.
+/// Where no way leads to any, for a camera does not see the floor at the body's feet, the body turns to the one nearest to where it stands. `None` if no
+/// frontier is left.
 pub fn nearest_frontier(
     grid: &Occupancy,
     looked: &[Isometry2<f64>],
@@ -144,28 +145,28 @@ pub fn nearest_frontier(
         |square: &(i64, i64)| floor.unknown_beside(*square).iter().any(|&index| missed[index] > LEFT);
     let of_frontiers = frontiers(grid, options).into_iter().flat_map(|f| f.squares);
     let squares: FxHashSet<(i64, i64)> = of_frontiers.map(|p| floor.square(&p)).filter(is_left).collect();
-    let (mut goal, mut way_m) = (None, f64::INFINITY);
-    for square in floor.squares().filter(|s| squares.contains(s)) {
-        // The body's middle may not come that near to what is occupied: as near as it comes.
-        let near = floor.nearest_way_m(&ways, square, options.radius_m);
-        if near < way_m {
-            (goal, way_m) = (Some(floor.middle(square)), near);
-        }
-    }
-    let goal = goal?;
-    let reach_m = IN_RANGE * options.field.far_m;
-    let sees = |p: &Point2<f64>| (goal - p).norm() <= reach_m && floor.is_clear(p, &goal);
-    let stands = std::iter::once((start, 0.0)).chain(
-        floor.squares().map(|s| (floor.middle(s), ways[floor.index(s)])).filter(|(_, way)| way.is_finite()),
-    );
-    let on_way = stands.filter(|(p, way)| *way <= way_m && sees(p));
-    let (at, way_m) = on_way.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let ahead = goal - at;
-    let pose = Isometry2::new(at.coords, ahead.y.atan2(ahead.x));
-    let turn = from.rotation.angle_to(&pose.rotation).abs();
-    let (metre_s, radian_s, look_s) = options.seconds;
-    let gain_m2 = Unseen::default().gain_m2(&floor.outlook(&pose, way_m, &missed, options));
-    Some(NextPose { pose, gain_m2, way_m, cost_s: metre_s * way_m + radian_s * turn + look_s })
+    // The body's middle may not come that near to what is occupied: as near as it comes.
+    let goal = |s| (floor.nearest_way_m(&ways, s, options.radius_m), floor.middle(s));
+    let mut goals: Vec<(f64, Point2<f64>)> =
+        floor.squares().filter(|s| squares.contains(s)).map(goal).collect();
+    goals.sort_by(|(way_a, a), (way_b, b)| {
+        way_a.total_cmp(way_b).then((a - start).norm().total_cmp(&(b - start).norm()))
+    });
+    let next = |at: &Point2<f64>, way_m: f64, goal: &Point2<f64>| {
+        let ahead = goal - at;
+        let pose = Isometry2::new(at.coords, ahead.y.atan2(ahead.x));
+        let turn = from.rotation.angle_to(&pose.rotation).abs();
+        let (metre_s, radian_s, look_s) = options.seconds;
+        let gain_m2 = Unseen::default().gain_m2(&floor.outlook(&pose, way_m, &missed, options));
+        NextPose { pose, gain_m2, way_m, cost_s: metre_s * way_m + radian_s * turn + look_s }
+    };
+    goals.iter().find_map(|(way_m, goal)| {
+        let (at, way_m) = match way_m.is_finite() {
+            true => floor.seen_from(goal, *way_m, &start, &ways, options)?,
+            false => (start, 0.0),
+        };
+        Some(next(&at, way_m, goal)).filter(|look| look.gain_m2 >= LEAST_M2)
+    })
 }
 
 impl Floor<'_> {
@@ -173,6 +174,23 @@ impl Floor<'_> {
         let around = [(1, 0), (-1, 0), (0, 1), (0, -1)].map(|(x, y)| (column + x, row + y));
         let unknown = around.into_iter().filter(|s| self.space(*s) == Space::Unknown);
         unknown.filter_map(|s| self.index_beyond(s)).collect()
+    }
+
+    /// Where on the way to a place, and after how much of it, the place is in range first with nothing before it.
+    fn seen_from(
+        &self,
+        goal: &Point2<f64>,
+        most_m: f64,
+        start: &Point2<f64>,
+        ways: &[f64],
+        options: &ExploreOptions,
+    ) -> Option<(Point2<f64>, f64)> {
+        let reach_m = IN_RANGE * options.field.far_m;
+        let sees = |p: &Point2<f64>| (goal - p).norm() <= reach_m && self.is_clear(p, goal);
+        let stands = self.squares().map(|s| (self.middle(s), ways[self.index(s)]));
+        let on_way =
+            std::iter::once((*start, 0.0)).chain(stands).filter(|(p, way)| *way <= most_m && sees(p));
+        on_way.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// The shortest way to a square no farther from it than the body's radius and a square.

@@ -6,7 +6,7 @@ mod time_left;
 
 use descry_skills::{Circle, Move, OpenDoor, Outcome};
 
-use super::{Ability, Fact, Meaning, SkillWord};
+use super::{Ability, Fact, Meaning, NOTHING_MORE, SkillWord};
 use crate::abilities::searching::perceive::Eyes;
 use crate::mind::Mind;
 use crate::note::Note;
@@ -64,7 +64,7 @@ pub const ABILITY: Ability = Ability {
                 _ => String::new(),
             },
             learn: driven,
-            failed: |_, _, _, _, _| Ok(None),
+            failed: NOTHING_MORE,
         },
         SkillWord {
             name: "open-door",
@@ -79,7 +79,7 @@ pub const ABILITY: Ability = Ability {
                 Outcome::Opened(opened) => Ok(format!("it is open after {:.1} s", opened.duration_s)),
                 other => Err(WorldError::strange(other)),
             },
-            failed: |_, _, _, _, _| Ok(None),
+            failed: NOTHING_MORE,
         },
     ],
     begins: None,

@@ -1,10 +1,10 @@
 //! The calls that *shapes* answers: what a scan from a pose is expected to bring, and what it costs to get there.
 
-use descry_planner::{Answer, Call, CallError, Plan, Step};
+use descry_planner::{Answer, Call, CallError, Plan};
 
 use super::floor::{NOTHING_KNOWN_M, THIS, Thing, thing};
 use super::poses;
-use crate::abilities::{Meaning, argument};
+use crate::abilities::{Meaning, argument, one_after_another};
 use crate::situation::{Situation, holding};
 
 const SCANS: &[&str] = &["scanned"];
@@ -104,8 +104,14 @@ fn expected_found(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     if !thing.may_have(shape, s.floor.known.len(), s.threshold) || !s.floor.knows(shape) {
         return Ok(Answer::Number(0.0));
     }
-    let hope = if thing.outline.is_some() { hope(s, call, thing) } else { 1.0 };
-    Ok(Answer::Number(hope))
+    let scans = planned(s, call, thing);
+    let hope = match &thing.outline {
+        None => 1.0,
+        Some(_) if scans.is_empty() && thing.taken_for.is_some() => 0.0,
+        // Whatever else it is taken for now.
+        Some(_) => thing.hoped_of_name(&scans, s.floor.known.len()) - s.floor.surest(shape),
+    };
+    Ok(Answer::Number(hope.max(0.0)))
 }
 
 fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
@@ -127,7 +133,7 @@ pub(super) fn fallback(s: &Situation) -> Option<Plan> {
     };
     let open: Vec<&Thing> = s.floor.things.iter().filter(is_open).collect();
     if let Some(thing) = open.iter().find(|t| t.outline.is_some() && t.taken_for.is_none()) {
-        return Some(steps(&[("align", vec![thing.symbol.clone()], ALIGN_S)]));
+        return Some(one_after_another(&[("align", vec![thing.symbol.clone()], ALIGN_S)]));
     }
     let pose = |n: usize| s.candidates[n].symbol.clone();
     let here = pose(s.at);
@@ -152,31 +158,13 @@ pub(super) fn fallback(s: &Situation) -> Option<Plan> {
         Some(t) => ("scan", vec![pose(to), t.symbol.clone()], SWEEP_S),
         None => ("survey", vec![pose(to)], SWEEP_S),
     };
-    Some(if to == s.at { steps(&[sweep]) } else { steps(&[drive, sweep]) })
+    let both = [drive, sweep];
+    Some(one_after_another(if to == s.at { &both[1..] } else { &both }))
 }
 
 /// What a sweep and an alignment take, as in the domain.
 const SWEEP_S: f64 = 0.5;
 const ALIGN_S: f64 = 0.1;
-
-/// Steps one after the other.
-fn steps(all: &[(&str, Vec<String>, f64)]) -> Plan {
-    let mut start_s = 0.0;
-    let step = |(action, arguments, duration_s): &(&str, Vec<String>, f64)| {
-        let begins_s = start_s;
-        start_s += duration_s + GAP_S;
-        Step {
-            start_s: Some(begins_s),
-            action: (*action).into(),
-            arguments: arguments.clone(),
-            duration_s: *duration_s,
-        }
-    };
-    Plan { steps: all.iter().map(step).collect(), ..Plan::default() }
-}
-
-/// Between the end of a step and the begin of the next, seconds.
-const GAP_S: f64 = 0.001;
 
 /// Why a scan is taken from there.
 pub(super) fn hope_of_scan(s: &Situation, arguments: &[&str]) -> String {

@@ -96,8 +96,8 @@ fn may_be(s: &Situation) -> Vec<String> {
 }
 
 fn found(s: &Situation) -> Vec<String> {
-    let sure = |name: &String| s.floor.found(name).first().map_or(0.0, |(_, sure)| *sure);
-    s.floor.names.iter().map(|(name, _)| format!("(= (found {name}) {:.5})", sure(name))).collect()
+    let line = |name: &String| format!("(= (found {name}) {:.5})", s.floor.surest(name));
+    s.floor.names.iter().map(|(name, _)| line(name)).collect()
 }
 
 fn learned(s: &Situation) -> Vec<String> {

@@ -17,10 +17,12 @@ pub const THIS: &str = "this";
 pub const NOTHING_KNOWN_M: f64 = 1.0;
 /// That a thing is none of those known, before the first scan.
 const STRANGER: f64 = 0.5;
-/// A known shape whose scans fit none: measured one in a hundred; see `perception/examples/shapes`.
-const MISSED: f64 = 0.01;
-/// Strangers that scans take for one of five known shapes, as measured: up to so loose a shape (metres), such a share.
-const TAKEN_FOR_KNOWN: [(f64, f64); 3] = [(0.02, 0.10), (0.16, 0.15), (f64::INFINITY, 0.70)];
+/// Known shapes that scans fit to none, up to so loose a shape (metres): measured one of 210 where the outline is closed, see
+/// `perception/examples/shapes`. Scans of an open one hold each other in place too loosely: it is not called unknown before it was scanned once more.
+const MISSED: [(f64, f64); 2] = [(0.02, 0.01), (f64::INFINITY, 0.15)];
+/// Strangers taken for one of five known shapes once they are no looser than so much, metres: measured with 210 strangers that were scanned until then, and
+/// as long as several shapes were left.
+const TAKEN_FOR_KNOWN: [(f64, f64); 4] = [(0.01, 0.07), (0.02, 0.10), (0.16, 0.16), (f64::INFINITY, 0.60)];
 /// How many were known where that was measured.
 const MEASURED_WITH: f64 = 5.0;
 
@@ -89,15 +91,10 @@ impl Floor {
         self.known.iter().any(|k| symbol(&k.name) == shape)
     }
 
-    /// Of the things that are surely one of the known, those of a name, the surest first.
-    pub fn found<'a>(&'a self, shape: &'a str) -> Vec<(&'a Thing, f64)> {
-        let sure = |t: &'a Thing| {
-            let is = t.is()?;
-            (symbol(is) == shape).then(|| (t, t.sureness(self.known.len())))
-        };
-        let mut found: Vec<(&Thing, f64)> = self.things.iter().filter_map(sure).collect();
-        found.sort_by(|a, b| b.1.total_cmp(&a.1));
-        found
+    /// How sure it is of the surest of the things that fit one name alone, 0 if none does.
+    pub fn surest(&self, shape: &str) -> f64 {
+        let of_name = self.things.iter().filter(|t| t.is().is_some_and(|is| symbol(is) == shape));
+        of_name.map(|t| t.sureness(self.known.len())).fold(0.0, f64::max)
     }
 }
 
@@ -130,11 +127,15 @@ impl Thing {
         Some(&self.taken_for.as_ref()?.may_be)
     }
 
-    /// Whether it may be of a shape, as far as its scans tell: it is none where it is surely another.
+    /// Whether it may be of a shape, as far as its scans tell: not where it is surely another or none, nor where the shape is ruled out beside others.
     pub fn may_have(&self, shape: &str, known: usize, threshold: f64) -> bool {
-        let surely_another =
-            self.is().is_some_and(|is| symbol(is) != shape) && self.sureness(known) >= threshold;
-        !surely_another && self.may_be().is_none_or(|names| names.iter().any(|n| symbol(n) == shape))
+        let is_sure = self.sureness(known) >= threshold;
+        match self.taken_for.as_deref() {
+            None => true,
+            Some(Recognition { verdict: Verdict::Unknown, .. }) => !is_sure,
+            Some(Recognition { verdict: Verdict::Is(name), .. }) if is_sure => symbol(name) == shape,
+            Some(taken) => taken.may_be.iter().any(|name| symbol(name) == shape),
+        }
     }
 
     /// How sure it is what it is taken for, 0 to 1.
@@ -144,14 +145,19 @@ impl Thing {
             Some(Verdict::Is(_)) => sure_of_name(self.looseness_m(), known),
             Some(Verdict::Unknown) => {
                 let told = (1.0 - by_chance(self.looseness_m(), known)) * STRANGER;
-                told / (told + MISSED * (1.0 - STRANGER))
+                told / (told + up_to(&MISSED, self.looseness_m()) * (1.0 - STRANGER))
             }
         }
     }
 
     /// How sure one may hope to be of it after scans from more poses around it.
     pub fn hoped(&self, more: &[usize], known: usize) -> f64 {
-        sure_of_name(self.hoped_looseness_m(more), known).max(self.sureness(known))
+        self.hoped_of_name(more, known).max(self.sureness(known))
+    }
+
+    /// The same, should it fit one name alone.
+    pub fn hoped_of_name(&self, more: &[usize], known: usize) -> f64 {
+        sure_of_name(self.hoped_looseness_m(more), known)
     }
 }
 
@@ -163,9 +169,12 @@ fn sure_of_name(loose_m: f64, known: usize) -> f64 {
 
 /// The probability that a stranger fits one of so many known shapes.
 fn by_chance(loose_m: f64, known: usize) -> f64 {
-    let of_five =
-        TAKEN_FOR_KNOWN.iter().find(|(edge_m, _)| loose_m < *edge_m).map_or(1.0, |(_, share)| *share);
-    1.0 - (1.0 - of_five).powf(known as f64 / MEASURED_WITH)
+    1.0 - (1.0 - up_to(&TAKEN_FOR_KNOWN, loose_m)).powf(known as f64 / MEASURED_WITH)
+}
+
+/// The share of the first bin that a looseness lies in.
+fn up_to(bins: &[(f64, f64)], loose_m: f64) -> f64 {
+    bins.iter().find(|(edge_m, _)| loose_m < *edge_m).map_or(1.0, |(_, share)| *share)
 }
 
 /// A thing on the floor of a situation.

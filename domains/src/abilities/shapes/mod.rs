@@ -12,9 +12,9 @@ mod unseen;
 use std::sync::Arc;
 
 use descry_perception::laser::{KnownShape, Verdict};
-use descry_skills::{Align, Circle, Outcome, Scan, SkillFailure};
+use descry_skills::{Align, Circle, Outcome, Scan};
 
-use super::{Ability, SkillWord, moving};
+use super::{Ability, NOTHING_MORE, SkillWord, moving};
 use crate::abilities::searching::perceive::Eyes;
 use crate::goal::{Goal, type_of_slot};
 use crate::lexicon::symbol;
@@ -40,7 +40,7 @@ pub const ABILITY: Ability = Ability {
             ground: |_, _| Ok(Box::new(Scan)),
             because: calls::hope_of_scan,
             learn: scanned,
-            failed: nothing_more,
+            failed: NOTHING_MORE,
         },
         SkillWord {
             name: "survey",
@@ -49,7 +49,7 @@ pub const ABILITY: Ability = Ability {
             ground: |_, _| Ok(Box::new(Scan)),
             because: |s, _| format!("there are {} places left where it may stand", s.floor.room.len()),
             learn: scanned,
-            failed: nothing_more,
+            failed: NOTHING_MORE,
         },
         SkillWord {
             name: "circle",
@@ -61,7 +61,7 @@ pub const ABILITY: Ability = Ability {
                 Err(because) => because,
             },
             learn: moving::driven,
-            failed: nothing_more,
+            failed: NOTHING_MORE,
         },
         SkillWord {
             name: "align",
@@ -70,7 +70,7 @@ pub const ABILITY: Ability = Ability {
             ground: |s, arguments| Ok(Box::new(aligning(s, arguments[0])?)),
             because: |s, _| format!("{} shapes are known", s.floor.known.len()),
             learn: aligned,
-            failed: nothing_more,
+            failed: NOTHING_MORE,
         },
         SkillWord {
             name: "learn",
@@ -79,7 +79,7 @@ pub const ABILITY: Ability = Ability {
             ground: |s, arguments| Ok(Box::new(aligning(s, arguments[0])?)),
             because: |_, arguments| format!("its outline is known well enough to be {}", arguments[1]),
             learn: learned,
-            failed: nothing_more,
+            failed: NOTHING_MORE,
         },
     ],
     begins: Some(begins),
@@ -124,16 +124,6 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
         poses: domain.config.candidates,
         ..Floor::default()
     });
-}
-
-fn nothing_more(
-    _: &mut Mind,
-    _: Eyes<'_>,
-    _: &Situation,
-    _: &[&str],
-    _: &SkillFailure,
-) -> Result<Option<String>, WorldError> {
-    Ok(None)
 }
 
 /// The places on the way around a thing.

@@ -1,11 +1,11 @@
 //! The calls that *surveying* answers, and what is done where the planner finds no plan.
 
 use descry_perception::mapping::Unseen;
-use descry_planner::{Answer, Call, CallError, Plan, Step};
+use descry_planner::{Answer, Call, CallError, Plan};
 
 use super::chart::{LOOK_S, NOTHING_SEEN_M2};
 use crate::abilities::searching::reasons;
-use crate::abilities::{Meaning, argument};
+use crate::abilities::{Meaning, argument, one_after_another};
 use crate::situation::{Situation, holding};
 
 /// Every call.
@@ -71,16 +71,6 @@ pub(super) fn fallback(s: &Situation) -> Option<Plan> {
     let best = s.chart.open.iter().filter_map(rate).max_by(|a, b| a.0.total_cmp(&b.0));
     let Some((_, to, way_s)) = best else { return reasons::one_look(s) };
     let symbol = |n: usize| s.candidates[n].symbol.clone();
-    let step = |start_s, action: &str, arguments, duration_s| Step {
-        start_s: Some(start_s),
-        action: action.into(),
-        arguments,
-        duration_s,
-    };
-    let look = step(way_s + GAP_S, "chart", vec![symbol(to)], LOOK_S);
-    let drive = (to != s.at).then(|| step(0.0, "move", vec![symbol(s.at), symbol(to)], way_s));
-    Some(Plan { steps: drive.into_iter().chain([look]).collect(), ..Plan::default() })
+    let both = [("move", vec![symbol(s.at), symbol(to)], way_s), ("chart", vec![symbol(to)], LOOK_S)];
+    Some(one_after_another(if to == s.at { &both[1..] } else { &both }))
 }
-
-/// Between the end of a step and the begin of the next, seconds.
-const GAP_S: f64 = 0.001;

@@ -7,7 +7,7 @@ use descry_memory::RecordId;
 use descry_memory::remember::Surveyed;
 use descry_perception::mapping::{
     ExploreOptions, FieldOfView, Level, MapOptions, Outlook, RectifyOptions, RoomMap, Survey, Unseen,
-    outlooks, standable,
+    frontiers, outlooks, standable,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, UnitComplex, Vector2, Vector3};
 use descry_perception::occupancy::{Occupancy, Space};
@@ -186,6 +186,18 @@ impl Chart {
             gain_m2
         };
         self.open.iter().map(gain).sum()
+    }
+
+    /// Where the map ends without a wall, in words: floor goes on there that was not seen. None if it ends nowhere so, or nothing was mapped.
+    pub(crate) fn goes_on(&self, body: &Description) -> Option<String> {
+        let floor = self.floor(body)?;
+        let ends = frontiers(&floor, &explore(body));
+        let length_m = ends.iter().map(|f| f.squares.len()).sum::<usize>() as f64 * floor.cell_m;
+        let near = self.map_from_chart * ends.first()?.middle;
+        Some(format!(
+            "{length_m:.1} m of open floor border on what could not be seen, as near ({:.2}, {:.2}) m",
+            near.x, near.y
+        ))
     }
 
     /// Floor that is known to be open, square metres.

@@ -12,9 +12,9 @@ use std::sync::Arc;
 
 use descry_robots::Place;
 use descry_robots::nalgebra::Point3;
-use descry_skills::{Observe, Outcome, SkillFailure};
+use descry_skills::{Observe, Outcome};
 
-use super::{Ability, SkillWord};
+use super::{Ability, NOTHING_MORE, SkillWord};
 use crate::abilities::searching::perceive::Eyes;
 use crate::goal::Goal;
 use crate::load::Domain;
@@ -39,7 +39,7 @@ pub const ABILITY: Ability = Ability {
         ground: |s, _| Ok(Box::new(Observe { at: ahead(s) })),
         because: calls::hope,
         learn: charted,
-        failed: nothing_more,
+        failed: NOTHING_MORE,
     }],
     begins: Some(begins),
     fallback: Some(calls::fallback),
@@ -72,15 +72,4 @@ fn charted(
     let Outcome::Seen(sensed) = outcome else { return Err(WorldError::strange(outcome)) };
     notes.push(taken::take(mind, eyes, arguments[0], sensed)?);
     Ok(String::new())
-}
-
-/// What failed there is no longer looked at from there.
-fn nothing_more(
-    _: &mut Mind,
-    _: Eyes<'_>,
-    _: &Situation,
-    _: &[&str],
-    _: &SkillFailure,
-) -> Result<Option<String>, WorldError> {
-    Ok(None)
 }

@@ -27,8 +27,11 @@ pub(super) fn answer(_: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Opt
         }
         Ended::Failed(why) => (Verdict::Failed, format!("{why}; {known}; {left}")),
         Ended::NoPlan(_) | Ended::Undecided(_) => {
-            let text = "the room is not mapped whole: nothing that is left to be seen can be reached";
-            (Verdict::CannotTell, format!("{text}; {known}; {left}"))
+            let because = match s.time_left_s {
+                Some(_) => "nothing that is left to be seen can be reached in the time that is left",
+                None => "nothing that is left to be seen can be reached",
+            };
+            (Verdict::CannotTell, format!("the room is not mapped whole: {because}; {known}; {left}"))
         }
     };
     Some(Conclusion {

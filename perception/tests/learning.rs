@@ -4,8 +4,8 @@ mod household;
 mod tabletop;
 
 use descry_perception::learning::{
-    AroundOptions, KnowError, KnowOptions, LearnOptions, LearningError, Library, MetaRoom, NoticeOptions,
-    keyframes, learn, nearest, outward, register, stands, trajectories,
+    AroundOptions, Keyframe, KnowError, KnowOptions, LearnOptions, LearningError, Library, MetaRoom,
+    NoticeOptions, keyframes, learn, nearest, outward, register, stands, trajectories,
 };
 use descry_perception::nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
 use descry_perception::{Cloud, Intrinsics, Neighbours, View};
@@ -249,6 +249,10 @@ fn what_cannot_be_learned_from_is_said() {
     for (found, expected) in cases.iter().zip(&expected) {
         assert_eq!(found.to_string(), expected.to_string());
     }
+    let lost =
+        Keyframe { world_from_camera: looks[0].world_from_camera, used: false, why: "it is lost".to_owned() };
+    let left_out = learn(&looks, &[lost], &mask, &options).map(|m| m.cloud.len());
+    assert_eq!(left_out, Err(LearningError::FirstLeftOut { why: "it is lost".to_owned() }));
     let mut library = Library::default();
     assert_eq!(library.add(&view.cloud, &KnowOptions::default()), Err(KnowError::Model { points: 0 }));
     assert_eq!(library.recognise(&view, &KnowOptions::default()), Err(KnowError::NoCamera));

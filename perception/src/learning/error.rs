@@ -26,6 +26,14 @@ pub enum LearningError {
         /// Pixels of the view.
         expected: usize,
     },
+    /// The view that shows what to learn does not fit the others.
+    #[error(
+        "the first view was left out ({why}): what it shows of the object cannot be carried over to the others"
+    )]
+    FirstLeftOut {
+        /// Why.
+        why: String,
+    },
     /// Nothing of the object is left after cleaning.
     #[error(
         "{points} points of the object are left in the first view after its edge, outliers and planes were removed: go nearer"

@@ -24,6 +24,9 @@ pub(super) struct Frame {
 const WIDE: OrganisedOptions =
     OrganisedOptions { reach: 3, depth_step_share: 0.015, base_m: 0.006, least: 12 };
 
+/// Farthest that neighbours are looked for, pixels: what fills more of the image is too near to be measured.
+const WIDEST_PX: f64 = 32.0;
+
 impl Frame {
     /// What a view shows within `reach_m` of `centre` (world, metres). `None` if it is no depth image.
     pub fn new(
@@ -76,11 +79,13 @@ impl Frame {
         }
     }
 
-    /// Calls `found` with the pixels of a square around one, so wide that it holds all points within `radius_m`, itself among them.
+    /// Calls `found` with the pixels of a square around one, so wide that it holds all points within `radius_m`, itself among
+    /// them, as far as [`WIDEST_PX`].
     pub fn around(&self, pixel: usize, radius_m: f32, mut found: impl FnMut(usize)) {
         let Grid { width, height } = self.grid;
         let (u, v) = (pixel % width, pixel / width);
-        let half = (f64::from(radius_m) * self.map.intrinsics.fx / self.depth_m(pixel)).ceil() as usize;
+        let half = (f64::from(radius_m) * self.map.intrinsics.fx / self.depth_m(pixel)).ceil();
+        let half = half.clamp(1.0, WIDEST_PX) as usize;
         for row in v.saturating_sub(half)..(v + half + 1).min(height) {
             for column in u.saturating_sub(half)..(u + half + 1).min(width) {
                 found(row * width + column);

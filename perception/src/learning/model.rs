@@ -83,7 +83,7 @@ pub struct LearnedModel {
 /// Grows a model of what `mask` shows in the first view over the keyframes, in their order.
 ///
 /// # Errors
-/// If there is no view, one is no depth image, the mask has another size, nothing is left of the object, or an option means nothing.
+/// If there is no view, one is no depth image, the mask has another size, the first view was left out, nothing is left of the object, or an option means nothing.
 pub fn learn(
     views: &[View],
     keyframes: &[Keyframe],
@@ -95,6 +95,9 @@ pub fn learn(
     check(options)?;
     if mask.len() != first.cloud.len() {
         return Err(LearningError::Mask { found: mask.len(), expected: first.cloud.len() });
+    }
+    if let Some(why) = keyframes.first().filter(|f| !f.used).map(|f| f.why.clone()) {
+        return Err(LearningError::FirstLeftOut { why });
     }
     let pose = |k: usize| keyframes.get(k).map_or(views[k].world_from_camera, |f| f.world_from_camera);
     let seen: Vec<u32> = (0..mask.len()).filter(|&i| mask[i]).map(|i| i as u32).collect();

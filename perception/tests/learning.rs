@@ -234,7 +234,7 @@ fn what_cannot_be_learned_from_is_said() {
         learned(std::slice::from_ref(&view), &[true; 5], &options),
         MetaRoom::new(&[], notice(0.01)).expect_err("no view"),
         MetaRoom::new(&looks, notice(f64::NAN)).expect_err("no length"),
-        MetaRoom::new(&[view.clone()], notice(0.01)).expect_err("no pixels"),
+        MetaRoom::new(std::slice::from_ref(&view), notice(0.01)).expect_err("no pixels"),
     ];
     let expected = [
         LearningError::NoViews,

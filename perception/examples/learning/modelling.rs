@@ -47,8 +47,8 @@ fn print_head() {
 }
 
 fn print(row: &mut Row) {
-    let of = |f: fn(&Score) -> f64| pair(row.scores.iter().map(|s| f(s)));
-    let mean = |f: fn(&Score) -> f64| spread(&row.scores.iter().map(|s| f(s)).collect::<Vec<_>>()).0;
+    let of = |f: fn(&Score) -> f64| pair(row.scores.iter().map(f));
+    let mean = |f: fn(&Score) -> f64| spread(&row.scores.iter().map(f).collect::<Vec<_>>()).0;
     println!(
         "| {} | {} | {} | {} | {} | {} | {} | {:.1} | {:.1}, {:.2} | {:.1} of {:.1} | {:.1} |",
         row.name,

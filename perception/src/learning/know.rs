@@ -39,7 +39,7 @@ pub struct KnowOptions {
 
 impl Default for KnowOptions {
     fn default() -> Self {
-        KnowOptions { range_m: 2.5, keypoint_m: 0.015, least_confidence: 0.9, judge: Judge::default() }
+        KnowOptions { range_m: 2.5, keypoint_m: 0.015, least_confidence: 0.8, judge: Judge::default() }
     }
 }
 

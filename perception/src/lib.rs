@@ -10,6 +10,7 @@ pub mod files;
 pub mod hull;
 pub mod laser;
 mod lattice;
+pub mod learning;
 pub mod locate;
 pub mod mapping;
 pub mod merge;

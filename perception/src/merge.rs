@@ -167,21 +167,9 @@ const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 1200,
 /// If there is no view, no usable point, a pose that is not finite, or an option that means nothing.
 pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeError> {
     let _span = tracing::debug_span!("merge", views = views.len()).entered();
-    check(views, options)?;
     let mut steps = Vec::new();
-
-    let prepared = filter_and_thin(views, options, &mut steps)?;
-    let maps: Vec<Option<DepthMap>> =
-        views.par_iter().map(|v| DepthMap::from_view(v, &v.world_from_camera)).collect();
-    let mut aligned = align(&prepared, &maps, options.up, &FIRST);
-    if aligned.left_out() > 0 {
-        let wide = align(&prepared, &maps, options.up, &WIDE);
-        if wide.left_out() < aligned.left_out() {
-            aligned = wide;
-        }
-    }
-    let Aligned { poses, used, mut whys, found, planes, steps: alignments } = aligned;
-    steps.extend(alignments);
+    let Placed { prepared, maps, aligned } = place(views, options, &mut steps)?;
+    let Aligned { poses, used, mut whys, found, planes, .. } = aligned;
     let seen = visibility(maps, &used, &poses);
     let fused = fuse::fuse(views, &prepared, &used, &poses, &planes, &seen, options);
     steps.push(Step {
@@ -193,6 +181,41 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
     let fits =
         (0..views.len()).map(|i| fit(&prepared[i], &poses[i], &found[i], used[i], whys[i].take())).collect();
     Ok(Merged { cloud: fused.cloud, views_per_point: fused.views_per_point, visibility: seen, fits, steps })
+}
+
+/// Where the views belong, without a merged cloud: steps 1 to 4 alone. One fit a view, in the order given.
+///
+/// # Errors
+/// As [`merge`].
+pub fn align_views(views: &[View], options: &MergeOptions) -> Result<Vec<ViewFit>, MergeError> {
+    let _span = tracing::debug_span!("align views", views = views.len()).entered();
+    let Placed { prepared, mut aligned, .. } = place(views, options, &mut Vec::new())?;
+    let Aligned { poses, used, found, whys, .. } = &mut aligned;
+    Ok((0..views.len()).map(|i| fit(&prepared[i], &poses[i], &found[i], used[i], whys[i].take())).collect())
+}
+
+/// Views after steps 1 to 4.
+struct Placed {
+    prepared: Vec<Prepared>,
+    maps: Vec<Option<DepthMap>>,
+    aligned: Aligned,
+}
+
+/// Steps 1 to 4; from farther away if a view would be left out else.
+fn place(views: &[View], options: &MergeOptions, steps: &mut Vec<Step>) -> Result<Placed, MergeError> {
+    check(views, options)?;
+    let prepared = filter_and_thin(views, options, steps)?;
+    let maps: Vec<Option<DepthMap>> =
+        views.par_iter().map(|v| DepthMap::from_view(v, &v.world_from_camera)).collect();
+    let mut aligned = align(&prepared, &maps, options.up, &FIRST);
+    if aligned.left_out() > 0 {
+        let wide = align(&prepared, &maps, options.up, &WIDE);
+        if wide.left_out() < aligned.left_out() {
+            aligned = wide;
+        }
+    }
+    steps.append(&mut aligned.steps);
+    Ok(Placed { prepared, maps, aligned })
 }
 
 /// The views brought together: steps 3 and 4.

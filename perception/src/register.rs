@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
 pub use align::align;
 pub(crate) use equations::Sums;
+pub(crate) use equations::rigid;
 pub(crate) use pairs::Partner;
 pub use pairs::{Pair, pairs};
 

@@ -107,7 +107,7 @@ impl DepthMap {
     }
 
     /// The least depth in the 3×3 pixels around one, infinite where there is no return.
-    fn nearest_around(&self, pixel: usize) -> f32 {
+    pub(crate) fn nearest_around(&self, pixel: usize) -> f32 {
         let (width, height) = (self.intrinsics.width, self.intrinsics.height);
         let (column, row) = (pixel % width, pixel / width);
         let columns = column.saturating_sub(1)..(column + 2).min(width);

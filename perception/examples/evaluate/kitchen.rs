@@ -1,15 +1,13 @@
 //! Frames of a real kitchen with poses: merged at random, mugs against their reference places.
 
+use super::frames::frames;
 use super::mosd::cup;
-use descry_perception::files::depth;
 use descry_perception::merge::{MergeOptions, merge};
-use descry_perception::nalgebra::{
-    Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
-};
+use descry_perception::nalgebra::{Point3, Unit, Vector3};
 use descry_perception::recognise::{Descry, Published, Range};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::surface::SurfaceOptions;
-use descry_perception::{Intrinsics, ObjectModel, Recogniser, View};
+use descry_perception::{ObjectModel, Recogniser, View};
 use std::path::Path;
 
 const DRAWS: u64 = 20;
@@ -20,48 +18,6 @@ struct Reference {
     name: String,
     place: Point3<f64>,
     is_mug: bool,
-}
-
-fn numbers(path: &Path) -> Result<Vec<f64>, String> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    text.split_whitespace().map(|w| w.parse().map_err(|e| format!("{}: {e}", path.display()))).collect()
-}
-
-pub fn frames(dir: &Path) -> Result<Vec<(String, View)>, String> {
-    let k = numbers(&dir.join("camera-intrinsics.txt"))?;
-    let mut names: Vec<String> = std::fs::read_dir(dir)
-        .map_err(|e| format!("{}: {e}", dir.display()))?
-        .filter_map(|e| e.ok()?.file_name().to_str()?.strip_suffix(".depth.png").map(str::to_owned))
-        .collect();
-    names.sort();
-    names
-        .into_iter()
-        .map(|name| {
-            let bytes =
-                std::fs::read(dir.join(format!("{name}.depth.png"))).map_err(|e| format!("{name}: {e}"))?;
-            let image = depth::read(&bytes, 0.001).map_err(|e| format!("{name}: {e}"))?;
-            let camera = Intrinsics {
-                width: image.width,
-                height: image.height,
-                fx: k[0],
-                fy: k[4],
-                cx: k[2],
-                cy: k[5],
-            };
-            let p = numbers(&dir.join(format!("{name}.pose.txt")))?;
-            let turn = Matrix3::new(p[0], p[1], p[2], p[4], p[5], p[6], p[8], p[9], p[10]);
-            let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&turn));
-            let view = View {
-                stamp_ns: 0,
-                cloud: camera.cloud_from_depth(&image.depths_m).map_err(|e| e.to_string())?,
-                intrinsics: Some(camera),
-                world_from_camera: Isometry3::from_parts(Translation3::new(p[3], p[7], p[11]), turn),
-                pose_sigma_m: 0.02,
-                pose_sigma_rad: 0.015,
-            };
-            Ok((name, view))
-        })
-        .collect()
 }
 
 /// Mugs of a real kitchen: with a handle, 9 to 11 cm high.

@@ -1,6 +1,7 @@
 //! Segmentation, merging and recognition against what is known, and how long single views take, as tables:
 //! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]...`.
 
+mod frames;
 mod kitchen;
 mod mosd;
 mod surfaces;

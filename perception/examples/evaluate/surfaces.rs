@@ -18,7 +18,7 @@ pub fn run(paths: &[&str]) -> Result<(), String> {
             tell(&cloud, &seen, &SurfaceOptions::default());
             continue;
         }
-        let frames = super::kitchen::frames(Path::new(path))?;
+        let frames = super::frames::frames(Path::new(path))?;
         let up = Some(Unit::new_normalize(Vector3::z()));
         let views: Vec<View> = frames.into_iter().map(|(_, view)| view).collect();
         for set in std::iter::once(&views[..]).chain(views.chunks(1)) {

@@ -123,5 +123,5 @@ fn frames(dir: &Path) -> Result<Vec<Case>, String> {
         let options = SceneOptions { surface: table.surface(), ..SceneOptions::default() };
         Case { name, view, options, models: vec![kitchen::mug()] }
     };
-    Ok(kitchen::frames(dir)?.into_iter().map(case).collect())
+    Ok(crate::frames::frames(dir)?.into_iter().map(case).collect())
 }

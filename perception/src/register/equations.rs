@@ -184,6 +184,19 @@ impl Sums {
     }
 }
 
+/// The motion that brings the first of each pair onto the second, by least squares; `None` if the pairs leave a direction free.
+pub(crate) fn rigid(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Isometry3<f64>> {
+    let n = pairs.len() as f64;
+    let centre = Point3::from(pairs.iter().map(|p| p.0.coords).sum::<Vector3<f64>>() / n);
+    let mut sums = Sums::ZERO;
+    for (from, to) in pairs {
+        sums.add_points((from - centre).into(), (to - centre).into(), 1.0);
+    }
+    let motion = sums.closed_form(&centre);
+    let finite = motion.step.to_homogeneous().iter().all(|v| v.is_finite());
+    (motion.free == 0 && finite).then_some(motion.step)
+}
+
 /// Singular vectors with the least value last, where the sign of a reflection belongs.
 fn ordered(u: Matrix3<f64>, v_t: Matrix3<f64>, values: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     let mut order = [0, 1, 2];

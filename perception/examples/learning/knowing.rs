@@ -1,0 +1,133 @@
+//! Learned objects known again in clutter: f-score against coverage (Fig. 5), confidence against truth.
+
+use crate::household::{Body, CAMERA, Room, RoomOptions, TABLE_M, looking, standing};
+use crate::measure::onto;
+use crate::runs::{RunOptions, radius_m, run, truth};
+use crate::tabletop::Draws;
+use descry_perception::learning::{KnowOptions, LearnOptions, Library, Recognised, learn};
+use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::{Cloud, Neighbours, View};
+use std::f64::consts::TAU;
+
+/// Things of a household on the round table, seen from somewhere.
+pub struct Scene {
+    pub view: View,
+    /// Which bodies stand where.
+    pub things: Vec<(usize, Isometry3<f64>)>,
+}
+
+/// A scene of some of the bodies: those asked for, if there is room.
+pub fn scene(bodies: &[Body], which: &[usize], seed: u64) -> Scene {
+    let mut draws = Draws(seed ^ 0x5ce);
+    let mut room = Room::new(RoomOptions { controlled: true, seed });
+    let mut things: Vec<(usize, Isometry3<f64>, f64)> = Vec::new();
+    for &i in which {
+        let reach = radius_m(&bodies[i]);
+        for _ in 0..60 {
+            let (r, turn) = (0.33 * draws.next().sqrt(), TAU * draws.next());
+            let pose = standing(r * turn.cos(), r * turn.sin(), TAU * draws.next());
+            let free = |other: &(usize, Isometry3<f64>, f64)| {
+                (other.1.translation.vector - pose.translation.vector).norm() > other.2 + reach + 0.005
+            };
+            if things.iter().all(free) {
+                room.put(&bodies[i], pose);
+                things.push((i, pose, reach));
+                break;
+            }
+        }
+    }
+    let (turn, far) = (TAU * draws.next(), 0.95 + 0.4 * draws.next());
+    let eye = Point3::new(far * turn.cos(), far * turn.sin(), TABLE_M + 0.55 + 0.35 * draws.next());
+    let pose = looking(eye, Point3::new(0.0, 0.0, TABLE_M + 0.05));
+    let only = (Point3::new(0.0, 0.0, TABLE_M), 0.6);
+    let view = room.look_at(&CAMERA, &pose, &pose, (0.0, 0.0), seed ^ 0x77, only);
+    Scene { view, things: things.into_iter().map(|(i, p, _)| (i, p)).collect() }
+}
+
+/// A model in the frame of its body.
+pub struct Model {
+    pub body: usize,
+    pub cloud: Cloud,
+}
+
+/// How many looks a turntable gives, from two heights.
+const TURNTABLE: usize = 14;
+
+/// A model made with a turntable: near, from perfect poses, of pixels that are given.
+pub fn offline(bodies: &[Body], body: usize, seed: u64) -> Result<Model, String> {
+    let mut room = Room::new(RoomOptions { controlled: true, seed });
+    let world_from_body = standing(0.0, 0.0, 0.0);
+    room.put(&bodies[body], world_from_body);
+    let middle = Point3::new(0.0, 0.0, TABLE_M + 0.1);
+    let views: Vec<View> = (0..TURNTABLE)
+        .map(|k| {
+            let turn = TAU * k as f64 / TURNTABLE as f64;
+            let eye = Point3::new(0.75 * turn.cos(), 0.75 * turn.sin(), TABLE_M + [0.35, 0.75][k % 2]);
+            let pose = looking(eye, middle);
+            room.look_at(&CAMERA, &pose, &pose, (0.0, 0.0), seed + k as u64, (middle, 0.24))
+        })
+        .collect();
+    let labels = views[0].cloud.labels.as_deref().unwrap_or_default();
+    let mask: Vec<bool> =
+        labels.iter().zip(&views[0].cloud.points).map(|(l, p)| *l == 1 && p.z.is_finite()).collect();
+    let model = learn(&views, &[], &mask, &LearnOptions::default()).map_err(|e| e.to_string())?;
+    let body_from_model = world_from_body.inverse() * model.world_from_model;
+    Ok(Model { body, cloud: model.cloud.transformed(&body_from_model) })
+}
+
+/// The models of a run over its first looks, brought onto the true body.
+pub fn learned_steps(
+    bodies: &[Body],
+    body: usize,
+    options: RunOptions,
+    looks: &[usize],
+) -> Result<Vec<Model>, String> {
+    let run = run(&bodies[body], &bodies[(body + 5) % bodies.len()], options)?;
+    let truth = truth(&bodies[body], &run.world_from_body);
+    let model = |&count: &usize| {
+        let count = count.min(run.views.len());
+        let model = learn(&run.views[..count], &run.keyframes[..count], &run.mask, &LearnOptions::default())
+            .map_err(|e| e.to_string())?;
+        let found = model.cloud.transformed(&model.world_from_model);
+        let cloud = found.transformed(&(run.world_from_body.inverse() * onto(&found, &truth)));
+        Ok(Model { body, cloud })
+    };
+    looks.iter().map(model).collect()
+}
+
+/// Mean distance of a body's surface where it was said to be from where it is, metres: what looks the same at both counts as the same.
+pub fn surface_off_m(surface: &Cloud, said: &Isometry3<f64>, truly: &Isometry3<f64>) -> f64 {
+    let tree = Neighbours::new(&surface.points).expect("few points");
+    let there = surface.transformed(&(truly.inverse() * said));
+    let off = there
+        .points
+        .iter()
+        .step_by(7)
+        .map(|p| tree.nearest(p, 1.0).map_or(1.0, |n| f64::from(n.distance_sq).sqrt()));
+    off.clone().sum::<f64>() / off.count().max(1) as f64
+}
+
+/// An answer is right if that body's surface is on average no farther from where it truly is, metres.
+pub const RIGHT_M: f64 = 0.01;
+
+/// True if an answer is right.
+pub fn is_right(scene: &Scene, surfaces: &[Cloud], body: usize, found: &Recognised) -> bool {
+    scene.things.iter().any(|(i, pose)| {
+        *i == body && surface_off_m(&surfaces[body], &found.world_from_model, pose) < RIGHT_M
+    })
+}
+
+/// A library of models.
+pub fn library(models: &[&Model]) -> Library {
+    let mut library = Library::default();
+    for model in models {
+        library.add(&model.cloud, &KnowOptions::default()).expect("a learned model has points");
+    }
+    library
+}
+
+/// Some of the numbers below `of`, none twice.
+pub fn some(draws: &mut Draws, of: usize, count: usize) -> Vec<usize> {
+    let mut all: Vec<usize> = (0..of).collect();
+    (0..count.min(of)).map(|_| all.remove((draws.next() * all.len() as f64) as usize % all.len())).collect()
+}

@@ -1,0 +1,122 @@
+//! Recall, precision and distance as the paper measures them (section VII).
+
+use crate::household::{Body, CAMERA};
+use crate::runs::{Run, apart, truth};
+use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::register::{Method, Prepared, RegisterOptions, align};
+use descry_perception::{Cloud, Neighbours};
+
+/// A true point is visible if the camera measured within this of it, metres; explained if a learned point lies within this, metres.
+const VISIBLE_M: f32 = 0.01;
+const EXPLAINED_M: f32 = 0.02;
+/// A stricter distance than the paper's, metres.
+const STRICT_M: f32 = 0.006;
+
+/// How well a run did.
+#[derive(Clone, Copy, Debug)]
+pub struct Score {
+    pub first: (f64, f64),
+    pub model: (f64, f64),
+    pub strict: (f64, f64),
+    /// Mean distance of the model's points from the true surface, metres.
+    pub distance_m: f64,
+    /// Mean error of the used keyframes' poses among each other, metres and radians.
+    pub poses: (f64, f64),
+    pub used: usize,
+    pub looks: usize,
+}
+
+/// Shares of `truth` within `radius_m` of `found`, and of `found` within that of `truth`.
+fn recall_precision(truth: &Cloud, found: &Cloud, radius_m: f32) -> (f64, f64) {
+    let share = |of: &Cloud, within: &Neighbours| {
+        let near = of.points.iter().filter(|p| within.nearest(p, radius_m).is_some()).count();
+        near as f64 / of.len().max(1) as f64
+    };
+    let (to_truth, to_found) = (tree(truth), tree(found));
+    (share(truth, &to_found), share(found, &to_truth))
+}
+
+fn tree(cloud: &Cloud) -> Neighbours {
+    Neighbours::new(&cloud.points).expect("few points")
+}
+
+/// True points that a run's looks, from their true poses, measured.
+fn visible(run: &Run, truth: &Cloud, views: impl Iterator<Item = usize> + Clone) -> Cloud {
+    truth.filter(|p| {
+        views.clone().any(|k| {
+            let q = run.truths[k].inverse() * p.cast::<f64>();
+            let pixel = CAMERA.project(&q).and_then(|(u, v)| CAMERA.pixel(u, v));
+            pixel.is_some_and(|i| (run.views[k].cloud.points[i].z - q.z as f32).abs() < VISIBLE_M)
+        })
+    })
+}
+
+/// The motion that brings a learned cloud onto the truth, as the paper aligns before it compares.
+pub fn onto(found: &Cloud, truth: &Cloud) -> Isometry3<f64> {
+    let source = Prepared::new(&found.points).expect("few points");
+    let target = Prepared::with_normals(&truth.points, 15).expect("few points");
+    let options = RegisterOptions {
+        method: Method::PointToPlane,
+        within_m: 0.03,
+        robust_m: Some(0.005),
+        ..RegisterOptions::default()
+    };
+    match align(&source, &target, &options) {
+        Ok(fit) if fit.matched * 2 > fit.of => fit.target_from_source,
+        _ => Isometry3::identity(),
+    }
+}
+
+/// Scores a run against its truth.
+pub fn score(run: &Run, body: &Body) -> Score {
+    let truth = truth(body, &run.world_from_body);
+    let seen = visible(run, &truth, std::iter::once(0));
+    let pixels: Vec<u32> = (0..run.mask.len()).filter(|&i| run.mask[i]).map(|i| i as u32).collect();
+    let first = run.views[0].cloud.select(&pixels).finite().transformed(&run.views[0].world_from_camera);
+    let first = first.transformed(&onto(&first, &truth));
+    let used: Vec<usize> = (0..run.views.len()).filter(|&k| run.model.looks[k].pixels > 0).collect();
+    let seen_by_all = visible(run, &truth, used.iter().copied());
+    let found = run.model.cloud.transformed(&run.model.world_from_model);
+    let found = found.transformed(&onto(&found, &truth));
+    let to_truth = tree(&truth);
+    let distances = found
+        .points
+        .iter()
+        .map(|p| to_truth.nearest(p, 1.0).map_or(1.0, |n| f64::from(n.distance_sq).sqrt()));
+    Score {
+        first: recall_precision(&seen, &first, EXPLAINED_M),
+        model: recall_precision(&seen_by_all, &found, EXPLAINED_M),
+        strict: recall_precision(&seen_by_all, &found, STRICT_M),
+        distance_m: distances.sum::<f64>() / found.len().max(1) as f64,
+        poses: pose_error(run, &used),
+        used: used.len(),
+        looks: run.views.len(),
+    }
+}
+
+/// How the used keyframes lie to the first against how they truly do: mean at the object, metres, and radians.
+fn pose_error(run: &Run, used: &[usize]) -> (f64, f64) {
+    let object = Point3::from(run.world_from_body.translation.vector);
+    let errors: Vec<Isometry3<f64>> =
+        used.iter().map(|&k| run.keyframes[k].world_from_camera * run.truths[k].inverse()).collect();
+    let places: Vec<Point3<f64>> = errors.iter().map(|e| e * object).collect();
+    let n = errors.len().max(1) as f64;
+    let mean =
+        Point3::from(places.iter().map(|p| p.coords).sum::<descry_perception::nalgebra::Vector3<f64>>() / n);
+    let metres = places.iter().map(|p| (p - mean).norm()).sum::<f64>() / n;
+    let turns = errors.iter().map(|e| apart(&errors[0], e).1).sum::<f64>() / n;
+    (metres, turns)
+}
+
+/// Mean and standard deviation.
+pub fn spread(values: &[f64]) -> (f64, f64) {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt())
+}
+
+/// The middle one.
+pub fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}

@@ -1,0 +1,27 @@
+//! Objects learned without being told (Fäulhammer et al., *Autonomous Learning of Object Models on a Mobile Robot*).
+//!
+//! The pipeline, a file a step: what differs from the static structure of a place ([`MetaRoom`], Eq. 1, 2); where to stand around it
+//! ([`stands`], [`trajectories`]); the looks that are far enough apart ([`keyframes`]) brought together ([`register`]); in each look the object is
+//! cleaned of its edge, supervoxels and planes (Eq. 3, 4), carried over from the looks before and grown ([`learn`]); all are fused by their noise
+//! ([`LearnedModel`]); and known again, with a pose and a confidence ([`Library`]).
+
+mod around;
+mod error;
+mod frame;
+mod fuse;
+mod grow;
+mod know;
+mod mask;
+mod model;
+mod notice;
+mod planes;
+mod register;
+mod supervoxel;
+
+pub use around::{AroundOptions, nearest, stands, trajectories};
+pub use error::LearningError;
+pub use know::evidence::{Evidence, Judge, WEIGHTS};
+pub use know::{KnowError, KnowOptions, Library, Recognised, outward};
+pub use model::{LearnOptions, LearnedModel, Used, learn};
+pub use notice::{Appeared, MetaRoom, NoticeOptions, Visit};
+pub use register::{Keyframe, keyframes, register};

@@ -1,0 +1,80 @@
+//! What cannot be learned from.
+
+use crate::cloud::CloudError;
+use crate::cluster::ClusterError;
+use crate::merge::MergeError;
+use crate::register::RegisterError;
+use crate::voxel::VoxelError;
+
+/// Views, masks or options that cannot be learned from.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LearningError {
+    /// There was no view.
+    #[error("no view to learn from: give at least one")]
+    NoViews,
+    /// A view whose pixels are not known.
+    #[error("view {view} is no depth image: give an organised cloud, or one with its camera's intrinsics")]
+    NotOrganised {
+        /// Index of the view.
+        view: usize,
+    },
+    /// The mask does not fit the first view.
+    #[error("the mask has {found} pixels where the first view has {expected}: give one entry a pixel")]
+    Mask {
+        /// Entries given.
+        found: usize,
+        /// Pixels of the view.
+        expected: usize,
+    },
+    /// The view that shows what to learn does not fit the others.
+    #[error(
+        "the first view was left out ({why}): what it shows of the object cannot be carried over to the others"
+    )]
+    FirstLeftOut {
+        /// Why.
+        why: String,
+    },
+    /// Nothing of the object is left after cleaning.
+    #[error(
+        "{points} points of the object are left in the first view after its edge, outliers and planes were removed: go nearer"
+    )]
+    NothingLeft {
+        /// How many points.
+        points: usize,
+    },
+    /// Options that mean nothing.
+    #[error("learning option `{field}` is {value}: expected {expected}")]
+    Option {
+        /// The option.
+        field: &'static str,
+        /// What was given.
+        value: f64,
+        /// What was expected.
+        expected: &'static str,
+    },
+    /// The views could not be brought together.
+    #[error(transparent)]
+    Merge(#[from] MergeError),
+    /// A cloud could not be brought onto another.
+    #[error(transparent)]
+    Register(#[from] RegisterError),
+    /// Too many points.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
+    /// A cloud could not be thinned.
+    #[error(transparent)]
+    Voxel(#[from] VoxelError),
+    /// No clusters could be made.
+    #[error(transparent)]
+    Cluster(#[from] ClusterError),
+}
+
+impl LearningError {
+    /// Checks that a number is positive.
+    pub(super) fn positive(field: &'static str, value: f64) -> Result<(), LearningError> {
+        if value.is_finite() && value > 0.0 {
+            return Ok(());
+        }
+        Err(LearningError::Option { field, value, expected: "a positive number" })
+    }
+}

@@ -1,0 +1,138 @@
+//! All looks in one cloud, each place from the measurement that is least in doubt (section V-C).
+
+use super::LearningError;
+use super::frame::Frame;
+use super::grow;
+use super::mask::Mask;
+use crate::cloud::{Cloud, is_finite};
+use crate::neighbours::Neighbours;
+use crate::noise::{axial_sigma_m, lateral_sigma_m};
+use crate::voxel;
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+/// Doubt beside a depth edge: σ_e = k·exp(−d²/D²), k and D in metres.
+const EDGE_M: (f64, f64) = (1.0, 0.002);
+/// Neighbouring depths that differ by more than this part are an edge.
+const EDGE_SHARE: f32 = 0.015;
+/// An edge farther away casts no doubt that counts, metres.
+const EDGE_REACH_M: f32 = 0.008;
+/// Measurements within so far of a place along its surface say where it is, metres; farther off along the normal they are of another surface.
+const SMOOTH_M: f32 = 0.004;
+const DEEP_M: f32 = 0.01;
+/// Measurements that are asked where a place is, at most: more tell it no better.
+const ASKED: usize = 60_000;
+/// Least cosine between normals of one surface.
+const SAME_SIDE: f32 = 0.6;
+
+/// The object as one look measured it.
+#[derive(Default)]
+pub(super) struct Measured {
+    cloud: Cloud,
+    /// σ_z² + σ_L² + σ_e², square metres.
+    variances: Vec<f64>,
+}
+
+impl Measured {
+    /// Adds the pixels of a look.
+    pub fn add(&mut self, frame: &Frame, mask: &Mask) {
+        let edges = edges(frame);
+        let focal = frame.map.intrinsics.fx;
+        self.cloud.append(&frame.cloud(mask));
+        self.variances.extend(mask.pixels().map(|i| {
+            let (z, angle) = (frame.depth_m(i), frame.angle_rad(i));
+            let sigma = |sigma: Option<f64>| sigma.unwrap_or(EDGE_M.0);
+            let edge = EDGE_M.0 * (-edge_distance_sq(frame, &edges, i) / (EDGE_M.1 * EDGE_M.1)).exp();
+            sigma(axial_sigma_m(z, angle)).powi(2)
+                + sigma(lateral_sigma_m(z, angle, focal)).powi(2)
+                + edge * edge
+        }));
+    }
+
+    /// In each cube the point of least variance; then moved along its normal to where all measurements around say, if `smooth`; without outliers.
+    pub fn fused(&self, cube_m: f32, smooth: bool) -> Result<Cloud, LearningError> {
+        let mut chosen = self.least(&self.cloud, &self.variances, cube_m)?;
+        if smooth {
+            let smoothed = self.smoothed(&chosen)?;
+            let variances: Vec<f64> = chosen.iter().map(|&i| self.variances[i as usize]).collect();
+            chosen = self.least(&smoothed, &variances, cube_m)?;
+            let thinned = smoothed.select(&chosen);
+            return Ok(thinned.select(&grow::kept(&thinned.points)?));
+        }
+        let fused = self.cloud.select(&chosen);
+        Ok(fused.select(&grow::kept(&fused.points)?))
+    }
+
+    /// The index of the point of least variance in each cube, ascending.
+    fn least(&self, cloud: &Cloud, variances: &[f64], cube_m: f32) -> Result<Vec<u32>, LearningError> {
+        let assigned = voxel::assign(&cloud.points, cube_m)?;
+        let mut best = vec![u32::MAX; assigned.voxels];
+        for (i, &voxel) in assigned.voxel.iter().enumerate().filter(|(_, v)| **v != voxel::NONE) {
+            let best = &mut best[voxel as usize];
+            if *best == u32::MAX || variances[i] < variances[*best as usize] {
+                *best = i as u32;
+            }
+        }
+        best.sort_unstable();
+        Ok(best)
+    }
+
+    /// The chosen points, each moved along its normal to the mean of the measurements around it, weighed by their variances. Two looks that are
+    /// off by less than the sensor's noise make one wall so, not two.
+    fn smoothed(&self, chosen: &[u32]) -> Result<Cloud, LearningError> {
+        let mut cloud = self.cloud.select(chosen);
+        let Some(normals) = &self.cloud.normals else { return Ok(cloud) };
+        let stride = self.cloud.len().div_ceil(ASKED).max(1);
+        let asked: Vec<Point3<f32>> = self.cloud.points.iter().step_by(stride).copied().collect();
+        let tree = Neighbours::new(&asked)?;
+        let place = |&i: &u32| {
+            let (mut at, mut normal) = (self.cloud.points[i as usize], normals[i as usize]);
+            for _ in 0..2 {
+                let (mut weight, mut off, mut mean) = (0.0_f32, 0.0_f32, Vector3::zeros());
+                tree.within(&at, DEEP_M, |near| {
+                    let k = near.index as usize * stride;
+                    let apart = self.cloud.points[k] - at;
+                    let height = apart.dot(&normal);
+                    let aside_sq = near.distance_sq - height * height;
+                    let w = (-aside_sq / (SMOOTH_M * SMOOTH_M)).exp() / self.variances[k] as f32;
+                    if aside_sq < 4.0 * SMOOTH_M * SMOOTH_M && normals[k].dot(&normal) > SAME_SIDE {
+                        (weight, off, mean) = (weight + w, off + w * height, mean + normals[k] * w);
+                    }
+                });
+                if weight > 0.0 {
+                    at += normal * (off / weight);
+                    normal = mean.try_normalize(1e-12).unwrap_or(normal);
+                }
+            }
+            (at, normal)
+        };
+        let places: Vec<_> = chosen.par_iter().map(place).collect();
+        cloud.points = places.iter().map(|p| p.0).collect();
+        cloud.normals = Some(places.iter().map(|p| p.1).collect());
+        Ok(cloud)
+    }
+}
+
+/// Pixels beside a step in depth.
+fn edges(frame: &Frame) -> Mask {
+    let width = frame.grid.width;
+    let depths = &frame.map.depths_m;
+    let step = |&i: &usize| {
+        [i.wrapping_sub(1), i + 1, i.wrapping_sub(width), i + width].iter().any(|&j| {
+            depths.get(j).is_none_or(|z| z.is_nan() || (z - depths[i]).abs() > EDGE_SHARE * depths[i])
+        })
+    };
+    Mask::of(frame.grid, frame.near.iter().map(|&i| i as usize).filter(step))
+}
+
+/// Squared distance to the nearest edge, square metres; infinite if none is near.
+fn edge_distance_sq(frame: &Frame, edges: &Mask, pixel: usize) -> f64 {
+    let at = frame.points[pixel];
+    let mut nearest = f32::INFINITY;
+    frame.around(pixel, EDGE_REACH_M, |other| {
+        if edges.set[other] && is_finite(&frame.points[other]) {
+            nearest = nearest.min((frame.points[other] - at).norm_squared());
+        }
+    });
+    f64::from(nearest)
+}

@@ -1,0 +1,306 @@
+//! Learned objects known again (section VI; Aldoma et al. 2013).
+//!
+//! Local features of shape and of pattern are matched by nearest neighbour, matches grouped by the pose that they share, poses refined on the scene's
+//! surface, and what is left is judged by rays and chosen together: no part of the scene is explained twice.
+
+pub mod evidence;
+mod feature;
+mod group;
+mod scene;
+mod skin;
+
+use crate::cloud::{Cloud, CloudError};
+use crate::register::{Method, Prepared, RegisterError, RegisterOptions, align};
+use crate::view::View;
+use crate::voxel::VoxelError;
+use evidence::{Evidence, Judge, Verified, first_sight, verify};
+use feature::{Feature, Kind, features};
+use group::{Vote, matches, votes};
+use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
+use scene::Seen;
+use serde::{Deserialize, Serialize};
+use skin::Skin;
+pub use skin::outward;
+
+/// How learned objects are recognised.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct KnowOptions {
+    /// Returns farther away are not looked at, metres.
+    pub range_m: f64,
+    /// Distance of the places that are described, metres (paper: 1.5 cm).
+    pub keypoint_m: f32,
+    /// Less confidence is not told.
+    pub least_confidence: f64,
+    /// What evidence is worth.
+    pub judge: Judge,
+}
+
+impl Default for KnowOptions {
+    fn default() -> Self {
+        KnowOptions { range_m: 2.5, keypoint_m: 0.015, least_confidence: 0.8, judge: Judge::default() }
+    }
+}
+
+/// A learned object found in a view.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Recognised {
+    /// Number of the model in the library, in the order in which they were added.
+    pub model: usize,
+    /// Where it is, by the pose that the view states.
+    pub world_from_model: Isometry3<f64>,
+    /// Probability that it is that object at that place.
+    pub confidence: f64,
+    /// What speaks for it.
+    pub evidence: Evidence,
+}
+
+/// Models or views that cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum KnowError {
+    /// A model without normals or with next to no points.
+    #[error("the model has {points} points with a normal: learn it, or estimate normals that point outwards")]
+    Model {
+        /// How many there are.
+        points: usize,
+    },
+    /// A view whose pixels are not known.
+    #[error(
+        "the view shows no pixels in front of a camera: give an organised cloud in the optical frame (z forward), or intrinsics"
+    )]
+    NoCamera,
+    /// Too many points.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
+    /// Points too far out.
+    #[error(transparent)]
+    Voxel(#[from] VoxelError),
+    /// A pose could not be refined.
+    #[error(transparent)]
+    Register(#[from] RegisterError),
+}
+
+/// Learned models, made ready.
+#[derive(Default)]
+pub struct Library {
+    models: Vec<Known>,
+}
+
+struct Known {
+    skin: Skin,
+    /// Every so many of its points: for a first sight.
+    coarse: Skin,
+    features: [Vec<Feature>; 2],
+    /// Largest extent, metres.
+    size_m: f64,
+}
+
+const KINDS: [Kind; 2] = [Kind::Shape, Kind::Pattern];
+/// Distance of the points that a first sight looks at, metres.
+const COARSE_M: f32 = 0.01;
+/// Fewest points of a model.
+const LEAST_POINTS: usize = 60;
+/// Votes of a model that are looked at, refined, and judged.
+const LOOKED_AT: usize = 60;
+const REFINED: usize = 6;
+/// Poses nearer to each other than this are one, metres and radians.
+const SAME: (f64, f64) = (0.02, 0.26);
+/// Two answers may share at most this part of the smaller one's explained points.
+const SHARED: f64 = 0.2;
+
+/// The twelve corners of an icosahedron: directions that a model is described from.
+fn directions() -> Vec<Vector3<f32>> {
+    let golden = 0.5 * (1.0 + 5_f32.sqrt());
+    let mut all = Vec::new();
+    for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
+        all.extend([Vector3::new(0.0, a, b), Vector3::new(a, b, 0.0), Vector3::new(b, 0.0, a)]);
+    }
+    all.into_iter().map(|v| v.normalize()).collect()
+}
+
+impl Library {
+    /// Adds a model: a cloud with outward normals about any origin, coloured or not. Its number.
+    ///
+    /// # Errors
+    /// If it has next to no points with normals.
+    pub fn add(&mut self, cloud: &Cloud, options: &KnowOptions) -> Result<usize, KnowError> {
+        let skin = Skin::of(cloud)?;
+        if skin.points.len() < LEAST_POINTS {
+            return Err(KnowError::Model { points: skin.points.len() });
+        }
+        let mut all = [Vec::new(), Vec::new()];
+        for away in directions() {
+            let part = skin.part(&skin.seen_from(&away))?;
+            let keypoints = part.keypoints(options.keypoint_m, |_| true);
+            for (features_of, kind) in all.iter_mut().zip(KINDS) {
+                features_of.extend(features(&part, &keypoints, kind));
+            }
+        }
+        let few: Vec<u32> = skin.keypoints(COARSE_M, |_| true);
+        let coarse = skin.part(&few)?;
+        let size_m = cloud.bounds().map_or(0.0, |(low, high)| f64::from((high - low).norm()));
+        self.models.push(Known { skin, coarse, features: all, size_m });
+        Ok(self.models.len() - 1)
+    }
+
+    /// Number of models.
+    pub fn len(&self) -> usize {
+        self.models.len()
+    }
+
+    /// True if nothing was learned.
+    pub fn is_empty(&self) -> bool {
+        self.models.is_empty()
+    }
+
+    /// Which models are in a view, and where, the surest first.
+    ///
+    /// # Errors
+    /// If the view is no depth image.
+    pub fn recognise(&self, view: &View, options: &KnowOptions) -> Result<Vec<Recognised>, KnowError> {
+        let mut found = self.candidates(view, options)?;
+        found.retain(|c| c.confidence >= options.least_confidence);
+        let mut chosen = together(found);
+        chosen.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+        Ok(chosen.into_iter().map(|c| c.recognised(view)).collect())
+    }
+
+    /// All that was judged, whatever the confidence and whatever shares its place, the surest first: for fitting a [`Judge`].
+    ///
+    /// # Errors
+    /// As [`Library::recognise`].
+    pub fn judged(&self, view: &View, options: &KnowOptions) -> Result<Vec<Recognised>, KnowError> {
+        let mut found = self.candidates(view, options)?;
+        found.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+        Ok(found.into_iter().map(|c| c.recognised(view)).collect())
+    }
+
+    fn candidates(&self, view: &View, options: &KnowOptions) -> Result<Vec<Candidate>, KnowError> {
+        let _span = tracing::debug_span!("know again", models = self.models.len()).entered();
+        let widest_m = self.models.iter().map(|m| m.size_m).fold(0.0, f64::max);
+        let scene = Seen::new(view, options.range_m, widest_m * widest_m)?;
+        let keypoints = scene.skin.keypoints(options.keypoint_m, |i| !scene.wide[i]);
+        let described = KINDS.map(|kind| features(&scene.skin, &keypoints, kind));
+        let of_model = |(number, model): (usize, &Known)| model.find(number, &described, &scene, options);
+        let all: Vec<Vec<Candidate>> =
+            self.models.par_iter().enumerate().map(of_model).collect::<Result<_, _>>()?;
+        Ok(all.into_iter().flatten().collect())
+    }
+}
+
+/// A model at a pose, judged.
+struct Candidate {
+    model: usize,
+    camera_from_model: Isometry3<f64>,
+    confidence: f64,
+    evidence: Evidence,
+    claims: Vec<u32>,
+}
+
+impl Candidate {
+    fn recognised(self, view: &View) -> Recognised {
+        Recognised {
+            model: self.model,
+            world_from_model: view.world_from_camera * self.camera_from_model,
+            confidence: self.confidence,
+            evidence: self.evidence,
+        }
+    }
+
+    /// True if both explain much of the same.
+    fn conflicts(&self, other: &Candidate) -> bool {
+        let shared = self.claims.iter().filter(|c| other.claims.binary_search(c).is_ok()).count();
+        shared as f64 > SHARED * self.claims.len().min(other.claims.len()) as f64
+    }
+
+    /// What it adds to an explanation of the scene.
+    fn worth(&self) -> f64 {
+        self.claims.len() as f64 * (self.confidence - 0.5)
+    }
+}
+
+impl Known {
+    fn find(
+        &self,
+        number: usize,
+        described: &[Vec<Feature>; 2],
+        scene: &Seen,
+        options: &KnowOptions,
+    ) -> Result<Vec<Candidate>, KnowError> {
+        let all = described.iter().zip(&self.features).flat_map(|(s, m)| matches(s, m)).collect();
+        let mut votes = votes(all);
+        votes.truncate(LOOKED_AT);
+        let at = |vote: &Vote| first_sight(&self.coarse, &vote.scene_from_model, scene);
+        let mut ranked: Vec<(f64, Vote)> = votes.iter().map(|v| (at(v), *v)).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut kept: Vec<Vote> = Vec::new();
+        for (_, vote) in ranked {
+            if kept.len() < REFINED && kept.iter().all(|k| !same(&k.scene_from_model, &vote.scene_from_model))
+            {
+                kept.push(vote);
+            }
+        }
+        let judged = |vote: Vote| {
+            let pose = self.refined(&vote.scene_from_model, scene)?;
+            let Verified { evidence, claims } = verify(&self.skin, &pose, scene, vote.matches);
+            let confidence = options.judge.confidence(&evidence);
+            Ok(Candidate { model: number, camera_from_model: pose, confidence, evidence, claims })
+        };
+        kept.into_iter().map(judged).collect()
+    }
+
+    /// The pose after its visible side was brought onto the scene's surface, from far to near.
+    fn refined(&self, start: &Isometry3<f64>, scene: &Seen) -> Result<Isometry3<f64>, KnowError> {
+        let mut pose = *start;
+        for within_m in [0.025, 0.01] {
+            let eye = pose.inverse() * Point3::origin();
+            let seen = self.skin.seen_from(&eye.coords.cast().normalize());
+            let points: Vec<Point3<f32>> = seen.iter().map(|&i| self.skin.points[i as usize]).collect();
+            if points.len() < LEAST_POINTS / 2 {
+                return Ok(pose);
+            }
+            let options = RegisterOptions {
+                method: Method::PointToPlane,
+                start_target_from_source: pose,
+                within_m,
+                rounds: 15,
+                settle_m: 2e-4,
+                settle_rad: 1e-3,
+                robust_m: Some(0.004),
+                ..RegisterOptions::default()
+            };
+            let fit = align(&Prepared::new(&points)?, &scene.target, &options)?;
+            // What slips away along a plane or around an axis was held by features, not by the surface.
+            if fit.moved_m < 0.04 && fit.moved_rad < 0.5 {
+                pose = fit.target_from_source;
+            }
+        }
+        Ok(pose)
+    }
+}
+
+fn same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+    (a.translation.vector - b.translation.vector).norm() < SAME.0 && a.rotation.angle_to(&b.rotation) < SAME.1
+}
+
+/// Those that together explain the scene best without explaining any part of it twice: from the best of each alone, changed one at a time for the
+/// better (add one and drop what it conflicts with).
+fn together(mut found: Vec<Candidate>) -> Vec<Candidate> {
+    found.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
+    let n = found.len();
+    let conflicts: Vec<Vec<bool>> =
+        found.iter().map(|a| found.iter().map(|b| a.conflicts(b)).collect()).collect();
+    let mut chosen = vec![false; n];
+    loop {
+        let gain = |i: usize| {
+            let lost: f64 = (0..n).filter(|&j| chosen[j] && conflicts[i][j]).map(|j| found[j].worth()).sum();
+            found[i].worth() - lost
+        };
+        let best = (0..n).filter(|&i| !chosen[i]).map(|i| (i, gain(i))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((i, _)) = best.filter(|b| b.1 > 0.0) else { break };
+        (0..n).filter(|&j| conflicts[i][j]).for_each(|j| chosen[j] = false);
+        chosen[i] = true;
+    }
+    found.into_iter().zip(chosen).filter(|(_, c)| *c).map(|(c, _)| c).collect()
+}

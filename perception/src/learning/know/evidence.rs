@@ -1,0 +1,194 @@
+//! What speaks for a model at a pose: each of its points is a ray of the camera that ends there, before it or behind it.
+
+use super::scene::Seen;
+use super::skin::Skin;
+use crate::noise::frontal_sigma_m;
+use nalgebra::{Isometry3, Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// What rays say of a model at a pose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// Points of the model that face the camera and are in its image.
+    pub facing: usize,
+    /// Of those, points where the camera measured a surface that is turned as the model's …
+    pub explained: usize,
+    /// … points that it saw through …
+    pub through: usize,
+    /// … and points that something nearer hides.
+    pub hidden: usize,
+    /// How alike colours are where it is explained: 1 the same, 0 altogether different; `None` if model or scene has none.
+    pub colour: Option<f64>,
+    /// Mean distance along the ray where it is explained, in standard deviations of the camera.
+    pub off_sigmas: f64,
+    /// Scene points that carry on the explained surface smoothly beyond the model, per explained point: it may be part of something larger.
+    pub beyond: f64,
+    /// Features that voted for the pose.
+    pub votes: usize,
+}
+
+/// Weights of what a [`Judge`] looks at.
+pub const WEIGHTS: usize = 9;
+
+/// How evidence becomes a probability: logistic regression.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Judge {
+    /// The last is the constant.
+    pub weights: [f64; WEIGHTS],
+}
+
+impl Default for Judge {
+    /// Weights by reasoning, in the order of [`Evidence::measures`]; part `judge` of `examples/learning` fits others to simulated scenes.
+    fn default() -> Self {
+        Judge { weights: [10.0, 8.0, 3.5, -0.6, -2.0, 0.8, 0.2, -2.0, -13.0] }
+    }
+}
+
+impl Evidence {
+    /// What a [`Judge`] looks at: share of the points that could be seen that are explained; likeness of colour, and whether there is none; mean
+    /// error; what carries on beyond; how much is explained; votes; share of the model's side that is hidden; and one.
+    pub fn measures(&self) -> [f64; WEIGHTS] {
+        [
+            self.explained_share(),
+            self.colour.unwrap_or(0.0),
+            f64::from(u8::from(self.colour.is_none())),
+            self.off_sigmas,
+            self.beyond.min(2.0),
+            (1.0 + self.explained as f64 / 50.0).ln(),
+            (1.0 + self.votes as f64).ln(),
+            self.hidden as f64 / self.facing.max(1) as f64,
+            1.0,
+        ]
+    }
+
+    /// Share of the points that nothing hides that are explained.
+    pub fn explained_share(&self) -> f64 {
+        self.explained as f64 / self.facing.saturating_sub(self.hidden).max(1) as f64
+    }
+}
+
+impl Judge {
+    /// Probability that a model with this evidence is where it is said to be.
+    pub fn confidence(&self, evidence: &Evidence) -> f64 {
+        let sum: f64 = self.weights.iter().zip(evidence.measures()).map(|(w, m)| w * m).sum();
+        1.0 / (1.0 + (-sum).exp())
+    }
+}
+
+/// Least cosine between the normals of model and scene where a point is explained.
+const TURNED_AS: f32 = 0.6;
+/// Farthest scene point that a point of the model explains, metres.
+const NEAR_M: f32 = 0.012;
+/// Colours that differ by so much (CIE 1976, lightness counts half) are as unlike as not, and points told apart by colour.
+const UNLIKE: f32 = 14.0;
+/// What carries on the surface beyond the model is looked for between these distances, metres, where it is turned as there (cosine).
+const BEYOND_M: (f32, f32) = (0.010, 0.025);
+const SMOOTH: f32 = 0.94;
+
+/// Evidence, and the scene's points that are explained.
+pub(super) struct Verified {
+    pub evidence: Evidence,
+    /// Indices in the scene's skin, ascending.
+    pub claims: Vec<u32>,
+}
+
+/// What a model's skin at a pose is worth against a scene.
+pub(super) fn verify(
+    model: &Skin,
+    camera_from_model: &Isometry3<f64>,
+    scene: &Seen,
+    votes: usize,
+) -> Verified {
+    let Rays { mut evidence, pairs } = rays(model, camera_from_model, scene);
+    let mut claims: Vec<u32> = pairs.iter().map(|pair| pair.1 as u32).collect();
+    claims.sort_unstable();
+    claims.dedup();
+    evidence.votes = votes;
+    evidence.beyond = beyond(model, camera_from_model, scene, &claims);
+    Verified { evidence, claims }
+}
+
+/// How well a pose does at first sight: share of what could be seen that is explained, and likeness of colour.
+pub(super) fn first_sight(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen) -> f64 {
+    let evidence = rays(model, camera_from_model, scene).evidence;
+    evidence.explained_share() * (0.5 + evidence.colour.unwrap_or(0.5))
+}
+
+/// Evidence of the rays alone, and which points of the model (first) explain which of the scene.
+struct Rays {
+    evidence: Evidence,
+    pairs: Vec<(usize, usize)>,
+}
+
+fn rays(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen) -> Rays {
+    let eye = camera_from_model.inverse() * Point3::origin();
+    let away = eye.coords.cast::<f32>().normalize();
+    let mut e = Evidence::default();
+    let (mut pairs, mut off) = (Vec::new(), 0.0);
+    for i in model.seen_from(&away) {
+        let p = camera_from_model * model.points[i as usize].cast::<f64>();
+        let Some((depth, nearest)) = scene.around(&p) else { continue };
+        e.facing += 1;
+        let sigma = frontal_sigma_m(p.z as f32);
+        let tolerance = (3.0 * sigma).max(0.006);
+        if nearest > p.z as f32 + tolerance.max(0.01) {
+            e.through += 1;
+        } else if depth < p.z as f32 - tolerance {
+            e.hidden += 1;
+        } else if (depth - p.z as f32).abs() <= tolerance {
+            let normal = camera_from_model.rotation * model.normals[i as usize].cast::<f64>();
+            let near = scene.skin.tree.nearest(&p.cast(), NEAR_M).map(|n| n.index as usize);
+            let Some(k) = near.filter(|&k| scene.skin.normals[k].dot(&normal.cast()) >= TURNED_AS) else {
+                continue;
+            };
+            e.explained += 1;
+            off += f64::from((depth - p.z as f32).abs() / sigma);
+            pairs.push((i as usize, k));
+        }
+    }
+    e.off_sigmas = off / e.explained.max(1) as f64;
+    e.colour = likeness(model, &scene.skin, &pairs);
+    Rays { evidence: e, pairs }
+}
+
+/// Mean likeness of colours of pairs (model, scene), after the lightness of the one is brought to that of the other.
+fn likeness(model: &Skin, scene: &Skin, pairs: &[(usize, usize)]) -> Option<f64> {
+    let (a, b) = (model.lab.as_ref()?, scene.lab.as_ref()?);
+    if pairs.is_empty() {
+        return Some(0.0);
+    }
+    let mut lighter: Vec<f32> = pairs.iter().map(|&(i, k)| b[k][0] - a[i][0]).collect();
+    let middle = lighter.len() / 2;
+    let gain = lighter.select_nth_unstable_by(middle, f32::total_cmp).1.clamp(-15.0, 15.0);
+    let alike = |&(i, k): &(usize, usize)| {
+        let lightness = 0.5 * (b[k][0] - a[i][0] - gain);
+        let off_sq = lightness.powi(2) + (b[k][1] - a[i][1]).powi(2) + (b[k][2] - a[i][2]).powi(2);
+        f64::from((-off_sq / (UNLIKE * UNLIKE)).exp())
+    };
+    Some(pairs.iter().map(alike).sum::<f64>() / pairs.len() as f64)
+}
+
+fn beyond(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen, claims: &[u32]) -> f64 {
+    let model_from_camera = camera_from_model.inverse();
+    let turn = model_from_camera.rotation.to_rotation_matrix().cast::<f32>();
+    let mut carried = rustc_hash::FxHashSet::default();
+    for &claim in claims {
+        let normal = scene.skin.normals[claim as usize];
+        scene.skin.tree.within(&scene.skin.points[claim as usize], BEYOND_M.1, |near| {
+            let k = near.index as usize;
+            let flat = |d: Vector3<f32>| d.dot(&normal).abs() < 0.006;
+            if !scene.wide[k]
+                && scene.skin.normals[k].dot(&normal) > SMOOTH
+                && flat(scene.skin.points[k] - scene.skin.points[claim as usize])
+            {
+                carried.insert(near.index);
+            }
+        });
+    }
+    let outside = |k: &&u32| {
+        let p: Point3<f32> = (model_from_camera * scene.skin.points[**k as usize].cast::<f64>()).cast();
+        let normal = turn * scene.skin.normals[**k as usize];
+        model.tree.nearest(&p, BEYOND_M.0).is_none_or(|n| model.normals[n.index as usize].dot(&normal) < 0.5)
+    };
+    carried.iter().filter(outside).count() as f64 / claims.len().max(1) as f64
+}

@@ -1,0 +1,193 @@
+//! Local features: shape where a surface bends (SHOT: Tombari, Salti, Di Stefano 2010), the printed pattern where it is coloured.
+
+use super::skin::Skin;
+use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
+use rayon::prelude::*;
+
+/// A described place.
+#[derive(Clone, Debug)]
+pub(super) struct Feature {
+    pub at: Point3<f32>,
+    pub normal: Vector3<f32>,
+    /// Bytes, so that distances are quick.
+    pub descriptor: Box<[u8]>,
+}
+
+/// What is described.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// How normals are spread around a place.
+    Shape,
+    /// The colours around a place, in the tangent plane.
+    Pattern,
+}
+
+/// The features of one kind at some points of a skin; where there is nothing to describe there is none.
+pub(super) fn features(skin: &Skin, keypoints: &[u32], kind: Kind) -> Vec<Feature> {
+    let describe = |&i: &u32| {
+        let descriptor = match kind {
+            Kind::Shape => shape(skin, i as usize),
+            Kind::Pattern => pattern(skin, i as usize),
+        }?;
+        Some(Feature { at: skin.points[i as usize], normal: skin.normals[i as usize], descriptor })
+    };
+    keypoints.par_iter().filter_map(describe).collect()
+}
+
+/// Sum of absolute differences.
+pub(super) fn distance(a: &[u8], b: &[u8]) -> u32 {
+    a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b))).sum()
+}
+
+/// Radius that a shape is described in, metres.
+const SHAPE_M: f32 = 0.04;
+/// Sectors of azimuth, elevation and radius, and bins of the angle between normals.
+const SECTORS: [usize; 4] = [8, 2, 2, 11];
+/// A neighbourhood whose normals are more of one mind is flat: nothing to tell apart. One less the length of their mean.
+const FLAT: f32 = 0.04;
+const FEWEST: usize = 20;
+
+fn shape(skin: &Skin, centre: usize) -> Option<Box<[u8]>> {
+    let at = skin.points[centre];
+    let mut near: Vec<(usize, f32)> = Vec::new();
+    skin.tree.within(&at, SHAPE_M, |n| near.push((n.index as usize, n.distance_sq.sqrt())));
+    let mean: Vector3<f32> = near.iter().map(|(k, _)| skin.normals[*k]).sum();
+    if near.len() < FEWEST || 1.0 - mean.norm() / (near.len() as f32) < FLAT {
+        return None;
+    }
+    let axes = local_frame(skin, &at, &skin.normals[centre], &near)?;
+    let mut bins = vec![0.0_f32; SECTORS.iter().product()];
+    for &(k, distance) in near.iter().filter(|n| n.1 > 1e-6) {
+        let local = axes * (skin.points[k] - at);
+        let cosine = axes.row(2).transpose().dot(&skin.normals[k]);
+        let azimuth = local.y.atan2(local.x) / std::f32::consts::TAU + 0.5;
+        let places = [
+            azimuth * SECTORS[0] as f32 - 0.5,
+            0.5 * (local.z / distance + 1.0) * SECTORS[1] as f32 - 0.5,
+            distance / SHAPE_M * SECTORS[2] as f32 - 0.5,
+            0.5 * (cosine + 1.0) * SECTORS[3] as f32 - 0.5,
+        ];
+        spread(&mut bins, places);
+    }
+    let length = bins.iter().map(|b| b * b).sum::<f32>().sqrt();
+    (length > 0.0).then(|| bins.iter().map(|b| (510.0 * b / length).min(255.0) as u8).collect())
+}
+
+/// Adds one to the bins around a place, by proportion; azimuth goes round, the others end.
+fn spread(bins: &mut [f32], places: [f32; 4]) {
+    for corner in 0..16_usize {
+        let (mut index, mut weight) = (0, 1.0);
+        for (axis, (&place, &count)) in places.iter().zip(&SECTORS).enumerate() {
+            let low = place.floor();
+            let up = corner >> axis & 1;
+            weight *= if up == 1 { place - low } else { 1.0 - (place - low) };
+            let bin = low as i32 + up as i32;
+            let last = count as i32 - 1;
+            let bin = if axis == 0 { bin.rem_euclid(count as i32) } else { bin.clamp(0, last) };
+            index = index * count + bin as usize;
+        }
+        bins[index] += weight;
+    }
+}
+
+/// Rows are the axes of the local reference frame: by the spread of the neighbours weighed by nearness, z to the side of the normal, x to
+/// where most neighbours lie.
+fn local_frame(
+    skin: &Skin,
+    at: &Point3<f32>,
+    normal: &Vector3<f32>,
+    near: &[(usize, f32)],
+) -> Option<Matrix3<f32>> {
+    let mut scatter = Matrix3::zeros();
+    for &(k, distance) in near {
+        let d = skin.points[k] - at;
+        scatter += d * d.transpose() * (SHAPE_M - distance);
+    }
+    let eigen = SymmetricEigen::new(scatter);
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let column = |k: usize| eigen.eigenvectors.column(order[k]).into_owned();
+    let (z, x) = (column(0), column(2));
+    let z = if z.dot(normal) < 0.0 { -z } else { z };
+    let before = near.iter().filter(|(k, _)| (skin.points[*k] - at).dot(&x) >= 0.0).count();
+    let x = if 2 * before < near.len() { -x } else { x };
+    let y = z.cross(&x);
+    let frame = Matrix3::from_rows(&[x.transpose(), y.transpose(), z.transpose()]);
+    frame.iter().all(|v| v.is_finite()).then_some(frame)
+}
+
+/// A pattern is read on a square of so many cells, of this side, metres.
+const CELLS: usize = 8;
+const CELL_M: f32 = 0.006;
+/// Least change of lightness from the middle to the border of a pattern that gives it a direction, in units of L*.
+const CONTRAST: f32 = 4.0;
+/// Least share of the cells that must have been seen.
+const COVERED: f32 = 0.75;
+/// Bytes a unit: of lightness after normalising, and of a* and b*.
+const SCALES: [f32; 2] = [40.0, 2.0];
+
+/// Lightness and colour on a square of the tangent plane, turned to where it gets lighter and free of contrast, as Brown, Szeliski and Winder (2005)
+/// do in images.
+fn pattern(skin: &Skin, centre: usize) -> Option<Box<[u8]>> {
+    let lab = skin.lab.as_ref()?;
+    let (at, normal) = (skin.points[centre], skin.normals[centre]);
+    let reach_m = 0.5 * CELLS as f32 * CELL_M;
+    let aside = if normal.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+    let right = normal.cross(&aside).normalize();
+    let up = normal.cross(&right);
+    let mut near: Vec<(f32, f32, [f32; 3])> = Vec::new();
+    skin.tree.within(&at, reach_m * 1.45, |n| {
+        let k = n.index as usize;
+        let d = skin.points[k] - at;
+        if skin.normals[k].dot(&normal) > 0.7 && d.dot(&normal).abs() < 0.01 {
+            near.push((d.dot(&right), d.dot(&up), lab[k]));
+        }
+    });
+    let (dx, dy) = slope(near.iter().filter(|(x, y, _)| x.hypot(*y) <= reach_m))?;
+    let steep = dx.hypot(dy);
+    if steep * reach_m < CONTRAST {
+        return None;
+    }
+    let (c, s) = (dx / steep, dy / steep);
+    let mut cells = [([0.0_f32; 3], 0.0_f32); CELLS * CELLS];
+    for (x, y, colour) in near {
+        let cell = |t: f32| ((t + reach_m) / CELL_M).floor();
+        let (i, j) = (cell(c * x + s * y), cell(c * y - s * x));
+        if i >= 0.0 && j >= 0.0 && i < CELLS as f32 && j < CELLS as f32 {
+            let (sum, n) = &mut cells[j as usize * CELLS + i as usize];
+            (0..3).for_each(|k| sum[k] += colour[k]);
+            *n += 1.0;
+        }
+    }
+    described(&cells)
+}
+
+/// How lightness changes along both axes, per metre, by least squares.
+fn slope<'a>(points: impl Iterator<Item = &'a (f32, f32, [f32; 3])>) -> Option<(f32, f32)> {
+    let mut normal = Matrix3::<f32>::zeros();
+    let mut right = Vector3::zeros();
+    for (x, y, lab) in points {
+        let row = Vector3::new(100.0 * x, 100.0 * y, 1.0);
+        normal += row * row.transpose();
+        right += row * lab[0];
+    }
+    let solution = normal.try_inverse()? * right;
+    solution.iter().all(|v| v.is_finite()).then(|| (100.0 * solution.x, 100.0 * solution.y))
+}
+
+fn described(cells: &[([f32; 3], f32)]) -> Option<Box<[u8]>> {
+    let seen = || cells.iter().filter(|c| c.1 > 0.0);
+    let count = seen().count() as f32;
+    if count < COVERED * cells.len() as f32 {
+        return None;
+    }
+    let value = |c: &([f32; 3], f32), k: usize| c.0[k] / c.1;
+    let mean: [f32; 3] = std::array::from_fn(|k| seen().map(|c| value(c, k)).sum::<f32>() / count);
+    let sigma = (seen().map(|c| (value(c, 0) - mean[0]).powi(2)).sum::<f32>() / count).sqrt().max(1.0);
+    let byte = |v: f32| (128.0 + v).clamp(0.0, 255.0) as u8;
+    let lightness =
+        cells.iter().map(|c| byte(if c.1 > 0.0 { SCALES[0] * (value(c, 0) - mean[0]) / sigma } else { 0.0 }));
+    let colour =
+        |k: usize| cells.iter().map(move |c| byte(SCALES[1] * if c.1 > 0.0 { value(c, k) } else { mean[k] }));
+    Some(lightness.chain(colour(1)).chain(colour(2)).collect())
+}

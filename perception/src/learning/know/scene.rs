@@ -1,0 +1,92 @@
+//! A look made ready to be recognised in.
+
+use super::KnowError;
+use super::skin::{STEP_M, Skin};
+use crate::cloud::{Cloud, is_finite};
+use crate::draw::Draws;
+use crate::neighbours::Neighbours;
+use crate::normals::{self, OrganisedOptions};
+use crate::plane::{self, PlaneOptions};
+use crate::register::Prepared;
+use crate::view::View;
+use crate::visibility::DepthMap;
+use nalgebra::{Isometry3, Point3};
+
+/// What a camera saw, in its own frame.
+pub(super) struct Seen {
+    pub skin: Skin,
+    /// True for points of planes that are wider than any model.
+    pub wide: Vec<bool>,
+    /// The skin, to be registered to.
+    pub target: Prepared,
+    map: DepthMap,
+}
+
+const NORMALS: OrganisedOptions =
+    OrganisedOptions { reach: 3, depth_step_share: 0.015, base_m: 0.006, least: 12 };
+/// Neighbours that a normal is made of where there are no pixels, and for registration.
+const NEIGHBOURS: usize = 20;
+/// Most wide planes, and how far points lie from them at most, metres.
+const PLANES: usize = 6;
+const PLANE_M: f32 = 0.012;
+/// Least cosine between the normals of a point and its wide plane.
+const LEVEL: f32 = 0.85;
+
+impl Seen {
+    /// Prepares what lies within `range_m`. Planes of more than `widest_m2` are of no object.
+    pub fn new(view: &View, range_m: f64, widest_m2: f64) -> Result<Seen, KnowError> {
+        let map = DepthMap::from_view(view, &Isometry3::identity()).ok_or(KnowError::NoCamera)?;
+        let near = |p: &Point3<f32>| is_finite(p) && f64::from(p.z) <= range_m;
+        let cloud = match view.cloud.grid {
+            Some(_) => normals::organised(&view.cloud, &NORMALS).map(|n| n.normals),
+            None => {
+                let tree = Neighbours::new(&view.cloud.points)?;
+                Some(normals::estimate(&tree, NEIGHBOURS, &Point3::origin()).normals)
+            }
+        };
+        let skin = Skin::of(&Cloud { normals: cloud, ..view.cloud.clone() }.filter(near))?;
+        let target = Prepared::with_normals(&skin.points, NEIGHBOURS)?;
+        let wide = wide(&skin, widest_m2);
+        Ok(Seen { skin, wide, target, map })
+    }
+
+    /// Depth measured at the pixel of a point and the least around it, metres; `None` beyond the image or where nothing came back at all.
+    pub fn around(&self, p: &Point3<f64>) -> Option<(f32, f32)> {
+        let (u, v) = self.map.intrinsics.project(p)?;
+        let pixel = self.map.intrinsics.pixel(u, v)?;
+        let nearest = self.map.nearest_around(pixel);
+        if !nearest.is_finite() {
+            return None;
+        }
+        let here = self.map.depths_m[pixel];
+        Some((if here.is_nan() { nearest } else { here }, nearest))
+    }
+}
+
+fn wide(skin: &Skin, widest_m2: f64) -> Vec<bool> {
+    let mut wide = vec![false; skin.points.len()];
+    let least = (widest_m2 / f64::from(STEP_M * STEP_M)) as usize;
+    let mut draws = Draws::new(0);
+    for _ in 0..PLANES {
+        let open: Vec<usize> = (0..wide.len()).filter(|&i| !wide[i]).collect();
+        if open.len() < least.max(3) {
+            break;
+        }
+        let points: Vec<Point3<f32>> = open.iter().map(|&i| skin.points[i]).collect();
+        let options =
+            PlaneOptions { tolerance_m: PLANE_M, rounds: 300, seed: draws.next(), ..PlaneOptions::default() };
+        let Ok(fit) = plane::find(&points, &options) else { break };
+        let normal = fit.plane.facing(&Point3::origin()).normal.cast::<f32>();
+        let on: Vec<usize> = fit
+            .inliers
+            .iter()
+            .map(|&i| open[i as usize])
+            .filter(|&i| skin.normals[i].dot(&normal) > LEVEL)
+            .collect();
+        if on.len() < least.max(3) {
+            break;
+        }
+        on.into_iter().for_each(|i| wide[i] = true);
+    }
+    wide
+}

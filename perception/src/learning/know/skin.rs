@@ -1,0 +1,145 @@
+//! A surface at one resolution: what models and scenes are compared as.
+
+use crate::cloud::{Cloud, CloudError, is_finite};
+use crate::neighbours::Neighbours;
+use crate::normals;
+use crate::voxel;
+use nalgebra::{Point3, Vector3};
+
+/// Distance of its points, metres.
+pub(super) const STEP_M: f32 = 0.004;
+/// Cells in which what lies behind is hidden, and how far behind, metres.
+const CELL_M: f32 = 0.008;
+const BEHIND_M: f32 = 0.012;
+/// Least cosine between a normal and the direction that it is seen from.
+const FACING: f32 = 0.2;
+
+/// Points about `STEP_M` apart, with normals towards whoever sees them.
+pub(super) struct Skin {
+    pub points: Vec<Point3<f32>>,
+    pub normals: Vec<Vector3<f32>>,
+    /// CIE L*, a*, b*; none if the cloud has no colours.
+    pub lab: Option<Vec<[f32; 3]>>,
+    pub tree: Neighbours,
+}
+
+impl Skin {
+    /// The skin of a cloud with normals.
+    pub fn of(cloud: &Cloud) -> Result<Skin, super::KnowError> {
+        Ok(Skin::gathered(&voxel::downsample(cloud, STEP_M)?)?)
+    }
+
+    fn gathered(cloud: &Cloud) -> Result<Skin, CloudError> {
+        let none = Vec::new();
+        let normals = cloud.normals.as_ref().unwrap_or(&none);
+        let kept: Vec<u32> = (0..normals.len())
+            .filter(|&i| is_finite(&cloud.points[i]) && normals[i].x.is_finite())
+            .map(|i| i as u32)
+            .collect();
+        let kept = cloud.select(&kept);
+        let tree = Neighbours::new(&kept.points)?;
+        let lab = kept.colours.map(|c| c.into_iter().map(lab).collect());
+        Ok(Skin { points: kept.points, normals: kept.normals.unwrap_or_default(), lab, tree })
+    }
+
+    /// Indices of the points that can be seen from far away in a direction (unit length, from the object).
+    pub fn seen_from(&self, away: &Vector3<f32>) -> Vec<u32> {
+        let aside = if away.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+        let right = away.cross(&aside).normalize();
+        let up = away.cross(&right);
+        let cell = |p: &Point3<f32>| {
+            let at = |axis: &Vector3<f32>| (axis.dot(&p.coords) / CELL_M).floor() as i32;
+            (at(&right), at(&up))
+        };
+        let mut nearest = rustc_hash::FxHashMap::default();
+        for p in &self.points {
+            let height = away.dot(&p.coords);
+            let best = nearest.entry(cell(p)).or_insert(height);
+            *best = height.max(*best);
+        }
+        let seen = |&i: &u32| {
+            let (p, n) = (&self.points[i as usize], &self.normals[i as usize]);
+            n.dot(away) > FACING && away.dot(&p.coords) > nearest[&cell(p)] - BEHIND_M
+        };
+        (0..self.points.len() as u32).filter(seen).collect()
+    }
+
+    /// The skin of some of the points.
+    pub fn part(&self, indices: &[u32]) -> Result<Skin, CloudError> {
+        let points: Vec<Point3<f32>> = indices.iter().map(|&i| self.points[i as usize]).collect();
+        Ok(Skin {
+            tree: Neighbours::new(&points)?,
+            points,
+            normals: indices.iter().map(|&i| self.normals[i as usize]).collect(),
+            lab: self.lab.as_ref().map(|lab| indices.iter().map(|&i| lab[i as usize]).collect()),
+        })
+    }
+
+    /// One index a cube of `step_m`, of the points for which `wanted` holds: that nearest to the middle of those in the cube.
+    pub fn keypoints(&self, step_m: f32, wanted: impl Fn(usize) -> bool) -> Vec<u32> {
+        let chosen: Vec<u32> = (0..self.points.len() as u32).filter(|&i| wanted(i as usize)).collect();
+        let points: Vec<Point3<f32>> = chosen.iter().map(|&i| self.points[i as usize]).collect();
+        let Ok(assigned) = voxel::assign(&points, step_m) else { return Vec::new() };
+        let mut sums = vec![(Vector3::zeros(), 0.0_f32); assigned.voxels];
+        for (p, &v) in points.iter().zip(&assigned.voxel).filter(|(_, v)| **v != voxel::NONE) {
+            sums[v as usize].0 += p.coords;
+            sums[v as usize].1 += 1.0;
+        }
+        let mut best = vec![(f32::INFINITY, 0_u32); assigned.voxels];
+        for (k, &v) in assigned.voxel.iter().enumerate().filter(|(_, v)| **v != voxel::NONE) {
+            let (sum, n) = sums[v as usize];
+            let off = (points[k].coords - sum / n).norm_squared();
+            if off < best[v as usize].0 {
+                best[v as usize] = (off, chosen[k]);
+            }
+        }
+        best.into_iter().map(|(_, i)| i).collect()
+    }
+}
+
+/// Neighbours that a normal is made of.
+const NEIGHBOURS: usize = 20;
+
+/// A cloud of a body that was seen from all around with normals that point out: away from the middle of its bounds, which holds for bodies that bulge.
+///
+/// # Errors
+/// If there are more points than 32-bit indices can name.
+pub fn outward(cloud: &Cloud) -> Result<Cloud, CloudError> {
+    let cloud = cloud.finite();
+    let tree = Neighbours::new(&cloud.points)?;
+    let middle = cloud.bounds().map_or(Point3::origin(), |(low, high)| nalgebra::center(&low, &high));
+    let towards = normals::estimate(&tree, NEIGHBOURS, &middle).normals;
+    Ok(Cloud { normals: Some(towards.into_iter().map(|n| -n).collect()), ..cloud })
+}
+
+/// CIE L*a*b* of an sRGB colour (white D65).
+pub(super) fn lab(rgb: [u8; 3]) -> [f32; 3] {
+    let linear = rgb.map(|c| {
+        let c = f32::from(c) / 255.0;
+        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    });
+    let row = |m: [f32; 3]| m[0] * linear[0] + m[1] * linear[1] + m[2] * linear[2];
+    let cube = |t: f32| if t > 0.008856 { t.cbrt() } else { 7.787 * t + 16.0 / 116.0 };
+    let x = cube(row([0.4124, 0.3576, 0.1805]) / 0.9505);
+    let y = cube(row([0.2126, 0.7152, 0.0722]));
+    let z = cube(row([0.0193, 0.1192, 0.9505]) / 1.089);
+    [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_as_the_standard_says() {
+        for (rgb, expected) in [
+            ([255, 255, 255], [100.0, 0.0, 0.0]),
+            ([0, 0, 0], [0.0, 0.0, 0.0]),
+            ([255, 0, 0], [53.2, 80.1, 67.2]),
+            ([0, 0, 255], [32.3, 79.2, -107.9]),
+        ] {
+            let found = lab(rgb);
+            assert!((0..3).all(|k| (found[k] - expected[k]).abs() < 0.3), "{rgb:?}: {found:?}");
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Masks over the pixels of an image: morphology by squares (section V-A, a).
+
+use crate::cloud::Grid;
+
+/// Pixels of which something holds, row by row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Mask {
+    pub grid: Grid,
+    pub set: Vec<bool>,
+}
+
+impl Mask {
+    pub fn none(grid: Grid) -> Mask {
+        Mask { grid, set: vec![false; grid.width * grid.height] }
+    }
+
+    pub fn of(grid: Grid, pixels: impl IntoIterator<Item = usize>) -> Mask {
+        let mut mask = Mask::none(grid);
+        pixels.into_iter().for_each(|i| mask.set[i] = true);
+        mask
+    }
+
+    /// Indices of the pixels.
+    pub fn pixels(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.set.len()).filter(|&i| self.set[i])
+    }
+
+    pub fn count(&self) -> usize {
+        self.set.iter().filter(|s| **s).count()
+    }
+
+    /// True if a pixel lies on the border of the image.
+    pub fn touches_border(&self) -> bool {
+        let Grid { width, height } = self.grid;
+        self.pixels().any(|i| {
+            let (u, v) = (i % width, i / width);
+            u == 0 || v == 0 || u + 1 == width || v + 1 == height
+        })
+    }
+
+    /// All pixels that have one of the mask within a square of `reach` pixels to each side.
+    pub fn dilated(&self, reach: usize) -> Mask {
+        self.along_rows(reach).transposed().along_rows(reach).transposed()
+    }
+
+    /// All pixels around which a square of `reach` pixels to each side is in the mask. Beyond the image counts as in it.
+    pub fn eroded(&self, reach: usize) -> Mask {
+        let out = Mask { grid: self.grid, set: self.set.iter().map(|s| !s).collect() }.dilated(reach);
+        Mask { grid: self.grid, set: out.set.into_iter().map(|s| !s).collect() }
+    }
+
+    /// Fills gaps narrower than the square.
+    pub fn closed(&self, reach: usize) -> Mask {
+        self.dilated(reach).eroded(reach)
+    }
+
+    /// Drops slivers narrower than the square.
+    pub fn opened(&self, reach: usize) -> Mask {
+        self.eroded(reach).dilated(reach)
+    }
+
+    fn along_rows(&self, reach: usize) -> Mask {
+        let mut out = Mask::none(self.grid);
+        let width = self.grid.width.max(1);
+        for (line, to) in self.set.chunks_exact(width).zip(out.set.chunks_exact_mut(width)) {
+            let mut free_from = 0;
+            for u in (0..width).filter(|&u| line[u]) {
+                let end = (u + reach + 1).min(width);
+                to[u.saturating_sub(reach).max(free_from)..end].fill(true);
+                free_from = end;
+            }
+        }
+        out
+    }
+
+    fn transposed(&self) -> Mask {
+        let Grid { width, height } = self.grid;
+        let mut out = Mask::none(Grid { width: height, height: width });
+        for v in 0..height {
+            for u in 0..width {
+                out.set[u * height + v] = self.set[v * width + u];
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `#` is set.
+    fn mask(rows: &[&str]) -> Mask {
+        let grid = Grid { width: rows[0].len(), height: rows.len() };
+        Mask { grid, set: rows.iter().flat_map(|r| r.chars()).map(|c| c == '#').collect() }
+    }
+
+    #[test]
+    fn squares_grow_shrink_fill_and_drop() {
+        let dot = mask(&[".....", ".....", "..#..", ".....", "....."]);
+        let square = mask(&[".....", ".###.", ".###.", ".###.", "....."]);
+        let holed = mask(&[".....", ".###.", ".#.#.", ".###.", "....."]);
+        let cases = [
+            ("grow", dot.dilated(1), &square),
+            ("shrink", square.eroded(1), &dot),
+            ("fill", holed.closed(1), &square),
+            ("drop", dot.opened(1), &Mask::none(dot.grid)),
+            ("keep", square.opened(1), &square),
+        ];
+        for (name, found, expected) in cases {
+            assert_eq!(&found, expected, "{name}");
+        }
+        assert!(!square.touches_border() && square.dilated(1).touches_border());
+    }
+}

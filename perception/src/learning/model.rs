@@ -1,0 +1,227 @@
+//! A model grown over looks, from the pixels that the object has in the first (section V).
+
+use super::LearningError;
+use super::frame::Frame;
+use super::fuse::Measured;
+use super::grow::{grown, transferred, without_outliers};
+use super::mask::Mask;
+use super::planes::{PlaneRules, Removed};
+use super::register::Keyframe;
+use super::supervoxel::Supervoxels;
+use crate::cloud::Cloud;
+use crate::neighbours::Neighbours;
+use crate::noise::frontal_sigma_m;
+use crate::view::View;
+use crate::visibility::Seen;
+use crate::voxel;
+use nalgebra::{Isometry3, Point3, Translation3};
+use serde::{Deserialize, Serialize};
+
+/// How an object is modelled. Parameters of the paper where it gives any.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LearnOptions {
+    /// Nothing of the object lies farther from the middle of what the first view shows, metres.
+    pub reach_m: f64,
+    /// Side of a supervoxel, metres (paper: 5 mm).
+    pub supervoxel_m: f32,
+    /// Least share of a supervoxel that is of the object, for it to stay (paper: 25 %).
+    pub supervoxel_share: f64,
+    /// Least share of a plane that is of the object, for it to stay (ϑ_obj of Eq. 3).
+    pub plane_object_share: f64,
+    /// A plane of which as much was invisible in the first view stays (ϑ_vis of Eq. 4).
+    pub plane_hidden_share: f64,
+    /// Points within this of the object are of it, metres (paper: 1 cm).
+    pub radius_m: f32,
+    /// Where the surface turns by less, radians (paper: 20 degrees).
+    pub angle_rad: f64,
+    /// Side of the cubes of the model, metres (paper: 2 mm).
+    pub cube_m: f32,
+    /// True: each point of the model lies where all measurements around it say, not only the best one (beyond the paper).
+    pub smooth: bool,
+    /// A look that sees through more than this share of what is known of the object is left out.
+    pub through_share: f64,
+}
+
+impl Default for LearnOptions {
+    fn default() -> Self {
+        LearnOptions {
+            reach_m: 0.45,
+            supervoxel_m: 0.005,
+            supervoxel_share: 0.25,
+            plane_object_share: 0.25,
+            plane_hidden_share: 0.25,
+            radius_m: 0.01,
+            angle_rad: 20_f64.to_radians(),
+            cube_m: 0.002,
+            smooth: true,
+            through_share: 0.3,
+        }
+    }
+}
+
+/// What one look gave to a model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Used {
+    /// Pixels of the object; 0 if it was left out.
+    pub pixels: usize,
+    /// Why it was left out.
+    pub left_out: Option<String>,
+}
+
+/// A rigid object as it was learned.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LearnedModel {
+    /// Points with normals, and colours where the views had them, about the middle of the object, metres.
+    pub cloud: Cloud,
+    /// Where that middle was when it was learned; axes as the world's.
+    pub world_from_model: Isometry3<f64>,
+    /// What each look gave.
+    pub looks: Vec<Used>,
+}
+
+/// Grows a model of what `mask` shows in the first view over the keyframes, in their order.
+///
+/// # Errors
+/// If there is no view, one is no depth image, the mask has another size, the first view was left out, nothing is left of the object, or an option means nothing.
+pub fn learn(
+    views: &[View],
+    keyframes: &[Keyframe],
+    mask: &[bool],
+    options: &LearnOptions,
+) -> Result<LearnedModel, LearningError> {
+    let _span = tracing::debug_span!("learn", views = views.len()).entered();
+    let first = views.first().ok_or(LearningError::NoViews)?;
+    check(options)?;
+    if mask.len() != first.cloud.len() {
+        return Err(LearningError::Mask { found: mask.len(), expected: first.cloud.len() });
+    }
+    if let Some(why) = keyframes.first().filter(|f| !f.used).map(|f| f.why.clone()) {
+        return Err(LearningError::FirstLeftOut { why });
+    }
+    let pose = |k: usize| keyframes.get(k).map_or(views[k].world_from_camera, |f| f.world_from_camera);
+    let seen: Vec<u32> = (0..mask.len()).filter(|&i| mask[i]).map(|i| i as u32).collect();
+    let seen = first.cloud.select(&seen).finite().transformed(&pose(0));
+    let (low, high) = seen.bounds().ok_or(LearningError::NothingLeft { points: 0 })?;
+    let centre = nalgebra::center(&low, &high).cast();
+
+    let mut growing = Growing::new(options);
+    let mut looks = Vec::new();
+    for (k, view) in views.iter().enumerate() {
+        if let Some(why) = keyframes.get(k).filter(|f| !f.used).map(|f| f.why.clone()) {
+            looks.push(Used { pixels: 0, left_out: Some(why) });
+            continue;
+        }
+        let frame = Frame::new(view, &pose(k), &centre, options.reach_m)
+            .ok_or(LearningError::NotOrganised { view: k })?;
+        looks.push(growing.look(frame, (k == 0).then_some(mask))?);
+    }
+    growing.finish(looks)
+}
+
+fn check(options: &LearnOptions) -> Result<(), LearningError> {
+    for (field, value) in [
+        ("reach_m", options.reach_m),
+        ("supervoxel_m", f64::from(options.supervoxel_m)),
+        ("radius_m", f64::from(options.radius_m)),
+        ("angle_rad", options.angle_rad),
+        ("cube_m", f64::from(options.cube_m)),
+    ] {
+        LearningError::positive(field, value)?;
+    }
+    Ok(())
+}
+
+/// A model half made.
+struct Growing<'a> {
+    options: &'a LearnOptions,
+    rules: PlaneRules,
+    removed: Removed,
+    first: Option<crate::visibility::DepthMap>,
+    /// The object so far, world frame, thinned.
+    object: Cloud,
+    measured: Measured,
+}
+
+/// Fewest pixels that an object is learned from.
+const LEAST_PIXELS: usize = 50;
+/// What is carried from look to look is thinned to this, metres.
+const CARRIED_M: f32 = 0.004;
+
+impl<'a> Growing<'a> {
+    fn new(options: &'a LearnOptions) -> Growing<'a> {
+        Growing {
+            options,
+            rules: PlaneRules {
+                object_share: options.plane_object_share,
+                hidden_share: options.plane_hidden_share,
+            },
+            removed: Removed::default(),
+            first: None,
+            object: Cloud::default(),
+            measured: Measured::default(),
+        }
+    }
+
+    /// One look: labelled, filtered (section V-A), grown (V-B), kept for fusing (V-C).
+    fn look(&mut self, mut frame: Frame, given: Option<&[bool]>) -> Result<Used, LearningError> {
+        let options = self.options;
+        let pieces = Supervoxels::of(&mut frame, options.supervoxel_m)?;
+        let all = Mask::of(frame.grid, frame.near.iter().map(|&i| i as usize));
+        let label = match given {
+            Some(mask) => Mask { grid: frame.grid, set: mask.to_vec() },
+            None => {
+                if let Some(why) = self.contradiction(&frame) {
+                    return Ok(Used { pixels: 0, left_out: Some(why) });
+                }
+                transferred(&frame, &all, &Neighbours::new(&self.object.points)?, options.radius_m)
+            }
+        };
+        let mut object = label.closed(2).eroded(1);
+        object.set.iter_mut().zip(&all.set).for_each(|(o, near)| *o &= near);
+        object = without_outliers(&frame, &object)?;
+        pieces.drop_unsupported(&mut object, options.supervoxel_share);
+        let first = self.first.get_or_insert_with(|| frame.map.clone());
+        let usable = self.removed.filtered(&frame, &object, first, &self.rules);
+        object.set.iter_mut().zip(&usable.set).for_each(|(o, usable)| *o &= usable);
+        let object = grown(&frame, &usable, object, options.radius_m, options.angle_rad);
+        let pixels = object.count();
+        if pixels < LEAST_PIXELS {
+            return match given {
+                Some(_) => Err(LearningError::NothingLeft { points: pixels }),
+                None => Ok(Used { pixels: 0, left_out: Some("the object is not in view".to_owned()) }),
+            };
+        }
+        self.measured.add(&frame, &object);
+        self.object.append(&Cloud::from_points(frame.cloud(&object).points));
+        self.object = voxel::downsample(&self.object, CARRIED_M)?;
+        Ok(Used { pixels, left_out: None })
+    }
+
+    /// Why a look cannot be of the object as it is known so far: it sees through it.
+    fn contradiction(&self, frame: &Frame) -> Option<String> {
+        let (mut through, mut seen) = (0, 0);
+        for p in &self.object.points {
+            let q = frame.map.camera_from_world * p.cast::<f64>();
+            let tolerance_m = 0.01_f64.max(3.0 * f64::from(frontal_sigma_m(q.z as f32)));
+            match frame.map.look_from(&q, tolerance_m) {
+                Seen::Free => (through, seen) = (through + 1, seen + 1),
+                Seen::Surface => seen += 1,
+                Seen::Hidden | Seen::Never => {}
+            }
+        }
+        let share = f64::from(through) / f64::from(seen.max(1));
+        (share > self.options.through_share)
+            .then(|| format!("it sees through {:.0} % of the object", 100.0 * share))
+    }
+
+    fn finish(self, looks: Vec<Used>) -> Result<LearnedModel, LearningError> {
+        let cloud = self.measured.fused(self.options.cube_m, self.options.smooth)?;
+        let Some((low, high)) = cloud.bounds() else {
+            return Err(LearningError::NothingLeft { points: 0 });
+        };
+        let middle: Point3<f64> = nalgebra::center(&low, &high).cast();
+        let world_from_model = Isometry3::from(Translation3::from(middle.coords));
+        Ok(LearnedModel { cloud: cloud.transformed(&world_from_model.inverse()), world_from_model, looks })
+    }
+}

@@ -1,0 +1,336 @@
+//! What differs from the static structure of a place (section III; Ambruş et al., *Meta-Rooms*, 2014).
+
+use super::LearningError;
+use super::mask::Mask;
+use crate::cloud::{Cloud, Grid, is_finite};
+use crate::cluster;
+use crate::neighbours::Neighbours;
+use crate::noise::frontal_sigma_m;
+use crate::register::{Method, Prepared, RegisterOptions, align};
+use crate::view::View;
+use crate::visibility::{DepthMap, Seen};
+use crate::voxel;
+use nalgebra::{Isometry3, Point3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// How differences are told.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct NoticeOptions {
+    /// Points farther than this from every point of the other cloud differ, metres (δ of Eq. 1; paper: 1 cm). Where the camera errs by more than a
+    /// third of it, three of its standard deviations count.
+    pub delta_m: f64,
+    /// Nothing farther from its camera is new, or gone, metres. What lies farther is background.
+    pub range_m: f64,
+    /// Side of the voxels that the static structure is kept in, metres.
+    pub voxel_m: f64,
+    /// Dynamic points no farther apart hang together, metres.
+    pub cluster_step_m: f32,
+    /// Fewest pixels of a dynamic cluster in the view that shows it best.
+    pub least_pixels: usize,
+    /// How far localisation may be off between two visits, metres.
+    pub search_m: f32,
+}
+
+impl Default for NoticeOptions {
+    fn default() -> Self {
+        NoticeOptions {
+            delta_m: 0.01,
+            range_m: 3.0,
+            voxel_m: 0.006,
+            cluster_step_m: 0.02,
+            least_pixels: 150,
+            search_m: 0.1,
+        }
+    }
+}
+
+/// The static structure around a place, refined by each visit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MetaRoom {
+    /// World frame, one point a voxel.
+    pub cloud: Cloud,
+    /// Visits that it was made from.
+    pub visits: usize,
+    options: NoticeOptions,
+}
+
+/// Something that was not there before.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Appeared {
+    /// Its points, world frame, from all views of the visit.
+    pub cloud: Cloud,
+    /// Index of the view that shows most of it and all that is seen of it: the first training view.
+    pub view: usize,
+    /// Its pixels in that view, row by row (O_0).
+    pub mask: Vec<bool>,
+}
+
+impl Appeared {
+    /// Middle of its bounds, world, metres.
+    pub fn centre(&self) -> Point3<f64> {
+        self.cloud.bounds().map_or(Point3::origin(), |(low, high)| nalgebra::center(&low, &high).cast())
+    }
+}
+
+/// What a visit taught.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Visit {
+    /// What came, the largest first.
+    pub appeared: Vec<Appeared>,
+    /// What went, the largest first, world frame.
+    pub gone: Vec<Cloud>,
+    /// Where the cameras stood, the views of a visit moved together onto the static structure.
+    pub poses: Vec<Isometry3<f64>>,
+    /// Points that the static structure gained: they had been hidden or never seen …
+    pub added: usize,
+    /// … and lost: this visit looked through them.
+    pub removed: usize,
+}
+
+/// Half the side of a square that a point of the static structure covers when it is looked at, in voxels.
+const COVER: f64 = 0.75;
+/// Background is kept up to this, metres: to have seen it is to have seen past what stands before it now.
+const BACKGROUND_M: f32 = 8.0;
+
+impl MetaRoom {
+    /// The first visit: all that is seen is static until it changes. The views of a visit must fit each other.
+    ///
+    /// # Errors
+    /// If there is no view, one is no depth image, or an option means nothing.
+    pub fn new(views: &[View], options: NoticeOptions) -> Result<MetaRoom, LearningError> {
+        for (field, value) in [
+            ("delta_m", options.delta_m),
+            ("range_m", options.range_m),
+            ("voxel_m", options.voxel_m),
+            ("cluster_step_m", f64::from(options.cluster_step_m)),
+            ("search_m", f64::from(options.search_m)),
+        ] {
+            LearningError::positive(field, value)?;
+        }
+        let poses: Vec<Isometry3<f64>> = views.iter().map(|v| v.world_from_camera).collect();
+        maps(views, &poses)?;
+        let cloud = voxel::downsample(&together(views, &poses), options.voxel_m as f32)?;
+        Ok(MetaRoom { cloud, visits: 1, options })
+    }
+
+    /// Compares a visit with the static structure both ways (Eq. 2) and refines it.
+    ///
+    /// # Errors
+    /// As [`MetaRoom::new`].
+    pub fn visit(&mut self, views: &[View]) -> Result<Visit, LearningError> {
+        let _span = tracing::debug_span!("visit", views = views.len(), points = self.cloud.len()).entered();
+        let poses = self.localised(views)?;
+        let maps = maps(views, &poses)?;
+        let tree = Neighbours::new(&self.cloud.points)?;
+        let changes: Vec<Change> =
+            views.par_iter().zip(&maps).map(|(view, map)| self.compare(view, map, &tree)).collect();
+        let appeared = self.clusters(views, &poses, &changes)?;
+        let (gone, removed) = self.remove(&maps)?;
+        let added = self.add(views, &poses, &changes, &appeared)?;
+        self.visits += 1;
+        Ok(Visit { appeared, gone, poses, added, removed })
+    }
+
+    /// The poses of the views after all were moved together onto the static structure, where they fit it.
+    fn localised(&self, views: &[View]) -> Result<Vec<Isometry3<f64>>, LearningError> {
+        const THINNED_M: f32 = 0.03;
+        const NEIGHBOURS: usize = 12;
+        let stated: Vec<Isometry3<f64>> = views.iter().map(|v| v.world_from_camera).collect();
+        let seen = voxel::downsample(&together(views, &stated), THINNED_M)?;
+        let source = Prepared::with_normals(&seen.points, NEIGHBOURS)?;
+        let target = Prepared::with_normals(&voxel::downsample(&self.cloud, THINNED_M)?.points, NEIGHBOURS)?;
+        let mut by_world = Isometry3::identity();
+        // From far to near, so that what has moved since has no say in the end.
+        for within_m in [self.options.search_m, 0.4 * self.options.search_m] {
+            let options = RegisterOptions {
+                method: Method::Generalised,
+                start_target_from_source: by_world,
+                within_m,
+                robust_m: Some(self.options.delta_m),
+                ..RegisterOptions::default()
+            };
+            let fit = align(&source, &target, &options)?;
+            if !fit.converged() {
+                return Ok(stated);
+            }
+            by_world = fit.target_from_source;
+        }
+        Ok(stated.iter().map(|pose| by_world * pose).collect())
+    }
+
+    /// The static structure as a camera sees it: least depth a pixel.
+    fn seen_by(&self, map: &DepthMap) -> Vec<f32> {
+        let camera = map.intrinsics;
+        let mut depths_m = vec![f32::INFINITY; camera.width * camera.height];
+        for p in &self.cloud.points {
+            let q = map.camera_from_world * p.cast::<f64>();
+            let Some((u, v)) = camera.project(&q) else { continue };
+            let half = (COVER * self.options.voxel_m * camera.fx / q.z).min(20.0);
+            let span = |at: f64, end: usize| {
+                let clamp = |c: f64| c.round().clamp(0.0, end as f64) as usize;
+                clamp(at - half)..clamp(at + half + 1.0)
+            };
+            for row in span(v, camera.height) {
+                for column in span(u, camera.width) {
+                    let depth = &mut depths_m[row * camera.width + column];
+                    *depth = depth.min(q.z as f32);
+                }
+            }
+        }
+        depths_m
+    }
+
+    /// What a view sees that is not of the static structure, and how it lies to it.
+    fn compare(&self, view: &View, map: &DepthMap, tree: &Neighbours) -> Change {
+        let known = self.seen_by(map);
+        let grid = Grid { width: map.intrinsics.width, height: map.intrinsics.height };
+        let world_from_camera = map.camera_from_world.inverse();
+        let (mut before, mut revealed, mut unknown) = (Mask::none(grid), Vec::new(), Vec::new());
+        for (i, p) in view.cloud.points.iter().enumerate().take(known.len()) {
+            if !is_finite(p) || p.z > BACKGROUND_M {
+                continue;
+            }
+            let apart_m = self.tolerance_m(p.z);
+            if (p.z - known[i]).abs() <= apart_m {
+                continue;
+            }
+            let world: Point3<f32> = (world_from_camera * p.cast::<f64>()).cast();
+            if tree.nearest(&world, apart_m).is_some() {
+                continue;
+            }
+            if !known[i].is_finite() {
+                unknown.push(i as u32);
+            } else if p.z > known[i] {
+                revealed.push(i as u32);
+            } else if f64::from(p.z) <= self.options.range_m {
+                before.set[i] = true;
+            }
+        }
+        Change { before: before.opened(1), revealed, unknown }
+    }
+
+    fn tolerance_m(&self, z_m: f32) -> f32 {
+        (self.options.delta_m as f32).max(3.0 * frontal_sigma_m(z_m))
+    }
+
+    /// What came, by what hangs together, with the view that shows it best.
+    fn clusters(
+        &self,
+        views: &[View],
+        poses: &[Isometry3<f64>],
+        changes: &[Change],
+    ) -> Result<Vec<Appeared>, LearningError> {
+        let mut origin: Vec<(usize, usize)> = Vec::new();
+        let mut all = Cloud::default();
+        for (k, ((view, pose), change)) in views.iter().zip(poses).zip(changes).enumerate() {
+            let pixels: Vec<u32> = change.before.pixels().map(|i| i as u32).collect();
+            origin.extend(pixels.iter().map(|&i| (k, i as usize)));
+            all.append(&view.cloud.select(&pixels).transformed(pose));
+        }
+        let clusters =
+            cluster::euclidean(&all.points, self.options.cluster_step_m, self.options.least_pixels)?;
+        let of_cluster = |cluster: &Vec<u32>| {
+            let mask_in = |k: usize| {
+                let here = cluster.iter().map(|&i| origin[i as usize]).filter(|o| o.0 == k).map(|o| o.1);
+                Mask::of(changes[k].before.grid, here)
+            };
+            let masks: Vec<Mask> = (0..views.len()).map(mask_in).collect();
+            let score = |k: &usize| (!masks[*k].touches_border(), masks[*k].count(), usize::MAX - k);
+            let view = (0..views.len()).max_by_key(score)?;
+            let mask = &masks[view];
+            (mask.count() >= self.options.least_pixels).then(|| Appeared {
+                cloud: all.select(cluster),
+                view,
+                mask: mask.set.clone(),
+            })
+        };
+        Ok(clusters.iter().filter_map(of_cluster).collect())
+    }
+
+    /// Drops what the visit looked through (D_2 without what is hidden): what went, by clusters, and how many points.
+    fn remove(&mut self, maps: &[DepthMap]) -> Result<(Vec<Cloud>, usize), LearningError> {
+        let through = |p: &Point3<f32>| {
+            maps.iter().any(|map| {
+                let q = map.camera_from_world * p.cast::<f64>();
+                let near = q.z > 0.0 && q.z <= self.options.range_m;
+                near && map.look_from(&q, f64::from(self.tolerance_m(q.z as f32))) == Seen::Free
+            })
+        };
+        let gone: Vec<bool> = self.cloud.points.par_iter().map(through).collect();
+        let pick = |wanted: bool| -> Vec<u32> {
+            (0u32..).zip(&gone).filter(|(_, g)| **g == wanted).map(|(i, _)| i).collect()
+        };
+        let lost = self.cloud.select(&pick(true));
+        self.cloud = self.cloud.select(&pick(false));
+        // Thinned to voxels, a cluster of so many pixels is about so many points.
+        let least = self.options.least_pixels / 4;
+        let clusters = cluster::euclidean(&lost.points, self.options.cluster_step_m, least)?;
+        Ok((clusters.iter().map(|c| lost.select(c)).collect(), lost.len()))
+    }
+
+    /// Adds what was hidden or never seen before: how many points. What was never seen and hangs together with something new may be of it.
+    fn add(
+        &mut self,
+        views: &[View],
+        poses: &[Isometry3<f64>],
+        changes: &[Change],
+        appeared: &[Appeared],
+    ) -> Result<usize, LearningError> {
+        let (mut new, mut unknown) = (Cloud::default(), Cloud::default());
+        for ((view, pose), change) in views.iter().zip(poses).zip(changes) {
+            let of = |pixels: &[u32]| bare(&view.cloud.select(pixels)).transformed(pose);
+            new.append(&of(&change.revealed));
+            unknown.append(&of(&change.unknown));
+        }
+        let voxel_m = self.options.voxel_m as f32;
+        let mut both = voxel::downsample(&unknown, voxel_m)?;
+        let first_new = both.len();
+        appeared.iter().for_each(|a| both.append(&bare(&a.cloud)));
+        for cluster in cluster::euclidean(&both.points, self.options.cluster_step_m, 1)? {
+            if cluster.last().is_none_or(|&last| (last as usize) < first_new) {
+                new.append(&both.select(&cluster));
+            }
+        }
+        let new = voxel::downsample(&new, voxel_m)?;
+        self.cloud.append(&new);
+        Ok(new.len())
+    }
+}
+
+/// How a view differs from the static structure.
+struct Change {
+    /// Pixels before it.
+    before: Mask,
+    /// Pixels behind it: they may always have been there.
+    revealed: Vec<u32>,
+    /// Pixels where nothing was known.
+    unknown: Vec<u32>,
+}
+
+fn maps(views: &[View], poses: &[Isometry3<f64>]) -> Result<Vec<DepthMap>, LearningError> {
+    if views.is_empty() {
+        return Err(LearningError::NoViews);
+    }
+    let map = |(k, (view, pose)): (usize, (&View, &Isometry3<f64>))| {
+        let organised = view.cloud.grid.and_then(|_| DepthMap::from_view(view, pose));
+        organised.ok_or(LearningError::NotOrganised { view: k })
+    };
+    views.iter().zip(poses).enumerate().map(map).collect()
+}
+
+/// Points alone: what is static is kept without colours and labels.
+fn bare(cloud: &Cloud) -> Cloud {
+    Cloud::from_points(cloud.points.clone())
+}
+
+/// The points of some views, world frame.
+fn together(views: &[View], poses: &[Isometry3<f64>]) -> Cloud {
+    let mut all = Cloud::default();
+    for (view, pose) in views.iter().zip(poses) {
+        let near = view.cloud.filter(|p| is_finite(p) && p.z <= BACKGROUND_M);
+        all.append(&bare(&near).transformed(pose));
+    }
+    all
+}

@@ -1,0 +1,52 @@
+//! Keyframes: which looks are far enough apart, and how they lie to each other (section IV-C).
+//!
+//! The paper tracks the camera from frame to frame and adjusts all keyframes in the end. Here all keyframes are aligned together against each
+//! other and against where localisation had them, as [`crate::merge`] does; one that contradicts the others is left out and says why.
+
+use super::LearningError;
+use crate::merge::{self, MergeOptions};
+use crate::view::View;
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+
+/// A look and where its camera stood.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Keyframe {
+    /// The corrected pose.
+    pub world_from_camera: Isometry3<f64>,
+    /// False if the look does not fit the others.
+    pub used: bool,
+    /// Why it settled, or was left out.
+    pub why: String,
+}
+
+/// Indices of the looks that are worth keeping: the first, and each whose direction from `centre` (world, metres) is more than `step_rad` from that
+/// of every one kept before (paper: 15 degrees).
+pub fn keyframes(poses: &[Isometry3<f64>], centre: &Point3<f64>, step_rad: f64) -> Vec<usize> {
+    let direction = |i: usize| poses[i].translation.vector - centre.coords;
+    let mut kept: Vec<usize> = Vec::new();
+    for i in 0..poses.len() {
+        if kept.iter().all(|&k| direction(i).angle(&direction(k)) > step_rad) {
+            kept.push(i);
+        }
+    }
+    kept
+}
+
+/// Brings looks together. `up` is up in the world, `range_m` how far returns are used.
+///
+/// # Errors
+/// If there is no view, no usable point, or a pose that is not finite.
+pub fn register(
+    views: &[View],
+    up: Option<Unit<Vector3<f64>>>,
+    range_m: f64,
+) -> Result<Vec<Keyframe>, LearningError> {
+    let options = MergeOptions { up, range_m, ..MergeOptions::default() };
+    let fits = merge::align_views(views, &options)?;
+    let keyframe = |fit: merge::ViewFit| Keyframe {
+        world_from_camera: fit.world_from_camera,
+        used: fit.used,
+        why: fit.why,
+    };
+    Ok(fits.into_iter().map(keyframe).collect())
+}

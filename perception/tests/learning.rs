@@ -1,0 +1,260 @@
+//! Learning objects, each step by itself, in a simulated room: what is new, how looks lie to each other, the model grown, known again.
+
+mod household;
+mod tabletop;
+
+use descry_perception::learning::{
+    AroundOptions, Keyframe, KnowError, KnowOptions, LearnOptions, LearningError, Library, MetaRoom,
+    NoticeOptions, keyframes, learn, nearest, outward, register, stands, trajectories,
+};
+use descry_perception::nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
+use descry_perception::{Cloud, Intrinsics, Neighbours, View};
+use household::{Body, Room, RoomOptions, TABLE_M, bodies, looking, standing};
+use std::f64::consts::TAU;
+use tabletop::{Draws, disturbed};
+
+/// A quarter of the pixels of an Xtion.
+const SMALL: Intrinsics = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5 };
+const EXACT: (f64, f64) = (0.0, 0.0);
+
+fn room(things: &[(&str, Isometry3<f64>)]) -> Room {
+    let mut room = Room::new(RoomOptions { controlled: true, seed: 3 });
+    for (name, pose) in things {
+        room.put(&body(name), *pose);
+    }
+    room
+}
+
+fn body(name: &str) -> Body {
+    bodies().into_iter().find(|b| b.name == name).expect("a body of that name")
+}
+
+fn around(turn_rad: f64, far_m: f64, up_m: f64) -> Isometry3<f64> {
+    let eye = Point3::new(far_m * turn_rad.cos(), far_m * turn_rad.sin(), TABLE_M + up_m);
+    looking(eye, Point3::new(0.0, 0.0, TABLE_M + 0.08))
+}
+
+fn look(room: &Room, pose: &Isometry3<f64>, stated: &Isometry3<f64>, seed: u64) -> View {
+    room.look(&SMALL, pose, stated, EXACT, seed)
+}
+
+fn near(place: &Point3<f64>, x: f64, y: f64) -> bool {
+    (place.x - x).hypot(place.y - y) < 0.06
+}
+
+#[test]
+fn what_comes_and_goes_is_noticed_and_what_was_hidden_is_learned() {
+    let (left, right) = ((0.0, -0.22), (0.05, 0.2));
+    let tin = ("tin", standing(left.0, left.1, 0.0));
+    let muesli = ("muesli", standing(right.0, right.1, 1.0));
+    let pose = around(0.3, 1.1, 0.7);
+    let seen = |things: &[(&str, Isometry3<f64>)], seed| vec![look(&room(things), &pose, &pose, seed)];
+    let mut meta = MetaRoom::new(&seen(&[tin], 1), NoticeOptions::default()).expect("a sound visit");
+
+    let nothing = meta.visit(&seen(&[tin], 2)).expect("a sound visit");
+    assert!(nothing.appeared.is_empty() && nothing.gone.is_empty(), "{:?}", nothing.appeared.len());
+
+    let came = meta.visit(&seen(&[tin, muesli], 3)).expect("a sound visit");
+    assert_eq!(came.appeared.len(), 1);
+    let there = &came.appeared[0];
+    assert!(near(&there.centre(), right.0, right.1), "{}", there.centre());
+    let view = &seen(&[tin, muesli], 3)[0];
+    let labels = view.cloud.labels.as_deref().unwrap_or_default();
+    let of_it =
+        |truly: bool| there.mask.iter().zip(labels).filter(|(m, l)| **m && (**l == 2) == truly).count();
+    let all = labels.iter().zip(&view.cloud.points).filter(|(l, p)| **l == 2 && p.z.is_finite()).count();
+    assert!(of_it(true) * 10 > all * 7 && of_it(false) * 20 < all, "{} {} {all}", of_it(true), of_it(false));
+
+    let went = meta.visit(&seen(&[], 4)).expect("a sound visit");
+    assert!(went.appeared.is_empty() && went.gone.len() == 1, "{}", went.gone.len());
+    let (low, high) = went.gone[0].bounds().expect("points");
+    let middle = descry_perception::nalgebra::center(&low, &high).cast();
+    assert!(near(&middle, left.0, left.1), "{middle}");
+    // The table behind the tin is known now, so that it is new when it comes back.
+    assert!(went.added > 0 && went.removed > 0);
+    let back = meta.visit(&seen(&[tin], 5)).expect("a sound visit");
+    assert!(back.appeared.len() == 1 && near(&back.appeared[0].centre(), left.0, left.1));
+}
+
+#[test]
+fn stands_are_found_around_obstacles_and_strung_together() {
+    let object = Point3::new(0.0, 0.0, 0.8);
+    let post = |x: f32, y: f32| (0..30).map(move |k| Point3::new(x, y, 0.05 * k as f32));
+    // A table of half a metre, a post on one line, and a wall across two others.
+    let table =
+        (0..200).map(|k| Point3::new(0.5 * (0.1 * k as f32).cos(), 0.5 * (0.1 * k as f32).sin(), 0.7));
+    let wall = (0..60).flat_map(|k| post(-0.75 + 0.01 * k as f32, 0.95));
+    let high = std::iter::once(Point3::new(0.9, 0.0, 2.4));
+    let seen: Vec<Point3<f32>> = table.chain(post(0.9, 0.0)).chain(wall).chain(high).collect();
+    let options = AroundOptions { lines: 8, most_m: 1.2, ..AroundOptions::default() };
+    let found = stands(&object, &seen, &options).expect("sound options");
+    let free: Vec<usize> = (0..8).filter(|&k| found[k].is_some()).collect();
+    assert_eq!(free, [1, 4, 5, 6, 7], "{found:?}");
+    for stand in found.iter().flatten() {
+        let off = seen.iter().map(|p| f64::from(p.x - stand.x as f32).hypot(f64::from(p.y) - stand.y));
+        assert!(off.fold(f64::INFINITY, f64::min) > options.footprint_m - 1e-6);
+    }
+    let straight = |a: &Point2<f64>, b: &Point2<f64>| Some((b - a).norm());
+    let lengths = |strings: &[Vec<Point2<f64>>]| strings.iter().map(Vec::len).collect::<Vec<_>>();
+    let strings = trajectories(&found, options.detour, straight);
+    assert_eq!(lengths(&strings), [1, 4]);
+    let ring: Vec<Option<Point2<f64>>> =
+        (0..6).map(|k| Some(Point2::new((k as f64).cos(), (k as f64).sin()))).collect();
+    assert_eq!(lengths(&trajectories(&ring, 1.5, straight)), [6]);
+    assert_eq!(lengths(&trajectories(&ring, 0.5, straight)), [1; 6]);
+    assert!(trajectories(&[], 1.5, straight).is_empty());
+    let here = strings[1][3] + Vector2::new(0.0, 0.1);
+    let taken = nearest(&strings, &here, straight).expect("a way");
+    assert!(taken.len() == 4 && taken[0] == strings[1][3]);
+    assert!(nearest(&strings, &here, |_, _| None).is_none());
+}
+
+#[test]
+fn looks_far_enough_apart_are_kept() {
+    let check = |degrees: &[f64], kept: &[usize]| {
+        let poses: Vec<Isometry3<f64>> = degrees.iter().map(|d| around(d.to_radians(), 1.0, 0.0)).collect();
+        let centre = Point3::new(0.0, 0.0, TABLE_M);
+        assert_eq!(keyframes(&poses, &centre, 15_f64.to_radians()), kept, "{degrees:?}");
+    };
+    check(&[], &[]);
+    check(&[0.0, 10.0, 20.0, 30.0, 41.0], &[0, 2, 4]);
+    check(&[0.0, 16.0, 1.0, 359.0], &[0, 1]);
+}
+
+#[test]
+fn looks_come_together_and_one_that_does_not_fit_is_left_out() {
+    let room = room(&[("kettle", standing(0.0, 0.0, 0.4)), ("tissues", standing(0.15, 0.2, 2.0))]);
+    let mut draws = Draws(5);
+    let truths: Vec<Isometry3<f64>> = (0..5).map(|k| around(0.35 * f64::from(k), 1.0, 0.6)).collect();
+    let mut views: Vec<View> = truths
+        .iter()
+        .enumerate()
+        .map(|(k, t)| {
+            let stated = disturbed(t, 0.01, 0.0175, &mut draws);
+            room.look(&SMALL, t, &stated, (0.01, 0.0175), k as u64)
+        })
+        .collect();
+    views[3].world_from_camera = around(0.35 * 3.0 + 2.0, 1.0, 0.6);
+    let fits = register(&views, Some(Vector3::z_axis()), 2.5).expect("sound views");
+    let object = Point3::new(0.0, 0.0, TABLE_M + 0.1);
+    let apart = |poses: &dyn Fn(usize) -> Isometry3<f64>| {
+        let at = |k: usize| poses(k) * (truths[k].inverse() * object);
+        [1, 2, 4].iter().map(|&k| (at(k) - at(0)).norm()).fold(0.0, f64::max)
+    };
+    let before = apart(&|k| views[k].world_from_camera);
+    let after = apart(&|k| fits[k].world_from_camera);
+    assert!(after < 0.006 && after < 0.5 * before, "{before} {after}");
+    let used: Vec<bool> = fits.iter().map(|f| f.used).collect();
+    assert_eq!(used, [true, true, true, false, true], "{:?}", fits[3].why);
+}
+
+/// Looks at one body on the table from exact poses, and its pixels in the first.
+fn turntable(name: &str, looks: usize) -> (Vec<View>, Vec<bool>, Cloud) {
+    let place = standing(0.0, 0.0, 0.5);
+    let room = room(&[(name, place)]);
+    let middle = Point3::new(0.0, 0.0, TABLE_M + 0.1);
+    let views: Vec<View> = (0..looks)
+        .map(|k| {
+            let pose = around(TAU * k as f64 / looks as f64, 0.55, [0.3, 0.5][k % 2]);
+            room.look_at(&SMALL, &pose, &pose, EXACT, k as u64, (middle, 0.28))
+        })
+        .collect();
+    let labels = views[0].cloud.labels.as_deref().unwrap_or_default();
+    let mask = labels.iter().zip(&views[0].cloud.points).map(|(l, p)| *l == 1 && p.z.is_finite()).collect();
+    (views, mask, Room::surface(&body(name), 0.005).transformed(&place))
+}
+
+fn share_near(of: &Cloud, to: &Cloud, within_m: f32) -> f64 {
+    let tree = Neighbours::new(&to.points).expect("few points");
+    let near = of.points.iter().filter(|p| tree.nearest(p, within_m).is_some()).count();
+    near as f64 / of.len().max(1) as f64
+}
+
+#[test]
+fn a_model_grows_over_looks_without_the_table() {
+    for name in ["muesli", "head", "mug"] {
+        let (mut views, mask, truth) = turntable(name, 8);
+        // One look says that it was taken from elsewhere.
+        views[5].world_from_camera = Isometry3::translation(0.12, 0.0, 0.0) * views[5].world_from_camera;
+        let model = learn(&views, &[], &mask, &LearnOptions::default()).expect("a sound object");
+        let cloud = model.cloud.transformed(&model.world_from_model);
+        let (recall, precision) = (share_near(&truth, &cloud, 0.01), share_near(&cloud, &truth, 0.008));
+        assert!(recall > 0.85 && precision > 0.95, "{name}: {recall} {precision}");
+        assert!(model.looks[5].left_out.is_some(), "{name}: {:?}", model.looks);
+        let on_table = cloud.points.iter().filter(|p| f64::from(p.z) < TABLE_M - 0.006).count();
+        assert!(on_table * 50 < cloud.len(), "{name}: {on_table} of {}", cloud.len());
+    }
+}
+
+#[test]
+fn what_was_learned_is_known_again_and_nothing_else() {
+    let names = ["muesli", "kettle", "truck"];
+    let options = KnowOptions::default();
+    let mut library = Library::default();
+    for name in names {
+        library.add(&Room::surface(&body(name), 0.003), &options).expect("a sound model");
+    }
+    let check = |things: &[(&str, Isometry3<f64>)], expected: &[usize]| {
+        let pose = around(0.9, 0.9, 0.5);
+        let middle = Point3::new(0.0, 0.0, TABLE_M);
+        let view = room(things).look_at(&household::CAMERA, &pose, &pose, EXACT, 9, (middle, 0.5));
+        let found = library.recognise(&view, &options).expect("an organised view");
+        let mut models: Vec<usize> = found.iter().map(|f| f.model).collect();
+        models.sort_unstable();
+        println!("{models:?}: {:.3?}", found.iter().map(|f| f.confidence).collect::<Vec<_>>());
+        assert_eq!(models, expected, "{things:?}: {found:#?}");
+        for f in &found {
+            let truth = things.iter().find(|t| t.0 == names[f.model]).expect("it is there").1;
+            let surface = Room::surface(&body(names[f.model]), 0.005);
+            let (there, said) = (surface.transformed(&truth), surface.transformed(&f.world_from_model));
+            assert!(share_near(&said, &there, 0.012) > 0.9, "{}: {f:?}", names[f.model]);
+        }
+    };
+    let (a, b, c) = (standing(-0.15, 0.1, 0.7), standing(0.16, -0.12, 2.0), standing(0.1, 0.2, 4.0));
+    check(&[("kettle", a), ("tin", b)], &[1]);
+    check(&[("muesli", a), ("truck", b), ("bear", c)], &[0, 2]);
+    check(&[("tissues", a), ("bottle", b)], &[]);
+}
+
+#[test]
+fn what_cannot_be_learned_from_is_said() {
+    let view = View::alone(Cloud::from_points(vec![Point3::origin(); 5]));
+    let (looks, mask, _) = turntable("tin", 1);
+    let learned = |views: &[View], mask: &[bool], options: &LearnOptions| {
+        learn(views, &[], mask, options).map(|m| m.cloud.len()).expect_err("it cannot be")
+    };
+    let options = LearnOptions::default();
+    let flat = LearnOptions { cube_m: 0.0, ..options.clone() };
+    let notice = |delta_m: f64| NoticeOptions { delta_m, ..NoticeOptions::default() };
+    let cases = [
+        learned(&[], &[], &options),
+        learned(&looks, &[true], &options),
+        learned(&looks, &mask, &flat),
+        learned(&looks, &vec![false; mask.len()], &options),
+        learned(std::slice::from_ref(&view), &[true; 5], &options),
+        MetaRoom::new(&[], notice(0.01)).expect_err("no view"),
+        MetaRoom::new(&looks, notice(f64::NAN)).expect_err("no length"),
+        MetaRoom::new(std::slice::from_ref(&view), notice(0.01)).expect_err("no pixels"),
+    ];
+    let expected = [
+        LearningError::NoViews,
+        LearningError::Mask { found: 1, expected: mask.len() },
+        LearningError::Option { field: "cube_m", value: 0.0, expected: "a positive number" },
+        LearningError::NothingLeft { points: 0 },
+        LearningError::NotOrganised { view: 0 },
+        LearningError::NoViews,
+        LearningError::Option { field: "delta_m", value: f64::NAN, expected: "a positive number" },
+        LearningError::NotOrganised { view: 0 },
+    ];
+    for (found, expected) in cases.iter().zip(&expected) {
+        assert_eq!(found.to_string(), expected.to_string());
+    }
+    let lost =
+        Keyframe { world_from_camera: looks[0].world_from_camera, used: false, why: "it is lost".to_owned() };
+    let left_out = learn(&looks, &[lost], &mask, &options).map(|m| m.cloud.len());
+    assert_eq!(left_out, Err(LearningError::FirstLeftOut { why: "it is lost".to_owned() }));
+    let mut library = Library::default();
+    assert_eq!(library.add(&view.cloud, &KnowOptions::default()), Err(KnowError::Model { points: 0 }));
+    assert_eq!(library.recognise(&view, &KnowOptions::default()), Err(KnowError::NoCamera));
+    assert_eq!(outward(&Cloud::default()).map(|c| c.len()), Ok(0));
+}

@@ -49,9 +49,13 @@ impl Mask {
         Mask { grid: self.grid, set: out.set.into_iter().map(|s| !s).collect() }
     }
 
-    /// Fills gaps narrower than the square.
+    /// Fills gaps narrower than the square. The border of the image is no side of a gap.
     pub fn closed(&self, reach: usize) -> Mask {
-        self.dilated(reach).eroded(reach)
+        let Grid { width, height } = self.grid;
+        let wide = Grid { width: width + 2 * reach, height: height + 2 * reach };
+        let there = |i: usize| (i / width + reach) * wide.width + i % width + reach;
+        let closed = Mask::of(wide, self.pixels().map(there)).dilated(reach).eroded(reach);
+        Mask { grid: self.grid, set: (0..self.set.len()).map(|i| closed.set[there(i)]).collect() }
     }
 
     /// Drops slivers narrower than the square.

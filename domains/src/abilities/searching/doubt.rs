@@ -291,6 +291,8 @@ impl Doubt {
                     let space = &situation.spaces[on];
                     let Unseen { points, likely } =
                         unseen_volume(surface, space, &standing, &centre, size_m)?;
+                    // Where no map knows how far it goes, it may be another surface.
+                    let likely = likely && surface.whole;
                     let weight = each * if likely { MEASURED_WEIGHT } else { 1.0 };
                     Some(Hypothesis { weight, on, centre, points, facing: None })
                 })

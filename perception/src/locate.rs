@@ -13,9 +13,18 @@ const BIN_M: f64 = 0.02;
 const STRAY: usize = 3;
 /// A sample wants this many points within [`DEPTH_M`] behind it.
 const FEWEST: usize = 8;
+/// Noise throws points beyond an end, and edges lose some: where it is, is counted from the points of a strip so deep behind it
+/// against those of the next strip inwards.
 const DEPTH_M: f64 = 0.04;
-/// A camera must have looked past the place this far beyond a sample.
-const BEYOND_M: f64 = 0.03;
+/// Points so far below the surface, close to its end, are of the side of a board: they tell by themselves where it ends.
+const BELOW_M: f64 = 0.004;
+/// So many bins to either side are counted together.
+const POOLED: usize = 2;
+/// Shares of the inner strip's points that the outer may hold; otherwise an object stands there, or a shadow cuts in.
+const SHARES: std::ops::Range<f64> = 0.5..1.3;
+/// A camera must have looked past the places this far beyond a sample. Beside an object pixels are lost, and one place alone
+/// would take the border of its shadow for the end of the surface.
+const BEYOND_M: [f64; 3] = [0.03, 0.06, 0.09];
 /// How far a sample may be off, round by round: what a view cuts off or an object hides lies farther in than the edge.
 const GATES_M: [f64; 7] = [0.15, 0.12, 0.08, 0.05, 0.03, 0.02, 0.02];
 /// Standard deviation of one sample; neighbours err together, which is why it is no millimetre.
@@ -50,14 +59,15 @@ pub fn locate(
         return located;
     }
     let frame = Frame::of(outline, up);
-    let [points, outline] = [points, outline].map(|p| p.iter().map(|p| frame.flat(p)).collect::<Vec<_>>());
-    let edges = edges(&outline);
-    let around: Vec<Vec<Point2<f64>>> = edges.iter().map(|edge| around(edge, &points).collect()).collect();
+    let points: Vec<Seen> =
+        points.iter().map(|p| Seen { at: frame.flat(p), height_m: frame.height_m(p) }).collect();
+    let edges = edges(&outline.iter().map(|p| frame.flat(p)).collect::<Vec<_>>());
+    let around: Vec<Vec<Seen>> = edges.iter().map(|edge| around(edge, &points).collect()).collect();
     let mut moved = Isometry2::identity();
     for gate_m in GATES_M {
         let is_end = |m: &Match| {
-            let beyond = moved.inverse() * (m.at + m.normal * BEYOND_M);
-            is_past(&(frame.origin + frame.right * beyond.x + frame.ahead * beyond.y))
+            let mut beyond = BEYOND_M.iter().map(|b| moved.inverse() * (m.at + m.normal * *b));
+            beyond.all(|p| is_past(&(frame.origin + frame.right * p.x + frame.ahead * p.y)))
         };
         let matches: Vec<Match> = edges
             .iter()
@@ -80,6 +90,13 @@ struct Edge {
     along: Vector2<f64>,
     outward: Vector2<f64>,
     length_m: f64,
+}
+
+/// A seen point: where it lies in the plane of the outline, and how far above it.
+#[derive(Clone, Copy)]
+struct Seen {
+    at: Point2<f64>,
+    height_m: f64,
 }
 
 /// A sample with the edge of the outline that it lies on.
@@ -112,6 +129,10 @@ impl Frame {
         Point2::new(self.right.dot(&d), self.ahead.dot(&d))
     }
 
+    fn height_m(&self, p: &Point3<f64>) -> f64 {
+        self.up.dot(&(p - self.origin))
+    }
+
     /// A motion in the plane as one in space.
     fn lift(&self, moved: &Isometry2<f64>) -> Isometry3<f64> {
         let turn = UnitQuaternion::from_axis_angle(&self.up, moved.rotation.angle());
@@ -135,44 +156,78 @@ fn edges(outline: &[Point2<f64>]) -> Vec<Edge> {
 }
 
 /// Points that can come near an edge while the estimate moves: those that now lie no farther from its line than twice the widest gate.
-fn around<'a>(edge: &'a Edge, points: &'a [Point2<f64>]) -> impl Iterator<Item = Point2<f64>> + 'a {
-    let reach_m = 2.0 * GATES_M[0] + DEPTH_M;
-    points.iter().copied().filter(move |p| edge.outward.dot(&(p - edge.from)).abs() < reach_m)
+fn around<'a>(edge: &'a Edge, points: &'a [Seen]) -> impl Iterator<Item = Seen> + 'a {
+    let reach_m = 2.0 * (GATES_M[0] + DEPTH_M);
+    points.iter().copied().filter(move |p| edge.outward.dot(&(p.at - edge.from)).abs() < reach_m)
 }
 
 /// Where the seen surface ends along an edge, a sample every [`BIN_M`].
-fn samples(edge: &Edge, points: &[Point2<f64>], moved: &Isometry2<f64>, gate_m: f64) -> Vec<Match> {
+fn samples(edge: &Edge, points: &[Seen], moved: &Isometry2<f64>, gate_m: f64) -> Vec<Match> {
     let bins = (edge.length_m / BIN_M) as usize;
-    // The farthest of each bin, farthest first.
-    let mut farthest = vec![[f64::NEG_INFINITY; STRAY + 1]; bins];
-    let mut near: Vec<(usize, f64)> = Vec::with_capacity(points.len());
     let (turn, shift) = (moved.rotation.to_rotation_matrix(), moved.translation.vector - edge.from.coords);
+    // How far out the points of each bin lie, and how high.
+    let mut near: Vec<Vec<(f64, f64)>> = vec![Vec::new(); bins];
     for p in points {
-        let d = turn * p.coords + shift;
+        let d = turn * p.at.coords + shift;
         let (reach, out) = (edge.along.dot(&d), edge.outward.dot(&d));
-        if reach < 0.0 || out >= gate_m || out <= -gate_m - DEPTH_M {
-            continue;
-        }
-        let Some(ends) = farthest.get_mut((reach / BIN_M) as usize) else { continue };
-        near.push(((reach / BIN_M) as usize, out));
-        let mut next = out;
-        for end in ends {
-            if next > *end {
-                std::mem::swap(end, &mut next);
+        if reach >= 0.0 && out < gate_m && out > -gate_m - 2.0 * DEPTH_M {
+            if let Some(bin) = near.get_mut((reach / BIN_M) as usize) {
+                bin.push((out, p.height_m));
             }
         }
     }
-    let mut behind = vec![0_usize; bins];
-    for &(bin, out) in &near {
-        behind[bin] += usize::from(out > farthest[bin][STRAY] - DEPTH_M);
-    }
-    let ends = farthest.into_iter().zip(behind).enumerate().filter_map(|(bin, (ends, behind))| {
-        let end = ends[STRAY];
+    let strips: Vec<Option<Strips>> = near.iter_mut().map(|bin| Strips::of(bin)).collect();
+    let ends = strips.iter().enumerate().filter_map(|(bin, own)| {
+        let own = own.as_ref()?;
+        let pooled = strips[bin.saturating_sub(POOLED)..(bin + POOLED + 1).min(bins)].iter().flatten();
+        let (outer, inner) = pooled.fold((0, 0), |sum, s| (sum.0 + s.outer, sum.1 + s.inner));
+        let share = outer as f64 / inner as f64;
+        let counted_m = SHARES.contains(&share).then_some(own.reached_m + (share - 1.0) * DEPTH_M);
+        let end = own.side_m.or(counted_m)?;
         let at = edge.from + edge.along * ((bin as f64 + 0.5) * BIN_M) + edge.outward * end;
-        let sample = Match { at, normal: edge.outward, distance_m: end };
-        (end.is_finite() && behind >= FEWEST && end.abs() < gate_m).then_some(sample)
+        (end.abs() < gate_m).then_some(Match { at, normal: edge.outward, distance_m: end })
     });
     ends.collect()
+}
+
+/// What is behind the last points of a bin.
+struct Strips {
+    /// How far out the last points lie but for stray ones.
+    reached_m: f64,
+    /// Points of the surface in the outer strip and in the inner.
+    outer: usize,
+    inner: usize,
+    /// Where the side of the board is, if it is seen.
+    side_m: Option<f64>,
+}
+
+impl Strips {
+    /// Of the points of a bin, how far out and how high each; none without points enough. Their order is lost.
+    fn of(points: &mut [(f64, f64)]) -> Option<Strips> {
+        if points.len() <= STRAY {
+            return None;
+        }
+        let reached_m = points.select_nth_unstable_by(STRAY, |a, b| b.0.total_cmp(&a.0)).1.0;
+        let strip = |p: &(f64, f64)| ((reached_m - p.0) / DEPTH_M).max(0.0) as usize;
+        let behind = points.iter().filter(|p| strip(p) == 0).count();
+        let mut inner: Vec<f64> = points.iter().filter(|p| strip(p) == 1).map(|p| p.1).collect();
+        if inner.is_empty() || behind < FEWEST {
+            return None;
+        }
+        let height_m = median(&mut inner);
+        let is_low = |p: &(f64, f64)| p.1 < height_m - BELOW_M;
+        let outer = points.iter().filter(|p| strip(p) == 0 && !is_low(p)).count();
+        let is_side = |p: &&(f64, f64)| is_low(p) && p.0 > reached_m - DEPTH_M / 2.0;
+        let mut side: Vec<f64> = points.iter().filter(is_side).map(|p| p.0).collect();
+        let side_m = (side.len() >= FEWEST).then(|| median(&mut side));
+        Some(Strips { reached_m, outer, inner: inner.len(), side_m })
+    }
+}
+
+/// The upper one of the two in the middle, of at least one value.
+fn median(values: &mut [f64]) -> f64 {
+    let half = values.len() / 2;
+    *values.select_nth_unstable_by(half, f64::total_cmp).1
 }
 
 /// One Gauss-Newton step towards the edges, held by what was known before.

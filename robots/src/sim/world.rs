@@ -173,7 +173,7 @@ pub(crate) fn upright(x_m: f64, y_m: f64, z_m: f64, yaw_rad: f64) -> Isometry3<f
 
 /// Side of a table's legs, metres.
 const LEG_M: f64 = 0.05;
-/// Thickness of a shelf's uprights, beside its boards, metres.
+/// Thickness of a shelf's uprights, beside its boards and below their tops: a board ends where the map says so, metres.
 const UPRIGHT_M: f64 = 0.02;
 /// Thickness of a door's panel, metres.
 const PANEL_M: f64 = 0.04;
@@ -196,7 +196,7 @@ impl SurfaceSpec {
             SurfaceKind::Board if self.uprights => {
                 let side = |inner: f64, outer: f64| {
                     let low = Point3::new(inner.min(outer), -y, -self.height_m);
-                    Solid::cuboid(top, low, Point3::new(inner.max(outer), y, 0.0), self.colour)
+                    Solid::cuboid(top, low, Point3::new(inner.max(outer), y, -self.thickness_m), self.colour)
                 };
                 vec![board, side(-x, -x - UPRIGHT_M), side(x, x + UPRIGHT_M)]
             }

@@ -25,6 +25,9 @@ const FREE_SHARE: f64 = 0.15;
 const GRAZED: usize = 2;
 /// Share of an object's volume in which something was measured that no object explains, for it to be likely that one stands there.
 const MEASURED_SHARE: f64 = 1.0 / 3.0;
+/// Share of an object's volume that may have been seen free where so much was measured: from afar a rim is cut off and noise frays
+/// what is left.
+const FRAYED_SHARE: f64 = 0.5;
 /// How many times more likely an object stands at such a place than at one of which nothing is known: what was measured there is
 /// something, if not what is asked about.
 const MEASURED_WEIGHT: f64 = 50.0;
@@ -291,8 +294,6 @@ impl Doubt {
                     let space = &situation.spaces[on];
                     let Unseen { points, likely } =
                         unseen_volume(surface, space, &standing, &centre, size_m)?;
-                    // Where no map knows how far it goes, it may be another surface.
-                    let likely = likely && surface.whole;
                     let weight = each * if likely { MEASURED_WEIGHT } else { 1.0 };
                     Some(Hypothesis { weight, on, centre, points, facing: None })
                 })
@@ -391,30 +392,32 @@ fn unseen_volume(
         standing.iter().any(|track| surface.is_of(track, &point, space.voxel_m() / 2.0))
     });
     let mut unseen = Vec::new();
-    let mut free = 0.0;
+    let (mut free, mut measured) = (0.0, 0.0);
     for (n, &at) in COLUMNS.iter().enumerate() {
         for level in LEVELS {
             let point = column(at) + surface.up * (height_m * level);
             match space.cell(&point) {
                 Cell::Unseen => unseen.push(point),
-                Cell::Occupied if !explained[n] => unseen.push(point),
+                Cell::Occupied if !explained[n] => {
+                    measured += 1.0;
+                    unseen.push(point);
+                }
                 Cell::Occupied => {}
                 Cell::Free => free += 1.0,
             }
-            if free > FREE_SHARE * all {
-                return None;
-            }
         }
     }
-    if (unseen.len() as f64) < UNSEEN_SHARE * all {
+    // Where no map knows how far it goes, it may be another surface.
+    let likely = surface.whole && measured >= MEASURED_SHARE * all && !explained.contains(&true);
+    let (most_free, least_unseen) =
+        if likely { (FRAYED_SHARE, 1.0 - FRAYED_SHARE) } else { (FREE_SHARE, UNSEEN_SHARE) };
+    if free > most_free * all || (unseen.len() as f64) < least_unseen * all {
         return None;
     }
     let is_inside = |&n: &usize| {
         let top = column(COLUMNS[n]) + surface.up * height_m;
         explained[n] && is_roofed(space, &top, &surface.up)
     };
-    let measured = unseen.iter().filter(|point| space.cell(point) == Cell::Occupied).count() as f64;
-    let likely = measured >= MEASURED_SHARE * all && !explained.contains(&true);
     ((0..COLUMNS.len()).filter(is_inside).count() <= GRAZED).then_some(Unseen { points: unseen, likely })
 }
 

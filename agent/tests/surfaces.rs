@@ -131,6 +131,21 @@ fn a_surface_that_is_not_there_is_refused() {
     );
 }
 
+/// The border of a box's shadow was taken for the end of a table; a third view rubbed the cup out.
+#[test]
+fn a_cup_is_found_where_it_is() {
+    let folder = TempDir::new().expect("a folder can be made");
+    for seed in ["8177", "9124"] {
+        let place = ["--domain", "home", "--scene", "two-rooms", "--seed", seed, "--run", seed, "--json"];
+        let report = check(folder.path(), &[&["find", "cup A"], place.as_slice()].concat(), 0);
+        let [at, truly] = ["position_m", "true_position_m"].map(|key| {
+            report[key].as_array().into_iter().flatten().filter_map(Value::as_f64).collect::<Vec<_>>()
+        });
+        let off_m = at.iter().zip(&truly).map(|(f, t)| (f - t).powi(2)).sum::<f64>().sqrt();
+        assert!(off_m < 0.02 && at.len() == 3, "seed {seed}: {off_m:.3} m off: {report}");
+    }
+}
+
 /// The cups that are found in two rooms, against where they truly stand, which a search for each by itself reports.
 #[test]
 fn cups_in_two_rooms_are_all_found_and_where_they_are() {
@@ -144,8 +159,10 @@ fn cups_in_two_rooms_are_all_found_and_where_they_are() {
     let at = |value: &Value| -> Vec<f64> {
         value.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
     };
-    // A plane that cuts through the wall behind a board; something measured that no object explains; views that slide along a counter.
-    for (seed, cup) in [(5123, "cup A"), (5103, "cup B"), (7034, "cup B")] {
+    // A plane that cuts through the wall behind a board; something measured that no object explains; views that slide along a counter;
+    // views of a board from afar that blur what stands on it; a cup at three metres of which too little is left to be an object.
+    for (seed, cup) in [(5123, "cup A"), (5103, "cup B"), (7034, "cup B"), (11035, "cup A"), (8169, "cup A")]
+    {
         let all = report(seed, "find all cups");
         let found = all["objects"].as_array().into_iter().flatten().find(|o| o["label"] == cup);
         let found = at(&found.unwrap_or_else(|| panic!("seed {seed}: no {cup} in {all}"))["position_m"]);

@@ -47,8 +47,19 @@ pub struct Look {
     pub stamp_ns: i64,
     /// Its record.
     pub record: RecordId,
-    /// What lays what it alone shows of a surface of the map on the outline there, from where localisation had it; none: not yet told.
-    pub map_from_localised: Option<Isometry3<f64>>,
+    /// How what it alone shows of a surface of the map lies on the outline there.
+    pub laid: Laid,
+}
+
+/// How a view lies on the outline of a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Laid {
+    /// As localisation has it: the map has no outline, or nobody has tried.
+    AsLocalised,
+    /// Moved by this, `map_from_localised`.
+    By(Isometry3<f64>),
+    /// Not at all: by itself the view shows no such surface.
+    Nowhere,
 }
 
 impl Mind {

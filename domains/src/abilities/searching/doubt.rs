@@ -28,6 +28,8 @@ const MEASURED_SHARE: f64 = 1.0 / 3.0;
 /// Share of an object's volume that may have been seen free where so much was measured: from afar a rim is cut off and noise frays
 /// what is left.
 const FRAYED_SHARE: f64 = 0.5;
+/// What is known so well is not taken for two things that blur into each other.
+const SURE: f64 = 0.8;
 /// How many times more likely an object stands at such a place than at one of which nothing is known: what was measured there is
 /// something, if not what is asked about.
 const MEASURED_WEIGHT: f64 = 50.0;
@@ -391,6 +393,12 @@ fn unseen_volume(
         let point = column(at);
         standing.iter().any(|track| surface.is_of(track, &point, space.voxel_m() / 2.0))
     });
+    // Nothing is looked for in a vessel.
+    let fills =
+        |track: &Track| COLUMNS.iter().all(|&at| surface.is_of(track, &column(at), space.voxel_m() / 2.0));
+    if standing.iter().any(|track| track.certainty() >= SURE && track.label().is_some() && fills(track)) {
+        return None;
+    }
     let mut unseen = Vec::new();
     let (mut free, mut measured) = (0.0, 0.0);
     for (n, &at) in COLUMNS.iter().enumerate() {
@@ -481,6 +489,60 @@ mod tests {
         let mut space = Space::default();
         space.integrate(&DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m });
         space
+    }
+
+    /// What a camera one metre before a cup has seen of it from the side: a piece of its middle, so high and so wide to either side.
+    fn seen_from_the_side(low_m: f64, high_m: f64, aside_m: f64) -> Space {
+        let intrinsics = Intrinsics { width: 320, height: 240, fx: 500.0, fy: 500.0, cx: 160.0, cy: 120.0 };
+        let depth_m = |n: usize| {
+            let (u, v) = ((n % 320) as f64 - 160.0, (n / 320) as f64 - 120.0);
+            let (aside, height) = (u / 500.0, 0.05 - v / 500.0);
+            let is_seen = aside.abs() < aside_m && height > low_m && height < high_m;
+            // From afar noise is as wide as the cup.
+            let noise_m = 0.015 * ((n * 7919) % 5) as f64 - 0.03;
+            let front_m = (0.035_f64.powi(2) - aside * aside).max(0.0).sqrt();
+            if is_seen { (1.0 - front_m + noise_m) as f32 } else { 3.0 }
+        };
+        // Along +x, with the image's rows downwards.
+        let ahead = UnitQuaternion::from_euler_angles(
+            -std::f64::consts::FRAC_PI_2,
+            0.0,
+            -std::f64::consts::FRAC_PI_2,
+        );
+        let world_from_camera = Isometry3::from_parts(Translation3::new(-1.0, 0.0, 0.05), ahead);
+        let depths_m = (0..320 * 240).map(depth_m).collect();
+        let mut space = Space::default();
+        space.integrate(&DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m });
+        space
+    }
+
+    #[test]
+    fn what_is_left_of_a_thing_seen_from_afar_may_be_the_whole() {
+        let left = |low_m: f64, high_m: f64, surface: &KnownSurface| {
+            let space = seen_from_the_side(low_m, high_m, 0.03);
+            unseen_volume(surface, &space, &[], &Point3::origin(), (0.104, 0.07)).map(|hidden| hidden.likely)
+        };
+        assert_eq!(left(0.0, 0.075, &table()), Some(true), "its rim was cut off");
+        assert_eq!(left(0.0, 0.02, &table()), None, "too little is left of it");
+        let boundless = KnownSurface { whole: false, ..table() };
+        assert_eq!(left(0.0, 0.075, &boundless), None);
+    }
+
+    #[test]
+    fn nothing_is_looked_for_in_a_vessel() {
+        let hidden = |standing: &[&Track]| {
+            let at = Point3::origin();
+            unseen_volume(&table(), &Space::default(), standing, &at, (0.104, 0.06)).is_some()
+        };
+        let known = Track {
+            unknown: 0.05,
+            kinds: vec![("cup".into(), 0.95)],
+            probabilities: vec![("cup B".into(), 0.95)],
+            ..disc()
+        };
+        assert!(hidden(&[]));
+        assert!(hidden(&[&disc()]), "of what is not known it may be a part");
+        assert!(!hidden(&[&known]));
     }
 
     fn table() -> KnownSurface {

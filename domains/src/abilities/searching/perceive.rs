@@ -23,7 +23,7 @@ use super::discover;
 use super::placing;
 use super::vanished::{keep_unrefuted, set_aside_unseen, taken_away};
 use crate::lexicon::symbol;
-use crate::mind::{Look, Mind};
+use crate::mind::{Laid, Look, Mind};
 use crate::note::Note;
 use crate::situation::{KnownSurface, Situation};
 use crate::world::WorldError;
@@ -93,7 +93,7 @@ pub fn remember(
     let id = record.put_cloud(sensed.stamp_ns, frame, &sensed.cloud, &sensing, meta)?;
     for &n in shown {
         let region = &mut mind.regions[n];
-        region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id, map_from_localised: None });
+        region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id, laid: Laid::AsLocalised });
         region.taken += 1;
     }
     mind.views += 1;
@@ -127,7 +127,11 @@ fn views(mind: &Mind) -> Vec<RecordId> {
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
     let (merging, seeking) = options(eyes.robot, Some(&mind.known.surfaces[on].symbol));
     let seeking = seeking_at(seeking, &mind.known.surfaces[on]);
-    place_looks(mind, eyes, on, (&merging, &seeking.surface))?;
+    if !place_looks(mind, eyes, on, (&merging, &seeking.surface))? {
+        let because = format!("this view by itself does not show the {}", mind.known.surfaces[on].name);
+        notes.push(Note::Nothing { because });
+        return Ok(());
+    }
     let views = restore(mind, eyes, on)?;
     let seen = merge(&views, &merging).map_err(|nothing| nothing.to_string()).and_then(|merged| {
         let (surfaces, options) = (&mind.known.surfaces, &seeking.surface);
@@ -207,23 +211,31 @@ fn without_walls(robot: &dyn Robot, known: &KnownSurface, mut merged: Merged) ->
 }
 
 /// Lays each new view of a surface that the map has on its outline by itself. Views of a long surface from its two ends share little
-/// that would hold them together along it; the ends that each shows do.
+/// that would hold them together along it; the ends that each shows do. A view that shows no such surface by itself is left out as soon
+/// as another does: it would be laid on the others anyhow. False if that is the newest.
 fn place_looks(
     mind: &mut Mind,
     eyes: Eyes<'_>,
     on: usize,
     options: (&MergeOptions, &SurfaceOptions),
-) -> Result<(), WorldError> {
+) -> Result<bool, WorldError> {
     let known = &mind.known.surfaces[on];
     if !known.whole {
-        return Ok(());
+        return Ok(true);
     }
     let description = eyes.robot.description();
-    for look in mind.regions[on].looks.iter_mut().filter(|look| look.map_from_localised.is_none()) {
+    let looks = &mut mind.regions[on].looks;
+    for look in looks.iter_mut().filter(|look| look.laid == Laid::AsLocalised) {
         let view = eyes.record.view_at(look.stamp_ns, &description.frames.map)?;
-        look.map_from_localised = Some(placing::of_view(description, known, view, options));
+        look.laid = placing::of_view(description, known, view, options);
     }
-    Ok(())
+    let is_laid = |look: &Look| look.laid != Laid::Nowhere;
+    let is_of_use = looks.last().is_some_and(is_laid);
+    if looks.iter().any(is_laid) {
+        looks.retain(is_laid);
+        return Ok(is_of_use);
+    }
+    Ok(true)
 }
 
 /// Reads the views of a surface back from the record by their timestamps, with the transforms of those times. What a view shows
@@ -233,7 +245,7 @@ fn restore(mind: &Mind, eyes: Eyes<'_>, on: usize) -> Result<Vec<View>, WorldErr
     let region = &mind.regions[on];
     let restored = |look: &Look| -> Result<View, WorldError> {
         let mut view = eyes.record.view_at(look.stamp_ns, map)?;
-        if let Some(map_from_localised) = look.map_from_localised {
+        if let Laid::By(map_from_localised) = look.laid {
             view.world_from_camera = map_from_localised * view.world_from_camera;
         }
         let since = region.changes.iter().filter(|c| c.stamp_ns >= look.stamp_ns);

@@ -8,6 +8,7 @@ use descry_perception::surface::{Surface, SurfaceOptions, find_surface};
 use descry_robots::Description;
 
 use super::perceive::ON_SURFACE_M;
+use crate::mind::Laid;
 use crate::situation::KnownSurface;
 
 /// How far beyond the hull of a surface points of it are looked for.
@@ -27,16 +28,16 @@ pub(super) fn lay_on_map(
     (merged.moved(&map_from_world), surface.moved(&map_from_world))
 }
 
-/// What lays a view on the outline of a surface that the map has; nothing is moved where the view shows no such surface.
+/// How a view lies on the outline of a surface that the map has.
 pub(super) fn of_view(
     body: &Description,
     known: &KnownSurface,
     view: View,
     (merging, seeking): (&MergeOptions, &SurfaceOptions),
-) -> Isometry3<f64> {
-    let Ok(merged) = merge(&[view], merging) else { return Isometry3::identity() };
+) -> Laid {
+    let Ok(merged) = merge(&[view], merging) else { return Laid::Nowhere };
     let found = find_surface(&merged.cloud, &merged.visibility, seeking);
-    found.map_or_else(|_| Isometry3::identity(), |surface| located(body, known, &merged, &surface))
+    found.map_or(Laid::Nowhere, |surface| Laid::By(located(body, known, &merged, &surface)))
 }
 
 fn located(body: &Description, known: &KnownSurface, merged: &Merged, surface: &Surface) -> Isometry3<f64> {

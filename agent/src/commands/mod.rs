@@ -2,6 +2,7 @@
 
 mod check;
 mod experiment;
+mod explain;
 mod find;
 mod goals;
 mod input;
@@ -48,6 +49,8 @@ pub enum Command {
     Robot(robot::Arguments),
     /// Show what happened in a run
     Show(show::Arguments),
+    /// Say why a run went as it did: why each plan, why this and not that, what the verdict rests on
+    Explain(explain::Arguments),
     /// Live through a run again from its record: the same percepts, beliefs and verdict, or where they part
     Replay(replay::Arguments),
     /// List the runs
@@ -83,6 +86,7 @@ pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
         Command::Experiment(arguments) => experiment::run(arguments, stop),
         Command::Robot(arguments) => robot::run(arguments),
         Command::Show(arguments) => show::run(arguments),
+        Command::Explain(arguments) => explain::run(arguments),
         Command::Replay(arguments) => replay::run(arguments),
         Command::Runs(arguments) => runs::run(arguments),
         Command::Memory(arguments) => memory::run(arguments),

@@ -4,6 +4,7 @@ mod check;
 mod experiment;
 mod explain;
 mod find;
+mod fmt;
 mod goals;
 mod input;
 mod memory;
@@ -15,6 +16,7 @@ mod robot;
 mod runs;
 mod show;
 mod validate;
+mod why_not;
 
 use clap::Subcommand;
 
@@ -40,6 +42,8 @@ pub enum Command {
     Validate(validate::Arguments),
     /// Read a domain (and a problem) and show every finding under its text
     Check(check::Arguments),
+    /// Lay out PDDL and plans: comments stay, and what is read is the same
+    Fmt(fmt::Arguments),
     /// Find the table and the objects in point clouds (PCD, PLY)
     Recognise(recognise::Arguments),
     /// Carry out a batch of runs: tables with intervals, plots and a page; goes on where it was cut off
@@ -82,6 +86,7 @@ pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
         Command::Validate(arguments) => validate::run(arguments),
         Command::New(arguments) => new::run(arguments),
         Command::Check(arguments) => check::run(arguments),
+        Command::Fmt(arguments) => fmt::run(arguments),
         Command::Recognise(arguments) => recognise::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments, stop),
         Command::Robot(arguments) => robot::run(arguments),

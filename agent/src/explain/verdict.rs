@@ -35,7 +35,10 @@ pub fn rests_on(
     lost.extend(faults.iter().map(ToString::to_string));
     let newest = beliefs.last().and_then(|d| serde_json::from_value::<Belief>(d.body.clone()).ok());
     match &newest {
-        Some(belief) => said.extend(believed(belief, report)),
+        Some(belief) => {
+            said.push("after the last look this was believed:".into());
+            said.extend(believed(belief, report));
+        }
         None if report.objects.is_empty() => said.push("nothing was believed to be anywhere.".into()),
         None => said.push("what was believed of each object is not in the record.".into()),
     }

@@ -3,10 +3,11 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use descry_planner::{Plan, Source, pddl};
+use descry_planner::Source;
 
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
+use crate::layout::laid_out;
 
 /// Arguments of `descry fmt`.
 #[derive(clap::Args)]
@@ -43,7 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
                     replace(path, &text)?;
                 }
             }
-            Err(drawn) => broken.push(drawn),
+            Err(findings) => broken.push(input::drawn(&findings)),
         }
     }
     if !broken.is_empty() {
@@ -57,28 +58,12 @@ fn piped(is_check: bool) -> Result<Exit, CommandError> {
     let read = std::io::stdin().read_to_string(&mut text);
     read.map_err(|e| CommandError::BadInput(format!("standard input: {e}\n  PDDL or a plan was expected")))?;
     let source = Source::new("standard input", text);
-    let text = laid_out(&source).map_err(CommandError::BadInput)?;
+    let text = laid_out(&source).map_err(|findings| CommandError::BadInput(input::drawn(&findings)))?;
     if is_check {
         return Ok(if text == source.text { Exit::Done } else { Exit::No });
     }
     input::print_text(text.trim_end_matches('\n'))?;
     Ok(Exit::Done)
-}
-
-/// A text laid out, or what is wrong with it, drawn.
-pub fn laid_out(source: &Source) -> Result<String, String> {
-    let laid_out = if is_plan(&source.text) { Plan::format(source) } else { pddl::format(source) };
-    laid_out.map_err(|findings| input::drawn(&findings))
-}
-
-/// Whether a text is a plan: it does not define anything.
-pub fn is_plan(text: &str) -> bool {
-    let mut words = text
-        .lines()
-        .map(|line| line.split(';').next().unwrap_or_default())
-        .flat_map(|line| line.split(|c: char| c.is_whitespace() || "()".contains(c)))
-        .filter(|word| !word.is_empty());
-    words.next().is_some_and(|word| !word.eq_ignore_ascii_case("define"))
 }
 
 /// The files of a path: itself, or all below it that end as PDDL and plans do.

@@ -7,6 +7,9 @@ mod find;
 mod fmt;
 mod goals;
 mod input;
+mod line;
+mod lsp;
+mod manual;
 mod memory;
 mod new;
 mod plan;
@@ -21,6 +24,7 @@ mod why_not;
 use clap::Subcommand;
 
 pub use input::{drawn, is_coloured, narrate};
+pub use line::asked;
 
 use crate::exit::{CommandError, Exit};
 use crate::stop::Stop;
@@ -44,6 +48,8 @@ pub enum Command {
     Check(check::Arguments),
     /// Lay out PDDL and plans: comments stay, and what is read is the same
     Fmt(fmt::Arguments),
+    /// Serve editors: findings, hover, definitions, completion and layout of PDDL, plans and domain.toml (LSP, standard input and output)
+    Lsp(lsp::Arguments),
     /// Find the table and the objects in point clouds (PCD, PLY)
     Recognise(recognise::Arguments),
     /// Carry out a batch of runs: tables with intervals, plots and a page; goes on where it was cut off
@@ -64,6 +70,10 @@ pub enum Command {
     Memory(memory::Arguments),
     /// Write a record into one MCAP file: short for `memory export`
     Export(memory::ExportArguments),
+    /// Print what lets a shell complete commands and options
+    Completions(manual::CompletionsArguments),
+    /// Print the man page, or write one for each command
+    Man(manual::ManArguments),
 }
 
 impl Command {
@@ -87,6 +97,7 @@ pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
         Command::New(arguments) => new::run(arguments),
         Command::Check(arguments) => check::run(arguments),
         Command::Fmt(arguments) => fmt::run(arguments),
+        Command::Lsp(arguments) => lsp::run(arguments),
         Command::Recognise(arguments) => recognise::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments, stop),
         Command::Robot(arguments) => robot::run(arguments),
@@ -96,5 +107,7 @@ pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
         Command::Runs(arguments) => runs::run(arguments),
         Command::Memory(arguments) => memory::run(arguments),
         Command::Export(arguments) => memory::export(arguments),
+        Command::Completions(arguments) => manual::completions(arguments),
+        Command::Man(arguments) => manual::man(arguments),
     }
 }

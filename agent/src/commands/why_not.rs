@@ -171,7 +171,7 @@ impl Answer {
         });
         match &self.leads_to_it {
             Tried::None(why) => {
-                let why = indented(why);
+                let why = indented(&why.replace("(taken)", action));
                 lines.push(format!("It can never be taken, whatever the goal:\n{why}"));
                 return lines.join("\n");
             }

@@ -142,6 +142,7 @@ fn compared(weighed: &Weighed, chosen: &Way, asked: &Asked) -> String {
         return format!("of {all} ways to get further, {mine} gains most a second.{alike}{next}");
     }
     let more = if better.len() >= MOST_KEPT { "at least " } else { "" };
+    let many = if better.len() == 1 { "1 gains".into() } else { format!("{} gain", better.len()) };
     let first = figures(better[0]);
     let rule = match &asked.policy {
         Some(policy) => format!("The policy {policy} goes by its own rule."),
@@ -152,8 +153,7 @@ fn compared(weighed: &Weighed, chosen: &Way, asked: &Asked) -> String {
         None => "The planner counts the time of the plan to its end, not what its beginning gains a second.".into(),
     };
     format!(
-        "{mine} is one of {all} ways to get further; {more}{} gain more a second, first {first}. {rule}",
-        better.len()
+        "{mine} is one of {all} ways to get further; {more}{many} more a second, first {first}. {rule}"
     )
 }
 

@@ -1,6 +1,7 @@
 //! Lines from lists, words and comments.
 
 use super::tree::{Node, What};
+use crate::pddl::parse::ACTION_PARTS;
 
 /// Letters in a line, where that can be had.
 pub const WIDTH: usize = 120;
@@ -11,9 +12,6 @@ const BEFORE_COMMENT: usize = 2;
 
 /// Lists with parts that stand in lines of their own.
 const ACTIONS: [&str; 4] = [":action", ":durative-action", ":process", ":event"];
-/// Words with which such a line begins.
-const PARTS: [&str; 7] =
-    [":parameters", ":precondition", ":condition", ":effect", ":duration", ":grounding", ":vars"];
 
 /// Lists that stand behind these words begin in the same line, however long they are.
 const STAYING: [&str; 6] = ["not", "at", "over", "preference", ":goal", ":metric"];
@@ -231,7 +229,7 @@ fn set_breaks(children: &mut [Node<'_>], from: usize) {
 /// Each part of an action begins a line, its value stands behind its name.
 fn parts_apart(children: &mut [Node<'_>]) {
     let is_part = |node: &Node<'_>| {
-        node.word().is_some_and(|word| PARTS.iter().any(|part| part.eq_ignore_ascii_case(word)))
+        node.word().is_some_and(|word| ACTION_PARTS.iter().any(|part| part.eq_ignore_ascii_case(word)))
     };
     for n in 1..children.len() {
         if is_part(&children[n]) {

@@ -9,7 +9,7 @@ use descry_domains::answer::Ended;
 use descry_domains::situation::KnownSurface;
 use descry_domains::world::Round;
 use descry_memory::{Blob, Form};
-use descry_planner::semantics::{Changes, Pending};
+use descry_planner::semantics::{Binding, Changes, Pending};
 use descry_planner::task::{Action, Comparison, Effect, FunctionId, ObjectId};
 use descry_planner::{Plan, Semantics, State, Step};
 use serde::{Deserialize, Serialize};
@@ -230,14 +230,25 @@ impl<'r> Scale<'r> {
             return None;
         }
         let pending = semantics.remember(state, &action.effects.end, &mut binding).ok()?;
-        let mut change = |effects: &[Effect], pending: Option<&Pending>| {
-            let mut changes = Changes::default();
-            semantics.changes(state, effects, &mut binding, pending, &mut changes).ok()?.ok()?;
-            semantics.apply(state, &changes).ok()?.ok()
-        };
-        change(&action.effects.start, None)?;
-        change(&action.effects.end, Some(&pending))?;
+        self.change(state, &action.effects.start, &mut binding, None)?;
+        for condition in [&action.condition.over_all, &action.condition.end] {
+            semantics.holds(state, condition, &mut binding).ok().filter(|holds| *holds)?;
+        }
+        self.change(state, &action.effects.end, &mut binding, Some(&pending))?;
         Some(takes_s)
+    }
+
+    /// Makes changes; none where they contradict each other.
+    fn change(
+        &self,
+        state: &mut State,
+        effects: &[Effect],
+        binding: &mut Binding,
+        pending: Option<&Pending>,
+    ) -> Option<()> {
+        let mut changes = Changes::default();
+        self.semantics.changes(state, effects, binding, pending, &mut changes).ok()?.ok()?;
+        self.semantics.apply(state, &changes).ok()?.ok()
     }
 
     fn way(&self, steps: &[Step]) -> Option<Way> {

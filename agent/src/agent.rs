@@ -9,7 +9,7 @@ use descry_domains::actions::Carried;
 use descry_domains::answer::{Conclusion, Ended};
 use descry_domains::note::Note;
 use descry_domains::world::{Choice, Job, Round, Setting, World, WorldError};
-use descry_memory::{Draft, LogLevel, Meta, Record, RecordId, viewer};
+use descry_memory::{Blob, Draft, LogLevel, Meta, Record, RecordId, viewer};
 use descry_planner::{Outcome as Planned, Plan, Statistics, Step, Task};
 use descry_robots::Robot;
 use descry_skills::{Call, Context, SkillFailure};
@@ -17,6 +17,7 @@ use descry_skills::{Call, Context, SkillFailure};
 use crate::exit::CommandError;
 use crate::report::Event;
 use crate::stop::Stop;
+use crate::weigh;
 
 /// A planning call ends after so many evaluated states; then the best plan so far, or one good look, has to do.
 const MOST_EVALUATED: u64 = 2_500;
@@ -29,6 +30,8 @@ pub struct Agent<'a> {
     tell: &'a mut dyn FnMut(&Event),
     plan: Option<Plan>,
     totals: Totals,
+    /// What plans are weighed by; none where that would ask programs.
+    weighed_by: Option<String>,
 }
 
 /// What a run has taken so far.
@@ -57,7 +60,7 @@ impl<'a> Agent<'a> {
         stop: Stop,
         tell: &'a mut dyn FnMut(&Event),
     ) -> Self {
-        Self { robot, record, stop, tell, plan: None, totals: Totals::default() }
+        Self { robot, record, stop, tell, plan: None, totals: Totals::default(), weighed_by: None }
     }
 
     /// Pursues a goal until it is achieved, until nothing can help any more, or until a limit is reached.
@@ -71,6 +74,7 @@ impl<'a> Agent<'a> {
     ) -> Result<(Conclusion, Totals), CommandError> {
         let here = self.robot.pose().await.map_err(CommandError::broken)?;
         let goal = setting.goal;
+        self.weighed_by = setting.domain.config.attachments.is_empty().then(|| goal.pddl.clone());
         let mut world = World::begin(setting, chooser, &here)?;
         self.say(&Event::Goal {
             said: goal.said.clone(),
@@ -83,6 +87,7 @@ impl<'a> Agent<'a> {
             if let Some(ended) = self.step(&mut world, &round).await? {
                 (self.totals.views, self.totals.distance_m) = world.taken();
                 let remembered = world.to_remember();
+                self.rest_on(&round, &ended)?;
                 return Ok((Conclusion { remembered, ..world.answer(&round, &ended) }, self.totals));
             }
         }
@@ -199,13 +204,15 @@ impl<'a> Agent<'a> {
         calls: Vec<(String, u64)>,
     ) -> Result<(), CommandError> {
         self.totals.plans += 1;
-        let said = self.say(&Event::Planned {
+        let event = Event::Planned {
             round: self.totals.plans,
             because,
             steps: plan.to_string().lines().filter(|l| !l.starts_with(';')).map(str::to_string).collect(),
             makespan_s: plan.makespan_s().unwrap_or(0.0),
             calls,
-        })?;
+        };
+        let weighed = self.weighed_by.as_ref().map(|goal| weigh::blob(&weigh::weigh(round, &plan, goal)));
+        let said = self.say_with(&event, weighed.transpose()?)?;
         self.record.hold(&[round.record, said], "plan").map_err(CommandError::broken)?;
         self.plan = Some(plan);
         Ok(())
@@ -383,8 +390,22 @@ impl<'a> Agent<'a> {
         }
     }
 
+    /// Records what the end of a run rests on.
+    fn rest_on(&mut self, round: &Round, ended: &Ended) -> Result<(), CommandError> {
+        let body =
+            serde_json::to_value(weigh::rests(round, ended)).map_err(|e| CommandError::Bug(e.to_string()))?;
+        let meta = Meta { body, ..Meta::default() };
+        let draft = Draft { meta, kept: true, ..Draft::new(weigh::RESTS, self.robot.now_ns()) };
+        self.record.put(draft).map(|_| ()).map_err(CommandError::broken)
+    }
+
     /// Tells of an event, and records it.
     fn say(&mut self, event: &Event) -> Result<RecordId, CommandError> {
+        self.say_with(event, None)
+    }
+
+    /// The same with something more beside it.
+    fn say_with(&mut self, event: &Event, more: Option<Blob<'static>>) -> Result<RecordId, CommandError> {
         (self.tell)(event);
         let body = serde_json::to_value(event).map_err(|e| CommandError::Bug(e.to_string()))?;
         let meta = Meta { body, ..Meta::default() };
@@ -393,6 +414,7 @@ impl<'a> Agent<'a> {
         if let Event::Planned { steps, .. } = event {
             blobs.push(viewer::plan(stamp_ns, &steps.join("\n")));
         }
+        blobs.extend(more);
         let draft = Draft { meta, blobs, ..Draft::new("event", stamp_ns) };
         self.record.put(draft).map_err(CommandError::broken)
     }

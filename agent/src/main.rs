@@ -2,8 +2,7 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-use descry_agent::commands::{self, Command};
+use descry_agent::commands;
 use descry_agent::exit::Exit;
 use descry_agent::stop::Stop;
 use tokio::signal::unix::{SignalKind, signal};
@@ -14,24 +13,6 @@ use tracing_subscriber::filter::LevelFilter;
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Finds things by looking carefully: plans where to look, drives there, records, merges, recognises, and looks again.
-#[derive(Parser)]
-#[command(name = "descry", version, about, after_help = EXIT_CODES)]
-struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
-const EXIT_CODES: &str = "Exit codes:
-  0   achieved, plan found, valid, no finding
-  1   an honest no: not found after every useful view, plan invalid, findings
-  2   bad input or usage
-  3   proven unsolvable
-  4   out of time or memory
-  5   the robot or a store failed for good
-  70  a bug of descry
-  130, 143, 129  stopped by Ctrl-C, by SIGTERM, by the end of its terminal";
-
 fn main() -> ExitCode {
     std::panic::set_hook(Box::new(|panic| {
         commands::narrate(&format!(
@@ -40,12 +21,12 @@ fn main() -> ExitCode {
     }));
     warn_people();
     let outcome = std::panic::catch_unwind(|| {
-        let arguments = Arguments::parse();
+        let command = commands::asked();
         let stop = Stop::default();
-        if arguments.command.can_be_stopped() {
+        if command.can_be_stopped() {
             listen(&stop);
         }
-        commands::run(&arguments.command, &stop)
+        commands::run(&command, &stop)
     });
     match outcome {
         Ok(Ok(exit)) => exit.into(),

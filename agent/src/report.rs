@@ -188,15 +188,20 @@ impl Report {
     }
 }
 
+/// A verdict as people read it.
+pub fn words(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Achieved => "achieved",
+        Verdict::NotFound => "not found",
+        Verdict::CannotTell => "cannot tell",
+        Verdict::Impossible => "cannot be done",
+        Verdict::Failed => "failed",
+    }
+}
+
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let verdict = match self.verdict {
-            Verdict::Achieved => "achieved",
-            Verdict::NotFound => "not found",
-            Verdict::CannotTell => "cannot tell",
-            Verdict::Impossible => "cannot be done",
-            Verdict::Failed => "failed",
-        };
+        let verdict = words(self.verdict);
         let answer = self.answer.as_ref().map(|a| format!("{a}; ")).unwrap_or_default();
         writeln!(f, "\n{answer}{verdict}: {}", self.why)?;
         if let (Some(object), Some([x, y, z])) = (&self.object, self.position_m) {

@@ -1,5 +1,7 @@
 //! Plans: what to do, when, for how long; in the form of the planning competitions.
 
+mod format;
+
 use std::fmt;
 
 use crate::diagnostic::{Diagnostic, Findings, Source, Span};

@@ -3,13 +3,13 @@
 
 use std::path::PathBuf;
 
-use descry_domains::check;
-use descry_domains::load::{Domain, LoadError};
+use descry_domains::load::Domain;
 use descry_planner::Findings;
 use serde_json::json;
 
 use crate::commands::input;
 use crate::exit::{CommandError, Exit};
+use crate::findings;
 
 /// Arguments of `descry check`.
 #[derive(clap::Args)]
@@ -49,16 +49,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
 
 /// The whole folder of a domain.
 fn folder(name: &str, json: bool) -> Result<Exit, CommandError> {
-    let domain = match Domain::load(name) {
-        Ok(domain) => domain,
-        Err(LoadError::Findings { findings }) => return say(&findings, &[], json),
-        Err(other) => return Err(CommandError::bad_input(other)),
-    };
-    let mut findings = descry_planner::check(&domain.pddl, None);
-    let own = check::findings(&domain);
-    findings.list.extend(own.list);
-    findings.sources = own.sources;
-    say(&findings, &check::grounding(&domain), json)
+    let (findings, grounding) = findings::of_folder(Domain::load(name)).map_err(CommandError::bad_input)?;
+    say(&findings, &grounding, json)
 }
 
 fn say(findings: &Findings, grounding: &[String], json: bool) -> Result<Exit, CommandError> {

@@ -2,9 +2,14 @@
 
 mod check;
 mod experiment;
+mod explain;
 mod find;
+mod fmt;
 mod goals;
 mod input;
+mod line;
+mod lsp;
+mod manual;
 mod memory;
 mod new;
 mod plan;
@@ -14,10 +19,12 @@ mod robot;
 mod runs;
 mod show;
 mod validate;
+mod why_not;
 
 use clap::Subcommand;
 
 pub use input::{drawn, is_coloured, narrate};
+pub use line::asked;
 
 use crate::exit::{CommandError, Exit};
 use crate::stop::Stop;
@@ -39,6 +46,10 @@ pub enum Command {
     Validate(validate::Arguments),
     /// Read a domain (and a problem) and show every finding under its text
     Check(check::Arguments),
+    /// Lay out PDDL and plans: comments stay, and what is read is the same
+    Fmt(fmt::Arguments),
+    /// Serve editors: findings, hover, definitions, completion and layout of PDDL, plans and domain.toml (LSP, standard input and output)
+    Lsp(lsp::Arguments),
     /// Find the table and the objects in point clouds (PCD, PLY)
     Recognise(recognise::Arguments),
     /// Carry out a batch of runs: tables with intervals, plots and a page; goes on where it was cut off
@@ -48,6 +59,8 @@ pub enum Command {
     Robot(robot::Arguments),
     /// Show what happened in a run
     Show(show::Arguments),
+    /// Say why a run went as it did: why each plan, why this and not that, what the verdict rests on
+    Explain(explain::Arguments),
     /// Live through a run again from its record: the same percepts, beliefs and verdict, or where they part
     Replay(replay::Arguments),
     /// List the runs
@@ -57,6 +70,10 @@ pub enum Command {
     Memory(memory::Arguments),
     /// Write a record into one MCAP file: short for `memory export`
     Export(memory::ExportArguments),
+    /// Print what lets a shell complete commands and options
+    Completions(manual::CompletionsArguments),
+    /// Print the man page, or write one for each command
+    Man(manual::ManArguments),
 }
 
 impl Command {
@@ -79,13 +96,18 @@ pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
         Command::Validate(arguments) => validate::run(arguments),
         Command::New(arguments) => new::run(arguments),
         Command::Check(arguments) => check::run(arguments),
+        Command::Fmt(arguments) => fmt::run(arguments),
+        Command::Lsp(arguments) => lsp::run(arguments),
         Command::Recognise(arguments) => recognise::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments, stop),
         Command::Robot(arguments) => robot::run(arguments),
         Command::Show(arguments) => show::run(arguments),
+        Command::Explain(arguments) => explain::run(arguments),
         Command::Replay(arguments) => replay::run(arguments),
         Command::Runs(arguments) => runs::run(arguments),
         Command::Memory(arguments) => memory::run(arguments),
         Command::Export(arguments) => memory::export(arguments),
+        Command::Completions(arguments) => manual::completions(arguments),
+        Command::Man(arguments) => manual::man(arguments),
     }
 }

@@ -9,6 +9,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::commands::input::{self, AttachmentArguments};
+use crate::commands::why_not;
 use crate::exit::{CommandError, Exit};
 
 /// Arguments of `descry plan`.
@@ -36,6 +37,9 @@ pub struct Arguments {
     /// Draw the plan as a Gantt chart, as SVG
     #[arg(long, value_name = "FILE")]
     gantt: Option<PathBuf>,
+    /// Say besides why an action is not in the plan: what it lacks, whether a plan can have it, what that takes
+    #[arg(long, value_name = "(ACTION …)")]
+    why_not: Option<String>,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
@@ -98,10 +102,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         let drawn = std::fs::write(path, crate::gantt::svg(plan));
         drawn.map_err(|e| CommandError::BadInput(format!("--gantt {}: {e}", path.display())))?;
     }
+    let asked = arguments.why_not.as_deref();
+    let answer = |asked| why_not::answer(&task, &attachments, outcome.plan(), asked, &options, &stop);
+    let answer = asked.map(answer).transpose()?;
     if arguments.json {
-        print_json(status, &outcome, started)?;
+        print_json(status, &outcome, answer.as_ref(), started)?;
     } else {
         show(&status, &outcome, arguments.out.is_some(), started, stop())?;
+        if let Some(answer) = answer {
+            input::narrate(&answer.said(outcome.plan()));
+        }
     }
     Ok(exit)
 }
@@ -131,7 +141,12 @@ fn address_space_bytes() -> Option<u64> {
     line.split_whitespace().next()?.parse().ok()
 }
 
-fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(), CommandError> {
+fn print_json(
+    status: Status,
+    outcome: &Outcome,
+    answer: Option<&why_not::Answer>,
+    started: Instant,
+) -> Result<(), CommandError> {
     let plan = outcome.plan();
     let why = match outcome {
         Outcome::Unsolvable { why, .. } => Some(why),
@@ -139,7 +154,7 @@ fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(),
     };
     let Statistics { evaluated, expanded, plans, actions, optimal, scored_only, attachments } =
         outcome.statistics();
-    input::print_json(&json!({
+    let mut said = json!({
         "status": status,
         "cost": plan.and_then(|p| p.cost),
         "makespan": plan.and_then(Plan::makespan_s),
@@ -155,7 +170,11 @@ fn print_json(status: Status, outcome: &Outcome, started: Instant) -> Result<(),
         "why": why.map(|why| why.to_string()),
         "findings": why.map(|why| &why.findings),
         "plan": plan.map(|p| &p.steps),
-    }))
+    });
+    if let Some(answer) = answer {
+        said["why_not"] = json!(answer);
+    }
+    input::print_json(&said)
 }
 
 fn show(

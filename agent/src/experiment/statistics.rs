@@ -1,7 +1,8 @@
 //! Rates, means, differences and calibration, with intervals of 95 %.
 //!
 //! Rates get Wilson's score interval. Everything else gets a percentile bootstrap that resamples whole *groups* (all runs in
-//! one scene), since runs in the same scene are not independent; its seed is fixed, so the same rows give the same interval.
+//! one scene), since runs in the same scene are not independent; its seed is fixed, so the same rows give the same interval. A share
+//! of all or nothing, of which it says nothing, gets Wilson's interval of as many observations as there are groups.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -68,7 +69,18 @@ pub fn mean(observations: &[Observation]) -> Option<Estimate> {
 pub fn ratio(pairs: &[Pair]) -> Option<Estimate> {
     let sums = sums(pairs.iter().map(|p| (p.group, [p.a, p.b])));
     let n = pairs.iter().map(|p| p.b).sum::<f64>() as usize;
-    estimate(n, &sums, |[a, b]| a / b)
+    estimate(n, &sums, |[a, b]| a / b).map(|found| at_an_end(found, sums.len()))
+}
+
+/// A share of 0 or 1 is resampled as 0 or 1 however few groups there are: then each group counts once, by Wilson's interval.
+fn at_an_end(found: Estimate, groups: usize) -> Estimate {
+    match found.interval {
+        Some([low, high]) if low == high && (low == 0.0 || low == 1.0) => {
+            let hits = if low == 1.0 { groups } else { 0 };
+            Estimate { interval: rate(hits, groups).and_then(|e| e.interval), ..found }
+        }
+        _ => found,
+    }
 }
 
 /// The mean of `a - b`; none without pairs.
@@ -198,6 +210,16 @@ mod tests {
             close(h, high);
         }
         assert_eq!(rate(0, 0), None);
+    }
+
+    #[test]
+    fn a_share_of_all_or_nothing_is_not_sure() {
+        let pairs = |a: f64| (0..16).map(|group| Pair { group, a, b: 3.0 }).collect::<Vec<_>>();
+        let interval = |a: f64| ratio(&pairs(a)).and_then(|e| e.interval).expect("an interval");
+        let wilson = |hits: usize| rate(hits, 16).and_then(|e| e.interval).expect("an interval");
+        assert_eq!((interval(3.0), interval(0.0)), (wilson(16), wilson(0)));
+        assert!((interval(3.0)[0] - 0.806).abs() < 1e-3 && interval(3.0)[1] == 1.0, "{:?}", interval(3.0));
+        assert_eq!(interval(1.5), [0.5, 0.5]);
     }
 
     #[test]

@@ -2,10 +2,12 @@
 
 pub mod ast;
 mod check;
+mod format;
 pub mod lex;
 pub mod parse;
 
 pub use check::check;
+pub use format::format;
 
 /// The name most like `name`, if one is near enough to be meant: at most a third of its letters differ.
 pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {

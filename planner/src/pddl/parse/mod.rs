@@ -45,7 +45,8 @@ struct Parser<'a> {
     findings: &'a mut Vec<Diagnostic>,
 }
 
-const DOMAIN_SECTIONS: &[&str] = &[
+/// Sections of a domain.
+pub const DOMAIN_SECTIONS: &[&str] = &[
     ":requirements",
     ":oplinit",
     ":types",
@@ -59,7 +60,8 @@ const DOMAIN_SECTIONS: &[&str] = &[
     ":constraints",
 ];
 
-const PROBLEM_SECTIONS: &[&str] = &[
+/// Sections of a problem.
+pub const PROBLEM_SECTIONS: &[&str] = &[
     ":domain",
     ":requirements",
     ":moduleoptions",
@@ -71,7 +73,8 @@ const PROBLEM_SECTIONS: &[&str] = &[
     ":metric",
 ];
 
-const ACTION_PARTS: &[&str] =
+/// Parts of an action.
+pub const ACTION_PARTS: &[&str] =
     &[":parameters", ":precondition", ":condition", ":effect", ":duration", ":grounding", ":vars"];
 
 impl<'a> Parser<'a> {

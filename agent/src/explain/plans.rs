@@ -1,0 +1,203 @@
+//! Why each plan was made, why it was this one, and what came of it.
+
+use descry_domains::note::Note;
+
+use super::chapters::{Chapter, Deed};
+use super::wording::{count, reasons, share};
+use super::{Asked, Told};
+use crate::weigh::{Expected, Way, Weighed};
+
+/// Numbers that are named; the rest are counted.
+const MOST_NAMED: usize = 3;
+/// Rates nearer to each other than this share are alike.
+const ALIKE: f64 = 0.02;
+/// As many ways as are kept in the order of their rates.
+const MOST_KEPT: usize = crate::weigh::MOST_KEPT;
+
+/// All plans of a run.
+pub fn told(chapters: &[Chapter], asked: &Asked) -> Vec<Told> {
+    let before = std::iter::once(None).chain(chapters.iter().map(Some));
+    chapters.iter().zip(before).map(|(chapter, before)| tell(chapter, before, asked)).collect()
+}
+
+fn tell(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked) -> Told {
+    Told {
+        round: chapter.round,
+        at_s: chapter.at_s,
+        cause: cause(chapter, before),
+        intent: intent(chapter, asked),
+        why: why(chapter, asked),
+        outcome: chapter.deeds.iter().filter_map(outcome).collect(),
+    }
+}
+
+/// What a plan was caused by: the failure, or what was learned, that ended the one before; or that it had been done and was not enough.
+fn cause(chapter: &Chapter, before: Option<&Chapter>) -> String {
+    let Some(before) = before else { return "the run began, and there was no plan.".into() };
+    if let Some(Deed::Failed(call, _, therefore)) = before.deeds.last() {
+        return format!("{call} failed. What follows from that: {therefore}.");
+    }
+    let moved = before.deeds.iter().rev().find_map(|deed| match deed {
+        Deed::Noted(Note::Changed { because }) => Some(format!("something was moved: {because}. ")),
+        _ => None,
+    });
+    let begun = before.deeds.iter().filter(|deed| matches!(deed, Deed::Began)).count();
+    let done = match before.steps.len().saturating_sub(begun) {
+        0 => {
+            let now = reasons::missed(&chapter.because, "is");
+            format!("plan {} was carried out to its end, and {now}.", before.round)
+        }
+        left => {
+            let now = reasons::missed(&chapter.because, "would be only");
+            format!(
+                "with what was learned, the {} left of plan {} would not do: {now}.",
+                count(left, "step"),
+                before.round
+            )
+        }
+    };
+    format!("{}{done}", moved.unwrap_or_default())
+}
+
+/// A step as it is written in a plan, without its times.
+fn bare(step: &str) -> &str {
+    match (step.find('('), step.find(')')) {
+        (Some(from), Some(to)) if from < to => &step[from..=to],
+        _ => step,
+    }
+}
+
+fn intent(chapter: &Chapter, asked: &Asked) -> Vec<String> {
+    let steps: Vec<&str> = chapter.steps.iter().map(|s| bare(s)).collect();
+    let mut said = vec![format!("{}.", steps.join(", then "))];
+    let mut numbers: Vec<&Expected> = chapter.weighed.iter().flat_map(|w| &w.numbers).collect();
+    numbers.sort_by(|a, b| (b.then - b.now).abs().total_cmp(&(a.then - a.now).abs()));
+    let one = |n: &&Expected| {
+        let wanted = asked.wanted(&n.name).map(|w| format!(" ({} is wanted)", share(w))).unwrap_or_default();
+        format!("{} from {} to {}{wanted}", n.name, share(n.now), share(n.then))
+    };
+    let named: Vec<String> = numbers.iter().take(MOST_NAMED).map(one).collect();
+    if !named.is_empty() {
+        let more = numbers.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!(", and {more} more") } else { String::new() };
+        said.push(format!("Expected of it: {}{more}.", named.join(", ")));
+    }
+    said
+}
+
+/// Why this plan and not another, as far as the record says.
+fn why(chapter: &Chapter, asked: &Asked) -> Vec<String> {
+    let Some(weighed) = &chapter.weighed else {
+        return vec!["what else could have been done, and at what cost, is not in the record.".into()];
+    };
+    let Some(chosen) = &weighed.chosen else {
+        return vec![
+            "it does what the goal asks next. No step of it is there to learn more: nothing was compared."
+                .into(),
+        ];
+    };
+    if weighed.others.is_empty() {
+        return vec![format!("{} was the only way known to get further.", chosen.steps.join(" "))];
+    }
+    let mut said = vec![compared(weighed, chosen, asked)];
+    said.extend(quickest(weighed, chosen, asked));
+    let most = weighed.others.iter().max_by(|a, b| a.gains.total_cmp(&b.gains));
+    if let Some(other) = most.filter(|o| o.gains > chosen.gains * (1.0 + ALIKE)) {
+        let longer_s = other.takes_s - chosen.takes_s;
+        let longer =
+            if longer_s > 0.0 { format!(", but takes {longer_s:.1} s longer") } else { String::new() };
+        said.push(format!("{} gains most{longer}.", figures(other)));
+    }
+    said
+}
+
+/// A way with its figures.
+fn figures(way: &Way) -> String {
+    format!(
+        "{} [+{} in {:.1} s, {} a second]",
+        way.steps.join(" "),
+        share(way.gains),
+        way.takes_s,
+        rate(way.rate())
+    )
+}
+
+/// Three digits that count.
+fn rate(rate: f64) -> String {
+    let digits = if rate > 0.0 { (2.0 - rate.log10().floor()).clamp(1.0, 8.0) as usize } else { 1 };
+    format!("{rate:.digits$}")
+}
+
+/// Where a plan's way stands among all, by what is gained a second.
+fn compared(weighed: &Weighed, chosen: &Way, asked: &Asked) -> String {
+    let all = weighed.open;
+    let ratio = |o: &Way| o.rate() / chosen.rate();
+    let better: Vec<&Way> = weighed.others.iter().filter(|o| ratio(o) > 1.0 + ALIKE).collect();
+    let mine = figures(chosen);
+    if better.is_empty() {
+        let alike = weighed.others.iter().find(|o| ratio(o) >= 1.0 - ALIKE);
+        let next = weighed.others.iter().find(|o| ratio(o) < 1.0 - ALIKE);
+        let alike = alike.map(|o| format!(" As good is {}.", figures(o))).unwrap_or_default();
+        let next = next.map(|o| format!(" Next comes {}.", figures(o))).unwrap_or_default();
+        return format!("of {all} ways to get further, {mine} gains most a second.{alike}{next}");
+    }
+    let more = if better.len() >= MOST_KEPT { "at least " } else { "" };
+    let many = if better.len() == 1 { "1 gains".into() } else { format!("{} gain", better.len()) };
+    let first = figures(better[0]);
+    let rule = match &asked.policy {
+        Some(policy) => format!("The policy {policy} goes by its own rule."),
+        None if enough(weighed, better[0], asked) == Some(false) => {
+            "The planner takes the plan that is quickest to reach all that is wanted; that one would not be enough by itself."
+                .into()
+        }
+        None => "The planner counts the time of the plan to its end, not what its beginning gains a second.".into(),
+    };
+    format!("{mine} is one of {all} ways to get further; {more}{many} more a second, first {first}. {rule}")
+}
+
+/// Whether a way by itself is expected to be enough; none where more than one number counts, or nothing says what is wanted.
+fn enough(weighed: &Weighed, way: &Way, asked: &Asked) -> Option<bool> {
+    let [only] = weighed.numbers.as_slice() else { return None };
+    let wanted = asked.wanted(&only.name)?;
+    Some(if only.then >= only.now { only.now + way.gains >= wanted } else { only.now - way.gains <= wanted })
+}
+
+/// The quickest way, if it is another, and why it was not taken.
+fn quickest(weighed: &Weighed, chosen: &Way, asked: &Asked) -> Option<String> {
+    let other = weighed.others.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s))?;
+    if other.takes_s > chosen.takes_s - 0.1 {
+        return None;
+    }
+    let but = match enough(weighed, other, asked) {
+        Some(false) => ", but would not be expected to be enough by itself",
+        _ if other.gains < chosen.gains => ", but gains less",
+        _ => "",
+    };
+    Some(format!("{} is the quickest{but}.", figures(other)))
+}
+
+/// What came of a step, in a sentence; none where nothing did that has not been said.
+fn outcome(deed: &Deed) -> Option<String> {
+    Some(match deed {
+        Deed::Began => return None,
+        Deed::Ended(call, said) => format!("{call}: {said}."),
+        Deed::Failed(call, because, _) => format!("{call} failed: {because}."),
+        Deed::Noted(Note::Perceived { on, merged, left_out, residual_m, objects, changed, .. }) => {
+            let views = match merged {
+                1 => "one view".to_string(),
+                n => format!("{n} views ({:.1} mm apart)", residual_m * 1e3),
+            };
+            let left_out: String = left_out.iter().map(|why| format!("; left out: {why}")).collect();
+            let changed: String = changed.iter().map(|text| format!("; {text}")).collect();
+            format!("the {on}, in {views}, shows {}{left_out}{changed}.", count(objects.len(), "object"))
+        }
+        Deed::Noted(note) => {
+            let text = note.to_string();
+            let mut lines = text.lines().map(str::trim);
+            let first = lines.next().unwrap_or_default();
+            let first = first.split_once(' ').map_or(first, |(_, rest)| rest.trim());
+            let all: Vec<&str> = std::iter::once(first).chain(lines).collect();
+            format!("{}.", all.join("; "))
+        }
+    })
+}

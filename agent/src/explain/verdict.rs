@@ -1,0 +1,166 @@
+//! What the verdict of a run rests on: what is believed of what was asked for and by how many views, what was seen of where it may be,
+//! and what is left.
+
+use std::collections::BTreeSet;
+
+use descry_domains::answer::Verdict;
+use descry_domains::lexicon::symbol;
+use descry_memory::belief::{Belief, Track};
+use descry_memory::{Document, Query, Record};
+
+use super::wording::{count, reasons, share};
+use crate::exit::CommandError;
+use crate::report::{self, Report};
+use crate::weigh::{self, InDoubt, Rests, Seen};
+
+/// Objects that are described one by one; the rest are counted.
+const MOST_NAMED: usize = 6;
+/// What an object is not with more than this is not worth a word.
+const HARDLY: f64 = 0.005;
+
+/// It, in sentences.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the record cannot be read.
+pub fn rests_on(
+    record: &Record,
+    report: Option<&Report>,
+    lost: &mut Vec<String>,
+) -> Result<Vec<String>, CommandError> {
+    let Some(report) = report else {
+        return Ok(vec!["there is no verdict: the run was cut off (descry do --resume goes on with it), or its report is lost.".into()]);
+    };
+    let mut said = vec![format!("{}: {}.", report::words(report.verdict), reasons::no_plan(&report.why))];
+    let (beliefs, faults) = record.find_whole(&Query::of_kind("belief")).map_err(CommandError::broken)?;
+    lost.extend(faults.iter().map(ToString::to_string));
+    let newest = beliefs.last().and_then(|d| serde_json::from_value::<Belief>(d.body.clone()).ok());
+    match &newest {
+        Some(belief) => {
+            said.push("after the last look this was believed:".into());
+            said.extend(believed(belief, report));
+        }
+        None if report.objects.is_empty() => said.push("nothing was believed to be anywhere.".into()),
+        None => said.push("what was believed of each object is not in the record.".into()),
+    }
+    let looks = Looks::of(record)?;
+    let rests = record.newest(weigh::RESTS).map_err(CommandError::broken)?;
+    match rests.and_then(|d| serde_json::from_value::<Rests>(d.body).ok()) {
+        Some(rests) => {
+            said.extend(rests.in_doubt.iter().map(|doubt| seen(doubt, &looks)));
+            said.extend(left(&rests, report));
+        }
+        None => said
+            .push("what was seen of each surface in the end, and what is left, is not in the record.".into()),
+    }
+    Ok(said)
+}
+
+/// The looks of a run: from where, and at what, by symbol.
+struct Looks(Vec<(String, Vec<String>)>);
+
+impl Looks {
+    fn of(record: &Record) -> Result<Self, CommandError> {
+        let (clouds, _) = record.find_whole(&Query::of_kind("cloud")).map_err(CommandError::broken)?;
+        let part = |d: &Document| {
+            let on = serde_json::from_value(d.body["on"].clone()).ok()?;
+            Some((d.body["from"].as_str()?.to_owned(), on))
+        };
+        Ok(Looks(clouds.iter().filter_map(part).collect()))
+    }
+
+    /// From how many places something was looked at.
+    fn places(&self, on: &str) -> usize {
+        let on = symbol(on);
+        let from = self.0.iter().filter(|(_, shown)| shown.contains(&on)).map(|(from, _)| from);
+        from.collect::<BTreeSet<_>>().len()
+    }
+}
+
+/// What is believed of what was asked for; where that was not one thing, of every object, the least sure first.
+fn believed(belief: &Belief, report: &Report) -> Vec<String> {
+    let mut tracks: Vec<&Track> = belief.tracks.iter().collect();
+    let Some(name) = &report.object else {
+        tracks.sort_by(|a, b| a.certainty().total_cmp(&b.certainty()));
+        let mut said: Vec<String> = tracks.iter().take(MOST_NAMED).map(|t| object(t, None)).collect();
+        if tracks.len() > MOST_NAMED {
+            said.push(format!("{} of which it is surer.", count(tracks.len() - MOST_NAMED, "more object")));
+        }
+        return said;
+    };
+    tracks.sort_by(|a, b| b.probability_of(name).total_cmp(&a.probability_of(name)));
+    let may_be: Vec<&&Track> = tracks.iter().filter(|t| t.probability_of(name) > HARDLY).collect();
+    let mut said: Vec<String> = may_be.iter().take(MOST_NAMED).map(|t| object(t, Some(name))).collect();
+    let (rest, known) = (tracks.len() - may_be.len(), belief.tracks.len());
+    said.push(match (known, rest) {
+        (0, _) => "no object is believed to stand anywhere.".into(),
+        (_, 0) => format!("there is no other object: {} in all.", count(known, "object")),
+        (_, 1) => format!("one other object is surely not {name}."),
+        (_, rest) => format!("{rest} other objects are surely not {name}."),
+    });
+    said
+}
+
+/// An object: what it is taken for, and by what.
+fn object(track: &Track, asked: Option<&str>) -> String {
+    let mut names: Vec<(&str, f64)> = track.probabilities.iter().map(|(n, p)| (n.as_str(), *p)).collect();
+    names.push(("none of the known objects", track.unknown));
+    names.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let first = asked.map_or(names[0], |name| (name, track.probability_of(name)));
+    let others: Vec<String> = names
+        .iter()
+        .filter(|(n, p)| *n != first.0 && *p > HARDLY)
+        .take(2)
+        .map(|(n, p)| format!("{n} {}", share(*p)))
+        .collect();
+    let others = if others.is_empty() { String::new() } else { format!(" ({})", others.join(", ")) };
+    let on = if track.on.is_empty() { "is in the hand".into() } else { format!("stands on {}", track.on) };
+    let [x, y, _]: [f64; 3] = track.position_m.coords.into();
+    format!(
+        "what {on} at ({x:.2}, {y:.2}) m is {} with {}{others}; {} looked at it, and {:.0} % of its outside was seen.",
+        first.0,
+        share(first.1),
+        count(track.evidence.views, "view"),
+        track.seen_fraction * 100.0
+    )
+}
+
+/// Why there was nothing more to do, and what is left.
+fn left(rests: &Rests, report: &Report) -> Vec<String> {
+    let mut said = Vec::new();
+    if let Some(left) = report.remaining.filter(|_| report.verdict != Verdict::Achieved) {
+        said.push(format!(
+            "the probability that it is there after all, unseen or as one of the objects that were seen, is {}.",
+            share(left)
+        ));
+    }
+    if report.remaining.is_none() && report.verdict != Verdict::Achieved {
+        let open = rests.in_doubt.iter().filter(|doubt| doubt.left > HARDLY);
+        said.extend(open.map(|d| format!("about {}, {} is still open in all.", d.about, share(d.left))));
+    }
+    let because = reasons::no_plan(&rests.said);
+    said.push(match rests.ended.as_str() {
+        "reached" => "it ended because the goal held.".into(),
+        "no plan" if because.is_empty() => "it ended because there was no plan any more.".into(),
+        "no plan" => format!("it ended because there was no plan any more: {because}."),
+        _ => format!("it ended because {because}."),
+    });
+    said
+}
+
+/// What was seen of where something may be.
+fn seen(doubt: &InDoubt, looks: &Looks) -> String {
+    let one = |seen: &Seen| {
+        let places = looks.places(&seen.on).max(seen.places);
+        let from = count(places, "place");
+        match (seen.share, places) {
+            (_, 0) => format!("nothing of the {}, which was not looked at", seen.on),
+            (None, _) => format!("the {} from {from}", seen.on),
+            (Some(part), _) => format!("{:.0} % of the {} from {from}", (part * 100.0).floor(), seen.on),
+        }
+    };
+    let all: Vec<String> = doubt.seen.iter().map(one).collect();
+    match all.as_slice() {
+        [] => format!("nothing was seen of where {} may be.", doubt.about),
+        all => format!("of where {} may be, this was seen: {}.", doubt.about, all.join(", ")),
+    }
+}

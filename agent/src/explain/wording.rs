@@ -1,0 +1,99 @@
+//! Numbers, reasons and lines as people read them.
+
+pub mod reasons;
+
+/// So many of something.
+pub fn count(n: usize, of: &str) -> String {
+    let all = if n == 1 { "" } else { "s" };
+    format!("{n} {of}{all}")
+}
+
+/// A share, a probability or a number of a domain: two digits, four near 0 and 1.
+pub fn share(value: f64) -> String {
+    let near_an_end = (5e-5..0.01).contains(&value) || value > 0.99 && value < 1.0 - 5e-5;
+    if !near_an_end {
+        return format!("{:.2}", value + 0.0).replace("-0.00", "0.00");
+    }
+    format!("{value:.4}").trim_end_matches('0').to_string()
+}
+
+/// A text in lines of at most so many letters, the first behind a sign, the others as far in.
+pub fn wrapped(text: &str, first: &str, most: usize) -> String {
+    let indent = " ".repeat(first.chars().count());
+    let mut lines: Vec<String> = Vec::new();
+    let mut line = first.to_string();
+    let mut is_empty = true;
+    for word in words(text) {
+        if !is_empty && line.chars().count() + 1 + word.chars().count() > most {
+            lines.push(std::mem::replace(&mut line, indent.clone()));
+            is_empty = true;
+        }
+        if !is_empty {
+            line.push(' ');
+        }
+        line += &word;
+        is_empty = false;
+    }
+    lines.push(line);
+    lines.join("\n")
+}
+
+/// Words of a text; a call is one word, where it is short, and so is a number of percent.
+fn words(text: &str) -> Vec<String> {
+    const LONGEST_CALL: usize = 60;
+    let mut words: Vec<String> = Vec::new();
+    let mut depth = 0_i32;
+    for word in text.split_whitespace() {
+        let before = depth;
+        let signs = |open: &[char]| word.matches(open).count() as i32;
+        depth += signs(&['(', '[']) - signs(&[')', ']']);
+        match words.last_mut() {
+            Some(last) if before > 0 && last.chars().count() + word.chars().count() < LONGEST_CALL => {
+                last.push(' ');
+                *last += word;
+            }
+            Some(last) if word.starts_with('%') => {
+                last.push(' ');
+                *last += word;
+            }
+            _ => words.push(word.to_string()),
+        }
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_as_long_as_asked_and_calls_stay_whole() {
+        let text = "go from here (move start table-5) to there and (observe table-5 table) look";
+        let lines = wrapped(text, "- ", 30);
+        assert!(lines.lines().all(|l| l.chars().count() <= 30), "{lines}");
+        assert!(
+            lines.contains("(move start table-5)") && lines.contains("(observe table-5 table)"),
+            "{lines}"
+        );
+        let back: Vec<&str> = lines.trim_start_matches("- ").split_whitespace().collect();
+        assert_eq!(back.join(" "), text);
+        assert_eq!(wrapped("", "- ", 30), "- ");
+    }
+
+    #[test]
+    fn shares_say_something_near_their_ends() {
+        let cases = [
+            (0.0, "0.00"),
+            (-0.0, "0.00"),
+            (-1e-9, "0.00"),
+            (0.5, "0.50"),
+            (0.004, "0.004"),
+            (0.00001, "0.00"),
+            (0.9996, "0.9996"),
+            (0.99999, "1.00"),
+            (1.0, "1.00"),
+            (9.1364, "9.14"),
+        ];
+        cases.iter().for_each(|(value, text)| assert_eq!(share(*value), *text));
+    }
+}

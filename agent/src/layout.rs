@@ -1,0 +1,24 @@
+//! PDDL and plans laid out, whichever a text is: the same on the command line and in an editor.
+
+use descry_planner::{Findings, Plan, Source, pddl};
+
+/// A text laid out.
+///
+/// # Errors
+/// What keeps it from being read: such a text is not touched.
+pub fn laid_out(source: &Source) -> Result<String, Findings> {
+    if is_plan(&source.text) { Plan::format(source) } else { pddl::format(source) }
+}
+
+/// Whether a text is a plan: it does not define anything.
+fn is_plan(text: &str) -> bool {
+    words(text).next().is_some_and(|word| !word.eq_ignore_ascii_case("define"))
+}
+
+/// The words of a text in PDDL, without comments and parentheses.
+pub fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.lines()
+        .map(|line| line.split(';').next().unwrap_or_default())
+        .flat_map(|line| line.split(|c: char| c.is_whitespace() || "()".contains(c)))
+        .filter(|word| !word.is_empty())
+}

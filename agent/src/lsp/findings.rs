@@ -1,0 +1,218 @@
+//! What is to be said about texts, as an editor shows it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use descry_domains::load::{LoadError, from_files};
+use descry_planner::pddl::lex::Symbols;
+use descry_planner::pddl::parse;
+use descry_planner::{Diagnostic, Findings, Plan, Severity, Span};
+use lsp_types::{
+    Diagnostic as Shown, DiagnosticRelatedInformation, DiagnosticSeverity, Location, NumberOrString,
+    PublishDiagnosticsParams, Uri,
+};
+
+use super::texts::{Lines, Texts, path_of, uri_of};
+use super::units::{self, Unit};
+
+/// The files about which something was said that still stands.
+#[derive(Default)]
+pub struct Told {
+    files: BTreeSet<PathBuf>,
+}
+
+impl Told {
+    /// What is to be said after a text has changed: about it, and about all that depends on it.
+    pub fn after(&mut self, texts: &Texts, uri: &Uri) -> Vec<PublishDiagnosticsParams> {
+        let path = path_of(uri);
+        let text = texts.text(&path).unwrap_or_default();
+        let mut said: BTreeMap<PathBuf, Vec<Shown>> = of_text(texts, &path, &text);
+        if matches!(units::of(texts, &path, &text), Unit::Domain | Unit::Folder(_)) {
+            for other in texts.paths().filter(|other| **other != path) {
+                let text = texts.text(other).unwrap_or_default();
+                let depends = units::of(texts, other, &text) == Unit::Problem
+                    && units::domain_of(texts, other, &text).as_ref() == Some(&path);
+                if depends {
+                    said.extend(of_text(texts, other, &text).into_iter().filter(|(file, _)| file == other));
+                }
+            }
+        }
+        said.entry(path.clone()).or_default();
+        // Of files that nothing was said about before, silence is no news.
+        said.retain(|file, list| *file == path || !list.is_empty() || self.files.contains(file));
+        for (file, list) in &said {
+            if list.is_empty() {
+                self.files.remove(file)
+            } else {
+                self.files.insert(file.clone())
+            };
+        }
+        let publish = |(file, diagnostics): (PathBuf, Vec<Shown>)| {
+            Some(PublishDiagnosticsParams { uri: uri_of(&file)?, diagnostics, version: None })
+        };
+        said.into_iter().filter_map(publish).collect()
+    }
+
+    /// Nothing is said any more about a text that was closed.
+    pub fn forget(&mut self, uri: &Uri) -> PublishDiagnosticsParams {
+        self.files.remove(&path_of(uri));
+        PublishDiagnosticsParams { uri: uri.clone(), diagnostics: Vec::new(), version: None }
+    }
+}
+
+/// What is to be said about a text and what it is a part of, by file.
+fn of_text(texts: &Texts, path: &Path, text: &str) -> BTreeMap<PathBuf, Vec<Shown>> {
+    match units::of(texts, path, text) {
+        Unit::Folder(folder) => of_folder(texts, &folder),
+        Unit::Other => BTreeMap::new(),
+        Unit::Domain => match units::source(texts, path) {
+            Some(domain) => by_file(&descry_planner::check(&domain, None)),
+            None => BTreeMap::new(),
+        },
+        Unit::Problem => of_problem(texts, path, text),
+        Unit::Plan => {
+            let source = descry_planner::Source::new(path.display().to_string(), text);
+            Plan::read(&source).err().map(|findings| by_file(&findings)).unwrap_or_default()
+        }
+    }
+}
+
+/// A problem with its domain; where there is none to be found, what can be said without.
+fn of_problem(texts: &Texts, path: &Path, text: &str) -> BTreeMap<PathBuf, Vec<Shown>> {
+    let source = descry_planner::Source::new(path.display().to_string(), text);
+    let domain = units::domain_of(texts, path, text).and_then(|domain| units::source(texts, &domain));
+    let Some(domain) = domain else {
+        let mut list = Vec::new();
+        let mut symbols = Symbols::default();
+        let problem = parse::problem(text, 0, &mut symbols, &mut list);
+        if let Some(name) = problem.domain {
+            let text =
+                format!("no domain `{}` was found beside this problem or above", symbols.name(name.symbol));
+            let finding = Diagnostic::warning("no-domain", text, name.span, "this domain");
+            list.push(finding.with_help("only what needs no domain is checked"));
+        }
+        return by_file(&Findings { sources: vec![source], list });
+    };
+    by_file(&descry_planner::check(&domain, Some(&source)))
+}
+
+/// The whole folder of a domain: what `descry check DIR` says.
+fn of_folder(texts: &Texts, folder: &Path) -> BTreeMap<PathBuf, Vec<Shown>> {
+    let files = units::files(texts, folder);
+    let mut all: BTreeMap<PathBuf, Vec<Shown>> =
+        files.values().map(|(name, _)| (PathBuf::from(name), Vec::new())).collect();
+    let loaded = from_files(files.clone(), Some(folder.to_path_buf()));
+    match crate::findings::of_folder(loaded) {
+        Ok((findings, _)) => {
+            let mut said = by_file(&findings);
+            // Beside a fault of `domain.toml` those of the PDDL are worth their place.
+            if findings.has_errors()
+                && let Some(domain) = units::source(texts, &folder.join("domain.pddl"))
+            {
+                said.entry(folder.join("domain.pddl")).or_insert_with(|| {
+                    by_file(&descry_planner::check(&domain, None)).into_values().flatten().collect()
+                });
+            }
+            all.extend(said);
+        }
+        Err(error) => {
+            let (file, at, said) = of_error(folder, &files, &error);
+            let text = files.values().find(|(name, _)| Path::new(name) == file).map_or("", |(_, text)| text);
+            let finding = Diagnostic::error("unreadable", said, at, "");
+            all.entry(file).or_default().push(shown(&finding, text, None));
+            if let Some(domain) = units::source(texts, &folder.join("domain.pddl")) {
+                for (file, said) in by_file(&descry_planner::check(&domain, None)) {
+                    all.entry(file).or_default().extend(said);
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Where an error is that is no finding: its file, the place in it, and what is said.
+fn of_error(
+    folder: &Path,
+    files: &descry_domains::load::Files,
+    error: &LoadError,
+) -> (PathBuf, Span, String) {
+    let whole = |path: &str| (PathBuf::from(path), Span::default());
+    let first = folder.join("domain.toml");
+    match error {
+        LoadError::Toml { path, drawn } => {
+            let text = files.values().find(|(name, _)| name == path).map_or("", |(_, text)| text);
+            let said: Vec<&str> = drawn
+                .lines()
+                .filter(|line| !line.contains('|') && !line.starts_with("TOML parse error"))
+                .collect();
+            (PathBuf::from(path), toml_place(text, drawn), said.join("\n").trim().to_string())
+        }
+        LoadError::File { path, because, expected } => {
+            let (file, span) = if files.values().any(|(name, _)| name == path) {
+                whole(path)
+            } else {
+                (first, Span::default())
+            };
+            (file, span, format!("{path}: {because}\nexpected: {expected}"))
+        }
+        other => (first, Span::default(), other.to_string()),
+    }
+}
+
+/// The place that `TOML parse error at line L, column C` names: to the end of that line.
+fn toml_place(text: &str, drawn: &str) -> Span {
+    let number = |before: &str| {
+        let (_, rest) = drawn.split_once(before)?;
+        rest.split(|c: char| !c.is_ascii_digit()).next()?.parse::<usize>().ok()
+    };
+    let (line, column) = (number("at line ").unwrap_or(1).max(1), number("column ").unwrap_or(1).max(1));
+    let start: usize = text.split_inclusive('\n').take(line - 1).map(str::len).sum();
+    let rest = text[start..].lines().next().unwrap_or_default();
+    let from = start + rest.chars().take(column - 1).map(char::len_utf8).sum::<usize>();
+    Span { source: 0, start: from as u32, end: (start + rest.len()).max(from) as u32 }
+}
+
+/// Findings by the file that they are about.
+fn by_file(findings: &Findings) -> BTreeMap<PathBuf, Vec<Shown>> {
+    let mut all: BTreeMap<PathBuf, Vec<Shown>> =
+        findings.sources.iter().map(|source| (PathBuf::from(&source.name), Vec::new())).collect();
+    for finding in &findings.list {
+        let at = finding.labels.first().map_or(0, |label| label.span.source as usize);
+        let Some(source) = findings.sources.get(at) else { continue };
+        let said = shown(finding, &source.text, Some(findings));
+        all.entry(PathBuf::from(&source.name)).or_default().push(said);
+    }
+    all
+}
+
+/// A finding as an editor shows it.
+fn shown(finding: &Diagnostic, text: &str, all: Option<&Findings>) -> Shown {
+    let first = finding.labels.first();
+    let range = Lines::of(text).range(first.map_or(Span::default(), |label| label.span));
+    let mut message = finding.message.clone();
+    if let Some(label) = first.filter(|label| !matches!(label.text.as_str(), "" | "here")) {
+        message += &format!("\n{}", label.text);
+    }
+    if let Some(help) = &finding.help {
+        message += &format!("\nhelp: {help}");
+    }
+    let related = |label: &descry_planner::Label| {
+        let source = all?.sources.get(label.span.source as usize)?;
+        let range = Lines::of(&source.text).range(label.span);
+        let location = Location { uri: uri_of(Path::new(&source.name))?, range };
+        Some(DiagnosticRelatedInformation { location, message: label.text.clone() })
+    };
+    let related: Vec<_> = finding.labels.iter().skip(1).filter_map(related).collect();
+    Shown {
+        range,
+        severity: Some(match finding.severity {
+            Severity::Error => DiagnosticSeverity::ERROR,
+            Severity::Warning => DiagnosticSeverity::WARNING,
+        }),
+        code: Some(NumberOrString::String(finding.code.into())),
+        source: Some("descry".into()),
+        message,
+        related_information: (!related.is_empty()).then_some(related),
+        ..Shown::default()
+    }
+}

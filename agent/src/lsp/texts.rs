@@ -1,0 +1,187 @@
+//! The texts that an editor has open, and positions in them.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use descry_planner::Span;
+use lsp_types::{Position, Range, TextDocumentContentChangeEvent, Uri};
+
+/// Files longer than this are not looked into, bytes.
+const MOST_BYTES: u64 = 16 << 20;
+
+/// What is open; everything else is read from the disk.
+#[derive(Default)]
+pub struct Texts {
+    open: HashMap<PathBuf, String>,
+}
+
+impl Texts {
+    /// A text was opened.
+    pub fn open(&mut self, uri: &Uri, text: String) {
+        self.open.insert(path_of(uri), text);
+    }
+
+    /// A text was changed: all of it, or a part.
+    pub fn change(&mut self, uri: &Uri, change: TextDocumentContentChangeEvent) {
+        let text = self.open.entry(path_of(uri)).or_default();
+        match change.range {
+            None => *text = change.text,
+            Some(range) => {
+                let (from, to) = (offset(text, range.start), offset(text, range.end));
+                text.replace_range(from..to.max(from), &change.text);
+            }
+        }
+    }
+
+    /// A text was closed: what the disk has counts again.
+    pub fn close(&mut self, uri: &Uri) {
+        self.open.remove(&path_of(uri));
+    }
+
+    /// The text of a file, open or on the disk.
+    pub fn text(&self, path: &Path) -> Option<String> {
+        if let Some(text) = self.open.get(path) {
+            return Some(text.clone());
+        }
+        let is_small = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() <= MOST_BYTES);
+        is_small.then(|| std::fs::read_to_string(path).ok()).flatten()
+    }
+
+    /// Whether there is such a file.
+    pub fn has(&self, path: &Path) -> bool {
+        self.open.contains_key(path) || path.is_file()
+    }
+
+    /// The paths of what is open.
+    pub fn paths(&self) -> impl Iterator<Item = &PathBuf> {
+        self.open.keys()
+    }
+
+    /// The files of a folder that end so, open or on the disk, in the order of their names.
+    pub fn of_folder(&self, folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
+        let on_disk = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        let open = self.open.keys().filter(|path| path.parent() == Some(folder)).cloned();
+        let is_one =
+            |path: &PathBuf| path.extension().is_some_and(|e| endings.iter().any(|ending| e == *ending));
+        let mut all: Vec<PathBuf> = on_disk.chain(open).filter(is_one).collect();
+        all.sort();
+        all.dedup();
+        all
+    }
+}
+
+/// The path that an address means; of one that means no file, its text.
+pub fn path_of(uri: &Uri) -> PathBuf {
+    let text = uri.as_str();
+    let Some(path) = text.strip_prefix("file://") else { return PathBuf::from(text) };
+    let bytes = path.as_bytes();
+    let mut decoded = Vec::with_capacity(bytes.len());
+    let mut at = 0;
+    while let Some(&byte) = bytes.get(at) {
+        let hex = path.get(at + 1..at + 3).and_then(|hex| u8::from_str_radix(hex, 16).ok());
+        match (byte, hex) {
+            (b'%', Some(value)) => {
+                decoded.push(value);
+                at += 3;
+            }
+            _ => {
+                decoded.push(byte);
+                at += 1;
+            }
+        }
+    }
+    PathBuf::from(String::from_utf8_lossy(&decoded).into_owned())
+}
+
+/// The address of a path; none where it makes none.
+pub fn uri_of(path: &Path) -> Option<Uri> {
+    let text = path.to_str()?;
+    if !text.starts_with('/') {
+        return Uri::from_str(text).ok();
+    }
+    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"/-._~".contains(&byte);
+    let encoded: String = text
+        .bytes()
+        .map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") })
+        .collect();
+    Uri::from_str(&format!("file://{encoded}")).ok()
+}
+
+/// The byte at a position; columns count units of UTF-16. Beyond a line's end it is that end.
+pub fn offset(text: &str, position: Position) -> usize {
+    let mut start = 0;
+    for _ in 0..position.line {
+        match text[start..].find('\n') {
+            Some(end) => start += end + 1,
+            None => return text.len(),
+        }
+    }
+    let line = text[start..].split('\n').next().unwrap_or_default();
+    let mut units = 0;
+    for (at, letter) in line.char_indices() {
+        if units >= position.character as usize {
+            return start + at;
+        }
+        units += letter.len_utf16();
+    }
+    start + line.len()
+}
+
+/// Positions in a text, where many are asked for.
+pub struct Lines<'a> {
+    text: &'a str,
+    starts: Vec<usize>,
+}
+
+impl<'a> Lines<'a> {
+    /// Of a text.
+    pub fn of(text: &'a str) -> Self {
+        let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+        Lines { text, starts }
+    }
+
+    /// The position of a byte.
+    pub fn position(&self, at: usize) -> Position {
+        let at = at.min(self.text.len());
+        let line = self.starts.partition_point(|&start| start <= at) - 1;
+        let before = self.text.get(self.starts[line]..at).unwrap_or_default();
+        Position::new(line as u32, before.encode_utf16().count() as u32)
+    }
+
+    /// The range of a span.
+    pub fn range(&self, span: Span) -> Range {
+        Range::new(self.position(span.start as usize), self.position(span.end as usize))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_count_units_of_utf_16() {
+        let text = "ab\n𝄞ü c\r\n\nlast";
+        let check = |line: u32, character: u32, at: usize| {
+            assert_eq!(offset(text, Position::new(line, character)), at, "{line}:{character}");
+        };
+        check(0, 0, 0);
+        check(0, 9, 2);
+        check(1, 0, 3);
+        check(1, 2, 7);
+        check(1, 3, 9);
+        check(3, 4, text.len());
+        check(9, 0, text.len());
+        for at in text.char_indices().map(|(at, _)| at) {
+            assert_eq!(offset(text, Lines::of(text).position(at)), at);
+        }
+    }
+
+    #[test]
+    fn addresses_and_paths_are_the_same() {
+        for path in ["/a/b.pddl", "/with blank/ü%20.pddl"] {
+            let uri = uri_of(Path::new(path)).expect("an address");
+            assert_eq!(path_of(&uri), Path::new(path), "{}", uri.as_str());
+        }
+    }
+}

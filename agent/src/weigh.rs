@@ -1,0 +1,374 @@
+//! What a plan was weighed against: the same steps with other objects, what each would take and gain, by the answers of the calls
+//! that the plan itself rests on. It is kept beside the plan, so that it can be told later why it was this one.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use descry_domains::abilities::searching::doubt::Doubt;
+use descry_domains::answer::Ended;
+use descry_domains::situation::KnownSurface;
+use descry_domains::world::Round;
+use descry_memory::{Blob, Form};
+use descry_planner::semantics::{Binding, Changes, Pending};
+use descry_planner::task::{Action, Comparison, Effect, FunctionId, ObjectId};
+use descry_planner::{Plan, Semantics, State, Step};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::exit::CommandError;
+
+/// The blob under which it is kept beside the event of a plan.
+pub const BLOB: &str = "weighed";
+/// More combinations of objects than this are not tried.
+const MOST_TRIED: usize = 600;
+/// So many others are kept.
+pub const MOST_KEPT: usize = 12;
+/// Plans with more steps than this until something is gained are not compared.
+const MOST_STEPS: usize = 6;
+/// Less than this is no gain.
+const GAINED: f64 = 1e-6;
+
+/// What a plan was weighed against.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Weighed {
+    /// The numbers that count, before the plan and as it expects them in the end.
+    pub numbers: Vec<Expected>,
+    /// The plan until it first gains something.
+    pub chosen: Option<Way>,
+    /// Others that could have been taken, those that gain most a second first.
+    pub others: Vec<Way>,
+    /// How many could have been taken in all, these among them.
+    pub open: usize,
+}
+
+/// A number of the domain.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Expected {
+    /// As it is written in PDDL.
+    pub name: String,
+    /// Its value now.
+    pub now: f64,
+    /// Its value after the plan, if all goes as expected.
+    pub then: f64,
+}
+
+/// Steps, and what they bring.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Way {
+    /// The calls.
+    pub steps: Vec<String>,
+    /// What they count for, one after the other, seconds.
+    pub takes_s: f64,
+    /// By how much they bring the numbers that count nearer to what is wanted, together.
+    pub gains: f64,
+}
+
+impl Way {
+    /// What it gains a second.
+    pub fn rate(&self) -> f64 {
+        self.gains / self.takes_s.max(1e-9)
+    }
+}
+
+/// Something that is in doubt.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct InDoubt {
+    /// What it is about, as people call it.
+    pub about: String,
+    /// The probability that hangs on it, 0 to 1.
+    pub left: f64,
+    /// What was seen of where it may be.
+    pub seen: Vec<Seen>,
+}
+
+/// How much of a place was seen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Seen {
+    /// The place, as people call it.
+    pub on: String,
+    /// The share of it where nothing could stand unseen, 0 to 1; none while nothing is known of it.
+    pub share: Option<f64>,
+    /// From so many places.
+    pub places: usize,
+}
+
+/// What the end of a run rests on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rests {
+    /// Why there was nothing more to do: a word, and what was said.
+    pub ended: String,
+    /// See [`Ended`].
+    pub said: String,
+    /// What is in doubt in the end.
+    pub in_doubt: Vec<InDoubt>,
+}
+
+/// The kind under which that is recorded.
+pub const RESTS: &str = "rests-on";
+
+/// It as it is recorded.
+pub fn rests(round: &Round, ended: &Ended) -> Rests {
+    let (ended, said) = match ended {
+        Ended::Reached => ("reached", String::new()),
+        Ended::NoPlan(why) => ("no plan", why.clone()),
+        Ended::Undecided(why) => ("undecided", why.clone()),
+        Ended::Limit(why) => ("limit", why.clone()),
+        Ended::Failed(why) => ("failed", why.clone()),
+    };
+    Rests { ended: ended.into(), said, in_doubt: in_doubt(round) }
+}
+
+/// What was weighed, as it is kept beside the event.
+///
+/// # Errors
+/// [`CommandError::Bug`] if it cannot be written as JSON.
+pub fn blob(weighed: &Weighed) -> Result<Blob<'static>, CommandError> {
+    let data = serde_json::to_vec(weighed).map_err(|e| CommandError::Bug(e.to_string()))?;
+    Ok(Blob { name: BLOB.into(), form: Form::Bytes, layout: Value::Null, data: data.into() })
+}
+
+/// Weighs a plan against others; `goal` says which numbers count.
+pub fn weigh(round: &Round, plan: &Plan, goal: &str) -> Weighed {
+    Scale::new(round, plan, goal).and_then(|scale| scale.weigh(plan)).unwrap_or_default()
+}
+
+/// What is in doubt in a round about what was asked for.
+fn in_doubt(round: &Round) -> Vec<InDoubt> {
+    let s = &round.situation;
+    let places = |on: usize| s.observed.iter().filter(|look| look.1 == on).count();
+    let told = |about: &str, doubt: &Doubt| {
+        let of = |(on, surface): (usize, &KnownSurface)| {
+            let (share, places) = (doubt.share_seen(on), places(on));
+            (share.is_some() || places > 0).then(|| Seen { on: surface.name.clone(), share, places })
+        };
+        let seen = s.surfaces.iter().enumerate().filter_map(of).collect();
+        InDoubt { about: about.into(), left: doubt.remaining().max(0.0), seen }
+    };
+    // What was seen of a kind is no longer looked for.
+    let things = s.things.iter().enumerate().filter(|(_, t)| t.track.is_none());
+    let things = things.map(|(n, t)| told(&t.name, s.doubt_about(n)));
+    let kinds = s.kinds.iter().enumerate().map(|(n, t)| told(&t.name, s.doubt_of(n)));
+    let surfaces = s.asked.iter().map(|&on| told(&s.surfaces[on].name, s.doubt_on(on)));
+    things.chain(kinds).chain(surfaces).collect()
+}
+
+/// The numbers that count in a round, and their values now.
+struct Scale<'r> {
+    semantics: Semantics<'r>,
+    state: State,
+    /// Functions of the task that count, each with whether less of it is wanted.
+    counting: Vec<(FunctionId, bool)>,
+}
+
+impl<'r> Scale<'r> {
+    /// The numbers that the goal speaks of; else those that the steps ask for.
+    fn new(round: &'r Round, plan: &Plan, goal: &str) -> Option<Self> {
+        let semantics = Semantics::new(&round.task, &round.attachments);
+        let state = semantics.initial().ok()?;
+        let named = |text: &str| -> Vec<(FunctionId, bool)> {
+            let words = words(text);
+            let functions = (0..).zip(&round.task.functions).filter(|(_, f)| f.result.is_none());
+            let named = functions.filter(|(_, f)| words.contains(&f.name.as_str()));
+            named.map(|(n, f)| (FunctionId(n), less_is_wanted(&words, &f.name))).collect()
+        };
+        let mut counting = named(goal);
+        if counting.is_empty() {
+            let asked = |step: &Step| {
+                let (action, binding) = semantics.bind(step).ok()?;
+                Some(semantics.condition_text(&round.task.action(action).condition.start, &binding))
+            };
+            counting = named(&plan.steps.iter().filter_map(asked).collect::<Vec<_>>().join(" "));
+        }
+        Some(Scale { semantics, state, counting })
+    }
+
+    /// The numbers that count in a state, by name, each with whether less of it is wanted.
+    fn numbers(&self, state: &State) -> BTreeMap<String, (f64, bool)> {
+        let task = self.semantics.task;
+        let of = |&(id, less): &(FunctionId, bool)| {
+            let name = &task.function(id).name;
+            let named = state.values(id).map(move |(arguments, value)| {
+                let arguments: String =
+                    arguments.iter().map(|&a| format!(" {}", task.object(a).name)).collect();
+                (format!("({name}{arguments})"), (value, less))
+            });
+            named.collect::<Vec<_>>()
+        };
+        self.counting.iter().flat_map(of).collect()
+    }
+
+    /// By how much a number comes nearer to what is wanted.
+    fn gain(now: f64, then: f64, less: bool) -> f64 {
+        (if less { now - then } else { then - now }).max(0.0)
+    }
+
+    /// Steps, one after the other: what they count for, seconds, and the state then; none where they cannot be taken.
+    fn after(&self, steps: &[Step]) -> Option<(f64, State)> {
+        let mut state = self.state.clone();
+        let mut takes_s = 0.0;
+        for step in steps {
+            takes_s += self.apply(&mut state, step)?;
+        }
+        Some((takes_s, state))
+    }
+
+    /// Applies a step; returns what it counts for, seconds.
+    fn apply(&self, state: &mut State, step: &Step) -> Option<f64> {
+        let semantics = &self.semantics;
+        let (id, mut binding) = semantics.bind(step).ok()?;
+        let action = semantics.task.action(id);
+        let takes_s = match &action.duration {
+            None => 0.0,
+            Some(bounds) => {
+                let bound = bounds.iter().find(|b| b.comparison == Comparison::Equal)?;
+                semantics.number(state, &bound.value, &binding).ok()?.filter(|s| s.is_finite())?
+            }
+        };
+        binding.duration_s = action.is_durative().then_some(takes_s);
+        if !semantics.holds(state, &action.condition.start, &mut binding).ok()? {
+            return None;
+        }
+        let pending = semantics.remember(state, &action.effects.end, &mut binding).ok()?;
+        self.change(state, &action.effects.start, &mut binding, None)?;
+        for condition in [&action.condition.over_all, &action.condition.end] {
+            semantics.holds(state, condition, &mut binding).ok().filter(|holds| *holds)?;
+        }
+        self.change(state, &action.effects.end, &mut binding, Some(&pending))?;
+        Some(takes_s)
+    }
+
+    /// Makes changes; none where they contradict each other.
+    fn change(
+        &self,
+        state: &mut State,
+        effects: &[Effect],
+        binding: &mut Binding,
+        pending: Option<&Pending>,
+    ) -> Option<()> {
+        let mut changes = Changes::default();
+        self.semantics.changes(state, effects, binding, pending, &mut changes).ok()?.ok()?;
+        self.semantics.apply(state, &changes).ok()?.ok()
+    }
+
+    fn way(&self, steps: &[Step]) -> Option<Way> {
+        let (takes_s, state) = self.after(steps)?;
+        let (now, then) = (self.numbers(&self.state), self.numbers(&state));
+        let gain = |(name, (now, less)): (&String, &(f64, bool))| {
+            then.get(name).map_or(0.0, |(then, _)| Self::gain(*now, *then, *less))
+        };
+        Some(Way { steps: steps.iter().map(call).collect(), takes_s, gains: now.iter().map(gain).sum() })
+    }
+
+    fn weigh(&self, plan: &Plan) -> Option<Weighed> {
+        let first = (1..=plan.steps.len().min(MOST_STEPS))
+            .find_map(|n| Some((n, self.way(&plan.steps[..n]).filter(|way| way.gains > GAINED)?)));
+        let (n, chosen) = first?;
+        let then = self.after(&plan.steps).map(|(_, state)| self.numbers(&state)).unwrap_or_default();
+        let expected = |(name, (now, less)): (String, (f64, bool))| {
+            let then = then.get(&name)?.0;
+            (Self::gain(now, then, less) > GAINED).then_some(Expected { name, now, then })
+        };
+        let numbers = self.numbers(&self.state).into_iter().filter_map(expected).collect();
+        let others = self.others(&plan.steps[..n], &chosen);
+        let open = others.len() + 1;
+        Some(Weighed { numbers, chosen: Some(chosen), others: kept(others), open })
+    }
+
+    /// The same steps with other objects, with what has to be done before. The last step that has a choice is varied.
+    fn others(&self, steps: &[Step], chosen: &Way) -> Vec<Way> {
+        let task = self.semantics.task;
+        let choices = |step: &Step| -> Option<Vec<Arc<[ObjectId]>>> {
+            let (action, _) = self.semantics.bind(step).ok()?;
+            Some(task.action(action).parameters.iter().map(|p| Arc::clone(&p.objects)).collect())
+        };
+        let count = |all: &[Arc<[ObjectId]>]| {
+            all.iter()
+                .map(|objects| objects.len())
+                .try_fold(1_usize, usize::checked_mul)
+                .unwrap_or(usize::MAX)
+        };
+        let varied = (0..steps.len()).rev().find_map(|n| {
+            let all = choices(&steps[n])?;
+            (2..=MOST_TRIED).contains(&count(&all)).then_some((n, all))
+        });
+        let Some((at, all)) = varied else { return Vec::new() };
+        let other = |number: usize| {
+            let mut rest = number;
+            let pick = |objects: &Arc<[ObjectId]>| {
+                let object = objects[rest % objects.len()];
+                rest /= objects.len();
+                task.object(object).name.clone()
+            };
+            Step { arguments: all.iter().map(pick).collect(), ..steps[at].clone() }
+        };
+        let ways = (0..count(&all)).map(other).filter(|other| call(other) != call(&steps[at]));
+        let ways = ways.filter_map(|other| self.in_place(steps, at, &other));
+        ways.filter(|way| way.gains > GAINED && way.steps != chosen.steps).collect()
+    }
+
+    /// Steps with another in the place of one: at once, as the plan leads there, or by one step from where it begins.
+    fn in_place(&self, steps: &[Step], at: usize, other: &Step) -> Option<Way> {
+        let old = &steps[at];
+        let changed: Vec<(&String, &String)> =
+            old.arguments.iter().zip(&other.arguments).filter(|(old, new)| old != new).collect();
+        let put = |name: &String| {
+            changed
+                .iter()
+                .find(|(old, _)| *old == name)
+                .map_or_else(|| name.clone(), |(_, new)| (*new).clone())
+        };
+        let same = |step: &Step| Step { arguments: step.arguments.iter().map(put).collect(), ..step.clone() };
+        let mut all: Vec<Step> = steps.iter().map(same).collect();
+        all[at] = other.clone();
+        self.way(&all[at..]).or_else(|| self.way(&all)).or_else(|| {
+            changed.iter().flat_map(|(old, new)| self.bridges(old, new, other)).find_map(|bridge| {
+                let led: Vec<Step> = std::iter::once(bridge).chain(all[at..].iter().cloned()).collect();
+                self.way(&led)
+            })
+        })
+    }
+
+    /// Steps that may lead from an object to another, for what a step is about.
+    fn bridges(&self, from: &str, to: &str, step: &Step) -> Vec<Step> {
+        let bridge = |action: &Action, more: &[&String]| {
+            let arguments = [from, to].into_iter().chain(more.iter().map(|m| m.as_str()));
+            let arguments = arguments.map(str::to_string).collect();
+            Step { start_s: None, action: action.name.clone(), arguments, duration_s: 0.0 }
+        };
+        let actions = self.semantics.task.actions.iter();
+        actions
+            .flat_map(|action| match action.parameters.len() {
+                2 => vec![bridge(action, &[])],
+                3 => step.arguments.iter().map(|a| bridge(action, &[a])).collect(),
+                _ => Vec::new(),
+            })
+            .collect()
+    }
+}
+
+/// The words of a text in PDDL.
+fn words(text: &str) -> Vec<&str> {
+    text.split(|c: char| c.is_whitespace() || "()".contains(c)).filter(|w| !w.is_empty()).collect()
+}
+
+/// Whether a goal asks for at most so much of a number.
+fn less_is_wanted(goal: &[&str], name: &str) -> bool {
+    goal.windows(2).any(|pair| matches!(pair[0], "<=" | "<") && pair[1] == name)
+}
+
+fn call(step: &Step) -> String {
+    let arguments: String = step.arguments.iter().map(|a| format!(" {a}")).collect();
+    format!("({}{arguments})", step.action)
+}
+
+/// Those that gain most a second, and of the others the quickest and the one that gains most.
+fn kept(mut all: Vec<Way>) -> Vec<Way> {
+    all.sort_by(|a, b| b.rate().total_cmp(&a.rate()).then_with(|| a.steps.cmp(&b.steps)));
+    let rest = all.split_off(MOST_KEPT.min(all.len()));
+    let quickest = rest.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s)).cloned();
+    let most = rest.iter().max_by(|a, b| a.gains.total_cmp(&b.gains)).cloned();
+    all.extend(quickest.into_iter().chain(most));
+    all.dedup();
+    all
+}

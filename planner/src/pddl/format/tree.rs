@@ -1,0 +1,106 @@
+//! Lists, words and comments as they stand in a text, with the line breaks before each.
+
+/// What stands in a text.
+#[derive(Debug, Clone)]
+pub struct Node<'a> {
+    /// Line breaks before it.
+    pub breaks: usize,
+    /// Where there are none, blanks before it.
+    pub blanks: usize,
+    /// What it is.
+    pub what: What<'a>,
+}
+
+/// See [`Node`].
+#[derive(Debug, Clone)]
+pub enum What<'a> {
+    /// Anything between delimiters.
+    Word(&'a str),
+    /// From its semicolon to the end of the line, and the column at which it begins.
+    Comment(&'a str, usize),
+    /// What opens it, what stands in it, what closes it.
+    List(char, Vec<Node<'a>>, char),
+}
+
+impl<'a> Node<'a> {
+    /// The word that it is.
+    pub fn word(&self) -> Option<&'a str> {
+        match self.what {
+            What::Word(word) => Some(word),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a comment.
+    pub fn is_comment(&self) -> bool {
+        matches!(self.what, What::Comment(..))
+    }
+
+    /// Whether it is a list.
+    pub fn is_list(&self) -> bool {
+        matches!(self.what, What::List(..))
+    }
+}
+
+/// Reads a text whose parentheses fit.
+pub fn read(text: &str) -> Vec<Node<'_>> {
+    // The outermost list is the text itself.
+    let mut open: Vec<(Gap, char, Vec<Node<'_>>)> = vec![(Gap::default(), '(', Vec::new())];
+    let (mut at, mut gap, mut line_start) =
+        (if text.starts_with('\u{feff}') { 3 } else { 0 }, Gap::default(), 0);
+    let bytes = text.as_bytes();
+    while let Some(&byte) = bytes.get(at) {
+        let end = match byte {
+            b'\n' => {
+                gap = Gap { breaks: gap.breaks + 1, blanks: 0 };
+                line_start = at + 1;
+                at + 1
+            }
+            b' ' | b'\t' | b'\r' | 0x0b | 0x0c => {
+                gap.blanks += 1;
+                at + 1
+            }
+            b'(' | b'[' => {
+                open.push((std::mem::take(&mut gap), char::from(byte), Vec::new()));
+                at + 1
+            }
+            b')' | b']' => {
+                gap = Gap::default();
+                if let Some((gap, sign, children)) = open.pop() {
+                    put(&mut open, gap, What::List(sign, children, char::from(byte)));
+                }
+                at + 1
+            }
+            b';' => {
+                let end = text[at..].find('\n').map_or(text.len(), |n| at + n);
+                let column = text[line_start..at].chars().count();
+                let what = What::Comment(text[at..end].trim_end(), column);
+                put(&mut open, std::mem::take(&mut gap), what);
+                end
+            }
+            _ => {
+                let delimiter = |byte: &u8| byte.is_ascii_whitespace() || b"\x0b()[];?".contains(byte);
+                let rest = &bytes[at + 1..];
+                let end = at + 1 + rest.iter().position(delimiter).unwrap_or(rest.len());
+                let what = What::Word(&text[at..end]);
+                put(&mut open, std::mem::take(&mut gap), what);
+                end
+            }
+        };
+        at = end;
+    }
+    open.into_iter().next().map(|(_, _, children)| children).unwrap_or_default()
+}
+
+fn put<'a>(open: &mut [(Gap, char, Vec<Node<'a>>)], Gap { breaks, blanks }: Gap, what: What<'a>) {
+    if let Some((_, _, children)) = open.last_mut() {
+        children.push(Node { breaks, blanks, what });
+    }
+}
+
+/// What stands between two nodes.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gap {
+    breaks: usize,
+    blanks: usize,
+}

@@ -1,0 +1,97 @@
+//! A plan laid out: a step a line, times and durations in three digits where that is exact, comments where they stand.
+
+use super::{Plan, Reader, seconds};
+use crate::diagnostic::{Findings, Source};
+
+impl Plan {
+    /// Lays a plan out. Steps keep their order, and reading it gives the same plan.
+    ///
+    /// # Errors
+    /// Every line that is no step: such a text is not touched.
+    pub fn format(source: &Source) -> Result<String, Findings> {
+        Plan::read(source)?;
+        let mut reader = Reader { text: &source.text, at: 0, findings: Vec::new() };
+        let mut out = String::new();
+        loop {
+            let rest = reader.rest();
+            let blanks = &rest[..rest.len() - rest.trim_start().len()];
+            let breaks = blanks.matches('\n').count();
+            reader.at += blanks.len();
+            let rest = reader.rest();
+            if rest.is_empty() {
+                break;
+            }
+            let is_comment = rest.starts_with(';');
+            if !out.is_empty() {
+                out += match (breaks, is_comment) {
+                    (0, true) => "  ",
+                    (0 | 1, _) => "\n",
+                    _ => "\n\n",
+                };
+            }
+            let from = reader.at;
+            if is_comment {
+                reader.at += rest.find('\n').unwrap_or(rest.len());
+                out += source.text[from..reader.at].trim_end();
+            } else if reader.try_step().is_ok() {
+                out += &step(&source.text[from..reader.at]);
+            } else {
+                // It has been read once: this cannot be.
+                return Ok(source.text.clone());
+            }
+        }
+        if !out.is_empty() {
+            out.push('\n');
+        }
+        Ok(out)
+    }
+}
+
+/// A step as it is written, with one blank where some are.
+fn step(text: &str) -> String {
+    let (before, rest) = text.split_once('(').unwrap_or(("", text));
+    let (inside, after) = rest.split_once(')').unwrap_or((rest, ""));
+    let time =
+        before.split_once(':').map(|(time, _)| format!("{}: ", exact(time.trim()))).unwrap_or_default();
+    let call = inside.split_whitespace().collect::<Vec<_>>().join(" ");
+    let inside = after.trim().trim_start_matches('[').trim_end_matches(']').trim();
+    let duration = if inside.is_empty() { String::new() } else { format!(" [{}]", exact(inside)) };
+    format!("{time}({call}){duration}")
+}
+
+/// A number in the digits of plans where these say all of it; else as it is written.
+fn exact(text: &str) -> String {
+    match text.parse::<f64>() {
+        Ok(value) if seconds(value).parse() == Ok(value) => seconds(value),
+        _ => text.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plans_are_laid_out_and_read_as_before() {
+        for (text, expected) in [
+            ("", ""),
+            ("(move  a b)\n\n\n\n( MOVE b c )\n;cost = 2\n", "(move a b)\n\n(MOVE b c)\n;cost = 2\n"),
+            ("0:(a)[1](b)", ""),
+            (
+                "0 : (a x) [ 2 ] ; first\n;; second\n1.00000001: (b)[D:1; C:3]",
+                "0.000: (a x) [2.000]  ; first\n;; second\n1.00000001: (b) [D:1; C:3]\n",
+            ),
+            ("0.5: (b) [1] 0.25: (a) [1]", "0.500: (b) [1.000]\n0.250: (a) [1.000]\n"),
+        ] {
+            let source = Source::new("plan", text);
+            let Ok(laid_out) = Plan::format(&source) else {
+                assert!(expected.is_empty() && Plan::read(&source).is_err(), "{text}");
+                continue;
+            };
+            assert_eq!(laid_out, expected);
+            let again = Source::new("plan", laid_out.as_str());
+            assert_eq!(Plan::format(&again).ok().as_deref(), Some(laid_out.as_str()));
+            assert_eq!(Plan::read(&source).ok(), Plan::read(&again).ok());
+        }
+    }
+}

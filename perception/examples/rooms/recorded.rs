@@ -86,7 +86,7 @@ fn sheet(map: &RoomMap, clouds: &[Station], scale: f64) -> Sheet {
     let mut sheet = Sheet::around(near, scale);
     let poses = vec![Isometry2::identity(); clouds.len()];
     sheet.stations(clouds, &poses, f64::INFINITY);
-    sheet.walls(&map.walls);
+    sheet.upright(map);
     sheet.levels(map);
     sheet
 }

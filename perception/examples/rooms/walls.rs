@@ -105,7 +105,7 @@ fn draw(
     if let Some(grid) = &map.grid {
         walls.grid(grid);
     }
-    walls.walls(&map.walls);
+    walls.upright(&map);
     walls.levels(&map);
     write(dir, "map.svg", &[("walls, tables and open floor", walls)])
 }

@@ -35,7 +35,7 @@ fn run(seed: u64, out: Option<&Path>, part: Option<&str>) -> Result<(), String> 
         pillars::print(seed, out)?;
     }
     if is_asked("variations") {
-        variations::print(seed)?;
+        variations::print(seed, out)?;
     }
     if is_asked("recorded") {
         recorded::rooms(out)?;

@@ -89,6 +89,8 @@ const LEVELS: u32 = 3;
 const NARROW: f64 = 1.0;
 /// What lies nearer to a wider wall is of it, in edges of cells.
 const OF_WALL: f64 = 1.5;
+/// What is measured of a surface is blurred to each side, in tolerances.
+const BLURRED: f64 = 3.0;
 /// A round wall stands for so many planes at least.
 const PLANES: usize = 3;
 /// Circles that are tried at most, and steps of least squares.
@@ -223,6 +225,11 @@ fn search(
     while let Some(circle) = best(columns, &group, from_inside, options) {
         group.retain(|c| !circle.on.contains(c));
         let cylinder = told(columns, &circle, &group, from_inside, options);
+        if cylinder.is_some() {
+            // What is blurred before and behind it is of it.
+            let miss_m = |c: &usize| (columns[*c].at - circle.middle).norm() - circle.radius_m;
+            group.retain(|c| miss_m(c).abs() > BLURRED * options.tolerance_m);
+        }
         found.extend(cylinder.filter(|c| c.heights_m.1 - c.heights_m.0 >= least_height_m));
     }
 }
@@ -319,7 +326,7 @@ fn told(
         heights_m = (heights_m.0.min(column.heights_m.0), heights_m.1.max(column.heights_m.1));
     }
     // A pillar is solid: what was seen within is against it. Of a round wall only what is seen right before or behind it is.
-    let reach_m = 3.0 * options.tolerance_m;
+    let reach_m = BLURRED * options.tolerance_m;
     let is_beside = |c: &Column| {
         let miss_m = (c.at - middle).norm() - radius_m;
         miss_m < reach_m && (!from_inside || miss_m > -reach_m)

@@ -1,7 +1,7 @@
 //! How well a map's walls agree with a building.
 
 use super::{Building, CAMERA_HEIGHT_M, Opening};
-use descry_perception::mapping::{Station, Survey, UprightCylinder, Wall};
+use descry_perception::mapping::{RoomMap, Station, Survey, UprightCylinder};
 use descry_perception::nalgebra::{Isometry2, Point2, Rotation2, Vector2};
 
 /// Heights at which something is in a body's way, metres.
@@ -67,18 +67,17 @@ fn between(a: &(Point2<f64>, Point2<f64>), b: &(Point2<f64>, Point2<f64>)) -> f6
     u.perp(&v).abs().asin()
 }
 
-/// Holds walls to a building; they agree if nearer than `within_m`. A door is looked for where the stop of the drive nearest to it has it: `poses` and
+/// Holds all that is upright on a map to a building; they agree if nearer than `within_m`. A door is looked for where the stop of the drive nearest to it has it: `poses` and
 /// `truths` are of the same stops.
 pub fn score(
-    walls: &[Wall],
+    map: &RoomMap,
     building: &Building,
     within_m: f64,
     poses: &[Isometry2<f64>],
     truths: &[Isometry2<f64>],
 ) -> Score {
     const ALIKE_RAD: f64 = 0.3;
-    let found: Vec<(Point2<f64>, Point2<f64>)> =
-        walls.iter().flat_map(|w| w.feet().collect::<Vec<_>>()).collect();
+    let found: Vec<(Point2<f64>, Point2<f64>)> = map.feet().collect();
     let panels: Vec<_> = building.panels.iter().map(|p| (p.a, p.b)).collect();
     let (mut right, mut all, mut angle, mut offset) = (0.0, 0.0, 0.0, 0.0);
     for foot in &found {
@@ -126,7 +125,7 @@ pub fn score(
         angle_deg: angle / f64::max(right, 1.0),
         offset_m: offset / f64::max(right, 1.0),
         openings: (kept.count(), building.openings.len()),
-        walls: walls.len(),
+        walls: map.walls.len(),
     }
 }
 

@@ -31,7 +31,7 @@ pub use frontier::{ExploreOptions, Frontier, NextPose, frontiers, next_poses, st
 pub use fuse::FuseOptions;
 pub use graph::{Edge, GraphError, PoseGraph, Settled};
 pub use orientation::{OrientationOptions, Orientations, orientations};
-pub use outlook::{Outlook, Unseen, in_order, nearest_frontier, outlooks};
+pub use outlook::{Outlook, Unseen, nearest_frontier, outlooks};
 pub use pair::{Matcher, PairFit, RectifyOptions, chained, rectify_drive, rectify_pair};
 pub use patch::{Constraints, Fit};
 pub use room::{Level, MapOptions, RoomMap, Survey, Wall};

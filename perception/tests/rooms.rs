@@ -8,7 +8,7 @@ use corridor::{Building, CAMERA_HEIGHT_M, Rig, along, around, field_of_view, wit
 use descry_perception::mapping::{
     Cells, CellsError, ClosureOptions, ExploreOptions, FieldOfView, Fit, MapOptions, MappingError, Matcher,
     NormalOptions, PairFit, RectifyOptions, RoomMap, Station, Survey, Unseen, by_regions, chained, closures,
-    correct_drive, in_order, nearest_frontier, next_poses, outlooks, rectify_drive, rectify_pair, standable,
+    correct_drive, nearest_frontier, next_poses, outlooks, rectify_drive, rectify_pair, standable,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, Point3, Vector2, Vector3};
 use descry_perception::occupancy::Space;
@@ -360,14 +360,6 @@ fn a_few_outlooks_show_what_can_be_seen() {
         unseen.look(look);
         assert!(unseen.gain_m2(look) < 0.9 * gain_m2);
     }
-    // In the order of least time each is taken once, and no other first leads to less.
-    let order = in_order(&floor, &truths[3], &found, &options);
-    let mut sorted = order.clone();
-    sorted.sort_unstable();
-    assert_eq!(sorted, (0..found.len()).collect::<Vec<_>>());
-    let one = &found[order[0]..=order[0]];
-    assert_eq!(in_order(&floor, &truths[3], one, &options), [0]);
-    assert!(in_order(&floor, &truths[3], &[], &options).is_empty());
     let keep: Vec<Isometry2<f64>> = found.iter().rev().take(2).map(|look| look.pose).collect();
     let again = outlooks(&floor, &truths[..4], &keep, 6, &options);
     assert!(keep.iter().zip(&again).all(|(pose, look)| *pose == look.pose));

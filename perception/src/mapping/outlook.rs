@@ -94,63 +94,6 @@ pub fn outlooks(
     chosen
 }
 
-/// Looks that are put in order; more are left out.
-const MOST_IN_ORDER: usize = 12;
-/// A way that does not exist takes so long, seconds.
-const NEVER_S: f64 = 1e6;
-
-/// The order in which all of some looks are taken in least time, from where the body stands, by Held and Karp's dynamic programme: numbers of `looks`, of
-/// which those beyond the twelfth are left out. What promises little and lies on the way is taken along; a policy that goes for the best rate comes back for it.
-pub fn in_order(
-    grid: &Occupancy,
-    from: &Isometry2<f64>,
-    looks: &[Outlook],
-    options: &ExploreOptions,
-) -> Vec<usize> {
-    let looks = &looks[..looks.len().min(MOST_IN_ORDER)];
-    let n = looks.len();
-    let floor = Floor::of(grid, options.field.far_m);
-    let (metre_s, radian_s, look_s) = options.seconds;
-    let took_s = |way_m: f64, a: &Isometry2<f64>, b: &Isometry2<f64>| {
-        let turn = a.rotation.angle_to(&b.rotation).abs();
-        (metre_s * way_m + radian_s * turn + look_s).min(NEVER_S)
-    };
-    let between = |a: &Outlook| -> Vec<f64> {
-        let ways = floor.ways_m(&a.pose.translation.vector.into(), options.radius_m);
-        let way_m = |b: &Outlook| floor.way_m(&ways, &b.pose.translation.vector.into());
-        looks.iter().map(|b| took_s(way_m(b), &a.pose, &b.pose)).collect()
-    };
-    let costs_s: Vec<Vec<f64>> = looks.iter().map(between).collect();
-    // For each set of looks and the last of them: the least time, and which came before.
-    let mut least = vec![(f64::INFINITY, usize::MAX); n << n];
-    for (k, look) in looks.iter().enumerate() {
-        least[(n << k) + k] = (took_s(look.way_m, from, &look.pose), usize::MAX);
-    }
-    for set in 1..1_usize << n {
-        for last in (0..n).filter(|k| set >> k & 1 == 1) {
-            let (so_far_s, _) = least[n * set + last];
-            for next in (0..n).filter(|k| set >> k & 1 == 0) {
-                let there = &mut least[n * (set | 1 << next) + next];
-                let after_s = so_far_s + costs_s[last][next];
-                if after_s < there.0 {
-                    *there = (after_s, last);
-                }
-            }
-        }
-    }
-    let mut set = (1 << n) - 1;
-    let mut order: Vec<usize> = Vec::new();
-    let mut last = (0..n).min_by(|&a, &b| least[n * set + a].0.total_cmp(&least[n * set + b].0));
-    while let Some(k) = last {
-        order.push(k);
-        let before = least[n * set + k].1;
-        set &= !(1 << k);
-        last = (before != usize::MAX).then_some(before);
-    }
-    order.reverse();
-    order
-}
-
 impl Floor<'_> {
     fn way_m(&self, ways: &[f64], place: &Point2<f64>) -> f64 {
         let (column, row) = self.square(place);

@@ -62,8 +62,10 @@ pub struct CylinderOptions {
     pub round_wall_m: RangeInclusive<f64>,
     /// What lies no farther from the surface is of it, metres.
     pub tolerance_m: f64,
-    /// At least so much of the circle is seen in one piece, radians: less may be a bend.
+    /// At least so much of the circle of a pillar is seen in one piece, radians: less may be a bend …
     pub least_arc_rad: f64,
+    /// … and of a round wall: less may be the walls of a cluttered room.
+    pub least_round_rad: f64,
     /// At least this share of what is seen there lies on it.
     pub least_share: f64,
 }
@@ -75,6 +77,7 @@ impl Default for CylinderOptions {
             round_wall_m: 1.0..=15.0,
             tolerance_m: 0.06,
             least_arc_rad: 2.1,
+            least_round_rad: 4.0,
             least_share: 0.6,
         }
     }
@@ -336,7 +339,8 @@ fn told(
     let arcs_rad = arcs(&seen);
     let longest_rad = arcs_rad.iter().map(|(from, to)| to - from).fold(0.0, f64::max);
     let share = held / (held + against);
-    let is_one = longest_rad >= options.least_arc_rad
+    let least_rad = if from_inside { options.least_round_rad } else { options.least_arc_rad };
+    let is_one = longest_rad >= least_rad
         && share >= options.least_share
         && (from_inside || {
             let all: Vec<Column> = on.iter().map(|&c| columns[c]).chain(beside).collect();

@@ -33,12 +33,9 @@ struct Run {
     seconds: f64,
 }
 
-/// How likely another look shows what one should have shown and did not (chosen on seeds 1 to 4).
-const AGAIN: f64 = 0.1;
-
 fn options() -> ExploreOptions {
     let field = FieldOfView { far_m: MAP_FAR_M, ..field_of_view() };
-    ExploreOptions { field, again: AGAIN, ..ExploreOptions::default() }
+    ExploreOptions { field, ..ExploreOptions::default() }
 }
 
 /// Two rows of two or three rooms, doors between them, a table in each; and the middle of the first room.

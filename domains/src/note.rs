@@ -44,7 +44,9 @@ pub enum Note {
     Charted {
         /// Walls of the map.
         walls: usize,
-        /// How long they are together, openings left out, metres.
+        /// Pillars and round walls.
+        cylinders: usize,
+        /// How long the walls are together, openings left out, metres.
         walls_m: f64,
         /// Open floor, square metres.
         open_m2: f64,
@@ -92,11 +94,20 @@ impl fmt::Display for Note {
                 write!(f, "sweep     {} things on the floor", things.len())?;
                 things.iter().try_for_each(|text| write!(f, "\n          {text}"))
             }
-            Note::Charted { walls, walls_m, open_m2, unseen_m2, surfaces, moved_m, turned_rad } => {
+            Note::Charted {
+                walls,
+                cylinders,
+                walls_m,
+                open_m2,
+                unseen_m2,
+                surfaces,
+                moved_m,
+                turned_rad,
+            } => {
                 let (cm, degrees) = (1e2 * moved_m, turned_rad.to_degrees());
                 write!(
                     f,
-                    "map       {walls} walls of {walls_m:.1} m, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; stood {cm:.1} cm and {degrees:.1}° off"
+                    "map       {walls} walls of {walls_m:.1} m, {cylinders} pillars or round walls, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; stood {cm:.1} cm and {degrees:.1}° off"
                 )?;
                 surfaces.iter().try_for_each(|text| write!(f, "\n          {text}"))
             }

@@ -5,10 +5,11 @@
 //! how two stops in a row lie to each other ([`rectify_pair`]: ICP-EM, Eq. 1 to 3); where the drive came by again ([`closures`]) and all poses
 //! together ([`PoseGraph`]), which the paper leaves open; all points as small pieces of surface ([`Cells`], normals by regions: Eq. 4); the
 //! orientations of walls ([`orientations`]: k-means); patches grown and planes put through them ([`Fit`], [`Constraints`]) and joined
-//! ([`FuseOptions`]); the map of walls, level surfaces and open floor ([`Survey`], [`RoomMap`]); where to go next to see more of it ([`next_poses`]).
+//! ([`FuseOptions`]); pillars and round walls ([`UprightCylinder`]); the map of walls, level surfaces and open floor ([`Survey`], [`RoomMap`]); where to go next to see more of it ([`next_poses`]).
 
 mod cells;
 mod closure;
+mod cylinder;
 mod error;
 mod field;
 mod frontier;
@@ -24,6 +25,7 @@ mod station;
 
 pub use cells::{Cells, CellsError, Facet, NormalOptions, by_regions};
 pub use closure::{Closure, ClosureOptions, closures, correct_drive, relocate};
+pub use cylinder::{CylinderOptions, UprightCylinder};
 pub use error::MappingError;
 pub use frontier::{ExploreOptions, Frontier, NextPose, frontiers, next_poses, standable};
 pub use fuse::FuseOptions;

@@ -44,7 +44,7 @@ pub fn export(seed: u64, dir: &Path) -> Result<(), String> {
         }
         poses.push('\n');
     }
-    let feet: Vec<(Point2<f64>, Point2<f64>)> = map.walls.iter().flat_map(|wall| wall.feet()).collect();
+    let feet: Vec<(Point2<f64>, Point2<f64>)> = map.feet().collect();
     save("poses.txt", poses.as_bytes())?;
     save("walls.txt", lines(&building.walls).as_bytes())?;
     save("ours.txt", lines(&feet).as_bytes())?;

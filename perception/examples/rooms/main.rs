@@ -6,6 +6,7 @@
 mod corridor;
 mod drive;
 mod exploring;
+mod pillars;
 mod plot;
 mod poses;
 mod recorded;
@@ -30,8 +31,11 @@ fn run(seed: u64, out: Option<&Path>, part: Option<&str>) -> Result<(), String> 
     if is_asked("walls") {
         walls::walls(seed, out)?;
     }
+    if is_asked("pillars") {
+        pillars::print(seed, out)?;
+    }
     if is_asked("variations") {
-        variations::print(seed)?;
+        variations::print(seed, out)?;
     }
     if is_asked("recorded") {
         recorded::rooms(out)?;
@@ -48,7 +52,7 @@ fn run(seed: u64, out: Option<&Path>, part: Option<&str>) -> Result<(), String> 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let seed = arguments.first().map_or(Ok(1), |text| text.parse());
-    let parts = ["poses", "drive", "walls", "variations", "recorded", "exploring", "times"];
+    let parts = ["poses", "drive", "walls", "pillars", "variations", "recorded", "exploring", "times"];
     let part = arguments.get(2).map(String::as_str);
     let result = match (seed, arguments.len()) {
         (Ok(seed), 0..=3) if part.is_none_or(|part| parts.contains(&part)) => {

@@ -1,6 +1,6 @@
 //! Plots: the points from above, walls, and the grid, as SVG.
 
-use descry_perception::mapping::{RoomMap, Station, Wall};
+use descry_perception::mapping::{RoomMap, Station, UprightCylinder};
 use descry_perception::nalgebra::{Isometry2, Point2};
 use descry_perception::occupancy::{Occupancy, Space};
 use std::fmt::Write;
@@ -91,12 +91,16 @@ impl Sheet {
         }
     }
 
-    pub fn walls(&mut self, walls: &[Wall]) {
-        for (i, wall) in walls.iter().enumerate() {
+    /// Walls in different colours, cylinders in one.
+    pub fn upright(&mut self, map: &RoomMap) {
+        for (i, wall) in map.walls.iter().enumerate() {
             let style = format!(r#"stroke="{}" stroke-width="2.5""#, COLOURS[i % COLOURS.len()]);
             for (a, b) in wall.feet() {
                 self.line(&a, &b, &style);
             }
+        }
+        for (a, b) in map.cylinders.iter().flat_map(UprightCylinder::feet) {
+            self.line(&a, &b, r##"stroke="#C00000" stroke-width="2.5""##);
         }
     }
 

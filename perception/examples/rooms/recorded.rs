@@ -68,6 +68,18 @@ fn print(name: &str, map: &RoomMap, points: usize, seconds: f64) {
             wall.stretches_m.len()
         );
     }
+    for c in &map.cylinders {
+        println!(
+            "    cylinder of radius {:.2} m at ({:.2}, {:.2}), {:.2} to {:.2} m high, {:.0}° seen, rms {:.1} cm",
+            c.radius_m,
+            c.middle.x,
+            c.middle.y,
+            c.heights_m.0,
+            c.heights_m.1,
+            c.arc_rad().to_degrees(),
+            100.0 * c.rms_m
+        );
+    }
     for level in map.levels.iter().take(6) {
         println!(
             "    level {:>5.2} m high, {:>5.2} m², seen from {}",
@@ -86,7 +98,7 @@ fn sheet(map: &RoomMap, clouds: &[Station], scale: f64) -> Sheet {
     let mut sheet = Sheet::around(near, scale);
     let poses = vec![Isometry2::identity(); clouds.len()];
     sheet.stations(clouds, &poses, f64::INFINITY);
-    sheet.walls(&map.walls);
+    sheet.upright(map);
     sheet.levels(map);
     sheet
 }

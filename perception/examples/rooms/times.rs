@@ -58,7 +58,7 @@ pub fn print(seed: u64) {
             let map = survey.map(&MapOptions::default()).expect("sound options");
             let planes_s = processor_s() - before_s;
             let (_, has_mb) = memory_mb();
-            let s = score(&map.walls, &building, 0.15, &truths, &truths);
+            let s = score(&map, &building, 0.15, &truths, &truths);
             println!(
                 "{:>6.2}   {steps_s:>6.2} {add_s:>6.2} {planes_s:>6.2}   {:>5.0} {:>6.1}  {:>6.1}   precision {:>5.1}, recall {:>5.1} %, doors {}/{}, {} fits",
                 points as f64 / 1e6,

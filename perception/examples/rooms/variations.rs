@@ -2,10 +2,12 @@
 
 use super::corridor::measure::{score, survey};
 use super::corridor::{Building, Panel, Rig, along};
+use super::plot::{Sheet, write};
 use super::poses::{off, options, steps};
 use descry_perception::mapping::{MapOptions, Matcher, RoomMap, chained};
 use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use std::f64::consts::TAU;
+use std::path::Path;
 
 /// A pose every 20 degrees around places.
 fn looking_round(places: &[(f64, f64)]) -> Vec<Isometry2<f64>> {
@@ -24,9 +26,9 @@ fn told(name: &str, building: &Building, truths: &[Isometry2<f64>], seed: u64) -
     let odometry = stations[0].odom_from_level.inv_mul(&stations[last].odom_from_level);
     let (way_before, turn_before) = off(&odometry, &truths[0].inv_mul(&truths[last]));
     let map = survey(&stations, truths).map(&MapOptions::default()).map_err(|e| e.to_string())?;
-    let s = score(&map.walls, building, 0.15, truths, truths);
+    let s = score(&map, building, 0.15, truths, truths);
     println!(
-        "{name:<34} last pose off {:>5.2} m {:>5.1}° by odometry, {way:>5.2} m {turn:>5.1}° rectified; walls {:>2} (truth {:>2}), precision {:>5.1}, recall {:>5.1} %, angle {:.2}°, main direction {}",
+        "{name:<34} last pose off {:>5.2} m {:>5.1}° by odometry, {way:>5.2} m {turn:>5.1}° rectified; walls {:>2} (truth {:>2}), precision {:>5.1}, recall {:>5.1} %, angle {:.2}°, main direction {}{}",
         way_before,
         turn_before,
         s.walls,
@@ -34,7 +36,19 @@ fn told(name: &str, building: &Building, truths: &[Isometry2<f64>], seed: u64) -
         100.0 * s.precision,
         100.0 * s.recall,
         s.angle_deg,
-        map.main_rad.map_or("none".to_owned(), |m| format!("{:.1}°", m.to_degrees()))
+        map.main_rad.map_or("none".to_owned(), |m| format!("{:.1}°", m.to_degrees())),
+        map.cylinders
+            .iter()
+            .map(|c| format!(
+                "; a cylinder of radius {:.2} m at ({:.2}, {:.2}), {:.0}° of it seen from {}, rms {:.1} cm",
+                c.radius_m,
+                c.middle.x,
+                c.middle.y,
+                c.arc_rad().to_degrees(),
+                if c.from_inside { "inside" } else { "outside" },
+                100.0 * c.rms_m
+            ))
+            .collect::<String>()
     );
     Ok(map)
 }
@@ -48,7 +62,7 @@ fn bare(left: f64, right: f64) -> (Building, Vec<Isometry2<f64>>) {
 }
 
 /// Prints what comes out.
-pub fn print(seed: u64) -> Result<(), String> {
+pub fn print(seed: u64, out: Option<&Path>) -> Result<(), String> {
     let at = Point2::new;
     println!("\nother buildings: poses by the wheels and rectified, walls at true poses");
     let square = [at(3.0, -2.5), at(3.0, 2.5), at(-3.0, 2.5), at(-3.0, -2.5)];
@@ -57,8 +71,8 @@ pub fn print(seed: u64) -> Result<(), String> {
         (0..72).map(|i| TAU * f64::from(i) / 72.0).map(|a| at(3.0 * a.cos(), 3.0 * a.sin())).collect();
     let places = [(0.5, 0.2), (-1.0, -0.6)];
     told("square room", &Building::room(&square, |_| 0.5), &looking_round(&places), seed)?;
-    told("a diagonal wall", &Building::room(&cut, |_| 0.5), &looking_round(&places), seed)?;
-    told("round room", &Building::room(&round, |_| 0.5), &looking_round(&places), seed)?;
+    let diagonal = told("a diagonal wall", &Building::room(&cut, |_| 0.5), &looking_round(&places), seed)?;
+    let round = told("round room", &Building::room(&round, |_| 0.5), &looking_round(&places), seed)?;
     let both = bare(0.5, 0.5);
     told("corridor without doors", &both.0, &both.1, seed)?;
     let one = bare(0.5, 0.0);
@@ -76,9 +90,7 @@ pub fn print(seed: u64) -> Result<(), String> {
     glass.panels.push(Panel { a: at(6.0, 5.5), b: at(-6.0, 5.5), z: (0.0, 2.6), texture: 0.5 });
     let map = told("a glass wall (3 m behind it a wall)", &glass, &looking_round(&places), seed)?;
     let stood = |y: f64| {
-        map.walls
-            .iter()
-            .flat_map(|w| w.feet().collect::<Vec<_>>())
+        map.feet()
             .filter(|(a, b)| (a.y - y).abs() < 0.3 && (b.y - y).abs() < 0.3)
             .map(|(a, b)| (b - a).norm())
             .fold(0.0, |sum, length: f64| sum + length)
@@ -89,5 +101,16 @@ pub fn print(seed: u64) -> Result<(), String> {
         stood(2.5),
         stood(5.5)
     );
-    Ok(())
+    let Some(dir) = out else { return Ok(()) };
+    let plots = [("a diagonal wall", &diagonal), ("a round room", &round), ("a glass wall", &map)].map(
+        |(name, map)| {
+            let mut sheet = Sheet::new(at(-4.5, -3.5), at(4.5, 6.5), 40.0);
+            if let Some(grid) = &map.grid {
+                sheet.grid(grid);
+            }
+            sheet.upright(map);
+            (name, sheet)
+        },
+    );
+    write(dir, "variations.svg", &plots)
 }

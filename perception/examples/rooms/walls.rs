@@ -51,7 +51,7 @@ pub fn walls(seed: u64, out: Option<&Path>) -> Result<(), String> {
         let survey = survey(&stations, &poses);
         for (way, options) in ways() {
             let map = survey.map(&options).map_err(|e| e.to_string())?;
-            let s = score(&map.walls, &building, within_m, &poses, &truths);
+            let s = score(&map, &building, within_m, &poses, &truths);
             let upright = &map.walls;
             let tilt: f64 =
                 upright.iter().map(|w| w.area_m2 * w.plane.normal.z.abs().asin().to_degrees()).sum();
@@ -105,7 +105,7 @@ fn draw(
     if let Some(grid) = &map.grid {
         walls.grid(grid);
     }
-    walls.walls(&map.walls);
+    walls.upright(&map);
     walls.levels(&map);
     write(dir, "map.svg", &[("walls, tables and open floor", walls)])
 }

@@ -99,6 +99,25 @@ pub struct Facet {
     pub points: u32,
 }
 
+/// What a cube holds, whether or not its normal is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Region {
+    /// Centroid, in the map, metres.
+    pub at: Point3<f64>,
+    /// Mean of the unit vectors towards the camera.
+    pub towards: Vector3<f64>,
+    /// Unit normal, towards where it was seen from.
+    pub normal: Option<Vector3<f64>>,
+    pub points: u32,
+}
+
+impl Region {
+    /// The piece of surface that it is, if there is evidence of one.
+    pub fn facet(&self) -> Option<Facet> {
+        self.normal.map(|normal| Facet { at: self.at, normal, points: self.points })
+    }
+}
+
 /// How normals are found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalOptions {
@@ -191,8 +210,13 @@ impl Cells {
 
     /// The surface in each cell, where there is evidence of one, in the order of the cells.
     pub fn facets(&self, options: &NormalOptions) -> Vec<Facet> {
+        self.regions(options).iter().filter_map(Region::facet).collect()
+    }
+
+    /// What is in each cell that is no noise, in the order of the cells.
+    pub(super) fn regions(&self, options: &NormalOptions) -> Vec<Region> {
         let _span = tracing::debug_span!("normals by regions", cells = self.len()).entered();
-        let facet = |sums: &Sums| {
+        let region = |sums: &Sums| {
             if sums.count < options.least_points {
                 return None;
             }
@@ -205,13 +229,14 @@ impl Cells {
                 return None;
             }
             let full = around.into_iter().filter(|s| f64::from(s.count) >= least);
-            let regions: Vec<Point3<f64>> = full.map(|s| self.centroid(s)).collect();
-            let normal = by_regions(&at, &regions, &towards, options)?;
-            Some((sums.cube, Facet { at, normal, points: sums.count }))
+            let others: Vec<Point3<f64>> = full.map(|s| self.centroid(s)).collect();
+            let normal = by_regions(&at, &others, &towards, options);
+            let towards = towards / f64::from(sums.count);
+            Some((sums.cube, Region { at, towards, normal, points: sums.count }))
         };
-        let mut found: Vec<_> = self.sums.par_iter().filter_map(facet).collect();
+        let mut found: Vec<_> = self.sums.par_iter().filter_map(region).collect();
         found.sort_unstable_by_key(|(cube, _)| *cube);
-        found.into_iter().map(|(_, facet)| facet).collect()
+        found.into_iter().map(|(_, region)| region).collect()
     }
 
     /// The plan of what was seen at some heights: cells that lie over each other are one spot.

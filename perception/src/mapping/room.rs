@@ -1,6 +1,7 @@
 //! The map: walls with their openings, level surfaces, and the grid of what is open.
 
-use super::cells::{Cells, CellsError, Facet, NormalOptions};
+use super::cells::{Cells, CellsError, Facet, NormalOptions, Region};
+use super::cylinder::{CylinderOptions, UprightCylinder, cylinders};
 use super::error::{MappingError, check, check_pose};
 use super::fuse::{FuseOptions, fuse};
 use super::grid::Sightlines;
@@ -45,6 +46,8 @@ pub struct MapOptions {
     pub constrained: bool,
     /// How patches are joined; `None`: not at all.
     pub fuse: Option<FuseOptions>,
+    /// How pillars and round walls are found; `None`: not at all.
+    pub cylinders: Option<CylinderOptions>,
     /// Smaller walls are left out, square metres …
     pub least_area_m2: f64,
     /// … and lower ones, metres: they are things, not walls.
@@ -67,6 +70,7 @@ impl Default for MapOptions {
             fit: Fit::LeastSquares,
             constrained: true,
             fuse: Some(FuseOptions::default()),
+            cylinders: Some(CylinderOptions::default()),
             least_area_m2: 0.3,
             least_height_m: 1.0,
             least_level_m2: 0.15,
@@ -127,6 +131,8 @@ pub struct Level {
 pub struct RoomMap {
     /// Walls, the largest first.
     pub walls: Vec<Wall>,
+    /// Pillars and round walls; what is one of them is no wall.
+    pub cylinders: Vec<UprightCylinder>,
     /// Level surfaces, the largest first.
     pub levels: Vec<Level>,
     /// Direction of the normals of most walls, modulo a quarter turn, radians.
@@ -136,6 +142,12 @@ pub struct RoomMap {
 }
 
 impl RoomMap {
+    /// The feet of all that is upright, as straight lines.
+    pub fn feet(&self) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> + '_ {
+        let of_walls = self.walls.iter().flat_map(Wall::feet);
+        of_walls.chain(self.cylinders.iter().flat_map(UprightCylinder::feet))
+    }
+
     /// The floor as a body that is up to `height_m` high must take it: open where it was seen open or where the body has stood (discs of `radius_m`
     /// around poses), occupied under walls and under level surfaces lower than it.
     pub fn floor(&self, stood: &[Isometry2<f64>], radius_m: f64, height_m: f64) -> Option<Occupancy> {
@@ -242,15 +254,24 @@ impl Survey {
             ("the reach of normals", options.normals.reach as f64, 1.0, 10.0),
         ])?;
         let edge_m = self.cells.edge_m();
-        let facets = self.cells.facets(&options.normals);
-        let (patches, main_rad) = upright(&facets, options, edge_m);
+        let regions = self.cells.regions(&options.normals);
+        let facets: Vec<Facet> = regions.iter().filter_map(Region::facet).collect();
+        let (mut patches, main_rad) = upright(&facets, options, edge_m);
+        let heights_m = (&options.opening_band_m, options.least_height_m);
+        let cylinders = options
+            .cylinders
+            .as_ref()
+            .map(|how| cylinders(&regions, &mut patches, heights_m, how, edge_m))
+            .unwrap_or_default();
         let mut walls: Vec<Wall> = patches.iter().filter_map(|p| wall(p, &facets, options, edge_m)).collect();
         walls.sort_by(|a, b| b.area_m2.total_cmp(&a.area_m2));
-        let mut grid = self.grid();
-        if let Some(grid) = &mut grid {
-            walls.iter().for_each(|wall| draw(wall, grid));
-        }
-        Ok(RoomMap { walls, levels: levels(&facets, options, edge_m), main_rad, grid })
+        let levels = levels(&facets, options, edge_m);
+        let mut map = RoomMap { walls, cylinders, levels, main_rad, grid: None };
+        map.grid = self.grid().map(|mut grid| {
+            map.feet().for_each(|foot| draw(foot, &mut grid));
+            grid
+        });
+        Ok(map)
     }
 }
 
@@ -337,23 +358,18 @@ fn wall(patch: &Patch, facets: &[Facet], options: &MapOptions, edge_m: f64) -> O
     })
 }
 
-/// Marks the squares under a wall's stretches, but where lines of sight went through.
-fn draw(wall: &Wall, grid: &mut Occupancy) {
-    for (from, to) in wall.feet() {
-        let steps = ((to - from).norm() / (0.5 * grid.cell_m)).ceil() as usize;
-        for i in 0..=steps {
-            let at = from + (to - from) * (i as f64 / steps.max(1) as f64);
-            let square = ((at - grid.origin) / grid.cell_m).map(f64::floor);
-            let rows = grid.cells.len() / grid.width.max(1);
-            if square.x >= 0.0
-                && square.y >= 0.0
-                && (square.x as usize) < grid.width
-                && (square.y as usize) < rows
-            {
-                let cell = &mut grid.cells[square.y as usize * grid.width + square.x as usize];
-                if *cell == Space::Unknown {
-                    *cell = Space::Occupied;
-                }
+/// Marks the squares under a foot of a wall, but where lines of sight went through.
+fn draw((from, to): (Point2<f64>, Point2<f64>), grid: &mut Occupancy) {
+    let steps = ((to - from).norm() / (0.5 * grid.cell_m)).ceil() as usize;
+    for i in 0..=steps {
+        let at = from + (to - from) * (i as f64 / steps.max(1) as f64);
+        let square = ((at - grid.origin) / grid.cell_m).map(f64::floor);
+        let rows = grid.cells.len() / grid.width.max(1);
+        let inside = square.x >= 0.0 && square.y >= 0.0 && (square.x as usize) < grid.width;
+        if inside && (square.y as usize) < rows {
+            let cell = &mut grid.cells[square.y as usize * grid.width + square.x as usize];
+            if *cell == Space::Unknown {
+                *cell = Space::Occupied;
             }
         }
     }

@@ -1,7 +1,7 @@
 //! How well a map's walls agree with a building.
 
 use super::{Building, CAMERA_HEIGHT_M, Opening};
-use descry_perception::mapping::{Station, Survey, Wall};
+use descry_perception::mapping::{RoomMap, Station, Survey, UprightCylinder};
 use descry_perception::nalgebra::{Isometry2, Point2, Rotation2, Vector2};
 
 /// Heights at which something is in a body's way, metres.
@@ -67,18 +67,17 @@ fn between(a: &(Point2<f64>, Point2<f64>), b: &(Point2<f64>, Point2<f64>)) -> f6
     u.perp(&v).abs().asin()
 }
 
-/// Holds walls to a building; they agree if nearer than `within_m`. A door is looked for where the stop of the drive nearest to it has it: `poses` and
+/// Holds all that is upright on a map to a building; they agree if nearer than `within_m`. A door is looked for where the stop of the drive nearest to it has it: `poses` and
 /// `truths` are of the same stops.
 pub fn score(
-    walls: &[Wall],
+    map: &RoomMap,
     building: &Building,
     within_m: f64,
     poses: &[Isometry2<f64>],
     truths: &[Isometry2<f64>],
 ) -> Score {
     const ALIKE_RAD: f64 = 0.3;
-    let found: Vec<(Point2<f64>, Point2<f64>)> =
-        walls.iter().flat_map(|w| w.feet().collect::<Vec<_>>()).collect();
+    let found: Vec<(Point2<f64>, Point2<f64>)> = map.feet().collect();
     let panels: Vec<_> = building.panels.iter().map(|p| (p.a, p.b)).collect();
     let (mut right, mut all, mut angle, mut offset) = (0.0, 0.0, 0.0, 0.0);
     for foot in &found {
@@ -126,6 +125,40 @@ pub fn score(
         angle_deg: angle / f64::max(right, 1.0),
         offset_m: offset / f64::max(right, 1.0),
         openings: (kept.count(), building.openings.len()),
-        walls: walls.len(),
+        walls: map.walls.len(),
     }
+}
+
+/// Pillars held to the truth.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PillarScore {
+    /// Found, those of them that are none, and those that there are.
+    pub found: usize,
+    pub wrong: usize,
+    pub all: usize,
+    /// Means over those that are right, metres.
+    pub off_m: f64,
+    pub radius_off_m: f64,
+}
+
+/// Holds the cylinders of a map to the pillars of a building: one is right within 10 cm of a pillar's axis.
+pub fn score_pillars(cylinders: &[UprightCylinder], building: &Building) -> PillarScore {
+    let mut score = PillarScore { all: building.pillars.len(), ..PillarScore::default() };
+    let mut left = building.pillars.clone();
+    for cylinder in cylinders {
+        let off_m = |p: &super::Pillar| (p.middle - cylinder.middle).norm();
+        let nearest = (0..left.len()).min_by(|&a, &b| off_m(&left[a]).total_cmp(&off_m(&left[b])));
+        score.found += 1;
+        match nearest.filter(|&n| off_m(&left[n]) < 0.1) {
+            Some(n) => {
+                let pillar = left.swap_remove(n);
+                score.off_m += off_m(&pillar);
+                score.radius_off_m += (pillar.radius_m - cylinder.radius_m).abs();
+            }
+            None => score.wrong += 1,
+        }
+    }
+    let right = f64::max((score.found - score.wrong) as f64, 1.0);
+    (score.off_m, score.radius_off_m) = (score.off_m / right, score.radius_off_m / right);
+    score
 }

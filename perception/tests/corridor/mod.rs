@@ -40,6 +40,15 @@ pub struct Table {
     pub height: f64,
 }
 
+/// A round pillar from floor to ceiling.
+#[derive(Clone, Copy, Debug)]
+pub struct Pillar {
+    pub middle: Point2<f64>,
+    pub radius_m: f64,
+    /// Share of it that has texture.
+    pub texture: f64,
+}
+
 /// A gap in a wall.
 #[derive(Clone, Copy, Debug)]
 pub struct Opening {
@@ -52,6 +61,7 @@ pub struct Opening {
 pub struct Building {
     pub panels: Vec<Panel>,
     pub tables: Vec<Table>,
+    pub pillars: Vec<Pillar>,
     /// Open doors.
     pub openings: Vec<Opening>,
     /// Walls of the corridor itself, for measuring: without lintels, rooms behind doors and furniture.
@@ -135,6 +145,37 @@ impl Building {
         building
     }
 
+    /// A box from the floor up, no wall when measured: a square post, a cupboard.
+    pub fn post(&mut self, middle: Point2<f64>, half: [f64; 2], turn_rad: f64, height_m: f64) {
+        let at = Isometry2::new(middle.coords, turn_rad);
+        let [x, y] = half;
+        let corners = [(x, y), (-x, y), (-x, -y), (x, -y)].map(|(u, v)| at * Point2::new(u, v));
+        for i in 0..4 {
+            let (a, b) = (corners[i], corners[(i + 1) % 4]);
+            self.panels.push(Panel { a, b, z: (0.0, height_m), texture: 0.5 });
+        }
+    }
+
+    /// A hall of 12 by 8 m with two rows of posts, each round or square by the seed, some with a table or a cupboard against the walls.
+    pub fn hall(seed: u64) -> Building {
+        let mut draws = Draws(seed);
+        let at = Point2::new;
+        let mut hall = Building::room(&[at(6.0, -4.0), at(6.0, 4.0), at(-6.0, 4.0), at(-6.0, -4.0)], |_| 0.5);
+        for (x, y) in [-4.0, -1.4, 1.4, 4.0].into_iter().flat_map(|x| [(x, -1.7), (x, 1.7)]) {
+            let middle = at(x + 0.5 * (draws.next() - 0.5), y + 0.5 * (draws.next() - 0.5));
+            let half_m = 0.12 + 0.3 * draws.next();
+            if draws.next() < 0.6 {
+                hall.pillars.push(Pillar { middle, radius_m: half_m, texture: 0.4 + 0.3 * draws.next() });
+            } else {
+                let longer_m = half_m * (1.0 + 0.5 * draws.next());
+                hall.post(middle, [half_m, longer_m], draws.next(), CEILING_M);
+            }
+        }
+        hall.post(at(5.7, 2.5 * draws.next()), [0.3, 0.5], 0.0, 1.8);
+        hall.table(at(-5.4, -1.0 + 2.0 * draws.next()), [0.5, 0.4]);
+        hall
+    }
+
     /// A closed room around corners given anticlockwise.
     pub fn room(corners: &[Point2<f64>], texture: impl Fn(usize) -> f64) -> Building {
         let mut building = Building::default();
@@ -180,6 +221,9 @@ pub fn field_of_view() -> FieldOfView {
     FieldOfView { right_rad: -half_rad, left_rad: half_rad, near_m: 0.5, far_m: FAR_M }
 }
 
+/// Floor, ceiling and tables have texture of their own.
+const LEVELS: usize = 3;
+
 /// A repeatable number from 0 to 1 for a place.
 fn hash(panel: usize, u: i64, v: i64) -> f64 {
     let key = (panel as u64) << 48 ^ ((u as u64) & 0xff_ffff) << 24 ^ ((v as u64) & 0xff_ffff);
@@ -190,11 +234,13 @@ fn is_textured(panel: usize, share: f64, u_m: f64, v_m: f64) -> bool {
     hash(panel, (u_m / TEXTURE_M).floor() as i64, (v_m / TEXTURE_M).floor() as i64) < share
 }
 
-/// Where a column's ray meets a panel.
+/// Where a column's ray meets a panel or a pillar; pillars are numbered after the panels and level surfaces.
 struct Hit {
     depth: f64,
-    panel: usize,
+    number: usize,
     along_m: f64,
+    z: (f64, f64),
+    texture: f64,
 }
 
 impl Building {
@@ -227,13 +273,26 @@ impl Building {
         let from = Point2::from(truth.translation.vector);
         let ray = truth.rotation * Vector2::new(1.0, side);
         let mut hits: Vec<Hit> = Vec::new();
-        for (panel, p) in self.panels.iter().enumerate() {
+        for (number, p) in self.panels.iter().enumerate() {
             let along = p.b - p.a;
             let to = p.a - from;
             let across = ray.perp(&along);
             let (t, s) = (to.perp(&along) / across, to.perp(&ray) / across);
             if t > 0.05 && t < FAR_M && (0.0..=1.0).contains(&s) {
-                hits.push(Hit { depth: t, panel, along_m: s * along.norm() });
+                let along_m = s * along.norm();
+                hits.push(Hit { depth: t, number, along_m, z: p.z, texture: p.texture });
+            }
+        }
+        for (number, p) in (self.panels.len() + LEVELS..).zip(&self.pillars) {
+            let to = from - p.middle;
+            let (square, half) = (ray.norm_squared(), ray.dot(&to));
+            let root = (half * half - square * (to.norm_squared() - p.radius_m * p.radius_m)).sqrt();
+            let t = (-half - root) / square;
+            // No number: the ray passes by.
+            if t > 0.05 && t < FAR_M {
+                let off = to + ray * t;
+                let along_m = off.y.atan2(off.x) * p.radius_m;
+                hits.push(Hit { depth: t, number, along_m, z: (0.0, CEILING_M), texture: p.texture });
             }
         }
         hits.sort_by(|a, b| a.depth.total_cmp(&b.depth));
@@ -244,8 +303,7 @@ impl Building {
     fn depth(&self, truth: &Isometry2<f64>, side: f64, up: f64, hits: &[Hit]) -> Option<f64> {
         let upright = hits.iter().find(|h| {
             let z = CAMERA_HEIGHT_M + h.depth * up;
-            let (low, high) = self.panels[h.panel].z;
-            z >= low && z <= high
+            z >= h.z.0 && z <= h.z.1
         });
         let place = |t: f64| truth * (Point2::new(1.0, side) * t);
         let level = |z: f64| (z - CAMERA_HEIGHT_M) / up;
@@ -259,7 +317,7 @@ impl Building {
         match upright {
             Some(hit) if hit.depth < flat => {
                 let z = CAMERA_HEIGHT_M + hit.depth * up;
-                is_textured(hit.panel, self.panels[hit.panel].texture, hit.along_m, z).then_some(hit.depth)
+                is_textured(hit.number, hit.texture, hit.along_m, z).then_some(hit.depth)
             }
             _ if flat < FAR_M => {
                 let p = place(flat);

@@ -258,14 +258,14 @@ impl Chart {
         self.surfaces.iter().any(|(name, _)| symbol(name) == surface)
     }
 
-    /// Whether a wall of this map stands between two places.
+    /// Whether a wall or a pillar of this map stands between two places.
     pub(crate) fn hides(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         let [from, to] = &[from, to].map(|p| self.map_from_chart.inverse_transform_point(p));
         let side = |a: &Point2<f64>, b: &Point2<f64>, p: &Point2<f64>| (b - a).perp(&(p - a));
         let crosses = |a: &Point2<f64>, b: &Point2<f64>| {
             side(a, b, from) * side(a, b, to) < 0.0 && side(from, to, a) * side(from, to, b) < 0.0
         };
-        self.map.as_ref().is_some_and(|m| m.walls.iter().flat_map(|w| w.feet()).any(|(a, b)| crosses(&a, &b)))
+        self.map.as_ref().is_some_and(|m| m.feet().any(|(a, b)| crosses(&a, &b)))
     }
 
     /// The surfaces as searching takes them: as far as they were seen.

@@ -1,8 +1,8 @@
-//! The map as a picture, seen from above: open floor, walls, surfaces, and where it was looked from.
+//! The map as a picture, seen from above: open floor, walls, pillars, surfaces, and where it was looked from.
 
 use std::io::Cursor;
 
-use descry_perception::mapping::RoomMap;
+use descry_perception::mapping::{RoomMap, UprightCylinder, Wall};
 use descry_perception::nalgebra::{Point2, Vector2};
 use descry_perception::occupancy::{Occupancy, Space};
 use descry_robots::image::{ImageFormat, ImageResult, Rgb, RgbImage};
@@ -16,6 +16,7 @@ const UNKNOWN: [u8; 3] = [255, 255, 255];
 const FREE: [u8; 3] = [220, 235, 247];
 const OCCUPIED: [u8; 3] = [150, 150, 150];
 const WALL: [u8; 3] = [0, 70, 140];
+const CYLINDER: [u8; 3] = [190, 0, 0];
 const SURFACE: [u8; 3] = [0, 140, 100];
 const STOOD: [u8; 3] = [213, 94, 0];
 
@@ -69,9 +70,9 @@ pub(super) fn png(chart: &Chart, map: &RoomMap) -> ImageResult<Vec<u8>> {
         let n = level.outline.len();
         (0..n).for_each(|i| canvas.line(&level.outline[i], &level.outline[(i + 1) % n], 1, SURFACE));
     }
-    for (a, b) in map.walls.iter().flat_map(|wall| wall.feet()) {
-        canvas.line(&a, &b, 1, WALL);
-    }
+    map.walls.iter().flat_map(Wall::feet).for_each(|(a, b)| canvas.line(&a, &b, 1, WALL));
+    let round = map.cylinders.iter().flat_map(UprightCylinder::feet);
+    round.for_each(|(a, b)| canvas.line(&a, &b, 1, CYLINDER));
     for pair in chart.stood.windows(2) {
         canvas.line(&pair[0].translation.vector.into(), &pair[1].translation.vector.into(), 0, STOOD);
     }

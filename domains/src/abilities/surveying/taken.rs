@@ -124,10 +124,11 @@ fn keep(mind: &mut Mind, eyes: Eyes<'_>, stamp_ns: i64) -> Result<(), WorldError
 
 fn note(chart: &Chart, fit: &PairFit, believed: &Isometry2<f64>) -> Note {
     let off = believed.inv_mul(&fit.before_from_after);
-    let walls = chart.map.as_ref().map_or(&[][..], |m| &m.walls);
+    let (walls, cylinders) = chart.map.as_ref().map_or((&[][..], 0), |m| (&m.walls, m.cylinders.len()));
     let length = |w: &descry_perception::mapping::Wall| w.stretches_m.iter().map(|(a, b)| b - a).sum::<f64>();
     Note::Charted {
         walls: walls.len(),
+        cylinders,
         walls_m: walls.iter().map(length).sum(),
         open_m2: chart.open_m2(),
         unseen_m2: chart.unseen_m2(),

@@ -11,9 +11,9 @@ pub(super) fn answer(_: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Opt
         return None;
     }
     let chart = &s.chart;
-    let walls = chart.map.as_ref().map_or(0, |m| m.walls.len());
+    let (walls, cylinders) = chart.map.as_ref().map_or((0, 0), |m| (m.walls.len(), m.cylinders.len()));
     let known = format!(
-        "{:.1} m² of open floor, {walls} walls and {} surfaces, after {} looks and {:.1} m",
+        "{:.1} m² of open floor, {walls} walls, {cylinders} pillars or round walls and {} surfaces, after {} looks and {:.1} m",
         chart.open_m2(),
         chart.surfaces.len(),
         mind.views,

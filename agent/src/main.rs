@@ -73,5 +73,7 @@ fn hear(stop: &Stop) -> std::io::Result<()> {
 fn warn_people() {
     let filter = EnvFilter::builder().with_default_directive(LevelFilter::WARN.into()).from_env_lossy();
     let lines = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    // It would panic over what it cannot write, as to a full disk.
+    let lines = lines.log_internal_errors(false);
     lines.with_ansi(commands::is_coloured()).without_time().with_target(false).init();
 }

@@ -26,7 +26,7 @@ pub use export::{Exported, export};
 pub use foxglove::LogLevel;
 pub use nalgebra;
 pub use record::{Image, Options, Record, kind};
-pub use stores::local::{Durability, LocalOptions, LocalStore, Recovery};
+pub use stores::local::{Durability, LocalOptions, LocalStore, Recovery, free_bytes};
 #[cfg(feature = "mongodb")]
 pub use stores::mongo::{MongoOptions, MongoStore};
 pub use stores::{Count, Fault, Report, Retention, Stats, Store};

@@ -7,6 +7,9 @@ use crate::exit::{CommandError, Exit};
 use crate::experiment::{self, Ended, ExperimentError, Options, Shard, Source};
 use crate::stop::Stop;
 
+/// A job that fails while less than this is left on the disk failed for want of room.
+const LEAST_FREE_BYTES: u64 = 64 << 20;
+
 /// Arguments of `descry experiment`.
 #[derive(clap::Args)]
 pub struct Arguments {
@@ -38,6 +41,7 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
         shard: arguments.shard,
         merge: arguments.merge.clone(),
         threads: arguments.jobs.unwrap_or(cores).max(1),
+        least_free_bytes: LEAST_FREE_BYTES,
         stop: stop.clone(),
         tell: input::narrate,
     };
@@ -70,7 +74,9 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
 /// What went wrong is the input's fault, or the disk's.
 fn failed(error: ExperimentError) -> CommandError {
     match error {
-        ExperimentError::File { .. } | ExperimentError::Threads { .. } => CommandError::broken(error),
+        ExperimentError::File { .. } | ExperimentError::Threads { .. } | ExperimentError::NoRoom { .. } => {
+            CommandError::broken(error)
+        }
         _ => CommandError::bad_input(error),
     }
 }

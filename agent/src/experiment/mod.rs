@@ -136,6 +136,8 @@ pub struct Options {
     pub merge: Vec<PathBuf>,
     /// How many jobs at a time.
     pub threads: usize,
+    /// A job that fails while less room is left on the disk does not count, and none is begun after it.
+    pub least_free_bytes: u64,
     /// Ends it early.
     pub stop: Stop,
     /// Hears how far it has got, a line now and then where there is no terminal for a bar.
@@ -216,6 +218,18 @@ pub enum ExperimentError {
         all: usize,
         /// The first of them.
         first: String,
+    },
+    /// The disk is full; what was journalled stands.
+    #[error(
+        "{folder}: the disk is full, and {job} failed: {because}\n  free some room and run it again: what is done is not done again"
+    )]
+    NoRoom {
+        /// The folder of the results.
+        folder: String,
+        /// The job that does not count.
+        job: String,
+        /// Why it failed.
+        because: String,
     },
     /// The system gives no thread.
     #[error("no thread could be started: {because}\n  try a smaller --jobs")]
@@ -334,6 +348,7 @@ fn perform(
         options.threads,
         &scratch,
         (&options.stop, options.tell),
+        options.least_free_bytes,
         &mut journal,
     )?;
     done.extend(finished.into_iter().map(|job| (job.job.clone(), job)));

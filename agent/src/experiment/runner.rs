@@ -23,7 +23,8 @@ const LINE_EVERY: Duration = Duration::from_secs(15);
 /// emptied. Where it is stopped, jobs under way are not done. Gives the finished jobs in the order in which they ended.
 ///
 /// # Errors
-/// [`ExperimentError::File`] if the journal cannot be written; no further job is begun then.
+/// [`ExperimentError::File`] if the journal cannot be written, [`ExperimentError::NoRoom`] if a job fails while less than
+/// `least_free_bytes` are left; no further job is begun then.
 pub fn run(
     kind: &dyn Kind,
     jobs: &[Job],
@@ -31,6 +32,7 @@ pub fn run(
     threads: usize,
     scratch: &Path,
     (stop, tell): (&Stop, fn(&str)),
+    least_free_bytes: u64,
     journal: &mut Journal,
 ) -> Result<Vec<Finished>, ExperimentError> {
     let (next, ended) = (AtomicUsize::new(0), AtomicBool::new(false));
@@ -53,7 +55,9 @@ pub fn run(
         });
         drop(send);
         let result = match started {
-            Ok(()) => collect(&receive, todo.len(), journal, tell),
+            Ok(()) => {
+                collect(&receive, todo.len(), journal, tell, |job| lacks_room(job, scratch, least_free_bytes))
+            }
             Err(e) => Err(ExperimentError::Threads { because: e.to_string() }),
         };
         ended.store(true, Ordering::Relaxed);
@@ -80,15 +84,31 @@ fn said(panic: &(dyn Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without a word".into())
 }
 
+/// A job that failed on a disk without room says nothing of itself.
+fn lacks_room(job: &Finished, scratch: &Path, least_free_bytes: u64) -> Option<ExperimentError> {
+    let because = job.error.clone()?;
+    let folder = scratch.parent()?;
+    let free = descry_memory::free_bytes(folder).ok()?;
+    (free < least_free_bytes).then(|| ExperimentError::NoRoom {
+        folder: folder.display().to_string(),
+        job: job.job.clone(),
+        because,
+    })
+}
+
 fn collect(
     done: &Receiver<Finished>,
     all: usize,
     journal: &mut Journal,
     tell: fn(&str),
+    lacks_room: impl Fn(&Finished) -> Option<ExperimentError>,
 ) -> Result<Vec<Finished>, ExperimentError> {
     let mut progress = Progress::new(all, tell);
     let mut finished = Vec::with_capacity(all);
     for job in done {
+        if let Some(full) = lacks_room(&job) {
+            return Err(full);
+        }
         journal.append(&job)?;
         progress.one_more(job.error.is_some());
         finished.push(job);

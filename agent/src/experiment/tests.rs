@@ -63,7 +63,15 @@ fn source() -> Source {
 }
 
 fn options(out: &Path, shard: Option<Shard>, threads: usize) -> Options {
-    Options { out: out.to_path_buf(), shard, merge: vec![], threads, stop: Stop::default(), tell: |_| () }
+    Options {
+        out: out.to_path_buf(),
+        shard,
+        merge: vec![],
+        threads,
+        least_free_bytes: 0,
+        stop: Stop::default(),
+        tell: |_| (),
+    }
 }
 
 /// Every file of the results, without the journals.
@@ -96,6 +104,25 @@ fn failures_and_panics_are_rows() -> Tested {
                     k=5 parity=odd,5,odd,,\"panic: five, \"\"of all\"\" numbers\"\nk=6 parity=even,6,even,36,\nk=7 parity=odd,7,odd,49,\n";
     assert_eq!(csv, expected);
     assert!(!folder.path().join("scratch").exists(), "what runs leave is removed");
+    Ok(())
+}
+
+#[test]
+fn a_full_disk_ends_it_and_costs_no_job() -> Tested {
+    let folder = tempfile::tempdir()?;
+    let no_room = Options { least_free_bytes: u64::MAX, ..options(folder.path(), None, 1) };
+    let kind = squares(8);
+    let ended = carry_out(&kind, &source(), &no_room);
+    assert!(
+        matches!(&ended, Err(ExperimentError::NoRoom { job, .. }) if job == "k=3 parity=odd"),
+        "{ended:?}"
+    );
+    assert!(kind.done.into_inner() < 8, "nothing is begun on a full disk");
+    // With room again, what failed for the want of it is done.
+    let kind = squares(8);
+    let ended = carry_out(&kind, &source(), &options(folder.path(), None, 1))?;
+    assert!(matches!(ended, Ended::Whole(whole) if whole.failed == 2));
+    assert_eq!(kind.done.into_inner(), 5, "what was journalled stands");
     Ok(())
 }
 

@@ -9,6 +9,7 @@ mod index;
 mod lock;
 pub(crate) mod pins;
 mod prune;
+pub use prune::free_bytes;
 mod recover;
 mod scan;
 pub(crate) mod segment;

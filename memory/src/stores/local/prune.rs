@@ -6,6 +6,17 @@ use crate::document::Draft;
 use crate::error::Error;
 use crate::stores::Retention;
 use std::fs;
+use std::path::Path;
+
+/// Room left on the disk of a folder, bytes.
+///
+/// # Errors
+/// [`Error::File`] if the system does not tell.
+pub fn free_bytes(folder: &Path) -> Result<u64, Error> {
+    let free = rustix::fs::statvfs(folder)
+        .map_err(|e| Error::file("cannot ask for the room on", folder, e.into()))?;
+    Ok(free.f_bavail.saturating_mul(free.f_frsize))
+}
 
 impl LocalStore {
     /// Makes room for what is coming, where there is a bound in bytes.
@@ -71,9 +82,7 @@ impl LocalStore {
             return Ok(true);
         }
         if let Some(least) = retention.min_free_bytes {
-            let free = rustix::fs::statvfs(&self.dir)
-                .map_err(|e| Error::file("cannot ask for the room on", &self.dir, e.into()))?;
-            if free.f_bavail.saturating_mul(free.f_frsize) < least {
+            if free_bytes(&self.dir)? < least {
                 return Ok(true);
             }
         }

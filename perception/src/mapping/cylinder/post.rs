@@ -55,7 +55,8 @@ fn upright_m2(columns: &[Local], tolerance_m: f64) -> f64 {
 /// The nearest side of those that a column may have been seen on, and how far off that is, metres.
 fn nearest(column: &Local, sides: &[f64; 4]) -> (usize, f64) {
     let away_m = |side: usize| {
-        let outward = if side.is_multiple_of(2) { -column.towards[side / 2] } else { column.towards[side / 2] };
+        let outward =
+            if side.is_multiple_of(2) { -column.towards[side / 2] } else { column.towards[side / 2] };
         if outward > 0.0 { (column.at[side / 2] - sides[side]).abs() } else { f64::INFINITY }
     };
     (0..4).map(|side| (side, away_m(side))).fold((0, f64::INFINITY), |a, b| if b.1 < a.1 { b } else { a })

@@ -134,6 +134,8 @@ pub(crate) fn conclude(
 
 /// In an answer, `{changes <surface>}` stands for what has changed there since an earlier run.
 pub(crate) const CHANGES: &str = "changes";
+/// A probability that is said with an answer that holds.
+const WORTH_SAYING: f64 = 0.01;
 /// An object nearer than this to where one was is that one, metres.
 const SAME_M: f64 = 0.10;
 
@@ -151,7 +153,7 @@ impl Asker<'_> {
     fn reached(&self) -> (Verdict, String) {
         let s = self.s;
         let mut said = self.surely();
-        for kind in &s.kinds {
+        for (of, kind) in s.kinds.iter().enumerate() {
             let members = self.members(kind);
             if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {
                 return self.none_of(kind);
@@ -160,6 +162,11 @@ impl Asker<'_> {
                 0 => format!("there is no {}", kind.name),
                 n => format!("all of {} are found: {n}, {}", kind.name, members.join("; ")),
             });
+            // As sure as was asked for is not sure.
+            let hidden = s.doubt_of(of).hidden;
+            if hidden >= WORTH_SAYING {
+                said.push(format!("where nothing was seen there may be another ({hidden:.2})"));
+            }
         }
         for &on in &s.asked {
             said.push(format!("everything on the {} is identified", s.surfaces[on].name));

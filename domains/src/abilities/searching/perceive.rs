@@ -7,14 +7,14 @@ use descry_memory::viewer::{self, Labelled};
 use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
 use descry_perception::View;
 use descry_perception::hull::Hull;
-use descry_perception::merge::{MergeOptions, Merged, merge};
+use descry_perception::merge::{MergeOptions, Merged, ViewFit, merge};
 use descry_perception::nalgebra::{Point3, Translation3, Unit, Vector3};
 use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment_on};
 use descry_perception::surface::{Region, Role, SurfaceOptions, find_surface};
 use descry_perception::visibility::{DepthMap, Seen, Visibility};
-use descry_robots::{Robot, Sensed};
+use descry_robots::{Description, Robot, Sensed};
 use serde::Serialize;
 use serde_json::json;
 
@@ -46,6 +46,8 @@ pub(super) const ON_SURFACE_M: f64 = 0.012;
 /// What lies so near to a wall of the map, or beyond it, is the wall, metres: localisation along a surface errs by two or three
 /// centimetres.
 const WALL_M: f64 = 0.03;
+/// A view that nothing holds but the others may be moved by so many standard deviations of localisation.
+const ASTRAY: f64 = 3.0;
 
 /// What perceiving needs besides what is known.
 #[derive(Clone, Copy)]
@@ -127,11 +129,7 @@ fn views(mind: &Mind) -> Vec<RecordId> {
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
     let (merging, seeking) = options(eyes.robot, Some(&mind.known.surfaces[on].symbol));
     let seeking = seeking_at(seeking, &mind.known.surfaces[on]);
-    if !place_looks(mind, eyes, on, (&merging, &seeking.surface))? {
-        let because = format!("this view by itself does not show the {}", mind.known.surfaces[on].name);
-        notes.push(Note::Nothing { because });
-        return Ok(());
-    }
+    place_looks(mind, eyes, on, (&merging, &seeking.surface))?;
     let views = restore(mind, eyes, on)?;
     let seen = merge(&views, &merging).map_err(|nothing| nothing.to_string()).and_then(|merged| {
         let (surfaces, options) = (&mind.known.surfaces, &seeking.surface);
@@ -150,6 +148,15 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         }
     };
     mind.regions[on].nothing = None;
+    let last = mind.regions[on].looks.last().map(|look| look.stamp_ns);
+    if without_astray(mind, eyes.robot.description(), on, &merged) {
+        if mind.regions[on].looks.last().map(|look| look.stamp_ns) == last {
+            return perceive(mind, eyes, on, notes);
+        }
+        let because = format!("this view does not fit the others of the {}", mind.known.surfaces[on].name);
+        notes.push(Note::Nothing { because });
+        return Ok(());
+    }
     let agreeing = merged.fits.iter().filter(|fit| fit.used).count();
     mind.regions[on].disputed = merged.fits.len() >= 2 * agreeing;
     let (merged, surface) =
@@ -211,17 +218,16 @@ fn without_walls(robot: &dyn Robot, known: &KnownSurface, mut merged: Merged) ->
 }
 
 /// Lays each new view of a surface that the map has on its outline by itself. Views of a long surface from its two ends share little
-/// that would hold them together along it; the ends that each shows do. A view that shows no such surface by itself is left out as soon
-/// as another does: it would be laid on the others anyhow. False if that is the newest.
+/// that would hold them together along it; the ends that each shows do.
 fn place_looks(
     mind: &mut Mind,
     eyes: Eyes<'_>,
     on: usize,
     options: (&MergeOptions, &SurfaceOptions),
-) -> Result<bool, WorldError> {
+) -> Result<(), WorldError> {
     let known = &mind.known.surfaces[on];
     if !known.whole {
-        return Ok(true);
+        return Ok(());
     }
     let description = eyes.robot.description();
     let looks = &mut mind.regions[on].looks;
@@ -229,13 +235,24 @@ fn place_looks(
         let view = eyes.record.view_at(look.stamp_ns, &description.frames.map)?;
         look.laid = placing::of_view(description, known, view, options);
     }
-    let is_laid = |look: &Look| look.laid != Laid::Nowhere;
-    let is_of_use = looks.last().is_some_and(is_laid);
-    if looks.iter().any(is_laid) {
-        looks.retain(is_laid);
-        return Ok(is_of_use);
+    Ok(())
+}
+
+/// Leaves out each view that shows no such surface by itself and is moved farther by the others than localisation errs: it was laid
+/// somewhere along them. What is left, if that is not all; the newest may be gone.
+fn without_astray(mind: &mut Mind, body: &Description, on: usize, merged: &Merged) -> bool {
+    let looks = &mut mind.regions[on].looks;
+    let is_astray = |look: &Look, fit: &ViewFit| {
+        let far = fit.moved_m > ASTRAY * body.pose_sigma_m || fit.moved_rad > ASTRAY * body.pose_sigma_rad;
+        look.laid == Laid::Nowhere && fit.used && far
+    };
+    let astray: Vec<bool> = looks.iter().zip(&merged.fits).map(|(look, fit)| is_astray(look, fit)).collect();
+    if !astray.contains(&true) || !looks.iter().any(|look| matches!(look.laid, Laid::By(_))) {
+        return false;
     }
-    Ok(true)
+    let mut astray = astray.into_iter();
+    looks.retain(|_| !astray.next().unwrap_or(false));
+    true
 }
 
 /// Reads the views of a surface back from the record by their timestamps, with the transforms of those times. What a view shows

@@ -81,10 +81,10 @@ impl LocalStore {
         if retention.max_bytes.is_some_and(|most| self.bytes(writer) > most) {
             return Ok(true);
         }
-        if let Some(least) = retention.min_free_bytes {
-            if free_bytes(&self.dir)? < least {
-                return Ok(true);
-            }
+        if let Some(least) = retention.min_free_bytes
+            && free_bytes(&self.dir)? < least
+        {
+            return Ok(true);
         }
         if let Some(age) = retention.max_age_ns
             && let Some((_, newest)) = self.index().oldest_segment()?

@@ -346,9 +346,8 @@ fn perform(
         jobs,
         &todo,
         options.threads,
-        &scratch,
+        (&scratch, options.least_free_bytes),
         (&options.stop, options.tell),
-        options.least_free_bytes,
         &mut journal,
     )?;
     done.extend(finished.into_iter().map(|job| (job.job.clone(), job)));

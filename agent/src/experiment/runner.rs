@@ -30,9 +30,8 @@ pub fn run(
     jobs: &[Job],
     todo: &[usize],
     threads: usize,
-    scratch: &Path,
+    (scratch, least_free_bytes): (&Path, u64),
     (stop, tell): (&Stop, fn(&str)),
-    least_free_bytes: u64,
     journal: &mut Journal,
 ) -> Result<Vec<Finished>, ExperimentError> {
     let (next, ended) = (AtomicUsize::new(0), AtomicBool::new(false));

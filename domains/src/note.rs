@@ -105,14 +105,24 @@ impl fmt::Display for Note {
                 turned_rad,
             } => {
                 let (cm, degrees) = (1e2 * moved_m, turned_rad.to_degrees());
+                let round = and_round(*cylinders);
                 write!(
                     f,
-                    "map       {walls} walls of {walls_m:.1} m, {cylinders} pillars or round walls, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; stood {cm:.1} cm and {degrees:.1}° off"
+                    "map       {walls} walls of {walls_m:.1} m{round}, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; stood {cm:.1} cm and {degrees:.1}° off"
                 )?;
                 surfaces.iter().try_for_each(|text| write!(f, "\n          {text}"))
             }
             Note::Changed { because } => write!(f, "changed   {because}; only the last view still holds"),
             Note::Nothing { because } => write!(f, "see       nothing yet: {because}"),
         }
+    }
+}
+
+/// The pillars and round walls of a map, after its walls; nothing if there are none.
+pub(crate) fn and_round(cylinders: usize) -> String {
+    match cylinders {
+        0 => String::new(),
+        1 => ", 1 pillar or round wall".into(),
+        n => format!(", {n} pillars or round walls"),
     }
 }

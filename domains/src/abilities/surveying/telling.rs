@@ -3,6 +3,7 @@
 use crate::answer::{Conclusion, Ended, Verdict};
 use crate::goal::Goal;
 use crate::mind::Mind;
+use crate::note::and_round;
 use crate::situation::Situation;
 
 /// See the module; none where something else was asked for, too.
@@ -13,8 +14,9 @@ pub(super) fn answer(_: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Opt
     let chart = &s.chart;
     let (walls, cylinders) = chart.map.as_ref().map_or((0, 0), |m| (m.walls.len(), m.cylinders.len()));
     let known = format!(
-        "{:.1} m² of open floor, {walls} walls, {cylinders} pillars or round walls and {} surfaces, after {} looks and {:.1} m",
+        "{:.1} m² of open floor, {walls} walls{} and {} surfaces, after {} looks and {:.1} m",
         chart.open_m2(),
+        and_round(cylinders),
         chart.surfaces.len(),
         mind.views,
         mind.distance_m

@@ -58,7 +58,7 @@ pub enum Laid {
     AsLocalised,
     /// Moved by this, `map_from_localised`.
     By(Isometry3<f64>),
-    /// Not at all: by itself the view shows no such surface.
+    /// Not at all: by itself the view shows no such surface, or not where localisation can be.
     Nowhere,
 }
 

@@ -8,7 +8,7 @@ use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sight
 use descry_perception::View;
 use descry_perception::hull::Hull;
 use descry_perception::merge::{MergeOptions, Merged, ViewFit, merge};
-use descry_perception::nalgebra::{Point3, Translation3, Unit, Vector3};
+use descry_perception::nalgebra::{Isometry3, Point3, Translation3, Unit, Vector3};
 use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment_on};
@@ -46,8 +46,8 @@ pub(super) const ON_SURFACE_M: f64 = 0.012;
 /// What lies so near to a wall of the map, or beyond it, is the wall, metres: localisation along a surface errs by two or three
 /// centimetres.
 const WALL_M: f64 = 0.03;
-/// A view that nothing holds but the others may be moved by so many standard deviations of localisation.
-const ASTRAY: f64 = 3.0;
+/// A view may be moved by so many standard deviations of localisation; more is an error of what moved it.
+const ASTRAY: f64 = 4.0;
 
 /// What perceiving needs besides what is known.
 #[derive(Clone, Copy)]
@@ -148,8 +148,12 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         }
     };
     mind.regions[on].nothing = None;
+    let agreeing = merged.fits.iter().filter(|fit| fit.used).count();
+    mind.regions[on].disputed = merged.fits.len() >= 2 * agreeing;
+    let (merged, surface) =
+        placing::lay_on_map(eyes.robot.description(), &mind.known.surfaces[on], merged, surface);
     let last = mind.regions[on].looks.last().map(|look| look.stamp_ns);
-    if without_astray(mind, eyes.robot.description(), on, &merged) {
+    if without_astray(mind, eyes.robot.description(), on, (&views, &merged)) {
         if mind.regions[on].looks.last().map(|look| look.stamp_ns) == last {
             return perceive(mind, eyes, on, notes);
         }
@@ -157,10 +161,6 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         notes.push(Note::Nothing { because });
         return Ok(());
     }
-    let agreeing = merged.fits.iter().filter(|fit| fit.used).count();
-    mind.regions[on].disputed = merged.fits.len() >= 2 * agreeing;
-    let (merged, surface) =
-        placing::lay_on_map(eyes.robot.description(), &mind.known.surfaces[on], merged, surface);
     let merged = without_walls(eyes.robot, &mind.known.surfaces[on], merged);
     let newest = newest(&views, &merged);
     if let Some(map) = &newest {
@@ -238,16 +238,35 @@ fn place_looks(
     Ok(())
 }
 
-/// Leaves out each view that shows no such surface by itself and is moved farther by the others than localisation errs: it was laid
-/// somewhere along them. What is left, if that is not all; the newest may be gone.
-fn without_astray(mind: &mut Mind, body: &Description, on: usize, merged: &Merged) -> bool {
+/// Whether a camera is moved farther from where localisation has it than that errs.
+pub(super) fn is_astray(body: &Description, localised: &Isometry3<f64>, moved: &Isometry3<f64>) -> bool {
+    let shift = moved.translation.vector - localised.translation.vector;
+    let turn = moved.rotation.rotation_to(&localised.rotation);
+    shift.norm() > ASTRAY * body.pose_sigma_m || turn.angle() > ASTRAY * body.pose_sigma_rad
+}
+
+/// Leaves out each view of a surface of the map that its outline and the other views have moved farther than localisation errs: it was
+/// laid somewhere along them. False if none is left out, or nothing would be left; the newest may be gone.
+fn without_astray(
+    mind: &mut Mind,
+    body: &Description,
+    on: usize,
+    (views, merged): (&[View], &Merged),
+) -> bool {
     let looks = &mut mind.regions[on].looks;
-    let is_astray = |look: &Look, fit: &ViewFit| {
-        let far = fit.moved_m > ASTRAY * body.pose_sigma_m || fit.moved_rad > ASTRAY * body.pose_sigma_rad;
-        look.laid == Laid::Nowhere && fit.used && far
+    if !mind.known.surfaces[on].whole {
+        return false;
+    }
+    let has_strayed = |(look, (view, fit)): (&Look, (&View, &ViewFit))| {
+        let localised = match look.laid {
+            Laid::By(map_from_localised) => map_from_localised.inverse() * view.world_from_camera,
+            Laid::AsLocalised | Laid::Nowhere => view.world_from_camera,
+        };
+        fit.used && is_astray(body, &localised, &fit.world_from_camera)
     };
-    let astray: Vec<bool> = looks.iter().zip(&merged.fits).map(|(look, fit)| is_astray(look, fit)).collect();
-    if !astray.contains(&true) || !looks.iter().any(|look| matches!(look.laid, Laid::By(_))) {
+    let placed = views.iter().zip(&merged.fits);
+    let astray: Vec<bool> = looks.iter().zip(placed).map(has_strayed).collect();
+    if !astray.contains(&true) || !astray.contains(&false) {
         return false;
     }
     let mut astray = astray.into_iter();

@@ -7,7 +7,7 @@ use descry_perception::nalgebra::{Isometry3, Point3};
 use descry_perception::surface::{Surface, SurfaceOptions, find_surface};
 use descry_robots::Description;
 
-use super::perceive::ON_SURFACE_M;
+use super::perceive::{ON_SURFACE_M, is_astray};
 use crate::mind::Laid;
 use crate::situation::KnownSurface;
 
@@ -28,16 +28,21 @@ pub(super) fn lay_on_map(
     (merged.moved(&map_from_world), surface.moved(&map_from_world))
 }
 
-/// How a view lies on the outline of a surface that the map has.
+/// How a view lies on the outline of a surface that the map has; nowhere, if that were farther off than localisation errs.
 pub(super) fn of_view(
     body: &Description,
     known: &KnownSurface,
     view: View,
     (merging, seeking): (&MergeOptions, &SurfaceOptions),
 ) -> Laid {
+    let localised = view.world_from_camera;
     let Ok(merged) = merge(&[view], merging) else { return Laid::Nowhere };
-    let found = find_surface(&merged.cloud, &merged.visibility, seeking);
-    found.map_or(Laid::Nowhere, |surface| Laid::By(located(body, known, &merged, &surface)))
+    let Ok(surface) = find_surface(&merged.cloud, &merged.visibility, seeking) else { return Laid::Nowhere };
+    let map_from_localised = located(body, known, &merged, &surface);
+    match is_astray(body, &localised, &(map_from_localised * localised)) {
+        true => Laid::Nowhere,
+        false => Laid::By(map_from_localised),
+    }
 }
 
 fn located(body: &Description, known: &KnownSurface, merged: &Merged, surface: &Surface) -> Isometry3<f64> {

@@ -1,7 +1,11 @@
 //! Where a seen surface lies on the map: localisation against the outline of a known table.
 //!
 //! Localisation errs by centimetres and degrees, and so does a merged cloud as a whole. A table whose outline the map
-//! knows tells by how much: the edges that were seen are laid on the edges of the outline.
+//! knows tells by how much: the ends that were seen are laid on the edges of the outline.
+
+mod endings;
+
+pub use endings::{Ending, endings};
 
 use nalgebra::{
     Isometry2, Isometry3, Matrix3, Point2, Point3, Translation3, Unit, UnitQuaternion, Vector2, Vector3,
@@ -9,22 +13,8 @@ use nalgebra::{
 
 /// Length of an edge that gives one sample.
 const BIN_M: f64 = 0.02;
-/// A sample is where this many points lie farther out: single stray points do not count.
-const STRAY: usize = 3;
-/// A sample wants this many points within [`DEPTH_M`] behind it.
-const FEWEST: usize = 8;
-/// Noise throws points beyond an end, and edges lose some: where it is, is counted from the points of a strip so deep behind it
-/// against those of the next strip inwards.
-const DEPTH_M: f64 = 0.04;
-/// Points so far below the surface, close to its end, are of the side of a board: they tell by themselves where it ends.
-const BELOW_M: f64 = 0.004;
-/// So many bins to either side are counted together.
-const POOLED: usize = 2;
-/// Shares of the inner strip's points that the outer may hold; otherwise an object stands there, or a shadow cuts in.
-const SHARES: std::ops::Range<f64> = 0.5..1.3;
-/// A camera must have looked past the places this far beyond a sample. Beside an object pixels are lost, and one place alone
-/// would take the border of its shadow for the end of the surface.
-const BEYOND_M: [f64; 3] = [0.03, 0.06, 0.09];
+/// A sample wants this many endings.
+const FEWEST: usize = 2;
 /// How far a sample may be off, round by round: what a view cuts off or an object hides lies farther in than the edge.
 const GATES_M: [f64; 7] = [0.15, 0.12, 0.08, 0.05, 0.03, 0.02, 0.02];
 /// Standard deviation of one sample; neighbours err together, which is why it is no millimetre.
@@ -41,40 +31,27 @@ pub struct Located {
     pub residual_m: f64,
 }
 
-/// Lays the seen points of a surface on the outline that the map has of it (in order around, metres).
+/// Lays the endings of a surface that were seen on the outline that the map has of it (in order around, metres).
 ///
-/// `sigma_m` and `sigma_rad` say how well the cloud's place in the map is known before: where no edge tells otherwise, it
-/// stays. Moves along the surface and turns about `up`; heights are left as they are. The surface ends only where `is_past`
-/// says of a place (cloud's frame) just beyond the last points that a camera looked past it: elsewhere only the image ends.
+/// `sigma_m` and `sigma_rad` say how well the place in the map of what was seen is known before: where no ending tells otherwise,
+/// it stays. Moves along the surface and turns about `up`; heights are left as they are.
 pub fn locate(
-    points: &[Point3<f64>],
+    endings: &[Ending],
     up: &Unit<Vector3<f64>>,
     outline: &[Point3<f64>],
     sigma_m: f64,
     sigma_rad: f64,
-    is_past: impl Fn(&Point3<f64>) -> bool,
 ) -> Located {
     let mut located = Located { map_from_world: Isometry3::identity(), matched: 0, residual_m: 0.0 };
     if outline.len() < 3 {
         return located;
     }
     let frame = Frame::of(outline, up);
-    let points: Vec<Seen> =
-        points.iter().map(|p| Seen { at: frame.flat(p), height_m: frame.height_m(p) }).collect();
+    let ends: Vec<End> = endings.iter().map(|ending| End::of(ending, &frame)).collect();
     let edges = edges(&outline.iter().map(|p| frame.flat(p)).collect::<Vec<_>>());
-    let around: Vec<Vec<Seen>> = edges.iter().map(|edge| around(edge, &points).collect()).collect();
     let mut moved = Isometry2::identity();
     for gate_m in GATES_M {
-        let is_end = |m: &Match| {
-            let mut beyond = BEYOND_M.iter().map(|b| moved.inverse() * (m.at + m.normal * *b));
-            beyond.all(|p| is_past(&(frame.origin + frame.right * p.x + frame.ahead * p.y)))
-        };
-        let matches: Vec<Match> = edges
-            .iter()
-            .zip(&around)
-            .flat_map(|(edge, near)| samples(edge, near, &moved, gate_m))
-            .filter(is_end)
-            .collect();
+        let matches = samples(&edges, &ends, &moved, gate_m);
         located.matched = matches.len();
         let square: f64 = matches.iter().map(|m| m.distance_m.powi(2)).sum();
         located.residual_m = if matches.is_empty() { 0.0 } else { (square / matches.len() as f64).sqrt() };
@@ -92,11 +69,30 @@ struct Edge {
     length_m: f64,
 }
 
-/// A seen point: where it lies in the plane of the outline, and how far above it.
-#[derive(Clone, Copy)]
-struct Seen {
-    at: Point2<f64>,
-    height_m: f64,
+/// An [`Ending`] in the plane of the outline.
+struct End {
+    on: Point2<f64>,
+    past: Point2<f64>,
+    side: Option<Point2<f64>>,
+    eye: Point2<f64>,
+}
+
+impl End {
+    fn of(ending: &Ending, frame: &Frame) -> End {
+        let side = ending.side.map(|side| frame.flat(&side));
+        End { on: frame.flat(&ending.on), past: frame.flat(&ending.past), side, eye: frame.flat(&ending.eye) }
+    }
+
+    /// How far out it is from an edge, and half of how far it may be off, metres; none where it is no end on that edge's side.
+    fn from_edge(&self, edge: &Edge, moved: &Isometry2<f64>) -> Option<(f64, f64)> {
+        let out = |p: &Point2<f64>| edge.outward.dot(&(moved * p - edge.from));
+        let (on, past) = (out(&self.on), out(&self.past));
+        match self.side.as_ref().filter(|_| out(&self.eye) > on) {
+            // A board shows its side to whoever stands before it.
+            Some(side) => Some((out(side), 0.0)),
+            None => (past > on).then_some(((on + past) / 2.0, (past - on) / 2.0)),
+        }
+    }
 }
 
 /// A sample with the edge of the outline that it lies on.
@@ -106,6 +102,7 @@ struct Match {
     normal: Vector2<f64>,
     /// Signed, along the normal.
     distance_m: f64,
+    variance_m2: f64,
 }
 
 /// The plane of the outline with its middle as origin.
@@ -127,10 +124,6 @@ impl Frame {
     fn flat(&self, p: &Point3<f64>) -> Point2<f64> {
         let d = p - self.origin;
         Point2::new(self.right.dot(&d), self.ahead.dot(&d))
-    }
-
-    fn height_m(&self, p: &Point3<f64>) -> f64 {
-        self.up.dot(&(p - self.origin))
     }
 
     /// A motion in the plane as one in space.
@@ -155,80 +148,46 @@ fn edges(outline: &[Point2<f64>]) -> Vec<Edge> {
     (0..outline.len()).filter_map(edge).collect()
 }
 
-/// Points that can come near an edge while the estimate moves: those that now lie no farther from its line than twice the widest gate.
-fn around<'a>(edge: &'a Edge, points: &'a [Seen]) -> impl Iterator<Item = Seen> + 'a {
-    let reach_m = 2.0 * (GATES_M[0] + DEPTH_M);
-    points.iter().copied().filter(move |p| edge.outward.dot(&(p.at - edge.from)).abs() < reach_m)
-}
-
-/// Where the seen surface ends along an edge, a sample every [`BIN_M`].
-fn samples(edge: &Edge, points: &[Seen], moved: &Isometry2<f64>, gate_m: f64) -> Vec<Match> {
-    let bins = (edge.length_m / BIN_M) as usize;
-    let (turn, shift) = (moved.rotation.to_rotation_matrix(), moved.translation.vector - edge.from.coords);
-    // How far out the points of each bin lie, and how high.
-    let mut near: Vec<Vec<(f64, f64)>> = vec![Vec::new(); bins];
-    for p in points {
-        let d = turn * p.at.coords + shift;
-        let (reach, out) = (edge.along.dot(&d), edge.outward.dot(&d));
-        if reach < 0.0 || out >= gate_m || out <= -gate_m - 2.0 * DEPTH_M {
-            continue;
-        }
-        if let Some(bin) = near.get_mut((reach / BIN_M) as usize) {
-            bin.push((out, p.height_m));
+/// Where the surface ends along the edges, a sample every [`BIN_M`]: the mean of the endings there that lie nearest to that edge.
+fn samples(edges: &[Edge], ends: &[End], moved: &Isometry2<f64>, gate_m: f64) -> Vec<Match> {
+    let mut bins: Vec<Vec<Bin>> =
+        edges.iter().map(|edge| vec![Bin::default(); (edge.length_m / BIN_M) as usize]).collect();
+    for end in ends {
+        let along = |edge: &Edge| edge.along.dot(&(moved * end.on - edge.from));
+        let near = edges.iter().zip(&mut bins).filter_map(|(edge, bins)| {
+            let (out_m, half_m) = end.from_edge(edge, moved).filter(|(out_m, _)| out_m.abs() < gate_m)?;
+            let reach_m = along(edge);
+            let bin = if reach_m < 0.0 { None } else { bins.get_mut((reach_m / BIN_M) as usize) };
+            bin.map(|bin| (bin, out_m, half_m))
+        });
+        if let Some((bin, out_m, half_m)) = near.min_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) {
+            bin.count += 1;
+            bin.out_m += out_m;
+            bin.half_m += half_m;
         }
     }
-    let strips: Vec<Option<Strips>> = near.iter_mut().map(|bin| Strips::of(bin)).collect();
-    let ends = strips.iter().enumerate().filter_map(|(bin, own)| {
-        let own = own.as_ref()?;
-        let pooled = strips[bin.saturating_sub(POOLED)..(bin + POOLED + 1).min(bins)].iter().flatten();
-        let (outer, inner) = pooled.fold((0, 0), |sum, s| (sum.0 + s.outer, sum.1 + s.inner));
-        let share = outer as f64 / inner as f64;
-        let counted_m = SHARES.contains(&share).then_some(own.reached_m + (share - 1.0) * DEPTH_M);
-        let end = own.side_m.or(counted_m)?;
-        let at = edge.from + edge.along * ((bin as f64 + 0.5) * BIN_M) + edge.outward * end;
-        (end.abs() < gate_m).then_some(Match { at, normal: edge.outward, distance_m: end })
+    let each = edges.iter().zip(&bins).flat_map(|(edge, bins)| {
+        let full = bins.iter().enumerate().filter(|(_, bin)| bin.count >= FEWEST);
+        full.map(move |(n, bin)| bin.sample(edge, (n as f64 + 0.5) * BIN_M))
     });
-    ends.collect()
+    each.collect()
 }
 
-/// What is behind the last points of a bin.
-struct Strips {
-    /// How far out the last points lie but for stray ones.
-    reached_m: f64,
-    /// Points of the surface in the outer strip and in the inner.
-    outer: usize,
-    inner: usize,
-    /// Where the side of the board is, if it is seen.
-    side_m: Option<f64>,
+/// Endings on a piece of an edge: how many, the sums of how far out they are and of half their widths.
+#[derive(Clone, Default)]
+struct Bin {
+    count: usize,
+    out_m: f64,
+    half_m: f64,
 }
 
-impl Strips {
-    /// Of the points of a bin, how far out and how high each; none without points enough. Their order is lost.
-    fn of(points: &mut [(f64, f64)]) -> Option<Strips> {
-        if points.len() <= STRAY {
-            return None;
-        }
-        let reached_m = points.select_nth_unstable_by(STRAY, |a, b| b.0.total_cmp(&a.0)).1.0;
-        let strip = |p: &(f64, f64)| ((reached_m - p.0) / DEPTH_M).max(0.0) as usize;
-        let behind = points.iter().filter(|p| strip(p) == 0).count();
-        let mut inner: Vec<f64> = points.iter().filter(|p| strip(p) == 1).map(|p| p.1).collect();
-        if inner.is_empty() || behind < FEWEST {
-            return None;
-        }
-        let height_m = median(&mut inner);
-        let is_low = |p: &(f64, f64)| p.1 < height_m - BELOW_M;
-        let outer = points.iter().filter(|p| strip(p) == 0 && !is_low(p)).count();
-        let is_side = |p: &&(f64, f64)| is_low(p) && p.0 > reached_m - DEPTH_M / 2.0;
-        let mut side: Vec<f64> = points.iter().filter(is_side).map(|p| p.0).collect();
-        let side_m = (side.len() >= FEWEST).then(|| median(&mut side));
-        Some(Strips { reached_m, outer, inner: inner.len(), side_m })
+impl Bin {
+    fn sample(&self, edge: &Edge, reach_m: f64) -> Match {
+        let (distance_m, half_m) = (self.out_m / self.count as f64, self.half_m / self.count as f64);
+        let at = edge.from + edge.along * reach_m + edge.outward * distance_m;
+        let variance_m2 = SAMPLE_SIGMA_M.powi(2) + half_m.powi(2) / 3.0;
+        Match { at, normal: edge.outward, distance_m, variance_m2 }
     }
-}
-
-/// The upper one of the two in the middle, of at least one value.
-fn median(values: &mut [f64]) -> f64 {
-    let half = values.len() / 2;
-    *values.select_nth_unstable_by(half, f64::total_cmp).1
 }
 
 /// One Gauss-Newton step towards the edges, held by what was known before.
@@ -239,8 +198,8 @@ fn step(matches: &[Match], moved: &Isometry2<f64>, sigma_m: f64, sigma_rad: f64)
     let mut gradient = prior.component_mul(&Vector3::new(t.x, t.y, moved.rotation.angle()));
     for m in matches {
         let row = Vector3::new(m.normal.x, m.normal.y, m.normal.dot(&Vector2::new(-m.at.y, m.at.x)));
-        information += row * row.transpose() * SAMPLE_SIGMA_M.powi(-2);
-        gradient += row * m.distance_m * SAMPLE_SIGMA_M.powi(-2);
+        information += row * row.transpose() / m.variance_m2;
+        gradient += row * m.distance_m / m.variance_m2;
     }
     match information.try_inverse() {
         Some(inverse) => {
@@ -254,90 +213,151 @@ fn step(matches: &[Match], moved: &Isometry2<f64>, sigma_m: f64, sigma_rad: f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Intrinsics;
+    use crate::merge::{MergeOptions, merge};
+    use crate::surface::{Region, SurfaceOptions, find_surface};
+    use crate::view::View;
 
-    const TABLE: [[f64; 2]; 4] = [[-0.8, -0.4], [0.8, -0.4], [0.8, 0.4], [-0.8, 0.4]];
+    const CAMERA: Intrinsics =
+        Intrinsics { width: 320, height: 240, fx: 262.0, fy: 262.0, cx: 159.5, cy: 119.5 };
+    /// A box: its low and its high corner.
+    type Block = [[f64; 3]; 2];
+    const BOARD: Block = [[-0.8, -0.4, 0.695], [0.8, 0.4, 0.72]];
+    const FLOOR: Block = [[-9.0, -9.0, -0.1], [9.0, 9.0, 0.0]];
 
-    fn raised(points: &[[f64; 2]]) -> Vec<Point3<f64>> {
-        points.iter().map(|p| Point3::new(p[0], p[1], 0.72)).collect()
+    /// What the camera makes worse.
+    #[derive(Clone, Copy, Default)]
+    struct Faults {
+        /// Farthest that a depth is off, as a share of its square.
+        noise: f64,
+        /// Pixels lost to either side of a jump in depth, and to the right of one that falls away.
+        lost: usize,
+        shadow: usize,
     }
 
-    /// Points of the table every 4 mm, where `seen` says so.
-    fn points(seen: impl Fn(f64, f64) -> bool) -> Vec<Point3<f64>> {
-        let grid = (-200..=200)
-            .flat_map(|i| (-100..=100).map(move |j| [f64::from(i) * 0.004, f64::from(j) * 0.004]));
-        raised(&grid.filter(|&[x, y]| seen(x, y)).collect::<Vec<_>>())
+    fn outline() -> Vec<Point3<f64>> {
+        let [low, high] = BOARD;
+        let corners = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]];
+        corners.iter().map(|c| Point3::new(c[0], c[1], high[2])).collect()
     }
 
-    /// Moves the seen part of a table away and expects it back within the given distance at its middle.
-    fn check(seen: impl Fn(f64, f64) -> bool, x_m: f64, y_m: f64, yaw_deg: f64, within_m: f64) {
-        let truth = Isometry3::new(Vector3::new(x_m, y_m, 0.0), Vector3::z() * yaw_deg.to_radians());
-        let seen: Vec<Point3<f64>> = points(seen).iter().map(|p| truth.inverse() * p).collect();
-        let found = locate(&seen, &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05, |_| true);
-        let middle = Point3::new(0.0, 0.0, 0.72);
-        let off_m = (found.map_from_world * (truth.inverse() * middle) - middle).norm();
-        assert!(off_m < within_m, "moved by {x_m}, {y_m}, {yaw_deg}: {off_m} m off, {found:?}");
+    /// How far along a ray the first of some blocks is; infinite without one.
+    fn hit(blocks: &[Block], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
+        let each = blocks.iter().map(|[low, high]| {
+            let (mut near, mut far) = (0.0_f64, f64::INFINITY);
+            for i in 0..3 {
+                let (a, b) = ((low[i] - eye[i]) / ray[i], (high[i] - eye[i]) / ray[i]);
+                (near, far) = (near.max(a.min(b)), far.min(a.max(b)));
+            }
+            if near <= far { near } else { f64::INFINITY }
+        });
+        each.fold(f64::INFINITY, f64::min)
     }
+
+    /// What a camera sees that looks from one place at another.
+    fn view(blocks: &[Block], eye: [f64; 3], at: [f64; 3], faults: Faults) -> View {
+        let (eye, at) = (Point3::from(eye), Point3::from(at));
+        let forward = (at - eye).normalize();
+        let right = forward.cross(&Vector3::z()).normalize();
+        let axes = Matrix3::from_columns(&[right, forward.cross(&right), forward]);
+        let turn = UnitQuaternion::from_matrix(&axes);
+        let world_from_camera = Isometry3::from_parts(Translation3::from(eye.coords), turn);
+        let (width, count) = (CAMERA.width, CAMERA.width * CAMERA.height);
+        let ray = |pixel: usize| {
+            turn * CAMERA.unproject((pixel % width) as f64, (pixel / width) as f64, 1.0).coords
+        };
+        let exact: Vec<f64> = (0..count).map(|pixel| hit(blocks, &eye, &ray(pixel))).collect();
+        let noise = |pixel: usize| (pixel * 7919 % 8191) as f64 / 4095.0 - 1.0;
+        let depths: Vec<f32> = (0..count)
+            .map(|pixel| {
+                let z = exact[pixel];
+                let far =
+                    |steps: isize, step: usize| exact.get(pixel.wrapping_add_signed(steps * step as isize));
+                let jumps = |steps: isize, step: usize| far(steps, step).is_some_and(|f| (f - z).abs() > 0.1);
+                let n = faults.lost as isize;
+                let is_lost = (-n..=n).any(|k| jumps(k, 1) || jumps(k, width));
+                let in_shadow = (1..=faults.shadow as isize).any(|k| far(-k, 1).is_some_and(|f| f + 0.1 < z));
+                let noisy = z + faults.noise * z * z * noise(pixel);
+                if is_lost && pixel % 2 == 0 || in_shadow { f32::NAN } else { noisy as f32 }
+            })
+            .collect();
+        View {
+            stamp_ns: 0,
+            cloud: CAMERA.cloud_from_depth(&depths).unwrap_or_default(),
+            intrinsics: Some(CAMERA),
+            world_from_camera,
+            pose_sigma_m: 0.03,
+            pose_sigma_rad: 0.03,
+        }
+    }
+
+    /// Lays a view of some blocks whose place is told wrongly on the board, and gives how far off its middle then is, metres.
+    fn laid(view: &View, told_from_true: &Isometry3<f64>) -> (Vector3<f64>, Located) {
+        let told = View { world_from_camera: told_from_true * view.world_from_camera, ..view.clone() };
+        let up = Some(Vector3::z_axis());
+        let found = merge(&[told], &MergeOptions { up, ..MergeOptions::default() }).unwrap();
+        let region = Some(Region { corners: outline(), margin_m: 0.25 });
+        let options =
+            SurfaceOptions { up, region, height_band_m: Some((0.6, 0.8)), ..SurfaceOptions::default() };
+        let surface = find_surface(&found.cloud, &found.visibility, &options).unwrap();
+        let located = locate(&endings(&found.visibility, &surface), &surface.up, &outline(), 0.05, 0.05);
+        let middle = Point3::new(0.0, 0.0, BOARD[1][2]);
+        (located.map_from_world * (told_from_true * middle) - middle, located)
+    }
+
+    /// Looks at the board with what else is there, its place told wrongly by so much, and expects it back within the given distance.
+    fn check(others: &[Block], eye: [f64; 3], faults: Faults, within_m: f64) {
+        let blocks = [others, &[BOARD, FLOOR]].concat();
+        for (x_m, y_m, yaw_deg) in [(0.0, 0.0, 0.0), (0.04, -0.03, 2.0), (-0.06, 0.05, -4.0)] {
+            let told = Isometry3::new(Vector3::new(x_m, y_m, 0.0), Vector3::z() * f64::to_radians(yaw_deg));
+            let (off, located) = laid(&view(&blocks, eye, [0.0, 0.0, 0.72], faults), &told);
+            let case = format!("from {eye:?}, told {x_m}, {y_m}, {yaw_deg}");
+            assert!(off.xy().norm() < within_m, "{case}: {off:?} off, {located:?}");
+        }
+    }
+
+    const BEFORE: [f64; 3] = [0.2, -1.6, 1.5];
+    const BESIDE: [f64; 3] = [1.9, 0.5, 1.4];
 
     #[test]
     fn a_table_comes_back_to_its_place() {
-        check(|_, _| true, 0.0, 0.0, 0.0, 0.002);
-        check(|_, _| true, 0.04, -0.03, 2.0, 0.004);
-        check(|_, _| true, -0.06, 0.05, -4.0, 0.006);
-        let cut_corner = |x: f64, y: f64| x + y < 0.8;
-        check(cut_corner, 0.04, -0.03, 2.0, 0.005);
-        let cut_by_the_view = |x: f64, y: f64| x < 0.3 + 0.25 * y;
-        check(cut_by_the_view, 0.04, -0.03, 2.0, 0.006);
-        let hidden_behind_a_box = |x: f64, y: f64| !(x > -0.3 && x < 0.3 && y > 0.1);
-        check(hidden_behind_a_box, -0.03, 0.04, -2.0, 0.005);
+        check(&[], BEFORE, Faults::default(), 0.006);
+        check(&[], BESIDE, Faults::default(), 0.006);
+        let on_a_corner = [[0.5, 0.1, 0.72], [0.9, 0.5, 1.0]];
+        check(&[on_a_corner], BEFORE, Faults::default(), 0.006);
+        let in_front = [[-0.3, -0.39, 0.72], [0.2, -0.2, 0.95]];
+        check(&[in_front], BEFORE, Faults::default(), 0.006);
     }
 
     #[test]
-    fn where_the_image_ends_the_table_goes_on() {
-        let seen = points(|x, _| x > -0.4 && x < 0.72);
-        let found = locate(&seen, &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05, |p| p.x < 0.7);
-        let off_m = (found.map_from_world * Point3::origin()).coords.norm();
-        assert!(off_m < 0.002, "{off_m} m off, {found:?}");
-    }
-
-    #[test]
-    fn noise_and_the_side_of_the_board_do_not_move_an_end() {
-        // Far along the view noise is wide, and the side below the near end is as dense as the surface is thin.
-        let noise_m = |i: i32, j: i32| 0.012 * f64::from((i * 7919 + j * 104_729).rem_euclid(17) - 8) / 8.0;
-        let mut seen: Vec<Point3<f64>> = (-200..=200)
-            .flat_map(|i| (-100..=100).map(move |j| (i, j)))
-            .map(|(i, j)| Point3::new(f64::from(i) * 0.004 + noise_m(i, j), f64::from(j) * 0.004, 0.72))
-            .collect();
-        let side = (-100..=100).flat_map(|j| (1..8).map(move |k| (j, k)));
-        seen.extend(side.map(|(j, k)| {
-            Point3::new(-0.8 + noise_m(j, k), f64::from(j) * 0.004, 0.72 - 0.0015 * f64::from(k))
-        }));
-        let seen_at = |left: bool, right: bool| {
-            let is_past = |p: &Point3<f64>| if p.x < 0.0 { left } else { right };
-            locate(&seen, &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05, is_past).map_from_world
-        };
-        for (left, right) in [(true, false), (false, true), (true, true)] {
-            let off_m = (seen_at(left, right) * Point3::origin()).x.abs();
-            assert!(off_m < 0.004, "ends seen: left {left}, right {right}: {off_m} m off");
-        }
+    fn noise_and_what_an_edge_loses_do_not_move_an_end() {
+        let faults = Faults { noise: 0.006, lost: 1, shadow: 0 };
+        check(&[], BEFORE, faults, 0.006);
+        check(&[], BESIDE, faults, 0.006);
+        check(&[], BEFORE, Faults { shadow: 20, ..faults }, 0.01);
+        check(&[], BESIDE, Faults { shadow: 20, ..faults }, 0.01);
     }
 
     #[test]
     fn the_border_of_a_shadow_is_no_end() {
-        // A box hides what is left of a slanting line; beside its shadow some pixels are lost.
-        let border = |y: f64| -0.74 + 0.1 * y;
-        let seen = points(|x, y| x > border(y) && x < 0.3);
-        let is_past = |p: &Point3<f64>| p.x > border(p.y) - 0.05 && p.x < 0.25;
-        let found = locate(&seen, &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05, is_past);
-        let off_m = (found.map_from_world * Point3::origin()).coords.norm();
-        assert!(off_m < 0.005, "{off_m} m off, {found:?}");
+        let hides_the_left_end = [[-0.78, -0.38, 0.72], [-0.5, -0.1, 1.2]];
+        check(&[hides_the_left_end], [0.9, -1.2, 1.3], Faults { lost: 1, ..Faults::default() }, 0.006);
     }
 
     #[test]
-    fn what_no_edge_tells_stays() {
-        let inner = points(|x, y| x.abs() < 0.3 && y.abs() < 0.2);
-        let found = locate(&inner, &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05, |_| true);
-        assert_eq!((found.map_from_world.translation.vector.norm(), found.matched), (0.0, 0));
-        let none = locate(&[], &Vector3::z_axis(), &raised(&TABLE), 0.05, 0.05, |_| true);
+    fn where_something_upright_stands_against_it_the_surface_does_not_end() {
+        // Against the right end, and farther than the board is deep.
+        let cupboard = [[0.8, -0.6, 0.0], [1.2, 0.6, 1.1]];
+        check(&[cupboard], [-0.9, -1.4, 1.5], Faults { noise: 0.003, lost: 1, shadow: 0 }, 0.006);
+    }
+
+    #[test]
+    fn what_no_end_tells_stays() {
+        let near = view(&[BOARD, FLOOR], [0.0, -0.1, 1.3], [0.0, 0.0, 0.72], Faults::default());
+        let (off, located) = laid(&near, &Isometry3::translation(0.03, 0.02, 0.0));
+        let stays = (off - Vector3::new(0.03, 0.02, 0.0)).norm() < 1e-9;
+        assert!(stays && located.matched == 0, "{off:?}, {located:?}");
+        let none = locate(&[], &Vector3::z_axis(), &outline(), 0.05, 0.05);
         assert_eq!((none.map_from_world, none.matched), (Isometry3::identity(), 0));
     }
 }

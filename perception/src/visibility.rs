@@ -182,16 +182,6 @@ impl Visibility {
         Visibility { maps: viewpoints.iter().filter_map(|v| virtual_map(cloud, v)).collect() }
     }
 
-    /// True if a camera had the place in its image and neither a surface there nor anything before it. Unlike [`Seen::Free`] no return
-    /// behind it is asked for: a floor may be out of range.
-    pub fn looked_past(&self, p: &Point3<f64>, tolerance_m: f64) -> bool {
-        self.maps.iter().any(|map| {
-            let q = map.camera_from_world * p;
-            let in_image = map.intrinsics.project(&q).and_then(|(u, v)| map.intrinsics.pixel(u, v)).is_some();
-            in_image && matches!(map.look_from(&q, tolerance_m), Seen::Free | Seen::Never)
-        })
-    }
-
     /// The best knowledge of a point: free in any look outweighs surface, hidden and never.
     pub fn look(&self, p: &Point3<f64>, tolerance_m: f64) -> Seen {
         let mut best = Seen::Never;

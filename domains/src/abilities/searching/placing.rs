@@ -1,18 +1,15 @@
 //! Where what was seen of a surface lies on the map: its outline there mends localisation's error.
 
 use descry_perception::View;
-use descry_perception::locate::locate;
+use descry_perception::locate::{endings, locate};
 use descry_perception::merge::{MergeOptions, Merged, merge};
-use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::nalgebra::Isometry3;
 use descry_perception::surface::{Surface, SurfaceOptions, find_surface};
 use descry_robots::Description;
 
-use super::perceive::{ON_SURFACE_M, is_astray};
+use super::perceive::is_astray;
 use crate::mind::Laid;
 use crate::situation::KnownSurface;
-
-/// How far beyond the hull of a surface points of it are looked for.
-const HULL_MARGIN_M: f64 = 0.02;
 
 /// Lays a merged surface on the outline that the map has of it: that mends what is left of localisation's error.
 pub(super) fn lay_on_map(
@@ -46,11 +43,7 @@ pub(super) fn of_view(
 }
 
 fn located(body: &Description, known: &KnownSurface, merged: &Merged, surface: &Surface) -> Isometry3<f64> {
-    let outline = surface.outline();
-    let on_it =
-        |p: &Point3<f64>| surface.height_m(p).abs() < ON_SURFACE_M && outline.covers(p, HULL_MARGIN_M);
-    let points: Vec<Point3<f64>> = merged.cloud.points.iter().map(|p| p.cast()).filter(on_it).collect();
-    let is_past = |p: &Point3<f64>| merged.visibility.looked_past(p, ON_SURFACE_M);
+    let endings = endings(&merged.visibility, surface);
     let sigmas = (body.pose_sigma_m, body.pose_sigma_rad);
-    locate(&points, &surface.up, &known.outline, sigmas.0, sigmas.1, is_past).map_from_world
+    locate(&endings, &surface.up, &known.outline, sigmas.0, sigmas.1).map_from_world
 }

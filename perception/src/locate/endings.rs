@@ -1,0 +1,191 @@
+//! Where a camera saw a surface end: between two neighbouring rays, one that met it and one that went past it.
+//!
+//! Noise of depth moves a point along its ray. Where the ray meets the plane of the surface is free of it.
+
+use crate::surface::Surface;
+use crate::visibility::{DepthMap, Visibility};
+use nalgebra::{Point3, Vector3};
+
+/// Points so near to the plane are of the surface.
+const ON_M: f64 = 0.012;
+/// Points below this are of the side of a board, or of nothing: mixed from what is before and behind an edge.
+const BELOW_M: f64 = 0.004;
+/// Points below this are something else, seen past the surface.
+const PAST_M: f64 = 0.02;
+/// How far beside the hull of what was seen of it the surface may go on.
+const HULL_MARGIN_M: f64 = 0.04;
+/// Of this many pixels to either side of an end [`CERTAIN`] agree: single pixels are noise.
+const AROUND: usize = 4;
+const CERTAIN: usize = 3;
+/// A surface reaches so far back from its end, metres: where something upright goes through its plane, less is near that.
+const DEEP_M: f64 = 0.04;
+/// A side is seen in so many pixels of a line.
+const SIDE: usize = 2;
+/// A surface ends within so many pixels of the last that shows it: an edge loses one or two. What else is lost there lies behind, in the
+/// shadow of the projector.
+const LOST: usize = 3;
+/// Where nothing returns for so far behind the last point on it, nothing is there, metres.
+const NOTHING_M: f64 = 0.09;
+
+/// Where a surface ends on a line of pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ending {
+    /// Where the last ray meets the surface, world, metres.
+    pub on: Point3<f64>,
+    /// Where the first ray that went past it goes through its plane.
+    pub past: Point3<f64>,
+    /// The middle of what was seen of the side of a board between them.
+    pub side: Option<Point3<f64>>,
+    /// The camera.
+    pub eye: Point3<f64>,
+}
+
+/// All that the cameras saw of where a surface ends. What hides it, and what the image cuts off, is no end.
+pub fn endings(visibility: &Visibility, surface: &Surface) -> Vec<Ending> {
+    let outline = surface.outline();
+    let is_near = |ending: &Ending| outline.covers(&ending.on, HULL_MARGIN_M);
+    visibility.maps.iter().flat_map(|map| Rays::of(map, surface).endings()).filter(is_near).collect()
+}
+
+/// What a pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shown {
+    /// No return.
+    Nothing,
+    /// The surface.
+    On,
+    /// What is just below its plane.
+    Low,
+    /// What lies behind its plane.
+    Past,
+    /// Anything else.
+    Other,
+}
+
+/// The rays of a camera and the plane of a surface, in the optical frame.
+struct Rays<'a> {
+    map: &'a DepthMap,
+    world_from_camera: nalgebra::Isometry3<f64>,
+    up: Vector3<f64>,
+    /// How high above the plane the camera is.
+    eye_m: f64,
+    shown: Vec<Shown>,
+}
+
+impl<'a> Rays<'a> {
+    fn of(map: &'a DepthMap, surface: &Surface) -> Rays<'a> {
+        let world_from_camera = map.camera_from_world.inverse();
+        let up = map.camera_from_world.rotation * surface.up.into_inner();
+        let eye_m = surface.height_m(&map.viewpoint());
+        let mut rays = Rays { map, world_from_camera, up, eye_m, shown: Vec::new() };
+        if eye_m > 0.0 {
+            rays.shown = (0..map.depths_m.len()).map(|pixel| rays.shown(pixel)).collect();
+        }
+        rays
+    }
+
+    /// The ray of a pixel at a depth of one.
+    fn ray(&self, pixel: usize) -> Vector3<f64> {
+        let width = self.map.intrinsics.width;
+        self.map.intrinsics.unproject((pixel % width) as f64, (pixel / width) as f64, 1.0).coords
+    }
+
+    fn shown(&self, pixel: usize) -> Shown {
+        let depth_m = f64::from(self.map.depths_m[pixel]);
+        if depth_m.is_nan() {
+            return Shown::Nothing;
+        }
+        let fall = self.up.dot(&self.ray(pixel));
+        let height_m = self.eye_m + fall * depth_m;
+        match height_m {
+            _ if fall >= 0.0 || height_m > ON_M => Shown::Other,
+            _ if height_m > -BELOW_M => Shown::On,
+            _ if height_m > -PAST_M => Shown::Low,
+            _ => Shown::Past,
+        }
+    }
+
+    /// Where the ray of a pixel goes through the plane, world; none if it rises.
+    fn through(&self, pixel: usize) -> Option<Point3<f64>> {
+        let ray = self.ray(pixel);
+        let fall = self.up.dot(&ray);
+        (fall < 0.0).then(|| self.world_from_camera * Point3::from(ray * (-self.eye_m / fall)))
+    }
+
+    fn endings(&self) -> Vec<Ending> {
+        let (width, height) = (self.map.intrinsics.width, self.map.intrinsics.height);
+        let mut endings = Vec::new();
+        if self.shown.is_empty() {
+            return endings;
+        }
+        let mut both_ways = |line: &[usize]| {
+            self.along(line, &mut endings);
+            self.along(&line.iter().rev().copied().collect::<Vec<_>>(), &mut endings);
+        };
+        for row in 0..height {
+            both_ways(&(row * width..(row + 1) * width).collect::<Vec<_>>());
+        }
+        for column in 0..width {
+            both_ways(&(0..height).map(|row| row * width + column).collect::<Vec<_>>());
+        }
+        endings
+    }
+
+    /// The ends of the surface along a line of pixels.
+    fn along(&self, line: &[usize], endings: &mut Vec<Ending>) {
+        let shown = |at: usize| self.shown[line[at]];
+        let most = |what: Shown, range: std::ops::Range<usize>| {
+            range.filter(|&at| shown(at) == what).count() >= CERTAIN
+        };
+        for last in AROUND - 1..line.len() {
+            let next = (last + 1).min(line.len() - 1);
+            if shown(last) != Shown::On || matches!(shown(next), Shown::On | Shown::Other) {
+                continue;
+            }
+            if !most(Shown::On, last + 1 - AROUND..last + 1) || !self.is_deep(&line[..=last]) {
+                continue;
+            }
+            let is_gap = |&at: &usize| matches!(shown(at), Shown::Nothing | Shown::Low);
+            let gap = last + 1..(next..line.len()).find(|at| !is_gap(at)).unwrap_or(line.len());
+            let is_past = match gap.end {
+                end if end == line.len() => self.is_nothing(&line[gap.clone()]),
+                end => shown(end) == Shown::Past && most(Shown::Past, end..(end + AROUND).min(line.len())),
+            };
+            if !is_past {
+                continue;
+            }
+            let past = gap.end.min(last + LOST);
+            let ends = self.through(line[last]).zip(self.through(line[past]));
+            let Some((on, past)) = ends else { continue };
+            let side = self.side(gap.filter(|&at| shown(at) == Shown::Low).map(|at| line[at]));
+            let eye = Point3::from(self.world_from_camera.translation.vector);
+            endings.push(Ending { on, past, side, eye });
+        }
+    }
+
+    /// Whether the last pixels show the surface for as far as [`DEEP_M`].
+    fn is_deep(&self, line: &[usize]) -> bool {
+        let Some(end) = line.last().and_then(|&pixel| self.through(pixel)) else { return false };
+        let is_far = |&&pixel: &&usize| self.through(pixel).is_none_or(|p| (p - end).norm() > DEEP_M);
+        let near = line.iter().rev().position(|pixel| is_far(&pixel));
+        let on =
+            |near: usize| line[line.len() - near..].iter().filter(|&&p| self.shown[p] == Shown::On).count();
+        near.is_some_and(|near| AROUND * on(near) >= CERTAIN * near)
+    }
+
+    /// Whether some pixels of a line up to its end show nothing, for long enough.
+    fn is_nothing(&self, gap: &[usize]) -> bool {
+        let ends =
+            || Some((self.through(*gap.first()?)?, gap.iter().rev().find_map(|&pixel| self.through(pixel))?));
+        gap.len() >= LOST
+            && gap.iter().all(|&pixel| self.shown[pixel] == Shown::Nothing)
+            && ends().is_some_and(|(from, to)| (to - from).norm() > NOTHING_M)
+    }
+
+    /// The middle of what some pixels show, world.
+    fn side(&self, pixels: impl Iterator<Item = usize>) -> Option<Point3<f64>> {
+        let at = |pixel: usize| self.ray(pixel) * f64::from(self.map.depths_m[pixel]);
+        let (sum, count) = pixels.fold((Vector3::zeros(), 0), |(sum, n), pixel| (sum + at(pixel), n + 1));
+        (count >= SIDE).then(|| self.world_from_camera * Point3::from(sum / count as f64))
+    }
+}

@@ -143,6 +143,31 @@ pub(crate) fn refit(
 }
 
 impl Round {
+    /// The same body where its side as seen from one direction lies in the middle of the points, along that direction (horizontal, unit,
+    /// towards the camera). Errors of depth lie along the view: a circle through such points is drawn into them, and too near.
+    pub fn behind(
+        &self,
+        points: &[Point3<f64>],
+        (base_m, top_m): (f64, f64),
+        [to_x, to_y]: [f64; 2],
+    ) -> Option<Round> {
+        /// Beside this share of the radius the side falls away too steeply to be placed.
+        const STEEP: f64 = 0.9;
+        let band = side_band(base_m, top_m);
+        let side = points.iter().filter(|p| band.contains(&p.z)).filter_map(|p| {
+            let (x, y, r) = (p.x - self.x, p.y - self.y, self.radius_at(p.z));
+            let (along, across) = (x * to_x + y * to_y, x * to_y - y * to_x);
+            (across.abs() < STEEP * r).then(|| along - (r * r - across * across).sqrt())
+        });
+        let mut shifts: Vec<f64> = side.collect();
+        let half = shifts.len() / 2;
+        if shifts.len() < 12 {
+            return None;
+        }
+        let shift_m = *shifts.select_nth_unstable_by(half, f64::total_cmp).1;
+        Some(Round { x: self.x + shift_m * to_x, y: self.y + shift_m * to_y, ..*self })
+    }
+
     /// [`Round::spread_m`] of the side points that count.
     pub fn spread_of(
         &self,
@@ -273,6 +298,23 @@ mod tests {
             });
             assert!(close, "{name}: {found:?}");
         }
+    }
+
+    #[test]
+    fn far_off_a_body_stands_behind_what_was_seen_of_it() {
+        // Depth along y comes in steps of 2.5 cm, as at nearly three metres.
+        let (x, y, r) = (0.3, 2.7, 0.035);
+        let across = |i: usize| -0.95 * r + 1.9 * r * (i % 20) as f64 / 19.0;
+        let seen = |i: usize| {
+            let depth = y - (r * r - across(i).powi(2)).sqrt();
+            Point3::new(x + across(i), (depth / 0.025).round() * 0.025, 0.1 * (i / 20) as f64 / 10.0)
+        };
+        let points: Vec<Point3<f64>> = (0..200).map(seen).collect();
+        let drawn =
+            Round { x, y: y - 0.03, radius_m: r, ..fit(&cup(x, y, r, r, TAU), 0.0, 0.1, 0.001, 1).unwrap() };
+        let off =
+            drawn.behind(&points, (0.0, 0.1), [0.0, -1.0]).map(|found| (found.x - x).hypot(found.y - y));
+        assert!(off.is_some_and(|off| off < 0.012), "{off:?} m off");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use crate::round::{self, Edge, Round};
 use crate::segment::{Scene, Segment, end, quantile, top_m};
 use crate::surface::range_sigma_m;
 use crate::visibility::{Seen, Visibility};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector2};
 
 /// Directions around the body that are looked at one by one.
 const SECTORS: usize = 36;
@@ -38,6 +38,12 @@ const HEIGHT_M: f64 = 0.002;
 const SLIVER_M: f64 = 0.01;
 /// How far below the rim a look must reach to be a look inside, metres.
 const INSIDE_M: f64 = 0.014;
+
+/// Measured worse than this, depth does not tell where the middle of a cup is: it spreads points along the view as far as the side is
+/// deep, metres.
+const FAR_M: f64 = 0.006;
+/// Cosine of the angle within which cameras see the same side of a thing.
+const SAME_SIDE: f64 = 0.9;
 
 /// All that was measured on one segment.
 #[derive(Clone, Debug)]
@@ -76,6 +82,18 @@ struct Asker<'a> {
 impl Asker<'_> {
     fn look(&self, x: f64, y: f64, z: f64) -> Seen {
         self.seen.look(&(self.world_from_surface * Point3::new(x, y, z)), self.tolerance_m)
+    }
+
+    /// Horizontal direction from a body to the cameras that had it in view, if they saw the same side of it.
+    fn only_from(&self, round: &Round) -> Option<[f64; 2]> {
+        let place = self.world_from_surface * Point3::new(round.x, round.y, round.middle_m);
+        let saw = self.seen.maps.iter().filter(|map| map.look(&place, 0.06) > Seen::Never);
+        let eyes = saw.map(|map| self.world_from_surface.inverse() * map.viewpoint());
+        let each: Vec<Vector2<f64>> = eyes
+            .filter_map(|eye| Vector2::new(eye.x - round.x, eye.y - round.y).try_normalize(0.1))
+            .collect();
+        let mean = each.iter().sum::<Vector2<f64>>().try_normalize(1e-9)?;
+        each.iter().all(|eye| eye.dot(&mean) > SAME_SIDE).then_some(mean.into())
     }
 
     /// Standard deviation of the best measurement of a point of the surface, metres; `None` if cameras that measure better look
@@ -139,6 +157,9 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
     if let Some(first) = measured.round {
         let edges = silhouettes(&first, segment, &asker, base_m, height_m);
         let round = round::refit(&first, &segment.points, &edges, base_m, top, sigma_m);
+        let eye = (sigma_m > FAR_M).then(|| asker.only_from(&first)).flatten();
+        let round =
+            round.map(|r| eye.and_then(|eye| r.behind(&segment.points, (base_m, top), eye)).unwrap_or(r));
         measured.round = round.filter(|round| round.inliers >= MOST);
     }
     if let Some(round) = measured.round {

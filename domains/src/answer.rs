@@ -292,7 +292,8 @@ impl Asker<'_> {
                 let room = surface.room.as_ref().map(|room| format!(" in the {room}")).unwrap_or_default();
                 let is_found = !surface.whole && self.s.surfaces.len() > 1;
                 let at = surface.centre().filter(|_| is_found);
-                let at = at.map(|p| format!(", whose middle is at {}", reasons::place(&p))).unwrap_or_default();
+                let at =
+                    at.map(|p| format!(", whose middle is at {}", reasons::place(&p))).unwrap_or_default();
                 format!("stands on the {}{at}{room}", surface.name)
             }
             None => "is in the hand".into(),

@@ -11,6 +11,7 @@ pub mod perceive;
 mod placing;
 pub mod policies;
 pub mod reasons;
+mod unnoticed;
 mod vanished;
 
 use descry_skills::{Observe, Outcome, PushAside, SkillFailure};

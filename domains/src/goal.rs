@@ -329,7 +329,12 @@ fn name_suggestions(lexicon: &Lexicon, miss: &Miss) -> String {
     if let Some(nearest) = nearest.filter(|n| distance(n) <= 2) {
         lines.push(format!("  did you mean \"{nearest}\"?"));
     }
-    lines.push(format!("  known: {}", lexicon.listed(&miss.of_type)));
+    lines.push(match names.is_empty() {
+        true => {
+            format!("  the body knows no {} beforehand, and of this type the domain has none", miss.of_type)
+        }
+        false => format!("  known: {}", lexicon.listed(&miss.of_type)),
+    });
     if miss.of_type == "thing" || miss.of_type == "kind" {
         lines.push("  a new object is a file in the domain's folder objects/".into());
     }
@@ -401,6 +406,14 @@ mod tests {
             "find both salt and pepper and a cup",
             &[&["salt", "pepper and a cup"], &["salt and pepper", "a cup"]],
         );
+    }
+
+    #[test]
+    fn what_a_body_does_not_know_is_said_to_be_so() {
+        let domain = Domain::load("home").unwrap();
+        let lexicon = Lexicon::new(&domain, &crate::lexicon::Places::default());
+        let why = read("bring cup A to the desk", &domain, &lexicon).unwrap_err().to_string();
+        assert!(why.contains("the body knows no surface beforehand") && !why.contains("known: "), "{why}");
     }
 
     #[test]

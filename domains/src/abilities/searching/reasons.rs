@@ -56,13 +56,15 @@ pub fn look_there(s: &Situation, from: usize, on: usize) -> Plan {
 
 /// What a look is expected to settle.
 pub(super) fn hope(s: &Situation, from: usize, on: usize) -> String {
-    let things = s.things.iter().filter(|t| t.track.is_none()).chain(&s.kinds).map(|t| t.name.as_str());
-    let surfaces = s.asked.iter().map(|&on| s.surfaces[on].name.as_str());
-    let mut names: Vec<&str> = things.chain(surfaces).collect();
-    if names.is_empty() {
-        names = s.surfaces.iter().map(|on| on.name.as_str()).collect();
+    let own = s.things.iter().enumerate().filter(|(_, t)| t.track.is_none());
+    let own = own.map(|(what, t)| (t.name.as_str(), s.doubt_about(what)));
+    let kinds = s.kinds.iter().enumerate().map(|(of, kind)| (kind.name.as_str(), s.doubt_of(of)));
+    let surface = |on: usize| (s.surfaces[on].name.as_str(), s.doubt_on(on));
+    let mut doubts: Vec<(&str, &Doubt)> =
+        own.chain(kinds).chain(s.asked.iter().map(|&on| surface(on))).collect();
+    if doubts.is_empty() {
+        doubts = (0..s.surfaces.len()).map(surface).collect();
     }
-    let doubts = names.into_iter().zip(s.doubts());
     let said = |(name, doubt): (&str, &Doubt)| {
         if doubt.anywhere {
             return format!("nothing is known yet of where {name} could be");
@@ -70,7 +72,7 @@ pub(super) fn hope(s: &Situation, from: usize, on: usize) -> String {
         let share = doubt.share_settled(s, (from, on), Taken::default()) * 100.0;
         format!("shows {share:.0} % of where {name} is in doubt ({:.2} left)", doubt.remaining())
     };
-    doubts.map(said).collect::<Vec<_>>().join(", ")
+    doubts.into_iter().map(said).collect::<Vec<_>>().join(", ")
 }
 
 /// What keeps one from saying that a thing is not there; none if nothing does.

@@ -84,7 +84,7 @@ impl End {
     }
 
     /// How far out it is from an edge, and half of how far it may be off, metres; none where it is no end on that edge's side.
-    fn from_edge(&self, edge: &Edge, moved: &Isometry2<f64>) -> Option<(f64, f64)> {
+    fn beyond(&self, edge: &Edge, moved: &Isometry2<f64>) -> Option<(f64, f64)> {
         let out = |p: &Point2<f64>| edge.outward.dot(&(moved * p - edge.from));
         let (on, past) = (out(&self.on), out(&self.past));
         match self.side.as_ref().filter(|_| out(&self.eye) > on) {
@@ -155,7 +155,7 @@ fn samples(edges: &[Edge], ends: &[End], moved: &Isometry2<f64>, gate_m: f64) ->
     for end in ends {
         let along = |edge: &Edge| edge.along.dot(&(moved * end.on - edge.from));
         let near = edges.iter().zip(&mut bins).filter_map(|(edge, bins)| {
-            let (out_m, half_m) = end.from_edge(edge, moved).filter(|(out_m, _)| out_m.abs() < gate_m)?;
+            let (out_m, half_m) = end.beyond(edge, moved).filter(|(out_m, _)| out_m.abs() < gate_m)?;
             let reach_m = along(edge);
             let bin = if reach_m < 0.0 { None } else { bins.get_mut((reach_m / BIN_M) as usize) };
             bin.map(|bin| (bin, out_m, half_m))

@@ -198,6 +198,8 @@ fn a_further_view_is_laid_on_those_before_it() {
             let (apart, off) = (disagreement_m(&merged, &truths[..n]), offset_m(&merged, &truths[..n]));
             assert!(n < 5 || apart < 0.012, "seed {seed}, {n} views: {apart} m apart");
             assert!(n < 5 || off < 0.04, "seed {seed}, {n} views: {off} m off");
+            let at_once = Merger::default().merge(&views[..n], &options()).expect("the views are sound");
+            assert!(same(&merged, &at_once), "seed {seed}: {n} views at once give something else");
         }
         assert!(laid >= 4, "seed {seed}: only {laid} views were laid on those before");
         // A view that cannot be placed is left out as it is by merging anew.

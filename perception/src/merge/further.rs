@@ -2,7 +2,8 @@
 //!
 //! What is known of a view by itself is kept as long as the view is the same. Where the earlier views lie and what was gathered of them is
 //! kept while it is a further view that comes: it alone is aligned, to the views beside it, and gathered. Errors of one look by one do not add
-//! up: whenever there are half as many views more, and whenever a view does not fit in, all are merged anew.
+//! up: whenever there are half as many views more, and whenever a view does not fit in, all are merged anew. Which views are merged together
+//! follows from the views alone, not from what was merged before: the same views give the same bytes, whatever was kept.
 
 use super::check::belongs;
 use super::fuse::{gather, gather_further};
@@ -10,8 +11,8 @@ use super::joint::Found;
 use super::parts::Part;
 use super::prepare::Prepared;
 use super::{
-    Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Ready, SECOND, Step, ViewFit, check, fits,
-    joint, merged, objects, only_levelled, place, place_on, visibility,
+    Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Ready, SECOND, Step, ViewFit, check,
+    filter_and_thin, fit, fits, joint, merged, objects, only_levelled, place, place_on, visibility,
 };
 use crate::cloud::Cloud;
 use crate::view::View;
@@ -21,7 +22,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::fmt;
 
-/// Up to so many views all are merged anew with each.
+/// Up to so many views all are merged together.
 const FEW: usize = 4;
 /// So many views beside a further one hold it where it belongs.
 const BESIDE: usize = 5;
@@ -36,11 +37,9 @@ pub struct Merger {
     base: Option<Base>,
 }
 
-/// What was merged last.
+/// The views that were merged last.
 struct Base {
     digests: Vec<u64>,
-    /// Views when all were merged anew.
-    anew: usize,
     aligned: Aligned,
     gathered: Vec<Gathered>,
     fits: Vec<ViewFit>,
@@ -54,7 +53,8 @@ impl fmt::Debug for Merger {
 }
 
 impl Merger {
-    /// As [`merge`](super::merge), quicker if all views but the last were merged last time. Then the earlier views stay where they were found.
+    /// As [`merge`](super::merge), quicker if all views but the last were merged last time. Up to four views are merged as there; of more,
+    /// the later are laid on the earlier.
     ///
     /// # Errors
     /// As [`merge`](super::merge).
@@ -65,10 +65,20 @@ impl Merger {
             *self = Merger { options: Some(options.clone()), ..Merger::default() };
         }
         self.prepare(views, options);
-        match self.further(views, options) {
-            Some(merged) => Ok(merged),
-            None => self.anew(views, options),
+        let anew = together(views.len());
+        let is_begun = |base: &Base| base.digests.len() >= anew && self.digests.starts_with(&base.digests);
+        let kept = self.base.take().filter(is_begun);
+        let begun = kept.as_ref().map_or(anew, |base| base.digests.len());
+        let mut base = kept.map_or_else(|| self.anew(&views[..anew], options), Ok);
+        for n in begun + 1..=views.len() {
+            let further = base.ok().and_then(|base| self.further(base, &views[..n], options));
+            base = further.map_or_else(|| self.anew(&views[..n], options), Ok);
         }
+        let base = base?;
+        let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
+        let merged = merged(&base.gathered, seen, base.fits.clone(), base.steps.clone());
+        self.base = Some(base);
+        Ok(merged)
     }
 
     /// What is known of each view by itself: of those that were here before it is kept.
@@ -84,46 +94,41 @@ impl Merger {
         self.digests = digests;
     }
 
-    /// All views together.
-    fn anew(&mut self, views: &[View], options: &MergeOptions) -> Result<Merged, MergeError> {
-        self.base = None;
-        let mut steps = super::filter_and_thin(views, &self.prepared, options)?;
-        let mut aligned = place(&self.prepared, &self.maps, options, &mut steps);
-        let gathered = gather(views, &self.prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
-        let fits = fits(&self.prepared, &mut aligned);
-        let seen = visibility(self.maps.clone(), &aligned.used, &aligned.poses);
-        let merged = merged(&gathered, seen, fits.clone(), steps.clone());
-        let (digests, anew) = (self.digests.clone(), views.len());
-        self.base = Some(Base { digests, anew, aligned, gathered, fits, steps });
-        Ok(merged)
+    /// The first views, together.
+    fn anew(&self, views: &[View], options: &MergeOptions) -> Result<Base, MergeError> {
+        let (prepared, maps) = (&self.prepared[..views.len()], &self.maps[..views.len()]);
+        let mut steps = filter_and_thin(views, prepared, options)?;
+        let mut aligned = place(prepared, maps, options, &mut steps);
+        let gathered = gather(views, prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
+        let fits = fits(prepared, &mut aligned);
+        Ok(Base { digests: self.digests[..views.len()].to_vec(), aligned, gathered, fits, steps })
     }
 
-    /// The last view with the others as they lie; `None` if it is no further view of these or does not fit in.
-    fn further(&mut self, views: &[View], options: &MergeOptions) -> Option<Merged> {
+    /// The last of the first views with the others as they lie; `None` if it does not fit in, or another did not.
+    fn further(&self, mut base: Base, views: &[View], options: &MergeOptions) -> Option<Base> {
         let last = views.len() - 1;
-        let base = self.base.as_mut()?;
-        let is_further = base.digests == self.digests[..last] && base.aligned.used.iter().all(|used| *used);
-        if !is_further
-            || views.len() <= FEW
-            || 2 * views.len() >= 3 * base.anew
-            || self.prepared[last].points.is_empty()
-        {
+        let (prepared, maps) = (&self.prepared[..=last], &self.maps[..=last]);
+        if prepared[last].points.is_empty() || !base.aligned.used.iter().all(|used| *used) {
             return None;
         }
-        let (pose, found, parts) = base.aligned.lay_further(&self.prepared, &self.maps)?;
-        let of_view = (&views[last], &self.prepared[last]);
+        let (pose, found, parts) = base.aligned.lay_further(prepared, maps)?;
+        let of_view = (&views[last], &prepared[last]);
         if !gather_further(&mut base.gathered, last, of_view, &pose, &base.aligned.planes, options) {
             return None;
         }
         base.aligned.take(pose, found, parts);
         base.digests.push(self.digests[last]);
-        base.fits.push(super::fit(&self.prepared[last], &pose, &found, true, None));
-        let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
-        let mut steps = base.steps.clone();
-        let result = format!("{} views stay where they lay, one is laid on them", last);
-        steps.push(Step { name: "further look".to_owned(), points: found.matched, result });
-        Some(merged(&base.gathered, seen, base.fits.clone(), steps))
+        base.fits.push(fit(&prepared[last], &pose, &found, true, None));
+        let result = format!("view {last} is laid on the others, which stay");
+        base.steps.push(Step { name: "further look".to_owned(), points: found.matched, result });
+        Some(base)
     }
+}
+
+/// How many of the first views of so many are merged together: few, or with half as many more each time.
+fn together(views: usize) -> usize {
+    let more = std::iter::successors(Some(FEW), |n| Some((3 * n).div_ceil(2)));
+    more.take_while(|n| *n <= views).last().unwrap_or(views)
 }
 
 impl Aligned {

@@ -489,7 +489,7 @@ fn visibility(maps: Vec<Option<DepthMap>>, used: &[bool], poses: &[Isometry3<f64
     let placed = |((map, used), pose): ((Option<DepthMap>, &bool), &Isometry3<f64>)| {
         map.filter(|_| *used).map(|map| DepthMap { camera_from_world: pose.inverse(), ..map })
     };
-    Visibility { maps: maps.into_iter().zip(used).zip(poses).filter_map(placed).collect() }
+    Visibility { maps: maps.into_iter().zip(used).zip(poses).filter_map(placed).collect(), held: true }
 }
 
 fn fit(

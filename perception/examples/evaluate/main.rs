@@ -1,5 +1,5 @@
 //! Segmentation, merging and recognition against what is known, and how long single views take, as tables:
-//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]... | further VIEWS [anew | kept]`.
+//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
 mod frames;
 mod further;
@@ -10,6 +10,7 @@ mod table;
 #[path = "../../tests/tabletop/mod.rs"]
 mod tabletop;
 mod times;
+mod variants;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -32,8 +33,9 @@ fn main() -> ExitCode {
             Ok(count) => further::run(count, mode.first().copied().unwrap_or_default()),
             Err(_) => Err(format!("`{count}` is no number of views")),
         },
+        ["variants", dirs @ ..] => variants::run(dirs),
         _ => Err(
-            "usage: evaluate mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]... | further VIEWS [anew | kept]"
+            "usage: evaluate mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
                 .to_owned(),
         ),
     };

@@ -9,7 +9,7 @@ use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::{Cloud, ObjectModel, Percept, Recogniser, Scene, View, Visibility};
 use proptest::prelude::*;
 use std::sync::LazyLock;
-use tabletop::{Draws, TABLE_M, Thing, look, on_ring};
+use tabletop::{Draws, Thing, look, on_ring};
 
 fn model(name: &str, kind: &str, diameter_m: [f64; 2], height_m: [f64; 2], handle: Handle) -> ObjectModel {
     let range = |[low, high]: [f64; 2]| Range { low, high };

@@ -23,7 +23,7 @@ use rustc_hash::FxHashMap;
 use std::fmt;
 
 /// Up to so many views all are merged together.
-const FEW: usize = 4;
+const FEW: usize = 6;
 /// So many views beside a further one hold it where it belongs.
 const BESIDE: usize = 5;
 
@@ -53,7 +53,7 @@ impl fmt::Debug for Merger {
 }
 
 impl Merger {
-    /// As [`merge`](super::merge), quicker if all views but the last were merged last time. Up to four views are merged as there; of more,
+    /// As [`merge`](super::merge), quicker if all views but the last were merged last time. Up to six views are merged as there; of more,
     /// the later are laid on the earlier.
     ///
     /// # Errors
@@ -77,7 +77,8 @@ impl Merger {
         let base = base?;
         let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
         let merged = merged(&base.gathered, seen, base.fits.clone(), base.steps.clone());
-        self.base = Some(base);
+        // With one more all are merged anew: then nothing of this is wanted.
+        self.base = (together(views.len() + 1) <= views.len()).then_some(base);
         Ok(merged)
     }
 

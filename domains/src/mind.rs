@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use descry_memory::RecordId;
+use descry_perception::merge::Merger;
 use descry_perception::nalgebra::Isometry3;
 
 use crate::abilities::searching::change::Change;
@@ -30,6 +31,8 @@ pub struct Mind {
 pub struct Region {
     /// Views that still hold.
     pub looks: Vec<Look>,
+    /// What merging them left that a further one does not need anew.
+    pub merger: Merger,
     /// Places where something has moved.
     pub changes: Vec<Change>,
     /// How many looks have been taken in all.

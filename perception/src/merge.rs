@@ -5,6 +5,7 @@
 
 mod bricks;
 mod check;
+mod further;
 mod fuse;
 mod joint;
 mod parts;
@@ -16,6 +17,8 @@ mod settle;
 use crate::cloud::Cloud;
 use crate::view::View;
 use crate::visibility::{DepthMap, Visibility};
+pub use further::Merger;
+use fuse::Gathered;
 use joint::{Found, Round};
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use parts::{Part, Parts, Plane};
@@ -167,20 +170,47 @@ const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 1200,
 /// If there is no view, no usable point, a pose that is not finite, or an option that means nothing.
 pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeError> {
     let _span = tracing::debug_span!("merge", views = views.len()).entered();
-    let mut steps = Vec::new();
-    let Placed { prepared, maps, aligned } = place(views, options, &mut steps)?;
-    let Aligned { poses, used, mut whys, found, planes, .. } = aligned;
-    let seen = visibility(maps, &used, &poses);
-    let fused = fuse::fuse(views, &prepared, &used, &poses, &planes, &seen, options);
+    check(views, options)?;
+    let Ready { prepared, maps } = Ready::of(views, options);
+    let mut steps = filter_and_thin(views, &prepared, options)?;
+    let mut aligned = place(&prepared, &maps, options, &mut steps);
+    let seen = visibility(maps, &aligned.used, &aligned.poses);
+    let gathered = fuse::gather(views, &prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
+    Ok(merged(&gathered, seen, fits(&prepared, &mut aligned), steps))
+}
+
+/// The merged cloud of what was gathered, with what is said of it.
+fn merged(gathered: &[Gathered], seen: Visibility, fits: Vec<ViewFit>, mut steps: Vec<Step>) -> Merged {
+    let fused = settle::settle(gathered, &seen);
     steps.push(Step {
         name: "fuse".to_owned(),
         points: fused.cloud.len(),
         result: format!("{} returns in voxels of {:.1} mm", fused.returns, 1e3 * fused.voxel_m),
     });
+    Merged { cloud: fused.cloud, views_per_point: fused.views_per_point, visibility: seen, fits, steps }
+}
 
-    let fits =
-        (0..views.len()).map(|i| fit(&prepared[i], &poses[i], &found[i], used[i], whys[i].take())).collect();
-    Ok(Merged { cloud: fused.cloud, views_per_point: fused.views_per_point, visibility: seen, fits, steps })
+/// One fit a view; takes the words of why views were left out.
+fn fits(prepared: &[Prepared], aligned: &mut Aligned) -> Vec<ViewFit> {
+    let Aligned { poses, used, found, whys, .. } = aligned;
+    (0..prepared.len()).map(|i| fit(&prepared[i], &poses[i], &found[i], used[i], whys[i].take())).collect()
+}
+
+/// What is known of each view by itself.
+struct Ready {
+    prepared: Vec<Prepared>,
+    maps: Vec<Option<DepthMap>>,
+}
+
+impl Ready {
+    fn of(views: &[View], options: &MergeOptions) -> Ready {
+        let (prepared, maps) = views.par_iter().map(|view| Ready::of_view(view, options)).unzip();
+        Ready { prepared, maps }
+    }
+
+    fn of_view(view: &View, options: &MergeOptions) -> (Prepared, Option<DepthMap>) {
+        (prepare::prepare(view, options), DepthMap::from_view(view, &view.world_from_camera))
+    }
 }
 
 /// Where the views belong, without a merged cloud: steps 1 to 4 alone. One fit a view, in the order given.
@@ -189,36 +219,33 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
 /// As [`merge`].
 pub fn align_views(views: &[View], options: &MergeOptions) -> Result<Vec<ViewFit>, MergeError> {
     let _span = tracing::debug_span!("align views", views = views.len()).entered();
-    let Placed { prepared, mut aligned, .. } = place(views, options, &mut Vec::new())?;
-    let Aligned { poses, used, found, whys, .. } = &mut aligned;
-    Ok((0..views.len()).map(|i| fit(&prepared[i], &poses[i], &found[i], used[i], whys[i].take())).collect())
-}
-
-/// Views after steps 1 to 4.
-struct Placed {
-    prepared: Vec<Prepared>,
-    maps: Vec<Option<DepthMap>>,
-    aligned: Aligned,
-}
-
-/// Steps 1 to 4; from farther away if a view would be left out else.
-fn place(views: &[View], options: &MergeOptions, steps: &mut Vec<Step>) -> Result<Placed, MergeError> {
     check(views, options)?;
-    let prepared = filter_and_thin(views, options, steps)?;
-    let maps: Vec<Option<DepthMap>> =
-        views.par_iter().map(|v| DepthMap::from_view(v, &v.world_from_camera)).collect();
-    let mut aligned = align(&prepared, &maps, options.up, &FIRST);
+    let Ready { prepared, maps } = Ready::of(views, options);
+    let mut steps = filter_and_thin(views, &prepared, options)?;
+    let mut aligned = place(&prepared, &maps, options, &mut steps);
+    Ok(fits(&prepared, &mut aligned))
+}
+
+/// Steps 3 and 4; from farther away if a view would be left out else.
+fn place(
+    prepared: &[Prepared],
+    maps: &[Option<DepthMap>],
+    options: &MergeOptions,
+    steps: &mut Vec<Step>,
+) -> Aligned {
+    let mut aligned = align(prepared, maps, options.up, &FIRST);
     if aligned.left_out() > 0 {
-        let wide = align(&prepared, &maps, options.up, &WIDE);
+        let wide = align(prepared, maps, options.up, &WIDE);
         if wide.left_out() < aligned.left_out() {
             aligned = wide;
         }
     }
     steps.append(&mut aligned.steps);
-    Ok(Placed { prepared, maps, aligned })
+    aligned
 }
 
 /// The views brought together: steps 3 and 4.
+#[derive(Debug)]
 struct Aligned {
     poses: Vec<Isometry3<f64>>,
     used: Vec<bool>,
@@ -227,6 +254,8 @@ struct Aligned {
     found: Vec<Found>,
     /// The dominant planes that are level, world frame.
     planes: Vec<Plane>,
+    /// What the points belong to.
+    parts: Parts,
     steps: Vec<Step>,
 }
 
@@ -251,10 +280,11 @@ fn align(
         .collect();
     let mut used: Vec<bool> = whys.iter().map(Option::is_none).collect();
     align_everything(prepared, &used, &mut poses, first, &mut steps);
-    let Parts { of: parts, planes, up } = parts::find(prepared, &used, &poses, up, &mut steps);
-    let found = align_objects(prepared, &mut used, &mut whys, &parts, up, &mut poses, maps, &mut steps);
-    let planes = parts::level_again(&planes, up, prepared, &used, &parts, &poses);
-    Aligned { poses, used, whys, found, planes, steps }
+    let parts = parts::find(prepared, &used, &poses, up, &mut steps);
+    let found =
+        align_objects(prepared, &mut used, &mut whys, &parts.of, parts.up, &mut poses, maps, &mut steps);
+    let planes = parts::level_again(&parts.planes, parts.up, prepared, &used, &parts.of, &poses);
+    Aligned { poses, used, whys, found, planes, parts, steps }
 }
 
 fn check(views: &[View], options: &MergeOptions) -> Result<(), MergeError> {
@@ -279,13 +309,12 @@ fn check(views: &[View], options: &MergeOptions) -> Result<(), MergeError> {
     }
 }
 
-/// Steps 1 and 2 of the paper: views by their poses into the world, filtered by height and range, thinned.
+/// What steps 1 and 2 of the paper did: views by their poses into the world, filtered by height and range, thinned.
 fn filter_and_thin(
     views: &[View],
+    prepared: &[Prepared],
     options: &MergeOptions,
-    steps: &mut Vec<Step>,
-) -> Result<Vec<Prepared>, MergeError> {
-    let prepared: Vec<Prepared> = views.par_iter().map(|v| prepare::prepare(v, options)).collect();
+) -> Result<Vec<Step>, MergeError> {
     let given = views.iter().map(|v| v.cloud.count_finite()).sum();
     let points = prepared.iter().map(|p| p.points.len()).sum();
     if points == 0 {
@@ -294,10 +323,11 @@ fn filter_and_thin(
         return Err(MergeError::Empty { views: views.len(), range_m: options.range_m, band });
     }
     let step = |name: &str, points, result: String| Step { name: name.to_owned(), points, result };
-    steps.push(step("initial alignment", given, format!("{} views by their stated poses", views.len())));
     let thinned = format!("within {} m, voxels of {:.0} mm", options.range_m, 1e3 * options.align_voxel_m);
-    steps.push(step("filter and thin", points, thinned));
-    Ok(prepared)
+    Ok(vec![
+        step("initial alignment", given, format!("{} views by their stated poses", views.len())),
+        step("filter and thin", points, thinned),
+    ])
 }
 
 /// Step 3: all points; the table levels the views.
@@ -309,7 +339,7 @@ fn align_everything(
     steps: &mut Vec<Step>,
 ) {
     let all: Vec<Vec<Part>> = prepared.iter().map(|p| vec![Part::Standing; p.points.len()]).collect();
-    let found = joint::align(prepared, used, &all, poses, first);
+    let found = joint::align(prepared, used, used, &all, poses, first);
     steps.push(aligned("first alignment", &found));
 }
 
@@ -343,7 +373,7 @@ fn align_objects(
     if let Some(up) = up {
         place_objects(prepared, used, parts, &up, &levelled, poses);
     }
-    let mut found = joint::align(prepared, used, parts, poses, &SECOND);
+    let mut found = joint::align(prepared, used, used, parts, poses, &SECOND);
     while let Some((worst, why)) = check::misfit(prepared, used, parts, poses, maps, &found) {
         if let Some(up) = up.filter(|_| !retried[worst]) {
             // The others have settled since: a better model to be placed on than a single view was.
@@ -352,13 +382,13 @@ fn align_objects(
             let placed: Vec<_> = others.flat_map(|i| objects(&prepared[i], &parts[i], &poses[i])).collect();
             poses[worst] = levelled[worst];
             place_on(prepared, parts, &up, &placed, &levelled, poses, worst);
-            found = joint::align(prepared, used, parts, poses, &SECOND);
+            found = joint::align(prepared, used, used, parts, poses, &SECOND);
             continue;
         }
         used[worst] = false;
         whys[worst] = Some(why);
         poses[worst] = prepared[worst].prior;
-        let settled = joint::align(prepared, used, parts, poses, &SETTLE);
+        let settled = joint::align(prepared, used, used, parts, poses, &SETTLE);
         found.iter_mut().zip(settled).zip(used.iter()).for_each(|((f, s), u)| {
             if *u {
                 *f = s;
@@ -459,7 +489,7 @@ fn visibility(maps: Vec<Option<DepthMap>>, used: &[bool], poses: &[Isometry3<f64
     let placed = |((map, used), pose): ((Option<DepthMap>, &bool), &Isometry3<f64>)| {
         map.filter(|_| *used).map(|map| DepthMap { camera_from_world: pose.inverse(), ..map })
     };
-    Visibility { maps: maps.into_iter().zip(used).zip(poses).filter_map(placed).collect() }
+    Visibility { maps: maps.into_iter().zip(used).zip(poses).filter_map(placed).collect(), held: true }
 }
 
 fn fit(

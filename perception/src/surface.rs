@@ -369,6 +369,9 @@ fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
 
 /// Up as people and robots hold cameras: against the images' downward axis.
 fn held_up(seen: &Visibility) -> Option<Unit<Vector3<f64>>> {
+    if !seen.held {
+        return None;
+    }
     let sum: Vector3<f64> =
         seen.maps.iter().map(|m| m.camera_from_world.rotation.inverse() * -Vector3::y()).sum();
     Unit::try_new(sum, 1e-6)

@@ -4,8 +4,10 @@
 
 use crate::camera::Intrinsics;
 use crate::cloud::{Cloud, is_finite};
+use crate::segment::quantile;
+use crate::spread::tangents;
 use crate::view::View;
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// What one camera, or the best of several, knows of a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -36,6 +38,8 @@ pub struct DepthMap {
 pub struct Visibility {
     /// One map a look.
     pub maps: Vec<DepthMap>,
+    /// True if the maps are images as cameras took them, so that their rows tell how these were held.
+    pub held: bool,
 }
 
 impl DepthMap {
@@ -174,12 +178,13 @@ impl Visibility {
     /// What the views saw from the poses they state; views without a camera or grid are left out.
     pub fn from_views(views: &[View]) -> Visibility {
         let map = |v: &View| DepthMap::from_view(v, &v.world_from_camera);
-        Visibility { maps: views.iter().filter_map(map).collect() }
+        Visibility { maps: views.iter().filter_map(map).collect(), held: true }
     }
 
-    /// What a bare cloud (world frame) lets one say if it was seen from `viewpoints`: it is projected onto a virtual camera at each.
+    /// What a bare cloud (world frame) lets one say if it was seen from `viewpoints`: it is projected onto a virtual camera at each. How a
+    /// camera was held there is not known.
     pub fn from_viewpoints(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Visibility {
-        Visibility { maps: viewpoints.iter().filter_map(|v| virtual_map(cloud, v)).collect() }
+        Visibility { maps: viewpoints.iter().filter_map(|v| virtual_map(cloud, v)).collect(), held: false }
     }
 
     /// The best knowledge of a point: free in any look outweighs surface, hidden and never.
@@ -205,26 +210,43 @@ impl Visibility {
     }
 }
 
-/// A camera at `viewpoint` that looks at the middle of the cloud, its pixels as coarse as the cloud is dense.
+/// A camera at `viewpoint` that looks where half of the cloud lies to each side, and as wide as nearly all of it: a few stray returns turn
+/// and widen it by nothing that shows. Its axes are those of the cloud as seen from there, the same in every frame.
 fn virtual_map(cloud: &Cloud, viewpoint: &Point3<f64>) -> Option<DepthMap> {
     const SIDE: usize = 320;
-    let (low, high) = cloud.bounds()?;
-    let target: Point3<f64> = nalgebra::center(&low.cast(), &high.cast());
-    let forward = (target - viewpoint).try_normalize(1e-9)?;
-    let aside = if forward.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
-    let camera_from_world = Isometry3::look_at_rh(viewpoint, &target, &aside);
-    // nalgebra looks along -z with y up; the optical frame looks along +z with y down.
-    let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    let camera_from_world =
-        Isometry3::from_parts(nalgebra::Translation3::identity(), turn) * camera_from_world;
-    let reach = cloud.points.iter().filter(|p| is_finite(p)).fold(0.0_f64, |reach, p| {
-        let q = camera_from_world * p.cast::<f64>();
-        if q.z > 0.05 { reach.max(q.x.abs() / q.z).max(q.y.abs() / q.z) } else { reach }
-    });
-    let middle = (SIDE / 2) as f64;
-    let focal = middle / reach.clamp(0.05, 2.0);
+    /// Share of the points that it has in view, and widest half angle, as a slope.
+    const IN_VIEW: f64 = 0.998;
+    const WIDEST: f64 = 2.0;
+    let finite = || cloud.points.iter().filter(|p| is_finite(p)).map(|p| p.cast::<f64>() - viewpoint);
+    let rays: Vec<Vector3<f64>> = finite().filter_map(|ray| ray.try_normalize(1e-9)).collect();
+    let median = |k: usize| quantile(&mut rays.iter().map(|ray| ray[k]).collect::<Vec<f64>>(), 0.5);
+    let forward =
+        (!rays.is_empty()).then(|| Vector3::new(median(0), median(1), median(2)))?.try_normalize(1e-9)?;
+    let (across, along) = tangents(&forward);
+    let slopes = |right: &Vector3<f64>, down: &Vector3<f64>| -> Vec<[f64; 2]> {
+        let before = rays.iter().map(|ray| (ray, ray.dot(&forward))).filter(|(_, z)| *z > 0.05);
+        before.map(|(ray, z)| [ray.dot(right) / z, ray.dot(down) / z]).collect()
+    };
+    let [xx, xy, yy] = slopes(&across, &along)
+        .iter()
+        .map(|s| s.map(|c| c.clamp(-WIDEST, WIDEST)))
+        .fold([0.0; 3], |m, [x, y]| [m[0] + x * x, m[1] + x * y, m[2] + y * y]);
+    let turn = 0.5 * (2.0 * xy).atan2(xx - yy);
+    let right = across * turn.cos() + along * turn.sin();
+    let down = forward.cross(&right);
+    let mut reaches: Vec<f64> = slopes(&right, &down).iter().map(|[x, y]| x.abs().max(y.abs())).collect();
+    if reaches.is_empty() {
+        return None;
+    }
+    let reach = quantile(&mut reaches, IN_VIEW);
+    let world_from_camera = Isometry3::from_parts(
+        viewpoint.coords.into(),
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_basis_unchecked(&[right, down, forward])),
+    );
+    let middle = 0.5 * (SIDE - 1) as f64;
+    let focal = middle / reach.clamp(0.05, WIDEST);
     let intrinsics = Intrinsics { width: SIDE, height: SIDE, fx: focal, fy: focal, cx: middle, cy: middle };
-    Some(DepthMap::project(cloud, &camera_from_world, intrinsics, &camera_from_world.inverse()))
+    Some(DepthMap::project(cloud, &world_from_camera.inverse(), intrinsics, &world_from_camera))
 }
 
 /// The pinhole camera that explains an organised cloud in its optical frame: least squares of `u·z = f·x + c·z` over its pixels.

@@ -2,7 +2,7 @@
 
 mod tabletop;
 
-use descry_perception::merge::{MergeError, MergeOptions, merge};
+use descry_perception::merge::{MergeError, MergeOptions, Merger, merge};
 use descry_perception::nalgebra::{Isometry3, Point3, Unit, Vector3};
 use descry_perception::{Merged, View};
 use tabletop::{Draws, TABLE_M, Thing, disturbed, look, on_ring};
@@ -149,5 +149,64 @@ fn the_merged_cloud_stays_within_its_bound() {
         let (low, high) = merged.cloud.bounds().expect("points");
         let (all_low, all_high) = whole.bounds().expect("points");
         assert!((low - all_low).norm() < 0.2 && (high - all_high).norm() < 0.2, "{low} {high}");
+    }
+}
+
+/// Everything that merging gives, but for words.
+fn same(one: &Merged, other: &Merged) -> bool {
+    let maps = |m: &Merged| m.visibility.maps.iter().map(|map| map.camera_from_world).collect::<Vec<_>>();
+    one.cloud.points == other.cloud.points
+        && one.views_per_point == other.views_per_point
+        && one.fits == other.fits
+        && maps(one) == maps(other)
+}
+
+#[test]
+fn what_was_kept_of_other_views_changes_nothing() {
+    let (mut views, _) = views(&RING, 0.03, 0.035, 5);
+    let mut merger = Merger::default();
+    let mut check = |what: &str, views: &[View]| {
+        let kept = merger.merge(views, &options()).expect("the views are sound");
+        assert!(same(&kept, &merge(views, &options()).expect("the views are sound")), "{what}");
+    };
+    for n in 1..=4 {
+        check(&format!("{n} views"), &views[..n]);
+    }
+    check("one is gone", &views[1..4]);
+    for p in &mut views[2].cloud.points[100_000..120_000] {
+        *p = Point3::new(f32::NAN, f32::NAN, f32::NAN);
+    }
+    check("something moved where one had looked", &views[..4]);
+    views.swap(0, 1);
+    check("in another order", &views[..4]);
+    let of_half = MergeOptions { align_voxel_m: 0.012, ..options() };
+    let kept = merger.merge(&views[..4], &of_half).expect("the views are sound");
+    assert!(same(&kept, &merge(&views[..4], &of_half).expect("the views are sound")), "other options");
+}
+
+#[test]
+fn a_further_view_is_laid_on_those_before_it() {
+    let angles: Vec<f64> = (0..11).map(|i| 2.4 * f64::from(i)).collect();
+    for (seed, sigma_m, sigma_rad) in [(1, 0.03, 0.035), (7, 0.03, 0.035), (4, 0.045, 0.04)] {
+        let (mut views, mut truths) = views(&angles, sigma_m, sigma_rad, seed);
+        let mut merger = Merger::default();
+        let mut laid = 0;
+        for n in 1..=views.len() {
+            let merged = merger.merge(&views[..n], &options()).expect("the views are sound");
+            laid += usize::from(merged.steps.iter().any(|step| step.name == "further look"));
+            assert_eq!(merged.visibility.maps.len(), n, "seed {seed}: {:?}", merged.fits);
+            let (apart, off) = (disagreement_m(&merged, &truths[..n]), offset_m(&merged, &truths[..n]));
+            assert!(n < 5 || apart < 0.012, "seed {seed}, {n} views: {apart} m apart");
+            assert!(n < 5 || off < 0.04, "seed {seed}, {n} views: {off} m off");
+            let at_once = Merger::default().merge(&views[..n], &options()).expect("the views are sound");
+            assert!(same(&merged, &at_once), "seed {seed}: {n} views at once give something else");
+        }
+        assert!(laid >= 4, "seed {seed}: only {laid} views were laid on those before");
+        // A view that cannot be placed is left out as it is by merging anew.
+        let lost = Isometry3::translation(0.0, 0.0, 0.4) * views[0].world_from_camera;
+        views.push(View { world_from_camera: lost, stamp_ns: 1, ..views[0].clone() });
+        truths.push(truths[0]);
+        let merged = merger.merge(&views, &options()).expect("the views are sound");
+        assert!(same(&merged, &merge(&views, &options()).expect("the views are sound")), "seed {seed}");
     }
 }

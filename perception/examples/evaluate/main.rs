@@ -1,7 +1,8 @@
 //! Segmentation, merging and recognition against what is known, and how long single views take, as tables:
-//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]...`.
+//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
 mod frames;
+mod further;
 mod kitchen;
 mod mosd;
 mod surfaces;
@@ -9,6 +10,7 @@ mod table;
 #[path = "../../tests/tabletop/mod.rs"]
 mod tabletop;
 mod times;
+mod variants;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -27,8 +29,13 @@ fn main() -> ExitCode {
             Ok(repetitions) => times::run(repetitions, views),
             Err(_) => Err(format!("`{repetitions}` is no number of repetitions")),
         },
+        ["further", count, mode @ ..] => match count.parse() {
+            Ok(count) => further::run(count, mode.first().copied().unwrap_or_default()),
+            Err(_) => Err(format!("`{count}` is no number of views")),
+        },
+        ["variants", dirs @ ..] => variants::run(dirs),
         _ => Err(
-            "usage: evaluate mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]..."
+            "usage: evaluate mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
                 .to_owned(),
         ),
     };

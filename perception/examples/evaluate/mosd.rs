@@ -2,6 +2,7 @@
 
 use descry_perception::cloud::is_finite;
 use descry_perception::files::read_cloud;
+use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::{Descry, Published, Range, Top};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::{ObjectModel, Percept, Recogniser, Scene, View, Visibility};
@@ -36,8 +37,9 @@ struct Tally {
 
 /// Scores every scene of the folder.
 pub fn run(dir: &Path) -> Result<(), String> {
-    let cups = table(&dir.join("cups.csv"))?;
-    let objects = table(&dir.join("objects.csv"))?;
+    let (cups, objects) = (dir.join("cups.csv"), dir.join("objects.csv"));
+    let cups = if cups.exists() { table(&cups)? } else { Vec::new() };
+    let objects = if objects.exists() { Some(table(&objects)?) } else { None };
     let mut scenes: Vec<PathBuf> = std::fs::read_dir(dir)
         .map_err(|e| format!("{}: {e}", dir.display()))?
         .filter_map(|entry| entry.ok().map(|e| e.path()))
@@ -51,7 +53,10 @@ pub fn run(dir: &Path) -> Result<(), String> {
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let (view, labels) = labelled(&path, &name)?;
         let start = std::time::Instant::now();
-        let seen = Visibility::from_views(std::slice::from_ref(&view));
+        let mut seen = Visibility::from_views(std::slice::from_ref(&view));
+        if seen.maps.is_empty() {
+            seen = Visibility::from_viewpoints(&view.cloud, &[Point3::origin()]);
+        }
         let scene = match segment(&view.cloud, &seen, &SceneOptions::default()) {
             Ok(scene) => scene,
             Err(why) => {
@@ -69,7 +74,8 @@ pub fn run(dir: &Path) -> Result<(), String> {
         let of_scene = |rows: &[Vec<String>]| -> Vec<u32> {
             rows.iter().filter(|r| r[0] == name).filter_map(|r| r[1].parse().ok()).collect()
         };
-        let owner = overlap(&scene, &view.cloud, &labels, &of_scene(&objects), &mut tally);
+        let known = objects.as_ref().map_or_else(|| labelled_objects(&labels), |rows| of_scene(rows));
+        let owner = overlap(&scene, &view.cloud, &labels, &known, &mut tally);
         let cups: Vec<Vec<String>> = cups.iter().filter(|c| c[2] == "cup").cloned().collect();
         for (recogniser, hits) in recognisers.iter().zip(&mut hits) {
             let percepts = recogniser.recognise(&scene, &seen, &[cup()]);
@@ -98,6 +104,14 @@ fn labelled(path: &Path, name: &str) -> Result<(View, Vec<u32>), String> {
     let cloud = read_cloud(&bytes).map_err(|e| format!("{}: {e}", path.display()))?.cloud;
     let labels = cloud.labels.clone().ok_or_else(|| format!("{name}: no labels"))?;
     Ok((View::alone(cloud), labels))
+}
+
+/// What the labels call objects, where no table lists them.
+fn labelled_objects(labels: &[u32]) -> Vec<u32> {
+    const FEWEST: usize = 60;
+    let mut sizes: BTreeMap<u32, usize> = BTreeMap::new();
+    labels.iter().filter(|label| **label >= 20).for_each(|label| *sizes.entry(label / 10).or_default() += 1);
+    sizes.into_iter().filter(|(_, size)| *size >= FEWEST).map(|(object, _)| object).collect()
 }
 
 /// How a recogniser does on cups.

@@ -40,9 +40,9 @@ pub fn models() -> Vec<ObjectModel> {
 }
 
 /// A thing and the name of the cup that it is.
-type Known = (Thing, Option<&'static str>);
+pub type Known = (Thing, Option<&'static str>);
 
-fn arrangement(draws: &mut Draws) -> Vec<Known> {
+pub fn arrangement(draws: &mut Draws) -> Vec<Known> {
     let mut placed: Vec<Known> = Vec::new();
     let kinds: [u8; 8] = [0, 0, 1, 1, 2, 3, 4, 5];
     for kind in kinds {
@@ -147,7 +147,7 @@ pub fn run(count: u64, out: Option<&Path>) -> Result<(), String> {
     Ok(())
 }
 
-fn options() -> MergeOptions {
+pub fn options() -> MergeOptions {
     MergeOptions {
         up: Some(Unit::new_normalize(Vector3::z())),
         height_band_m: Some((0.5, 1.2)),
@@ -172,7 +172,7 @@ pub fn surface() -> SurfaceOptions {
     }
 }
 
-fn judge(merged: &Merged, recogniser: &dyn Recogniser) -> Result<Vec<Percept>, String> {
+pub fn judge(merged: &Merged, recogniser: &dyn Recogniser) -> Result<Vec<Percept>, String> {
     let scene_options = SceneOptions { surface: surface(), ..SceneOptions::default() };
     match segment(&merged.cloud, &merged.visibility, &scene_options) {
         Ok(scene) => Ok(recogniser.recognise(&scene, &merged.visibility, &models())),

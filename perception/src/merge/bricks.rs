@@ -87,16 +87,18 @@ impl<C> Bricks<C> {
         *slot
     }
 
-    /// The same with the cells brick by brick, each made anew of the old one and its number.
-    pub fn in_order<D>(mut self, mut anew: impl FnMut(&C, usize) -> D) -> Bricks<D> {
-        let mut cells = Vec::with_capacity(self.cells.len());
+    /// Puts the cells into the order of the bricks, so that those beside each other in space are so in memory; gives their former numbers.
+    pub fn sort(&mut self) -> Vec<u32>
+    where
+        C: Copy,
+    {
+        let mut former = Vec::with_capacity(self.cells.len());
         for slot in self.slots.iter_mut().filter(|slot| **slot != NONE) {
-            let number = *slot as usize;
-            *slot = cells.len() as u32;
-            cells.push(anew(&self.cells[number], number));
+            former.push(*slot);
+            *slot = former.len() as u32 - 1;
         }
-        let Bricks { numbers, places, slots, layers, recent, .. } = self;
-        Bricks { cells, numbers, places, slots, layers, recent }
+        self.cells = former.iter().map(|&number| self.cells[number as usize]).collect();
+        former
     }
 
     #[inline(never)]

@@ -37,20 +37,8 @@ pub(super) fn misfit(
     if let Some(worst) = far.max_by(|a, b| a.1.0.total_cmp(&b.1.0)) {
         return Some((worst.0, worst.1.1));
     }
-    let mut contradicted: Vec<(f64, usize)> = active
-        .iter()
-        .map(|&i| {
-            let others = active.iter().copied().filter(|&j| j != i);
-            let worst = others.filter_map(|j| {
-                let own = contradiction(&views[i], &parts[i], &poses[i], maps[j].as_ref(), &poses[j]);
-                let theirs = contradiction(&views[j], &parts[j], &poses[j], maps[i].as_ref(), &poses[i]);
-                own.into_iter().chain(theirs).max_by(f64::total_cmp)
-            });
-            // With one other view there is nobody to ask who is wrong: the mean over those that can judge blames who disagrees with most.
-            let (n, sum) = worst.fold((0, 0.0), |(n, s), c| (n + 1, s + c));
-            (sum / f64::from(n.max(1)), i)
-        })
-        .collect();
+    let mut contradicted: Vec<(f64, usize)> =
+        active.iter().map(|&i| (contradicted(i, &active, views, parts, poses, maps), i)).collect();
     contradicted.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
     let (share, worst) = contradicted[0];
     (share > MOST_CONTRADICTED).then(|| {
@@ -59,6 +47,41 @@ pub(super) fn misfit(
             format!("{:.0} % of what it shows contradicts what the other views saw through", 100.0 * share),
         )
     })
+}
+
+/// Whether a further view belongs with the others as they lie.
+pub(super) fn belongs(
+    view: usize,
+    views: &[Prepared],
+    parts: &[Vec<Part>],
+    poses: &[Isometry3<f64>],
+    maps: &[Option<DepthMap>],
+    found: &Found,
+) -> bool {
+    let all: Vec<usize> = (0..views.len()).collect();
+    found.matched >= FEWEST_MATCHED
+        && too_far(&views[view], &poses[view]).is_none()
+        && contradicted(view, &all, views, parts, poses, maps) <= MOST_CONTRADICTED
+}
+
+/// Share of what a view shows, and of what others show, that contradicts the other: the mean over the others. With one other view there
+/// is nobody to ask who is wrong: the mean over those that can judge blames who disagrees with most.
+fn contradicted(
+    i: usize,
+    active: &[usize],
+    views: &[Prepared],
+    parts: &[Vec<Part>],
+    poses: &[Isometry3<f64>],
+    maps: &[Option<DepthMap>],
+) -> f64 {
+    let others = active.iter().copied().filter(|&j| j != i);
+    let worst = others.filter_map(|j| {
+        let own = contradiction(&views[i], &parts[i], &poses[i], maps[j].as_ref(), &poses[j]);
+        let theirs = contradiction(&views[j], &parts[j], &poses[j], maps[i].as_ref(), &poses[i]);
+        own.into_iter().chain(theirs).max_by(f64::total_cmp)
+    });
+    let (n, sum) = worst.fold((0, 0.0), |(n, s), c| (n + 1, s + c));
+    sum / f64::from(n.max(1))
 }
 
 /// How far beyond belief the camera was moved, with words.

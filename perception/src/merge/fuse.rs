@@ -8,10 +8,8 @@ use super::bricks::{Bricks, Grid};
 use super::parts::Plane;
 use super::prepare::Prepared;
 use super::returns::{Return, Returns};
-use super::settle::settle;
 use crate::cloud::Cloud;
 use crate::view::View;
-use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
@@ -84,16 +82,15 @@ pub(super) struct Fused {
     pub voxel_m: f64,
 }
 
-/// Fuses the used views at their corrected poses, with a sheet for each of the level `planes`.
-pub(super) fn fuse(
+/// Gathers the used views at their corrected poses, with a sheet for each of the level `planes`.
+pub(super) fn gather(
     views: &[View],
     prepared: &[Prepared],
     used: &[bool],
     poses: &[Isometry3<f64>],
     planes: &[Plane],
-    seen: &Visibility,
     options: &MergeOptions,
-) -> Fused {
+) -> Vec<Gathered> {
     let _span = tracing::debug_span!("fuse", views = views.len()).entered();
     let used: Vec<usize> = (0..views.len()).filter(|&i| used[i]).collect();
     let of = |&i: &usize| Returns::of(&views[i], &prepared[i], &poses[i], planes, options);
@@ -111,8 +108,31 @@ pub(super) fn fuse(
             voxel_m = all[0].grid.voxel_m * (cells as f64 / options.most_points as f64).sqrt().max(1.2);
             continue;
         }
-        return settle(all, seen);
+        all.iter_mut().for_each(Gathered::sort);
+        return all;
     }
+}
+
+/// Adds a further view to what was gathered with `planes`, as the view of that number. False, and nothing is added, if it does not go with
+/// it: it lies beyond its voxels, has no colours where that has, or makes it too large.
+pub(super) fn gather_further(
+    all: &mut [Gathered],
+    number: usize,
+    (view, prepared): (&View, &Prepared),
+    pose: &Isometry3<f64>,
+    planes: &[Plane],
+    options: &MergeOptions,
+) -> bool {
+    let returns = Returns::of(view, prepared, pose, planes, options);
+    let cells: usize = all.iter().map(|gathered| gathered.bricks.cells.len()).sum();
+    let coloured = !all[0].colours.is_empty();
+    let fits = all.iter().all(|gathered| gathered.holds(&returns, options));
+    let Ok(number) = u16::try_from(number) else { return false };
+    if !fits || cells + view.cloud.len() > options.most_points || coloured != view.cloud.colours.is_some() {
+        return false;
+    }
+    take(all, &returns, number, coloured);
+    true
 }
 
 /// Sorts the returns of a view into voxels and sheets.
@@ -162,6 +182,31 @@ impl Scale {
 }
 
 impl Gathered {
+    /// Puts the cells in the order of their bricks.
+    fn sort(&mut self) {
+        let former = self.bricks.sort();
+        if !self.colours.is_empty() {
+            self.colours = former.iter().map(|&number| self.colours[number as usize]).collect();
+        }
+    }
+
+    /// True if no return of a view lies below the lowest voxel or so far off that it could not be told from another.
+    fn holds(&self, returns: &Returns, options: &MergeOptions) -> bool {
+        let most = f64::from(1 << 19) * self.grid.voxel_m;
+        let scale = Scale::of(&returns.world_from_camera, self);
+        let camera = self.axes_from_world * returns.world_from_camera.translation.vector - self.grid.origin_m;
+        if camera.amin() > options.range_m + self.grid.voxel_m && camera.amax() + options.range_m < most {
+            return true;
+        }
+        let in_range =
+            |p: &&Point3<f32>| p.coords.norm_squared() <= (options.range_m * options.range_m) as f32;
+        let inside = |p: &Point3<f32>| {
+            let at = scale.turn * p.coords + scale.shift;
+            at.min() > 1.0 && f64::from(at.max()) * self.grid.voxel_m < most
+        };
+        returns.view.cloud.points.iter().filter(in_range).all(inside)
+    }
+
     /// Nothing yet, over all that is in range of a camera.
     fn over(of: &[Returns], on: Option<&Plane>, voxel_m: f64, options: &MergeOptions) -> Gathered {
         let axes_from_world = on.map_or_else(UnitQuaternion::identity, |(normal, _)| {

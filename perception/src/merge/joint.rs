@@ -53,17 +53,21 @@ const SLACK: f32 = 0.1;
 /// A pass that moves no camera farther than this, metres and radians, ends the round.
 const SETTLED: (f64, f64) = (2e-4, 2e-4);
 
-/// Aligns the views that are `used` among each other. `parts` tells for each view what its points belong to.
+/// Aligns the views that are `used` among each other; those of them that do not `move` stay where they are. `parts` tells for each view
+/// what its points belong to.
 pub(super) fn align(
     views: &[Prepared],
     used: &[bool],
+    moves: &[bool],
     parts: &[Vec<Part>],
     poses: &mut [Isometry3<f64>],
     round: &Round,
 ) -> Vec<Found> {
     let _span = tracing::debug_span!("align", views = views.len(), passes = round.passes).entered();
-    let askers: Vec<Askers> = parts.iter().map(|parts| Askers::of(parts)).collect();
-    let pairs = pairs(views, used, poses);
+    let asks = |(parts, used): (&Vec<Part>, &bool)| Askers::of(if *used { parts } else { &[] });
+    let askers: Vec<Askers> = parts.iter().zip(used).map(asks).collect();
+    let mut pairs = pairs(views, used, poses);
+    pairs.retain(|&(i, j)| moves[i] || moves[j]);
     let of_view = |i: usize| pairs.iter().filter(|pair| pair.0 == i).count();
     let ask = |&(i, j): &(usize, usize)| {
         Asked::of(&views[i].points, &askers[i], (i, j), round.asked / of_view(i), round)
@@ -74,7 +78,7 @@ pub(super) fn align(
         let share = pass as f64 / (round.passes.max(2) - 1) as f64;
         let radius = round.from_m * (round.to_m / round.from_m).powf(share);
         let links: Vec<Link> = asked.par_iter_mut().map(|asked| link(views, asked, poses, radius)).collect();
-        let moved = step(views, used, poses, &links);
+        let moved = step(views, used, moves, poses, &links);
         for (i, f) in found.iter_mut().enumerate() {
             let own = links.iter().filter(|l| l.from == i || l.to == i);
             let (n, squares) = own.fold((0, 0.0), |(n, s), l| (n + l.matched, s + l.squares));
@@ -222,29 +226,40 @@ impl Link {
 }
 
 /// One Gauss-Newton step on all poses; returns the largest shift and turn.
-fn step(views: &[Prepared], used: &[bool], poses: &mut [Isometry3<f64>], links: &[Link]) -> (f64, f64) {
-    let mut slots = vec![usize::MAX; views.len()];
-    let active: Vec<usize> = (0..views.len()).filter(|&i| used[i]).collect();
-    active.iter().enumerate().for_each(|(slot, &i)| slots[i] = slot);
+fn step(
+    views: &[Prepared],
+    used: &[bool],
+    moves: &[bool],
+    poses: &mut [Isometry3<f64>],
+    links: &[Link],
+) -> (f64, f64) {
+    let mut slots = vec![None; views.len()];
+    let active: Vec<usize> = (0..views.len()).filter(|&i| used[i] && moves[i]).collect();
+    active.iter().enumerate().for_each(|(slot, &i)| slots[i] = Some(6 * slot));
     let n = 6 * active.len();
     let mut normal = DMatrix::<f64>::zeros(n, n);
     let mut right = DVector::<f64>::zeros(n);
     for link in links {
-        let (i, j) = (6 * slots[link.from], 6 * slots[link.to]);
+        // What does not move has no rows.
+        let (i, j) = (slots[link.from], slots[link.to]);
         // Neighbouring points share their errors; the matched surface counts as this many independent looks.
         let shared = (150.0 / link.matched.max(1) as f64).min(1.0);
-        let mut add = |r: usize, c: usize, m: &Matrix6<f64>| {
-            let mut view = normal.fixed_view_mut::<6, 6>(r, c);
-            view += m * shared;
+        let mut add = |r: Option<usize>, c: Option<usize>, m: &Matrix6<f64>| {
+            if let Some((r, c)) = r.zip(c) {
+                let mut view = normal.fixed_view_mut::<6, 6>(r, c);
+                view += m * shared;
+            }
         };
         add(i, i, &link.blocks[0]);
         add(i, j, &link.blocks[1]);
         add(j, i, &link.blocks[1].transpose());
         add(j, j, &link.blocks[2]);
-        let mut rows = right.fixed_rows_mut::<6>(i);
-        rows += link.rights[0] * shared;
-        let mut rows = right.fixed_rows_mut::<6>(j);
-        rows += link.rights[1] * shared;
+        for (at, own) in [(i, &link.rights[0]), (j, &link.rights[1])] {
+            if let Some(at) = at {
+                let mut rows = right.fixed_rows_mut::<6>(at);
+                rows += own * shared;
+            }
+        }
     }
     for (slot, &i) in active.iter().enumerate() {
         let (turn, shift) = departure(&poses[i], &views[i].prior);

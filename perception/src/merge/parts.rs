@@ -35,6 +35,7 @@ pub(super) enum Part {
 pub(super) type Plane = (Vector3<f64>, f64);
 
 /// What the points of all views belong to.
+#[derive(Debug)]
 pub(super) struct Parts {
     /// By view and point.
     pub of: Vec<Vec<Part>>,
@@ -42,6 +43,21 @@ pub(super) struct Parts {
     pub planes: Vec<Plane>,
     /// Away from the ground, if that could be told.
     pub up: Option<Unit<Vector3<f64>>>,
+    standing: Option<Standing>,
+}
+
+impl Parts {
+    /// What the points of a further view belong to.
+    pub fn of_view(&self, view: &Prepared, pose: &Isometry3<f64>) -> Vec<Part> {
+        let seen: Vec<PlaneOfView> = self.planes.iter().map(|plane| PlaneOfView::of(plane, pose)).collect();
+        let on_plane = |k: usize| seen.iter().any(|plane| plane.holds(view, k));
+        let part = |k: usize| if on_plane(k) { Part::Plane } else { Part::Standing };
+        let mut parts: Vec<Part> = (0..view.points.len()).map(part).collect();
+        if let Some(surface) = &self.standing {
+            surface.part(&mut parts, &in_world(view, pose));
+        }
+        parts
+    }
 }
 
 /// Sorts the points of the used views, and tells which way is up.
@@ -78,13 +94,14 @@ pub(super) fn find(
     let on = |plane: usize, (i, k): (usize, usize)| {
         parts[i][k] == Part::Plane && seen[i][plane].holds(&prepared[i], k)
     };
-    if let Some(surface) = up.and_then(|up| Standing::on(&planes, &up, &places, prepared, on)) {
+    let standing = up.and_then(|up| Standing::on(&planes, &up, &places, prepared, on));
+    if let Some(surface) = &standing {
         parts.iter_mut().zip(&places).for_each(|(parts, places)| surface.part(parts, places));
     }
     let left = parts.iter().flatten().filter(|part| **part != Part::Plane).count();
     let result = format!("{} dominant planes removed", planes.len());
     steps.push(Step { name: "plane removal".to_owned(), points: left, result });
-    Parts { of: parts, planes, up }
+    Parts { of: parts, planes, up, standing }
 }
 
 /// The level planes once more, by least squares where the views lie now.
@@ -138,6 +155,7 @@ impl PlaneOfView {
 }
 
 /// The level plane that was measured best, and its outline.
+#[derive(Debug)]
 struct Standing {
     up: Vector3<f64>,
     offset_m: f64,

@@ -27,7 +27,7 @@ struct Settled {
 }
 
 /// One cloud of what was gathered.
-pub(super) fn settle(all: Vec<Gathered>, seen: &Visibility) -> Fused {
+pub(super) fn settle(all: &[Gathered], seen: &Visibility) -> Fused {
     let most = all.iter().map(|gathered| gathered.bricks.cells.len()).sum();
     let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
     let mut fused = Fused {
@@ -55,37 +55,34 @@ pub(super) fn settle(all: Vec<Gathered>, seen: &Visibility) -> Fused {
 
 impl Gathered {
     /// Gives what is left of the cells, some at a time.
-    fn settle(self, seen: &Visibility, mut give: impl FnMut(&[Settled])) {
+    fn settle(&self, seen: &Visibility, mut give: impl FnMut(&[Settled])) {
         /// Bricks that one thread settles in a row, and such rows at a time: what they fill is used again.
         const TOGETHER: usize = 64;
         const ROWS: usize = 32;
         let Gathered { grid, axes_from_world, flat, bricks, colours: sums, .. } = self;
         let world_from_axes = axes_from_world.inverse().to_rotation_matrix();
         let turn = world_from_axes.cast::<f32>();
-        let mut colours: Vec<[u8; 3]> = Vec::with_capacity(sums.len());
-        let bricks = bricks.in_order(|cell, number| {
+        let cells: Vec<Cell> = bricks.cells.iter().map(Cell::mean).collect();
+        let colour = |number: usize| {
             // Half up by cutting off: rounding is a call on some processors.
-            let colour = |sum: &Vector3<f32>| <[u8; 3]>::from((sum / cell.weight).map(|c| (c + 0.5) as u8));
-            colours.extend(sums.get(number).map(colour));
-            cell.mean()
-        });
+            let mean = sums.get(number).map(|sum| (sum / cells[number].weight).map(|c| (c + 0.5) as u8));
+            mean.map(<[u8; 3]>::from).unwrap_or_default()
+        };
         let gazes = seen.gazes();
         let settle_row = |row: usize, kept: &mut Vec<Settled>| {
             kept.clear();
             let mut keep = |number: usize, at: Vector3<f32>| {
-                let cell: &Cell = &bricks.cells[number];
+                let cell = &cells[number];
                 let at = world_from_axes * Point3::from(grid.origin_m + at.cast::<f64>() * grid.voxel_m);
                 let none = cell.normal == Vector3::zeros();
                 let normal = if none { Vector3::repeat(f32::NAN) } else { turn * cell.normal };
-                let colour = colours.get(number).copied().unwrap_or_default();
-                kept.push(Settled { at: at.cast(), normal, colour, views: cell.views });
+                kept.push(Settled { at: at.cast(), normal, colour: colour(number), views: cell.views });
             };
             for brick in (row * TOGETHER..bricks.len()).take(TOGETHER) {
                 match flat {
-                    true => level(&bricks, brick, &mut keep),
+                    true => level(bricks, &cells, brick, &mut keep),
                     false => bricks.visit(brick, |number, around| {
-                        let own = &bricks.cells[number];
-                        keep(number, smoothed(own, around, &bricks.cells, grid.voxel_m as f32));
+                        keep(number, smoothed(&cells[number], around, &cells, grid.voxel_m as f32));
                     }),
                 }
             }
@@ -133,13 +130,13 @@ fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3
 }
 
 /// Calls `found` for each column of a brick with its number and its mean, moved along z onto the mean of the columns around it.
-fn level(bricks: &Bricks<Cell>, brick: usize, mut found: impl FnMut(usize, Vector3<f32>)) {
+fn level(bricks: &Bricks<Cell>, cells: &[Cell], brick: usize, mut found: impl FnMut(usize, Vector3<f32>)) {
     let numbers = &bricks.wide(brick)[1];
     // Weight and weighted height: of the columns, then of three beside each other.
     let mut sums = [[[0.0_f32; WIDE]; WIDE]; 2];
     for (y, row) in numbers.iter().enumerate() {
         for (x, &number) in row.iter().enumerate().filter(|(_, number)| **number != NONE) {
-            let cell = &bricks.cells[number as usize];
+            let cell = &cells[number as usize];
             sums[0][y][x] = cell.weight;
             sums[1][y][x] = cell.weight * cell.at.z;
         }
@@ -154,7 +151,7 @@ fn level(bricks: &Bricks<Cell>, brick: usize, mut found: impl FnMut(usize, Vecto
         for x in 0..SIDE {
             let number = numbers[y + 1][x + 1];
             if number != NONE {
-                let own = bricks.cells[number as usize].at;
+                let own = cells[number as usize].at;
                 found(number as usize, Vector3::new(own.x, own.y, heights[x] / weights[x]));
             }
         }

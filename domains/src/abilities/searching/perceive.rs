@@ -7,7 +7,7 @@ use descry_memory::viewer::{self, Labelled};
 use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
 use descry_perception::View;
 use descry_perception::hull::Hull;
-use descry_perception::merge::{MergeOptions, Merged, ViewFit, merge};
+use descry_perception::merge::{MergeOptions, Merged, ViewFit};
 use descry_perception::nalgebra::{Isometry3, Point3, Translation3, Unit, Vector3};
 use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
@@ -131,7 +131,8 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     let seeking = seeking_at(seeking, &mind.known.surfaces[on]);
     place_looks(mind, eyes, on, (&merging, &seeking.surface))?;
     let views = restore(mind, eyes, on)?;
-    let seen = merge(&views, &merging).map_err(|nothing| nothing.to_string()).and_then(|merged| {
+    let merged = mind.regions[on].merger.merge(&views, &merging);
+    let seen = merged.map_err(|nothing| nothing.to_string()).and_then(|merged| {
         let (surfaces, options) = (&mind.known.surfaces, &seeking.surface);
         let found = match surfaces[on].whole {
             true => find_surface(&merged.cloud, &merged.visibility, options).map(|s| (s, Vec::new())),

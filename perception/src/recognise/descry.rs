@@ -375,13 +375,15 @@ fn top_log(top: Top, m: &Measured) -> f64 {
 }
 
 fn handle_log(handle: Handle, m: &Measured) -> f64 {
-    /// What sticks out so far is as often what views that lie beside each other leave of a side; twice as far it is a handle, metres.
-    const SHORT_M: f64 = 0.011;
+    /// What sticks out no farther than the first is as often what views that lie beside each other leave of a side; as far as the second
+    /// it is a handle, metres.
+    const REACHES_M: (f64, f64) = (0.014, 0.022);
     let unseen = m.evidence.handle_unseen.clamp(0.0, 1.0);
     let (with, without) = match m.evidence.handle {
         Sighting::Seen => {
-            let (with, sure) =
-                (0.9 * (1.0 - unseen) + 0.02, (m.evidence.protrusion_m / SHORT_M - 1.0).clamp(0.0, 1.0));
+            let (short_m, long_m) = REACHES_M;
+            let sure = ((m.evidence.protrusion_m - short_m) / (long_m - short_m)).clamp(0.0, 1.0);
+            let with = 0.9 * (1.0 - unseen) + 0.02;
             (with, with * (0.01 / with).powf(sure))
         }
         // A handle that is there is missed in view now and then; out of view always.

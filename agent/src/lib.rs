@@ -10,6 +10,7 @@ pub mod findings;
 pub mod gantt;
 pub mod keeping;
 pub mod layout;
+pub mod live;
 pub mod lsp;
 pub mod page;
 pub mod picture;

@@ -1,6 +1,7 @@
 //! A run as one page that needs nothing else: the map with route and views, the plans above what really happened, confidence after
 //! each look, what was seen in three dimensions, and all that was said; one moment in time moves all of them.
 
+mod live;
 mod points;
 mod story;
 
@@ -9,6 +10,7 @@ use descry_memory::Record;
 use crate::exit::CommandError;
 use crate::experiment::table::escaped;
 use crate::report::Report;
+pub use live::Running;
 
 const HTML: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/page.css");
@@ -19,7 +21,7 @@ const SCRIPT: &str = include_str!("page/page.js");
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of_run(record: &Record, report: Option<&Report>) -> Result<String, CommandError> {
-    let story = story::of(record, report)?;
+    let story = story::of(record, report, &mut story::Looks::default())?;
     let told = serde_json::to_string(&story).map_err(|e| CommandError::Bug(e.to_string()))?;
     Ok(laid_out(&format!("descry: {}", story.goal), &told))
 }

@@ -33,6 +33,7 @@ const EXAMPLES: [(&str, &[&str]); 21] = [
             "descry find \"cup A\"",
             "descry find mug --domain home --seed 7 --run runs/mug",
             "descry find \"cup A\" --robot recorded:FRAMES",
+            "descry find \"cup A\" --live",
         ],
     ),
     (
@@ -69,6 +70,7 @@ const EXAMPLES: [(&str, &[&str]); 21] = [
         "experiment",
         &[
             "descry experiment two-tables.toml --out results",
+            "descry experiment two-tables.toml --out results --live",
             "descry experiment two-tables.toml --out part --shard 0/4",
         ],
     ),

@@ -117,15 +117,16 @@ pub fn open(place: &Path) -> Result<Record, CommandError> {
     Ok(record)
 }
 
-/// Opens the record of a run that is being written, so that what is written later is read too.
+/// Opens the record of a run that is being written. What is written later is read too: there is an index on the disk as soon as
+/// anything is recorded.
 ///
 /// # Errors
 /// As [`open`], also if the run has not written anything yet.
 pub fn open_written(run: &Path) -> Result<Record, CommandError> {
     let record = found(run)?;
-    match record.recovery().index_rebuilt {
-        true => Err(CommandError::broken(format!("{}: nothing is recorded yet", run.display()))),
-        false => Ok(record),
+    match record.stats().map_err(CommandError::broken)?.records {
+        0 => Err(CommandError::broken(format!("{}: nothing is recorded yet", run.display()))),
+        _ => Ok(record),
     }
 }
 

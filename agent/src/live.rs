@@ -19,6 +19,9 @@ use tokio::sync::{Semaphore, watch};
 use crate::exit::CommandError;
 use news::News;
 
+/// The part of a page's script that hears of news.
+pub const FOLLOW: &str = include_str!("live/follow.js");
+
 /// How often it is looked whether there is something new, while somebody reads.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
 /// How long readers are waited for that have not fetched the end yet.
@@ -73,7 +76,9 @@ impl Port {
     /// [`CommandError::BadInput`] if it is not to be had.
     pub fn take(port: u16) -> Result<Self, CommandError> {
         let refused = |e: std::io::Error| {
-            CommandError::BadInput(format!("--live={port}: {e}\n  name another port, or none: --live takes one that is free"))
+            CommandError::BadInput(format!(
+                "--live={port}: {e}\n  name another port, or none: --live takes one that is free"
+            ))
         };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(refused)?;
         let address = listener.local_addr().map_err(refused)?;
@@ -93,7 +98,8 @@ impl Port {
     pub fn show(self, shown: Arc<dyn Shown>) -> Result<Live, CommandError> {
         let broken = |e: std::io::Error| CommandError::broken(format!("the page cannot be served: {e}"));
         let (end, ended) = watch::channel(false);
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().max_blocking_threads(2).build();
+        let runtime =
+            tokio::runtime::Builder::new_current_thread().enable_all().max_blocking_threads(2).build();
         let runtime = runtime.map_err(broken)?;
         let thread = std::thread::Builder::new().name("page".into()).spawn(move || {
             if let Err(e) = runtime.block_on(serve(self, shown, ended)) {

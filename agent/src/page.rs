@@ -9,10 +9,13 @@ use descry_memory::Record;
 
 use crate::exit::CommandError;
 use crate::experiment::table::escaped;
+use crate::live::FOLLOW;
 use crate::report::Report;
 pub use live::Running;
 
 const HTML: &str = include_str!("page/page.html");
+/// Colours of every page, light and dark.
+pub const COLOURS: &str = include_str!("page/colours.css");
 const STYLE: &str = include_str!("page/page.css");
 const SCRIPT: &str = include_str!("page/page.js");
 
@@ -29,7 +32,8 @@ pub fn of_run(record: &Record, report: Option<&Report>) -> Result<String, Comman
 /// The page that tells a story, as JSON.
 fn laid_out(title: &str, told: &str) -> String {
     let title = escaped(title);
-    let parts = [("{{title}}", title.as_str()), ("{{style}}", STYLE), ("{{script}}", SCRIPT)];
+    let (style, script) = ([COLOURS, STYLE].concat(), [FOLLOW, SCRIPT].concat());
+    let parts = [("{{title}}", title.as_str()), ("{{style}}", &style), ("{{script}}", &script)];
     let page = parts.into_iter().fold(HTML.to_owned(), |page, (name, part)| page.replace(name, part));
     // Within a script nothing may look like its end.
     page.replace("{{story}}", &told.replace("</", "<\\/"))

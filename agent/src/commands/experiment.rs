@@ -1,10 +1,11 @@
 //! `descry experiment FILE`: a batch of runs, and what they say together.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use crate::commands::input;
+use crate::commands::{input, live};
 use crate::exit::{CommandError, Exit};
-use crate::experiment::{self, Ended, ExperimentError, Options, Shard, Source};
+use crate::experiment::{self, Batch, Ended, ExperimentError, Options, Shard, Source};
 use crate::stop::Stop;
 
 /// A job that fails while less than this is left on the disk failed for want of room.
@@ -27,6 +28,8 @@ pub struct Arguments {
     /// Jobs at a time [default: one a core]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
+    #[command(flatten)]
+    live: live::LiveArguments,
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
@@ -45,7 +48,13 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
         stop: stop.clone(),
         tell: input::narrate,
     };
-    match experiment::run(&source, &options).map_err(failed)? {
+    let mut window = arguments.live.window()?;
+    if window.is_wanted() {
+        window.open(Arc::new(Batch::of(&source, options.out.clone()).map_err(failed)?))?;
+    }
+    let ended = experiment::run(&source, &options);
+    window.close();
+    match ended.map_err(failed)? {
         Ended::Part { done, all, .. } if stop.is_asked() => {
             let said = format!("stopped; {done} of {all} jobs are done\n  go on with the same command");
             Err(CommandError::Stopped { said, signal: stop.signal() })

@@ -76,7 +76,7 @@ pub struct With {
     #[arg(long, value_name = "STORE")]
     remember: Option<String>,
     #[command(flatten)]
-    live: live::Arguments,
+    live: live::LiveArguments,
     #[command(flatten)]
     keeping: Keeping,
     /// Print the result as one JSON object
@@ -172,8 +172,8 @@ fn go_on(
         return Err(CommandError::BadInput(text));
     }
     let claimed = Folder::locked(folder)?;
-    window.open(Arc::new(Running::of(folder)))?;
     let record = header.settings.keeping.resume(folder)?;
+    window.open(Arc::new(Running::of(folder)))?;
     let beginning = Beginning::of(&record)?;
     // A run that was cut off before it had recorded anything begins now.
     let domain = match &beginning {

@@ -89,7 +89,9 @@ fn refusal(headers: &HeaderMap, named: Option<&str>, port: u16) -> Option<&'stat
     let mut hosts = headers.get_all(header::HOST).iter().map(|host| host.to_str().ok());
     let is_own_host = matches!((hosts.next(), hosts.next()), (Some(Some(host)), None) if own(host));
     if !is_own_host || !named.is_none_or(own) {
-        return Some("this page is for this machine alone: it is at 127.0.0.1 or localhost, and has no other name");
+        return Some(
+            "this page is for this machine alone: it is at 127.0.0.1 or localhost, and has no other name",
+        );
     }
     let is_own = |origin: &header::HeaderValue| {
         origin.to_str().is_ok_and(|origin| origin.strip_prefix("http://").is_some_and(own))
@@ -123,15 +125,34 @@ mod tests {
         check(&[(HOST, "localhost:8000"), (ORIGIN, "http://localhost:8000")], None, 8000, true);
         check(&[(HOST, "127.0.0.1:8000")], Some("127.0.0.1:8000"), 8000, true);
         check(&[(HOST, "localhost")], None, 80, true);
-        for foreign in ["evil.example:8000", "127.0.0.1:8001", "127.0.0.1", "localhost.evil.example:8000", "", "127.0.0.1:8000.evil"] {
+        for foreign in [
+            "evil.example:8000",
+            "127.0.0.1:8001",
+            "127.0.0.1",
+            "localhost.evil.example:8000",
+            "",
+            "127.0.0.1:8000.evil",
+        ] {
             check(&[(HOST, foreign)], None, 8000, false);
             check(&[(HOST, "localhost:8000")], Some(foreign), 8000, false);
         }
-        for origin in ["http://evil.example", "null", "https://localhost:8000", "http://localhost:8001", "http://localhost:8000.evil", "file://"] {
+        for origin in [
+            "http://evil.example",
+            "null",
+            "https://localhost:8000",
+            "http://localhost:8001",
+            "http://localhost:8000.evil",
+            "file://",
+        ] {
             check(&[(HOST, "localhost:8000"), (ORIGIN, origin)], None, 8000, false);
         }
         check(&[], None, 8000, false);
         check(&[(HOST, "localhost:8000"), (HOST, "evil.example")], None, 8000, false);
-        check(&[(HOST, "localhost:8000"), (ORIGIN, "http://localhost:8000"), (ORIGIN, "http://evil")], None, 8000, false);
+        check(
+            &[(HOST, "localhost:8000"), (ORIGIN, "http://localhost:8000"), (ORIGIN, "http://evil")],
+            None,
+            8000,
+            false,
+        );
     }
 }

@@ -20,6 +20,8 @@ pub struct Running {
 #[derive(Default)]
 struct Told {
     record: Option<Record>,
+    /// Whether the run had ended when the record was opened.
+    has_ended: bool,
     looks: Looks,
     /// The story as text, and the revision that it tells.
     story: Option<(u64, String)>,
@@ -33,25 +35,26 @@ impl Running {
 
     fn told<T>(&self, read: impl FnOnce(&mut Told) -> Result<T, CommandError>) -> Result<T, CommandError> {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if told.record.is_none() {
-            let record = crate::keeping::open_written(&self.folder)?;
-            told.record = Some(record);
+        let has_ended = crate::run::has_ended(&self.folder);
+        if told.record.is_none() || told.has_ended != has_ended {
+            told.record = Some(crate::keeping::open_written(&self.folder)?);
+            told.has_ended = has_ended;
         }
         read(&mut told)
     }
 
-    fn revision_of(&self, told: &Told) -> Result<u64, CommandError> {
+    fn revision_of(told: &Told) -> Result<u64, CommandError> {
         let records = told.record.as_ref().map_or(Ok(0), |record| record.stats().map(|stats| stats.records));
-        Ok(records.map_err(CommandError::broken)? + u64::from(crate::run::has_ended(&self.folder)))
+        Ok(records.map_err(CommandError::broken)? + u64::from(told.has_ended))
     }
 
     /// The story without points; each look has the path of its own.
     fn story(&self, told: &mut Told) -> Result<String, CommandError> {
-        let revision = self.revision_of(told)?;
+        let revision = Self::revision_of(told)?;
         if let Some((_, story)) = told.story.as_ref().filter(|(of, _)| *of == revision) {
             return Ok(story.clone());
         }
-        let report = if crate::run::has_ended(&self.folder) { crate::run::report(&self.folder)? } else { None };
+        let report = if told.has_ended { crate::run::report(&self.folder)? } else { None };
         let Told { record: Some(record), looks, .. } = told else { return Ok("null".into()) };
         let story = story::of(record, report.as_ref(), looks)?.under_way();
         let text = serde_json::to_string(&story).map_err(|e| CommandError::Bug(e.to_string()))?;
@@ -62,7 +65,7 @@ impl Running {
 
 impl Shown for Running {
     fn revision(&self) -> u64 {
-        self.told(|told| self.revision_of(told)).unwrap_or(0)
+        self.told(|told| Self::revision_of(told)).unwrap_or(0)
     }
 
     fn at(&self, path: &str) -> Result<Option<Found>, CommandError> {

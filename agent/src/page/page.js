@@ -1,4 +1,3 @@
-"use strict";
 let story = JSON.parse(document.getElementById("story").textContent);
 const live = story === null;
 let over = !live;
@@ -372,30 +371,12 @@ function tell(next) {
 async function fetched(path) {
   try { const answer = await fetch(path); return answer.ok ? await answer.json() : null; } catch { return null; }
 }
-function follow() {
-  const news = new EventSource("news"), pause = () => new Promise(done => setTimeout(done, 300));
-  const lost = "descry does not answer any more; this is what it said last";
-  const state = words => { $("live").hidden = false; $("live").textContent = words; };
-  let last = null, telling = false;
-  state("live: the run has not begun yet");
-  news.onmessage = async event => {
-    last = JSON.parse(event.data);
-    if (telling) return;
-    telling = true;
-    for (let told = null; told !== last; await pause()) {
-      told = last;
-      over = told.ended;
-      const next = await fetched("story"), filled = next ? tell(next) : null;
-      if (next) state("live: this page follows the run");
-      if (!told.ended) continue;
-      await filled;
-      news.close();
-      state(next ? "descry has ended; this page shows all of the run, and stays." : lost);
-      break;
-    }
-    telling = false;
-  };
-  news.onerror = () => state(lost);
+let filled = null;
+async function tellNews(ended) {
+  over = ended;
+  const next = await fetched("story");
+  if (next) filled = tell(next);
+  return next !== null;
 }
 beginSpace(); hands();
-if (live) follow(); else tell(story);
+if (live) follow(tellNews, () => filled); else tell(story);

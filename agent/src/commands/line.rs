@@ -72,6 +72,7 @@ const EXAMPLES: [(&str, &[&str]); 21] = [
             "descry experiment two-tables.toml --out results",
             "descry experiment two-tables.toml --out results --live",
             "descry experiment two-tables.toml --out part --shard 0/4",
+            "descry experiment two-tables.toml --slurm batch.sh --shards 16 --jobs 4",
         ],
     ),
     ("robot", &["descry robot check \"program:python3 robot.py\""]),

@@ -1,6 +1,7 @@
 //! Batches of runs: a file says what is varied, every combination is a job, and the jobs become tables with intervals, plots
 //! and one page. A batch goes on where it was cut off, and its shards may be done on many machines.
 
+pub mod cluster;
 pub mod hash;
 pub mod journal;
 pub mod kinds;
@@ -236,6 +237,14 @@ pub enum ExperimentError {
         /// Why it failed.
         because: String,
     },
+    /// More shards than jobs, or none.
+    #[error("{jobs} jobs cannot be divided into {shards} shards\n  name from 1 to {jobs} with --shards")]
+    Shards {
+        /// How many shards were asked for.
+        shards: usize,
+        /// How many jobs there are.
+        jobs: usize,
+    },
     /// The system gives no thread.
     #[error("no thread could be started: {because}\n  try a smaller --jobs")]
     Threads {
@@ -265,6 +274,10 @@ fn carry_out(kind: &dyn Kind, source: &Source, options: &Options) -> Result<Ende
     let mut done = gather(&options.out, &options.merge, &header)?;
     if options.merge.is_empty() {
         perform(kind, &jobs, &header, options, &mut done)?;
+        if options.shard.is_some() {
+            // Whichever shard ends last finds what the others have done meanwhile.
+            done.append(&mut gather(&options.out, &[], &header)?);
+        }
     }
     let missing: Vec<&Job> = jobs.iter().filter(|job| !done.contains_key(&job.id)).collect();
     match missing.first() {

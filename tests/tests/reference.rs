@@ -182,7 +182,7 @@ fn short(value: &Expr) -> Option<String> {
         .replace("[ ", "[")
         .replace(" ]", "]")
         .replace(" ,", ",");
-    let plain = plain.replace(".into()", "").replace("- ", "-");
+    let plain = plain.replace(".into ()", "").replace(".into()", "").replace("- ", "-");
     let is_value = !plain.contains("::") && !plain.contains('(') && plain.len() < 40;
     (is_value && plain != "None").then(|| format!("`{plain}`"))
 }
@@ -202,7 +202,7 @@ fn table_of_struct(items: &[Item], item: &ItemStruct) -> String {
         let key = value_of(&told, "rename").flatten().unwrap_or_else(|| renamed(&name, how.as_deref()));
         let optional = field.ty.to_token_stream().to_string().starts_with("Option");
         let left_out = match value_of(&told, "default") {
-            Some(Some(function)) => default_of(items, &function).unwrap_or_else(|| "see there".into()),
+            Some(Some(function)) => default_of(items, &function).unwrap_or_else(|| "a default".into()),
             Some(None) => none_of(&field.ty),
             None if all_default => {
                 default_field(items, &item.ident.to_string(), &name).unwrap_or_else(|| none_of(&field.ty))

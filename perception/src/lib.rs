@@ -17,7 +17,7 @@
 //!
 //! let seen = Visibility::from_viewpoints(&cloud, &[Point3::new(-1.4, 0.0, 1.4)]);
 //! let scene = segment(&cloud, &seen, &SceneOptions::default())?;
-//! assert!((scene.surface.area_m2 - 0.8).abs() < 0.05);
+//! assert!((0.6..0.9).contains(&scene.surface.area_m2), "{} m²", scene.surface.area_m2);
 //! let models: [ObjectModel; 0] = []; // what is known; nothing is: so all that stands there is unknown
 //! let percepts = Descry::default().recognise(&scene, &seen, &models);
 //! assert_eq!(percepts.len(), 1);

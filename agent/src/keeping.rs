@@ -110,6 +110,27 @@ impl Keeping {
 /// # Errors
 /// [`CommandError::BadInput`] if there is none; [`CommandError::Broken`] if it cannot be opened.
 pub fn open(place: &Path) -> Result<Record, CommandError> {
+    let record = found(place)?;
+    if record.recovery().index_rebuilt {
+        tracing::warn!("{}: the index is damaged, and the segments are read without it", place.display());
+    }
+    Ok(record)
+}
+
+/// Opens the record of a run that is being written. What is written later is read too: there is an index on the disk as soon as
+/// anything is recorded.
+///
+/// # Errors
+/// As [`open`], also if the run has not written anything yet.
+pub fn open_written(run: &Path) -> Result<Record, CommandError> {
+    let record = found(run)?;
+    match record.stats().map_err(CommandError::broken)?.records {
+        0 => Err(CommandError::broken(format!("{}: nothing is recorded yet", run.display()))),
+        _ => Ok(record),
+    }
+}
+
+fn found(place: &Path) -> Result<Record, CommandError> {
     if let Some(text) = place.to_str().filter(|_| is_address(place)) {
         return Address::read(text)?.read_only();
     }
@@ -118,14 +139,10 @@ pub fn open(place: &Path) -> Result<Record, CommandError> {
     {
         return address.read_only();
     }
-    let record = Record::open_shared(place).map_err(|e| match e {
+    Record::open_shared(place).map_err(|e| match e {
         descry_memory::Error::NoRecord { .. } => CommandError::bad_input(e),
         other => CommandError::broken(other),
-    })?;
-    if record.recovery().index_rebuilt {
-        tracing::warn!("{}: the index is damaged, and the segments are read without it", place.display());
-    }
-    Ok(record)
+    })
 }
 
 /// The same, of which nothing is lost as far as can be told without reading all of it.

@@ -1,6 +1,7 @@
 //! A run as one page that needs nothing else: the map with route and views, the plans above what really happened, confidence after
 //! each look, what was seen in three dimensions, and all that was said; one moment in time moves all of them.
 
+mod live;
 mod points;
 mod story;
 
@@ -8,9 +9,13 @@ use descry_memory::Record;
 
 use crate::exit::CommandError;
 use crate::experiment::table::escaped;
+use crate::live::FOLLOW;
 use crate::report::Report;
+pub use live::Running;
 
 const HTML: &str = include_str!("page/page.html");
+/// Colours of every page, light and dark.
+pub const COLOURS: &str = include_str!("page/colours.css");
 const STYLE: &str = include_str!("page/page.css");
 const SCRIPT: &str = include_str!("page/page.js");
 
@@ -19,7 +24,7 @@ const SCRIPT: &str = include_str!("page/page.js");
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of_run(record: &Record, report: Option<&Report>) -> Result<String, CommandError> {
-    let story = story::of(record, report)?;
+    let story = story::of(record, report, &mut story::Looks::default())?;
     let told = serde_json::to_string(&story).map_err(|e| CommandError::Bug(e.to_string()))?;
     Ok(laid_out(&format!("descry: {}", story.goal), &told))
 }
@@ -27,7 +32,8 @@ pub fn of_run(record: &Record, report: Option<&Report>) -> Result<String, Comman
 /// The page that tells a story, as JSON.
 fn laid_out(title: &str, told: &str) -> String {
     let title = escaped(title);
-    let parts = [("{{title}}", title.as_str()), ("{{style}}", STYLE), ("{{script}}", SCRIPT)];
+    let (style, script) = ([COLOURS, STYLE].concat(), [FOLLOW, SCRIPT].concat());
+    let parts = [("{{title}}", title.as_str()), ("{{style}}", &style), ("{{script}}", &script)];
     let page = parts.into_iter().fold(HTML.to_owned(), |page, (name, part)| page.replace(name, part));
     // Within a script nothing may look like its end.
     page.replace("{{story}}", &told.replace("</", "<\\/"))

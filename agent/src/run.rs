@@ -30,7 +30,7 @@ use crate::keeping::Keeping;
 use crate::report::{Event, Report};
 use crate::stop::Stop;
 pub use beginning::Beginning;
-pub use files::{finish, header, keep_header, report};
+pub use files::{finish, has_ended, header, keep_header, report};
 pub use folder::Folder;
 
 /// What a run was started with: enough to start it again.

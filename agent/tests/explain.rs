@@ -66,7 +66,7 @@ fn what_is_not_there_is_explained() {
             "% of the table from 3 places",
             "the probability that it is there after all",
             "it ended because there was no plan any more",
-            " more calls",
+            "said no to all of ",
         ],
     );
 }

@@ -6,26 +6,9 @@ mod binary;
 use std::path::Path;
 
 use beside::shared;
-use binary::{check, check_refused, first_line, kill_after, outcome, start, without_readers};
+use binary::{check, check_refused, documents, first_line, kill_after, outcome, start, without_readers};
 use serde_json::Value;
 use tempfile::TempDir;
-
-/// Everything in a record but the bytes of blobs, and when the run began.
-fn documents(folder: &Path, run: &str) -> Vec<String> {
-    let mut found = check(folder, &["memory", "query", run, "--json"], 0);
-    let all = found["records"].as_array_mut().expect("a list");
-    let mut all: Vec<String> = all
-        .iter_mut()
-        .map(|document| {
-            if document["kind"] == "run" {
-                document["body"]["started_unix_s"] = Value::Null;
-            }
-            document.to_string()
-        })
-        .collect();
-    all.sort();
-    all
-}
 
 fn report(folder: &Path, run: &str) -> Value {
     let text = std::fs::read_to_string(folder.join(run).join("report.json")).expect("the run has ended");

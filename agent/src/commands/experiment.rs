@@ -1,10 +1,12 @@
 //! `descry experiment FILE`: a batch of runs, and what they say together.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use crate::commands::input;
+use crate::commands::{input, live};
 use crate::exit::{CommandError, Exit};
-use crate::experiment::{self, Ended, ExperimentError, Options, Shard, Source};
+use crate::experiment::cluster::{self, Cluster};
+use crate::experiment::{self, Batch, Ended, ExperimentError, Options, Shard, Source};
 use crate::stop::Stop;
 
 /// A job that fails while less than this is left on the disk failed for want of room.
@@ -12,6 +14,7 @@ const LEAST_FREE_BYTES: u64 = 64 << 20;
 
 /// Arguments of `descry experiment`.
 #[derive(clap::Args)]
+#[command(group = clap::ArgGroup::new("cluster").args(["slurm", "kubernetes"]).multiple(true))]
 pub struct Arguments {
     /// Experiment file (TOML): what is varied and measured
     file: PathBuf,
@@ -24,9 +27,20 @@ pub struct Arguments {
     /// Run nothing: put the shards of these folders together in --out
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
     merge: Vec<PathBuf>,
+    /// Run nothing: write the script of a Slurm job array that runs the shards, for sbatch
+    #[arg(long, value_name = "FILE", requires = "shards", conflicts_with_all = ["shard", "merge", "live"])]
+    slurm: Option<PathBuf>,
+    /// Run nothing: write an indexed Kubernetes job that runs the shards, for kubectl apply
+    #[arg(long, value_name = "FILE", requires = "shards", conflicts_with_all = ["shard", "merge", "live"])]
+    kubernetes: Option<PathBuf>,
+    /// With --slurm or --kubernetes: how many shards; --jobs is then the processors of each
+    #[arg(long, value_name = "N", requires = "cluster")]
+    shards: Option<usize>,
     /// Jobs at a time [default: one a core]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
+    #[command(flatten)]
+    live: live::LiveArguments,
     /// Print the summary as one JSON object
     #[arg(long)]
     json: bool,
@@ -45,7 +59,17 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
         stop: stop.clone(),
         tell: input::narrate,
     };
-    match experiment::run(&source, &options).map_err(failed)? {
+    if let Some(shards) = arguments.shards {
+        let cluster = Cluster { shards, threads: options.threads, out: options.out };
+        return write_for_cluster(arguments, &source, &cluster);
+    }
+    let mut window = arguments.live.window()?;
+    if window.is_wanted() {
+        window.open(Arc::new(Batch::of(&source, options.out.clone()).map_err(failed)?))?;
+    }
+    let ended = experiment::run(&source, &options);
+    window.close();
+    match ended.map_err(failed)? {
         Ended::Part { done, all, .. } if stop.is_asked() => {
             let said = format!("stopped; {done} of {all} jobs are done\n  go on with the same command");
             Err(CommandError::Stopped { said, signal: stop.signal() })
@@ -69,6 +93,23 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
             Ok(if results.failed == 0 { Exit::Done } else { Exit::No })
         }
     }
+}
+
+/// Writes what a cluster's scheduler takes.
+fn write_for_cluster(
+    arguments: &Arguments,
+    source: &Source,
+    cluster: &Cluster,
+) -> Result<Exit, CommandError> {
+    type Made = fn(&Source, &Cluster) -> Result<String, ExperimentError>;
+    let asked: [(&Option<PathBuf>, Made); 2] =
+        [(&arguments.slurm, cluster::slurm), (&arguments.kubernetes, cluster::kubernetes)];
+    for (file, made) in asked.iter().filter_map(|(file, made)| Some((file.as_ref()?, made))) {
+        let text = made(source, cluster).map_err(failed)?;
+        std::fs::write(file, text).map_err(|e| CommandError::broken(format!("{}: {e}", file.display())))?;
+        input::print_text(&file.display().to_string())?;
+    }
+    Ok(Exit::Done)
 }
 
 /// What went wrong is the input's fault, or the disk's.

@@ -1,6 +1,7 @@
 //! `descry find` and `descry do`: pursues a goal with a body.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use descry_domains::goal::{self, Goal};
@@ -10,12 +11,14 @@ use descry_domains::load::{DEFAULT, Domain};
 use descry_robots::Robot;
 
 use crate::body;
-use crate::commands::input;
+use crate::commands::live::Window;
+use crate::commands::{input, live};
 use crate::exit::{CommandError, Exit};
 use crate::keeping::Keeping;
 use descry_domains::abilities::searching::policies;
 use descry_domains::answer::Verdict;
 
+use crate::page::Running;
 use crate::report::{Event, Report};
 use crate::run::{self, Beginning, Folder, Settings, Task, Watcher, programs};
 use crate::stop::Stop;
@@ -73,6 +76,8 @@ pub struct With {
     #[arg(long, value_name = "STORE")]
     remember: Option<String>,
     #[command(flatten)]
+    live: live::LiveArguments,
+    #[command(flatten)]
     keeping: Keeping,
     /// Print the result as one JSON object
     #[arg(long)]
@@ -88,15 +93,17 @@ pub(super) fn pursue(arguments: &DoArguments, stop: &Stop) -> Result<Exit, Comma
 }
 
 fn carry_out(words: &[String], verb: &str, with: &With, stop: &Stop) -> Result<Exit, CommandError> {
-    let started = Instant::now();
     let said = format!("{verb}{}", words.join(" "));
-    let (mut report, folder) = match &with.resume {
-        Some(folder) => go_on(folder, (!words.is_empty()).then_some(&said), with.allow_programs, stop)?,
-        None => begin(&said, with, stop)?,
+    let mut window = with.live.window()?;
+    let ended = match &with.resume {
+        Some(folder) => {
+            let said = (!words.is_empty()).then_some(&said);
+            go_on(folder, said, with.allow_programs, &mut window, stop)
+        }
+        None => begin(&said, with, &mut window, stop),
     };
-    report.wall_s = started.elapsed().as_secs_f64();
-    run::finish(folder.path(), &report)?;
-    input::narrate(&report.to_string());
+    window.close();
+    let report = ended?;
     if with.json {
         input::print_json(&report)?;
     }
@@ -105,6 +112,14 @@ fn carry_out(words: &[String], verb: &str, with: &With, stop: &Stop) -> Result<E
         Verdict::NotFound | Verdict::CannotTell | Verdict::Impossible => Exit::No,
         Verdict::Failed => Exit::Broken,
     })
+}
+
+/// Keeps how a run ended, and says it.
+fn end(mut report: Report, folder: &Folder, started: Instant) -> Result<Report, CommandError> {
+    report.wall_s = started.elapsed().as_secs_f64();
+    run::finish(folder.path(), &report)?;
+    input::narrate(&report.to_string());
+    Ok(report)
 }
 
 fn tell(event: &Event) {
@@ -117,12 +132,14 @@ pub(super) fn understood(said: &str, domain: &Domain, robot: &dyn Robot) -> Resu
     goal::read(said, domain, &lexicon).map_err(CommandError::bad_input)
 }
 
-fn begin(said: &str, with: &With, stop: &Stop) -> Result<(Report, Folder), CommandError> {
+fn begin(said: &str, with: &With, window: &mut Window, stop: &Stop) -> Result<Report, CommandError> {
+    let started = Instant::now();
     let domain = input::domain(&with.domain)?;
     let body = body::open(&with.robot, with.scene.as_deref(), with.seed, &domain)?;
     let goal = understood(said, &domain, &*body.robot)?;
     let chooser = policies::named(&with.policy, with.seed, None).map_err(CommandError::bad_input)?;
     let folder = Folder::of_new_run(with.run.as_deref(), &goal)?;
+    window.open(Arc::new(Running::of(folder.path())))?;
     let settings = Settings {
         robot: with.robot.clone(),
         scene: with.scene.clone(),
@@ -134,15 +151,17 @@ fn begin(said: &str, with: &With, stop: &Stop) -> Result<(Report, Folder), Comma
     };
     let watcher = Watcher { stop, tell: &mut tell };
     let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, watcher)?;
-    Ok((report, folder))
+    end(report, &folder, started)
 }
 
 fn go_on(
     folder: &Path,
     said: Option<&String>,
     allow_programs: bool,
+    window: &mut Window,
     stop: &Stop,
-) -> Result<(Report, Folder), CommandError> {
+) -> Result<Report, CommandError> {
+    let started = Instant::now();
     let header = run::header(folder)?;
     if let Some(said) = said.filter(|said| **said != header.goal) {
         let text = format!(
@@ -154,6 +173,7 @@ fn go_on(
     }
     let claimed = Folder::locked(folder)?;
     let record = header.settings.keeping.resume(folder)?;
+    window.open(Arc::new(Running::of(folder)))?;
     let beginning = Beginning::of(&record)?;
     // A run that was cut off before it had recorded anything begins now.
     let domain = match &beginning {
@@ -172,5 +192,5 @@ fn go_on(
     let task = Task { domain: &domain, goal: &goal, past };
     let watcher = Watcher { stop, tell: &mut tell };
     let report = run::go_on(task, &body, &claimed, record, settings, chooser, watcher)?;
-    Ok((report, claimed))
+    end(report, &claimed, started)
 }

@@ -33,6 +33,7 @@ const EXAMPLES: [(&str, &[&str]); 21] = [
             "descry find \"cup A\"",
             "descry find mug --domain home --seed 7 --run runs/mug",
             "descry find \"cup A\" --robot recorded:FRAMES",
+            "descry find \"cup A\" --live",
         ],
     ),
     (
@@ -69,7 +70,9 @@ const EXAMPLES: [(&str, &[&str]); 21] = [
         "experiment",
         &[
             "descry experiment two-tables.toml --out results",
+            "descry experiment two-tables.toml --out results --live",
             "descry experiment two-tables.toml --out part --shard 0/4",
+            "descry experiment two-tables.toml --slurm batch.sh --shards 16 --jobs 4",
         ],
     ),
     ("robot", &["descry robot check \"program:python3 robot.py\""]),

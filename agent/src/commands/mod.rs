@@ -8,6 +8,7 @@ mod fmt;
 mod goals;
 mod input;
 mod line;
+mod live;
 mod lsp;
 mod manual;
 mod memory;

@@ -1,9 +1,11 @@
 //! Batches of runs: a file says what is varied, every combination is a job, and the jobs become tables with intervals, plots
 //! and one page. A batch goes on where it was cut off, and its shards may be done on many machines.
 
+pub mod cluster;
 pub mod hash;
 pub mod journal;
 pub mod kinds;
+mod live;
 pub mod page;
 pub mod plot;
 mod runner;
@@ -20,6 +22,7 @@ use serde_json::{Map, Value};
 
 use journal::{Done, Header, Journal};
 pub use kinds::Kind;
+pub use live::Batch;
 pub use write::Results;
 
 /// Named values, in the order in which they are shown.
@@ -82,6 +85,9 @@ impl Finished {
         Self { job: job.id.clone(), rows, clock: outcome.clock, error }
     }
 }
+
+/// A finished job, and which of all jobs it is.
+pub type Numbered<'a> = (usize, &'a Finished);
 
 /// An experiment file as it was read.
 #[derive(Debug, Clone)]
@@ -231,6 +237,14 @@ pub enum ExperimentError {
         /// Why it failed.
         because: String,
     },
+    /// More shards than jobs, or none.
+    #[error("{jobs} jobs cannot be divided into {shards} shards\n  name from 1 to {jobs} with --shards")]
+    Shards {
+        /// How many shards were asked for.
+        shards: usize,
+        /// How many jobs there are.
+        jobs: usize,
+    },
     /// The system gives no thread.
     #[error("no thread could be started: {because}\n  try a smaller --jobs")]
     Threads {
@@ -257,9 +271,13 @@ fn carry_out(kind: &dyn Kind, source: &Source, options: &Options) -> Result<Ende
     let jobs = kind.jobs();
     check_unique(&jobs)?;
     let header = header(source, kind, jobs.len());
-    let mut done = gather(options, &header)?;
+    let mut done = gather(&options.out, &options.merge, &header)?;
     if options.merge.is_empty() {
         perform(kind, &jobs, &header, options, &mut done)?;
+        if options.shard.is_some() {
+            // Whichever shard ends last finds what the others have done meanwhile.
+            done.append(&mut gather(&options.out, &[], &header)?);
+        }
     }
     let missing: Vec<&Job> = jobs.iter().filter(|job| !done.contains_key(&job.id)).collect();
     match missing.first() {
@@ -300,10 +318,10 @@ fn own_folder(options: &Options) -> PathBuf {
 }
 
 /// Everything that has been done so far: in the folder, in the folders of its shards, and in those that are named.
-fn gather(options: &Options, header: &Header) -> Result<Done, ExperimentError> {
-    let mut folders = vec![options.out.clone()];
-    folders.extend(options.merge.iter().cloned());
-    if let Some(absent) = options.merge.iter().find(|folder| !folder.is_dir()) {
+fn gather(out: &Path, merge: &[PathBuf], header: &Header) -> Result<Done, ExperimentError> {
+    let mut folders = vec![out.to_owned()];
+    folders.extend(merge.iter().cloned());
+    if let Some(absent) = merge.iter().find(|folder| !folder.is_dir()) {
         return Err(ExperimentError::file(absent, &"--merge names folders of shards, and this is none"));
     }
     let mut done = Done::new();

@@ -2,6 +2,10 @@
 
 use super::plot::Plot;
 use super::table::{Table, escaped};
+use crate::live::FOLLOW;
+use crate::page::COLOURS;
+
+const SCRIPT: &str = include_str!("live.js");
 
 /// A part of the results as people read them.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,27 +24,54 @@ pub enum Section {
 pub type Facts = Vec<(&'static str, String)>;
 
 const STYLE: &str = "
-body { font: 15px/1.5 system-ui, sans-serif; color: #1a1a1a; max-width: 76rem; margin: 2rem auto; padding: 0 1.5rem; }
-h1 { margin-bottom: 0; } h2 { margin-top: 2.5rem; border-bottom: 1px solid #ccc; } h3 { margin: 1.8rem 0 .4rem; }
+* { box-sizing: border-box; }
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--text); background: var(--ground); max-width: 76rem; margin: 2rem auto; padding: 0 1.5rem; }
+h1 { margin-bottom: 0; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--line); } h3 { margin: 1.8rem 0 .4rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .2rem .8rem; text-align: left; border-bottom: 1px solid #e4e4e4; white-space: nowrap; }
-th { border-bottom: 2px solid #888; } th.n, td.n { text-align: right; } tbody tr:hover { background: #f3f6fa; }
-.scroll { overflow-x: auto; } .note { color: #555; margin: .4rem 0 0; max-width: 60rem; }
-figure { margin: 1.2rem 0; } figure svg { max-width: 100%; height: auto; }
-pre { background: #f6f6f6; padding: 1rem; overflow-x: auto; } dl { display: grid; grid-template-columns: max-content 1fr; gap: .1rem 1rem; }
-dt { color: #555; } dd { margin: 0; font-family: ui-monospace, monospace; font-size: 90%; }
+th, td { padding: .2rem .8rem; text-align: left; border-bottom: 1px solid var(--line); white-space: nowrap; }
+th { border-bottom: 2px solid var(--faint); } th.n, td.n { text-align: right; } tbody tr:hover { background: var(--field); }
+.scroll { overflow-x: auto; } .note { color: var(--faint); margin: .4rem 0 0; max-width: 60rem; } #live { color: var(--now); }
+figure { margin: 1.2rem 0; } figure svg { max-width: 100%; height: auto; border-radius: 8px; } progress { width: 100%; accent-color: var(--done); }
+pre { background: var(--field); padding: 1rem; overflow-x: auto; } dl { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: .1rem 1rem; }
+dt { color: var(--faint); } dd { margin: 0; font-family: ui-monospace, monospace; font-size: 90%; overflow-wrap: anywhere; }
 ";
 
-/// The page.
-pub fn html(title: &str, about: &str, facts: &Facts, sections: &[Section], source: &str) -> String {
+/// How far a batch has come that goes on, for a page that follows it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Jobs that are done.
+    pub done: usize,
+    /// All jobs.
+    pub all: usize,
+}
+
+impl Progress {
+    fn html(self) -> String {
+        let Self { done, all } = self;
+        format!(
+            "<p id=\"live\">live</p>\n<progress max=\"{all}\" value=\"{done}\">{done} of {all} jobs</progress>\n"
+        )
+    }
+}
+
+/// The page: of results, or of a batch that goes on.
+pub fn html(
+    (title, about): (&str, &str),
+    facts: &Facts,
+    sections: &[Section],
+    source: &str,
+    progress: Option<Progress>,
+) -> String {
+    let script = progress.map_or(String::new(), |_| format!("<script>\n{FOLLOW}{SCRIPT}</script>\n"));
     let facts: String =
         facts.iter().map(|(name, value)| format!("<dt>{name}</dt><dd>{}</dd>\n", escaped(value))).collect();
     let body: String = sections.iter().map(section).collect();
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n\
-         <title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n<p>{}</p>\n<dl>\n{facts}</dl>\n{body}\
+         <title>{title}</title>\n<style>\n{COLOURS}{STYLE}</style>\n{script}</head>\n<body>\n<h1>{title}</h1>\n<p>{}</p>\n{}<dl>\n{facts}</dl>\n{body}\
          <h2>The experiment file</h2>\n<pre>{}</pre>\n</body>\n</html>\n",
         escaped(about),
+        progress.map_or(String::new(), Progress::html),
         escaped(source),
         title = escaped(title),
     )
@@ -83,7 +114,7 @@ mod tests {
             ..Table::default()
         };
         let sections = [Section::Heading("H & I".into()), Section::Table(table)];
-        let page = html("<name>", "about", &vec![("hash", "h".into())], &sections, "a = \"<b>\"");
+        let page = html(("<name>", "about"), &vec![("hash", "h".into())], &sections, "a = \"<b>\"", None);
         for part in [
             "<h1>&lt;name&gt;</h1>",
             "<dd>h</dd>",
@@ -93,6 +124,8 @@ mod tests {
         ] {
             assert!(page.contains(part), "{part} is not in\n{page}");
         }
-        assert!(!page.contains("src="), "a page stands alone");
+        assert!(!page.contains("src=") && !page.contains("<script"), "a page stands alone");
+        let live = html(("n", "a"), &vec![], &[], "", Some(Progress { done: 3, all: 8 }));
+        assert!(live.contains("<progress max=\"8\" value=\"3\">") && live.contains("follow("), "{live}");
     }
 }

@@ -51,8 +51,9 @@ impl Kind for Squares {
         }
     }
 
-    fn summarise(&self, finished: &[Finished]) -> Summary {
-        let squares = finished.iter().flat_map(|job| &job.rows).filter_map(|row| row.get("square")?.as_u64());
+    fn summarise(&self, finished: &[Numbered<'_>]) -> Summary {
+        let squares =
+            finished.iter().flat_map(|(_, job)| &job.rows).filter_map(|row| row.get("square")?.as_u64());
         let values = json!({ "sum": squares.sum::<u64>() }).as_object().cloned().unwrap_or_default();
         Summary { values, sections: vec![] }
     }

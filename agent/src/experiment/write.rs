@@ -12,7 +12,7 @@ use super::journal::Header;
 use super::page::{self, Facts, Section};
 use super::statistics::{Observation, mean, median};
 use super::table::{Table, number};
-use super::{ExperimentError, Finished, Kind, Row, Source};
+use super::{ExperimentError, Finished, Kind, Numbered, Row, Source};
 
 /// The results of an experiment.
 #[derive(Debug, Clone)]
@@ -35,7 +35,8 @@ pub(super) fn results(
     out: &Path,
 ) -> Result<Results, ExperimentError> {
     let head = kind.head();
-    let said = kind.summarise(finished);
+    let numbered: Vec<Numbered<'_>> = finished.iter().enumerate().collect();
+    let said = kind.summarise(&numbered);
     let failed = finished.iter().filter(|job| job.error.is_some()).count();
     let command = format!("descry experiment {}", source.path.display());
     let facts: Facts = vec![
@@ -60,7 +61,7 @@ pub(super) fn results(
     save(out, "jobs.csv", &csv(finished, |job| job.rows.clone()))?;
     save(out, "summary.json", &(summary_text + "\n"))?;
     save(out, "tables.md", &tables)?;
-    save(out, "index.html", &page::html(&head.name, &head.about, &facts, &sections, &source.text))?;
+    save(out, "index.html", &page::html((&head.name, &head.about), &facts, &sections, &source.text, None))?;
     if clock.is_some() {
         save(out, "clock.csv", &csv(finished, |job| vec![job.clock.clone()]))?;
         save(out, "clock.md", &clock_text)?;
@@ -83,7 +84,7 @@ fn save(folder: &Path, name: &str, text: &str) -> Result<(), ExperimentError> {
 }
 
 /// The jobs that failed, the same reason once with its count.
-fn failures(finished: &[Finished]) -> Vec<Section> {
+pub(super) fn failures<'a>(finished: impl IntoIterator<Item = &'a Finished>) -> Vec<Section> {
     let mut reasons = std::collections::BTreeMap::<&str, Vec<&str>>::new();
     for job in finished {
         if let Some(error) = &job.error {

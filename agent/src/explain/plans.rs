@@ -35,7 +35,7 @@ fn tell(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked) -> Told {
 fn cause(chapter: &Chapter, before: Option<&Chapter>) -> String {
     let Some(before) = before else { return "the run began, and there was no plan.".into() };
     if let Some(Deed::Failed(call, _, therefore)) = before.deeds.last() {
-        return format!("{call} failed. What follows from that: {therefore}.");
+        return format!("{call} failed. What follows from that: {}.", reasons::follows(therefore));
     }
     let moved = before.deeds.iter().rev().find_map(|deed| match deed {
         Deed::Noted(Note::Changed { because }) => Some(format!("something was moved: {because}. ")),
@@ -80,7 +80,7 @@ fn intent(chapter: &Chapter, asked: &Asked) -> Vec<String> {
     if !named.is_empty() {
         let more = numbers.len().saturating_sub(MOST_NAMED);
         let more = if more > 0 { format!(", and {more} more") } else { String::new() };
-        said.push(format!("Expected of it: {}{more}.", named.join(", ")));
+        said.push(format!("Hoped of it: {}{more}.", named.join(", ")));
     }
     said
 }
@@ -103,10 +103,9 @@ fn why(chapter: &Chapter, asked: &Asked) -> Vec<String> {
     said.extend(quickest(weighed, chosen, asked));
     let most = weighed.others.iter().max_by(|a, b| a.gains.total_cmp(&b.gains));
     if let Some(other) = most.filter(|o| o.gains > chosen.gains * (1.0 + ALIKE)) {
-        let longer_s = other.takes_s - chosen.takes_s;
-        let longer =
-            if longer_s > 0.0 { format!(", but takes {longer_s:.1} s longer") } else { String::new() };
-        said.push(format!("{} gains most{longer}.", figures(other)));
+        let more_s = other.takes_s - chosen.takes_s;
+        let more = if more_s > 0.0 { format!(", but counts for {more_s:.1} s more") } else { String::new() };
+        said.push(format!("{} gains most{more}.", figures(other)));
     }
     said
 }

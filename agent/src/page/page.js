@@ -1,5 +1,6 @@
-"use strict";
-const story = JSON.parse(document.getElementById("story").textContent);
+let story = JSON.parse(document.getElementById("story").textContent);
+const live = story === null;
+let over = !live;
 const $ = id => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
 const shape = (parent, name, attributes, text) => {
@@ -17,6 +18,8 @@ function head() {
   $("goal").textContent = story.goal;
   const report = story.report;
   const verdict = $("verdict");
+  verdict.replaceChildren();
+  $("facts").replaceChildren();
   if (report) {
     const words = { achieved: "achieved", not_found: "not found", cannot_tell: "cannot tell", impossible: "cannot be done", failed: "failed" };
     verdict.classList.toggle("no", report.verdict !== "achieved");
@@ -24,10 +27,10 @@ function head() {
     bold.textContent = (report.answer ? report.answer + "; " : "") + (words[report.verdict] ?? report.verdict);
     verdict.append(bold, ": " + report.why);
   } else {
-    verdict.textContent = "The run has not finished.";
+    verdict.textContent = over ? "The run has not finished." : "The run is under way.";
   }
+  $("lost").hidden = story.lost.length === 0;
   if (story.lost.length) {
-    $("lost").hidden = false;
     $("lost").textContent = "Lost from the record: " + story.lost.join("; ");
   }
   const facts = [["goal in PDDL", story.pddl], ["on the body's clock", seconds(story.ends_s)], ["looks", story.looks.length], ["plans", story.plans.length]];
@@ -166,6 +169,7 @@ function sureOf(at) {
   }
   if (story.report) shape(svg, "line", { x1: left, x2: wide - right, y1: y(story.report.threshold), y2: y(story.report.threshold), stroke: "var(--known)", "stroke-dasharray": "5 4" });
   const names = [...new Set(story.beliefs.flatMap(b => Object.keys(b.best)))];
+  svg.parentElement.hidden = story.looks.length > 0 && !names.length;
   const ends = [];
   names.forEach((name, n) => {
     const colour = `hsl(${n * 360 / names.length + 210} 60% 50%)`;
@@ -184,7 +188,7 @@ function sureOf(at) {
 
 // What was seen, in three dimensions.
 const view = { yaw: -.8, pitch: .6, far: 4, centre: [0, 0, .8] };
-let gl = null, program = null, clouds = [], turning = false;
+let gl = null, program = null, clouds = new Map(), turning = false, turned = false;
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
 function beginSpace() {
   const canvas = $("cloud");
@@ -198,11 +202,26 @@ function beginSpace() {
   gl.linkProgram(program);
   gl.useProgram(program);
   gl.enable(gl.DEPTH_TEST);
+}
+// The points of each look, those that stand elsewhere now in the place of those that were there. What is told anew meanwhile goes first.
+async function fillSpace() {
+  if (!gl) return;
+  const told = story;
   const buffer = data => { const b = gl.createBuffer(); gl.bindBuffer(gl.ARRAY_BUFFER, b); gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW); return b; };
-  clouds = story.looks.map(({ at_s, points }) => {
-    const places = bytes(points.places), colours = bytes(points.colours);
-    return { at_s, count: colours.length / 3, least: points.min_m, size: points.size_m, places: buffer(places), colours: buffer(colours) };
-  });
+  for (const { key, at_s, points } of story.looks) {
+    if (clouds.has(key)) continue;
+    const had = points ?? await fetched(`points/${key}`);
+    if (story !== told) return;
+    if (!had) continue;
+    const places = bytes(had.places), colours = bytes(had.colours);
+    clouds.set(key, { at_s, count: colours.length / 3, least: had.min_m, size: had.size_m, places: buffer(places), colours: buffer(colours) });
+  }
+  const keys = new Set(story.looks.map(l => l.key));
+  for (const [key, cloud] of clouds) {
+    if (keys.has(key)) continue;
+    gl.deleteBuffer(cloud.places); gl.deleteBuffer(cloud.colours); clouds.delete(key);
+  }
+  redraw();
 }
 function lookAt(at) {
   const shown = latest(story.beliefs, at)?.objects ?? [];
@@ -235,7 +254,7 @@ function spaceOf(at) {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.uniformMatrix4fv(gl.getUniformLocation(program, "seen"), false, seen);
     gl.uniform1f(gl.getUniformLocation(program, "dot"), .009 * high * 1.6 / 2 * 1.3);
-    const shown = clouds.filter(c => c.at_s <= at + 1e-6);
+    const shown = [...clouds.values()].filter(c => c.at_s <= at + 1e-6);
     const share = turning ? Math.min(1, 150000 / shown.reduce((sum, c) => sum + c.count, 1)) : 1;
     for (const cloud of shown) {
       gl.uniform3fv(gl.getUniformLocation(program, "least"), cloud.least);
@@ -278,18 +297,19 @@ function drawLabels(paper, seen, wide, high, scale, at) {
 
 // What was said, and the moment that all parts show.
 function said() {
-  story.moments.forEach(moment => {
+  $("said").replaceChildren(...story.moments.map(moment => {
     const item = document.createElement("li"), time = document.createElement("time"), text = document.createElement("pre");
     item.className = moment.what;
     time.textContent = seconds(moment.at_s);
     text.textContent = moment.text;
     item.append(time, text);
     item.addEventListener("click", () => go(moment.at_s));
-    $("said").append(item);
-  });
+    return item;
+  }));
 }
-let at = story.ends_s, drawn = false;
+let at = 0, drawn = false;
 function go(s) {
+  if (!story) return;
   at = Math.min(Math.max(s, 0), story.ends_s);
   $("time").value = at;
   $("now").textContent = seconds(at);
@@ -304,7 +324,7 @@ function redraw() {
   drawn = true;
   requestAnimationFrame(() => { drawn = false; spaceOf(at); });
 }
-const times = [...new Set([0, ...story.moments.map(m => m.at_s), ...story.looks.map(l => l.at_s), story.ends_s])].sort((a, b) => a - b);
+const times = () => [...new Set([0, ...story.moments.map(m => m.at_s), ...story.looks.map(l => l.at_s), story.ends_s])].sort((a, b) => a - b);
 let playing = null;
 function play() {
   if (playing) { clearInterval(playing); playing = null; return; }
@@ -312,10 +332,9 @@ function play() {
   playing = setInterval(() => { go(at + story.ends_s / 200); if (at >= story.ends_s) { clearInterval(playing); playing = null; } }, 50);
 }
 function hands() {
-  $("time").max = story.ends_s;
   $("time").addEventListener("input", e => go(+e.target.value));
-  $("back").addEventListener("click", () => go(times.findLast(t => t < at - 1e-6) ?? 0));
-  $("on").addEventListener("click", () => go(times.find(t => t > at + 1e-6) ?? story.ends_s));
+  $("back").addEventListener("click", () => go(times().findLast(t => t < at - 1e-6) ?? 0));
+  $("on").addEventListener("click", () => go(times().find(t => t > at + 1e-6) ?? story.ends_s));
   $("play").addEventListener("click", play);
   const canvas = $("cloud"), fingers = new Map();
   canvas.addEventListener("pointerdown", e => { canvas.setPointerCapture(e.pointerId); fingers.set(e.pointerId, [e.clientX, e.clientY]); });
@@ -324,15 +343,40 @@ function hands() {
     const before = fingers.get(e.pointerId);
     if (!before) return;
     const apart = () => { const [a, b] = [...fingers.values()]; return Math.hypot(a[0] - b[0], a[1] - b[1]); };
-    turning = true;
+    turning = turned = true;
     const was = fingers.size === 2 ? apart() : 0;
     fingers.set(e.pointerId, [e.clientX, e.clientY]);
     if (fingers.size === 2) view.far *= was / Math.max(apart(), 1);
     else { view.yaw -= (e.clientX - before[0]) * .008; view.pitch = Math.min(1.55, Math.max(-.3, view.pitch + (e.clientY - before[1]) * .008)); }
     redraw();
   });
-  canvas.addEventListener("wheel", e => { e.preventDefault(); view.far = Math.min(20, Math.max(.3, view.far * Math.exp(e.deltaY * .001))); redraw(); }, { passive: false });
+  canvas.addEventListener("wheel", e => { e.preventDefault(); turned = true; view.far = Math.min(20, Math.max(.3, view.far * Math.exp(e.deltaY * .001))); redraw(); }, { passive: false });
   addEventListener("resize", () => go(at));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => go(at));
 }
-head(); said(); beginSpace(); lookAt(story.ends_s); hands(); go(story.ends_s);
+
+// All of it, told anew: who looked at the end looks at the new end.
+function tell(next) {
+  const follows = !story || (at >= story.ends_s - 1e-6 && !playing);
+  story = next;
+  document.title = `descry: ${story.goal}`;
+  head(); said();
+  $("time").max = story.ends_s;
+  if (follows && !turned) lookAt(story.ends_s);
+  go(follows ? story.ends_s : at);
+  return fillSpace();
+}
+
+// While the run goes on: told anew whenever there are news.
+async function fetched(path) {
+  try { const answer = await fetch(path); return answer.ok ? await answer.json() : null; } catch { return null; }
+}
+let filled = null;
+async function tellNews(ended) {
+  over = ended;
+  const next = await fetched("story");
+  if (next) filled = tell(next);
+  return next !== null;
+}
+beginSpace(); hands();
+if (live) follow(tellNews, () => filled); else tell(story);

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use descry_perception::View;
+use descry_perception::Cloud;
 use descry_perception::nalgebra::{Isometry3, Point3};
 use serde::Serialize;
 
@@ -45,13 +45,13 @@ pub fn most(looks: usize) -> usize {
     MOST_OF_A_LOOK.min(MOST_OF_ALL / looks.max(1))
 }
 
-/// The points of a view whose camera stood there.
-pub fn pack(view: &View, map_from_camera: &Isometry3<f64>, near: &[Near], most: usize) -> Packed {
+/// The points of a cloud whose camera stood there.
+pub fn pack(cloud: &Cloud, map_from_camera: &Isometry3<f64>, near: &[Near], most: usize) -> Packed {
     let mut cell_m = CELL_M;
-    let mut kept = thinned(view, map_from_camera, near, cell_m);
+    let mut kept = thinned(cloud, map_from_camera, near, cell_m);
     while kept.len() > most {
         cell_m *= GROWTH;
-        kept = thinned(view, map_from_camera, near, cell_m);
+        kept = thinned(cloud, map_from_camera, near, cell_m);
     }
     let kept = mixed(kept);
     let least = |axis: usize| kept.iter().map(|(p, _)| p[axis]).fold(f64::INFINITY, f64::min);
@@ -82,14 +82,14 @@ fn mixed<T: Copy>(points: Vec<T>) -> Vec<T> {
 
 /// One point of each cell, the first.
 fn thinned(
-    view: &View,
+    cloud: &Cloud,
     map_from_camera: &Isometry3<f64>,
     near: &[Near],
     cell_m: f64,
 ) -> Vec<(Point3<f64>, [u8; 3])> {
     let mut taken = HashSet::new();
     let mut kept = Vec::new();
-    for (n, point) in view.cloud.points.iter().enumerate() {
+    for (n, point) in cloud.points.iter().enumerate() {
         let point = point.cast::<f64>();
         let range_m = point.coords.norm();
         if range_m.is_nan() || range_m >= FAR_M {
@@ -101,7 +101,7 @@ fn thinned(
         let side_m = if is_near { cell_m } else { cell_m * COARSER };
         let cell: [i32; 3] = std::array::from_fn(|k| (place[k] / side_m).floor() as i32);
         if taken.insert((is_near, cell)) {
-            let colour = view.cloud.colours.as_ref().map_or([170; 3], |colours| colours[n]);
+            let colour = cloud.colours.as_ref().map_or([170; 3], |colours| colours[n]);
             kept.push((place, colour));
         }
     }
@@ -110,8 +110,6 @@ fn thinned(
 
 #[cfg(test)]
 mod tests {
-    use descry_perception::Cloud;
-
     use super::*;
 
     #[test]
@@ -128,10 +126,10 @@ mod tests {
         let points = (0..side).flat_map(|i| (0..side).map(move |j| (i, j)));
         let points =
             points.map(|(i, j)| Point3::new(f32::from(i) * 0.01, f32::from(j) * 0.01, 1.0)).collect();
-        let view = View::alone(Cloud { points, ..Cloud::default() });
+        let cloud = Cloud { points, ..Cloud::default() };
         let everywhere = Near { min_m: Point3::new(-9.0, -9.0, -9.0), max_m: Point3::new(9.0, 9.0, 9.0) };
         let near = if near { vec![everywhere] } else { Vec::new() };
-        let packed = pack(&view, &Isometry3::identity(), &near, most);
+        let packed = pack(&cloud, &Isometry3::identity(), &near, most);
         let colours = STANDARD.decode(&packed.colours).unwrap();
         let places = STANDARD.decode(&packed.places).unwrap();
         assert_eq!(places.len(), 2 * colours.len());

@@ -1,6 +1,7 @@
 //! What a page shows of a run, gathered from its record.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use descry_memory::belief::Belief;
 use descry_memory::{Document, Query, Record};
@@ -81,14 +82,28 @@ struct Deed {
 }
 
 /// A look: from where, and what it measured.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 struct Look {
+    /// Another one whenever it is placed elsewhere.
+    key: String,
     at_s: f64,
     eye_m: [f64; 3],
     /// Corners of the image two metres away.
     corners_m: Vec<[f64; 3]>,
     on: Value,
-    points: Packed,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    points: Option<Arc<Packed>>,
+}
+
+/// The looks of a run as they were told last: who tells it again need not read them again.
+#[derive(Debug, Default)]
+pub struct Looks(BTreeMap<String, Look>);
+
+impl Looks {
+    /// The points of a look, by its key.
+    pub fn points(&self, key: &str) -> Option<Arc<Packed>> {
+        self.0.get(key)?.points.clone()
+    }
 }
 
 /// Where the body stood.
@@ -122,7 +137,7 @@ struct Object {
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
-pub fn of(record: &Record, report: Option<&Report>) -> Result<Story, CommandError> {
+pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result<Story, CommandError> {
     let mut all = All { record, lost: Vec::new(), first_ns: None };
     let events = all.find("event")?;
     let heads = all.find("run")?;
@@ -135,7 +150,7 @@ pub fn of(record: &Record, report: Option<&Report>) -> Result<Story, CommandErro
     let (moments, plans) = told(&all, &events);
     let deeds = deeds(&all, &events);
     let clouds = all.find("cloud")?;
-    let looks = looks(&mut all, &clouds, &map)?;
+    looks.tell(&mut all, &clouds, &map)?;
     let stands = stands(&all, &map, &clouds);
     let said = |name: &str| heads.first().and_then(|d| d.body[name].as_str()).unwrap_or_default().to_owned();
     let end_ns = events.iter().chain(&clouds).map(|d| d.stamp_ns).max().unwrap_or(0);
@@ -149,11 +164,22 @@ pub fn of(record: &Record, report: Option<&Report>) -> Result<Story, CommandErro
         moments,
         plans,
         deeds,
-        looks,
+        looks: looks.in_time(),
         stands,
         beliefs,
         lost: all.lost,
     })
+}
+
+impl Story {
+    /// The same for who fetches the points of each look alone. What cannot be read of a run that is being written may be there soon.
+    pub fn under_way(mut self) -> Self {
+        self.looks.iter_mut().for_each(|look| look.points = None);
+        if self.report.is_none() {
+            self.lost.clear();
+        }
+        self
+    }
 }
 
 /// The record, the time at which it begins, and what of it is lost.
@@ -228,44 +254,82 @@ fn deeds(all: &All<'_>, events: &[Document]) -> Vec<Deed> {
     deeds
 }
 
-/// The looks, each placed where the last merge that had it placed it.
-fn looks(all: &mut All<'_>, clouds: &[Document], map: &Map) -> Result<Vec<Look>, CommandError> {
-    let mut placed: BTreeMap<u64, Isometry3<f64>> = BTreeMap::new();
+/// Where the last merge that had it placed each look, by the number of its cloud.
+fn placed(all: &mut All<'_>) -> Result<BTreeMap<u64, Isometry3<f64>>, CommandError> {
+    let mut placed = BTreeMap::new();
     for document in all.find("percepts")? {
         let views: Vec<u64> = part(&document.body["views"]).unwrap_or_default();
         let fits = document.body["fits"].as_array().cloned().unwrap_or_default();
         let used = views.iter().zip(&fits).filter(|(_, fit)| fit["used"] == true);
         placed.extend(used.filter_map(|(view, fit)| Some((*view, part(&fit["world_from_camera"])?))));
     }
-    let frame = map.description["frames"]["map"].as_str().unwrap_or("map").to_owned();
-    let near: Vec<Near> = map.surfaces.iter().map(near).collect();
-    let most = points::most(clouds.len());
-    let mut looks = Vec::new();
-    for document in clouds {
-        let view = match all.record.view(document, &frame) {
-            Ok(view) => view,
-            Err(e) => {
-                all.lost.push(e.to_string());
-                continue;
+    Ok(placed)
+}
+
+impl Looks {
+    /// Takes in the looks of these clouds; those that stand where they stood are kept as they are.
+    fn tell(&mut self, all: &mut All<'_>, clouds: &[Document], map: &Map) -> Result<(), CommandError> {
+        let placed = placed(all)?;
+        let frame = map.description["frames"]["map"].as_str().unwrap_or("map").to_owned();
+        let near: Vec<Near> = map.surfaces.iter().map(near).collect();
+        let most = points::most(clouds.len());
+        let mut told = BTreeMap::new();
+        for document in clouds {
+            let pose = all.record.pose_of(document, &frame);
+            let placed = placed.get(&document.id.0).copied().map_or(pose, Ok);
+            let look = placed.and_then(|map_from_camera| {
+                let key = key(document, &map_from_camera);
+                match self.0.remove(&key) {
+                    Some(look) => Ok(look),
+                    None => look(all, document, (key, map_from_camera), &near, most),
+                }
+            });
+            match look {
+                Ok(look) => drop(told.insert(look.key.clone(), look)),
+                Err(e) => all.lost.push(e.to_string()),
             }
-        };
-        let map_from_camera = placed.get(&document.id.0).unwrap_or(&view.world_from_camera);
-        let corners = view.intrinsics.map(|i| {
-            let (w, h) = (i.width as f64, i.height as f64);
-            let far = |u: f64, v: f64| Point3::new((u - i.cx) / i.fx * 2.0, (v - i.cy) / i.fy * 2.0, 2.0);
-            [far(0.0, 0.0), far(w, 0.0), far(w, h), far(0.0, h)]
-                .map(|p| (map_from_camera * p).coords.into())
-                .to_vec()
-        });
-        looks.push(Look {
-            at_s: all.s(document.stamp_ns),
-            eye_m: map_from_camera.translation.vector.into(),
-            corners_m: corners.unwrap_or_default(),
-            on: document.body["on"].clone(),
-            points: points::pack(&view, map_from_camera, &near, most),
-        });
+        }
+        self.0 = told;
+        Ok(())
     }
-    Ok(looks)
+
+    fn in_time(&self) -> Vec<Look> {
+        let mut looks: Vec<Look> = self.0.values().cloned().collect();
+        looks.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+        looks
+    }
+}
+
+/// Another one for another cloud, and for another place of it.
+fn key(document: &Document, map_from_camera: &Isometry3<f64>) -> String {
+    let numbers = map_from_camera.to_homogeneous();
+    let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+    format!("{}-{:08x}", document.id, crc32fast::hash(&bytes))
+}
+
+fn look(
+    all: &All<'_>,
+    document: &Document,
+    (key, map_from_camera): (String, Isometry3<f64>),
+    near: &[Near],
+    most: usize,
+) -> Result<Look, descry_memory::Error> {
+    let (cloud, sensing) = all.record.cloud(document)?;
+    let corners = sensing.intrinsics.map(|i| {
+        let (w, h) = (i.width as f64, i.height as f64);
+        let far = |u: f64, v: f64| Point3::new((u - i.cx) / i.fx * 2.0, (v - i.cy) / i.fy * 2.0, 2.0);
+        [far(0.0, 0.0), far(w, 0.0), far(w, h), far(0.0, h)]
+            .map(|p| (map_from_camera * p).coords.into())
+            .to_vec()
+    });
+    Ok(Look {
+        key,
+        at_s: all.s(document.stamp_ns),
+        eye_m: map_from_camera.translation.vector.into(),
+        corners_m: corners.unwrap_or_default(),
+        on: document.body["on"].clone(),
+        points: Some(Arc::new(points::pack(&cloud, &map_from_camera, near, most))),
+    })
 }
 
 /// What is drawn densely about a surface.

@@ -73,6 +73,11 @@ pub fn report(folder: &Path) -> Result<Option<Report>, CommandError> {
     })
 }
 
+/// Whether a run has ended, and its folder says how.
+pub fn has_ended(folder: &Path) -> bool {
+    folder.join(REPORT).exists()
+}
+
 /// Records how a run ended: what is the same however often it is lived through.
 ///
 /// # Errors

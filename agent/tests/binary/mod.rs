@@ -68,3 +68,20 @@ pub fn without_readers(folder: &Path, arguments: &[&str], out: bool, err: bool) 
     drop((child.stdout.take(), child.stderr.take()));
     child.wait().expect("it ends").code()
 }
+
+/// Everything in a record but the bytes of blobs, and when the run began.
+pub fn documents(folder: &Path, run: &str) -> Vec<String> {
+    let mut found = check(folder, &["memory", "query", run, "--json"], 0);
+    let all = found["records"].as_array_mut().expect("a list");
+    let mut all: Vec<String> = all
+        .iter_mut()
+        .map(|document| {
+            if document["kind"] == "run" {
+                document["body"]["started_unix_s"] = Value::Null;
+            }
+            document.to_string()
+        })
+        .collect();
+    all.sort();
+    all
+}

@@ -17,7 +17,7 @@ use crate::experiment::page::Section;
 use crate::experiment::plot::{Axis, Plot, Point, Series};
 use crate::experiment::statistics::{self, Observation};
 use crate::experiment::table::{Table, shown};
-use crate::experiment::{ExperimentError, Finished, Job, Outcome, Source};
+use crate::experiment::{ExperimentError, Job, Numbered, Outcome, Source};
 use descry_domains::abilities::searching::policies;
 
 /// What a file of this kind says.
@@ -175,11 +175,11 @@ impl Kind for Faults {
         trial::carry_out(&trial, scratch, stop)
     }
 
-    fn summarise(&self, finished: &[Finished]) -> Summary {
+    fn summarise(&self, finished: &[Numbered<'_>]) -> Summary {
         let read = |case: &Case| -> (usize, Vec<(Measured, f64)>) {
-            let jobs = finished.iter().enumerate().filter(|(n, _)| self.setting(*n).0.name == case.name);
+            let jobs = finished.iter().filter(|(n, _)| self.setting(*n).0.name == case.name);
             let mut failed = 0;
-            let runs = jobs.filter_map(|(n, job)| {
+            let runs = jobs.filter_map(|&(n, job)| {
                 failed += usize::from(job.error.is_some());
                 let row = job.rows.first()?;
                 let mishaps = row.get("mishaps").and_then(Value::as_f64).unwrap_or(0.0);

@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 use super::{Head, Kind, OtherBody, Summary, parse, refuse};
 use crate::body::{self, program};
-use crate::experiment::{ExperimentError, Finished, Job, Outcome, Row, Source};
+use crate::experiment::{ExperimentError, Job, Numbered, Outcome, Row, Source};
 
 mod score;
 mod summary;
@@ -187,7 +187,7 @@ impl Kind for Figure4 {
         Ok(Outcome { rows, clock: clock.as_object().cloned().unwrap_or_default() })
     }
 
-    fn summarise(&self, finished: &[Finished]) -> Summary {
+    fn summarise(&self, finished: &[Numbered<'_>]) -> Summary {
         summary::summarise(self, finished)
     }
 }
@@ -204,9 +204,10 @@ struct Cell {
 }
 
 /// What a row of one cell says.
-fn cells(finished: &[Finished]) -> BTreeMap<(String, String, String, u64), Cell> {
+fn cells(finished: &[Numbered<'_>]) -> BTreeMap<(String, String, String, u64), Cell> {
     let mut cells = BTreeMap::<_, Cell>::new();
-    for (job, group) in finished.iter().zip(0_u64..) {
+    for &(number, job) in finished {
+        let group = number as u64;
         for row in &job.rows {
             let text = |key: &str| row.get(key).and_then(Value::as_str).map(str::to_string);
             let count = |key: &str| row.get(key).and_then(Value::as_f64);

@@ -13,11 +13,11 @@ use descry_robots::input::{self, Objection, Step};
 use serde::Deserialize;
 
 use super::page::Section;
-use super::{ExperimentError, Finished, Job, Outcome, Row, Source};
+use super::{ExperimentError, Job, Numbered, Outcome, Row, Source};
 use crate::body::program;
 
 /// A kind of experiment, bound to what a file says of it.
-pub trait Kind: Sync {
+pub trait Kind: Send + Sync {
     /// What every experiment file says.
     fn head(&self) -> &Head;
 
@@ -34,8 +34,8 @@ pub trait Kind: Sync {
     /// A text for people; it becomes a row.
     fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String>;
 
-    /// What the finished jobs, in the order of [`Kind::jobs`], say.
-    fn summarise(&self, finished: &[Finished]) -> Summary;
+    /// What finished jobs, in the order of [`Kind::jobs`], say: all of them, or those that are done so far.
+    fn summarise(&self, finished: &[Numbered<'_>]) -> Summary;
 }
 
 /// What every experiment file says.

@@ -15,7 +15,7 @@ use serde_json::json;
 use super::trial::{self, Trial};
 use super::{Head, Kind, OtherBody, Summary, parse, refuse};
 use crate::body;
-use crate::experiment::{ExperimentError, Finished, Job, Outcome, Source};
+use crate::experiment::{ExperimentError, Job, Numbered, Outcome, Source};
 
 mod score;
 mod summary;
@@ -255,7 +255,7 @@ impl Kind for Tasks {
         Ok(Outcome { rows: vec![row], clock: lived.clock })
     }
 
-    fn summarise(&self, finished: &[Finished]) -> Summary {
+    fn summarise(&self, finished: &[Numbered<'_>]) -> Summary {
         summary::summarise(self, finished)
     }
 }

@@ -14,7 +14,7 @@ use serde_json::json;
 use super::trial::{self, Trial};
 use super::{Head, Kind, Summary, parse, refuse};
 use crate::body;
-use crate::experiment::{ExperimentError, Finished, Job, Outcome, Source};
+use crate::experiment::{ExperimentError, Job, Numbered, Outcome, Source};
 use descry_domains::abilities::searching::policies;
 
 mod summary;
@@ -252,7 +252,7 @@ impl Kind for WhereToLook {
         trial::carry_out(&trial, scratch, stop)
     }
 
-    fn summarise(&self, finished: &[Finished]) -> Summary {
+    fn summarise(&self, finished: &[Numbered<'_>]) -> Summary {
         summary::summarise(self, finished)
     }
 }

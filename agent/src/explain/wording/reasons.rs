@@ -28,13 +28,29 @@ fn takes(because: &str) -> Option<String> {
     Some(format!("{call} would now count for {asked_s:.1} s, not for {had_s:.1}"))
 }
 
-/// `step N CALL at T: C does not hold at its start…`.
+/// `step N CALL at T: C does not hold at its start…`, or not all the time.
 fn no_longer(because: &str) -> Option<String> {
     let (call, rest) = step(because)?;
     let (_, rest) = rest.split_once(": ")?;
     let (condition, after) = rest.split_once(" does not hold")?;
     let values = after.split_once(": ").map(|(_, values)| format!(", {}", short(values))).unwrap_or_default();
+    if after.trim_start().starts_with("all the time") {
+        return Some(format!(
+            "{call} asks for {condition} as long as it lasts, which would end before{values}"
+        ));
+    }
     Some(format!("{call} asks for {condition}, which does not hold{values}"))
+}
+
+/// What is concluded from a failure: `try N of M`, or what is true from then on.
+pub fn follows(therefore: &str) -> String {
+    let tried = therefore.strip_prefix("try ").and_then(|tried| tried.split_once(" of "));
+    match tried {
+        Some((n, most)) if most.bytes().all(|b| b.is_ascii_digit()) => {
+            format!("{n} of {most} tries are used, and the plan is made anew with what is known now")
+        }
+        _ => therefore.to_string(),
+    }
 }
 
 /// The call of `step N CALL …`, and what follows.
@@ -60,7 +76,7 @@ fn short(text: &str) -> String {
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// What the planner said of a task without a plan: of long lists the first, and how many more.
+/// What the planner said of a task without a plan; calls of which there are many are counted, for which of them comes first says nothing.
 pub fn no_plan(said: &str) -> String {
     const LIST: &str = " said no to: ";
     let mut out = String::new();
@@ -81,9 +97,9 @@ pub fn no_plan(said: &str) -> String {
             .and_then(|(_, more)| more.strip_suffix(" more")?.trim().parse().ok())
             .unwrap_or(0);
         let first = first.split_once(" and ").map_or(first, |(first, _)| first.trim_end_matches(']'));
-        out += &format!("{before}{LIST}{first}]");
-        if named + more > 0 {
-            out += &format!(" and {} more calls", named + more);
+        match named + more {
+            0 => out += &format!("{before}{LIST}{first}]"),
+            others => out += &format!("{before} said no to all of {} calls", others + 1),
         }
     }
     out
@@ -113,15 +129,27 @@ mod tests {
                 "step 2 (go) at 3: [worth x] does not hold at its start",
                 "(go) asks for [worth x], which does not hold",
             ),
+            (
+                "step 1 (observe a b) at 2.26: (time-left) does not hold all the time",
+                "(observe a b) asks for (time-left) as long as it lasts, which would end before",
+            ),
             ("something else.", "something else"),
         ];
         cases.iter().for_each(|(said, plain)| assert_eq!(missed(said, "would be only"), *plain));
     }
 
     #[test]
+    fn what_follows_from_a_failure_is_no_promise_to_do_it_again() {
+        let plain = "1 of 4 tries are used, and the plan is made anew with what is known now";
+        assert_eq!(follows("try 1 of 4"), plain);
+        assert_eq!(follows("(shut study-door)"), "(shut study-door)");
+    }
+
+    #[test]
     fn long_lists_are_cut() {
         let said = "the attachment of `w` said no to: [w a b], [w c d] and 5 more (with any of these answered otherwise there might be a plan)\nthe attachment of `v` said no to: [v x] (with any …)";
-        let plain = "the attachment of `w` said no to: [w a b] and 6 more calls; the attachment of `v` said no to: [v x]";
+        let plain =
+            "the attachment of `w` said no to all of 7 calls; the attachment of `v` said no to: [v x]";
         assert_eq!(no_plan(said), plain);
         assert_eq!(no_plan("nothing."), "nothing");
     }

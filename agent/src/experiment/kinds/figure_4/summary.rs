@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::{Cell, Figure4, Summary, cells, row};
-use crate::experiment::Finished;
+use crate::experiment::Numbered;
 use crate::experiment::page::Section;
 use crate::experiment::plot::{Axis, Plot, Point, Series};
 use crate::experiment::statistics::{self, Estimate, Pair};
@@ -38,7 +38,7 @@ fn share(cell: &Cell, parts: impl Fn([f64; 4]) -> (f64, f64)) -> Option<Estimate
     statistics::ratio(&pairs.collect::<Vec<_>>())
 }
 
-pub(super) fn summarise(experiment: &Figure4, finished: &[Finished]) -> Summary {
+pub(super) fn summarise(experiment: &Figure4, finished: &[Numbered<'_>]) -> Summary {
     let cells = cells(finished);
     let cell = |set: &str, recogniser: &str, mode: &str, views: usize| {
         cells

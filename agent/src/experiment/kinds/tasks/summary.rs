@@ -7,7 +7,7 @@ use crate::experiment::page::Section;
 use crate::experiment::plot::{Axis, Plot, Point, Series};
 use crate::experiment::statistics::{self, Estimate, Observation};
 use crate::experiment::table::{Table, shown};
-use crate::experiment::{Finished, Row};
+use crate::experiment::{Numbered, Row};
 
 const NOTE: &str = "Shares with Wilson's intervals, means with intervals bootstrapped over arrangements, 95 % each. A run that \
                     ended with an error counts as not right.";
@@ -113,12 +113,11 @@ fn table(title: &str, parts: &[(String, Vec<&Run<'_>>)], policies: &[String]) ->
     (table, values)
 }
 
-pub(super) fn summarise(experiment: &Tasks, finished: &[Finished]) -> Summary {
+pub(super) fn summarise(experiment: &Tasks, finished: &[Numbered<'_>]) -> Summary {
     let text = &experiment.text;
     let runs: Vec<Run<'_>> = finished
         .iter()
-        .enumerate()
-        .map(|(n, job)| {
+        .map(|&(n, job)| {
             let setting = experiment.setting(n);
             Run {
                 goal: setting.goal,

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::{Setting, Summary, WhereToLook};
-use crate::experiment::Finished;
+use crate::experiment::Numbered;
 use crate::experiment::kinds::trial::Measured;
 use crate::experiment::page::Section;
 use crate::experiment::plot::{Axis, Plot, Point, Series};
@@ -121,12 +121,11 @@ fn parts(experiment: &WhereToLook) -> Vec<Part<'_>> {
     parts
 }
 
-pub(super) fn summarise(experiment: &WhereToLook, finished: &[Finished]) -> Summary {
-    let runs: Vec<Run<'_>> = experiment
-        .jobs
+pub(super) fn summarise(experiment: &WhereToLook, finished: &[Numbered<'_>]) -> Summary {
+    let runs: Vec<Run<'_>> = finished
         .iter()
-        .zip(finished)
-        .filter_map(|(setting, job)| {
+        .filter_map(|&(n, job)| {
+            let setting = &experiment.jobs[n];
             Some((setting, Measured::read(setting.scene as u64, job.rows.first()?)?))
         })
         .collect();

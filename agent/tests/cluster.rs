@@ -1,0 +1,101 @@
+//! An experiment's shards as a scheduler runs them: with the number of each where the scheduler puts it, in one folder that all share.
+
+mod binary;
+
+use std::path::Path;
+use std::process::Command;
+
+use binary::{check_refused, outcome};
+
+const BATCH: &str = r#"
+name = "A few runs"
+kind = "tasks"
+about = "It's \"a few\": $HOME"
+domain = "tabletop"
+scene = "default"
+runs = 2
+first_seed = 1
+policies = ["plan", "nearest"]
+
+[[goal]]
+say = "find cup A"
+targets = ["cup A"]
+truly = "found"
+"#;
+
+/// Where all results of a batch lie that are the same wherever it is done.
+fn results(folder: &Path, out: &str) -> Vec<String> {
+    ["jobs.csv", "summary.json", "tables.md"]
+        .map(|name| {
+            std::fs::read_to_string(folder.join(out).join(name))
+                .unwrap_or_else(|e| panic!("{out}/{name}: {e}"))
+        })
+        .to_vec()
+}
+
+/// Runs a shell's script as the pod or the task of that number.
+fn run(folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) {
+    let binary = Path::new(env!("CARGO_BIN_EXE_descry"));
+    let path = format!(
+        "{}:{}",
+        binary.parent().expect("a folder").display(),
+        std::env::var("PATH").unwrap_or_default()
+    );
+    let mut shell = Command::new(arguments[0]);
+    shell.args(&arguments[1..]).env("PATH", path).envs(variables.iter().copied()).current_dir(folder);
+    let ran = shell.output().expect("there is a shell");
+    assert!(ran.status.success(), "{variables:?}: {}", String::from_utf8_lossy(&ran.stderr));
+}
+
+#[test]
+fn an_array_of_shards_gives_what_one_batch_gives() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // A shell would read it as two words, and as the home of somebody.
+    let folder = &folder.path().join("some $HOME's");
+    std::fs::create_dir(folder).expect("the folder is writable");
+    std::fs::write(folder.join("batch.toml"), BATCH).expect("the folder is writable");
+    assert!(outcome(folder, &["experiment", "batch.toml", "--out", "whole"]).status.success());
+    let expected = results(folder, "whole");
+    let write = ["experiment", "batch.toml", "--out", "by slurm", "--shards", "3", "--jobs", "1"];
+    let written =
+        outcome(folder, &[&write[..], &["--slurm", "batch.sh", "--kubernetes", "batch.yaml"]].concat());
+    assert!(written.status.success(), "{}", String::from_utf8_lossy(&written.stderr));
+    // From anywhere: the script goes to where it was written.
+    let script = folder.join("batch.sh").display().to_string();
+    run(Path::new("/"), &["bash", "-n", &script], &[]);
+    for task in ["0", "2", "1"] {
+        run(Path::new("/"), &["bash", &script], &[("SLURM_ARRAY_TASK_ID", task)]);
+    }
+    assert_eq!(results(folder, "by slurm"), expected, "the last shard writes the results");
+    let yaml = std::fs::read_to_string(folder.join("batch.yaml")).expect("it is written");
+    let line =
+        |key: &str| yaml.lines().find_map(|line| line.trim().strip_prefix(key)).expect("the key is there");
+    let command: Vec<String> = serde_json::from_str(line("command: ")).expect("it is JSON");
+    let text: String = serde_json::from_str(line("\"batch.toml\": ")).expect("it is JSON");
+    assert_eq!(text, BATCH);
+    std::fs::create_dir(folder.join("mounted")).expect("the folder is writable");
+    std::fs::write(folder.join("mounted/batch.toml"), text).expect("the folder is writable");
+    let command: Vec<&str> = command.iter().map(String::as_str).collect();
+    for pod in ["1", "0", "2"] {
+        let mounted =
+            [("EXPERIMENT", "mounted/batch.toml"), ("RESULTS", "by pods"), ("JOB_COMPLETION_INDEX", pod)];
+        run(folder, &command, &mounted);
+    }
+    let merge = ["experiment", "batch.toml", "--out", "merged", "--merge", "by pods"];
+    assert!(outcome(folder, &merge).status.success());
+    assert_eq!(results(folder, "merged"), expected);
+}
+
+#[test]
+fn what_cannot_be_divided_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    std::fs::write(folder.join("batch.toml"), BATCH).expect("the folder is writable");
+    for shards in ["0", "5"] {
+        let asked = ["experiment", "batch.toml", "--slurm", "batch.sh", "--shards", shards];
+        check_refused(folder, &asked, 2, &["4 jobs", "from 1 to 4"]);
+    }
+    check_refused(folder, &["experiment", "batch.toml", "--slurm", "batch.sh"], 2, &["--shards"]);
+    check_refused(folder, &["experiment", "batch.toml", "--shards", "2"], 2, &["--slurm"]);
+    assert!(!folder.join("batch.sh").exists());
+}

@@ -1,0 +1,341 @@
+//! The reference of file formats: its tables of keys are those of the types that read the files.
+//!
+//! Between `<!-- keys FILE TYPE -->` and `<!-- end -->` a page has the table of a type. `UPDATE_DOCS=1 cargo test -p descry-tests
+//! --test reference` writes the tables anew.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use quote::ToTokens;
+use syn::punctuated::Punctuated;
+use syn::{Attribute, Expr, Fields, Item, ItemEnum, ItemStruct, Lit, Meta, Stmt, Token};
+
+/// Where the types are that read what people and their programs write.
+const FORMATS: &[&str] = &[
+    "domains/src/config.rs",
+    "perception/src/recognise/model.rs",
+    "robots/src/sim/scene/mod.rs",
+    "robots/src/sim/scene/room.rs",
+    "robots/src/sim/scene/door.rs",
+    "robots/src/sim/scene/surface.rs",
+    "robots/src/sim/scene/object.rs",
+    "robots/src/sim/shape.rs",
+    "robots/src/sim/faults.rs",
+    "robots/src/recorded/settings.rs",
+    "robots/src/program/hello.rs",
+    "robots/src/program/message.rs",
+    "agent/src/experiment/kinds/mod.rs",
+    "agent/src/experiment/kinds/figure_4.rs",
+    "agent/src/experiment/kinds/where_to_look.rs",
+    "agent/src/experiment/kinds/faults.rs",
+    "agent/src/experiment/kinds/tasks.rs",
+    "agent/src/experiment/kinds/tasks/score.rs",
+];
+
+/// Types that have no keys of their own: numbers and texts that are read in a way of their own.
+const WITHOUT_KEYS: &[&str] = &["Doorway", "NothingSaid", "NumberOrPair", "OtherBody", "Range", "Steps"];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace holds this crate").to_path_buf()
+}
+
+fn items(file: &str) -> Vec<Item> {
+    let text = fs::read_to_string(root().join(file)).unwrap_or_else(|e| panic!("{file}: {e}"));
+    syn::parse_file(&text).unwrap_or_else(|e| panic!("{file}: {e}")).items
+}
+
+/// What the lines before an item say, as one line of a table.
+fn meaning(attributes: &[Attribute]) -> String {
+    let lines = attributes.iter().filter_map(|attribute| match &attribute.meta {
+        Meta::NameValue(pair) if pair.path.is_ident("doc") => match &pair.value {
+            Expr::Lit(literal) => match &literal.lit {
+                Lit::Str(text) => Some(text.value().trim().to_owned()),
+                _ => None,
+            },
+            _ => None,
+        },
+        _ => None,
+    });
+    lines.collect::<Vec<_>>().join(" ").replace('|', "\\|").replace("[`", "`").replace("`]", "`")
+}
+
+/// What serde is told of an item: words, and the value of some.
+fn told(attributes: &[Attribute]) -> Vec<(String, Option<String>)> {
+    let serde = attributes.iter().filter(|attribute| attribute.path().is_ident("serde"));
+    let words = serde.flat_map(|attribute| {
+        attribute.parse_args_with(Punctuated::<Meta, Token![,]>::parse_terminated).into_iter().flatten()
+    });
+    words
+        .map(|word| {
+            let value = match &word {
+                Meta::NameValue(pair) => {
+                    Some(pair.value.to_token_stream().to_string().trim_matches('"').to_owned())
+                }
+                _ => None,
+            };
+            (word.path().to_token_stream().to_string(), value)
+        })
+        .collect()
+}
+
+fn value_of(told: &[(String, Option<String>)], word: &str) -> Option<Option<String>> {
+    told.iter().find(|(name, _)| name == word).map(|(_, value)| value.clone())
+}
+
+/// A name as a file has it.
+fn renamed(name: &str, how: Option<&str>) -> String {
+    let words = |mark: char| {
+        let split = name.chars().enumerate().flat_map(|(n, c)| {
+            let gap = (c.is_ascii_uppercase() && n > 0).then_some(mark);
+            gap.into_iter().chain([c.to_ascii_lowercase()])
+        });
+        split.collect::<String>()
+    };
+    match how {
+        Some("snake_case") => words('_'),
+        Some("kebab-case") => words('-').replace('_', "-"),
+        Some("lowercase") => name.to_lowercase(),
+        None => name.to_owned(),
+        Some(other) => panic!("{other} is not known here"),
+    }
+}
+
+/// A type in words.
+fn kind(ty: &syn::Type) -> String {
+    let text = ty.to_token_stream().to_string().replace(' ', "");
+    in_words(&text)
+}
+
+fn in_words(text: &str) -> String {
+    let within = |outer: &str| text.strip_prefix(outer).and_then(|rest| rest.strip_suffix('>'));
+    if let Some(inner) = within("Option<").or_else(|| within("Arc<")) {
+        return in_words(inner);
+    }
+    if let Some(inner) = within("Vec<") {
+        return format!("list of {}", several(inner));
+    }
+    if let Some(inner) = within("BTreeMap<String,") {
+        return format!("by name: {}", in_words(inner));
+    }
+    if let Some((inner, count)) =
+        text.strip_prefix('[').and_then(|t| t.strip_suffix(']')).and_then(|t| t.split_once(';'))
+    {
+        return format!("{count} {}", several(inner));
+    }
+    match text {
+        "f64" | "f32" => "number".into(),
+        "usize" | "u64" | "u32" | "u8" | "i64" => "whole number".into(),
+        "bool" => "true or false".into(),
+        "String" | "PathBuf" => "text".into(),
+        "(f64,f64)" => "2 numbers".into(),
+        "Vector3<f64>" => "3 numbers".into(),
+        "Isometry3<f64>" => "`translation` and `rotation` (a quaternion x, y, z, w)".into(),
+        "Value" => "anything".into(),
+        named => format!("`{named}`"),
+    }
+}
+
+/// The same of more than one.
+fn several(text: &str) -> String {
+    match in_words(text).as_str() {
+        one @ ("number" | "whole number" | "text") => format!("{one}s"),
+        one => one.to_owned(),
+    }
+}
+
+/// The value that a function of that name in this file gives, if it is short.
+fn default_of(items: &[Item], function: &str) -> Option<String> {
+    let body = items.iter().find_map(|item| match item {
+        Item::Fn(item) if item.sig.ident == function => Some(&item.block.stmts),
+        _ => None,
+    })?;
+    match body.as_slice() {
+        [Stmt::Expr(value, None)] => short(value),
+        _ => None,
+    }
+}
+
+/// The value of a field in what `Default` gives for a type.
+fn default_field(items: &[Item], of: &str, field: &str) -> Option<String> {
+    let own = items.iter().find_map(|item| match item {
+        Item::Impl(item) => {
+            let is_default = item.trait_.as_ref().is_some_and(|(_, path, _)| path.is_ident("Default"));
+            (is_default && item.self_ty.to_token_stream().to_string() == of).then_some(item)
+        }
+        _ => None,
+    })?;
+    let body = own.items.iter().find_map(|item| match item {
+        syn::ImplItem::Fn(item) => item.block.stmts.last(),
+        _ => None,
+    })?;
+    let Stmt::Expr(Expr::Struct(made), None) = body else { return None };
+    let given = made.fields.iter().find(|given| given.member.to_token_stream().to_string() == field)?;
+    short(&given.expr)
+}
+
+fn short(value: &Expr) -> Option<String> {
+    let text = value.to_token_stream().to_string();
+    let plain = text
+        .replace(".into ()", "")
+        .replace(" . ", ".")
+        .replace("[ ", "[")
+        .replace(" ]", "]")
+        .replace(" ,", ",");
+    let plain = plain.replace(".into ()", "").replace(".into()", "").replace("- ", "-");
+    let is_value = !plain.contains("::") && !plain.contains('(') && plain.len() < 40;
+    (is_value && plain != "None").then(|| format!("`{plain}`"))
+}
+
+fn table_of_struct(items: &[Item], item: &ItemStruct) -> String {
+    let Fields::Named(fields) = &item.fields else { panic!("{} has no named fields", item.ident) };
+    let of_all = told(&item.attrs);
+    let how = value_of(&of_all, "rename_all").flatten();
+    let all_default = value_of(&of_all, "default").is_some();
+    let mut text = String::from("| key | what | if left out | meaning |\n|---|---|---|---|\n");
+    for field in &fields.named {
+        let told = told(&field.attrs);
+        let name = field.ident.as_ref().expect("it is named").to_string();
+        if value_of(&told, "skip").is_some() || value_of(&told, "flatten").is_some() {
+            continue;
+        }
+        let key = value_of(&told, "rename").flatten().unwrap_or_else(|| renamed(&name, how.as_deref()));
+        let optional = field.ty.to_token_stream().to_string().starts_with("Option");
+        let left_out = match value_of(&told, "default") {
+            Some(Some(function)) => default_of(items, &function).unwrap_or_else(|| "a default".into()),
+            Some(None) => none_of(&field.ty),
+            None if all_default => {
+                default_field(items, &item.ident.to_string(), &name).unwrap_or_else(|| none_of(&field.ty))
+            }
+            None if optional => "nothing".into(),
+            None => "**needed**".into(),
+        };
+        text += &format!("| `{key}` | {} | {left_out} | {} |\n", kind(&field.ty), meaning(&field.attrs));
+    }
+    text
+}
+
+/// What stands for nothing in a type.
+fn none_of(ty: &syn::Type) -> String {
+    if ty.to_token_stream().to_string().starts_with("Option") {
+        return "nothing".into();
+    }
+    match kind(ty).as_str() {
+        "true or false" => "`false`".into(),
+        "number" | "whole number" => "`0`".into(),
+        "text" => "empty".into(),
+        named if named.starts_with('`') => "its defaults".into(),
+        _ => "none".into(),
+    }
+}
+
+fn table_of_enum(item: &ItemEnum) -> String {
+    let how = value_of(&told(&item.attrs), "rename_all").flatten();
+    let mut text = String::from("| one of | with | meaning |\n|---|---|---|\n");
+    for variant in &item.variants {
+        let told = told(&variant.attrs);
+        let name = value_of(&told, "rename").flatten();
+        let name = name.unwrap_or_else(|| renamed(&variant.ident.to_string(), how.as_deref()));
+        let is_default = variant.attrs.iter().any(|attribute| attribute.path().is_ident("default"));
+        let left_out = if is_default { "; if nothing is said" } else { "" };
+        let with: Vec<String> = match &variant.fields {
+            Fields::Unit => vec![],
+            Fields::Unnamed(fields) => fields.unnamed.iter().map(|field| kind(&field.ty)).collect(),
+            Fields::Named(fields) => {
+                let named = fields.named.iter().filter_map(|field| Some((field.ident.as_ref()?, &field.ty)));
+                named.map(|(name, ty)| format!("`{name}`: {}", kind(ty))).collect()
+            }
+        };
+        text += &format!("| `{name}`{left_out} | {} | {} |\n", with.join(", "), meaning(&variant.attrs));
+    }
+    text
+}
+
+/// The table of a type.
+fn table(file: &str, name: &str) -> String {
+    let items = items(file);
+    let made = items.iter().find_map(|item| match item {
+        Item::Struct(item) if item.ident == name => Some(table_of_struct(&items, item)),
+        Item::Enum(item) if item.ident == name => Some(table_of_enum(item)),
+        _ => None,
+    });
+    made.unwrap_or_else(|| panic!("{file} has no type {name}"))
+}
+
+const BEGIN: &str = "<!-- keys ";
+const END: &str = "<!-- end -->";
+
+/// A page with its tables made anew, and the types that they are of.
+fn renewed(page: &str) -> (String, BTreeSet<(String, String)>) {
+    let (mut text, mut rest, mut named) = (String::new(), page, BTreeSet::new());
+    while let Some((before, after)) = rest.split_once(BEGIN) {
+        let (head, after) = after.split_once(" -->\n").expect("a table begins with a line of its own");
+        let (file, name) = head.split_once(' ').expect("a file and a type are named");
+        let (_, after) = after.split_once(END).unwrap_or_else(|| panic!("the table of {name} does not end"));
+        text += &format!("{before}{BEGIN}{head} -->\n\n{}\n{END}", table(file, name));
+        named.insert((file.into(), name.into()));
+        rest = after;
+    }
+    (text + rest, named)
+}
+
+fn pages() -> Vec<PathBuf> {
+    let folder = fs::read_dir(root().join("docs/reference")).expect("there is a reference");
+    let mut pages: Vec<PathBuf> = folder.flatten().map(|entry| entry.path()).collect();
+    pages.sort();
+    pages
+}
+
+/// Holds a page to its types, or writes it anew; the types that it shows.
+fn check(page: &Path) -> BTreeSet<(String, String)> {
+    let text = fs::read_to_string(page).expect("a page is text");
+    let (renewed, shown) = renewed(&text);
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        fs::write(page, renewed).expect("the page can be written");
+    } else {
+        let mend = "UPDATE_DOCS=1 cargo test -p descry-tests --test reference";
+        assert!(text == renewed, "{} is out of date: {mend}", page.display());
+    }
+    shown
+}
+
+/// Whether what is read from a file is made into it.
+fn is_read(attributes: &[Attribute]) -> bool {
+    let derived = attributes.iter().filter(|attribute| attribute.path().is_ident("derive"));
+    derived.map(|derive| derive.to_token_stream().to_string()).any(|text| text.contains("Deserialize"))
+}
+
+#[test]
+fn every_table_is_that_of_its_type_and_every_type_has_one() {
+    let shown: BTreeSet<(String, String)> = pages().iter().flat_map(|page| check(page)).collect();
+    for file in FORMATS {
+        for item in items(file) {
+            let (name, attributes) = match &item {
+                Item::Struct(item) => (item.ident.to_string(), &item.attrs),
+                Item::Enum(item) => (item.ident.to_string(), &item.attrs),
+                _ => continue,
+            };
+            if is_read(attributes) && !WITHOUT_KEYS.contains(&name.as_str()) {
+                assert!(
+                    shown.contains(&((*file).to_owned(), name.clone())),
+                    "no page shows {name} of {file}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn every_page_is_in_the_table_of_contents() {
+    let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).expect("there is a table of contents");
+    let folders = ["docs", "docs/reference"];
+    for page in
+        folders.iter().flat_map(|folder| fs::read_dir(root().join(folder)).expect("it is there").flatten())
+    {
+        let path = page.path();
+        if path.extension().is_some_and(|e| e == "md") && !path.ends_with("SUMMARY.md") {
+            let name = path.strip_prefix(root().join("docs")).expect("it lies there").display().to_string();
+            assert!(contents.contains(&format!("({name})")), "{name} is not in docs/SUMMARY.md");
+        }
+    }
+}

@@ -17,7 +17,8 @@ from typing import IO, Any, Callable, Iterator, Optional, Union
 from warnings import warn
 
 import unified_planning as up
-from unified_planning.engines import Credits, Engine
+from unified_planning.engines import CompilationKind, Credits, Engine
+from unified_planning.engines.compilers import BoundedTypesRemover
 from unified_planning.engines.mixins import (
     AnytimePlannerMixin,
     OneshotPlannerMixin,
@@ -41,7 +42,7 @@ from unified_planning.model import Problem, ProblemKind
 from unified_planning.model.problem_kind_versioning import LATEST_PROBLEM_KIND_VERSION
 from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, TimeTriggeredPlan
 
-from . import Outcome, Plan, Step, Task
+from . import InputError, Outcome, Plan, Step, Task
 from . import plan as descry_plan
 from . import validate as descry_validate
 
@@ -70,8 +71,8 @@ FEATURES = frozenset(
         "GENERAL_NUMERIC_PLANNING",
         "INT_FLUENTS",
         "REAL_FLUENTS",
+        "BOUNDED_TYPES",
         "CONTINUOUS_TIME",
-        "TIMED_EFFECTS",
         "DURATION_INEQUALITIES",
         "STATIC_FLUENTS_IN_DURATIONS",
         "FLUENTS_IN_DURATIONS",
@@ -87,9 +88,15 @@ FEATURES = frozenset(
         "REAL_NUMBERS_IN_ACTIONS_COST",
     }
 )
-"""The kinds of problems that are planned for and validated as unified-planning means them."""
+"""The kinds of problems that are planned for and validated as unified-planning means them.
+
+Timed effects are not among them: in unified-planning they go on after the last action, and the goal has to outlast them;
+in PDDL a plan ends with its last action.
+"""
 
 _MOST_DENOMINATOR = 10**6
+_UNWRITABLE = (InputError, UPException, NotImplementedError)
+"""What a problem raises that has no PDDL which descry reads."""
 
 
 class DescryEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanValidatorMixin):
@@ -124,7 +131,9 @@ class DescryEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanValidat
 
     @staticmethod
     def supports(problem_kind: ProblemKind) -> bool:
-        return problem_kind <= DescryEngine.supported_kind()
+        # Bounds are made conditions of actions, which hold at moments, not throughout.
+        is_bounded_in_time = problem_kind.has_bounded_types() and problem_kind.has_continuous_time()
+        return problem_kind <= DescryEngine.supported_kind() and not is_bounded_in_time
 
     @staticmethod
     def supports_plan(plan_kind: PlanKind) -> bool:
@@ -147,12 +156,14 @@ class DescryEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanValidat
     ) -> PlanGenerationResult:
         if heuristic is not None:
             warn("descry has its own heuristics: the given one is not used.")
-        translation = _Translation(problem)
+        try:
+            translation = _Translation(problem)
+        except _UNWRITABLE as error:
+            return _unsupported(error)
         outcome = self._plan(translation, timeout)
-        result = translation.result(outcome)
         if output_stream is not None:
             output_stream.write(_told(outcome))
-        return result
+        return translation.result(outcome)
 
     def _plan(self, translation: "_Translation", timeout: Optional[float], **watched: Any) -> Outcome:
         return descry_plan(
@@ -169,7 +180,11 @@ class DescryEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin, PlanValidat
         timeout: Optional[float] = None,
         output_stream: Optional[IO[str]] = None,
     ) -> Iterator[PlanGenerationResult]:
-        translation = _Translation(problem)
+        try:
+            translation = _Translation(problem)
+        except _UNWRITABLE as error:
+            yield _unsupported(error)
+            return
         found: "queue.Queue[Union[Plan, Outcome, BaseException]]" = queue.Queue()
         stop = threading.Event()
 
@@ -207,9 +222,13 @@ class _Translation:
     def __init__(self, problem: "up.model.AbstractProblem") -> None:
         assert isinstance(problem, Problem)
         self.problem = problem
-        self.writer = PDDLWriter(problem, rewrite_bool_assignments=True)
-        self.task = Task(self.writer.get_domain(), self.writer.get_problem())
         self.is_temporal = problem.kind.has_continuous_time()
+        self.compiled = None
+        if problem.kind.has_bounded_types():
+            self.compiled = BoundedTypesRemover().compile(problem, CompilationKind.BOUNDED_TYPES_REMOVING)
+        written = problem if self.compiled is None else self.compiled.problem
+        self.writer = PDDLWriter(written, rewrite_bool_assignments=True)
+        self.task = Task(self.writer.get_domain(), self.writer.get_problem())
 
     def back(self, plan: Plan) -> "up.plans.Plan":
         """A plan of descry in the words of the problem."""
@@ -228,7 +247,10 @@ class _Translation:
         assert isinstance(action, up.model.Action)
         objects = (self.writer.get_item_named(name) for name in step.arguments)
         expressions = self.problem.environment.expression_manager
-        return ActionInstance(action, tuple(expressions.ObjectExp(o) for o in objects))
+        instance = ActionInstance(action, tuple(expressions.ObjectExp(o) for o in objects))
+        if self.compiled is not None and self.compiled.map_back_action_instance is not None:
+            return self.compiled.map_back_action_instance(instance)
+        return instance
 
     @staticmethod
     def _duration(step: Step, instance: ActionInstance) -> Optional[Fraction]:
@@ -238,11 +260,13 @@ class _Translation:
     def there(self, plan: "up.plans.Plan") -> Plan:
         """A plan of unified-planning in the words of descry."""
         name = self.writer.get_pddl_name
+        actions = {} if self.compiled is None else {a.name: a for a in self.compiled.problem.actions}
 
         def step(instance: ActionInstance, start: Any = None, duration: Any = None) -> Step:
             arguments = [name(parameter.object()) for parameter in instance.actual_parameters]
             started = None if start is None else float(start)
-            return Step(name(instance.action), arguments, started, float(duration or 0))
+            action = actions.get(instance.action.name, instance.action)
+            return Step(name(action), arguments, started, float(duration or 0))
 
         if isinstance(plan, SequentialPlan):
             return Plan([step(instance) for instance in plan.actions])
@@ -311,6 +335,11 @@ class _Translation:
         if len(metrics) != 1 or verdict.metric is None:
             return None
         return {metrics[0]: _fraction(verdict.metric)}
+
+
+def _unsupported(error: Exception) -> PlanGenerationResult:
+    logs = [LogMessage(LogLevel.ERROR, str(error))]
+    return PlanGenerationResult(Status.UNSUPPORTED_PROBLEM, None, "descry", log_messages=logs)
 
 
 def _fraction(value: float) -> Fraction:

@@ -87,6 +87,11 @@ pub fn input(py: Python<'_>, text: &str) -> PyErr {
     set().map_or_else(|e| e, |()| raised(py, "InputError", text, Some(&told)))
 }
 
+/// A body or a store that failed for good.
+pub fn broken(py: Python<'_>, text: &str) -> PyErr {
+    raised(py, "BrokenError", text, None)
+}
+
 /// A fault of this package.
 pub fn bug(py: Python<'_>, text: &str) -> PyErr {
     raised(py, "InternalError", text, None)
@@ -104,7 +109,7 @@ pub fn planning(py: Python<'_>, error: &PlanError) -> PyErr {
 pub fn command(py: Python<'_>, error: &CommandError) -> PyErr {
     match error {
         CommandError::BadInput(text) => input(py, text),
-        CommandError::Broken(text) => raised(py, "BrokenError", text, None),
+        CommandError::Broken(text) => broken(py, text),
         CommandError::Stopped { said, .. } => PyKeyboardInterrupt::new_err(said.clone()),
         CommandError::Bug(_) => bug(py, &error.to_string()),
     }

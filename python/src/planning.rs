@@ -79,9 +79,8 @@ pub fn plan(
         let told = Python::attach(|py| on_plan.call1(py, (Plan { inner: plan.clone() },)).map(drop));
         told.unwrap_or_else(|error| watch.raise(error));
     };
-    let planned = py.detach(|| {
-        descry_planner::plan(&task.inner, &attachments, &options, &|| watch.is_over(), &mut hear)
-    });
+    let planned = py
+        .detach(|| descry_planner::plan(&task.inner, &attachments, &options, &|| watch.is_over(), &mut hear));
     let cut_short = watch.end(py)?;
     let outcome = planned.map_err(|error| failure::planning(py, &error))?;
     Ok(told(&outcome, cut_short, watch.elapsed_s()))

@@ -26,6 +26,7 @@ from unified_planning.engines.mixins import (
 )
 from unified_planning.engines.mixins.anytime_planner import AnytimeGuarantee
 from unified_planning.engines.mixins.oneshot_planner import OptimalityGuarantee
+from unified_planning.engines.plan_validator import TimeTriggeredPlanValidator
 from unified_planning.engines.results import (
     FailedValidationReason,
     LogLevel,
@@ -317,6 +318,9 @@ class _Translation:
         return least is None or least >= epsilon
 
     def validated(self, plan: "up.plans.Plan") -> ValidationResult:
+        if isinstance(plan, TimeTriggeredPlan) and _meets(plan):
+            # PDDL forbids that happenings meet of which one disturbs the other; unified-planning has its own rules for it.
+            return TimeTriggeredPlanValidator(environment=plan.environment).validate(self.problem, plan)
         there = self.there(plan)
         verdict = descry_validate(self.task, there)
         if verdict.valid:
@@ -335,6 +339,12 @@ class _Translation:
         if len(metrics) != 1 or verdict.metric is None:
             return None
         return {metrics[0]: _fraction(verdict.metric)}
+
+
+def _meets(plan: TimeTriggeredPlan) -> bool:
+    """Whether steps of a plan start or end at one and the same time."""
+    times = [time for start, _, duration in plan.timed_actions for time in {start, start + (duration or 0)}]
+    return len(set(times)) < len(times)
 
 
 def _unsupported(error: Exception) -> PlanGenerationResult:

@@ -1,7 +1,7 @@
 //! The agent: a goal in words, pursued with a body.
 
 use std::path::PathBuf;
-use std::sync::PoisonError;
+use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
@@ -80,7 +80,7 @@ impl Report {
 }
 
 /// A domain that makes sense as a whole, with functions in the places of its programs.
-fn domain(py: Python<'_>, name: &str, given: [Given; 3], raised: &Raised) -> PyResult<Domain> {
+fn domain(py: Python<'_>, name: &str, given: [Given; 3], raised: &Arc<Raised>) -> PyResult<Domain> {
     let mut domain = Domain::load(name).map_err(|error| match error {
         LoadError::Findings { findings } => failure::findings(py, &findings),
         other => failure::input(py, &other.to_string()),
@@ -137,16 +137,18 @@ pub fn pursue(
     actions: Given,
     on_event: Option<Py<PyAny>>,
 ) -> PyResult<Report> {
-    let raised = Raised::default();
+    let raised = Arc::new(Raised::default());
     let loaded = self::domain(py, &domain, [attachments, facts, actions], &raised)?;
     let settings = Settings { robot, scene, seed, domain, policy, keeping: Keeping::default(), remember };
     let asked = Asked { said: goal, domain: loaded, folder: run, settings };
     let stop = Stop::default();
     let ended = py.detach(|| watched(&asked, &stop, &raised, on_event.as_ref()));
-    if let Some(error) = raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
-        return Err(error);
+    match raised.ended() {
+        Some(error) => Err(error),
+        None => ended
+            .map(|inner| Report { inner })
+            .map_err(|error| raised.behind(py, failure::command(py, &error))),
     }
-    ended.map(|inner| Report { inner }).map_err(|error| failure::command(py, &error))
 }
 
 /// Lets the run go on in a thread of its own, so that this one can look for Ctrl-C and tell of events.
@@ -157,8 +159,7 @@ fn watched(
     on_event: Option<&Py<PyAny>>,
 ) -> Result<report::Report, CommandError> {
     let raise = |error: PyErr| {
-        raised.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
-        stop.ask(2);
+        raised.end(error);
     };
     std::thread::scope(|scope| {
         let (tell, events) = channel();
@@ -170,7 +171,7 @@ fn watched(
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             Python::attach(|py| py.check_signals()).unwrap_or_else(raise);
-            if raised.lock().unwrap_or_else(PoisonError::into_inner).is_some() {
+            if raised.is_end() {
                 stop.ask(2);
             }
         }
@@ -190,7 +191,7 @@ fn told(py: Python<'_>, on_event: Option<&Py<PyAny>>, event: &Event) -> PyResult
 #[pyfunction]
 #[pyo3(signature = (domain="tabletop"))]
 pub fn goals(py: Python<'_>, domain: &str) -> PyResult<Vec<String>> {
-    let domain = self::domain(py, domain, [None, None, None], &Raised::default())?;
+    let domain = self::domain(py, domain, [None, None, None], &Arc::default())?;
     Ok(domain.config.goal.iter().map(|goal| goal.say.clone()).collect())
 }
 

@@ -1,24 +1,73 @@
 //! Functions of Python that stand in for the programs of a domain.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use descry_domains::function::{Function, Functions, Named};
 use descry_domains::load::Domain;
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use serde_json::{Map, Value};
 
 use crate::convert::{from_python, to_python};
 use crate::failure;
 
-/// The first exception that a function raised which ends the run: Ctrl-C, not a failure of the function.
-pub type Raised = Arc<Mutex<Option<PyErr>>>;
+/// What functions have raised.
+#[derive(Default)]
+pub struct Raised {
+    /// What ends the run: Ctrl-C, not a failure of a function.
+    ends: Mutex<Option<PyErr>>,
+    /// The last failure of a function, and its words.
+    failed: Mutex<Option<(String, PyErr)>>,
+}
+
+impl Raised {
+    /// Ends the run.
+    pub fn end(&self, error: PyErr) {
+        locked(&self.ends).get_or_insert(error);
+    }
+
+    /// Whether the run is to end.
+    pub fn is_end(&self) -> bool {
+        locked(&self.ends).is_some()
+    }
+
+    /// What ended the run, if anything did.
+    pub fn ended(&self) -> Option<PyErr> {
+        locked(&self.ends).take()
+    }
+
+    /// An error of the run with the failure behind it, if it speaks of that.
+    pub fn behind(&self, py: Python<'_>, error: PyErr) -> PyErr {
+        if let Some((words, failed)) = locked(&self.failed).take()
+            && error.to_string().contains(&words)
+        {
+            error.set_cause(py, Some(failed));
+        }
+        error
+    }
+
+    fn hear(&self, py: Python<'_>, error: PyErr) -> String {
+        let words = error.to_string();
+        if error.is_instance_of::<PyException>(py) {
+            *locked(&self.failed) = Some((words.clone(), error));
+        } else {
+            self.end(error);
+        }
+        words
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A function that is called with the parts of a question.
 struct Called {
     function: Py<PyAny>,
     hear: fn(&Map<String, Value>) -> Vec<Value>,
-    raised: Raised,
+    raised: Arc<Raised>,
 }
 
 impl std::fmt::Debug for Called {
@@ -33,16 +82,10 @@ impl Function for Called {
         Python::attach(|py| {
             let called = || -> PyResult<Value> {
                 let parts: Vec<_> = parts.iter().map(|part| to_python(py, part)).collect::<PyResult<_>>()?;
-                let answer = self.function.bind(py).call1(pyo3::types::PyTuple::new(py, parts)?)?;
+                let answer = self.function.bind(py).call1(PyTuple::new(py, parts)?)?;
                 from_python(&answer)
             };
-            called().map_err(|error| {
-                let text = error.to_string();
-                if !error.is_instance_of::<pyo3::exceptions::PyException>(py) {
-                    self.raised.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
-                }
-                text
-            })
+            called().map_err(|error| self.raised.hear(py, error))
         })
     }
 }
@@ -68,7 +111,7 @@ pub fn bind(
     py: Python<'_>,
     domain: &mut Domain,
     [calls, facts, actions]: [Given; 3],
-    raised: &Raised,
+    raised: &Arc<Raised>,
 ) -> PyResult<()> {
     let config = &domain.config;
     let known_calls: Vec<&str> = config.attachments.keys().map(String::as_str).collect();
@@ -91,7 +134,7 @@ fn named(
     given: Given,
     known: &[&str],
     hear: fn(&Map<String, Value>) -> Vec<Value>,
-    raised: &Raised,
+    raised: &Arc<Raised>,
 ) -> PyResult<Named> {
     let mut named = Named::new();
     for (name, function) in given.into_iter().flatten() {

@@ -30,6 +30,12 @@ def dear_edge(call):
     return 90 if call.arguments == ["home", "market"] else 1
 
 
+@pytest.fixture(scope="session")
+def slow():
+    """A task whose search takes long."""
+    return queens(14)
+
+
 def queens(n):
     """A task whose search takes long: n queens, one a row, put in any order."""
     names = " ".join(f"q{i}" for i in range(n))
@@ -73,14 +79,14 @@ def test_what_has_no_plan_says_why():
     task = descry.Task(SWITCHES, PROBLEM.replace("(on b)", "(on b) (not (on a))"))
     outcome = descry.plan(task)
     assert outcome.status == "unsolvable" and outcome.plan is None
-    assert "on a" in outcome.why and outcome.findings[0].file == "problem"
+    assert "exclude each other" in outcome.why and outcome.findings[0].file == "problem"
 
 
 @pytest.mark.parametrize(
     "domain, problem, told",
     [
         (SWITCHES.replace("(not (on ?s))", "(not (onn ?s))"), PROBLEM, ("domain", 6, 63, "did you mean `on`?")),
-        (SWITCHES, PROBLEM.replace("(on b)", "(on c)"), ("problem", 1, 93, None)),
+        (SWITCHES, PROBLEM.replace("(on b)", "(on c)"), ("problem", 1, 95, "did you mean `a`?")),
     ],
 )
 def test_an_error_points_at_its_place_and_offers_a_mend(domain, problem, told):
@@ -89,14 +95,14 @@ def test_an_error_points_at_its_place_and_offers_a_mend(domain, problem, told):
     error = raised.value
     file, line, column, mend = told
     assert (error.file, error.line, error.column) == (file, line, column), error
-    assert error.mend == mend if mend else error.mend
+    assert error.mend == mend
     assert error.findings[0].severity == "error" and isinstance(error, (descry.Error, ValueError))
 
 
 def test_further_input_that_cannot_be_used():
     with pytest.raises(descry.InputError) as raised:
         descry.Task("(define domain)", PROBLEM)
-    assert raised.value.expected == "`(define (domain name) …)`", vars(raised.value)
+    assert raised.value.expected == "`(domain name)` next", vars(raised.value)
     with pytest.raises(descry.InputError, match="no-such-file.pddl"):
         descry.Task.read("no-such-file.pddl", DATA / "roads-problem.pddl")
     for limit in (-1.0, math.nan, math.inf):
@@ -158,8 +164,9 @@ def test_a_module_without_a_function_is_named():
 
 def test_ever_better_plans_are_heard_of():
     heard = []
-    outcome = descry.plan(ROADS, anytime=True, attachments={"path-cost": dear_edge}, on_plan=heard.append)
-    assert outcome.is_optimal and heard[-1] == outcome.plan
+    calls = {"path-cost": dear_edge}
+    outcome = descry.plan(ROADS, anytime=True, attachments=calls, on_plan=heard.append, time_limit_s=0.3)
+    assert heard[-1] == outcome.plan
     spans = [plan.makespan_s for plan in heard]
     assert spans == sorted(spans, reverse=True)
     with pytest.raises(RuntimeError, match="enough"):
@@ -170,8 +177,8 @@ def enough(plan):
     raise RuntimeError("enough")
 
 
-def test_planning_ends_when_it_is_told_to():
-    task = queens(14)
+def test_planning_ends_when_it_is_told_to(slow):
+    task = slow
     assert descry.plan(task, time_limit_s=0.05).status == "out_of_time"
     asked = []
     outcome = descry.plan(task, stop=lambda: asked.append(1) or len(asked) > 2)
@@ -179,7 +186,7 @@ def test_planning_ends_when_it_is_told_to():
     assert descry.plan(task, memory_limit_mb=1).status == "out_of_memory"
 
 
-def test_ctrl_c_ends_planning_and_other_threads_go_on():
+def test_ctrl_c_ends_planning_and_other_threads_go_on(slow):
     counted = [0]
 
     def interrupt():
@@ -191,6 +198,6 @@ def test_ctrl_c_ends_planning_and_other_threads_go_on():
     thread = threading.Thread(target=interrupt)
     thread.start()
     with pytest.raises(KeyboardInterrupt):
-        descry.plan(queens(14), time_limit_s=60)
+        descry.plan(slow, time_limit_s=60)
     thread.join()
     assert counted[0] == 20

@@ -1,32 +1,68 @@
 import os
-from typing import Any, Callable, Dict, List, Literal, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, Literal, Mapping, Optional, Sequence, Tuple, Union, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "Attachment",
+    "Call",
+    "Document",
+    "Finding",
+    "Outcome",
+    "Percept",
+    "Plan",
+    "Recognition",
+    "Record",
+    "Report",
+    "Step",
+    "Surface",
+    "Task",
+    "Verdict",
+    "check",
+    "check_robot",
+    "goals",
+    "new_domain",
+    "plan",
+    "pursue",
+    "read_cloud",
+    "recognise",
+    "validate",
+]
 
 _Path = Union[str, "os.PathLike[str]"]
 _Point = Sequence[float]
 _Attachment = Union["Attachment", Callable[["Call"], Any]]
 
+@final
 class Finding:
     """One thing that is wrong with a text, where (line and column from 1), and how to mend it."""
 
-    severity: Literal["error", "warning"]
-    code: str
-    message: str
-    file: str
-    line: int
-    column: int
-    expected: Optional[str]
-    mend: Optional[str]
+    @property
+    def severity(self) -> Literal["error", "warning"]: ...
+    @property
+    def code(self) -> str: ...
+    @property
+    def message(self) -> str: ...
+    @property
+    def file(self) -> str: ...
+    @property
+    def line(self) -> int: ...
+    @property
+    def column(self) -> int: ...
+    @property
+    def expected(self) -> Optional[str]: ...
+    @property
+    def mend(self) -> Optional[str]: ...
 
+@final
 class Task:
     """A PDDL domain and problem, read and checked; semantic attachments, times, numbers, preferences and all.
 
     Raises :class:`~descry.InputError` with every fault that was found.
     """
 
-    def __init__(self, domain: str, problem: str) -> None: ...
+    def __new__(cls, domain: str, problem: str) -> "Task": ...
     @staticmethod
     def read(domain: _Path, problem: _Path) -> "Task":
         """The same from files."""
@@ -45,16 +81,17 @@ class Task:
     def modules(self) -> List[str]:
         """The modules that need an attachment each."""
 
+@final
 class Step:
     """One step of a plan: seconds; ``start_s`` is ``None`` in a plan without times."""
 
-    def __init__(
-        self,
+    def __new__(
+        cls,
         action: str,
         arguments: Sequence[str] = ...,
         start_s: Optional[float] = None,
         duration_s: float = 0.0,
-    ) -> None: ...
+    ) -> "Step": ...
     @property
     def action(self) -> str: ...
     @property
@@ -64,10 +101,11 @@ class Step:
     @property
     def duration_s(self) -> float: ...
 
+@final
 class Plan:
     """What to do, and when. ``str(plan)`` is its text in the form of the planning competitions."""
 
-    def __init__(self, steps: Sequence[Step], cost: Optional[float] = None) -> None: ...
+    def __new__(cls, steps: Sequence[Step], cost: Optional[float] = None) -> "Plan": ...
     @staticmethod
     def parse(text: str) -> "Plan":
         """``0.000: (move a b) [3.200]`` or ``(move a b)``, one or more to a line."""
@@ -87,6 +125,7 @@ class Plan:
 
     def __len__(self) -> int: ...
 
+@final
 class Call:
     """A question to an attachment: plain data, the same question has the same answer."""
 
@@ -103,6 +142,7 @@ class Call:
     def value(self, symbol: str, *arguments: str) -> Union[bool, float, str, None]:
         """One of them. Raises ``KeyError`` for a fact that the attachment does not read."""
 
+@final
 class Attachment:
     """A function that answers the calls of a module.
 
@@ -111,15 +151,16 @@ class Attachment:
     depends besides the arguments: answers are kept by them. ``relaxed`` is a cheap, optimistic answer for heuristics.
     """
 
-    def __init__(
-        self,
+    def __new__(
+        cls,
         function: Callable[[Call], Any],
         *,
         reads: Sequence[str] = ...,
         relaxed: Optional[Callable[[Call], Any]] = None,
-    ) -> None: ...
+    ) -> "Attachment": ...
     def __call__(self, *arguments: Any, **named: Any) -> Any: ...
 
+@final
 class Outcome:
     """How planning ended.
 
@@ -135,15 +176,12 @@ class Outcome:
     def is_optimal(self) -> bool:
         """Whether the plan is proven to be best."""
 
-    @property
-    def why(self) -> Optional[str]: ...
-    @property
-    def findings(self) -> List[Finding]: ...
-    @property
-    def time_s(self) -> float: ...
-    @property
-    def statistics(self) -> Dict[str, Any]: ...
+    why: Optional[str]
+    findings: List[Finding]
+    time_s: float
+    statistics: Dict[str, Any]
 
+@final
 class Verdict:
     """What the validator says of a plan; true if it is valid. ``step`` is the one at fault, from 0."""
 
@@ -182,6 +220,7 @@ def validate(task: Task, plan: Plan, *, attachments: Optional[Mapping[str, _Atta
 def check(domain: str, problem: Optional[str] = None) -> List[Finding]:
     """Every finding in the text of a domain, and of a problem: faults and warnings."""
 
+@final
 class Surface:
     """The surface that things stand on; metres, in the frame of the cloud."""
 
@@ -203,6 +242,7 @@ class Surface:
     def surface_from_world(self) -> NDArray[np.float64]:
         """4 x 4: z up with 0 on the surface, origin at the middle of its outline."""
 
+@final
 class Percept:
     """An object on a surface; ``label`` is ``None`` where it is unknown."""
 
@@ -237,6 +277,7 @@ class Percept:
     def data(self) -> Dict[str, Any]:
         """All of it, as ``descry recognise --json`` prints it."""
 
+@final
 class Recognition:
     """What stands in a cloud; without a surface ``why`` says why there is none."""
 
@@ -267,6 +308,7 @@ def recognise(
 def read_cloud(path: _Path) -> Tuple[NDArray[np.float32], NDArray[np.float64]]:
     """The points of a PCD or PLY file, N x 3 or height x width x 3, and where its sensor stood, metres."""
 
+@final
 class Document:
     """One entry of a record. ``stamp_ns`` is in the clock of the recording."""
 
@@ -284,6 +326,7 @@ class Document:
     def data(self) -> Dict[str, Any]:
         """All of it, as ``descry memory query --json`` prints it."""
 
+@final
 class Record:
     """A record: what was sensed, done and believed in a run. Reading locks nothing and changes nothing.
 
@@ -291,7 +334,7 @@ class Record:
     :class:`~descry.BrokenError` is raised.
     """
 
-    def __init__(self, place: _Path) -> None: ...
+    def __new__(cls, place: _Path) -> "Record": ...
     @property
     def lost(self) -> List[str]: ...
     @property
@@ -335,6 +378,7 @@ class Record:
     def verify(self) -> List[str]:
         """Reads every byte; returns what is damaged."""
 
+@final
 class Report:
     """What came of a run. ``str(report)`` is what ``descry do`` prints at its end."""
 

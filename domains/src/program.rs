@@ -515,6 +515,36 @@ mod tests {
         );
     }
 
+    /// Hears what a program hears, and says the name that it is asked about, or that it is tired.
+    #[derive(Debug)]
+    struct Echo;
+
+    impl Function for Echo {
+        fn answer(&self, question: &Value) -> Result<Value, String> {
+            match question["arguments"][0].as_str() {
+                Some("a") => Ok(json!(2.5)),
+                Some(_) => Err("tired".into()),
+                None => Ok(question.clone()),
+            }
+        }
+    }
+
+    #[test]
+    fn a_function_answers_in_the_place_of_a_program() {
+        let program = Program { program: vec!["function".into()], time_limit_s: 0.5, reads: vec![] };
+        let attachment = ProgramAttachment::new(program, None).answered_by(Some(Arc::new(Echo)));
+        let call = |name: &str| Call {
+            module: "m".into(),
+            kind: CallKind::Cost,
+            arguments: vec![name.into()],
+            readings: vec![],
+        };
+        let answers = attachment.evaluate_all(&[call("a"), call("b")]);
+        assert_eq!(answers, [Ok(Answer::Number(2.5)), Err(CallError::Failed("tired".into()))]);
+        let asked = json!({ "fact": "raining", "objects": [] });
+        assert_eq!(attachment.ask_one(asked.clone()), Ok(json!({ "value": asked })));
+    }
+
     #[test]
     fn a_program_that_fails_is_a_clean_error() {
         let crashed = "the attachment's program ended: `sh -c read a; echo broken pipe dream >&2; exit 3`, exit status: 3\n    broken pipe dream";

@@ -40,6 +40,7 @@ from unified_planning.environment import Environment, get_environment
 from unified_planning.exceptions import UPException
 from unified_planning.io import PDDLWriter
 from unified_planning.model import Problem, ProblemKind
+from unified_planning.model.metrics import MinimizeActionCosts
 from unified_planning.model.problem_kind_versioning import LATEST_PROBLEM_KIND_VERSION
 from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, TimeTriggeredPlan
 
@@ -224,10 +225,11 @@ class _Translation:
         assert isinstance(problem, Problem)
         self.problem = problem
         self.is_temporal = problem.kind.has_continuous_time()
+        written = _with_all_costs(problem)
         self.compiled = None
         if problem.kind.has_bounded_types():
-            self.compiled = BoundedTypesRemover().compile(problem, CompilationKind.BOUNDED_TYPES_REMOVING)
-        written = problem if self.compiled is None else self.compiled.problem
+            self.compiled = BoundedTypesRemover().compile(written, CompilationKind.BOUNDED_TYPES_REMOVING)
+            written = self.compiled.problem
         self.writer = PDDLWriter(written, rewrite_bool_assignments=True)
         self.task = Task(self.writer.get_domain(), self.writer.get_problem())
 
@@ -248,10 +250,8 @@ class _Translation:
         assert isinstance(action, up.model.Action)
         objects = (self.writer.get_item_named(name) for name in step.arguments)
         expressions = self.problem.environment.expression_manager
-        instance = ActionInstance(action, tuple(expressions.ObjectExp(o) for o in objects))
-        if self.compiled is not None and self.compiled.map_back_action_instance is not None:
-            return self.compiled.map_back_action_instance(instance)
-        return instance
+        # What is written may be a changed copy of the problem, whose actions have the same names.
+        return ActionInstance(self.problem.action(action.name), tuple(expressions.ObjectExp(o) for o in objects))
 
     @staticmethod
     def _duration(step: Step, instance: ActionInstance) -> Optional[Fraction]:
@@ -339,6 +339,21 @@ class _Translation:
         if len(metrics) != 1 or verdict.metric is None:
             return None
         return {metrics[0]: _fraction(verdict.metric)}
+
+
+def _with_all_costs(problem: Problem) -> Problem:
+    """A problem whose costs of actions are all stated, as the writer wants them: where there is none, it is 0."""
+    metrics = problem.quality_metrics
+    if len(metrics) != 1 or not isinstance(metrics[0], MinimizeActionCosts):
+        return problem
+    costs = {action.name: metrics[0].get_action_cost(action) for action in problem.actions}
+    if all(cost is not None for cost in costs.values()):
+        return problem
+    copy = problem.clone()
+    copy.clear_quality_metrics()
+    stated = {action: 0 if (cost := costs[action.name]) is None else cost for action in copy.actions}
+    copy.add_quality_metric(MinimizeActionCosts(stated, environment=problem.environment))
+    return copy
 
 
 def _meets(plan: TimeTriggeredPlan) -> bool:

@@ -133,6 +133,25 @@ def test_names_that_pddl_does_not_have_are_mapped_back():
     assert {(a.action, a.actual_parameters[0].object()) for a in plan.actions} == {(look, first), (look, second)}
 
 
+def test_an_action_without_a_cost_costs_nothing():
+    x, y = Fluent("x"), Fluent("y")
+    paid, free = InstantaneousAction("paid"), InstantaneousAction("free")
+    paid.add_effect(x, True)
+    free.add_precondition(x)
+    free.add_effect(y, True)
+    problem = Problem("costs")
+    for fluent in (x, y):
+        problem.add_fluent(fluent, default_initial_value=False)
+    problem.add_actions([paid, free])
+    problem.add_goal(y)
+    problem.add_quality_metric(MinimizeActionCosts({paid: Int(3)}))
+    with OneshotPlanner(name="descry") as planner:
+        result = planner.solve(problem)
+    assert [step.action for step in result.plan.actions] == [paid, free]
+    with PlanValidator(name="descry") as validator:
+        assert list(validator.validate(problem, result.plan).metric_evaluations.values()) == [3]
+
+
 def thirds():
     """An action that takes a third of a second, twice, one after the other."""
     count = Fluent("count", IntType())

@@ -11,6 +11,7 @@ use include_dir::{Dir, include_dir};
 use serde::Deserialize;
 
 use crate::config::{self, Config};
+use crate::function::Functions;
 use crate::program::Tape;
 use crate::vocabulary::Vocabulary;
 
@@ -46,6 +47,8 @@ pub struct Domain {
     pub folder: Option<PathBuf>,
     /// The texts that all this was read from.
     pub files: Files,
+    /// What answers in the places of its programs.
+    pub functions: Functions,
     /// Where the answers of its programs are kept, and come from.
     pub tape: Option<Arc<dyn Tape>>,
 }
@@ -235,7 +238,20 @@ pub fn from_files(files: Files, folder: Option<PathBuf>) -> Result<Domain, LoadE
     let shapes = under("shapes/").map(|(_, (name, text))| shape(name, text)).collect::<Result<_, _>>()?;
     let pddl = Source { name: pddl_name.clone(), text: pddl.clone() };
     let vocabulary = Vocabulary::read(&pddl).map_err(|findings| LoadError::Findings { findings })?;
-    Ok(Domain { pddl, vocabulary, toml, config, objects, shapes, scenes, folder, files, tape: None })
+    let functions = Functions::default();
+    Ok(Domain {
+        pddl,
+        vocabulary,
+        toml,
+        config,
+        objects,
+        shapes,
+        scenes,
+        folder,
+        files,
+        functions,
+        tape: None,
+    })
 }
 
 /// A shape as a run has learned it.

@@ -26,6 +26,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::config::Program;
+use crate::function::Function;
 
 /// How many of its last words on standard error are shown when a program ends.
 const LAST_WORDS: usize = 5;
@@ -68,6 +69,7 @@ pub trait Tape: std::fmt::Debug + Send + Sync {
 pub struct ProgramAttachment {
     program: Program,
     folder: Option<PathBuf>,
+    function: Option<Arc<dyn Function>>,
     tape: Option<Arc<dyn Tape>>,
     running: Mutex<Option<Running>>,
 }
@@ -108,13 +110,19 @@ struct Said {
 impl ProgramAttachment {
     /// Binds a program that is run in `folder` (none: the current one). It is started by its first question.
     pub fn new(program: Program, folder: Option<PathBuf>) -> Self {
-        Self { program, folder, tape: None, running: Mutex::new(None) }
+        Self { program, folder, function: None, tape: None, running: Mutex::new(None) }
     }
 
     /// The same with its answers on a tape.
     #[must_use]
     pub fn on(self, tape: Option<Arc<dyn Tape>>) -> Self {
         Self { tape, ..self }
+    }
+
+    /// The same with a function that answers instead of the program.
+    #[must_use]
+    pub fn answered_by(self, function: Option<Arc<dyn Function>>) -> Self {
+        Self { function, ..self }
     }
 
     fn ask(&self, calls: &[Call], level: Level) -> Vec<Result<Answer, CallError>> {
@@ -127,6 +135,9 @@ impl ProgramAttachment {
     }
 
     fn ask_program(&self, calls: &[Call], level: Level) -> Vec<Result<Answer, CallError>> {
+        if let Some(function) = &self.function {
+            return calls.iter().map(|call| ask_function(&**function, call)).collect();
+        }
         let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
         let outcome = self.ensure_started(&mut running).and_then(|r| self.exchange(r, calls, level));
         outcome.unwrap_or_else(|error| {
@@ -149,6 +160,10 @@ impl ProgramAttachment {
     }
 
     fn ask_program_one(&self, question: Value) -> Result<Value, CallError> {
+        if let Some(function) = &self.function {
+            let answered = function.answer(&question).map_err(CallError::Failed);
+            return answered.map(|value| json!({ "value": value }));
+        }
         let mut running = self.running.lock().unwrap_or_else(PoisonError::into_inner);
         let outcome = self.ensure_started(&mut running).and_then(|r| self.exchange_one(r, question));
         let is_over = matches!(
@@ -380,6 +395,13 @@ impl Attachment for ProgramAttachment {
     }
 }
 
+fn ask_function(function: &dyn Function, call: &Call) -> Result<Answer, CallError> {
+    let question = serde_json::to_value(call).map_err(|e| CallError::Failed(e.to_string()))?;
+    let value = function.answer(&question).map_err(CallError::Failed)?;
+    let said = value.to_string();
+    read_said(Said { value: Some(value), error: None }, &said).and_then(|answer| answer)
+}
+
 fn read_reply(line: &str) -> Result<(u64, Result<Answer, CallError>), CallError> {
     let reply: Reply =
         serde_json::from_str(line).map_err(|_| unreadable(line, "{\"id\": 7, \"value\": 3.2}"))?;
@@ -491,6 +513,36 @@ mod tests {
             r#"read a; read b; echo '{"id":0,"error":"no map"}'; echo '{"id":1,"value":true}'"#,
             "no map | Truth(true)",
         );
+    }
+
+    /// Hears what a program hears, and says the name that it is asked about, or that it is tired.
+    #[derive(Debug)]
+    struct Echo;
+
+    impl Function for Echo {
+        fn answer(&self, question: &Value) -> Result<Value, String> {
+            match question["arguments"][0].as_str() {
+                Some("a") => Ok(json!(2.5)),
+                Some(_) => Err("tired".into()),
+                None => Ok(question.clone()),
+            }
+        }
+    }
+
+    #[test]
+    fn a_function_answers_in_the_place_of_a_program() {
+        let program = Program { program: vec!["function".into()], time_limit_s: 0.5, reads: vec![] };
+        let attachment = ProgramAttachment::new(program, None).answered_by(Some(Arc::new(Echo)));
+        let call = |name: &str| Call {
+            module: "m".into(),
+            kind: CallKind::Cost,
+            arguments: vec![name.into()],
+            readings: vec![],
+        };
+        let answers = attachment.evaluate_all(&[call("a"), call("b")]);
+        assert_eq!(answers, [Ok(Answer::Number(2.5)), Err(CallError::Failed("tired".into()))]);
+        let asked = json!({ "fact": "raining", "objects": [] });
+        assert_eq!(attachment.ask_one(asked.clone()), Ok(json!({ "value": asked })));
     }
 
     #[test]

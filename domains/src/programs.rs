@@ -28,20 +28,22 @@ pub struct ProgramAction {
 impl Programs {
     /// Those that a domain names.
     pub fn of(domain: &Domain) -> Self {
-        let bind = |p: Program| ProgramAttachment::new(p, domain.folder.clone()).on(domain.tape.clone());
+        let bind = |p: Program, table: &str, name: &str| {
+            let function = domain.functions.of(table, name);
+            ProgramAttachment::new(p, domain.folder.clone()).answered_by(function).on(domain.tape.clone())
+        };
         let config = &domain.config;
-        let calls = config.attachments.iter().map(|(name, p)| (name.clone(), Arc::new(bind(p.clone()))));
+        let calls = config.attachments.iter();
+        let calls = calls.map(|(name, p)| (name.clone(), Arc::new(bind(p.clone(), "attachments", name))));
         let facts = config.word.iter().filter_map(|(name, word)| {
             let program = word.program.clone()?;
-            Some((
-                name.clone(),
-                bind(Program { program, time_limit_s: word.time_limit_s, reads: Vec::new() }),
-            ))
+            let program = Program { program, time_limit_s: word.time_limit_s, reads: Vec::new() };
+            Some((name.clone(), bind(program, "word", name)))
         });
         let actions = config.action.iter().filter_map(|(name, action)| {
             let program = action.program.clone()?;
-            let program = bind(Program { program, time_limit_s: action.limit_s(), reads: Vec::new() });
-            Some((name.clone(), ProgramAction { program: Arc::new(program) }))
+            let program = Program { program, time_limit_s: action.limit_s(), reads: Vec::new() };
+            Some((name.clone(), ProgramAction { program: Arc::new(bind(program, "action", name)) }))
         });
         Self { calls: calls.collect(), facts: facts.collect(), actions: actions.collect() }
     }

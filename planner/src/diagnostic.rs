@@ -169,7 +169,7 @@ impl Findings {
     }
 
     /// File, line and column of a place, both from 1.
-    fn place(&self, span: Span) -> (&str, usize, usize) {
+    pub fn place(&self, span: Span) -> (&str, usize, usize) {
         let Some(source) = self.sources.get(span.source as usize) else { return ("", 1, 1) };
         let (line, column) = excerpt::line_and_column(&source.text, span.start as usize);
         (&source.name, line, column)

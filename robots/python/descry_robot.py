@@ -163,13 +163,18 @@ def serve(robot, listen=None):
     server = _listen(listen)
     while True:
         connection, _ = server.accept()
-        if connection.family != socket.AF_UNIX:
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # a request is a line that is waited for
-        try:
-            _answer(robot, Wire(connection.fileno(), connection.fileno()))
-        except OSError as error:  # who asked is gone; the next one may come
-            print(f"the connection broke: {error}", file=sys.stderr)
-        connection.close()
+        answer(robot, connection)
+
+
+def answer(robot, connection):
+    """Answers over a connected socket until the other end closes it."""
+    if connection.family != socket.AF_UNIX:
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # a request is a line that is waited for
+    try:
+        _answer(robot, Wire(connection.fileno(), connection.fileno()))
+    except OSError as error:  # who asked is gone; the next one may come
+        print(f"the connection broke: {error}", file=sys.stderr)
+    connection.close()
 
 
 def _answer(robot, wire):

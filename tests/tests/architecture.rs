@@ -73,6 +73,17 @@ fn a_crate_uses_only_the_floors_below_its_own() {
                 "descry-skills",
             ],
         ),
+        (
+            "python",
+            &[
+                "descry-agent",
+                "descry-domains",
+                "descry-memory",
+                "descry-perception",
+                "descry-planner",
+                "descry-robots",
+            ],
+        ),
         ("tests", &["descry-agent"]),
     ]);
     for (package, allowed) in floors {

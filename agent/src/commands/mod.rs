@@ -26,6 +26,7 @@ use clap::Subcommand;
 
 pub use input::{drawn, is_coloured, narrate};
 pub use line::asked;
+pub use new::write_domain;
 
 use crate::exit::{CommandError, Exit};
 use crate::stop::Stop;

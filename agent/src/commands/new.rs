@@ -20,17 +20,7 @@ pub struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let folder = &arguments.folder;
-    free(folder)?;
-    let absolute = std::path::absolute(folder).map_err(|e| unwritable(folder, &e))?;
-    let name = absolute.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut written = Vec::new();
-    for (path, text) in template::files(&name) {
-        let path = folder.join(path);
-        let parent = path.parent().unwrap_or(folder);
-        std::fs::create_dir_all(parent).map_err(|e| unwritable(parent, &e))?;
-        std::fs::write(&path, text).map_err(|e| unwritable(&path, &e))?;
-        written.push(path.display().to_string());
-    }
+    let written = write_domain(folder)?;
     if arguments.json {
         input::print_json(&json!({ "folder": folder, "files": written }))?;
     } else {
@@ -43,6 +33,25 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         input::print_text(&format!("{}\n\nnext:\n{}", written.join("\n"), next.join("\n")))?;
     }
     Ok(Exit::Done)
+}
+
+/// Writes a small domain that runs into a folder; returns its files.
+///
+/// # Errors
+/// [`CommandError::BadInput`] if the folder holds something already, or cannot be written.
+pub fn write_domain(folder: &Path) -> Result<Vec<String>, CommandError> {
+    free(folder)?;
+    let absolute = std::path::absolute(folder).map_err(|e| unwritable(folder, &e))?;
+    let name = absolute.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut written = Vec::new();
+    for (path, text) in template::files(&name) {
+        let path = folder.join(path);
+        let parent = path.parent().unwrap_or(folder);
+        std::fs::create_dir_all(parent).map_err(|e| unwritable(parent, &e))?;
+        std::fs::write(&path, text).map_err(|e| unwritable(&path, &e))?;
+        written.push(path.display().to_string());
+    }
+    Ok(written)
 }
 
 /// The folder is not there yet, or empty.

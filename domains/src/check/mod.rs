@@ -108,13 +108,18 @@ impl Check<'_> {
         format!("{hint}known: {}", if names.is_empty() { "none".into() } else { names.join(", ") })
     }
 
-    /// A program can be started: a command that is there, and the file that it is given.
+    /// A program can be started: a command that is there, and the file that it is given. A function needs neither.
     fn program(&self, path: &[&str], program: &[String]) -> Option<Diagnostic> {
         let here = self.toml.at(path);
         let Some((command, arguments)) = program.split_first() else {
             let told = Diagnostic::error("no-program", "this program is empty", here, "here");
             return Some(told.with_help("name a command and its arguments, as [\"python3\", \"mine.py\"]"));
         };
+        if let [table, name, ..] = path
+            && self.domain.functions.of(table, name).is_some()
+        {
+            return None;
+        }
         // A run that is lived through again has its answers on tape.
         let folder = self.domain.folder.as_deref().filter(|_| self.domain.tape.is_none())?;
         let is_file = |a: &&String| !a.starts_with('-') && std::path::Path::new(a).extension().is_some();

@@ -1,0 +1,1 @@
+../../robots/python/descry_robot.py

@@ -1,0 +1,219 @@
+//! The agent: a goal in words, pursued with a body.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
+
+use descry_agent::body::{self, Body};
+use descry_agent::commands::write_domain;
+use descry_agent::exit::CommandError;
+use descry_agent::keeping::Keeping;
+use descry_agent::report::{self, Event};
+use descry_agent::run::{self, Folder, Settings, Watcher};
+use descry_agent::stop::Stop;
+use descry_domains::abilities::searching::policies;
+use descry_domains::check;
+use descry_domains::goal::{self, Goal};
+use descry_domains::lexicon::{Lexicon, Places};
+use descry_domains::load::{DEFAULT, Domain, LoadError};
+use descry_robots::conformance;
+use pyo3::prelude::*;
+
+use crate::convert::to_python;
+use crate::failure;
+use crate::function::{self, Given, Raised};
+
+/// Ctrl-C is looked for this often while nothing happens.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+
+/// What came of a run.
+#[pyclass(frozen, module = "descry")]
+pub struct Report {
+    inner: report::Report,
+}
+
+#[pymethods]
+impl Report {
+    #[getter]
+    fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &self.inner.verdict)
+    }
+
+    #[getter]
+    fn goal(&self) -> &str {
+        &self.inner.goal
+    }
+
+    #[getter]
+    fn why(&self) -> &str {
+        &self.inner.why
+    }
+
+    #[getter]
+    fn confidence(&self) -> f64 {
+        self.inner.confidence
+    }
+
+    #[getter]
+    fn position_m(&self) -> Option<[f64; 3]> {
+        self.inner.position_m
+    }
+
+    #[getter]
+    fn run(&self) -> PathBuf {
+        PathBuf::from(&self.inner.run)
+    }
+
+    #[getter]
+    fn data<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &self.inner)
+    }
+
+    fn __str__(&self) -> String {
+        self.inner.to_string().trim_start().to_string()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Report {}: {}>", self.inner.goal, report::words(self.inner.verdict))
+    }
+}
+
+/// A domain that makes sense as a whole, with functions in the places of its programs.
+fn domain(py: Python<'_>, name: &str, given: [Given; 3], raised: &Arc<Raised>) -> PyResult<Domain> {
+    let mut domain = Domain::load(name).map_err(|error| match error {
+        LoadError::Findings { findings } => failure::findings(py, &findings),
+        other => failure::input(py, &other.to_string()),
+    })?;
+    function::bind(py, &mut domain, given, raised)?;
+    check::runnable(&domain).map_err(|findings| failure::findings(py, &findings))?;
+    Ok(domain)
+}
+
+/// Everything a run needs but its body.
+struct Asked {
+    said: String,
+    domain: Domain,
+    folder: Option<PathBuf>,
+    settings: Settings,
+}
+
+impl Asked {
+    /// Pursues the goal from beginning to end.
+    fn pursue(&self, stop: &Stop, tell: &mut dyn FnMut(&Event)) -> Result<report::Report, CommandError> {
+        let started = Instant::now();
+        let Settings { robot, scene, seed, policy, .. } = &self.settings;
+        let body: Body = body::open(robot, scene.as_deref(), *seed, &self.domain)?;
+        let lexicon = Lexicon::new(&self.domain, &Places::of_body(&*body.robot));
+        let goal: Goal = goal::read(&self.said, &self.domain, &lexicon).map_err(CommandError::bad_input)?;
+        let chooser = policies::named(policy, *seed, None).map_err(CommandError::bad_input)?;
+        let folder = Folder::of_new_run(self.folder.as_deref(), &goal)?;
+        let keeping = Keeping::default().of_new_run(folder.path())?;
+        let settings = Settings { keeping, ..self.settings.clone() };
+        let watcher = Watcher { stop, tell };
+        let mut report = run::pursue(&self.domain, &goal, &body, &folder, &settings, chooser, watcher)?;
+        report.wall_s = started.elapsed().as_secs_f64();
+        run::finish(folder.path(), &report)?;
+        Ok(report)
+    }
+}
+
+/// Pursues a goal in the words of a domain.
+#[pyfunction]
+#[pyo3(signature = (goal, *, domain, robot, scene, seed, policy, run, remember, attachments, facts, actions, on_event))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub fn pursue(
+    py: Python<'_>,
+    goal: String,
+    domain: String,
+    robot: String,
+    scene: Option<String>,
+    seed: u64,
+    policy: String,
+    run: Option<PathBuf>,
+    remember: Option<String>,
+    attachments: Given,
+    facts: Given,
+    actions: Given,
+    on_event: Option<Py<PyAny>>,
+) -> PyResult<Report> {
+    let raised = Arc::new(Raised::default());
+    let loaded = self::domain(py, &domain, [attachments, facts, actions], &raised)?;
+    let settings = Settings { robot, scene, seed, domain, policy, keeping: Keeping::default(), remember };
+    let asked = Asked { said: goal, domain: loaded, folder: run, settings };
+    let stop = Stop::default();
+    let ended = py.detach(|| watched(&asked, &stop, &raised, on_event.as_ref()));
+    match raised.ended() {
+        Some(error) => Err(error),
+        None => ended
+            .map(|inner| Report { inner })
+            .map_err(|error| raised.behind(py, failure::command(py, &error))),
+    }
+}
+
+/// Lets the run go on in a thread of its own, so that this one can look for Ctrl-C and tell of events.
+fn watched(
+    asked: &Asked,
+    stop: &Stop,
+    raised: &Raised,
+    on_event: Option<&Py<PyAny>>,
+) -> Result<report::Report, CommandError> {
+    let raise = |error: PyErr| {
+        raised.end(error);
+    };
+    std::thread::scope(|scope| {
+        let (tell, events) = channel();
+        let running = scope.spawn(move || asked.pursue(stop, &mut |event| drop(tell.send(event.clone()))));
+        loop {
+            match events.recv_timeout(LOOK_EVERY) {
+                Ok(event) => Python::attach(|py| told(py, on_event, &event)).unwrap_or_else(raise),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => break,
+            }
+            Python::attach(|py| py.check_signals()).unwrap_or_else(raise);
+            if raised.is_end() {
+                stop.ask(2);
+            }
+        }
+        let bug = || CommandError::Bug("the run ended in a panic".into());
+        running.join().unwrap_or_else(|_| Err(bug()))
+    })
+}
+
+fn told(py: Python<'_>, on_event: Option<&Py<PyAny>>, event: &Event) -> PyResult<()> {
+    let Some(on_event) = on_event else { return Ok(()) };
+    let told = to_python(py, event)?;
+    told.set_item("text", event.to_string())?;
+    on_event.call1(py, (told,)).map(drop)
+}
+
+/// The phrases that a domain understands.
+#[pyfunction]
+#[pyo3(signature = (domain="tabletop"))]
+pub fn goals(py: Python<'_>, domain: &str) -> PyResult<Vec<String>> {
+    let domain = self::domain(py, domain, [None, None, None], &Arc::default())?;
+    Ok(domain.config.goal.iter().map(|goal| goal.say.clone()).collect())
+}
+
+/// Writes a small domain that runs into a folder, there to be changed.
+#[pyfunction]
+pub fn new_domain(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<String>> {
+    write_domain(&folder).map_err(|error| failure::command(py, &error))
+}
+
+/// Holds a body to the promises of every body.
+#[pyfunction]
+pub fn check_robot(py: Python<'_>, robot: &str) -> PyResult<()> {
+    let checked = py.detach(|| -> Result<(), CommandError> {
+        let domain = Domain::load(DEFAULT).map_err(CommandError::bad_input)?;
+        let body = body::open(robot, None, 1, &domain)?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+        let runtime = runtime.map_err(|e| CommandError::Bug(e.to_string()))?;
+        let told = |breach: conformance::Breach| {
+            let text = format!("every body: {}\n  this one: {}", breach.promise, breach.found);
+            CommandError::Broken(text)
+        };
+        runtime.block_on(conformance::check(&*body.robot)).map_err(told)
+    });
+    checked.map_err(|error| failure::command(py, &error))
+}

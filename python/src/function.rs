@@ -1,0 +1,152 @@
+//! Functions of Python that stand in for the programs of a domain.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use descry_domains::function::{Function, Functions, Named};
+use descry_domains::load::Domain;
+use pyo3::exceptions::PyException;
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use serde_json::{Map, Value};
+
+use crate::convert::{from_python, to_python};
+use crate::failure;
+
+/// What functions have raised.
+#[derive(Default)]
+pub struct Raised {
+    /// What ends the run: Ctrl-C, not a failure of a function.
+    ends: Mutex<Option<PyErr>>,
+    /// The last failure of a function, and its words.
+    failed: Mutex<Option<(String, PyErr)>>,
+}
+
+impl Raised {
+    /// Ends the run.
+    pub fn end(&self, error: PyErr) {
+        locked(&self.ends).get_or_insert(error);
+    }
+
+    /// Whether the run is to end.
+    pub fn is_end(&self) -> bool {
+        locked(&self.ends).is_some()
+    }
+
+    /// What ended the run, if anything did.
+    pub fn ended(&self) -> Option<PyErr> {
+        locked(&self.ends).take()
+    }
+
+    /// An error of the run with the failure behind it, if it speaks of that.
+    pub fn behind(&self, py: Python<'_>, error: PyErr) -> PyErr {
+        if let Some((words, failed)) = locked(&self.failed).take()
+            && error.to_string().contains(&words)
+        {
+            error.set_cause(py, Some(failed));
+        }
+        error
+    }
+
+    fn hear(&self, py: Python<'_>, error: PyErr) -> String {
+        let words = error.to_string();
+        if error.is_instance_of::<PyException>(py) {
+            *locked(&self.failed) = Some((words.clone(), error));
+        } else {
+            self.end(error);
+        }
+        words
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A function that is called with the parts of a question.
+struct Called {
+    function: Py<PyAny>,
+    hear: fn(&Map<String, Value>) -> Vec<Value>,
+    raised: Arc<Raised>,
+}
+
+impl std::fmt::Debug for Called {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a function of Python")
+    }
+}
+
+impl Function for Called {
+    fn answer(&self, question: &Value) -> Result<Value, String> {
+        let parts = question.as_object().map(self.hear).unwrap_or_default();
+        Python::attach(|py| {
+            let called = || -> PyResult<Value> {
+                let parts: Vec<_> = parts.iter().map(|part| to_python(py, part)).collect::<PyResult<_>>()?;
+                let answer = self.function.bind(py).call1(PyTuple::new(py, parts)?)?;
+                from_python(&answer)
+            };
+            called().map_err(|error| self.raised.hear(py, error))
+        })
+    }
+}
+
+/// The arguments of a call or an action, one by one.
+fn arguments(question: &Map<String, Value>) -> Vec<Value> {
+    question.get("arguments").and_then(Value::as_array).cloned().unwrap_or_default()
+}
+
+/// The objects that a fact may speak of, as one list.
+fn objects(question: &Map<String, Value>) -> Vec<Value> {
+    question.get("objects").cloned().into_iter().collect()
+}
+
+/// Functions by name, as they are given.
+pub type Given = Option<BTreeMap<String, Py<PyAny>>>;
+
+/// Puts functions in the places of the programs that a domain names.
+///
+/// # Errors
+/// A name for which `domain.toml` names no program.
+pub fn bind(
+    py: Python<'_>,
+    domain: &mut Domain,
+    [calls, facts, actions]: [Given; 3],
+    raised: &Arc<Raised>,
+) -> PyResult<()> {
+    let config = &domain.config;
+    let known_calls: Vec<&str> = config.attachments.keys().map(String::as_str).collect();
+    let known_facts = config.word.iter().filter(|(_, word)| word.program.is_some());
+    let known_facts: Vec<&str> = known_facts.map(|(name, _)| name.as_str()).collect();
+    let known_actions = config.action.iter().filter(|(_, action)| action.program.is_some());
+    let known_actions: Vec<&str> = known_actions.map(|(name, _)| name.as_str()).collect();
+    let functions = Functions {
+        calls: named(py, "attachments", calls, &known_calls, arguments, raised)?,
+        facts: named(py, "facts", facts, &known_facts, objects, raised)?,
+        actions: named(py, "actions", actions, &known_actions, arguments, raised)?,
+    };
+    domain.functions = functions;
+    Ok(())
+}
+
+fn named(
+    py: Python<'_>,
+    kind: &str,
+    given: Given,
+    known: &[&str],
+    hear: fn(&Map<String, Value>) -> Vec<Value>,
+    raised: &Arc<Raised>,
+) -> PyResult<Named> {
+    let mut named = Named::new();
+    for (name, function) in given.into_iter().flatten() {
+        if !known.contains(&name.as_str()) {
+            let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+            let text = format!(
+                "{kind}: domain.toml names no program for {name}\n  expected one of: {known}\n  \
+                 write program = [\"function\"] where domain.toml speaks of {name}"
+            );
+            return Err(failure::input(py, &text));
+        }
+        named.insert(name, Arc::new(Called { function, hear, raised: Arc::clone(raised) }));
+    }
+    Ok(named)
+}

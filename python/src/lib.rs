@@ -1,0 +1,34 @@
+//! The extension module of the Python package `descry`: what Python calls, on the crates that the command line is made of.
+
+mod agent;
+mod arrays;
+mod attachment;
+mod convert;
+mod failure;
+mod function;
+mod planning;
+mod recognise;
+mod record;
+mod task;
+mod watch;
+
+use pyo3::prelude::*;
+
+/// Loaded as `descry._descry`; people import `descry`.
+#[pymodule]
+mod _descry {
+    #[pymodule_export]
+    use super::agent::{Report, check_robot, goals, new_domain, pursue};
+    #[pymodule_export]
+    use super::attachment::{Attachment, Call};
+    #[pymodule_export]
+    use super::failure::Finding;
+    #[pymodule_export]
+    use super::planning::{Outcome, Verdict, plan, validate};
+    #[pymodule_export]
+    use super::recognise::{Percept, Recognition, Surface, read_cloud, recognise};
+    #[pymodule_export]
+    use super::record::{Document, Record};
+    #[pymodule_export]
+    use super::task::{Plan, Step, Task, check};
+}

@@ -39,7 +39,7 @@ fn explained(folder: &Path, words: &[&str]) -> Value {
 #[test]
 fn what_was_found_is_explained() {
     let told = check(
-        &["find", "cup A", "--seed", "3"],
+        &["find", "cup A", "--seed", "1"],
         0,
         &[
             "the run began, and there was no plan",
@@ -63,7 +63,7 @@ fn what_is_not_there_is_explained() {
         1,
         &[
             "not found: cup A is not there",
-            "% of the table from 3 places",
+            "% of the table from 4 places",
             "the probability that it is there after all",
             "it ended because there was no plan any more",
             "said no to all of ",
@@ -83,7 +83,7 @@ fn a_policy_is_not_called_the_planner() {
 #[test]
 fn a_run_that_was_cut_off_and_gone_on_with_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
-    binary::kill_after(folder.path(), &["find", "cup A", "--seed", "3", "--run", "run"], 6);
+    binary::kill_after(folder.path(), &["find", "cup A", "--seed", "1", "--run", "run"], 6);
     explained(folder.path(), &["It has not ended", "there is no verdict: the run was cut off"]);
     let run = binary::outcome(folder.path(), &["do", "--resume", "run"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));

@@ -307,7 +307,7 @@ function said() {
     return item;
   }));
 }
-let at = 0, drawn = false;
+let at = Infinity, drawn = false;
 function go(s) {
   if (!story) return;
   at = Math.min(Math.max(s, 0), story.ends_s);

@@ -33,6 +33,8 @@ pub struct Region {
     pub looks: Vec<Look>,
     /// What merging them left that a further one does not need anew.
     pub merger: Merger,
+    /// The views that its space holds, by their times, and from where they saw it.
+    pub taken_in: Vec<(i64, Isometry3<f64>)>,
     /// Places where something has moved.
     pub changes: Vec<Change>,
     /// How many looks have been taken in all.

@@ -5,7 +5,6 @@
 
 use std::sync::Arc;
 
-use descry_memory::space::Space;
 use descry_perception::merge::Merged;
 use descry_perception::nalgebra::Point3;
 use descry_perception::surface::{Role, Surface, SurfaceError, SurfaceOptions, best, find_surfaces};
@@ -45,14 +44,8 @@ pub(super) fn look(
     Ok((surface, others))
 }
 
-/// Takes up what was found beside a surface that is looked at, with the views that showed it; returns which surfaces are new.
-pub(super) fn adopt(
-    mind: &mut Mind,
-    on: usize,
-    others: Vec<Surface>,
-    merged: &Merged,
-    notes: &mut Vec<Note>,
-) -> Vec<usize> {
+/// Takes up what was found beside a surface that is looked at, with its views; returns which surfaces are new.
+pub(super) fn adopt(mind: &mut Mind, on: usize, others: Vec<Surface>, notes: &mut Vec<Note>) -> Vec<usize> {
     let fresh = |s: &Surface, mind: &Mind| !mind.known.surfaces.iter().any(|known| is_one(s, known));
     let mut new = Vec::new();
     for surface in others {
@@ -86,10 +79,7 @@ pub(super) fn adopt(
             mind.words.set("observed", vec![from, known.symbol.clone()], Some(1.0));
         }
         mind.known.surfaces.push(known);
-        let mut space = Space::default();
-        let earlier = merged.visibility.maps.len().saturating_sub(1);
-        merged.visibility.maps[..earlier].iter().for_each(|map| space.integrate(map));
-        mind.known.spaces.push(Arc::new(space));
+        mind.known.spaces.push(Arc::default());
         let seen = &mind.regions[on];
         let region = Region { looks: seen.looks.clone(), taken: seen.taken, ..Region::default() };
         mind.regions.push(region);

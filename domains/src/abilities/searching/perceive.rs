@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use descry_memory::belief::{Sighted, Track};
+use descry_memory::space::Space;
 use descry_memory::viewer::{self, Labelled};
 use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
 use descry_perception::View;
@@ -163,10 +164,8 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         return Ok(());
     }
     let merged = without_walls(eyes.robot, &mind.known.surfaces[on], merged);
+    take_in(mind, on, &views, &merged);
     let newest = newest(&views, &merged);
-    if let Some(map) = &newest {
-        Arc::make_mut(&mut mind.known.spaces[on]).integrate(map);
-    }
     let scene = segment_on(&merged.cloud, &merged.visibility, surface, &seeking);
     let percepts = eyes.recogniser.recognise(&scene, &merged.visibility, eyes.objects);
     if !mind.known.surfaces[on].whole {
@@ -175,7 +174,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     note_surface(&mut mind.known.surfaces[on], &scene);
     let gone_before = mind.known.belief.gone.len();
     notes.push(believe(mind, eyes, on, (&merged, newest.as_ref()), &percepts)?);
-    for new in discover::adopt(mind, on, others, &merged, notes) {
+    for new in discover::adopt(mind, on, others, notes) {
         perceive(mind, eyes, new, notes)?;
     }
     match newest.and_then(|newest| taken_away(mind, on, gone_before, &newest)) {
@@ -200,7 +199,6 @@ fn begin_again(mind: &mut Mind, on: usize) {
     let region = &mut mind.regions[on];
     let last = region.looks.len().saturating_sub(1);
     region.looks.drain(..last);
-    mind.known.spaces[on] = Arc::default();
     let surface = mind.known.surfaces[on].symbol.clone();
     mind.forget_looks(Some(&surface));
     let here = mind.known.candidates[mind.known.at].symbol.clone();
@@ -454,6 +452,43 @@ pub fn in_a_line(p: &Percept) -> String {
         "{name:16} {probability:.2}  at ({:.2}, {:.2}, {:.2}) m, {w:.0} x {d:.0} x {h:.0} cm, {seen:.0} % seen",
         at.x, at.y, at.z
     )
+}
+
+/// Takes what the views of a surface saw into its space. One that was left out may have been taken up since, and the other way round,
+/// and one that lay there may lie elsewhere now: then the space is made anew.
+fn take_in(mind: &mut Mind, on: usize, views: &[View], merged: &Merged) {
+    let (region, space) = (&mut mind.regions[on], Arc::make_mut(&mut mind.known.spaces[on]));
+    let used: Vec<(i64, &View, Isometry3<f64>)> = region
+        .looks
+        .iter()
+        .zip(views.iter().zip(&merged.fits))
+        .filter(|(_, (_, fit))| fit.used)
+        .map(|(look, (view, fit))| (look.stamp_ns, view, fit.world_from_camera))
+        .collect();
+    let lies_there = |(stamp_ns, pose): &(i64, Isometry3<f64>)| {
+        let is_it =
+            |(s, _, p): &(i64, &View, Isometry3<f64>)| s == stamp_ns && is_near(p, pose, space.voxel_m());
+        used.iter().any(is_it)
+    };
+    if !region.taken_in.iter().all(lies_there) {
+        *space = Space::default();
+        region.taken_in.clear();
+    }
+    for (stamp_ns, view, pose) in used {
+        if region.taken_in.iter().any(|&(s, _)| s == stamp_ns) {
+            continue;
+        }
+        if let Some(map) = DepthMap::from_view(view, &pose) {
+            space.integrate(&map);
+        }
+        region.taken_in.push((stamp_ns, pose));
+    }
+}
+
+/// Whether what a camera sees two metres off lies in the same voxel from two poses.
+fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>, voxel_m: f64) -> bool {
+    let turn_rad = a.rotation.angle_to(&b.rotation);
+    (a.translation.vector - b.translation.vector).norm() + 2.0 * turn_rad < voxel_m
 }
 
 /// What the newest view measured, from where it was placed; none if it could not be aligned.

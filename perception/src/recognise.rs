@@ -1,10 +1,12 @@
 //! From the objects on a surface to percepts (paper 004, section V, "Tabletop Scene Perception").
 
+mod asker;
 mod descry;
 mod evidence;
 mod model;
 mod percept;
 mod published;
+mod settle;
 
 use crate::segment::Scene;
 use crate::visibility::Visibility;

@@ -191,7 +191,7 @@ fn tolerance(sigma_m: f64) -> f64 {
 }
 
 /// Heights between base and top at which what is seen can be the side.
-fn side_band(base_m: f64, top_m: f64) -> Range<f64> {
+pub(crate) fn side_band(base_m: f64, top_m: f64) -> Range<f64> {
     let height = top_m - base_m;
     base_m + 0.15 * height..top_m - 0.1 * height
 }

@@ -133,6 +133,53 @@ fn views_that_lie_beside_each_other_show_one_thing_with_its_handle() {
     }
 }
 
+/// What is recognised in views of a cup, each from an angle, laid so far beside its place, and with the cup gone or there.
+fn cup_in(views: &[(f64, [f64; 2], bool)]) -> Vec<Percept> {
+    let mut draws = Draws(5);
+    let look_from = |&(angle, [x, y], there): &(f64, [f64; 2], bool)| {
+        let pose = on_ring(angle, 1.0, 1.3);
+        let mut stated = pose;
+        stated.translation.vector += Vector3::new(x, y, 0.0);
+        look(if there { &[CUP] } else { &[] }, &pose, &stated, &mut draws)
+    };
+    let views: Vec<View> = views.iter().map(look_from).collect();
+    let clouds = views.iter().map(|v| v.cloud.transformed(&v.world_from_camera));
+    let cloud = Cloud::from_points(clouds.flat_map(|c| c.points).collect());
+    let seen = Visibility::from_views(&views);
+    let scene = segment(&cloud, &seen, &options()).expect("there is a table");
+    Descry::default().recognise(&scene, &seen, &[cup_a()])
+}
+
+#[test]
+fn views_of_a_lone_cup_that_lie_beside_each_other_are_laid_on_each_other() {
+    for off_m in [[0.012, 0.0], [-0.012, 0.0], [0.0, 0.012], [0.009, -0.009], [0.014, 0.0], [0.0, -0.014]] {
+        let found = cup_in(&[(0.4, [0.0; 2], true), (0.4 + std::f64::consts::PI, off_m, true)]);
+        let said: Vec<_> =
+            found.iter().map(|p| (p.probability_of("cup A"), p.evidence.handle, p.size_m)).collect();
+        let right = matches!(said[..], [(p, handle, [long, _, _])] if p > 0.7 && handle != Sighting::Seen && long < 0.077);
+        assert!(right, "the last view {off_m:?} m off: {said:?}");
+    }
+}
+
+#[test]
+fn a_view_that_looks_past_what_others_see_says_nothing_of_it() {
+    let [near, beside] = [(0.4, [0.0; 2], true), (0.7, [0.0; 2], true)];
+    let without = cup_in(&[near, beside]);
+    let with = cup_in(&[near, beside, (0.1, [0.0; 2], false)]);
+    let said = |found: &[Percept]| -> Vec<(f64, Sighting, f64)> {
+        found
+            .iter()
+            .map(|p| (p.probability_of("cup A"), p.evidence.handle, p.evidence.handle_unseen))
+            .collect()
+    };
+    let (without, with) = (said(&without), said(&with));
+    assert!(matches!(without[..], [(p, Sighting::Unseen, unseen)] if p > 0.5 && unseen > 0.1), "{without:?}");
+    assert!(
+        matches!(with[..], [(p, Sighting::Unseen, unseen)] if p > 0.5 && unseen > 0.1),
+        "{with:?}, and without it {without:?}"
+    );
+}
+
 /// A carton as high as the white cylinder: some circle fits a part of its side.
 #[test]
 fn a_carton_in_one_piece_is_no_cylinder_however_its_views_lie() {

@@ -1,12 +1,14 @@
 //! Measuring on one segment what tells objects apart, and what could have been measured at all.
 
+use super::asker::Asker;
 use super::percept::{Evidence, Sighting};
+use super::settle::settle;
 use crate::outline::{self, Rectangle};
 use crate::round::{self, Edge, Round};
 use crate::segment::{Scene, Segment, end, quantile, top_m};
 use crate::surface::range_sigma_m;
 use crate::visibility::{Seen, Visibility};
-use nalgebra::{Isometry3, Point3, Vector2};
+use nalgebra::Point3;
 
 /// Directions around the body that are looked at one by one.
 const SECTORS: usize = 36;
@@ -40,10 +42,8 @@ const SLIVER_M: f64 = 0.01;
 const INSIDE_M: f64 = 0.014;
 
 /// Measured worse than this, depth does not tell where the middle of a cup is: it spreads points along the view as far as the side is
-/// deep, metres.
+/// deep; and a few of them that stick out together are no handle, metres.
 const FAR_M: f64 = 0.006;
-/// Cosine of the angle within which cameras see the same side of a thing.
-const SAME_SIDE: f64 = 0.9;
 
 /// All that was measured on one segment.
 #[derive(Clone, Debug)]
@@ -72,63 +72,25 @@ pub(super) struct Measured {
     pub seen_fraction: f64,
 }
 
-/// A place above the surface, asked of the cameras.
-struct Asker<'a> {
-    seen: &'a Visibility,
-    world_from_surface: Isometry3<f64>,
-    tolerance_m: f64,
-}
-
-impl Asker<'_> {
-    fn look(&self, x: f64, y: f64, z: f64) -> Seen {
-        self.seen.look(&(self.world_from_surface * Point3::new(x, y, z)), self.tolerance_m)
-    }
-
-    /// Horizontal direction from a body to the cameras that had it in view, if they saw the same side of it.
-    fn only_from(&self, round: &Round) -> Option<[f64; 2]> {
-        let place = self.world_from_surface * Point3::new(round.x, round.y, round.middle_m);
-        let saw = self.seen.maps.iter().filter(|map| map.look(&place, 0.06) > Seen::Never);
-        let eyes = saw.map(|map| self.world_from_surface.inverse() * map.viewpoint());
-        let each: Vec<Vector2<f64>> = eyes
-            .filter_map(|eye| Vector2::new(eye.x - round.x, eye.y - round.y).try_normalize(0.1))
-            .collect();
-        let mean = each.iter().sum::<Vector2<f64>>().try_normalize(1e-9)?;
-        each.iter().all(|eye| eye.dot(&mean) > SAME_SIDE).then_some(mean.into())
-    }
-
-    /// Standard deviation of the best measurement of a point of the surface, metres; `None` if cameras that measure better look
-    /// through it: it is noise, or a mixed pixel of a depth edge.
-    fn support(&self, p: &Point3<f64>) -> Option<f64> {
-        let place = self.world_from_surface * p;
-        let (mut through, mut here) = (0.0, 0.0);
-        let mut best_m = f64::INFINITY;
-        for map in &self.seen.maps {
-            let seen = map.look(&place, self.tolerance_m);
-            let sigma_m = range_sigma_m((place - map.viewpoint()).norm());
-            match seen {
-                Seen::Free => through += sigma_m.powi(-2),
-                Seen::Surface => {
-                    here += sigma_m.powi(-2);
-                    best_m = best_m.min(sigma_m);
-                }
-                Seen::Hidden | Seen::Never => {}
-            }
-        }
-        (through <= here).then_some(if here > 0.0 { best_m } else { 0.0 })
-    }
-}
-
 /// Measures one segment of a scene.
 pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Measured {
     let base_m = segment.base_m;
     let top = top_m(segment);
     let height_m = (top - base_m).max(0.001);
-    let (footprint_m, middle) = outline::bounding(&segment.points).unwrap_or_default();
+    let (_, middle) = outline::bounding(&segment.points).unwrap_or_default();
     let world_from_surface = scene.surface.surface_from_world.inverse();
     let place = world_from_surface * Point3::new(middle[0], middle[1], 0.5 * (base_m + top));
     let near = seen.viewpoints().iter().map(|v| (place - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
     let sigma_m = range_sigma_m(near).min(0.012);
-    let asker = Asker { seen, world_from_surface, tolerance_m: (3.0 * sigma_m).clamp(0.006, 0.015) };
+    let tolerance_m = (3.0 * sigma_m).clamp(0.006, 0.015);
+    let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m);
+    let first = round::fit(&segment.points, base_m, top, sigma_m, 7);
+    let settled = first.and_then(|round| settle(&round, segment, &asker, (base_m, top), sigma_m));
+    let (segment, asker, first) = match &settled {
+        Some(settled) => (&settled.segment, &settled.asker, Some(settled.round)),
+        None => (segment, &asker, first),
+    };
+    let (footprint_m, middle) = outline::bounding(&segment.points).unwrap_or_default();
     let side: Vec<Point3<f64>> = segment
         .points
         .iter()
@@ -138,11 +100,11 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
     let mut measured = Measured {
         blur_m: scene.surface.residual_m,
         evidence: Evidence { taper: 1.0, ..Evidence::default() },
-        round: round::fit(&segment.points, base_m, top, sigma_m, 7),
+        round: first,
         rectangle: outline::fit(&side),
         height_m,
         height_sigma_m: HEIGHT_M.hypot(0.5 * sigma_m).hypot(0.5 * scene.surface.residual_m.min(0.008)),
-        top_hidden: top_hidden(&asker, middle, footprint_m, top),
+        top_hidden: top_hidden(asker, middle, footprint_m, top),
         footprint_m,
         middle,
         looked_through: 0.0,
@@ -150,12 +112,12 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
         sigma_m,
         seen_fraction: 0.0,
     };
-    measured.evidence.views = views_of(seen, &place);
+    measured.evidence.views = views_of(asker, &place);
     if let Some(rectangle) = &measured.rectangle {
         measured.evidence.box_residual_m = rectangle.residual_m;
     }
-    if let Some(first) = measured.round {
-        let edges = silhouettes(&first, segment, &asker, base_m, height_m);
+    if let Some(first) = first {
+        let edges = silhouettes(&first, segment, asker, base_m, height_m);
         let round = round::refit(&first, &segment.points, &edges, base_m, top, sigma_m);
         let eye = (sigma_m > FAR_M).then(|| asker.only_from(&first)).flatten();
         let round =
@@ -163,7 +125,7 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
         measured.round = round.filter(|round| round.inliers >= MOST);
     }
     if let Some(round) = measured.round {
-        measure_round(&mut measured, &round, segment, &asker, (base_m, top));
+        measure_round(&mut measured, &round, segment, asker, (base_m, top));
     }
     measured
 }
@@ -182,8 +144,8 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
     };
     let near = bands.each_ref().map(in_band);
     let mut edges = Vec::new();
-    for map in &asker.seen.maps {
-        let eye = asker.world_from_surface.inverse() * map.viewpoint();
+    for view in &asker.views {
+        let eye = asker.world_from_surface.inverse() * view.viewpoint();
         let (ex, ey) = (round.x - eye.x, round.y - eye.y);
         let distance = ex.hypot(ey);
         if distance < 2.0 * round.radius_m {
@@ -198,7 +160,7 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
                 let reach_m = end(&reaches, 0.985) + LOST_M;
                 let beyond = reach_m + 0.012 - (across[0] * round.x + across[1] * round.y);
                 let place = Point3::new(round.x + across[0] * beyond, round.y + across[1] * beyond, z);
-                if map.look(&(asker.world_from_surface * place), asker.tolerance_m) == Seen::Free {
+                if view.look(&(asker.world_from_surface * place), asker.tolerance_m) == Seen::Free {
                     edges.push(Edge { direction: across, reach_m, height_m: z });
                 }
             }
@@ -208,8 +170,8 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
 }
 
 /// Number of looks with the place inside the image and not behind something else.
-fn views_of(seen: &Visibility, place: &Point3<f64>) -> usize {
-    seen.maps.iter().filter(|m| !matches!(m.look(place, 0.06), Seen::Never)).count()
+fn views_of(asker: &Asker, place: &Point3<f64>) -> usize {
+    asker.views.iter().filter(|view| !matches!(view.look(place, 0.06), Seen::Never)).count()
 }
 
 /// True if most places just above the object are hidden by something nearer to the cameras.
@@ -221,7 +183,7 @@ fn top_hidden(asker: &Asker, middle: [f64; 2], footprint_m: [f64; 2], top: f64) 
         .iter()
         .filter(|(dx, dy)| asker.look(middle[0] + dx, middle[1] + dy, above) < Seen::Surface)
         .count();
-    !asker.seen.maps.is_empty() && hidden >= 3
+    !asker.views.is_empty() && hidden >= 3
 }
 
 fn measure_round(
@@ -245,7 +207,7 @@ fn measure_round(
     measured.looked_through = sectors.looked_through_share();
     evidence.handle_unseen = sectors.unseen_share();
     let mut spread_m = round.spread_m;
-    let protrusion = Protrusion::find(round, segment, asker, base_m, height);
+    let protrusion = Protrusion::find(round, segment, asker, (base_m, height), measured.sigma_m > FAR_M);
     if let Some(protrusion) = &protrusion {
         evidence.protrusion_m = protrusion.reach_m;
         // What may be a handle says nothing against the roundness of what it is the handle of.
@@ -385,7 +347,13 @@ pub(super) struct Protrusion {
 }
 
 impl Protrusion {
-    fn find(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Option<Protrusion> {
+    fn find(
+        round: &Round,
+        segment: &Segment,
+        asker: &Asker,
+        (base_m, height): (f64, f64),
+        far: bool,
+    ) -> Option<Protrusion> {
         let beside = |p: &&Point3<f64>| {
             let outside_m = round.outside_m(p);
             let clear = |sigma_m: f64| outside_m > 3.0 * sigma_m;
@@ -429,7 +397,7 @@ impl Protrusion {
             direction: (sin, cos),
             width_m: right - left,
             points: local.len(),
-            least: (segment.points.len() / 150).clamp(6, 60),
+            least: if far { segment.points.len() / 30 } else { segment.points.len() / 150 }.clamp(6, 60),
             inside_height: high - low > 0.012 && low > base_m + 0.05 * height,
         })
     }

@@ -1,0 +1,148 @@
+//! What the cameras know of places around one body, each camera as it lies there.
+
+use crate::round::Round;
+use crate::surface::range_sigma_m;
+use crate::visibility::{DepthMap, Seen, Visibility};
+use nalgebra::{Isometry3, Point3, Vector2, Vector3};
+
+/// Cosine of the angle within which cameras see the same side of a thing.
+const SAME_SIDE: f64 = 0.9;
+/// Of so many of a body's points the cameras are asked whether it stands where they have it.
+const WITNESSES: usize = 160;
+/// A camera that looks through this share of what others see of a body, of what it has in view, is placed wrongly there.
+const ASTRAY: f64 = 0.5;
+/// How near to a point of a body what a camera measured still counts as the body: places that lie beside each other, metres.
+const BESIDE_M: f64 = 0.02;
+
+/// A place above the surface, asked of the cameras.
+#[derive(Clone)]
+pub(super) struct Asker<'a> {
+    pub views: Vec<Lying<'a>>,
+    pub world_from_surface: Isometry3<f64>,
+    pub tolerance_m: f64,
+}
+
+/// A camera, and how far what it shows of one body lies beside where the body is, world frame, metres.
+#[derive(Clone, Copy)]
+pub(super) struct Lying<'a> {
+    pub map: &'a DepthMap,
+    pub offset_m: Vector3<f64>,
+}
+
+impl Lying<'_> {
+    /// As [`DepthMap::look`].
+    pub fn look(&self, place: &Point3<f64>, tolerance_m: f64) -> Seen {
+        self.map.look(&(place + self.offset_m), tolerance_m)
+    }
+
+    /// Where the camera is, as seen from the body.
+    pub fn viewpoint(&self) -> Point3<f64> {
+        self.map.viewpoint() - self.offset_m
+    }
+}
+
+impl<'a> Asker<'a> {
+    /// The cameras asked about a body (its points in the surface's frame) but those that look through it where others, that measure as
+    /// well together, see it: a view that lies wrongly there says nothing of it.
+    pub fn of(
+        seen: &'a Visibility,
+        world_from_surface: Isometry3<f64>,
+        points: &[Point3<f64>],
+        tolerance_m: f64,
+    ) -> Asker<'a> {
+        let all: Vec<Lying<'a>> =
+            seen.maps.iter().map(|map| Lying { map, offset_m: Vector3::zeros() }).collect();
+        let views = match all.len() {
+            0 | 1 => all,
+            _ => without_astray(all, &world_from_surface, points),
+        };
+        Asker { views, world_from_surface, tolerance_m }
+    }
+
+    /// The best knowledge of a place (surface frame): free in any look outweighs surface, hidden and never.
+    pub fn look(&self, x: f64, y: f64, z: f64) -> Seen {
+        let place = self.world_from_surface * Point3::new(x, y, z);
+        let mut best = Seen::Never;
+        for view in &self.views {
+            best = best.max(view.look(&place, self.tolerance_m));
+            if best == Seen::Free {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Horizontal direction from a body to the cameras that had it in view, if they saw the same side of it.
+    pub fn only_from(&self, round: &Round) -> Option<[f64; 2]> {
+        let place = self.world_from_surface * Point3::new(round.x, round.y, round.middle_m);
+        let saw = self.views.iter().filter(|view| view.look(&place, 0.06) > Seen::Never);
+        let eyes = saw.map(|view| self.world_from_surface.inverse() * view.viewpoint());
+        let each: Vec<Vector2<f64>> = eyes
+            .filter_map(|eye| Vector2::new(eye.x - round.x, eye.y - round.y).try_normalize(0.1))
+            .collect();
+        let mean = each.iter().sum::<Vector2<f64>>().try_normalize(1e-9)?;
+        each.iter().all(|eye| eye.dot(&mean) > SAME_SIDE).then_some(mean.into())
+    }
+
+    /// Standard deviation of the best measurement of a point of the surface, metres; `None` if cameras that measure better look
+    /// through it: it is noise, or a mixed pixel of a depth edge.
+    pub fn support(&self, p: &Point3<f64>) -> Option<f64> {
+        let place = self.world_from_surface * p;
+        let (mut through, mut here) = (0.0, 0.0);
+        let mut best_m = f64::INFINITY;
+        for view in &self.views {
+            let seen = view.look(&place, self.tolerance_m);
+            let sigma_m = range_sigma_m((place - view.viewpoint()).norm());
+            match seen {
+                Seen::Free => through += sigma_m.powi(-2),
+                Seen::Surface => {
+                    here += sigma_m.powi(-2);
+                    best_m = best_m.min(sigma_m);
+                }
+                Seen::Hidden | Seen::Never => {}
+            }
+        }
+        (through <= here).then_some(if here > 0.0 { best_m } else { 0.0 })
+    }
+}
+
+/// Those of the cameras that do not look through a body which others see.
+fn without_astray<'a>(
+    all: Vec<Lying<'a>>,
+    world_from_surface: &Isometry3<f64>,
+    points: &[Point3<f64>],
+) -> Vec<Lying<'a>> {
+    let step = points.len().div_ceil(WITNESSES).max(1);
+    let witnesses: Vec<Point3<f64>> = points.iter().step_by(step).map(|p| world_from_surface * p).collect();
+    let through = |view: &Lying<'_>| {
+        let looks = witnesses.iter().map(|p| view.look(p, BESIDE_M));
+        let (free, here) = looks.fold((0, 0), |(free, here), seen| match seen {
+            Seen::Free => (free + 1, here),
+            Seen::Surface => (free, here + 1),
+            Seen::Hidden | Seen::Never => (free, here),
+        });
+        // A few points of its edge are no view of it.
+        (8 * (free + here) > witnesses.len()).then(|| free as f64 / (free + here) as f64)
+    };
+    let shares: Vec<Option<f64>> = all.iter().map(through).collect();
+    let weight = |view: &Lying<'_>| {
+        let middle = witnesses.get(witnesses.len() / 2).map_or(1.0, |p| (p - view.viewpoint()).norm());
+        range_sigma_m(middle).powi(-2)
+    };
+    let [mut for_it, mut against] = [0.0, 0.0];
+    for (view, share) in all.iter().zip(&shares) {
+        match share {
+            Some(share) if *share > ASTRAY => against += weight(view),
+            Some(_) => for_it += weight(view),
+            None => {}
+        }
+    }
+    if against == 0.0 || against >= for_it {
+        return all;
+    }
+    all.into_iter()
+        .zip(shares)
+        .filter(|(_, share)| share.is_none_or(|s| s <= ASTRAY))
+        .map(|(v, _)| v)
+        .collect()
+}

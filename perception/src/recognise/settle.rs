@@ -1,0 +1,280 @@
+//! Laying what the views show of one round body on each other.
+//!
+//! Views are merged as wholes, and as such they lie within a centimetre or so of each other: localisation errs, a tracker drifts, and
+//! the front of a lone cup and its back have no point in common that would hold them together. Of a round body each view by itself
+//! tells where the axis stands. So each gets a small shift of its own, as likely as [`SHIFT_M`] says, and axis, radius, slope and
+//! shifts are found together.
+
+use super::asker::{Asker, Lying};
+use crate::round::{self, Round, side_band};
+use crate::segment::Segment;
+use crate::surface::range_sigma_m;
+use crate::visibility::DepthMap;
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// Standard deviation of how far a view lies beside the others at one body, metres.
+const SHIFT_M: f64 = 0.008;
+/// Views that lie nearer to each other than this are left as they are, metres.
+const LEAST_M: f64 = 0.004;
+/// The side has to spread by no more than this share of what it did.
+const ROUNDER: f64 = 0.85;
+/// So near to the side a point is taken for one of it, metres.
+const SIDE_M: f64 = 0.008;
+/// No view is moved farther than this: it shows something else, metres.
+const MOST_M: f64 = 0.03;
+/// Points farther from the side than this tell nothing of it, metres: at first, and once it is near.
+const GATES_M: [f64; 8] = [0.02, 0.02, 0.016, 0.016, 0.012, 0.012, 0.01, 0.01];
+/// Points of a view that are enough to go by, and those that it needs.
+const ENOUGH: usize = 400;
+const FEWEST: usize = 40;
+/// Depths of one view of a body count for no more than so many.
+const INDEPENDENT: f64 = 25.0;
+/// Share of what a view shows of the body that has to lie on it, and how well, in spreads of a measurement, when the view is settled.
+const ON_IT: f64 = 0.7;
+const SPREADS: f64 = 1.3;
+/// However good the camera, a side is no smoother than this, metres.
+const SMOOTH_M: f64 = 0.0025;
+/// Side of the cells in which the points of a body are looked for in the views, and of those that they are thinned to, metres.
+const CELL_M: f64 = 0.01;
+const FUSE_M: f64 = 0.003;
+
+/// A body whose views are laid on each other.
+pub(super) struct Settled<'a> {
+    pub segment: Segment,
+    /// The cameras as they lie there.
+    pub asker: Asker<'a>,
+    pub round: Round,
+}
+
+/// A body with its views laid on each other; none if they lie so already, or if what they show becomes no rounder by it.
+pub(super) fn settle<'a>(
+    round: &Round,
+    segment: &Segment,
+    asker: &Asker<'a>,
+    (base_m, top_m): (f64, f64),
+    sigma_m: f64,
+) -> Option<Settled<'a>> {
+    if asker.views.len() < 2 {
+        return None;
+    }
+    let cells = Cells::of(&segment.points);
+    let shown: Vec<Vec<Point3<f64>>> = asker.views.iter().map(|view| shown_of(view, asker, &cells)).collect();
+    let band = side_band(base_m, top_m);
+    let sides: Vec<Side> = shown
+        .iter()
+        .zip(&asker.views)
+        .map(|(points, view)| Side::of(points.iter().filter(|p| band.contains(&p.z)), view, asker, round))
+        .collect();
+    let (body, shifts) = lay(round, &sides)?;
+    let moved = shown
+        .into_iter()
+        .zip(&shifts)
+        .flat_map(|(points, &[x, y])| points.into_iter().map(move |p| Point3::new(p.x - x, p.y - y, p.z)));
+    // What lay beside the body before and does so still is another thing, or the edge of one.
+    let of_it = |p: &Point3<f64>| body.outside_m(p) < SIDE_M || cells.holds(p);
+    let segment = Segment { points: thinned(moved.filter(of_it)), ..segment.clone() };
+    let settled = round::fit(&segment.points, base_m, top_m, sigma_m, 7)?;
+    if settled.spread_m > ROUNDER * round.spread_m {
+        return None;
+    }
+    let to_world =
+        |shift: &[f64; 2]| asker.world_from_surface.rotation * Vector3::new(shift[0], shift[1], 0.0);
+    let views = asker.views.iter().zip(&shifts);
+    let views = views.map(|(view, s)| Lying { offset_m: view.offset_m + to_world(s), ..*view }).collect();
+    Some(Settled { segment, asker: Asker { views, ..asker.clone() }, round: settled })
+}
+
+/// What one view shows of the side.
+struct Side {
+    points: Vec<Point3<f64>>,
+    /// Spread of a measurement, metres.
+    sigma_m: f64,
+}
+
+impl Side {
+    fn of<'p>(
+        points: impl Iterator<Item = &'p Point3<f64>>,
+        view: &Lying<'_>,
+        asker: &Asker<'_>,
+        round: &Round,
+    ) -> Side {
+        let near = |p: &&Point3<f64>| round.outside_m(p).abs() < GATES_M[0] + SHIFT_M;
+        let mut points: Vec<Point3<f64>> = points.filter(near).copied().collect();
+        let step = points.len().div_ceil(ENOUGH).max(1);
+        points = points.into_iter().step_by(step).collect();
+        if points.len() < FEWEST {
+            points.clear();
+        }
+        let foot = asker.world_from_surface * Point3::new(round.x, round.y, round.middle_m);
+        Side { points, sigma_m: range_sigma_m((foot - view.viewpoint()).norm()) }
+    }
+}
+
+/// The body, and by how much each view lies beside it, surface frame, metres: axis, radius, slope and shifts by Gauss-Newton. None if there is
+/// nothing to move, or if what a view shows does not lie on the body even then.
+fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
+    /// Columns before those of the shifts: axis, radius and slope.
+    const BODY: usize = 4;
+    if sides.iter().filter(|side| !side.points.is_empty()).count() < 2 {
+        return None;
+    }
+    let mut body = *round;
+    let mut shifts = vec![[0.0_f64; 2]; sides.len()];
+    for gate_m in GATES_M {
+        let size = BODY + 2 * sides.len();
+        let (mut normal, mut right) = (DMatrix::<f64>::zeros(size, size), DVector::<f64>::zeros(size));
+        for (v, side) in sides.iter().enumerate() {
+            let weight = (INDEPENDENT / side.points.len().max(1) as f64).min(1.0) / side.sigma_m.powi(2);
+            let at = BODY + 2 * v;
+            for p in &side.points {
+                let (x, y) = (p.x - body.x - shifts[v][0], p.y - body.y - shifts[v][1]);
+                let from_axis = x.hypot(y).max(1e-6);
+                let miss = from_axis - body.radius_at(p.z);
+                if miss.abs() > gate_m {
+                    continue;
+                }
+                let w = weight * (1.0 - (miss / gate_m).powi(2)).powi(2);
+                let (ux, uy) = (x / from_axis, y / from_axis);
+                let row = [(0, ux), (1, uy), (2, 1.0), (3, p.z - body.middle_m), (at, ux), (at + 1, uy)];
+                for (i, a) in row {
+                    right[i] += w * a * miss;
+                    row.iter().for_each(|&(j, b)| normal[(i, j)] += w * a * b);
+                }
+            }
+            for k in 0..2 {
+                normal[(at + k, at + k)] += SHIFT_M.powi(-2);
+                right[at + k] -= shifts[v][k] * SHIFT_M.powi(-2);
+            }
+        }
+        for (k, spread) in [(2, 0.05_f64), (3, 0.1)] {
+            normal[(k, k)] += spread.powi(-2);
+        }
+        right[3] -= body.slope * 0.1_f64.powi(-2);
+        let step = normal.cholesky()?.solve(&right);
+        body.x += step[0];
+        body.y += step[1];
+        body.radius_m += step[2];
+        body.slope = (body.slope + step[3]).clamp(-0.6, 0.6);
+        shifts.iter_mut().enumerate().for_each(|(v, s)| {
+            s[0] += step[BODY + 2 * v];
+            s[1] += step[BODY + 2 * v + 1];
+        });
+    }
+    let far = shifts.iter().map(|s| s[0].hypot(s[1])).fold(0.0, f64::max);
+    let on_it = |(side, shift): (&Side, &[f64; 2])| side.lies_on(&body, *shift);
+    ((LEAST_M..MOST_M).contains(&far) && body.radius_m > 0.0 && sides.iter().zip(&shifts).all(on_it))
+        .then_some((body, shifts))
+}
+
+impl Side {
+    /// Whether what is shown, moved back by a shift, is the side of a body, as smooth as the camera measures.
+    fn lies_on(&self, body: &Round, [x, y]: [f64; 2]) -> bool {
+        const GATE_M: f64 = 0.01;
+        let misses = self.points.iter().map(|p| body.outside_m(&Point3::new(p.x - x, p.y - y, p.z)));
+        let near: Vec<f64> = misses.filter(|m| m.abs() < GATE_M.max(2.0 * self.sigma_m)).collect();
+        let spread_m = (near.iter().map(|m| m * m).sum::<f64>() / near.len().max(1) as f64).sqrt();
+        self.points.is_empty()
+            || (near.len() as f64 > ON_IT * self.points.len() as f64
+                && spread_m < SMOOTH_M.max(SPREADS * self.sigma_m))
+    }
+}
+
+/// The cells that the points of a body lie in, seen from above, those beside them, and their range of heights.
+struct Cells {
+    own: FxHashSet<[i32; 2]>,
+    beside: FxHashSet<[i32; 2]>,
+    low: Point3<f64>,
+    high: Point3<f64>,
+}
+
+impl Cells {
+    fn of(points: &[Point3<f64>]) -> Cells {
+        let own: FxHashSet<[i32; 2]> = points.iter().map(Cells::cell).collect();
+        let around = |&[x, y]: &[i32; 2]| (0..9).map(move |k| [x + k % 3 - 1, y + k / 3 - 1]);
+        let beside = own.iter().flat_map(around).collect();
+        let ends = |end: fn(f64, f64) -> f64, from: f64| {
+            let reach = points.iter().fold(Point3::new(from, from, from), |a, p| {
+                Point3::new(end(a.x, p.x), end(a.y, p.y), end(a.z, p.z))
+            });
+            reach - Vector3::new(1.0, 1.0, 0.0) * (from.signum() * 2.0 * CELL_M)
+        };
+        let (low, high) = (ends(f64::min, f64::INFINITY), ends(f64::max, f64::NEG_INFINITY));
+        Cells { own, beside, low, high }
+    }
+
+    fn cell(p: &Point3<f64>) -> [i32; 2] {
+        [p.x, p.y].map(|m| (m / CELL_M).floor() as i32)
+    }
+
+    fn holds(&self, p: &Point3<f64>) -> bool {
+        self.own.contains(&Cells::cell(p))
+    }
+
+    /// Whether a point is in or beside the cells, no lower and no higher than the body.
+    fn reaches(&self, p: &Point3<f64>) -> bool {
+        p.z > self.low.z && p.z < self.high.z && self.beside.contains(&Cells::cell(p))
+    }
+}
+
+/// What a camera measured in or beside the cells of a body, surface frame.
+fn shown_of(view: &Lying<'_>, asker: &Asker<'_>, body: &Cells) -> Vec<Point3<f64>> {
+    let surface_from_camera = asker.world_from_surface.inverse() * view.map.camera_from_world.inverse();
+    let mut shown = Vec::new();
+    let Some([columns, rows]) = pixels_of(view.map, &surface_from_camera.inverse(), body) else {
+        return shown;
+    };
+    let i = view.map.intrinsics;
+    for v in rows {
+        for u in columns.clone() {
+            let z = f64::from(view.map.depths_m[v * i.width + u]);
+            if !z.is_finite() {
+                continue;
+            }
+            let p = surface_from_camera
+                * Point3::new((u as f64 - i.cx) / i.fx * z, (v as f64 - i.cy) / i.fy * z, z);
+            if body.reaches(&p) {
+                shown.push(p);
+            }
+        }
+    }
+    shown
+}
+
+/// The pixels that a body's box may fall on: columns and rows. None if it is not in view, or reaches behind the camera.
+fn pixels_of(
+    map: &DepthMap,
+    camera_from_surface: &Isometry3<f64>,
+    body: &Cells,
+) -> Option<[std::ops::Range<usize>; 2]> {
+    let mut reach = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+    for corner in 0..8 {
+        let of = |k: usize| if corner >> k & 1 == 0 { body.low[k] } else { body.high[k] };
+        let (u, v) = map.intrinsics.project(&(camera_from_surface * Point3::new(of(0), of(1), of(2))))?;
+        for (reach, at) in reach.iter_mut().zip([u, v]) {
+            *reach = [reach[0].min(at), reach[1].max(at)];
+        }
+    }
+    let sizes = [map.intrinsics.width, map.intrinsics.height];
+    let mut ranges = reach.into_iter().zip(sizes).map(|([low, high], size)| {
+        let within = |at: f64| at.clamp(0.0, size as f64) as usize;
+        within(low.floor())..within(high.ceil() + 1.0)
+    });
+    Some([ranges.next()?, ranges.next()?])
+}
+
+/// One point in each small cube: the middle of those there.
+fn thinned(points: impl Iterator<Item = Point3<f64>>) -> Vec<Point3<f64>> {
+    let mut cubes: FxHashMap<[i32; 3], usize> = FxHashMap::default();
+    let mut sums: Vec<(Vector3<f64>, f64)> = Vec::new();
+    for p in points {
+        let cube = [p.x, p.y, p.z].map(|m| (m / FUSE_M).floor() as i32);
+        let at = *cubes.entry(cube).or_insert_with(|| {
+            sums.push((Vector3::zeros(), 0.0));
+            sums.len() - 1
+        });
+        sums[at].0 += p.coords;
+        sums[at].1 += 1.0;
+    }
+    sums.into_iter().map(|(sum, n)| Point3::from(sum / n)).collect()
+}

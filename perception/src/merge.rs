@@ -319,7 +319,7 @@ fn filter_and_thin(
     let points = prepared.iter().map(|p| p.points.len()).sum();
     if points == 0 {
         let band =
-            options.height_band_m.map_or(String::new(), |(low, high)| format!(" and {low} to {high} m high"));
+            options.height_band_m.map_or(String::new(), |(low, high)| format!(" and {low:.2} to {high:.2} m high"));
         return Err(MergeError::Empty { views: views.len(), range_m: options.range_m, band });
     }
     let step = |name: &str, points, result: String| Step { name: name.to_owned(), points, result };

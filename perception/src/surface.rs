@@ -333,7 +333,7 @@ fn claim(surface: &Surface, samples: &[Sample]) -> f64 {
 fn wanted(options: &SurfaceOptions) -> String {
     let band = options
         .height_band_m
-        .map_or(String::new(), |(low, high)| format!(" between {low} and {high} m high"));
+        .map_or(String::new(), |(low, high)| format!(" between {low:.2} and {high:.2} m high"));
     let tilt = options
         .up
         .map_or(String::new(), |_| format!(" within {:.0}° of level", options.tilt_rad.to_degrees()));

@@ -133,3 +133,13 @@ fn what_may_be_the_floor_proves_nothing() {
     assert_eq!(said["verdict"], "cannot_tell", "{said}");
     assert!(why.contains("may be the floor") || why.contains("is the floor"), "{why}");
 }
+
+#[test]
+fn what_takes_a_hand_is_refused_for_want_of_one() {
+    let folder = TempDir::new().expect("a folder can be made");
+    record(&folder.path().join("plane"), PLANE, &[([0.0, -2.9], [0.0, -1.2, 0.1])]);
+    let pick = ["do", "pick up cup A", "--domain", "home", "--robot", "recorded:plane", "--json"];
+    let said = check(folder.path(), &pick, 1);
+    assert_eq!((&said["verdict"], &said["views"]), (&"impossible".into(), &0.into()), "{said}");
+    assert!(said["why"].as_str().is_some_and(|why| why.starts_with("the body has no hand")), "{said}");
+}

@@ -97,10 +97,11 @@ pub(crate) fn conclude(
     lexicon: &Lexicon,
     mind: &Mind,
     round: &Round,
+    lacks: Option<&'static str>,
     ended: &Ended,
 ) -> Conclusion {
     let s = &*round.situation;
-    let asker = Asker { goal, lexicon, mind, round, s };
+    let asker = Asker { goal, lexicon, mind, round, lacks, s };
     let (verdict, why) = match ended {
         Ended::Reached => asker.reached(),
         Ended::NoPlan(why) => asker.gave_up(why, true),
@@ -145,6 +146,8 @@ struct Asker<'a> {
     lexicon: &'a Lexicon,
     mind: &'a Mind,
     round: &'a Round,
+    /// A part that the domain needs and the body does not have.
+    lacks: Option<&'static str>,
     s: &'a Situation,
 }
 
@@ -204,7 +207,9 @@ impl Asker<'_> {
         let is_beyond_looks = self.goal.asked.more
             && !missing.is_empty()
             && missing.iter().all(|&n| s.doubt_about(n).can_be_settled(s));
-        if is_beyond_looks && is_proven {
+        // No look is needed to know it where a part is missing that nothing can be brought about without.
+        let is_beyond_the_body = self.goal.asked.more && self.lacks.is_some() && self.mind.views == 0;
+        if (is_beyond_looks || is_beyond_the_body) && is_proven {
             return (Verdict::Impossible, self.impossible(&says));
         }
         let left = |n: usize| self.nothing_seen(&s.things[n]).or_else(|| reasons::left_about(s, n));
@@ -252,7 +257,8 @@ impl Asker<'_> {
     fn impossible(&self, says: &str) -> String {
         let known = self.surely();
         let known = if known.is_empty() { String::new() } else { format!("{}; ", known.join("; ")) };
-        format!("{known}nothing that can be done brings about {}{says}", self.goal.pddl)
+        let lacks = self.lacks.map(|part| format!("the body has no {part}; ")).unwrap_or_default();
+        format!("{known}{lacks}nothing that can be done brings about {}{says}", self.goal.pddl)
     }
 
     /// Where the things stand that were asked for by name, of those of which it is sure.

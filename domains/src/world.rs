@@ -558,10 +558,13 @@ impl<'a> World<'a> {
 
     /// What is answered in the end.
     pub fn answer(&self, round: &Round, ended: &Ended) -> Conclusion {
-        let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.answers);
+        let abilities = || abilities::used(&self.setting.domain.config.uses);
+        let own = abilities().find_map(|a| a.answers);
+        let body = round.situation.robot.description();
+        let lacks = abilities().find_map(|a| a.lacks?(body));
         let goal = self.setting.goal;
         own.and_then(|answers| answers(goal, &self.mind, &round.situation, ended))
-            .unwrap_or_else(|| answer::conclude(goal, &self.lexicon, &self.mind, round, ended))
+            .unwrap_or_else(|| answer::conclude(goal, &self.lexicon, &self.mind, round, lacks, ended))
     }
 }
 

@@ -318,8 +318,9 @@ fn filter_and_thin(
     let given = views.iter().map(|v| v.cloud.count_finite()).sum();
     let points = prepared.iter().map(|p| p.points.len()).sum();
     if points == 0 {
-        let band =
-            options.height_band_m.map_or(String::new(), |(low, high)| format!(" and {low:.2} to {high:.2} m high"));
+        let band = options
+            .height_band_m
+            .map_or(String::new(), |(low, high)| format!(" and {low:.2} to {high:.2} m high"));
         return Err(MergeError::Empty { views: views.len(), range_m: options.range_m, band });
     }
     let step = |name: &str, points, result: String| Step { name: name.to_owned(), points, result };

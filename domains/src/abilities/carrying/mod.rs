@@ -80,6 +80,7 @@ pub const ABILITY: Ability = Ability {
             failed: put_down_failed,
         },
     ],
+    lacks: Some(|body| body.hand_opening_m.is_none().then_some("hand")),
     begins: None,
     fallback: Some(fallback),
     answers: None,

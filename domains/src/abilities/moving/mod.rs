@@ -82,6 +82,7 @@ pub const ABILITY: Ability = Ability {
             failed: NOTHING_MORE,
         },
     ],
+    lacks: None,
     begins: None,
     fallback: None,
     answers: None,

@@ -66,6 +66,7 @@ pub const ABILITY: Ability = Ability {
             failed: push_failed,
         },
     ],
+    lacks: None,
     begins: None,
     fallback: None,
     answers: None,

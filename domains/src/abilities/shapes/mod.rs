@@ -82,6 +82,7 @@ pub const ABILITY: Ability = Ability {
             failed: NOTHING_MORE,
         },
     ],
+    lacks: None,
     begins: Some(begins),
     fallback: Some(calls::fallback),
     answers: Some(telling::answer),

@@ -41,6 +41,7 @@ pub const ABILITY: Ability = Ability {
         learn: charted,
         failed: NOTHING_MORE,
     }],
+    lacks: None,
     begins: Some(begins),
     fallback: Some(calls::fallback),
     answers: Some(telling::answer),

@@ -17,6 +17,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 const SHIFT_M: f64 = 0.008;
 /// Views that lie nearer to each other than this are left as they are, metres.
 const LEAST_M: f64 = 0.004;
+/// The views of a side that spreads by less than this, or than a measurement, lie where they belong, metres.
+const TIGHT_M: f64 = 0.002;
 /// The side has to spread by no more than this share of what it did.
 const ROUNDER: f64 = 0.85;
 /// So near to the side a point is taken for one of it, metres.
@@ -55,7 +57,7 @@ pub(super) fn settle<'a>(
     (base_m, top_m): (f64, f64),
     sigma_m: f64,
 ) -> Option<Settled<'a>> {
-    if asker.views.len() < 2 {
+    if asker.views.len() < 2 || round.spread_m < sigma_m.max(TIGHT_M) {
         return None;
     }
     let cells = Cells::of(&segment.points);
@@ -111,8 +113,8 @@ impl Side {
     }
 }
 
-/// The body, and by how much each view lies beside it, surface frame, metres: axis, radius, slope and shifts by Gauss-Newton. None if there is
-/// nothing to move, or if what a view shows does not lie on the body even then.
+/// The body, and by how much each view lies beside it, surface frame, metres: axis, radius, slope and shifts by Gauss-Newton. None if
+/// there is nothing to move, or if what a view shows does not lie on the body even then.
 fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
     /// Columns before those of the shifts: axis, radius and slope.
     const BODY: usize = 4;

@@ -1,0 +1,480 @@
+//! Preferences and constraints of PDDL3 compiled away, for searches that know only a goal and costs.
+//!
+//! - A constraint becomes the flags of its automaton ([`Automaton`]): an action that may change its conditions looks at them
+//!   right before, where they have been the same since the last such action, and the goal looks at the last state.
+//! - A preference becomes two actions, one free where it is kept and one that pays where it is not (Keyder and Geffner 2009,
+//!   "Soft goals can be compiled away"). They follow the last action of the plan one preference after the other, so that
+//!   their order leaves nothing to search.
+//! - An action with preferences of its own becomes several of its name: each preference is a condition, or is paid for.
+
+mod conditions;
+mod touch;
+
+use rustc_hash::FxHashMap;
+
+use crate::diagnostic::Span;
+use crate::model::automaton::{AT_END, Automaton, Cases, Literal};
+use crate::model::walk::{self, Part};
+use crate::task::{
+    Action, Assignment, Atom, Change, Condition, Effect, Expression, Fact, Fluent, Function, FunctionId,
+    GroundFluent, Object, ObjectId, Parameter, Predicate, PredicateId, PreferenceId, PreferredGoal,
+    Quantified, Rule, Task, Term, Timed, Trajectory, TypeId,
+};
+
+use conditions::{Fixed, all, any, each_binding, is_false, negated};
+use touch::Mentioned;
+
+/// Preferences of one action that become conditions of its copies, at most.
+const MOST_OF_AN_ACTION: usize = 3;
+
+/// A task without preferences and constraints.
+pub(crate) struct Compiled {
+    /// The task. Actions whose names hold a blank are no steps of a plan.
+    pub task: Task,
+    /// Some preference is not in it.
+    pub forgets_preferences: bool,
+}
+
+/// The task without its preferences and constraints; `None` where it has none.
+pub(crate) fn compile(task: &Task) -> Option<Compiled> {
+    if task.constraints.is_empty() && task.preferences.is_empty() {
+        return None;
+    }
+    let mut compiler = Compiler::new(task);
+    for (action, own) in task.actions.iter().enumerate() {
+        compiler.action_preferences(action, own);
+    }
+    for constraint in &task.constraints {
+        let Trajectory { forall, operator, conditions, slots, preference, .. } = constraint;
+        match Automaton::of(*operator) {
+            Some(automaton) => compiler.instances(automaton, forall, *slots, conditions, *preference),
+            None => compiler.forget(*preference),
+        }
+    }
+    for (preference, own) in (0..).map(PreferenceId).zip(&task.preferences) {
+        for PreferredGoal { forall, condition, slots, .. } in &own.goals {
+            let conditions = std::slice::from_ref(condition);
+            compiler.instances(&AT_END, forall, *slots, conditions, Some(preference));
+        }
+    }
+    Some(compiler.finish())
+}
+
+/// A constraint or preference with objects for its variables.
+struct Instance {
+    automaton: &'static Automaton,
+    /// Both conditions; atoms and their absence only, where numbers are compared.
+    conditions: [Condition; 2],
+    /// Facts: the automaton's flags, and one for having been broken where that is allowed.
+    flags: Vec<Condition>,
+    preference: Option<PreferenceId>,
+}
+
+impl Instance {
+    fn literal(&self, literal: &Literal) -> Condition {
+        let (condition, wanted) = match *literal {
+            Literal::First(wanted) => (&self.conditions[0], wanted),
+            Literal::Second(wanted) => (&self.conditions[1], wanted),
+            Literal::Flag(flag, wanted) => (&self.flags[flag], wanted),
+        };
+        if wanted { condition.clone() } else { negated(condition) }
+    }
+
+    fn case(&self, case: &[Literal]) -> Condition {
+        all(case.iter().map(|literal| self.literal(literal)))
+    }
+
+    fn cases(&self, cases: Cases) -> Condition {
+        any(cases.iter().map(|case| self.case(case)))
+    }
+
+    /// The fact that it was broken.
+    fn was_broken(&self) -> Option<&Condition> {
+        self.flags.get(self.automaton.flags)
+    }
+
+    /// What must hold in the last state.
+    fn kept(&self) -> Condition {
+        let broken = any([self.cases(self.automaton.broken), self.cases(self.automaton.open)]);
+        all(self.was_broken().map(negated).into_iter().chain([negated(&broken)]))
+    }
+}
+
+struct Compiler<'t> {
+    task: &'t Task,
+    made: Task,
+    fixed: Fixed,
+    /// By preference: the function that counts its violations, if the metric asks for them.
+    counters: Vec<Option<FunctionId>>,
+    /// The predicate of all flags, one object each.
+    flag: PredicateId,
+    flags: usize,
+    /// Objects that were added.
+    stages: Vec<ObjectId>,
+    /// What each preference that is not decided asks of the last state.
+    kept: Vec<(PreferenceId, Condition)>,
+    /// Violations that nothing can avert.
+    lost: FxHashMap<PreferenceId, f64>,
+    goal: Vec<Condition>,
+    forgets_preferences: bool,
+}
+
+impl<'t> Compiler<'t> {
+    fn new(task: &'t Task) -> Compiler<'t> {
+        let mut made = task.clone();
+        made.constraints.clear();
+        made.preferences.clear();
+        for action in &mut made.actions {
+            action.preferences.clear();
+        }
+        let mut compiler = Compiler {
+            task,
+            made,
+            fixed: Fixed::new(task),
+            counters: vec![None; task.preferences.len()],
+            flag: PredicateId(0),
+            flags: 0,
+            stages: Vec::new(),
+            kept: Vec::new(),
+            lost: FxHashMap::default(),
+            goal: vec![task.goal.body.clone()],
+            forgets_preferences: false,
+        };
+        compiler.flag = compiler.predicate("seen on the way", true);
+        compiler.count_violations();
+        compiler
+    }
+
+    /// A function for each preference that the metric asks for, in its place.
+    fn count_violations(&mut self) {
+        let Some(metric) = &self.task.metric else { return };
+        walk::expression(&metric.value, &mut |part| {
+            if let Part::Expression(Expression::Violated(id)) = part
+                && self.counters[id.index()].is_none()
+            {
+                let name = format!("violations of {}", self.task.preferences[id.index()].name);
+                self.counters[id.index()] = Some(function(&mut self.made, name));
+            }
+        });
+        let counters = &self.counters;
+        if let Some(metric) = &mut self.made.metric {
+            metric.value = walk::replaced(&metric.value, &|part| match part {
+                Expression::Violated(id) => counters[id.index()].map(counted),
+                _ => None,
+            });
+        }
+    }
+
+    /// Something stays to be looked at after the search.
+    fn forget(&mut self, preference: Option<PreferenceId>) {
+        self.forgets_preferences |= preference.is_some();
+    }
+
+    fn predicate(&mut self, name: &str, over_stages: bool) -> PredicateId {
+        let id = PredicateId(self.made.predicates.len() as u32);
+        let (types, objects, span) = (vec![TypeId(0)], Vec::new().into(), Span::default());
+        let parameter = Parameter { name: "?stage".to_string(), types, objects, span };
+        let parameters = if over_stages { vec![parameter] } else { Vec::new() };
+        let name = name.to_string();
+        self.made.predicates.push(Predicate { name, parameters, stratum: None, span });
+        id
+    }
+
+    /// An object of its own for a number.
+    fn stage(&mut self, number: usize) -> ObjectId {
+        while self.stages.len() <= number {
+            self.stages.push(ObjectId(self.made.objects.len() as u32));
+            let name = format!("stage {}", self.stages.len());
+            self.made.objects.push(Object { name, types: vec![TypeId(0)], span: Span::default() });
+        }
+        self.stages[number]
+    }
+
+    fn fresh_flag(&mut self) -> Condition {
+        self.flags += 1;
+        let stage = self.stage(self.flags - 1);
+        Condition::Atom(atom(self.flag, &[stage]))
+    }
+
+    /// Every instance of a constraint or preference.
+    fn instances(
+        &mut self,
+        automaton: &'static Automaton,
+        forall: &[Quantified],
+        slots: usize,
+        conditions: &[Condition],
+        preference: Option<PreferenceId>,
+    ) {
+        if preference.is_some_and(|id| self.counters[id.index()].is_none()) {
+            return self.forget(preference);
+        }
+        let mut bindings = Vec::new();
+        each_binding(forall, &mut vec![None; slots], &mut |binding| bindings.push(binding.clone()));
+        for mut binding in bindings {
+            let ground = |condition| self.fixed.ground(condition, &mut binding);
+            let own: Vec<Condition> = conditions.iter().map(ground).collect();
+            self.instance(automaton, own, preference);
+        }
+    }
+
+    fn instance(
+        &mut self,
+        automaton: &'static Automaton,
+        conditions: Vec<Condition>,
+        preference: Option<PreferenceId>,
+    ) {
+        let task = self.task;
+        let mentioned = Mentioned::of(task, &conditions);
+        let timed = !task.init.timed.is_empty();
+        if mentioned.opaque || mentioned.drifts(task) || timed && preference.is_some() {
+            return self.forget(preference);
+        }
+        let mut conditions = conditions.into_iter().chain([Condition::TRUE, Condition::TRUE]);
+        let mut next = || conditions.next().unwrap_or_default();
+        let mut conditions = [next(), next()];
+        if mentioned.compares {
+            conditions = conditions.map(|condition| self.derived(condition));
+        }
+        let may_break = !automaton.broken.is_empty() && preference.is_some();
+        let flags = (0..automaton.flags + usize::from(may_break)).map(|_| self.fresh_flag()).collect();
+        let instance = Instance { automaton, conditions, flags, preference };
+        if automaton.flags > 0 || !automaton.broken.is_empty() {
+            for index in 0..task.actions.len() {
+                self.watch(&instance, &mentioned, index);
+            }
+        }
+        let kept = instance.kept();
+        match preference {
+            None => self.goal.push(kept),
+            Some(id) if is_false(&kept) => *self.lost.entry(id).or_default() += 1.0,
+            Some(_) if kept.is_true() => {}
+            Some(id) => self.kept.push((id, kept)),
+        }
+    }
+
+    /// A derived fact in place of a condition of which the opposite cannot be said.
+    fn derived(&mut self, condition: Condition) -> Condition {
+        if condition.is_true() {
+            return condition;
+        }
+        let predicate = self.predicate("holds", false);
+        let stratum = self.made.predicates.iter().filter_map(|own| own.stratum).max();
+        self.made.predicates[predicate.index()].stratum = Some(stratum.map_or(0, |top| top + 1));
+        let (parameters, span) = (Vec::new(), Span::default());
+        self.made.rules.push(Rule { predicate, parameters, slots: 0, body: condition, span });
+        Condition::Atom(atom(predicate, &[]))
+    }
+
+    /// Lets an action look, right before it changes something.
+    fn watch(&mut self, instance: &Instance, mentioned: &Mentioned, index: usize) {
+        let own = &self.task.actions[index];
+        let start = mentioned.touched(own, &own.effects.start);
+        let end = mentioned.touched(own, &own.effects.end);
+        let copies =
+            self.made.actions.iter_mut().filter(|made| made.span == own.span && made.name == own.name);
+        for made in copies {
+            look(instance, &start, &mut made.condition.start, &mut made.effects.start, false);
+            look(instance, &end, &mut made.condition.end, &mut made.effects.end, true);
+        }
+    }
+}
+
+/// Conditions and effects that an instance has on an action that touches it.
+fn look(
+    instance: &Instance,
+    touched: &Condition,
+    condition: &mut Condition,
+    effects: &mut Vec<Effect>,
+    at_end: bool,
+) {
+    if is_false(touched) {
+        return;
+    }
+    let mut set = |fact: &Condition, raised: bool, when: Condition| {
+        let Condition::Atom(fact) = fact else { return };
+        if !is_false(&when) {
+            let change = if raised { Change::Add(fact.clone()) } else { Change::Delete(fact.clone()) };
+            effects.push(effect(change, when, at_end));
+        }
+    };
+    for (flag, raised, case) in instance.automaton.changes {
+        set(&instance.flags[*flag], *raised, all([touched.clone(), instance.case(case)]));
+    }
+    let broken = instance.cases(instance.automaton.broken);
+    match (instance.was_broken(), instance.preference) {
+        (Some(fact), _) => set(fact, true, all([touched.clone(), broken])),
+        (None, None) => {
+            let kept = any([negated(touched), negated(&broken)]);
+            *condition = all([std::mem::take(condition), kept]);
+        }
+        (None, Some(_)) => {}
+    }
+}
+
+impl Compiler<'_> {
+    /// Copies of an action, one for each set of its preferences that it pays for.
+    fn action_preferences(&mut self, index: usize, own: &Action) {
+        let mut parts: Vec<(FunctionId, bool, &Condition)> = Vec::new();
+        for (id, Timed { start, over_all, end }) in &own.preferences {
+            let Some(counter) = self.counters[id.index()] else {
+                self.forget(Some(*id));
+                continue;
+            };
+            let mut exact = over_all.is_true();
+            for (condition, at_end) in [(start, false), (end, true)].into_iter().filter(|p| !p.0.is_true()) {
+                walk::condition(condition, &mut |part| {
+                    exact &= !matches!(part, Part::Condition(Condition::Compare(..)));
+                });
+                parts.push((counter, at_end, condition));
+            }
+            self.forgets_preferences |= !exact;
+            parts.retain(|part| exact || part.0 != counter);
+        }
+        if parts.len() > MOST_OF_AN_ACTION {
+            self.forgets_preferences = true;
+            return;
+        }
+        let plain = self.made.actions[index].clone();
+        for paid in 0..1usize << parts.len() {
+            let mut copy = plain.clone();
+            for (number, &(counter, at_end, condition)) in parts.iter().enumerate() {
+                let pays = paid >> number & 1 == 1;
+                let asked = if pays { negated(condition) } else { condition.clone() };
+                let place = if at_end { &mut copy.condition.end } else { &mut copy.condition.start };
+                *place = all([std::mem::take(place), asked]);
+                if pays {
+                    let effects = if at_end { &mut copy.effects.end } else { &mut copy.effects.start };
+                    effects.push(pay(counter, 1.0, at_end));
+                }
+            }
+            match paid {
+                0 => self.made.actions[index] = copy,
+                _ => self.made.actions.push(copy),
+            }
+        }
+    }
+
+    fn finish(mut self) -> Compiled {
+        let soft = !self.kept.is_empty() || !self.lost.is_empty();
+        if soft {
+            self.steps_for_time();
+            self.last_stage();
+        }
+        self.made.goal.body = all(self.goal);
+        Compiled { task: self.made, forgets_preferences: self.forgets_preferences }
+    }
+
+    /// The actions after the last one of the plan.
+    fn last_stage(&mut self) {
+        let working = self.predicate("at work", false);
+        let turn = self.predicate("turn", true);
+        let at_work = Condition::Atom(atom(working, &[]));
+        let durative = |action: &Action| action.duration.is_some();
+        for action in &mut self.made.actions {
+            let start = std::mem::take(&mut action.condition.start);
+            action.condition.start = all([at_work.clone(), start]);
+            if durative(action) {
+                let end = std::mem::take(&mut action.condition.end);
+                action.condition.end = all([at_work.clone(), end]);
+            }
+        }
+        self.made.init.facts.push(Fact { predicate: working, arguments: Box::new([]) });
+        let first = atom(turn, &[self.stage(0)]);
+        let mut effects = vec![
+            effect(Change::Delete(atom(working, &[])), Condition::TRUE, false),
+            effect(Change::Add(first.clone()), Condition::TRUE, false),
+        ];
+        let mut lost: Vec<_> = std::mem::take(&mut self.lost).into_iter().collect();
+        lost.sort_unstable_by_key(|(id, _)| *id);
+        let paid = lost.into_iter().filter_map(|(id, times)| Some((self.counters[id.index()]?, times)));
+        effects.extend(paid.map(|(counter, times)| pay(counter, times, false)));
+        let condition = all([at_work].into_iter().chain(self.goal.iter().cloned()));
+        let slots = self.task.goal.slots;
+        self.made.actions.push(Action { slots, ..bookkeeping("end of plan", condition, effects) });
+        let mut now = first;
+        for (number, (id, kept)) in std::mem::take(&mut self.kept).into_iter().enumerate() {
+            let next = atom(turn, &[self.stage(number + 1)]);
+            let step = vec![
+                effect(Change::Delete(now.clone()), Condition::TRUE, false),
+                effect(Change::Add(next.clone()), Condition::TRUE, false),
+            ];
+            let turn = Condition::Atom(now);
+            let violated = all([turn.clone(), negated(&kept)]);
+            self.made.actions.push(bookkeeping("keep it", all([turn, kept]), step.clone()));
+            let paid = self.counters[id.index()].map(|counter| pay(counter, 1.0, false));
+            let step = step.into_iter().chain(paid).collect();
+            self.made.actions.push(bookkeeping("give it up", violated, step));
+            now = next;
+        }
+        self.goal.push(Condition::Atom(now));
+    }
+
+    /// Without times, the length of a plan is the number of its steps, and bookkeeping is none.
+    fn steps_for_time(&mut self) {
+        let mut timed = false;
+        let metric = self.made.metric.iter();
+        metric.for_each(|metric| {
+            walk::expression(&metric.value, &mut |part| {
+                timed |= matches!(part, Part::Expression(Expression::TotalTime));
+            });
+        });
+        if !timed || self.task.is_temporal() {
+            return;
+        }
+        let steps = function(&mut self.made, "steps".to_string());
+        for action in &mut self.made.actions {
+            action.effects.start.push(pay(steps, 1.0, false));
+        }
+        if let Some(metric) = &mut self.made.metric {
+            let count = |part: &Expression| matches!(part, Expression::TotalTime).then(|| counted(steps));
+            metric.value = walk::replaced(&metric.value, &count);
+        }
+    }
+}
+
+/// A number of its own, zero at first.
+fn function(task: &mut Task, name: String) -> FunctionId {
+    let function = FunctionId(task.functions.len() as u32);
+    task.functions.push(Function { name, parameters: Vec::new(), result: None, span: Span::default() });
+    task.init.numbers.push((GroundFluent { function, arguments: Box::new([]) }, 0.0));
+    function
+}
+
+fn fluent(function: FunctionId) -> Fluent {
+    Fluent { function, arguments: Vec::new(), span: Span::default() }
+}
+
+fn counted(function: FunctionId) -> Expression {
+    Expression::Fluent(fluent(function))
+}
+
+fn atom(predicate: PredicateId, arguments: &[ObjectId]) -> Atom {
+    let arguments = arguments.iter().map(|&object| Term::Object(object)).collect();
+    Atom { predicate, arguments, span: Span::default() }
+}
+
+fn effect(change: Change, when: Condition, at_end: bool) -> Effect {
+    let (start, end) = if at_end { (Condition::TRUE, when) } else { (when, Condition::TRUE) };
+    let when = Timed { start, over_all: Condition::TRUE, end };
+    Effect { forall: Vec::new(), when, change, span: Span::default() }
+}
+
+fn pay(counter: FunctionId, times: f64, at_end: bool) -> Effect {
+    let change = Change::Number(Assignment::Increase, fluent(counter), Expression::Number(times));
+    effect(change, Condition::TRUE, at_end)
+}
+
+fn bookkeeping(name: &str, condition: Condition, effects: Vec<Effect>) -> Action {
+    Action {
+        name: name.to_string(),
+        parameters: Vec::new(),
+        slots: 0,
+        duration: None,
+        condition: Timed { start: condition, ..Timed::default() },
+        effects: Timed { start: effects, ..Timed::default() },
+        continuous: Vec::new(),
+        grounding: Vec::new(),
+        preferences: Vec::new(),
+        span: Span::default(),
+    }
+}

@@ -112,9 +112,9 @@ fn search(
     };
     let mut outcome = search_for(task, &compiled.task, attachments, options, stop, on_plan)?;
     let statistics = outcome.statistics_mut();
-    statistics.scored_only = compiled.forgets_preferences;
+    statistics.scored_only = compiled.forgets || compiled.uncounted;
     // Times say more than the compiled task does of what happens at once and when.
-    statistics.optimal &= !compiled.forgets_preferences && !task.is_temporal();
+    statistics.optimal &= !compiled.forgets && !task.is_temporal();
     Ok(outcome)
 }
 

@@ -31,8 +31,10 @@ const MOST_OF_AN_ACTION: usize = 3;
 pub(crate) struct Compiled {
     /// The task. Actions whose names hold a blank are no steps of a plan.
     pub task: Task,
-    /// Some preference is not in it.
-    pub forgets_preferences: bool,
+    /// A preference that the metric counts is not in it.
+    pub forgets: bool,
+    /// The metric counts no preference at all.
+    pub uncounted: bool,
 }
 
 /// The task without its preferences and constraints; `None` where it has none.
@@ -116,7 +118,7 @@ struct Compiler<'t> {
     /// Violations that nothing can avert.
     lost: FxHashMap<PreferenceId, f64>,
     goal: Vec<Condition>,
-    forgets_preferences: bool,
+    forgets: bool,
 }
 
 impl<'t> Compiler<'t> {
@@ -138,7 +140,7 @@ impl<'t> Compiler<'t> {
             kept: Vec::new(),
             lost: FxHashMap::default(),
             goal: vec![task.goal.body.clone()],
-            forgets_preferences: false,
+            forgets: false,
         };
         compiler.flag = compiler.predicate("seen on the way", true);
         compiler.count_violations();
@@ -167,7 +169,7 @@ impl<'t> Compiler<'t> {
 
     /// Something stays to be looked at after the search.
     fn forget(&mut self, preference: Option<PreferenceId>) {
-        self.forgets_preferences |= preference.is_some();
+        self.forgets |= preference.is_some_and(|id| self.counters[id.index()].is_some());
     }
 
     fn predicate(&mut self, name: &str, over_stages: bool) -> PredicateId {
@@ -206,7 +208,7 @@ impl<'t> Compiler<'t> {
         preference: Option<PreferenceId>,
     ) {
         if preference.is_some_and(|id| self.counters[id.index()].is_none()) {
-            return self.forget(preference);
+            return;
         }
         let mut bindings = Vec::new();
         each_binding(forall, &mut vec![None; slots], &mut |binding| bindings.push(binding.clone()));
@@ -316,10 +318,7 @@ impl Compiler<'_> {
     fn action_preferences(&mut self, index: usize, own: &Action) {
         let mut parts: Vec<(FunctionId, bool, &Condition)> = Vec::new();
         for (id, Timed { start, over_all, end }) in &own.preferences {
-            let Some(counter) = self.counters[id.index()] else {
-                self.forget(Some(*id));
-                continue;
-            };
+            let Some(counter) = self.counters[id.index()] else { continue };
             let mut exact = over_all.is_true();
             for (condition, at_end) in [(start, false), (end, true)].into_iter().filter(|p| !p.0.is_true()) {
                 walk::condition(condition, &mut |part| {
@@ -327,11 +326,11 @@ impl Compiler<'_> {
                 });
                 parts.push((counter, at_end, condition));
             }
-            self.forgets_preferences |= !exact;
+            self.forgets |= !exact;
             parts.retain(|part| exact || part.0 != counter);
         }
         if parts.len() > MOST_OF_AN_ACTION {
-            self.forgets_preferences = true;
+            self.forgets = true;
             return;
         }
         let plain = self.made.actions[index].clone();
@@ -361,7 +360,8 @@ impl Compiler<'_> {
             self.last_stage();
         }
         self.made.goal.body = all(self.goal);
-        Compiled { task: self.made, forgets_preferences: self.forgets_preferences }
+        let uncounted = self.counters.iter().all(Option::is_none) && !self.counters.is_empty();
+        Compiled { task: self.made, forgets: self.forgets, uncounted }
     }
 
     /// The actions after the last one of the plan.

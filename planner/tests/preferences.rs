@@ -104,7 +104,7 @@ fn constraints_are_planned_for() {
         ("(and (forall (?r - room) (at-most-once (at ?r))) (sometime (at c)) (sometime (at b)))", Never),
         ("(sometime-after (at a) (lit))", Least(3.0)),
         ("(sometime-after (lit) (at c))", Least(2.0)),
-        ("(and (sometime (lit)) (sometime-after (lit) (at c)))", Least(4.0)),
+        ("(and (sometime (lit)) (sometime-after (lit) (at c)))", Least(5.0)),
         ("(sometime-before (at d) (lit))", Least(3.0)),
         ("(sometime-before (at d) (at c))", Least(3.0)),
         ("(sometime-before (at a) (lit))", Never),

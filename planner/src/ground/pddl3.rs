@@ -354,9 +354,8 @@ impl Compiler<'_> {
     }
 
     fn finish(mut self) -> Compiled {
-        let soft = !self.kept.is_empty() || !self.lost.is_empty();
-        if soft {
-            self.steps_for_time();
+        self.steps_for_time();
+        if !self.kept.is_empty() || !self.lost.is_empty() {
             self.last_stage();
         }
         self.made.goal.body = all(self.goal);

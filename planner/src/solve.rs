@@ -1,5 +1,6 @@
 //! The way in: [`plan`] takes a task to a timed plan, or says why there is none.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -147,9 +148,19 @@ fn search_for(
         return out_of_memory();
     }
     let memory = memory.beside(compiled);
+    // What searches know of preferences may be less than what the validator counts.
+    let least = Cell::new(f64::INFINITY);
+    let sign = if original.metric.as_ref().is_none_or(|metric| metric.minimise) { 1.0 } else { -1.0 };
+    let check = |plan| {
+        let plan = checked(original, attachments, plan)?;
+        let cost = sign * plan.cost.unwrap_or(0.0);
+        let better = original.preferences.is_empty() || cost < least.get();
+        least.set(least.get().min(cost));
+        Ok(better.then_some(plan))
+    };
     if grounded.goal_reachable && is_classical(&grounded) {
-        let check = |plan| checked(original, attachments, plan);
-        return plan_classical(task, &grounded, options, memory, stop, &check, on_plan);
+        let soft = !original.preferences.is_empty();
+        return plan_classical(task, &grounded, options, soft, memory, stop, &check, on_plan);
     }
     let calls = Calls::bind(task, &grounded, attachments)?;
     configure(task, attachments)?;
@@ -162,11 +173,12 @@ fn search_for(
     let mut invalid: Option<PlanError> = None;
     let mut hear = |timed: &[Timed]| {
         let plan = to_plan(task, &grounded, &world, timed);
-        match checked(original, attachments, plan) {
-            Ok(plan) => {
+        match check(plan) {
+            Ok(Some(plan)) => {
                 on_plan(&plan);
                 best = Some(plan);
             }
+            Ok(None) => {}
             Err(error) => invalid = Some(error),
         }
         Ok(())

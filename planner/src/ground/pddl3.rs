@@ -21,7 +21,7 @@ use crate::task::{
     Quantified, Rule, Task, Term, Timed, Trajectory, TypeId,
 };
 
-use conditions::{Fixed, all, any, each_binding, is_false, negated};
+use conditions::{Fixed, all, any, each_binding, is_false, negated, words};
 use touch::Mentioned;
 
 /// Preferences of one action that become conditions of its copies, at most.
@@ -62,7 +62,14 @@ pub(crate) fn compile(task: &Task) -> Option<Compiled> {
     Some(compiler.finish())
 }
 
-/// A constraint or preference with objects for its variables.
+/// A constraint or preference with objects for its variables, as it is stated.
+struct Stated {
+    automaton: &'static Automaton,
+    conditions: Vec<Condition>,
+    preference: Option<PreferenceId>,
+}
+
+/// The same with what the searches need of it.
 struct Instance {
     automaton: &'static Automaton,
     /// Both conditions; atoms and their absence only, where numbers are compared.
@@ -108,13 +115,11 @@ struct Compiler<'t> {
     fixed: Fixed,
     /// By preference: the function that counts its violations, if the metric asks for them.
     counters: Vec<Option<FunctionId>>,
-    /// The predicate of all flags, one object each.
-    flag: PredicateId,
-    flags: usize,
-    /// Objects that were added.
-    stages: Vec<ObjectId>,
-    /// What each preference that is not decided asks of the last state.
-    kept: Vec<(PreferenceId, Condition)>,
+    /// Instances by what they say, with how often it is said.
+    said: FxHashMap<(String, Option<PreferenceId>), usize>,
+    instances: Vec<(Stated, f64)>,
+    /// What each preference that is not decided asks of the last state, and how often.
+    kept: Vec<(PreferenceId, f64, Condition)>,
     /// Violations that nothing can avert.
     lost: FxHashMap<PreferenceId, f64>,
     goal: Vec<Condition>,
@@ -134,15 +139,13 @@ impl<'t> Compiler<'t> {
             made,
             fixed: Fixed::new(task),
             counters: vec![None; task.preferences.len()],
-            flag: PredicateId(0),
-            flags: 0,
-            stages: Vec::new(),
+            said: FxHashMap::default(),
+            instances: Vec::new(),
             kept: Vec::new(),
             lost: FxHashMap::default(),
             goal: vec![task.goal.body.clone()],
             forgets: false,
         };
-        compiler.flag = compiler.predicate("seen on the way", true);
         compiler.count_violations();
         compiler
     }
@@ -172,33 +175,18 @@ impl<'t> Compiler<'t> {
         self.forgets |= preference.is_some_and(|id| self.counters[id.index()].is_some());
     }
 
-    fn predicate(&mut self, name: &str, over_stages: bool) -> PredicateId {
+    fn predicate(&mut self, name: &str, parameters: Vec<Parameter>) -> PredicateId {
         let id = PredicateId(self.made.predicates.len() as u32);
-        let (types, objects, span) = (vec![TypeId(0)], Vec::new().into(), Span::default());
-        let parameter = Parameter { name: "?stage".to_string(), types, objects, span };
-        let parameters = if over_stages { vec![parameter] } else { Vec::new() };
-        let name = name.to_string();
+        let (name, span) = (name.to_string(), Span::default());
         self.made.predicates.push(Predicate { name, parameters, stratum: None, span });
         id
     }
 
-    /// An object of its own for a number.
-    fn stage(&mut self, number: usize) -> ObjectId {
-        while self.stages.len() <= number {
-            self.stages.push(ObjectId(self.made.objects.len() as u32));
-            let name = format!("stage {}", self.stages.len());
-            self.made.objects.push(Object { name, types: vec![TypeId(0)], span: Span::default() });
-        }
-        self.stages[number]
+    fn fact(&mut self, name: &str) -> Condition {
+        Condition::Atom(atom(self.predicate(name, Vec::new()), &[]))
     }
 
-    fn fresh_flag(&mut self) -> Condition {
-        self.flags += 1;
-        let stage = self.stage(self.flags - 1);
-        Condition::Atom(atom(self.flag, &[stage]))
-    }
-
-    /// Every instance of a constraint or preference.
+    /// Every instance of a constraint or preference, those that say the same together.
     fn instances(
         &mut self,
         automaton: &'static Automaton,
@@ -210,21 +198,20 @@ impl<'t> Compiler<'t> {
         if preference.is_some_and(|id| self.counters[id.index()].is_none()) {
             return;
         }
-        let mut bindings = Vec::new();
-        each_binding(forall, &mut vec![None; slots], &mut |binding| bindings.push(binding.clone()));
-        for mut binding in bindings {
-            let ground = |condition| self.fixed.ground(condition, &mut binding);
-            let own: Vec<Condition> = conditions.iter().map(ground).collect();
-            self.instance(automaton, own, preference);
-        }
+        each_binding(forall, &mut vec![None; slots], &mut |binding| {
+            let ground = |condition| self.fixed.ground(condition, binding);
+            let conditions: Vec<Condition> = conditions.iter().map(ground).collect();
+            let words: Vec<String> = conditions.iter().map(words).collect();
+            let key = (format!("{automaton:?}{words:?}"), preference);
+            let number = *self.said.entry(key).or_insert(self.instances.len());
+            match self.instances.get_mut(number) {
+                Some((_, times)) => *times += 1.0,
+                None => self.instances.push((Stated { automaton, conditions, preference }, 1.0)),
+            }
+        });
     }
 
-    fn instance(
-        &mut self,
-        automaton: &'static Automaton,
-        conditions: Vec<Condition>,
-        preference: Option<PreferenceId>,
-    ) {
+    fn instance(&mut self, Stated { automaton, conditions, preference }: Stated, times: f64) {
         let task = self.task;
         let mentioned = Mentioned::of(task, &conditions);
         let timed = !task.init.timed.is_empty();
@@ -238,7 +225,8 @@ impl<'t> Compiler<'t> {
             conditions = conditions.map(|condition| self.derived(condition));
         }
         let may_break = !automaton.broken.is_empty() && preference.is_some();
-        let flags = (0..automaton.flags + usize::from(may_break)).map(|_| self.fresh_flag()).collect();
+        let flags = 0..automaton.flags + usize::from(may_break);
+        let flags = flags.map(|_| self.fact("seen on the way")).collect();
         let instance = Instance { automaton, conditions, flags, preference };
         if automaton.flags > 0 || !automaton.broken.is_empty() {
             for index in 0..task.actions.len() {
@@ -248,9 +236,9 @@ impl<'t> Compiler<'t> {
         let kept = instance.kept();
         match preference {
             None => self.goal.push(kept),
-            Some(id) if is_false(&kept) => *self.lost.entry(id).or_default() += 1.0,
+            Some(id) if is_false(&kept) => *self.lost.entry(id).or_default() += times,
             Some(_) if kept.is_true() => {}
-            Some(id) => self.kept.push((id, kept)),
+            Some(id) => self.kept.push((id, times, kept)),
         }
     }
 
@@ -259,7 +247,7 @@ impl<'t> Compiler<'t> {
         if condition.is_true() {
             return condition;
         }
-        let predicate = self.predicate("holds", false);
+        let predicate = self.predicate("holds", Vec::new());
         let stratum = self.made.predicates.iter().filter_map(|own| own.stratum).max();
         self.made.predicates[predicate.index()].stratum = Some(stratum.map_or(0, |top| top + 1));
         let (parameters, span) = (Vec::new(), Span::default());
@@ -354,6 +342,9 @@ impl Compiler<'_> {
     }
 
     fn finish(mut self) -> Compiled {
+        for (stated, times) in std::mem::take(&mut self.instances) {
+            self.instance(stated, times);
+        }
         self.steps_for_time();
         if !self.kept.is_empty() || !self.lost.is_empty() {
             self.last_stage();
@@ -365,47 +356,53 @@ impl Compiler<'_> {
 
     /// The actions after the last one of the plan.
     fn last_stage(&mut self) {
-        let working = self.predicate("at work", false);
-        let turn = self.predicate("turn", true);
-        let at_work = Condition::Atom(atom(working, &[]));
-        let durative = |action: &Action| action.duration.is_some();
+        let at_work = self.fact("at work");
         for action in &mut self.made.actions {
             let start = std::mem::take(&mut action.condition.start);
             action.condition.start = all([at_work.clone(), start]);
-            if durative(action) {
+            if action.is_durative() {
                 let end = std::mem::take(&mut action.condition.end);
                 action.condition.end = all([at_work.clone(), end]);
             }
         }
-        self.made.init.facts.push(Fact { predicate: working, arguments: Box::new([]) });
-        let first = atom(turn, &[self.stage(0)]);
-        let mut effects = vec![
-            effect(Change::Delete(atom(working, &[])), Condition::TRUE, false),
-            effect(Change::Add(first.clone()), Condition::TRUE, false),
-        ];
+        if let Condition::Atom(at_work) = &at_work {
+            let fact = Fact { predicate: at_work.predicate, arguments: Box::new([]) };
+            self.made.init.facts.push(fact);
+        }
+        let turns = self.turns();
         let mut lost: Vec<_> = std::mem::take(&mut self.lost).into_iter().collect();
         lost.sort_unstable_by_key(|(id, _)| *id);
         let paid = lost.into_iter().filter_map(|(id, times)| Some((self.counters[id.index()]?, times)));
-        effects.extend(paid.map(|(counter, times)| pay(counter, times, false)));
-        let condition = all([at_work].into_iter().chain(self.goal.iter().cloned()));
-        let slots = self.task.goal.slots;
-        self.made.actions.push(Action { slots, ..bookkeeping("end of plan", condition, effects) });
-        let mut now = first;
-        for (number, (id, kept)) in std::mem::take(&mut self.kept).into_iter().enumerate() {
-            let next = atom(turn, &[self.stage(number + 1)]);
-            let step = vec![
-                effect(Change::Delete(now.clone()), Condition::TRUE, false),
-                effect(Change::Add(next.clone()), Condition::TRUE, false),
-            ];
-            let turn = Condition::Atom(now);
-            let violated = all([turn.clone(), negated(&kept)]);
-            self.made.actions.push(bookkeeping("keep it", all([turn, kept]), step.clone()));
-            let paid = self.counters[id.index()].map(|counter| pay(counter, 1.0, false));
+        let paid: Vec<Effect> = paid.map(|(counter, times)| pay(counter, times, false)).collect();
+        let condition = all([at_work.clone()].into_iter().chain(self.goal.iter().cloned()));
+        let effects = from_to(&at_work, &turns[0]).into_iter().chain(paid).collect();
+        let end = Action { slots: self.task.goal.slots, ..bookkeeping("end of plan", condition, effects) };
+        // From the last one: so grounding goes back from the goal in one go.
+        let kept = std::mem::take(&mut self.kept);
+        for (turn, (id, times, kept)) in turns.windows(2).zip(kept).rev() {
+            let step = from_to(&turn[0], &turn[1]);
+            let violated = all([turn[0].clone(), negated(&kept)]);
+            let kept = all([turn[0].clone(), kept]);
+            self.made.actions.push(bookkeeping("keep it", kept, step.clone()));
+            let paid = self.counters[id.index()].map(|counter| pay(counter, times, false));
             let step = step.into_iter().chain(paid).collect();
             self.made.actions.push(bookkeeping("give it up", violated, step));
-            now = next;
         }
-        self.goal.push(Condition::Atom(now));
+        self.made.actions.push(end);
+        self.goal.extend(turns.last().cloned());
+    }
+
+    /// Facts of which one after the other holds: before each preference, and after the last.
+    fn turns(&mut self) -> Vec<Condition> {
+        let (types, objects, span) = (vec![TypeId(0)], Vec::new().into(), Span::default());
+        let parameter = Parameter { name: "?stage".to_string(), types: types.clone(), objects, span };
+        let turn = self.predicate("turn", vec![parameter]);
+        let stage = |number: usize| {
+            let id = ObjectId(self.made.objects.len() as u32);
+            self.made.objects.push(Object { name: format!("stage {number}"), types: types.clone(), span });
+            Condition::Atom(atom(turn, &[id]))
+        };
+        (0..=self.kept.len()).map(stage).collect()
     }
 
     /// Without times, the length of a plan is the number of its steps, and bookkeeping is none.
@@ -461,6 +458,13 @@ fn effect(change: Change, when: Condition, at_end: bool) -> Effect {
 fn pay(counter: FunctionId, times: f64, at_end: bool) -> Effect {
     let change = Change::Number(Assignment::Increase, fluent(counter), Expression::Number(times));
     effect(change, Condition::TRUE, at_end)
+}
+
+/// One fact gives way to another.
+fn from_to(from: &Condition, to: &Condition) -> Vec<Effect> {
+    let (Condition::Atom(from), Condition::Atom(to)) = (from, to) else { return Vec::new() };
+    let changes = [Change::Delete(from.clone()), Change::Add(to.clone())];
+    changes.map(|change| effect(change, Condition::TRUE, false)).into()
 }
 
 fn bookkeeping(name: &str, condition: Condition, effects: Vec<Effect>) -> Action {

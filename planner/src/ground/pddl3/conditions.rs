@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashSet;
 
+use crate::diagnostic::Span;
 use crate::task::{
     Atom, Call, Condition, Expression, Fact, Fluent, GroundChange, ObjectId, PredicateId, Quantified, Slot,
     Task, Term,
@@ -153,8 +154,22 @@ impl Fixed {
             Some(arguments) if self.predicates[atom.predicate.index()] => {
                 truth(self.facts.contains(&Fact { predicate: atom.predicate, arguments }))
             }
-            _ => Condition::Atom(Atom { arguments, ..*atom }),
+            _ => Condition::Atom(Atom { arguments, predicate: atom.predicate, span: Span::default() }),
         }
+    }
+}
+
+/// The same words for conditions that say the same in another order.
+pub(super) fn words(condition: &Condition) -> String {
+    let list = |name: &str, parts: &[Condition]| {
+        let mut list: Vec<String> = parts.iter().map(words).collect();
+        list.sort_unstable();
+        format!("{name}{list:?}")
+    };
+    match condition {
+        Condition::And(parts) => list("and", parts),
+        Condition::Or(parts) => list("or", parts),
+        other => format!("{other:?}"),
     }
 }
 

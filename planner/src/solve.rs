@@ -115,7 +115,7 @@ fn search(
     let statistics = outcome.statistics_mut();
     statistics.scored_only = compiled.forgets || compiled.uncounted;
     // Times say more than the compiled task does of what happens at once and when.
-    statistics.optimal &= !compiled.forgets && !task.is_temporal();
+    statistics.optimal &= !statistics.scored_only && !task.is_temporal();
     Ok(outcome)
 }
 
@@ -282,8 +282,8 @@ fn checked(task: &Task, attachments: &Attachments, mut plan: Plan) -> Result<Pla
         let mut free = task.clone();
         free.constraints.retain(|constraint| constraint.preference.is_some());
         if validate(&free, attachments, &plan).valid {
-            let help = "constraints on times, and on what attachments say or changes by itself, are checked, but not planned for: \
-                 ask for the same in conditions and the goal";
+            let help = "checked, but not planned for: `always-within`, `hold-during` and `hold-after`, `within` where actions take no \
+                 time, and what attachments say or changes by itself; ask for the same in conditions and the goal";
             let explained = |finding: Diagnostic| finding.with_help(help);
             let list = verdict.findings.list.into_iter().map(explained).collect();
             return Err(PlanError::Refused(Findings { list, ..verdict.findings }));

@@ -6,7 +6,7 @@ mod solving;
 
 use descry_planner::{Attachments, Options, Outcome, PlanError, plan};
 
-use solving::{read, solve};
+use solving::{read, solve, solve_twice};
 
 /// Rooms in a row, a lamp, and a load that wears the carrier.
 const ROOMS: &str = "(define (domain rooms) (:requirements :adl :numeric-fluents :preferences :constraints)
@@ -40,8 +40,9 @@ fn problem(aims: &str) -> String {
 
 /// Plans for what is asked on the way round until nothing better is left.
 fn check(aims: &str, expected: Expected) {
-    let task = read(ROOMS, &problem(aims));
-    let (outcome, verdict) = solve(&task, &Options { anytime: true, ..Options::default() });
+    let (domain, problem) = (ROOMS, problem(aims));
+    let options = Options { anytime: true, ..Options::default() };
+    let (outcome, verdict) = solve_twice(domain, &problem, &options);
     match expected {
         Never => assert!(matches!(outcome, Outcome::Unsolvable { .. }), "{aims}: {outcome:?}"),
         Least(value) => {
@@ -50,7 +51,7 @@ fn check(aims: &str, expected: Expected) {
         }
     }
     // Without time to improve, what is found keeps the constraints too.
-    let (at_once, _) = solve(&task, &Options::default());
+    let (at_once, _) = solve_twice(domain, &problem, &Options::default());
     assert_eq!(at_once.plan().is_some(), matches!(expected, Least(_)), "{aims}: {at_once:?}");
 }
 
@@ -62,7 +63,11 @@ fn preferences_are_kept_where_they_pay() {
         ("(preference p (at d))", "(+ (total-time) (* 5 (is-violated p)))", 2.0),
         ("(preference p (or (at d) (at a)))", "(+ (total-time) (is-violated p))", 0.0),
         // One of two, and both under one name.
-        ("(and (preference p (at d)) (preference q (at b)))", "(+ (* 2 (is-violated p)) (is-violated q))", 1.0),
+        (
+            "(and (preference p (at d)) (preference q (at b)))",
+            "(+ (* 2 (is-violated p)) (is-violated q))",
+            1.0,
+        ),
         ("(forall (?r - room) (preference p (at ?r)))", "(is-violated p)", 4.0),
         ("(forall (?r - room) (preference p (clean ?r)))", "(+ (is-violated p) (* 0.1 (total-time)))", 0.9),
         // Nothing averts it; nothing can break it; nothing counts it.
@@ -73,6 +78,7 @@ fn preferences_are_kept_where_they_pay() {
         ("(and (at d) (preference p (lit)))", "(+ (total-time) (* 2 (is-violated p)))", 3.0),
         ("(preference p (< (wear) 2))", "(+ (wear) (is-violated p))", 0.0),
         ("(and (at d) (preference p (= (wear) 3)))", "(+ (total-time) (* 9 (is-violated p)))", 3.0),
+        ("(preference p (at d))", "(- (total-time) (* 5 (- 1 (is-violated p))))", -3.0),
         // On the way of an action.
         ("(clean a)", "(is-violated seeing)", 0.0),
         ("(clean a)", "(+ (total-time) (* 0.5 (is-violated seeing)))", 1.5),
@@ -146,7 +152,8 @@ fn constraints_on_times_are_checked_and_said_not_to_be_planned_for() {
     let task = read(ROOMS, &problem("(:goal (at d)) (:constraints (within 1 (lit)))"));
     let found = plan(&task, &Attachments::new(), &Options::default(), &|| false, &mut |_| {});
     assert!(matches!(&found, Err(PlanError::Refused(_))), "{found:?}");
-    let aims = "(:goal (at d)) (:constraints (preference p (within 1 (lit)))) (:metric minimize (is-violated p))";
+    let aims =
+        "(:goal (at d)) (:constraints (preference p (within 1 (lit)))) (:metric minimize (is-violated p))";
     let (outcome, verdict) = solve(&read(ROOMS, &problem(aims)), &Options::default());
     assert!(outcome.statistics().scored_only && !outcome.statistics().optimal);
     assert_eq!(verdict.and_then(|verdict| verdict.cost), Some(1.0));
@@ -155,11 +162,22 @@ fn constraints_on_times_are_checked_and_said_not_to_be_planned_for() {
 #[test]
 fn why_constraints_leave_no_plan_is_said() {
     let task = read(ROOMS, &problem("(:goal (at d)) (:constraints (always (not (at a))))"));
-    let Outcome::Unsolvable { why, .. } = solve(&task, &Options::default()).0 else { panic!("a is the start") };
+    let Outcome::Unsolvable { why, .. } = solve(&task, &Options::default()).0 else {
+        panic!("a is the start")
+    };
     assert!(why.to_string().contains("on no way to it are all constraints kept"), "{why}");
     let label = &why.findings.list[0].labels[0];
     let text = &task.sources[1].text;
     assert!(why.findings.render(false).contains("always"), "{label:?} {text}");
+}
+
+#[test]
+fn rewards_are_maximised() {
+    let aims = "(:goal (and (preference p (at d)) (preference q (at e))))
+      (:metric maximize (- (+ (* 3 (- 1 (is-violated p))) (* 4 (- 1 (is-violated q)))) (* 0.5 (total-time))))";
+    let (outcome, verdict) =
+        solve(&read(ROOMS, &problem(aims)), &Options { anytime: true, ..Options::default() });
+    assert_eq!(verdict.and_then(|verdict| verdict.cost), Some(3.0), "{outcome:?}");
 }
 
 /// Rooms with doors that take time.
@@ -192,6 +210,16 @@ fn plans_with_times_keep_constraints_and_preferences() {
         let value = verdict.and_then(|verdict| verdict.metric.or(verdict.makespan));
         assert!(value.is_some_and(|value| value <= most), "{aims}: {value:?} {outcome:?}");
         assert!(!outcome.statistics().optimal && !outcome.statistics().scored_only);
+    }
+    for aims in [
+        "(:goal (at d)) (:constraints (within 5 (lit)))",
+        "(:goal (at d)) (:constraints (and (within 3 (at b)) (within 3 (lit))))",
+        "(:goal (at d)) (:constraints (preference p (within 2.5 (lit)))) (:metric maximize (- 1 (is-violated p)))",
+    ] {
+        let text = problem(aims).replace("(:domain rooms)", "(:domain walks)").replace("(= (wear) 0)", "");
+        let (outcome, verdict) = solve(&read(WALKS, &text), &Options::default());
+        assert!(outcome.plan().is_some_and(|plan| plan.steps.len() == 3), "{aims}: {outcome:?}");
+        assert!(verdict.is_some_and(|verdict| verdict.metric.is_none_or(|value| value == 1.0)));
     }
     let aims = "(:goal (at d)) (:constraints (always (not (at a))))";
     let text = problem(aims).replace("(:domain rooms)", "(:domain walks)").replace("(= (wear) 0)", "");

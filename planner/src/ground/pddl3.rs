@@ -2,6 +2,7 @@
 //!
 //! - A constraint becomes the flags of its automaton ([`Automaton`]): an action that may change its conditions looks at them
 //!   right before, where they have been the same since the last such action, and the goal looks at the last state.
+//! - Of what must come about within a time, an action of ours is witness that comes early enough.
 //! - A preference becomes two actions, one free where it is kept and one that pays where it is not (Keyder and Geffner 2009,
 //!   "Soft goals can be compiled away"). They follow the last action of the plan one preference after the other, so that
 //!   their order leaves nothing to search.
@@ -17,8 +18,8 @@ use crate::model::automaton::{AT_END, Automaton, Cases, Literal};
 use crate::model::walk::{self, Part};
 use crate::task::{
     Action, Assignment, Atom, Change, Condition, Effect, Expression, Fact, Fluent, Function, FunctionId,
-    GroundFluent, Object, ObjectId, Parameter, Predicate, PredicateId, PreferenceId, PreferredGoal,
-    Quantified, Rule, Task, Term, Timed, Trajectory, TypeId,
+    GroundChange, GroundFluent, Modal, Object, ObjectId, Parameter, Predicate, PredicateId, PreferenceId,
+    PreferredGoal, Quantified, Rule, Task, Term, Timed, TimedInitial, Trajectory, TypeId,
 };
 
 use conditions::{Fixed, all, any, each_binding, is_false, negated, words};
@@ -47,24 +48,38 @@ pub(crate) fn compile(task: &Task) -> Option<Compiled> {
         compiler.action_preferences(action, own);
     }
     for constraint in &task.constraints {
-        let Trajectory { forall, operator, conditions, slots, preference, .. } = constraint;
-        match Automaton::of(*operator) {
-            Some(automaton) => compiler.instances(automaton, forall, *slots, conditions, *preference),
-            None => compiler.forget(*preference),
-        }
+        let Trajectory { forall, operator, times_s, conditions, slots, preference, .. } = constraint;
+        let asked = match (Automaton::of(*operator), operator, &times_s[..]) {
+            (Some(automaton), ..) => Asked::States(automaton),
+            (None, Modal::Within, [time_s]) if task.is_temporal() => Asked::Within(*time_s),
+            _ => {
+                compiler.forget(*preference);
+                continue;
+            }
+        };
+        compiler.instances(asked, forall, *slots, conditions, *preference);
     }
     for (preference, own) in (0..).map(PreferenceId).zip(&task.preferences) {
         for PreferredGoal { forall, condition, slots, .. } in &own.goals {
             let conditions = std::slice::from_ref(condition);
-            compiler.instances(&AT_END, forall, *slots, conditions, Some(preference));
+            compiler.instances(Asked::States(&AT_END), forall, *slots, conditions, Some(preference));
         }
     }
     Some(compiler.finish())
 }
 
+/// What is asked of the conditions.
+#[derive(Debug, Clone, Copy)]
+enum Asked {
+    /// What an automaton accepts.
+    States(&'static Automaton),
+    /// That the first one holds at some time up to this one, in seconds.
+    Within(f64),
+}
+
 /// A constraint or preference with objects for its variables, as it is stated.
 struct Stated {
-    automaton: &'static Automaton,
+    asked: Asked,
     conditions: Vec<Condition>,
     preference: Option<PreferenceId>,
 }
@@ -163,10 +178,13 @@ impl<'t> Compiler<'t> {
         });
         let counters = &self.counters;
         if let Some(metric) = &mut self.made.metric {
-            metric.value = walk::replaced(&metric.value, &|part| match part {
+            let counted = walk::replaced(&metric.value, &|part| match part {
                 Expression::Violated(id) => counters[id.index()].map(counted),
                 _ => None,
             });
+            // Violations are costs.
+            metric.value = if metric.minimise { counted } else { Expression::Negative(Box::new(counted)) };
+            metric.minimise = true;
         }
     }
 
@@ -189,7 +207,7 @@ impl<'t> Compiler<'t> {
     /// Every instance of a constraint or preference, those that say the same together.
     fn instances(
         &mut self,
-        automaton: &'static Automaton,
+        asked: Asked,
         forall: &[Quantified],
         slots: usize,
         conditions: &[Condition],
@@ -202,20 +220,30 @@ impl<'t> Compiler<'t> {
             let ground = |condition| self.fixed.ground(condition, binding);
             let conditions: Vec<Condition> = conditions.iter().map(ground).collect();
             let words: Vec<String> = conditions.iter().map(words).collect();
-            let key = (format!("{automaton:?}{words:?}"), preference);
+            let key = (format!("{asked:?}{words:?}"), preference);
             let number = *self.said.entry(key).or_insert(self.instances.len());
             match self.instances.get_mut(number) {
                 Some((_, times)) => *times += 1.0,
-                None => self.instances.push((Stated { automaton, conditions, preference }, 1.0)),
+                None => self.instances.push((Stated { asked, conditions, preference }, 1.0)),
             }
         });
     }
 
-    fn instance(&mut self, Stated { automaton, conditions, preference }: Stated, times: f64) {
+    fn instance(&mut self, Stated { asked, conditions, preference }: Stated, times: f64) {
         let task = self.task;
+        // What comes about by itself may still do so after the last action of a plan.
+        if preference.is_some() && !task.init.timed.is_empty() {
+            return self.forget(preference);
+        }
+        let automaton = match asked {
+            Asked::States(automaton) => automaton,
+            Asked::Within(time_s) => {
+                let kept = self.witnessed(time_s, all(conditions));
+                return self.ask(kept, preference, times);
+            }
+        };
         let mentioned = Mentioned::of(task, &conditions);
-        let timed = !task.init.timed.is_empty();
-        if mentioned.opaque || mentioned.drifts(task) || timed && preference.is_some() {
+        if mentioned.opaque || mentioned.drifts(task) {
             return self.forget(preference);
         }
         let mut conditions = conditions.into_iter().chain([Condition::TRUE, Condition::TRUE]);
@@ -233,13 +261,31 @@ impl<'t> Compiler<'t> {
                 self.watch(&instance, &mentioned, index);
             }
         }
-        let kept = instance.kept();
+        self.ask(instance.kept(), preference, times);
+    }
+
+    /// Asks something of the last state.
+    fn ask(&mut self, kept: Condition, preference: Option<PreferenceId>, times: f64) {
         match preference {
             None => self.goal.push(kept),
             Some(id) if is_false(&kept) => *self.lost.entry(id).or_default() += times,
             Some(_) if kept.is_true() => {}
             Some(id) => self.kept.push((id, times, kept)),
         }
+    }
+
+    /// The fact that some action of ours has seen the condition before it was too late.
+    fn witnessed(&mut self, time_s: f64, condition: Condition) -> Condition {
+        let (seen, early) = (self.fact("seen in time"), self.fact("early"));
+        let (Condition::Atom(own), Condition::Atom(early_atom)) = (&seen, &early) else { return seen };
+        let early_fact = Fact { predicate: early_atom.predicate, arguments: Box::new([]) };
+        let init = &mut self.made.init;
+        init.facts.push(early_fact.clone());
+        let late = TimedInitial { time_s, change: GroundChange::Delete(early_fact), span: Span::default() };
+        init.timed.insert(init.timed.partition_point(|timed| timed.time_s <= time_s), late);
+        let effects = vec![effect(Change::Add(own.clone()), Condition::TRUE, false)];
+        self.made.actions.push(bookkeeping("see it", all([early, condition]), effects));
+        seen
     }
 
     /// A derived fact in place of a condition of which the opposite cannot be said.

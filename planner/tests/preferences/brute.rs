@@ -96,7 +96,8 @@ struct Constraint {
     forall: bool,
 }
 
-const OPERATORS: [&str; 6] = ["at end", "always", "sometime", "at-most-once", "sometime-after", "sometime-before"];
+const OPERATORS: [&str; 6] =
+    ["at end", "always", "sometime", "at-most-once", "sometime-after", "sometime-before"];
 const PREFERENCES: usize = 3;
 
 #[derive(Debug)]
@@ -149,10 +150,11 @@ fn make(chance: &mut Chance) -> Made {
 
 impl Made {
     fn texts(&self) -> (String, String) {
-        let mut domain = "(define (domain d) (:requirements :adl :preferences :constraints :derived-predicates)
+        let mut domain =
+            "(define (domain d) (:requirements :adl :preferences :constraints :derived-predicates)
   (:types thing) (:constants a b c - thing) (:predicates (p ?x - thing) (q) (every))
   (:derived (every) (forall (?y - thing) (p ?y)))"
-            .to_string();
+                .to_string();
         for (number, action) in self.actions.iter().enumerate() {
             let preferred =
                 action.preferred.iter().map(|preferred| format!("(preference own {})", preferred.text()));
@@ -165,8 +167,10 @@ impl Made {
                 "\n  (:action a{number} :parameters (?x - thing) :precondition (and {condition} {preferred}) :effect (and {effects}))"
             );
         }
-        let mut facts: String =
-            (0..3).filter(|bit| self.initial >> bit & 1 == 1).map(|bit| format!("(p {})", OBJECTS[bit])).collect();
+        let mut facts: String = (0..3)
+            .filter(|bit| self.initial >> bit & 1 == 1)
+            .map(|bit| format!("(p {})", OBJECTS[bit]))
+            .collect();
         if self.initial & 8 != 0 {
             facts.push_str("(q)");
         }
@@ -212,7 +216,8 @@ impl Made {
         for &step in steps {
             let state = states[states.len() - 1];
             states.push(self.next(state, step)?);
-            let violated = self.actions[step.0].preferred.as_ref().is_some_and(|own| !own.holds(state, step.1));
+            let violated =
+                self.actions[step.0].preferred.as_ref().is_some_and(|own| !own.holds(state, step.1));
             value += usize::from(violated) * self.weights[PREFERENCES];
         }
         for constraint in &self.constraints {

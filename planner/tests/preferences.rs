@@ -40,9 +40,9 @@ fn problem(aims: &str) -> String {
 
 /// Plans for what is asked on the way round until nothing better is left.
 fn check(aims: &str, expected: Expected) {
-    let (domain, problem) = (ROOMS, problem(aims));
+    let (domain, problem) = (ROOMS.replace("(preference seeing (lit))", ""), problem(aims));
     let options = Options { anytime: true, ..Options::default() };
-    let (outcome, verdict) = solve_twice(domain, &problem, &options);
+    let (outcome, verdict) = solve_twice(&domain, &problem, &options);
     match expected {
         Never => assert!(matches!(outcome, Outcome::Unsolvable { .. }), "{aims}: {outcome:?}"),
         Least(value) => {
@@ -51,7 +51,7 @@ fn check(aims: &str, expected: Expected) {
         }
     }
     // Without time to improve, what is found keeps the constraints too.
-    let (at_once, _) = solve_twice(domain, &problem, &Options::default());
+    let (at_once, _) = solve_twice(&domain, &problem, &Options::default());
     assert_eq!(at_once.plan().is_some(), matches!(expected, Least(_)), "{aims}: {at_once:?}");
 }
 

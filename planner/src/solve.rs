@@ -72,11 +72,12 @@ fn on_the_way(
     outcome: Outcome,
 ) -> Outcome {
     let Outcome::Unsolvable { statistics, .. } = &outcome else { return outcome };
-    if task.constraints.is_empty() && task.preferences.is_empty() || options.bound.is_some() {
+    let plain = task.constraints.is_empty() && task.preferences.is_empty();
+    if plain || options.bound.is_some() && !task.is_temporal() {
         return outcome;
     }
     let limit = (2 * statistics.evaluated).max(LEAST_EVALUATIONS);
-    let options = Options { evaluation_limit: Some(limit), anytime: false, ..options.clone() };
+    let options = Options { evaluation_limit: Some(limit), anytime: false, bound: None, ..options.clone() };
     let statistics = statistics.clone();
     match search(&freed(task), attachments, &options, stop, &mut |_| {}) {
         Ok(Outcome::Unsolvable { why, .. }) => Outcome::Unsolvable { why, statistics },
@@ -159,7 +160,8 @@ fn search_for(
         Ok(better.then_some(plan))
     };
     if grounded.goal_reachable && is_classical(&grounded) {
-        let soft = !original.preferences.is_empty();
+        // Violations are numbers that the original does not have.
+        let soft = !original.preferences.is_empty() && task.functions.len() > original.functions.len();
         return plan_classical(task, &grounded, options, soft, memory, stop, &check, on_plan);
     }
     let calls = Calls::bind(task, &grounded, attachments)?;

@@ -88,6 +88,25 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
 /// What is said where no relaxation knows better.
 const UNREACHED: &str = "every state that can be reached was seen, and none fulfils the whole goal";
 
+/// No way to the goal keeps the constraints. `reachable` where there is a way that breaks them.
+pub(crate) fn constrained(task: &Task, reachable: bool) -> Explanation {
+    let hard = task.constraints.iter().filter(|constraint| constraint.preference.is_none());
+    let mut spans = hard.map(|constraint| constraint.span);
+    let message = match reachable {
+        true => "the goal can be reached, but on no way to it are all constraints kept",
+        false => {
+            "every state that can be reached was seen, and none fulfils the goal with all constraints kept"
+        }
+    };
+    let span = spans.next().unwrap_or_default();
+    let mut finding = Diagnostic::error("unsolvable", message, span, "this constraint on the way");
+    for span in spans.take(SHOWN) {
+        finding = finding.with_label(span, "this too");
+    }
+    let finding = finding.with_help("make it a `(preference …)` to see how much of it can be kept");
+    Explanation { findings: Findings { sources: task.sources.to_vec(), list: vec![finding] } }
+}
+
 /// Each part of the goal can be had if nothing is ever taken away: what may be in the way of all. `narrowed` where these
 /// parts alone cannot be had.
 fn together(task: &Task, parts: &[&Condition], narrowed: bool) -> Diagnostic {

@@ -41,7 +41,8 @@ pub struct Statistics {
     pub actions: u64,
     /// Set where the plan is proven to be best.
     pub optimal: bool,
-    /// Set where the task has preferences: they score plans, and no search looks for those that keep more of them.
+    /// Set where the task has preferences that no search looked for: those that the metric does not count, or that ask for
+    /// times or attachments. They only score plans.
     pub scored_only: bool,
     /// By attachment, for this call alone.
     pub attachments: BTreeMap<String, CallStatistics>,

@@ -1,5 +1,6 @@
 //! The way in: [`plan`] takes a task to a timed plan, or says why there is none.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -7,8 +8,8 @@ use crate::attachment::{Attachments, CallStatistics};
 use crate::calls::{Calls, report};
 use crate::classical::compiled::is_classical;
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::explain::{explain, is_open, narrowed};
-use crate::ground::{Expression, GroundError, GroundTask, ground};
+use crate::explain::{constrained, explain, is_open, narrowed};
+use crate::ground::{Expression, GroundError, GroundTask, compile, ground};
 use crate::memory::MemoryLimit;
 use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::plan::Plan;
@@ -33,8 +34,8 @@ pub fn plan(
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
-    let mut outcome = search(task, attachments, options, stop, on_plan)?;
-    outcome.statistics_mut().scored_only = !task.preferences.is_empty();
+    let outcome = search(task, attachments, options, stop, on_plan)?;
+    let mut outcome = on_the_way(task, attachments, options, stop, outcome);
     if let Outcome::Unsolvable { why, statistics } = &mut outcome
         && options.bound.is_none()
         && task.modules.is_empty()
@@ -48,7 +49,7 @@ pub fn plan(
             let found = search(task, attachments, &options, stop, &mut |_| {});
             !stop() && matches!(found, Ok(Outcome::Unsolvable { .. }))
         };
-        if let Some(narrowed) = narrowed(task, &mut unsolvable) {
+        if let Some(narrowed) = narrowed(&freed(task), &mut unsolvable) {
             *why = narrowed;
         }
     }
@@ -62,7 +63,66 @@ const FORMS: usize = 2;
 /// Evaluated states that a part of a goal may always take.
 const LEAST_EVALUATIONS: u64 = 1_000;
 
+/// Tells a goal out of reach from constraints on the way to it, where nothing was found.
+fn on_the_way(
+    task: &Task,
+    attachments: &Attachments,
+    options: &Options,
+    stop: &(dyn Fn() -> bool + Sync),
+    outcome: Outcome,
+) -> Outcome {
+    let Outcome::Unsolvable { statistics, .. } = &outcome else { return outcome };
+    let plain = task.constraints.is_empty() && task.preferences.is_empty();
+    if plain || options.bound.is_some() && !task.is_temporal() {
+        return outcome;
+    }
+    let limit = (2 * statistics.evaluated).max(LEAST_EVALUATIONS);
+    let options = Options { evaluation_limit: Some(limit), anytime: false, bound: None, ..options.clone() };
+    let statistics = statistics.clone();
+    match search(&freed(task), attachments, &options, stop, &mut |_| {}) {
+        Ok(Outcome::Unsolvable { why, .. }) => Outcome::Unsolvable { why, statistics },
+        _ if task.is_temporal() => Outcome::OutOfTime { best: None, statistics },
+        found => {
+            let reachable = matches!(found, Ok(Outcome::Solved { .. }));
+            Outcome::Unsolvable { why: constrained(task, reachable), statistics }
+        }
+    }
+}
+
+/// The task with nothing asked but the goal.
+fn freed(task: &Task) -> Task {
+    let mut free = task.clone();
+    free.constraints.clear();
+    if !free.preferences.is_empty() {
+        free.preferences.clear();
+        free.actions.iter_mut().for_each(|action| action.preferences.clear());
+        free.metric = None;
+    }
+    free
+}
+
+/// Searches for plans of a task without its preferences and constraints, where these are compiled away.
 fn search(
+    task: &Task,
+    attachments: &Attachments,
+    options: &Options,
+    stop: &(dyn Fn() -> bool + Sync),
+    on_plan: &mut dyn FnMut(&Plan),
+) -> Result<Outcome, PlanError> {
+    let Some(compiled) = compile(task) else {
+        return search_for(task, task, attachments, options, stop, on_plan);
+    };
+    let mut outcome = search_for(task, &compiled.task, attachments, options, stop, on_plan)?;
+    let statistics = outcome.statistics_mut();
+    statistics.scored_only = compiled.forgets || compiled.uncounted;
+    // Times say more than the compiled task does of what happens at once and when.
+    statistics.optimal &= !statistics.scored_only && !task.is_temporal();
+    Ok(outcome)
+}
+
+/// Searches for plans of `task`, which are valid plans of `original` once its bookkeeping is left out.
+fn search_for(
+    original: &Task,
     task: &Task,
     attachments: &Attachments,
     options: &Options,
@@ -89,9 +149,20 @@ fn search(
         return out_of_memory();
     }
     let memory = memory.beside(compiled);
+    // What searches know of preferences may be less than what the validator counts.
+    let least = Cell::new(f64::INFINITY);
+    let sign = if original.metric.as_ref().is_none_or(|metric| metric.minimise) { 1.0 } else { -1.0 };
+    let check = |plan| {
+        let plan = checked(original, attachments, plan)?;
+        let cost = sign * plan.cost.unwrap_or(0.0);
+        let better = original.preferences.is_empty() || cost < least.get();
+        least.set(least.get().min(cost));
+        Ok(better.then_some(plan))
+    };
     if grounded.goal_reachable && is_classical(&grounded) {
-        let check = |plan| checked(task, attachments, plan);
-        return plan_classical(task, &grounded, options, memory, stop, &check, on_plan);
+        // Violations are numbers that the original does not have.
+        let soft = !original.preferences.is_empty() && task.functions.len() > original.functions.len();
+        return plan_classical(task, &grounded, options, soft, memory, stop, &check, on_plan);
     }
     let calls = Calls::bind(task, &grounded, attachments)?;
     configure(task, attachments)?;
@@ -104,11 +175,12 @@ fn search(
     let mut invalid: Option<PlanError> = None;
     let mut hear = |timed: &[Timed]| {
         let plan = to_plan(task, &grounded, &world, timed);
-        match checked(task, attachments, plan) {
-            Ok(plan) => {
+        match check(plan) {
+            Ok(Some(plan)) => {
                 on_plan(&plan);
                 best = Some(plan);
             }
+            Ok(None) => {}
             Err(error) => invalid = Some(error),
         }
         Ok(())
@@ -128,8 +200,7 @@ fn search(
     statistics.attachments = since(&before, attachments.statistics());
     Ok(match (best, progress.reason) {
         (Some(plan), reason @ (Reason::Exhausted | Reason::Enough)) => {
-            // What preferences cost, only the validator knows.
-            statistics.optimal = reason == Reason::Exhausted && task.preferences.is_empty();
+            statistics.optimal = reason == Reason::Exhausted;
             Outcome::Solved { plan, statistics }
         }
         (None, Reason::Exhausted | Reason::Enough) => {
@@ -201,9 +272,10 @@ fn to_plan(task: &Task, grounded: &GroundTask, world: &World, timed: &[Timed]) -
     Plan { steps: steps.collect(), ..Plan::default() }
 }
 
-/// Every plan that leaves this crate has passed the validator. The searches do not look at constraints on the way to the
-/// goal: a plan that breaks nothing else is refused.
-fn checked(task: &Task, attachments: &Attachments, plan: Plan) -> Result<Plan, PlanError> {
+/// Every plan that leaves this crate has passed the validator. No search looks at constraints that ask for times or attachments:
+/// a plan that breaks nothing else is refused.
+fn checked(task: &Task, attachments: &Attachments, mut plan: Plan) -> Result<Plan, PlanError> {
+    plan.steps.retain(|step| !step.action.contains(' '));
     let verdict = validate(task, attachments, &plan);
     if verdict.valid {
         return Ok(Plan { cost: verdict.cost, ..plan });
@@ -212,8 +284,8 @@ fn checked(task: &Task, attachments: &Attachments, plan: Plan) -> Result<Plan, P
         let mut free = task.clone();
         free.constraints.retain(|constraint| constraint.preference.is_some());
         if validate(&free, attachments, &plan).valid {
-            let help =
-                "constraints are checked, but not planned for: ask for the same in conditions and the goal";
+            let help = "checked, but not planned for: `always-within`, `hold-during` and `hold-after`, `within` where actions take no \
+                 time, and what attachments say or changes by itself; ask for the same in conditions and the goal";
             let explained = |finding: Diagnostic| finding.with_help(help);
             let list = verdict.findings.list.into_iter().map(explained).collect();
             return Err(PlanError::Refused(Findings { list, ..verdict.findings }));

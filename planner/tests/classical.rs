@@ -53,6 +53,19 @@ const SHUTTLE_PROBLEM: &str = "(define (problem p) (:domain shuttle) (:objects a
   (:goal (and (box-at x c) (box-at y a))) (:metric minimize (total-cost)))";
 
 #[test]
+fn harm_under_a_condition_that_nobody_wants_is_done() {
+    // Whoever leaves the lamp on anywhere but in the cellar is seen.
+    let domain = "(define (domain lamp) (:requirements :adl) (:types place)
+      (:predicates (at ?p - place) (lit) (was-lit) (seen)) (:constants cellar - place)
+      (:action go :parameters (?a ?b - place) :precondition (at ?a) :effect (and (not (at ?a)) (at ?b)))
+      (:action light :precondition (not (lit)) :effect (and (lit) (was-lit)))
+      (:action quench :precondition (lit) :effect (and (not (lit)) (when (not (at cellar)) (seen)))))";
+    let problem = "(define (problem p) (:domain lamp) (:objects hall attic - place) (:init (at hall))
+      (:goal (and (at hall) (was-lit) (not (lit)) (not (seen)))))";
+    check(domain, problem, Expect::Best(4.0));
+}
+
+#[test]
 fn costs_are_minimised() {
     check(SHUTTLE, SHUTTLE_PROBLEM, Expect::CostAtMost(10.0));
     check(SHUTTLE, SHUTTLE_PROBLEM, Expect::Best(10.0));

@@ -215,7 +215,7 @@ fn effects_at_the_end_remember_what_held_before() {
 fn a_plan_that_breaks_a_constraint_on_the_way_is_refused_under_the_text() {
     let domain = "(define (domain d) (:requirements :constraints) (:predicates (a) (b) (c))
       (:action one :parameters () :effect (a)) (:action two :parameters () :precondition (a) :effect (b)))";
-    for (constraint, kept) in [("(sometime-before (b) (a))", true), ("(sometime (c))", false)] {
+    for (constraint, kept) in [("(sometime-before (b) (a))", true), ("(within 1 (c))", false)] {
         let problem =
             format!("(define (problem p) (:domain d) (:init) (:goal (b)) (:constraints (and {constraint})))");
         let task = Task::read(&Source::new("domain.pddl", domain), &Source::new("problem.pddl", problem));

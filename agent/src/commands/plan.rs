@@ -200,8 +200,8 @@ fn show(
             input::narrate(&format!("{} ({time})", summary(plan)));
             if outcome.statistics().scored_only {
                 input::narrate(
-                    "  preferences score this plan, but nothing searched for one that keeps more of them: \
-                     what must hold belongs in the goal",
+                    "  not every preference was planned for: those that the metric does not count, and \
+                     some on times or attachments, were only looked at afterwards",
                 );
             }
         }

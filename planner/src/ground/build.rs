@@ -107,7 +107,12 @@ pub fn ground(
         let valued: Vec<u32> = (0..make.atoms.len() as u32)
             .filter(|&atom| functions.contains(&(make.atoms.predicate(atom) as usize)))
             .collect();
-        relevant::prune(&mut raw, &make.comparisons, &make.calls, &undefined, &costs.read, &valued)
+        let mut relevant =
+            relevant::prune(&mut raw, &make.comparisons, &make.calls, &undefined, &costs.read, &valued);
+        // An effect that only harms has its conditions too, though nobody wants it to happen.
+        let asked = relevant.unwanted.iter_mut().zip(absences(&raw));
+        asked.for_each(|(unwanted, asked)| *unwanted |= asked);
+        relevant
     };
     let mut ground = assemble(task, raw, make, reached, relevant, groups, costs.metric, goal_possible);
     ground.obstacles = found;

@@ -9,6 +9,7 @@ mod invariants;
 mod metric;
 mod normal;
 mod obstacles;
+mod pddl3;
 mod raw;
 mod reach;
 mod relaxed;
@@ -20,4 +21,5 @@ mod variables;
 
 pub use build::{GroundError, ground};
 pub use obstacles::{MissingAtom, Obstacle};
+pub(crate) use pddl3::compile;
 pub use task::*;

@@ -1,4 +1,6 @@
-//! What planner, validator and monitor share: numbers and how they compare, and walking over what is said.
+//! What planner, validator and monitor share: numbers and how they compare, walking over what is said, and what is asked of
+//! the states on the way.
 
+pub(crate) mod automaton;
 pub(crate) mod relation;
 pub(crate) mod walk;

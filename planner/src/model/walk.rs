@@ -109,3 +109,17 @@ pub(crate) fn aims<'t>(task: &'t Task, visit: &mut dyn FnMut(Part<'t>)) {
     constraints.chain(preferred).for_each(|own| condition(own, visit));
     task.metric.iter().for_each(|metric| expression(&metric.value, visit));
 }
+
+/// An expression with something else for some of its parts.
+pub(crate) fn replaced(own: &Expression, with: &dyn Fn(&Expression) -> Option<Expression>) -> Expression {
+    let list = |parts: &[Expression]| parts.iter().map(|part| replaced(part, with)).collect();
+    let both = |sides: &[Expression; 2]| Box::new(sides.each_ref().map(|side| replaced(side, with)));
+    with(own).unwrap_or_else(|| match own {
+        Expression::Add(parts) => Expression::Add(list(parts)),
+        Expression::Multiply(parts) => Expression::Multiply(list(parts)),
+        Expression::Subtract(sides) => Expression::Subtract(both(sides)),
+        Expression::Divide(sides) => Expression::Divide(both(sides)),
+        Expression::Negative(inner) => Expression::Negative(Box::new(replaced(inner, with))),
+        other => other.clone(),
+    })
+}

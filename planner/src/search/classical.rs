@@ -9,18 +9,22 @@ use crate::task::Task;
 
 use super::run::{ClassicalEnd, ClassicalOptions, solve};
 
-/// Plans for a task that is [`crate::classical::compiled::is_classical`]; `check` validates each plan.
+/// Plans for a task that is [`crate::classical::compiled::is_classical`]; `check` validates each plan, and keeps back those that
+/// are no better than the ones before. `soft` where more is to be won than what a first plan has.
+#[allow(clippy::too_many_arguments)]
 pub(crate) fn plan_classical(
     task: &Task,
     grounded: &GroundTask,
     options: &Options,
+    soft: bool,
     memory: MemoryLimit,
     stop: &(dyn Fn() -> bool + Sync),
-    check: &dyn Fn(Plan) -> Result<Plan, PlanError>,
+    check: &dyn Fn(Plan) -> Result<Option<Plan>, PlanError>,
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
     let classical = ClassicalOptions {
         anytime: options.anytime,
+        soft,
         bound: options.bound,
         memory,
         evaluation_limit: options.evaluation_limit,
@@ -32,11 +36,12 @@ pub(crate) fn plan_classical(
     let outcome = solve(grounded, &classical, stop, &mut |operators, _cost| match check(named(
         task, grounded, operators,
     )) {
-        Ok(plan) => {
+        Ok(Some(plan)) => {
             plans += 1;
             on_plan(&plan);
             best = Some(plan);
         }
+        Ok(None) => {}
         Err(error) => invalid = Some(error),
     });
     if let Some(error) = invalid.filter(|error| best.is_none() || matches!(error, PlanError::Internal { .. }))

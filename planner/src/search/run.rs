@@ -18,6 +18,8 @@ use super::novelty;
 pub(crate) struct ClassicalOptions {
     /// Keep improving until stopped or nothing cheaper is left.
     pub anytime: bool,
+    /// A first plan leaves undone what nobody must do: search on for as long as improving it may take.
+    pub soft: bool,
     /// Only plans whose cost is below this.
     pub bound: Option<f64>,
     /// What the search may take.
@@ -97,6 +99,8 @@ pub(crate) fn solve(
 const LEAST_WORK: u64 = 5_000_000;
 /// Further work for each operator.
 const WORK_PER_OPERATOR: u64 = 1500;
+/// How much more than that the search for plans that keep more preferences may take.
+const SOFT_SHARE: u64 = 20;
 /// Work of the first search before another is tried; later rounds get more.
 const FIRST_WORK: u64 = 60_000_000;
 /// How much more work each round of first searches gets.
@@ -196,7 +200,11 @@ impl<'a, 's> Run<'a, 's> {
         if self.limited() || (self.shared.stop)() {
             return if self.options.anytime { ClassicalEnd::Stopped } else { ClassicalEnd::Done };
         }
-        if self.options.anytime { self.anytime() } else { ClassicalEnd::Done }
+        match (self.options.anytime, self.options.soft) {
+            (true, _) => self.anytime(FIRST_WORK * 4, u64::MAX),
+            (false, true) => self.anytime(2 * budget, self.counts.work + SOFT_SHARE * budget),
+            (false, false) => ClassicalEnd::Done,
+        }
     }
 
     /// The first plan, and whether a search without lookahead may still find a shorter one quickly.
@@ -302,12 +310,14 @@ impl<'a, 's> Run<'a, 's> {
     /// Searches with falling weights for plans below the bound, each improved, until there is none.
     ///
     /// Where the metric is no sum over the operators, no bound keeps a search from the plan that it found before: once all
-    /// of them end so, there is nothing left to try.
-    fn anytime(&mut self) -> ClassicalEnd {
-        let mut work_limit = FIRST_WORK * 4;
+    /// of them end so, there is nothing left to try. Ends too once so much work is done in all.
+    fn anytime(&mut self, mut work_limit: u64, until: u64) -> ClassicalEnd {
         let mut turn = 0usize;
         let mut again = 0;
         loop {
+            if self.counts.work >= until {
+                return ClassicalEnd::Done;
+            }
             let weight = WEIGHTS[turn % WEIGHTS.len()];
             let strategy = Strategy {
                 weight: Some(weight),

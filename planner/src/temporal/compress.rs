@@ -31,6 +31,7 @@ pub(crate) fn classical_plan(
     }
     let options = ClassicalOptions {
         anytime: false,
+        soft: false,
         bound: None,
         memory,
         evaluation_limit: Some(if space.tight { evaluations.min(MOST_EVALUATED) } else { evaluations }),

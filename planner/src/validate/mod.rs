@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use crate::attachment::Attachments;
 use crate::diagnostic::{Diagnostic, Findings};
+use crate::model::walk;
 use crate::plan::Plan;
 use crate::semantics::{Binding, CallFailure, Semantics};
 use crate::state::State;
@@ -126,23 +127,10 @@ fn whole(semantics: &Semantics<'_>, plan: &Plan) -> Result<Result<Replayed, Box<
 fn metric(semantics: &Semantics<'_>, replayed: &Replayed) -> Result<Option<f64>, CallFailure> {
     let Some(metric) = &semantics.task.metric else { return Ok(None) };
     let violations = trajectory::violations(semantics, replayed)?;
-    let known = known_values(&metric.value, replayed.end, &violations);
+    let known = walk::replaced(&metric.value, &|part| match part {
+        Expression::TotalTime => Some(Expression::Number(replayed.end)),
+        Expression::Violated(id) => Some(Expression::Number(violations[id.index()])),
+        _ => None,
+    });
     semantics.number(&replayed.state, &known, &Binding::new(0))
-}
-
-/// A metric with the values that only the end of a plan tells.
-fn known_values(expression: &Expression, end: f64, violations: &[f64]) -> Expression {
-    let all = |parts: &[Expression]| parts.iter().map(|part| known_values(part, end, violations)).collect();
-    let both =
-        |sides: &[Expression; 2]| Box::new(sides.each_ref().map(|side| known_values(side, end, violations)));
-    match expression {
-        Expression::TotalTime => Expression::Number(end),
-        Expression::Violated(id) => Expression::Number(violations.get(id.index()).copied().unwrap_or(0.0)),
-        Expression::Add(parts) => Expression::Add(all(parts)),
-        Expression::Multiply(parts) => Expression::Multiply(all(parts)),
-        Expression::Subtract(sides) => Expression::Subtract(both(sides)),
-        Expression::Divide(sides) => Expression::Divide(both(sides)),
-        Expression::Negative(inner) => Expression::Negative(Box::new(known_values(inner, end, violations))),
-        other => other.clone(),
-    }
 }

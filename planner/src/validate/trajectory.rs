@@ -1,6 +1,7 @@
 //! Constraints and preferences of PDDL3 (Gerevini and Long 2005) on the states that a plan goes through.
 
 use super::{Fault, Replayed, replay};
+use crate::model::automaton::Automaton;
 use crate::semantics::{Binding, CallFailure, Semantics, Why};
 use crate::task::{Modal, Trajectory};
 
@@ -78,17 +79,11 @@ fn holds(
     // The state that lasts from one happening to the next is there at every time between them.
     let ends = |at: usize| times.get(at + 1).copied().unwrap_or(f64::INFINITY);
     let all = 0..times.len();
+    if let Some(automaton) = Automaton::of(constraint.operator) {
+        return Ok(automaton.accepts(first.into_iter().zip(second)));
+    }
     Ok(match constraint.operator {
-        Modal::AtEnd => first.last() == Some(&true),
-        Modal::Always => first.iter().all(|&holds| holds),
-        Modal::Sometime => first.iter().any(|&holds| holds),
         Modal::Within => all.into_iter().any(|at| first[at] && times[at] <= time(0)),
-        Modal::AtMostOnce => {
-            let rises = all.into_iter().filter(|&at| first[at] && (at == 0 || !first[at - 1])).count();
-            rises <= 1
-        }
-        Modal::SometimeAfter => all.into_iter().all(|at| !first[at] || second[at..].contains(&true)),
-        Modal::SometimeBefore => all.into_iter().all(|at| !first[at] || second[..at].contains(&true)),
         Modal::AlwaysWithin => all.into_iter().all(|at| {
             let soon = |later: usize| second[later] && times[later] - times[at] <= time(0);
             !first[at] || (at..times.len()).any(soon)
@@ -96,6 +91,7 @@ fn holds(
         Modal::HoldDuring => {
             all.into_iter().all(|at| first[at] || ends(at) <= time(0) || times[at] >= time(1))
         }
-        Modal::HoldAfter => all.into_iter().all(|at| first[at] || ends(at) <= time(0)),
+        // The one that is left: `hold-after`.
+        _ => all.into_iter().all(|at| first[at] || ends(at) <= time(0)),
     })
 }

@@ -1,0 +1,529 @@
+//! Preferences and constraints of PDDL3 compiled away, for searches that know only a goal and costs.
+//!
+//! - A constraint becomes the flags of its automaton ([`Automaton`]): an action that may change its conditions looks at them
+//!   right before, where they have been the same since the last such action, and the goal looks at the last state.
+//! - Of what must come about within a time, an action of ours is witness that comes early enough.
+//! - A preference becomes two actions, one free where it is kept and one that pays where it is not (Keyder and Geffner 2009,
+//!   "Soft goals can be compiled away"). They follow the last action of the plan one preference after the other, so that
+//!   their order leaves nothing to search.
+//! - An action with preferences of its own becomes several of its name: each preference is a condition, or is paid for.
+
+mod conditions;
+mod touch;
+
+use rustc_hash::FxHashMap;
+
+use crate::diagnostic::Span;
+use crate::model::automaton::{AT_END, Automaton, Cases, Literal};
+use crate::model::walk::{self, Part};
+use crate::task::{
+    Action, Assignment, Atom, Change, Condition, Effect, Expression, Fact, Fluent, Function, FunctionId,
+    GroundChange, GroundFluent, Modal, Object, ObjectId, Parameter, Predicate, PredicateId, PreferenceId,
+    PreferredGoal, Quantified, Rule, Task, Term, Timed, TimedInitial, Trajectory, TypeId,
+};
+
+use conditions::{Fixed, all, any, each_binding, is_false, negated, words};
+use touch::Mentioned;
+
+/// Preferences of one action that become conditions of its copies, at most.
+const MOST_OF_AN_ACTION: usize = 3;
+
+/// A task without preferences and constraints.
+pub(crate) struct Compiled {
+    /// The task. Actions whose names hold a blank are no steps of a plan.
+    pub task: Task,
+    /// A preference that the metric counts is not in it.
+    pub forgets: bool,
+    /// The metric counts no preference at all.
+    pub uncounted: bool,
+}
+
+/// The task without its preferences and constraints; `None` where it has none.
+pub(crate) fn compile(task: &Task) -> Option<Compiled> {
+    if task.constraints.is_empty() && task.preferences.is_empty() {
+        return None;
+    }
+    let mut compiler = Compiler::new(task);
+    for (action, own) in task.actions.iter().enumerate() {
+        compiler.action_preferences(action, own);
+    }
+    for constraint in &task.constraints {
+        let Trajectory { forall, operator, times_s, conditions, slots, preference, .. } = constraint;
+        let asked = match (Automaton::of(*operator), operator, &times_s[..]) {
+            (Some(automaton), ..) => Asked::States(automaton),
+            (None, Modal::Within, [time_s]) if task.is_temporal() => Asked::Within(*time_s),
+            _ => {
+                compiler.forget(*preference);
+                continue;
+            }
+        };
+        compiler.instances(asked, forall, *slots, conditions, *preference);
+    }
+    for (preference, own) in (0..).map(PreferenceId).zip(&task.preferences) {
+        for PreferredGoal { forall, condition, slots, .. } in &own.goals {
+            let conditions = std::slice::from_ref(condition);
+            compiler.instances(Asked::States(&AT_END), forall, *slots, conditions, Some(preference));
+        }
+    }
+    Some(compiler.finish())
+}
+
+/// What is asked of the conditions.
+#[derive(Debug, Clone, Copy)]
+enum Asked {
+    /// What an automaton accepts.
+    States(&'static Automaton),
+    /// That the first one holds at some time up to this one, in seconds.
+    Within(f64),
+}
+
+/// A constraint or preference with objects for its variables, as it is stated.
+struct Stated {
+    asked: Asked,
+    conditions: Vec<Condition>,
+    preference: Option<PreferenceId>,
+}
+
+/// The same with what the searches need of it.
+struct Instance {
+    automaton: &'static Automaton,
+    /// Both conditions; atoms and their absence only, where numbers are compared.
+    conditions: [Condition; 2],
+    /// Facts: the automaton's flags, and one for having been broken where that is allowed.
+    flags: Vec<Condition>,
+    preference: Option<PreferenceId>,
+}
+
+impl Instance {
+    fn literal(&self, literal: &Literal) -> Condition {
+        let (condition, wanted) = match *literal {
+            Literal::First(wanted) => (&self.conditions[0], wanted),
+            Literal::Second(wanted) => (&self.conditions[1], wanted),
+            Literal::Flag(flag, wanted) => (&self.flags[flag], wanted),
+        };
+        if wanted { condition.clone() } else { negated(condition) }
+    }
+
+    fn case(&self, case: &[Literal]) -> Condition {
+        all(case.iter().map(|literal| self.literal(literal)))
+    }
+
+    fn cases(&self, cases: Cases) -> Condition {
+        any(cases.iter().map(|case| self.case(case)))
+    }
+
+    /// The fact that it was broken.
+    fn was_broken(&self) -> Option<&Condition> {
+        self.flags.get(self.automaton.flags)
+    }
+
+    /// What must hold in the last state.
+    fn kept(&self) -> Condition {
+        let broken = any([self.cases(self.automaton.broken), self.cases(self.automaton.open)]);
+        all(self.was_broken().map(negated).into_iter().chain([negated(&broken)]))
+    }
+}
+
+struct Compiler<'t> {
+    task: &'t Task,
+    made: Task,
+    fixed: Fixed,
+    /// By preference: the function that counts its violations, if the metric asks for them.
+    counters: Vec<Option<FunctionId>>,
+    /// Instances by what they say, with how often it is said.
+    said: FxHashMap<(String, Option<PreferenceId>), usize>,
+    instances: Vec<(Stated, f64)>,
+    /// What each preference that is not decided asks of the last state, and how often.
+    kept: Vec<(PreferenceId, f64, Condition)>,
+    /// Violations that nothing can avert.
+    lost: FxHashMap<PreferenceId, f64>,
+    goal: Vec<Condition>,
+    forgets: bool,
+}
+
+impl<'t> Compiler<'t> {
+    fn new(task: &'t Task) -> Compiler<'t> {
+        let mut made = task.clone();
+        made.constraints.clear();
+        made.preferences.clear();
+        for action in &mut made.actions {
+            action.preferences.clear();
+        }
+        let mut compiler = Compiler {
+            task,
+            made,
+            fixed: Fixed::new(task),
+            counters: vec![None; task.preferences.len()],
+            said: FxHashMap::default(),
+            instances: Vec::new(),
+            kept: Vec::new(),
+            lost: FxHashMap::default(),
+            goal: vec![task.goal.body.clone()],
+            forgets: false,
+        };
+        compiler.count_violations();
+        compiler
+    }
+
+    /// A function for each preference that the metric asks for, in its place.
+    fn count_violations(&mut self) {
+        let Some(metric) = &self.task.metric else { return };
+        walk::expression(&metric.value, &mut |part| {
+            if let Part::Expression(Expression::Violated(id)) = part
+                && self.counters[id.index()].is_none()
+            {
+                let name = format!("violations of {}", self.task.preferences[id.index()].name);
+                self.counters[id.index()] = Some(function(&mut self.made, name));
+            }
+        });
+        let counters = &self.counters;
+        if let Some(metric) = &mut self.made.metric {
+            let counted = walk::replaced(&metric.value, &|part| match part {
+                Expression::Violated(id) => counters[id.index()].map(counted),
+                _ => None,
+            });
+            // Violations are costs.
+            metric.value = if metric.minimise { counted } else { Expression::Negative(Box::new(counted)) };
+            metric.minimise = true;
+        }
+    }
+
+    /// Something stays to be looked at after the search.
+    fn forget(&mut self, preference: Option<PreferenceId>) {
+        self.forgets |= preference.is_some_and(|id| self.counters[id.index()].is_some());
+    }
+
+    fn predicate(&mut self, name: &str, parameters: Vec<Parameter>) -> PredicateId {
+        let id = PredicateId(self.made.predicates.len() as u32);
+        let (name, span) = (name.to_string(), Span::default());
+        self.made.predicates.push(Predicate { name, parameters, stratum: None, span });
+        id
+    }
+
+    fn fact(&mut self, name: &str) -> Condition {
+        Condition::Atom(atom(self.predicate(name, Vec::new()), &[]))
+    }
+
+    /// Every instance of a constraint or preference, those that say the same together.
+    fn instances(
+        &mut self,
+        asked: Asked,
+        forall: &[Quantified],
+        slots: usize,
+        conditions: &[Condition],
+        preference: Option<PreferenceId>,
+    ) {
+        if preference.is_some_and(|id| self.counters[id.index()].is_none()) {
+            return;
+        }
+        each_binding(forall, &mut vec![None; slots], &mut |binding| {
+            let ground = |condition| self.fixed.ground(condition, binding);
+            let conditions: Vec<Condition> = conditions.iter().map(ground).collect();
+            let words: Vec<String> = conditions.iter().map(words).collect();
+            let key = (format!("{asked:?}{words:?}"), preference);
+            let number = *self.said.entry(key).or_insert(self.instances.len());
+            match self.instances.get_mut(number) {
+                Some((_, times)) => *times += 1.0,
+                None => self.instances.push((Stated { asked, conditions, preference }, 1.0)),
+            }
+        });
+    }
+
+    fn instance(&mut self, Stated { asked, conditions, preference }: Stated, times: f64) {
+        let task = self.task;
+        // What comes about by itself may still do so after the last action of a plan.
+        if preference.is_some() && !task.init.timed.is_empty() {
+            return self.forget(preference);
+        }
+        let automaton = match asked {
+            Asked::States(automaton) => automaton,
+            Asked::Within(time_s) => {
+                let kept = self.witnessed(time_s, all(conditions));
+                return self.ask(kept, preference, times);
+            }
+        };
+        let mentioned = Mentioned::of(task, &conditions);
+        if mentioned.opaque || mentioned.drifts(task) {
+            return self.forget(preference);
+        }
+        let mut conditions = conditions.into_iter().chain([Condition::TRUE, Condition::TRUE]);
+        let mut next = || conditions.next().unwrap_or_default();
+        let mut conditions = [next(), next()];
+        if mentioned.compares {
+            conditions = conditions.map(|condition| self.derived(condition));
+        }
+        let may_break = !automaton.broken.is_empty() && preference.is_some();
+        let flags = 0..automaton.flags + usize::from(may_break);
+        let flags = flags.map(|_| self.fact("seen on the way")).collect();
+        let instance = Instance { automaton, conditions, flags, preference };
+        if automaton.flags > 0 || !automaton.broken.is_empty() {
+            for index in 0..task.actions.len() {
+                self.watch(&instance, &mentioned, index);
+            }
+        }
+        self.ask(instance.kept(), preference, times);
+    }
+
+    /// Asks something of the last state.
+    fn ask(&mut self, kept: Condition, preference: Option<PreferenceId>, times: f64) {
+        match preference {
+            None => self.goal.push(kept),
+            Some(id) if is_false(&kept) => *self.lost.entry(id).or_default() += times,
+            Some(_) if kept.is_true() => {}
+            Some(id) => self.kept.push((id, times, kept)),
+        }
+    }
+
+    /// The fact that some action of ours has seen the condition before it was too late.
+    fn witnessed(&mut self, time_s: f64, condition: Condition) -> Condition {
+        let (seen, early) = (self.fact("seen in time"), self.fact("early"));
+        let (Condition::Atom(own), Condition::Atom(early_atom)) = (&seen, &early) else { return seen };
+        let early_fact = Fact { predicate: early_atom.predicate, arguments: Box::new([]) };
+        let init = &mut self.made.init;
+        init.facts.push(early_fact.clone());
+        let late = TimedInitial { time_s, change: GroundChange::Delete(early_fact), span: Span::default() };
+        init.timed.insert(init.timed.partition_point(|timed| timed.time_s <= time_s), late);
+        let effects = vec![effect(Change::Add(own.clone()), Condition::TRUE, false)];
+        self.made.actions.push(bookkeeping("see it", all([early, condition]), effects));
+        seen
+    }
+
+    /// A derived fact in place of a condition of which the opposite cannot be said.
+    fn derived(&mut self, condition: Condition) -> Condition {
+        if condition.is_true() {
+            return condition;
+        }
+        let predicate = self.predicate("holds", Vec::new());
+        let stratum = self.made.predicates.iter().filter_map(|own| own.stratum).max();
+        self.made.predicates[predicate.index()].stratum = Some(stratum.map_or(0, |top| top + 1));
+        let (parameters, span) = (Vec::new(), Span::default());
+        self.made.rules.push(Rule { predicate, parameters, slots: 0, body: condition, span });
+        Condition::Atom(atom(predicate, &[]))
+    }
+
+    /// Lets an action look, right before it changes something.
+    fn watch(&mut self, instance: &Instance, mentioned: &Mentioned, index: usize) {
+        let own = &self.task.actions[index];
+        let start = mentioned.touched(own, &own.effects.start);
+        let end = mentioned.touched(own, &own.effects.end);
+        let copies =
+            self.made.actions.iter_mut().filter(|made| made.span == own.span && made.name == own.name);
+        for made in copies {
+            look(instance, &start, &mut made.condition.start, &mut made.effects.start, false);
+            look(instance, &end, &mut made.condition.end, &mut made.effects.end, true);
+        }
+    }
+}
+
+/// Conditions and effects that an instance has on an action that touches it.
+fn look(
+    instance: &Instance,
+    touched: &Condition,
+    condition: &mut Condition,
+    effects: &mut Vec<Effect>,
+    at_end: bool,
+) {
+    if is_false(touched) {
+        return;
+    }
+    let mut set = |fact: &Condition, raised: bool, when: Condition| {
+        let Condition::Atom(fact) = fact else { return };
+        if !is_false(&when) {
+            let change = if raised { Change::Add(fact.clone()) } else { Change::Delete(fact.clone()) };
+            effects.push(effect(change, when, at_end));
+        }
+    };
+    for (flag, raised, case) in instance.automaton.changes {
+        set(&instance.flags[*flag], *raised, all([touched.clone(), instance.case(case)]));
+    }
+    let broken = instance.cases(instance.automaton.broken);
+    match (instance.was_broken(), instance.preference) {
+        (Some(fact), _) => set(fact, true, all([touched.clone(), broken])),
+        (None, None) => {
+            let kept = any([negated(touched), negated(&broken)]);
+            *condition = all([std::mem::take(condition), kept]);
+        }
+        (None, Some(_)) => {}
+    }
+}
+
+impl Compiler<'_> {
+    /// Copies of an action, one for each set of its preferences that it pays for.
+    fn action_preferences(&mut self, index: usize, own: &Action) {
+        let mut parts: Vec<(FunctionId, bool, &Condition)> = Vec::new();
+        for (id, Timed { start, over_all, end }) in &own.preferences {
+            let Some(counter) = self.counters[id.index()] else { continue };
+            let mut exact = over_all.is_true();
+            for (condition, at_end) in [(start, false), (end, true)].into_iter().filter(|p| !p.0.is_true()) {
+                walk::condition(condition, &mut |part| {
+                    exact &= !matches!(part, Part::Condition(Condition::Compare(..)));
+                });
+                parts.push((counter, at_end, condition));
+            }
+            self.forgets |= !exact;
+            parts.retain(|part| exact || part.0 != counter);
+        }
+        if parts.len() > MOST_OF_AN_ACTION {
+            self.forgets = true;
+            return;
+        }
+        let plain = self.made.actions[index].clone();
+        for paid in 0..1usize << parts.len() {
+            let mut copy = plain.clone();
+            for (number, &(counter, at_end, condition)) in parts.iter().enumerate() {
+                let pays = paid >> number & 1 == 1;
+                let asked = if pays { negated(condition) } else { condition.clone() };
+                let place = if at_end { &mut copy.condition.end } else { &mut copy.condition.start };
+                *place = all([std::mem::take(place), asked]);
+                if pays {
+                    let effects = if at_end { &mut copy.effects.end } else { &mut copy.effects.start };
+                    effects.push(pay(counter, 1.0, at_end));
+                }
+            }
+            match paid {
+                0 => self.made.actions[index] = copy,
+                _ => self.made.actions.push(copy),
+            }
+        }
+    }
+
+    fn finish(mut self) -> Compiled {
+        for (stated, times) in std::mem::take(&mut self.instances) {
+            self.instance(stated, times);
+        }
+        self.steps_for_time();
+        if !self.kept.is_empty() || !self.lost.is_empty() {
+            self.last_stage();
+        }
+        self.made.goal.body = all(self.goal);
+        let uncounted = self.counters.iter().all(Option::is_none) && !self.counters.is_empty();
+        Compiled { task: self.made, forgets: self.forgets, uncounted }
+    }
+
+    /// The actions after the last one of the plan.
+    fn last_stage(&mut self) {
+        let at_work = self.fact("at work");
+        for action in &mut self.made.actions {
+            let start = std::mem::take(&mut action.condition.start);
+            action.condition.start = all([at_work.clone(), start]);
+            if action.is_durative() {
+                let end = std::mem::take(&mut action.condition.end);
+                action.condition.end = all([at_work.clone(), end]);
+            }
+        }
+        if let Condition::Atom(at_work) = &at_work {
+            let fact = Fact { predicate: at_work.predicate, arguments: Box::new([]) };
+            self.made.init.facts.push(fact);
+        }
+        let turns = self.turns();
+        let mut lost: Vec<_> = std::mem::take(&mut self.lost).into_iter().collect();
+        lost.sort_unstable_by_key(|(id, _)| *id);
+        let paid = lost.into_iter().filter_map(|(id, times)| Some((self.counters[id.index()]?, times)));
+        let paid: Vec<Effect> = paid.map(|(counter, times)| pay(counter, times, false)).collect();
+        let condition = all([at_work.clone()].into_iter().chain(self.goal.iter().cloned()));
+        let effects = from_to(&at_work, &turns[0]).into_iter().chain(paid).collect();
+        let end = Action { slots: self.task.goal.slots, ..bookkeeping("end of plan", condition, effects) };
+        // From the last one: so grounding goes back from the goal in one go.
+        let kept = std::mem::take(&mut self.kept);
+        for (turn, (id, times, kept)) in turns.windows(2).zip(kept).rev() {
+            let step = from_to(&turn[0], &turn[1]);
+            let violated = all([turn[0].clone(), negated(&kept)]);
+            let kept = all([turn[0].clone(), kept]);
+            self.made.actions.push(bookkeeping("keep it", kept, step.clone()));
+            let paid = self.counters[id.index()].map(|counter| pay(counter, times, false));
+            let step = step.into_iter().chain(paid).collect();
+            self.made.actions.push(bookkeeping("give it up", violated, step));
+        }
+        self.made.actions.push(end);
+        self.goal.extend(turns.last().cloned());
+    }
+
+    /// Facts of which one after the other holds: before each preference, and after the last.
+    fn turns(&mut self) -> Vec<Condition> {
+        let (types, objects, span) = (vec![TypeId(0)], Vec::new().into(), Span::default());
+        let parameter = Parameter { name: "?stage".to_string(), types: types.clone(), objects, span };
+        let turn = self.predicate("turn", vec![parameter]);
+        let stage = |number: usize| {
+            let id = ObjectId(self.made.objects.len() as u32);
+            self.made.objects.push(Object { name: format!("stage {number}"), types: types.clone(), span });
+            Condition::Atom(atom(turn, &[id]))
+        };
+        (0..=self.kept.len()).map(stage).collect()
+    }
+
+    /// Without times, the length of a plan is the number of its steps, and bookkeeping is none.
+    fn steps_for_time(&mut self) {
+        let mut timed = false;
+        let metric = self.made.metric.iter();
+        metric.for_each(|metric| {
+            walk::expression(&metric.value, &mut |part| {
+                timed |= matches!(part, Part::Expression(Expression::TotalTime));
+            });
+        });
+        if !timed || self.task.is_temporal() {
+            return;
+        }
+        let steps = function(&mut self.made, "steps".to_string());
+        for action in &mut self.made.actions {
+            action.effects.start.push(pay(steps, 1.0, false));
+        }
+        if let Some(metric) = &mut self.made.metric {
+            let count = |part: &Expression| matches!(part, Expression::TotalTime).then(|| counted(steps));
+            metric.value = walk::replaced(&metric.value, &count);
+        }
+    }
+}
+
+/// A number of its own, zero at first.
+fn function(task: &mut Task, name: String) -> FunctionId {
+    let function = FunctionId(task.functions.len() as u32);
+    task.functions.push(Function { name, parameters: Vec::new(), result: None, span: Span::default() });
+    task.init.numbers.push((GroundFluent { function, arguments: Box::new([]) }, 0.0));
+    function
+}
+
+fn fluent(function: FunctionId) -> Fluent {
+    Fluent { function, arguments: Vec::new(), span: Span::default() }
+}
+
+fn counted(function: FunctionId) -> Expression {
+    Expression::Fluent(fluent(function))
+}
+
+fn atom(predicate: PredicateId, arguments: &[ObjectId]) -> Atom {
+    let arguments = arguments.iter().map(|&object| Term::Object(object)).collect();
+    Atom { predicate, arguments, span: Span::default() }
+}
+
+fn effect(change: Change, when: Condition, at_end: bool) -> Effect {
+    let (start, end) = if at_end { (Condition::TRUE, when) } else { (when, Condition::TRUE) };
+    let when = Timed { start, over_all: Condition::TRUE, end };
+    Effect { forall: Vec::new(), when, change, span: Span::default() }
+}
+
+fn pay(counter: FunctionId, times: f64, at_end: bool) -> Effect {
+    let change = Change::Number(Assignment::Increase, fluent(counter), Expression::Number(times));
+    effect(change, Condition::TRUE, at_end)
+}
+
+/// One fact gives way to another.
+fn from_to(from: &Condition, to: &Condition) -> Vec<Effect> {
+    let (Condition::Atom(from), Condition::Atom(to)) = (from, to) else { return Vec::new() };
+    let changes = [Change::Delete(from.clone()), Change::Add(to.clone())];
+    changes.map(|change| effect(change, Condition::TRUE, false)).into()
+}
+
+fn bookkeeping(name: &str, condition: Condition, effects: Vec<Effect>) -> Action {
+    Action {
+        name: name.to_string(),
+        parameters: Vec::new(),
+        slots: 0,
+        duration: None,
+        condition: Timed { start: condition, ..Timed::default() },
+        effects: Timed { start: effects, ..Timed::default() },
+        continuous: Vec::new(),
+        grounding: Vec::new(),
+        preferences: Vec::new(),
+        span: Span::default(),
+    }
+}

@@ -1,0 +1,109 @@
+//! The modal operators of PDDL3 (Gerevini and Long 2005) without times, as automata over the states of a plan.
+//!
+//! Each sees the states one after the other, the first and the last included, and remembers at most two flags of what it saw.
+//! None changes its mind where a state is seen twice: whoever runs one may leave out states in which neither condition
+//! has changed.
+
+use crate::task::Modal;
+
+/// Something that holds in a state, or does not.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Literal {
+    /// The operator's first condition.
+    First(bool),
+    /// Its second condition.
+    Second(bool),
+    /// A flag that earlier states have left.
+    Flag(usize, bool),
+}
+
+use Literal::{First, Flag, Second};
+
+/// Conjunctions of literals; one of them is enough.
+pub(crate) type Cases = &'static [&'static [Literal]];
+
+/// What an operator asks.
+#[derive(Debug)]
+pub(crate) struct Automaton {
+    /// How many flags it has, all of them down at first.
+    pub flags: usize,
+    /// States that break it, whatever comes later.
+    pub broken: Cases,
+    /// States that raise (or lower) a flag for the states after them.
+    pub changes: &'static [(usize, bool, &'static [Literal])],
+    /// Last states that leave it unfulfilled.
+    pub open: Cases,
+}
+
+/// `at end`.
+pub(crate) static AT_END: Automaton =
+    Automaton { flags: 0, broken: &[], changes: &[], open: &[&[First(false)]] };
+static ALWAYS: Automaton = Automaton { flags: 0, broken: &[&[First(false)]], changes: &[], open: &[] };
+static SOMETIME: Automaton = Automaton {
+    flags: 1,
+    broken: &[],
+    changes: &[(0, true, &[First(true)])],
+    open: &[&[First(false), Flag(0, false)]],
+};
+/// It was true; it was true and became false.
+static AT_MOST_ONCE: Automaton = Automaton {
+    flags: 2,
+    broken: &[&[First(true), Flag(1, true)]],
+    changes: &[(0, true, &[First(true)]), (1, true, &[First(false), Flag(0, true)])],
+    open: &[],
+};
+/// The second condition is owed.
+static SOMETIME_AFTER: Automaton = Automaton {
+    flags: 1,
+    broken: &[],
+    changes: &[(0, true, &[First(true), Second(false)]), (0, false, &[Second(true)])],
+    open: &[&[First(true), Second(false)], &[Second(false), Flag(0, true)]],
+};
+/// The second condition was true.
+static SOMETIME_BEFORE: Automaton = Automaton {
+    flags: 1,
+    broken: &[&[First(true), Flag(0, false)]],
+    changes: &[(0, true, &[Second(true)])],
+    open: &[],
+};
+
+impl Automaton {
+    /// That of an operator; `None` for one that asks for times.
+    pub(crate) fn of(operator: Modal) -> Option<&'static Automaton> {
+        match operator {
+            Modal::AtEnd => Some(&AT_END),
+            Modal::Always => Some(&ALWAYS),
+            Modal::Sometime => Some(&SOMETIME),
+            Modal::AtMostOnce => Some(&AT_MOST_ONCE),
+            Modal::SometimeAfter => Some(&SOMETIME_AFTER),
+            Modal::SometimeBefore => Some(&SOMETIME_BEFORE),
+            Modal::Within | Modal::AlwaysWithin | Modal::HoldDuring | Modal::HoldAfter => None,
+        }
+    }
+
+    /// Whether it is content with a plan, given the truths of both conditions state by state.
+    pub(crate) fn accepts(&self, truths: impl IntoIterator<Item = (bool, bool)>) -> bool {
+        let mut flags = [false; 2];
+        let mut open = true;
+        for (first, second) in truths {
+            let holds = |literal: &Literal| match *literal {
+                First(wanted) => first == wanted,
+                Second(wanted) => second == wanted,
+                Flag(flag, wanted) => flags[flag] == wanted,
+            };
+            let any = |cases: Cases| cases.iter().any(|case| case.iter().all(holds));
+            if any(self.broken) {
+                return false;
+            }
+            open = any(self.open);
+            let mut next = flags;
+            for (flag, raised, case) in self.changes {
+                if case.iter().all(holds) {
+                    next[*flag] = *raised;
+                }
+            }
+            flags = next;
+        }
+        !open
+    }
+}

@@ -31,6 +31,10 @@ pub struct Candidate {
     pub place: Place,
 }
 
+/// What lies so near to a wall of the map, or beyond it, is the wall, metres: localisation along a surface errs by two or three
+/// centimetres.
+const WALL_M: f64 = 0.03;
+
 /// Something to stand things on, as far as it is known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownSurface {
@@ -40,6 +44,8 @@ pub struct KnownSurface {
     pub name: String,
     /// The room that it is in, as people call it, if the map knows.
     pub room: Option<String>,
+    /// Outline of that room's floor, within its walls, anticlockwise, metres; empty where the map has none.
+    pub floor: Vec<Point3<f64>>,
     /// Convex outline in the map, metres; empty while nothing is known of it.
     pub outline: Vec<Point3<f64>>,
     /// Unit normal, away from the floor.
@@ -63,6 +69,11 @@ impl KnownSurface {
     /// Whether a point lies over the outline widened by a margin in metres.
     pub(crate) fn covers(&self, point: &Point3<f64>, margin_m: f64) -> bool {
         is_over(&self.outline, &self.up, point, margin_m)
+    }
+
+    /// Whether a point is of a wall of its room, or beyond it; of one that is so much thicker, metres, where it is blurred.
+    pub(crate) fn is_of_wall(&self, point: &Point3<f64>, blur_m: f64) -> bool {
+        self.floor.len() >= 3 && !is_over(&self.floor, &Vector3::z(), point, -WALL_M - blur_m)
     }
 
     /// Whether a point lies over what was measured of an object that stands here, or over the circle around its size.

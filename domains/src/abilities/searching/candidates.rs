@@ -72,10 +72,16 @@ pub(crate) fn ring(
 /// Everything to stand things on: what the body's map knows, or where it knows nothing what the domain names.
 pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
     let up = robot.description().up.unwrap_or_else(Vector3::z);
+    let floor = |name: &Option<String>| {
+        let room = robot.rooms().iter().find(|room| Some(&room.name) == name.as_ref());
+        room.map(|room| room.outline_m.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect())
+            .unwrap_or_default()
+    };
     let on_map = robot.surfaces().iter().map(|hint| KnownSurface {
         symbol: symbol(&hint.name),
         name: hint.name.clone(),
         room: hint.room.clone(),
+        floor: floor(&hint.room),
         whole: true,
         outline: hint.outline_m.iter().map(|p| Point3::new(p.x, p.y, hint.height_m)).collect(),
         up,
@@ -86,6 +92,7 @@ pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
             symbol: symbol(name),
             name: name.clone(),
             room: None,
+            floor: Vec::new(),
             whole: false,
             outline: Vec::new(),
             up,

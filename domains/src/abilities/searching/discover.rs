@@ -62,6 +62,7 @@ pub(super) fn adopt(mind: &mut Mind, on: usize, others: Vec<Surface>, notes: &mu
             symbol: symbol(&name),
             name: name.clone(),
             room: None,
+            floor: Vec::new(),
             outline: surface.hull.clone(),
             up: surface.up.into_inner(),
             whole: false,

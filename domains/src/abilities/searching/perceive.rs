@@ -44,9 +44,6 @@ const BESIDE_M: f64 = 0.25;
 const SAME_M: f64 = 0.10;
 /// Points this near to a surface lie on it.
 pub(super) const ON_SURFACE_M: f64 = 0.012;
-/// What lies so near to a wall of the map, or beyond it, is the wall, metres: localisation along a surface errs by two or three
-/// centimetres.
-const WALL_M: f64 = 0.03;
 /// A view may be moved by so many standard deviations of localisation; more is an error of what moved it.
 const ASTRAY: f64 = 4.0;
 
@@ -163,7 +160,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         notes.push(Note::Nothing { because });
         return Ok(());
     }
-    let merged = without_walls(eyes.robot, &mind.known.surfaces[on], merged);
+    let merged = without_walls(&mind.known.surfaces[on], merged);
     take_in(mind, on, &views, &merged);
     let newest = newest(&views, &merged);
     let scene = segment_on(&merged.cloud, &merged.visibility, surface, &seeking);
@@ -207,12 +204,8 @@ fn begin_again(mind: &mut Mind, on: usize) {
 }
 
 /// Takes the walls of the surface's room out of a merged cloud, as the map has them: what stands against a wall is not one with it.
-fn without_walls(robot: &dyn Robot, known: &KnownSurface, mut merged: Merged) -> Merged {
-    let room = robot.rooms().iter().find(|room| Some(&room.name) == known.room.as_ref());
-    let Some(room) = room.filter(|room| room.outline_m.len() >= 3) else { return merged };
-    let floor: Vec<Point3<f64>> = room.outline_m.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
-    let inside = KnownSurface { outline: floor, up: Vector3::z(), ..known.clone() };
-    merged.cloud = merged.cloud.filter(|p| inside.covers(&p.cast(), -WALL_M));
+fn without_walls(known: &KnownSurface, mut merged: Merged) -> Merged {
+    merged.cloud = merged.cloud.filter(|p| !known.is_of_wall(&p.cast(), 0.0));
     merged
 }
 

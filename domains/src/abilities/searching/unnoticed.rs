@@ -21,6 +21,9 @@ const MEASURED_SHARE: f64 = 1.0 / 3.0;
 /// Share of an object's volume that may have been seen free where so much was measured: from afar a rim is cut off and noise frays
 /// what is left.
 const FRAYED_SHARE: f64 = 0.5;
+/// What goes on so high above an object's foot, in its heights, is not of it; and so near to a wall, in voxels, is the wall.
+const ABOVE: f64 = 1.5;
+const WALL_BLUR: f64 = 3.0;
 /// What is known so well is not taken for two things that blur into each other.
 const SURE: f64 = 0.8;
 /// How far above an unseen place the top of a body that fills it is looked for, metres.
@@ -93,12 +96,15 @@ pub(super) fn unseen_volume(
     let mut unseen = Vec::new();
     let (mut free, mut measured) = (0.0, 0.0);
     for (n, &at) in COLUMNS.iter().enumerate() {
+        let above = column(at) + surface.up * (height_m * ABOVE);
+        let is_wall =
+            surface.is_of_wall(&above, WALL_BLUR * space.voxel_m()) && space.cell(&above) != Cell::Free;
         for level in LEVELS {
             let point = column(at) + surface.up * (height_m * level);
             match space.cell(&point) {
                 Cell::Unseen => unseen.push(point),
                 Cell::Occupied if !explained[n] => {
-                    measured += 1.0;
+                    measured += if is_wall { 0.0 } else { 1.0 };
                     unseen.push(point);
                 }
                 Cell::Occupied => {}
@@ -191,6 +197,22 @@ mod tests {
     }
 
     #[test]
+    fn what_was_measured_of_a_wall_is_no_thing() {
+        let space = seen_from_the_side(0.0, 0.2, 0.5);
+        let likely = |surface: &KnownSurface| {
+            unseen_volume(surface, &space, &[], &Point3::origin(), (0.104, 0.07)).map(|hidden| hidden.likely)
+        };
+        assert_eq!(likely(&table()), Some(true));
+        let floor =
+            [(-2.0, -2.0), (0.01, -2.0), (0.01, 2.0), (-2.0, 2.0)].map(|(x, y)| Point3::new(x, y, -0.7));
+        assert_eq!(
+            likely(&KnownSurface { floor: floor.to_vec(), ..table() }),
+            Some(false),
+            "a wall stands there"
+        );
+    }
+
+    #[test]
     fn nothing_is_looked_for_in_a_vessel() {
         let hidden = |standing: &[&Track]| {
             let at = Point3::origin();
@@ -213,6 +235,7 @@ mod tests {
             symbol: "table".into(),
             name: "table".into(),
             room: None,
+            floor: Vec::new(),
             outline: corners.map(|(x, y)| Point3::new(x, y, 0.0)).to_vec(),
             up: Vector3::z(),
             whole: true,

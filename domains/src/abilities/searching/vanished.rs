@@ -127,6 +127,7 @@ mod tests {
             symbol: "table".into(),
             name: "table".into(),
             room: None,
+            floor: Vec::new(),
             outline: vec![],
             up: Vector3::z(),
             whole: true,

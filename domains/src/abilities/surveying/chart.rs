@@ -274,6 +274,7 @@ impl Chart {
             symbol: symbol(name),
             name: name.clone(),
             room: None,
+            floor: Vec::new(),
             outline: level
                 .outline
                 .iter()

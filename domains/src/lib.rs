@@ -32,6 +32,7 @@ mod programs;
 pub mod situation;
 pub mod template;
 pub mod vocabulary;
+mod walls;
 pub mod words;
 pub mod world;
 

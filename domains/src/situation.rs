@@ -400,7 +400,7 @@ impl Situation {
         std::iter::once(centre)
             .chain(surface.outline.iter().copied())
             .chain(halfway)
-            .any(|p| self.in_view(&camera, &p))
+            .any(|p| self.in_view(&camera, &p) && !self.is_walled_off(&eye, &p.xy()))
     }
 
     /// How clearly a look from a candidate shows what stands on a surface, 0 to 1: the weight that a depth of its noise has
@@ -445,7 +445,11 @@ impl Situation {
         }
         let gone = |p: &Point3<f64>| moved.is_some_and(|o| o.covers(p));
         let space = &self.spaces[on];
-        let visible = |p: &&Point3<f64>| self.in_view(&camera, p) && space.line_of_sight(&eye, p, &gone);
+        let visible = |p: &&Point3<f64>| {
+            self.in_view(&camera, p)
+                && space.line_of_sight(&eye, p, &gone)
+                && !self.is_walled_off(&eye.xy(), &p.xy())
+        };
         if hypothesis.points.iter().filter(visible).count() * 2 <= hypothesis.points.len() {
             return 0.0;
         }

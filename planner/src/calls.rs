@@ -320,12 +320,7 @@ impl<'a> Calls<'a> {
             self.settled.borrow_mut()[call as usize][level as usize] = Some(answer.clone());
             return Ok(answer);
         }
-        let values =
-            bound.sources.variables.iter().map(|&variable| u64::from(state.values[variable as usize]));
-        // Adding zero makes -0.0 and 0.0 one key.
-        let numbers =
-            bound.sources.numbers.iter().map(|&number| (state.numbers[number as usize] + 0.0).to_bits());
-        let key: Box<[u64]> = values.chain(numbers).collect();
+        let key = self.what_is_read(bound.sources, state);
         if let Some(answer) = self.known.borrow().get(&(call, level)).and_then(|known| known.get(&key)) {
             hit();
             return Ok(answer.clone());
@@ -333,6 +328,27 @@ impl<'a> Calls<'a> {
         let answer = self.ask(bound, None, state, level)?;
         self.known.borrow_mut().entry((call, level)).or_default().insert(key, answer.clone());
         Ok(answer)
+    }
+
+    /// The values of the variables that are read, as many in a word as it can tell apart, then those of the numbers.
+    fn what_is_read(&self, sources: &Sources, state: &Values) -> Box<[u64]> {
+        let mut words = Vec::with_capacity(sources.variables.len() / 16 + 1 + sources.numbers.len());
+        let (mut word, mut room) = (0, 1_u64);
+        for &variable in &sources.variables {
+            let value = u64::from(state.values[variable as usize]);
+            let many = u64::from(self.ground.variables[variable as usize].domain_size().max(2));
+            match room.checked_mul(many) {
+                Some(more) => (word, room) = (word + value * room, more),
+                None => {
+                    words.push(word);
+                    (word, room) = (value, many);
+                }
+            }
+        }
+        words.push(word);
+        // Adding zero makes -0.0 and 0.0 one key.
+        words.extend(sources.numbers.iter().map(|&number| (state.numbers[number as usize] + 0.0).to_bits()));
+        words.into_boxed_slice()
     }
 
     fn ask(

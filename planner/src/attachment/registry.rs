@@ -45,12 +45,14 @@ struct CacheKey {
     level: Level,
     module: Arc<str>,
     arguments: Vec<Arc<str>>,
-    readings: Vec<KeyValue>,
+    /// Of each reading two bits: false, true, or one of the others. A call may read hundreds of facts.
+    truths: Vec<u64>,
+    /// The readings that are no truths, in their order.
+    others: Vec<KeyValue>,
 }
 
 #[derive(PartialEq, Eq, Hash)]
 enum KeyValue {
-    Truth(bool),
     Number(u64),
     Object(Arc<str>),
     Undefined,
@@ -58,19 +60,25 @@ enum KeyValue {
 
 impl CacheKey {
     fn new(call: &Call, level: Level) -> CacheKey {
-        let readings = call.readings.iter().map(|reading| match &reading.value {
-            FactValue::Truth(truth) => KeyValue::Truth(*truth),
-            // Adding zero makes -0.0 and 0.0 one key.
-            FactValue::Number(number) => KeyValue::Number((number + 0.0).to_bits()),
-            FactValue::Object(name) => KeyValue::Object(name.clone()),
-            FactValue::Undefined => KeyValue::Undefined,
-        });
-        CacheKey {
-            level,
-            module: call.module.clone(),
-            arguments: call.arguments.clone(),
-            readings: readings.collect(),
+        const A_WORD: usize = 32;
+        let mut truths = vec![0; call.readings.len().div_ceil(A_WORD)];
+        let mut others = Vec::new();
+        for (n, reading) in call.readings.iter().enumerate() {
+            let bits = match &reading.value {
+                FactValue::Truth(truth) => u64::from(*truth),
+                other => {
+                    others.push(match other {
+                        // Adding zero makes -0.0 and 0.0 one key.
+                        FactValue::Number(number) => KeyValue::Number((number + 0.0).to_bits()),
+                        FactValue::Object(name) => KeyValue::Object(name.clone()),
+                        _ => KeyValue::Undefined,
+                    });
+                    2
+                }
+            };
+            truths[n / A_WORD] |= bits << (2 * (n % A_WORD));
         }
+        CacheKey { level, module: call.module.clone(), arguments: call.arguments.clone(), truths, others }
     }
 }
 

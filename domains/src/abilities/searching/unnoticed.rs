@@ -21,7 +21,8 @@ const MEASURED_SHARE: f64 = 1.0 / 3.0;
 /// Share of an object's volume that may have been seen free where so much was measured: from afar a rim is cut off and noise frays
 /// what is left.
 const FRAYED_SHARE: f64 = 0.5;
-/// What goes on so high above an object's foot, in its heights, is not of it; and so near to a wall, in voxels, is the wall.
+/// What goes on so high above an object's foot, in its heights, is not of it; and so near to a wall, in voxels, is the wall. Within
+/// a voxel of where walls are taken out of the clouds, everything is.
 const ABOVE: f64 = 1.5;
 const WALL_BLUR: f64 = 3.0;
 /// What is known so well is not taken for two things that blur into each other.
@@ -97,8 +98,8 @@ pub(super) fn unseen_volume(
     let (mut free, mut measured) = (0.0, 0.0);
     for (n, &at) in COLUMNS.iter().enumerate() {
         let above = column(at) + surface.up * (height_m * ABOVE);
-        let is_wall =
-            surface.is_of_wall(&above, WALL_BLUR * space.voxel_m()) && space.cell(&above) != Cell::Free;
+        let is_wall = surface.is_of_wall(&above, space.voxel_m())
+            || surface.is_of_wall(&above, WALL_BLUR * space.voxel_m()) && space.cell(&above) != Cell::Free;
         for level in LEVELS {
             let point = column(at) + surface.up * (height_m * level);
             match space.cell(&point) {
@@ -198,18 +199,19 @@ mod tests {
 
     #[test]
     fn what_was_measured_of_a_wall_is_no_thing() {
-        let space = seen_from_the_side(0.0, 0.2, 0.5);
-        let likely = |surface: &KnownSurface| {
+        let likely = |seen_up_to_m: f64, surface: &KnownSurface| {
+            let space = seen_from_the_side(0.0, seen_up_to_m, 0.5);
             unseen_volume(surface, &space, &[], &Point3::origin(), (0.104, 0.07)).map(|hidden| hidden.likely)
         };
-        assert_eq!(likely(&table()), Some(true));
-        let floor =
-            [(-2.0, -2.0), (0.01, -2.0), (0.01, 2.0), (-2.0, 2.0)].map(|(x, y)| Point3::new(x, y, -0.7));
-        assert_eq!(
-            likely(&KnownSurface { floor: floor.to_vec(), ..table() }),
-            Some(false),
-            "a wall stands there"
-        );
+        let before_wall = |wall_m: f64| {
+            let floor = [(-2.0, -2.0), (wall_m, -2.0), (wall_m, 2.0), (-2.0, 2.0)];
+            let floor = floor.map(|(x, y)| Point3::new(x, y, -0.7)).to_vec();
+            KnownSurface { floor, ..table() }
+        };
+        assert_eq!(likely(0.2, &table()), Some(true));
+        assert_eq!(likely(0.2, &before_wall(0.01)), Some(false), "a wall stands there");
+        assert_eq!(likely(0.11, &before_wall(0.01)), Some(false), "a wall of which little was seen");
+        assert_eq!(likely(0.11, &before_wall(0.15)), Some(true), "the wall is too far behind it");
     }
 
     #[test]

@@ -9,8 +9,8 @@ use descry_planner::{Answer, Call, CallError};
 use crate::abilities::argument;
 use crate::situation::Situation;
 
-/// No look costs more than so many seconds for being in vain.
-const MOST_S: f64 = 300.0;
+/// No look costs more than so many seconds for being in vain: where next to nothing is left, one look is as vain as another.
+const MOST_S: f64 = 10_000.0;
 
 pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
     let on = situation.surface(argument(call, 0)?)?;

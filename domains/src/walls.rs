@@ -1,0 +1,89 @@
+//! What the walls of the map hide: a line of sight leads from room to room through open doors only.
+
+use descry_robots::nalgebra::{Point2, Vector2};
+use descry_robots::{Door, Room};
+
+use crate::situation::Situation;
+
+/// What is this near to where a line of sight ends stands before the wall behind it, metres.
+const BEFORE_M: f64 = 0.05;
+/// A wall is at most so thick, metres: the outlines of two rooms lie so far from the middle of the door between them.
+const THICK_M: f64 = 0.3;
+
+impl Situation {
+    /// Whether a wall of the map, or a door that is believed to be shut, stands between two places.
+    pub(crate) fn is_walled_off(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
+        let is_open = |n: &usize| !self.shut.contains(n);
+        let open = (0..self.doors.len()).filter(is_open).map(|n| &self.doors[n].door);
+        crosses_a_wall(self.robot.rooms(), open, from, to)
+    }
+}
+
+/// Whether the way between two places leads through the outline of a room anywhere but at one of the doors.
+fn crosses_a_wall<'a>(
+    rooms: &[Room],
+    doors: impl Iterator<Item = &'a Door> + Clone,
+    from: &Point2<f64>,
+    to: &Point2<f64>,
+) -> bool {
+    let way = to - from;
+    let far = way.norm() - BEFORE_M;
+    let Some(ahead) = way.try_normalize(1e-9) else { return false };
+    let crossing = |a: &Point2<f64>, b: &Point2<f64>| {
+        let wall = b - a;
+        let turn = ahead.perp(&wall);
+        let (along, share) = ((a - from).perp(&wall) / turn, (a - from).perp(&ahead) / turn);
+        let is_met = turn != 0.0 && (0.0..=1.0).contains(&share) && (0.0..far).contains(&along);
+        is_met.then(|| from + ahead * along)
+    };
+    rooms.iter().filter(|room| room.outline_m.len() >= 3).any(|room| {
+        let corners = &room.outline_m;
+        let walls = (0..corners.len()).map(|n| (&corners[n], &corners[(n + 1) % corners.len()]));
+        walls
+            .filter_map(|(a, b)| crossing(a, b))
+            .any(|at| !doors.clone().any(|door| leads_through(door, &at)))
+    })
+}
+
+fn leads_through(door: &Door, at: &Point2<f64>) -> bool {
+    let along = Vector2::new(door.along_rad.cos(), door.along_rad.sin());
+    let aside = at - door.centre_m;
+    aside.dot(&along).abs() <= door.width_m / 2.0 && aside.perp(&along).abs() <= THICK_M
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether two rooms beside each other, with a door in the wall of 10 cm between them, let one see from here to there.
+    fn check(from: (f64, f64), to: (f64, f64), open: bool, hidden: bool) {
+        let room = |name: &str, west: f64| Room {
+            name: name.into(),
+            outline_m: [(west, 0.0), (west + 3.0, 0.0), (west + 3.0, 4.0), (west, 4.0)]
+                .map(|(x, y)| Point2::new(x, y))
+                .to_vec(),
+        };
+        let door = Door {
+            name: "door".into(),
+            centre_m: Point2::new(3.05, 1.0),
+            along_rad: std::f64::consts::FRAC_PI_2,
+            width_m: 0.9,
+            between: ["kitchen".into(), "study".into()],
+        };
+        let doors = open.then_some(&door).into_iter();
+        let [from, to] = [from, to].map(|(x, y)| Point2::new(x, y));
+        let rooms = [room("kitchen", 0.0), room("study", 3.1)];
+        assert_eq!(crosses_a_wall(&rooms, doors, &from, &to), hidden, "{from} to {to}, door open: {open}");
+    }
+
+    #[test]
+    fn one_sees_into_the_next_room_through_an_open_door_only() {
+        check((1.0, 1.0), (2.9, 3.5), false, false);
+        check((1.0, 1.0), (5.0, 1.1), true, false);
+        check((1.0, 1.0), (5.0, 1.1), false, true);
+        check((1.0, 1.0), (5.0, 3.9), true, true);
+        // What lies at the wall's foot stands before it.
+        check((1.0, 1.0), (3.0, 3.0), false, false);
+        check((2.9, 1.0), (1.0, 1.0), false, false);
+    }
+}

@@ -249,8 +249,9 @@ fn measure(grounded: &GroundTask) -> Measure {
     match &grounded.metric {
         None => Measure::Makespan,
         Some(metric) if metric.minimise && metric.expression == Expression::TotalTime => Measure::Makespan,
-        Some(metric) if metric.additive && metric.minimise => {
-            Measure::Additive { time_weight: metric.time_weight }
+        Some(metric) if metric.additive => {
+            let sign = if metric.minimise { 1.0 } else { -1.0 };
+            Measure::Additive { sign, time_weight: sign * metric.time_weight }
         }
         Some(metric) if metric.minimise => Measure::Expression(metric.expression.clone()),
         Some(metric) => Measure::Expression(Expression::Negative(Box::new(metric.expression.clone()))),

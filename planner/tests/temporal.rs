@@ -328,3 +328,16 @@ fn published_tasks_that_need_concurrency() {
         }
     }
 }
+
+#[test]
+fn what_actions_earn_is_made_large() {
+    let domain = "(:predicates (at ?p) (road ?from ?to)) (:functions (reward) (gain ?p))
+      (:durative-action go :parameters (?from ?to) :duration (= ?duration 2)
+        :condition (and (at start (at ?from)) (at start (road ?from ?to)))
+        :effect (and (at start (not (at ?from))) (at end (at ?to)) (at end (increase (reward) (gain ?to)))))";
+    let problem = "(:objects a b c) (:init (at a) (road a b) (road b c) (road a c)
+      (= (reward) 0) (= (gain b) 5) (= (gain c) 1)) (:goal (at c))";
+    check(domain, &format!("{problem} (:metric minimize (reward))"), Some(2.0));
+    check(domain, &format!("{problem} (:metric maximize (reward))"), Some(4.0));
+    check(domain, &format!("{problem} (:metric maximize (- (reward) (* 3 (total-time))))"), Some(2.0));
+}

@@ -349,7 +349,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
     ) -> Result<Option<End>, Failure> {
         let Ok(times) = self.times(parent, &step, !situation.open.is_empty()) else { return Ok(None) };
         let measured = self.space.measured(costs, &situation.state, times.makespan_s)?;
-        if measured >= self.manner.bound {
+        let too_dear = measured >= self.manner.bound;
+        if too_dear && self.space.only_grows {
             return Ok(None);
         }
         self.counts.work += WORK_A_STATE + situation.state.values.len() as u64;
@@ -369,7 +370,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             self.steps[node as usize] = step;
             self.costs[node as usize] = costs;
         }
-        if !times.due && self.space.world.is_goal(&situation)? {
+        if !times.due && !too_dear && self.space.world.is_goal(&situation)? {
             if !times.late {
                 return Ok(Some(End::Found(self.path(node))));
             }
@@ -491,7 +492,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         };
         let cost = self.nodes[node as usize].cost;
         let reachable = if self.space.is_makespan() { cost.max(estimate.finish_s) } else { cost };
-        if reachable >= self.manner.bound {
+        if self.space.only_grows && reachable >= self.manner.bound {
             return Ok(());
         }
         self.counts.expanded += 1;

@@ -20,13 +20,27 @@ use super::world::{Moment, Span, World};
 pub(crate) enum Measure {
     /// When the last action ends.
     Makespan,
-    /// Costs of the actions, plus a weight times the makespan.
+    /// Costs of the actions times a sign, plus a weight times the makespan.
     Additive {
+        /// One, or minus one where what actions add is a reward.
+        sign: f64,
         /// Weight of the makespan.
         time_weight: f64,
     },
     /// An expression over the last state and the makespan, to be made small.
     Expression(Expression),
+}
+
+impl Measure {
+    /// Whether no action earns a reward. Of an expression over states that is not known; it is taken to be so.
+    fn only_grows(&self, world: &World) -> bool {
+        let Measure::Additive { sign, time_weight } = self else { return true };
+        let grows = |cost: &Expression| match cost {
+            Expression::Constant(cost) => sign * cost >= 0.0,
+            _ => *sign > 0.0,
+        };
+        *time_weight >= 0.0 && world.acts.iter().all(|act| grows(act.cost))
+    }
 }
 
 /// A search space with everything that several searches on it share.
@@ -45,6 +59,8 @@ pub(crate) struct Space<'w, 'a> {
     everywhere: Vec<u32>,
     /// Whether times can make a sequence impossible.
     pub tight: bool,
+    /// Whether a beginning of a plan that is as dear as another plan leads to no better one.
+    pub only_grows: bool,
 }
 
 impl<'w, 'a> Space<'w, 'a> {
@@ -72,7 +88,8 @@ impl<'w, 'a> Space<'w, 'a> {
         }
         let accesses = Accesses::new(world);
         let tight = open_act.contains(&true) || !ground.timed.is_empty();
-        Space { world, open_act, measure, accesses, pivots, everywhere, tight }
+        let only_grows = measure.only_grows(world);
+        Space { world, open_act, measure, accesses, pivots, everywhere, tight, only_grows }
     }
 
     /// Actions whose facts at start hold, in order.
@@ -116,7 +133,7 @@ impl<'w, 'a> Space<'w, 'a> {
     pub fn timed_measure(&self) -> bool {
         match &self.measure {
             Measure::Makespan => true,
-            Measure::Additive { time_weight } => *time_weight != 0.0,
+            Measure::Additive { time_weight, .. } => *time_weight != 0.0,
             Measure::Expression(_) => true,
         }
     }
@@ -130,7 +147,7 @@ impl<'w, 'a> Space<'w, 'a> {
 
     /// What an action adds to an additive metric.
     pub fn step_cost(&self, before: &Values, step: &Step) -> Result<f64, Failure> {
-        let Measure::Additive { .. } = self.measure else { return Ok(0.0) };
+        let Measure::Additive { sign, .. } = self.measure else { return Ok(0.0) };
         if matches!(step.part, Part::End | Part::Free) {
             return Ok(0.0);
         }
@@ -140,14 +157,14 @@ impl<'w, 'a> Space<'w, 'a> {
             proposal: step.proposal.as_ref(),
             level: Level::Exact,
         };
-        self.world.evaluate(self.world.acts[step.act as usize].cost, &moment)
+        Ok(sign * self.world.evaluate(self.world.acts[step.act as usize].cost, &moment)?)
     }
 
     /// The measure of a plan or a beginning of one, from its additive costs, its last state and its makespan.
     pub fn measured(&self, costs: f64, state: &Values, makespan_s: f64) -> Result<f64, Failure> {
         match &self.measure {
             Measure::Makespan => Ok(makespan_s),
-            Measure::Additive { time_weight } => Ok(costs + time_weight * makespan_s),
+            Measure::Additive { time_weight, .. } => Ok(costs + time_weight * makespan_s),
             Measure::Expression(expression) => {
                 let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Exact };
                 let timed = with_total_time(expression, makespan_s);

@@ -100,6 +100,19 @@ fn the_same_seed_gives_the_same_run() {
 }
 
 #[test]
+fn results_are_printed_and_what_happens_is_told() {
+    let (out, err) = check(&["find", "cup A"], 0, &[]);
+    assert!(out.contains("achieved: cup A stands on the table") && !out.contains("(observe "), "{out}");
+    assert!(err.contains("(observe ") && !err.contains("achieved:"), "{err}");
+    let said = json(&["find", "cup Z", "--json"], 2);
+    assert_eq!(
+        (&said["goal"], &said["verdict"], &said["exit"]),
+        (&"find cup Z".into(), &"failed".into(), &2.into())
+    );
+    assert!(said["why"].as_str().is_some_and(|why| why.contains("did you mean \"cup A\"")), "{said}");
+}
+
+#[test]
 fn what_is_not_there_is_not_found() {
     let said = json(&["find", "cup A", "--scene", "no-cup-a", "--json"], 1);
     assert_eq!(said["verdict"], "not_found", "{said}");

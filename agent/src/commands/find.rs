@@ -79,7 +79,7 @@ pub struct With {
     live: live::LiveArguments,
     #[command(flatten)]
     keeping: Keeping,
-    /// Print the result as one JSON object
+    /// Print the result as one JSON object, also if it fails
     #[arg(long)]
     json: bool,
 }
@@ -103,22 +103,45 @@ fn carry_out(words: &[String], verb: &str, with: &With, stop: &Stop) -> Result<E
         None => begin(&said, with, &mut window, stop),
     };
     window.close();
-    let report = ended?;
-    if with.json {
-        input::print_json(&report)?;
+    match &ended {
+        Ok(report) if with.json => {
+            input::narrate(&report.to_string());
+            input::print_json(report)?;
+        }
+        Ok(report) => {
+            input::narrate("");
+            input::print_text(report.to_string().trim())?;
+        }
+        Err(failed) if with.json => input::print_json(&Unended::of(&said, failed))?,
+        Err(_) => {}
     }
-    Ok(match report.verdict {
+    Ok(match ended?.verdict {
         Verdict::Achieved => Exit::Done,
         Verdict::NotFound | Verdict::CannotTell | Verdict::Impossible => Exit::No,
         Verdict::Failed => Exit::Broken,
     })
 }
 
-/// Keeps how a run ended, and says it.
+/// What `--json` says of a run that came to no end: the keys that every result has.
+#[derive(serde::Serialize)]
+struct Unended<'a> {
+    goal: &'a str,
+    verdict: Verdict,
+    why: String,
+    exit: u8,
+}
+
+impl<'a> Unended<'a> {
+    fn of(said: &'a str, failed: &CommandError) -> Self {
+        let why = failed.to_string();
+        Self { goal: said, verdict: Verdict::Failed, why, exit: failed.exit() as u8 }
+    }
+}
+
+/// Keeps how a run ended.
 fn end(mut report: Report, folder: &Folder, started: Instant) -> Result<Report, CommandError> {
     report.wall_s = started.elapsed().as_secs_f64();
     run::finish(folder.path(), &report)?;
-    input::narrate(&report.to_string());
     Ok(report)
 }
 

@@ -109,13 +109,23 @@ function mapOf(at) {
     shape(svg, "circle", { cx: body.x_m, cy: -body.y_m, r, fill: "none", stroke: "var(--now)", "stroke-width": .14 * em });
     shape(svg, "line", { x1: body.x_m, y1: -body.y_m, x2: body.x_m + r * Math.cos(body.yaw_rad), y2: -body.y_m - r * Math.sin(body.yaw_rad), stroke: "var(--now)", "stroke-width": .18 * em });
   }
+  const named = [];
   for (const o of latest(story.beliefs, at)?.objects ?? []) {
     const colour = o.name ? "var(--known)" : "var(--unknown)";
     const outline = o.footprint_m.length > 2 ? o.footprint_m : null;
     const drawn = outline ? shape(svg, "polygon", { points: path(outline), fill: colour, "fill-opacity": .55, stroke: colour, "stroke-width": .07 * em })
       : shape(svg, "circle", { cx: o.position_m[0], cy: -o.position_m[1], r: Math.max(o.size_m[0], .04) / 2, fill: colour });
     drawn.append(titled(`${o.name ?? "unknown"} ${o.probability.toFixed(2)}`));
-    if (o.name) words(o.position_m[0], o.position_m[1] + .6 * em, o.name, { fill: colour, style: `font-size:${em * .9}px` });
+    if (o.name) named.push([o.position_m[0], o.position_m[1] + .6 * em, o.name, colour]);
+  }
+  // Names of neighbours stand above each other, from the lowest up.
+  const set = [];
+  for (const [x, low, name, colour] of named.sort((a, b) => a[1] - b[1])) {
+    const half = name.length * .25 * em;
+    let y = low;
+    while (set.some(o => Math.abs(o.x - x) < o.half + half && Math.abs(o.y - y) < .95 * em)) y += .2 * em;
+    set.push({ x, y, half });
+    words(x, y, name, { fill: colour, style: `font-size:${em * .9}px` });
   }
 }
 const titled = text => { const title = document.createElementNS(SVG, "title"); title.textContent = text; return title; };
@@ -243,6 +253,15 @@ function matrix(wide, high) {
   const rows = [[...right, along(right)].map(v => v * a), [...up, along(up)].map(v => v * f), [...back, along(back)].map((v, k) => v * z + (k === 3 ? w : 0)), [...back, along(back)].map(v => -v)];
   return Float32Array.from([0, 1, 2, 3].flatMap(c => rows.map(r => r[c])));
 }
+// How many points are drawn while the picture turns: as many as come 30 times a second here, by how long the picture before took.
+let most = 60000, before_ms = 0;
+function affordable() {
+  const now_ms = performance.now(), took_ms = now_ms - before_ms;
+  before_ms = now_ms;
+  // A hand that rests is no slow picture.
+  if (took_ms < 250) most = took_ms > 36 ? Math.max(6000, most * .8) : took_ms < 24 ? Math.min(400000, most * 1.1) : most;
+  return most;
+}
 function spaceOf(at) {
   const canvas = $("cloud"), labels = $("labels"), scale = window.devicePixelRatio || 1;
   const wide = Math.round(canvas.clientWidth * scale), high = Math.round(canvas.clientHeight * scale);
@@ -255,7 +274,7 @@ function spaceOf(at) {
     gl.uniformMatrix4fv(gl.getUniformLocation(program, "seen"), false, seen);
     gl.uniform1f(gl.getUniformLocation(program, "dot"), .009 * high * 1.6 / 2 * 1.3);
     const shown = [...clouds.values()].filter(c => c.at_s <= at + 1e-6);
-    const share = turning ? Math.min(1, 150000 / shown.reduce((sum, c) => sum + c.count, 1)) : 1;
+    const share = turning ? Math.min(1, affordable() / shown.reduce((sum, c) => sum + c.count, 1)) : 1;
     for (const cloud of shown) {
       gl.uniform3fv(gl.getUniformLocation(program, "least"), cloud.least);
       gl.uniform3fv(gl.getUniformLocation(program, "size"), cloud.size);

@@ -22,6 +22,7 @@ const FORMATS: &[&str] = &[
     "robots/src/sim/scene/object.rs",
     "robots/src/sim/shape.rs",
     "robots/src/sim/faults.rs",
+    "robots/src/sim/stereo.rs",
     "robots/src/recorded/settings.rs",
     "robots/src/program/hello.rs",
     "robots/src/program/message.rs",
@@ -35,6 +36,9 @@ const FORMATS: &[&str] = &[
 
 /// Types that have no keys of their own: numbers and texts that are read in a way of their own.
 const WITHOUT_KEYS: &[&str] = &["Doorway", "NothingSaid", "NumberOrPair", "OtherBody", "Range", "Steps"];
+
+/// Where the constants are that stand for what a key is if it is left out.
+const CONSTANTS: &[&str] = &["domains/src/load.rs", "domains/src/abilities/searching/policies/mod.rs"];
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace holds this crate").to_path_buf()
@@ -57,7 +61,12 @@ fn meaning(attributes: &[Attribute]) -> String {
         },
         _ => None,
     });
-    lines.collect::<Vec<_>>().join(" ").replace('|', "\\|").replace("[`", "`").replace("`]", "`")
+    let text = lines.collect::<Vec<_>>().join(" ").replace('|', "\\|").replace("[`", "`").replace("`]", "`");
+    // Where a link of the code leads is nothing for people.
+    match text.split_once("`(crate::") {
+        Some((before, after)) => format!("{before}`{}", after.split_once(')').map_or("", |(_, rest)| rest)),
+        None => text,
+    }
 }
 
 /// What serde is told of an item: words, and the value of some.
@@ -131,7 +140,13 @@ fn in_words(text: &str) -> String {
         "(f64,f64)" => "2 numbers".into(),
         "Vector3<f64>" => "3 numbers".into(),
         "Isometry3<f64>" => "`translation` and `rotation` (a quaternion x, y, z, w)".into(),
-        "Value" => "anything".into(),
+        "Point2<f64>" => "2 numbers".into(),
+        "Point3<f64>" => "3 numbers".into(),
+        "Stamp" => "nanoseconds".into(),
+        "Value" | "serde_json::Value" | "serde::de::IgnoredAny" => "anything".into(),
+        "OtherBody" => "text".into(),
+        "Steps" => "text, or list of texts".into(),
+        "Range" => "number, or least and greatest".into(),
         named => format!("`{named}`"),
     }
 }
@@ -140,20 +155,52 @@ fn in_words(text: &str) -> String {
 fn several(text: &str) -> String {
     match in_words(text).as_str() {
         one @ ("number" | "whole number" | "text") => format!("{one}s"),
+        "2 numbers" => "pairs of numbers".into(),
         one => one.to_owned(),
     }
 }
 
-/// The value that a function of that name in this file gives, if it is short.
-fn default_of(items: &[Item], function: &str) -> Option<String> {
-    let body = items.iter().find_map(|item| match item {
-        Item::Fn(item) if item.sig.ident == function => Some(&item.block.stmts),
+/// The value that a function of that name gives, in this file or else in another with formats, if it is short.
+fn default_of(here: &[Item], function: &str) -> Option<String> {
+    let name = function.rsplit("::").next()?.trim();
+    let in_items = |items: &[Item]| {
+        let body = items.iter().find_map(|item| match item {
+            Item::Fn(item) if item.sig.ident == name => Some(&item.block.stmts),
+            _ => None,
+        })?;
+        match body.as_slice() {
+            [Stmt::Expr(value, None)] => short(value),
+            _ => None,
+        }
+    };
+    in_items(here).or_else(|| FORMATS.iter().find_map(|file| in_items(&items(file))))
+}
+
+/// The value of a constant.
+fn constant(name: &str) -> Option<String> {
+    let all = CONSTANTS.iter().flat_map(|file| items(file));
+    let found = all.filter_map(|item| match item {
+        Item::Const(item) if item.ident == name => Some(item.expr.to_token_stream().to_string()),
+        _ => None,
+    });
+    found.last()
+}
+
+/// The variant of a type of one of the files with formats that stands where nothing is said.
+fn default_variant(name: &str) -> Option<String> {
+    let found = FORMATS.iter().flat_map(|file| items(file)).find_map(|item| match item {
+        Item::Enum(item) if item.ident == name => Some(item),
         _ => None,
     })?;
-    match body.as_slice() {
-        [Stmt::Expr(value, None)] => short(value),
-        _ => None,
-    }
+    let variant = found.variants.iter().find(|v| v.attrs.iter().any(|a| a.path().is_ident("default")))?;
+    Some(name_of_variant(&found, variant))
+}
+
+/// A variant as a file has it.
+fn name_of_variant(of: &ItemEnum, variant: &syn::Variant) -> String {
+    let how = value_of(&told(&of.attrs), "rename_all").flatten();
+    let own = value_of(&told(&variant.attrs), "rename").flatten();
+    own.unwrap_or_else(|| renamed(&variant.ident.to_string(), how.as_deref()))
 }
 
 /// The value of a field in what `Default` gives for a type.
@@ -182,7 +229,11 @@ fn short(value: &Expr) -> Option<String> {
         .replace("[ ", "[")
         .replace(" ]", "]")
         .replace(" ,", ",");
-    let plain = plain.replace(".into ()", "").replace(".into()", "").replace("- ", "-");
+    let plain = plain.replace(".into ()", "").replace(".into()", "").replace("- ", "-").replace("vec ! ", "");
+    let range = plain.strip_prefix("Range { low : ").and_then(|rest| rest.strip_suffix(" }"));
+    let plain = range.map_or(plain.clone(), |pair| format!("[{}]", pair.replace(" high : ", " ")));
+    let last = plain.rsplit(":: ").next().unwrap_or_default();
+    let plain = constant(last).unwrap_or(plain);
     let is_value = !plain.contains("::") && !plain.contains('(') && plain.len() < 40;
     (is_value && plain != "None").then(|| format!("`{plain}`"))
 }
@@ -210,7 +261,9 @@ fn table_of_struct(items: &[Item], item: &ItemStruct) -> String {
             None if optional => "nothing".into(),
             None => "**needed**".into(),
         };
-        text += &format!("| `{key}` | {} | {left_out} | {} |\n", kind(&field.ty), meaning(&field.attrs));
+        let meaning = meaning(&field.attrs);
+        assert!(!meaning.is_empty(), "nothing says what `{key}` of {} means", item.ident);
+        text += &format!("| `{key}` | {} | {left_out} | {meaning} |\n", kind(&field.ty));
     }
     text
 }
@@ -222,20 +275,18 @@ fn none_of(ty: &syn::Type) -> String {
     }
     match kind(ty).as_str() {
         "true or false" => "`false`".into(),
-        "number" | "whole number" => "`0`".into(),
+        "number" | "whole number" | "nanoseconds" => "`0`".into(),
         "text" => "empty".into(),
-        named if named.starts_with('`') => "its defaults".into(),
+        named if named.starts_with('`') => default_variant(named.trim_matches('`'))
+            .map_or("what its keys are if left out".into(), |variant| format!("`{variant}`")),
         _ => "none".into(),
     }
 }
 
 fn table_of_enum(item: &ItemEnum) -> String {
-    let how = value_of(&told(&item.attrs), "rename_all").flatten();
     let mut text = String::from("| one of | with | meaning |\n|---|---|---|\n");
     for variant in &item.variants {
-        let told = told(&variant.attrs);
-        let name = value_of(&told, "rename").flatten();
-        let name = name.unwrap_or_else(|| renamed(&variant.ident.to_string(), how.as_deref()));
+        let name = name_of_variant(item, variant);
         let is_default = variant.attrs.iter().any(|attribute| attribute.path().is_ident("default"));
         let left_out = if is_default { "; if nothing is said" } else { "" };
         let with: Vec<String> = match &variant.fields {
@@ -246,7 +297,9 @@ fn table_of_enum(item: &ItemEnum) -> String {
                 named.map(|(name, ty)| format!("`{name}`: {}", kind(ty))).collect()
             }
         };
-        text += &format!("| `{name}`{left_out} | {} | {} |\n", with.join(", "), meaning(&variant.attrs));
+        let meaning = meaning(&variant.attrs);
+        assert!(!meaning.is_empty(), "nothing says what `{name}` of {} means", item.ident);
+        text += &format!("| `{name}`{left_out} | {} | {meaning} |\n", with.join(", "));
     }
     text
 }
@@ -321,6 +374,70 @@ fn every_table_is_that_of_its_type_and_every_type_has_one() {
                     "no page shows {name} of {file}"
                 );
             }
+        }
+    }
+}
+
+/// The types that a page's tables name.
+fn named_in(page: &str) -> BTreeSet<String> {
+    let rows = page.lines().filter(|line| line.starts_with('|'));
+    let what = rows.filter_map(|row| row.split(" | ").nth(1));
+    let words = what.flat_map(|what| what.split('`').skip(1).step_by(2));
+    words
+        .filter(|word| {
+            word.starts_with(|c: char| c.is_ascii_uppercase()) && word.chars().all(char::is_alphanumeric)
+        })
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn every_type_that_a_table_names_has_a_table() {
+    let texts: Vec<String> =
+        pages().iter().map(|page| fs::read_to_string(page).expect("a page is text")).collect();
+    let shown: BTreeSet<String> =
+        texts.iter().flat_map(|text| renewed(text).1).map(|(_, name)| name).collect();
+    let named: BTreeSet<String> = texts.iter().flat_map(|text| named_in(text)).collect();
+    let missing: Vec<&String> = named.difference(&shown).collect();
+    assert!(!named.is_empty() && missing.is_empty(), "no table shows {missing:?}");
+}
+
+/// The names in a list of a file: a constant whose entries are pairs that begin with a name.
+fn names_in(file: &str, list: &str) -> Vec<String> {
+    let found = items(file).into_iter().find_map(|item| match item {
+        Item::Const(item) if item.ident == list => Some(*item.expr),
+        _ => None,
+    });
+    let array = match found {
+        Some(Expr::Reference(reference)) => *reference.expr,
+        Some(other) => other,
+        None => panic!("{file} has no list {list}"),
+    };
+    let Expr::Array(array) = array else { panic!("{list} of {file} is no list") };
+    let first = |entry: &Expr| match entry {
+        Expr::Tuple(pair) => match &pair.elems[0] {
+            Expr::Lit(literal) => match &literal.lit {
+                Lit::Str(name) => name.value(),
+                _ => panic!("{list} of {file} begins with no text"),
+            },
+            _ => panic!("{list} of {file} begins with no text"),
+        },
+        _ => panic!("{list} of {file} has no pairs"),
+    };
+    array.elems.iter().map(first).collect()
+}
+
+#[test]
+fn every_name_that_an_experiment_may_say_is_on_its_page() {
+    let page = fs::read_to_string(root().join("docs/reference/experiments.md")).expect("it is there");
+    for (file, list) in [
+        ("domains/src/abilities/searching/policies/mod.rs", "ALL"),
+        ("agent/src/experiment/kinds/mod.rs", "ALL"),
+        ("agent/src/experiment/kinds/figure_4.rs", "RECOGNISERS"),
+    ] {
+        for name in names_in(file, list) {
+            let is_shown = page.contains(&format!("`{name}`")) || page.contains(&format!("\"{name}\""));
+            assert!(is_shown, "{name} of {file} is not in docs/reference/experiments.md");
         }
     }
 }

@@ -89,10 +89,11 @@ function mapOf(at) {
     shape(svg, "line", { x1: x - dx, y1: -y + dy, x2: x + dx, y2: -y - dy, stroke: "var(--room)", "stroke-width": .3 });
     shape(svg, "line", { x1: x - dx, y1: -y + dy, x2: x + dx, y2: -y - dy, stroke: "var(--planned)", "stroke-width": .04 }).append(titled(door.name));
   }
+  const named = [];
   for (const surface of story.map.surfaces) {
     shape(svg, "polygon", { points: path(surface.outline_m), fill: "var(--field)", stroke: "var(--line)", "stroke-width": .12 * em });
     const [x] = middle(surface.outline_m);
-    words(x, least(surface.outline_m.map(p => p[1])) - em, surface.name, { fill: "var(--faint)" });
+    named.push({ x, y: least(surface.outline_m.map(p => p[1])) - em, name: surface.name, step: -1, more: { fill: "var(--faint)" } });
   }
   const looked = story.looks.filter(l => l.at_s <= at + 1e-6);
   looked.forEach((look, n) => {
@@ -115,7 +116,16 @@ function mapOf(at) {
     const drawn = outline ? shape(svg, "polygon", { points: path(outline), fill: colour, "fill-opacity": .55, stroke: colour, "stroke-width": .07 * em })
       : shape(svg, "circle", { cx: o.position_m[0], cy: -o.position_m[1], r: Math.max(o.size_m[0], .04) / 2, fill: colour });
     drawn.append(titled(`${o.name ?? "unknown"} ${o.probability.toFixed(2)}`));
-    if (o.name) words(o.position_m[0], o.position_m[1] + .6 * em, o.name, { fill: colour, style: `font-size:${em * .9}px` });
+    if (o.name) named.push({ x: o.position_m[0], y: o.position_m[1] + .6 * em, name: o.name, step: 1, more: { fill: colour, style: `font-size:${em * .9}px` } });
+  }
+  // Names of neighbours make room for each other: those of objects upwards, those of surfaces downwards.
+  const set = [];
+  for (const { x, y: from, name, step, more } of named.sort((a, b) => a.step - b.step || a.step * (a.y - b.y))) {
+    const half = name.length * .27 * em;
+    let y = from;
+    while (set.some(o => Math.abs(o.x - x) < o.half + half && Math.abs(o.y - y) < .95 * em)) y += step * .2 * em;
+    set.push({ x, y, half });
+    words(x, y, name, more);
   }
 }
 const titled = text => { const title = document.createElementNS(SVG, "title"); title.textContent = text; return title; };
@@ -157,8 +167,10 @@ function planOf(at) {
 
 // How sure: the best probability of each known object after each look.
 function sureOf(at) {
-  const svg = $("sure");
+  const svg = $("sure"), names = [...new Set(story.beliefs.flatMap(b => Object.keys(b.best)))];
   svg.replaceChildren();
+  // What is hidden has no width: this comes first.
+  svg.parentElement.hidden = story.looks.length > 0 && !names.length;
   const wide = Math.max(320, svg.clientWidth), high = 300, left = 34, right = 115, low = high - 26;
   svg.setAttribute("viewBox", `0 0 ${wide} ${high}`);
   svg.style.height = `${high}px`;
@@ -168,8 +180,6 @@ function sureOf(at) {
     shape(svg, "text", { x: left - 6, y: y(p) + 4, "text-anchor": "end" }, p);
   }
   if (story.report) shape(svg, "line", { x1: left, x2: wide - right, y1: y(story.report.threshold), y2: y(story.report.threshold), stroke: "var(--known)", "stroke-dasharray": "5 4" });
-  const names = [...new Set(story.beliefs.flatMap(b => Object.keys(b.best)))];
-  svg.parentElement.hidden = story.looks.length > 0 && !names.length;
   const ends = [];
   names.forEach((name, n) => {
     const colour = `hsl(${n * 360 / names.length + 210} 60% 50%)`;
@@ -180,8 +190,8 @@ function sureOf(at) {
   });
   ends.sort((a, b) => a.y - b.y);
   ends.forEach((e, n) => { if (n && e.y - ends[n - 1].y < 14) e.y = ends[n - 1].y + 14; });
-  const over = Math.max(0, (ends.at(-1)?.y ?? 0) - low - 4);
-  ends.forEach(e => shape(svg, "text", { x: wide - right + 8, y: e.y - over, style: `fill:${e.colour}` }, e.name));
+  ends.forEach((e, n) => { e.y = Math.min(e.y, low + 4 - 14 * (ends.length - 1 - n)); });
+  ends.forEach(e => shape(svg, "text", { x: wide - right + 8, y: e.y, style: `fill:${e.colour}` }, e.name));
   shape(svg, "line", { x1: x(at), x2: x(at), y1: 12, y2: low, stroke: "var(--now)", "stroke-width": 1.5 });
   for (const s of [0, story.ends_s]) shape(svg, "text", { x: x(s), y: high - 6, "text-anchor": "middle" }, seconds(s));
 }
@@ -243,6 +253,15 @@ function matrix(wide, high) {
   const rows = [[...right, along(right)].map(v => v * a), [...up, along(up)].map(v => v * f), [...back, along(back)].map((v, k) => v * z + (k === 3 ? w : 0)), [...back, along(back)].map(v => -v)];
   return Float32Array.from([0, 1, 2, 3].flatMap(c => rows.map(r => r[c])));
 }
+// How many points are drawn while the picture turns: as many as come 30 times a second here, by how long the picture before took.
+let most = 60000, before_ms = 0;
+function affordable() {
+  const now_ms = performance.now(), took_ms = now_ms - before_ms;
+  before_ms = now_ms;
+  // A hand that rests is no slow picture.
+  if (took_ms < 250) most = took_ms > 36 ? Math.max(6000, most * .8) : took_ms < 24 ? Math.min(400000, most * 1.1) : most;
+  return most;
+}
 function spaceOf(at) {
   const canvas = $("cloud"), labels = $("labels"), scale = window.devicePixelRatio || 1;
   const wide = Math.round(canvas.clientWidth * scale), high = Math.round(canvas.clientHeight * scale);
@@ -255,7 +274,7 @@ function spaceOf(at) {
     gl.uniformMatrix4fv(gl.getUniformLocation(program, "seen"), false, seen);
     gl.uniform1f(gl.getUniformLocation(program, "dot"), .009 * high * 1.6 / 2 * 1.3);
     const shown = [...clouds.values()].filter(c => c.at_s <= at + 1e-6);
-    const share = turning ? Math.min(1, 150000 / shown.reduce((sum, c) => sum + c.count, 1)) : 1;
+    const share = turning ? Math.min(1, affordable() / shown.reduce((sum, c) => sum + c.count, 1)) : 1;
     for (const cloud of shown) {
       gl.uniform3fv(gl.getUniformLocation(program, "least"), cloud.least);
       gl.uniform3fv(gl.getUniformLocation(program, "size"), cloud.size);

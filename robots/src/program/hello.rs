@@ -26,38 +26,58 @@ pub(super) struct Hello {
     /// Checked before the rest is read.
     #[serde(rename = "protocol")]
     _protocol: u32,
+    /// For people and records.
     name: String,
+    /// True if the world is simulated too.
     #[serde(default)]
     simulated: bool,
+    /// Where its clock begins, nanoseconds.
     #[serde(default)]
     now_ns: Stamp,
+    /// What drives.
     base: Base,
+    /// The depth camera.
     camera: Camera,
+    /// What turns the camera; left out if nothing does.
     head: Option<Head>,
+    /// What pushes and grasps; left out if there is none.
     arm: Option<Arm>,
+    /// A laser that sweeps level; left out if there is none.
     laser: Option<Laser>,
+    /// Names of its frames in records.
     #[serde(default)]
     frames: BodyFrames,
+    /// Direction of "up" in the map; left out if it is not known.
     up: Option<Vector3<f64>>,
+    /// Standard deviation of localisation along each axis, metres.
     pose_sigma_m: f64,
+    /// Standard deviation of the heading, radians.
     pose_sigma_rad: f64,
+    /// The map of the floor; its cells follow as bytes.
     map: Option<Map>,
+    /// Surfaces that the map knows: things may stand on them.
     #[serde(default)]
     surfaces: Vec<SurfaceHint>,
+    /// Rooms that the map knows.
     #[serde(default)]
     rooms: Vec<Room>,
+    /// Doors that the map knows.
     #[serde(default)]
     doors: Vec<Door>,
+    /// The only places where it stands, for a body that does not stand anywhere else.
     stations: Option<Vec<Station>>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Base {
+    /// Its outline on the floor.
     footprint: Footprint,
+    /// How fast it drives, metres a second.
     linear_m_s: f64,
+    /// How fast it turns on the spot, radians a second.
     angular_rad_s: f64,
-    /// Kept between the footprint and what the map shows.
+    /// Kept between the footprint and what the map shows, metres.
     #[serde(default = "default_clearance_m")]
     clearance_m: f64,
 }
@@ -69,19 +89,27 @@ fn default_clearance_m() -> f64 {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Camera {
+    /// Pixels in a row.
     width: usize,
+    /// Rows.
     height: usize,
+    /// Focal length along x, pixels.
     fx: f64,
+    /// Focal length along y, pixels.
     fy: f64,
+    /// Column of the principal point.
     cx: f64,
+    /// Row of the principal point.
     cy: f64,
+    /// Least and greatest depth that it measures, metres.
     range_m: (f64, f64),
-    /// Of a depth of 1.
+    /// What a depth of 1 stands for, metres.
     #[serde(default = "default_unit_m")]
     unit_m: f64,
     /// Whether a colour image of the same pixels follows the depths.
     #[serde(default)]
     colour: bool,
+    /// Name of its frame in records.
     #[serde(default = "default_camera_frame")]
     frame: String,
     /// Where it is, if no head turns it; the base's own pose if nothing is said.
@@ -99,18 +127,26 @@ fn default_camera_frame() -> String {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Arm {
+    /// How far from the base's middle it reaches, metres.
     reach_m: f64,
+    /// The widest thing that the hand takes, metres; left out if it only pushes.
     hand_opening_m: Option<f64>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Laser {
+    /// Where it is on the base; it does not move there.
     base_from_laser: Isometry3<f64>,
+    /// Angle of the first reading, anticlockwise from straight ahead, radians.
     first_rad: f64,
+    /// Angle from one reading to the next, radians.
     step_rad: f64,
+    /// Readings in a sweep.
     readings: usize,
+    /// Nothing farther returns, metres.
     reach_m: f64,
+    /// Name of its frame in records.
     #[serde(default = "default_laser_frame")]
     frame: String,
 }
@@ -122,7 +158,9 @@ fn default_laser_frame() -> String {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct BodyFrames {
+    /// Of the map.
     map: String,
+    /// Of the base.
     base: String,
 }
 
@@ -136,9 +174,13 @@ impl Default for BodyFrames {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Map {
+    /// Side of a cell, metres.
     resolution_m: f64,
+    /// Corner of the first cell, in the map, metres.
     origin_m: Point2<f64>,
+    /// Cells along x.
     width: usize,
+    /// Cells along y.
     height: usize,
 }
 

@@ -42,7 +42,9 @@ pub(super) struct Cancel {
 /// A line of the program after its hello.
 #[derive(Debug, Deserialize)]
 pub(super) struct Said {
+    /// The request that is answered.
     pub id: u64,
+    /// The body's clock, nanoseconds; it never goes back.
     pub now_ns: Stamp,
     #[serde(flatten)]
     pub what: What,
@@ -64,7 +66,9 @@ pub(super) enum What {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Feedback {
+    /// How much of it is done, 0 to 1.
     pub fraction: f64,
+    /// Driven so far, metres.
     #[serde(default)]
     pub distance_m: f64,
 }
@@ -93,9 +97,13 @@ impl Said {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PoseSaid {
+    /// Where localisation says that the base is now.
     pub map_from_base: Isometry3<f64>,
+    /// Standard deviation along each axis, metres; as the hello says if left out.
     pub sigma_m: Option<f64>,
+    /// Standard deviation of the heading, radians; as the hello says if left out.
     pub sigma_rad: Option<f64>,
+    /// Where it stands, if it has stations.
     pub station: Option<String>,
 }
 
@@ -103,7 +111,9 @@ pub(super) struct PoseSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct DrivenSaid {
+    /// As odometry counted it, metres.
     pub distance_m: f64,
+    /// Where localisation says that the base is now.
     pub map_from_base: Isometry3<f64>,
 }
 
@@ -111,6 +121,7 @@ pub(super) struct DrivenSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LookedSaid {
+    /// By what angle the head's limits miss the point, radians.
     pub miss_rad: f64,
 }
 
@@ -118,8 +129,11 @@ pub(super) struct LookedSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SensedSaid {
+    /// When the frame was taken, nanoseconds on the body's clock; as the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
+    /// Where the base was then.
     pub map_from_base: Isometry3<f64>,
+    /// Where the camera was on the base then.
     pub base_from_camera: Isometry3<f64>,
 }
 
@@ -127,7 +141,9 @@ pub(super) struct SensedSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ScannedSaid {
+    /// When the sweep was taken, nanoseconds on the body's clock; as the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
+    /// Where the base was then.
     pub map_from_base: Isometry3<f64>,
 }
 
@@ -135,6 +151,7 @@ pub(super) struct ScannedSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PushedSaid {
+    /// How far the thing was moved, metres.
     pub moved_m: f64,
 }
 
@@ -142,6 +159,7 @@ pub(super) struct PushedSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GraspedSaid {
+    /// How far the hand is open around the thing, metres.
     pub width_m: f64,
 }
 

@@ -24,8 +24,11 @@ use descry_domains::abilities::searching::policies;
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
+    /// The experiment's name.
     name: String,
+    /// `faults`.
     kind: String,
+    /// What it is to show, in a line.
     #[serde(default)]
     about: String,
     /// Built-in domain or a domain's folder.
@@ -39,16 +42,19 @@ struct Text {
     target: String,
     /// Runs of each case, each in an arrangement of its own.
     runs: usize,
+    /// Seed of the first arrangement; each further one has the next.
     #[serde(default = "default_seed")]
     first_seed: u64,
     /// Share of the runs of each case without the target.
     #[serde(default)]
     absent_share: f64,
+    /// Who chooses where to look next: one of the policies above.
     #[serde(default = "default_policy")]
     policy: String,
     /// A thing is found where it is if it stands no farther from there.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
+    /// What goes wrong.
     #[serde(rename = "case")]
     cases: Vec<Case>,
 }
@@ -57,7 +63,9 @@ struct Text {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Case {
+    /// For tables and plots.
     name: String,
+    /// What goes wrong in it; nothing if there is none.
     #[serde(default, rename = "fault")]
     faults: Vec<Fault>,
 }

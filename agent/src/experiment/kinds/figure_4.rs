@@ -28,8 +28,11 @@ mod views;
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
+    /// The experiment's name.
     name: String,
+    /// `figure-4`.
     kind: String,
+    /// What it is to show, in a line.
     #[serde(default)]
     about: String,
     /// Built-in domain or a domain's folder.
@@ -42,7 +45,8 @@ struct Text {
     /// The known objects; all of the domain if left out.
     #[serde(default)]
     known: Vec<String>,
-    /// Recognisers by their names, the first one is the one whose figures stand at the top of the summary.
+    /// Recognisers by their names, `descry` and `published` (that of the paper); the figures of the first stand at the top of the
+    /// summary.
     recognisers: Vec<String>,
     /// Looks, all around.
     #[serde(default = "default_poses")]
@@ -50,6 +54,7 @@ struct Text {
     /// From the centre of the surface.
     #[serde(default = "default_distance_m")]
     distance_m: f64,
+    /// Arrangements that are counted together.
     #[serde(rename = "set")]
     sets: Vec<Set>,
 }
@@ -58,8 +63,11 @@ struct Text {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Set {
+    /// For tables and plots.
     name: String,
+    /// Seed of the first arrangement; each further one has the next.
     first_seed: u64,
+    /// How many arrangements.
     arrangements: u64,
     /// Instead of our simulator: `program:COMMAND`, in a world of its own that has things of the same kinds.
     #[serde(default)]

@@ -26,8 +26,11 @@ use score::Truly;
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
+    /// The experiment's name.
     name: String,
+    /// `tasks`.
     kind: String,
+    /// What it is to show, in a line.
     #[serde(default)]
     about: String,
     /// Built-in domain or a domain's folder.
@@ -36,13 +39,15 @@ struct Text {
     scene: String,
     /// Runs of each goal, policy and case, each in an arrangement of its own.
     runs: usize,
+    /// Seed of the first arrangement; each further one has the next.
     #[serde(default = "default_seed")]
     first_seed: u64,
-    /// By name.
+    /// Who chooses where to look next: one of the policies above each.
     policies: Vec<String>,
     /// A thing is found where it is if it stands no farther from there, along the floor.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
+    /// What is asked for; each with each policy and case.
     #[serde(rename = "goal")]
     goals: Vec<GoalText>,
     /// What goes wrong; nothing if there is none.
@@ -78,10 +83,12 @@ struct GoalText {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Case {
+    /// For tables and plots.
     name: String,
     /// Instead of our simulator: `program:COMMAND`, whose world has the places and things of the scene.
     #[serde(default)]
     robot: Option<OtherBody>,
+    /// What goes wrong in it; nothing if there is none.
     #[serde(default, rename = "fault")]
     faults: Vec<Fault>,
 }

@@ -23,8 +23,11 @@ mod summary;
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
+    /// The experiment's name.
     name: String,
+    /// `where-to-look`.
     kind: String,
+    /// What it is to show, in a line.
     #[serde(default)]
     about: String,
     /// Built-in domain or a domain's folder.
@@ -38,6 +41,7 @@ struct Text {
     target: String,
     /// Arrangements; each has one level of occlusion, in turn.
     scenes: usize,
+    /// Seed of the first arrangement; each further one has the next.
     #[serde(default = "default_seed")]
     first_seed: u64,
     /// Share of the scenes of each level from which the target is removed.
@@ -48,15 +52,17 @@ struct Text {
     first_look_from_start: bool,
     /// Numbers of poses around the surface.
     poses: Vec<usize>,
-    /// By name.
+    /// Who chooses where to look next: one of the policies above each.
     policies: Vec<String>,
-    /// The policy that is compared, and those that it is compared with.
+    /// The policy that is compared with others.
     ours: String,
+    /// The policies that it is compared with.
     #[serde(default)]
     against: Vec<String>,
     /// A thing is found where it is if it stands no farther from there.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
+    /// Levels of occlusion, in turn.
     #[serde(rename = "occlusion")]
     occlusions: Vec<Occlusion>,
 }
@@ -65,7 +71,9 @@ struct Text {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Occlusion {
+    /// For tables and plots.
     name: String,
+    /// Least and greatest share of the target that is not occluded from the start.
     visible_from_start: [f64; 2],
 }
 

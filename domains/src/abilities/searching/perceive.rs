@@ -125,7 +125,8 @@ fn views(mind: &Mind) -> Vec<RecordId> {
 /// The multi-view perception of paper 004, section V, on one surface: restore its views by their timestamps, merge, recognise,
 /// believe.
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
-    let (merging, seeking) = options_at(eyes.robot, &mind.known.surfaces[on]);
+    let (merging, seeking) = options(eyes.robot, Some(&mind.known.surfaces[on].symbol));
+    let seeking = seeking_at(seeking, &mind.known.surfaces[on]);
     place_looks(mind, eyes, on, (&merging, &seeking.surface))?;
     let views = restore(mind, eyes, on)?;
     let merged = mind.regions[on].merger.merge(&views, &merging);
@@ -181,6 +182,13 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         }
         None => Ok(()),
     }
+}
+
+/// The same, for a surface that the map has: it is looked for where its outline is.
+fn seeking_at(seeking: SceneOptions, surface: &KnownSurface) -> SceneOptions {
+    let region = surface.whole.then(|| Region { corners: surface.outline.clone(), margin_m: BESIDE_M });
+    let tilt_rad = if surface.whole { LEVEL_RAD } else { seeking.surface.tilt_rad };
+    SceneOptions { surface: SurfaceOptions { region, tilt_rad, ..seeking.surface.clone() }, ..seeking }
 }
 
 /// Things on a surface were moved while nobody looked: only its newest view still holds, and looks at it may be taken again.
@@ -496,17 +504,6 @@ pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptio
     let scene = SceneOptions { surface, ..SceneOptions::default() };
     let height_band_m = within(HEIGHT_TOLERANCE_M).map(|(low, high)| (low, high + scene.tallest_m));
     (MergeOptions { up, height_band_m, ..MergeOptions::default() }, scene)
-}
-
-/// The same for one surface: one that the map has is merged and looked for where its outline is.
-fn options_at(robot: &dyn Robot, known: &KnownSurface) -> (MergeOptions, SceneOptions) {
-    let (merging, seeking) = options(robot, Some(&known.symbol));
-    if !known.whole {
-        return (merging, seeking);
-    }
-    let region = Some(Region { corners: known.outline.clone(), margin_m: BESIDE_M });
-    let surface = SurfaceOptions { region: region.clone(), tilt_rad: LEVEL_RAD, ..seeking.surface };
-    (MergeOptions { region, ..merging }, SceneOptions { surface, ..seeking })
 }
 
 /// The part of the map that a frame shows; none if nothing returned.

@@ -97,11 +97,14 @@ pub enum GoalError {
 pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, GoalError> {
     let (words, wanted) = conditions(said)?;
     let mut nearest_miss = None;
-    for phrase in &domain.config.goal {
-        for slots in fits(&phrase.say, &words) {
-            match fill(lexicon, &domain.config.open, &slots) {
-                Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
-                Err(found) => nearest_miss = nearest_miss.or(Some(found)),
+    // A name that anybody may make up is only heard where no phrase holds what has a name.
+    for open in [&[][..], &domain.config.open] {
+        for phrase in &domain.config.goal {
+            for slots in fits(&phrase.say, &words) {
+                match fill(lexicon, open, &slots) {
+                    Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
+                    Err(found) => nearest_miss = nearest_miss.or(Some(found)),
+                }
             }
         }
     }
@@ -297,7 +300,7 @@ fn fill(lexicon: &Lexicon, open: &[String], slots: &[(&str, String)]) -> Result<
     Ok(filled)
 }
 
-fn without_article(name: &str) -> &str {
+pub(crate) fn without_article(name: &str) -> &str {
     ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 

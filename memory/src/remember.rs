@@ -9,6 +9,7 @@ use crate::Meta;
 use crate::belief::{Belief, Track};
 use crate::document::Draft;
 use crate::error::Error;
+use crate::learned::{LearnedThing, Visited};
 use crate::record::Record;
 
 /// The kind under which it is kept.
@@ -53,6 +54,12 @@ pub struct Remembered {
     /// The map, if one was made.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surveyed: Option<Surveyed>,
+    /// How places looked that were visited.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub visited: Vec<Visited>,
+    /// Things that were learned, the oldest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub things: Vec<LearnedThing>,
 }
 
 impl Remembered {

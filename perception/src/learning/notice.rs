@@ -53,7 +53,8 @@ pub struct MetaRoom {
     pub cloud: Cloud,
     /// Visits that it was made from.
     pub visits: usize,
-    options: NoticeOptions,
+    /// How differences are told.
+    pub options: NoticeOptions,
 }
 
 /// Something that was not there before.
@@ -143,12 +144,13 @@ impl MetaRoom {
         let target = Prepared::with_normals(&voxel::downsample(&self.cloud, THINNED_M)?.points, NEIGHBOURS)?;
         let mut by_world = Isometry3::identity();
         // From far to near, so that what has moved since has no say in the end.
-        for within_m in [self.options.search_m, 0.4 * self.options.search_m] {
+        let (far_m, delta_m) = (self.options.search_m, self.options.delta_m);
+        for (within_m, robust_m) in [(far_m, 5.0 * delta_m), (0.4 * far_m, 2.0 * delta_m), (3.0 * delta_m as f32, delta_m)] {
             let options = RegisterOptions {
                 method: Method::Generalised,
                 start_target_from_source: by_world,
                 within_m,
-                robust_m: Some(self.options.delta_m),
+                robust_m: Some(robust_m),
                 ..RegisterOptions::default()
             };
             let fit = align(&source, &target, &options)?;

@@ -1,0 +1,225 @@
+//! Learned things known again on a surface, in any domain: what one of its views suggests is held against all of them, and what is left explains
+//! the objects that stand there.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use descry_perception::learning::{Glance, Judged, KnowOptions};
+use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::recognise::Percept;
+use descry_perception::{Cloud, Neighbours, View};
+
+use super::news::{Models, News};
+use crate::situation::KnownSurface;
+
+/// Guesses of all views together that are looked at, the surest first.
+const GUESSES: usize = 12;
+/// Guesses nearer to each other than this are one, metres and radians.
+const SAME: (f64, f64) = (0.03, 0.35);
+/// Less probability than this says nothing.
+const LEAST: f64 = 0.05;
+/// Points nearer than this to a thing's surface are of it, metres: views lie on each other to half of it.
+const OF_IT_M: f32 = 0.015;
+/// An object of which this share of the points is of a thing is that thing.
+const SHARE: f64 = 0.6;
+/// How far beside a surface a thing on it may have its middle, and how far above, metres.
+const BESIDE_M: f64 = 0.03;
+const ABOVE_M: (f64, f64) = (-0.02, 0.6);
+/// That some object is the thing that is sought, before it was looked at, and that a look which shows it does not tell it.
+const PRIOR: f64 = 0.3;
+const MISSED: f64 = 0.3;
+/// An object that is longer than a thing, or shorter, by more than this is not it, metres; what stays of the probability then.
+const LONGER_M: f64 = 0.03;
+const NOT_IT: f64 = 0.002;
+
+/// What was made of views so far, by their times.
+pub type Glances = BTreeMap<i64, Arc<Glance>>;
+
+/// A learned thing somewhere.
+pub(super) struct Found {
+    /// Its number among [`News::things`].
+    pub thing: usize,
+    /// Where, and how sure that is.
+    pub judged: Judged,
+    /// Its surface there.
+    pub cloud: Cloud,
+    tree: Neighbours,
+}
+
+impl Found {
+    /// The share of some points (world) that are of it.
+    pub fn share_of(&self, points: &[Point3<f32>]) -> f64 {
+        let near = |p: &&Point3<f32>| self.tree.nearest(p, OF_IT_M).is_some();
+        points.iter().filter(near).count() as f64 / points.len().max(1) as f64
+    }
+}
+
+/// Which learned things views show, each with where its camera stood, the surest first; no place holds two. `holds` says where they may be.
+pub(super) fn find(
+    news: &News,
+    glances: &mut Glances,
+    views: &[(&View, Isometry3<f64>)],
+    holds: impl Fn(&Point3<f64>) -> bool,
+) -> Vec<Found> {
+    let Some(models) = news.models.clone() else { return Vec::new() };
+    let options = KnowOptions::default();
+    let looks: Vec<(Arc<Glance>, Isometry3<f64>)> = views
+        .iter()
+        .filter_map(|(view, pose)| {
+            if let Some(known) = glances.get(&view.stamp_ns) {
+                return Some((Arc::clone(known), *pose));
+            }
+            let glance = Arc::new(models.library.glance(view, &options).ok()?);
+            glances.insert(view.stamp_ns, Arc::clone(&glance));
+            Some((glance, *pose))
+        })
+        .collect();
+    let looks: Vec<(&Glance, Isometry3<f64>)> = looks.iter().map(|(g, pose)| (&**g, *pose)).collect();
+    let mut guesses: Vec<(descry_perception::learning::Guess, Isometry3<f64>)> = Vec::new();
+    let all = looks.iter().flat_map(|(glance, pose)| glance.guesses.iter().map(move |g| (*g, *pose)));
+    let mut all: Vec<_> = all.map(|(guess, pose)| (guess, pose * guess.camera_from_model)).collect();
+    all.sort_by(|a, b| b.0.confidence.total_cmp(&a.0.confidence));
+    for (guess, at) in all {
+        let is_one = |other: &(descry_perception::learning::Guess, Isometry3<f64>)| {
+            other.0.model == guess.model && is_same(&other.1, &at)
+        };
+        let middle = Point3::from(at.translation.vector);
+        if guesses.len() < GUESSES && holds(&middle) && !guesses.iter().any(is_one) {
+            guesses.push((guess, at));
+        }
+    }
+    let judged = guesses.iter().filter_map(|(guess, at)| {
+        let judged = models.library.judge(guess, at, &looks, &options).ok()??;
+        found(news, &models, guess.model, judged)
+    });
+    let mut judged: Vec<Found> = judged.filter(|f| f.judged.confidence >= LEAST).collect();
+    judged.sort_by(|a, b| b.judged.confidence.total_cmp(&a.judged.confidence));
+    let mut apart: Vec<Found> = Vec::new();
+    for f in judged {
+        // Two of the same kind of thing may stand there; in one place there is one.
+        if apart.iter().all(|other| other.share_of(&f.cloud.points) < 0.3) {
+            apart.push(f);
+        }
+    }
+    apart
+}
+
+fn found(news: &News, models: &Models, model: usize, judged: Judged) -> Option<Found> {
+    let thing = *models.things.get(model)?;
+    let cloud = news.things.get(thing)?.cloud.transformed(&judged.world_from_model);
+    let tree = Neighbours::new(&cloud.points).ok()?;
+    Some(Found { thing, judged, cloud, tree })
+}
+
+fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+    (a.translation.vector - b.translation.vector).norm() < SAME.0 && a.rotation.angle_to(&b.rotation) < SAME.1
+}
+
+/// Whether the middle of something may be that of a thing on a surface.
+pub(super) fn stands_on(surface: &KnownSurface, middle: &Point3<f64>) -> bool {
+    let above_m = surface.outline.first().map_or(0.0, |p| surface.up.dot(&(middle - p)));
+    surface.covers(middle, BESIDE_M) && (ABOVE_M.0..ABOVE_M.1).contains(&above_m)
+}
+
+/// Says of each object on a surface which learned thing it may be; what several objects are of one thing is one. `points` is the cloud that the percepts
+/// index.
+pub(crate) fn explain(
+    news: &News,
+    glances: &mut Glances,
+    surface: &KnownSurface,
+    views: &[(&View, Isometry3<f64>)],
+    points: &[Point3<f32>],
+    percepts: Vec<Percept>,
+) -> Vec<Percept> {
+    if news.models.is_none() {
+        return percepts;
+    }
+    let found = find(news, glances, views, |middle| stands_on(surface, middle));
+    let shares: Vec<Vec<f64>> = percepts
+        .iter()
+        .map(|p| {
+            let own: Vec<Point3<f32>> = p.indices.iter().step_by(3).map(|&i| points[i as usize]).collect();
+            found.iter().map(|f| f.share_of(&own)).collect()
+        })
+        .collect();
+    let mut explained: Vec<Percept> = Vec::new();
+    let mut taken: Vec<bool> = vec![false; percepts.len()];
+    for (n, f) in found.iter().enumerate() {
+        let mut own: Vec<usize> =
+            (0..percepts.len()).filter(|&k| shares[k][n] >= SHARE && !taken[k]).collect();
+        own.sort_by_key(|&k| std::cmp::Reverse(percepts[k].points));
+        let Some(&first) = own.first() else { continue };
+        own.iter().for_each(|&k| taken[k] = true);
+        let mut whole = percepts[first].clone();
+        for &k in &own[1..] {
+            whole.points += percepts[k].points;
+            whole.indices.extend(&percepts[k].indices);
+        }
+        whole.indices.sort_unstable();
+        place(&mut whole, f, surface);
+        name(&mut whole, news, Some(f), views.len());
+        explained.push(whole);
+    }
+    let rest = percepts.into_iter().zip(taken).filter(|(_, taken)| !taken);
+    explained.extend(rest.map(|(mut p, _)| {
+        name(&mut p, news, None, views.len());
+        p
+    }));
+    explained
+}
+
+/// Where a thing is that was known again: its middle over what it stands on, and its sides.
+fn place(percept: &mut Percept, found: &Found, surface: &KnownSurface) {
+    let middle = Point3::from(found.judged.world_from_model.translation.vector);
+    let up_m = surface.up.dot(&(middle - percept.position_m));
+    percept.position_m = middle - surface.up * up_m;
+    if let Some((low, high)) = found.cloud.bounds() {
+        let size = (high - low).cast::<f64>();
+        percept.size_m = [size.x.max(size.y), size.x.min(size.y), size.z];
+    }
+}
+
+/// Spreads probability over the learned things: the one that was found there, and those that a look may have missed.
+fn name(percept: &mut Percept, news: &News, found: Option<&Found>, looks: usize) {
+    let mut of_things: Vec<(String, f64)> = Vec::new();
+    let is = found.map(|f| (f.thing, f.judged.confidence.clamp(0.0, 0.999)));
+    let left = 1.0 - is.map_or(0.0, |(_, p)| p);
+    for (n, thing) in news.things.iter().enumerate() {
+        let p = match is {
+            Some((it, p)) if it == n => p,
+            _ => left * missed(percept, &thing.cloud, looks),
+        };
+        of_things.push((thing.name.clone(), p));
+    }
+    let sum: f64 = of_things.iter().map(|(_, p)| p).sum();
+    let scale = if sum > 0.999 { 0.999 / sum } else { 1.0 };
+    of_things.iter_mut().for_each(|(_, p)| *p *= scale);
+    let rest = 1.0 - sum * scale;
+    percept.probabilities.iter_mut().chain(&mut percept.kinds).for_each(|(_, p)| *p *= rest);
+    percept.unknown *= rest;
+    percept.kinds.extend(of_things.iter().cloned());
+    percept.probabilities.extend(of_things);
+    let best = percept.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((name, _)) = best.filter(|(_, p)| *p > percept.unknown).cloned() {
+        if news.things.iter().any(|t| t.name == name) {
+            percept.kind = Some(name.clone());
+        }
+        percept.label = Some(name);
+    } else {
+        (percept.label, percept.kind) = (None, None);
+    }
+}
+
+/// The probability that an object is a thing which so many looks at it have not told.
+fn missed(percept: &Percept, thing: &Cloud, looks: usize) -> f64 {
+    let (low, high) = thing.bounds().unwrap_or_default();
+    let longest = f64::from((high - low).norm());
+    let [w, d, h] = percept.size_m;
+    let seen = (w * w + d * d + h * h).sqrt();
+    let is_smaller = seen < 0.6 * longest && percept.seen_fraction > 0.5;
+    if seen > longest + LONGER_M || is_smaller {
+        return NOT_IT;
+    }
+    let not_told = MISSED.powi(looks as i32);
+    PRIOR * not_told / (PRIOR * not_told + 1.0 - PRIOR)
+}

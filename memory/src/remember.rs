@@ -105,6 +105,20 @@ impl Remembered {
         Self { present: elsewhere.into_iter().chain(seen).collect(), gone, ..self }
     }
 
+    /// Gives a thing that was learned another name, wherever it was seen.
+    pub fn rename(&mut self, old: &str, new: &str) {
+        let rename = |name: &mut String| {
+            if name == old {
+                new.clone_into(name);
+            }
+        };
+        self.things.iter_mut().for_each(|thing| rename(&mut thing.name));
+        for r in self.present.iter_mut().chain(&mut self.gone) {
+            let track = &mut r.track;
+            track.probabilities.iter_mut().chain(&mut track.kinds).for_each(|(name, _)| rename(name));
+        }
+    }
+
     /// What may be believed of it now: probabilities worn by time, and below `most`, so that nothing is taken for sure that was not
     /// looked at again.
     pub fn aged(&self, now_unix_s: f64, most: f64) -> Vec<Track> {

@@ -38,10 +38,17 @@ pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<
 /// A thing that is asked for: one of the domain's objects or kinds, or one that was learned.
 pub(super) fn asked_for(domain: &Domain, goal: &Goal, news: &News, name: &str) -> Result<Thing, WorldError> {
     let known = situation::thing(domain, name);
+    let learned = news.thing(name);
     if !known.models.is_empty() {
-        return Ok(known);
+        return match learned {
+            None => Ok(known),
+            Some(_) => Err(WorldError::Domain(format!(
+                "\"{name}\" is an object of the domain {}, and something that was learned is called so\n  give that another name: descry name STORE \"{name}\" \"…\"",
+                domain.config.name
+            ))),
+        };
     }
-    if let Some(learned) = news.thing(name) {
+    if let Some(learned) = learned {
         return Ok(Thing { name: learned.name.clone(), models: vec![news::model(learned)], ..known });
     }
     let said = goal.slots.iter().find(|slot| slot.symbol == name).map_or(name, |slot| slot.name.as_str());

@@ -136,20 +136,26 @@ impl MetaRoom {
 
     /// The poses of the views after all were moved together onto the static structure, where they fit it.
     fn localised(&self, views: &[View]) -> Result<Vec<Isometry3<f64>>, LearningError> {
-        const THINNED_M: f32 = 0.03;
+        /// What is seen is thinned more than what it is moved onto: two grids of the same width are drawn onto each other, and off the truth.
+        const SEEN_M: f32 = 0.03;
+        const ROOM_M: f32 = 0.01;
         const NEIGHBOURS: usize = 12;
         let stated: Vec<Isometry3<f64>> = views.iter().map(|v| v.world_from_camera).collect();
-        let seen = voxel::downsample(&together(views, &stated), THINNED_M)?;
+        let seen = voxel::downsample(&together(views, &stated), SEEN_M)?;
         let source = Prepared::with_normals(&seen.points, NEIGHBOURS)?;
-        let target = Prepared::with_normals(&voxel::downsample(&self.cloud, THINNED_M)?.points, NEIGHBOURS)?;
+        let target = Prepared::with_normals(&voxel::downsample(&self.cloud, ROOM_M)?.points, NEIGHBOURS)?;
+        let (far_m, delta_m) = (self.options.search_m, self.options.delta_m);
         let mut by_world = Isometry3::identity();
         // From far to near, so that what has moved since has no say in the end.
-        let (far_m, delta_m) = (self.options.search_m, self.options.delta_m);
-        for (within_m, robust_m) in [(far_m, 5.0 * delta_m), (0.4 * far_m, 2.0 * delta_m), (3.0 * delta_m as f32, delta_m)] {
+        for (within_m, robust_m) in
+            [(far_m, 5.0 * delta_m), (0.4 * far_m, 2.0 * delta_m), (3.0 * delta_m as f32, delta_m)]
+        {
             let options = RegisterOptions {
                 method: Method::Generalised,
                 start_target_from_source: by_world,
                 within_m,
+                settle_m: 1e-4,
+                settle_rad: 1e-4,
                 robust_m: Some(robust_m),
                 ..RegisterOptions::default()
             };

@@ -47,7 +47,14 @@ pub struct Object {
 impl Object {
     /// Middle of the box around it, handle left out, in the map.
     pub fn centre_m(&self) -> Point3<f64> {
-        self.map_from_object * Point3::new(0.0, 0.0, 0.5 * self.shape.height_m())
+        let middle = match &self.shape {
+            Shape::Composed(_) | Shape::Household(_) => {
+                let (low, high) = self.shape.bounds();
+                nalgebra::center(&low, &high)
+            }
+            _ => Point3::new(0.0, 0.0, 0.5 * self.shape.height_m()),
+        };
+        self.map_from_object * middle
     }
 
     /// Name of the surface that it stands on.

@@ -28,8 +28,11 @@ const ABOVE_M: (f64, f64) = (-0.02, 0.6);
 /// That some object is the thing that is sought, before it was looked at, and that a look which shows it does not tell it.
 const PRIOR: f64 = 0.3;
 const MISSED: f64 = 0.3;
-/// An object that is longer than a thing, or shorter, by more than this is not it, metres; what stays of the probability then.
+/// An object that is longer than a thing by more than this is not it, metres, nor one that is well seen and, with all that stands so near that it may be
+/// a part of it, has less than this share of its length; what stays of the probability then.
 const LONGER_M: f64 = 0.03;
+const SHORTER: f64 = 0.6;
+const BESIDE_IT_M: f64 = 0.04;
 const NOT_IT: f64 = 0.002;
 
 /// What was made of views so far, by their times.
@@ -157,15 +160,28 @@ pub(crate) fn explain(
         }
         whole.indices.sort_unstable();
         place(&mut whole, f, surface);
-        name(&mut whole, news, Some(f), views.len());
+        name(&mut whole, news, Ok(f));
         explained.push(whole);
     }
-    let rest = percepts.into_iter().zip(taken).filter(|(_, taken)| !taken);
-    explained.extend(rest.map(|(mut p, _)| {
-        name(&mut p, news, None, views.len());
+    let rest: Vec<Percept> = percepts.into_iter().zip(taken).filter(|(_, taken)| !taken).map(|(p, _)| p).collect();
+    let sizes: Vec<f64> = rest.iter().map(|p| together_m(p, &rest)).collect();
+    explained.extend(rest.into_iter().zip(sizes).map(|(mut p, longest_m)| {
+        name(&mut p, news, Err(longest_m));
         p
     }));
     explained
+}
+
+/// How long an object is at most with those that stand so near to it that they may be parts of one thing, metres.
+fn together_m(percept: &Percept, all: &[Percept]) -> f64 {
+    let reach = |p: &Percept| 0.5 * p.size_m[0].hypot(p.size_m[1]);
+    let near = |p: &&Percept| {
+        (p.position_m - percept.position_m).xy().norm() < reach(p) + reach(percept) + BESIDE_IT_M
+    };
+    let far = |p: &Percept| (p.position_m - percept.position_m).xy().norm() + reach(p);
+    let wide_m = all.iter().filter(near).map(far).fold(reach(percept), f64::max) + reach(percept);
+    let high_m = all.iter().filter(near).map(|p| p.size_m[2]).fold(percept.size_m[2], f64::max);
+    wide_m.hypot(high_m)
 }
 
 /// Where a thing is that was known again: its middle over what it stands on, and its sides.
@@ -179,15 +195,16 @@ fn place(percept: &mut Percept, found: &Found, surface: &KnownSurface) {
     }
 }
 
-/// Spreads probability over the learned things: the one that was found there, and those that a look may have missed.
-fn name(percept: &mut Percept, news: &News, found: Option<&Found>, looks: usize) {
+/// Spreads probability over the learned things: the one that was found there, or those that looks may have missed at something which is so long with all
+/// that may be of it, metres.
+fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
     let mut of_things: Vec<(String, f64)> = Vec::new();
-    let is = found.map(|f| (f.thing, f.judged.confidence.clamp(0.0, 0.999)));
+    let is = found.ok().map(|f| (f.thing, f.judged.confidence.clamp(0.0, 0.999)));
     let left = 1.0 - is.map_or(0.0, |(_, p)| p);
     for (n, thing) in news.things.iter().enumerate() {
         let p = match is {
             Some((it, p)) if it == n => p,
-            _ => left * missed(percept, &thing.cloud, looks),
+            _ => left * missed(percept, &thing.cloud, found.err()),
         };
         of_things.push((thing.name.clone(), p));
     }
@@ -210,16 +227,16 @@ fn name(percept: &mut Percept, news: &News, found: Option<&Found>, looks: usize)
     }
 }
 
-/// The probability that an object is a thing which so many looks at it have not told.
-fn missed(percept: &Percept, thing: &Cloud, looks: usize) -> f64 {
+/// The probability that an object is a thing which looks at it have not told. With all that may be of it, it is so long at most, metres.
+fn missed(percept: &Percept, thing: &Cloud, together_m: Option<f64>) -> f64 {
     let (low, high) = thing.bounds().unwrap_or_default();
-    let longest = f64::from((high - low).norm());
+    let longest_m = f64::from((high - low).norm());
     let [w, d, h] = percept.size_m;
-    let seen = (w * w + d * d + h * h).sqrt();
-    let is_smaller = seen < 0.6 * longest && percept.seen_fraction > 0.5;
-    if seen > longest + LONGER_M || is_smaller {
+    let is_longer = w.hypot(d).hypot(h) > longest_m + LONGER_M;
+    let is_shorter = together_m.is_some_and(|m| m < SHORTER * longest_m) && percept.seen_fraction > 0.5;
+    if is_longer || is_shorter {
         return NOT_IT;
     }
-    let not_told = MISSED.powi(looks as i32);
+    let not_told = MISSED.powi(percept.evidence.views as i32);
     PRIOR * not_told / (PRIOR * not_told + 1.0 - PRIOR)
 }

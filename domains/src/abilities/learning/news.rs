@@ -192,7 +192,7 @@ impl Novelty {
     fn direction(&self, from: &Point3<f64>) -> usize {
         let off = from - self.centre;
         let turn = off.y.atan2(off.x).rem_euclid(TAU);
-        (turn / TAU * DIRECTIONS as f64) as usize % DIRECTIONS
+        (turn / TAU * DIRECTIONS as f64).round() as usize % DIRECTIONS
     }
 
     /// The directions that a look from a place shows.

@@ -10,6 +10,8 @@ use crate::situation::{Candidate, Situation};
 
 /// Lines around something, on each of which a stand is looked for: 30 degrees from each to the next (paper: 20 lines, and a look every 15 degrees).
 const LINES: usize = 12;
+/// Least and greatest height of what the body could run into, metres: where it is told by two degrees wrongly, the floor two metres off seems so high.
+const BAND_M: (f64, f64) = (0.15, 1.5);
 /// Kept between the footprint and what was seen, metres: about two standard deviations of localisation.
 const CLEAR_M: f64 = 0.06;
 
@@ -24,6 +26,7 @@ pub(super) fn make(
 ) -> (Vec<Option<String>>, Vec<bool>) {
     let options = AroundOptions {
         lines: LINES,
+        band_m: BAND_M,
         footprint_m: robot.description().footprint.radius_m() + CLEAR_M,
         ..AroundOptions::default()
     };
@@ -68,7 +71,7 @@ fn obstacles(
     let mut all: Vec<Point3<f32>> =
         seen.iter().filter(|p| near(p.x.into(), p.y.into())).copied().collect();
     if let Some(map) = robot.map() {
-        let height_m = AroundOptions::default().band_m.1.min(0.5) as f32;
+        let height_m = BAND_M.0 as f32 + 0.1;
         let cells = (0..map.occupied.len()).filter(|&k| map.occupied[k]).map(|k| {
             let middle = |at: usize, low: f64| low + (at as f64 + 0.5) * map.resolution_m;
             (middle(k % map.width, map.origin_m.x), middle(k / map.width, map.origin_m.y))

@@ -62,10 +62,12 @@ pub(super) fn visit(
     let options = NoticeOptions { search_m: SEARCH_M, ..NoticeOptions::default() };
     let strange = |e: descry_perception::learning::LearningError| WorldError::Bug(format!("a visit: {e}"));
     let surface = mind.known.surfaces.iter().find(|s| s.symbol == place.on);
+    let localised = view.world_from_camera;
     let views = [match surface {
         Some(surface) => perceive::laid(eyes, surface, view),
         None => view,
     }];
+    let views_pose = views[0].world_from_camera;
     let mut told = Told { waypoint: waypoint.into(), ..Told::default() };
     let compared = match &place.room {
         None => {
@@ -75,6 +77,7 @@ pub(super) fn visit(
         Some(before) => {
             let mut room = MetaRoom { options, ..MetaRoom::clone(before) };
             let visit = room.visit(&views).map_err(strange)?;
+            told.pose = visit.poses.first().copied();
             let off = differing(&visit, &views[0]);
             let fits = off < STRANGE;
             if !fits {
@@ -94,7 +97,8 @@ pub(super) fn visit(
             take_in(mind, eyes, &on, waypoint, (&views[0], visit), &mut told);
         }
     }
-    Ok(told.note())
+    let off = told.pose.unwrap_or(views_pose).inverse() * localised;
+    Ok(told.note(&off))
 }
 
 /// The share of what is seen that came.
@@ -108,15 +112,18 @@ fn differing(visit: &Visit, view: &View) -> f64 {
 struct Told {
     waypoint: String,
     visits: usize,
+    /// Where the camera stood, by what was there before.
+    pose: Option<Isometry3<f64>>,
     strange: Option<String>,
     came: Vec<String>,
     gone: Vec<String>,
 }
 
 impl Told {
-    fn note(self) -> Note {
-        let Told { waypoint, visits, strange, came, gone } = self;
-        Note::Visited { waypoint, visits, strange, came, gone }
+    fn note(self, off: &Isometry3<f64>) -> Note {
+        let Told { waypoint, visits, strange, came, gone, .. } = self;
+        let (moved_m, turned_rad) = (off.translation.vector.norm(), off.rotation.angle());
+        Note::Visited { waypoint, visits, moved_m, turned_rad, strange, came, gone }
     }
 }
 
@@ -337,11 +344,16 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
     let looks = (used.len(), of.looks.len());
     let points = model.cloud.len();
     novelty(mind, what)?.fate = Fate::Learned { name: name.clone(), looks, sides };
+    let left_out = (0..of.looks.len()).filter(|n| !used.contains(n)).filter_map(|n| {
+        let own = modelled.keyframes.get(n).filter(|k| !k.used).map(|k| k.why.clone());
+        Some(format!("\n          look {} left out: {}", n + 1, own.or_else(|| model.looks[n].left_out.clone())?))
+    });
     Ok(format!(
-        "{name} is learned from {} of {} looks: {points} points, {}, {:.0} % of its sides seen",
+        "{name} is learned from {} of {} looks: {points} points, {}, {:.0} % of its sides seen{}",
         looks.0,
         looks.1,
         size(&size_m, &at_m),
-        1e2 * sides
+        1e2 * sides,
+        left_out.collect::<String>()
     ))
 }

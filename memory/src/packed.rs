@@ -49,14 +49,12 @@ fn pack(cloud: &Cloud) -> Packed {
     let bounds = cloud.bounds().unwrap_or_default();
     let size_m = f64::from((bounds.1 - bounds.0).max());
     let unit_m = UNITS_M[usize::from(size_m / UNITS_M[0] >= f64::from(u16::MAX))];
-    let steps = |p: &Point3<f32>| -> [i64; 3] {
-        std::array::from_fn(|k| (f64::from(p[k]) / unit_m).round() as i64)
-    };
+    let steps =
+        |p: &Point3<f32>| -> [i64; 3] { std::array::from_fn(|k| (f64::from(p[k]) / unit_m).round() as i64) };
     let low = steps(&bounds.0);
     let above = |p: &Point3<f32>| -> Option<[u16; 3]> {
         let at = steps(p);
-        let parts: Vec<u16> =
-            (0..3).map(|k| u16::try_from(at[k] - low[k]).ok()).collect::<Option<_>>()?;
+        let parts: Vec<u16> = (0..3).map(|k| u16::try_from(at[k] - low[k]).ok()).collect::<Option<_>>()?;
         parts.try_into().ok()
     };
     let kept: Vec<u32> =
@@ -87,9 +85,8 @@ fn unpack(packed: &Packed) -> Result<Cloud, String> {
         let steps = packed.low[k] + i64::from(u16::from_le_bytes([pair[0], pair[1]]));
         (steps as f64 * packed.unit_m) as f32
     };
-    let point = |p: &[u8]| {
-        Point3::new(coordinate(0, &p[..2]), coordinate(1, &p[2..4]), coordinate(2, &p[4..6]))
-    };
+    let point =
+        |p: &[u8]| Point3::new(coordinate(0, &p[..2]), coordinate(1, &p[2..4]), coordinate(2, &p[4..6]));
     let points: Vec<Point3<f32>> = raw.chunks_exact(6).map(point).collect();
     let part = |byte: u8| match byte as i8 {
         UNKNOWN => f32::NAN,

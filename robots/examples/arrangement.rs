@@ -12,7 +12,11 @@ fn run(file: &str, seed: &str, visit: Option<&str>) -> Result<String, String> {
     let scene = arrange(&spec, seed).map_err(|e| e.to_string())?;
     let line = |o: &descry_robots::sim::Object| {
         let [x, y, z] = o.centre_m().coords.into();
-        format!(r#"{{"name": "{}", "on": "{}", "centre_m": [{x:.4}, {y:.4}, {z:.4}]}}"#, o.name, o.surface().unwrap_or(""))
+        format!(
+            r#"{{"name": "{}", "on": "{}", "centre_m": [{x:.4}, {y:.4}, {z:.4}]}}"#,
+            o.name,
+            o.surface().unwrap_or("")
+        )
     };
     Ok(scene.objects.iter().map(line).collect::<Vec<_>>().join("\n"))
 }

@@ -124,7 +124,8 @@ fn line(thing: &LearnedThing, now_unix_s: f64) -> String {
 /// The day of the week in UTC: the first of January 1970 was a Thursday.
 fn weekday(unix_s: f64) -> &'static str {
     let days = (unix_s / 86_400.0).floor() as i64;
-    ["Thursday", "Friday", "Saturday", "Sunday", "Monday", "Tuesday", "Wednesday"][days.rem_euclid(7) as usize]
+    ["Thursday", "Friday", "Saturday", "Sunday", "Monday", "Tuesday", "Wednesday"]
+        [days.rem_euclid(7) as usize]
 }
 
 #[cfg(test)]

@@ -136,13 +136,15 @@ impl MetaRoom {
 
     /// The poses of the views after all were moved together onto the static structure, where they fit it.
     fn localised(&self, views: &[View]) -> Result<Vec<Isometry3<f64>>, LearningError> {
-        /// What is seen is thinned more than what it is moved onto: two grids of the same width are drawn onto each other, and off the truth.
-        const SEEN_M: f32 = 0.03;
+        /// What is seen is thinned by pixels: points of a grid of voxels are drawn onto those of another grid, and centimetres off the truth where only
+        /// edges hold what is seen along a plane.
+        const EVERY: usize = 6;
         const ROOM_M: f32 = 0.01;
         const NEIGHBOURS: usize = 12;
         let stated: Vec<Isometry3<f64>> = views.iter().map(|v| v.world_from_camera).collect();
-        let seen = voxel::downsample(&together(views, &stated), SEEN_M)?;
-        let source = Prepared::with_normals(&seen.points, NEIGHBOURS)?;
+        let thinned: Vec<View> =
+            views.iter().map(|v| View { cloud: every(&v.cloud, EVERY), ..v.clone() }).collect();
+        let source = Prepared::with_normals(&together(&thinned, &stated).points, NEIGHBOURS)?;
         let target = Prepared::with_normals(&voxel::downsample(&self.cloud, ROOM_M)?.points, NEIGHBOURS)?;
         let (far_m, delta_m) = (self.options.search_m, self.options.delta_m);
         let mut by_world = Isometry3::identity();
@@ -326,6 +328,13 @@ fn maps(views: &[View], poses: &[Isometry3<f64>]) -> Result<Vec<DepthMap>, Learn
         organised.ok_or(LearningError::NotOrganised { view: k })
     };
     views.iter().zip(poses).enumerate().map(map).collect()
+}
+
+/// Each so many-th pixel along rows and columns.
+fn every(cloud: &Cloud, step: usize) -> Cloud {
+    let width = cloud.grid.map_or(1, |grid| grid.width);
+    let kept = (0..cloud.len()).filter(|i| (i % width) % step == 0 && (i / width) % step == 0);
+    cloud.select(&kept.map(|i| i as u32).collect::<Vec<_>>())
 }
 
 /// Points alone: what is static is kept without colours and labels.

@@ -98,9 +98,7 @@ impl Piece {
         let turn = thing_from_piece.rotation.to_rotation_matrix().into_inner();
         let reach = match &self.shape {
             // How far an ellipsoid reaches along an axis.
-            Shape::Ball(_) => {
-                Vector3::from_fn(|k, _| turn.row(k).transpose().component_mul(&half).norm())
-            }
+            Shape::Ball(_) => Vector3::from_fn(|k, _| turn.row(k).transpose().component_mul(&half).norm()),
             _ => turn.abs() * half,
         };
         let middle = thing_from_piece * middle;
@@ -191,10 +189,8 @@ mod tests {
 
     #[test]
     fn a_pattern_is_the_same_at_the_same_place_and_differs_by_its_seed() {
-        let paint = |seed| Paint {
-            colour: [120; 3],
-            pattern: Some(Pattern { size_m: 0.03, spread: 100.0, seed }),
-        };
+        let paint =
+            |seed| Paint { colour: [120; 3], pattern: Some(Pattern { size_m: 0.03, spread: 100.0, seed }) };
         let places: Vec<Point3<f64>> =
             (0..50).map(|k| Point3::new(0.02 * f64::from(k), 0.01, 0.05)).collect();
         let of = |seed| places.iter().map(|p| paint(seed).at(p)).collect::<Vec<_>>();

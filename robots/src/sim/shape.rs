@@ -276,9 +276,7 @@ impl Shape {
             Shape::Ball(Ball { size_m }) => size_m[0].max(size_m[1]),
             Shape::Rod(r) => r.diameter_m,
             Shape::Bow(b) => b.height_m,
-            Shape::Composed(_) | Shape::Household(_) => {
-                2.0 * self.composed().map_or(0.0, Composed::radius_m)
-            }
+            Shape::Composed(_) | Shape::Household(_) => 2.0 * self.composed().map_or(0.0, Composed::radius_m),
         };
         0.5 * diameter
     }
@@ -287,9 +285,7 @@ impl Shape {
     pub fn painted(&self, colour: [u8; 3]) -> Vec<(Part, Paint)> {
         match self.composed() {
             Some(composed) => composed.painted(colour),
-            None => {
-                self.parts().into_iter().map(|part| (part, Paint { colour, pattern: None })).collect()
-            }
+            None => self.parts().into_iter().map(|part| (part, Paint { colour, pattern: None })).collect(),
         }
     }
 

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use descry_perception::learning::{Glance, Judged, KnowOptions};
+use descry_perception::learning::{Glance, Guess, Judged, KnowOptions};
 use descry_perception::nalgebra::{Isometry3, Point3};
 use descry_perception::recognise::Percept;
 use descry_perception::{Cloud, Neighbours, View};
@@ -12,6 +12,10 @@ use descry_perception::{Cloud, Neighbours, View};
 use super::news::{Models, News};
 use crate::situation::KnownSurface;
 
+/// Returns farther than this tell nothing, metres.
+const RANGE_M: f64 = 3.0;
+/// So many of the newest cameras look at what all views show together.
+const TOGETHER: usize = 3;
 /// Guesses of all views together that are looked at, the surest first.
 const GUESSES: usize = 12;
 /// Guesses nearer to each other than this are one, metres and radians.
@@ -57,15 +61,20 @@ impl Found {
     }
 }
 
-/// Which learned things views show, each with where its camera stood, the surest first; no place holds two. `holds` says where they may be.
+/// A guess, and where in the world that is.
+type Placed = (Guess, Isometry3<f64>);
+
+/// Which learned things views show, each with where its camera stood, the surest first; no place holds two. Beside what each view suggests there is what is
+/// `suggested` by all of them; `holds` says where things may be.
 pub(super) fn find(
     news: &News,
     glances: &mut Glances,
     views: &[(&View, Isometry3<f64>)],
+    suggested: Vec<Placed>,
     holds: impl Fn(&Point3<f64>) -> bool,
 ) -> Vec<Found> {
     let Some(models) = news.models.clone() else { return Vec::new() };
-    let options = KnowOptions::default();
+    let options = options();
     let looks: Vec<(Arc<Glance>, Isometry3<f64>)> = views
         .iter()
         .filter_map(|(view, pose)| {
@@ -78,14 +87,12 @@ pub(super) fn find(
         })
         .collect();
     let looks: Vec<(&Glance, Isometry3<f64>)> = looks.iter().map(|(g, pose)| (&**g, *pose)).collect();
-    let mut guesses: Vec<(descry_perception::learning::Guess, Isometry3<f64>)> = Vec::new();
-    let all = looks.iter().flat_map(|(glance, pose)| glance.guesses.iter().map(move |g| (*g, *pose)));
-    let mut all: Vec<_> = all.map(|(guess, pose)| (guess, pose * guess.camera_from_model)).collect();
+    let mut guesses: Vec<Placed> = Vec::new();
+    let mut all: Vec<Placed> = looks.iter().flat_map(|(glance, pose)| placed(glance, pose)).collect();
+    all.extend(suggested);
     all.sort_by(|a, b| b.0.confidence.total_cmp(&a.0.confidence));
     for (guess, at) in all {
-        let is_one = |other: &(descry_perception::learning::Guess, Isometry3<f64>)| {
-            other.0.model == guess.model && is_same(&other.1, &at)
-        };
+        let is_one = |other: &Placed| other.0.model == guess.model && is_same(&other.1, &at);
         let middle = Point3::from(at.translation.vector);
         if guesses.len() < GUESSES && holds(&middle) && !guesses.iter().any(is_one) {
             guesses.push((guess, at));
@@ -107,6 +114,41 @@ pub(super) fn find(
     apart
 }
 
+fn options() -> KnowOptions {
+    KnowOptions { range_m: RANGE_M, ..KnowOptions::default() }
+}
+
+fn placed(glance: &Glance, world_from_camera: &Isometry3<f64>) -> Vec<Placed> {
+    glance.guesses.iter().map(|guess| (*guess, world_from_camera * guess.camera_from_model)).collect()
+}
+
+/// What all views of a surface together suggest, as the newest of their cameras would see it: less noise than in any view alone.
+fn together(
+    models: &Models,
+    surface: &KnownSurface,
+    views: &[(&View, Isometry3<f64>)],
+    merged: &Cloud,
+) -> Vec<Placed> {
+    let Some(normals) = &merged.normals else { return Vec::new() };
+    let Some(corner) = surface.outline.first() else { return Vec::new() };
+    let is_near = |p: &Point3<f64>| {
+        let above_m = surface.up.dot(&(p - corner));
+        surface.covers(p, BESIDE_M) && (ABOVE_M.0..ABOVE_M.1).contains(&above_m)
+    };
+    let seen = |(view, pose): &(&View, Isometry3<f64>)| {
+        let eye = Point3::from(pose.translation.vector);
+        let faces = |&i: &u32| {
+            let (p, n) = (merged.points[i as usize].cast::<f64>(), normals[i as usize].cast::<f64>());
+            is_near(&p) && n.dot(&(eye - p)) > 0.0
+        };
+        let facing: Vec<u32> = (0..merged.len() as u32).filter(faces).collect();
+        let cloud = merged.select(&facing).transformed(&pose.inverse());
+        let together = View { cloud, world_from_camera: *pose, ..View::clone(view) };
+        models.library.glance(&together, &options()).map_or_else(|_| Vec::new(), |g| placed(&g, pose))
+    };
+    views.iter().rev().take(TOGETHER).flat_map(seen).collect()
+}
+
 fn found(news: &News, models: &Models, model: usize, judged: Judged) -> Option<Found> {
     let thing = *models.things.get(model)?;
     let cloud = news.things.get(thing)?.cloud.transformed(&judged.world_from_model);
@@ -124,24 +166,24 @@ pub(super) fn stands_on(surface: &KnownSurface, middle: &Point3<f64>) -> bool {
     surface.covers(middle, BESIDE_M) && (ABOVE_M.0..ABOVE_M.1).contains(&above_m)
 }
 
-/// Says of each object on a surface which learned thing it may be; what several objects are of one thing is one. `points` is the cloud that the percepts
-/// index.
+/// Says of each object on a surface which learned thing it may be; what several objects are of one thing is one. `merged` is the cloud of all views, which
+/// the percepts index.
 pub(crate) fn explain(
     news: &News,
     glances: &mut Glances,
     surface: &KnownSurface,
     views: &[(&View, Isometry3<f64>)],
-    points: &[Point3<f32>],
+    merged: &Cloud,
     percepts: Vec<Percept>,
 ) -> Vec<Percept> {
-    if news.models.is_none() {
-        return percepts;
-    }
-    let found = find(news, glances, views, |middle| stands_on(surface, middle));
+    let Some(models) = &news.models else { return percepts };
+    let suggested = together(models, surface, views, merged);
+    let found = find(news, glances, views, suggested, |middle| stands_on(surface, middle));
     let shares: Vec<Vec<f64>> = percepts
         .iter()
         .map(|p| {
-            let own: Vec<Point3<f32>> = p.indices.iter().step_by(3).map(|&i| points[i as usize]).collect();
+            let own: Vec<Point3<f32>> =
+                p.indices.iter().step_by(3).map(|&i| merged.points[i as usize]).collect();
             found.iter().map(|f| f.share_of(&own)).collect()
         })
         .collect();
@@ -163,7 +205,8 @@ pub(crate) fn explain(
         name(&mut whole, news, Ok(f));
         explained.push(whole);
     }
-    let rest: Vec<Percept> = percepts.into_iter().zip(taken).filter(|(_, taken)| !taken).map(|(p, _)| p).collect();
+    let rest: Vec<Percept> =
+        percepts.into_iter().zip(taken).filter(|(_, taken)| !taken).map(|(p, _)| p).collect();
     let sizes: Vec<f64> = rest.iter().map(|p| together_m(p, &rest)).collect();
     explained.extend(rest.into_iter().zip(sizes).map(|(mut p, longest_m)| {
         name(&mut p, news, Err(longest_m));

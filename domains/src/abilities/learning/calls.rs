@@ -22,7 +22,8 @@ const LOOK_S: f64 = 1.5;
 
 fn expected_sides(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let (from, what) = (argument(call, 0)?, argument(call, 1)?);
-    let novelty = s.news.novelty(what).ok_or_else(|| CallError::Failed(format!("`{what}` is nothing new")))?;
+    let novelty =
+        s.news.novelty(what).ok_or_else(|| CallError::Failed(format!("`{what}` is nothing new")))?;
     let before: Vec<&str> = holding(call, "faced")
         .filter(|r| r.arguments.get(1).is_some_and(|of| **of == *what))
         .filter_map(|r| r.arguments.first().map(|pose| &**pose))
@@ -33,7 +34,8 @@ fn expected_sides(s: &Situation, call: &Call) -> Result<Answer, CallError> {
 fn gain(s: &Situation, novelty: &Novelty, from: &str, before: &[&str]) -> f64 {
     let mut seen = novelty.seen();
     seen.extend(before.iter().flat_map(|pose| novelty.shown_from(s, pose)));
-    let fresh: BTreeSet<usize> = novelty.shown_from(s, from).into_iter().filter(|d| !seen.contains(d)).collect();
+    let fresh: BTreeSet<usize> =
+        novelty.shown_from(s, from).into_iter().filter(|d| !seen.contains(d)).collect();
     fresh.len() as f64 / DIRECTIONS as f64
 }
 

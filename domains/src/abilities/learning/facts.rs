@@ -8,7 +8,12 @@ use crate::situation::Situation;
 /// Every fact.
 pub(super) const ALL: &[Fact] = &[
     Fact { name: "waypoint", types: &["pose"], about: "a place is visited from there", states: waypoint },
-    Fact { name: "stand", types: &["pose", "novelty"], about: "one can look at it from there", states: stand },
+    Fact {
+        name: "stand",
+        types: &["pose", "novelty"],
+        about: "one can look at it from there",
+        states: stand,
+    },
     Fact {
         name: "way-in",
         types: &["pose"],
@@ -58,7 +63,8 @@ fn stand(s: &Situation) -> Vec<String> {
 }
 
 fn way_in(s: &Situation) -> Vec<String> {
-    let around = |pose: &String| s.news.novelties.iter().any(|n| n.stands.iter().flatten().any(|p| p == pose));
+    let around =
+        |pose: &String| s.news.novelties.iter().any(|n| n.stands.iter().flatten().any(|p| p == pose));
     let free = s.candidates.iter().map(|c| &c.symbol).filter(|pose| !around(pose)).cloned();
     let first = open(s).next().map(|n| n.symbol.as_str());
     let in_turn = open(s).flat_map(|n| stands::ways_in(s, n, Some(n.symbol.as_str()) == first));
@@ -72,7 +78,8 @@ fn next_to(s: &Situation) -> Vec<String> {
 
 fn before(s: &Situation) -> Vec<String> {
     let all: Vec<&Novelty> = open(s).collect();
-    let pairs = all.iter().enumerate().flat_map(|(k, one)| all[k + 1..].iter().map(move |other| (one, other)));
+    let pairs =
+        all.iter().enumerate().flat_map(|(k, one)| all[k + 1..].iter().map(move |other| (one, other)));
     pairs.map(|(one, other)| format!("(before {} {})", one.symbol, other.symbol)).collect()
 }
 

@@ -88,8 +88,7 @@ pub const ABILITY: Ability = Ability {
 /// Two waypoints a surface, on opposite sides of it: what one look hides the other shows.
 fn waypoints(candidates: &[Candidate], surface: &str, poses: usize) -> Vec<Candidate> {
     let number = |c: &Candidate| c.symbol.strip_prefix(&format!("{surface}-"))?.parse::<usize>().ok();
-    let ring: Vec<(usize, &Candidate)> =
-        candidates.iter().filter_map(|c| Some((number(c)?, c))).collect();
+    let ring: Vec<(usize, &Candidate)> = candidates.iter().filter_map(|c| Some((number(c)?, c))).collect();
     let apart = |a: usize, b: usize| {
         let steps = a.abs_diff(b);
         steps.min(poses - steps)

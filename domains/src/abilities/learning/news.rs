@@ -62,8 +62,8 @@ pub struct Novelty {
     pub on: String,
     /// Its middle, in the map.
     pub centre: Point3<f64>,
-    /// How far it reaches from there, metres.
-    pub radius_m: f64,
+    /// Sides of the box around what was noticed of it, metres.
+    pub size_m: [f64; 3],
     /// Looks at it, the one that noticed it first.
     pub looks: Vec<Look>,
     /// Its pixels in that.
@@ -170,7 +170,12 @@ impl News {
     }
 
     /// What a later run is to remember of the places: those that this one has visited as they are now, the others as they were.
-    pub(crate) fn visited(&self, before: Vec<Visited>, at: impl Fn(&str) -> Option<[f64; 3]>, now: f64) -> Vec<Visited> {
+    pub(crate) fn visited(
+        &self,
+        before: Vec<Visited>,
+        at: impl Fn(&str) -> Option<[f64; 3]>,
+        now: f64,
+    ) -> Vec<Visited> {
         let seen: Vec<Visited> = self
             .places
             .iter()
@@ -188,6 +193,11 @@ impl News {
 }
 
 impl Novelty {
+    /// How far it reaches from its middle, metres.
+    pub(super) fn radius_m(&self) -> f64 {
+        0.5 * self.size_m[0].hypot(self.size_m[1])
+    }
+
     /// The direction of a place around it, one of [`DIRECTIONS`].
     fn direction(&self, from: &Point3<f64>) -> usize {
         let off = from - self.centre;

@@ -44,7 +44,8 @@ pub(super) fn make(
     let joined = |line: usize| {
         let (a, b) = (poses[line].as_ref()?, poses[(line + 1) % poses.len()].as_ref()?);
         let straight_m = (at(&a.place)? - at(&b.place)?).norm();
-        let way = mind.known.chart.travel(robot, &a.place, std::slice::from_ref(&b.place), &[]).pop()?.ok()?;
+        let way =
+            mind.known.chart.travel(robot, &a.place, std::slice::from_ref(&b.place), &[]).pop()?.ok()?;
         Some(way.distance_m <= options.detour * straight_m)
     };
     let joined = (0..poses.len()).map(|line| joined(line).unwrap_or(false)).collect();
@@ -68,15 +69,16 @@ fn obstacles(
     within_m: f64,
 ) -> Vec<Point3<f32>> {
     let near = |x: f64, y: f64| (x - centre.x).hypot(y - centre.y) < within_m + 1.0;
-    let mut all: Vec<Point3<f32>> =
-        seen.iter().filter(|p| near(p.x.into(), p.y.into())).copied().collect();
+    let mut all: Vec<Point3<f32>> = seen.iter().filter(|p| near(p.x.into(), p.y.into())).copied().collect();
     if let Some(map) = robot.map() {
         let height_m = BAND_M.0 as f32 + 0.1;
         let cells = (0..map.occupied.len()).filter(|&k| map.occupied[k]).map(|k| {
             let middle = |at: usize, low: f64| low + (at as f64 + 0.5) * map.resolution_m;
             (middle(k % map.width, map.origin_m.x), middle(k / map.width, map.origin_m.y))
         });
-        all.extend(cells.filter(|(x, y)| near(*x, *y)).map(|(x, y)| Point3::new(x as f32, y as f32, height_m)));
+        all.extend(
+            cells.filter(|(x, y)| near(*x, *y)).map(|(x, y)| Point3::new(x as f32, y as f32, height_m)),
+        );
     }
     all
 }
@@ -95,7 +97,8 @@ fn left(s: &Situation, novelty: &Novelty) -> Vec<Option<String>> {
 /// Stands strung together as far as the way between neighbours is no detour.
 fn strings(s: &Situation, novelty: &Novelty) -> Vec<Vec<String>> {
     let left = left(s, novelty);
-    let places: Vec<Option<Point2<f64>>> = left.iter().map(|p| p.as_ref().and_then(|p| point(s, p))).collect();
+    let places: Vec<Option<Point2<f64>>> =
+        left.iter().map(|p| p.as_ref().and_then(|p| point(s, p))).collect();
     let line = |p: &Point2<f64>| places.iter().position(|at| at.as_ref() == Some(p));
     let way_m = |a: &Point2<f64>, b: &Point2<f64>| novelty.joined[line(a)?].then(|| (b - a).norm());
     let strung = trajectories(&places, 1.0, way_m);

@@ -32,6 +32,9 @@ const SAME_M: f64 = 0.12;
 /// So sure must it be that something is what was learned before, and as great a share of it must be explained.
 const SURE: f64 = 0.8;
 const EXPLAINED: f64 = 0.5;
+/// A model that is along any axis longer than this many times what was noticed, and so much more (metres), has taken in what it stands on or beside.
+const GROWN: f64 = 2.0;
+const GROWN_M: f64 = 0.1;
 /// A thing is seen through if of its points so many were looked through, of those that were looked at, and at least so many were.
 const THROUGH: f64 = 0.6;
 const LOOKED_AT: u32 = 50;
@@ -81,7 +84,8 @@ pub(super) fn visit(
             let off = differing(&visit, &views[0]);
             let fits = off < STRANGE;
             if !fits {
-                told.strange = Some(format!("{:.0} % of what is seen differs from what was there", 1e2 * off));
+                told.strange =
+                    Some(format!("{:.0} % of what is seen differs from what was there", 1e2 * off));
             }
             fits.then_some((room, Some(visit)))
         }
@@ -139,7 +143,8 @@ fn take_in(
     let pose = visit.poses.first().copied().unwrap_or(view.world_from_camera);
     let view = Arc::new(View { world_from_camera: pose, ..view.clone() });
     let seen = view.cloud.finite().transformed(&pose);
-    let mut found = again::find(&mind.known.news.clone(), &mut mind.glances, &[(&view, pose)], |_| true);
+    let mut found =
+        again::find(&mind.known.news.clone(), &mut mind.glances, &[(&view, pose)], Vec::new(), |_| true);
     found.retain(|f| f.judged.confidence >= SURE);
     for appeared in &visit.appeared {
         let surface = mind.known.surfaces.iter().find(|s| is_on(s, &appeared.cloud)).cloned();
@@ -152,7 +157,9 @@ fn take_in(
         let known = found.iter().find(|f| f.share_of(&appeared.cloud.points) >= EXPLAINED);
         match known {
             Some(f) => told.came.push(known_again(mind, &surface, f)),
-            None => told.came.extend(new(mind, eyes, &surface.symbol, waypoint, (&view, appeared), &seen.points)),
+            None => {
+                told.came.extend(new(mind, eyes, &surface.symbol, waypoint, (&view, appeared), &seen.points))
+            }
         }
     }
     for gone in &visit.gone {
@@ -188,11 +195,15 @@ fn is_on(surface: &KnownSurface, cloud: &Cloud) -> bool {
 /// Keeps a change unless it is known.
 fn change(mind: &mut Mind, change: Change) {
     let at = |c: &Change| match c {
-        Change::Came { at, .. } | Change::Left { at, .. } | Change::Gone { at, .. } | Change::Beside { at, .. } => *at,
+        Change::Came { at, .. }
+        | Change::Left { at, .. }
+        | Change::Gone { at, .. }
+        | Change::Beside { at, .. } => *at,
     };
     let news = Arc::make_mut(&mut mind.known.news);
     let is_one = |c: &Change| {
-        std::mem::discriminant(c) == std::mem::discriminant(&change) && (at(c) - at(&change)).norm() < 2.0 * SAME_M
+        std::mem::discriminant(c) == std::mem::discriminant(&change)
+            && (at(c) - at(&change)).norm() < 2.0 * SAME_M
     };
     if !news.changes.iter().any(is_one) {
         news.changes.push(change);
@@ -204,10 +215,8 @@ fn known_again(mind: &mut Mind, surface: &KnownSurface, f: &Found) -> String {
     let at = Point3::from(f.judged.world_from_model.translation.vector);
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
     let thing = &mut Arc::make_mut(&mut mind.known.news).things[f.thing];
-    let before = std::mem::replace(
-        &mut thing.seen,
-        Seen { unix_s: now_unix_s, at_m: at, on: surface.symbol.clone() },
-    );
+    let before =
+        std::mem::replace(&mut thing.seen, Seen { unix_s: now_unix_s, at_m: at, on: surface.symbol.clone() });
     let name = thing.name.clone();
     let p = f.judged.confidence;
     let is_moved = (before.at_m - at).norm() > SAME_M;
@@ -230,7 +239,7 @@ fn new(
     let (centre, size_m) = extent(&appeared.cloud);
     let look = Look { from: waypoint.into(), view: Arc::clone(view) };
     let news = Arc::make_mut(&mut mind.known.news);
-    let is_one = |n: &&mut Novelty| (n.centre - centre).norm() < SAME_M.max(n.radius_m);
+    let is_one = |n: &&mut Novelty| (n.centre - centre).norm() < SAME_M.max(n.radius_m());
     if let Some(known) = news.novelties.iter_mut().find(is_one) {
         if known.fate == Fate::Open {
             known.looks.push(look);
@@ -243,7 +252,7 @@ fn new(
         symbol: symbol.clone(),
         on: on.into(),
         centre,
-        radius_m: 0.5 * (size_m[0] * size_m[0] + size_m[1] * size_m[1]).sqrt(),
+        size_m,
         looks: vec![look],
         mask: Arc::new(appeared.mask.clone()),
         stands,
@@ -308,8 +317,8 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
     let used: Vec<usize> = (0..of.looks.len()).filter(|&n| is_used(n)).collect();
     let views: Vec<(&View, Isometry3<f64>)> =
         used.iter().filter_map(|&n| Some((&*of.looks[n].view, poses(n)?))).collect();
-    let near = |p: &Point3<f64>| (p - of.centre).norm() < SAME_M.max(of.radius_m);
-    let before = again::find(&mind.known.news.clone(), &mut mind.glances, &views, near);
+    let near = |p: &Point3<f64>| (p - of.centre).norm() < SAME_M.max(of.radius_m());
+    let before = again::find(&mind.known.news.clone(), &mut mind.glances, &views, Vec::new(), near);
     let surface = mind.known.surfaces.iter().find(|s| s.symbol == of.on).cloned();
     if let Some((f, surface)) = before.iter().find(|f| f.judged.confidence >= SURE).zip(surface) {
         let (name, confidence) = (mind.known.news.things[f.thing].name.clone(), f.judged.confidence);
@@ -324,12 +333,18 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
             return Ok(format!("it is not learned: {because}"));
         }
     };
+    let (_, size_m) = extent(&model.cloud);
+    if (0..3).any(|k| size_m[k] > GROWN * of.size_m[k] + GROWN_M) {
+        let at = Point3::from(model.world_from_model.translation.vector);
+        let because = format!("what was taken for it grew beyond what had come, to {}", size(&size_m, &at));
+        novelty(mind, what)?.fate = Fate::GivenUp(because.clone());
+        return Ok(format!("it is not learned: {because}"));
+    }
     let seen = Novelty { looks: used.iter().map(|&n| of.looks[n].clone()).collect(), ..of.clone() };
     let sides = seen.seen().len() as f64 / DIRECTIONS as f64;
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
     let news = Arc::make_mut(&mut mind.known.news);
     let name = news.free_name();
-    let (_, size_m) = extent(&model.cloud);
     let at_m = Point3::from(model.world_from_model.translation.vector);
     news.things.push(LearnedThing {
         name: name.clone(),
@@ -346,7 +361,11 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
     novelty(mind, what)?.fate = Fate::Learned { name: name.clone(), looks, sides };
     let left_out = (0..of.looks.len()).filter(|n| !used.contains(n)).filter_map(|n| {
         let own = modelled.keyframes.get(n).filter(|k| !k.used).map(|k| k.why.clone());
-        Some(format!("\n          look {} left out: {}", n + 1, own.or_else(|| model.looks[n].left_out.clone())?))
+        Some(format!(
+            "\n          look {} left out: {}",
+            n + 1,
+            own.or_else(|| model.looks[n].left_out.clone())?
+        ))
     });
     Ok(format!(
         "{name} is learned from {} of {} looks: {points} points, {}, {:.0} % of its sides seen{}",

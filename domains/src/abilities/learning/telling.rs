@@ -45,7 +45,8 @@ fn told(mind: &Mind, s: &Situation, ended: &Ended, is_to_learn: bool) -> (Verdic
     let mut said: Vec<String> = news.novelties.iter().map(|n| fate(mind, n, is_to_learn)).collect();
     said.extend(news.changes.iter().map(|c| changed(c)));
     let nothing = if is_to_learn { "nothing is new" } else { "nothing has changed" };
-    let compared = |p: &&Place| p.is_visited && p.strange.is_none() && p.room.as_ref().is_some_and(|r| r.visits > 1);
+    let compared =
+        |p: &&Place| p.is_visited && p.strange.is_none() && p.room.as_ref().is_some_and(|r| r.visits > 1);
     let count = news.places.iter().filter(compared).count();
     if said.is_empty() {
         said.push(if count == 0 { "nothing can be new yet".into() } else { nothing.into() });
@@ -83,7 +84,9 @@ fn open<'a>(
     is_to_learn: bool,
 ) -> Vec<String> {
     let left = |p: &Place| match (&p.strange, p.is_visited) {
-        (Some(why), _) => Some(format!("what {} shows cannot be compared with earlier visits: {why}", p.waypoint)),
+        (Some(why), _) => {
+            Some(format!("what {} shows cannot be compared with earlier visits: {why}", p.waypoint))
+        }
         (None, false) => Some(format!("{} was not visited", p.waypoint)),
         (None, true) => None,
     };
@@ -111,7 +114,10 @@ fn fate(mind: &Mind, n: &Novelty, is_to_learn: bool) -> String {
                 true => "from all around".into(),
                 false => format!("from {:.0} % of its sides alone", 1e2 * sides),
             };
-            format!("something new{on} {at} is learned as \"{name}\", seen {all_round} in {} of {} looks", looks.0, looks.1)
+            format!(
+                "something new{on} {at} is learned as \"{name}\", seen {all_round} in {} of {} looks",
+                looks.0, looks.1
+            )
         }
         Fate::Known { name, confidence } => format!("{name} stands{on} {at} ({confidence:.2})"),
         Fate::GivenUp(because) => format!("something new{on} {at} could not be learned: {because}"),
@@ -130,7 +136,9 @@ fn changed(change: &Change) -> String {
             at.x, at.y, before.x, before.y
         ),
         Change::Left { name, at } => format!("{name} is no longer at ({:.2}, {:.2}) m", at.x, at.y),
-        Change::Gone { at, size_m } => format!("something that always stood there is gone, {}", size(size_m, at)),
+        Change::Gone { at, size_m } => {
+            format!("something that always stood there is gone, {}", size(size_m, at))
+        }
         Change::Beside { at, size_m } => {
             format!("something stands on no surface where nothing stood before, {}", size(size_m, at))
         }
@@ -144,14 +152,13 @@ fn believed(mind: &Mind, n: &Novelty) -> Believed {
         Fate::Open | Fate::GivenUp(_) => (None, 1.0),
     };
     let surface = mind.known.surfaces.iter().find(|s| s.symbol == n.on);
-    let side = 2.0 * n.radius_m;
     Believed {
         asked: true,
         kind: label.clone(),
         label,
         confidence,
         position_m: n.centre.coords.into(),
-        size_m: [side, side, 0.0],
+        size_m: n.size_m,
         on: surface.map(|s| s.name.clone()),
         room: surface.and_then(|s| s.room.clone()),
     }

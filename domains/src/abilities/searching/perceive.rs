@@ -22,8 +22,8 @@ use serde_json::json;
 use super::change::Change;
 use super::discover;
 use super::placing;
-use crate::abilities::learning::again;
 use super::vanished::{keep_unrefuted, set_aside_unseen, taken_away};
+use crate::abilities::learning::again;
 use crate::lexicon::symbol;
 use crate::mind::{Laid, Look, Mind};
 use crate::note::Note;
@@ -187,11 +187,17 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
 }
 
 /// Says of each percept which of the things that were learned it may be.
-fn known_again(mind: &mut Mind, on: usize, (views, merged): (&[View], &Merged), percepts: Vec<Percept>) -> Vec<Percept> {
+fn known_again(
+    mind: &mut Mind,
+    on: usize,
+    (views, merged): (&[View], &Merged),
+    percepts: Vec<Percept>,
+) -> Vec<Percept> {
     let placed = views.iter().zip(&merged.fits).filter(|(_, fit)| fit.used);
-    let placed: Vec<(&View, Isometry3<f64>)> = placed.map(|(view, fit)| (view, fit.world_from_camera)).collect();
+    let placed: Vec<(&View, Isometry3<f64>)> =
+        placed.map(|(view, fit)| (view, fit.world_from_camera)).collect();
     let Mind { known, glances, .. } = mind;
-    again::explain(&known.news, glances, &known.surfaces[on], &placed, &merged.cloud.points, percepts)
+    again::explain(&known.news, glances, &known.surfaces[on], &placed, &merged.cloud, percepts)
 }
 
 /// The same, for a surface that the map has: it is looked for where its outline is.

@@ -85,9 +85,10 @@ impl Library {
                 .map(|pose| (of(&pose), pose))
                 .into_iter()
                 .max_by(|a, b| a.0.explained_share().total_cmp(&b.0.explained_share()));
-            told.extend(best.filter(|(e, _)| e.facing.saturating_sub(e.hidden) >= FEWEST).map(
-                |(e, pose)| (e, world_from_camera * pose),
-            ));
+            told.extend(
+                best.filter(|(e, _)| e.facing.saturating_sub(e.hidden) >= FEWEST)
+                    .map(|(e, pose)| (e, world_from_camera * pose)),
+            );
         }
         let Some(most) = told.iter().max_by_key(|(e, _)| e.explained) else { return Ok(None) };
         let evidence = Evidence::of_several(&told.iter().map(|(e, _)| *e).collect::<Vec<_>>());
@@ -105,7 +106,8 @@ impl Evidence {
     /// count as the square root of their number.
     fn of_several(all: &[Evidence]) -> Evidence {
         let root = (all.len().max(1) as f64).sqrt();
-        let sum = |of: fn(&Evidence) -> usize| (all.iter().map(of).sum::<usize>() as f64 / root).round() as usize;
+        let sum =
+            |of: fn(&Evidence) -> usize| (all.iter().map(of).sum::<usize>() as f64 / root).round() as usize;
         let explained: usize = all.iter().map(|e| e.explained).sum();
         let mean = |of: &dyn Fn(&Evidence) -> f64| {
             all.iter().map(|e| of(e) * e.explained as f64).sum::<f64>() / explained.max(1) as f64

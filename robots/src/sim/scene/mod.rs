@@ -262,7 +262,11 @@ impl SceneSpec {
             within(&at("moves"), &o.moves)?;
             if self.visits > 1 && o.apart_from.is_some() {
                 let mend = "name its surface with `on`";
-                return Err(object(&at("apart_from"), "what moves between visits is not kept apart".into(), mend.into()));
+                return Err(object(
+                    &at("apart_from"),
+                    "what moves between visits is not kept apart".into(),
+                    mend.into(),
+                ));
             }
         }
         match &self.target {

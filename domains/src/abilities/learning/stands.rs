@@ -1,5 +1,7 @@
 //! Where to stand around something new, and how to get from one stand to the next (section IV-A of the paper).
 
+use std::collections::BTreeMap;
+
 use descry_perception::learning::{AroundOptions, stands, trajectories};
 use descry_perception::nalgebra::{Point2, Point3};
 use descry_robots::{Place, Pose2, Robot};
@@ -12,6 +14,10 @@ use crate::situation::{Candidate, Situation};
 const LINES: usize = 12;
 /// Least and greatest height of what the body could run into, metres: where it is told by two degrees wrongly, the floor two metres off seems so high.
 const BAND_M: (f64, f64) = (0.15, 1.5);
+/// What was seen is something if so many returns of one look fall into one cell of its floor plan, of such a side, metres: beside depth edges some hang in
+/// the air, each by itself.
+const RETURNS: usize = 8;
+const CELL_M: f32 = 0.05;
 /// Kept between the footprint and what was seen, metres: about two standard deviations of localisation.
 const CLEAR_M: f64 = 0.06;
 
@@ -69,7 +75,14 @@ fn obstacles(
     within_m: f64,
 ) -> Vec<Point3<f32>> {
     let near = |x: f64, y: f64| (x - centre.x).hypot(y - centre.y) < within_m + 1.0;
-    let mut all: Vec<Point3<f32>> = seen.iter().filter(|p| near(p.x.into(), p.y.into())).copied().collect();
+    let cell = |p: &Point3<f32>| [p.x, p.y].map(|c| (c / CELL_M).floor() as i32);
+    let in_band = |p: &&Point3<f32>| (BAND_M.0..BAND_M.1).contains(&f64::from(p.z));
+    let tall: Vec<&Point3<f32>> =
+        seen.iter().filter(in_band).filter(|p| near(p.x.into(), p.y.into())).collect();
+    let mut returns: BTreeMap<[i32; 2], usize> = BTreeMap::new();
+    tall.iter().for_each(|p| *returns.entry(cell(p)).or_default() += 1);
+    let mut all: Vec<Point3<f32>> =
+        tall.into_iter().filter(|p| returns[&cell(p)] >= RETURNS).copied().collect();
     if let Some(map) = robot.map() {
         let height_m = BAND_M.0 as f32 + 0.1;
         let cells = (0..map.occupied.len()).filter(|&k| map.occupied[k]).map(|k| {

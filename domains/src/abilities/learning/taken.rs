@@ -27,6 +27,10 @@ const STRANGE: f64 = 0.3;
 /// How far over a surface the lowest of something on it may be, and how far beside it its middle, metres.
 const ON_M: f64 = 0.06;
 const BESIDE_M: f64 = 0.05;
+/// What came or went with a second side shorter than this is an edge that was measured otherwise, metres.
+const SLIVER_M: f64 = 0.04;
+/// What came so near to something new, beside how far that reaches, is of it, metres.
+const OF_IT_M: f64 = 0.1;
 /// Things nearer to each other than this are one, metres.
 const SAME_M: f64 = 0.12;
 /// So sure must it be that something is what was learned before, and as great a share of it must be explained.
@@ -146,10 +150,14 @@ fn take_in(
     let mut found =
         again::find(&mind.known.news.clone(), &mut mind.glances, &[(&view, pose)], Vec::new(), |_| true);
     found.retain(|f| f.judged.confidence >= SURE);
-    for appeared in &visit.appeared {
+    for appeared in visit.appeared.iter().filter(|a| !is_sliver(&a.cloud)) {
         let surface = mind.known.surfaces.iter().find(|s| is_on(s, &appeared.cloud)).cloned();
         let Some(surface) = surface else {
             let (at, size_m) = extent(&appeared.cloud);
+            let is_of = |n: &Novelty| (n.centre - at).xy().norm() < n.radius_m() + OF_IT_M;
+            if mind.known.news.novelties.iter().any(is_of) {
+                continue;
+            }
             told.came.push(format!("something on no surface, {}", size(&size_m, &at)));
             change(mind, Change::Beside { at, size_m });
             continue;
@@ -162,7 +170,7 @@ fn take_in(
             }
         }
     }
-    for gone in &visit.gone {
+    for gone in visit.gone.iter().filter(|gone| !is_sliver(gone)) {
         let (at, size_m) = extent(gone);
         told.gone.push(size(&size_m, &at));
         change(mind, Change::Gone { at, size_m });
@@ -175,6 +183,12 @@ fn take_in(
 fn extent(cloud: &Cloud) -> (Point3<f64>, [f64; 3]) {
     let (low, high) = cloud.bounds().unwrap_or_default();
     (center(&low, &high).cast(), (high - low).cast().into())
+}
+
+fn is_sliver(cloud: &Cloud) -> bool {
+    let (_, mut size_m) = extent(cloud);
+    size_m.sort_by(f64::total_cmp);
+    size_m[1] < SLIVER_M
 }
 
 /// A size and a place, for people.

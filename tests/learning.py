@@ -10,6 +10,7 @@ and one where it is gone and the other stands. A line of JSON a seed, and the co
 
 import json
 import math
+import os
 import pathlib
 import re
 import subprocess
@@ -20,6 +21,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 THINGS = re.findall(r"^\[([\w-]+)\]", (ROOT / "robots/src/sim/household.toml").read_text(), re.M)
 # What stands on the tables from the beginning is not learned.
 THINGS = [name for name in THINGS if name not in ("tissues", "radio")]
+DESCRY = os.environ.get("DESCRY", str(ROOT / "target/release/descry"))
 NEAR_M = 0.1
 
 
@@ -29,7 +31,7 @@ def run(*arguments):
 
 
 def descry(*arguments):
-    out, err = run(str(ROOT / "target/release/descry"), *arguments, "--json")
+    out, err = run(DESCRY, *arguments, "--json")
     return json.loads(out) if out.strip() else {"verdict": "error", "why": err[-300:]}
 
 
@@ -65,14 +67,14 @@ def seed_of(seed, scene_name, folder):
     row["first"], row["second"], row["why"] = first["verdict"], second["verdict"], second["why"][:400]
     row["looks"], row["seconds"], row["wall_s"] = second.get("views"), second.get("sim_time_s"), second.get("wall_s")
     there = truth(scene, seed, 2)[thing]["centre_m"]
-    learned, _ = run(str(ROOT / "target/release/descry"), "name", str(store), "--json")
+    learned, _ = run(DESCRY, "name", str(store), "--json")
     learned = json.loads(learned)["things"] if learned.strip() else []
     right = [t for t in learned if off_m(t["seen"]["position_m"], there) < NEAR_M]
     row["learned"], row["false"] = len(right), len(learned) - len(right)
     if not right:
         return row
     row["sides"] = right[0]["sides"]
-    run(str(ROOT / "target/release/descry"), "name", str(store), right[0]["name"], thing)
+    run(DESCRY, "name", str(store), right[0]["name"], thing)
     for visit, key in ((3, "moved"), (4, "gone")):
         found = pursue(f"find {thing}", visit)
         row[key] = {"verdict": found["verdict"], "confidence": found.get("confidence"), "views": found.get("views")}

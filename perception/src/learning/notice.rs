@@ -332,8 +332,9 @@ fn maps(views: &[View], poses: &[Isometry3<f64>]) -> Result<Vec<DepthMap>, Learn
 
 /// Each so many-th pixel along rows and columns.
 fn every(cloud: &Cloud, step: usize) -> Cloud {
-    let width = cloud.grid.map_or(1, |grid| grid.width);
-    let kept = (0..cloud.len()).filter(|i| (i % width) % step == 0 && (i / width) % step == 0);
+    let width = cloud.grid.map_or(1, |grid| grid.width.max(1));
+    let kept =
+        (0..cloud.len()).filter(|i| (i % width).is_multiple_of(step) && (i / width).is_multiple_of(step));
     cloud.select(&kept.map(|i| i as u32).collect::<Vec<_>>())
 }
 

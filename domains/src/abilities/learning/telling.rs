@@ -43,7 +43,7 @@ fn told(mind: &Mind, s: &Situation, ended: &Ended, is_to_learn: bool) -> (Verdic
         return (Verdict::CannotTell, "there is nothing to visit: the map knows no surface".into());
     }
     let mut said: Vec<String> = news.novelties.iter().map(|n| fate(mind, n, is_to_learn)).collect();
-    said.extend(news.changes.iter().map(|c| changed(c)));
+    said.extend(news.changes.iter().map(changed));
     let nothing = if is_to_learn { "nothing is new" } else { "nothing has changed" };
     let compared =
         |p: &&Place| p.is_visited && p.strange.is_none() && p.room.as_ref().is_some_and(|r| r.visits > 1);

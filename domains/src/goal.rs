@@ -110,11 +110,7 @@ pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, Goal
     }
     let domain_name = domain.config.name.clone();
     Err(match nearest_miss {
-        Some(miss) => GoalError::NoSuchName {
-            suggestions: name_suggestions(lexicon, &miss),
-            found: miss.found,
-            domain: domain_name,
-        },
+        Some(miss) => no_such_name(lexicon, &domain_name, miss),
         None => GoalError::NoPhrase {
             said: said.into(),
             suggestions: phrase_suggestions(domain, lexicon),
@@ -124,9 +120,18 @@ pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, Goal
 }
 
 /// A slot that holds a word which nothing is called.
-struct Miss {
-    of_type: String,
-    found: String,
+pub(crate) struct Miss {
+    pub of_type: String,
+    pub found: String,
+}
+
+/// Says so, and what could have been said.
+pub(crate) fn no_such_name(lexicon: &Lexicon, domain: &str, miss: Miss) -> GoalError {
+    GoalError::NoSuchName {
+        suggestions: name_suggestions(lexicon, &miss),
+        found: miss.found,
+        domain: domain.into(),
+    }
 }
 
 /// The type that fills a slot: `thing` of `thing` and of `first:thing`.

@@ -120,6 +120,8 @@ impl<'a> World<'a> {
             surfaces.iter().position(|s| s.symbol == *name).ok_or_else(|| no_surface(name, &surfaces))
         };
         let news = News::of_past(setting.past.as_ref());
+        let mut lexicon = Lexicon::new(domain, &Places::of_body(&**robot));
+        news.things.iter().for_each(|thing| lexicon.learn("thing", &thing.name));
         let asked: Vec<Thing> = goal
             .asked
             .things
@@ -127,7 +129,7 @@ impl<'a> World<'a> {
             .map(|(name, on)| {
                 let on =
                     on.as_ref().map(|on| on.iter().map(index).collect::<Result<Vec<_>, _>>()).transpose()?;
-                Ok(Thing { on, ..asked_for(domain, goal, &news, name)? })
+                Ok(Thing { on, ..asked_for(domain, goal, &news, &lexicon, name)? })
             })
             .collect::<Result<_, WorldError>>()?;
         let ring = &domain.config.candidates;
@@ -169,7 +171,7 @@ impl<'a> World<'a> {
             .for_each(|begins| begins(&mut mind, domain, goal));
         Ok(Self {
             chooser,
-            lexicon: Lexicon::new(domain, &Places::of_body(&**robot)),
+            lexicon,
             mind,
             programs: Programs::of(domain),
             asked,

@@ -5,7 +5,7 @@ use descry_robots::{PoseEstimate, Robot};
 
 use super::WorldError;
 use crate::abilities::learning::news::{self, News};
-use crate::goal::Goal;
+use crate::goal::{Goal, Miss, no_such_name};
 use crate::lexicon::{Lexicon, symbol};
 use crate::load::Domain;
 use crate::situation::{self, Candidate, Known, KnownDoor, Past, Situation, Thing};
@@ -36,7 +36,13 @@ pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<
 }
 
 /// A thing that is asked for: one of the domain's objects or kinds, or one that was learned.
-pub(super) fn asked_for(domain: &Domain, goal: &Goal, news: &News, name: &str) -> Result<Thing, WorldError> {
+pub(super) fn asked_for(
+    domain: &Domain,
+    goal: &Goal,
+    news: &News,
+    lexicon: &Lexicon,
+    name: &str,
+) -> Result<Thing, WorldError> {
     let known = situation::thing(domain, name);
     let learned = news.thing(name);
     if !known.models.is_empty() {
@@ -52,13 +58,8 @@ pub(super) fn asked_for(domain: &Domain, goal: &Goal, news: &News, name: &str) -
         return Ok(Thing { name: learned.name.clone(), models: vec![news::model(learned)], ..known });
     }
     let said = goal.slots.iter().find(|slot| slot.symbol == name).map_or(name, |slot| slot.name.as_str());
-    let objects = domain.objects.iter().map(|o| o.name.as_str());
-    let all: Vec<&str> = objects.chain(news.things.iter().map(|t| t.name.as_str())).collect();
-    let all = if all.is_empty() { "nothing".into() } else { all.join(", ") };
-    Err(WorldError::Domain(format!(
-        "nothing is called \"{said}\" in the domain {}\n  known are: {all}\n  what was learned is known with --remember STORE, by the name that `descry name` gave it",
-        domain.config.name
-    )))
+    let miss = Miss { of_type: "thing".into(), found: said.into() };
+    Err(WorldError::Domain(no_such_name(lexicon, &domain.config.name, miss).to_string()))
 }
 
 /// Of what is remembered of earlier runs, what may still stand where it was seen: less than sure, so that it is looked at again.

@@ -17,8 +17,10 @@ pub(super) const ALL: &[Meaning] = &[Meaning {
     answers: expected_sides,
 }];
 
-/// What a look takes, as in the domain.
-const LOOK_S: f64 = 1.5;
+/// What a visit, a look and a model take, as in the domain, seconds.
+const PATROL_S: f64 = 2.0;
+const FACE_S: f64 = 1.5;
+const MODEL_S: f64 = 1.0;
 
 fn expected_sides(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let (from, what) = (argument(call, 0)?, argument(call, 1)?);
@@ -65,13 +67,14 @@ pub(super) fn fallback(s: &Situation) -> Option<Plan> {
     let Some((way_s, to, what, of)) = nearest else {
         let ready = s.news.novelties.iter().find(|n| n.fate == Fate::Open);
         return match ready {
-            Some(n) => Some(one_after_another(&[("model", vec![n.symbol.clone()], LOOK_S)])),
+            Some(n) => Some(one_after_another(&[("model", vec![n.symbol.clone()], MODEL_S)])),
             None => reasons::one_look(s),
         };
     };
+    let takes_s = if of.is_some() { FACE_S } else { PATROL_S };
     let both = [
         ("move", vec![symbol(s.at), symbol(to)], way_s),
-        (what, std::iter::once(symbol(to)).chain(of).collect(), LOOK_S),
+        (what, std::iter::once(symbol(to)).chain(of).collect(), takes_s),
     ];
     Some(one_after_another(if to == s.at { &both[1..] } else { &both }))
 }

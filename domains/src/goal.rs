@@ -97,21 +97,20 @@ pub enum GoalError {
 pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, GoalError> {
     let (words, wanted) = conditions(said)?;
     let mut nearest_miss = None;
-    for phrase in &domain.config.goal {
-        for slots in fits(&phrase.say, &words) {
-            match fill(lexicon, &domain.config.open, &slots) {
-                Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
-                Err(found) => nearest_miss = nearest_miss.or(Some(found)),
+    // A name that anybody may make up is only heard where no phrase holds what has a name.
+    for open in [&[][..], &domain.config.open] {
+        for phrase in &domain.config.goal {
+            for slots in fits(&phrase.say, &words) {
+                match fill(lexicon, open, &slots) {
+                    Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
+                    Err(found) => nearest_miss = nearest_miss.or(Some(found)),
+                }
             }
         }
     }
     let domain_name = domain.config.name.clone();
     Err(match nearest_miss {
-        Some(miss) => GoalError::NoSuchName {
-            suggestions: name_suggestions(lexicon, &miss),
-            found: miss.found,
-            domain: domain_name,
-        },
+        Some(miss) => no_such_name(lexicon, &domain_name, miss),
         None => GoalError::NoPhrase {
             said: said.into(),
             suggestions: phrase_suggestions(domain, lexicon),
@@ -121,9 +120,18 @@ pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, Goal
 }
 
 /// A slot that holds a word which nothing is called.
-struct Miss {
-    of_type: String,
-    found: String,
+pub(crate) struct Miss {
+    pub of_type: String,
+    pub found: String,
+}
+
+/// Says so, and what could have been said.
+pub(crate) fn no_such_name(lexicon: &Lexicon, domain: &str, miss: Miss) -> GoalError {
+    GoalError::NoSuchName {
+        suggestions: name_suggestions(lexicon, &miss),
+        found: miss.found,
+        domain: domain.into(),
+    }
 }
 
 /// The type that fills a slot: `thing` of `thing` and of `first:thing`.
@@ -297,7 +305,7 @@ fn fill(lexicon: &Lexicon, open: &[String], slots: &[(&str, String)]) -> Result<
     Ok(filled)
 }
 
-fn without_article(name: &str) -> &str {
+pub(crate) fn without_article(name: &str) -> &str {
     ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 

@@ -21,6 +21,7 @@ mod supervoxel;
 pub use around::{AroundOptions, nearest, stands, trajectories};
 pub use error::LearningError;
 pub use know::evidence::{Evidence, Judge, WEIGHTS};
+pub use know::several::{Glance, Guess, Judged};
 pub use know::{KnowError, KnowOptions, Library, Recognised, outward};
 pub use model::{LearnOptions, LearnedModel, Used, learn};
 pub use notice::{Appeared, MetaRoom, NoticeOptions, Visit};

@@ -74,7 +74,8 @@ impl Check<'_> {
             |of: &str| ["surface", "room", "door"].contains(&of) && self.places.surfaces.is_empty();
         let is_empty = |f: &&Filled| {
             let of = type_of_slot(&f.slot);
-            self.lexicon.of_type(of).is_empty() && !is_body_s(of)
+            let may_be_made_up = self.domain.config.open.iter().any(|open| open == of);
+            self.lexicon.of_type(of).is_empty() && !is_body_s(of) && !may_be_made_up
         };
         let told = |f: &Filled| {
             let of = type_of_slot(&f.slot);

@@ -7,6 +7,7 @@ pub mod evidence;
 mod feature;
 mod group;
 mod scene;
+pub mod several;
 mod skin;
 
 use crate::cloud::{Cloud, CloudError};
@@ -178,11 +179,19 @@ impl Library {
 
     fn candidates(&self, view: &View, options: &KnowOptions) -> Result<Vec<Candidate>, KnowError> {
         let _span = tracing::debug_span!("know again", models = self.models.len()).entered();
+        self.candidates_in(&self.scene(view, options)?, options)
+    }
+
+    /// A look made ready.
+    fn scene(&self, view: &View, options: &KnowOptions) -> Result<Seen, KnowError> {
         let widest_m = self.models.iter().map(|m| m.size_m).fold(0.0, f64::max);
-        let scene = Seen::new(view, options.range_m, widest_m * widest_m)?;
+        Seen::new(view, options.range_m, widest_m * widest_m)
+    }
+
+    fn candidates_in(&self, scene: &Seen, options: &KnowOptions) -> Result<Vec<Candidate>, KnowError> {
         let keypoints = scene.skin.keypoints(options.keypoint_m, |i| !scene.wide[i]);
         let described = KINDS.map(|kind| features(&scene.skin, &keypoints, kind));
-        let of_model = |(number, model): (usize, &Known)| model.find(number, &described, &scene, options);
+        let of_model = |(number, model): (usize, &Known)| model.find(number, &described, scene, options);
         let all: Vec<Vec<Candidate>> =
             self.models.par_iter().enumerate().map(of_model).collect::<Result<_, _>>()?;
         Ok(all.into_iter().flatten().collect())

@@ -217,6 +217,26 @@ fn what_was_learned_is_known_again_and_nothing_else() {
 }
 
 #[test]
+fn what_two_models_explain_alike_is_neither_for_sure() {
+    let options = KnowOptions { least_confidence: 0.0, ..KnowOptions::default() };
+    let mut library = Library::default();
+    let muesli = Room::surface(&body("muesli"), 0.003);
+    library.add(&muesli, &options).expect("a sound model");
+    let pose = around(0.9, 0.9, 0.5);
+    let middle = Point3::new(0.0, 0.0, TABLE_M);
+    let there = room(&[("muesli", standing(0.05, 0.1, 0.7))]);
+    let view = there.look_at(&household::CAMERA, &pose, &pose, EXACT, 9, (middle, 0.5));
+    let most = |library: &Library| {
+        let found = library.recognise(&view, &options).expect("an organised view");
+        found.iter().map(|f| f.confidence).fold(0.0, f64::max)
+    };
+    let alone = most(&library);
+    library.add(&muesli, &options).expect("a sound model");
+    let beside_its_like = most(&library);
+    assert!(alone > 0.8 && (0.3..0.55).contains(&beside_its_like), "{alone} {beside_its_like}");
+}
+
+#[test]
 fn what_cannot_be_learned_from_is_said() {
     let view = View::alone(Cloud::from_points(vec![Point3::origin(); 5]));
     let (looks, mask, _) = turntable("tin", 1);

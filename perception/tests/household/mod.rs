@@ -3,9 +3,11 @@
 #![allow(dead_code)]
 
 mod bodies;
+mod made;
 mod solid;
 
 pub use bodies::{Body, bodies};
+pub use made::made;
 pub use solid::{Paint, Part, Solid};
 
 use super::tabletop::Draws;

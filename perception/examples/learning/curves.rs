@@ -57,8 +57,10 @@ fn variants(body: usize, seed: u64, page: &mut Page) -> Vec<Variant> {
         seed: seed * 300 + body as u64,
     };
     let mut all = Vec::new();
-    let perfect: Result<Vec<Model>, String> =
-        TURNTABLE_STEPS.iter().map(|looks| offline(&bodies[body], body, *looks, seed * 500 + 40 * body as u64)).collect();
+    let perfect: Result<Vec<Model>, String> = TURNTABLE_STEPS
+        .iter()
+        .map(|looks| offline(&bodies[body], body, *looks, seed * 500 + 40 * body as u64))
+        .collect();
     for (kind, models) in [
         (Kind::Perfect, perfect),
         (Kind::Controlled, learned_steps(&bodies, body, options(true), &ROBOT_STEPS)),
@@ -77,7 +79,8 @@ fn variants(body: usize, seed: u64, page: &mut Page) -> Vec<Variant> {
             Err(why) => page.say(&format!("{}, {kind:?}: not learned: {why}", bodies[body].name)),
         }
     }
-    let whole = all.iter().find(|v| v.kind == Kind::Perfect && v.whole).map_or(1.0, |v| voxels(&v.model.cloud));
+    let whole =
+        all.iter().find(|v| v.kind == Kind::Perfect && v.whole).map_or(1.0, |v| voxels(&v.model.cloud));
     for variant in &mut all {
         variant.coverage = (voxels(&variant.model.cloud) / whole).min(1.0);
     }
@@ -113,7 +116,8 @@ pub fn print(seed: u64, objects: usize, scenes: usize, page: &mut Page) -> Resul
             look_for(i, &variants, &found, &scene, &surfaces, tally, &mut claims);
         }
     }
-    let known: Vec<&Model> = variants.iter().filter(|v| v.whole && v.kind == Kind::Perfect).map(|v| &v.model).collect();
+    let known: Vec<&Model> =
+        variants.iter().filter(|v| v.whole && v.kind == Kind::Perfect).map(|v| &v.model).collect();
     let seconds = seconds(&known, seed)?;
     tables(&variants, &tallies, page);
     page.say(&format!(
@@ -143,7 +147,8 @@ fn look_for(
 ) {
     let body = variants[variant].model.body;
     let rival = |v: &Variant| v.whole && v.kind == Kind::Perfect && v.model.body != body;
-    let known = found.iter().filter(|c| c.recognised.model == variant || rival(&variants[c.recognised.model]));
+    let known =
+        found.iter().filter(|c| c.recognised.model == variant || rival(&variants[c.recognised.model]));
     let told = choose(known.cloned().collect(), KnowOptions::default().least_confidence);
     let own: Vec<(f64, bool)> = told
         .iter()
@@ -174,7 +179,8 @@ fn tables(variants: &[Variant], tallies: &[Tally], page: &mut Page) {
     let mut table = Table::new(&["object", "model", "coverage", "f-score", "right", "wrong", "missed"]);
     for (kind, name, ..) in KINDS {
         let of_kind = || variants.iter().zip(tallies).filter(|(v, _)| v.kind == kind && v.whole);
-        let mean = |f: fn(&(&Variant, &Tally)) -> f64| spread(&of_kind().map(|v| f(&v)).collect::<Vec<_>>()).0;
+        let mean =
+            |f: fn(&(&Variant, &Tally)) -> f64| spread(&of_kind().map(|v| f(&v)).collect::<Vec<_>>()).0;
         let sum = |f: fn(&Tally) -> usize| of_kind().map(|v| f(v.1)).sum::<usize>().to_string();
         means.row(vec![
             name.to_owned(),

@@ -92,8 +92,15 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
 /// Stated against true shares of answers.
 pub fn print(claims: &[(&str, Vec<Claim>)], page: &mut Page) -> Result<(), String> {
     page.heading("Confidence against truth");
-    let mut table =
-        Table::new(&["answers of", "stated", "answers", "stated in the mean", "right", "Brier", "of the base rate"]);
+    let mut table = Table::new(&[
+        "answers of",
+        "stated",
+        "answers",
+        "stated in the mean",
+        "right",
+        "Brier",
+        "of the base rate",
+    ]);
     let mut panel = Vec::new();
     for (name, claims) in claims {
         let told = reliability(claims, 10);
@@ -114,7 +121,11 @@ pub fn print(claims: &[(&str, Vec<Claim>)], page: &mut Page) -> Result<(), Strin
         panel.push(Line { dashed: false, colour, points });
     }
     page.table(&table);
-    let lines = panel.into_iter().chain([Line { dashed: true, colour: "#999", points: vec![(0.0, 0.0), (1.0, 1.0)] }]);
+    let lines = panel.into_iter().chain([Line {
+        dashed: true,
+        colour: "#999",
+        points: vec![(0.0, 0.0), (1.0, 1.0)],
+    }]);
     let panel = Panel { name: "reliability".to_owned(), lines: lines.collect() };
     panels(&[panel], ("stated", "right"), &page.file("confidence.svg"))?;
     page.figure("confidence.svg", "Share of right answers against what was stated");

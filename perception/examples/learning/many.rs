@@ -86,21 +86,37 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
             known.recognise(&scene.view, &KnowOptions::default()).map_err(|e| e.to_string())?;
             seconds.push(start.elapsed().as_secs_f64());
         }
-        let counts =
-            [said.right, said.askew, said.other, said.silent, said.strangers.0, said.strangers.1, said.nowhere];
+        let counts = [
+            said.right,
+            said.askew,
+            said.other,
+            said.silent,
+            said.strangers.0,
+            said.strangers.1,
+            said.nowhere,
+        ];
         let mut row = vec![few.len().to_string()];
         row.extend(counts.map(|c| c.to_string()));
         row.push(format!("{:.2}", median(&mut seconds)));
         table.row(row);
     }
     page.table(&table);
-    heat(&confusion, ("said (the last: nothing)", "truly (the last: strangers)"), &page.file("confusion.svg"))?;
+    heat(
+        &confusion,
+        ("said (the last: nothing)", "truly (the last: strangers)"),
+        &page.file("confusion.svg"),
+    )?;
     page.figure("confusion.svg", "What is taken for what, with all models known");
     Ok(claims)
 }
 
 /// Learns so many objects by the robot, in a mixed order; returns models that go by the numbers of the bodies, and the bodies, strangers last.
-fn learn_all(seed: u64, most: usize, draws: &mut Draws, page: &mut Page) -> Result<(Vec<Model>, Vec<Body>), String> {
+fn learn_all(
+    seed: u64,
+    most: usize,
+    draws: &mut Draws,
+    page: &mut Page,
+) -> Result<(Vec<Model>, Vec<Body>), String> {
     let mut drawn = seed * 100 + APART;
     let mut open = bodies();
     let (mut models, mut all): (Vec<Model>, Vec<Body>) = (Vec::new(), Vec::new());
@@ -136,7 +152,10 @@ fn learn_all(seed: u64, most: usize, draws: &mut Draws, page: &mut Page) -> Resu
     }
     let clouds: Vec<&Cloud> = models.iter().take(20).map(|m| &m.cloud).collect();
     sheet(&clouds, &page.file("models-many.png"))?;
-    page.figure("models-many.png", "The first of them as they were learned: from the front and, below, from behind");
+    page.figure(
+        "models-many.png",
+        "The first of them as they were learned: from the front and, below, from behind",
+    );
     all.extend((1..=most.max(8) as u64).map(|k| made(drawn + 1000 + k)));
     Ok((models, all))
 }

@@ -68,17 +68,22 @@ pub fn onto(found: &Cloud, truth: &Cloud) -> Isometry3<f64> {
     }
 }
 
+/// A model where it truly is: by the look that noticed it, whose pose localisation had wrong by as much as all the rest, then by its surface.
+fn aligned(model: &LearnedModel, first: &Isometry3<f64>, run: &Run, truth: &Cloud) -> Cloud {
+    let true_from_stated = run.truths[0] * first.inverse();
+    let found = model.cloud.transformed(&(true_from_stated * model.world_from_model));
+    found.transformed(&onto(&found, truth))
+}
+
 /// Scores a run against its truth.
 pub fn score(run: &Run, body: &Body) -> Score {
     let truth = truth(body, &run.world_from_body);
     let seen = visible(run, &truth, std::iter::once(0));
     let pixels: Vec<u32> = (0..run.mask.len()).filter(|&i| run.mask[i]).map(|i| i as u32).collect();
-    let first = run.views[0].cloud.select(&pixels).finite().transformed(&run.views[0].world_from_camera);
-    let first = first.transformed(&onto(&first, &truth));
+    let first = run.views[0].cloud.select(&pixels).finite().transformed(&run.truths[0]);
     let used: Vec<usize> = (0..run.views.len()).filter(|&k| run.model.looks[k].pixels > 0).collect();
     let seen_by_all = visible(run, &truth, used.iter().copied());
-    let found = run.model.cloud.transformed(&run.model.world_from_model);
-    let found = found.transformed(&onto(&found, &truth));
+    let found = aligned(&run.model, &run.keyframes[0].world_from_camera, run, &truth);
     let to_truth = tree(&truth);
     let distances = found
         .points
@@ -115,10 +120,10 @@ const ASIDE_M: f32 = 0.004;
 const DEEP_M: f32 = 0.03;
 
 /// Mean distance of a model's points from the true surface, what 95 % keep within, metres, and the share of the learned surface that is there twice.
-pub fn doubled(model: &LearnedModel, body: &Body, world_from_body: &Isometry3<f64>) -> (f64, f64, f64) {
-    let truth = truth(body, world_from_body);
-    let found = model.cloud.transformed(&model.world_from_model);
-    let found = found.transformed(&onto(&found, &truth));
+pub fn doubled(model: &LearnedModel, registered: bool, body: &Body, run: &Run) -> (f64, f64, f64) {
+    let truth = truth(body, &run.world_from_body);
+    let first = if registered { run.keyframes[0].world_from_camera } else { run.views[0].world_from_camera };
+    let found = aligned(model, &first, run, &truth);
     let to_truth = tree(&truth);
     let off = |p: &Point3<f32>| to_truth.nearest(p, 1.0).map_or(1.0, |n| f64::from(n.distance_sq).sqrt());
     let mut distances: Vec<f64> = found.points.iter().map(off).collect();

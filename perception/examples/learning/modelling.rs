@@ -70,7 +70,7 @@ fn row(place: Place, noise: (&str, f64, f64), objects: usize, seed: u64, all_way
         if all_ways {
             for (way, found) in WAYS.iter().zip(&mut row.ways) {
                 if let Ok(model) = modelled(&run, way) {
-                    found.push(doubled(&model, body, &run.world_from_body));
+                    found.push(doubled(&model, way.registered, body, &run));
                 }
             }
         }
@@ -123,7 +123,8 @@ pub fn print(seed: u64, objects: usize, page: &mut Page) -> Result<(), String> {
             table.row(cells(&name, &mut found));
             failed.extend(found.failed.iter().map(|why| format!("{name}: not learned: {why}")));
             for (way, found) in WAYS.iter().zip(&found.ways).filter(|_| all_ways) {
-                let mean = |f: fn(&(f64, f64, f64)) -> f64| spread(&found.iter().map(f).collect::<Vec<_>>()).0;
+                let mean =
+                    |f: fn(&(f64, f64, f64)) -> f64| spread(&found.iter().map(f).collect::<Vec<_>>()).0;
                 walls.row(vec![
                     name.clone(),
                     way.name.to_owned(),
@@ -156,7 +157,10 @@ fn section(run: &Run, page: &mut Page) -> Result<(), String> {
         cuts.push(Slice { name: way.name, points: cut.map(|p| (p.x, p.y)).collect() });
     }
     slices(&cuts, &page.file("double-wall.svg"))?;
-    page.figure("double-wall.svg", "Half-way up through the model of the muesli carton, keyframes 1 cm and 1° off");
+    page.figure(
+        "double-wall.svg",
+        "Half-way up through the model of the muesli carton, keyframes 1 cm and 1° off",
+    );
     Ok(())
 }
 

@@ -110,10 +110,8 @@ pub fn panels(panels: &[Panel], axes: (&str, &str), path: &Path) -> Result<(), S
         r#"{OPEN} width="{width}" height="{height}" viewBox="0 0 {width} {height}"><rect width="100%" height="100%" fill="white"/>"#
     );
     for (k, panel) in panels.iter().enumerate() {
-        let corner = (
-            left + (k % COLUMNS) as f64 * (side + gap.0),
-            top + (k / COLUMNS) as f64 * (side + gap.1),
-        );
+        let corner =
+            (left + (k % COLUMNS) as f64 * (side + gap.0), top + (k / COLUMNS) as f64 * (side + gap.1));
         let at = |(x, y): (f64, f64)| (corner.0 + x * side, corner.1 + (1.0 - y) * side);
         for k in 0..=2 {
             let share = 0.5 * f64::from(k);
@@ -176,7 +174,11 @@ pub fn slices(cuts: &[Slice], path: &Path) -> Result<(), String> {
     );
     for (k, cut) in cuts.iter().enumerate() {
         let middle = (wide * (k as f32 + 0.5), 20.0 + 0.5 * high);
-        let _ = write!(text, r#"<text x="{}" y="14" text-anchor="middle" font-size="10">{}</text>"#, middle.0, cut.name);
+        let _ = write!(
+            text,
+            r#"<text x="{}" y="14" text-anchor="middle" font-size="10">{}</text>"#,
+            middle.0, cut.name
+        );
         for (x, y) in &cut.points {
             let _ = write!(
                 text,

@@ -43,7 +43,15 @@ fn words(found: &[Recognised]) -> String {
         let (at, turn) = (f.world_from_model.translation.vector, f.world_from_model.rotation.scaled_axis());
         format!(
             "at {:.3} {:.3} {:.3} m, turned {:.2} {:.2} {:.2} rad, confidence {:.3} ({} points explained, {} seen through, {} hidden)",
-            at.x, at.y, at.z, turn.x, turn.y, turn.z, f.confidence, f.evidence.explained, f.evidence.through,
+            at.x,
+            at.y,
+            at.z,
+            turn.x,
+            turn.y,
+            turn.z,
+            f.confidence,
+            f.evidence.explained,
+            f.evidence.through,
             f.evidence.hidden
         )
     };
@@ -166,7 +174,12 @@ fn kitchen(dir: &Path, page: &mut Page) -> Result<(), String> {
                     let eye = Point3::from(up.into_inner() * 0.25 - Vector3::z() * 0.4);
                     let name = format!("kitchen-{begin}-{}.png", thing.name.replace(' ', "-"));
                     let labels = vec![1; model.cloud.len()];
-                    picture(&model.cloud, &labels, &page.file(&name), (eye, Point3::origin(), up.into_inner()))?;
+                    picture(
+                        &model.cloud,
+                        &labels,
+                        &page.file(&name),
+                        (eye, Point3::origin(), up.into_inner()),
+                    )?;
                     page.figure(&name, &thing.name);
                     library.add(&model.cloud, &options).map_err(|e| e.to_string())?;
                     known.push((thing, model));
@@ -197,8 +210,11 @@ fn found_again(
             let own = judged.iter().filter(|c| c.recognised.model == model);
             own.map(|c| c.recognised.confidence).fold(0.0, f64::max)
         };
-        let most: Vec<String> =
-            known.iter().enumerate().map(|(m, (thing, _))| format!("{} {:.2}", thing.name, most(m))).collect();
+        let most: Vec<String> = known
+            .iter()
+            .enumerate()
+            .map(|(m, (thing, _))| format!("{} {:.2}", thing.name, most(m)))
+            .collect();
         let found = choose(judged, options.least_confidence);
         let inside = |t: &Thing| {
             let q = view.world_from_camera.inverse() * t.at;
@@ -216,14 +232,16 @@ fn found_again(
             counts[m][1] += usize::from(own.iter().any(|off| *off < THERE_M));
             counts[m][2] += own.iter().filter(|off| **off >= THERE_M).count();
         }
-        let there = known.iter().filter(|k| inside(k.0)).map(|k| k.0.name.as_str()).collect::<Vec<_>>().join(", ");
+        let there =
+            known.iter().filter(|k| inside(k.0)).map(|k| k.0.name.as_str()).collect::<Vec<_>>().join(", ");
         let told = found.iter().map(|f| {
             format!("{} ({:.2}, {:.1} cm off)", known[f.model].0.name, f.confidence, 100.0 * off_m(f))
         });
         let told = told.collect::<Vec<_>>().join(", ");
         answers.row(vec![(2 * k + begin).to_string(), there, told, most.join(", "), format!("{seconds:.1}")]);
     }
-    let mut table = Table::new(&["thing", "frames with it in the image, in range", "found there", "said elsewhere"]);
+    let mut table =
+        Table::new(&["thing", "frames with it in the image, in range", "found there", "said elsewhere"]);
     for ((thing, _), count) in known.iter().zip(&counts) {
         let mut row = vec![thing.name.clone()];
         row.extend(count.map(|c| c.to_string()));

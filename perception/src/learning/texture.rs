@@ -58,13 +58,17 @@ pub(super) fn refined(
     let pairs = pairs(&active, poses);
     let mut moved = poses.to_vec();
     for blur in BLURS {
-        let images: Vec<Vec<f32>> =
-            looks.par_iter().map(|l| l.as_ref().map_or(Vec::new(), |l| blurred(&l.light, l.grid, blur))).collect();
+        let images: Vec<Vec<f32>> = looks
+            .par_iter()
+            .map(|l| l.as_ref().map_or(Vec::new(), |l| blurred(&l.light, l.grid, blur)))
+            .collect();
         for _ in 0..ROUNDS {
             let links: Vec<Sums> = pairs
                 .par_iter()
                 .map(|&(i, j)| match (&looks[i], &looks[j]) {
-                    (Some(a), Some(b)) => link((a, &images[i]), (b, &images[j]), &moved[j].inv_mul(&moved[i])),
+                    (Some(a), Some(b)) => {
+                        link((a, &images[i]), (b, &images[j]), &moved[j].inv_mul(&moved[i]))
+                    }
                     _ => Sums::ZERO,
                 })
                 .collect();
@@ -98,8 +102,10 @@ impl Look {
         let (grid, colours) = (view.cloud.grid?, view.cloud.colours.as_ref()?);
         let map = DepthMap::from_view(view, &Isometry3::identity())?;
         let normals = normals::organised(&view.cloud, &WIDE)?.normals;
-        let light: Vec<f32> =
-            colours.iter().map(|c| 0.3 * f32::from(c[0]) + 0.59 * f32::from(c[1]) + 0.11 * f32::from(c[2])).collect();
+        let light: Vec<f32> = colours
+            .iter()
+            .map(|c| 0.3 * f32::from(c[0]) + 0.59 * f32::from(c[1]) + 0.11 * f32::from(c[2]))
+            .collect();
         let smooth = blurred(&light, grid, 1);
         let points = view.cloud.points.clone();
         let usable = |i: usize| is_finite(&points[i]) && points[i].z <= range_m && normals[i].x.is_finite();
@@ -109,7 +115,8 @@ impl Look {
                 let mut best = (CONTRAST, None);
                 for v in row..row + CELL_PX {
                     for i in v * grid.width + column..v * grid.width + column + CELL_PX {
-                        let steep = (smooth[i + 1] - smooth[i - 1]).hypot(smooth[i + grid.width] - smooth[i - grid.width]);
+                        let steep = (smooth[i + 1] - smooth[i - 1])
+                            .hypot(smooth[i + grid.width] - smooth[i - grid.width]);
                         if 0.5 * steep > best.0 && usable(i) {
                             best = (0.5 * steep, Some(i as u32));
                         }
@@ -127,7 +134,8 @@ impl Look {
     fn place(&self, q: &Point3<f32>) -> Option<(f32, f32, usize)> {
         let (u, v) = self.map.intrinsics.project(&q.cast())?;
         let at = self.map.intrinsics.pixel(u, v)?;
-        let inside = u >= 1.0 && v >= 1.0 && u < (self.grid.width - 2) as f64 && v < (self.grid.height - 2) as f64;
+        let inside =
+            u >= 1.0 && v >= 1.0 && u < (self.grid.width - 2) as f64 && v < (self.grid.height - 2) as f64;
         let on = (self.map.depths_m[at] - q.z).abs() < NEAR_M.max(3.0 * frontal_sigma_m(q.z));
         (inside && on).then_some((u as f32, v as f32, at))
     }
@@ -166,7 +174,8 @@ fn sampled(image: &[f32], width: usize, u: f32, v: f32) -> (f32, f32, f32) {
 
 /// What the marks and surfaces of one look ask of its place in another, as motions of the first in the frame of the second.
 fn link((a, of_a): (&Look, &[f32]), (b, of_b): (&Look, &[f32]), b_from_a: &Isometry3<f64>) -> Sums {
-    let (turn, shift) = (b_from_a.rotation.to_rotation_matrix().cast::<f32>(), b_from_a.translation.vector.cast::<f32>());
+    let (turn, shift) =
+        (b_from_a.rotation.to_rotation_matrix().cast::<f32>(), b_from_a.translation.vector.cast::<f32>());
     let moved = |i: u32| Point3::from(turn * a.points[i as usize].coords + shift);
     let camera = &b.map.intrinsics;
     let (fx, fy, width) = (camera.fx as f32, camera.fy as f32, b.grid.width);
@@ -186,7 +195,8 @@ fn link((a, of_a): (&Look, &[f32]), (b, of_b): (&Look, &[f32]), b_from_a: &Isome
         let gain = ratios.select_nth_unstable_by(middle, f32::total_cmp).1.clamp(0.6, 1.6);
         for (i, q, (light, du, dv)) in met {
             let residual = light - gain * of_a[i as usize];
-            let slope = Vector3::new(du * fx / q.z, dv * fy / q.z, -(du * fx * q.x + dv * fy * q.y) / (q.z * q.z));
+            let slope =
+                Vector3::new(du * fx / q.z, dv * fy / q.z, -(du * fx * q.x + dv * fy * q.y) / (q.z * q.z));
             add(&mut sums, &q, &slope, residual, LIGHTNESS);
         }
     }
@@ -263,7 +273,8 @@ fn step(active: &[usize], pairs: &[(usize, usize)], links: &[Sums], poses: &mut 
         let by = solution.fixed_rows::<6>(slot);
         let (turn, shift) = (Vector3::new(by[0], by[1], by[2]), Vector3::new(by[3], by[4], by[5]));
         if turn.norm() < 0.1 && shift.norm() < 0.1 {
-            poses[i] *= Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn));
+            poses[i] *=
+                Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn));
             most = most.max(turn.norm()).max(shift.norm());
         }
     }

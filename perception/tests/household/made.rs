@@ -77,8 +77,7 @@ fn flask(draws: &mut Draws) -> Vec<Part> {
 }
 
 fn bowl(draws: &mut Draws) -> Vec<Part> {
-    let (low, high, h) =
-        (between(draws, 0.03, 0.05), between(draws, 0.07, 0.11), between(draws, 0.05, 0.09));
+    let (low, high, h) = (between(draws, 0.03, 0.05), between(draws, 0.07, 0.11), between(draws, 0.05, 0.09));
     let side = Solid::Cone { low_m: low, high_m: high, height_m: h, wall_m: Some(0.006) };
     vec![part(side, paint(draws), Isometry3::identity())]
 }

@@ -191,8 +191,7 @@ fn what_the_first_look_shows_beside_the_object_is_not_of_it() {
     // Two cartons whose fronts are one plane: what is smooth goes on from one to the other.
     let (turn, wide) = (0.5_f64, 0.192);
     let place = standing(0.0, 0.0, turn);
-    let room =
-        room(&[("muesli", place), ("muesli", standing(wide * turn.cos(), wide * turn.sin(), turn))]);
+    let room = room(&[("muesli", place), ("muesli", standing(wide * turn.cos(), wide * turn.sin(), turn))]);
     let middle = Point3::new(0.0, 0.0, TABLE_M + 0.1);
     let views: Vec<View> = (0..5)
         .map(|k| {

@@ -69,7 +69,8 @@ pub fn onto(found: &Cloud, truth: &Cloud) -> Isometry3<f64> {
 }
 
 /// A model where it truly is: by the look that noticed it, whose pose localisation had wrong by as much as all the rest, then by its surface.
-fn aligned(model: &LearnedModel, first: &Isometry3<f64>, run: &Run, truth: &Cloud) -> Cloud {
+pub fn aligned(model: &LearnedModel, registered: bool, run: &Run, truth: &Cloud) -> Cloud {
+    let first = if registered { run.keyframes[0].world_from_camera } else { run.views[0].world_from_camera };
     let true_from_stated = run.truths[0] * first.inverse();
     let found = model.cloud.transformed(&(true_from_stated * model.world_from_model));
     found.transformed(&onto(&found, truth))
@@ -83,7 +84,7 @@ pub fn score(run: &Run, body: &Body) -> Score {
     let first = run.views[0].cloud.select(&pixels).finite().transformed(&run.truths[0]);
     let used: Vec<usize> = (0..run.views.len()).filter(|&k| run.model.looks[k].pixels > 0).collect();
     let seen_by_all = visible(run, &truth, used.iter().copied());
-    let found = aligned(&run.model, &run.keyframes[0].world_from_camera, run, &truth);
+    let found = aligned(&run.model, true, run, &truth);
     let to_truth = tree(&truth);
     let distances = found
         .points
@@ -122,8 +123,7 @@ const DEEP_M: f32 = 0.03;
 /// Mean distance of a model's points from the true surface, what 95 % keep within, metres, and the share of the learned surface that is there twice.
 pub fn doubled(model: &LearnedModel, registered: bool, body: &Body, run: &Run) -> (f64, f64, f64) {
     let truth = truth(body, &run.world_from_body);
-    let first = if registered { run.keyframes[0].world_from_camera } else { run.views[0].world_from_camera };
-    let found = aligned(model, &first, run, &truth);
+    let found = aligned(model, registered, run, &truth);
     let to_truth = tree(&truth);
     let off = |p: &Point3<f32>| to_truth.nearest(p, 1.0).map_or(1.0, |n| f64::from(n.distance_sq).sqrt());
     let mut distances: Vec<f64> = found.points.iter().map(off).collect();

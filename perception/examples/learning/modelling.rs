@@ -1,10 +1,10 @@
 //! How much of an object is noticed and learned, and how well (section VII-A and Table I); the double wall and what removes it.
 
 use crate::household::bodies;
-use crate::measure::{Score, doubled, median, pair, score, spread};
+use crate::measure::{Score, aligned, doubled, median, pair, score, spread};
 use crate::page::{Page, Table};
 use crate::plot::{Slice, slices};
-use crate::runs::{Run, RunOptions, Way, modelled, run};
+use crate::runs::{Run, RunOptions, Way, modelled, run, truth};
 
 /// Pose noise of a keyframe: metres and degrees.
 const NOISES: [(&str, f64, f64); 3] =
@@ -149,10 +149,11 @@ pub fn print(seed: u64, objects: usize, page: &mut Page) -> Result<(), String> {
 
 /// A cut through one model made in all ways.
 fn section(run: &Run, page: &mut Page) -> Result<(), String> {
+    let truth = truth(&bodies()[0], &run.world_from_body);
     let mut cuts = Vec::new();
     for way in &WAYS {
         let model = modelled(run, way).map_err(|e| e.to_string())?;
-        let cloud = model.cloud.transformed(&(run.world_from_body.inverse() * model.world_from_model));
+        let cloud = aligned(&model, way.registered, run, &truth).transformed(&run.world_from_body.inverse());
         let cut = cloud.points.iter().filter(|p| (p.z - 0.14).abs() < 0.004);
         cuts.push(Slice { name: way.name, points: cut.map(|p| (p.x, p.y)).collect() });
     }

@@ -1,6 +1,6 @@
 //! What evidence is worth: logistic regression on scenes of other objects than those that are evaluated.
 
-use crate::household::{Body, Room, made};
+use crate::household::{Body, Room, made::made};
 use crate::knowing::{Model, is_right, learned_steps, library, offline, scene, some};
 use crate::page::{Page, Table};
 use crate::plot::{BLUE, Line, ORANGE, Panel, panels};

@@ -1,6 +1,6 @@
 //! Many learned models known at once: time of a recognition, and what is taken for what.
 
-use crate::household::{Body, Room, bodies, made};
+use crate::household::{Body, Room, bodies, made::made};
 use crate::knowing::{Model, Scene, is_right, learned_steps, library, scene, some};
 use crate::measure::median;
 use crate::page::{Page, Table};

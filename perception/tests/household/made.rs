@@ -23,10 +23,13 @@ fn paint(draws: &mut Draws) -> Paint {
     if printed { cubes(base, spread, coarse_m, seed) } else { Paint::Plain(base) }
 }
 
+/// What a thing is called, and how one is drawn.
+type Sort = (&'static str, fn(&mut Draws) -> Vec<Part>);
+
 /// An object of one of ten sorts.
 pub fn made(seed: u64) -> Body {
     let mut draws = Draws(seed ^ 0x0b1ec7);
-    let sorts: [(&'static str, fn(&mut Draws) -> Vec<Part>); 10] = [
+    let sorts: [Sort; 10] = [
         ("carton", carton),
         ("can", can),
         ("cup", cup),

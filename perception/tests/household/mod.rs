@@ -3,11 +3,10 @@
 #![allow(dead_code)]
 
 mod bodies;
-mod made;
+pub mod made;
 mod solid;
 
 pub use bodies::{Body, bodies};
-pub use made::made;
 pub use solid::{Paint, Part, Solid};
 
 use super::tabletop::Draws;

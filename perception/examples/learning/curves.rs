@@ -92,8 +92,8 @@ pub fn print(seed: u64, objects: usize, scenes: usize, page: &mut Page) -> Resul
     page.heading("Recognition against coverage");
     let bodies = bodies();
     let mut variants: Vec<Variant> = (0..objects).flat_map(|i| variants(i, seed, page)).collect();
-    for i in objects..bodies.len() {
-        let model = offline(&bodies[i], i, TURNTABLE_STEPS[2], seed * 500 + 40 * i as u64)?;
+    for (i, body) in bodies.iter().enumerate().skip(objects) {
+        let model = offline(body, i, TURNTABLE_STEPS[2], seed * 500 + 40 * i as u64)?;
         variants.push(Variant { kind: Kind::Perfect, model, coverage: 1.0, whole: true });
     }
     for (kind, name, ..) in KINDS {

@@ -2,7 +2,7 @@
 
 use super::evidence::{Evidence, verify};
 use super::scene::Seen;
-use super::{KnowError, KnowOptions, Library};
+use super::{KnowError, KnowOptions, Library, Recognised};
 use crate::view::View;
 use nalgebra::Isometry3;
 
@@ -51,12 +51,13 @@ impl Library {
     /// If the view is no depth image.
     pub fn glance(&self, view: &View, options: &KnowOptions) -> Result<Glance, KnowError> {
         let scene = self.scene(view, options)?;
-        let mut found = self.candidates_in(&scene, options)?;
+        let found = self.candidates_in(&scene, &Isometry3::identity(), options)?;
+        let mut found: Vec<Recognised> = found.into_iter().map(|c| c.recognised).collect();
         found.retain(|c| c.confidence >= LEAST);
         found.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-        let guess = |c: &super::Candidate| Guess {
+        let guess = |c: &Recognised| Guess {
             model: c.model,
-            camera_from_model: c.camera_from_model,
+            camera_from_model: c.world_from_model,
             confidence: c.confidence,
             votes: c.evidence.votes,
         };

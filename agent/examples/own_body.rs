@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use descry_agent::body::Body;
 use descry_agent::keeping::Keeping;
-use descry_agent::run::{self, Folder, Settings, Watcher};
+use descry_agent::run::{self, Folder, Settings, Task, Watcher};
 use descry_agent::stop::Stop;
 use descry_domains::abilities::searching::policies;
 use descry_domains::goal;
@@ -288,7 +288,8 @@ pub fn pursue(said: &str, folder: &Path) -> Result<String, Box<dyn Error>> {
     let chooser = policies::named(policies::PLAN, 1, None)?;
     let mut tell = |event: &descry_agent::report::Event| println!("{event}");
     let watcher = Watcher { stop: &Stop::default(), tell: &mut tell };
-    let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, watcher)?;
+    let task = Task { domain: &domain, goal: &goal, past: None };
+    let report = run::pursue(task, &body, &folder, &settings, chooser, watcher)?;
     run::finish(folder.path(), &report)?;
     Ok(report.to_string())
 }

@@ -4,7 +4,7 @@
 //!
 //! ```
 //! use descry_agent::keeping::Keeping;
-//! use descry_agent::run::{self, Folder, Settings, Watcher};
+//! use descry_agent::run::{self, Folder, Settings, Task, Watcher};
 //! use descry_agent::{body, stop::Stop};
 //! use descry_domains::abilities::searching::policies;
 //! use descry_domains::goal;
@@ -28,7 +28,8 @@
 //! let mut said = Vec::new();
 //! let watcher = Watcher { stop: &Stop::default(), tell: &mut |event| said.push(event.to_string()) };
 //! let chooser = policies::named(policies::PLAN, 3, None)?;
-//! let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, watcher)?;
+//! let task = Task { domain: &domain, goal: &goal, past: None };
+//! let report = run::pursue(task, &body, &folder, &settings, chooser, watcher)?;
 //! assert_eq!(report.verdict, descry_domains::answer::Verdict::Achieved, "{said:?}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

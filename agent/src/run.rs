@@ -94,14 +94,14 @@ pub struct Watcher<'a> {
 /// # Errors
 /// [`CommandError`] if the body or the record fails for good, or the domain cannot be used.
 pub fn pursue(
-    domain: &Domain,
-    goal: &Goal,
+    task: Task<'_>,
     body: &Body,
     folder: &Folder,
     settings: &Settings,
     chooser: Chooser,
     watcher: Watcher<'_>,
 ) -> Result<Report, CommandError> {
+    let Task { domain, goal, past } = task;
     let header = Header {
         version: env!("CARGO_PKG_VERSION").into(),
         goal: goal.said.clone(),
@@ -111,18 +111,24 @@ pub fn pursue(
     };
     keep_header(folder.path(), &header)?;
     let record = Arc::new(settings.keeping.create(folder.path())?);
-    let store = settings.remember.as_deref();
-    let past = store.map(|store| remembering::recall(store, now_unix_s())).transpose()?;
-    let beginning = Beginning { past: past.clone(), ..Beginning::new(header, domain, body.scene.clone()) };
+    let beginning = Beginning { past: past.cloned(), ..Beginning::new(header, domain, body.scene.clone()) };
     beginning.put(&record, body.robot.now_ns())?;
     let tape = Arc::new(RecordTape { into: Arc::clone(&record), from: Arc::clone(&record) });
     let robot = Arc::new(TapedRobot::begin(Arc::clone(&body.robot), tape));
     let kept = programs::on_record(domain, &record, None, &robot, true)?;
-    let task = Task { domain: &kept.domain, goal, past: past.as_ref() };
+    let task = Task { domain: &kept.domain, ..task };
     let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), watcher)?;
     remember(settings, remembered.as_ref())?;
     show_true_position(&mut report, body);
     Ok(report)
+}
+
+/// What is remembered of earlier runs in a store, if one is named.
+///
+/// # Errors
+/// [`CommandError::Broken`] if there is a store and it cannot be read.
+pub fn recall(store: Option<&str>) -> Result<Option<Past>, CommandError> {
+    store.map(|store| remembering::recall(store, now_unix_s())).transpose()
 }
 
 fn now_unix_s() -> f64 {

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use descry_agent::body::{scene_spec, simulate};
 use descry_agent::explain;
-use descry_agent::run::{self, Folder, Settings, Watcher};
+use descry_agent::run::{self, Folder, Settings, Task, Watcher};
 use descry_agent::stop::Stop;
 use descry_domains::abilities::searching::policies;
 use descry_domains::lexicon::{Lexicon, Places};
@@ -124,7 +124,8 @@ fn faulty(goal: &str, seed: u64, faults: &str) -> String {
     };
     let chooser = policies::named(policies::PLAN, seed, None).expect("a policy");
     let watcher = Watcher { stop: &Stop::default(), tell: &mut |_| {} };
-    let report = run::pursue(&domain, &goal, &body, &into, &settings, chooser, watcher).expect("it ends");
+    let task = Task { domain: &domain, goal: &goal, past: None };
+    let report = run::pursue(task, &body, &into, &settings, chooser, watcher).expect("it ends");
     let header = run::header(into.path()).expect("a run");
     let record = descry_agent::keeping::open(into.path()).expect("a record");
     let told = explain::of(&record, &header, Some(&report)).expect("it is explained").to_string();

@@ -57,7 +57,7 @@ fn a_simulated_run_is_played_again_and_goes_on_after_kills() {
 fn a_run_on_real_views_is_played_again_and_goes_on_after_kills() {
     let Some(kitchen) = shared("data/kitchen") else { return };
     let robot = format!("recorded:{}", kitchen.display());
-    check_goal(&["find", "mug", "--robot", &robot], &[&[1], &[12, 20]]);
+    check_goal(&["find", "mug", "--robot", &robot], &[&[1], &[12, 10]]);
 }
 
 /// A run whose body is the record of another finds what that one found, where that one found it.

@@ -130,6 +130,12 @@ pub(crate) fn outcome(outcome: &Outcome) -> Value {
             "left_out": a.left_out,
             "opened": a.opened,
         }),
+        Outcome::Modelled(m) => json!({
+            "fits": m.keyframes.iter().map(|k| json!({ "used": k.used, "why": k.why })).collect::<Vec<_>>(),
+            "points": m.model.as_ref().map_or(0, |model| model.cloud.len()),
+            "looks": m.model.as_ref().map(|model| model.looks.clone()).unwrap_or_default(),
+            "because": m.model.as_ref().err(),
+        }),
         Outcome::Pushed(p) => json!({ "moved_m": p.moved_m, "duration_s": p.duration_s }),
         Outcome::Opened(o) => json!({ "duration_s": o.duration_s }),
         Outcome::Grasped(g, hand) => {

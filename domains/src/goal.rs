@@ -297,7 +297,7 @@ fn fill(lexicon: &Lexicon, open: &[String], slots: &[(&str, String)]) -> Result<
     Ok(filled)
 }
 
-fn without_article(name: &str) -> &str {
+pub(crate) fn without_article(name: &str) -> &str {
     ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 

@@ -7,6 +7,7 @@ use descry_robots::Robot;
 use descry_robots::sim::SceneSpec;
 
 use crate::load::Domain;
+use crate::situation::Past;
 
 /// The PDDL symbol of a name: lower case, with hyphens for everything that is no letter or digit.
 pub fn symbol(name: &str) -> String {
@@ -117,6 +118,12 @@ impl Lexicon {
             }
         }
         Self { by_type }
+    }
+
+    /// With the names of the things that earlier runs have learned.
+    pub fn remembering(mut self, past: Option<&Past>) -> Self {
+        past.iter().flat_map(|p| &p.remembered.things).for_each(|thing| self.learn("thing", &thing.name));
+        self
     }
 
     /// Something has turned up that has a name.

@@ -16,11 +16,12 @@ use crate::program::Tape;
 use crate::vocabulary::Vocabulary;
 
 /// The domains that come with the program.
-static BUILT_IN: [(&str, Dir<'_>); 4] = [
+static BUILT_IN: [(&str, Dir<'_>); 5] = [
     ("tabletop", include_dir!("$CARGO_MANIFEST_DIR/tabletop")),
     ("home", include_dir!("$CARGO_MANIFEST_DIR/home")),
     ("shapes", include_dir!("$CARGO_MANIFEST_DIR/shapes")),
     ("survey", include_dir!("$CARGO_MANIFEST_DIR/survey")),
+    ("learning", include_dir!("$CARGO_MANIFEST_DIR/learning")),
 ];
 
 /// The domain that is used when none is named.
@@ -230,9 +231,8 @@ pub fn from_files(files: Files, folder: Option<PathBuf>) -> Result<Domain, LoadE
     let under = |prefix: &'static str| files.iter().filter(move |(key, _)| key.starts_with(prefix));
     let objects = parse_objects(&files)?;
     let scenes = under("scenes/")
-        .map(|(key, (_, text))| {
-            let name = key.trim_start_matches("scenes/").trim_end_matches(".toml");
-            (name.to_string(), text.clone())
+        .flat_map(|(key, (_, text))| {
+            visits(key.trim_start_matches("scenes/").trim_end_matches(".toml"), text)
         })
         .collect();
     let shapes = under("shapes/").map(|(_, (name, text))| shape(name, text)).collect::<Result<_, _>>()?;
@@ -252,6 +252,13 @@ pub fn from_files(files: Files, folder: Option<PathBuf>) -> Result<Domain, LoadE
         functions,
         tape: None,
     })
+}
+
+/// A scene, and each of its later visits, where it has some, under a name of its own: `room-visit-2`.
+fn visits(name: &str, text: &str) -> Vec<(String, String)> {
+    let count = text.parse::<toml::Table>().ok().and_then(|t| t.get("visits")?.as_integer()).unwrap_or(1);
+    let later = (2..=count).map(|n| (format!("{name}-visit-{n}"), format!("visit = {n}\n{text}")));
+    std::iter::once((name.to_string(), text.to_string())).chain(later).collect()
 }
 
 /// A shape as a run has learned it.

@@ -6,6 +6,7 @@ use descry_memory::RecordId;
 use descry_perception::merge::Merger;
 use descry_perception::nalgebra::Isometry3;
 
+use crate::abilities::learning::again::Glances;
 use crate::abilities::searching::change::Change;
 use crate::situation::Known;
 use crate::words::Words;
@@ -24,6 +25,8 @@ pub struct Mind {
     pub pushes: usize,
     /// Driven so far, metres.
     pub distance_m: f64,
+    /// What learned things views suggest by themselves.
+    pub glances: Glances,
 }
 
 /// What was done about one surface.

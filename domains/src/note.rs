@@ -59,6 +59,23 @@ pub enum Note {
         /// See there.
         turned_rad: f64,
     },
+    /// A place was visited.
+    Visited {
+        /// From where.
+        waypoint: String,
+        /// How often it was seen so far, this time too; 0 if this visit could not be compared.
+        visits: usize,
+        /// By how much the body stood elsewhere than it believed, by what it saw, metres and radians.
+        moved_m: f64,
+        /// See there.
+        turned_rad: f64,
+        /// Why it could not be compared.
+        strange: Option<String>,
+        /// What has come.
+        came: Vec<String>,
+        /// What is gone.
+        gone: Vec<String>,
+    },
     /// Somebody has moved something: what was seen before the last view no longer holds.
     Changed {
         /// What shows it.
@@ -111,6 +128,17 @@ impl fmt::Display for Note {
                     "map       {walls} walls of {walls_m:.1} m{round}, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; stood {cm:.1} cm and {degrees:.1}° off"
                 )?;
                 surfaces.iter().try_for_each(|text| write!(f, "\n          {text}"))
+            }
+            Note::Visited { waypoint, visits, moved_m, turned_rad, strange, came, gone } => {
+                match (strange, *visits, came.is_empty() && gone.is_empty()) {
+                    (Some(why), ..) => write!(f, "visit     {waypoint}: not compared: {why}")?,
+                    (_, 0 | 1, _) => write!(f, "visit     {waypoint}: for the first time")?,
+                    (_, n, true) => write!(f, "visit     {waypoint}, {n} times so far: as it was")?,
+                    (_, n, false) => write!(f, "visit     {waypoint}, {n} times so far")?,
+                }
+                write!(f, "; stood {:.1} cm and {:.1}° off", 1e2 * moved_m, turned_rad.to_degrees())?;
+                came.iter().try_for_each(|text| write!(f, "\n          came: {text}"))?;
+                gone.iter().try_for_each(|text| write!(f, "\n          gone: {text}"))
             }
             Note::Changed { because } => write!(f, "changed   {because}; only the last view still holds"),
             Note::Nothing { because } => write!(f, "see       nothing yet: {because}"),

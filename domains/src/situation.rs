@@ -13,6 +13,7 @@ use descry_planner::{Call, CallError, FactValue};
 use descry_robots::{Place, Robot};
 use serde::{Deserialize, Serialize};
 
+use crate::abilities::learning::news::News;
 use crate::abilities::searching::doubt::{Doubt, Hypothesis, Taken};
 use crate::abilities::searching::obstacle::{self, Obstacle};
 use crate::abilities::searching::reasons;
@@ -199,6 +200,8 @@ pub struct Known {
     pub floor: Arc<Floor>,
     /// The map that the body has made itself.
     pub chart: Arc<Chart>,
+    /// What is new, and the things that were learned.
+    pub news: Arc<News>,
     /// How much more often each thing, then each kind, then anything is expected on each surface than on another.
     pub expected: Vec<Vec<f64>>,
 }

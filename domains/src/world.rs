@@ -12,11 +12,12 @@ use descry_memory::remember::Remembered;
 use descry_memory::{Record, RecordId};
 use descry_perception::recognise::Recogniser;
 use descry_planner::{Attachments, Plan, Source, Task, after, monitor};
-use descry_robots::{PoseEstimate, Robot};
+use descry_robots::{Place, PoseEstimate, Robot};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::json;
 
 use crate::abilities;
+use crate::abilities::learning::news::News;
 use crate::abilities::searching::candidates;
 use crate::abilities::searching::perceive::{self, Eyes};
 pub use crate::abilities::searching::policies::Chooser;
@@ -31,10 +32,10 @@ use crate::load::Domain;
 use crate::mind::{Mind, Region};
 use crate::note::Note;
 use crate::programs::Programs;
-use crate::situation::{self, Candidate, Known, Past, Situation, Thing};
+use crate::situation::{Candidate, Known, Past, Situation, Thing};
 use crate::words::{self, Words};
 pub use error::WorldError;
-use grounds::{doors, expected, kinds, known_by_map, members, no_surface, objects, recalled};
+use grounds::{asked_for, doors, expected, kinds, known_by_map, members, no_surface, objects, recalled};
 
 /// What a world is made of.
 #[derive(Clone)]
@@ -118,6 +119,8 @@ impl<'a> World<'a> {
         let index = |name: &String| {
             surfaces.iter().position(|s| s.symbol == *name).ok_or_else(|| no_surface(name, &surfaces))
         };
+        let news = News::of_past(setting.past.as_ref());
+        let lexicon = Lexicon::new(domain, &Places::of_body(&**robot)).remembering(setting.past.as_ref());
         let asked: Vec<Thing> = goal
             .asked
             .things
@@ -125,7 +128,7 @@ impl<'a> World<'a> {
             .map(|(name, on)| {
                 let on =
                     on.as_ref().map(|on| on.iter().map(index).collect::<Result<Vec<_>, _>>()).transpose()?;
-                Ok(Thing { on, ..situation::thing(domain, name) })
+                Ok(Thing { on, ..asked_for(domain, &news, name)? })
             })
             .collect::<Result<_, WorldError>>()?;
         let ring = &domain.config.candidates;
@@ -153,19 +156,21 @@ impl<'a> World<'a> {
             past: setting.past.clone(),
             floor: Arc::default(),
             chart: Arc::new(chart),
+            news: Arc::new(news),
             expected: Vec::new(),
             surfaces,
         };
         let regions = known.surfaces.iter().map(|_| Region::default()).collect();
         let words = Words::begin(domain).map_err(|e| WorldError::Domain(format!("domain.toml: {e}")))?;
-        let mut mind = Mind { known, words, regions, views: 0, pushes: 0, distance_m: 0.0 };
+        let glances = Default::default();
+        let mut mind = Mind { known, words, regions, views: 0, pushes: 0, distance_m: 0.0, glances };
         mind.attend();
         abilities::used(&domain.config.uses)
             .filter_map(|a| a.begins)
             .for_each(|begins| begins(&mut mind, domain, goal));
         Ok(Self {
             chooser,
-            lexicon: Lexicon::new(domain, &Places::of_body(&**robot)),
+            lexicon,
             mind,
             programs: Programs::of(domain),
             asked,
@@ -218,6 +223,7 @@ impl<'a> World<'a> {
         self.mind.known.expected = expected(domain, &self.mind.known);
         self.mind.known.surfaces.iter().for_each(|surface| self.lexicon.learn("surface", &surface.name));
         self.mind.known.floor.names.iter().for_each(|(_, name)| self.lexicon.learn("shape", name));
+        self.mind.known.news.things.iter().for_each(|thing| self.lexicon.learn("thing", &thing.name));
         self.mind.attend();
     }
 
@@ -553,6 +559,12 @@ impl<'a> World<'a> {
         let mut before = Remembered::clone(&past.remembered);
         before.shapes.extend(known.floor.learned.iter().cloned());
         before.surveyed = known.chart.kept().or(before.surveyed);
+        before.things.clone_from(&known.news.things);
+        let pose = |waypoint: &str| match &known.candidates.iter().find(|c| c.symbol == waypoint)?.place {
+            Place::Pose(pose) => Some([pose.x_m, pose.y_m, pose.yaw_rad]),
+            Place::Station(_) => Some([0.0; 3]),
+        };
+        before.visited = known.news.visited(std::mem::take(&mut before.visited), pose, past.now_unix_s);
         Some(before.after(&known.belief, &looked_at, past.now_unix_s))
     }
 

@@ -26,6 +26,8 @@ mod error;
 mod export;
 mod flusher;
 mod foxglove;
+pub mod learned;
+mod packed;
 mod record;
 pub mod remember;
 mod retrace;

@@ -9,6 +9,7 @@ use crate::Meta;
 use crate::belief::{Belief, Track};
 use crate::document::Draft;
 use crate::error::Error;
+use crate::learned::{LearnedThing, Visited};
 use crate::record::Record;
 
 /// The kind under which it is kept.
@@ -53,6 +54,12 @@ pub struct Remembered {
     /// The map, if one was made.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surveyed: Option<Surveyed>,
+    /// How places looked that were visited.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub visited: Vec<Visited>,
+    /// Things that were learned, the oldest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub things: Vec<LearnedThing>,
 }
 
 impl Remembered {
@@ -96,6 +103,20 @@ impl Remembered {
         let now = belief.tracks.iter().filter(|t| looked_at.contains(&t.on));
         let seen = now.map(|track| Recollection { seen_unix_s: now_unix_s, track: track.clone() });
         Self { present: elsewhere.into_iter().chain(seen).collect(), gone, ..self }
+    }
+
+    /// Gives a thing that was learned another name, wherever it was seen.
+    pub fn rename(&mut self, old: &str, new: &str) {
+        let rename = |name: &mut String| {
+            if name == old {
+                new.clone_into(name);
+            }
+        };
+        self.things.iter_mut().for_each(|thing| rename(&mut thing.name));
+        for r in self.present.iter_mut().chain(&mut self.gone) {
+            let track = &mut r.track;
+            track.probabilities.iter_mut().chain(&mut track.kinds).for_each(|(name, _)| rename(name));
+        }
     }
 
     /// What may be believed of it now: probabilities worn by time, and below `most`, so that nothing is taken for sure that was not

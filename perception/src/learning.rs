@@ -17,11 +17,13 @@ mod notice;
 mod planes;
 mod register;
 mod supervoxel;
+mod texture;
 
 pub use around::{AroundOptions, nearest, stands, trajectories};
 pub use error::LearningError;
 pub use know::evidence::{Evidence, Judge, WEIGHTS};
-pub use know::{KnowError, KnowOptions, Library, Recognised, outward};
+pub use know::several::{Glance, Guess, Judged};
+pub use know::{Candidate, KnowError, KnowOptions, Library, Recognised, choose, outward};
 pub use model::{LearnOptions, LearnedModel, Used, learn};
 pub use notice::{Appeared, MetaRoom, NoticeOptions, Visit};
 pub use register::{Keyframe, keyframes, register};

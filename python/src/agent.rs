@@ -10,7 +10,7 @@ use descry_agent::commands::write_domain;
 use descry_agent::exit::CommandError;
 use descry_agent::keeping::Keeping;
 use descry_agent::report::{self, Event};
-use descry_agent::run::{self, Folder, Settings, Watcher};
+use descry_agent::run::{self, Folder, Settings, Task, Watcher};
 use descry_agent::stop::Stop;
 use descry_domains::abilities::searching::policies;
 use descry_domains::check;
@@ -104,14 +104,16 @@ impl Asked {
         let started = Instant::now();
         let Settings { robot, scene, seed, policy, .. } = &self.settings;
         let body: Body = body::open(robot, scene.as_deref(), *seed, &self.domain)?;
-        let lexicon = Lexicon::new(&self.domain, &Places::of_body(&*body.robot));
+        let past = run::recall(self.settings.remember.as_deref())?;
+        let lexicon = Lexicon::new(&self.domain, &Places::of_body(&*body.robot)).remembering(past.as_ref());
         let goal: Goal = goal::read(&self.said, &self.domain, &lexicon).map_err(CommandError::bad_input)?;
         let chooser = policies::named(policy, *seed, None).map_err(CommandError::bad_input)?;
         let folder = Folder::of_new_run(self.folder.as_deref(), &goal)?;
         let keeping = Keeping::default().of_new_run(folder.path())?;
         let settings = Settings { keeping, ..self.settings.clone() };
         let watcher = Watcher { stop, tell };
-        let mut report = run::pursue(&self.domain, &goal, &body, &folder, &settings, chooser, watcher)?;
+        let task = Task { domain: &self.domain, goal: &goal, past: past.as_ref() };
+        let mut report = run::pursue(task, &body, &folder, &settings, chooser, watcher)?;
         report.wall_s = started.elapsed().as_secs_f64();
         run::finish(folder.path(), &report)?;
         Ok(report)

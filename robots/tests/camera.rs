@@ -98,6 +98,7 @@ fn inside(o: &Object, map_point: &Point3<f64>) -> f64 {
             let [x, y, z] = b.size_m;
             (0.5 * x - p.x.abs()).min(0.5 * y - p.y.abs()).min(within_height(z))
         }
+        other => panic!("{other:?} stands in none of these scenes"),
     }
 }
 

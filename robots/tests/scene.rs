@@ -186,3 +186,66 @@ fn a_target_can_be_left_out() {
     assert!(spec.target.is_none() && spec.check().is_ok());
     assert!(arrange(&spec, 1).unwrap().object("cup").is_none());
 }
+
+/// Two tables, and things that come, go and move.
+const VISITS: &str = "
+visits = 3
+[start]
+position_m = [-2.0, 0.0]
+[[surface]]
+name = 'table'
+size_m = [1.4, 0.9]
+height_m = 0.72
+[[obstacle]]
+name = 'chair'
+position_m = [0.0, 1.2]
+size_m = [0.4, 0.4, 0.45]
+legs_m = 0.03
+back_m = 0.4
+visits = [2]
+on_map = false
+[[object]]
+name = 'tissues'
+shape.household = 'tissues'
+[[object]]
+name = 'radio'
+shape.household = 'radio'
+visits = [1]
+[[object]]
+name = 'kettle'
+shape.household = 'kettle'
+visits = [2, 3]
+moves = [3]
+scale = [0.9, 1.1]
+";
+
+#[test]
+fn between_visits_things_come_go_and_move_and_the_others_stay() {
+    for seed in 1..6 {
+        let visit = |n: usize| {
+            let spec = SceneSpec::parse("visits.toml", &format!("visit = {n}\n{VISITS}")).unwrap();
+            arrange(&spec, seed).unwrap()
+        };
+        let visits = [visit(1), visit(2), visit(3)];
+        let names: Vec<Vec<&str>> =
+            visits.iter().map(|s| s.objects.iter().map(|o| o.name.as_str()).collect()).collect();
+        assert_eq!(names, [vec!["tissues", "radio"], vec!["tissues", "kettle"], vec!["tissues", "kettle"]]);
+        assert_eq!(visits.each_ref().map(|s| s.obstacles.len()), [0, 1, 0]);
+        let at = |n: usize, name: &str| visits[n].object(name).unwrap().map_from_object;
+        assert!(at(0, "tissues") == at(1, "tissues") && at(1, "tissues") == at(2, "tissues"));
+        assert_ne!(at(1, "kettle"), at(2, "kettle"));
+        assert_eq!(visits[1].object("kettle").unwrap().shape, visits[2].object("kettle").unwrap().shape);
+    }
+}
+
+#[test]
+fn visits_and_household_things_that_are_not_there_are_refused() {
+    let check = |from: &str, to: &str, said: &str| {
+        let error = SceneSpec::parse("visits.toml", &VISITS.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    };
+    check("visits = [2, 3]", "visits = [2, 4]", "there is no visit 4");
+    check("visits = 3", "visits = 3\nvisit = 5", "there is no visit 5");
+    check("'kettle'\nvisits", "'cattle'\nvisits", "nothing of a household is called \"cattle\"");
+    check("legs_m = 0.03\n", "", "no seat");
+}

@@ -30,6 +30,7 @@
 
 mod align;
 mod circle;
+mod model;
 mod r#move;
 mod observe;
 mod open_door;
@@ -43,6 +44,7 @@ mod skill;
 pub use align::Align;
 pub use circle::Circle;
 pub use descry_robots;
+pub use model::{Model, Modelled};
 pub use r#move::Move;
 pub use observe::Observe;
 pub use open_door::OpenDoor;

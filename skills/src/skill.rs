@@ -7,6 +7,8 @@ use descry_robots::{
     Sensed, Watch,
 };
 
+use crate::model::Modelled;
+
 /// One action of a plan, with the names of its objects.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Call {
@@ -56,6 +58,8 @@ pub enum Outcome {
     Scanned(Box<Scanned>),
     /// Scans were brought together.
     Aligned(Box<Alignment>),
+    /// Looks at a thing were brought together.
+    Modelled(Box<Modelled>),
     /// Something was moved.
     Pushed(Pushed),
     /// A door is open.

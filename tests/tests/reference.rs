@@ -21,6 +21,7 @@ const FORMATS: &[&str] = &[
     "robots/src/sim/scene/surface.rs",
     "robots/src/sim/scene/object.rs",
     "robots/src/sim/shape.rs",
+    "robots/src/sim/composed.rs",
     "robots/src/sim/faults.rs",
     "robots/src/sim/stereo.rs",
     "robots/src/recorded/settings.rs",

@@ -8,6 +8,7 @@ use descry_domains::goal::{self, Goal};
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
 
+use descry_domains::situation::Past;
 use descry_robots::Robot;
 
 use crate::body;
@@ -149,9 +150,14 @@ fn tell(event: &Event) {
     input::narrate(&event.to_string());
 }
 
-/// A goal in the words of a domain and of the places that a body knows.
-pub(super) fn understood(said: &str, domain: &Domain, robot: &dyn Robot) -> Result<Goal, CommandError> {
-    let lexicon = Lexicon::new(domain, &Places::of_body(robot));
+/// A goal in the words of a domain, of the places that a body knows and of the things that were learned.
+pub(super) fn understood(
+    said: &str,
+    domain: &Domain,
+    robot: &dyn Robot,
+    past: Option<&Past>,
+) -> Result<Goal, CommandError> {
+    let lexicon = Lexicon::new(domain, &Places::of_body(robot)).remembering(past);
     goal::read(said, domain, &lexicon).map_err(CommandError::bad_input)
 }
 
@@ -159,7 +165,8 @@ fn begin(said: &str, with: &With, window: &mut Window, stop: &Stop) -> Result<Re
     let started = Instant::now();
     let domain = input::domain(&with.domain)?;
     let body = body::open(&with.robot, with.scene.as_deref(), with.seed, &domain)?;
-    let goal = understood(said, &domain, &*body.robot)?;
+    let past = run::recall(with.remember.as_deref())?;
+    let goal = understood(said, &domain, &*body.robot, past.as_ref())?;
     let chooser = policies::named(&with.policy, with.seed, None).map_err(CommandError::bad_input)?;
     let folder = Folder::of_new_run(with.run.as_deref(), &goal)?;
     window.open(Arc::new(Running::of(folder.path())))?;
@@ -173,7 +180,8 @@ fn begin(said: &str, with: &With, window: &mut Window, stop: &Stop) -> Result<Re
         remember: with.remember.clone(),
     };
     let watcher = Watcher { stop, tell: &mut tell };
-    let report = run::pursue(&domain, &goal, &body, &folder, &settings, chooser, watcher)?;
+    let task = Task { domain: &domain, goal: &goal, past: past.as_ref() };
+    let report = run::pursue(task, &body, &folder, &settings, chooser, watcher)?;
     end(report, &folder, started)
 }
 
@@ -206,12 +214,12 @@ fn go_on(
     programs::check_allowed(&domain, &header.settings.robot, &folder.display().to_string(), allow_programs)?;
     let settings = &header.settings;
     let body = body::open(&settings.robot, settings.scene.as_deref(), settings.seed, &domain)?;
-    let goal = understood(&header.goal, &domain, &*body.robot)?;
+    let past = beginning.as_ref().and_then(|b| b.past.as_ref());
+    let goal = understood(&header.goal, &domain, &*body.robot, past)?;
     let chooser = policies::named(&settings.policy, settings.seed, None).map_err(CommandError::bad_input)?;
     if beginning.is_none() {
         Beginning::new(header.clone(), &domain, body.scene.clone()).put(&record, body.robot.now_ns())?;
     }
-    let past = beginning.as_ref().and_then(|b| b.past.as_ref());
     let task = Task { domain: &domain, goal: &goal, past };
     let watcher = Watcher { stop, tell: &mut tell };
     let report = run::go_on(task, &body, &claimed, record, settings, chooser, watcher)?;

@@ -26,7 +26,7 @@ const EXIT_CODES: &str = "Exit codes:
   130, 143, 129  stopped by Ctrl-C, by SIGTERM, by the end of its terminal";
 
 /// Each command with lines that show what it is for.
-const EXAMPLES: [(&str, &[&str]); 21] = [
+const EXAMPLES: [(&str, &[&str]); 22] = [
     (
         "find",
         &[
@@ -88,6 +88,7 @@ const EXAMPLES: [(&str, &[&str]); 21] = [
             "descry memory verify runs/mug",
         ],
     ),
+    ("name", &["descry name seen", "descry name seen \"thing 1\" \"the thing from Tuesday\""]),
     ("export", &["descry export runs/mug mug.mcap"]),
     ("completions", &["descry completions bash > ~/.local/share/bash-completion/completions/descry"]),
     ("man", &["descry man | man -l -", "descry man --out ~/.local/share/man/man1"]),

@@ -12,6 +12,7 @@ mod live;
 mod lsp;
 mod manual;
 mod memory;
+mod name;
 mod new;
 mod plan;
 mod recognise;
@@ -70,6 +71,8 @@ pub enum Command {
     /// A record by itself: show, query, verify, export
     #[command(subcommand)]
     Memory(memory::Arguments),
+    /// Say what a thing is called that a run has learned; without names, list what was learned
+    Name(name::Arguments),
     /// Write a record into one MCAP file: short for `memory export`
     Export(memory::ExportArguments),
     /// Print what lets a shell complete commands and options
@@ -108,6 +111,7 @@ pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
         Command::Replay(arguments) => replay::run(arguments),
         Command::Runs(arguments) => runs::run(arguments),
         Command::Memory(arguments) => memory::run(arguments),
+        Command::Name(arguments) => name::run(arguments),
         Command::Export(arguments) => memory::export(arguments),
         Command::Completions(arguments) => manual::completions(arguments),
         Command::Man(arguments) => manual::man(arguments),

@@ -86,7 +86,7 @@ fn replay(arguments: &Arguments, source: &Arc<Record>) -> Result<Replayed, Comma
     let robot = Arc::new(robot(source, &record, arguments)?);
     beginning.put(&record, robot.known().now_ns)?;
     let kept = programs::on_record(&beginning.domain()?, &record, Some(source), &robot, false)?;
-    let goal = super::find::understood(&header.goal, &kept.domain, &*robot)?;
+    let goal = super::find::understood(&header.goal, &kept.domain, &*robot, beginning.past.as_ref())?;
     let chooser = policies::named(&header.settings.policy, header.settings.seed, None);
     let chooser = chooser.map_err(CommandError::bad_input)?;
     let mut tell = |event: &Event| input::narrate(&event.to_string());

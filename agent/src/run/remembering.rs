@@ -15,7 +15,9 @@ use crate::keeping::{Address, is_address};
 /// # Errors
 /// [`CommandError::Broken`] if there is a store and it cannot be read.
 pub fn recall(store: &str, now_unix_s: f64) -> Result<Past, CommandError> {
-    let remembered = Remembered::recall(&open(store)?).map_err(CommandError::broken)?;
+    let is_new = !is_address(Path::new(store)) && !Path::new(store).exists();
+    let remembered = if is_new { Ok(Remembered::default()) } else { Remembered::recall(&open(store)?) };
+    let remembered = remembered.map_err(CommandError::broken)?;
     Ok(Past { remembered: Arc::new(remembered), now_unix_s })
 }
 

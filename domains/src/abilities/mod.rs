@@ -1,6 +1,7 @@
 //! Abilities: what a domain takes by name. Each is a list of facts, calls and skills, with the functions behind them.
 
 pub mod carrying;
+pub mod learning;
 pub mod moving;
 pub mod searching;
 pub mod shapes;
@@ -114,8 +115,14 @@ pub type Fallback = fn(&Situation) -> Option<Plan>;
 pub type Answers = fn(&Goal, &Mind, &Situation, &Ended) -> Option<Conclusion>;
 
 /// Every ability; the first is that of every body and needs no naming.
-pub const ALL: &[&Ability] =
-    &[&moving::ABILITY, &searching::ABILITY, &carrying::ABILITY, &shapes::ABILITY, &surveying::ABILITY];
+pub const ALL: &[&Ability] = &[
+    &moving::ABILITY,
+    &searching::ABILITY,
+    &carrying::ABILITY,
+    &shapes::ABILITY,
+    &surveying::ABILITY,
+    &learning::ABILITY,
+];
 
 /// The abilities that a domain uses.
 pub fn used(names: &[String]) -> impl Iterator<Item = &'static Ability> + '_ {

@@ -3,6 +3,7 @@
 use descry_planner::Diagnostic;
 
 use super::Check;
+use crate::abilities::{self, learning};
 use crate::answer::CHANGES;
 use crate::asked::mentions;
 use crate::config::GoalPhrase;
@@ -74,7 +75,9 @@ impl Check<'_> {
             |of: &str| ["surface", "room", "door"].contains(&of) && self.places.surfaces.is_empty();
         let is_empty = |f: &&Filled| {
             let of = type_of_slot(&f.slot);
-            self.lexicon.of_type(of).is_empty() && !is_body_s(of)
+            let may_be_learned = of == "thing"
+                && abilities::used(&self.domain.config.uses).any(|a| a.name == learning::ABILITY.name);
+            self.lexicon.of_type(of).is_empty() && !is_body_s(of) && !may_be_learned
         };
         let told = |f: &Filled| {
             let of = type_of_slot(&f.slot);

@@ -4,6 +4,7 @@ use descry_memory::belief::Belief;
 use descry_robots::{PoseEstimate, Robot};
 
 use super::WorldError;
+use crate::abilities::learning::news::{self, News};
 use crate::goal::Goal;
 use crate::lexicon::{Lexicon, symbol};
 use crate::load::Domain;
@@ -24,6 +25,7 @@ pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<
         ("obstacle".into(), s.obstacles().iter().map(|o| o.symbol.clone()).collect()),
         ("spot".into(), s.floor.things.iter().map(|t| t.symbol.clone()).collect()),
         ("shape".into(), s.floor.names.iter().map(|(symbol, _)| symbol.clone()).collect()),
+        ("novelty".into(), s.news.novelties.iter().map(|n| n.symbol.clone()).collect()),
         ("door".into(), s.doors.iter().map(|d| d.symbol.clone()).collect()),
         ("room".into(), lexicon.of_type("room").iter().map(|n| n.symbol.clone()).collect()),
     ];
@@ -31,6 +33,21 @@ pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<
         objects.push((of.clone(), names.iter().map(|n| symbol(n)).collect()));
     }
     objects
+}
+
+/// A thing that is asked for: one of the domain's objects or kinds, or one that was learned.
+pub(super) fn asked_for(domain: &Domain, news: &News, name: &str) -> Result<Thing, WorldError> {
+    let known = situation::thing(domain, name);
+    match news.thing(name) {
+        None => Ok(known),
+        Some(learned) if known.models.is_empty() => {
+            Ok(Thing { name: learned.name.clone(), models: vec![news::model(learned)], ..known })
+        }
+        Some(_) => Err(WorldError::Domain(format!(
+            "\"{name}\" is an object of the domain {}, and something that was learned is called so\n  give that another name: descry name STORE \"{name}\" \"…\"",
+            domain.config.name
+        ))),
+    }
 }
 
 /// Of what is remembered of earlier runs, what may still stand where it was seen: less than sure, so that it is looked at again.

@@ -1,52 +1,68 @@
 //! What evidence is worth: logistic regression on scenes of other objects than those that are evaluated.
 
-use crate::household::{Body, Room, bodies};
-use crate::knowing::{Model, is_right, library, offline, scene, some};
+use crate::household::{Body, Room, made::made};
+use crate::knowing::{Model, is_right, learned_steps, library, offline, scene, some};
+use crate::page::{Page, Table};
+use crate::plot::{BLUE, Line, ORANGE, Panel, panels};
+use crate::runs::RunOptions;
 use crate::tabletop::Draws;
 use descry_perception::Cloud;
-use descry_perception::calibration::reliability;
+use descry_perception::calibration::{Claim, reliability};
 use descry_perception::learning::{Evidence, Judge, KnowOptions, WEIGHTS};
 use descry_perception::nalgebra::{SMatrix, SVector};
-use std::path::Path;
 
 const ROUNDS: usize = 30;
 /// Pull of the weights towards nothing.
 const RIDGE: f64 = 0.02;
+/// Objects that are learned, and as many that nobody knows.
+const KNOWN: usize = 24;
 
-/// Other objects of the same sorts.
-pub fn others(seed: u64) -> Vec<Body> {
-    let mut draws = Draws(seed ^ 0x0de);
-    bodies().iter().map(|b| b.varied(0.85 + 0.35 * draws.next(), 1 + (draws.next() * 1e9) as u64)).collect()
+/// Models as the robot and as a turntable makes them, one after the other.
+fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
+    let mut models = Vec::new();
+    for (i, body) in bodies.iter().enumerate().take(KNOWN) {
+        let own = seed * 7000 + 50 * i as u64;
+        let options = RunOptions {
+            controlled: i % 4 != 3,
+            noise: (0.005, 0.5_f64.to_radians()),
+            touching: false,
+            step_rad: 15_f64.to_radians(),
+            seed: own,
+        };
+        let made = match i % 2 {
+            0 => offline(body, i, usize::MAX, own),
+            _ => learned_steps(std::slice::from_ref(body), 0, options, &[usize::MAX])
+                .and_then(|mut m| m.pop().ok_or_else(String::new)),
+        };
+        models.extend(made.into_iter().map(|model| Model { body: i, ..model }));
+    }
+    models
 }
 
-/// Fits a judge and prints it; what it was fitted to is written to DIR.
-pub fn fit(seed: u64, scenes: usize, out: &Path) -> Result<(), String> {
-    let bodies = others(seed);
+/// Fits a judge and prints it; what it was fitted to is written to the page's folder.
+pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
+    let bodies: Vec<Body> = (0..2 * KNOWN as u64).map(|k| made(seed * 1000 + k)).collect();
     let surfaces: Vec<Cloud> = bodies.iter().map(|b| Room::surface(b, 0.004)).collect();
-    let models: Vec<Model> = (0..bodies.len())
-        .map(|i| offline(&bodies, i, seed * 7000 + 50 * i as u64))
-        .collect::<Result<_, _>>()?;
+    let models = models(&bodies, seed);
     let library = library(&models.iter().collect::<Vec<_>>());
     let mut claims: Vec<(Evidence, bool)> = Vec::new();
+    let mut lines = Vec::new();
     let mut draws = Draws(seed);
     for k in 0..scenes {
         let mut scene = scene(&bodies, &some(&mut draws, bodies.len(), 5), seed * 9000 + k as u64);
-        if k % 2 == 1 {
+        if k % 4 == 3 {
             // What is known without colours has to be judged as well.
             scene.view.cloud.colours = None;
         }
         for found in library.judged(&scene.view, &KnowOptions::default()).map_err(|e| e.to_string())? {
+            let found = found.recognised;
             let right = is_right(&scene, &surfaces, models[found.model].body, &found);
             claims.push((found.evidence, right));
-        }
-    }
-    println!("{} claims, {} right", claims.len(), claims.iter().filter(|c| c.1).count());
-    let lines: Vec<String> = claims
-        .iter()
-        .map(|(e, right)| {
-            format!(
-                "{},{},{},{},{},{:.4},{:.4},{:.4},{}",
-                u8::from(*right),
+            let e = found.evidence;
+            lines.push(format!(
+                "{k},{},{},{},{},{},{},{:.4},{:.4},{:.4},{}",
+                found.model,
+                u8::from(right),
                 e.facing,
                 e.explained,
                 e.through,
@@ -55,15 +71,64 @@ pub fn fit(seed: u64, scenes: usize, out: &Path) -> Result<(), String> {
                 e.off_sigmas,
                 e.beyond,
                 e.votes
-            )
-        })
-        .collect();
-    let path = out.join("claims.csv");
+            ));
+        }
+    }
+    let path = page.file("claims.csv");
     std::fs::write(&path, lines.join("\n")).map_err(|e| format!("{}: {e}", path.display()))?;
     let judge = regression(&claims);
-    println!("weights {:.2?}", judge.weights);
-    let stated: Vec<(f64, bool)> = claims.iter().map(|(e, r)| (judge.confidence(e), *r)).collect();
-    println!("on what it was fitted to: {:?}", reliability(&stated, 5));
+    page.heading("What evidence is worth");
+    page.say(&format!(
+        "{} claims, {} right, weights {:.2?}",
+        claims.len(),
+        claims.iter().filter(|c| c.1).count(),
+        judge.weights
+    ));
+    let stated: Vec<Claim> = claims.iter().map(|(e, r)| (judge.confidence(e), *r)).collect();
+    page.say(&format!("on what it was fitted to: {:?}", reliability(&stated, 5)));
+    Ok(())
+}
+
+/// Stated against true shares of answers.
+pub fn print(claims: &[(&str, Vec<Claim>)], page: &mut Page) -> Result<(), String> {
+    page.heading("Confidence against truth");
+    let mut table = Table::new(&[
+        "answers of",
+        "stated",
+        "answers",
+        "stated in the mean",
+        "right",
+        "Brier",
+        "of the base rate",
+    ]);
+    let mut panel = Vec::new();
+    for (name, claims) in claims {
+        let told = reliability(claims, 10);
+        let colour = if panel.is_empty() { BLUE } else { ORANGE };
+        let mut points = Vec::new();
+        for bin in told.bins.iter().filter(|b| b.count > 0) {
+            points.push((bin.stated, bin.came_true));
+            table.row(vec![
+                (*name).to_owned(),
+                format!("{:.1} to {:.1}", bin.low, bin.high),
+                bin.count.to_string(),
+                format!("{:.3}", bin.stated),
+                format!("{:.3}", bin.came_true),
+                format!("{:.3}", told.brier),
+                format!("{:.3}", told.brier_of_base_rate),
+            ]);
+        }
+        panel.push(Line { dashed: false, colour, points });
+    }
+    page.table(&table);
+    let lines = panel.into_iter().chain([Line {
+        dashed: true,
+        colour: "#999",
+        points: vec![(0.0, 0.0), (1.0, 1.0)],
+    }]);
+    let panel = Panel { name: "reliability".to_owned(), lines: lines.collect() };
+    panels(&[panel], ("stated", "right"), &page.file("confidence.svg"))?;
+    page.figure("confidence.svg", "Share of right answers against what was stated");
     Ok(())
 }
 

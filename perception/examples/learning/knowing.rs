@@ -53,13 +53,13 @@ pub struct Model {
 /// How many looks a turntable gives, from two heights.
 const TURNTABLE: usize = 14;
 
-/// A model made with a turntable: near, from perfect poses, of pixels that are given.
-pub fn offline(bodies: &[Body], body: usize, seed: u64) -> Result<Model, String> {
+/// A model made with a turntable, of its first looks: near, from perfect poses, of pixels that are given.
+pub fn offline(body: &Body, number: usize, looks: usize, seed: u64) -> Result<Model, String> {
     let mut room = Room::new(RoomOptions { controlled: true, seed });
     let world_from_body = standing(0.0, 0.0, 0.0);
-    room.put(&bodies[body], world_from_body);
+    room.put(body, world_from_body);
     let middle = Point3::new(0.0, 0.0, TABLE_M + 0.1);
-    let views: Vec<View> = (0..TURNTABLE)
+    let views: Vec<View> = (0..looks.min(TURNTABLE))
         .map(|k| {
             let turn = TAU * k as f64 / TURNTABLE as f64;
             let eye = Point3::new(0.75 * turn.cos(), 0.75 * turn.sin(), TABLE_M + [0.35, 0.75][k % 2]);
@@ -72,7 +72,7 @@ pub fn offline(bodies: &[Body], body: usize, seed: u64) -> Result<Model, String>
         labels.iter().zip(&views[0].cloud.points).map(|(l, p)| *l == 1 && p.z.is_finite()).collect();
     let model = learn(&views, &[], &mask, &LearnOptions::default()).map_err(|e| e.to_string())?;
     let body_from_model = world_from_body.inverse() * model.world_from_model;
-    Ok(Model { body, cloud: model.cloud.transformed(&body_from_model) })
+    Ok(Model { body: number, cloud: model.cloud.transformed(&body_from_model) })
 }
 
 /// The models of a run over its first looks, brought onto the true body.
@@ -115,6 +115,29 @@ pub fn is_right(scene: &Scene, surfaces: &[Cloud], body: usize, found: &Recognis
     scene.things.iter().any(|(i, pose)| {
         *i == body && surface_off_m(&surfaces[body], &found.world_from_model, pose) < RIGHT_M
     })
+}
+
+/// Answers about one model in all scenes.
+#[derive(Default)]
+pub struct Tally {
+    pub right: usize,
+    pub wrong: usize,
+    pub missed: usize,
+}
+
+impl Tally {
+    /// Whether it was there, and for each answer whether it is right.
+    pub fn add(&mut self, there: bool, answers: impl Iterator<Item = bool>) {
+        let (mut right, mut all) = (0, 0);
+        answers.for_each(|is_right| (right, all) = (right + usize::from(is_right), all + 1));
+        self.right += right;
+        self.wrong += all - right;
+        self.missed += usize::from(there && right == 0);
+    }
+
+    pub fn f_score(&self) -> f64 {
+        2.0 * self.right as f64 / (2 * self.right + self.wrong + self.missed).max(1) as f64
+    }
 }
 
 /// A library of models.

@@ -1,6 +1,6 @@
 //! The evaluation of Fäulhammer et al. in a simulated room, and on recordings:
-//! `cargo run --release -p descry-perception --example learning -- SEED DIR [PART] [SCENES]`. Plots and pictures are written to DIR. PART is one of
-//! them alone, by the name of its file; SCENES is how many scenes `curves` and `judge` look at.
+//! `cargo run --release -p descry-perception --example learning -- SEED DIR [PART] [COUNT]`. DIR/page.html has tables, plots and pictures. PART is one of
+//! them alone, by the name of its file; COUNT is how many objects `modelling` learns, and how many scenes the others look at.
 
 mod curves;
 #[path = "../evaluate/frames.rs"]
@@ -9,50 +9,68 @@ mod frames;
 mod household;
 mod judge;
 mod knowing;
+mod many;
 mod measure;
 mod modelling;
+mod page;
 mod plot;
 mod recorded;
 mod runs;
 #[path = "../../tests/tabletop/mod.rs"]
 mod tabletop;
 
+use page::Page;
 use std::path::Path;
 use std::process::ExitCode;
 
-const PARTS: [&str; 4] = ["modelling", "curves", "recorded", "judge"];
-/// Objects whose learned models are recognised, and in how many scenes.
+const PARTS: [&str; 5] = ["modelling", "curves", "many", "recorded", "judge"];
+/// Objects that are learned, as in the paper; how many are known at once at most.
 const OBJECTS: usize = 10;
-const SCENES: usize = 12;
+const MANY: usize = 50;
+/// Scenes that are looked at for the curves and for many models.
+const SCENES: usize = 36;
 
-fn run(seed: u64, out: &Path, part: Option<&str>, scenes: usize) -> Result<(), String> {
+fn run(seed: u64, out: &Path, part: Option<&str>, count: Option<usize>) -> Result<(), String> {
     std::fs::create_dir_all(out).map_err(|e| format!("{}: {e}", out.display()))?;
+    let mut page = Page::new(out);
+    // What evidence is worth is fitted for itself: what is evaluated must not know of it.
     let is_asked = |name: &str| part.map_or(name != "judge", |part| part == name);
+    let (objects, scenes) = (count.unwrap_or(OBJECTS), count.unwrap_or(SCENES));
+    let mut claims = Vec::new();
     if is_asked("modelling") {
-        modelling::tables(seed);
+        modelling::print(seed, objects, &mut page)?;
+        page.write()?;
     }
     if is_asked("curves") {
-        curves::print(seed, OBJECTS, scenes, out)?;
+        claims.push(("the curves", curves::print(seed, OBJECTS, scenes, &mut page)?));
+        page.write()?;
+    }
+    if is_asked("many") {
+        claims.push(("many models", many::print(seed, MANY, scenes, &mut page)?));
+        page.write()?;
+    }
+    if !claims.is_empty() {
+        judge::print(&claims, &mut page)?;
     }
     if is_asked("recorded") {
-        recorded::print(out)?;
+        recorded::print(&mut page)?;
     }
     if is_asked("judge") {
-        judge::fit(seed, scenes, out)?;
+        judge::fit(seed, scenes, &mut page)?;
     }
-    Ok(())
+    page.write()
 }
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let seed = arguments.first().and_then(|text| text.parse().ok());
-    let scenes = arguments.get(3).map_or(Some(SCENES), |text| text.parse().ok());
+    let count = arguments.get(3).map(|text| text.parse::<usize>()).transpose();
     let part = arguments.get(2).map(String::as_str);
-    let result = match (seed, arguments.get(1), scenes) {
-        (Some(seed), Some(out), Some(scenes)) if part.is_none_or(|part| PARTS.contains(&part)) => {
-            run(seed, Path::new(out), part, scenes)
+    let result = match (seed, arguments.get(1), count) {
+        (Some(seed), Some(out), Ok(count)) if part.is_none_or(|part| PARTS.contains(&part)) => {
+            run(seed, Path::new(out), part, count)
         }
-        _ => Err(format!("usage: learning SEED DIR [PART] [SCENES]\n  PART is one of {}", PARTS.join(", "))),
+        _ => Err(format!("usage: learning SEED DIR [PART] [COUNT]\n  PART is one of {}", PARTS.join(", "))),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -27,11 +27,11 @@ pub fn picture(
 }
 
 /// Models beside each other in their own colours, seen from the front and from behind, as a PNG.
-pub fn sheet(models: &[(&str, &Cloud)], path: &Path) -> Result<(), String> {
+pub fn sheet(models: &[&Cloud], path: &Path) -> Result<(), String> {
     const SIDE: u32 = 240;
     let columns = models.len().div_ceil(2) as u32;
     let mut image = image::RgbImage::from_pixel(columns * SIDE, 4 * SIDE, image::Rgb([18, 20, 26]));
-    for (k, (_, cloud)) in models.iter().enumerate() {
+    for (k, cloud) in models.iter().enumerate() {
         let Some((low, high)) = cloud.bounds() else { continue };
         let middle = descry_perception::nalgebra::center(&low, &high).cast::<f64>();
         for (half, side) in [(0, 1.0), (1, -1.0)] {
@@ -80,68 +80,138 @@ fn draw(
     }
 }
 
-/// A line of a plot: its name and colour, and points (coverage, f-score).
+/// A line of a panel: points (coverage, f-score), joined if there is more than one.
 pub struct Line {
-    pub name: String,
     pub dashed: bool,
-    pub colour: usize,
+    pub colour: &'static str,
     pub points: Vec<(f64, f64)>,
 }
 
-/// Okabe and Ito.
-const COLOURS: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A00"];
+/// A plot of its own with a name.
+pub struct Panel {
+    pub name: String,
+    pub lines: Vec<Line>,
+}
 
-/// F-score against coverage, as Fig. 5.
-pub fn curves(lines: &[Line], path: &Path) -> Result<(), String> {
-    let (width, height, left, top) = (620.0, 420.0, 60.0, 30.0);
-    let at = |(x, y): (f64, f64)| (left + x * width, top + (1.0 - y) * height);
-    let mut text = String::from(
-        r#"<svg xmlns="http://www.w3.org/2000/svg" width="900" height="520" font-family="sans-serif" font-size="13"><rect width="900" height="520" fill="white"/>"#,
+/// Okabe and Ito.
+pub const BLUE: &str = "#0072B2";
+pub const ORANGE: &str = "#D55E00";
+pub const GREEN: &str = "#009E73";
+
+const OPEN: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" font-family="sans-serif" font-size="11""#;
+
+/// Panels beside each other, both axes from 0 to 1.
+pub fn panels(panels: &[Panel], axes: (&str, &str), path: &Path) -> Result<(), String> {
+    const COLUMNS: usize = 5;
+    let (side, left, top, gap) = (160.0, 46.0, 24.0, (56.0, 62.0));
+    let (columns, rows) = (panels.len().min(COLUMNS), panels.len().div_ceil(COLUMNS));
+    let (width, height) = (columns as f64 * (side + gap.0) + 10.0, rows as f64 * (side + gap.1) + 6.0);
+    let mut text = format!(
+        r#"{OPEN} width="{width}" height="{height}" viewBox="0 0 {width} {height}"><rect width="100%" height="100%" fill="white"/>"#
     );
-    for k in 0..=5 {
-        let share = f64::from(k) / 5.0;
-        let ((x0, y), (x1, _)) = (at((0.0, share)), at((1.0, share)));
-        let (x, y1) = at((share, 0.0));
-        let _ = write!(
-            text,
-            r##"<line x1="{x0}" y1="{y}" x2="{x1}" y2="{y}" stroke="#ddd"/><text x="{}" y="{}" text-anchor="end">{share:.1}</text><text x="{x}" y="{}" text-anchor="middle">{share:.1}</text>"##,
-            x0 - 8.0,
-            y + 4.0,
-            y1 + 20.0
-        );
-    }
-    let _ = write!(
-        text,
-        r#"<text x="{}" y="{}" text-anchor="middle">coverage of the model</text><text x="16" y="{}" transform="rotate(-90 16 {})" text-anchor="middle">f-score</text>"#,
-        left + 0.5 * width,
-        top + height + 42.0,
-        top + 0.5 * height,
-        top + 0.5 * height
-    );
-    for (k, line) in lines.iter().enumerate() {
-        let colour = COLOURS[line.colour % COLOURS.len()];
-        let dash = if line.dashed { r#" stroke-dasharray="6 4""# } else { "" };
-        let points: Vec<String> =
-            line.points.iter().map(|p| at(*p)).map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-        let _ = write!(
-            text,
-            r#"<polyline points="{}" fill="none" stroke="{colour}" stroke-width="2"{dash}/>"#,
-            points.join(" ")
-        );
-        for p in &line.points {
-            let (x, y) = at(*p);
-            let _ = write!(text, r#"<circle cx="{x:.1}" cy="{y:.1}" r="3" fill="{colour}"/>"#);
+    for (k, panel) in panels.iter().enumerate() {
+        let corner =
+            (left + (k % COLUMNS) as f64 * (side + gap.0), top + (k / COLUMNS) as f64 * (side + gap.1));
+        let at = |(x, y): (f64, f64)| (corner.0 + x * side, corner.1 + (1.0 - y) * side);
+        for k in 0..=2 {
+            let share = 0.5 * f64::from(k);
+            let ((x0, y), (x1, _)) = (at((0.0, share)), at((1.0, share)));
+            let (x, low) = at((share, 0.0));
+            let _ = write!(
+                text,
+                r##"<line x1="{x0}" y1="{y}" x2="{x1}" y2="{y}" stroke="#ddd"/><text x="{}" y="{}" text-anchor="end">{share}</text><text x="{x}" y="{}" text-anchor="middle">{share}</text>"##,
+                x0 - 5.0,
+                y + 4.0,
+                low + 14.0
+            );
         }
-        let y = top + 16.0 * k as f64 + 10.0;
+        let ((x, high), (_, low)) = (at((0.5, 1.0)), at((0.5, 0.0)));
+        let aside = corner.0 - 30.0;
         let _ = write!(
             text,
-            r#"<line x1="{0}" y1="{y}" x2="{1}" y2="{y}" stroke="{colour}" stroke-width="2"{dash}/><text x="{2}" y="{3}">{4}</text>"#,
-            left + width + 12.0,
-            left + width + 42.0,
-            left + width + 48.0,
-            y + 4.0,
-            line.name
+            r#"<text x="{x}" y="{}" text-anchor="middle" font-weight="bold">{}</text><text x="{x}" y="{}" text-anchor="middle">{}</text><text x="{aside}" y="{y}" transform="rotate(-90 {aside} {y})" text-anchor="middle">{}</text>"#,
+            high - 8.0,
+            panel.name,
+            low + 29.0,
+            axes.0,
+            axes.1,
+            y = 0.5 * (high + low)
         );
+        for line in &panel.lines {
+            let dash = if line.dashed { r#" stroke-dasharray="5 3""# } else { "" };
+            let points: Vec<(f64, f64)> = line.points.iter().map(|p| at(*p)).collect();
+            let path: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+            let _ = write!(
+                text,
+                r#"<polyline points="{}" fill="none" stroke="{}" stroke-width="2"{dash}/>"#,
+                path.join(" "),
+                line.colour
+            );
+            for (x, y) in points {
+                let _ = write!(text, r#"<circle cx="{x:.1}" cy="{y:.1}" r="3.2" fill="{}"/>"#, line.colour);
+            }
+        }
+    }
+    text.push_str("</svg>\n");
+    std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// A cut through a model, metres.
+pub struct Slice {
+    pub name: &'static str,
+    pub points: Vec<(f32, f32)>,
+}
+
+/// Cuts beside each other at one scale.
+pub fn slices(cuts: &[Slice], path: &Path) -> Result<(), String> {
+    const PER_M: f32 = 1150.0;
+    let (wide, high) = (270.0, 150.0);
+    let width = wide * cuts.len() as f32;
+    let mut text = format!(
+        r#"{OPEN} width="{width}" height="{}" viewBox="0 0 {width} {}"><rect width="100%" height="100%" fill="white"/>"#,
+        high + 20.0,
+        high + 20.0
+    );
+    for (k, cut) in cuts.iter().enumerate() {
+        let middle = (wide * (k as f32 + 0.5), 20.0 + 0.5 * high);
+        let _ = write!(
+            text,
+            r#"<text x="{}" y="14" text-anchor="middle" font-size="10">{}</text>"#,
+            middle.0, cut.name
+        );
+        for (x, y) in &cut.points {
+            let _ = write!(
+                text,
+                r##"<circle cx="{:.1}" cy="{:.1}" r="1" fill="#333"/>"##,
+                middle.0 + PER_M * x,
+                middle.1 - PER_M * y
+            );
+        }
+    }
+    text.push_str("</svg>\n");
+    std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// Counts by row and column as shades, each row by its sum.
+pub fn heat(counts: &[Vec<usize>], names: (&str, &str), path: &Path) -> Result<(), String> {
+    let (rows, columns) = (counts.len(), counts.first().map_or(0, Vec::len));
+    let cell = (620.0 / columns.max(1) as f64).min(26.0);
+    let (left, top) = (30.0, 24.0);
+    let (width, height) = (left + cell * columns as f64 + 6.0, top + cell * rows as f64 + 6.0);
+    let mut text = format!(
+        r#"{OPEN} width="{width}" height="{height}" viewBox="0 0 {width} {height}"><rect width="100%" height="100%" fill="white"/><text x="{left}" y="15">{}</text><text x="15" y="{top}" transform="rotate(-90 15 {top})" text-anchor="end">{}</text>"#,
+        names.0, names.1
+    );
+    for (j, row) in counts.iter().enumerate() {
+        let sum = row.iter().sum::<usize>().max(1) as f64;
+        for (i, count) in row.iter().enumerate() {
+            let (x, y) = (left + cell * i as f64, top + cell * j as f64);
+            let light = (255.0 * (1.0 - *count as f64 / sum)) as u8;
+            let _ = write!(
+                text,
+                r##"<rect x="{x:.1}" y="{y:.1}" width="{cell:.1}" height="{cell:.1}" fill="rgb({light},{light},255)" stroke="#e4e6ec" stroke-width=".5"/>"##
+            );
+        }
     }
     text.push_str("</svg>\n");
     std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))

@@ -2,10 +2,11 @@
 //! other.
 
 use crate::frames::frames;
+use crate::page::{Page, Table};
 use crate::plot::picture;
 use descry_perception::files::read_cloud;
 use descry_perception::learning::{
-    KnowOptions, LearnOptions, LearnedModel, Library, Recognised, learn, outward, register,
+    KnowOptions, LearnOptions, LearnedModel, Library, Recognised, choose, learn, outward, register,
 };
 use descry_perception::nalgebra::{Isometry3, Point3, Unit, Vector3};
 use descry_perception::{Cloud, View};
@@ -25,58 +26,67 @@ fn files(dir: &Path, ending: &str) -> Vec<PathBuf> {
     all
 }
 
-pub fn print(out: &Path) -> Result<(), String> {
+pub fn print(page: &mut Page) -> Result<(), String> {
+    page.heading("Recordings");
     let shared = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     if !shared.is_dir() {
-        println!("\nskipped: no ../shared/data beside the workspace");
+        page.say("skipped: no ../shared/data beside the workspace");
         return Ok(());
     }
-    milk(&shared, out)?;
-    kitchen(&shared.join("kitchen"), out)
+    milk(&shared, page)?;
+    kitchen(&shared.join("kitchen"), page)
 }
 
-fn told(name: &str, found: &[Recognised], seconds: f64) {
-    let poses: Vec<String> = found
-        .iter()
-        .map(|f| {
-            let (at, turn) = (f.world_from_model.translation.vector, f.world_from_model.rotation.scaled_axis());
-            format!(
-                "model {} at {:.3} {:.3} {:.3} m, turned {:.2} {:.2} {:.2}, confidence {:.2} ({} explained, {} seen through, {} hidden)",
-                f.model, at.x, at.y, at.z, turn.x, turn.y, turn.z, f.confidence, f.evidence.explained,
-                f.evidence.through, f.evidence.hidden
-            )
-        })
-        .collect();
-    println!(
-        "{name}: {} ({seconds:.1} s)",
-        if poses.is_empty() { "nothing".to_owned() } else { poses.join("; ") }
-    );
+/// Answers in words: place and axis of rotation times angle.
+fn words(found: &[Recognised]) -> String {
+    let pose = |f: &Recognised| {
+        let (at, turn) = (f.world_from_model.translation.vector, f.world_from_model.rotation.scaled_axis());
+        format!(
+            "at {:.3} {:.3} {:.3} m, turned {:.2} {:.2} {:.2} rad, confidence {:.3} ({} points explained, {} seen through, {} hidden)",
+            at.x,
+            at.y,
+            at.z,
+            turn.x,
+            turn.y,
+            turn.z,
+            f.confidence,
+            f.evidence.explained,
+            f.evidence.through,
+            f.evidence.hidden
+        )
+    };
+    match found {
+        [] => "nothing".to_owned(),
+        all => all.iter().map(pose).collect::<Vec<_>>().join("; "),
+    }
 }
 
-fn milk(shared: &Path, out: &Path) -> Result<(), String> {
+fn milk(shared: &Path, page: &mut Page) -> Result<(), String> {
     let options = KnowOptions::default();
     let mut library = Library::default();
     // The model is painted in one colour: that tells nothing of the carton.
     let bare = Cloud { colours: None, ..cloud(&shared.join("pcl/milk.pcd"))? };
     let milk = outward(&bare).map_err(|e| e.to_string())?;
     library.add(&milk, &options).map_err(|e| e.to_string())?;
-    println!("\nThe milk carton of the Point Cloud Library");
+    page.say("The milk carton of the Point Cloud Library in its scene, and in scenes without it");
+    let mut table = Table::new(&["scene", "found", "the most confidence in any pose", "s"]);
     let mut scenes = vec![shared.join("pcl/milk_cartoon_all_small_clorox.pcd")];
     scenes.extend(files(&shared.join("mosd"), "pcd"));
     for (k, path) in scenes.iter().enumerate() {
         let view = in_optical_frame(cloud(path)?);
         let start = Instant::now();
-        let found = library.recognise(&view, &options).map_err(|e| e.to_string())?;
+        let judged = library.judged(&view, &options).map_err(|e| e.to_string())?;
+        let most = judged.iter().map(|c| c.recognised.confidence).fold(0.0, f64::max);
+        let found = choose(judged, options.least_confidence);
         let name = path.file_stem().map_or(String::new(), |n| n.to_string_lossy().into_owned());
-        told(&name, &found, start.elapsed().as_secs_f64());
-        if found.is_empty() {
-            let best = library.judged(&view, &options).map_err(|e| e.to_string())?;
-            best.first().iter().for_each(|b| println!("  the best: {:.3} {:?}", b.confidence, b.evidence));
-        }
+        let seconds = start.elapsed().as_secs_f64();
+        table.row(vec![name, words(&found), format!("{most:.3}"), format!("{seconds:.1}")]);
         if k == 0 {
-            draw(&view, &milk, &found, &out.join("milk.png"))?;
+            draw(&view, &milk, &found, &page.file("milk.png"))?;
         }
     }
+    page.table(&table);
+    page.figure("milk.png", "The scene, and the model where it was found");
     Ok(())
 }
 
@@ -103,14 +113,36 @@ fn in_optical_frame(cloud: Cloud) -> View {
     View { world_from_camera: turn.inverse(), ..View::alone(cloud.transformed(&turn)) }
 }
 
+/// The recording's colour camera as its depth camera sees it: focal length and centre, pixels, and shift, metres. By where steps of depth meet
+/// edges of the image best, over all frames.
+const COLOUR: (f64, [f64; 2], [f64; 2]) = (525.0, [322.0, 236.0], [-0.029, 0.005]);
+
+/// A frame with the colours of its image.
+fn coloured(mut view: View, dir: &Path, name: &str) -> Result<View, String> {
+    let path = dir.join(format!("{name}.color.jpg"));
+    let image = image::open(&path).map_err(|e| format!("{}: {e}", path.display()))?.to_rgb8();
+    let (focal, centre, shift) = COLOUR;
+    let colour = |p: &Point3<f32>| {
+        let at = |k: usize| focal * (f64::from(p[k]) + shift[k]) / f64::from(p.z) + centre[k];
+        let (u, v) = (at(0).round(), at(1).round());
+        let inside = u >= 0.0 && v >= 0.0 && u < f64::from(image.width()) && v < f64::from(image.height());
+        if inside { image.get_pixel(u as u32, v as u32).0 } else { [0; 3] }
+    };
+    view.cloud.colours = Some(view.cloud.points.iter().map(colour).collect());
+    Ok(view)
+}
+
+/// The poses of the frames are good to a few centimetres among each other: an answer no farther off is where the thing stands, metres.
+const THERE_M: f64 = 0.08;
+
 /// A thing of the kitchen: its name and where it stands.
 struct Thing {
     name: String,
     at: Point3<f64>,
 }
 
-/// Which half of the frames is learned from.
-fn kitchen(dir: &Path, out: &Path) -> Result<(), String> {
+/// Things of a table, learned from every other frame and looked for in the rest.
+fn kitchen(dir: &Path, page: &mut Page) -> Result<(), String> {
     let text = std::fs::read_to_string(dir.join("objects.json")).map_err(|e| e.to_string())?;
     let json: serde_json::Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
     let three = |v: &serde_json::Value| Vector3::from([0, 1, 2].map(|k| v[k].as_f64().unwrap_or(0.0)));
@@ -121,67 +153,102 @@ fn kitchen(dir: &Path, out: &Path) -> Result<(), String> {
         at: Point3::from(three(&o["centroid"])),
     };
     let things: Vec<Thing> = json["objects"].as_array().into_iter().flatten().map(thing).collect();
-    let all: Vec<View> = frames(dir)?.into_iter().map(|f| f.1).collect();
-    let (even, odd): (Vec<_>, Vec<_>) = all.iter().enumerate().partition(|(k, _)| k % 2 == 0);
-    let views =
-        |half: Vec<(usize, &View)>| -> Vec<View> { half.into_iter().map(|(_, v)| v.clone()).collect() };
-    let (learned_from, found_in) = (views(even), views(odd));
-    println!(
-        "\nThings of a kitchen, learned from {} frames, looked for in {}",
-        learned_from.len(),
-        found_in.len()
-    );
-    let options = KnowOptions::default();
-    let mut library = Library::default();
-    let mut known = Vec::new();
-    for thing in &things {
-        match model_of(thing, &learned_from, up, table_m) {
-            Ok(model) => {
-                let looks = model.looks.iter().filter(|l| l.pixels > 0).count();
-                println!("{}: {} points of {looks} looks", thing.name, model.cloud.len());
-                let eye = Point3::from(up.into_inner() * 0.25 - Vector3::z() * 0.4);
-                let path = out.join(format!("kitchen-{}.png", thing.name.replace(' ', "-")));
-                let labels = vec![1; model.cloud.len()];
-                picture(&model.cloud, &labels, &path, (eye, Point3::origin(), up.into_inner()))?;
-                library.add(&model.cloud, &options).map_err(|e| e.to_string())?;
-                known.push((thing, model));
+    let all: Vec<View> =
+        frames(dir)?.into_iter().map(|(name, view)| coloured(view, dir, &name)).collect::<Result<_, _>>()?;
+    for begin in [0, 1] {
+        let half = |k: usize| all.iter().skip(k).step_by(2).cloned().collect::<Vec<View>>();
+        let (learned_from, found_in) = (half(begin), half(1 - begin));
+        page.say(&format!(
+            "Things of a kitchen, learned from {} frames, looked for in the {} others",
+            learned_from.len(),
+            found_in.len()
+        ));
+        let options = KnowOptions::default();
+        let mut library = Library::default();
+        let mut known = Vec::new();
+        for thing in &things {
+            match model_of(thing, &learned_from, up, table_m) {
+                Ok(model) => {
+                    let looks = model.looks.iter().filter(|l| l.pixels > 0).count();
+                    page.say(&format!("{}: {} points of {looks} looks", thing.name, model.cloud.len()));
+                    let eye = Point3::from(up.into_inner() * 0.25 - Vector3::z() * 0.4);
+                    let name = format!("kitchen-{begin}-{}.png", thing.name.replace(' ', "-"));
+                    let labels = vec![1; model.cloud.len()];
+                    picture(
+                        &model.cloud,
+                        &labels,
+                        &page.file(&name),
+                        (eye, Point3::origin(), up.into_inner()),
+                    )?;
+                    page.figure(&name, &thing.name);
+                    library.add(&model.cloud, &options).map_err(|e| e.to_string())?;
+                    known.push((thing, model));
+                }
+                Err(why) => page.say(&format!("{}: not learned: {why}", thing.name)),
             }
-            Err(why) => println!("{}: not learned: {why}", thing.name),
         }
+        found_again(&library, &known, (&found_in, 1 - begin), &options, page)?;
     }
-    found_again(&library, &known, &things, &found_in, &options)
+    Ok(())
 }
 
-/// Prints what is found in frames that were not learned from.
+/// What is found in frames that were not learned from: counts for each thing, and every answer.
 fn found_again(
     library: &Library,
     known: &[(&Thing, LearnedModel)],
-    things: &[Thing],
-    frames: &[View],
+    (frames, begin): (&[View], usize),
     options: &KnowOptions,
+    page: &mut Page,
 ) -> Result<(), String> {
+    let mut answers = Table::new(&["frame", "in the image", "found", "the most confidence in each", "s"]);
+    let mut counts = vec![[0_usize; 3]; known.len()];
     for (k, view) in frames.iter().enumerate() {
         let start = Instant::now();
-        let found = library.recognise(view, options).map_err(|e| e.to_string())?;
+        let judged = library.judged(view, options).map_err(|e| e.to_string())?;
         let seconds = start.elapsed().as_secs_f64();
-        let inside = |t: &&Thing| {
+        let most = |model: usize| {
+            let own = judged.iter().filter(|c| c.recognised.model == model);
+            own.map(|c| c.recognised.confidence).fold(0.0, f64::max)
+        };
+        let most: Vec<String> = known
+            .iter()
+            .enumerate()
+            .map(|(m, (thing, _))| format!("{} {:.2}", thing.name, most(m)))
+            .collect();
+        let found = choose(judged, options.least_confidence);
+        let inside = |t: &Thing| {
             let q = view.world_from_camera.inverse() * t.at;
             let camera = view.intrinsics.as_ref();
             let pixel = camera.and_then(|c| c.project(&q).and_then(|(u, v)| c.pixel(u, v)));
             pixel.is_some() && q.z < options.range_m
         };
-        let there: Vec<&str> = things.iter().filter(inside).map(|t| t.name.as_str()).collect();
-        let told: Vec<String> = found
-            .iter()
-            .map(|f| {
-                let (thing, model) = &known[f.model];
-                let off = f.world_from_model.translation.vector - model.world_from_model.translation.vector;
-                format!("{} ({:.2}, {:.1} cm off)", thing.name, f.confidence, 100.0 * off.norm())
-            })
-            .collect();
-        let (there, told) = (there.join(", "), told.join(", "));
-        println!("frame {}: in the image: {there}; found: {told} ({seconds:.1} s)", 2 * k + 1);
+        let off_m = |f: &Recognised| {
+            let truly = known[f.model].1.world_from_model.translation.vector;
+            (f.world_from_model.translation.vector - truly).norm()
+        };
+        for (m, (thing, _)) in known.iter().enumerate() {
+            let own: Vec<f64> = found.iter().filter(|f| f.model == m).map(off_m).collect();
+            counts[m][0] += usize::from(inside(thing));
+            counts[m][1] += usize::from(own.iter().any(|off| *off < THERE_M));
+            counts[m][2] += own.iter().filter(|off| **off >= THERE_M).count();
+        }
+        let there =
+            known.iter().filter(|k| inside(k.0)).map(|k| k.0.name.as_str()).collect::<Vec<_>>().join(", ");
+        let told = found.iter().map(|f| {
+            format!("{} ({:.2}, {:.1} cm off)", known[f.model].0.name, f.confidence, 100.0 * off_m(f))
+        });
+        let told = told.collect::<Vec<_>>().join(", ");
+        answers.row(vec![(2 * k + begin).to_string(), there, told, most.join(", "), format!("{seconds:.1}")]);
     }
+    let mut table =
+        Table::new(&["thing", "frames with it in the image, in range", "found there", "said elsewhere"]);
+    for ((thing, _), count) in known.iter().zip(&counts) {
+        let mut row = vec![thing.name.clone()];
+        row.extend(count.map(|c| c.to_string()));
+        table.row(row);
+    }
+    page.table(&table);
+    page.table(&answers);
     Ok(())
 }
 

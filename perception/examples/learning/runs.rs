@@ -3,7 +3,7 @@
 use crate::household::{Body, CAMERA, CAMERA_M, Room, RoomOptions, TABLE_M, looking, standing};
 use crate::tabletop::{Draws, disturbed};
 use descry_perception::learning::{
-    Keyframe, LearnOptions, LearnedModel, MetaRoom, NoticeOptions, keyframes, learn, register,
+    Keyframe, LearnOptions, LearnedModel, LearningError, MetaRoom, NoticeOptions, keyframes, learn, register,
 };
 use descry_perception::nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use descry_perception::{Cloud, View};
@@ -15,8 +15,6 @@ pub struct RunOptions {
     pub controlled: bool,
     /// Spread of the pose of each keyframe, metres and radians.
     pub noise: (f64, f64),
-    /// False: the stated poses are taken as they are.
-    pub registered: bool,
     /// Something else stands beside the object, so near that they touch.
     pub touching: bool,
     /// Between keyframes, radians.
@@ -127,16 +125,27 @@ pub fn run(body: &Body, beside: &Body, options: RunOptions) -> Result<Run, Strin
         poses.push(looks[k]);
     }
     let start = Instant::now();
-    let keyframes = if options.registered {
-        register(&views, Some(Vector3::z_axis()), 2.5).map_err(|e| e.to_string())?
-    } else {
-        let stated =
-            |v: &View| Keyframe { world_from_camera: v.world_from_camera, used: true, why: String::new() };
-        views.iter().map(stated).collect()
-    };
+    let keyframes = register(&views, Some(Vector3::z_axis()), 2.5).map_err(|e| e.to_string())?;
     let model = learn(&views, &keyframes, &mask, &LearnOptions::default()).map_err(|e| e.to_string())?;
     let learn_s = start.elapsed().as_secs_f64();
     Ok(Run { views, truths: poses, keyframes, mask, world_from_body, model, notice_s, learn_s })
+}
+
+/// A way to a model.
+#[derive(Clone, Copy, Debug)]
+pub struct Way {
+    /// False: the stated poses are taken as they are.
+    pub registered: bool,
+    /// As [`LearnOptions::smooth`].
+    pub smooth: bool,
+    pub name: &'static str,
+}
+
+/// The model of a run made in another way.
+pub fn modelled(run: &Run, way: &Way) -> Result<LearnedModel, LearningError> {
+    let keyframes: &[Keyframe] = if way.registered { &run.keyframes } else { &[] };
+    let options = LearnOptions { smooth: way.smooth, ..LearnOptions::default() };
+    learn(&run.views, keyframes, &run.mask, &options)
 }
 
 /// How far a body reaches from its axis, metres.

@@ -7,6 +7,7 @@ pub mod evidence;
 mod feature;
 mod group;
 mod scene;
+pub mod several;
 mod skin;
 
 use crate::cloud::{Cloud, CloudError};
@@ -159,64 +160,65 @@ impl Library {
     /// # Errors
     /// If the view is no depth image.
     pub fn recognise(&self, view: &View, options: &KnowOptions) -> Result<Vec<Recognised>, KnowError> {
-        let mut found = self.candidates(view, options)?;
-        found.retain(|c| c.confidence >= options.least_confidence);
-        let mut chosen = together(found);
-        chosen.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-        Ok(chosen.into_iter().map(|c| c.recognised(view)).collect())
+        Ok(choose(self.judged(view, options)?, options.least_confidence))
     }
 
-    /// All that was judged, whatever the confidence and whatever shares its place, the surest first: for fitting a [`Judge`].
+    /// All that was judged by itself, whatever the confidence and whatever shares its place: for [`choose`], and for fitting a [`Judge`].
     ///
     /// # Errors
     /// As [`Library::recognise`].
-    pub fn judged(&self, view: &View, options: &KnowOptions) -> Result<Vec<Recognised>, KnowError> {
-        let mut found = self.candidates(view, options)?;
-        found.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-        Ok(found.into_iter().map(|c| c.recognised(view)).collect())
+    pub fn judged(&self, view: &View, options: &KnowOptions) -> Result<Vec<Candidate>, KnowError> {
+        let _span = tracing::debug_span!("know again", models = self.models.len()).entered();
+        self.candidates_in(&self.scene(view, options)?, &view.world_from_camera, options)
     }
 
-    fn candidates(&self, view: &View, options: &KnowOptions) -> Result<Vec<Candidate>, KnowError> {
-        let _span = tracing::debug_span!("know again", models = self.models.len()).entered();
+    /// A look made ready.
+    fn scene(&self, view: &View, options: &KnowOptions) -> Result<Seen, KnowError> {
         let widest_m = self.models.iter().map(|m| m.size_m).fold(0.0, f64::max);
-        let scene = Seen::new(view, options.range_m, widest_m * widest_m)?;
+        Seen::new(view, options.range_m, widest_m * widest_m)
+    }
+
+    fn candidates_in(
+        &self,
+        scene: &Seen,
+        world_from_camera: &Isometry3<f64>,
+        options: &KnowOptions,
+    ) -> Result<Vec<Candidate>, KnowError> {
         let keypoints = scene.skin.keypoints(options.keypoint_m, |i| !scene.wide[i]);
         let described = KINDS.map(|kind| features(&scene.skin, &keypoints, kind));
-        let of_model = |(number, model): (usize, &Known)| model.find(number, &described, &scene, options);
+        let of_model = |(number, model): (usize, &Known)| {
+            model.find(number, &described, scene, world_from_camera, options)
+        };
         let all: Vec<Vec<Candidate>> =
             self.models.par_iter().enumerate().map(of_model).collect::<Result<_, _>>()?;
         Ok(all.into_iter().flatten().collect())
     }
 }
 
-/// A model at a pose, judged.
-struct Candidate {
-    model: usize,
-    camera_from_model: Isometry3<f64>,
-    confidence: f64,
-    evidence: Evidence,
-    claims: Vec<u32>,
+/// A model at a pose, judged by itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// What it would be.
+    pub recognised: Recognised,
+    /// Points of the view's surface that it explains, ascending.
+    explained: Vec<u32>,
 }
 
 impl Candidate {
-    fn recognised(self, view: &View) -> Recognised {
-        Recognised {
-            model: self.model,
-            world_from_model: view.world_from_camera * self.camera_from_model,
-            confidence: self.confidence,
-            evidence: self.evidence,
-        }
-    }
-
     /// True if both explain much of the same.
     fn conflicts(&self, other: &Candidate) -> bool {
-        let shared = self.claims.iter().filter(|c| other.claims.binary_search(c).is_ok()).count();
-        shared as f64 > SHARED * self.claims.len().min(other.claims.len()) as f64
+        let shared = self.explained.iter().filter(|c| other.explained.binary_search(c).is_ok()).count();
+        shared as f64 > SHARED * self.explained.len().min(other.explained.len()) as f64
     }
 
     /// What it adds to an explanation of the scene.
     fn worth(&self) -> f64 {
-        self.claims.len() as f64 * (self.confidence - 0.5)
+        self.explained.len() as f64 * (self.recognised.confidence - 0.5)
+    }
+
+    fn odds(&self) -> f64 {
+        let p = self.recognised.confidence.clamp(0.0, 1.0 - 1e-9);
+        p / (1.0 - p)
     }
 }
 
@@ -226,6 +228,7 @@ impl Known {
         number: usize,
         described: &[Vec<Feature>; 2],
         scene: &Seen,
+        world_from_camera: &Isometry3<f64>,
         options: &KnowOptions,
     ) -> Result<Vec<Candidate>, KnowError> {
         let all = described.iter().zip(&self.features).flat_map(|(s, m)| matches(s, m)).collect();
@@ -245,7 +248,9 @@ impl Known {
             let pose = self.refined(&vote.scene_from_model, scene)?;
             let Verified { evidence, claims } = verify(&self.skin, &pose, scene, vote.matches);
             let confidence = options.judge.confidence(&evidence);
-            Ok(Candidate { model: number, camera_from_model: pose, confidence, evidence, claims })
+            let world_from_model = world_from_camera * pose;
+            let recognised = Recognised { model: number, world_from_model, confidence, evidence };
+            Ok(Candidate { recognised, explained: claims })
         };
         kept.into_iter().map(judged).collect()
     }
@@ -284,9 +289,10 @@ fn same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
     (a.translation.vector - b.translation.vector).norm() < SAME.0 && a.rotation.angle_to(&b.rotation) < SAME.1
 }
 
-/// Those that together explain the scene best without explaining any part of it twice: from the best of each alone, changed one at a time for the
-/// better (add one and drop what it conflicts with).
-fn together(mut found: Vec<Candidate>) -> Vec<Candidate> {
+/// Those that together explain the scene best without explaining any part of it twice, the surest first: from the best of each alone, changed one at
+/// a time for the better (add one and drop what it conflicts with). What another model explains as well is shared among both by their odds; less
+/// confidence than `least_confidence` is not told.
+pub fn choose(mut found: Vec<Candidate>, least_confidence: f64) -> Vec<Recognised> {
     found.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
     let n = found.len();
     let conflicts: Vec<Vec<bool>> =
@@ -302,5 +308,21 @@ fn together(mut found: Vec<Candidate>) -> Vec<Candidate> {
         (0..n).filter(|&j| conflicts[i][j]).for_each(|j| chosen[j] = false);
         chosen[i] = true;
     }
-    found.into_iter().zip(chosen).filter(|(_, c)| *c).map(|(c, _)| c).collect()
+    let told = |i: usize| {
+        let own = &found[i].recognised;
+        let mut rivals = rustc_hash::FxHashMap::<usize, f64>::default();
+        for rival in (0..n).filter(|&j| conflicts[i][j]).map(|j| &found[j]) {
+            if rival.recognised.model != own.model {
+                let odds = rivals.entry(rival.recognised.model).or_default();
+                *odds = odds.max(rival.odds());
+            }
+        }
+        let odds = found[i].odds();
+        let others: f64 = rivals.values().sum();
+        Recognised { confidence: odds / (1.0 + odds + others), ..own.clone() }
+    };
+    let mut all: Vec<Recognised> = (0..n).filter(|&i| chosen[i]).map(told).collect();
+    all.retain(|r| r.confidence >= least_confidence);
+    all.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    all
 }

@@ -12,7 +12,7 @@ use crate::cloud::Cloud;
 use crate::neighbours::Neighbours;
 use crate::noise::frontal_sigma_m;
 use crate::view::View;
-use crate::visibility::Seen;
+use crate::visibility::{DepthMap, Seen};
 use crate::voxel;
 use nalgebra::{Isometry3, Point3, Translation3};
 use serde::{Deserialize, Serialize};
@@ -137,10 +137,35 @@ struct Growing<'a> {
     options: &'a LearnOptions,
     rules: PlaneRules,
     removed: Removed,
-    first: Option<crate::visibility::DepthMap>,
+    first: Option<First>,
     /// The object so far, world frame, thinned.
     object: Cloud,
     measured: Measured,
+}
+
+/// What the look that noticed the object shows: what lies beside the object there is not of it, however smoothly it carries it on.
+struct First {
+    map: DepthMap,
+    /// Pixels of the object, and those so near that noise may put it there.
+    own: Mask,
+}
+
+/// Pixels beside what was noticed that may be of it as well.
+const BESIDE_PX: usize = 8;
+
+impl First {
+    /// True if a place of the world is surface that the first look shows beside the object.
+    fn shows_beside(&self, p: &Point3<f32>) -> bool {
+        let q = self.map.camera_from_world * p.cast::<f64>();
+        let camera = &self.map.intrinsics;
+        let Some(pixel) = camera.project(&q).and_then(|(u, v)| camera.pixel(u, v)) else { return false };
+        !self.own.set[pixel] && self.map.look_from(&q, tolerance_m(&q)) == Seen::Surface
+    }
+}
+
+/// How far a measurement may lie from what another look measured there, metres.
+fn tolerance_m(q: &Point3<f64>) -> f64 {
+    0.01_f64.max(3.0 * f64::from(frontal_sigma_m(q.z as f32)))
 }
 
 /// Fewest pixels that an object is learned from.
@@ -181,8 +206,11 @@ impl<'a> Growing<'a> {
         object.set.iter_mut().zip(&all.set).for_each(|(o, near)| *o &= near);
         object = without_outliers(&frame, &object)?;
         pieces.drop_unsupported(&mut object, options.supervoxel_share);
-        let first = self.first.get_or_insert_with(|| frame.map.clone());
-        let usable = self.removed.filtered(&frame, &object, first, &self.rules);
+        let first =
+            self.first.get_or_insert_with(|| First { map: frame.map.clone(), own: label.dilated(BESIDE_PX) });
+        let mut usable = self.removed.filtered(&frame, &object, &first.map, &self.rules);
+        let beside: Vec<usize> = usable.pixels().filter(|&i| first.shows_beside(&frame.points[i])).collect();
+        beside.into_iter().for_each(|i| usable.set[i] = false);
         object.set.iter_mut().zip(&usable.set).for_each(|(o, usable)| *o &= usable);
         let object = grown(&frame, &usable, object, options.radius_m, options.angle_rad);
         let pixels = object.count();
@@ -203,8 +231,7 @@ impl<'a> Growing<'a> {
         let (mut through, mut seen) = (0, 0);
         for p in &self.object.points {
             let q = frame.map.camera_from_world * p.cast::<f64>();
-            let tolerance_m = 0.01_f64.max(3.0 * f64::from(frontal_sigma_m(q.z as f32)));
-            match frame.map.look_from(&q, tolerance_m) {
+            match frame.map.look_from(&q, tolerance_m(&q)) {
                 Seen::Free => (through, seen) = (through + 1, seen + 1),
                 Seen::Surface => seen += 1,
                 Seen::Hidden | Seen::Never => {}

@@ -53,7 +53,8 @@ pub struct MetaRoom {
     pub cloud: Cloud,
     /// Visits that it was made from.
     pub visits: usize,
-    options: NoticeOptions,
+    /// How differences are told.
+    pub options: NoticeOptions,
 }
 
 /// Something that was not there before.
@@ -135,20 +136,29 @@ impl MetaRoom {
 
     /// The poses of the views after all were moved together onto the static structure, where they fit it.
     fn localised(&self, views: &[View]) -> Result<Vec<Isometry3<f64>>, LearningError> {
-        const THINNED_M: f32 = 0.03;
+        /// What is seen is thinned by pixels: points of a grid of voxels are drawn onto those of another grid, and centimetres off the truth where only
+        /// edges hold what is seen along a plane.
+        const EVERY: usize = 6;
+        const ROOM_M: f32 = 0.01;
         const NEIGHBOURS: usize = 12;
         let stated: Vec<Isometry3<f64>> = views.iter().map(|v| v.world_from_camera).collect();
-        let seen = voxel::downsample(&together(views, &stated), THINNED_M)?;
-        let source = Prepared::with_normals(&seen.points, NEIGHBOURS)?;
-        let target = Prepared::with_normals(&voxel::downsample(&self.cloud, THINNED_M)?.points, NEIGHBOURS)?;
+        let thinned: Vec<View> =
+            views.iter().map(|v| View { cloud: every(&v.cloud, EVERY), ..v.clone() }).collect();
+        let source = Prepared::with_normals(&together(&thinned, &stated).points, NEIGHBOURS)?;
+        let target = Prepared::with_normals(&voxel::downsample(&self.cloud, ROOM_M)?.points, NEIGHBOURS)?;
+        let (far_m, delta_m) = (self.options.search_m, self.options.delta_m);
         let mut by_world = Isometry3::identity();
         // From far to near, so that what has moved since has no say in the end.
-        for within_m in [self.options.search_m, 0.4 * self.options.search_m] {
+        for (within_m, robust_m) in
+            [(far_m, 5.0 * delta_m), (0.4 * far_m, 2.0 * delta_m), (3.0 * delta_m as f32, delta_m)]
+        {
             let options = RegisterOptions {
                 method: Method::Generalised,
                 start_target_from_source: by_world,
                 within_m,
-                robust_m: Some(self.options.delta_m),
+                settle_m: 1e-4,
+                settle_rad: 1e-4,
+                robust_m: Some(robust_m),
                 ..RegisterOptions::default()
             };
             let fit = align(&source, &target, &options)?;
@@ -318,6 +328,14 @@ fn maps(views: &[View], poses: &[Isometry3<f64>]) -> Result<Vec<DepthMap>, Learn
         organised.ok_or(LearningError::NotOrganised { view: k })
     };
     views.iter().zip(poses).enumerate().map(map).collect()
+}
+
+/// Each so many-th pixel along rows and columns.
+fn every(cloud: &Cloud, step: usize) -> Cloud {
+    let width = cloud.grid.map_or(1, |grid| grid.width.max(1));
+    let kept =
+        (0..cloud.len()).filter(|i| (i % width).is_multiple_of(step) && (i / width).is_multiple_of(step));
+    cloud.select(&kept.map(|i| i as u32).collect::<Vec<_>>())
 }
 
 /// Points alone: what is static is kept without colours and labels.

@@ -1,9 +1,11 @@
 //! Keyframes: which looks are far enough apart, and how they lie to each other (section IV-C).
 //!
 //! The paper tracks the camera from frame to frame and adjusts all keyframes in the end. Here all keyframes are aligned together against each
-//! other and against where localisation had them, as [`crate::merge`] does; one that contradicts the others is left out and says why.
+//! other and against where localisation had them, as [`crate::merge`] does; one that contradicts the others is left out and says why. Then what is
+//! printed on things brings together what surfaces leave loose.
 
 use super::LearningError;
+use super::texture;
 use crate::merge::{self, MergeOptions};
 use crate::view::View;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
@@ -43,10 +45,13 @@ pub fn register(
 ) -> Result<Vec<Keyframe>, LearningError> {
     let options = MergeOptions { up, range_m, ..MergeOptions::default() };
     let fits = merge::align_views(views, &options)?;
-    let keyframe = |fit: merge::ViewFit| Keyframe {
-        world_from_camera: fit.world_from_camera,
+    let poses: Vec<Isometry3<f64>> = fits.iter().map(|f| f.world_from_camera).collect();
+    let used: Vec<bool> = fits.iter().map(|f| f.used).collect();
+    let poses = texture::refined(views, &poses, &used, range_m);
+    let keyframe = |(fit, world_from_camera): (merge::ViewFit, Isometry3<f64>)| Keyframe {
+        world_from_camera,
         used: fit.used,
         why: fit.why,
     };
-    Ok(fits.into_iter().map(keyframe).collect())
+    Ok(fits.into_iter().zip(poses).map(keyframe).collect())
 }

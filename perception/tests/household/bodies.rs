@@ -10,28 +10,28 @@ pub struct Body {
     pub parts: Vec<Part>,
 }
 
-fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
+pub(super) fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
     Translation3::new(x, y, z).into()
 }
 
-fn tilted(x: f64, y: f64, z: f64, turn: [f64; 3]) -> Isometry3<f64> {
+pub(super) fn tilted(x: f64, y: f64, z: f64, turn: [f64; 3]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_scaled_axis(Vector3::from(turn)))
 }
 
-fn part(solid: Solid, paint: Paint, here_from_part: Isometry3<f64>) -> Part {
+pub(super) fn part(solid: Solid, paint: Paint, here_from_part: Isometry3<f64>) -> Part {
     Part { solid, paint, here_from_part }
 }
 
-fn cubes(base: [u8; 3], spread: f64, coarse_m: f64, seed: u64) -> Paint {
+pub(super) fn cubes(base: [u8; 3], spread: f64, coarse_m: f64, seed: u64) -> Paint {
     Paint::Cubes { base, spread, coarse_m, fine_m: 0.4 * coarse_m, seed }
 }
 
-fn cone(low_m: f64, high_m: f64, height_m: f64) -> Solid {
+pub(super) fn cone(low_m: f64, high_m: f64, height_m: f64) -> Solid {
     Solid::Cone { low_m, high_m, height_m, wall_m: None }
 }
 
 /// A bow of rods in the plane y = 0, out from x.
-fn bow(x: f64, low: f64, high: f64, out: f64, radius_m: f64, paint: Paint) -> Vec<Part> {
+pub(super) fn bow(x: f64, low: f64, high: f64, out: f64, radius_m: f64, paint: Paint) -> Vec<Part> {
     let knots: Vec<[f64; 3]> = (0..=6)
         .map(|i| {
             let turn = std::f64::consts::PI * f64::from(i) / 6.0;

@@ -3,6 +3,7 @@
 #![allow(dead_code)]
 
 mod bodies;
+pub mod made;
 mod solid;
 
 pub use bodies::{Body, bodies};

@@ -10,7 +10,7 @@ use crate::sim::render::visible_share;
 use crate::sim::scene::{
     DoorSpec, DoorState, ObjectSpec, ObstacleSpec, RoomSpec, SceneSpec, SurfaceSpec, TargetSpec,
 };
-use crate::sim::shape::Outline;
+use crate::sim::shape::{Outline, Shape};
 use crate::sim::walls::walls;
 use crate::sim::world::{HungDoor, LABEL_OBJECT, Object, Scene, Stand, upright};
 use nalgebra::{Isometry2, Point2, Vector2};
@@ -55,6 +55,7 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
         target_visible_from_start: None,
         mapped: spec.mapped,
         stereo: spec.stereo,
+        visit: spec.visit,
     };
     let description = body::description();
     let router = Router::new(&scene.map(), description.footprint.radius_m() + SAFETY_M, description.speeds);
@@ -66,6 +67,12 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
         ));
     }
     let mut failures = Failures::default();
+    if spec.visits > 1 {
+        let placed = (0..ROUNDS as u64).find_map(|round| visits(spec, mix(seed ^ 0x71517) ^ round));
+        failures.crowded = ROUNDS;
+        scene.objects = placed.ok_or_else(|| failures.report(spec, seed))?;
+        return Ok(scene);
+    }
     for _ in 0..ROUNDS {
         if !place_all(spec, &mut scene, &mut rng) {
             failures.crowded += 1;
@@ -106,6 +113,7 @@ fn stand_on_floor(spec: &SceneSpec, seed: u64) -> Result<Vec<ObstacleSpec>, Inpu
             placed.push(o);
         }
         if placed.len() == spec.obstacles.len() {
+            placed.retain(|o| spec.is_there(&o.visits, spec.visit));
             return Ok(placed);
         }
     }
@@ -176,6 +184,35 @@ impl Failures {
     }
 }
 
+/// What stands where in the visit asked for: who comes or moves finds a place beside those that are there, by draws of his own, so that all others stay
+/// where they stood.
+fn visits(spec: &SceneSpec, seed: u64) -> Option<Vec<Object>> {
+    let mut there: Vec<Option<Object>> = vec![None; spec.objects.len()];
+    let mut asked = Vec::new();
+    let draws = |i: usize, visit: usize| ChaCha8Rng::seed_from_u64(mix(mix(seed ^ i as u64) ^ visit as u64));
+    for visit in 1..=spec.visits {
+        let is_there = |o: &ObjectSpec| spec.is_there(&o.visits, visit);
+        for (i, o) in spec.objects.iter().enumerate() {
+            if !is_there(o) || o.moves.contains(&visit) {
+                there[i] = None;
+            }
+        }
+        for (i, o) in spec.objects.iter().enumerate().filter(|(_, o)| is_there(o)) {
+            if there[i].is_none() {
+                let scaled = |[low, high]: [f64; 2]| o.shape.scaled(draws(i, 0).random_range(low..=high));
+                let shape = o.scale.map_or(o.shape.clone(), scaled);
+                let mut rng = draws(i, visit);
+                let surface = choose_surface(spec, o, None, &mut rng)?;
+                there[i] = Some(place(o, shape, surface, there.iter().flatten(), spec.gap_m, &mut rng)?);
+            }
+        }
+        if visit == spec.visit {
+            asked = there.iter().flatten().cloned().collect();
+        }
+    }
+    Some(asked)
+}
+
 fn place_all(spec: &SceneSpec, scene: &mut Scene, rng: &mut ChaCha8Rng) -> bool {
     scene.objects.clear();
     // What is fixed stands first, then what is large: small things find room between large ones.
@@ -197,28 +234,40 @@ fn place_all(spec: &SceneSpec, scene: &mut Scene, rng: &mut ChaCha8Rng) -> bool 
     let mut placed: Vec<Option<Object>> = vec![None; spec.objects.len()];
     for i in order {
         let o = &spec.objects[i];
-        let surface = surfaces[i];
-        let mut object = Object {
-            name: o.name.clone(),
-            kind: o.kind.clone().unwrap_or_else(|| o.name.clone()),
-            shape: shapes[i].clone(),
-            colour: o.colour,
-            stands: Stand::On(surface.name.clone()),
-            map_from_object: surface.map_from_top(),
-        };
-        let tries = if o.position_m.is_some() { 1 } else { PLACES };
-        let fixed = o.position_m.is_some();
-        let found = (0..tries).any(|_| {
-            move_somewhere(o, surface, &mut object, rng);
-            fixed || fits(&object, surface, placed.iter().flatten(), spec.gap_m)
-        });
-        if !found {
-            return false;
+        let others = placed.iter().flatten();
+        match place(o, shapes[i].clone(), surfaces[i], others, spec.gap_m, rng) {
+            Some(object) => placed[i] = Some(object),
+            None => return false,
         }
-        placed[i] = Some(object);
     }
     scene.objects = placed.into_iter().flatten().collect();
     true
+}
+
+/// An object on its surface, beside the others that stand there; none if no place was found.
+fn place<'a>(
+    o: &ObjectSpec,
+    shape: Shape,
+    surface: &SurfaceSpec,
+    others: impl Iterator<Item = &'a Object> + Clone,
+    gap_m: f64,
+    rng: &mut ChaCha8Rng,
+) -> Option<Object> {
+    let mut object = Object {
+        name: o.name.clone(),
+        kind: o.kind.clone().unwrap_or_else(|| o.name.clone()),
+        shape,
+        colour: o.colour,
+        stands: Stand::On(surface.name.clone()),
+        map_from_object: surface.map_from_top(),
+    };
+    let fixed = o.position_m.is_some();
+    let tries = if fixed { 1 } else { PLACES };
+    let found = (0..tries).any(|_| {
+        move_somewhere(o, surface, &mut object, rng);
+        fixed || fits(&object, surface, others.clone(), gap_m)
+    });
+    found.then_some(object)
 }
 
 /// For each object one of the surfaces that it may stand on, by their weights; nothing is drawn where there is one.
@@ -227,30 +276,39 @@ fn choose_surfaces<'a>(spec: &'a SceneSpec, rng: &mut ChaCha8Rng) -> Option<Vec<
     for o in &spec.objects {
         let other = spec.objects.iter().position(|other| Some(&other.name) == o.apart_from.as_ref());
         let taken = other.and_then(|k| chosen.get(k)).map(|s| &s.name);
-        let weight = |k: usize| o.weights.as_ref().map_or(1.0, |w| w[k]);
-        let choice: Vec<(&SurfaceSpec, f64)> = spec
-            .surfaces_of(o)
-            .into_iter()
-            .enumerate()
-            .filter(|(_, s)| Some(&s.name) != taken)
-            .map(|(k, s)| (s, weight(k)))
-            .filter(|(_, weight)| *weight > 0.0)
-            .collect();
-        let surface = match choice.as_slice() {
-            [] => return None,
-            [(only, _)] => only,
-            several => {
-                let mut left = rng.random::<f64>() * several.iter().map(|(_, weight)| weight).sum::<f64>();
-                let first = several.iter().find(|(_, weight)| {
-                    left -= weight;
-                    left < 0.0
-                });
-                first.unwrap_or(&several[several.len() - 1]).0
-            }
-        };
-        chosen.push(surface);
+        chosen.push(choose_surface(spec, o, taken, rng)?);
     }
     Some(chosen)
+}
+
+/// One of the surfaces that an object may stand on, by their weights, but not `taken`.
+fn choose_surface<'a>(
+    spec: &'a SceneSpec,
+    o: &ObjectSpec,
+    taken: Option<&String>,
+    rng: &mut ChaCha8Rng,
+) -> Option<&'a SurfaceSpec> {
+    let weight = |k: usize| o.weights.as_ref().map_or(1.0, |w| w[k]);
+    let choice: Vec<(&SurfaceSpec, f64)> = spec
+        .surfaces_of(o)
+        .into_iter()
+        .enumerate()
+        .filter(|(_, s)| Some(&s.name) != taken)
+        .map(|(k, s)| (s, weight(k)))
+        .filter(|(_, weight)| *weight > 0.0)
+        .collect();
+    match choice.as_slice() {
+        [] => None,
+        [(only, _)] => Some(only),
+        several => {
+            let mut left = rng.random::<f64>() * several.iter().map(|(_, weight)| weight).sum::<f64>();
+            let first = several.iter().find(|(_, weight)| {
+                left -= weight;
+                left < 0.0
+            });
+            Some(first.unwrap_or(&several[several.len() - 1]).0)
+        }
+    }
 }
 
 fn move_somewhere(o: &ObjectSpec, surface: &SurfaceSpec, object: &mut Object, rng: &mut ChaCha8Rng) {

@@ -3,6 +3,7 @@
 
 pub mod arrange;
 pub mod body;
+pub mod composed;
 pub mod drive;
 pub mod faults;
 mod hand;

@@ -210,13 +210,14 @@ fn draw_solid(p: &Placed, camera: &Intrinsics, row: usize, line: &mut Line) {
         }
         let in_camera = ray(camera, column, row);
         let d = p.solid_from_camera * in_camera;
-        if let Some(hit) = p.solid.hit(&p.origin, &d, line.depth[column]) {
+        if let Some((hit, part)) = p.solid.meet(&p.origin, &d, line.depth[column]) {
             // Seen from inside a cup the surface faces the other way.
             let facing = if d.dot(&hit.normal) > 0.0 { -hit.normal } else { hit.normal };
             line.depth[column] = hit.t;
             line.cosine[column] = (-d.dot(&facing) / in_camera.norm()) as f32;
             line.label[column] = p.solid.label;
-            line.colour[column] = shade(p.solid.colour, &(rotation * facing));
+            let colour = p.solid.colour_at(part, &(p.origin + d * hit.t));
+            line.colour[column] = shade(colour, &(rotation * facing));
         }
     }
 }

@@ -77,7 +77,11 @@ struct Trip {
 
 impl SimRobot {
     /// Puts the body at the start of a scene.
-    pub fn new(scene: Scene, options: SimOptions) -> SimRobot {
+    pub fn new(scene: Scene, mut options: SimOptions) -> SimRobot {
+        if scene.visit > 1 {
+            // Nobody errs the same way in every visit.
+            options.seed = noise::mix(options.seed ^ scene.visit as u64);
+        }
         let mut description = body::description();
         description.pose_sigma_m = options.localisation.sigma_m;
         description.pose_sigma_rad = options.localisation.sigma_rad;

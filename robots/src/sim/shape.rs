@@ -1,6 +1,7 @@
 //! The solids that stand in a scene, and where rays meet them. Frame of a shape: origin at the centre of its base, z up.
 
-use nalgebra::{Point3, Vector3};
+use crate::sim::composed::{self, Composed, Paint};
+use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// What an object is made of. Lengths in metres, outer sizes.
@@ -17,6 +18,16 @@ pub enum Shape {
     Canister(Canister),
     /// A box along its axes.
     Box(Cuboid),
+    /// An ellipsoid along its axes.
+    Ball(Ball),
+    /// An upright rod, round at its ends.
+    Rod(Rod),
+    /// Half a ring that stands upright towards its x axis: a handle.
+    Bow(Bow),
+    /// Several solids as one rigid thing.
+    Composed(Composed),
+    /// A composed thing of a household, by name: kettle, teddy, ….
+    Household(String),
 }
 
 /// An open, hollow, possibly tapered cylinder.
@@ -89,6 +100,34 @@ pub struct Cuboid {
     pub size_m: [f64; 3],
 }
 
+/// An ellipsoid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ball {
+    /// Its diameters along x, y and z.
+    pub size_m: [f64; 3],
+}
+
+/// A rod that is round at its ends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rod {
+    /// From end to end.
+    pub length_m: f64,
+    /// Across.
+    pub diameter_m: f64,
+}
+
+/// Half a ring.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bow {
+    /// Across the ring, which is how high it stands.
+    pub height_m: f64,
+    /// Of the rod that is bent.
+    pub thickness_m: f64,
+}
+
 fn default_wall_m() -> f64 {
     0.003
 }
@@ -122,18 +161,36 @@ impl Shape {
             | Shape::Mug(Mug { height_m, .. })
             | Shape::Cylinder(Cylinder { height_m, .. })
             | Shape::Canister(Canister { height_m, .. }) => *height_m,
-            Shape::Box(Cuboid { size_m }) => size_m[2],
+            Shape::Box(Cuboid { size_m }) | Shape::Ball(Ball { size_m }) => size_m[2],
+            Shape::Rod(Rod { length_m, .. }) => *length_m,
+            Shape::Bow(Bow { height_m, .. }) => *height_m,
+            Shape::Composed(_) | Shape::Household(_) => self.bounds().1.z,
+        }
+    }
+
+    /// What it is composed of, if it is.
+    fn composed(&self) -> Option<&Composed> {
+        match self {
+            Shape::Composed(composed) => Some(composed),
+            Shape::Household(name) => composed::named(name),
+            _ => None,
         }
     }
 
     /// Corners of the box around it in its own frame.
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
+        if let Some(composed) = self.composed() {
+            return composed.bounds();
+        }
         let (half_x, half_y, high_x) = match self {
             Shape::Mug(m) => {
                 let r = 0.5 * m.diameter_m.max(m.base_diameter_m.unwrap_or(0.0));
                 (r, r, handle_centre_m(m) + m.handle_m)
             }
-            Shape::Box(Cuboid { size_m }) => (0.5 * size_m[0], 0.5 * size_m[1], 0.5 * size_m[0]),
+            Shape::Box(Cuboid { size_m }) | Shape::Ball(Ball { size_m }) => {
+                (0.5 * size_m[0], 0.5 * size_m[1], 0.5 * size_m[0])
+            }
+            Shape::Bow(b) => (0.0, 0.5 * b.thickness_m, 0.5 * b.height_m),
             _ => {
                 let r = self.round_radius_m();
                 (r, r, r)
@@ -156,6 +213,10 @@ impl Shape {
     /// How wide a hand must open around its body, a handle left out, metres.
     pub fn width_m(&self) -> f64 {
         match self {
+            Shape::Ball(_) | Shape::Bow(_) | Shape::Composed(_) | Shape::Household(_) => {
+                let (low, high) = self.bounds();
+                (high - low).xy().min()
+            }
             Shape::Box(Cuboid { size_m }) => size_m[0].min(size_m[1]),
             _ => 2.0 * self.round_radius_m(),
         }
@@ -187,7 +248,20 @@ impl Shape {
                 c.lid_diameter_m *= factor;
                 c.lid_height_m *= factor;
             }
-            Shape::Box(b) => b.size_m.iter_mut().for_each(|s| *s *= factor),
+            Shape::Box(Cuboid { size_m }) | Shape::Ball(Ball { size_m }) => {
+                size_m.iter_mut().for_each(|s| *s *= factor);
+            }
+            Shape::Rod(r) => {
+                r.length_m *= factor;
+                r.diameter_m *= factor;
+            }
+            Shape::Bow(b) => {
+                b.height_m *= factor;
+                b.thickness_m *= factor;
+            }
+            Shape::Composed(_) | Shape::Household(_) => {
+                shape = Shape::Composed(self.composed().map(|c| c.scaled(factor)).unwrap_or_default());
+            }
         }
         shape
     }
@@ -198,14 +272,44 @@ impl Shape {
             Shape::Mug(m) => m.diameter_m.max(m.base_diameter_m.unwrap_or(0.0)),
             Shape::Cylinder(c) => c.diameter_m.max(c.top_diameter_m.unwrap_or(0.0)),
             Shape::Canister(c) => c.diameter_m.max(c.lid_diameter_m),
-            Shape::Box(b) => b.size_m[0].hypot(b.size_m[1]),
+            Shape::Box(Cuboid { size_m }) => size_m[0].hypot(size_m[1]),
+            Shape::Ball(Ball { size_m }) => size_m[0].max(size_m[1]),
+            Shape::Rod(r) => r.diameter_m,
+            Shape::Bow(b) => b.height_m,
+            Shape::Composed(_) | Shape::Household(_) => 2.0 * self.composed().map_or(0.0, Composed::radius_m),
         };
         0.5 * diameter
+    }
+
+    /// The surfaces that a ray can meet, with their colours; `colour` is that of those that say none.
+    pub fn painted(&self, colour: [u8; 3]) -> Vec<(Part, Paint)> {
+        match self.composed() {
+            Some(composed) => composed.painted(colour),
+            None => self.parts().into_iter().map(|part| (part, Paint { colour, pattern: None })).collect(),
+        }
     }
 
     /// The surfaces that a ray can meet.
     pub fn parts(&self) -> Vec<Part> {
         match self {
+            Shape::Composed(_) | Shape::Household(_) => {
+                self.painted([0; 3]).into_iter().map(|(part, _)| part).collect()
+            }
+            Shape::Ball(Ball { size_m }) => vec![Part::ball(&(0.5 * Vector3::from(*size_m)), 0.0)],
+            Shape::Rod(r) => {
+                let radius = 0.5 * r.diameter_m;
+                let end = Vector3::repeat(radius);
+                vec![
+                    Part::frustum(radius, radius, radius, r.length_m - radius),
+                    Part::ball(&end, 0.0),
+                    Part::ball(&end, r.length_m - r.diameter_m),
+                ]
+            }
+            Shape::Bow(b) => vec![Part::Handle {
+                centre: Point3::new(0.0, 0.0, 0.5 * b.height_m),
+                major_m: 0.5 * (b.height_m - b.thickness_m),
+                minor_m: 0.5 * b.thickness_m,
+            }],
             Shape::Cup(c) => shell(c.diameter_m, c.base_diameter_m, c.height_m, c.wall_m),
             Shape::Mug(m) => {
                 let mut parts = shell(m.diameter_m, m.base_diameter_m, m.height_m, m.wall_m);
@@ -308,6 +412,20 @@ pub enum Part {
         /// Greatest corner.
         high: Point3<f64>,
     },
+    /// An ellipsoid.
+    Ball {
+        /// Its middle.
+        middle: Point3<f64>,
+        /// Half its diameters.
+        half: Vector3<f64>,
+    },
+    /// Another surface in a frame of its own.
+    Turned {
+        /// That frame.
+        part_from_here: Isometry3<f64>,
+        /// The surface there.
+        part: Box<Part>,
+    },
 }
 
 /// Where a ray meets a surface.
@@ -330,10 +448,25 @@ impl Part {
         Part::Frustum { axis_m: base_m - slope * low_m, slope, low_m, high_m }
     }
 
+    /// An ellipsoid that touches the level `low_m` from above.
+    fn ball(half: &Vector3<f64>, low_m: f64) -> Part {
+        Part::Ball { middle: Point3::new(0.0, 0.0, low_m + half.z), half: *half }
+    }
+
+    /// The surface in another frame than its own.
+    pub(crate) fn turned(self, part_from_here: Isometry3<f64>) -> Part {
+        Part::Turned { part_from_here, part: Box::new(self) }
+    }
+
     /// The first hit with 0 < t < `before`.
     #[inline]
     pub fn hit(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<Hit> {
         match *self {
+            Part::Turned { part_from_here, ref part } => {
+                let hit = part.hit(&(part_from_here * o), &(part_from_here * d), before)?;
+                Some(Hit { normal: part_from_here.rotation.inverse() * hit.normal, ..hit })
+            }
+            Part::Ball { middle, half } => ball_hit(o, d, before, &middle, &half),
             Part::Frustum { axis_m, slope, low_m, high_m } => {
                 frustum_hit(o, d, before, (axis_m, slope), (low_m, high_m))
             }
@@ -428,6 +561,26 @@ fn cuboid_hit(
     let mut normal = Vector3::zeros();
     normal[axis] = 1.0;
     Some(Hit { t, normal })
+}
+
+/// In the frame in which its half diameters are one it is a ball of radius 1.
+#[inline]
+fn ball_hit(
+    o: &Point3<f64>,
+    d: &Vector3<f64>,
+    before: f64,
+    middle: &Point3<f64>,
+    half: &Vector3<f64>,
+) -> Option<Hit> {
+    let (from, along) = ((o - middle).component_div(half), d.component_div(half));
+    let (a, b, c) = (along.norm_squared(), from.dot(&along), from.norm_squared() - 1.0);
+    let square = b * b - a * c;
+    if square < 0.0 {
+        return None;
+    }
+    let root = square.sqrt();
+    let t = [(-b - root) / a, (-b + root) / a].into_iter().find(|t| *t > NEAREST_T)?;
+    (t < before).then(|| Hit { t, normal: (from + along * t).component_div(half).normalize() })
 }
 
 /// The body is convex, two boxes and four cylinders together: from outside a ray enters it where it enters the first of them.

@@ -2,6 +2,7 @@
 
 use crate::body::Pose2;
 use crate::grid::OccupancyGrid;
+use crate::sim::composed::Paint;
 use crate::sim::scene::{Doorway, ObstacleSpec, RoomSpec, SurfaceKind, SurfaceSpec, TargetSpec};
 use crate::sim::shape::{Cuboid, Hit, Part, Shape};
 use crate::sim::stereo::Stereo;
@@ -46,7 +47,14 @@ pub struct Object {
 impl Object {
     /// Middle of the box around it, handle left out, in the map.
     pub fn centre_m(&self) -> Point3<f64> {
-        self.map_from_object * Point3::new(0.0, 0.0, 0.5 * self.shape.height_m())
+        let middle = match &self.shape {
+            Shape::Composed(_) | Shape::Household(_) => {
+                let (low, high) = self.shape.bounds();
+                nalgebra::center(&low, &high)
+            }
+            _ => Point3::new(0.0, 0.0, 0.5 * self.shape.height_m()),
+        };
+        self.map_from_object * middle
     }
 
     /// Name of the surface that it stands on.
@@ -107,6 +115,8 @@ pub struct Scene {
     pub mapped: bool,
     /// The pair of cameras, if the body has one instead of the depth camera.
     pub stereo: Option<Stereo>,
+    /// Which visit this is.
+    pub visit: usize,
 }
 
 /// What a pixel shows.
@@ -125,6 +135,8 @@ pub struct Solid {
     pub map_from_solid: Isometry3<f64>,
     /// Its surfaces.
     pub parts: Vec<Part>,
+    /// Their colours, in the same order; none: all are of the one colour.
+    pub paints: Vec<Paint>,
     /// The box around it in its own frame.
     pub bounds: (Point3<f64>, Point3<f64>),
     /// Red, green, blue.
@@ -137,21 +149,33 @@ impl Solid {
     /// The first hit of a ray in the solid's own frame.
     #[inline]
     pub fn hit(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<Hit> {
+        self.meet(o, d, before).map(|(hit, _)| hit)
+    }
+
+    /// The same, and the number of the part that is hit.
+    #[inline]
+    pub fn meet(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<(Hit, usize)> {
         let mut nearest = None;
         let mut before = before;
-        for part in &self.parts {
+        for (n, part) in self.parts.iter().enumerate() {
             if let Some(hit) = part.hit(o, d, before) {
                 before = hit.t;
-                nearest = Some(hit);
+                nearest = Some((hit, n));
             }
         }
         nearest
+    }
+
+    /// The colour of a part at a place of the solid's own frame.
+    pub fn colour_at(&self, part: usize, p: &Point3<f64>) -> [u8; 3] {
+        self.paints.get(part).map_or(self.colour, |paint| paint.at(p))
     }
 
     fn cuboid(map_from_solid: Isometry3<f64>, low: Point3<f64>, high: Point3<f64>, colour: [u8; 3]) -> Solid {
         Solid {
             map_from_solid,
             parts: vec![Part::Cuboid { low, high }],
+            paints: Vec::new(),
             bounds: (low, high),
             colour,
             label: LABEL_FURNITURE,
@@ -181,6 +205,8 @@ const PANEL_M: f64 = 0.04;
 const BEYOND_M: f64 = 10.0;
 /// Thickness of a seat on legs, metres.
 const SEAT_M: f64 = 0.06;
+/// Thickness of a chair's back, metres.
+const BACK_M: f64 = 0.04;
 /// Of every wall.
 pub const WALL_COLOUR: [u8; 3] = [205, 205, 195];
 const PANEL_COLOUR: [u8; 3] = [140, 90, 60];
@@ -242,6 +268,8 @@ impl ObstacleSpec {
             yaw_deg: 0.0,
             corner_m: 0.0,
             legs_m: None,
+            back_m: None,
+            visits: Vec::new(),
             on_map: false,
             colour: WALL_COLOUR,
         }
@@ -253,8 +281,8 @@ impl ObstacleSpec {
     }
 
     fn solid(&self) -> Solid {
-        let (low, high) = Shape::Box(Cuboid { size_m: self.size_m }).bounds();
-        let parts = match self.legs_m {
+        let (low, mut high) = Shape::Box(Cuboid { size_m: self.size_m }).bounds();
+        let mut parts = match self.legs_m {
             Some(legs_m) => {
                 let thick = Vector3::new(legs_m, legs_m, 0.0);
                 let under_m = (high.z - SEAT_M).max(0.5 * high.z);
@@ -273,6 +301,11 @@ impl ObstacleSpec {
             None if self.corner_m > 0.0 => vec![Part::Rounded { high, corner_m: self.corner_m }],
             None => vec![Part::Cuboid { low, high }],
         };
+        if let Some(back_m) = self.back_m {
+            let seat = high;
+            high.z += back_m;
+            parts.push(Part::Cuboid { low: Point3::new(seat.x - BACK_M, low.y, seat.z), high });
+        }
         Solid { parts, ..Solid::cuboid(self.map_from_obstacle(), low, high, self.colour) }
     }
 
@@ -384,9 +417,11 @@ impl Scene {
 impl Object {
     /// The object as something that a ray can meet.
     pub fn solid(&self, label: u16) -> Solid {
+        let (parts, paints) = self.shape.painted(self.colour).into_iter().unzip();
         Solid {
             map_from_solid: self.map_from_object,
-            parts: self.shape.parts(),
+            parts,
+            paints,
             bounds: self.shape.bounds(),
             colour: self.colour,
             label,

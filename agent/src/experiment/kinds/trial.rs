@@ -20,7 +20,7 @@ use descry_domains::abilities::searching::policies::{self, Foresight};
 use descry_domains::answer::Verdict;
 
 use crate::report::{Event, Report};
-use crate::run::{self, Folder, Settings, Watcher};
+use crate::run::{self, Folder, Settings, Task, Watcher};
 
 /// Seeds tried for an arrangement that is as hidden as was asked for.
 const ARRANGEMENTS: u64 = 20;
@@ -105,7 +105,8 @@ pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Liv
         }
     };
     let watcher = Watcher { stop, tell: &mut count };
-    let report = run::pursue(trial.domain, &goal, &body, &folder, &settings, chooser, watcher);
+    let task = Task { domain: trial.domain, goal: &goal, past: None };
+    let report = run::pursue(task, &body, &folder, &settings, chooser, watcher);
     let report = report.map_err(|e| e.to_string())?;
     let run_s = started.elapsed().as_secs_f64() - arranged_s;
     let mut clock = Row::new();

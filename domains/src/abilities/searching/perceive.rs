@@ -23,6 +23,7 @@ use super::change::Change;
 use super::discover;
 use super::placing;
 use super::vanished::{keep_unrefuted, set_aside_unseen, taken_away};
+use crate::abilities::learning::again;
 use crate::lexicon::symbol;
 use crate::mind::{Laid, Look, Mind};
 use crate::note::Note;
@@ -165,6 +166,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     let newest = newest(&views, &merged);
     let scene = segment_on(&merged.cloud, &merged.visibility, surface, &seeking);
     let percepts = eyes.recogniser.recognise(&scene, &merged.visibility, eyes.objects);
+    let percepts = known_again(mind, on, (&views, &merged), percepts);
     if !mind.known.surfaces[on].whole {
         discover::join(mind, on, &scene.surface);
     }
@@ -184,6 +186,20 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     }
 }
 
+/// Says of each percept which of the things that were learned it may be.
+fn known_again(
+    mind: &mut Mind,
+    on: usize,
+    (views, merged): (&[View], &Merged),
+    percepts: Vec<Percept>,
+) -> Vec<Percept> {
+    let placed = views.iter().zip(&merged.fits).filter(|(_, fit)| fit.used);
+    let placed: Vec<(&View, Isometry3<f64>)> =
+        placed.map(|(view, fit)| (view, fit.world_from_camera)).collect();
+    let Mind { known, glances, .. } = mind;
+    again::explain(&known.news, glances, &known.surfaces[on], &placed, &merged.cloud, percepts)
+}
+
 /// The same, for a surface that the map has: it is looked for where its outline is.
 fn seeking_at(seeking: SceneOptions, surface: &KnownSurface) -> SceneOptions {
     let region = surface.whole.then(|| Region { corners: surface.outline.clone(), margin_m: BESIDE_M });
@@ -196,6 +212,7 @@ fn begin_again(mind: &mut Mind, on: usize) {
     let region = &mut mind.regions[on];
     let last = region.looks.len().saturating_sub(1);
     region.looks.drain(..last);
+    mind.glances.clear();
     let surface = mind.known.surfaces[on].symbol.clone();
     mind.forget_looks(Some(&surface));
     let here = mind.known.candidates[mind.known.at].symbol.clone();
@@ -228,6 +245,21 @@ fn place_looks(
         look.laid = placing::of_view(description, known, view, options);
     }
     Ok(())
+}
+
+/// A view as it lies on the outline that the map has of a surface; as localisation has it where there is none, or nothing of it is seen.
+pub(crate) fn laid(eyes: Eyes<'_>, surface: &KnownSurface, view: View) -> View {
+    if !surface.whole {
+        return view;
+    }
+    let (merging, seeking) = options(eyes.robot, Some(&surface.symbol));
+    let seeking = seeking_at(seeking, surface);
+    match placing::of_view(eyes.robot.description(), surface, view.clone(), (&merging, &seeking.surface)) {
+        Laid::By(map_from_localised) => {
+            View { world_from_camera: map_from_localised * view.world_from_camera, ..view }
+        }
+        Laid::AsLocalised | Laid::Nowhere => view,
+    }
 }
 
 /// Whether a camera is moved farther from where localisation has it than that errs.
@@ -294,6 +326,7 @@ pub fn something_moved(
     space.forget(&change.foot, &change.up, change.radius_m, change.height_m);
     put(record, "change", change.stamp_ns, &change)?;
     mind.regions[on].changes.push(change);
+    mind.glances.clear();
     let surface = mind.known.surfaces[on].symbol.clone();
     mind.forget_looks(Some(&surface));
     Ok(())

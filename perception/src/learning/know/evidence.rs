@@ -38,9 +38,10 @@ pub struct Judge {
 }
 
 impl Default for Judge {
-    /// Weights by reasoning, in the order of [`Evidence::measures`]; part `judge` of `examples/learning` fits others to simulated scenes.
+    /// Weights in the order of [`Evidence::measures`], as part `judge` of `examples/learning` with seed 501 and 24 scenes fits them to drawn objects that
+    /// no evaluation knows.
     fn default() -> Self {
-        Judge { weights: [10.0, 8.0, 3.5, -0.6, -2.0, 0.8, 0.2, -2.0, -13.0] }
+        Judge { weights: [7.96, 8.17, 2.09, -2.60, 0.09, 0.81, 2.35, -6.89, -12.92] }
     }
 }
 

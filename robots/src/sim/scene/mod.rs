@@ -31,7 +31,7 @@
 //! spread_m = [4.0, 3.0]             # somewhere in this rectangle around its position, turned by the seed
 //! gap_m = 1.5                       # from all obstacles above it
 //! size_m = [0.32, 0.32, 0.6]
-//! corner_m = 0.12                   # radius of its upright edges; `legs_m = 0.03` makes a seat on four legs
+//! corner_m = 0.12                   # radius of its upright edges; `legs_m = 0.03` makes a seat on four legs, `back_m = 0.4` with it a chair
 //!
 //! [start]
 //! position_m = [-2.2, 0.0]
@@ -64,6 +64,18 @@
 //! baseline_m = 0.1
 //! disparity_sigma_px = 0.3          # depth is off by z²·0.3/(f·0.1)
 //! textured = 0.5                    # share of floor and walls on which anything can be matched
+//! ```
+//!
+//! What comes, goes and moves between visits stands in one scene; `visit = 2` at its beginning makes it that of the second:
+//!
+//! ```toml
+//! visits = 3                        # at the beginning
+//!
+//! [[object]]
+//! name = "kettle"
+//! shape.household = "kettle"        # composed of several solids, painted; or shape.composed = { parts = [...] }
+//! visits = [2, 3]                   # when it is there; always if left out
+//! moves = [3]                       # when it stands elsewhere than in the visit before
 //! ```
 //!
 //! A flat has several rooms instead of the one. What lies between them is wall, as high as the highest; doors are openings in it:
@@ -141,6 +153,16 @@ pub struct SceneSpec {
     /// A pair of cameras instead of the depth camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stereo: Option<Stereo>,
+    /// How many visits it tells of; between them things come, go and move.
+    #[serde(default = "default_one")]
+    pub visits: usize,
+    /// Which of them this is.
+    #[serde(default = "default_one")]
+    pub visit: usize,
+}
+
+fn default_one() -> usize {
+    1
 }
 
 fn default_true() -> bool {
@@ -211,7 +233,50 @@ impl SceneSpec {
             self.check_object(i, o)?;
         }
         self.check_stereo()?;
+        self.check_visits()?;
         self.check_target()
+    }
+
+    /// Whether what is there in some visits only (none: in all) is there now.
+    pub(crate) fn is_there(&self, visits: &[usize], visit: usize) -> bool {
+        visits.is_empty() || visits.contains(&visit)
+    }
+
+    fn check_visits(&self) -> Result<(), Objection> {
+        let known = 1..=self.visits;
+        let within = |path: &[Step], visits: &[usize]| match visits.iter().find(|v| !known.contains(v)) {
+            Some(visit) => Err(object(
+                path,
+                format!("there is no visit {visit}"),
+                format!("1 to {}, or another `visits` of the scene", self.visits),
+            )),
+            None => Ok(()),
+        };
+        within(&[Step::Key("visit")], &[self.visit])?;
+        for (i, o) in self.obstacles.iter().enumerate() {
+            within(&[Step::Key("obstacle"), Step::Index(i), Step::Key("visits")], &o.visits)?;
+        }
+        for (i, o) in self.objects.iter().enumerate() {
+            let at = |key| [Step::Key("object"), Step::Index(i), Step::Key(key)];
+            within(&at("visits"), &o.visits)?;
+            within(&at("moves"), &o.moves)?;
+            if self.visits > 1 && o.apart_from.is_some() {
+                let mend = "name its surface with `on`";
+                return Err(object(
+                    &at("apart_from"),
+                    "what moves between visits is not kept apart".into(),
+                    mend.into(),
+                ));
+            }
+        }
+        match &self.target {
+            Some(_) if self.visits > 1 => Err(object(
+                &[Step::Key("target")],
+                "a scene of several visits is not arranged around one object".into(),
+                "leave [target] out".into(),
+            )),
+            _ => Ok(()),
+        }
     }
 
     fn check_stereo(&self) -> Result<(), Objection> {

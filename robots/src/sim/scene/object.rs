@@ -4,6 +4,7 @@ use super::check::{finite, object, positive};
 use super::surface::headroom_m;
 use super::{SceneSpec, SurfaceSpec, default_grey, one_or_many};
 use crate::input::{Objection, Step};
+use crate::sim::composed::{Composed, household};
 use crate::sim::shape::{Cuboid, Shape};
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +46,12 @@ pub struct ObjectSpec {
     /// Red, green, blue.
     #[serde(default = "default_grey")]
     pub colour: [u8; 3],
+    /// The visits in which it is there; all if left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub visits: Vec<usize>,
+    /// The visits in which it stands elsewhere than in the one before.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub moves: Vec<usize>,
 }
 
 /// What an arrangement must show and hide.
@@ -270,5 +277,34 @@ fn check_shape(shape: &Shape, path: &[Step]) -> Result<(), Objection> {
             positive(&[c.height_m - c.lid_height_m], &within("canister", "height_m"))
         }
         Shape::Box(Cuboid { size_m }) => positive(size_m, &within("box", "size_m")),
+        Shape::Ball(ball) => positive(&ball.size_m, &within("ball", "size_m")),
+        Shape::Rod(rod) => {
+            positive(&[rod.diameter_m], &within("rod", "diameter_m"))?;
+            positive(&[rod.length_m - rod.diameter_m], &within("rod", "length_m"))
+        }
+        Shape::Bow(bow) => {
+            positive(&[bow.thickness_m], &within("bow", "thickness_m"))?;
+            positive(&[bow.height_m - 2.0 * bow.thickness_m], &within("bow", "height_m"))
+        }
+        Shape::Composed(composed) => check_parts(composed, &within("composed", "parts")),
+        Shape::Household(name) if household().all(|known| known != name) => Err(object(
+            &[path, &[Step::Key("household")]].concat(),
+            format!("nothing of a household is called \"{name}\""),
+            format!("one of: {}", household().collect::<Vec<_>>().join(", ")),
+        )),
+        Shape::Household(_) => Ok(()),
     }
+}
+
+fn check_parts(composed: &Composed, path: &[Step]) -> Result<(), Objection> {
+    if composed.parts.is_empty() {
+        return Err(object(path, "it has no part".into(), "give at least one".into()));
+    }
+    composed.parts.iter().enumerate().try_for_each(|(n, part)| {
+        let at = |key| [path, &[Step::Index(n), Step::Key(key)]].concat();
+        check_shape(&part.shape, &at("shape"))?;
+        finite(&part.at_m, &at("at_m"))?;
+        finite(&part.turn_deg, &at("turn_deg"))?;
+        part.pattern.map_or(Ok(()), |pattern| positive(&[pattern.size_m], &at("pattern")))
+    })
 }

@@ -76,6 +76,12 @@ pub struct ObstacleSpec {
     /// A seat on four legs this thick, not a box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub legs_m: Option<f64>,
+    /// How high its back stands above such a seat, metres; none: it has no back.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub back_m: Option<f64>,
+    /// The visits in which it is there; all if left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub visits: Vec<usize>,
     /// True if the robot's map shows it.
     #[serde(default = "default_true")]
     pub on_map: bool,
@@ -172,6 +178,13 @@ impl SceneSpec {
             if legs_m > half_m {
                 let problem = format!("legs {legs_m} m thick leave nothing between them");
                 return Err(object(&at("legs_m"), problem, format!("at most {half_m:.4}")));
+            }
+        }
+        if let Some(back_m) = o.back_m {
+            positive(&[back_m], &at("back_m"))?;
+            if o.legs_m.is_none() {
+                let problem = format!("\"{}\" has no seat to which a back belongs", o.name);
+                return Err(object(&at("back_m"), problem, "give `legs_m`, or leave `back_m` out".into()));
             }
         }
         if let Some(spread_m) = o.spread_m {

@@ -1,0 +1,286 @@
+//! Learned things known again on a surface, in any domain: what one of its views suggests is held against all of them, and what is left explains
+//! the objects that stand there.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use descry_perception::learning::{Glance, Guess, Judged, KnowOptions};
+use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::recognise::Percept;
+use descry_perception::{Cloud, Neighbours, View};
+
+use super::news::{Models, News};
+use crate::situation::KnownSurface;
+
+/// Returns farther than this tell nothing, metres.
+const RANGE_M: f64 = 3.0;
+/// So many of the newest cameras look at what all views show together.
+const TOGETHER: usize = 3;
+/// Guesses of all views together that are looked at, the surest first.
+const GUESSES: usize = 12;
+/// Guesses nearer to each other than this are one, metres and radians.
+const SAME: (f64, f64) = (0.03, 0.35);
+/// Less probability than this says nothing.
+const LEAST: f64 = 0.05;
+/// Points nearer than this to a thing's surface are of it, metres: views lie on each other to half of it.
+const OF_IT_M: f32 = 0.015;
+/// An object of which this share of the points is of a thing is that thing.
+const SHARE: f64 = 0.6;
+/// How far beside a surface a thing on it may have its middle, and how far above, metres.
+const BESIDE_M: f64 = 0.03;
+const ABOVE_M: (f64, f64) = (-0.02, 0.6);
+/// That some object is the thing that is sought, before it was looked at, and that a look at its surface does not tell it: 8 of 20 did not, in twelve
+/// searches of `tests/learning.py`, which is 1 of 2.5.
+const PRIOR: f64 = 0.3;
+const MISSED: f64 = 0.4;
+/// An object that is longer than a thing by more than this is not it, metres, nor one that is well seen and, with all that stands so near that it may be
+/// a part of it, has less than this share of its length; what stays of the probability then.
+const LONGER_M: f64 = 0.03;
+const SHORTER: f64 = 0.6;
+const BESIDE_IT_M: f64 = 0.04;
+const NOT_IT: f64 = 0.002;
+
+/// What was made of views so far, by their times.
+pub type Glances = BTreeMap<i64, Arc<Glance>>;
+
+/// A learned thing somewhere.
+pub(super) struct Found {
+    /// Its number among [`News::things`].
+    pub thing: usize,
+    /// Where, and how sure that is.
+    pub judged: Judged,
+    /// Its surface there.
+    pub cloud: Cloud,
+    tree: Neighbours,
+}
+
+impl Found {
+    /// The share of some points (world) that are of it.
+    pub fn share_of(&self, points: &[Point3<f32>]) -> f64 {
+        let near = |p: &&Point3<f32>| self.tree.nearest(p, OF_IT_M).is_some();
+        points.iter().filter(near).count() as f64 / points.len().max(1) as f64
+    }
+}
+
+/// A guess, and where in the world that is.
+type Placed = (Guess, Isometry3<f64>);
+
+/// Which learned things views show, each with where its camera stood, the surest first; no place holds two. Beside what each view suggests there is what is
+/// `suggested` by all of them; `holds` says where things may be.
+pub(super) fn find(
+    news: &News,
+    glances: &mut Glances,
+    views: &[(&View, Isometry3<f64>)],
+    suggested: Vec<Placed>,
+    holds: impl Fn(&Point3<f64>) -> bool,
+) -> Vec<Found> {
+    let Some(models) = news.models.clone() else { return Vec::new() };
+    let options = options();
+    let looks: Vec<(Arc<Glance>, Isometry3<f64>)> = views
+        .iter()
+        .filter_map(|(view, pose)| {
+            if let Some(known) = glances.get(&view.stamp_ns) {
+                return Some((Arc::clone(known), *pose));
+            }
+            let glance = Arc::new(models.library.glance(view, &options).ok()?);
+            glances.insert(view.stamp_ns, Arc::clone(&glance));
+            Some((glance, *pose))
+        })
+        .collect();
+    let looks: Vec<(&Glance, Isometry3<f64>)> = looks.iter().map(|(g, pose)| (&**g, *pose)).collect();
+    let mut guesses: Vec<Placed> = Vec::new();
+    let mut all: Vec<Placed> = looks.iter().flat_map(|(glance, pose)| placed(glance, pose)).collect();
+    all.extend(suggested);
+    all.sort_by(|a, b| b.0.confidence.total_cmp(&a.0.confidence));
+    for (guess, at) in all {
+        let is_one = |other: &Placed| other.0.model == guess.model && is_same(&other.1, &at);
+        let middle = Point3::from(at.translation.vector);
+        if guesses.len() < GUESSES && holds(&middle) && !guesses.iter().any(is_one) {
+            guesses.push((guess, at));
+        }
+    }
+    let judged = guesses.iter().filter_map(|(guess, at)| {
+        let judged = models.library.judge(guess, at, &looks, &options).ok()??;
+        found(news, &models, guess.model, judged)
+    });
+    let mut judged: Vec<Found> = judged.filter(|f| f.judged.confidence >= LEAST).collect();
+    judged.sort_by(|a, b| b.judged.confidence.total_cmp(&a.judged.confidence));
+    let mut apart: Vec<Found> = Vec::new();
+    for f in judged {
+        // Two of the same kind of thing may stand there; in one place there is one.
+        if apart.iter().all(|other| other.share_of(&f.cloud.points) < 0.3) {
+            apart.push(f);
+        }
+    }
+    apart
+}
+
+fn options() -> KnowOptions {
+    KnowOptions { range_m: RANGE_M, ..KnowOptions::default() }
+}
+
+fn placed(glance: &Glance, world_from_camera: &Isometry3<f64>) -> Vec<Placed> {
+    glance.guesses.iter().map(|guess| (*guess, world_from_camera * guess.camera_from_model)).collect()
+}
+
+/// What all views of a surface together suggest, as the newest of their cameras would see it: less noise than in any view alone.
+fn together(
+    models: &Models,
+    surface: &KnownSurface,
+    views: &[(&View, Isometry3<f64>)],
+    merged: &Cloud,
+) -> Vec<Placed> {
+    let Some(normals) = &merged.normals else { return Vec::new() };
+    let Some(corner) = surface.outline.first() else { return Vec::new() };
+    let is_near = |p: &Point3<f64>| {
+        let above_m = surface.up.dot(&(p - corner));
+        surface.covers(p, BESIDE_M) && (ABOVE_M.0..ABOVE_M.1).contains(&above_m)
+    };
+    let seen = |(view, pose): &(&View, Isometry3<f64>)| {
+        let eye = Point3::from(pose.translation.vector);
+        let faces = |&i: &u32| {
+            let (p, n) = (merged.points[i as usize].cast::<f64>(), normals[i as usize].cast::<f64>());
+            is_near(&p) && n.dot(&(eye - p)) > 0.0
+        };
+        let facing: Vec<u32> = (0..merged.len() as u32).filter(faces).collect();
+        let cloud = merged.select(&facing).transformed(&pose.inverse());
+        let together = View { cloud, world_from_camera: *pose, ..View::clone(view) };
+        models.library.glance(&together, &options()).map_or_else(|_| Vec::new(), |g| placed(&g, pose))
+    };
+    views.iter().rev().take(TOGETHER).flat_map(seen).collect()
+}
+
+fn found(news: &News, models: &Models, model: usize, judged: Judged) -> Option<Found> {
+    let thing = *models.things.get(model)?;
+    let cloud = news.things.get(thing)?.cloud.transformed(&judged.world_from_model);
+    let tree = Neighbours::new(&cloud.points).ok()?;
+    Some(Found { thing, judged, cloud, tree })
+}
+
+fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+    (a.translation.vector - b.translation.vector).norm() < SAME.0 && a.rotation.angle_to(&b.rotation) < SAME.1
+}
+
+/// Whether the middle of something may be that of a thing on a surface.
+pub(super) fn stands_on(surface: &KnownSurface, middle: &Point3<f64>) -> bool {
+    let above_m = surface.outline.first().map_or(0.0, |p| surface.up.dot(&(middle - p)));
+    surface.covers(middle, BESIDE_M) && (ABOVE_M.0..ABOVE_M.1).contains(&above_m)
+}
+
+/// Says of each object on a surface which learned thing it may be; what several objects are of one thing is one. `merged` is the cloud of all views, which
+/// the percepts index.
+pub(crate) fn explain(
+    news: &News,
+    glances: &mut Glances,
+    surface: &KnownSurface,
+    views: &[(&View, Isometry3<f64>)],
+    merged: &Cloud,
+    percepts: Vec<Percept>,
+) -> Vec<Percept> {
+    let Some(models) = &news.models else { return percepts };
+    let suggested = together(models, surface, views, merged);
+    let found = find(news, glances, views, suggested, |middle| stands_on(surface, middle));
+    let shares: Vec<Vec<f64>> = percepts
+        .iter()
+        .map(|p| {
+            let own: Vec<Point3<f32>> =
+                p.indices.iter().step_by(3).map(|&i| merged.points[i as usize]).collect();
+            found.iter().map(|f| f.share_of(&own)).collect()
+        })
+        .collect();
+    let mut explained: Vec<Percept> = Vec::new();
+    let mut taken: Vec<bool> = vec![false; percepts.len()];
+    for (n, f) in found.iter().enumerate() {
+        let mut own: Vec<usize> =
+            (0..percepts.len()).filter(|&k| shares[k][n] >= SHARE && !taken[k]).collect();
+        own.sort_by_key(|&k| std::cmp::Reverse(percepts[k].points));
+        let Some(&first) = own.first() else { continue };
+        own.iter().for_each(|&k| taken[k] = true);
+        let mut whole = percepts[first].clone();
+        for &k in &own[1..] {
+            whole.points += percepts[k].points;
+            whole.indices.extend(&percepts[k].indices);
+        }
+        whole.indices.sort_unstable();
+        place(&mut whole, f, surface);
+        name(&mut whole, news, Ok(f));
+        explained.push(whole);
+    }
+    let rest: Vec<Percept> =
+        percepts.into_iter().zip(taken).filter(|(_, taken)| !taken).map(|(p, _)| p).collect();
+    let sizes: Vec<f64> = rest.iter().map(|p| together_m(p, &rest)).collect();
+    explained.extend(rest.into_iter().zip(sizes).map(|(mut p, longest_m)| {
+        name(&mut p, news, Err(longest_m));
+        p
+    }));
+    explained
+}
+
+/// How long an object is at most with those that stand so near to it that they may be parts of one thing, metres.
+fn together_m(percept: &Percept, all: &[Percept]) -> f64 {
+    let reach = |p: &Percept| 0.5 * p.size_m[0].hypot(p.size_m[1]);
+    let near = |p: &&Percept| {
+        (p.position_m - percept.position_m).xy().norm() < reach(p) + reach(percept) + BESIDE_IT_M
+    };
+    let far = |p: &Percept| (p.position_m - percept.position_m).xy().norm() + reach(p);
+    let wide_m = all.iter().filter(near).map(far).fold(reach(percept), f64::max) + reach(percept);
+    let high_m = all.iter().filter(near).map(|p| p.size_m[2]).fold(percept.size_m[2], f64::max);
+    wide_m.hypot(high_m)
+}
+
+/// Where a thing is that was known again: its middle over what it stands on, and its sides.
+fn place(percept: &mut Percept, found: &Found, surface: &KnownSurface) {
+    let middle = Point3::from(found.judged.world_from_model.translation.vector);
+    let up_m = surface.up.dot(&(middle - percept.position_m));
+    percept.position_m = middle - surface.up * up_m;
+    if let Some((low, high)) = found.cloud.bounds() {
+        let size = (high - low).cast::<f64>();
+        percept.size_m = [size.x.max(size.y), size.x.min(size.y), size.z];
+    }
+}
+
+/// Spreads probability over the learned things: the one that was found there, or those that looks may have missed at something which is so long with all
+/// that may be of it, metres.
+fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
+    let mut of_things: Vec<(String, f64)> = Vec::new();
+    let is = found.ok().map(|f| (f.thing, f.judged.confidence.clamp(0.0, 0.999)));
+    let left = 1.0 - is.map_or(0.0, |(_, p)| p);
+    for (n, thing) in news.things.iter().enumerate() {
+        let p = match is {
+            Some((it, p)) if it == n => p,
+            _ => left * missed(percept, &thing.cloud, found.err()),
+        };
+        of_things.push((thing.name.clone(), p));
+    }
+    let sum: f64 = of_things.iter().map(|(_, p)| p).sum();
+    let scale = if sum > 0.999 { 0.999 / sum } else { 1.0 };
+    of_things.iter_mut().for_each(|(_, p)| *p *= scale);
+    let rest = 1.0 - sum * scale;
+    percept.probabilities.iter_mut().chain(&mut percept.kinds).for_each(|(_, p)| *p *= rest);
+    percept.unknown *= rest;
+    percept.kinds.extend(of_things.iter().cloned());
+    percept.probabilities.extend(of_things);
+    let best = percept.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((name, _)) = best.filter(|(_, p)| *p > percept.unknown).cloned() {
+        if news.things.iter().any(|t| t.name == name) {
+            percept.kind = Some(name.clone());
+        }
+        percept.label = Some(name);
+    } else {
+        (percept.label, percept.kind) = (None, None);
+    }
+}
+
+/// The probability that an object is a thing which looks at it have not told. With all that may be of it, it is so long at most, metres.
+fn missed(percept: &Percept, thing: &Cloud, together_m: Option<f64>) -> f64 {
+    let (low, high) = thing.bounds().unwrap_or_default();
+    let longest_m = f64::from((high - low).norm());
+    let [w, d, h] = percept.size_m;
+    let is_longer = w.hypot(d).hypot(h) > longest_m + LONGER_M;
+    let is_shorter = together_m.is_some_and(|m| m < SHORTER * longest_m) && percept.seen_fraction > 0.5;
+    if is_longer || is_shorter {
+        return NOT_IT;
+    }
+    let not_told = MISSED.powi(percept.evidence.views as i32);
+    PRIOR * not_told / (PRIOR * not_told + 1.0 - PRIOR)
+}

@@ -1,0 +1,150 @@
+//! Where to stand around something new, and how to get from one stand to the next (section IV-A of the paper).
+
+use std::collections::BTreeMap;
+
+use descry_perception::learning::{AroundOptions, stands, trajectories};
+use descry_perception::nalgebra::{Point2, Point3};
+use descry_robots::{Place, Pose2, Robot};
+
+use super::news::Novelty;
+use crate::mind::Mind;
+use crate::situation::{Candidate, Situation};
+
+/// Lines around something, on each of which a stand is looked for: 30 degrees from each to the next (paper: 20 lines, and a look every 15 degrees).
+const LINES: usize = 12;
+/// Least and greatest height of what the body could run into, metres: where it is told by two degrees wrongly, the floor two metres off seems so high.
+const BAND_M: (f64, f64) = (0.15, 1.5);
+/// What was seen is something if so many returns of one look fall into one cell of its floor plan, of such a side, metres: beside depth edges some hang in
+/// the air, each by itself.
+const RETURNS: usize = 8;
+const CELL_M: f32 = 0.05;
+/// Kept between the footprint and what was seen, metres: about two standard deviations of localisation.
+const CLEAR_M: f64 = 0.06;
+
+/// Finds where to stand around something, and makes each a pose that the body can be sent to, by the lines around it; and whether the way from each to
+/// the next is no detour.
+pub(super) fn make(
+    mind: &mut Mind,
+    robot: &dyn Robot,
+    name: &str,
+    centre: &Point3<f64>,
+    seen: &[Point3<f32>],
+) -> (Vec<Option<String>>, Vec<bool>) {
+    let options = AroundOptions {
+        lines: LINES,
+        band_m: BAND_M,
+        footprint_m: robot.description().footprint.radius_m() + CLEAR_M,
+        ..AroundOptions::default()
+    };
+    let found = stands(centre, &obstacles(robot, centre, seen, options.most_m), &options).unwrap_or_default();
+    let place = |p: &Point2<f64>| Place::Pose(Pose2::facing(p.x, p.y, &centre.xy()));
+    let places: Vec<Place> = found.iter().flatten().map(place).collect();
+    let here = &mind.known.candidates[mind.known.at].place;
+    let mut reached = mind.known.chart.travel(robot, here, &places, &[]).into_iter();
+    let poses = found.iter().enumerate().map(|(line, stand)| {
+        let place = place(stand.as_ref()?);
+        reached.next()?.ok()?;
+        Some(Candidate { symbol: format!("{name}-{}", line + 1), place })
+    });
+    let poses: Vec<Option<Candidate>> = poses.collect();
+    let joined = |line: usize| {
+        let (a, b) = (poses[line].as_ref()?, poses[(line + 1) % poses.len()].as_ref()?);
+        let straight_m = (at(&a.place)? - at(&b.place)?).norm();
+        let way =
+            mind.known.chart.travel(robot, &a.place, std::slice::from_ref(&b.place), &[]).pop()?.ok()?;
+        Some(way.distance_m <= options.detour * straight_m)
+    };
+    let joined = (0..poses.len()).map(|line| joined(line).unwrap_or(false)).collect();
+    mind.known.candidates.extend(poses.iter().flatten().cloned());
+    (poses.into_iter().map(|pose| pose.map(|p| p.symbol)).collect(), joined)
+}
+
+/// Where a place is on the floor, if it is a pose.
+fn at(place: &Place) -> Option<Point2<f64>> {
+    match place {
+        Place::Pose(pose) => Some(pose.point()),
+        Place::Station(_) => None,
+    }
+}
+
+/// What the body could run into near a place: what was seen, and what its map shows.
+fn obstacles(
+    robot: &dyn Robot,
+    centre: &Point3<f64>,
+    seen: &[Point3<f32>],
+    within_m: f64,
+) -> Vec<Point3<f32>> {
+    let near = |x: f64, y: f64| (x - centre.x).hypot(y - centre.y) < within_m + 1.0;
+    let cell = |p: &Point3<f32>| [p.x, p.y].map(|c| (c / CELL_M).floor() as i32);
+    let in_band = |p: &&Point3<f32>| (BAND_M.0..BAND_M.1).contains(&f64::from(p.z));
+    let tall: Vec<&Point3<f32>> =
+        seen.iter().filter(in_band).filter(|p| near(p.x.into(), p.y.into())).collect();
+    let mut returns: BTreeMap<[i32; 2], usize> = BTreeMap::new();
+    tall.iter().for_each(|p| *returns.entry(cell(p)).or_default() += 1);
+    let mut all: Vec<Point3<f32>> =
+        tall.into_iter().filter(|p| returns[&cell(p)] >= RETURNS).copied().collect();
+    if let Some(map) = robot.map() {
+        let height_m = BAND_M.0 as f32 + 0.1;
+        let cells = (0..map.occupied.len()).filter(|&k| map.occupied[k]).map(|k| {
+            let middle = |at: usize, low: f64| low + (at as f64 + 0.5) * map.resolution_m;
+            (middle(k % map.width, map.origin_m.x), middle(k / map.width, map.origin_m.y))
+        });
+        all.extend(
+            cells.filter(|(x, y)| near(*x, *y)).map(|(x, y)| Point3::new(x as f32, y as f32, height_m)),
+        );
+    }
+    all
+}
+
+/// Where a pose is on the floor.
+fn point(s: &Situation, pose: &str) -> Option<Point2<f64>> {
+    at(&s.candidates[s.candidate(pose).ok()?].place)
+}
+
+/// The stands that can be reached as far as is known, by the lines: those that were given up are left out.
+fn left(s: &Situation, novelty: &Novelty) -> Vec<Option<String>> {
+    let can_go = |pose: &&String| s.candidate(pose).is_ok_and(|n| !s.out_of_reach.contains(&n));
+    novelty.stands.iter().map(|stand| stand.as_ref().filter(can_go).cloned()).collect()
+}
+
+/// Stands strung together as far as the way between neighbours is no detour.
+fn strings(s: &Situation, novelty: &Novelty) -> Vec<Vec<String>> {
+    let left = left(s, novelty);
+    let places: Vec<Option<Point2<f64>>> =
+        left.iter().map(|p| p.as_ref().and_then(|p| point(s, p))).collect();
+    let line = |p: &Point2<f64>| places.iter().position(|at| at.as_ref() == Some(p));
+    let way_m = |a: &Point2<f64>, b: &Point2<f64>| novelty.joined[line(a)?].then(|| (b - a).norm());
+    let strung = trajectories(&places, 1.0, way_m);
+    let named = |p: &Point2<f64>| left[line(p)?].clone();
+    strung.iter().map(|string| string.iter().filter_map(named).collect()).collect()
+}
+
+/// Pairs of neighbours between which the way is no detour.
+pub(super) fn neighbours(s: &Situation, novelty: &Novelty) -> Vec<(String, String)> {
+    let strings = strings(s, novelty);
+    let mut pairs: Vec<(String, String)> = strings
+        .iter()
+        .flat_map(|string| string.windows(2).map(|w| (w[0].clone(), w[1].clone())).collect::<Vec<_>>())
+        .collect();
+    // A ring is closed.
+    if let [ring] = strings.as_slice()
+        && ring.len() == novelty.stands.len()
+        && let (Some(first), Some(last)) = (ring.first(), ring.last())
+    {
+        pairs.push((last.clone(), first.clone()));
+    }
+    pairs
+}
+
+/// The stands to which one may drive from anywhere: the ends of strings and, around what comes next, the nearest that is still open.
+pub(super) fn ways_in(s: &Situation, novelty: &Novelty, is_next: bool) -> Vec<String> {
+    let strings = strings(s, novelty);
+    let mut ends: Vec<String> =
+        strings.iter().flat_map(|string| string.first().into_iter().chain(string.last())).cloned().collect();
+    let way_s = |pose: &str| s.candidate(pose).map_or(f64::INFINITY, |n| s.travel_s(s.at, n));
+    let closest = novelty.open_stands(s).min_by(|a, b| way_s(a).total_cmp(&way_s(b)));
+    ends.extend(closest.filter(|_| is_next).cloned());
+    ends.sort();
+    ends.dedup();
+    ends
+}

@@ -1,0 +1,392 @@
+//! What happens with a visit, with a look at something new, and with a model of it.
+
+use std::sync::Arc;
+
+use descry_memory::RecordId;
+use descry_memory::learned::{LearnedThing, Place as Seen};
+use descry_perception::learning::{Appeared, MetaRoom, NoticeOptions, Visit};
+use descry_perception::nalgebra::{Isometry3, Point3, center};
+use descry_perception::visibility::{DepthMap, Seen as Sight};
+use descry_perception::{Cloud, View};
+use descry_robots::Sensed;
+use descry_skills::Modelled;
+
+use super::again::{self, Found};
+use super::news::{Change, DIRECTIONS, Fate, Look, Models, Novelty};
+use super::stands;
+use crate::abilities::searching::perceive::{self, Eyes};
+use crate::mind::Mind;
+use crate::note::Note;
+use crate::situation::KnownSurface;
+use crate::world::WorldError;
+
+/// How far localisation may be off between two visits, metres: it errs by centimetres and by degrees, which two metres off are centimetres, too.
+const SEARCH_M: f32 = 0.15;
+/// A visit of which so large a share differs from what was there before does not fit it: the body is not where it believes to be.
+const STRANGE: f64 = 0.3;
+/// How far over a surface the lowest of something on it may be, and how far beside it its middle, metres.
+const ON_M: f64 = 0.06;
+const BESIDE_M: f64 = 0.05;
+/// What came or went with a second side shorter than this is an edge that was measured otherwise, metres.
+const SLIVER_M: f64 = 0.04;
+/// What came so near to something new, beside how far that reaches, is of it, metres.
+const OF_IT_M: f64 = 0.1;
+/// Things nearer to each other than this are one, metres.
+const SAME_M: f64 = 0.12;
+/// So sure must it be that something is what was learned before, and as great a share of it must be explained.
+const SURE: f64 = 0.8;
+const EXPLAINED: f64 = 0.5;
+/// A model that is along any axis longer than this many times what was noticed, and so much more (metres), has taken in what it stands on or beside.
+const GROWN: f64 = 2.0;
+const GROWN_M: f64 = 0.1;
+/// A thing is seen through if of its points so many were looked through, of those that were looked at, and at least so many were.
+const THROUGH: f64 = 0.6;
+const LOOKED_AT: u32 = 50;
+/// A depth so much beyond a point has looked through it, metres.
+const BEYOND_M: f64 = 0.03;
+
+/// Records a view of something that is learned from, and reads it back by its time.
+fn remember(mind: &mut Mind, eyes: Eyes<'_>, sensed: &Sensed) -> Result<View, WorldError> {
+    let id = perceive::remember(mind, eyes, &[], sensed)?;
+    let news = Arc::make_mut(&mut mind.known.news);
+    news.records.push(id);
+    let records: &[RecordId] = &news.records;
+    eyes.record.hold(records, "news")?;
+    Ok(eyes.record.view_at(sensed.stamp_ns, &eyes.robot.description().frames.map)?)
+}
+
+/// A place was visited: what is new there, and what is gone.
+pub(super) fn visit(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    waypoint: &str,
+    sensed: &Sensed,
+) -> Result<Note, WorldError> {
+    let view = remember(mind, eyes, sensed)?;
+    let at = mind.known.news.places.iter().position(|p| p.waypoint == waypoint);
+    let at = at.ok_or_else(|| WorldError::Bug(format!("`{waypoint}` is no place to visit")))?;
+    let place = mind.known.news.places[at].clone();
+    let options = NoticeOptions { search_m: SEARCH_M, ..NoticeOptions::default() };
+    let strange = |e: descry_perception::learning::LearningError| WorldError::Bug(format!("a visit: {e}"));
+    let surface = mind.known.surfaces.iter().find(|s| s.symbol == place.on);
+    let localised = view.world_from_camera;
+    let views = [match surface {
+        Some(surface) => perceive::laid(eyes, surface, view),
+        None => view,
+    }];
+    let views_pose = views[0].world_from_camera;
+    let mut told = Told { waypoint: waypoint.into(), ..Told::default() };
+    let compared = match &place.room {
+        None => {
+            let room = MetaRoom::new(&views, options).map_err(strange)?;
+            Some((room, None))
+        }
+        Some(before) => {
+            let mut room = MetaRoom { options, ..MetaRoom::clone(before) };
+            let visit = room.visit(&views).map_err(strange)?;
+            told.pose = visit.poses.first().copied();
+            let off = differing(&visit, &views[0]);
+            let fits = off < STRANGE;
+            if !fits {
+                told.strange =
+                    Some(format!("{:.0} % of what is seen differs from what was there", 1e2 * off));
+            }
+            fits.then_some((room, Some(visit)))
+        }
+    };
+    let place = &mut Arc::make_mut(&mut mind.known.news).places[at];
+    place.is_visited = true;
+    place.strange.clone_from(&told.strange);
+    let on = place.on.clone();
+    if let Some((room, visit)) = compared {
+        told.visits = room.visits;
+        place.room = Some(Arc::new(room));
+        if let Some(visit) = visit {
+            take_in(mind, eyes, &on, waypoint, (&views[0], visit), &mut told);
+        }
+    }
+    let off = told.pose.unwrap_or(views_pose).inverse() * localised;
+    Ok(told.note(&off))
+}
+
+/// The share of what is seen that came.
+fn differing(visit: &Visit, view: &View) -> f64 {
+    let came: usize = visit.appeared.iter().map(|a| a.mask.iter().filter(|m| **m).count()).sum();
+    came as f64 / view.cloud.count_finite().max(1) as f64
+}
+
+/// What is said of a visit.
+#[derive(Default)]
+struct Told {
+    waypoint: String,
+    visits: usize,
+    /// Where the camera stood, by what was there before.
+    pose: Option<Isometry3<f64>>,
+    strange: Option<String>,
+    came: Vec<String>,
+    gone: Vec<String>,
+}
+
+impl Told {
+    fn note(self, off: &Isometry3<f64>) -> Note {
+        let Told { waypoint, visits, strange, came, gone, .. } = self;
+        let (moved_m, turned_rad) = (off.translation.vector.norm(), off.rotation.angle());
+        Note::Visited { waypoint, visits, moved_m, turned_rad, strange, came, gone }
+    }
+}
+
+/// Takes in what a visit shows: things that were learned stand where they are known again, the rest of what came to a surface is new.
+fn take_in(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    on: &str,
+    waypoint: &str,
+    (view, visit): (&View, Visit),
+    told: &mut Told,
+) {
+    let pose = visit.poses.first().copied().unwrap_or(view.world_from_camera);
+    let view = Arc::new(View { world_from_camera: pose, ..view.clone() });
+    let seen = view.cloud.finite().transformed(&pose);
+    let mut found =
+        again::find(&mind.known.news.clone(), &mut mind.glances, &[(&view, pose)], Vec::new(), |_| true);
+    found.retain(|f| f.judged.confidence >= SURE);
+    for appeared in visit.appeared.iter().filter(|a| !is_sliver(&a.cloud)) {
+        let surface = mind.known.surfaces.iter().find(|s| is_on(s, &appeared.cloud)).cloned();
+        let Some(surface) = surface else {
+            let (at, size_m) = extent(&appeared.cloud);
+            let is_of = |n: &Novelty| (n.centre - at).xy().norm() < n.radius_m() + OF_IT_M;
+            if mind.known.news.novelties.iter().any(is_of) {
+                continue;
+            }
+            told.came.push(format!("something on no surface, {}", size(&size_m, &at)));
+            change(mind, Change::Beside { at, size_m });
+            continue;
+        };
+        let known = found.iter().find(|f| f.share_of(&appeared.cloud.points) >= EXPLAINED);
+        match known {
+            Some(f) => told.came.push(known_again(mind, &surface, f)),
+            None => {
+                told.came.extend(new(mind, eyes, &surface.symbol, waypoint, (&view, appeared), &seen.points))
+            }
+        }
+    }
+    for gone in visit.gone.iter().filter(|gone| !is_sliver(gone)) {
+        let (at, size_m) = extent(gone);
+        told.gone.push(size(&size_m, &at));
+        change(mind, Change::Gone { at, size_m });
+    }
+    if let Some(map) = DepthMap::from_view(&view, &pose) {
+        told.gone.extend(left(mind, on, &map));
+    }
+}
+
+fn extent(cloud: &Cloud) -> (Point3<f64>, [f64; 3]) {
+    let (low, high) = cloud.bounds().unwrap_or_default();
+    (center(&low, &high).cast(), (high - low).cast().into())
+}
+
+fn is_sliver(cloud: &Cloud) -> bool {
+    let (_, mut size_m) = extent(cloud);
+    size_m.sort_by(f64::total_cmp);
+    size_m[1] < SLIVER_M
+}
+
+/// A size and a place, for people.
+pub(super) fn size([w, d, h]: &[f64; 3], at: &Point3<f64>) -> String {
+    let [w, d, h] = [w, d, h].map(|m| 1e2 * m);
+    format!("{w:.0} x {d:.0} x {h:.0} cm at ({:.2}, {:.2}, {:.2}) m", at.x, at.y, at.z)
+}
+
+/// Whether what came stands on a surface.
+fn is_on(surface: &KnownSurface, cloud: &Cloud) -> bool {
+    let Some(corner) = surface.outline.first() else { return false };
+    let (middle, _) = extent(cloud);
+    let height = |p: &Point3<f32>| surface.up.dot(&(p.cast::<f64>() - corner));
+    let lowest = cloud.points.iter().map(height).fold(f64::INFINITY, f64::min);
+    surface.covers(&middle, BESIDE_M) && lowest.abs() < ON_M.max(0.25 * height(&middle.cast()).abs())
+}
+
+/// Keeps a change unless it is known.
+fn change(mind: &mut Mind, change: Change) {
+    let at = |c: &Change| match c {
+        Change::Came { at, .. }
+        | Change::Left { at, .. }
+        | Change::Gone { at, .. }
+        | Change::Beside { at, .. } => *at,
+    };
+    let news = Arc::make_mut(&mut mind.known.news);
+    let is_one = |c: &Change| {
+        std::mem::discriminant(c) == std::mem::discriminant(&change)
+            && (at(c) - at(&change)).norm() < 2.0 * SAME_M
+    };
+    if !news.changes.iter().any(is_one) {
+        news.changes.push(change);
+    }
+}
+
+/// Something that was learned stands there.
+fn known_again(mind: &mut Mind, surface: &KnownSurface, f: &Found) -> String {
+    let at = Point3::from(f.judged.world_from_model.translation.vector);
+    let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
+    let thing = &mut Arc::make_mut(&mut mind.known.news).things[f.thing];
+    let before =
+        std::mem::replace(&mut thing.seen, Seen { unix_s: now_unix_s, at_m: at, on: surface.symbol.clone() });
+    let name = thing.name.clone();
+    let p = f.judged.confidence;
+    let is_moved = (before.at_m - at).norm() > SAME_M;
+    if is_moved {
+        change(mind, Change::Came { name: name.clone(), at, before: before.at_m });
+    }
+    let there = if is_moved { "which stood elsewhere" } else { "where it stood" };
+    format!("{name} ({p:.2}), {there}, at ({:.2}, {:.2}) m", at.x, at.y)
+}
+
+/// Something is new. Says what, if nobody had noticed it.
+fn new(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    on: &str,
+    waypoint: &str,
+    (view, appeared): (&Arc<View>, &Appeared),
+    seen: &[Point3<f32>],
+) -> Option<String> {
+    let (centre, size_m) = extent(&appeared.cloud);
+    let look = Look { from: waypoint.into(), view: Arc::clone(view) };
+    let news = Arc::make_mut(&mut mind.known.news);
+    let is_one = |n: &&mut Novelty| (n.centre - centre).norm() < SAME_M.max(n.radius_m());
+    if let Some(known) = news.novelties.iter_mut().find(is_one) {
+        if known.fate == Fate::Open {
+            known.looks.push(look);
+        }
+        return None;
+    }
+    let symbol = format!("new-{}", news.novelties.len() + 1);
+    let (stands, joined) = stands::make(mind, eyes.robot, &symbol, &centre, seen);
+    Arc::make_mut(&mut mind.known.news).novelties.push(Novelty {
+        symbol: symbol.clone(),
+        on: on.into(),
+        centre,
+        size_m,
+        looks: vec![look],
+        mask: Arc::new(appeared.mask.clone()),
+        stands,
+        joined,
+        fate: Fate::Open,
+    });
+    Some(format!("{symbol}: something new, {}", size(&size_m, &centre)))
+}
+
+/// Things that were learned and stood on a surface, and that this look has looked through.
+fn left(mind: &mut Mind, on: &str, map: &DepthMap) -> Vec<String> {
+    let is_there = |t: &&LearnedThing| t.seen.on == on;
+    let of = |t: &LearnedThing| (t.name.clone(), t.seen.at_m, t.cloud.clone());
+    let here: Vec<_> = mind.known.news.things.iter().filter(is_there).map(of).collect();
+    let mut said = Vec::new();
+    for (name, at, cloud) in here {
+        let (mut through, mut looked_at) = (0_u32, 0_u32);
+        for p in &cloud.points {
+            match map.look(&(at + p.coords.cast::<f64>()), BEYOND_M) {
+                Sight::Free => (through, looked_at) = (through + 1, looked_at + 1),
+                Sight::Surface => looked_at += 1,
+                Sight::Hidden | Sight::Never => {}
+            }
+        }
+        if looked_at >= LOOKED_AT && f64::from(through) / f64::from(looked_at) > THROUGH {
+            said.push(format!("{name}, which stood at ({:.2}, {:.2}) m", at.x, at.y));
+            change(mind, Change::Left { name, at });
+        }
+    }
+    said
+}
+
+/// A look at something new was taken.
+pub(super) fn face(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    from: &str,
+    what: &str,
+    sensed: &Sensed,
+) -> Result<String, WorldError> {
+    let view = Arc::new(remember(mind, eyes, sensed)?);
+    let novelty = novelty(mind, what)?;
+    novelty.looks.push(Look { from: from.into(), view });
+    let sides = novelty.seen().len() as f64 / DIRECTIONS as f64;
+    Ok(format!("{:.0} % of its sides were seen in {} looks", 1e2 * sides, novelty.looks.len()))
+}
+
+fn novelty<'a>(mind: &'a mut Mind, what: &str) -> Result<&'a mut Novelty, WorldError> {
+    let news = Arc::make_mut(&mut mind.known.news);
+    let found = news.novelties.iter_mut().find(|n| n.symbol == what);
+    found.ok_or_else(|| WorldError::Bug(format!("`{what}` is gone")))
+}
+
+/// Looks were brought together: something was learned, or is known after all, or cannot be learned.
+pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Result<String, WorldError> {
+    let of = novelty(mind, what)?.clone();
+    let poses = |n: usize| modelled.keyframes.get(n).map(|k| k.world_from_camera);
+    let is_used = |n: usize| match &modelled.model {
+        Ok(model) => model.looks.get(n).is_some_and(|u| u.left_out.is_none()),
+        Err(_) => modelled.keyframes.get(n).is_some_and(|k| k.used),
+    };
+    let used: Vec<usize> = (0..of.looks.len()).filter(|&n| is_used(n)).collect();
+    let views: Vec<(&View, Isometry3<f64>)> =
+        used.iter().filter_map(|&n| Some((&*of.looks[n].view, poses(n)?))).collect();
+    let near = |p: &Point3<f64>| (p - of.centre).norm() < SAME_M.max(of.radius_m());
+    let before = again::find(&mind.known.news.clone(), &mut mind.glances, &views, Vec::new(), near);
+    let surface = mind.known.surfaces.iter().find(|s| s.symbol == of.on).cloned();
+    if let Some((f, surface)) = before.iter().find(|f| f.judged.confidence >= SURE).zip(surface) {
+        let (name, confidence) = (mind.known.news.things[f.thing].name.clone(), f.judged.confidence);
+        let said = known_again(mind, &surface, f);
+        novelty(mind, what)?.fate = Fate::Known { name, confidence };
+        return Ok(format!("it is known: {said}"));
+    }
+    let model = match &modelled.model {
+        Ok(model) => model,
+        Err(because) => {
+            novelty(mind, what)?.fate = Fate::GivenUp(because.clone());
+            return Ok(format!("it is not learned: {because}"));
+        }
+    };
+    let (_, size_m) = extent(&model.cloud);
+    if (0..3).any(|k| size_m[k] > GROWN * of.size_m[k] + GROWN_M) {
+        let at = Point3::from(model.world_from_model.translation.vector);
+        let because = format!("what was taken for it grew beyond what had come, to {}", size(&size_m, &at));
+        novelty(mind, what)?.fate = Fate::GivenUp(because.clone());
+        return Ok(format!("it is not learned: {because}"));
+    }
+    let seen = Novelty { looks: used.iter().map(|&n| of.looks[n].clone()).collect(), ..of.clone() };
+    let sides = seen.seen().len() as f64 / DIRECTIONS as f64;
+    let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
+    let news = Arc::make_mut(&mut mind.known.news);
+    let name = news.free_name();
+    let at_m = Point3::from(model.world_from_model.translation.vector);
+    news.things.push(LearnedThing {
+        name: name.clone(),
+        learned_unix_s: now_unix_s,
+        cloud: model.cloud.clone(),
+        sides,
+        seen: Seen { unix_s: now_unix_s, at_m, on: of.on.clone() },
+    });
+    news.learned += 1;
+    news.models = Models::of(&news.things);
+    mind.glances.clear();
+    let looks = (used.len(), of.looks.len());
+    let points = model.cloud.len();
+    novelty(mind, what)?.fate = Fate::Learned { name: name.clone(), looks, sides };
+    let left_out = (0..of.looks.len()).filter(|n| !used.contains(n)).filter_map(|n| {
+        let own = modelled.keyframes.get(n).filter(|k| !k.used).map(|k| k.why.clone());
+        Some(format!(
+            "\n          look {} left out: {}",
+            n + 1,
+            own.or_else(|| model.looks[n].left_out.clone())?
+        ))
+    });
+    Ok(format!(
+        "{name} is learned from {} of {} looks: {points} points, {}, {:.0} % of its sides seen{}",
+        looks.0,
+        looks.1,
+        size(&size_m, &at_m),
+        1e2 * sides,
+        left_out.collect::<String>()
+    ))
+}

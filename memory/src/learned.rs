@@ -1,0 +1,68 @@
+//! What learning leaves: how places looked that were visited, and the things that were learned.
+
+use descry_perception::Cloud;
+use descry_perception::learning::MetaRoom;
+use nalgebra::Point3;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::packed;
+
+/// How a place looked, by all visits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Visited {
+    /// The waypoint from which it was looked at.
+    pub waypoint: String,
+    /// Where that is in the map: x and y, metres, and the heading, radians.
+    pub at: [f64; 3],
+    /// When it was visited last, seconds since 1970.
+    pub last_unix_s: f64,
+    /// Its static structure.
+    #[serde(serialize_with = "write_room", deserialize_with = "read_room")]
+    pub room: MetaRoom,
+}
+
+/// A thing that was learned.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LearnedThing {
+    /// As it is called.
+    pub name: String,
+    /// When it was learned, seconds since 1970.
+    pub learned_unix_s: f64,
+    /// Its surface about its middle, upright as it stood, metres.
+    #[serde(with = "packed")]
+    pub cloud: Cloud,
+    /// Share of the directions around it from which it was seen, 0 to 1.
+    pub sides: f64,
+    /// Where it was seen last.
+    pub seen: Place,
+}
+
+/// Where something was seen, and when.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// When, seconds since 1970.
+    pub unix_s: f64,
+    /// Its middle, in the map, metres.
+    pub at_m: Point3<f64>,
+    /// The surface that it stood on, by its symbol.
+    pub on: String,
+}
+
+/// A static structure as it is written.
+#[derive(Serialize, Deserialize)]
+struct Room {
+    visits: usize,
+    options: descry_perception::learning::NoticeOptions,
+    #[serde(with = "packed")]
+    cloud: Cloud,
+}
+
+fn write_room<S: Serializer>(room: &MetaRoom, writer: S) -> Result<S::Ok, S::Error> {
+    let MetaRoom { cloud, visits, options } = room.clone();
+    Room { visits, options, cloud }.serialize(writer)
+}
+
+fn read_room<'de, D: Deserializer<'de>>(reader: D) -> Result<MetaRoom, D::Error> {
+    let Room { visits, options, cloud } = Room::deserialize(reader)?;
+    Ok(MetaRoom { cloud, visits, options })
+}

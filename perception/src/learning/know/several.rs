@@ -1,0 +1,127 @@
+//! What several looks say together: what one suggests is held against all others.
+
+use super::evidence::{Evidence, verify};
+use super::scene::Seen;
+use super::{KnowError, KnowOptions, Library, Recognised};
+use crate::view::View;
+use nalgebra::Isometry3;
+
+/// Less confidence than this is no guess.
+const LEAST: f64 = 0.02;
+/// Fewer points of a model that a look could have shown say nothing of it.
+const FEWEST: usize = 40;
+
+/// A look made ready, with what it suggests.
+pub struct Glance {
+    scene: Seen,
+    /// Models that may be there, whatever shares their place, the surest first.
+    pub guesses: Vec<Guess>,
+}
+
+/// A model that may be somewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Guess {
+    /// Its number in the library.
+    pub model: usize,
+    /// Where.
+    pub camera_from_model: Isometry3<f64>,
+    /// Probability, by this look alone.
+    pub confidence: f64,
+    /// Features that voted for it.
+    pub votes: usize,
+}
+
+/// A model at a place as several looks have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judged {
+    /// Where, as the look has it that shows most of it.
+    pub world_from_model: Isometry3<f64>,
+    /// What speaks for it in all of them.
+    pub evidence: Evidence,
+    /// Probability that it is that object at that place.
+    pub confidence: f64,
+    /// How many looks could have shown it.
+    pub looks: usize,
+}
+
+impl Library {
+    /// Makes a look ready and guesses what is in it.
+    ///
+    /// # Errors
+    /// If the view is no depth image.
+    pub fn glance(&self, view: &View, options: &KnowOptions) -> Result<Glance, KnowError> {
+        let scene = self.scene(view, options)?;
+        let found = self.candidates_in(&scene, &Isometry3::identity(), options)?;
+        let mut found: Vec<Recognised> = found.into_iter().map(|c| c.recognised).collect();
+        found.retain(|c| c.confidence >= LEAST);
+        found.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+        let guess = |c: &Recognised| Guess {
+            model: c.model,
+            camera_from_model: c.world_from_model,
+            confidence: c.confidence,
+            votes: c.evidence.votes,
+        };
+        let guesses = found.iter().map(guess).collect();
+        Ok(Glance { scene, guesses })
+    }
+
+    /// Holds a guess, which is somewhere in the world, against some looks, each with where its camera stood; `None` if none could have shown it.
+    ///
+    /// # Errors
+    /// If a pose cannot be refined.
+    pub fn judge(
+        &self,
+        guess: &Guess,
+        world_from_model: &Isometry3<f64>,
+        looks: &[(&Glance, Isometry3<f64>)],
+        options: &KnowOptions,
+    ) -> Result<Option<Judged>, KnowError> {
+        let Some(known) = self.models.get(guess.model) else { return Ok(None) };
+        let mut told: Vec<(Evidence, Isometry3<f64>)> = Vec::new();
+        for (glance, world_from_camera) in looks {
+            let stated = world_from_camera.inverse() * world_from_model;
+            let of = |pose: &Isometry3<f64>| verify(&known.skin, pose, &glance.scene, guess.votes).evidence;
+            let refined = known.refined(&stated, &glance.scene)?;
+            let best = [stated, refined]
+                .map(|pose| (of(&pose), pose))
+                .into_iter()
+                .max_by(|a, b| a.0.explained_share().total_cmp(&b.0.explained_share()));
+            told.extend(
+                best.filter(|(e, _)| e.facing.saturating_sub(e.hidden) >= FEWEST)
+                    .map(|(e, pose)| (e, world_from_camera * pose)),
+            );
+        }
+        let Some(most) = told.iter().max_by_key(|(e, _)| e.explained) else { return Ok(None) };
+        let evidence = Evidence::of_several(&told.iter().map(|(e, _)| *e).collect::<Vec<_>>());
+        Ok(Some(Judged {
+            world_from_model: most.1,
+            confidence: options.judge.confidence(&evidence),
+            evidence,
+            looks: told.len(),
+        }))
+    }
+}
+
+impl Evidence {
+    /// The evidence of several looks as that of one: what is seen through in one speaks against what others explain. Looks err together, so that many
+    /// count as the square root of their number.
+    fn of_several(all: &[Evidence]) -> Evidence {
+        let root = (all.len().max(1) as f64).sqrt();
+        let sum =
+            |of: fn(&Evidence) -> usize| (all.iter().map(of).sum::<usize>() as f64 / root).round() as usize;
+        let explained: usize = all.iter().map(|e| e.explained).sum();
+        let mean = |of: &dyn Fn(&Evidence) -> f64| {
+            all.iter().map(|e| of(e) * e.explained as f64).sum::<f64>() / explained.max(1) as f64
+        };
+        Evidence {
+            facing: sum(|e| e.facing),
+            explained: sum(|e| e.explained),
+            through: sum(|e| e.through),
+            hidden: sum(|e| e.hidden),
+            colour: all.iter().all(|e| e.colour.is_some()).then(|| mean(&|e| e.colour.unwrap_or_default())),
+            off_sigmas: mean(&|e| e.off_sigmas),
+            beyond: mean(&|e| e.beyond),
+            votes: all.iter().map(|e| e.votes).max().unwrap_or_default(),
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Things composed of several solids, painted with patterns: what a household has besides cups and boxes.
+
+use crate::sim::shape::{Part, Shape};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+/// Several solids as one rigid thing.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Composed {
+    /// The solids; where they overlap only the outer surface is seen.
+    pub parts: Vec<Piece>,
+}
+
+/// One of the solids of a composed thing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Piece {
+    /// Its solid, the origin at the centre of its base.
+    pub shape: Shape,
+    /// Where that origin is in the thing, metres.
+    #[serde(default)]
+    pub at_m: [f64; 3],
+    /// Turned about the thing's x, then y, then z axis, degrees.
+    #[serde(default)]
+    pub turn_deg: [f64; 3],
+    /// Red, green, blue; that of the object if left out.
+    #[serde(default)]
+    pub colour: Option<[u8; 3]>,
+    /// What is printed on it.
+    #[serde(default)]
+    pub pattern: Option<Pattern>,
+}
+
+/// Random patches of colours around the colour that it is printed on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pattern {
+    /// Side of the larger patches, metres; smaller ones within them have two fifths of it.
+    pub size_m: f64,
+    /// By how much red, green and blue differ at most.
+    pub spread: f64,
+    /// Another one for another print.
+    #[serde(default)]
+    pub seed: u64,
+}
+
+/// The colours of a part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Paint {
+    /// Red, green, blue.
+    pub colour: [u8; 3],
+    /// What is printed on it.
+    pub pattern: Option<Pattern>,
+}
+
+/// Of the colour's change the larger patches make so much, the smaller so much; and the side of these as a share of those.
+const LARGER: f64 = 0.7;
+const SMALLER: f64 = 0.5;
+const SMALLER_SIDE: f64 = 0.4;
+
+impl Paint {
+    /// The colour at a place of the solid's frame.
+    pub fn at(&self, p: &Point3<f64>) -> [u8; 3] {
+        let Some(pattern) = self.pattern else { return self.colour };
+        let larger = patch(p, pattern.size_m, pattern.seed);
+        let smaller = patch(p, SMALLER_SIDE * pattern.size_m, !pattern.seed);
+        std::array::from_fn(|k| {
+            let off = LARGER * larger[k] + SMALLER * smaller[0];
+            (f64::from(self.colour[k]) + pattern.spread * off).clamp(4.0, 250.0) as u8
+        })
+    }
+}
+
+/// Three draws from -1 to 1 that belong to the cube around a place.
+fn patch(p: &Point3<f64>, size_m: f64, seed: u64) -> [f64; 3] {
+    let cell = |key: u64, c: f64| super::noise::mix(key ^ ((c / size_m + 0.37).floor() as i64 as u64));
+    let key = p.iter().fold(super::noise::mix(seed), |key, c| cell(key, *c));
+    [1, 2, 3].map(|k: u64| 2.0 * super::noise::share(super::noise::mix(key ^ k)) - 1.0)
+}
+
+impl Piece {
+    fn thing_from_piece(&self) -> Isometry3<f64> {
+        let [x, y, z] = self.turn_deg.map(f64::to_radians);
+        Isometry3::from_parts(
+            Translation3::from(Vector3::from(self.at_m)),
+            UnitQuaternion::from_euler_angles(x, y, z),
+        )
+    }
+
+    /// Corners of the box around it in the thing's frame.
+    fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
+        let thing_from_piece = self.thing_from_piece();
+        let (low, high) = self.shape.bounds();
+        let (middle, half) = (nalgebra::center(&low, &high), 0.5 * (high - low));
+        let turn = thing_from_piece.rotation.to_rotation_matrix().into_inner();
+        let reach = match &self.shape {
+            // How far an ellipsoid reaches along an axis.
+            Shape::Ball(_) => Vector3::from_fn(|k, _| turn.row(k).transpose().component_mul(&half).norm()),
+            _ => turn.abs() * half,
+        };
+        let middle = thing_from_piece * middle;
+        (middle - reach, middle + reach)
+    }
+}
+
+impl Composed {
+    /// Corners of the box around it.
+    pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
+        let all = self.parts.iter().map(Piece::bounds);
+        all.reduce(|(low, high), (l, h)| (low.inf(&l), high.sup(&h))).unwrap_or_default()
+    }
+
+    /// How far it reaches from its axis, metres, at most.
+    pub fn radius_m(&self) -> f64 {
+        let reach = |(low, high): (Point3<f64>, Point3<f64>)| {
+            low.x.abs().max(high.x.abs()).hypot(low.y.abs().max(high.y.abs()))
+        };
+        self.parts.iter().map(|piece| reach(piece.bounds())).fold(0.0, f64::max)
+    }
+
+    /// The same, larger.
+    pub fn scaled(&self, factor: f64) -> Composed {
+        let piece = |p: &Piece| Piece {
+            shape: p.shape.scaled(factor),
+            at_m: p.at_m.map(|m| m * factor),
+            ..p.clone()
+        };
+        Composed { parts: self.parts.iter().map(piece).collect() }
+    }
+
+    /// The surfaces that a ray can meet, with their colours; `colour` is that of pieces that say none.
+    pub fn painted(&self, colour: [u8; 3]) -> Vec<(Part, Paint)> {
+        let of = |piece: &Piece| -> Vec<(Part, Paint)> {
+            let own = piece.colour.unwrap_or(colour);
+            let piece_from_thing = piece.thing_from_piece().inverse();
+            let turned = |(part, paint): (Part, Paint)| {
+                let pattern = piece.pattern.or(paint.pattern);
+                (part.turned(piece_from_thing), Paint { pattern, ..paint })
+            };
+            piece.shape.painted(own).into_iter().map(turned).collect()
+        };
+        self.parts.iter().flat_map(of).collect()
+    }
+}
+
+/// Rigid things of a household, by name, in the form in which a scene file composes its own.
+static HOUSEHOLD: LazyLock<BTreeMap<String, Composed>> =
+    LazyLock::new(|| toml::from_str(include_str!("household.toml")).unwrap_or_default());
+
+/// The names of the things of a household.
+pub fn household() -> impl Iterator<Item = &'static str> {
+    HOUSEHOLD.keys().map(String::as_str)
+}
+
+/// The thing of a household of that name.
+pub(crate) fn named(name: &str) -> Option<&'static Composed> {
+    HOUSEHOLD.get(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_household_has_ten_things_and_more_and_each_stands_on_its_base() {
+        assert!(HOUSEHOLD.len() >= 10, "{:?}", household().collect::<Vec<_>>());
+        for (name, thing) in HOUSEHOLD.iter() {
+            let (low, high) = thing.bounds();
+            assert!(low.z.abs() < 0.004, "{name} stands at {low}");
+            let size = high - low;
+            assert!(size.iter().all(|s| (0.05..0.45).contains(s)), "{name}: {size}");
+            assert!(thing.parts.len() > 1, "{name} is one solid");
+            // Straight from above a ray meets something, and no higher than its box.
+            let parts = thing.painted([0; 3]);
+            let middle = nalgebra::center(&low, &high);
+            let eye = Point3::new(middle.x, middle.y, 1.0);
+            let nearest = parts
+                .iter()
+                .filter_map(|(part, _)| part.hit(&eye, &-Vector3::z(), f64::INFINITY))
+                .map(|hit| 1.0 - hit.t)
+                .fold(0.0, f64::max);
+            assert!(nearest > 0.01 && nearest <= high.z + 1e-6, "{name}: {nearest} of {}", high.z);
+        }
+        assert!(HOUSEHOLD.values().any(|t| t.parts.iter().all(|p| p.pattern.is_none())));
+    }
+
+    #[test]
+    fn a_pattern_is_the_same_at_the_same_place_and_differs_by_its_seed() {
+        let paint =
+            |seed| Paint { colour: [120; 3], pattern: Some(Pattern { size_m: 0.03, spread: 100.0, seed }) };
+        let places: Vec<Point3<f64>> =
+            (0..50).map(|k| Point3::new(0.02 * f64::from(k), 0.01, 0.05)).collect();
+        let of = |seed| places.iter().map(|p| paint(seed).at(p)).collect::<Vec<_>>();
+        assert_eq!(of(1), of(1));
+        assert_ne!(of(1), of(2));
+        let plain = Paint { colour: [1, 2, 3], pattern: None };
+        assert_eq!(plain.at(&places[7]), [1, 2, 3]);
+    }
+}

@@ -1,0 +1,120 @@
+"""Things of a household learned and found again, over seeds: what the learning domain promises, counted.
+
+    cargo build --release && cargo build --release -p descry-robots --example arrangement
+    python3 tests/learning.py 101 112 [household|chairs] [FOLDER]
+
+For each seed one of the things of a household comes before the second visit and another before the third, by the scene of the domain with their names
+in it. In separate processes: a first visit; a second, that learns; a search for what was learned where it has been moved to, beside the other;
+and one where it is gone and the other stands. A line of JSON a seed, and the counts.
+"""
+
+import json
+import math
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+THINGS = re.findall(r"^\[([\w-]+)\]", (ROOT / "robots/src/sim/household.toml").read_text(), re.M)
+# What stands on the tables from the beginning is not learned.
+THINGS = [name for name in THINGS if name not in ("tissues", "radio")]
+DESCRY = os.environ.get("DESCRY", str(ROOT / "target/release/descry"))
+NEAR_M = 0.1
+
+
+def run(*arguments):
+    done = subprocess.run(arguments, capture_output=True, text=True)
+    return done.stdout, done.stderr
+
+
+def descry(*arguments):
+    out, err = run(DESCRY, *arguments, "--json")
+    return json.loads(out) if out.strip() else {"verdict": "error", "why": err[-300:]}
+
+
+def truth(scene, seed, visit):
+    out, _ = run(str(ROOT / "target/release/examples/arrangement"), str(scene), str(seed), str(visit))
+    return {o["name"]: o for o in map(json.loads, out.splitlines())}
+
+
+def off_m(a, b):
+    return math.dist(a[:2], b[:2])
+
+
+def seed_of(seed, scene_name, folder):
+    thing, other = THINGS[seed % len(THINGS)], THINGS[(seed + 5) % len(THINGS)]
+    text = (ROOT / f"domains/learning/scenes/{scene_name}.toml").read_text()
+    text = text.replace('"kettle"', '"THING"').replace('"teddy"', f'"{other}"').replace('"THING"', f'"{thing}"')
+    scene = folder / f"scene-{seed}.toml"
+    scene.write_text(text)
+    of_visit = {}
+    for visit in (1, 2, 3, 4):
+        of_visit[visit] = folder / f"scene-{seed}-{visit}.toml"
+        of_visit[visit].write_text(f"visit = {visit}\n{text}")
+    store = folder / f"store-{seed}"
+
+    def pursue(goal, visit, remember=True):
+        keep = ("--remember", str(store)) if remember else ()
+        place = ("--scene", str(of_visit[visit]), "--seed", str(seed), "--run", str(folder / f"run-{seed}-{visit}-{goal[:5]}"))
+        return descry("do", goal, "--domain", "learning", *place, *keep)
+
+    row = {"seed": seed, "thing": thing, "other": other}
+    first = pursue("learn what is new", 1)
+    second = pursue("learn what is new", 2)
+    row["first"], row["second"], row["why"] = first["verdict"], second["verdict"], second["why"][:400]
+    row["looks"], row["seconds"], row["wall_s"] = second.get("views"), second.get("sim_time_s"), second.get("wall_s")
+    there = truth(scene, seed, 2)[thing]["centre_m"]
+    learned, _ = run(DESCRY, "name", str(store), "--json")
+    learned = json.loads(learned)["things"] if learned.strip() else []
+    right = [t for t in learned if off_m(t["seen"]["position_m"], there) < NEAR_M]
+    row["learned"], row["false"] = len(right), len(learned) - len(right)
+    if not right:
+        return row
+    row["sides"] = right[0]["sides"]
+    run(DESCRY, "name", str(store), right[0]["name"], thing)
+    for visit, key in ((3, "moved"), (4, "gone")):
+        found = pursue(f"find {thing}", visit)
+        row[key] = {"verdict": found["verdict"], "confidence": found.get("confidence"), "views": found.get("views")}
+        true = truth(scene, seed, visit)
+        if found["verdict"] == "achieved":
+            at = found["position_m"]
+            row[key]["off_m"] = off_m(at, true[thing]["centre_m"]) if thing in true else None
+        else:
+            row[key]["why"] = found["why"][:300]
+    return row
+
+
+def main():
+    low, high = int(sys.argv[1]), int(sys.argv[2])
+    scene = sys.argv[3] if len(sys.argv) > 3 else "household"
+    folder = pathlib.Path(sys.argv[4]) if len(sys.argv) > 4 else pathlib.Path(tempfile.mkdtemp())
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for seed in range(low, high + 1):
+        row = seed_of(seed, scene, folder)
+        print(json.dumps(row), flush=True)
+        rows.append(row)
+    named = [r for r in rows if "moved" in r]
+    is_right = lambda r: r["moved"]["verdict"] == "achieved" and (r["moved"]["off_m"] or 9) < NEAR_M
+    offs = sorted(r["moved"]["off_m"] for r in named if is_right(r))
+    count = lambda condition: sum(1 for r in named if condition(r))
+    print(json.dumps({
+        "seeds": len(rows),
+        "learned": sum(1 for r in rows if r.get("learned")),
+        "false_things_learned": sum(r.get("false", 0) for r in rows),
+        "found_where_it_was_moved": count(is_right),
+        "false_yes_beside_another": count(lambda r: r["moved"]["verdict"] == "achieved" and not is_right(r)),
+        "false_not_there": count(lambda r: r["moved"]["verdict"] == "not_found"),
+        "cannot_tell": count(lambda r: r["moved"]["verdict"] == "cannot_tell"),
+        "off_m": {"mean": sum(offs) / max(len(offs), 1), "most": max(offs, default=None)},
+        "gone_not_there": count(lambda r: r["gone"]["verdict"] == "not_found"),
+        "gone_cannot_tell": count(lambda r: r["gone"]["verdict"] == "cannot_tell"),
+        "gone_false_yes": count(lambda r: r["gone"]["verdict"] == "achieved"),
+    }))
+
+
+if __name__ == "__main__":
+    main()

@@ -122,6 +122,9 @@ pub struct Report {
     pub remaining: Option<f64>,
     /// Where it is believed to be: the middle of its body, in the map.
     pub position_m: Option<[f64; 3]>,
+    /// Standard deviation of that, in the direction in which it is known worst.
+    #[serde(default)]
+    pub position_sigma_m: Option<f64>,
     /// Where it is; simulation only.
     pub true_position_m: Option<[f64; 3]>,
     /// The surface that it is believed to stand on, as people call it.
@@ -170,6 +173,7 @@ impl Report {
             threshold: goal.threshold,
             remaining: None,
             position_m: None,
+            position_sigma_m: None,
             true_position_m: None,
             on: None,
             true_on: None,
@@ -206,7 +210,13 @@ impl fmt::Display for Report {
         writeln!(f, "\n{answer}{verdict}: {}", self.why)?;
         if let (Some(object), Some([x, y, z])) = (&self.object, self.position_m) {
             let on = self.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
-            writeln!(f, "  {object}{on} at ({x:.3}, {y:.3}, {z:.3}) m, confidence {:.2}", self.confidence)?;
+            let give_cm = self.position_sigma_m.map_or(0.0, |sigma_m| 1e2 * sigma_m);
+            let give = if give_cm >= 1.0 { format!(" give or take {give_cm:.0} cm") } else { String::new() };
+            writeln!(
+                f,
+                "  {object}{on} at ({x:.3}, {y:.3}, {z:.3}) m{give}, confidence {:.2}",
+                self.confidence
+            )?;
         }
         if let Some([x, y, z]) = self.true_position_m {
             writeln!(f, "  in truth at ({x:.3}, {y:.3}, {z:.3}) m")?;

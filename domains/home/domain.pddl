@@ -23,6 +23,7 @@
     (search-cost ?on - surface                                   cost             search_cost@descry)
     (expected-gain ?from - pose ?on - surface ?what - thing      cost             expected_gain@descry)
     (expected-presence ?from - pose ?on - surface ?what - thing  cost             expected_presence@descry)
+    (expected-placing ?from - pose ?on - surface ?what - thing   cost             expected_placing@descry)
     (expected-clarity ?from - pose ?on - surface                 cost             expected_clarity@descry)
     (expected-completeness ?from - pose ?on - surface ?of - kind cost             expected_completeness@descry)
     (can-grasp ?from - pose ?what - thing ?on - surface          conditionchecker can_grasp@descry)
@@ -48,6 +49,7 @@
   (:functions
     (confidence ?what - thing)                  ; how sure we are that it stands where we believe it does, 0 to 1
     (presence ?what - thing ?on - surface)      ; how sure we are that it stands on that surface, 0 to 1
+    (placed ?what - thing)                      ; how sure we are where on its surface that is, where we believe in one, 0 to 1
     (completeness ?of - kind)                   ; how sure we are of having found all of a kind, 0 to 1
     (completeness-in ?of - kind ?where - room)  ; the same of those in a room
     (clarity ?on - surface)                     ; how sure we are what each object on it is, the least sure one, 0 to 1
@@ -96,7 +98,8 @@
       (at end (increase (clarity ?on) [expected-clarity ?from ?on]))
       (forall (?what - thing)
         (and (at end (increase (confidence ?what) [expected-gain ?from ?on ?what]))
-             (at end (increase (presence ?what ?on) [expected-presence ?from ?on ?what]))))
+             (at end (increase (presence ?what ?on) [expected-presence ?from ?on ?what]))
+             (at end (increase (placed ?what) [expected-placing ?from ?on ?what]))))
       (forall (?of - kind)
         (at end (increase (completeness ?of) [expected-completeness ?from ?on ?of])))
       (forall (?of - kind ?where - room)

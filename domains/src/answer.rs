@@ -6,6 +6,7 @@ use descry_perception::nalgebra::Vector3;
 use descry_planner::{FactValue, Plan, after};
 use serde::{Deserialize, Serialize};
 
+use crate::abilities::searching::adrift;
 use crate::abilities::searching::doubt::Doubt;
 use crate::abilities::searching::reasons;
 use crate::config::Answers;
@@ -57,6 +58,9 @@ pub struct Believed {
     pub confidence: f64,
     /// The middle of its body, in the map.
     pub position_m: [f64; 3],
+    /// Standard deviation of that, in the direction in which it is known worst; none if nothing is known of it.
+    #[serde(default)]
+    pub position_sigma_m: Option<f64>,
     /// Sides of its footprint and height.
     pub size_m: [f64; 3],
     /// The surface that it stands on, as people call it.
@@ -353,6 +357,7 @@ impl Asker<'_> {
             kind: t.kind().map(str::to_string),
             confidence: t.certainty(),
             position_m: (t.position_m + up * (t.size_m[2] / 2.0)).coords.into(),
+            position_sigma_m: on.map(|surface| adrift::worst(surface, t).1),
             size_m: t.size_m,
             on: on.map(|s| s.name.clone()),
             room: on.and_then(|s| s.room.clone()),

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use descry_memory::belief::{Belief, Track};
 use descry_memory::remember::Remembered;
 use descry_memory::space::Space;
+use descry_perception::locate::Certainty;
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::noise::axial_sigma_m;
 use descry_perception::recognise::ObjectModel;
@@ -14,6 +15,7 @@ use descry_robots::{Place, Robot};
 use serde::{Deserialize, Serialize};
 
 use crate::abilities::learning::news::News;
+use crate::abilities::searching::adrift;
 use crate::abilities::searching::doubt::{Doubt, Hypothesis, Taken};
 use crate::abilities::searching::obstacle::{self, Obstacle};
 use crate::abilities::searching::reasons;
@@ -55,6 +57,8 @@ pub struct KnownSurface {
     pub whole: bool,
     /// Why it may be the floor, if it may.
     pub doubtful: Option<String>,
+    /// How well what was seen of it is laid on the outline of the map; none without such an outline, or while nothing was seen.
+    pub placed: Option<Certainty>,
 }
 
 impl KnownSurface {
@@ -228,6 +232,7 @@ struct Derived {
     of: Vec<OnceLock<Doubt>>,
     about_on: Vec<OnceLock<Doubt>>,
     going_there_s: Vec<OnceLock<f64>>,
+    unseen_ends: Vec<OnceLock<Vec<Hypothesis>>>,
     obstacles: OnceLock<Vec<Obstacle>>,
 }
 
@@ -254,6 +259,7 @@ impl Situation {
             of: cells(known.kinds.len()),
             about_on: cells(known.things.len() * known.surfaces.len()),
             going_there_s: cells(known.surfaces.len()),
+            unseen_ends: cells(known.surfaces.len()),
             obstacles: OnceLock::new(),
         };
         Self { known, thresholds, derived }
@@ -463,10 +469,32 @@ impl Situation {
         self.clearness(from, on) * (-unseen_m / FREE_PATH_M).exp()
     }
 
-    /// How sure it is where a thing stands, 0 to 1: the most probable object that it may be, where it is asked about.
+    /// How sure it is where a thing stands, 0 to 1: the most probable object that it may be, where it is asked about, and that this stands
+    /// where it is believed to, as far as looks can tell.
     pub fn confidence(&self, what: usize) -> f64 {
         let thing = &self.things[what];
-        self.belief.tracks.iter().map(|t| thing.probability(t, &self.surfaces)).fold(0.0, f64::max)
+        let there = |t| match thing.probability(t, &self.surfaces) {
+            0.0 => 0.0,
+            p => p * (1.0 - adrift::chance_off(self, t)),
+        };
+        self.belief.tracks.iter().map(there).fold(0.0, f64::max)
+    }
+
+    /// The object that a thing most probably is, if that is more likely than not.
+    pub(crate) fn best(&self, what: usize) -> Option<&Track> {
+        let p = |t: &Track| self.things[what].probability(t, &self.surfaces);
+        let best = self.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b)));
+        best.filter(|t| p(t) > 0.5)
+    }
+
+    /// How sure it is that a thing, where one is believed in, stands where on its surface it is believed to, 0 to 1.
+    pub fn placed(&self, what: usize) -> f64 {
+        self.best(what).map_or(1.0, |track| 1.0 - adrift::chance_off(self, track))
+    }
+
+    /// The sides of a surface that a look could show for it to be known better where what was seen of it lies on the map.
+    pub(crate) fn unseen_ends(&self, on: usize) -> &[Hypothesis] {
+        self.derived.unseen_ends[on].get_or_init(|| adrift::unseen_ends(self, on))
     }
 
     /// How sure it is that a thing stands on a surface, 0 to 1.

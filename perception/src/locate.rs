@@ -8,7 +8,8 @@ mod endings;
 pub use endings::{Ending, endings};
 
 use nalgebra::{
-    Isometry2, Isometry3, Matrix3, Point2, Point3, Translation3, Unit, UnitQuaternion, Vector2, Vector3,
+    Isometry2, Isometry3, Matrix2x3, Matrix3, Point2, Point3, SymmetricEigen, Translation3, Unit,
+    UnitQuaternion, Vector2, Vector3,
 };
 
 /// Length of an edge that gives one sample.
@@ -19,6 +20,11 @@ const FEWEST: usize = 2;
 const GATES_M: [f64; 7] = [0.15, 0.12, 0.08, 0.05, 0.03, 0.02, 0.02];
 /// Standard deviation of one sample; neighbours err together, which is why it is no millimetre.
 const SAMPLE_SIGMA_M: f64 = 0.03;
+/// Where fewer samples than this tell where it ends on either side, a surface is laid by how far it was seen to reach.
+const FEW: usize = 5;
+/// Standard deviation of how far it was seen to reach, where that is from side to side, and most that it may fall short of it, metres.
+const REACH_SIGMA_M: f64 = 0.01;
+const SHORT_M: f64 = 0.10;
 
 /// How a surface was laid on its outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,33 +35,63 @@ pub struct Located {
     pub matched: usize,
     /// Root mean square distance of those from the outline afterwards, metres; 0 without any.
     pub residual_m: f64,
+    /// How well that is known; none without an outline.
+    pub certainty: Option<Certainty>,
 }
 
-/// Lays the endings of a surface that were seen on the outline that the map has of it (in order around, metres).
+/// How well it is known where a surface lies on the map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Certainty {
+    frame: Frame,
+    /// Of a shift along the two axes of the frame, square metres, and of a turn about its origin, square radians.
+    covariance: Matrix3<f64>,
+}
+
+impl Certainty {
+    /// The direction along the surface in which the place of a point is known worst, and its standard deviation that way, metres.
+    pub fn worst(&self, at: &Point3<f64>) -> (Unit<Vector3<f64>>, f64) {
+        let p = self.frame.flat(at);
+        let moved = Matrix2x3::new(1.0, 0.0, -p.y, 0.0, 1.0, p.x);
+        let of_place = SymmetricEigen::new(moved * self.covariance * moved.transpose());
+        let n = of_place.eigenvalues.imax();
+        let (way, variance) = (of_place.eigenvectors.column(n), of_place.eigenvalues[n]);
+        let way = self.frame.right * way[0] + self.frame.ahead * way[1];
+        (Unit::new_normalize(way), variance.max(0.0).sqrt())
+    }
+}
+
+/// Lays the endings of a surface that were seen on the outline that the map has of it (in order around, metres), and between two sides
+/// of which none was seen, what was seen of the surface, its `hull`, if that is hardly shorter: a board between uprights ends nowhere.
 ///
 /// `sigma_m` and `sigma_rad` say how well the place in the map of what was seen is known before: where no ending tells otherwise,
 /// it stays. Moves along the surface and turns about `up`; heights are left as they are.
 pub fn locate(
     endings: &[Ending],
+    hull: &[Point3<f64>],
     up: &Unit<Vector3<f64>>,
     outline: &[Point3<f64>],
     sigma_m: f64,
     sigma_rad: f64,
 ) -> Located {
-    let mut located = Located { map_from_world: Isometry3::identity(), matched: 0, residual_m: 0.0 };
+    let mut located =
+        Located { map_from_world: Isometry3::identity(), matched: 0, residual_m: 0.0, certainty: None };
     if outline.len() < 3 {
         return located;
     }
     let frame = Frame::of(outline, up);
     let ends: Vec<End> = endings.iter().map(|ending| End::of(ending, &frame)).collect();
     let edges = edges(&outline.iter().map(|p| frame.flat(p)).collect::<Vec<_>>());
+    let hull: Vec<Point2<f64>> = hull.iter().map(|p| frame.flat(p)).collect();
     let mut moved = Isometry2::identity();
     for gate_m in GATES_M {
-        let matches = samples(&edges, &ends, &moved, gate_m);
+        let mut matches = samples(&edges, &ends, &moved, gate_m);
         located.matched = matches.len();
         let square: f64 = matches.iter().map(|m| m.distance_m.powi(2)).sum();
         located.residual_m = if matches.is_empty() { 0.0 } else { (square / matches.len() as f64).sqrt() };
-        moved = step(&matches, &moved, sigma_m.max(1e-6), sigma_rad.max(1e-6));
+        matches.extend(spans(&edges, &hull, &matches, &moved));
+        let (stepped, covariance) = step(&matches, &moved, sigma_m.max(1e-6), sigma_rad.max(1e-6));
+        moved = stepped;
+        located.certainty = Some(Certainty { frame, covariance });
     }
     located.map_from_world = frame.lift(&moved);
     located
@@ -106,6 +142,7 @@ struct Match {
 }
 
 /// The plane of the outline with its middle as origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Frame {
     origin: Point3<f64>,
     right: Vector3<f64>,
@@ -173,6 +210,30 @@ fn samples(edges: &[Edge], ends: &[End], moved: &Isometry2<f64>, gate_m: f64) ->
     each.collect()
 }
 
+/// What lies between two opposite sides of the outline of which none shows where it ends, and reaches nearly from one to the other: in the middle.
+fn spans(edges: &[Edge], hull: &[Point2<f64>], ends: &[Match], moved: &Isometry2<f64>) -> Vec<Match> {
+    let is_open = |edge: &&Edge| ends.iter().filter(|m| m.normal == edge.outward).count() < FEW;
+    let open: Vec<&Edge> = edges.iter().filter(is_open).collect();
+    let reach =
+        |edge: &Edge| hull.iter().map(|p| edge.outward.dot(&(moved * p - edge.from))).reduce(f64::max);
+    let between = |a: &Edge, b: &Edge| {
+        let (beyond_a, beyond_b) = (reach(a)?, reach(b)?);
+        let short_m = -(beyond_a + beyond_b);
+        (short_m.abs() < SHORT_M).then(|| Match {
+            at: Point2::origin(),
+            normal: a.outward,
+            distance_m: (beyond_a - beyond_b) / 2.0,
+            variance_m2: REACH_SIGMA_M.powi(2) + short_m.powi(2) / 12.0,
+        })
+    };
+    let pairs = open.iter().enumerate().flat_map(|(n, a)| open[n + 1..].iter().map(move |b| (*a, *b)));
+    let opposite = pairs.filter(|(a, b)| a.outward.dot(&b.outward) < OPPOSITE);
+    opposite.filter_map(|(a, b)| between(a, b)).collect()
+}
+
+/// The cosine between the normals of two sides that lie opposite.
+const OPPOSITE: f64 = -0.98;
+
 /// Endings on a piece of an edge: how many, the sums of how far out they are and of half their widths.
 #[derive(Clone, Default)]
 struct Bin {
@@ -190,8 +251,13 @@ impl Bin {
     }
 }
 
-/// One Gauss-Newton step towards the edges, held by what was known before.
-fn step(matches: &[Match], moved: &Isometry2<f64>, sigma_m: f64, sigma_rad: f64) -> Isometry2<f64> {
+/// One Gauss-Newton step towards the edges, held by what was known before, and the covariance of what it leads to.
+fn step(
+    matches: &[Match],
+    moved: &Isometry2<f64>,
+    sigma_m: f64,
+    sigma_rad: f64,
+) -> (Isometry2<f64>, Matrix3<f64>) {
     let t = moved.translation.vector;
     let prior = Vector3::new(sigma_m.powi(-2), sigma_m.powi(-2), sigma_rad.powi(-2));
     let mut information = Matrix3::from_diagonal(&prior);
@@ -204,9 +270,9 @@ fn step(matches: &[Match], moved: &Isometry2<f64>, sigma_m: f64, sigma_rad: f64)
     match information.try_inverse() {
         Some(inverse) => {
             let d = -(inverse * gradient);
-            Isometry2::new(Vector2::new(d.x, d.y), d.z) * moved
+            (Isometry2::new(Vector2::new(d.x, d.y), d.z) * moved, inverse)
         }
-        None => *moved,
+        None => (*moved, Matrix3::from_diagonal(&prior.map(f64::recip))),
     }
 }
 
@@ -300,7 +366,8 @@ mod tests {
         let options =
             SurfaceOptions { up, region, height_band_m: Some((0.6, 0.8)), ..SurfaceOptions::default() };
         let surface = find_surface(&found.cloud, &found.visibility, &options).unwrap();
-        let located = locate(&endings(&found.visibility, &surface), &surface.up, &outline(), 0.05, 0.05);
+        let located =
+            locate(&endings(&found.visibility, &surface), &surface.hull, &surface.up, &outline(), 0.05, 0.05);
         let middle = Point3::new(0.0, 0.0, BOARD[1][2]);
         (located.map_from_world * (told_from_true * middle) - middle, located)
     }
@@ -352,12 +419,37 @@ mod tests {
     }
 
     #[test]
+    fn a_board_between_uprights_lies_between_them() {
+        let uprights = [[[-0.83, -0.4, 0.0], [-0.8, 0.4, 1.6]], [[0.8, -0.4, 0.0], [0.83, 0.4, 1.6]]];
+        check(&uprights, [0.1, -1.6, 1.3], Faults { noise: 0.003, lost: 1, shadow: 0 }, 0.012);
+        let box_at_an_end = [[-0.79, -0.39, 0.72], [-0.74, 0.39, 0.9]];
+        let others = [uprights[0], uprights[1], box_at_an_end];
+        check(&others, [0.1, -1.6, 1.3], Faults { noise: 0.003, lost: 1, shadow: 0 }, 0.04);
+    }
+
+    #[test]
+    fn how_well_it_lies_is_known() {
+        let along_m = |others: &[Block], eye, at| {
+            let blocks = [others, &[BOARD, FLOOR]].concat();
+            let (_, located) = laid(&view(&blocks, eye, at, Faults::default()), &Isometry3::identity());
+            let (way, sigma_m) = located.certainty.unwrap().worst(&Point3::new(0.3, 0.0, 0.72));
+            (way.x.abs(), sigma_m)
+        };
+        let (_, whole_m) = along_m(&[], BEFORE, [0.0, 0.0, 0.72]);
+        assert!(whole_m < 0.01, "{whole_m}");
+        // Of the right half no end is seen, and the left end is out of the picture.
+        let cupboard = [[0.8, -0.6, 0.0], [1.2, 0.6, 1.1]];
+        let (way, half_m) = along_m(&[cupboard], [0.4, -1.2, 1.2], [0.5, 0.0, 0.72]);
+        assert!(way > 0.99 && (0.04..0.051).contains(&half_m), "{way} {half_m}");
+    }
+
+    #[test]
     fn what_no_end_tells_stays() {
         let near = view(&[BOARD, FLOOR], [0.0, -0.1, 1.3], [0.0, 0.0, 0.72], Faults::default());
         let (off, located) = laid(&near, &Isometry3::translation(0.03, 0.02, 0.0));
         let stays = (off - Vector3::new(0.03, 0.02, 0.0)).norm() < 1e-9;
         assert!(stays && located.matched == 0, "{off:?}, {located:?}");
-        let none = locate(&[], &Vector3::z_axis(), &outline(), 0.05, 0.05);
+        let none = locate(&[], &[], &Vector3::z_axis(), &outline(), 0.05, 0.05);
         assert_eq!((none.map_from_world, none.matched), (Isometry3::identity(), 0));
     }
 }

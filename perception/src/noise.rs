@@ -32,6 +32,11 @@ pub fn lateral_sigma_m(z_m: f64, angle_rad: f64, focal_px: f64) -> Option<f64> {
         .then(|| (0.8 + 0.034 * degrees / (90.0 - degrees)) * z_m / focal_px)
 }
 
+/// Standard normal distribution function.
+pub fn normal_cdf(x: f64) -> f64 {
+    libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2) / 2.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

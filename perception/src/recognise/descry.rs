@@ -7,6 +7,7 @@ use super::Recogniser;
 use super::evidence::{Measured, measure};
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
 use super::percept::{Percept, Sighting, Stance};
+use crate::noise::normal_cdf;
 use crate::segment::{Scene, Segment};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -403,16 +404,6 @@ fn everyday_density(value: f64, (median, spread): (f64, f64)) -> f64 {
 
 fn normal_density(x: f64, sigma: f64) -> f64 {
     (-0.5 * (x / sigma).powi(2)).exp() / (sigma * std::f64::consts::TAU.sqrt())
-}
-
-/// Standard normal distribution function (Abramowitz and Stegun 26.2.17, error below 1e-7).
-fn normal_cdf(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.231_641_9 * x.abs());
-    let series = t
-        * (0.319_381_530
-            + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
-    let upper = normal_density(x, 1.0) * series;
-    if x >= 0.0 { 1.0 - upper } else { upper }
 }
 
 fn log_sum(logs: &[f64]) -> f64 {

@@ -158,6 +158,7 @@ fn believed(mind: &Mind, n: &Novelty) -> Believed {
         label,
         confidence,
         position_m: n.centre.coords.into(),
+        position_sigma_m: None,
         size_m: n.size_m,
         on: surface.map(|s| s.name.clone()),
         room: surface.and_then(|s| s.room.clone()),

@@ -86,6 +86,7 @@ pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
         outline: hint.outline_m.iter().map(|p| Point3::new(p.x, p.y, hint.height_m)).collect(),
         up,
         doubtful: None,
+        placed: None,
     });
     let named =
         domain.config.surfaces.iter().filter(|_| robot.surfaces().is_empty()).map(|name| KnownSurface {
@@ -97,6 +98,7 @@ pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
             outline: Vec::new(),
             up,
             doubtful: None,
+            placed: None,
         });
     on_map.chain(named).collect()
 }

@@ -67,6 +67,7 @@ pub(super) fn adopt(mind: &mut Mind, on: usize, others: Vec<Surface>, notes: &mu
             up: surface.up.into_inner(),
             whole: false,
             doubtful: None,
+            placed: None,
         };
         let at = known.centre().unwrap_or_else(Point3::origin);
         notes.push(Note::Surface { name, at_m: at.into(), area_m2: surface.area_m2 });

@@ -10,6 +10,7 @@ use descry_memory::belief::Track;
 use descry_perception::nalgebra::{Point3, Vector3};
 use descry_perception::recognise::ObjectModel;
 
+use super::adrift;
 use super::unnoticed::{Unseen, across, around, grid, unseen_volume};
 use crate::situation::{Situation, Thing};
 
@@ -78,13 +79,15 @@ impl Doubt {
     /// What is in doubt about a thing: where it may be hidden, and which objects may be it.
     pub(crate) fn about(situation: &Situation, what: usize) -> Self {
         let thing = &situation.things[what];
-        let best = situation.confidence(what);
+        let p = |track: &Track| thing.probability(track, &situation.surfaces);
+        let best = situation.belief.tracks.iter().map(p).fold(0.0, f64::max);
         let mut doubt = Self::hidden(situation, thing, &situation.expected[what]);
         doubt.scale_hidden(1.0 - best);
         for track in &situation.belief.tracks {
             let p = thing.probability(track, &situation.surfaces);
             if p > NEGLIGIBLE {
                 doubt.hypotheses.extend(unseen_sides(situation, track, p));
+                doubt.hypotheses.extend(adrift::ends_of(situation, track, p));
             }
         }
         doubt
@@ -213,7 +216,8 @@ impl Doubt {
 
     /// The probability that hangs on all that is in doubt.
     pub fn remaining(&self) -> f64 {
-        if self.anywhere { self.hidden } else { self.hypotheses.iter().map(|h| h.weight).sum() }
+        let all: f64 = self.hypotheses.iter().map(|h| h.weight).sum();
+        if self.anywhere { self.hidden } else { all.min(1.0) }
     }
 
     /// The probability that hangs on hidden places that no look shows, and those places.

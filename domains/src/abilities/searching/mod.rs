@@ -1,5 +1,6 @@
 //! *searching*: poses to look from, looks, what is in doubt and what a look would settle, pushing aside what hides it.
 
+pub(crate) mod adrift;
 mod calls;
 pub mod candidates;
 pub mod change;

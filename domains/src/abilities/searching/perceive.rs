@@ -150,8 +150,9 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     mind.regions[on].nothing = None;
     let agreeing = merged.fits.iter().filter(|fit| fit.used).count();
     mind.regions[on].disputed = merged.fits.len() >= 2 * agreeing;
-    let (merged, surface) =
+    let (merged, surface, placed) =
         placing::lay_on_map(eyes.robot.description(), &mind.known.surfaces[on], merged, surface);
+    mind.known.surfaces[on].placed = placed;
     let last = mind.regions[on].looks.last().map(|look| look.stamp_ns);
     if without_astray(mind, eyes.robot.description(), on, (&views, &merged)) {
         if mind.regions[on].looks.last().map(|look| look.stamp_ns) == last {

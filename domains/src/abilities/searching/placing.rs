@@ -1,9 +1,8 @@
 //! Where what was seen of a surface lies on the map: its outline there mends localisation's error.
 
 use descry_perception::View;
-use descry_perception::locate::{endings, locate};
+use descry_perception::locate::{Certainty, Located, endings, locate};
 use descry_perception::merge::{MergeOptions, Merged, merge};
-use descry_perception::nalgebra::Isometry3;
 use descry_perception::surface::{Surface, SurfaceOptions, find_surface};
 use descry_robots::Description;
 
@@ -11,18 +10,19 @@ use super::perceive::is_astray;
 use crate::mind::Laid;
 use crate::situation::KnownSurface;
 
-/// Lays a merged surface on the outline that the map has of it: that mends what is left of localisation's error.
+/// Lays a merged surface on the outline that the map has of it: that mends what is left of localisation's error. Says how well.
 pub(super) fn lay_on_map(
     body: &Description,
     known: &KnownSurface,
     merged: Merged,
     surface: Surface,
-) -> (Merged, Surface) {
+) -> (Merged, Surface, Option<Certainty>) {
     if !known.whole {
-        return (merged, surface);
+        return (merged, surface, None);
     }
-    let map_from_world = located(body, known, &merged, &surface);
-    (merged.moved(&map_from_world), surface.moved(&map_from_world))
+    let located = located(body, known, &merged, &surface);
+    let map_from_world = located.map_from_world;
+    (merged.moved(&map_from_world), surface.moved(&map_from_world), located.certainty)
 }
 
 /// How a view lies on the outline of a surface that the map has; nowhere, if that were farther off than localisation errs.
@@ -35,15 +35,15 @@ pub(super) fn of_view(
     let localised = view.world_from_camera;
     let Ok(merged) = merge(&[view], merging) else { return Laid::Nowhere };
     let Ok(surface) = find_surface(&merged.cloud, &merged.visibility, seeking) else { return Laid::Nowhere };
-    let map_from_localised = located(body, known, &merged, &surface);
+    let map_from_localised = located(body, known, &merged, &surface).map_from_world;
     match is_astray(body, &localised, &(map_from_localised * localised)) {
         true => Laid::Nowhere,
         false => Laid::By(map_from_localised),
     }
 }
 
-fn located(body: &Description, known: &KnownSurface, merged: &Merged, surface: &Surface) -> Isometry3<f64> {
+fn located(body: &Description, known: &KnownSurface, merged: &Merged, surface: &Surface) -> Located {
     let endings = endings(&merged.visibility, surface);
     let sigmas = (body.pose_sigma_m, body.pose_sigma_rad);
-    locate(&endings, &surface.up, &known.outline, sigmas.0, sigmas.1).map_from_world
+    locate(&endings, &surface.hull, &surface.up, &known.outline, sigmas.0, sigmas.1)
 }

@@ -242,6 +242,7 @@ mod tests {
             up: Vector3::z(),
             whole: true,
             doubtful: None,
+            placed: None,
         }
     }
 

@@ -132,6 +132,7 @@ mod tests {
             up: Vector3::z(),
             whole: true,
             doubtful: None,
+            placed: None,
         };
         let mut belief = Belief::default();
         belief.gone = vec![track(0, 0.0, 1.0, 0.07), track(1, 0.0, cup, 0.07)];

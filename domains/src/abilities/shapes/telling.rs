@@ -213,6 +213,7 @@ impl<'a> Teller<'a> {
             label,
             confidence: thing.sureness(s.floor.known.len()),
             position_m: [middle.x, middle.y, 0.0],
+            position_sigma_m: None,
             size_m: [width_m, width_m, 0.0],
             on: None,
             room,

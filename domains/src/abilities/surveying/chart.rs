@@ -283,6 +283,7 @@ impl Chart {
             up: Vector3::z(),
             whole: false,
             doubtful: None,
+            placed: None,
         })
     }
 }

@@ -4,6 +4,7 @@ mod can_see;
 mod expected_clarity;
 mod expected_completeness;
 mod expected_gain;
+mod expected_placing;
 mod expected_presence;
 mod search_cost;
 mod worth_a_look;
@@ -48,6 +49,12 @@ pub(super) const ALL: &[Meaning] = &[
         reads: LOOKS,
         about: "how much of the doubt about a thing on that surface a look would settle",
         answers: expected_presence::answer,
+    },
+    Meaning {
+        name: "expected-placing",
+        reads: LOOKS,
+        about: "how much of the doubt about where on its surface a thing stands a look would settle",
+        answers: expected_placing::answer,
     },
     Meaning {
         name: "search-cost",

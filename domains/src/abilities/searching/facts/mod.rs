@@ -7,6 +7,7 @@ mod confidence;
 mod is;
 mod last_seen;
 mod on;
+mod placed;
 mod presence;
 mod sure;
 
@@ -25,6 +26,12 @@ pub(super) const ALL: &[Fact] = &[
         types: &["thing", "surface"],
         about: "how sure it is that the thing stands on the surface, 0 to 1",
         states: presence::state,
+    },
+    Fact {
+        name: "placed",
+        types: &["thing"],
+        about: "how sure it is that the thing, where one is believed in, stands where on its surface it is believed to, 0 to 1",
+        states: placed::state,
     },
     Fact {
         name: "on",

@@ -1,0 +1,100 @@
+//! How well it is known where things stand along a surface of the map: what was seen of it is laid on its outline by its ends, and
+//! where none was seen, localisation's error is left.
+
+use descry_memory::belief::Track;
+use descry_memory::space::Cell;
+use descry_perception::nalgebra::{Point3, Vector3};
+use descry_perception::noise::normal_cdf;
+
+use super::doubt::Hypothesis;
+use crate::situation::{KnownSurface, Situation};
+
+/// A thing that is farther than this from where it is said to stand is not there, metres: nobody would grasp it.
+const OFF_M: f64 = 0.03;
+/// A chance below this of being that far off is none.
+const NEGLIGIBLE: f64 = 0.01;
+/// Cosine of the widest angle between a direction and the normal of a side that tells of it.
+const ACROSS: f64 = 0.7;
+/// A side is looked for at points so far apart, and so far inside of it and above the surface, metres.
+const STEP_M: f64 = 0.05;
+const INSIDE_M: f64 = 0.01;
+
+/// Standard deviation of where an object stands, in the direction in which that is known worst, and this direction, metres.
+pub(crate) fn worst(surface: &KnownSurface, track: &Track) -> (Option<Vector3<f64>>, f64) {
+    match &surface.placed {
+        Some(placed) => {
+            let (way, sigma_m) = placed.worst(&track.position_m);
+            (Some(way.into_inner()), sigma_m.hypot(track.position_sigma_m))
+        }
+        None => (None, track.position_sigma_m),
+    }
+}
+
+/// The probability that an object stands elsewhere along its surface than is believed, as far as some look can tell more of that.
+pub(crate) fn chance_off(s: &Situation, track: &Track) -> f64 {
+    let Some(on) = s.surface_of(track) else { return 0.0 };
+    let (Some(_), sigma_m) = worst(&s.surfaces[on], track) else { return 0.0 };
+    let chance = 2.0 * normal_cdf(-OFF_M / sigma_m);
+    if chance < NEGLIGIBLE || s.unseen_ends(on).is_empty() { 0.0 } else { chance }
+}
+
+/// The share of the sides of its surface that would tell where things stand along it, which a look shows beyond those before it.
+pub(super) fn share_shown(s: &Situation, look: (usize, usize), before: &[(usize, usize)]) -> f64 {
+    let ends = s.unseen_ends(look.1);
+    let told = |(from, on): (usize, usize), end| s.would_settle(from, on, end, None);
+    let earlier = |end| before.iter().filter(|b| b.1 == look.1).map(|b| told(*b, end)).fold(0.0, f64::max);
+    let fresh: f64 = ends.iter().map(|end| (told(look, end) - earlier(end)).max(0.0)).sum();
+    fresh / ends.len().max(1) as f64
+}
+
+/// What a look must show for it to be known where an object stands along its surface, each with its part of what hangs on the object.
+pub(super) fn ends_of(s: &Situation, track: &Track, weight: f64) -> Vec<Hypothesis> {
+    let weight = weight * chance_off(s, track);
+    match s.surface_of(track) {
+        Some(on) if weight > 0.0 => {
+            let ends = s.unseen_ends(on);
+            let each = weight / ends.len() as f64;
+            ends.iter().map(|end| Hypothesis { weight: each, ..end.clone() }).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// The sides of a surface that tell where it lies in the direction in which that is known worst, have not been seen, and that a look
+/// which can be taken shows.
+pub(crate) fn unseen_ends(s: &Situation, on: usize) -> Vec<Hypothesis> {
+    let surface = &s.surfaces[on];
+    let Some((placed, centre)) = surface.placed.as_ref().zip(surface.centre()) else { return Vec::new() };
+    let (way, _) = placed.worst(&centre);
+    let corners = surface.outline.len();
+    let sides = (0..corners).map(|n| (surface.outline[n], surface.outline[(n + 1) % corners]));
+    let ends = sides.filter_map(|(a, b)| end(s, on, &centre, [a, b], &way));
+    let looks = || {
+        let from = 0..s.candidates.len();
+        from.filter(|&from| !s.observed.contains(&(from, on)) && s.can_reach(from) && s.sees(from, on))
+    };
+    ends.filter(|end| looks().any(|from| s.would_settle(from, on, end, None) > 0.0)).collect()
+}
+
+/// A side of a surface, if it tells of a direction and most of it has not been seen.
+fn end(
+    s: &Situation,
+    on: usize,
+    centre: &Point3<f64>,
+    [a, b]: [Point3<f64>; 2],
+    way: &Vector3<f64>,
+) -> Option<Hypothesis> {
+    let surface = &s.surfaces[on];
+    let along = (b - a).try_normalize(1e-9)?;
+    let across = surface.up.cross(&along).normalize();
+    let inward = across * across.dot(&(centre - a)).signum();
+    if inward.dot(way).abs() < ACROSS {
+        return None;
+    }
+    let steps = ((b - a).norm() / STEP_M) as usize;
+    let point = |n: usize| a + along * (STEP_M * (n as f64 + 0.5)) + (inward + surface.up) * INSIDE_M;
+    let points: Vec<Point3<f64>> = (0..steps).map(point).collect();
+    let unseen = points.iter().filter(|p| s.spaces[on].cell(p) == Cell::Unseen).count();
+    let centre = a + (b - a) / 2.0;
+    (2 * unseen > steps).then_some(Hypothesis { weight: 0.0, on, centre, points, facing: None })
+}

@@ -1,0 +1,18 @@
+//! `[expected-placing ?from ?on ?what]`: by how much a look is expected to raise the certainty that an object stands where on its
+//! surface it is believed to. What an earlier look of the plan shows does not count again.
+
+use descry_planner::{Answer, Call, CallError};
+
+use crate::abilities::argument;
+use crate::abilities::searching::adrift;
+use crate::situation::Situation;
+
+pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let look = (situation.candidate(argument(call, 0)?)?, situation.surface(argument(call, 1)?)?);
+    let what = situation.thing(argument(call, 2)?)?;
+    let Some(track) = situation.best(what).filter(|t| situation.surface_of(t) == Some(look.1)) else {
+        return Ok(Answer::Number(0.0));
+    };
+    let shown = adrift::share_shown(situation, look, &situation.planned_looks(call));
+    Ok(Answer::Number(adrift::chance_off(situation, track) * shown))
+}

@@ -15,6 +15,7 @@ mod search;
 mod settle;
 
 use crate::cloud::Cloud;
+use crate::surface::Region;
 use crate::view::View;
 use crate::visibility::{DepthMap, Visibility};
 pub use further::Merger;
@@ -35,6 +36,8 @@ pub struct MergeOptions {
     pub up: Option<Unit<Vector3<f64>>>,
     /// Least and greatest height along `up` of what is merged, metres; outside it points are dropped.
     pub height_band_m: Option<(f64, f64)>,
+    /// Seen along `up`, what is merged, if not all of it; views are aligned by all that they show.
+    pub region: Option<Region>,
     /// Returns farther from their camera than this are dropped, metres.
     pub range_m: f64,
     /// Side of the voxels in which clouds are aligned, metres (paper: 1 cm).
@@ -50,6 +53,7 @@ impl Default for MergeOptions {
         MergeOptions {
             up: None,
             height_band_m: None,
+            region: None,
             range_m: 3.5,
             align_voxel_m: 0.01,
             fuse_voxel_m: 0.003,

@@ -311,6 +311,19 @@ impl Region {
         hull::clip(surface.flat(&surface.hull), &convex_hull(surface.flat(&self.corners)), self.margin_m)
     }
 
+    /// Unit vectors across `up` into the region, and how far along them its edges lie, metres; none of what has no area.
+    pub(crate) fn edges(&self, up: &Vector3<f64>) -> Vec<(Vector3<f64>, f64)> {
+        let n = self.corners.len();
+        let middle = self.corners.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords) / n.max(1) as f64;
+        let edge = |i: usize| {
+            let (a, b) = (&self.corners[i].coords, &self.corners[(i + 1) % n].coords);
+            let across = up.cross(&(b - a)).try_normalize(0.0)?;
+            let inward = if across.dot(&(middle - a)) < 0.0 { -across } else { across };
+            Some((inward, inward.dot(a)))
+        };
+        if n < 3 { Vec::new() } else { (0..n).filter_map(edge).collect() }
+    }
+
     fn cut(&self, surface: Surface) -> Surface {
         let common = self.common(&surface);
         let world_from_surface = surface.surface_from_world.inverse();

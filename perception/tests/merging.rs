@@ -4,6 +4,7 @@ mod tabletop;
 
 use descry_perception::merge::{MergeError, MergeOptions, Merger, merge};
 use descry_perception::nalgebra::{Isometry3, Point3, Unit, Vector3};
+use descry_perception::surface::Region;
 use descry_perception::{Merged, View};
 use tabletop::{Draws, TABLE_M, Thing, disturbed, look, on_ring};
 
@@ -67,6 +68,31 @@ fn offset_m(merged: &Merged, truths: &[Isometry3<f64>]) -> f64 {
 }
 
 const RING: [f64; 5] = [0.0, 1.1, 2.4, 3.6, 5.0];
+
+/// Only what is over the region is merged, and it comes out as it does with all the rest around it.
+#[test]
+fn of_a_region_what_is_beside_it_is_left_away() {
+    let (views, _) = views(&[0.0, 1.2, 2.4], 0.02, 0.01, 7);
+    let corners = [(-0.3, -0.2), (-0.3, 0.2), (0.3, 0.2), (0.3, -0.2)];
+    let corners = corners.map(|(x, y)| Point3::new(x, y, 0.0)).to_vec();
+    let over = |p: &Point3<f32>, margin_m: f32| p.x.abs() < 0.3 + margin_m && p.y.abs() < 0.2 + margin_m;
+    let whole = merge(&views, &options()).expect("the views are sound");
+    for turned in [false, true] {
+        let mut corners = corners.clone();
+        corners.rotate_left(usize::from(turned));
+        if turned {
+            corners.reverse();
+        }
+        let region = Some(Region { corners, margin_m: 0.05 });
+        let part = merge(&views, &MergeOptions { region, ..options() }).expect("the views are sound");
+        assert_eq!(part.fits, whole.fits);
+        let inner = |merged: &Merged| merged.cloud.points.iter().filter(|p| over(p, 0.03)).count();
+        assert_eq!(inner(&part), inner(&whole));
+        assert!(inner(&part) > 1_000);
+        assert!(part.cloud.points.iter().all(|p| over(p, 0.06)), "beyond the region");
+        assert!(whole.cloud.points.iter().any(|p| !over(p, 0.06)));
+    }
+}
 
 #[test]
 fn views_with_wrong_poses_come_together() {

@@ -61,6 +61,8 @@ pub(super) struct Within {
     up: Vector3<f32>,
     heights_m: (f32, f32),
     range_sq: f32,
+    /// Horizontal directions into the region, and how far along them it begins, metres.
+    pub edges: Vec<(Vector3<f32>, f32)>,
 }
 
 impl Within {
@@ -78,7 +80,20 @@ impl Within {
             up: up.cast(),
             heights_m: (heights_m.0 as f32, heights_m.1 as f32),
             range_sq: (options.range_m * options.range_m) as f32,
+            edges: Vec::new(),
         }
+    }
+
+    /// The same, and in the region.
+    pub fn of_fused(world_from_camera: &Isometry3<f64>, options: &MergeOptions) -> Within {
+        let within = Within::of(world_from_camera, options, 0.0);
+        let (Some(up), Some(region)) = (options.up, &options.region) else { return within };
+        let camera = &world_from_camera.translation.vector;
+        let in_camera = |(inward, edge_m): (Vector3<f64>, f64)| {
+            let least_m = edge_m - region.margin_m - inward.dot(camera);
+            ((world_from_camera.rotation.inverse() * inward).cast(), least_m as f32)
+        };
+        Within { edges: region.edges(&up).into_iter().map(in_camera).collect(), ..within }
     }
 
     /// False also for what is no return.

@@ -112,7 +112,7 @@ impl<'a> Returns<'a> {
         planes: &[Plane],
         options: &MergeOptions,
     ) -> Returns<'a> {
-        let within = Within::of(world_from_camera, options, 0.0);
+        let within = Within::of_fused(world_from_camera, options);
         let cloud = prepared.coarse.as_ref().unwrap_or(&view.cloud);
         let normals = Cow::Borrowed(cloud.normals.as_deref().unwrap_or_default());
         let coarse = Facing::of(view, cloud.grid, normals);
@@ -142,7 +142,7 @@ impl<'a> Returns<'a> {
         &points[points.len().min(row * self.width)..points.len().min((row + 1) * self.width)]
     }
 
-    /// Calls `found` for those that are in range and band and do not fly.
+    /// Calls `found` for those that are in range, band and region and do not fly.
     pub fn visit(&self, mut found: impl FnMut(Return)) {
         let mut lines: [Line; 3] = std::array::from_fn(|_| Line::of(self.width));
         lines[2].fill(self.line(0));
@@ -191,6 +191,12 @@ impl<'a> Returns<'a> {
             block.on[i] = if kept { THING } else { DROPPED };
             sigmas_m[i] = sigma_m(z[i], x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
             block.weight[i] = 1.0 / (sigmas_m[i] * sigmas_m[i]);
+        }
+        for (inward, least_m) in &self.within.edges {
+            for i in 0..LANES {
+                let inside = inward.x * x[i] + inward.y * y[i] + inward.z * z[i] >= *least_m;
+                block.on[i] = if inside { block.on[i] } else { DROPPED };
+            }
         }
         for (number, plane) in (0..).zip(&self.planes).filter(|(number, _)| around.contains(number)) {
             for i in 0..LANES {

@@ -126,9 +126,13 @@ fn views(mind: &Mind) -> Vec<RecordId> {
 /// The multi-view perception of paper 004, section V, on one surface: restore its views by their timestamps, merge, recognise,
 /// believe.
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
-    let (merging, seeking) = options(eyes.robot, Some(&mind.known.surfaces[on].symbol));
-    let seeking = seeking_at(seeking, &mind.known.surfaces[on]);
+    let (merging, seeking) = options_at(eyes.robot, &mind.known.surfaces[on]);
     place_looks(mind, eyes, on, (&merging, &seeking.surface))?;
+    if !keep_placed(&mut mind.regions[on].looks) {
+        let because = format!("the {} cannot be made out in this view", mind.known.surfaces[on].name);
+        notes.push(Note::Nothing { because });
+        return Ok(());
+    }
     let views = restore(mind, eyes, on)?;
     let merged = mind.regions[on].merger.merge(&views, &merging);
     let seen = merged.map_err(|nothing| nothing.to_string()).and_then(|merged| {
@@ -201,13 +205,6 @@ fn known_again(
     again::explain(&known.news, glances, &known.surfaces[on], &placed, &merged.cloud, percepts)
 }
 
-/// The same, for a surface that the map has: it is looked for where its outline is.
-fn seeking_at(seeking: SceneOptions, surface: &KnownSurface) -> SceneOptions {
-    let region = surface.whole.then(|| Region { corners: surface.outline.clone(), margin_m: BESIDE_M });
-    let tilt_rad = if surface.whole { LEVEL_RAD } else { seeking.surface.tilt_rad };
-    SceneOptions { surface: SurfaceOptions { region, tilt_rad, ..seeking.surface.clone() }, ..seeking }
-}
-
 /// Things on a surface were moved while nobody looked: only its newest view still holds, and looks at it may be taken again.
 fn begin_again(mind: &mut Mind, on: usize) {
     let region = &mut mind.regions[on];
@@ -248,13 +245,22 @@ fn place_looks(
     Ok(())
 }
 
+/// Leaves out the views in which the surface could not be made out, once there is one in which it could: too little in them would hold
+/// them to the others, and they blur what those show. False if the newest is gone.
+fn keep_placed(looks: &mut Vec<Look>) -> bool {
+    let newest = looks.last().map(|look| look.stamp_ns);
+    if looks.iter().any(|look| matches!(look.laid, Laid::By(_))) {
+        looks.retain(|look| look.laid != Laid::Nowhere);
+    }
+    looks.last().map(|look| look.stamp_ns) == newest
+}
+
 /// A view as it lies on the outline that the map has of a surface; as localisation has it where there is none, or nothing of it is seen.
 pub(crate) fn laid(eyes: Eyes<'_>, surface: &KnownSurface, view: View) -> View {
     if !surface.whole {
         return view;
     }
-    let (merging, seeking) = options(eyes.robot, Some(&surface.symbol));
-    let seeking = seeking_at(seeking, surface);
+    let (merging, seeking) = options_at(eyes.robot, surface);
     match placing::of_view(eyes.robot.description(), surface, view.clone(), (&merging, &seeking.surface)) {
         Laid::By(map_from_localised) => {
             View { world_from_camera: map_from_localised * view.world_from_camera, ..view }
@@ -538,6 +544,17 @@ pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptio
     let scene = SceneOptions { surface, ..SceneOptions::default() };
     let height_band_m = within(HEIGHT_TOLERANCE_M).map(|(low, high)| (low, high + scene.tallest_m));
     (MergeOptions { up, height_band_m, ..MergeOptions::default() }, scene)
+}
+
+/// The same for one surface: one that the map has is merged and looked for where its outline is.
+fn options_at(robot: &dyn Robot, known: &KnownSurface) -> (MergeOptions, SceneOptions) {
+    let (merging, seeking) = options(robot, Some(&known.symbol));
+    if !known.whole {
+        return (merging, seeking);
+    }
+    let region = Some(Region { corners: known.outline.clone(), margin_m: BESIDE_M });
+    let surface = SurfaceOptions { region: region.clone(), tilt_rad: LEVEL_RAD, ..seeking.surface };
+    (MergeOptions { region, ..merging }, SceneOptions { surface, ..seeking })
 }
 
 /// The part of the map that a frame shows; none if nothing returned.

@@ -3,8 +3,7 @@
 use crate::situation::Situation;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
-    let fluent = |what: usize| {
-        format!("(= (placed {}) {:.6})", situation.things[what].symbol, situation.placed(what))
-    };
+    let fluent =
+        |what: usize| format!("(= (placed {}) {:.6})", situation.things[what].symbol, situation.placed(what));
     (0..situation.things.len()).map(fluent).collect()
 }

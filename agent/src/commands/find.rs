@@ -105,12 +105,12 @@ fn carry_out(words: &[String], verb: &str, with: &With, stop: &Stop) -> Result<E
     window.close();
     match &ended {
         Ok(report) if with.json => {
-            input::narrate(&report.to_string());
+            input::narrate_fitted(&report.to_string());
             input::print_json(report)?;
         }
         Ok(report) => {
             input::narrate("");
-            input::print_text(report.to_string().trim())?;
+            input::print_fitted(report.to_string().trim())?;
         }
         Err(failed) if with.json => input::print_json(&Unended::of(&said, failed))?,
         Err(_) => {}
@@ -146,7 +146,7 @@ fn end(mut report: Report, folder: &Folder, started: Instant) -> Result<Report, 
 }
 
 fn tell(event: &Event) {
-    input::narrate(&event.to_string());
+    input::narrate_fitted(&event.to_string());
 }
 
 /// A goal in the words of a domain, of the places that a body knows and of the things that were learned.

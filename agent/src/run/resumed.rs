@@ -74,8 +74,9 @@ pub fn resume(
     };
     (asked.prepare)(&mut domain)?;
     let robot = asked.robot.unwrap_or(&settings.robot);
-    let allowed = asked.allow_programs;
-    programs::check_allowed(&domain, robot, &folder.display().to_string(), allowed)?;
+    // A body that is named now is wanted.
+    let recorded = if asked.robot.is_some() { "" } else { robot };
+    programs::check_allowed(&domain, recorded, &folder.display().to_string(), asked.allow_programs)?;
     let body = body::open(robot, settings.scene.as_deref(), settings.seed, &domain)?;
     let past = beginning.as_ref().and_then(|b| b.past.as_ref());
     let lexicon = Lexicon::new(&domain, &Places::of_body(&*body.robot)).remembering(past);

@@ -3,15 +3,20 @@
 
 mod chapters;
 mod plans;
+mod states;
 mod verdict;
 mod wording;
 
+use descry_domains::abilities;
+use descry_domains::load::Domain;
+use descry_domains::vocabulary::Ground;
 use descry_memory::Record;
 use serde::Serialize;
 
 use crate::exit::CommandError;
 use crate::report::Report;
-use crate::run::Header;
+use crate::run::{Beginning, Header};
+use states::States;
 use wording::{count, wrapped};
 
 /// What a run is explained by.
@@ -49,15 +54,40 @@ pub struct Told {
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<Explanation, CommandError> {
-    let (chapters, mut lost) = chapters::of(record)?;
+    let states = States::of(record)?;
+    let (chapters, mut lost) = chapters::of(record, &states, &header.resumed)?;
+    // The words of the domain of that time, if this version still understands it.
+    let domain = Beginning::of(record).ok().flatten().and_then(|beginning| beginning.domain().ok());
     let planner = descry_domains::abilities::searching::policies::PLAN;
     let policy = Some(&header.settings.policy).filter(|policy| *policy != planner).cloned();
     let asked = Asked { goal: header.pddl_goal.clone(), policy };
     let plans = plans::told(&chapters, &asked);
     let is_weighed = chapters.iter().any(|c| c.weighed.as_ref().is_some_and(|w| w.chosen.is_some()));
-    let asked = said(header, &asked, report, chapters.len(), is_weighed);
-    let verdict = verdict::rests_on(record, report, &mut lost)?;
-    Ok(Explanation { asked, plans, verdict, lost })
+    let mut said = said(header, &asked, report, chapters.len(), is_weighed);
+    said.splice(1..1, domain.as_ref().and_then(|domain| numbers(domain, &chapters)));
+    let meanings = |call: &str| domain.as_ref().and_then(|domain| meaning(domain, call));
+    let verdict = verdict::rests_on(record, report, &states, &meanings, &mut lost)?;
+    Ok(Explanation { asked: said, plans, verdict, lost })
+}
+
+/// What a call of the domain asks, if descry itself answers it.
+fn meaning(domain: &Domain, call: &str) -> Option<String> {
+    let own = domain.config.attachments.contains_key(call);
+    let mut calls = abilities::used(&domain.config.uses).flat_map(|ability| ability.calls);
+    calls.find(|c| c.name == call && !own).map(|c| c.about.to_string())
+}
+
+/// What the numbers say that plans are to change.
+fn numbers(domain: &Domain, chapters: &[chapters::Chapter]) -> Option<String> {
+    let expected = chapters.iter().filter_map(|c| c.weighed.as_ref()).flat_map(|w| &w.numbers);
+    let names = expected.filter_map(|n| n.name.trim_matches(['(', ')']).split(' ').next());
+    let names: std::collections::BTreeSet<&str> = names.collect();
+    let about = |name: &&str| match domain.vocabulary.ground(&domain.vocabulary.word(name)?, &domain.config) {
+        Ground::Sensed(fact) => Some(format!("({name} …) is {}", fact.about)),
+        _ => None,
+    };
+    let all: Vec<String> = names.iter().filter_map(about).collect();
+    (!all.is_empty()).then(|| format!("Numbers: {}.", all.join("; ")))
 }
 
 /// What a run was asked, as far as plans depend on it.
@@ -105,10 +135,17 @@ fn said(
         ),
         None => format!("It has not ended: the record goes as far as plan {plans}."),
     });
+    if !header.resumed.is_empty() {
+        let times = match header.resumed.len() {
+            1 => "once".into(),
+            n => format!("{n} times"),
+        };
+        said.push(format!("It was cut off {times}, and gone on with from its record."));
+    }
     if is_weighed {
         said.push(
-            "In brackets: what a way is expected to bring, the seconds for which the domain counts it (looking in vain \
-             may be counted, too), and the one by the other."
+            "In brackets: by how much steps are expected to bring the numbers nearer to what is wanted, the seconds at \
+             which the domain reckons them, time for looks in vain included where it counts that, and the gain a second."
                 .into(),
         );
     }

@@ -5,6 +5,7 @@ mod files;
 mod folder;
 pub mod programs;
 mod remembering;
+mod resumed;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -32,6 +33,7 @@ use crate::stop::Stop;
 pub use beginning::Beginning;
 pub use files::{finish, has_ended, header, keep_header, report};
 pub use folder::Folder;
+pub use resumed::{GoingOn, Prepare, Resumed, resume};
 
 /// What a run was started with: enough to start it again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,6 +67,9 @@ pub struct Header {
     pub pddl_goal: String,
     /// When it was started, seconds since 1970.
     pub started_unix_s: u64,
+    /// How often it was cut off and gone on with, and where.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub resumed: Vec<Resumed>,
     /// What it was started with.
     #[serde(flatten)]
     pub settings: Settings,
@@ -107,6 +112,7 @@ pub fn pursue(
         goal: goal.said.clone(),
         pddl_goal: goal.pddl.clone(),
         started_unix_s: now_unix_s() as u64,
+        resumed: Vec::new(),
         settings: settings.clone(),
     };
     keep_header(folder.path(), &header)?;

@@ -32,7 +32,7 @@ const GAINED: f64 = 1e-6;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Weighed {
-    /// The numbers that count, before the plan and as it expects them in the end.
+    /// The numbers that count, before the plan and as it expects them in the end; where it uses up what it gains, as soon as it has.
     pub numbers: Vec<Expected>,
     /// The plan until it first gains something.
     pub chosen: Option<Way>,
@@ -260,16 +260,25 @@ impl<'r> Scale<'r> {
         Some(Way { steps: steps.iter().map(call).collect(), takes_s, gains: now.iter().map(gain).sum() })
     }
 
-    fn weigh(&self, plan: &Plan) -> Option<Weighed> {
-        let first = (1..=plan.steps.len().min(MOST_STEPS))
-            .find_map(|n| Some((n, self.way(&plan.steps[..n]).filter(|way| way.gains > GAINED)?)));
-        let (n, chosen) = first?;
-        let then = self.after(&plan.steps).map(|(_, state)| self.numbers(&state)).unwrap_or_default();
+    /// The numbers that steps bring nearer to what is wanted.
+    fn expected(&self, steps: &[Step]) -> Vec<Expected> {
+        let then = self.after(steps).map(|(_, state)| self.numbers(&state)).unwrap_or_default();
         let expected = |(name, (now, less)): (String, (f64, bool))| {
             let then = then.get(&name)?.0;
             (Self::gain(now, then, less) > GAINED).then_some(Expected { name, now, then })
         };
-        let numbers = self.numbers(&self.state).into_iter().filter_map(expected).collect();
+        self.numbers(&self.state).into_iter().filter_map(expected).collect()
+    }
+
+    fn weigh(&self, plan: &Plan) -> Option<Weighed> {
+        let first = (1..=plan.steps.len().min(MOST_STEPS))
+            .find_map(|n| Some((n, self.way(&plan.steps[..n]).filter(|way| way.gains > GAINED)?)));
+        let (n, chosen) = first?;
+        let mut numbers = self.expected(&plan.steps);
+        if numbers.is_empty() {
+            // What a look is to make sure of may no longer be so once the plan has used it.
+            numbers = self.expected(&plan.steps[..n]);
+        }
         let others = self.others(&plan.steps[..n], &chosen);
         let open = others.len() + 1;
         Some(Weighed { numbers, chosen: Some(chosen), others: kept(others), open })

@@ -13,11 +13,13 @@ from ._descry import (
     Plan,
     Recognition,
     Record,
+    Replay,
     Report,
     Step,
     Surface,
     Task,
     Verdict,
+    WhyNot,
     check,
     goals,
     new_domain,
@@ -25,9 +27,10 @@ from ._descry import (
     read_cloud,
     recognise,
     validate,
+    why_not,
 )
 from .errors import BrokenError, Error, InputError, InternalError
-from .running import check_robot, pursue
+from .running import check_robot, pursue, replay, resume
 
 __all__ = [
     "Attachment",
@@ -43,11 +46,13 @@ __all__ = [
     "Plan",
     "Recognition",
     "Record",
+    "Replay",
     "Report",
     "Step",
     "Surface",
     "Task",
     "Verdict",
+    "WhyNot",
     "check",
     "check_robot",
     "goals",
@@ -56,5 +61,8 @@ __all__ = [
     "pursue",
     "read_cloud",
     "recognise",
+    "replay",
+    "resume",
     "validate",
+    "why_not",
 ]

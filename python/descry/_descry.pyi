@@ -14,11 +14,13 @@ __all__ = [
     "Plan",
     "Recognition",
     "Record",
+    "Replay",
     "Report",
     "Step",
     "Surface",
     "Task",
     "Verdict",
+    "WhyNot",
     "check",
     "check_robot",
     "goals",
@@ -27,7 +29,10 @@ __all__ = [
     "pursue",
     "read_cloud",
     "recognise",
+    "replay",
+    "resume",
     "validate",
+    "why_not",
 ]
 
 _Path = Union[str, "os.PathLike[str]"]
@@ -212,6 +217,42 @@ def plan(
     proven best; ``on_plan`` hears of each better one. Without, it ends after a short improvement. ``bound``: accept
     only plans whose metric is below. Ctrl-C ends it with ``KeyboardInterrupt``; an exception that an attachment raises
     comes out as it is.
+    """
+
+@final
+class WhyNot:
+    """What is said of an action that is asked about. ``str(answer)`` says it in sentences."""
+
+    @property
+    def action(self) -> str:
+        """The action, as it is written in plans."""
+
+    @property
+    def in_plan(self) -> bool:
+        """Whether the plan has it."""
+
+    @property
+    def unmet(self) -> List[str]:
+        """What of its condition does not hold at first."""
+
+    @property
+    def data(self) -> Dict[str, Any]:
+        """All of it, as ``descry plan --why-not --json`` prints it: plans that lead to it and that have it, too."""
+
+def why_not(
+    task: Task,
+    action: str,
+    *,
+    plan: Optional[Plan] = None,
+    time_limit_s: Optional[float] = None,
+    memory_limit_mb: Optional[int] = None,
+    seed: int = 0,
+    attachments: Optional[Mapping[str, _Attachment]] = None,
+) -> WhyNot:
+    """Says why an action, ``"(move a b)"``, is not in a plan: what it lacks at first, whether anything leads to it, and
+    what a plan with it takes beside ``plan`` (default: the one that is found).
+
+    Raises :class:`~descry.InputError` if the task has no such action.
     """
 
 def validate(task: Task, plan: Plan, *, attachments: Optional[Mapping[str, _Attachment]] = None) -> Verdict:
@@ -421,4 +462,49 @@ def pursue(
     actions: Optional[Dict[str, Callable[..., Any]]],
     on_event: Optional[Callable[[Dict[str, Any]], object]],
 ) -> Report: ...
+def resume(
+    run: _Path,
+    *,
+    robot: Optional[str],
+    allow_programs: bool,
+    attachments: Optional[Dict[str, Callable[..., Any]]],
+    facts: Optional[Dict[str, Callable[..., Any]]],
+    actions: Optional[Dict[str, Callable[..., Any]]],
+    on_event: Optional[Callable[[Dict[str, Any]], object]],
+) -> Report: ...
+@final
+class Replay:
+    """What came of living through a run again; true if all that was recorded came about again."""
+
+    @property
+    def same(self) -> bool: ...
+    @property
+    def verdict(self) -> Optional[str]:
+        """The verdict that it came to; ``None`` where the run was cut off."""
+
+    @property
+    def cut_off(self) -> Optional[str]:
+        """Where the run was cut off, if it was."""
+
+    @property
+    def differences(self) -> List[str]:
+        """What is not the same, a line each."""
+
+    @property
+    def damage(self) -> List[str]:
+        """What of the record is damaged: of such a record nothing is played."""
+
+    @property
+    def data(self) -> Dict[str, Any]:
+        """All of it, as ``descry replay --json`` prints it."""
+
+    def __bool__(self) -> bool: ...
+
+def replay(
+    run: _Path,
+    *,
+    speed: Optional[float],
+    out: Optional[_Path],
+    on_event: Optional[Callable[[Dict[str, Any]], object]],
+) -> Replay: ...
 def check_robot(robot: str) -> None: ...

@@ -56,6 +56,51 @@ def pursue(
         )
 
 
+def resume(
+    run: Union[str, "os.PathLike[str]"],
+    *,
+    robot: Optional[Body] = None,
+    allow_programs: bool = False,
+    attachments: Optional[Mapping[str, Callable[..., Any]]] = None,
+    facts: Optional[Mapping[str, Callable[[Sequence[str]], Sequence[str]]]] = None,
+    actions: Optional[Mapping[str, Callable[..., Optional[str]]]] = None,
+    on_event: Optional[Callable[[Dict[str, Any]], object]] = None,
+) -> "_descry.Report":
+    """Goes on with a run that was killed or stopped, as ``descry do --resume`` does: what its record holds is lived
+    through once more without asking body or functions, and then the run goes on. Goal and settings are those of the run.
+
+    ``robot`` is its body where that is an object of Python, or has moved to another place. ``allow_programs`` lets the
+    programs run that the record names; the functions are those of :func:`pursue`, and need no such leave.
+    """
+    given = {
+        "allow_programs": allow_programs,
+        "attachments": None if attachments is None else dict(attachments),
+        "facts": None if facts is None else dict(facts),
+        "actions": None if actions is None else dict(actions),
+        "on_event": on_event,
+    }
+    if robot is None:
+        return _descry.resume(os.fspath(run), robot=None, **given)  # type: ignore[arg-type]
+    with _served(robot) as place:
+        return _descry.resume(os.fspath(run), robot=place, **given)  # type: ignore[arg-type]
+
+
+def replay(
+    run: Union[str, "os.PathLike[str]"],
+    *,
+    speed: Optional[float] = None,
+    out: Optional[Union[str, "os.PathLike[str]"]] = None,
+    on_event: Optional[Callable[[Dict[str, Any]], object]] = None,
+) -> "_descry.Replay":
+    """Lives through a run again from its record, as ``descry replay`` does: no body, function or program is asked.
+
+    ``speed``: seconds of the body's clock that pass in one second (default: as fast as it goes). ``out``: a folder that
+    keeps what comes about as a run.
+    """
+    kept = None if out is None else os.fspath(out)
+    return _descry.replay(os.fspath(run), speed=speed, out=kept, on_event=on_event)
+
+
 def check_robot(robot: Body) -> None:
     """Holds a body to the promises of every body.
 

@@ -30,7 +30,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// What came of a run.
 #[pyclass(frozen, module = "descry")]
 pub struct Report {
-    inner: report::Report,
+    pub(crate) inner: report::Report,
 }
 
 #[pymethods]
@@ -143,29 +143,41 @@ pub fn pursue(
     let loaded = self::domain(py, &domain, [attachments, facts, actions], &raised)?;
     let settings = Settings { robot, scene, seed, domain, policy, keeping: Keeping::default(), remember };
     let asked = Asked { said: goal, domain: loaded, folder: run, settings };
+    let run = |stop: &Stop, tell: &mut dyn FnMut(&Event)| asked.pursue(stop, tell);
+    carried_out(py, &raised, on_event.as_ref(), run).map(|inner| Report { inner })
+}
+
+/// Carries a run out while other threads of Python go on.
+///
+/// # Errors
+/// What ended it: what a function has raised, Ctrl-C, or the run's own.
+pub fn carried_out<T: Send>(
+    py: Python<'_>,
+    raised: &Raised,
+    on_event: Option<&Py<PyAny>>,
+    run: impl FnOnce(&Stop, &mut dyn FnMut(&Event)) -> Result<T, CommandError> + Send,
+) -> PyResult<T> {
     let stop = Stop::default();
-    let ended = py.detach(|| watched(&asked, &stop, &raised, on_event.as_ref()));
+    let ended = py.detach(|| watched(run, &stop, raised, on_event));
     match raised.ended() {
         Some(error) => Err(error),
-        None => ended
-            .map(|inner| Report { inner })
-            .map_err(|error| raised.behind(py, failure::command(py, &error))),
+        None => ended.map_err(|error| raised.behind(py, failure::command(py, &error))),
     }
 }
 
-/// Lets the run go on in a thread of its own, so that this one can look for Ctrl-C and tell of events.
-fn watched(
-    asked: &Asked,
+/// Lets a run go on in a thread of its own, so that this one can look for Ctrl-C and tell of events.
+fn watched<T: Send>(
+    run: impl FnOnce(&Stop, &mut dyn FnMut(&Event)) -> Result<T, CommandError> + Send,
     stop: &Stop,
     raised: &Raised,
     on_event: Option<&Py<PyAny>>,
-) -> Result<report::Report, CommandError> {
+) -> Result<T, CommandError> {
     let raise = |error: PyErr| {
         raised.end(error);
     };
     std::thread::scope(|scope| {
         let (tell, events) = channel();
-        let running = scope.spawn(move || asked.pursue(stop, &mut |event| drop(tell.send(event.clone()))));
+        let running = scope.spawn(move || run(stop, &mut |event| drop(tell.send(event.clone()))));
         loop {
             match events.recv_timeout(LOOK_EVERY) {
                 Ok(event) => Python::attach(|py| told(py, on_event, &event)).unwrap_or_else(raise),

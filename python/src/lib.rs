@@ -1,5 +1,6 @@
 //! The extension module of the Python package `descry`: what Python calls, on the crates that the command line is made of.
 
+mod again;
 mod agent;
 mod arrays;
 mod attachment;
@@ -11,12 +12,15 @@ mod recognise;
 mod record;
 mod task;
 mod watch;
+mod why_not;
 
 use pyo3::prelude::*;
 
 /// Loaded as `descry._descry`; people import `descry`.
 #[pymodule]
 mod _descry {
+    #[pymodule_export]
+    use super::again::{Replay, replay, resume};
     #[pymodule_export]
     use super::agent::{Report, check_robot, goals, new_domain, pursue};
     #[pymodule_export]
@@ -31,4 +35,6 @@ mod _descry {
     use super::record::{Document, Record};
     #[pymodule_export]
     use super::task::{Plan, Step, Task, check};
+    #[pymodule_export]
+    use super::why_not::{WhyNot, why_not};
 }

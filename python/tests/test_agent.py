@@ -250,5 +250,60 @@ def test_an_exception_of_a_listener_ends_the_run(tmp_path):
         descry.pursue("find cup A", run=tmp_path / "run", on_event=listen)
 
 
+def stop_at(kind):
+    """A listener that ends a run at the first event of a kind."""
+
+    def listen(event):
+        if event.get("event") == kind:
+            raise LookupError("that is enough")
+
+    return listen
+
+
+def test_a_run_is_played_again(found, tmp_path):
+    report, _, folder = found
+    heard = []
+    again = descry.replay(folder, out=tmp_path / "again", on_event=heard.append)
+    assert again and again.same and again.verdict == report.verdict == "achieved"
+    assert (again.differences, again.damage, again.cut_off) == ([], [], None)
+    assert heard[0]["event"] == "goal" and dict(again.data["compared"])["percepts"] == report.data["views"]
+    assert descry.Record(tmp_path / "again").report()["verdict"] == "achieved"
+    with pytest.raises(descry.InputError):
+        descry.replay(tmp_path)
+    with pytest.raises(LookupError, match="enough"):
+        descry.replay(folder, on_event=stop_at("planned"))
+
+
+def test_a_run_that_was_stopped_goes_on(found, tmp_path):
+    report, _, _ = found
+    with pytest.raises(LookupError):
+        descry.pursue("find cup A", seed=1, run=tmp_path / "run", on_event=stop_at("acted"))
+    assert descry.replay(tmp_path / "run").cut_off is not None
+    went_on = descry.resume(tmp_path / "run")
+    assert (went_on.verdict, went_on.position_m) == (report.verdict, report.position_m)
+    assert "It was cut off once" in descry.Record(tmp_path / "run").explain()
+    assert descry.replay(tmp_path / "run").same
+    with pytest.raises(descry.InputError):
+        descry.resume(tmp_path / "none")
+
+
+def test_functions_and_bodies_of_python_go_on_too(bell, tmp_path):
+    def given(raining):
+        return dict(facts={"raining": raining}, attachments={"effort": lambda at: 1.0}, actions={"ring": lambda at: "ding"})
+
+    with pytest.raises(LookupError):
+        descry.pursue("ring", domain=bell, run=tmp_path / "run", **given(lambda objects: ["(raining)"]), on_event=stop_at("planned"))
+    with pytest.raises(descry.InputError, match="allow"):
+        descry.resume(tmp_path / "run")
+    # What was answered before is not asked again.
+    asked = []
+    report = descry.resume(tmp_path / "run", **given(lambda objects: asked.append(1) or ["(raining)"]))
+    assert report.verdict == "achieved" and len(asked) <= 2, (str(report), asked)
+
+    with pytest.raises(LookupError):
+        descry.pursue("find cup A", robot=template()(), run=tmp_path / "body", on_event=stop_at("planned"))
+    assert descry.resume(tmp_path / "body", robot=template()()).verdict == "not_found"
+
+
 def test_what_may_be_said():
     assert "find <thing>" in descry.goals(), descry.goals()

@@ -201,3 +201,19 @@ def test_ctrl_c_ends_planning_and_other_threads_go_on(slow):
         descry.plan(slow, time_limit_s=60)
     thread.join()
     assert counted[0] == 20
+
+
+def test_why_an_action_is_not_in_a_plan():
+    calls = {"path-cost": dear_edge}
+    found = descry.plan(ROADS, attachments=calls).plan
+    answer = descry.why_not(ROADS, "(drive van home market)", plan=found, attachments=calls)
+    assert (answer.action, answer.in_plan, answer.unmet) == ("(drive van home market)", False, [])
+    assert "It is not needed" in str(answer) and "makespan 90.000" in str(answer)
+    later = descry.why_not(ROADS, "(drive van crossing market)", attachments=calls)
+    assert later.in_plan and later.unmet == ["(at van crossing)"] and "cannot be taken at once" in str(later)
+    assert later.data["leads_to_it"]["found"]["steps"][0]["action"] == "drive"
+    for wrong in ("(fly van)", "(drive van home)", "drive"):
+        with pytest.raises(descry.InputError):
+            descry.why_not(ROADS, wrong, attachments=calls)
+    with pytest.raises(ZeroDivisionError):
+        descry.why_not(ROADS, "(drive van home market)", attachments={"path-cost": lambda call: 1 / 0})

@@ -59,7 +59,7 @@ fn say(findings: &Findings, grounding: &[String], json: bool) -> Result<Exit, Co
         input::print_json(&json!({ "errors": errors, "findings": findings, "grounding": grounding }))?;
     } else {
         if !grounding.is_empty() {
-            input::print_text(&grounding.join("\n"))?;
+            input::print_fitted(&grounding.join("\n"))?;
         }
         let said = if findings.is_empty() { "no finding".to_string() } else { input::drawn(findings) };
         input::narrate(said.trim_end());

@@ -7,7 +7,6 @@ use std::time::Instant;
 use descry_domains::goal::{self, Goal};
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
-
 use descry_domains::situation::Past;
 use descry_robots::Robot;
 
@@ -21,7 +20,7 @@ use descry_domains::answer::Verdict;
 
 use crate::page::Running;
 use crate::report::{Event, Report};
-use crate::run::{self, Beginning, Folder, Settings, Task, Watcher, programs};
+use crate::run::{self, Folder, GoingOn, Settings, Task, Watcher};
 use crate::stop::Stop;
 
 /// Arguments of `descry find`.
@@ -106,12 +105,12 @@ fn carry_out(words: &[String], verb: &str, with: &With, stop: &Stop) -> Result<E
     window.close();
     match &ended {
         Ok(report) if with.json => {
-            input::narrate(&report.to_string());
+            input::narrate_fitted(&report.to_string());
             input::print_json(report)?;
         }
         Ok(report) => {
             input::narrate("");
-            input::print_text(report.to_string().trim())?;
+            input::print_fitted(report.to_string().trim())?;
         }
         Err(failed) if with.json => input::print_json(&Unended::of(&said, failed))?,
         Err(_) => {}
@@ -147,7 +146,7 @@ fn end(mut report: Report, folder: &Folder, started: Instant) -> Result<Report, 
 }
 
 fn tell(event: &Event) {
-    input::narrate(&event.to_string());
+    input::narrate_fitted(&event.to_string());
 }
 
 /// A goal in the words of a domain, of the places that a body knows and of the things that were learned.
@@ -192,36 +191,8 @@ fn go_on(
     window: &mut Window,
     stop: &Stop,
 ) -> Result<Report, CommandError> {
-    let started = Instant::now();
-    let header = run::header(folder)?;
-    if let Some(said) = said.filter(|said| **said != header.goal) {
-        let text = format!(
-            "{said}: the run in {} has the goal \"{}\"\n  leave the goal out",
-            folder.display(),
-            header.goal
-        );
-        return Err(CommandError::BadInput(text));
-    }
-    let claimed = Folder::locked(folder)?;
-    let record = header.settings.keeping.resume(folder)?;
-    window.open(Arc::new(Running::of(folder)))?;
-    let beginning = Beginning::of(&record)?;
-    // A run that was cut off before it had recorded anything begins now.
-    let domain = match &beginning {
-        Some(beginning) => beginning.domain()?,
-        None => Domain::load(&header.settings.domain).map_err(CommandError::bad_input)?,
-    };
-    programs::check_allowed(&domain, &header.settings.robot, &folder.display().to_string(), allow_programs)?;
-    let settings = &header.settings;
-    let body = body::open(&settings.robot, settings.scene.as_deref(), settings.seed, &domain)?;
-    let past = beginning.as_ref().and_then(|b| b.past.as_ref());
-    let goal = understood(&header.goal, &domain, &*body.robot, past)?;
-    let chooser = policies::named(&settings.policy, settings.seed, None).map_err(CommandError::bad_input)?;
-    if beginning.is_none() {
-        Beginning::new(header.clone(), &domain, body.scene.clone()).put(&record, body.robot.now_ns())?;
-    }
-    let task = Task { domain: &domain, goal: &goal, past };
-    let watcher = Watcher { stop, tell: &mut tell };
-    let report = run::go_on(task, &body, &claimed, record, settings, chooser, watcher)?;
-    end(report, &claimed, started)
+    let said = said.map(String::as_str);
+    let asked = GoingOn { folder, said, robot: None, allow_programs, prepare: &|_| Ok(()) };
+    let mut begun = || window.open(Arc::new(Running::of(folder)));
+    run::resume(&asked, &mut begun, Watcher { stop, tell: &mut tell })
 }

@@ -47,6 +47,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         lines.push(format!("{of}s:"));
         lines.extend(names(of).iter().map(|n| format!("  {}", n.join(", "))));
     }
-    input::print_text(&lines.join("\n"))?;
+    input::print_fitted(&lines.join("\n"))?;
     Ok(Exit::Done)
 }

@@ -13,6 +13,7 @@ use descry_memory::Fault;
 use descry_planner::{Attachment, Attachments, Findings, Source};
 use serde::Serialize;
 
+use crate::commands::fitted;
 use crate::exit::{CommandError, Exit};
 
 /// No text that people write is longer.
@@ -61,6 +62,16 @@ pub fn print_text(text: &str) -> Result<(), CommandError> {
 /// Tells people what happens, on standard error; that nobody hears it is no fault.
 pub fn narrate(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// The same in lines that fit a terminal.
+pub fn narrate_fitted(text: &str) {
+    narrate(&fitted::fitted(text, fitted::width(&std::io::stderr())));
+}
+
+/// [`print_text`] in lines that fit a terminal.
+pub fn print_fitted(text: &str) -> Result<(), CommandError> {
+    print_text(&fitted::fitted(text, fitted::width(&std::io::stdout())))
 }
 
 /// Says what of a record is lost; returns how a command ends that showed the rest.

@@ -4,6 +4,7 @@ mod check;
 mod experiment;
 mod explain;
 mod find;
+mod fitted;
 mod fmt;
 mod goals;
 mod input;
@@ -16,12 +17,12 @@ mod name;
 mod new;
 mod plan;
 mod recognise;
-mod replay;
+pub mod replay;
 mod robot;
 mod runs;
 mod show;
 mod validate;
-mod why_not;
+pub mod why_not;
 
 use clap::Subcommand;
 

@@ -110,7 +110,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     } else {
         show(&status, &outcome, arguments.out.is_some(), started, stop())?;
         if let Some(answer) = answer {
-            input::narrate(&answer.said(outcome.plan()));
+            input::narrate_fitted(&answer.said(outcome.plan()));
         }
     }
     Ok(exit)

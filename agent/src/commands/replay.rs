@@ -40,58 +40,83 @@ const COMPARED: [&str; 5] = ["percepts", "belief", "problem", "skill", "event"];
 const OWN: [&str; 5] = ["wall_s", "run", "true_position_m", "true_on", "true_in"];
 
 /// The outcome of a replay.
-#[derive(Default, Serialize)]
-struct Replayed {
-    run: String,
+#[derive(Debug, Default, Serialize)]
+pub struct Replayed {
+    /// The run's folder.
+    pub run: String,
     /// What is not as it was written. Of such a record nothing is played.
-    damage: Vec<Fault>,
+    pub damage: Vec<Fault>,
     /// Whether everything that was recorded came about again.
-    same: bool,
+    pub same: bool,
     /// Documents that are the same, by kind.
-    compared: Vec<(&'static str, usize)>,
-    verdict: Option<Value>,
+    pub compared: Vec<(&'static str, usize)>,
+    /// The verdict that it came to, if it came to one.
+    pub verdict: Option<Value>,
     /// Where the run was cut off.
-    cut_off: Option<String>,
+    pub cut_off: Option<String>,
     /// What is not the same, one line each.
-    differences: Vec<String>,
+    pub differences: Vec<String>,
+}
+
+/// How a run is to be lived through again.
+#[derive(Debug, Clone, Copy)]
+pub struct Replay<'a> {
+    /// The run's folder.
+    pub run: &'a Path,
+    /// Seconds of the body's clock that pass in one second; none: as fast as it goes.
+    pub speed: Option<f64>,
+    /// The folder that keeps what comes about as a run, if any is to.
+    pub out: Option<&'a Path>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
-    run::header(&arguments.run)?;
-    let source = Arc::new(keeping::open(&arguments.run)?);
-    let damage = source.verify().map_err(CommandError::broken)?.faults;
-    let replayed = match damage.is_empty() {
-        true => replay(arguments, &source)?,
-        false => Replayed { damage, ..Replayed::default() },
-    };
-    let replayed = Replayed { run: arguments.run.display().to_string(), ..replayed };
+    let mut tell = |event: &Event| input::narrate_fitted(&event.to_string());
+    let asked = Replay { run: &arguments.run, speed: arguments.speed, out: arguments.out.as_deref() };
+    let replayed = replay(asked, Watcher { stop: &Stop::default(), tell: &mut tell })?;
     say(&replayed, arguments.json)?;
     Ok(if replayed.same { Exit::Done } else { Exit::No })
 }
 
+/// Lives through a run again from its record, unless that is damaged.
+///
+/// # Errors
+/// [`CommandError`] if there is no run, if its record does not say what it began with, or if living through it fails.
+pub fn replay(asked: Replay<'_>, watcher: Watcher<'_>) -> Result<Replayed, CommandError> {
+    run::header(asked.run)?;
+    let source = Arc::new(keeping::open(asked.run)?);
+    let damage = source.verify().map_err(CommandError::broken)?.faults;
+    let replayed = match damage.is_empty() {
+        true => live_through(asked, &source, watcher)?,
+        false => Replayed { damage, ..Replayed::default() },
+    };
+    Ok(Replayed { run: asked.run.display().to_string(), ..replayed })
+}
+
 /// Lives through a run whose record is whole.
-fn replay(arguments: &Arguments, source: &Arc<Record>) -> Result<Replayed, CommandError> {
+fn live_through(
+    asked: Replay<'_>,
+    source: &Arc<Record>,
+    watcher: Watcher<'_>,
+) -> Result<Replayed, CommandError> {
     let Some(beginning) = Beginning::of(source)? else {
         let text = format!(
             "{}: the record does not say what the run began with\n  it is empty, or of an older version",
-            arguments.run.display()
+            asked.run.display()
         );
         return Err(CommandError::BadInput(text));
     };
     let header = &beginning.header;
-    let scratch = Scratch::new(arguments.out.as_deref())?;
+    let scratch = Scratch::new(asked.out)?;
     let options = Options { durability: Durability::Process, ..Options::default() };
     let record = Record::create(&scratch.folder.join(RECORD), options).map_err(CommandError::broken)?;
     let record = Arc::new(record);
-    let robot = Arc::new(robot(source, &record, arguments)?);
+    let robot = Arc::new(robot(source, &record, asked)?);
     beginning.put(&record, robot.known().now_ns)?;
     let kept = programs::on_record(&beginning.domain()?, &record, Some(source), &robot, false)?;
     let goal = super::find::understood(&header.goal, &kept.domain, &*robot, beginning.past.as_ref())?;
     let chooser = policies::named(&header.settings.policy, header.settings.seed, None);
     let chooser = chooser.map_err(CommandError::bad_input)?;
-    let mut tell = |event: &Event| input::narrate(&event.to_string());
     let task = Task { domain: &kept.domain, goal: &goal, past: beginning.past.as_ref() };
-    let watcher = Watcher { stop: &Stop::default(), tell: &mut tell };
     let lived = run::live_through(task, &robot, &record, chooser, &scratch.folder, watcher);
     let ended = robot.ended().or_else(|| kept.ended());
     let report = match (lived, &ended) {
@@ -99,12 +124,12 @@ fn replay(arguments: &Arguments, source: &Arc<Record>) -> Result<Replayed, Comma
         (Ok((report, _)), None) => Some(report),
         (Err(e), None) => return Err(e),
     };
-    let recorded = run::report(&arguments.run)?;
+    let recorded = run::report(asked.run)?;
     let mut replayed = compare(source, &record, ended, &header.settings.keeping)?;
     replayed.verdict = report.as_ref().map(|r| json!(r.verdict));
     replayed.differences.extend(compare_reports(recorded.as_ref(), report.as_ref()));
     replayed.same = replayed.differences.is_empty();
-    if let (Some(report), true) = (&report, arguments.out.is_some()) {
+    if let (Some(report), true) = (&report, asked.out.is_some()) {
         run::keep_header(&scratch.folder, header)?;
         run::finish(&scratch.folder, report)?;
     }
@@ -112,21 +137,17 @@ fn replay(arguments: &Arguments, source: &Arc<Record>) -> Result<Replayed, Comma
 }
 
 /// The body of the run, as its record has it.
-fn robot(
-    source: &Arc<Record>,
-    into: &Arc<Record>,
-    arguments: &Arguments,
-) -> Result<TapedRobot, CommandError> {
+fn robot(source: &Arc<Record>, into: &Arc<Record>, asked: Replay<'_>) -> Result<TapedRobot, CommandError> {
     let Some(known) = tape::known(source)? else {
         let text = format!(
             "{}: the record does not say what the body was\n  it is empty, of an older version, or its beginning was pruned",
-            arguments.run.display()
+            asked.run.display()
         );
         return Err(CommandError::BadInput(text));
     };
     let entries = tape::entries(source)?;
     let tape = Arc::new(RecordTape { into: Arc::clone(into), from: Arc::clone(source) });
-    Ok(TapedRobot::replay(known, tape, entries, arguments.speed))
+    Ok(TapedRobot::replay(known, tape, entries, asked.speed))
 }
 
 /// Holds what came about again against what was recorded: all of it, what of it was kept, or up to where the record ends.

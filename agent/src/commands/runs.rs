@@ -26,18 +26,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         input::print_json(&json!({ "runs": runs }))?;
         return Ok(Exit::Done);
     }
-    for run in &runs {
-        let text = |key: &str| run[key].as_str().unwrap_or("?").to_string();
-        let views = run["views"].as_u64().map_or(String::new(), |n| format!("{n} views"));
-        let started = run["started_unix_s"].as_u64().map_or("?".into(), date);
-        input::print_text(&format!(
-            "{:16}  {:40} {:12} {:9} {}",
-            started,
-            text("run"),
-            text("verdict"),
-            views,
-            text("goal")
-        ))?;
+    if !runs.is_empty() {
+        input::print_fitted(&table(&runs))?;
     }
     if runs.is_empty() {
         input::narrate(&format!(
@@ -46,6 +36,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         ));
     }
     Ok(Exit::Done)
+}
+
+/// The runs, a line each: when it began, its folder, how it ended, its views, its goal.
+fn table(runs: &[Value]) -> String {
+    let text = |run: &Value, key: &str| run[key].as_str().unwrap_or("?").to_string();
+    let row = |run: &Value| {
+        let views = run["views"].as_u64().map_or(String::new(), |n| format!("{n} views"));
+        let started = run["started_unix_s"].as_u64().map_or("?".into(), date);
+        [started, text(run, "run"), text(run, "verdict"), views, text(run, "goal")]
+    };
+    let rows: Vec<[String; 5]> = runs.iter().map(row).collect();
+    let width = |n: usize| rows.iter().map(|row| row[n].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..5).map(width).collect();
+    let cell = |(text, width): (&String, &usize)| format!("{text:width$}");
+    let line = |row: &[String; 5]| row.iter().zip(&widths).map(cell).collect::<Vec<_>>().join("  ");
+    rows.iter().map(|row| line(row).trim_end().to_string()).collect::<Vec<_>>().join("\n")
 }
 
 fn list(arguments: &Arguments) -> Result<Vec<Value>, CommandError> {

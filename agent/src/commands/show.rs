@@ -42,12 +42,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     } else {
         for event in &events {
             match serde_json::from_value::<Event>(event.clone()) {
-                Ok(event) => input::print_text(&event.to_string())?,
+                Ok(event) => input::print_fitted(&event.to_string())?,
                 Err(_) => input::print_text(&compact(event))?,
             }
         }
         match (report, &damaged) {
-            (Some(report), _) => input::print_text(&report.to_string())?,
+            (Some(report), _) => input::print_fitted(&report.to_string())?,
             (None, None) => input::print_text("\nthe run has not finished")?,
             (None, Some(_)) => (),
         }

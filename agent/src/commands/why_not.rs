@@ -11,21 +11,21 @@ use crate::exit::CommandError;
 #[derive(Debug, Serialize)]
 pub struct Answer {
     /// The action, as it is written in plans.
-    action: String,
+    pub action: String,
     /// Whether the plan that was found has it.
-    in_plan: bool,
+    pub in_plan: bool,
     /// The parts of its condition that do not hold at first.
-    unmet: Vec<String>,
+    pub unmet: Vec<String>,
     /// A plan that takes it, whatever the goal.
-    leads_to_it: Tried,
+    pub leads_to_it: Tried,
     /// A plan that takes it and reaches the goal.
-    with_it: Tried,
+    pub with_it: Tried,
 }
 
 /// How looking for a plan ended.
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
-enum Tried {
+pub enum Tried {
     /// A plan was found.
     Found(Plan),
     /// There is none, and why.

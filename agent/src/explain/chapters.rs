@@ -1,10 +1,12 @@
 //! The record of a run, plan by plan.
 
 use descry_domains::note::Note;
-use descry_memory::{Document, Query, Record};
+use descry_memory::{Document, Query, Record, RecordId};
 
+use super::states::{Difference, States};
 use crate::exit::CommandError;
 use crate::report::Event;
+use crate::run::Resumed;
 use crate::weigh::{self, Weighed};
 
 /// A plan and what came of it.
@@ -18,6 +20,8 @@ pub struct Chapter {
     pub because: String,
     /// Its steps, as they were said.
     pub steps: Vec<String>,
+    /// What it takes to its end, seconds.
+    pub makespan_s: f64,
     /// What it was weighed against; none: the record does not say.
     pub weighed: Option<Weighed>,
     /// What happened from then on.
@@ -31,39 +35,61 @@ pub enum Deed {
     Began,
     /// What came of a step.
     Ended(String, String),
-    /// A step failed, why, and what was concluded.
-    Failed(String, String, String),
+    /// A step failed.
+    Failed {
+        /// The call.
+        call: String,
+        /// Why.
+        because: String,
+        /// What was concluded.
+        therefore: String,
+        /// What is taken to be so from then on, and what no longer; none: the record does not say.
+        changed: Option<Difference>,
+    },
+    /// The run was cut off, and gone on with.
+    Resumed,
     /// Something was learned.
     Noted(Note),
 }
 
-/// The plans of a run, and what of them is lost.
+/// The plans of a run, which was gone on with so often, and what of them is lost.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
-pub fn of(record: &Record) -> Result<(Vec<Chapter>, Vec<String>), CommandError> {
+pub fn of(
+    record: &Record,
+    states: &States,
+    resumed: &[Resumed],
+) -> Result<(Vec<Chapter>, Vec<String>), CommandError> {
     let found = record.find_whole(&Query::of_kind("event")).map_err(CommandError::broken)?;
     let (documents, faults) = found;
     let mut lost: Vec<String> = faults.iter().map(ToString::to_string).collect();
     let first_ns = documents.first().map_or(0, |d| d.stamp_ns);
     let mut chapters: Vec<Chapter> = Vec::new();
+    // What was cut off before there was a plan is told with the first.
+    let mut cuts = resumed.iter().filter(|cut| cut.after.is_none()).count();
     for document in &documents {
         let at_s = (document.stamp_ns - first_ns) as f64 * 1e-9;
         let Ok(event) = serde_json::from_value::<Event>(document.body.clone()) else { continue };
         let deed = match event {
-            Event::Planned { round, because, steps, .. } => {
+            Event::Planned { round, because, steps, makespan_s, .. } => {
                 let weighed = weighed(record, document, &mut lost);
-                chapters.push(Chapter { round, at_s, because, steps, weighed, deeds: Vec::new() });
-                continue;
+                let deeds = Vec::new();
+                chapters.push(Chapter { round, at_s, because, steps, makespan_s, weighed, deeds });
+                None
             }
-            Event::Goal { .. } | Event::Kept { .. } => continue,
-            Event::Acting { .. } => Deed::Began,
-            Event::Acted { call, outcome } => Deed::Ended(call, outcome),
-            Event::Failed { call, because, therefore } => Deed::Failed(call, because, therefore),
-            Event::Noted(note) => Deed::Noted(note),
+            Event::Goal { .. } | Event::Kept { .. } => None,
+            Event::Acting { .. } => Some(Deed::Began),
+            Event::Acted { call, outcome } => Some(Deed::Ended(call, outcome)),
+            Event::Failed { call, because, therefore } => {
+                Some(Deed::Failed { call, because, therefore, changed: states.across(document.id) })
+            }
+            Event::Noted(note) => Some(Deed::Noted(note)),
         };
+        cuts += resumed.iter().filter(|cut| cut.after.map(RecordId) == Some(document.id)).count();
         if let Some(chapter) = chapters.last_mut() {
-            chapter.deeds.push(deed);
+            chapter.deeds.extend(deed);
+            chapter.deeds.extend((0..std::mem::take(&mut cuts)).map(|_| Deed::Resumed));
         }
     }
     Ok((chapters, lost))

@@ -34,7 +34,8 @@ fn tell(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked) -> Told {
 /// What a plan was caused by: the failure, or what was learned, that ended the one before; or that it had been done and was not enough.
 fn cause(chapter: &Chapter, before: Option<&Chapter>) -> String {
     let Some(before) = before else { return "the run began, and there was no plan.".into() };
-    if let Some(Deed::Failed(call, _, therefore)) = before.deeds.last() {
+    let last = before.deeds.iter().rev().find(|deed| !matches!(deed, Deed::Resumed));
+    if let Some(Deed::Failed { call, therefore, .. }) = last {
         return format!("{call} failed. What follows from that: {}.", reasons::follows(therefore));
     }
     let moved = before.deeds.iter().rev().find_map(|deed| match deed {
@@ -49,11 +50,8 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>) -> String {
         }
         left => {
             let now = reasons::missed(&chapter.because, "would be only");
-            format!(
-                "with what was learned, the {} left of plan {} would not do: {now}.",
-                count(left, "step"),
-                before.round
-            )
+            let rest = if left == 1 { "step that was".into() } else { format!("{left} steps that were") };
+            format!("with what was learned, the {rest} left of plan {} would not do: {now}.", before.round)
         }
     };
     format!("{}{done}", moved.unwrap_or_default())
@@ -99,15 +97,32 @@ fn why(chapter: &Chapter, asked: &Asked) -> Vec<String> {
     if weighed.others.is_empty() {
         return vec![format!("{} was the only way known to get further.", chosen.steps.join(" "))];
     }
-    let mut said = vec![compared(weighed, chosen, asked)];
-    said.extend(quickest(weighed, chosen, asked));
+    let mut named = Named::default();
+    let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
+    said.extend(quickest(weighed, chosen, asked, &mut named));
     let most = weighed.others.iter().max_by(|a, b| a.gains.total_cmp(&b.gains));
     if let Some(other) = most.filter(|o| o.gains > chosen.gains * (1.0 + ALIKE)) {
         let more_s = other.takes_s - chosen.takes_s;
-        let more = if more_s > 0.0 { format!(", but counts for {more_s:.1} s more") } else { String::new() };
-        said.push(format!("{} gains most{more}.", figures(other)));
+        let more =
+            if more_s > 0.0 { format!(", but is reckoned at {more_s:.1} s more") } else { String::new() };
+        said.push(format!("{} gains most{more}.", named.once(other)));
     }
     said
+}
+
+/// The ways of which the figures were given.
+#[derive(Default)]
+struct Named(Vec<Vec<String>>);
+
+impl Named {
+    /// A way, the first time with its figures.
+    fn once(&mut self, way: &Way) -> String {
+        if self.0.contains(&way.steps) {
+            return way.steps.join(" ");
+        }
+        self.0.push(way.steps.clone());
+        figures(way)
+    }
 }
 
 /// A way with its figures.
@@ -128,28 +143,34 @@ fn rate(rate: f64) -> String {
 }
 
 /// Where a plan's way stands among all, by what is gained a second.
-fn compared(weighed: &Weighed, chosen: &Way, asked: &Asked) -> String {
+fn compared(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked, named: &mut Named) -> String {
     let all = weighed.open;
     let ratio = |o: &Way| o.rate() / chosen.rate();
     let better: Vec<&Way> = weighed.others.iter().filter(|o| ratio(o) > 1.0 + ALIKE).collect();
-    let mine = figures(chosen);
+    let mine = named.once(chosen);
     if better.is_empty() {
         let alike = weighed.others.iter().find(|o| ratio(o) >= 1.0 - ALIKE);
         let next = weighed.others.iter().find(|o| ratio(o) < 1.0 - ALIKE);
-        let alike = alike.map(|o| format!(" As good is {}.", figures(o))).unwrap_or_default();
-        let next = next.map(|o| format!(" Next comes {}.", figures(o))).unwrap_or_default();
+        let alike = alike.map(|o| format!(" As good is {}.", named.once(o))).unwrap_or_default();
+        let next = next.map(|o| format!(" Next comes {}.", named.once(o))).unwrap_or_default();
         return format!("of {all} ways to get further, {mine} gains most a second.{alike}{next}");
     }
     let more = if better.len() >= MOST_KEPT { "at least " } else { "" };
     let many = if better.len() == 1 { "1 gains".into() } else { format!("{} gain", better.len()) };
-    let first = figures(better[0]);
+    let first = named.once(better[0]);
     let rule = match &asked.policy {
         Some(policy) => format!("The policy {policy} goes by its own rule."),
-        None if enough(weighed, better[0], asked) == Some(false) => {
-            "The planner takes the plan that is quickest to reach all that is wanted; that one would not be enough by itself."
-                .into()
+        None => {
+            let alone = match enough(weighed, better[0], asked) {
+                Some(false) => " That one would not be expected to be enough by itself.",
+                _ => "",
+            };
+            format!(
+                "The planner counts to the end: it takes the quickest whole plan that it finds, here {:.1} s, not what gains \
+                 most a second at first.{alone}",
+                chapter.makespan_s
+            )
         }
-        None => "The planner counts the time of the plan to its end, not what its beginning gains a second.".into(),
     };
     format!("{mine} is one of {all} ways to get further; {more}{many} more a second, first {first}. {rule}")
 }
@@ -162,7 +183,7 @@ fn enough(weighed: &Weighed, way: &Way, asked: &Asked) -> Option<bool> {
 }
 
 /// The quickest way, if it is another, and why it was not taken.
-fn quickest(weighed: &Weighed, chosen: &Way, asked: &Asked) -> Option<String> {
+fn quickest(weighed: &Weighed, chosen: &Way, asked: &Asked, named: &mut Named) -> Option<String> {
     let other = weighed.others.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s))?;
     if other.takes_s > chosen.takes_s - 0.1 {
         return None;
@@ -172,7 +193,7 @@ fn quickest(weighed: &Weighed, chosen: &Way, asked: &Asked) -> Option<String> {
         _ if other.gains < chosen.gains => ", but gains less",
         _ => "",
     };
-    Some(format!("{} is the quickest{but}.", figures(other)))
+    Some(format!("{} is the quickest{but}.", named.once(other)))
 }
 
 /// What came of a step, in a sentence; none where nothing did that has not been said.
@@ -180,15 +201,23 @@ fn outcome(deed: &Deed) -> Option<String> {
     Some(match deed {
         Deed::Began => return None,
         Deed::Ended(call, said) => format!("{call}: {said}."),
-        Deed::Failed(call, because, _) => format!("{call} failed: {because}."),
+        Deed::Failed { call, because, changed, .. } => {
+            let since = changed.as_ref().filter(|c| !c.is_empty());
+            let since = since.map(|c| format!(" From then on {c}.")).unwrap_or_default();
+            format!("{call} failed: {because}.{since}")
+        }
+        Deed::Resumed => {
+            "here the run was cut off; it was gone on with from its record, and what had been done was not done again."
+                .into()
+        }
         Deed::Noted(Note::Perceived { on, merged, left_out, residual_m, objects, changed, .. }) => {
             let views = match merged {
                 1 => "one view".to_string(),
                 n => format!("{n} views ({:.1} mm apart)", residual_m * 1e3),
             };
-            let left_out: String = left_out.iter().map(|why| format!("; left out: {why}")).collect();
+            let left_out: String = left_out.iter().map(|why| format!("; {}", left_out_as(why))).collect();
             let changed: String = changed.iter().map(|text| format!("; {text}")).collect();
-            format!("the {on}, in {views}, shows {}{left_out}{changed}.", count(objects.len(), "object"))
+            format!("the {on}, in {views}, shows {}{left_out}{changed}.", shown(objects.len()))
         }
         Deed::Noted(note) => {
             let text = note.to_string();
@@ -199,4 +228,16 @@ fn outcome(deed: &Deed) -> Option<String> {
             format!("{}.", all.join("; "))
         }
     })
+}
+
+fn shown(objects: usize) -> String {
+    if objects == 0 { "no object".into() } else { count(objects, "object") }
+}
+
+/// Why a view is left out: `view 1 left out: left out: …` says it twice.
+fn left_out_as(said: &str) -> String {
+    match said.split_once(" left out: ") {
+        Some((view, why)) => format!("{view} is left out: {}", why.strip_prefix("left out: ").unwrap_or(why)),
+        None => format!("left out: {said}"),
+    }
 }

@@ -8,7 +8,9 @@ use descry_domains::lexicon::symbol;
 use descry_memory::belief::{Belief, Track};
 use descry_memory::{Document, Query, Record};
 
-use super::wording::{count, reasons, share};
+use super::states::{Difference, States};
+use super::wording::reasons::{self, Meanings};
+use super::wording::{count, listed, share};
 use crate::exit::CommandError;
 use crate::report::{self, Report};
 use crate::weigh::{self, InDoubt, Rests, Seen};
@@ -25,12 +27,25 @@ const HARDLY: f64 = 0.005;
 pub fn rests_on(
     record: &Record,
     report: Option<&Report>,
+    states: &States,
+    meanings: Meanings<'_>,
     lost: &mut Vec<String>,
 ) -> Result<Vec<String>, CommandError> {
     let Some(report) = report else {
         return Ok(vec!["there is no verdict: the run was cut off (descry do --resume goes on with it), or its report is lost.".into()]);
     };
-    let mut said = vec![format!("{}: {}.", report::words(report.verdict), reasons::no_plan(&report.why))];
+    let rests = record.newest(weigh::RESTS).map_err(CommandError::broken)?;
+    let rests = rests.and_then(|d| serde_json::from_value::<Rests>(d.body).ok());
+    // Why it ended is said last.
+    let end = rests.as_ref().map(|rests| rests.said.as_str()).filter(|end| !end.is_empty());
+    let why = end.and_then(|end| report.why.strip_suffix(end)).map(|why| why.trim_end_matches(": "));
+    let why = why.filter(|why| !why.is_empty()).unwrap_or(&report.why);
+    let verdict = report::words(report.verdict);
+    let verdict = match &report.answer {
+        Some(answer) => format!("the answer is {answer} ({verdict})"),
+        None => verdict.to_string(),
+    };
+    let mut said = vec![format!("{verdict}: {}.", reasons::no_plan(why, meanings))];
     let (beliefs, faults) = record.find_whole(&Query::of_kind("belief")).map_err(CommandError::broken)?;
     lost.extend(faults.iter().map(ToString::to_string));
     let newest = beliefs.last().and_then(|d| serde_json::from_value::<Belief>(d.body.clone()).ok());
@@ -38,16 +53,18 @@ pub fn rests_on(
         Some(belief) => {
             said.push("after the last look this was believed:".into());
             said.extend(believed(belief, report));
+            let since = beliefs.last().and_then(|look| states.since(look.id));
+            let since = since.filter(|since: &Difference| !since.is_empty());
+            said.extend(since.map(|since| format!("and by what was done since that look: {since}.")));
         }
         None if report.objects.is_empty() => said.push("nothing was believed to be anywhere.".into()),
         None => said.push("what was believed of each object is not in the record.".into()),
     }
     let looks = Looks::of(record)?;
-    let rests = record.newest(weigh::RESTS).map_err(CommandError::broken)?;
-    match rests.and_then(|d| serde_json::from_value::<Rests>(d.body).ok()) {
+    match rests {
         Some(rests) => {
             said.extend(rests.in_doubt.iter().map(|doubt| seen(doubt, &looks)));
-            said.extend(left(&rests, report));
+            said.extend(left(&rests, report, meanings));
         }
         None => said
             .push("what was seen of each surface in the end, and what is left, is not in the record.".into()),
@@ -125,7 +142,7 @@ fn object(track: &Track, asked: Option<&str>) -> String {
 }
 
 /// Why there was nothing more to do, and what is left.
-fn left(rests: &Rests, report: &Report) -> Vec<String> {
+fn left(rests: &Rests, report: &Report, meanings: Meanings<'_>) -> Vec<String> {
     let mut said = Vec::new();
     if let Some(left) = report.remaining.filter(|_| report.verdict != Verdict::Achieved) {
         said.push(format!(
@@ -137,11 +154,11 @@ fn left(rests: &Rests, report: &Report) -> Vec<String> {
         let open = rests.in_doubt.iter().filter(|doubt| doubt.left > HARDLY);
         said.extend(open.map(|d| format!("about {}, {} is still open in all.", d.about, share(d.left))));
     }
-    let because = reasons::no_plan(&rests.said);
+    let because = reasons::no_plan(&rests.said, meanings);
     said.push(match rests.ended.as_str() {
         "reached" => "it ended because the goal held.".into(),
-        "no plan" if because.is_empty() => "it ended because there was no plan any more.".into(),
-        "no plan" => format!("it ended because there was no plan any more: {because}."),
+        "no plan" if because.is_empty() => "it ended because nothing more could be done about it.".into(),
+        "no plan" => format!("it ended because nothing more could be done about it: {because}."),
         _ => format!("it ended because {because}."),
     });
     said
@@ -153,14 +170,22 @@ fn seen(doubt: &InDoubt, looks: &Looks) -> String {
         let places = looks.places(&seen.on).max(seen.places);
         let from = count(places, "place");
         match (seen.share, places) {
-            (_, 0) => format!("nothing of the {}, which was not looked at", seen.on),
             (None, _) => format!("the {} from {from}", seen.on),
             (Some(part), _) => format!("{:.0} % of the {} from {from}", (part * 100.0).floor(), seen.on),
         }
     };
-    let all: Vec<String> = doubt.seen.iter().map(one).collect();
-    match all.as_slice() {
-        [] => format!("nothing was seen of where {} may be.", doubt.about),
-        all => format!("of where {} may be, this was seen: {}.", doubt.about, all.join(", ")),
+    let is_seen = |seen: &&Seen| looks.places(&seen.on).max(seen.places) > 0;
+    let (looked_at, others): (Vec<&Seen>, Vec<&Seen>) = doubt.seen.iter().partition(is_seen);
+    let others: Vec<String> = others.iter().map(|seen| format!("the {}", seen.on)).collect();
+    let not = match others.as_slice() {
+        [] => String::new(),
+        others => format!("; {} not looked at", {
+            let were = if others.len() == 1 { "was" } else { "were" };
+            format!("{} {were}", listed(others, others.len()))
+        }),
+    };
+    match looked_at.into_iter().map(one).collect::<Vec<_>>().as_slice() {
+        [] => format!("nothing was seen of where {} may be{not}.", doubt.about),
+        all => format!("of where {} may be, this was seen: {}{not}.", doubt.about, all.join(", ")),
     }
 }

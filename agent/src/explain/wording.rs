@@ -8,6 +8,16 @@ pub fn count(n: usize, of: &str) -> String {
     format!("{n} {of}{all}")
 }
 
+/// The first of some texts, in a sentence; the rest are counted.
+pub fn listed(all: &[String], most: usize) -> String {
+    let named = all[..all.len().min(most)].join(", ");
+    match (all, all.len().saturating_sub(most)) {
+        ([before @ .., last], 0) if !before.is_empty() => format!("{} and {last}", before.join(", ")),
+        (_, 0) => named,
+        (_, more) => format!("{named} and {more} more"),
+    }
+}
+
 /// A share, a probability or a number of a domain: two digits, four near 0 and 1.
 pub fn share(value: f64) -> String {
     let near_an_end = (5e-5..0.01).contains(&value) || value > 0.99 && value < 1.0 - 5e-5;
@@ -38,28 +48,34 @@ pub fn wrapped(text: &str, first: &str, most: usize) -> String {
     lines.join("\n")
 }
 
-/// Words of a text; a call is one word, where it is short, and so is a number of percent.
+/// Words of a text; a call or figures in brackets are one word, where they are short, and so is a number of percent.
 fn words(text: &str) -> Vec<String> {
-    const LONGEST_CALL: usize = 60;
     let mut words: Vec<String> = Vec::new();
+    let mut open: Vec<&str> = Vec::new();
     let mut depth = 0_i32;
     for word in text.split_whitespace() {
-        let before = depth;
-        let signs = |open: &[char]| word.matches(open).count() as i32;
+        let signs = |of: &[char]| word.matches(of).count() as i32;
         depth += signs(&['(', '[']) - signs(&[')', ']']);
-        match words.last_mut() {
-            Some(last) if before > 0 && last.chars().count() + word.chars().count() < LONGEST_CALL => {
-                last.push(' ');
-                *last += word;
-            }
-            Some(last) if word.starts_with('%') => {
-                last.push(' ');
-                *last += word;
-            }
-            _ => words.push(word.to_string()),
+        open.push(word);
+        if depth <= 0 {
+            take(&mut words, &std::mem::take(&mut open));
+            depth = 0;
         }
     }
+    take(&mut words, &open);
     words
+}
+
+/// Takes what stands in brackets, or a word by itself, into the words of a text. What is said in passing is no call.
+fn take(words: &mut Vec<String>, open: &[&str]) {
+    const LONGEST_CALL: usize = 60;
+    let whole = open.join(" ");
+    let in_passing = whole.starts_with('(') && whole.contains(", ");
+    match words.last_mut() {
+        Some(last) if open.len() == 1 && whole.starts_with('%') => *last += &format!(" {whole}"),
+        _ if whole.chars().count() <= LONGEST_CALL && !in_passing && !whole.is_empty() => words.push(whole),
+        _ => words.extend(open.iter().map(|word| word.to_string())),
+    }
 }
 
 #[cfg(test)]
@@ -78,6 +94,8 @@ mod tests {
         let back: Vec<&str> = lines.trim_start_matches("- ").split_whitespace().collect();
         assert_eq!(back.join(" "), text);
         assert_eq!(wrapped("", "- ", 30), "- ");
+        let passing = wrapped("cup A with 0.80 (other cup 0.10, mug 0.05)", "", 26);
+        assert_eq!(passing, "cup A with 0.80 (other cup\n0.10, mug 0.05)");
     }
 
     #[test]

@@ -129,7 +129,7 @@ pub fn check_allowed(domain: &Domain, robot: &str, place: &str, allowed: bool) -
     let one = |(name, command): &(&str, &[String])| format!("\n    {name}: {}", command.join(" "));
     let elsewhere = robot.split_once(':').filter(|(kind, _)| ["program", "socket"].contains(kind));
     let body = elsewhere.map(|(_, at)| format!("\n    the body: {at}"));
-    let all: String = body.into_iter().chain(domain.programs().iter().map(one)).collect();
+    let all: String = body.into_iter().chain(unbound(domain).iter().map(one)).collect();
     if allowed || all.is_empty() {
         return Ok(());
     }
@@ -137,4 +137,17 @@ pub fn check_allowed(domain: &Domain, robot: &str, place: &str, allowed: bool) -
         "{place}: its record names programs that would be run or spoken with:{all}\n  allow that with --allow-programs, if you trust them"
     );
     Err(CommandError::BadInput(text))
+}
+
+/// The programs of a domain in whose places no function answers.
+fn unbound(domain: &Domain) -> Vec<(&str, &[String])> {
+    let config = &domain.config;
+    let calls = config.attachments.iter().map(|(name, p)| ("attachments", name, Some(&p.program)));
+    let words = config.word.iter().map(|(name, word)| ("word", name, word.program.as_ref()));
+    let actions = config.action.iter().map(|(name, action)| ("action", name, action.program.as_ref()));
+    let runs = |(table, name, program): (&str, &'_ String, Option<&'_ Vec<String>>)| {
+        domain.functions.of(table, name).is_none().then_some(program).flatten().is_some()
+    };
+    let all = calls.chain(words).chain(actions).filter(|of| runs(*of));
+    all.filter_map(|(_, name, program)| Some((name.as_str(), program?.as_slice()))).collect()
 }

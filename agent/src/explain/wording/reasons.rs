@@ -1,5 +1,8 @@
 //! What the monitor and the planner said, in fewer and plainer words. What is not known here is passed on as it is.
 
+/// What a call of the domain asks, in words.
+pub type Meanings<'a> = &'a dyn Fn(&str) -> Option<String>;
+
 /// Why the rest of a plan would not do; `is` stands between a number of the goal and its value.
 pub fn missed(because: &str, is: &str) -> String {
     goal(because, is)
@@ -16,7 +19,25 @@ fn goal(because: &str, is: &str) -> Option<String> {
     if values.is_empty() {
         return Some(format!("{goal} does not hold"));
     }
-    Some(format!("{} where {goal} is wanted", short(&values.replacen(" is ", &format!(" {is} "), 1))))
+    let found = short(&values.replacen(" is ", &format!(" {is} "), 1));
+    Some(match bound(goal) {
+        Some((number, wanted)) if values.starts_with(number) => format!("{found}, and {wanted} is wanted"),
+        _ => format!("{found} where {goal} is wanted"),
+    })
+}
+
+/// The number that a comparison is about, and what it has to be: `(>= N V)`.
+fn bound(condition: &str) -> Option<(&str, String)> {
+    let rest = condition.strip_suffix(')')?;
+    let (most, rest) = match rest.strip_prefix("(>= (") {
+        Some(rest) => ("at least", rest),
+        None => ("at most", rest.strip_prefix("(<= (")?),
+    };
+    let end = rest.find(')')?;
+    let number = &condition[4..4 + end + 2];
+    let value = rest[end + 1..].trim();
+    let is_one = !value.contains(' ') && !value.is_empty();
+    is_one.then(|| (number, format!("{most} {value}")))
 }
 
 /// `step N CALL at T takes A, B is asked for`.
@@ -25,7 +46,7 @@ fn takes(because: &str) -> Option<String> {
     let (had, asked) = rest.split_once(" takes ")?.1.split_once(", ")?;
     let asked = asked.strip_suffix(" is asked for")?;
     let (had_s, asked_s): (f64, f64) = (had.parse().ok()?, asked.parse().ok()?);
-    Some(format!("{call} would now count for {asked_s:.1} s, not for {had_s:.1}"))
+    Some(format!("{call} is now reckoned at {asked_s:.1} s instead of {had_s:.1} s"))
 }
 
 /// `step N CALL at T: C does not hold at its start…`, or not all the time.
@@ -33,13 +54,21 @@ fn no_longer(because: &str) -> Option<String> {
     let (call, rest) = step(because)?;
     let (_, rest) = rest.split_once(": ")?;
     let (condition, after) = rest.split_once(" does not hold")?;
-    let values = after.split_once(": ").map(|(_, values)| format!(", {}", short(values))).unwrap_or_default();
-    if after.trim_start().starts_with("all the time") {
-        return Some(format!(
-            "{call} asks for {condition} as long as it lasts, which would end before{values}"
-        ));
+    let all_the_time = after.trim_start().starts_with("all the time");
+    if let (Some((number, wanted)), false) = (bound(condition), all_the_time)
+        && let Some((_, values)) = after.split_once(": ")
+        && let Some(found) = values.strip_prefix(number).and_then(|rest| rest.strip_prefix(" is "))
+    {
+        let (is, name) = (found.split(", ").next().unwrap_or(found), wanted.rsplit(' ').next().unwrap_or(""));
+        let named = values.split(", ").find_map(|v| v.strip_prefix(name)?.strip_prefix(" is "));
+        let named = named.map(|value| format!(", {}", short(value))).unwrap_or_default();
+        return Some(format!("{call} needs {number} to be {wanted}{named}, and it is {}", short(is)));
     }
-    Some(format!("{call} asks for {condition}, which does not hold{values}"))
+    let values = after.split_once(": ").map(|(_, values)| format!(", {}", short(values))).unwrap_or_default();
+    if all_the_time {
+        return Some(format!("{call} needs {condition} as long as it lasts, which would end before{values}"));
+    }
+    Some(format!("{call} needs {condition}, which does not hold{values}"))
 }
 
 /// What is concluded from a failure: `try N of M`, or what is true from then on.
@@ -76,33 +105,41 @@ fn short(text: &str) -> String {
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// What the planner said of a task without a plan; calls of which there are many are counted, for which of them comes first says nothing.
-pub fn no_plan(said: &str) -> String {
-    const LIST: &str = " said no to: ";
-    let mut out = String::new();
-    for part in said.split('\n').filter(|part| !part.trim().is_empty()) {
-        if !out.is_empty() {
-            out += "; ";
-        }
-        let Some((before, list)) = part.split_once(LIST) else {
-            out += part.trim_end_matches('.');
-            continue;
-        };
-        let list = list.split_once(" (with any").map_or(list, |(list, _)| list);
-        let mut calls = list.split("], ");
-        let first = calls.next().unwrap_or_default().trim_end_matches(']');
-        let named = calls.count();
-        let more: usize = list
-            .rsplit_once(" and ")
-            .and_then(|(_, more)| more.strip_suffix(" more")?.trim().parse().ok())
-            .unwrap_or(0);
-        let first = first.split_once(" and ").map_or(first, |(first, _)| first.trim_end_matches(']'));
-        match named + more {
-            0 => out += &format!("{before}{LIST}{first}]"),
-            others => out += &format!("{before} said no to all of {} calls", others + 1),
-        }
-    }
-    out
+/// What the planner said of a task without a plan. Calls that were refused are told by what they ask, and counted: which of them
+/// comes first says nothing.
+pub fn no_plan(said: &str, meanings: Meanings<'_>) -> String {
+    let parts = said.split('\n').filter(|part| !part.trim().is_empty());
+    let parts: Vec<String> =
+        parts.map(|part| refused(part, meanings).unwrap_or_else(|| plain(part))).collect();
+    parts.join("; ")
+}
+
+fn plain(part: &str) -> String {
+    part.trim_end_matches('.').to_string()
+}
+
+/// ``the attachment of `NAME` said no to: LIST``, or how else it answered, at the end of a text.
+fn refused(part: &str, meanings: Meanings<'_>) -> Option<String> {
+    let (before, rest) = part.split_once("the attachment of `")?;
+    let (name, rest) = rest.split_once("` ")?;
+    let (answer, list) = rest.split_once(": ")?;
+    let answer = match answer {
+        "said no to" => "no",
+        "said yes, where no is needed, to" => "yes, where no is needed,",
+        _ => "impossible",
+    };
+    let list = list.split_once(" (with any").map_or(list, |(list, _)| list);
+    let mut calls = list.split("], ");
+    let first = calls.next().unwrap_or_default();
+    let first = first.split_once(" and ").map_or(first, |(first, _)| first).trim_end_matches(']');
+    let named = calls.count();
+    let more =
+        list.rsplit_once(" and ").and_then(|(_, more)| more.strip_suffix(" more")?.trim().parse().ok());
+    let about = meanings(name).map(|about| format!("{name} ({about})")).unwrap_or_else(|| name.to_string());
+    Some(match named + more.unwrap_or(0) {
+        0 => format!("{before}{about} is {answer} for {first}]"),
+        others => format!("{before}{about} is {answer} in all of {} cases", others + 1),
+    })
 }
 
 #[cfg(test)]
@@ -114,24 +151,32 @@ mod tests {
         let cases = [
             (
                 "the goal (>= (confidence cup-a) 0.8) is not reached: (confidence cup-a) is 0.628928",
-                "(confidence cup-a) would be only 0.629 where (>= (confidence cup-a) 0.8) is wanted",
+                "(confidence cup-a) would be only 0.629, and at least 0.8 is wanted",
             ),
             ("the goal (on a b) is not reached", "(on a b) does not hold"),
             (
                 "step 2 (observe a b) at 28.464493 takes 2, 12.911622 is asked for",
-                "(observe a b) would now count for 12.9 s, not for 2.0",
+                "(observe a b) is now reckoned at 12.9 s instead of 2.0 s",
             ),
             (
                 "step 1 (pick-up a) at 1.5: (>= (presence a) (sure)) does not hold at its start: (presence a) is 0.000008, (sure) is 0.8",
-                "(pick-up a) asks for (>= (presence a) (sure)), which does not hold, (presence a) is 0, (sure) is 0.8",
+                "(pick-up a) needs (presence a) to be at least (sure), 0.8, and it is 0",
+            ),
+            (
+                "step 1 (go) at 1: (>= (charge) 0.5) does not hold at its start: (charge) is 0.123456",
+                "(go) needs (charge) to be at least 0.5, and it is 0.123",
+            ),
+            (
+                "the goal (<= (unseen) 0.1) is not reached: (unseen) is 0.25",
+                "(unseen) would be only 0.25, and at most 0.1 is wanted",
             ),
             (
                 "step 2 (go) at 3: [worth x] does not hold at its start",
-                "(go) asks for [worth x], which does not hold",
+                "(go) needs [worth x], which does not hold",
             ),
             (
                 "step 1 (observe a b) at 2.26: (time-left) does not hold all the time",
-                "(observe a b) asks for (time-left) as long as it lasts, which would end before",
+                "(observe a b) needs (time-left) as long as it lasts, which would end before",
             ),
             ("something else.", "something else"),
         ];
@@ -146,11 +191,23 @@ mod tests {
     }
 
     #[test]
-    fn long_lists_are_cut() {
-        let said = "the attachment of `w` said no to: [w a b], [w c d] and 5 more (with any of these answered otherwise there might be a plan)\nthe attachment of `v` said no to: [v x] (with any …)";
-        let plain =
-            "the attachment of `w` said no to all of 7 calls; the attachment of `v` said no to: [v x]";
-        assert_eq!(no_plan(said), plain);
-        assert_eq!(no_plan("nothing."), "nothing");
+    fn refused_calls_are_told_by_what_they_ask() {
+        let about = |name: &str| (name == "w").then(|| "whether it is worth it".to_string());
+        let cases = [
+            (
+                "the attachment of `w` said no to: [w a b], [w c d] and 5 more (with any of these answered otherwise there might be a plan)\nthe attachment of `v` said no to: [v x] (with any …)",
+                "w (whether it is worth it) is no in all of 7 cases; v is no for [v x]",
+            ),
+            (
+                "it cannot be told, after 2 looks: the attachment of `w` said no to: [w x]",
+                "it cannot be told, after 2 looks: w (whether it is worth it) is no for [w x]",
+            ),
+            (
+                "the attachment of `v` called impossible (an infinite cost): [v x], [v y]",
+                "v is impossible in all of 2 cases",
+            ),
+            ("nothing.", "nothing"),
+        ];
+        cases.iter().for_each(|(said, plain)| assert_eq!(no_plan(said, &about), *plain));
     }
 }

@@ -1,0 +1,69 @@
+//! Lines as long as a terminal is wide. Where nobody looks at them on one, each stays in one piece.
+
+use std::io::IsTerminal;
+
+/// A terminal that does not say how wide it is.
+const USUAL_WIDTH: usize = 80;
+
+/// How wide the terminal behind a stream is, in letters; none where there is none.
+pub fn width(stream: &(impl IsTerminal + std::os::fd::AsFd)) -> Option<usize> {
+    let known = || terminal_size::terminal_size_of(stream).map(|(width, _)| usize::from(width.0));
+    stream.is_terminal().then(|| known().filter(|width| *width > 0).unwrap_or(USUAL_WIDTH))
+}
+
+/// A text in lines of at most so many letters; none: as it is. What goes on stands below where its second column begins.
+pub fn fitted(text: &str, width: Option<usize>) -> String {
+    let Some(width) = width else { return text.to_string() };
+    text.lines().map(|line| folded(line, width)).collect::<Vec<_>>().join("\n")
+}
+
+fn folded(line: &str, width: usize) -> String {
+    if line.chars().count() <= width {
+        return line.to_string();
+    }
+    let indent = " ".repeat(hang(line, width / 2));
+    let mut lines = Vec::new();
+    let mut rest: Vec<char> = line.chars().collect();
+    let from = indent.len();
+    while rest.len() > width {
+        let ends = (from + 1..=width).rev().find(|&at| rest[at] == ' ' && rest[at - 1] != ' ');
+        // A word that is longer than a line stays whole.
+        let Some(at) = ends.or_else(|| (width..rest.len()).find(|&at| rest[at] == ' ')) else { break };
+        let next = rest[at..].iter().skip_while(|sign| **sign == ' ');
+        let next: Vec<char> = indent.chars().chain(next.copied()).collect();
+        rest.truncate(at);
+        lines.push(rest.into_iter().collect());
+        rest = next;
+    }
+    lines.push(rest.into_iter().collect::<String>());
+    lines.join("\n")
+}
+
+/// Where the second column of a line begins; where it has none so far to the left, a little further in than the line does.
+fn hang(line: &str, most: usize) -> usize {
+    let signs: Vec<char> = line.chars().collect();
+    let first = signs.iter().position(|sign| *sign != ' ').unwrap_or(0);
+    let gap = (first..signs.len().saturating_sub(1)).find(|&at| signs[at] == ' ' && signs[at + 1] == ' ');
+    let column = gap.and_then(|gap| Some(gap + signs[gap..].iter().position(|sign| *sign != ' ')?));
+    column.filter(|at| *at <= most).unwrap_or(first + 2).min(most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_lines_are_folded_under_their_second_column() {
+        let check = |line: &str, width: usize, folded: &str| {
+            let found = fitted(line, Some(width));
+            assert_eq!(found, folded);
+            assert_eq!(fitted(line, None), line);
+        };
+        check("short", 10, "short");
+        check("do        drive there and look", 20, "do        drive\n          there and\n          look");
+        check("  2 views, 1 replan, 3 m", 15, "  2 views, 1\n    replan, 3 m");
+        check("  [a]     one two\nb", 14, "  [a]     one\n    two\nb");
+        check("averyveryverylongword and more", 10, "averyveryverylongword\n  and more");
+        check("", 10, "");
+    }
+}

@@ -1,0 +1,151 @@
+//! What was taken to be so in each round of a run, and what changed of it from one to another.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+use descry_memory::{Query, Record, RecordId};
+
+use super::wording::{listed, share};
+use crate::exit::CommandError;
+
+/// Changes of a kind that are named; the rest are counted.
+const MOST_NAMED: usize = 4;
+/// Numbers nearer to each other than this are the same.
+const SAME: f64 = 5e-3;
+
+/// What a round began with.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct State {
+    facts: BTreeSet<String>,
+    numbers: BTreeMap<String, f64>,
+}
+
+impl State {
+    /// The `:init` of a problem in PDDL.
+    fn read(pddl: &str) -> Self {
+        let mut state = State::default();
+        let Some((_, init)) = pddl.split_once("(:init") else { return state };
+        let (mut depth, mut from) = (0_usize, 0);
+        for (at, sign) in init.char_indices() {
+            match sign {
+                '(' if depth == 0 => (from, depth) = (at, 1),
+                '(' => depth += 1,
+                ')' if depth == 0 => break,
+                ')' => {
+                    depth -= 1;
+                    if depth == 0 {
+                        state.take(&init[from..=at]);
+                    }
+                }
+                _ => {}
+            }
+        }
+        state
+    }
+
+    fn take(&mut self, stated: &str) {
+        let number = stated.strip_prefix("(= (").and_then(|rest| rest.split_once(')'));
+        match number.and_then(|(name, value)| Some((name, value.trim_end_matches(')').trim().parse().ok()?)))
+        {
+            Some((name, value)) => drop(self.numbers.insert(format!("({name})"), value)),
+            None => drop(self.facts.insert(stated.to_string())),
+        }
+    }
+}
+
+/// What is so in one round and not in another.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Difference {
+    came: Vec<String>,
+    went: Vec<String>,
+    numbers: Vec<(String, f64, f64)>,
+}
+
+impl Difference {
+    fn between(before: &State, after: &State) -> Self {
+        let number = |(name, now): (&String, &f64)| {
+            let was = before.numbers.get(name)?;
+            ((now - was).abs() > SAME).then(|| (name.clone(), *was, *now))
+        };
+        let mut numbers: Vec<_> = after.numbers.iter().filter_map(number).collect();
+        numbers.sort_by(|a, b| (b.2 - b.1).abs().total_cmp(&(a.2 - a.1).abs()));
+        let only = |a: &State, b: &State| a.facts.difference(&b.facts).cloned().collect();
+        Difference { came: only(after, before), went: only(before, after), numbers }
+    }
+
+    /// Whether all is as it was.
+    pub fn is_empty(&self) -> bool {
+        self.came.is_empty() && self.went.is_empty() && self.numbers.is_empty()
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let facts = |all: &[String]| listed(all, MOST_NAMED);
+        let number = |(name, was, now): &(String, f64, f64)| {
+            format!("{name} is {} instead of {}", share(*now), share(*was))
+        };
+        let numbers: Vec<String> = self.numbers.iter().map(number).collect();
+        let holds = |all: &[String]| if all.len() == 1 { "holds" } else { "hold" };
+        let came = (!self.came.is_empty()).then(|| format!("{} {}", facts(&self.came), holds(&self.came)));
+        let went =
+            (!self.went.is_empty()).then(|| format!("{} no longer {}", facts(&self.went), holds(&self.went)));
+        let numbers = (!numbers.is_empty()).then(|| listed(&numbers, MOST_NAMED));
+        let all: Vec<String> = [came, went, numbers].into_iter().flatten().collect();
+        f.write_str(&all.join("; "))
+    }
+}
+
+/// The rounds of a run, in their order.
+#[derive(Debug)]
+pub struct States(Vec<(RecordId, State)>);
+
+impl States {
+    /// As far as the record has them.
+    ///
+    /// # Errors
+    /// [`CommandError::Broken`] if the record cannot be read.
+    pub fn of(record: &Record) -> Result<Self, CommandError> {
+        let (problems, _) = record.find_whole(&Query::of_kind("problem")).map_err(CommandError::broken)?;
+        let of = |d: &descry_memory::Document| Some((d.id, State::read(d.body["pddl"].as_str()?)));
+        Ok(States(problems.iter().filter_map(of).collect()))
+    }
+
+    /// What changed with something that was recorded under a number: from the round before it to the next.
+    pub fn across(&self, id: RecordId) -> Option<Difference> {
+        let next = self.0.iter().position(|(round, _)| *round > id)?;
+        Some(Difference::between(&self.0[next.checked_sub(1)?].1, &self.0[next].1))
+    }
+
+    /// What changed from the round after something that was recorded to the last.
+    pub fn since(&self, id: RecordId) -> Option<Difference> {
+        let next = self.0.iter().find(|(round, _)| *round > id)?;
+        Some(Difference::between(&next.1, &self.0.last()?.1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BEFORE: &str = "(define (problem a) (:init (at start) (hand-free) (= (sure) 0.8)\n    (= (presence cup-a desk) 0.850000)) (:goal (at end)))";
+
+    #[test]
+    fn what_changed_is_told() {
+        let check = |after: &str, told: &str| {
+            let [before, after] = [BEFORE, after].map(State::read);
+            assert_eq!(Difference::between(&before, &after).to_string(), told);
+        };
+        check(BEFORE, "");
+        check(
+            "(:init (at start) (shut door) (= (sure) 0.8) (= (presence cup-a desk) 0.400000))",
+            "(shut door) holds; (hand-free) no longer holds; (presence cup-a desk) is 0.40 instead of 0.85",
+        );
+        check("(:init (at start) (hand-free) (= (sure) 0.8) (= (presence cup-a desk) 0.851))", "");
+        check(
+            "(:init (a) (b) (c) (d) (e) (f) (at start) (hand-free) (= (sure) 0.8))",
+            "(a), (b), (c), (d) and 2 more hold",
+        );
+        assert!(State::read("nothing").facts.is_empty());
+    }
+}

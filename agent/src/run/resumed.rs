@@ -1,0 +1,104 @@
+//! Going on with a run that was cut off.
+
+use std::path::Path;
+use std::time::Instant;
+
+use descry_domains::abilities::searching::policies;
+use descry_domains::goal;
+use descry_domains::lexicon::{Lexicon, Places};
+use descry_domains::load::Domain;
+use descry_memory::Record;
+use serde::{Deserialize, Serialize};
+
+use super::{Beginning, Folder, Header, Task, Watcher, files, go_on, now_unix_s, programs};
+use crate::body;
+use crate::exit::CommandError;
+use crate::report::Report;
+
+/// That a run was cut off and gone on with. It stands beside the record, which is the same as if nothing had happened.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Resumed {
+    /// When, seconds since 1970.
+    pub unix_s: u64,
+    /// The last event that was recorded before, by its number; none: nothing had happened.
+    pub after: Option<u64>,
+}
+
+/// What makes a domain from a record ready to be used.
+pub type Prepare<'a> = dyn Fn(&mut Domain) -> Result<(), CommandError> + Sync + 'a;
+
+/// How a run is gone on with.
+pub struct GoingOn<'a> {
+    /// The run's folder.
+    pub folder: &'a Path,
+    /// The goal that it is expected to have, if one was said.
+    pub said: Option<&'a str>,
+    /// Where the body is now, if it is not where the run began with it.
+    pub robot: Option<&'a str>,
+    /// Whether the programs that the record names may be run.
+    pub allow_programs: bool,
+    /// Binds functions in the places of programs.
+    pub prepare: &'a Prepare<'a>,
+}
+
+/// Goes on with a run from its record to its end; goal and settings are those of that run. `begun` hears when it is claimed.
+///
+/// # Errors
+/// [`CommandError`] as for [`super::pursue`]; if the run has another goal, if another process writes it, if its record is damaged, or
+/// if it names programs that are not allowed.
+pub fn resume(
+    asked: &GoingOn<'_>,
+    begun: &mut dyn FnMut() -> Result<(), CommandError>,
+    watcher: Watcher<'_>,
+) -> Result<Report, CommandError> {
+    let started = Instant::now();
+    let folder = asked.folder;
+    let header = files::header(folder)?;
+    if let Some(said) = asked.said.filter(|said| **said != header.goal) {
+        let text = format!(
+            "{said}: the run in {} has the goal \"{}\"\n  leave the goal out",
+            folder.display(),
+            header.goal
+        );
+        return Err(CommandError::BadInput(text));
+    }
+    let claimed = Folder::locked(folder)?;
+    let record = header.settings.keeping.resume(folder)?;
+    begun()?;
+    let beginning = Beginning::of(&record)?;
+    let settings = &header.settings;
+    // A run that was cut off before it had recorded anything begins now.
+    let mut domain = match &beginning {
+        Some(beginning) => beginning.domain()?,
+        None => Domain::load(&settings.domain).map_err(CommandError::bad_input)?,
+    };
+    (asked.prepare)(&mut domain)?;
+    let robot = asked.robot.unwrap_or(&settings.robot);
+    // A body that is named now is wanted.
+    let recorded = if asked.robot.is_some() { "" } else { robot };
+    programs::check_allowed(&domain, recorded, &folder.display().to_string(), asked.allow_programs)?;
+    let body = body::open(robot, settings.scene.as_deref(), settings.seed, &domain)?;
+    let past = beginning.as_ref().and_then(|b| b.past.as_ref());
+    let lexicon = Lexicon::new(&domain, &Places::of_body(&*body.robot)).remembering(past);
+    let goal = goal::read(&header.goal, &domain, &lexicon).map_err(CommandError::bad_input)?;
+    let chooser = policies::named(&settings.policy, settings.seed, None).map_err(CommandError::bad_input)?;
+    keep(folder, &header, &record)?;
+    if beginning.is_none() {
+        let header = Header { resumed: Vec::new(), ..header.clone() };
+        Beginning::new(header, &domain, body.scene.clone()).put(&record, body.robot.now_ns())?;
+    }
+    let task = Task { domain: &domain, goal: &goal, past };
+    let mut report = go_on(task, &body, &claimed, record, settings, chooser, watcher)?;
+    report.wall_s = started.elapsed().as_secs_f64();
+    files::finish(folder, &report)?;
+    Ok(report)
+}
+
+/// Writes into a run's folder that it is gone on with.
+fn keep(folder: &Path, header: &Header, record: &Record) -> Result<(), CommandError> {
+    let events = record.find(&record.own("event")).map_err(CommandError::broken)?;
+    let after = events.last().map(|event| event.id.0);
+    let mut header = header.clone();
+    header.resumed.push(Resumed { unix_s: now_unix_s() as u64, after });
+    files::keep_header(folder, &header)
+}

@@ -39,6 +39,22 @@ fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
     models
 }
 
+/// A claim as a line of a file.
+pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
+    format!(
+        "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{}",
+        u8::from(right),
+        e.facing,
+        e.explained,
+        e.through,
+        e.hidden,
+        e.colour.unwrap_or(-1.0),
+        e.off_sigmas,
+        e.beyond,
+        e.votes
+    )
+}
+
 /// Fits a judge and prints it; what it was fitted to is written to the page's folder.
 pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
     let bodies: Vec<Body> = (0..2 * KNOWN as u64).map(|k| made(seed * 1000 + k)).collect();
@@ -58,20 +74,7 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
             let found = found.recognised;
             let right = is_right(&scene, &surfaces, models[found.model].body, &found);
             claims.push((found.evidence, right));
-            let e = found.evidence;
-            lines.push(format!(
-                "{k},{},{},{},{},{},{},{:.4},{:.4},{:.4},{}",
-                found.model,
-                u8::from(right),
-                e.facing,
-                e.explained,
-                e.through,
-                e.hidden,
-                e.colour.unwrap_or(-1.0),
-                e.off_sigmas,
-                e.beyond,
-                e.votes
-            ));
+            lines.push(line(k, found.model, right, &found.evidence));
         }
     }
     let path = page.file("claims.csv");

@@ -15,7 +15,7 @@ const ROUNDS: usize = 30;
 /// Pull of the weights towards nothing.
 const RIDGE: f64 = 0.02;
 /// Objects that are learned, and as many that nobody knows.
-const KNOWN: usize = 24;
+const KNOWN: usize = 16;
 
 /// Models as the robot and as a turntable makes them, one after the other.
 fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
@@ -63,6 +63,7 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
     let library = library(&models.iter().collect::<Vec<_>>());
     let mut claims: Vec<(Evidence, bool)> = Vec::new();
     let mut lines = Vec::new();
+    let path = page.file("claims.csv");
     let mut draws = Draws(seed);
     for k in 0..scenes {
         let mut scene = scene(&bodies, &some(&mut draws, bodies.len(), 5), seed * 9000 + k as u64);
@@ -76,9 +77,8 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
             claims.push((found.evidence, right));
             lines.push(line(k, found.model, right, &found.evidence));
         }
+        std::fs::write(&path, lines.join("\n")).map_err(|e| format!("{}: {e}", path.display()))?;
     }
-    let path = page.file("claims.csv");
-    std::fs::write(&path, lines.join("\n")).map_err(|e| format!("{}: {e}", path.display()))?;
     let judge = regression(&claims);
     page.heading("What evidence is worth");
     page.say(&format!(

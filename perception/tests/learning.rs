@@ -148,6 +148,24 @@ fn looks_come_together_and_one_that_does_not_fit_is_left_out() {
     assert_eq!(used, [true, true, true, false, true], "{:?}", fits[3].why);
 }
 
+#[test]
+fn looks_at_a_plain_desk_stay_where_surfaces_hold_them() {
+    let mut room = Room::new(RoomOptions { controlled: false, seed: 11 });
+    room.put(&body("muesli"), standing(0.0, 0.0, 0.4));
+    let truths: Vec<Isometry3<f64>> =
+        [0.0, 0.26, 0.52, 3.14, 3.4, 3.66].map(|turn| around(turn, 1.25, 0.73)).into();
+    let views: Vec<View> = truths
+        .iter()
+        .enumerate()
+        .map(|(k, t)| room.look(&household::CAMERA, t, t, EXACT, k as u64))
+        .collect();
+    let fits = register(&views, Some(Vector3::z_axis()), 2.5).expect("sound views");
+    let object = Point3::new(0.0, 0.0, TABLE_M + 0.1);
+    let at = |k: usize| fits[k].world_from_camera * (truths[k].inverse() * object);
+    let off = (1..6).map(|k| (at(k) - at(0)).norm()).fold(0.0, f64::max);
+    assert!(off < 0.004, "{off}");
+}
+
 /// Looks at one body on the table from exact poses, and its pixels in the first.
 fn turntable(name: &str, looks: usize) -> (Vec<View>, Vec<bool>, Cloud) {
     let place = standing(0.0, 0.0, 0.5);

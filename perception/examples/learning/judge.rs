@@ -15,7 +15,7 @@ const ROUNDS: usize = 30;
 /// Pull of the weights towards nothing.
 const RIDGE: f64 = 0.02;
 /// Objects that are learned, and as many that nobody knows.
-const KNOWN: usize = 24;
+const KNOWN: usize = 16;
 
 /// Models as the robot and as a turntable makes them, one after the other.
 fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
@@ -39,6 +39,22 @@ fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
     models
 }
 
+/// A claim as a line of a file.
+pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
+    format!(
+        "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{}",
+        u8::from(right),
+        e.facing,
+        e.explained,
+        e.through,
+        e.hidden,
+        e.colour.unwrap_or(-1.0),
+        e.off_sigmas,
+        e.beyond,
+        e.votes
+    )
+}
+
 /// Fits a judge and prints it; what it was fitted to is written to the page's folder.
 pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
     let bodies: Vec<Body> = (0..2 * KNOWN as u64).map(|k| made(seed * 1000 + k)).collect();
@@ -47,6 +63,7 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
     let library = library(&models.iter().collect::<Vec<_>>());
     let mut claims: Vec<(Evidence, bool)> = Vec::new();
     let mut lines = Vec::new();
+    let path = page.file("claims.csv");
     let mut draws = Draws(seed);
     for k in 0..scenes {
         let mut scene = scene(&bodies, &some(&mut draws, bodies.len(), 5), seed * 9000 + k as u64);
@@ -58,24 +75,10 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
             let found = found.recognised;
             let right = is_right(&scene, &surfaces, models[found.model].body, &found);
             claims.push((found.evidence, right));
-            let e = found.evidence;
-            lines.push(format!(
-                "{k},{},{},{},{},{},{},{:.4},{:.4},{:.4},{}",
-                found.model,
-                u8::from(right),
-                e.facing,
-                e.explained,
-                e.through,
-                e.hidden,
-                e.colour.unwrap_or(-1.0),
-                e.off_sigmas,
-                e.beyond,
-                e.votes
-            ));
+            lines.push(line(k, found.model, right, &found.evidence));
         }
+        std::fs::write(&path, lines.join("\n")).map_err(|e| format!("{}: {e}", path.display()))?;
     }
-    let path = page.file("claims.csv");
-    std::fs::write(&path, lines.join("\n")).map_err(|e| format!("{}: {e}", path.display()))?;
     let judge = regression(&claims);
     page.heading("What evidence is worth");
     page.say(&format!(

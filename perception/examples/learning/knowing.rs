@@ -1,5 +1,6 @@
 //! Learned objects known again in clutter: f-score against coverage (Fig. 5), confidence against truth.
 
+use crate::household::made::furniture;
 use crate::household::{Body, CAMERA, Room, RoomOptions, TABLE_M, looking, standing};
 use crate::measure::onto;
 use crate::runs::{RunOptions, radius_m, run, truth};
@@ -16,10 +17,11 @@ pub struct Scene {
     pub things: Vec<(usize, Isometry3<f64>)>,
 }
 
-/// A scene of some of the bodies: those asked for, if there is room.
+/// A scene of some of the bodies: those asked for, if there is room. Behind the table stands furniture, on it a box that nobody learned; every fourth
+/// is a desk with chairs.
 pub fn scene(bodies: &[Body], which: &[usize], seed: u64) -> Scene {
     let mut draws = Draws(seed ^ 0x5ce);
-    let mut room = Room::new(RoomOptions { controlled: true, seed });
+    let mut room = Room::new(RoomOptions { controlled: seed % 4 != 3, seed });
     let mut things: Vec<(usize, Isometry3<f64>, f64)> = Vec::new();
     for &i in which {
         let reach = radius_m(&bodies[i]);
@@ -37,11 +39,39 @@ pub fn scene(bodies: &[Body], which: &[usize], seed: u64) -> Scene {
         }
     }
     let (turn, far) = (TAU * draws.next(), 0.95 + 0.4 * draws.next());
+    furnish(&mut room, turn + 0.5 * TAU, &mut draws);
     let eye = Point3::new(far * turn.cos(), far * turn.sin(), TABLE_M + 0.55 + 0.35 * draws.next());
     let pose = looking(eye, Point3::new(0.0, 0.0, TABLE_M + 0.05));
-    let only = (Point3::new(0.0, 0.0, TABLE_M), 0.6);
-    let view = room.look_at(&CAMERA, &pose, &pose, (0.0, 0.0), seed ^ 0x77, only);
+    let mut view = room.look(&CAMERA, &pose, &pose, (0.0, 0.0), seed ^ 0x77);
+    recolour(&mut view, &mut draws);
     Scene { view, things: things.into_iter().map(|(i, p, _)| (i, p)).collect() }
+}
+
+/// Puts two pieces of furniture on the floor in a direction from the table's middle, and a box on the table's border.
+fn furnish(room: &mut Room, towards: f64, draws: &mut Draws) {
+    let mut put = |low, high, far_m: f64, up_m: f64, wide: f64| {
+        let body = furniture(low, high, (draws.next() * 1e12) as u64);
+        let at = towards + wide * (2.0 * draws.next() - 1.0);
+        let turned = standing(far_m * at.cos(), far_m * at.sin(), at + 0.6 * draws.next());
+        room.put(&body, Isometry3::translation(0.0, 0.0, up_m - TABLE_M) * turned);
+    };
+    put([0.15, 0.2, 0.35], [0.3, 0.5, 0.65], 0.95, 0.0, 0.4);
+    put([0.15, 0.2, 0.35], [0.3, 0.5, 0.65], 1.25, 0.0, 1.0);
+    put([0.02, 0.1, 0.08], [0.06, 0.18, 0.2], 0.44, TABLE_M, 0.9);
+}
+
+/// Light is another than when things were learned, and the camera of colours does not see quite what that of depth sees.
+fn recolour(view: &mut View, draws: &mut Draws) {
+    let gains: [f64; 3] = std::array::from_fn(|_| 1.0 + 0.06 * draws.normal());
+    let off = [0; 2].map(|_| (2.0 * draws.normal()).round() as isize);
+    let (Some(colours), Some(grid)) = (&view.cloud.colours, view.cloud.grid) else { return };
+    let moved = |k: usize, by: isize, of: usize| k.saturating_add_signed(by).min(of - 1);
+    let beside = |i: usize| {
+        let (u, v) = (moved(i % grid.width, off[0], grid.width), moved(i / grid.width, off[1], grid.height));
+        let colour = colours[v * grid.width + u];
+        std::array::from_fn(|c| (f64::from(colour[c]) * gains[c]).min(255.0) as u8)
+    };
+    view.cloud.colours = Some((0..colours.len()).map(beside).collect());
 }
 
 /// A model in the frame of its body.

@@ -2,6 +2,7 @@
 //! other.
 
 use crate::frames::frames;
+use crate::judge::line;
 use crate::page::{Page, Table};
 use crate::plot::picture;
 use descry_perception::files::read_cloud;
@@ -202,10 +203,19 @@ fn found_again(
 ) -> Result<(), String> {
     let mut answers = Table::new(&["frame", "in the image", "found", "the most confidence in each", "s"]);
     let mut counts = vec![[0_usize; 3]; known.len()];
+    let off_m = |f: &Recognised| {
+        let truly = known[f.model].1.world_from_model.translation.vector;
+        (f.world_from_model.translation.vector - truly).norm()
+    };
+    let mut claims = Vec::new();
     for (k, view) in frames.iter().enumerate() {
         let start = Instant::now();
         let judged = library.judged(view, options).map_err(|e| e.to_string())?;
         let seconds = start.elapsed().as_secs_f64();
+        claims.extend(judged.iter().map(|c| {
+            let found = &c.recognised;
+            line(2 * k + begin, found.model, off_m(found) < THERE_M, &found.evidence)
+        }));
         let most = |model: usize| {
             let own = judged.iter().filter(|c| c.recognised.model == model);
             own.map(|c| c.recognised.confidence).fold(0.0, f64::max)
@@ -221,10 +231,6 @@ fn found_again(
             let camera = view.intrinsics.as_ref();
             let pixel = camera.and_then(|c| c.project(&q).and_then(|(u, v)| c.pixel(u, v)));
             pixel.is_some() && q.z < options.range_m
-        };
-        let off_m = |f: &Recognised| {
-            let truly = known[f.model].1.world_from_model.translation.vector;
-            (f.world_from_model.translation.vector - truly).norm()
         };
         for (m, (thing, _)) in known.iter().enumerate() {
             let own: Vec<f64> = found.iter().filter(|f| f.model == m).map(off_m).collect();
@@ -249,7 +255,8 @@ fn found_again(
     }
     page.table(&table);
     page.table(&answers);
-    Ok(())
+    let path = page.file(&format!("kitchen-claims-{begin}.csv"));
+    std::fs::write(&path, claims.join("\n")).map_err(|e| format!("{}: {e}", path.display()))
 }
 
 /// A model of what stands at a place on the table, begun in the frame that shows most of it.

@@ -2,7 +2,7 @@
 //!
 //! The paper tracks the camera from frame to frame and adjusts all keyframes in the end. Here all keyframes are aligned together against each
 //! other and against where localisation had them, as [`crate::merge`] does; one that contradicts the others is left out and says why. Then what is
-//! printed on things brings together what surfaces leave loose.
+//! printed on things brings together what surfaces leave loose, and they are aligned once more from there.
 
 use super::LearningError;
 use super::texture;
@@ -47,7 +47,12 @@ pub fn register(
     let fits = merge::align_views(views, &options)?;
     let poses: Vec<Isometry3<f64>> = fits.iter().map(|f| f.world_from_camera).collect();
     let used: Vec<bool> = fits.iter().map(|f| f.used).collect();
-    let poses = texture::refined(views, &poses, &used, range_m);
+    let by_texture = texture::refined(views, &poses, &used, range_m);
+    // Surfaces have the last word where they say anything; where they let looks slide, these stay as texture has them.
+    let stated = |(view, pose): (&View, &Isometry3<f64>)| View { world_from_camera: *pose, ..view.clone() };
+    let again: Vec<View> = views.iter().zip(&by_texture).map(stated).collect();
+    let settled = merge::align_views(&again, &options)?;
+    let poses = settled.iter().zip(&by_texture).map(|(s, p)| if s.used { s.world_from_camera } else { *p });
     let keyframe = |(fit, world_from_camera): (merge::ViewFit, Isometry3<f64>)| Keyframe {
         world_from_camera,
         used: fit.used,

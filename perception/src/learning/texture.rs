@@ -25,6 +25,8 @@ const CONTRAST: f32 = 3.0;
 const LIGHTNESS: f32 = 8.0;
 /// A mark that would lie farther before or behind what the other look measured there is hidden or of another surface, metres.
 const NEAR_M: f32 = 0.015;
+/// Neighbouring pixels that differ by more than this and what the camera errs are of two surfaces, metres.
+const STEP_M: f32 = 0.01;
 /// Neighbouring pixels err together: of so many marks or points one tells something new.
 const SHARED: f32 = 12.0;
 /// Each look is compared with so many whose directions are nearest.
@@ -92,7 +94,9 @@ struct Look {
     normals: Vec<Vector3<f32>>,
     /// Lightness of each pixel, 0 to 255.
     light: Vec<f32>,
-    /// Pixels where it changes most, and pixels of the surface evenly spread.
+    /// Pixels so far inside a surface that what lies before or behind it is not blurred into them.
+    inner: Vec<bool>,
+    /// Pixels inside a surface where lightness changes most, and pixels of the surface evenly spread.
     marks: Vec<u32>,
     spread: Vec<u32>,
 }
@@ -107,6 +111,7 @@ impl Look {
             .map(|c| 0.3 * f32::from(c[0]) + 0.59 * f32::from(c[1]) + 0.11 * f32::from(c[2]))
             .collect();
         let smooth = blurred(&light, grid, 1);
+        let inner = inner(&map.depths_m, grid);
         let points = view.cloud.points.clone();
         let usable = |i: usize| is_finite(&points[i]) && points[i].z <= range_m && normals[i].x.is_finite();
         let (mut marks, mut spread) = (Vec::new(), Vec::new());
@@ -117,7 +122,7 @@ impl Look {
                     for i in v * grid.width + column..v * grid.width + column + CELL_PX {
                         let steep = (smooth[i + 1] - smooth[i - 1])
                             .hypot(smooth[i + grid.width] - smooth[i - grid.width]);
-                        if 0.5 * steep > best.0 && usable(i) {
+                        if 0.5 * steep > best.0 && inner[i] && usable(i) {
                             best = (0.5 * steep, Some(i as u32));
                         }
                     }
@@ -127,7 +132,7 @@ impl Look {
                 spread.extend(usable(middle).then_some(middle as u32));
             }
         }
-        Some(Look { map, grid, points, normals, light, marks, spread })
+        Some(Look { map, grid, points, normals, light, inner, marks, spread })
     }
 
     /// Pixel coordinates of a point of this camera's frame that lies on what it measured, and the pixel's index.
@@ -139,6 +144,19 @@ impl Look {
         let on = (self.map.depths_m[at] - q.z).abs() < NEAR_M.max(3.0 * frontal_sigma_m(q.z));
         (inside && on).then_some((u as f32, v as f32, at))
     }
+}
+
+/// Pixels without a step of depth so near that blurring would reach it. Where a surface ends, another look has something else behind it: such an edge
+/// is no mark of the surface.
+fn inner(depths_m: &[f32], grid: Grid) -> Vec<bool> {
+    let goes_on = |a: f32, b: f32| (a - b).abs() < STEP_M + 6.0 * frontal_sigma_m(a);
+    let ends = |i: usize| {
+        let beside = (i + 1 < depths_m.len()).then(|| i + 1);
+        let below = (i + grid.width < depths_m.len()).then(|| i + grid.width);
+        beside.into_iter().chain(below).any(|k| !goes_on(depths_m[i], depths_m[k]))
+    };
+    let steps: Vec<f32> = (0..depths_m.len()).map(|i| f32::from(u8::from(ends(i)))).collect();
+    blurred(&steps, grid, BLURS[0]).into_iter().map(|near| near == 0.0).collect()
 }
 
 /// Means over squares of `half` pixels to each side.
@@ -184,7 +202,7 @@ fn link((a, of_a): (&Look, &[f32]), (b, of_b): (&Look, &[f32]), b_from_a: &Isome
         let q = moved(i);
         let Some((u, v, at)) = b.place(&q) else { continue };
         // What is seen steeply in one of the looks is blurred otherwise.
-        if (turn * a.normals[i as usize]).dot(&b.normals[at]) > 0.85 {
+        if b.inner[at] && (turn * a.normals[i as usize]).dot(&b.normals[at]) > 0.85 {
             met.push((i, q, sampled(of_b, width, u, v)));
         }
     }

@@ -149,3 +149,11 @@ fn house(draws: &mut Draws) -> Vec<Part> {
         part(Solid::Block([x, edge, edge]), roof, tilted(0.0, 0.0, 2.0 * z, [FRAC_PI_4, 0.0, 0.0])),
     ]
 }
+
+/// A cupboard, a shelf, a box that is larger than what is learned: half its depth, width and height between two bounds, metres.
+pub fn furniture(low: [f64; 3], high: [f64; 3], seed: u64) -> Body {
+    let mut draws = Draws(seed ^ 0xf0e1);
+    let half: [f64; 3] = std::array::from_fn(|k| between(&mut draws, low[k], high[k]));
+    let parts = vec![part(Solid::Block(half), paint(&mut draws), at(0.0, 0.0, half[2]))];
+    Body { name: "furniture", parts }
+}

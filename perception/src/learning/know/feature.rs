@@ -1,6 +1,6 @@
 //! Local features: shape where a surface bends (SHOT: Tombari, Salti, Di Stefano 2010), the printed pattern where it is coloured.
 
-use super::skin::Skin;
+use super::skin::{Skin, across};
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
@@ -132,8 +132,7 @@ fn pattern(skin: &Skin, centre: usize) -> Option<Box<[u8]>> {
     let lab = skin.lab.as_ref()?;
     let (at, normal) = (skin.points[centre], skin.normals[centre]);
     let reach_m = 0.5 * CELLS as f32 * CELL_M;
-    let aside = if normal.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
-    let right = normal.cross(&aside).normalize();
+    let right = across(&normal);
     let up = normal.cross(&right);
     let mut near: Vec<(f32, f32, [f32; 3])> = Vec::new();
     skin.tree.within(&at, reach_m * 1.45, |n| {

@@ -14,6 +14,12 @@ const BEHIND_M: f32 = 0.012;
 /// Least cosine between a normal and the direction that it is seen from.
 const FACING: f32 = 0.2;
 
+/// A direction across another, unit lengths.
+pub(super) fn across(along: &Vector3<f32>) -> Vector3<f32> {
+    let aside = if along.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+    along.cross(&aside).normalize()
+}
+
 /// Points about `STEP_M` apart, with normals towards whoever sees them.
 pub(super) struct Skin {
     pub points: Vec<Point3<f32>>,
@@ -44,8 +50,7 @@ impl Skin {
 
     /// Indices of the points that can be seen from far away in a direction (unit length, from the object).
     pub fn seen_from(&self, away: &Vector3<f32>) -> Vec<u32> {
-        let aside = if away.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
-        let right = away.cross(&aside).normalize();
+        let right = across(away);
         let up = away.cross(&right);
         let cell = |p: &Point3<f32>| {
             let at = |axis: &Vector3<f32>| (axis.dot(&p.coords) / CELL_M).floor() as i32;

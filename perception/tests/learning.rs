@@ -3,6 +3,8 @@
 mod household;
 mod tabletop;
 
+use std::f64::consts::PI;
+
 use descry_perception::learning::{
     AroundOptions, Keyframe, KnowError, KnowOptions, LearnOptions, LearningError, Library, MetaRoom,
     NoticeOptions, keyframes, learn, nearest, outward, register, stands, trajectories,
@@ -153,7 +155,7 @@ fn looks_at_a_plain_desk_stay_where_surfaces_hold_them() {
     let mut room = Room::new(RoomOptions { controlled: false, seed: 11 });
     room.put(&body("muesli"), standing(0.0, 0.0, 0.4));
     let truths: Vec<Isometry3<f64>> =
-        [0.0, 0.26, 0.52, 3.14, 3.4, 3.66].map(|turn| around(turn, 1.25, 0.73)).into();
+        [0.0, 0.26, 0.52, PI, PI + 0.26, PI + 0.52].map(|turn| around(turn, 1.25, 0.73)).into();
     let views: Vec<View> = truths
         .iter()
         .enumerate()

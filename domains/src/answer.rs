@@ -221,7 +221,7 @@ impl Asker<'_> {
         if let Some((n, doubt)) = open {
             let asked = self.where_asked(&s.things[n]);
             let text = format!("it cannot be told whether {} is {asked}, {doubt}", s.things[n].name);
-            return (Verdict::CannotTell, format!("{text}; {}{says}", self.looks()));
+            return (Verdict::CannotTell, format!("{text}; {}", self.looks()));
         }
         if let Some(&n) = missing.first() {
             let thing = &s.things[n];
@@ -233,11 +233,11 @@ impl Asker<'_> {
         let unclear = s.kinds.iter().enumerate().any(|(n, _)| s.completeness(n) < s.threshold)
             || s.asked.iter().any(|&on| s.clarity(on) < s.threshold);
         if unclear {
-            let doubt = reasons::left_in_all(s).map(|d| format!(", {d}")).unwrap_or_default();
-            return (
-                Verdict::CannotTell,
-                format!("not everything could be identified{doubt}; {}{says}", self.looks()),
-            );
+            let left = match reasons::left_in_all(s) {
+                Some(doubt) => format!(", {doubt}; {}", self.looks()),
+                None => format!("; {}{says}", self.looks()),
+            };
+            return (Verdict::CannotTell, format!("not everything could be identified{left}"));
         }
         if !is_proven {
             let text = format!("no plan was found that brings about {}", self.goal.pddl);

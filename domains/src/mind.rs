@@ -55,6 +55,8 @@ pub struct Look {
     pub stamp_ns: i64,
     /// Its record.
     pub record: RecordId,
+    /// From how far away it shows the middle of its surface, as far as that is known, metres.
+    pub away_m: f64,
     /// How what it alone shows of a surface of the map lies on the outline there.
     pub laid: Laid,
 }

@@ -582,7 +582,13 @@ impl<'a> World<'a> {
 
 /// What perceiving needs.
 fn eyes<'e>(setting: &'e Setting<'_>, robot: &'e dyn Robot) -> Eyes<'e> {
-    Eyes { record: setting.record, recogniser: setting.recogniser, objects: &setting.domain.objects, robot }
+    Eyes {
+        record: setting.record,
+        recogniser: setting.recogniser,
+        objects: &setting.domain.objects,
+        robot,
+        thresholds: setting.domain.config.thresholds,
+    }
 }
 
 /// A part of a call for the body.

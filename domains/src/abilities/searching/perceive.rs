@@ -10,6 +10,7 @@ use descry_perception::View;
 use descry_perception::hull::Hull;
 use descry_perception::merge::{MergeOptions, Merged, ViewFit};
 use descry_perception::nalgebra::{Isometry3, Point3, Translation3, Unit, Vector3};
+use descry_perception::noise::axial_sigma_m;
 use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment_on};
@@ -24,6 +25,7 @@ use super::discover;
 use super::placing;
 use super::vanished::{keep_unrefuted, set_aside_unseen, taken_away};
 use crate::abilities::learning::again;
+use crate::config::Thresholds;
 use crate::lexicon::symbol;
 use crate::mind::{Laid, Look, Mind};
 use crate::note::Note;
@@ -59,6 +61,8 @@ pub struct Eyes<'a> {
     pub objects: &'a [ObjectModel],
     /// The body, which is only asked.
     pub robot: &'a dyn Robot,
+    /// What counts as sure.
+    pub thresholds: Thresholds,
 }
 
 /// Puts a view of some surfaces into the record: its transforms and colours, then its cloud, so that a cloud is never without its
@@ -93,8 +97,10 @@ pub fn remember(
     };
     let id = record.put_cloud(sensed.stamp_ns, frame, &sensed.cloud, &sensing, meta)?;
     for &n in shown {
+        let away = mind.known.surfaces[n].centre().map(|centre| (centre.coords - eye).norm());
+        let away_m = away.unwrap_or_default();
         let region = &mut mind.regions[n];
-        region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id, laid: Laid::AsLocalised });
+        region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id, away_m, laid: Laid::AsLocalised });
         region.taken += 1;
     }
     mind.views += 1;
@@ -156,6 +162,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     mind.regions[on].disputed = merged.fits.len() >= 2 * agreeing;
     let (merged, surface, placed) =
         placing::lay_on_map(eyes.robot.description(), &mind.known.surfaces[on], merged, surface);
+    let before = confidences(mind, eyes);
     mind.known.surfaces[on].placed = placed;
     let last = mind.regions[on].looks.last().map(|look| look.stamp_ns);
     if without_astray(mind, eyes.robot.description(), on, (&views, &merged)) {
@@ -170,14 +177,16 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     take_in(mind, on, &views, &merged);
     let newest = newest(&views, &merged);
     let scene = segment_on(&merged.cloud, &merged.visibility, surface, &seeking);
-    let percepts = eyes.recogniser.recognise(&scene, &merged.visibility, eyes.objects);
+    let mut percepts = eyes.recogniser.recognise(&scene, &merged.visibility, eyes.objects);
+    let known = &mind.known.surfaces[on];
+    percepts.retain(|p| !known.whole || known.covers(&p.position_m, OVER_M));
     let percepts = known_again(mind, on, (&views, &merged), percepts);
     if !mind.known.surfaces[on].whole {
         discover::join(mind, on, &scene.surface);
     }
     note_surface(&mut mind.known.surfaces[on], &scene);
     let gone_before = mind.known.belief.gone.len();
-    notes.push(believe(mind, eyes, on, (&merged, newest.as_ref()), &percepts)?);
+    notes.push(believe(mind, eyes, on, (&merged, newest.as_ref()), &percepts, &before)?);
     for new in discover::adopt(mind, on, others, notes) {
         perceive(mind, eyes, new, notes)?;
     }
@@ -245,15 +254,22 @@ fn place_looks(
     Ok(())
 }
 
-/// Leaves out the views in which the surface could not be made out, once there is one in which it could: too little in them would hold
-/// them to the others, and they blur what those show. False if the newest is gone.
+/// Leaves out the views in which the surface could not be made out and that were taken from much farther away than one in which it could:
+/// too little in them would hold them to the others, and they blur what those show. False if the newest is gone.
 fn keep_placed(looks: &mut Vec<Look>) -> bool {
     let newest = looks.last().map(|look| look.stamp_ns);
-    if looks.iter().any(|look| matches!(look.laid, Laid::By(_))) {
-        looks.retain(|look| look.laid != Laid::Nowhere);
+    let sigma_m = |look: &Look| axial_sigma_m(look.away_m, 0.0).unwrap_or_default();
+    let placed = looks.iter().filter(|look| matches!(look.laid, Laid::By(_))).map(sigma_m);
+    if let Some(least_m) = placed.reduce(f64::min) {
+        looks.retain(|look| look.laid != Laid::Nowhere || sigma_m(look) < BLURRED * least_m);
     }
     looks.last().map(|look| look.stamp_ns) == newest
 }
+
+/// What stands on a surface has its middle over it, give or take so much, metres: what stands farther out stands beside it.
+const OVER_M: f64 = 0.06;
+/// A view whose noise is so many times that of another blurs it.
+const BLURRED: f64 = 2.0;
 
 /// A view as it lies on the outline that the map has of a surface; as localisation has it where there is none, or nothing of it is seen.
 pub(crate) fn laid(eyes: Eyes<'_>, surface: &KnownSurface, view: View) -> View {
@@ -377,8 +393,8 @@ fn believe(
     on: usize,
     (merged, newest): (&Merged, Option<&DepthMap>),
     percepts: &[Percept],
+    before: &[f64],
 ) -> Result<Note, WorldError> {
-    let before = confidences(mind);
     let stamp_ns = eyes.robot.now_ns();
     let surface = mind.known.surfaces[on].clone();
     let viewpoints: Vec<Vec<Point3<f64>>> =
@@ -403,7 +419,7 @@ fn believe(
     let apart: Vec<Track> = unseen.into_iter().filter(|old| !is_one(old)).collect();
     belief.tracks.extend(apart);
     belief.tracks.sort_by_key(|track| track.id);
-    let after = confidences(mind);
+    let after = confidences(mind, eyes);
     let changed = mind.known.things.iter().zip(before.iter().zip(&after));
     let changed =
         changed.map(|(thing, (b, a))| format!("confidence in {}: {b:.2} -> {a:.2}", thing.name)).collect();
@@ -467,12 +483,9 @@ pub(crate) fn put(
     Ok(record.put(Draft { meta, ..Draft::new(kind, stamp_ns) })?)
 }
 
-fn confidences(mind: &Mind) -> Vec<f64> {
-    let (tracks, surfaces) = (&mind.known.belief.tracks, &mind.known.surfaces);
-    let best = |thing: &crate::situation::Thing| {
-        tracks.iter().map(|t| thing.probability(t, surfaces)).fold(0.0, f64::max)
-    };
-    mind.known.things.iter().map(best).collect()
+fn confidences(mind: &Mind, eyes: Eyes<'_>) -> Vec<f64> {
+    let now = Situation::new(mind.known.clone(), eyes.thresholds);
+    (0..now.things.len()).map(|what| now.confidence(what)).collect()
 }
 
 /// A percept in a line.

@@ -63,8 +63,10 @@ pub(crate) struct Calls<'a> {
     sources: Vec<Arc<Sources>>,
     /// Answers of calls that read nothing and take no proposed parameter, exact and relaxed.
     settled: RefCell<Vec<[Option<Answer>; 2]>>,
-    /// Answers of calls that read something, without a proposed parameter, by call and level.
-    known: RefCell<FxHashMap<(CallId, Level), Known>>,
+    /// Answers of calls that read something, without a proposed parameter, by call, exact and relaxed.
+    known: RefCell<Vec<[Known; 2]>>,
+    /// What the question asked last reads: room that is used again.
+    read: RefCell<Vec<u64>>,
     terms: Terms,
     /// Calls that were answered otherwise than needed: what was needed, and the proposed parameter.
     refused: RefCell<FxHashSet<Refusal>>,
@@ -103,7 +105,8 @@ impl<'a> Calls<'a> {
             asked: Vec::new(),
             sources: Vec::with_capacity(ground.calls.len()),
             settled: RefCell::new(vec![[None, None]; ground.calls.len()]),
-            known: RefCell::default(),
+            known: RefCell::new((0..ground.calls.len()).map(|_| Default::default()).collect()),
+            read: RefCell::default(),
             terms: Terms::default(),
             refused: RefCell::default(),
         };
@@ -320,19 +323,23 @@ impl<'a> Calls<'a> {
             self.settled.borrow_mut()[call as usize][level as usize] = Some(answer.clone());
             return Ok(answer);
         }
-        let key = self.what_is_read(bound.sources, state);
-        if let Some(answer) = self.known.borrow().get(&(call, level)).and_then(|known| known.get(&key)) {
-            hit();
-            return Ok(answer.clone());
-        }
+        let key = {
+            let mut key = self.read.borrow_mut();
+            self.what_is_read(bound.sources, state, &mut key);
+            if let Some(answer) = self.known.borrow()[call as usize][level as usize].get(key.as_slice()) {
+                hit();
+                return Ok(answer.clone());
+            }
+            Box::from(key.as_slice())
+        };
         let answer = self.ask(bound, None, state, level)?;
-        self.known.borrow_mut().entry((call, level)).or_default().insert(key, answer.clone());
+        self.known.borrow_mut()[call as usize][level as usize].insert(key, answer.clone());
         Ok(answer)
     }
 
     /// The values of the variables that are read, as many in a word as it can tell apart, then those of the numbers.
-    fn what_is_read(&self, sources: &Sources, state: &Values) -> Box<[u64]> {
-        let mut words = Vec::with_capacity(sources.variables.len() / 16 + 1 + sources.numbers.len());
+    fn what_is_read(&self, sources: &Sources, state: &Values, words: &mut Vec<u64>) {
+        words.clear();
         let (mut word, mut room) = (0, 1_u64);
         for &variable in &sources.variables {
             let value = u64::from(state.values[variable as usize]);
@@ -348,7 +355,6 @@ impl<'a> Calls<'a> {
         words.push(word);
         // Adding zero makes -0.0 and 0.0 one key.
         words.extend(sources.numbers.iter().map(|&number| (state.numbers[number as usize] + 0.0).to_bits()));
-        words.into_boxed_slice()
     }
 
     fn ask(

@@ -84,6 +84,16 @@ pub(super) fn unseen_volume(
     let all = (COLUMNS.len() * LEVELS.len()) as f64;
     let (e1, e2) = across(surface);
     let column = |(a, b): (f64, f64)| centre + (e1 * a + e2 * b) * diameter_m;
+    let cells = COLUMNS.map(|at| {
+        LEVELS.map(|level| {
+            let point = column(at) + surface.up * (height_m * level);
+            (point, space.cell(&point))
+        })
+    });
+    let free = cells.as_flattened().iter().filter(|(_, cell)| *cell == Cell::Free).count() as f64;
+    if free > FRAYED_SHARE * all {
+        return None;
+    }
     let explained = COLUMNS.map(|at| {
         let point = column(at);
         standing.iter().any(|track| surface.is_of(track, &point, space.voxel_m() / 2.0))
@@ -95,21 +105,19 @@ pub(super) fn unseen_volume(
         return None;
     }
     let mut unseen = Vec::new();
-    let (mut free, mut measured) = (0.0, 0.0);
+    let mut measured = 0.0;
     for (n, &at) in COLUMNS.iter().enumerate() {
         let above = column(at) + surface.up * (height_m * ABOVE);
         let is_wall = surface.is_of_wall(&above, space.voxel_m())
             || surface.is_of_wall(&above, WALL_BLUR * space.voxel_m()) && space.cell(&above) != Cell::Free;
-        for level in LEVELS {
-            let point = column(at) + surface.up * (height_m * level);
-            match space.cell(&point) {
+        for (point, cell) in cells[n] {
+            match cell {
                 Cell::Unseen => unseen.push(point),
                 Cell::Occupied if !explained[n] => {
                     measured += if is_wall { 0.0 } else { 1.0 };
                     unseen.push(point);
                 }
-                Cell::Occupied => {}
-                Cell::Free => free += 1.0,
+                Cell::Occupied | Cell::Free => {}
             }
         }
     }

@@ -10,31 +10,24 @@ use serde::{Deserialize, Serialize};
 use crate::exit::CommandError;
 pub use remote::{Address, is_address};
 
-/// Where and how a record is kept: options of the command line, and part of what a run was started with.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, clap::Args)]
+/// Where and how a record is kept: part of what a run was started with.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Keeping {
-    /// Where the record is kept: `mongodb://HOST[:PORT]/DATABASE[#RUN]`, for a descry that was built with the feature mongodb
-    /// [default: in the run's folder]
-    #[arg(long, value_name = "ADDRESS")]
+    /// Where the record is kept, `mongodb://HOST[:PORT]/DATABASE[#RUN]`; none: in the run's folder.
     pub memory: Option<String>,
-    /// When something counts as recorded: disk (it survives a power cut) or process (it survives any end of descry; a power cut
-    /// costs at most the last segment) [default: disk]
-    #[arg(long, value_name = "disk|process")]
+    /// When something counts as recorded; none: when it is on the disk.
     pub durability: Option<Kept>,
-    /// Greatest size of the record, such as 500MB; what is over goes oldest first, unless a belief or a plan rests on it
-    #[arg(long, value_name = "SIZE", value_parser = size)]
+    /// Greatest size of the record, bytes; what is over goes oldest first, unless a belief or a plan rests on it.
     pub max_bytes: Option<u64>,
-    /// Greatest age of what is recorded, seconds on the body's clock
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    /// Greatest age of what is recorded, seconds on the body's clock.
     pub max_age: Option<f64>,
-    /// Least room to be left on the disk, such as 2GB
-    #[arg(long, value_name = "SIZE", value_parser = size)]
+    /// Least room to be left on the disk, bytes.
     pub min_free: Option<u64>,
 }
 
 /// When something counts as recorded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kept {
     /// When it is on the disk.
@@ -159,31 +152,3 @@ pub fn open_whole(place: &Path) -> Result<Record, CommandError> {
 
 /// The folder of the record in that of its run.
 pub const RECORD: &str = "record";
-
-fn size(text: &str) -> Result<u64, String> {
-    let units = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9), ("TB", 1e12), ("B", 1.0), ("", 1.0)];
-    let read = |(unit, factor): (&str, f64)| {
-        let number: f64 = text.trim().strip_suffix(unit)?.trim().parse().ok()?;
-        (number.is_finite() && number >= 0.0).then_some((number * factor) as u64)
-    };
-    units.into_iter().find_map(read).ok_or_else(|| format!("`{text}` is no size: write 500MB or 2GB"))
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|s| s.is_finite() && *s >= 0.0);
-    number.ok_or_else(|| format!("`{text}` is no number of seconds"))
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn sizes_are_read_with_their_units() {
-        let cases = [("12", 12), ("500MB", 500_000_000), ("1.5 GB", 1_500_000_000), ("3kB", 3000), ("7B", 7)];
-        for (text, bytes) in cases {
-            assert_eq!(super::size(text), Ok(bytes), "{text}");
-        }
-        for text in ["", "much", "-1MB", "1 mile"] {
-            assert!(super::size(text).is_err(), "{text}");
-        }
-    }
-}

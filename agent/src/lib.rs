@@ -1,4 +1,4 @@
-//! The continual loop and the command line.
+//! The continual loop, and runs: begun, kept, resumed, replayed, explained. The command line is a crate above.
 //!
 //! A run on the simulated robot from beginning to end; the example `own_body` of this crate does the same with a body of its own.
 //!
@@ -7,14 +7,12 @@
 //! use descry_agent::run::{self, Folder, Settings, Task, Watcher};
 //! use descry_agent::{body, stop::Stop};
 //! use descry_domains::abilities::searching::policies;
-//! use descry_domains::goal;
-//! use descry_domains::lexicon::{Lexicon, Places};
 //! use descry_domains::load::Domain;
 //!
 //! let (said, folder) = ("find cup A", tempfile::tempdir()?);
 //! let domain = Domain::load("tabletop")?;
 //! let body = body::open("sim", None, 3, &domain)?;
-//! let goal = goal::read(said, &domain, &Lexicon::new(&domain, &Places::of_body(&*body.robot)))?;
+//! let goal = run::understood(said, &domain, &*body.robot, None)?;
 //! let settings = Settings {
 //!     robot: "sim".into(),
 //!     scene: None,
@@ -36,19 +34,13 @@
 
 pub mod agent;
 pub mod body;
-pub mod commands;
 pub mod exit;
-pub mod experiment;
 pub mod explain;
-pub mod findings;
-pub mod gantt;
 pub mod keeping;
-pub mod layout;
-pub mod live;
-pub mod lsp;
-pub mod page;
-pub mod picture;
+pub mod replay;
 pub mod report;
 pub mod run;
 pub mod stop;
+pub mod template;
 pub mod weigh;
+pub mod why_not;

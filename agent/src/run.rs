@@ -12,7 +12,8 @@ use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use descry_domains::answer::{Conclusion, Verdict};
-use descry_domains::goal::Goal;
+use descry_domains::goal::{self, Goal};
+use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;
 use descry_domains::situation::Past;
 use descry_domains::world::{Chooser, Setting};
@@ -127,6 +128,20 @@ pub fn pursue(
     remember(settings, remembered.as_ref())?;
     show_true_position(&mut report, body);
     Ok(report)
+}
+
+/// A goal in the words of a domain, of the places that a body knows and of the things that were learned.
+///
+/// # Errors
+/// [`CommandError::BadInput`] that says what could have been said.
+pub fn understood(
+    said: &str,
+    domain: &Domain,
+    robot: &dyn Robot,
+    past: Option<&Past>,
+) -> Result<Goal, CommandError> {
+    let lexicon = Lexicon::new(domain, &Places::of_body(robot)).remembering(past);
+    goal::read(said, domain, &lexicon).map_err(CommandError::bad_input)
 }
 
 /// What is remembered of earlier runs in a store, if one is named.

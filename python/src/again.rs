@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use descry_agent::commands::replay::{self as played, Replayed};
 use descry_agent::exit::CommandError;
+use descry_agent::replay::{self as played, Replayed};
 use descry_agent::report::Event;
 use descry_agent::run::{self, GoingOn, Watcher};
 use descry_agent::stop::Stop;

@@ -6,12 +6,12 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use descry_agent::body::{self, Body};
-use descry_agent::commands::write_domain;
 use descry_agent::exit::CommandError;
 use descry_agent::keeping::Keeping;
 use descry_agent::report::{self, Event};
 use descry_agent::run::{self, Folder, Settings, Task, Watcher};
 use descry_agent::stop::Stop;
+use descry_agent::template::write_domain;
 use descry_domains::abilities::searching::policies;
 use descry_domains::check;
 use descry_domains::goal::{self, Goal};
@@ -105,8 +105,7 @@ impl Asked {
         let Settings { robot, scene, seed, policy, .. } = &self.settings;
         let body: Body = body::open(robot, scene.as_deref(), *seed, &self.domain)?;
         let past = run::recall(self.settings.remember.as_deref())?;
-        let lexicon = Lexicon::new(&self.domain, &Places::of_body(&*body.robot)).remembering(past.as_ref());
-        let goal: Goal = goal::read(&self.said, &self.domain, &lexicon).map_err(CommandError::bad_input)?;
+        let goal = run::understood(&self.said, &self.domain, &*body.robot, past.as_ref())?;
         let chooser = policies::named(policy, *seed, None).map_err(CommandError::bad_input)?;
         let folder = Folder::of_new_run(self.folder.as_deref(), &goal)?;
         let keeping = Keeping::default().of_new_run(folder.path())?;

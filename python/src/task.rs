@@ -168,7 +168,7 @@ impl Plan {
     }
 
     fn gantt(&self) -> String {
-        descry_agent::gantt::svg(&self.inner)
+        descry_pages::gantt::svg(&self.inner)
     }
 
     fn __len__(&self) -> usize {

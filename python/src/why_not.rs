@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use descry_agent::commands::why_not::{self as asked_about, Answer};
+use descry_agent::why_not::{self as asked_about, Answer};
 use descry_planner::Options;
 use pyo3::prelude::*;
 

@@ -73,12 +73,38 @@ fn a_crate_uses_only_the_floors_below_its_own() {
                 "descry-skills",
             ],
         ),
+        ("pages", &["descry-agent", "descry-memory", "descry-perception", "descry-planner"]),
+        (
+            "experiments",
+            &[
+                "descry-agent",
+                "descry-domains",
+                "descry-memory",
+                "descry-pages",
+                "descry-perception",
+                "descry-robots",
+            ],
+        ),
+        (
+            "cli",
+            &[
+                "descry-agent",
+                "descry-domains",
+                "descry-experiments",
+                "descry-memory",
+                "descry-pages",
+                "descry-perception",
+                "descry-planner",
+                "descry-robots",
+            ],
+        ),
         (
             "python",
             &[
                 "descry-agent",
                 "descry-domains",
                 "descry-memory",
+                "descry-pages",
                 "descry-perception",
                 "descry-planner",
                 "descry-robots",
@@ -118,14 +144,10 @@ fn only_the_simulator_reads_the_truth_and_only_a_report_shows_it() {
     check_absent(
         "agent/src",
         &words,
-        &[
-            "agent/src/report",
-            "agent/src/commands/experiment",
-            "agent/src/experiment",
-            "agent/src/body.rs",
-            "agent/src/body/program.rs",
-        ],
+        &["agent/src/report", "agent/src/body.rs", "agent/src/body/program.rs"],
     );
+    check_absent("cli/src", &words, &["cli/src/commands/experiment"]);
+    check_absent("pages/src", &words, &[]);
 }
 
 /// Every name that the abilities give to facts, calls and skills, and every action and type of the built-in domains.
@@ -155,11 +177,9 @@ fn the_loop_names_no_noun_of_any_domain() {
     let nouns = nouns();
     assert!(nouns.len() > 30, "{nouns:?}");
     // Experiments are about domains; words as short as "in" are fields of the report.
-    for file in sources(&root().join("agent/src")) {
+    for file in ["agent/src", "pages/src", "cli/src"].iter().flat_map(|folder| sources(&root().join(folder)))
+    {
         let name = file.strip_prefix(root()).expect("sources lie below the root").display().to_string();
-        if name.starts_with("agent/src/experiment/") {
-            continue;
-        }
         let code = code(&file);
         for noun in nouns.iter().filter(|noun| noun.len() > 2) {
             let quoted = code.lines().find(|l| l.contains(&format!("\"{noun}\"")));
@@ -187,14 +207,38 @@ fn signals_are_heard_in_main_alone() {
         "skills/src",
         "domains/src",
         "agent/src",
+        "pages/src",
+        "experiments/src",
+        "cli/src",
     ] {
-        check_absent(folder, &["tokio::signal", "ctrl_c", "SignalKind"], &["agent/src/main.rs"]);
+        check_absent(folder, &["tokio::signal", "ctrl_c", "SignalKind"], &["cli/src/main.rs"]);
+    }
+}
+
+#[test]
+fn libraries_know_no_command_line_and_print_nothing() {
+    for folder in
+        ["planner/src", "perception/src", "memory/src", "skills/src", "domains/src", "agent/src", "pages/src"]
+    {
+        check_absent(folder, &["clap::", "println!", "eprint!", "eprintln!", "print!("], &[]);
     }
 }
 
 #[test]
 fn versions_are_written_once() {
-    for package in ["planner", "perception", "memory", "robots", "skills", "domains", "agent", "tests"] {
+    for package in [
+        "planner",
+        "perception",
+        "memory",
+        "robots",
+        "skills",
+        "domains",
+        "agent",
+        "pages",
+        "experiments",
+        "cli",
+        "tests",
+    ] {
         let text =
             fs::read_to_string(root().join(package).join("Cargo.toml")).expect("every crate has a manifest");
         let manifest: toml::Table = text.parse().expect("a manifest is TOML");

@@ -27,12 +27,12 @@ const FORMATS: &[&str] = &[
     "robots/src/recorded/settings.rs",
     "robots/src/program/hello.rs",
     "robots/src/program/message.rs",
-    "agent/src/experiment/kinds/mod.rs",
-    "agent/src/experiment/kinds/figure_4.rs",
-    "agent/src/experiment/kinds/where_to_look.rs",
-    "agent/src/experiment/kinds/faults.rs",
-    "agent/src/experiment/kinds/tasks.rs",
-    "agent/src/experiment/kinds/tasks/score.rs",
+    "experiments/src/kinds/mod.rs",
+    "experiments/src/kinds/figure_4.rs",
+    "experiments/src/kinds/where_to_look.rs",
+    "experiments/src/kinds/faults.rs",
+    "experiments/src/kinds/tasks.rs",
+    "experiments/src/kinds/tasks/score.rs",
 ];
 
 /// Types that have no keys of their own: numbers and texts that are read in a way of their own.
@@ -433,8 +433,8 @@ fn every_name_that_an_experiment_may_say_is_on_its_page() {
     let page = fs::read_to_string(root().join("docs/reference/experiments.md")).expect("it is there");
     for (file, list) in [
         ("domains/src/abilities/searching/policies/mod.rs", "ALL"),
-        ("agent/src/experiment/kinds/mod.rs", "ALL"),
-        ("agent/src/experiment/kinds/figure_4.rs", "RECOGNISERS"),
+        ("experiments/src/kinds/mod.rs", "ALL"),
+        ("experiments/src/kinds/figure_4.rs", "RECOGNISERS"),
     ] {
         for name in names_in(file, list) {
             let is_shown = page.contains(&format!("`{name}`")) || page.contains(&format!("\"{name}\""));

@@ -4,13 +4,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use descry_domains::abilities::searching::policies;
-use descry_domains::goal;
-use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;
 use descry_memory::Record;
 use serde::{Deserialize, Serialize};
 
-use super::{Beginning, Folder, Header, Task, Watcher, files, go_on, now_unix_s, programs};
+use super::{Beginning, Folder, Header, Task, Watcher, files, go_on, now_unix_s, programs, understood};
 use crate::body;
 use crate::exit::CommandError;
 use crate::report::Report;
@@ -79,8 +77,7 @@ pub fn resume(
     programs::check_allowed(&domain, recorded, &folder.display().to_string(), asked.allow_programs)?;
     let body = body::open(robot, settings.scene.as_deref(), settings.seed, &domain)?;
     let past = beginning.as_ref().and_then(|b| b.past.as_ref());
-    let lexicon = Lexicon::new(&domain, &Places::of_body(&*body.robot)).remembering(past);
-    let goal = goal::read(&header.goal, &domain, &lexicon).map_err(CommandError::bad_input)?;
+    let goal = understood(&header.goal, &domain, &*body.robot, past)?;
     let chooser = policies::named(&settings.policy, settings.seed, None).map_err(CommandError::bad_input)?;
     keep(folder, &header, &record)?;
     if beginning.is_none() {

@@ -1,0 +1,159 @@
+//! What several commands read and print in the same way.
+
+use std::io::{IsTerminal, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use descry_domains::check;
+use descry_domains::config::Program;
+use descry_domains::load::Domain;
+use descry_domains::program::ProgramAttachment;
+use descry_memory::Fault;
+use descry_planner::{Attachment, Attachments, Findings, Source};
+use serde::Serialize;
+
+use crate::commands::fitted;
+use descry_agent::exit::{CommandError, Exit};
+
+/// No text that people write is longer.
+const MOST_TEXT_BYTES: u64 = 256 << 20;
+
+/// Reads a text file.
+pub fn source(path: &Path) -> Result<Source, CommandError> {
+    let name = path.display().to_string();
+    let expected = |e: CommandError| CommandError::BadInput(format!("{e}\n  a PDDL file was expected"));
+    let bytes = read(path, MOST_TEXT_BYTES).map_err(expected)?;
+    let text = String::from_utf8(bytes).map_err(|e| {
+        let at = e.utf8_error().valid_up_to();
+        CommandError::BadInput(format!("{name}: byte {at} is not UTF-8 text\n  a PDDL file was expected"))
+    })?;
+    Ok(Source { name, text })
+}
+
+/// A domain that makes sense as a whole, by its name or folder.
+pub fn domain(name: &str) -> Result<Domain, CommandError> {
+    let domain = Domain::load(name).map_err(CommandError::bad_input)?;
+    check::runnable(&domain).map_err(|findings| CommandError::BadInput(drawn(&findings)))?;
+    Ok(domain)
+}
+
+/// Findings as people read them: drawn under the text, in colour on a terminal.
+pub fn drawn(findings: &Findings) -> String {
+    findings.render(is_coloured())
+}
+
+/// Prints one JSON object on standard output. A reader that has gone away is no fault.
+pub fn print_json(value: &impl Serialize) -> Result<(), CommandError> {
+    let text = serde_json::to_string(value).map_err(|e| CommandError::Bug(e.to_string()))?;
+    print_text(&text)
+}
+
+/// Prints a text and a line end on standard output. A reader that has gone away is no fault.
+pub fn print_text(text: &str) -> Result<(), CommandError> {
+    match writeln!(std::io::stdout(), "{text}") {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(CommandError::broken(format!("standard output: {e}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Tells people what happens, on standard error; that nobody hears it is no fault.
+pub fn narrate(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// The same in lines that fit a terminal.
+pub fn narrate_fitted(text: &str) {
+    narrate(&fitted::fitted(text, fitted::width(&std::io::stderr())));
+}
+
+/// [`print_text`] in lines that fit a terminal.
+pub fn print_fitted(text: &str) -> Result<(), CommandError> {
+    print_text(&fitted::fitted(text, fitted::width(&std::io::stdout())))
+}
+
+/// Says what of a record is lost; returns how a command ends that showed the rest.
+pub fn lost(faults: &[Fault]) -> Exit {
+    faults.iter().for_each(|fault| narrate(&format!("descry: lost: {fault}")));
+    if faults.is_empty() { Exit::Done } else { Exit::No }
+}
+
+/// Whether standard error shows colours: a terminal, and nobody said [`NO_COLOR`](https://no-color.org).
+pub fn is_coloured() -> bool {
+    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty())
+}
+
+/// So much is read of what does not say how long it is: a pipe or a device.
+const MOST_STREAM_BYTES: u64 = 256 << 20;
+
+/// Reads a file of at most so many bytes; more, or an end that does not come, is an error.
+pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, CommandError> {
+    let name = path.display();
+    let refused = |e: std::io::Error| CommandError::BadInput(format!("{name}: {e}"));
+    let file = std::fs::File::open(path).map_err(refused)?;
+    let metadata = file.metadata().map_err(refused)?;
+    let most = if metadata.is_file() { most } else { most.min(MOST_STREAM_BYTES) };
+    let too_much = || {
+        let text = format!("{name}: it has more than {} MB\n  expected a smaller file", most / 1_000_000);
+        CommandError::BadInput(text)
+    };
+    if metadata.len() > most {
+        return Err(too_much());
+    }
+    let mut bytes = Vec::new();
+    file.take(most + 1).read_to_end(&mut bytes).map_err(refused)?;
+    if bytes.len() as u64 > most { Err(too_much()) } else { Ok(bytes) }
+}
+
+/// Where the programs behind a domain's attachments are named.
+#[derive(clap::Args)]
+pub struct AttachmentArguments {
+    /// TOML file that names the programs of attachments, as `domain.toml` does [default: domain.toml beside the domain]
+    #[arg(long, value_name = "FILE")]
+    attachments: Option<PathBuf>,
+    /// A program that answers the calls of one module, such as 'path-cost=python3 cost.py' (may be given several times)
+    #[arg(long, value_name = "NAME=COMMAND")]
+    attach: Vec<String>,
+}
+
+/// The part of a TOML file that names programs; what else it says is another command's.
+#[derive(serde::Deserialize)]
+struct Programs {
+    #[serde(default)]
+    attachments: std::collections::BTreeMap<String, Program>,
+}
+
+impl AttachmentArguments {
+    /// The attachments of a planning task.
+    pub fn bind(&self, domain: &Path) -> Result<Attachments, CommandError> {
+        let started = Instant::now();
+        let mut attachments = Attachments::new().with_clock(move || started.elapsed().as_secs_f64());
+        let beside = domain.with_file_name("domain.toml");
+        let file = self.attachments.clone().or_else(|| beside.is_file().then_some(beside));
+        if let Some(file) = file {
+            let text = std::fs::read_to_string(&file)
+                .map_err(|e| CommandError::BadInput(format!("{}: {e}", file.display())))?;
+            let programs: Programs = toml::from_str(&text)
+                .map_err(|e| CommandError::BadInput(format!("{}\n{e}", file.display())))?;
+            let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).map(Path::to_path_buf);
+            for (name, program) in programs.attachments {
+                add(&mut attachments, name, program, folder.clone());
+            }
+        }
+        for given in &self.attach {
+            let Some((name, command)) = given.split_once('=') else {
+                let expected = "expected NAME=COMMAND, as in --attach 'path-cost=python3 cost.py'";
+                return Err(CommandError::BadInput(format!("--attach '{given}'\n  {expected}")));
+            };
+            let program = command.split_whitespace().map(str::to_string).collect();
+            add(&mut attachments, name.into(), Program { program, time_limit_s: 5.0, reads: vec![] }, None);
+        }
+        Ok(attachments)
+    }
+}
+
+fn add(attachments: &mut Attachments, name: String, program: Program, folder: Option<PathBuf>) {
+    attachments.insert_shared(name, Arc::new(ProgramAttachment::new(program, folder)) as Arc<dyn Attachment>);
+}

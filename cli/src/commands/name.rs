@@ -1,0 +1,139 @@
+//! `descry name`: the things that runs have learned, and what they are called.
+
+use std::path::{Path, PathBuf};
+
+use descry_domains::abilities::learning::news::called;
+use descry_memory::learned::LearnedThing;
+use descry_memory::remember::Remembered;
+use descry_memory::{Options, Record};
+use serde_json::{Value, json};
+
+use crate::commands::input;
+use descry_agent::exit::{CommandError, Exit};
+use descry_agent::keeping::{Address, is_address};
+
+/// Arguments of `descry name`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Where runs keep what they remember: a folder, or mongodb://HOST/DATABASE
+    store: PathBuf,
+    /// What it is called, such as "thing 1"; left out: all that was learned is listed
+    #[arg(requires = "new")]
+    old: Option<String>,
+    /// What it is to be called, such as "the thing from Tuesday"
+    new: Option<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    let store = open(&arguments.store)?;
+    let mut remembered = Remembered::recall(&store).map_err(CommandError::broken)?;
+    let now_unix_s = std::time::SystemTime::now()
+        .duration_since(std::time::UNIX_EPOCH)
+        .map_or(0.0, |since| since.as_secs_f64());
+    if let (Some(old), Some(new)) = (&arguments.old, &arguments.new) {
+        let known = find(&remembered, old)?.name.clone();
+        check_free(&remembered, &known, new)?;
+        remembered.rename(&known, new.trim());
+        remembered.keep(&store, now_unix_s).map_err(CommandError::broken)?;
+    }
+    let all: Vec<Value> = remembered.things.iter().map(|t| described(t, now_unix_s)).collect();
+    if arguments.json {
+        input::print_json(&json!({ "things": all }))?;
+        return Ok(Exit::Done);
+    }
+    if all.is_empty() {
+        input::narrate("nothing was learned yet; `descry do \"learn what is new\" --domain learning` does");
+    }
+    remembered.things.iter().try_for_each(|thing| input::print_text(&line(thing, now_unix_s)))?;
+    Ok(Exit::Done)
+}
+
+fn open(store: &Path) -> Result<Record, CommandError> {
+    if is_address(store) {
+        let address = Address::read(&store.display().to_string())?;
+        let address = if address.run.is_some() { address } else { address.of_run(Path::new("remembered")) };
+        return address.write(Options::default());
+    }
+    Record::open(store, Options::default()).map_err(CommandError::bad_input)
+}
+
+fn find<'a>(remembered: &'a Remembered, old: &str) -> Result<&'a LearnedThing, CommandError> {
+    let found = remembered.things.iter().find(|t| called(&t.name) == called(old));
+    found.ok_or_else(|| {
+        let names: Vec<&str> = remembered.things.iter().map(|t| t.name.as_str()).collect();
+        let names = if names.is_empty() { "nothing yet".into() } else { names.join(", ") };
+        CommandError::BadInput(format!("nothing that was learned is called \"{old}\"\n  there are: {names}"))
+    })
+}
+
+/// A name must be something that can be said, and nothing else's.
+fn check_free(remembered: &Remembered, old: &str, new: &str) -> Result<(), CommandError> {
+    let symbol = called(new);
+    if symbol.is_empty() {
+        let text = format!("\"{new}\" is no name\n  take letters or digits, as in \"lunch box\"");
+        return Err(CommandError::BadInput(text));
+    }
+    match remembered.things.iter().find(|t| t.name != old && called(&t.name) == symbol) {
+        Some(other) => Err(CommandError::BadInput(format!(
+            "\"{}\" is something else that was learned\n  take another name, or give that one another first",
+            other.name
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Sides of the box around a thing, centimetres.
+fn size_cm(thing: &LearnedThing) -> [f64; 3] {
+    let (low, high) = thing.cloud.bounds().unwrap_or_default();
+    [0, 1, 2].map(|k| 1e2 * f64::from(high[k] - low[k]))
+}
+
+fn described(thing: &LearnedThing, now_unix_s: f64) -> Value {
+    json!({
+        "name": thing.name,
+        "learned_unix_s": thing.learned_unix_s,
+        "learned_hours_ago": (now_unix_s - thing.learned_unix_s) / 3600.0,
+        "size_m": size_cm(thing).map(|cm| 1e-2 * cm),
+        "points": thing.cloud.len(),
+        "sides": thing.sides,
+        "seen": { "unix_s": thing.seen.unix_s, "on": thing.seen.on, "position_m": thing.seen.at_m },
+    })
+}
+
+fn line(thing: &LearnedThing, now_unix_s: f64) -> String {
+    let [w, d, h] = size_cm(thing);
+    let at = thing.seen.at_m;
+    format!(
+        "{:24} learned on {}, {:.1} h ago: {w:.0} x {d:.0} x {h:.0} cm, {:.0} % of its sides seen\n{:24} seen last on {}, {:.1} h ago, at ({:.2}, {:.2}) m on {}",
+        thing.name,
+        weekday(thing.learned_unix_s),
+        (now_unix_s - thing.learned_unix_s) / 3600.0,
+        1e2 * thing.sides,
+        "",
+        weekday(thing.seen.unix_s),
+        (now_unix_s - thing.seen.unix_s) / 3600.0,
+        at.x,
+        at.y,
+        thing.seen.on
+    )
+}
+
+/// The day of the week in UTC: the first of January 1970 was a Thursday.
+fn weekday(unix_s: f64) -> &'static str {
+    let days = (unix_s / 86_400.0).floor() as i64;
+    ["Thursday", "Friday", "Saturday", "Sunday", "Monday", "Tuesday", "Wednesday"]
+        [days.rem_euclid(7) as usize]
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn days_are_those_of_the_calendar() {
+        for (unix_s, day) in [(0.0, "Thursday"), (951_782_399.0, "Monday"), (1_795_478_400.0, "Tuesday")] {
+            assert_eq!(super::weekday(unix_s), day);
+        }
+    }
+}

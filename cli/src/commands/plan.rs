@@ -1,0 +1,244 @@
+//! `descry plan DOMAIN PROBLEM`: a plan, or why there is none.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use descry_planner::{Outcome, Plan, PlanError, Statistics, Task};
+use serde::Serialize;
+use serde_json::json;
+
+use crate::commands::input::{self, AttachmentArguments};
+use descry_agent::exit::{CommandError, Exit};
+use descry_agent::why_not;
+
+/// Arguments of `descry plan`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// PDDL domain
+    domain: PathBuf,
+    /// PDDL problem
+    problem: PathBuf,
+    /// Give up after so many seconds
+    #[arg(long, value_name = "S")]
+    time_limit: Option<f64>,
+    /// Give up before the process takes more memory than this
+    #[arg(long, value_name = "MB")]
+    memory_limit: Option<u64>,
+    /// Go on improving the plan until the time limit
+    #[arg(long)]
+    anytime: bool,
+    /// Decides every choice that is left open
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Write the plan to a file (with --anytime, each better one replaces it)
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Draw the plan as a Gantt chart, as SVG
+    #[arg(long, value_name = "FILE")]
+    gantt: Option<PathBuf>,
+    /// Say besides why an action is not in the plan: what it lacks, whether a plan can have it, what that takes
+    #[arg(long, value_name = "(ACTION …)")]
+    why_not: Option<String>,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    attachments: AttachmentArguments,
+}
+
+/// How planning ended, in a word.
+#[derive(Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Status {
+    Solved,
+    Unsolvable,
+    OutOfTime,
+    OutOfMemory,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    let started = Instant::now();
+    if arguments.time_limit.is_some_and(|s| s.is_nan() || s <= 0.0) {
+        return Err(CommandError::BadInput("--time-limit takes seconds, above 0".into()));
+    }
+    let (domain, problem) = (input::source(&arguments.domain)?, input::source(&arguments.problem)?);
+    let task = Task::read(&domain, &problem).map_err(|f| CommandError::BadInput(input::drawn(&f)))?;
+    let attachments = arguments.attachments.bind(&arguments.domain)?;
+    let deadline = arguments.time_limit.map(|s| started + Duration::from_secs_f64(s.min(1e9)));
+    let stop = || deadline.is_some_and(|d| Instant::now() >= d);
+    let options = descry_planner::Options {
+        anytime: arguments.anytime,
+        seed: arguments.seed,
+        memory_limit_bytes: arguments.memory_limit.map(|mb| mb << 20),
+        memory_used: used_bytes().map(|_| (|| used_bytes().unwrap_or(0)) as fn() -> u64),
+        ..descry_planner::Options::default()
+    };
+    let mut unwritten = Ok(());
+    let mut on_plan = |plan: &Plan| {
+        if let Some(path) = &arguments.out {
+            unwritten = write_plan(path, plan);
+        }
+        if arguments.anytime && !arguments.json {
+            input::narrate(&format!("{:8.2} s: {}", started.elapsed().as_secs_f64(), summary(plan)));
+        }
+    };
+    let outcome = descry_planner::plan(&task, &attachments, &options, &stop, &mut on_plan).map_err(failed)?;
+    unwritten?;
+    let (status, exit) = match &outcome {
+        Outcome::Solved { .. } => (Status::Solved, Exit::Done),
+        Outcome::Unsolvable { .. } => (Status::Unsolvable, Exit::Unsolvable),
+        // An improvement that was cut short leaves a plan, which is what was asked for.
+        Outcome::OutOfTime { best: Some(_), .. } | Outcome::OutOfMemory { best: Some(_), .. } => {
+            (Status::Solved, Exit::Done)
+        }
+        Outcome::OutOfTime { .. } => (Status::OutOfTime, Exit::OutOfTime),
+        Outcome::OutOfMemory { .. } => (Status::OutOfMemory, Exit::OutOfTime),
+    };
+    if let (Some(path), Some(plan)) = (&arguments.out, outcome.plan()) {
+        write_plan(path, plan)?;
+    }
+    if let (Some(path), Some(plan)) = (&arguments.gantt, outcome.plan()) {
+        let drawn = std::fs::write(path, descry_pages::gantt::svg(plan));
+        drawn.map_err(|e| CommandError::BadInput(format!("--gantt {}: {e}", path.display())))?;
+    }
+    let asked = arguments.why_not.as_deref();
+    let answer = |asked| why_not::answer(&task, &attachments, outcome.plan(), asked, &options, &stop);
+    let answer = asked.map(answer).transpose()?;
+    if arguments.json {
+        print_json(status, &outcome, answer.as_ref(), started)?;
+    } else {
+        show(&status, &outcome, arguments.out.is_some(), started, stop())?;
+        if let Some(answer) = answer {
+            input::narrate_fitted(&answer.said(outcome.plan()));
+        }
+    }
+    Ok(exit)
+}
+
+/// What the process has in use: what lies in main memory, or no more to be had once its address space is nearly used up.
+/// `None` where the system does not tell.
+fn used_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let kilobytes = |name: &str| {
+        let line = status.lines().find_map(|line| line.strip_prefix(name))?;
+        line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()
+    };
+    let (resident, addresses) = (kilobytes("VmRSS:")? << 10, kilobytes("VmSize:")? << 10);
+    let most = *ADDRESS_SPACE_BYTES.get_or_init(address_space_bytes);
+    let used_up = most.is_some_and(|most| addresses > most - most / ADDRESS_RESERVE);
+    Some(if used_up { u64::MAX } else { resident })
+}
+
+/// The part of the address space that is kept for what is taken between two looks.
+const ADDRESS_RESERVE: u64 = 16;
+static ADDRESS_SPACE_BYTES: OnceLock<Option<u64>> = OnceLock::new();
+
+/// The limit of the address space, where there is one.
+fn address_space_bytes() -> Option<u64> {
+    let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
+fn print_json(
+    status: Status,
+    outcome: &Outcome,
+    answer: Option<&why_not::Answer>,
+    started: Instant,
+) -> Result<(), CommandError> {
+    let plan = outcome.plan();
+    let why = match outcome {
+        Outcome::Unsolvable { why, .. } => Some(why),
+        _ => None,
+    };
+    let Statistics { evaluated, expanded, plans, actions, optimal, scored_only, attachments } =
+        outcome.statistics();
+    let mut said = json!({
+        "status": status,
+        "cost": plan.and_then(|p| p.cost),
+        "makespan": plan.and_then(Plan::makespan_s),
+        "steps": plan.map(|p| p.steps.len()),
+        "time_s": started.elapsed().as_secs_f64(),
+        "evaluated": evaluated,
+        "expanded": expanded,
+        "plans": plans,
+        "actions": actions,
+        "optimal": optimal,
+        "scored_only": scored_only,
+        "attachments": attachments,
+        "why": why.map(|why| why.to_string()),
+        "findings": why.map(|why| &why.findings),
+        "plan": plan.map(|p| &p.steps),
+    });
+    if let Some(answer) = answer {
+        said["why_not"] = json!(answer);
+    }
+    input::print_json(&said)
+}
+
+fn show(
+    status: &Status,
+    outcome: &Outcome,
+    written: bool,
+    started: Instant,
+    cut_short: bool,
+) -> Result<(), CommandError> {
+    let time = format!(
+        "{:.3} s, {} states evaluated",
+        started.elapsed().as_secs_f64(),
+        outcome.statistics().evaluated
+    );
+    match (outcome, outcome.plan()) {
+        (Outcome::Unsolvable { why, .. }, _) => {
+            input::narrate(&format!("proven unsolvable ({time})\n{}", input::drawn(&why.findings)));
+        }
+        (_, Some(plan)) => {
+            if !written {
+                input::print_text(plan.to_string().trim_end())?;
+            }
+            input::narrate(&format!("{} ({time})", summary(plan)));
+            if outcome.statistics().scored_only {
+                input::narrate(
+                    "  not every preference was planned for: those that the metric does not count, and \
+                     some on times or attachments, were only looked at afterwards",
+                );
+            }
+        }
+        _ if matches!(status, Status::OutOfMemory) => {
+            input::narrate(&format!("out of memory, no plan yet ({time})"))
+        }
+        _ if cut_short => input::narrate(&format!("out of time, no plan yet ({time})")),
+        _ => input::narrate(&format!(
+            "no plan was found, and none is ruled out: the search has left possibilities out ({time})"
+        )),
+    }
+    for (name, calls) in &outcome.statistics().attachments {
+        input::narrate(&format!(
+            "  [{name}] {} calls, {} from the cache, {:.3} s",
+            calls.calls + calls.relaxed,
+            calls.hits,
+            calls.time_s
+        ));
+    }
+    Ok(())
+}
+
+fn summary(plan: &Plan) -> String {
+    let cost = plan.cost.map_or(String::new(), |c| format!(", cost {c}"));
+    let makespan = plan.makespan_s().map_or(String::new(), |s| format!(", makespan {s:.3}"));
+    format!("{} steps{cost}{makespan}", plan.steps.len())
+}
+
+fn write_plan(path: &Path, plan: &Plan) -> Result<(), CommandError> {
+    std::fs::write(path, plan.to_string())
+        .map_err(|e| CommandError::BadInput(format!("--out {}: {e}", path.display())))
+}
+
+fn failed(error: PlanError) -> CommandError {
+    match (error.findings(), &error) {
+        (Some(findings), _) => CommandError::BadInput(input::drawn(findings)),
+        (None, PlanError::Internal { .. }) => CommandError::Bug(error.to_string()),
+        (None, _) => CommandError::bad_input(error),
+    }
+}

@@ -1,0 +1,143 @@
+//! `descry recognise CLOUD…`: the surface and the objects in point clouds, perception alone.
+
+use std::path::{Path, PathBuf};
+
+use descry_domains::abilities::searching::perceive;
+use descry_domains::load::{DEFAULT, Domain};
+use descry_perception::files::read_cloud;
+use descry_perception::nalgebra::Point3;
+use descry_perception::recognise::{Descry, ObjectModel, Percept, Published, Recogniser};
+use descry_perception::segment::{Scene, SceneOptions, segment};
+use descry_perception::{Cloud, View, Visibility};
+use serde_json::{Value, json};
+
+use crate::commands::input;
+use descry_agent::exit::{CommandError, Exit};
+
+/// Arguments of `descry recognise`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// PCD or PLY files
+    #[arg(required = true)]
+    clouds: Vec<PathBuf>,
+    /// Folder of object files [default: those of the domain tabletop]
+    #[arg(long, value_name = "DIR")]
+    objects: Option<PathBuf>,
+    /// Recogniser: descry, or published (the score of paper 004)
+    #[arg(long, default_value = "descry", value_parser = ["descry", "published"])]
+    recogniser: String,
+    /// Draw the cloud with each object tinted and named, as SVG; of one cloud
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// A larger cloud than any sensor gives at once: some fifty million points.
+const MOST_CLOUD_BYTES: u64 = 1 << 30;
+
+/// What a cloud holds.
+struct Seen {
+    path: String,
+    points: usize,
+    notes: Vec<String>,
+    cloud: Cloud,
+    found: Result<(Scene, Vec<Percept>), String>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    let objects = match &arguments.objects {
+        Some(folder) => descry_domains::load::objects(folder),
+        None => Domain::load(DEFAULT).map(|d| d.objects),
+    };
+    let objects = objects.map_err(CommandError::bad_input)?;
+    let recogniser: &dyn Recogniser = match arguments.recogniser.as_str() {
+        "published" => &Published::default(),
+        _ => &Descry::default(),
+    };
+    let seen: Vec<Seen> =
+        arguments.clouds.iter().map(|path| look(path, recogniser, &objects)).collect::<Result<_, _>>()?;
+    if let Some(path) = &arguments.picture {
+        draw(path, &seen)?;
+    }
+    if arguments.json {
+        input::print_json(&json!({ "clouds": seen.iter().map(as_json).collect::<Vec<_>>() }))?;
+    } else {
+        for cloud in &seen {
+            input::print_text(&as_text(cloud))?;
+        }
+    }
+    // No surface in a cloud is an honest no.
+    Ok(if seen.iter().all(|s| s.found.is_ok()) { Exit::Done } else { Exit::No })
+}
+
+fn look(path: &Path, recogniser: &dyn Recogniser, objects: &[ObjectModel]) -> Result<Seen, CommandError> {
+    let shown = path.display().to_string();
+    let bytes = input::read(path, MOST_CLOUD_BYTES)?;
+    let loaded = read_cloud(&bytes).map_err(|e| CommandError::BadInput(format!("{shown}, {e}")))?;
+    let cloud = loaded.cloud;
+    let points = cloud.points.len();
+    // The sensor stands where the file says; an organised cloud tells by its pixels what it looked through.
+    let view = View::alone(cloud);
+    let organised = Visibility::from_views(std::slice::from_ref(&view));
+    let visibility = match organised.maps.is_empty() {
+        false => organised,
+        true => {
+            let eye = Point3::from(loaded.viewpoint.translation.vector);
+            Visibility::from_viewpoints(&view.cloud, &[eye])
+        }
+    };
+    let found = segment(&view.cloud, &visibility, &SceneOptions::default())
+        .map(|scene| {
+            let percepts = recogniser.recognise(&scene, &visibility, objects);
+            (scene, percepts)
+        })
+        .map_err(|e| e.to_string());
+    Ok(Seen { path: shown, points, notes: loaded.notes, cloud: view.cloud, found })
+}
+
+fn draw(path: &Path, seen: &[Seen]) -> Result<(), CommandError> {
+    let [only] = seen else {
+        return Err(CommandError::BadInput("--picture draws one cloud: name one".into()));
+    };
+    let Ok((scene, percepts)) = &only.found else { return Ok(()) };
+    let drawn = descry_pages::picture::svg(&only.cloud, &scene.surface, percepts)?;
+    std::fs::write(path, drawn)
+        .map_err(|e| CommandError::BadInput(format!("--picture {}: {e}", path.display())))
+}
+
+fn as_json(seen: &Seen) -> Value {
+    let mut value = json!({ "cloud": seen.path, "points": seen.points, "notes": seen.notes });
+    match &seen.found {
+        Ok((scene, percepts)) => {
+            value["table"] = json!(scene.surface);
+            value["objects"] = json!(percepts);
+        }
+        Err(why) => {
+            value["table"] = Value::Null;
+            value["objects"] = json!([]);
+            value["why"] = json!(why);
+        }
+    }
+    value
+}
+
+fn as_text(seen: &Seen) -> String {
+    let mut lines = vec![format!("{}: {} points", seen.path, seen.points)];
+    lines.extend(seen.notes.iter().map(|note| format!("  note: {note}")));
+    match &seen.found {
+        Ok((scene, percepts)) => {
+            let s = &scene.surface;
+            lines.push(format!(
+                "  table: {:.2} m2, {} points within {:.1} mm",
+                s.area_m2,
+                s.points,
+                s.residual_m * 1e3
+            ));
+            lines.extend(percepts.iter().map(|p| format!("  {}", perceive::in_a_line(p))));
+        }
+        Err(why) => lines.push(format!("  no table: {why}")),
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,75 @@
+//! `descry robot check BODY`: whether a body keeps the promises of bodies, reported like a test.
+
+use descry_domains::load::{DEFAULT, Domain};
+use descry_robots::conformance;
+use serde::Serialize;
+
+use crate::commands::input;
+use descry_agent::body;
+use descry_agent::exit::{CommandError, Exit};
+
+/// What can be asked of a body by itself.
+#[derive(clap::Subcommand)]
+pub enum Arguments {
+    /// Drive it, look, take frames, stop it, and hold it to the promises of every body
+    Check(CheckArguments),
+}
+
+/// Arguments of `descry robot check`.
+#[derive(clap::Args)]
+pub struct CheckArguments {
+    /// The body: sim, recorded:DIR, program:COMMAND, or socket:HOST:PORT or socket:PATH
+    robot: String,
+    /// Print the result as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report {
+    robot: String,
+    kept: Vec<&'static str>,
+    broken: Option<Broken>,
+}
+
+#[derive(Serialize)]
+struct Broken {
+    check: &'static str,
+    promise: &'static str,
+    found: String,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    let Arguments::Check(arguments) = arguments;
+    let domain = Domain::load(DEFAULT).map_err(CommandError::bad_input)?;
+    let body = body::open(&arguments.robot, None, 1, &domain)?;
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|e| CommandError::Bug(e.to_string()))?;
+    let mut report = Report { robot: body.robot.description().name.clone(), kept: Vec::new(), broken: None };
+    input::narrate(&format!("checking \"{}\"", report.robot));
+    for (check, begin) in conformance::CHECKS {
+        match runtime.block_on(begin(&*body.robot)) {
+            Ok(()) => {
+                input::narrate(&format!("{check} ... ok"));
+                report.kept.push(check);
+            }
+            Err(breach) => {
+                input::narrate(&format!(
+                    "{check} ... FAILED\n\n  every body: {}\n  this one:   {}\n",
+                    breach.promise, breach.found
+                ));
+                report.broken = Some(Broken { check, promise: breach.promise, found: breach.found });
+                break;
+            }
+        }
+    }
+    let (kept, all) = (report.kept.len(), conformance::CHECKS.len());
+    let verdict = if report.broken.is_none() { "ok" } else { "FAILED" };
+    input::narrate(&format!("{verdict}: {kept} of {all} checks passed"));
+    if arguments.json {
+        input::print_json(&report)?;
+    }
+    Ok(if report.broken.is_none() { Exit::Done } else { Exit::No })
+}

@@ -1,0 +1,65 @@
+//! `descry show RUN`: what happened in a run, from its record.
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use crate::commands::input;
+use descry_agent::exit::{CommandError, Exit};
+use descry_agent::report::Event;
+
+/// Arguments of `descry show`.
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// The run's folder
+    run: PathBuf,
+    /// Write the run as one page instead: map, plans, what was seen, and what was said, moment by moment
+    #[arg(long, value_name = "FILE", conflicts_with = "json")]
+    html: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+    let folder = &arguments.run;
+    descry_agent::run::header(folder)?;
+    let record = descry_agent::keeping::open(folder)?;
+    let (events, mut lost) = descry_agent::run::events(&record)?;
+    lost.splice(0..0, record.recovery().faults.iter().cloned());
+    let (report, damaged) = match descry_agent::run::report(folder) {
+        Ok(report) => (report, None),
+        Err(e) => (None, Some(e)),
+    };
+    if let Some(page) = &arguments.html {
+        let text = descry_pages::page::of_run(&record, report.as_ref())?;
+        std::fs::write(page, text).map_err(|e| CommandError::broken(format!("{}: {e}", page.display())))?;
+        input::print_text(&page.display().to_string())?;
+    } else if arguments.json {
+        input::print_json(&json!({
+            "run": folder.display().to_string(), "events": events, "report": report, "lost": lost,
+        }))?;
+    } else {
+        for event in &events {
+            match serde_json::from_value::<Event>(event.clone()) {
+                Ok(event) => input::print_fitted(&event.to_string())?,
+                Err(_) => input::print_text(&compact(event))?,
+            }
+        }
+        match (report, &damaged) {
+            (Some(report), _) => input::print_fitted(&report.to_string())?,
+            (None, None) => input::print_text("\nthe run has not finished")?,
+            (None, Some(_)) => (),
+        }
+    }
+    if let Some(damaged) = &damaged {
+        input::narrate(&format!("descry: lost: {damaged}"));
+    }
+    let exit = input::lost(&lost);
+    Ok(if damaged.is_some() { Exit::No } else { exit })
+}
+
+/// An event of another version, as it stands in the record.
+fn compact(event: &Value) -> String {
+    serde_json::to_string(event).unwrap_or_default()
+}

@@ -1,0 +1,83 @@
+//! `descry`: the command line, an interface that scripts depend on.
+
+mod commands;
+mod findings;
+mod layout;
+mod lsp;
+
+use std::process::ExitCode;
+
+use descry_agent::exit::Exit;
+use descry_agent::stop::Stop;
+use tokio::signal::unix::{SignalKind, signal};
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::LevelFilter;
+
+/// Merging asks for tens of megabytes a look and gives them back: one that keeps them for the next is quicker.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+fn main() -> ExitCode {
+    std::panic::set_hook(Box::new(|panic| {
+        commands::narrate(&format!(
+            "descry: {panic}\n  this is a bug of descry; please report it with the command and its input"
+        ));
+    }));
+    warn_people();
+    let outcome = std::panic::catch_unwind(|| {
+        let command = commands::asked();
+        let stop = Stop::default();
+        if command.can_be_stopped() {
+            listen(&stop);
+        }
+        commands::run(&command, &stop)
+    });
+    match outcome {
+        Ok(Ok(exit)) => exit.into(),
+        Ok(Err(error)) => {
+            commands::narrate(&format!("descry: {error}"));
+            error.exit().into()
+        }
+        Err(_) => Exit::Bug.into(),
+    }
+}
+
+/// Lets signals ask to stop; the second Ctrl-C ends the program at once.
+fn listen(stop: &Stop) {
+    let stop = stop.clone();
+    let thread = std::thread::Builder::new().name("signals".into());
+    if let Err(e) = thread.spawn(move || hear(&stop)) {
+        tracing::warn!("Ctrl-C will end the program at once: {e}");
+    }
+}
+
+fn hear(stop: &Stop) -> std::io::Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().build()?;
+    runtime.block_on(async {
+        let mut interrupt = signal(SignalKind::interrupt())?;
+        let mut terminate = signal(SignalKind::terminate())?;
+        let mut hangup = signal(SignalKind::hangup())?;
+        loop {
+            let (by, kind) = tokio::select! {
+                _ = interrupt.recv() => (2, "Ctrl-C"),
+                _ = terminate.recv() => (15, "SIGTERM"),
+                _ = hangup.recv() => (1, "the end of the terminal"),
+            };
+            if !stop.is_asked() {
+                stop.ask(by);
+                commands::narrate(&format!("descry: {kind}: stopping the body; Ctrl-C again ends at once"));
+            } else if by == 2 {
+                std::process::exit(i32::from(Exit::Interrupted as u8));
+            }
+        }
+    })
+}
+
+/// Lets warnings reach people, on standard error; `RUST_LOG` asks for more or less.
+fn warn_people() {
+    let filter = EnvFilter::builder().with_default_directive(LevelFilter::WARN.into()).from_env_lossy();
+    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    // It would panic over what it cannot write, as to a full disk.
+    let lines = lines.log_internal_errors(false);
+    lines.with_ansi(commands::is_coloured()).without_time().with_target(false).init();
+}

@@ -1,0 +1,138 @@
+//! What can be varied and measured: one file each, and the list of them.
+
+mod faults;
+mod figure_4;
+mod tasks;
+mod trial;
+mod where_to_look;
+
+use descry_agent::stop::Stop;
+use std::path::Path;
+
+use descry_robots::input::{self, Objection, Step};
+use serde::Deserialize;
+
+use super::page::Section;
+use super::{ExperimentError, Job, Numbered, Outcome, Row, Source};
+use descry_agent::body::program;
+
+/// A kind of experiment, bound to what a file says of it.
+pub trait Kind: Send + Sync {
+    /// What every experiment file says.
+    fn head(&self) -> &Head;
+
+    /// Other texts that the results depend on, by name: scenes, domain. They count in the experiment's hash.
+    fn inputs(&self) -> Vec<(String, String)>;
+
+    /// Every combination, in an order that is always the same.
+    fn jobs(&self) -> Vec<Job>;
+
+    /// Does the job of this number. The outcome depends on nothing but the file and the number. `scratch` is a path that
+    /// nothing else uses; what is there afterwards is removed.
+    ///
+    /// # Errors
+    /// A text for people; it becomes a row.
+    fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String>;
+
+    /// What finished jobs, in the order of [`Kind::jobs`], say: all of them, or those that are done so far.
+    fn summarise(&self, finished: &[Numbered<'_>]) -> Summary;
+}
+
+/// What every experiment file says.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Head {
+    /// The experiment's name.
+    pub name: String,
+    /// One of the kinds.
+    pub kind: String,
+    /// What it is to show, in a line.
+    #[serde(default)]
+    pub about: String,
+}
+
+/// A body other than our simulator, as an experiment file names it: `program:COMMAND`. Its runs differ by seed and are held against
+/// the truth, so the command takes both.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(try_from = "String")]
+struct OtherBody(String);
+
+impl OtherBody {
+    /// The program's command line, with places for seed and truth.
+    fn command(&self) -> &str {
+        &self.0
+    }
+}
+
+impl TryFrom<String> for OtherBody {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let command = text.strip_prefix("program:").ok_or("expected program:COMMAND")?;
+        match [program::SEED, program::TRUTH].into_iter().find(|place| !command.contains(place)) {
+            Some(place) => {
+                Err(format!("the command has no {place}, such as --seed {{seed}} --truth {{truth}}"))
+            }
+            None => Ok(Self(command.to_string())),
+        }
+    }
+}
+
+/// What the jobs together say.
+#[derive(Debug, Clone, Default)]
+pub struct Summary {
+    /// For scripts: `summary.json`.
+    pub values: Row,
+    /// For people: tables and plots in the order in which they are read.
+    pub sections: Vec<Section>,
+}
+
+/// Reads what a file says of its kind.
+type Reader = fn(&Source) -> Result<Box<dyn Kind>, ExperimentError>;
+
+/// Every kind by its name in experiment files.
+pub const ALL: &[(&str, Reader)] = &[
+    ("figure-4", figure_4::read),
+    ("where-to-look", where_to_look::read),
+    ("faults", faults::read),
+    ("tasks", tasks::read),
+];
+
+/// The kind of an experiment file, with everything that the file says checked.
+///
+/// # Errors
+/// [`ExperimentError::Input`] points at the place.
+pub fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
+    let head: Head = parse(source)?;
+    let known: Vec<&str> = ALL.iter().map(|(name, _)| *name).collect();
+    match ALL.iter().find(|(name, _)| *name == head.kind) {
+        Some((_, reader)) => reader(source),
+        None => Err(refuse(
+            source,
+            "kind",
+            format!("no kind of experiment is called \"{}\"", head.kind),
+            format!("one of: {}", known.join(", ")),
+        )),
+    }
+}
+
+/// Reads an experiment file as TOML.
+fn parse<T: serde::de::DeserializeOwned>(source: &Source) -> Result<T, ExperimentError> {
+    input::parse_toml(&source.path.display().to_string(), &source.text)
+        .map_err(|e| ExperimentError::Input(e.to_string()))
+}
+
+/// A value that the format allows and the meaning does not, drawn under its line.
+fn refuse(
+    source: &Source,
+    key: &'static str,
+    problem: impl Into<String>,
+    mend: impl Into<String>,
+) -> ExperimentError {
+    let objection = Objection { path: vec![Step::Key(key)], problem: problem.into(), mend: mend.into() };
+    ExperimentError::Input(
+        input::draw(&source.path.display().to_string(), &source.text, objection).to_string(),
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,268 @@
+//! Tasks in a place with several surfaces: whatever may be said to a domain, by several policies, with and without mishaps. What
+//! is answered and done is held against how everything stands in the end.
+
+use descry_agent::stop::Stop;
+use std::path::Path;
+
+use descry_domains::abilities::searching::policies;
+use descry_domains::goal::{self, Goal};
+use descry_domains::lexicon::{Lexicon, Places};
+use descry_domains::load::Domain;
+use descry_robots::sim::{Fault, FaultPlan, SceneSpec};
+use serde::Deserialize;
+use serde_json::json;
+
+use super::trial::{self, Trial};
+use super::{Head, Kind, OtherBody, Summary, parse, refuse};
+use crate::{ExperimentError, Job, Numbered, Outcome, Source};
+use descry_agent::body;
+
+mod score;
+mod summary;
+
+use score::Truly;
+
+/// What a file of this kind says.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Text {
+    /// The experiment's name.
+    name: String,
+    /// `tasks`.
+    kind: String,
+    /// What it is to show, in a line.
+    #[serde(default)]
+    about: String,
+    /// Built-in domain or a domain's folder.
+    domain: String,
+    /// Scene of the domain, or a file.
+    scene: String,
+    /// Runs of each goal, policy and case, each in an arrangement of its own.
+    runs: usize,
+    /// Seed of the first arrangement; each further one has the next.
+    #[serde(default = "default_seed")]
+    first_seed: u64,
+    /// Who chooses where to look next: one of the policies above each.
+    policies: Vec<String>,
+    /// A thing is found where it is if it stands no farther from there, along the floor.
+    #[serde(default = "default_tolerance_m")]
+    position_tolerance_m: f64,
+    /// What is asked for; each with each policy and case.
+    #[serde(rename = "goal")]
+    goals: Vec<GoalText>,
+    /// What goes wrong; nothing if there is none.
+    #[serde(default = "nothing_goes_wrong", rename = "case")]
+    cases: Vec<Case>,
+}
+
+/// What is asked for, and when it is truly so.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GoalText {
+    /// In the words of the domain.
+    say: String,
+    /// The objects of the scene that it is about, by name or kind.
+    targets: Vec<String>,
+    /// When it is right.
+    truly: Truly,
+    /// The surface that it is about, by the scene's name.
+    #[serde(default)]
+    surface: Option<String>,
+    /// The room that it is about, by the scene's name.
+    #[serde(default)]
+    room: Option<String>,
+    /// Share of the runs without the targets.
+    #[serde(default)]
+    absent_share: f64,
+    /// Actions that are counted: the share of the runs in which each was carried out.
+    #[serde(default)]
+    stages: Vec<String>,
+}
+
+/// Mishaps that come together, or another body.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Case {
+    /// For tables and plots.
+    name: String,
+    /// Instead of our simulator: `program:COMMAND`, whose world has the places and things of the scene.
+    #[serde(default)]
+    robot: Option<OtherBody>,
+    /// What goes wrong in it; nothing if there is none.
+    #[serde(default, rename = "fault")]
+    faults: Vec<Fault>,
+}
+
+fn default_seed() -> u64 {
+    1
+}
+
+fn default_tolerance_m() -> f64 {
+    0.05
+}
+
+fn nothing_goes_wrong() -> Vec<Case> {
+    vec![Case { name: "nothing".into(), robot: None, faults: Vec::new() }]
+}
+
+/// The experiment.
+struct Tasks {
+    head: Head,
+    text: Text,
+    domain: Domain,
+    spec: SceneSpec,
+    /// The goals as they are understood, in the order of the file.
+    goals: Vec<Goal>,
+}
+
+/// One combination.
+struct Setting<'a> {
+    goal: usize,
+    case: &'a Case,
+    policy: &'a str,
+    run: usize,
+}
+
+pub(super) fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
+    let text: Text = parse(source)?;
+    check(source, &text)?;
+    let domain = Domain::load(&text.domain)
+        .map_err(|e| refuse(source, "domain", e.to_string(), "name another domain"))?;
+    let spec = body::scene_spec(Some(&text.scene), &domain)
+        .map_err(|e| refuse(source, "scene", e.to_string(), "name another scene"))?;
+    let lexicon = Lexicon::new(&domain, &Places::of_spec(&spec));
+    let goals = text.goals.iter().map(|g| {
+        check_goal(source, g, &spec)?;
+        goal::read(&g.say, &domain, &lexicon)
+            .map_err(|e| refuse(source, "goal", e.to_string(), "see descry goals"))
+    });
+    let goals = goals.collect::<Result<_, _>>()?;
+    let head = Head { name: text.name.clone(), kind: text.kind.clone(), about: text.about.clone() };
+    Ok(Box::new(Tasks { head, text, domain, spec, goals }))
+}
+
+/// What the format allows and the meaning does not.
+fn check(source: &Source, text: &Text) -> Result<(), ExperimentError> {
+    let known = policies::names();
+    if let Some(absent) = text.policies.iter().find(|p| !known.contains(&p.as_str())) {
+        let problem = format!("no policy is called \"{absent}\"");
+        return Err(refuse(source, "policies", problem, format!("one of: {}", known.join(", "))));
+    }
+    let wrong = |holds: bool, key, problem: &str, mend: &str| match holds {
+        true => Ok(()),
+        false => Err(refuse(source, key, problem, mend)),
+    };
+    wrong(!text.policies.is_empty(), "policies", "there is no policy", "name one, such as \"plan\"")?;
+    wrong((1..=1_000_000).contains(&text.runs), "runs", "so many runs make no experiment", "1 to 1000000")?;
+    let tolerance_m = text.position_tolerance_m;
+    wrong(tolerance_m > 0.0, "position_tolerance_m", "nothing is ever so near", "metres, such as 0.05")?;
+    wrong(!text.goals.is_empty(), "goal", "there is no goal", "add a [[goal]]")?;
+    wrong(!text.cases.is_empty(), "case", "there is no case", "add a [[case]], or leave them out")?;
+    for case in &text.cases {
+        let plan = FaultPlan { faults: case.faults.clone() };
+        plan.check()
+            .map_err(|o| refuse(source, "case", format!("case \"{}\": {}", case.name, o.problem), o.mend))?;
+        let ours = case.robot.is_none() || case.faults.is_empty();
+        wrong(ours, "case", "mishaps befall our simulator only", "leave robot or fault out")?;
+        let foresee = text.policies.iter().find(|p| policies::named(p, 1, None).is_err());
+        if let (Some(_), Some(policy)) = (&case.robot, foresee) {
+            let problem = format!("\"{policy}\" asks our simulator what a look would show");
+            return Err(refuse(source, "policies", problem, "leave it out, or every case with a robot"));
+        }
+    }
+    Ok(())
+}
+
+/// A goal names what the scene has, and all that it takes to tell whether it is truly so.
+fn check_goal(source: &Source, goal: &GoalText, spec: &SceneSpec) -> Result<(), ExperimentError> {
+    let refused = |problem: String, mend: String| {
+        Err(refuse(source, "goal", format!("goal \"{}\": {problem}", goal.say), mend))
+    };
+    let is_there =
+        |t: &&String| spec.objects.iter().any(|o| o.name == **t || o.kind.as_deref() == Some(t.as_str()));
+    if let Some(absent) = goal.targets.iter().find(|t| !is_there(t)) {
+        let names: Vec<&str> = spec.objects.iter().map(|o| o.name.as_str()).collect();
+        return refused(
+            format!("nothing in the scene is called \"{absent}\""),
+            format!("one of: {}", names.join(", ")),
+        );
+    }
+    let known = |name: &Option<String>, of: Vec<&str>, what: &str| match name {
+        Some(name) if !of.contains(&name.as_str()) => {
+            refused(format!("the scene has no {what} \"{name}\""), format!("one of: {}", of.join(", ")))
+        }
+        _ => Ok(()),
+    };
+    known(&goal.surface, spec.surfaces.iter().map(|s| s.name.as_str()).collect(), "surface")?;
+    known(&goal.room, spec.rooms.iter().map(|r| r.name.as_str()).collect(), "room")?;
+    if goal.truly.needs_surface() && goal.surface.is_none() {
+        return refused("it is not said on which surface".into(), "add surface = \"…\"".into());
+    }
+    match (0.0..1.0).contains(&goal.absent_share) {
+        true => Ok(()),
+        false => refused("absent_share is no share".into(), "from 0 to below 1, such as 0.25".into()),
+    }
+}
+
+impl Tasks {
+    /// Runs are outermost, so that the first shard of many has some of everything, and neighbours share an arrangement.
+    fn setting(&self, number: usize) -> Setting<'_> {
+        let Text { goals, cases, policies, .. } = &self.text;
+        let (rest, policy) = (number / policies.len(), number % policies.len());
+        let (rest, case) = (rest / cases.len(), rest % cases.len());
+        let (run, goal) = (rest / goals.len(), rest % goals.len());
+        Setting { goal, case: &cases[case], policy: &policies[policy], run }
+    }
+}
+
+impl Kind for Tasks {
+    fn head(&self) -> &Head {
+        &self.head
+    }
+
+    fn inputs(&self) -> Vec<(String, String)> {
+        let domain = format!("{}{:?}{:?}", self.domain.pddl.text, self.domain.config, self.domain.objects);
+        vec![("scene".into(), format!("{:?}", self.spec)), ("domain".into(), domain)]
+    }
+
+    fn jobs(&self) -> Vec<Job> {
+        let Text { goals, cases, policies, runs, .. } = &self.text;
+        let job = |number| {
+            let Setting { goal, case, policy, run } = self.setting(number);
+            Job::new([
+                ("run", json!(run)),
+                ("goal", json!(goals[goal].say)),
+                ("case", json!(case.name)),
+                ("policy", json!(policy)),
+            ])
+        };
+        (0..runs * goals.len() * cases.len() * policies.len()).map(job).collect()
+    }
+
+    fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String> {
+        let Setting { goal, case, policy, run } = self.setting(number);
+        let said = &self.text.goals[goal];
+        let (n, share) = (run as f64, said.absent_share);
+        let present = ((n + 1.0) * share).floor() <= (n * share).floor();
+        let trial = Trial {
+            domain: &self.domain,
+            goal: &self.goals[goal],
+            spec: &self.spec,
+            program: case.robot.as_ref().map(OtherBody::command),
+            targets: &said.targets,
+            present,
+            seed: self.text.first_seed.wrapping_add(run as u64),
+            faults: FaultPlan { faults: case.faults.clone() },
+            policy,
+            first_look_here: false,
+            tolerance_m: self.text.position_tolerance_m,
+        };
+        let lived = trial::live(&trial, scratch, stop)?;
+        let row = score::row(said, trial.tolerance_m, present, &lived);
+        Ok(Outcome { rows: vec![row], clock: lived.clock })
+    }
+
+    fn summarise(&self, finished: &[Numbered<'_>]) -> Summary {
+        summary::summarise(self, finished)
+    }
+}

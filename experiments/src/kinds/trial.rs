@@ -1,0 +1,253 @@
+//! One run of the agent in a simulated world, ours or a program's, held against the truth.
+
+use descry_agent::stop::Stop;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use descry_domains::goal::{self, Goal};
+use descry_domains::lexicon::{Lexicon, Places};
+use descry_domains::load::Domain;
+use descry_robots::Place;
+use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
+use descry_robots::truth::{TrueObject, Truth};
+use serde_json::{Value, json};
+
+use crate::{Outcome, Row};
+use descry_agent::body::{Body, program};
+use descry_agent::keeping::{Keeping, Kept};
+use descry_domains::abilities::searching::policies::{self, Foresight};
+use descry_domains::answer::Verdict;
+
+use descry_agent::report::{Event, Report};
+use descry_agent::run::{self, Folder, Settings, Task, Watcher};
+
+/// Seeds tried for an arrangement that is as hidden as was asked for.
+const ARRANGEMENTS: u64 = 20;
+/// Between the seeds that are tried, so that scenes do not share them.
+const NEXT_ARRANGEMENT: u64 = 1_000_003;
+
+/// What a run is made of.
+pub(super) struct Trial<'a> {
+    /// What may be said and what it means.
+    pub domain: &'a Domain,
+    /// What is pursued.
+    pub goal: &'a Goal,
+    /// The scene; its places and things have the same names in a program's world.
+    pub spec: &'a SceneSpec,
+    /// The command line of a program with a world of its own; none: our simulator.
+    pub program: Option<&'a str>,
+    /// What is looked for: names or kinds in the scene.
+    pub targets: &'a [String],
+    /// Whether they are there.
+    pub present: bool,
+    /// Fixes arrangement, noise, mishaps and random choices.
+    pub seed: u64,
+    /// What goes wrong on purpose.
+    pub faults: FaultPlan,
+    /// Who chooses.
+    pub policy: &'a str,
+    /// Whether the first look is taken from the start, whoever chooses.
+    pub first_look_here: bool,
+    /// A thing is found where it is if it stands no farther from there, metres.
+    pub tolerance_m: f64,
+}
+
+/// Carries a run out and holds it against how its target stands in the end. Its record is kept in `scratch`.
+pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Outcome, String> {
+    let Lived { report, truth, share, clock, .. } = live(trial, scratch, stop)?;
+    let mut row = measured(trial, &report);
+    row.insert("visible_from_start".into(), json!(share.map(|s| (s * 1e4).round() / 1e4)));
+    row.insert("mishaps".into(), json!(truth.events.len()));
+    Ok(Outcome { rows: vec![row], clock })
+}
+
+/// What came of a run.
+pub(super) struct Lived {
+    /// What it says.
+    pub report: Report,
+    /// How everything stands in the end.
+    pub truth: Truth,
+    /// How often each action was carried out to its end, by name.
+    pub carried: BTreeMap<String, usize>,
+    /// The share of the target that was seen from the start.
+    pub share: Option<f64>,
+    /// Times on the wall.
+    pub clock: Row,
+}
+
+/// Lets the agent live through a run.
+pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Lived, String> {
+    let started = std::time::Instant::now();
+    let Staged { body, goal, share, foresight } = match trial.program {
+        None => simulated(trial)?,
+        Some(command) => run_by_program(trial, command)?,
+    };
+    let arranged_s = started.elapsed().as_secs_f64();
+    let mut chooser = policies::named(trial.policy, trial.seed, foresight).map_err(|e| e.to_string())?;
+    chooser.first_look_here = trial.first_look_here;
+    let folder = Folder::made(scratch).map_err(|e| e.to_string())?;
+    let settings = Settings {
+        robot: trial.program.map_or_else(|| "sim".into(), |command| format!("program:{command}")),
+        scene: None,
+        seed: trial.seed,
+        domain: trial.domain.config.name.clone(),
+        policy: trial.policy.into(),
+        // What a batch has done is in its journal; a power cut costs a run at most.
+        keeping: Keeping { durability: Some(Kept::Process), ..Keeping::default() },
+        remember: None,
+    };
+    let mut carried = BTreeMap::new();
+    let mut count = |event: &Event| {
+        if let Event::Acted { call, .. } = event {
+            let action = call.trim_start_matches('(').split([' ', ')']).next().unwrap_or_default();
+            *carried.entry(action.to_string()).or_default() += 1;
+        }
+    };
+    let watcher = Watcher { stop, tell: &mut count };
+    let task = Task { domain: trial.domain, goal: &goal, past: None };
+    let report = run::pursue(task, &body, &folder, &settings, chooser, watcher);
+    let report = report.map_err(|e| e.to_string())?;
+    let run_s = started.elapsed().as_secs_f64() - arranged_s;
+    let mut clock = Row::new();
+    clock.insert("arrange_s".into(), json!(arranged_s));
+    clock.insert("run_s".into(), json!(run_s));
+    if report.planning_s > 0.0 {
+        let poses = trial.domain.config.candidates.poses;
+        clock.insert(format!("longest planning at {poses} poses, geometry apart"), json!(report.planning_s));
+        clock.insert(format!("longest geometry of a plan at {poses} poses"), json!(report.geometry_s));
+    }
+    let truth = body.truth()?.ok_or("the body does not say how everything really stands")?;
+    Ok(Lived { report, truth, carried, share, clock })
+}
+
+/// A body in its world, before a run.
+struct Staged {
+    body: Body,
+    /// As it is understood there.
+    goal: Goal,
+    /// The share of the target that is seen from the start.
+    share: Option<f64>,
+    foresight: Option<Foresight>,
+}
+
+fn simulated(trial: &Trial<'_>) -> Result<Staged, String> {
+    let without = trial.targets.iter().fold(trial.spec.clone(), |spec, target| spec.without(target));
+    // What hides an absent thing stands as it would if it were there.
+    let mut scene = arrangement(trial)?;
+    if !trial.present {
+        scene.objects.retain(|o| without.objects.iter().any(|kept| kept.name == o.name));
+        scene.target = None;
+    }
+    let share = scene.target_visible_from_start;
+    let options = SimOptions { seed: trial.seed, faults: trial.faults.clone(), ..SimOptions::default() };
+    let robot = Arc::new(SimRobot::new(scene, options));
+    let foresight = Some(foresight(&robot, trial.targets));
+    Ok(Staged { body: Body::simulated(robot), goal: trial.goal.clone(), share, foresight })
+}
+
+fn run_by_program(trial: &Trial<'_>, command: &str) -> Result<Staged, String> {
+    let without = if trial.present { &[] } else { trial.targets };
+    let body = program::open(command, trial.seed, without).map_err(|e| e.to_string())?;
+    let lexicon = Lexicon::new(trial.domain, &Places::of_body(&*body.robot));
+    let goal = goal::read(&trial.goal.said, trial.domain, &lexicon).map_err(|e| e.to_string())?;
+    Ok(Staged { body, goal, share: None, foresight: None })
+}
+
+fn arrangement(trial: &Trial<'_>) -> Result<descry_robots::sim::Scene, String> {
+    let tried = (0..ARRANGEMENTS)
+        .map(|n| arrange(trial.spec, trial.seed.wrapping_add(n.wrapping_mul(NEXT_ARRANGEMENT))));
+    let mut last = String::new();
+    for scene in tried {
+        match scene {
+            Ok(scene) => return Ok(scene),
+            Err(why) => last = why.to_string(),
+        }
+    }
+    Err(last)
+}
+
+/// Whether an object is there and one of those that are named, by name or kind.
+pub(super) fn is_among(object: &TrueObject, targets: &[String]) -> bool {
+    object.present && targets.iter().any(|target| object.name == *target || object.kind == *target)
+}
+
+/// What a look would truly show of the target, for the oracle, as things stand when it asks.
+fn foresight(robot: &Arc<SimRobot>, targets: &[String]) -> Foresight {
+    let (robot, targets) = (Arc::clone(robot), targets.to_vec());
+    Box::new(move |place: &Place, on: &str| {
+        let Place::Pose(pose) = place else { return 0.0 };
+        let stands = |o: &&TrueObject| is_among(o, &targets) && o.surface.as_deref() == Some(on);
+        let shares = robot.truth().objects;
+        shares.iter().filter(stands).map(|o| robot.true_visible_share(&o.name, pose)).fold(0.0, f64::max)
+    })
+}
+
+/// What a report says, held against how everything stands in the end.
+fn measured(trial: &Trial<'_>, report: &Report) -> Row {
+    let believed = report.position_m.filter(|_| report.verdict == Verdict::Achieved);
+    let error_m = believed.zip(report.true_position_m).map(|(believed, truth)| {
+        believed.iter().zip(&truth).take(2).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    });
+    let present = report.true_position_m.is_some();
+    let found = report.verdict == Verdict::Achieved && error_m.is_some_and(|e| e <= trial.tolerance_m);
+    let right = if present { found } else { report.verdict == Verdict::NotFound };
+    // What it says in the end of the chance that the thing is there (for "achieved": that it is where it says).
+    let stated = if report.verdict == Verdict::Achieved { Some(report.confidence) } else { report.remaining };
+    let came_true = if report.verdict == Verdict::Achieved { found } else { present };
+    let value = json!({
+        "target": trial.targets.join(", "),
+        "present": present,
+        "verdict": report.verdict,
+        "right": right,
+        "false_declaration": report.verdict == Verdict::Achieved && !found,
+        "views": report.views,
+        "metres": report.distance_m,
+        "seconds": report.sim_time_s,
+        "replans": report.replans,
+        "stated": stated,
+        "came_true": came_true,
+        "position_error_m": error_m,
+        "why": report.why,
+    });
+    value.as_object().cloned().unwrap_or_default()
+}
+
+/// A finished run, as the summaries read it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Measured {
+    /// Runs in one scene belong together.
+    pub group: u64,
+    /// Whether the target was there in the end.
+    pub present: bool,
+    /// Whether the verdict was right.
+    pub right: bool,
+    /// Whether it said to have found what is not there.
+    pub false_declaration: bool,
+    /// Looks.
+    pub views: f64,
+    /// Driven.
+    pub metres: f64,
+    /// On the body's clock.
+    pub seconds: f64,
+    /// The probability that it stated, and whether it came true.
+    pub forecast: Option<(f64, bool)>,
+}
+
+impl Measured {
+    /// Reads a row; a job that failed gives none.
+    pub fn read(group: u64, row: &Row) -> Option<Self> {
+        let truth = |key: &str| row.get(key).and_then(Value::as_bool);
+        let number = |key: &str| row.get(key).and_then(Value::as_f64);
+        Some(Self {
+            group,
+            present: truth("present")?,
+            right: truth("right")?,
+            false_declaration: truth("false_declaration")?,
+            views: number("views")?,
+            metres: number("metres")?,
+            seconds: number("seconds")?,
+            forecast: number("stated").zip(truth("came_true")),
+        })
+    }
+}

@@ -1,0 +1,376 @@
+//! Batches of runs: a file says what is varied, every combination is a job, and the jobs become tables with intervals, plots
+//! and one page. A batch goes on where it was cut off, and its shards may be done on many machines.
+
+pub mod cluster;
+pub mod hash;
+pub mod journal;
+pub mod kinds;
+mod live;
+pub mod page;
+pub mod plot;
+mod runner;
+pub mod statistics;
+pub mod table;
+mod write;
+
+use descry_agent::stop::Stop;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use journal::{Done, Header, Journal};
+pub use kinds::Kind;
+pub use live::Batch;
+pub use write::Results;
+
+/// Named values, in the order in which they are shown.
+pub type Row = Map<String, Value>;
+
+/// One combination of what is varied.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Job {
+    /// Unique in the experiment, the same on every machine, such as `scene=0012 poses=8 policy=plan`.
+    pub id: String,
+    /// What is varied, and its value here.
+    pub factors: Row,
+}
+
+impl Job {
+    /// A job from its factors; they make up its id.
+    pub fn new<const N: usize>(factors: [(&str, Value); N]) -> Self {
+        let shown = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_string);
+        let id: Vec<String> =
+            factors.iter().map(|(name, value)| format!("{name}={}", shown(value))).collect();
+        Self {
+            id: id.join(" "),
+            factors: factors.into_iter().map(|(name, value)| (name.to_string(), value)).collect(),
+        }
+    }
+}
+
+/// What a job gave: rows of measurements, the same whenever and wherever it is done, and what the clock on the wall said.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Outcome {
+    /// Measurements; usually one row.
+    pub rows: Vec<Row>,
+    /// Times on the wall: they differ from run to run and are reported apart.
+    pub clock: Row,
+}
+
+/// A line of the journal: a job that has been done.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Finished {
+    /// The job's id.
+    pub job: String,
+    /// Its factors with its measurements.
+    pub rows: Vec<Row>,
+    /// What the clock on the wall said.
+    #[serde(default)]
+    pub clock: Row,
+    /// Why there are no measurements.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+}
+
+impl Finished {
+    fn new(job: &Job, outcome: Result<Outcome, String>) -> Self {
+        let with_factors = |row: Row| job.factors.clone().into_iter().chain(row).collect();
+        let (outcome, error) = match outcome {
+            Ok(outcome) => (outcome, None),
+            Err(error) => (Outcome { rows: vec![Row::new()], clock: Row::new() }, Some(error)),
+        };
+        let rows = outcome.rows.into_iter().map(with_factors).collect();
+        Self { job: job.id.clone(), rows, clock: outcome.clock, error }
+    }
+}
+
+/// A finished job, and which of all jobs it is.
+pub type Numbered<'a> = (usize, &'a Finished);
+
+/// An experiment file as it was read.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// Its path, as it was given.
+    pub path: PathBuf,
+    /// Its text.
+    pub text: String,
+}
+
+impl Source {
+    /// Reads an experiment file.
+    ///
+    /// # Errors
+    /// [`ExperimentError::File`] if it is not there or no text.
+    pub fn read(path: &Path) -> Result<Self, ExperimentError> {
+        let text = std::fs::read_to_string(path).map_err(|e| ExperimentError::file(path, &e))?;
+        Ok(Self { path: path.to_path_buf(), text })
+    }
+}
+
+/// A part of the jobs: of every `of` jobs one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// Which, below `of`.
+    pub index: usize,
+    /// How many shards there are.
+    pub of: usize,
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    /// `I/N`. Counting may begin at 0 or at 1, as the machines' scheduler has it: `0/N` and `N/N` are the same shard.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |part: &str| part.trim().parse::<usize>().ok();
+        match text.split_once('/').and_then(|(i, n)| Some((number(i)?, number(n)?))) {
+            Some((i, n)) if n > 0 && i <= n => Ok(Self { index: i % n, of: n }),
+            _ => Err("I/N was expected with I from 0 to N-1 (or from 1 to N), such as 3/8".into()),
+        }
+    }
+}
+
+/// How to carry an experiment out.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Folder of the results.
+    pub out: PathBuf,
+    /// Only a part of the jobs.
+    pub shard: Option<Shard>,
+    /// Do nothing; put these folders together.
+    pub merge: Vec<PathBuf>,
+    /// How many jobs at a time.
+    pub threads: usize,
+    /// A job that fails while less room is left on the disk does not count, and none is begun after it.
+    pub least_free_bytes: u64,
+    /// Ends it early.
+    pub stop: Stop,
+    /// Hears how far it has got, a line now and then where there is no terminal for a bar.
+    pub tell: fn(&str),
+}
+
+/// How far it came.
+#[derive(Debug)]
+pub enum Ended {
+    /// All jobs are done; the results are written.
+    Whole(Box<Results>),
+    /// This shard is done, others are not.
+    Part {
+        /// Jobs that are done, in all shards whose folders are here.
+        done: usize,
+        /// All jobs.
+        all: usize,
+        /// The shard's folder.
+        folder: PathBuf,
+    },
+}
+
+/// Why an experiment cannot be carried out.
+#[derive(Debug, thiserror::Error)]
+pub enum ExperimentError {
+    /// The experiment file says what cannot be understood or done; the text points at the place and offers a mend.
+    #[error("{0}")]
+    Input(String),
+    /// A file or folder cannot be read or written.
+    #[error("{path}: {because}")]
+    File {
+        /// Which.
+        path: String,
+        /// What the system said.
+        because: String,
+    },
+    /// The folder holds another experiment.
+    #[error(
+        "{path} belongs to another experiment\n  found: {} with hash {}, {} jobs, version {}\n  expected: {} with hash {}, {} jobs, version {}\n  name another folder with --out, or remove this one",
+        found.experiment, found.hash, found.jobs, found.version, expected.experiment, expected.hash, expected.jobs, expected.version
+    )]
+    Another {
+        /// The journal.
+        path: String,
+        /// What its first line says.
+        found: Box<Header>,
+        /// What it would have to say.
+        expected: Box<Header>,
+    },
+    /// A file that is called like a journal and is none.
+    #[error("{path}: this is no journal of an experiment\n  name another folder with --out")]
+    NoJournal {
+        /// The file.
+        path: String,
+    },
+    /// Another process is at work in the folder.
+    #[error(
+        "{folder}: another process is at work on this experiment\n  wait for it, or give each its own --shard"
+    )]
+    Busy {
+        /// The folder.
+        folder: String,
+    },
+    /// Two combinations cannot be told apart.
+    #[error("the job \"{id}\" is there twice\n  remove what the file lists twice")]
+    Twice {
+        /// Its id.
+        id: String,
+    },
+    /// Shards are missing.
+    #[error(
+        "{missing} of {all} jobs are in none of the folders, the first of them \"{first}\"\n  do the missing shards, or leave --merge out to do them here"
+    )]
+    Missing {
+        /// How many.
+        missing: usize,
+        /// Of how many.
+        all: usize,
+        /// The first of them.
+        first: String,
+    },
+    /// The disk is full; what was journalled stands.
+    #[error(
+        "{folder}: the disk is full, and {job} failed: {because}\n  free some room and run it again: what is done is not done again"
+    )]
+    NoRoom {
+        /// The folder of the results.
+        folder: String,
+        /// The job that does not count.
+        job: String,
+        /// Why it failed.
+        because: String,
+    },
+    /// More shards than jobs, or none.
+    #[error("{jobs} jobs cannot be divided into {shards} shards\n  name from 1 to {jobs} with --shards")]
+    Shards {
+        /// How many shards were asked for.
+        shards: usize,
+        /// How many jobs there are.
+        jobs: usize,
+    },
+    /// The system gives no thread.
+    #[error("no thread could be started: {because}\n  try a smaller --jobs")]
+    Threads {
+        /// What the system said.
+        because: String,
+    },
+}
+
+impl ExperimentError {
+    fn file(path: &Path, because: &dyn std::fmt::Display) -> Self {
+        Self::File { path: path.display().to_string(), because: because.to_string() }
+    }
+}
+
+/// Carries an experiment out as far as it is not done yet, and writes its results once every job is done.
+///
+/// # Errors
+/// [`ExperimentError`]. A job that fails is no error but a row that says so.
+pub fn run(source: &Source, options: &Options) -> Result<Ended, ExperimentError> {
+    carry_out(&*kinds::read(source)?, source, options)
+}
+
+fn carry_out(kind: &dyn Kind, source: &Source, options: &Options) -> Result<Ended, ExperimentError> {
+    let jobs = kind.jobs();
+    check_unique(&jobs)?;
+    let header = header(source, kind, jobs.len());
+    let mut done = gather(&options.out, &options.merge, &header)?;
+    if options.merge.is_empty() {
+        perform(kind, &jobs, &header, options, &mut done)?;
+        if options.shard.is_some() {
+            // Whichever shard ends last finds what the others have done meanwhile.
+            done.append(&mut gather(&options.out, &[], &header)?);
+        }
+    }
+    let missing: Vec<&Job> = jobs.iter().filter(|job| !done.contains_key(&job.id)).collect();
+    match missing.first() {
+        Some(_) if options.merge.is_empty() => {
+            Ok(Ended::Part { done: jobs.len() - missing.len(), all: jobs.len(), folder: own_folder(options) })
+        }
+        Some(first) => {
+            Err(ExperimentError::Missing { missing: missing.len(), all: jobs.len(), first: first.id.clone() })
+        }
+        None => {
+            let finished: Vec<Finished> = jobs.iter().filter_map(|job| done.remove(&job.id)).collect();
+            write::results(kind, source, &header, &finished, &options.out).map(Box::new).map(Ended::Whole)
+        }
+    }
+}
+
+fn check_unique(jobs: &[Job]) -> Result<(), ExperimentError> {
+    let mut seen = BTreeSet::new();
+    match jobs.iter().find(|job| !seen.insert(&job.id)) {
+        Some(job) => Err(ExperimentError::Twice { id: job.id.clone() }),
+        None => Ok(()),
+    }
+}
+
+fn header(source: &Source, kind: &dyn Kind, jobs: usize) -> Header {
+    let inputs = kind.inputs();
+    let texts = std::iter::once(source.text.as_bytes()).chain(inputs.iter().map(|(_, text)| text.as_bytes()));
+    let version = env!("CARGO_PKG_VERSION").to_string();
+    Header { experiment: kind.head().name.clone(), hash: hash::fnv1a(texts), version, jobs }
+}
+
+/// Where this process writes.
+fn own_folder(options: &Options) -> PathBuf {
+    match options.shard {
+        Some(Shard { index, of }) => options.out.join(format!("shard-{index}-of-{of}")),
+        None => options.out.clone(),
+    }
+}
+
+/// Everything that has been done so far: in the folder, in the folders of its shards, and in those that are named.
+fn gather(out: &Path, merge: &[PathBuf], header: &Header) -> Result<Done, ExperimentError> {
+    let mut folders = vec![out.to_owned()];
+    folders.extend(merge.iter().cloned());
+    if let Some(absent) = merge.iter().find(|folder| !folder.is_dir()) {
+        return Err(ExperimentError::file(absent, &"--merge names folders of shards, and this is none"));
+    }
+    let mut done = Done::new();
+    for folder in folders {
+        done.append(&mut journal::done(&folder, header)?);
+        let Ok(entries) = std::fs::read_dir(&folder) else { continue };
+        let mut inner: Vec<PathBuf> =
+            entries.flatten().map(|entry| entry.path()).filter(|p| p.is_dir()).collect();
+        inner.sort();
+        for shard in inner {
+            done.append(&mut journal::done(&shard, header)?);
+        }
+    }
+    Ok(done)
+}
+
+/// Does what this process is to do and has not been done.
+fn perform(
+    kind: &dyn Kind,
+    jobs: &[Job],
+    header: &Header,
+    options: &Options,
+    done: &mut BTreeMap<String, Finished>,
+) -> Result<(), ExperimentError> {
+    let folder = own_folder(options);
+    let (mut journal, mut own, unreadable) = Journal::open(&folder, header)?;
+    if unreadable > 0 {
+        tracing::warn!(
+            "{unreadable} lines of {} cannot be read; their jobs are done again",
+            folder.join(journal::FILE).display()
+        );
+    }
+    done.append(&mut own);
+    let mine = |number: &usize| options.shard.is_none_or(|shard| number % shard.of == shard.index);
+    let todo: Vec<usize> =
+        (0..jobs.len()).filter(mine).filter(|&n| !done.contains_key(&jobs[n].id)).collect();
+    let scratch = folder.join("scratch");
+    let finished = runner::run(
+        kind,
+        jobs,
+        &todo,
+        options.threads,
+        (&scratch, options.least_free_bytes),
+        (&options.stop, options.tell),
+        &mut journal,
+    )?;
+    done.extend(finished.into_iter().map(|job| (job.job.clone(), job)));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

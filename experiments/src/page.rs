@@ -1,0 +1,132 @@
+//! The results as one page that needs nothing else: tables, plots, the experiment's text, and how to do it again.
+
+use super::plot::Plot;
+use super::table::Table;
+use descry_pages::escaped;
+use descry_pages::live::FOLLOW;
+use descry_pages::page::COLOURS;
+
+const SCRIPT: &str = include_str!("live.js");
+
+/// A part of the results as people read them.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Section {
+    /// A heading.
+    Heading(String),
+    /// A paragraph.
+    Text(String),
+    /// A table.
+    Table(Table),
+    /// A plot.
+    Plot(Box<Plot>),
+}
+
+/// Facts at the top of the page: name and value.
+pub type Facts = Vec<(&'static str, String)>;
+
+const STYLE: &str = "
+* { box-sizing: border-box; }
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--text); background: var(--ground); max-width: 76rem; margin: 2rem auto; padding: 0 1.5rem; }
+h1 { margin-bottom: 0; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--line); } h3 { margin: 1.8rem 0 .4rem; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { padding: .2rem .8rem; text-align: left; border-bottom: 1px solid var(--line); white-space: nowrap; }
+th { border-bottom: 2px solid var(--faint); } th.n, td.n { text-align: right; } tbody tr:hover { background: var(--field); }
+.scroll { overflow-x: auto; } .note { color: var(--faint); margin: .4rem 0 0; max-width: 60rem; } #live { color: var(--now); }
+figure { margin: 1.2rem 0; } figure svg { max-width: 100%; height: auto; border-radius: 8px; } progress { width: 100%; accent-color: var(--done); }
+pre { background: var(--field); padding: 1rem; overflow-x: auto; } dl { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: .1rem 1rem; }
+dt { color: var(--faint); } dd { margin: 0; font-family: ui-monospace, monospace; font-size: 90%; overflow-wrap: anywhere; }
+";
+
+/// How far a batch has come that goes on, for a page that follows it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Jobs that are done.
+    pub done: usize,
+    /// All jobs.
+    pub all: usize,
+}
+
+impl Progress {
+    fn html(self) -> String {
+        let Self { done, all } = self;
+        format!(
+            "<p id=\"live\">live</p>\n<progress max=\"{all}\" value=\"{done}\">{done} of {all} jobs</progress>\n"
+        )
+    }
+}
+
+/// The page: of results, or of a batch that goes on.
+pub fn html(
+    (title, about): (&str, &str),
+    facts: &Facts,
+    sections: &[Section],
+    source: &str,
+    progress: Option<Progress>,
+) -> String {
+    let script = progress.map_or(String::new(), |_| format!("<script>\n{FOLLOW}{SCRIPT}</script>\n"));
+    let facts: String =
+        facts.iter().map(|(name, value)| format!("<dt>{name}</dt><dd>{}</dd>\n", escaped(value))).collect();
+    let body: String = sections.iter().map(section).collect();
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n\
+         <title>{title}</title>\n<style>\n{COLOURS}{STYLE}</style>\n{script}</head>\n<body>\n<h1>{title}</h1>\n<p>{}</p>\n{}<dl>\n{facts}</dl>\n{body}\
+         <h2>The experiment file</h2>\n<pre>{}</pre>\n</body>\n</html>\n",
+        escaped(about),
+        progress.map_or(String::new(), Progress::html),
+        escaped(source),
+        title = escaped(title),
+    )
+}
+
+fn section(section: &Section) -> String {
+    match section {
+        Section::Heading(text) => format!("<h2>{}</h2>\n", escaped(text)),
+        Section::Text(text) => format!("<p>{}</p>\n", escaped(text)),
+        Section::Table(table) => format!("<div class=\"scroll\">{}</div>\n", table.html()),
+        Section::Plot(plot) => format!("<figure>{}</figure>\n", plot.svg()),
+    }
+}
+
+/// The tables alone, as Markdown.
+pub fn markdown(title: &str, facts: &Facts, sections: &[Section]) -> String {
+    let mut text = format!("# {title}\n\n");
+    facts.iter().for_each(|(name, value)| text += &format!("- {name}: {value}\n"));
+    for section in sections {
+        match section {
+            Section::Heading(heading) => text += &format!("\n## {heading}\n"),
+            Section::Text(paragraph) => text += &format!("\n{paragraph}\n"),
+            Section::Table(table) => text += &format!("\n{}", table.markdown()),
+            Section::Plot(plot) => text += &format!("\n![{}](plots/{}.svg)\n", plot.title(), plot.name()),
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_holds_everything_and_escapes_it() {
+        let table = Table {
+            title: "T".into(),
+            head: vec!["a".into()],
+            rows: vec![vec!["1".into()]],
+            ..Table::default()
+        };
+        let sections = [Section::Heading("H & I".into()), Section::Table(table)];
+        let page = html(("<name>", "about"), &vec![("hash", "h".into())], &sections, "a = \"<b>\"", None);
+        for part in [
+            "<h1>&lt;name&gt;</h1>",
+            "<dd>h</dd>",
+            "H &amp; I",
+            "<td class=\"n\">1</td>",
+            "a = &quot;&lt;b&gt;&quot;",
+        ] {
+            assert!(page.contains(part), "{part} is not in\n{page}");
+        }
+        assert!(!page.contains("src=") && !page.contains("<script"), "a page stands alone");
+        let live = html(("n", "a"), &vec![], &[], "", Some(Progress { done: 3, all: 8 }));
+        assert!(live.contains("<progress max=\"8\" value=\"3\">") && live.contains("follow("), "{live}");
+    }
+}

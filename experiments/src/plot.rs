@@ -1,0 +1,428 @@
+//! Plots as SVG: lines over a numeric axis, and dots by category. One style: axes with units, a legend, intervals as bars.
+//! Series differ in colour and in shape, so that they can be told apart without colour.
+
+use std::fmt::Write;
+
+use descry_pages::escaped;
+
+mod axis;
+
+use axis::Scale;
+
+/// Colours that people with any colour vision can tell apart (Okabe and Ito).
+const COLOURS: [&str; 8] =
+    ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8A8A00"];
+const WIDTH: f64 = 760.0;
+const TITLE: f64 = 34.0;
+const BOTTOM: f64 = 54.0;
+const LEGEND: f64 = 170.0;
+/// Height of the strip of counts under a reliability plot.
+const STRIP: f64 = 64.0;
+/// Width of a letter of the axes' text, on average.
+const LETTER: f64 = 6.6;
+
+/// A point with its interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Along the numeric axis of [`Plot::Lines`], or the number of the category in [`Plot::Dots`].
+    pub at: f64,
+    /// What was measured.
+    pub value: f64,
+    /// Its interval of 95 %.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// Points that belong together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name in the legend.
+    pub name: String,
+    /// In the order in which a line joins them.
+    pub points: Vec<Point>,
+    /// Drawn with a broken line: a reference, not a measurement of ours.
+    pub broken: bool,
+}
+
+/// An axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// What it shows, with its unit.
+    pub label: String,
+    /// Fixed ends; from the data if none.
+    pub range: Option<[f64; 2]>,
+}
+
+impl Axis {
+    /// An axis that ends where the data ends.
+    pub fn free(label: impl Into<String>) -> Self {
+        Self { label: label.into(), range: None }
+    }
+
+    /// An axis with fixed ends.
+    pub fn fixed(label: impl Into<String>, from: f64, to: f64) -> Self {
+        Self { label: label.into(), range: Some([from, to]) }
+    }
+}
+
+/// A plot; `name` is its file's name.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Plot {
+    /// Lines over a numeric axis.
+    Lines {
+        /// Of the file, without its ending.
+        name: String,
+        /// Heading.
+        title: String,
+        /// Horizontal.
+        x: Axis,
+        /// Vertical.
+        y: Axis,
+        /// The lines.
+        series: Vec<Series>,
+        /// Draws where both axes say the same: the reference of a reliability plot.
+        diagonal: bool,
+        /// Counts in a strip of their own below: place along x and number.
+        counts: Vec<(f64, usize)>,
+    },
+    /// A dot with its interval for each category, the series beside each other.
+    Dots {
+        /// Of the file, without its ending.
+        name: String,
+        /// Heading.
+        title: String,
+        /// From the top.
+        categories: Vec<String>,
+        /// Horizontal: the values.
+        x: Axis,
+        /// The dots; [`Point::at`] is the number of the category.
+        series: Vec<Series>,
+    },
+}
+
+impl Plot {
+    /// Name of its file, without the ending.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Lines { name, .. } | Self::Dots { name, .. } => name,
+        }
+    }
+
+    /// Its heading.
+    pub fn title(&self) -> &str {
+        match self {
+            Self::Lines { title, .. } | Self::Dots { title, .. } => title,
+        }
+    }
+
+    /// The picture.
+    pub fn svg(&self) -> String {
+        match self {
+            Self::Lines { title, x, y, series, diagonal, counts, .. } => {
+                lines(title, x, y, series, *diagonal, counts)
+            }
+            Self::Dots { title, categories, x, series, .. } => dots(title, categories, x, series),
+        }
+    }
+}
+
+/// A rectangle of the picture with its scales.
+struct Frame {
+    left: f64,
+    top: f64,
+    right: f64,
+    bottom: f64,
+}
+
+fn lines(
+    title: &str,
+    x: &Axis,
+    y: &Axis,
+    series: &[Series],
+    diagonal: bool,
+    counts: &[(f64, usize)],
+) -> String {
+    let strip = if counts.is_empty() { 0.0 } else { STRIP };
+    let height = 430.0 + strip;
+    let frame =
+        Frame { left: 66.0, top: TITLE + 8.0, right: WIDTH - LEGEND, bottom: height - BOTTOM - strip };
+    let points = || series.iter().flat_map(|s| &s.points);
+    let xs = Scale::new(x.range, points().map(|p| p.at), frame.left, frame.right);
+    let ys = Scale::new(y.range, points().flat_map(extent), frame.bottom, frame.top);
+    let mut svg = begin(title, height);
+    grid_across(&mut svg, &ys, &frame);
+    for tick in xs.ticks() {
+        let at = xs.at(tick);
+        let _ = writeln!(
+            svg,
+            r##"<line x1="{at:.1}" y1="{:.1}" x2="{at:.1}" y2="{:.1}" stroke="#888"/>"##,
+            frame.bottom,
+            frame.bottom + 5.0
+        );
+        label(&mut svg, at, frame.bottom + 19.0, "middle", &xs.text(tick));
+    }
+    axis_lines(&mut svg, &frame);
+    label(&mut svg, (frame.left + frame.right) / 2.0, frame.bottom + 40.0, "middle", &x.label);
+    label_upright(&mut svg, 18.0, (frame.top + frame.bottom) / 2.0, &y.label);
+    if diagonal {
+        let (low, high) = (xs.low.max(ys.low), xs.high.min(ys.high));
+        let _ = writeln!(
+            svg,
+            r##"<line x1="{:.1}" y1="{:.1}" x2="{:.1}" y2="{:.1}" stroke="#999" stroke-dasharray="5 4"/>"##,
+            xs.at(low),
+            ys.at(low),
+            xs.at(high),
+            ys.at(high)
+        );
+    }
+    for (n, s) in series.iter().enumerate() {
+        // Intervals of several lines at one place stand side by side.
+        let aside = (n as f64 - (series.len() as f64 - 1.0) / 2.0) * 3.0;
+        let placed: Vec<(f64, &Point)> = s.points.iter().map(|p| (xs.at(p.at) + aside, p)).collect();
+        let path: Vec<String> =
+            placed.iter().map(|(at, p)| format!("{at:.1},{:.1}", ys.at(p.value))).collect();
+        let broken = if s.broken { r#" stroke-dasharray="6 4""# } else { "" };
+        let _ = writeln!(
+            svg,
+            r#"<polyline points="{}" fill="none" stroke="{}" stroke-width="1.8"{broken}/>"#,
+            path.join(" "),
+            colour(n)
+        );
+        for (at, p) in placed {
+            if let Some([low, high]) = p.interval {
+                bar(&mut svg, (at, ys.at(low)), (at, ys.at(high)), colour(n));
+            }
+            mark(&mut svg, at, ys.at(p.value), n);
+        }
+    }
+    if !counts.is_empty() {
+        count_strip(&mut svg, &xs, &frame, counts);
+    }
+    legend(&mut svg, series);
+    svg + "</svg>\n"
+}
+
+fn dots(title: &str, categories: &[String], x: &Axis, series: &[Series]) -> String {
+    let row = (10.0 + 13.0 * series.len() as f64).max(26.0);
+    let widest = categories.iter().map(|c| c.chars().count()).max().unwrap_or(0) as f64;
+    let height = TITLE + 8.0 + row * categories.len().max(1) as f64 + BOTTOM;
+    let right = WIDTH - if series.len() > 1 { LEGEND } else { 24.0 };
+    let frame = Frame { left: 24.0 + LETTER * widest, top: TITLE + 8.0, right, bottom: height - BOTTOM };
+    let values = series.iter().flat_map(|s| &s.points).flat_map(extent);
+    let xs = Scale::new(x.range, values, frame.left + 8.0, frame.right - 8.0);
+    let mut svg = begin(title, height);
+    for tick in xs.ticks() {
+        let at = xs.at(tick);
+        let _ = writeln!(
+            svg,
+            r##"<line x1="{at:.1}" y1="{:.1}" x2="{at:.1}" y2="{:.1}" stroke="#e2e2e2"/>"##,
+            frame.top, frame.bottom
+        );
+        label(&mut svg, at, frame.bottom + 19.0, "middle", &xs.text(tick));
+    }
+    for (n, category) in categories.iter().enumerate() {
+        let top = frame.top + row * n as f64;
+        if n % 2 == 1 {
+            let _ = writeln!(
+                svg,
+                r##"<rect x="{:.1}" y="{top:.1}" width="{:.1}" height="{row:.1}" fill="#000" fill-opacity=".035"/>"##,
+                frame.left,
+                frame.right - frame.left
+            );
+        }
+        label(&mut svg, frame.left - 8.0, top + row / 2.0 + 4.0, "end", category);
+    }
+    axis_lines(&mut svg, &frame);
+    label(&mut svg, (frame.left + frame.right) / 2.0, frame.bottom + 40.0, "middle", &x.label);
+    for (n, s) in series.iter().enumerate() {
+        let aside = (n as f64 - (series.len() as f64 - 1.0) / 2.0) * 13.0;
+        for p in &s.points {
+            let y = frame.top + row * (p.at + 0.5) + aside;
+            if let Some([low, high]) = p.interval {
+                bar(&mut svg, (xs.at(low), y), (xs.at(high), y), colour(n));
+            }
+            mark(&mut svg, xs.at(p.value), y, n);
+        }
+    }
+    if series.len() > 1 {
+        legend(&mut svg, series);
+    }
+    svg + "</svg>\n"
+}
+
+fn extent(p: &Point) -> impl Iterator<Item = f64> + use<> {
+    let [low, high] = p.interval.unwrap_or([p.value; 2]);
+    [p.value, low, high].into_iter()
+}
+
+fn begin(title: &str, height: f64) -> String {
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" height=\"{height}\" \
+         font-family=\"system-ui, 'DejaVu Sans', Arial, sans-serif\" font-size=\"12\" fill=\"#1a1a1a\" role=\"img\">\n\
+         <title>{0}</title>\n<rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#fff\"/>\n\
+         <text x=\"14\" y=\"24\" font-size=\"15\" font-weight=\"600\">{0}</text>\n",
+        escaped(title)
+    )
+}
+
+fn axis_lines(svg: &mut String, f: &Frame) {
+    let _ = writeln!(
+        svg,
+        r##"<path d="M{:.1},{:.1} V{:.1} H{:.1}" fill="none" stroke="#888"/>"##,
+        f.left, f.top, f.bottom, f.right
+    );
+}
+
+fn grid_across(svg: &mut String, ys: &Scale, f: &Frame) {
+    for tick in ys.ticks() {
+        let at = ys.at(tick);
+        let _ = writeln!(
+            svg,
+            r##"<line x1="{:.1}" y1="{at:.1}" x2="{:.1}" y2="{at:.1}" stroke="#e2e2e2"/>"##,
+            f.left, f.right
+        );
+        label(svg, f.left - 8.0, at + 4.0, "end", &ys.text(tick));
+    }
+}
+
+fn count_strip(svg: &mut String, xs: &Scale, f: &Frame, counts: &[(f64, usize)]) {
+    let most = counts.iter().map(|(_, n)| *n).max().unwrap_or(1).max(1) as f64;
+    let base = f.bottom + BOTTOM + STRIP - 6.0;
+    label_upright(svg, 18.0, base - STRIP / 2.0 + 8.0, "count");
+    for (at, n) in counts {
+        let (x, tall) = (xs.at(*at), (STRIP - 26.0) * *n as f64 / most);
+        let _ = writeln!(
+            svg,
+            r##"<rect x="{:.1}" y="{:.1}" width="26" height="{tall:.1}" fill="#bbb"/>"##,
+            x - 13.0,
+            base - tall
+        );
+        label(svg, x, base - tall - 4.0, "middle", &n.to_string());
+    }
+    let _ = writeln!(
+        svg,
+        r##"<line x1="{:.1}" y1="{base:.1}" x2="{:.1}" y2="{base:.1}" stroke="#888"/>"##,
+        f.left, f.right
+    );
+}
+
+fn legend(svg: &mut String, series: &[Series]) {
+    let left = WIDTH - LEGEND + 18.0;
+    for (n, s) in series.iter().enumerate() {
+        let y = TITLE + 20.0 + 20.0 * n as f64;
+        let broken = if s.broken { r#" stroke-dasharray="6 4""# } else { "" };
+        let _ = writeln!(
+            svg,
+            r#"<line x1="{left}" y1="{y}" x2="{}" y2="{y}" stroke="{}" stroke-width="1.8"{broken}/>"#,
+            left + 24.0,
+            colour(n)
+        );
+        mark(svg, left + 12.0, y, n);
+        label(svg, left + 32.0, y + 4.0, "start", &s.name);
+    }
+}
+
+fn colour(n: usize) -> &'static str {
+    COLOURS[n % COLOURS.len()]
+}
+
+fn label(svg: &mut String, x: f64, y: f64, anchor: &str, text: &str) {
+    let _ = writeln!(svg, r#"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}">{}</text>"#, escaped(text));
+}
+
+fn label_upright(svg: &mut String, x: f64, y: f64, text: &str) {
+    let _ = writeln!(
+        svg,
+        r#"<text x="{x:.1}" y="{y:.1}" text-anchor="middle" transform="rotate(-90 {x:.1} {y:.1})">{}</text>"#,
+        escaped(text)
+    );
+}
+
+/// An interval with its ends.
+fn bar(svg: &mut String, (x1, y1): (f64, f64), (x2, y2): (f64, f64), colour: &str) {
+    let (dx, dy) = if (x1 - x2).abs() > (y1 - y2).abs() { (0.0, 3.5) } else { (3.5, 0.0) };
+    let cap = |x: f64, y: f64| format!("M{:.1},{:.1} L{:.1},{:.1}", x - dx, y - dy, x + dx, y + dy);
+    let _ = writeln!(
+        svg,
+        r#"<path d="M{x1:.1},{y1:.1} L{x2:.1},{y2:.1} {} {}" stroke="{colour}" stroke-width="1.2" fill="none"/>"#,
+        cap(x1, y1),
+        cap(x2, y2)
+    );
+}
+
+/// The shape of a series: circle, square, triangle, diamond, each filled or hollow.
+fn mark(svg: &mut String, x: f64, y: f64, n: usize) {
+    let fill = if n % 8 < 4 { colour(n) } else { "#fff" };
+    let style = format!(r#"fill="{fill}" stroke="{}" stroke-width="1.5""#, colour(n));
+    let _ = match n % 4 {
+        0 => writeln!(svg, r#"<circle cx="{x:.1}" cy="{y:.1}" r="3.8" {style}/>"#),
+        1 => writeln!(svg, r#"<rect x="{:.1}" y="{:.1}" width="7" height="7" {style}/>"#, x - 3.5, y - 3.5),
+        2 => writeln!(svg, r#"<path d="M{x:.1},{:.1} l4.6,8 h-9.2 z" {style}/>"#, y - 5.0),
+        _ => writeln!(svg, r#"<path d="M{x:.1},{:.1} l4.6,4.6 l-4.6,4.6 l-4.6,-4.6 z" {style}/>"#, y - 4.6),
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(values: &[f64]) -> Series {
+        let points = values.iter().zip(0..);
+        let points = points.map(|(&value, at)| Point {
+            at: f64::from(at),
+            value,
+            interval: Some([value - 0.1, value + 0.1]),
+        });
+        Series { name: "a & b".into(), points: points.collect(), broken: false }
+    }
+
+    fn numbers_are_finite(svg: &str) {
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+        assert_eq!(svg.matches("<svg").count(), 1);
+        assert!(svg.ends_with("</svg>\n"));
+    }
+
+    #[test]
+    fn a_plot_says_everything() {
+        let plot = Plot::Lines {
+            name: "p".into(),
+            title: "T <1>".into(),
+            x: Axis::free("views"),
+            y: Axis::fixed("recall", 0.0, 1.0),
+            series: vec![series(&[0.5, 0.75, 1.0])],
+            diagonal: true,
+            counts: vec![(1.0, 7)],
+        };
+        let svg = plot.svg();
+        for part in
+            ["T &lt;1&gt;", "a &amp; b", ">views<", ">recall<", "<polyline", ">7<", "stroke-dasharray"]
+        {
+            assert!(svg.contains(part), "{part} is not in\n{svg}");
+        }
+        assert_eq!(svg.matches("<circle").count(), 4, "three points and one in the legend");
+        numbers_are_finite(&svg);
+    }
+
+    #[test]
+    fn no_data_and_one_value_are_plots_too() {
+        for values in [&[][..], &[3.0], &[2.0, 2.0]] {
+            let dots = Plot::Dots {
+                name: "d".into(),
+                title: "D".into(),
+                categories: values.iter().map(ToString::to_string).collect(),
+                x: Axis::free("m"),
+                series: vec![series(values)],
+            };
+            numbers_are_finite(&dots.svg());
+            let lines = Plot::Lines {
+                name: "l".into(),
+                title: "L".into(),
+                x: Axis::free("s"),
+                y: Axis::free("m"),
+                series: vec![series(values)],
+                diagonal: false,
+                counts: vec![],
+            };
+            numbers_are_finite(&lines.svg());
+        }
+    }
+}

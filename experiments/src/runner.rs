@@ -1,0 +1,164 @@
+//! Does jobs on all cores. What a job gives does not depend on which thread does it, or when.
+
+use descry_agent::stop::Stop;
+use std::any::Any;
+use std::io::IsTerminal;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::journal::Journal;
+use super::{ExperimentError, Finished, Job, Kind};
+
+/// Runs plan by recursion and render: more than a thread's usual stack.
+const STACK_BYTES: usize = 16 << 20;
+/// How often a line is written where there is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(15);
+
+/// Does the jobs of these numbers and writes each into the journal. Runs keep what they record under `scratch`, which is
+/// emptied. Where it is stopped, jobs under way are not done. Gives the finished jobs in the order in which they ended.
+///
+/// # Errors
+/// [`ExperimentError::File`] if the journal cannot be written, [`ExperimentError::NoRoom`] if a job fails while less than
+/// `least_free_bytes` are left; no further job is begun then.
+pub fn run(
+    kind: &dyn Kind,
+    jobs: &[Job],
+    todo: &[usize],
+    threads: usize,
+    (scratch, least_free_bytes): (&Path, u64),
+    (stop, tell): (&Stop, fn(&str)),
+    journal: &mut Journal,
+) -> Result<Vec<Finished>, ExperimentError> {
+    let (next, ended) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let (send, receive) = channel();
+    let work = |send: Sender<Finished>| {
+        while !ended.load(Ordering::Relaxed) {
+            let Some(&number) = todo.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+            let finished = finish(kind, jobs, number, scratch, stop);
+            // A job that was under way when the batch was stopped is not done.
+            if stop.is_asked() || send.send(finished).is_err() {
+                break;
+            }
+        }
+    };
+    let result = std::thread::scope(|scope| {
+        let started = (0..threads.clamp(1, todo.len().max(1))).try_for_each(|n| {
+            let (work, send) = (&work, send.clone());
+            let named = std::thread::Builder::new().name(format!("jobs-{n}")).stack_size(STACK_BYTES);
+            named.spawn_scoped(scope, move || work(send)).map(drop)
+        });
+        drop(send);
+        let result = match started {
+            Ok(()) => {
+                collect(&receive, todo.len(), journal, tell, |job| lacks_room(job, scratch, least_free_bytes))
+            }
+            Err(e) => Err(ExperimentError::Threads { because: e.to_string() }),
+        };
+        ended.store(true, Ordering::Relaxed);
+        result
+    });
+    // What a run has left behind is of no more use; that it cannot be removed is no reason to lose the results.
+    let _ = std::fs::remove_dir_all(scratch);
+    result
+}
+
+/// Does one job. A job that panics is a row like any other that failed.
+fn finish(kind: &dyn Kind, jobs: &[Job], number: usize, scratch: &Path, stop: &Stop) -> Finished {
+    let scratch = scratch.join(number.to_string());
+    // What a batch that was cut off has left there is no run that could go on.
+    let _ = std::fs::remove_dir_all(&scratch);
+    let outcome = catch_unwind(AssertUnwindSafe(|| kind.run(number, &scratch, stop)));
+    let _ = std::fs::remove_dir_all(&scratch);
+    let outcome = outcome.unwrap_or_else(|panic| Err(format!("panic: {}", said(&*panic))));
+    Finished::new(&jobs[number], outcome)
+}
+
+fn said(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(ToString::to_string);
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without a word".into())
+}
+
+/// A job that failed on a disk without room says nothing of itself.
+fn lacks_room(job: &Finished, scratch: &Path, least_free_bytes: u64) -> Option<ExperimentError> {
+    let because = job.error.clone()?;
+    let folder = scratch.parent()?;
+    let free = descry_memory::free_bytes(folder).ok()?;
+    (free < least_free_bytes).then(|| ExperimentError::NoRoom {
+        folder: folder.display().to_string(),
+        job: job.job.clone(),
+        because,
+    })
+}
+
+fn collect(
+    done: &Receiver<Finished>,
+    all: usize,
+    journal: &mut Journal,
+    tell: fn(&str),
+    lacks_room: impl Fn(&Finished) -> Option<ExperimentError>,
+) -> Result<Vec<Finished>, ExperimentError> {
+    let mut progress = Progress::new(all, tell);
+    let mut finished = Vec::with_capacity(all);
+    for job in done {
+        if let Some(full) = lacks_room(&job) {
+            return Err(full);
+        }
+        journal.append(&job)?;
+        progress.one_more(job.error.is_some());
+        finished.push(job);
+    }
+    progress.end();
+    Ok(finished)
+}
+
+/// A bar on a terminal, a line now and then elsewhere; always on standard error.
+struct Progress {
+    bar: Option<ProgressBar>,
+    all: usize,
+    done: usize,
+    failed: usize,
+    began: Instant,
+    last_line: Instant,
+    tell: fn(&str),
+}
+
+impl Progress {
+    fn new(all: usize, tell: fn(&str)) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(all as u64);
+            let style = ProgressStyle::with_template("{bar:40} {pos}/{len} jobs, {eta} left {msg}");
+            style.map(|style| bar.set_style(style)).ok();
+            bar.enable_steady_tick(Duration::from_millis(500));
+            bar
+        });
+        Self { bar, all, done: 0, failed: 0, began: Instant::now(), last_line: Instant::now(), tell }
+    }
+
+    fn one_more(&mut self, failed: bool) {
+        self.done += 1;
+        self.failed += usize::from(failed);
+        if let Some(bar) = &self.bar {
+            if self.failed > 0 {
+                bar.set_message(format!("({} failed)", self.failed));
+            }
+            bar.inc(1);
+        } else if self.last_line.elapsed() > LINE_EVERY || self.done == self.all {
+            self.last_line = Instant::now();
+            let left_s =
+                self.began.elapsed().as_secs_f64() / self.done as f64 * (self.all - self.done) as f64;
+            let (done, all, failed) = (self.done, self.all, self.failed);
+            (self.tell)(&format!("{done}/{all} jobs, {failed} failed, about {left_s:.0} s left"));
+        }
+    }
+
+    fn end(self) {
+        if let Some(bar) = self.bar {
+            bar.finish();
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Tables: as text (which is Markdown) and as HTML.
+
+use descry_pages::escaped;
+
+use super::statistics::Estimate;
+
+/// A table with its heading.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Table {
+    /// Heading.
+    pub title: String,
+    /// What its numbers are and how their intervals were made.
+    pub note: String,
+    /// Names of the columns, with units.
+    pub head: Vec<String>,
+    /// Cells.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// An empty table.
+    pub fn new(title: impl Into<String>, note: impl Into<String>, head: &[&str]) -> Self {
+        let head = head.iter().map(ToString::to_string).collect();
+        Self { title: title.into(), note: note.into(), head, rows: Vec::new() }
+    }
+
+    /// As Markdown that is also aligned for the eye.
+    pub fn markdown(&self) -> String {
+        let columns = 0..self.head.len();
+        let cell =
+            |row: &[String], c: usize| row.get(c).map_or(String::new(), |text| text.replace('|', "\\|"));
+        let widths: Vec<usize> = columns
+            .map(|c| {
+                let below = self.rows.iter().map(|row| cell(row, c).chars().count());
+                below.chain([self.head[c].chars().count(), 3]).max().unwrap_or(3)
+            })
+            .collect();
+        let line = |row: &[String]| {
+            let padded = widths.iter().enumerate().map(|(c, &width)| match self.is_numeric(c) {
+                true => format!("{:>width$}", cell(row, c)),
+                false => format!("{:width$}", cell(row, c)),
+            });
+            format!("| {} |\n", padded.collect::<Vec<_>>().join(" | "))
+        };
+        let rules = widths.iter().enumerate().map(|(c, &width)| match self.is_numeric(c) {
+            true => format!("{}:", "-".repeat(width + 1)),
+            false => "-".repeat(width + 2),
+        });
+        let mut text =
+            format!("### {}\n\n{}|{}|\n", self.title, line(&self.head), rules.collect::<Vec<_>>().join("|"));
+        self.rows.iter().for_each(|row| text += &line(row));
+        if !self.note.is_empty() {
+            text += &format!("\n{}\n", self.note);
+        }
+        text
+    }
+
+    /// As a part of a page.
+    pub fn html(&self) -> String {
+        let class = |c: usize| if self.is_numeric(c) { " class=\"n\"" } else { "" };
+        let line = |row: &[String], tag: &str| {
+            let cells = row
+                .iter()
+                .enumerate()
+                .map(|(c, text)| format!("<{tag}{}>{}</{tag}>", class(c), escaped(text)));
+            format!("<tr>{}</tr>\n", cells.collect::<String>())
+        };
+        let rows: String = self.rows.iter().map(|row| line(row, "td")).collect();
+        let note = if self.note.is_empty() {
+            String::new()
+        } else {
+            format!("<p class=\"note\">{}</p>\n", escaped(&self.note))
+        };
+        format!(
+            "<h3>{}</h3>\n<table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody>\n</table>\n{note}",
+            escaped(&self.title),
+            line(&self.head, "th")
+        )
+    }
+
+    /// Columns of numbers are aligned to the right.
+    fn is_numeric(&self, column: usize) -> bool {
+        let numeric = |text: &String| {
+            text.is_empty()
+                || text == "-"
+                || text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c))
+        };
+        !self.rows.is_empty() && self.rows.iter().filter_map(|row| row.get(column)).all(numeric)
+    }
+}
+
+/// A value with its interval, as `0.98 [0.95, 0.99]`; a dash if there is none.
+pub fn shown(estimate: Option<Estimate>, decimals: usize) -> String {
+    match estimate {
+        None => "-".into(),
+        Some(Estimate { value, interval: None, .. }) => format!("{value:.decimals$}"),
+        Some(Estimate { value, interval: Some([low, high]), .. }) => {
+            format!("{value:.decimals$} [{low:.decimals$}, {high:.decimals$}]")
+        }
+    }
+}
+
+/// A number, or a dash.
+pub fn number(value: Option<f64>, decimals: usize) -> String {
+    value.map_or("-".into(), |value| format!("{value:.decimals$}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn markdown_is_aligned_and_html_escaped() {
+        let mut table = Table::new("T", "A note.", &["policy", "views"]);
+        table.rows = vec![vec!["a|b".into(), "12.5".into()], vec!["<c>".into(), "-".into()]];
+        let expected = "### T\n\n| policy | views |\n|--------|------:|\n| a\\|b   |  12.5 |\n| <c>    |     - |\n\nA note.\n";
+        assert_eq!(table.markdown(), expected);
+        assert!(table.html().contains("<td>&lt;c&gt;</td><td class=\"n\">-</td>"));
+    }
+
+    #[test]
+    fn estimates() {
+        let estimate = Estimate { value: 0.981, interval: Some([0.9, 1.0]), n: 3 };
+        assert_eq!(shown(Some(estimate), 2), "0.98 [0.90, 1.00]");
+        assert_eq!(
+            (shown(None, 2), number(None, 1), number(Some(1.25), 1)),
+            ("-".into(), "-".into(), "1.2".into())
+        );
+    }
+}

@@ -1,0 +1,92 @@
+//! A plan as a Gantt chart: a row a step, in the order in which they begin.
+
+use descry_planner::{Plan, Step};
+
+use crate::escaped;
+
+/// Width of the chart, of its names, and height of a row, pixels.
+const WIDE: f64 = 1000.0;
+const NAMES: f64 = 300.0;
+const ROW: f64 = 22.0;
+/// Most letters of a name that find room.
+const LETTERS: usize = 42;
+
+/// The chart as SVG. A plan without times has a step a unit.
+pub fn svg(plan: &Plan) -> String {
+    let timed = plan.makespan_s();
+    let begins = |n: usize, step: &Step| step.start_s.unwrap_or(n as f64);
+    let lasts = |step: &Step| if timed.is_some() { step.duration_s } else { 1.0 };
+    let mut steps: Vec<(f64, &Step)> =
+        plan.steps.iter().enumerate().map(|(n, step)| (begins(n, step), step)).collect();
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let ends = steps.iter().map(|(from, step)| from + lasts(step)).fold(0.0, f64::max).max(1e-9);
+    let x = |time: f64| NAMES + time / ends * (WIDE - NAMES - 20.0);
+    let low = ROW * steps.len() as f64;
+    let mut drawn = String::new();
+    for (n, (from, step)) in steps.iter().enumerate() {
+        let name = std::iter::once(&step.action).chain(&step.arguments);
+        let name = format!("({})", name.map(String::as_str).collect::<Vec<_>>().join(" "));
+        let short = match name.char_indices().nth(LETTERS) {
+            Some((cut, _)) => format!("{}…", &name[..cut]),
+            None => name.clone(),
+        };
+        let (y, wide) = (ROW * n as f64, (x(lasts(step)) - x(0.0)).max(2.0));
+        drawn += &format!(
+            "<g><title>{}</title><text x=\"0\" y=\"{:.0}\">{}</text>\
+             <rect x=\"{:.1}\" y=\"{:.0}\" width=\"{wide:.1}\" height=\"{:.0}\" rx=\"2\" fill=\"#2f6db3\"/></g>\n",
+            escaped(&format!("{name} from {from:.3} for {:.3}", lasts(step))),
+            y + 15.0,
+            escaped(&short),
+            x(*from),
+            y + 4.0,
+            ROW - 8.0,
+        );
+    }
+    for part in [0.0, 0.25, 0.5, 0.75, 1.0] {
+        let (time, at) = (part * ends, x(part * ends));
+        let text = if timed.is_some() { format!("{time:.1}") } else { format!("{time:.0}") };
+        drawn += &format!(
+            "<line x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"0\" y2=\"{low:.0}\" stroke=\"#8a8f98\" stroke-opacity=\".4\"/>\
+             <text x=\"{at:.1}\" y=\"{:.0}\" text-anchor=\"middle\">{text}</text>\n",
+            low + 18.0,
+        );
+    }
+    let high = low + 26.0;
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDE} {high}\" width=\"{WIDE}\" height=\"{high}\">\n\
+         <style>text {{ font: 12px system-ui, sans-serif; fill: #777 }}</style>\n{drawn}</svg>\n"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn step(start_s: Option<f64>, action: &str, duration_s: f64) -> Step {
+        Step { start_s, action: action.into(), arguments: vec!["a".into(), "<b>".into()], duration_s }
+    }
+
+    /// A plan, and parts of its chart in their order.
+    fn check(steps: Vec<Step>, parts: &[&str]) {
+        let drawn = svg(&Plan { steps, ..Plan::default() });
+        let mut rest = drawn.as_str();
+        for part in parts {
+            let (_, after) = rest.split_once(part).unwrap_or_else(|| panic!("no {part} in\n{drawn}"));
+            rest = after;
+        }
+    }
+
+    #[test]
+    fn steps_stand_in_the_order_in_which_they_begin() {
+        let timed = vec![step(Some(4.0), "second", 6.0), step(Some(0.0), "first", 4.0)];
+        check(
+            timed,
+            &["(first a &lt;b&gt;)", "width=\"272.0\"", "(second a", "width=\"408.0\"", ">10.0</text>"],
+        );
+        check(
+            vec![step(None, "one", 0.0), step(None, "two", 0.0)],
+            &["(one", "width=\"340.0\"", "(two", ">2</text>"],
+        );
+        check(Vec::new(), &["<svg", "</svg>"]);
+    }
+}

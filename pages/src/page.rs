@@ -1,0 +1,53 @@
+//! A run as one page that needs nothing else: the map with route and views, the plans above what really happened, confidence after
+//! each look, what was seen in three dimensions, and all that was said; one moment in time moves all of them.
+
+mod live;
+mod points;
+mod story;
+
+use descry_memory::Record;
+
+use crate::escaped;
+use crate::live::FOLLOW;
+use descry_agent::exit::CommandError;
+use descry_agent::report::Report;
+pub use live::Running;
+
+const HTML: &str = include_str!("page/page.html");
+/// Colours of every page, light and dark.
+pub const COLOURS: &str = include_str!("page/colours.css");
+const STYLE: &str = include_str!("page/page.css");
+const SCRIPT: &str = include_str!("page/page.js");
+
+/// The page of a run, from its record and, if it has finished, its report.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the record cannot be read.
+pub fn of_run(record: &Record, report: Option<&Report>) -> Result<String, CommandError> {
+    let story = story::of(record, report, &mut story::Looks::default())?;
+    let told = serde_json::to_string(&story).map_err(|e| CommandError::Bug(e.to_string()))?;
+    Ok(laid_out(&format!("descry: {}", story.goal), &told))
+}
+
+/// The page that tells a story, as JSON.
+fn laid_out(title: &str, told: &str) -> String {
+    let title = escaped(title);
+    let (style, script) = ([COLOURS, STYLE].concat(), [FOLLOW, SCRIPT].concat());
+    let parts = [("{{title}}", title.as_str()), ("{{style}}", &style), ("{{script}}", &script)];
+    let page = parts.into_iter().fold(HTML.to_owned(), |page, (name, part)| page.replace(name, part));
+    // Within a script nothing may look like its end.
+    page.replace("{{story}}", &told.replace("</", "<\\/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_people_wrote_is_no_markup() {
+        let page = laid_out("descry: <b> & co", r#"{"goal":"</script><b>{{style}}"}"#);
+        assert!(page.contains("<title>descry: &lt;b&gt; &amp; co</title>"));
+        assert!(page.contains(r#"{"goal":"<\/script><b>{{style}}"}"#), "{page}");
+        assert_eq!(page.matches("</script>").count(), 2);
+    }
+}

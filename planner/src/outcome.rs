@@ -1,6 +1,7 @@
 //! How planning is asked for, and how it ends.
 
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 
 use serde::Serialize;
 
@@ -26,6 +27,9 @@ pub struct Options {
     pub memory_used: Option<fn() -> u64>,
     /// Give up, or stop improving, after this many evaluated states.
     pub evaluation_limit: Option<u64>,
+    /// How many searches may go on side by side, for plans of actions that take no time; none: one. Their number changes nothing
+    /// but how long it takes, as long as nothing runs out. Where states or what the searches keep are counted, there is one.
+    pub threads: Option<NonZeroUsize>,
 }
 
 /// What planning took.

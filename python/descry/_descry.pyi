@@ -207,6 +207,7 @@ def plan(
     anytime: bool = False,
     seed: int = 0,
     bound: Optional[float] = None,
+    threads: Optional[int] = None,
     attachments: Optional[Mapping[str, _Attachment]] = None,
     on_plan: Optional[Callable[[Plan], object]] = None,
     stop: Optional[Callable[[], bool]] = None,
@@ -215,7 +216,8 @@ def plan(
 
     With ``anytime`` it goes on improving until the time limit, until ``stop()`` is true, or until the best plan is
     proven best; ``on_plan`` hears of each better one. Without, it ends after a short improvement. ``bound``: accept
-    only plans whose metric is below. Ctrl-C ends it with ``KeyboardInterrupt``; an exception that an attachment raises
+    only plans whose metric is below. ``threads``: how many searches may go on side by side, where actions take no time;
+    the plan is the same. Ctrl-C ends it with ``KeyboardInterrupt``; an exception that an attachment raises
     comes out as it is.
     """
 

@@ -1,6 +1,7 @@
 //! Planning and validating.
 
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -49,7 +50,7 @@ impl Outcome {
 
 /// Plans.
 #[pyfunction]
-#[pyo3(signature = (task, *, time_limit_s=None, memory_limit_mb=None, anytime=false, seed=0, bound=None, attachments=None, on_plan=None, stop=None))]
+#[pyo3(signature = (task, *, time_limit_s=None, memory_limit_mb=None, anytime=false, seed=0, bound=None, threads=None, attachments=None, on_plan=None, stop=None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub fn plan(
     py: Python<'_>,
@@ -59,6 +60,7 @@ pub fn plan(
     anytime: bool,
     seed: u64,
     bound: Option<f64>,
+    threads: Option<NonZeroUsize>,
     attachments: Option<BTreeMap<String, Py<PyAny>>>,
     on_plan: Option<Py<PyAny>>,
     stop: Option<Py<PyAny>>,
@@ -71,6 +73,7 @@ pub fn plan(
         anytime,
         seed,
         bound,
+        threads,
         memory_limit_bytes: memory_limit_mb.map(|mb| mb.saturating_mul(1 << 20)),
         ..Options::default()
     };

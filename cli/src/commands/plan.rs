@@ -1,5 +1,6 @@
 //! `descry plan DOMAIN PROBLEM`: a plan, or why there is none.
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
@@ -28,6 +29,9 @@ pub struct Arguments {
     /// Go on improving the plan until the time limit
     #[arg(long)]
     anytime: bool,
+    /// How many searches may go on side by side, where actions take no time; the plan is the same [default: 1]
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
     /// Decides every choice that is left open
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -70,6 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let options = descry_planner::Options {
         anytime: arguments.anytime,
         seed: arguments.seed,
+        threads: arguments.threads,
         memory_limit_bytes: arguments.memory_limit.map(|mb| mb << 20),
         memory_used: used_bytes().map(|_| (|| used_bytes().unwrap_or(0)) as fn() -> u64),
         ..descry_planner::Options::default()

@@ -7,7 +7,7 @@ use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::plan::{Plan, Step};
 use crate::task::Task;
 
-use super::run::{ClassicalEnd, ClassicalOptions, solve};
+use super::run::{ClassicalEnd, ClassicalOptions, FIRST_WORK, solve};
 
 /// Plans for a task that is [`crate::classical::compiled::is_classical`]; `check` validates each plan, and keeps back those that
 /// are no better than the ones before. `soft` where more is to be won than what a first plan has.
@@ -28,6 +28,8 @@ pub(crate) fn plan_classical(
         bound: options.bound,
         memory,
         evaluation_limit: options.evaluation_limit,
+        threads: options.threads,
+        first_work: FIRST_WORK,
     };
     let mut statistics = Statistics { actions: grounded.actions.len() as u64, ..Statistics::default() };
     let mut best = None;

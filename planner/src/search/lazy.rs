@@ -1,6 +1,8 @@
 //! Lazy best-first search with several open lists, preferred operators and lookahead; greedy or weighted A*
 //! (Richter and Westphal 2010, sections 5 and 6).
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::classical::compiled::Compiled;
 use crate::classical::successor::Successors;
 use crate::heuristics::landmarks::{Landmarks, Status};
@@ -69,13 +71,22 @@ pub(crate) struct Shared<'a> {
 
 /// How far a search may go, all its runs together.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Allowed {
+pub(crate) struct Allowed<'c> {
     /// See [`Relaxed::work`].
     pub work: u64,
     /// States evaluated.
     pub evaluations: u64,
     /// Memory taken.
     pub memory: MemoryLimit,
+    /// Set once nobody waits for what it comes to.
+    pub cancelled: &'c AtomicBool,
+}
+
+impl Allowed<'_> {
+    /// Whether a search must end: it was stopped, or nobody waits for it.
+    pub(crate) fn has_ended(&self, shared: &Shared<'_>) -> bool {
+        self.cancelled.load(Ordering::Relaxed) || (shared.stop)()
+    }
 }
 
 /// A search, which can be gone on with after it ended with [`End::Limit`].
@@ -105,12 +116,11 @@ pub(crate) struct Search<'a, 's> {
 }
 
 /// Runs one search.
-pub(crate) fn search(shared: &Shared<'_>, strategy: Strategy, counts: &mut Counts) -> End {
+pub(crate) fn search(shared: &Shared<'_>, strategy: Strategy, cancelled: &AtomicBool) -> (End, Counts) {
     let mut search = Search::new(shared, strategy);
     let (work, evaluations) = (strategy.work_limit, strategy.evaluation_limit);
-    let end = search.run(Allowed { work, evaluations, memory: shared.memory });
-    counts.add(search.counts());
-    end
+    let end = search.run(Allowed { work, evaluations, memory: shared.memory, cancelled });
+    (end, search.counts())
 }
 
 impl Counts {
@@ -172,7 +182,7 @@ impl<'a, 's> Search<'a, 's> {
     }
 
     /// Searches on as far as is allowed.
-    pub(crate) fn run(&mut self, allowed: Allowed) -> End {
+    pub(crate) fn run(&mut self, allowed: Allowed<'_>) -> End {
         if self.strategy.bound == 0 {
             return End::Exhausted;
         }
@@ -188,7 +198,7 @@ impl<'a, 's> Search<'a, 's> {
         let mut round = 0u64;
         loop {
             round += 1;
-            if self.stopped || (round.is_multiple_of(64) && (self.shared.stop)()) {
+            if self.stopped || (round.is_multiple_of(64) && allowed.has_ended(self.shared)) {
                 return End::Stopped;
             }
             self.unseen += UNSEEN_A_ROUND;

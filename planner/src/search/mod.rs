@@ -1,5 +1,6 @@
 //! Search for plans of instantaneous actions over finite-domain variables and numbers.
 
+mod abreast;
 pub(crate) mod classical;
 mod improve;
 pub(crate) mod lazy;

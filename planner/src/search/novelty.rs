@@ -157,7 +157,7 @@ impl<'a, 's> Search<'a, 's> {
         let mut round = 0u64;
         loop {
             round += 1;
-            if round.is_multiple_of(64) && (self.shared.stop)() {
+            if round.is_multiple_of(64) && allowed.has_ended(self.shared) {
                 return End::Stopped;
             }
             self.unseen += UNSEEN_A_ROUND;

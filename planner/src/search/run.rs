@@ -1,5 +1,9 @@
 //! The order in which searches are tried, and the improvement of what they find.
 
+use std::num::NonZeroUsize;
+use std::ops::Range;
+use std::sync::atomic::AtomicBool;
+
 use tracing::debug_span;
 
 use crate::classical::compiled::Compiled;
@@ -9,6 +13,7 @@ use crate::heuristics::landmarks::Landmarks;
 use crate::heuristics::relaxed::Counting;
 use crate::memory::MemoryLimit;
 
+use super::abreast::in_order;
 use super::improve::Improve;
 use super::lazy::{self, Allowed, Counts, End, Shared, Strategy, search};
 use super::novelty;
@@ -26,6 +31,10 @@ pub(crate) struct ClassicalOptions {
     pub memory: MemoryLimit,
     /// States to evaluate at most.
     pub evaluation_limit: Option<u64>,
+    /// Searches that may go on side by side.
+    pub threads: Option<NonZeroUsize>,
+    /// Work of the first search before another is tried; later rounds get more.
+    pub first_work: u64,
 }
 
 /// How it ended.
@@ -101,8 +110,8 @@ const LEAST_WORK: u64 = 5_000_000;
 const WORK_PER_OPERATOR: u64 = 1500;
 /// How much more than that the search for plans that keep more preferences may take.
 const SOFT_SHARE: u64 = 20;
-/// Work of the first search before another is tried; later rounds get more.
-const FIRST_WORK: u64 = 60_000_000;
+/// Work of the first search before another is tried where nobody asks for less.
+pub(crate) const FIRST_WORK: u64 = 60_000_000;
 /// How much more work each round of first searches gets.
 const ROUND_FACTOR: u64 = 3;
 /// Weights of the searches for better plans, one after another (Richter and Westphal 2010).
@@ -122,6 +131,8 @@ const GREEDY: Strategy = Strategy {
 /// The searches for a first plan in the order of their turns, two rounds: with lookahead, by novelty, plainly; every other
 /// round those that order states by estimates take the newest of equally good ones first.
 const ORDER: [usize; 6] = [0, NOVELTY, PLAIN, 1, NOVELTY, PLAIN + 1];
+/// Turns of a round, each of another search.
+const TURNS: usize = 3;
 /// Place of the search by novelty.
 const NOVELTY: usize = 2;
 /// Places of the searches without lookahead begin here.
@@ -142,7 +153,7 @@ impl<'a, 's> Kept<'a, 's> {
         Kept::Lazy(Box::new(lazy::Search::new(shared, Strategy { bound, lookahead, newest, ..GREEDY })))
     }
 
-    fn run(&mut self, allowed: Allowed) -> End {
+    fn run(&mut self, allowed: Allowed<'_>) -> End {
         match self {
             Kept::Lazy(search) => search.run(allowed),
             Kept::Novelty(search) => search.run(allowed),
@@ -162,6 +173,14 @@ impl<'a, 's> Kept<'a, 's> {
             Kept::Novelty(search) => search.bytes(),
         }
     }
+}
+
+/// What came of a turn.
+struct Taken<'a, 's> {
+    place: usize,
+    search: Kept<'a, 's>,
+    end: End,
+    took: Counts,
 }
 
 struct Run<'a, 's> {
@@ -201,7 +220,7 @@ impl<'a, 's> Run<'a, 's> {
             return if self.options.anytime { ClassicalEnd::Stopped } else { ClassicalEnd::Done };
         }
         match (self.options.anytime, self.options.soft) {
-            (true, _) => self.anytime(FIRST_WORK * 4, u64::MAX),
+            (true, _) => self.anytime(self.options.first_work * 4, u64::MAX),
             (false, true) => self.anytime(2 * budget, self.counts.work + SOFT_SHARE * budget),
             (false, false) => ClassicalEnd::Done,
         }
@@ -212,53 +231,75 @@ impl<'a, 's> Run<'a, 's> {
     /// Several searches take turns, each going on where it stopped, with more and more work each round.
     fn first(&mut self) -> Result<(Vec<u32>, bool), ClassicalEnd> {
         let mut kept: [Option<Kept<'a, 's>>; 5] = Default::default();
-        let mut work_limit = FIRST_WORK;
+        let mut work_limit = self.options.first_work;
         let mut turn = 0usize;
         loop {
-            let place = ORDER[turn % ORDER.len()];
-            let end = self.take_turn(&mut kept, place, work_limit);
-            tracing::debug!(turn, self.counts.evaluated, self.counts.work);
-            if matches!(end, End::Memory | End::Exhausted) {
-                kept[place] = None;
-            }
-            match end {
-                End::Plan(plan) => {
-                    return Ok((plan, turn == 0));
+            let places: Vec<usize> =
+                self.side_by_side(turn, TURNS).map(|turn| ORDER[turn % ORDER.len()]).collect();
+            for (place, taken) in places.iter().copied().zip(self.take_turns(&mut kept, &places, work_limit))
+            {
+                self.counts.add(taken.took);
+                tracing::debug!(turn, self.counts.evaluated, self.counts.work);
+                if !matches!(taken.end, End::Memory | End::Exhausted) {
+                    kept[place] = Some(taken.search);
                 }
-                // With a bound, only a search that follows cheaper ways to known states proves anything.
-                End::Exhausted if place >= PLAIN || self.bound == u32::MAX => {
-                    return Err(ClassicalEnd::Exhausted);
+                match taken.end {
+                    End::Plan(plan) => return Ok((plan, turn == 0)),
+                    End::Exhausted if self.proves(place) => return Err(ClassicalEnd::Exhausted),
+                    End::Stopped => return Err(ClassicalEnd::Stopped),
+                    // Another search may do with less.
+                    End::Memory if turn >= 2 => return Err(ClassicalEnd::Memory),
+                    End::Limit if self.limited() => return Err(ClassicalEnd::Stopped),
+                    End::Memory | End::Limit | End::Exhausted => {}
                 }
-                End::Stopped => return Err(ClassicalEnd::Stopped),
-                // Another search may do with less.
-                End::Memory if turn >= 2 => return Err(ClassicalEnd::Memory),
-                End::Limit if self.limited() => return Err(ClassicalEnd::Stopped),
-                End::Memory | End::Limit | End::Exhausted => {}
+                turn += 1;
             }
-            turn += 1;
-            if turn.is_multiple_of(3) {
+            if turn.is_multiple_of(TURNS) {
                 work_limit = work_limit.saturating_mul(ROUND_FACTOR);
             }
         }
     }
 
-    /// Lets one of the searches for a first plan go on for so much work.
-    fn take_turn(&mut self, kept: &mut [Option<Kept<'a, 's>>; 5], place: usize, work: u64) -> End {
-        let others: usize = kept.iter().flatten().map(Kept::bytes).sum();
-        let evaluations = self
-            .options
-            .evaluation_limit
-            .map_or(u64::MAX, |limit| limit.saturating_sub(self.counts.evaluated));
-        let search = kept[place].get_or_insert_with(|| Kept::new(self.shared, place, self.bound));
-        let (before, own) = (search.counts(), search.bytes());
-        let memory = self.shared.memory.beside(others - own.min(others));
-        let end = search.run(Allowed {
-            work: before.work.saturating_add(work),
-            evaluations: before.evaluated.saturating_add(evaluations),
-            memory,
-        });
-        self.counts.add(search.counts().since(before));
-        end
+    /// Whether there is no plan once a search is exhausted: with a bound, only one that follows cheaper ways to known states proves
+    /// anything.
+    fn proves(&self, place: usize) -> bool {
+        place >= PLAIN || self.bound == u32::MAX
+    }
+
+    /// The turns from this one on that may be taken side by side, in a round of so many.
+    fn side_by_side(&self, turn: usize, round: usize) -> Range<usize> {
+        // What is left for a turn must be known before the one before it has ended.
+        let counts = self.options.evaluation_limit.is_some() || self.shared.memory.counted().is_some();
+        let threads = self.options.threads.filter(|_| !counts).map_or(1, NonZeroUsize::get);
+        turn..turn + threads.min(round - turn % round)
+    }
+
+    /// Lets searches for a first plan go on side by side, for so much work each; what they come to, up to the first plan.
+    fn take_turns(
+        &self,
+        kept: &mut [Option<Kept<'a, 's>>; 5],
+        places: &[usize],
+        work: u64,
+    ) -> Vec<Taken<'a, 's>> {
+        let limit = self.options.evaluation_limit.unwrap_or(u64::MAX);
+        let evaluations = limit.saturating_sub(self.counts.evaluated);
+        let mut jobs = Vec::new();
+        for &place in places {
+            let mut search = kept[place].take().unwrap_or_else(|| Kept::new(self.shared, place, self.bound));
+            let memory = self.shared.memory.beside(kept.iter().flatten().map(Kept::bytes).sum());
+            jobs.push(move |cancelled: &AtomicBool| {
+                let before = search.counts();
+                let work = before.work.saturating_add(work);
+                let evaluations = before.evaluated.saturating_add(evaluations);
+                let end = search.run(Allowed { work, evaluations, memory, cancelled });
+                Taken { took: search.counts().since(before), place, search, end }
+            });
+        }
+        in_order(jobs, |taken| match taken.end {
+            End::Plan(_) | End::Stopped => true,
+            End::Exhausted => self.proves(taken.place),
+            End::Memory | End::Limit => false,
+        })
     }
 
     fn limited(&self) -> bool {
@@ -266,9 +307,9 @@ impl<'a, 's> Run<'a, 's> {
     }
 
     fn search(&mut self, strategy: Strategy) -> End {
-        let limit = self.options.evaluation_limit.unwrap_or(u64::MAX);
-        let evaluation_limit = limit.saturating_sub(self.counts.evaluated);
-        search(self.shared, Strategy { evaluation_limit, ..strategy }, &mut self.counts)
+        let (end, took) = self.search_each(&[strategy]).remove(0);
+        self.counts.add(took);
+        end
     }
 
     /// Improves a plan for so much work and takes it if it is the best so far; tells whether more work would do no more.
@@ -315,48 +356,132 @@ impl<'a, 's> Run<'a, 's> {
         let mut turn = 0usize;
         let mut again = 0;
         loop {
-            if self.counts.work >= until {
-                return ClassicalEnd::Done;
-            }
-            let weight = WEIGHTS[turn % WEIGHTS.len()];
-            let strategy = Strategy {
-                weight: Some(weight),
-                lookahead: turn % 2 == 1,
-                counting: if (turn / WEIGHTS.len()).is_multiple_of(2) {
-                    Counting::CostAndSteps
-                } else {
-                    Counting::CostThenSteps
-                },
-                bound: self.bound,
-                work_limit,
-                ..GREEDY
-            };
-            match self.search(strategy) {
-                End::Plan(plan) => {
-                    let plans = self.plans;
-                    let settled = self.improve(plan, work_limit);
-                    if self.task.measure.is_sum() {
-                        continue;
-                    }
-                    again = if settled && self.plans == plans { again + 1 } else { 0 };
-                    if again == 2 * WEIGHTS.len() {
-                        return ClassicalEnd::Done;
-                    }
+            let strategies: Vec<Strategy> = self
+                .side_by_side(turn, WEIGHTS.len())
+                .map(|turn| Strategy { bound: self.bound, work_limit, ..for_better(turn) })
+                .collect();
+            for (strategy, (end, took)) in strategies.iter().zip(self.search_each(&strategies)) {
+                if self.counts.work >= until {
+                    return ClassicalEnd::Done;
                 }
-                End::Exhausted if !strategy.lookahead && self.task.has_exact_costs() => {
-                    return ClassicalEnd::Exhausted;
+                self.counts.add(took);
+                match end {
+                    End::Plan(plan) => {
+                        let plans = self.plans;
+                        let settled = self.improve(plan, work_limit);
+                        if self.task.measure.is_sum() {
+                            continue;
+                        }
+                        again = if settled && self.plans == plans { again + 1 } else { 0 };
+                        if again == 2 * WEIGHTS.len() {
+                            return ClassicalEnd::Done;
+                        }
+                    }
+                    End::Exhausted if !strategy.lookahead && self.task.has_exact_costs() => {
+                        return ClassicalEnd::Exhausted;
+                    }
+                    End::Exhausted if !strategy.lookahead => return ClassicalEnd::Done,
+                    End::Stopped => return ClassicalEnd::Stopped,
+                    End::Memory if turn > WEIGHTS.len() => return ClassicalEnd::Memory,
+                    End::Limit if self.limited() => return ClassicalEnd::Stopped,
+                    // A lookahead search keeps the first way to a state: it cannot prove that no cheaper plan exists.
+                    End::Memory | End::Limit | End::Exhausted => again = 0,
                 }
-                End::Exhausted if !strategy.lookahead => return ClassicalEnd::Done,
-                End::Stopped => return ClassicalEnd::Stopped,
-                End::Memory if turn > WEIGHTS.len() => return ClassicalEnd::Memory,
-                End::Limit if self.limited() => return ClassicalEnd::Stopped,
-                // A lookahead search keeps the first way to a state: it cannot prove that no cheaper plan exists.
-                End::Memory | End::Limit | End::Exhausted => again = 0,
-            }
-            turn += 1;
-            if turn.is_multiple_of(WEIGHTS.len()) {
-                work_limit = work_limit.saturating_mul(2);
+                turn += 1;
+                if turn.is_multiple_of(WEIGHTS.len()) {
+                    work_limit = work_limit.saturating_mul(2);
+                }
             }
         }
+    }
+
+    /// Searches side by side: what each comes to and takes, up to the first plan.
+    fn search_each(&self, strategies: &[Strategy]) -> Vec<(End, Counts)> {
+        let limit = self.options.evaluation_limit.unwrap_or(u64::MAX);
+        let evaluation_limit = limit.saturating_sub(self.counts.evaluated);
+        let job = |strategy: &Strategy| {
+            let (shared, strategy) = (self.shared, Strategy { evaluation_limit, ..*strategy });
+            move |cancelled: &AtomicBool| search(shared, strategy, cancelled)
+        };
+        in_order(strategies.iter().map(job).collect(), |(end, _)| matches!(end, End::Plan(_) | End::Stopped))
+    }
+}
+
+/// How a better plan is looked for at a turn.
+fn for_better(turn: usize) -> Strategy {
+    let counting = match (turn / WEIGHTS.len()).is_multiple_of(2) {
+        true => Counting::CostAndSteps,
+        false => Counting::CostThenSteps,
+    };
+    Strategy { weight: Some(WEIGHTS[turn % WEIGHTS.len()]), lookahead: turn % 2 == 1, counting, ..GREEDY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::small;
+
+    /// Tiles of a puzzle with three by three places, in the order of its rows; 0 is the hole.
+    fn puzzle(tiles: [usize; 9]) -> GroundTask {
+        const DOMAIN: &str = "(define (domain tiles) (:requirements :typing) (:types place tile)
+          (:predicates (at ?t - tile ?p - place) (free ?p - place) (beside ?a ?b - place))
+          (:action slide :parameters (?t - tile ?a ?b - place)
+            :precondition (and (at ?t ?a) (free ?b) (beside ?a ?b))
+            :effect (and (at ?t ?b) (free ?a) (not (at ?t ?a)) (not (free ?b)))))";
+        let beside = |a: usize, b: usize| (a / 3).abs_diff(b / 3) + (a % 3).abs_diff(b % 3) == 1;
+        let (mut init, mut goal) = (String::new(), String::new());
+        for (place, tile) in tiles.iter().enumerate() {
+            match tile {
+                0 => init += &format!("(free p{place}) "),
+                tile => init += &format!("(at t{tile} p{place}) "),
+            }
+            for other in (0..9).filter(|&other| beside(place, other)) {
+                init += &format!("(beside p{place} p{other}) ");
+            }
+        }
+        for tile in 1..9 {
+            goal += &format!("(at t{tile} p{tile}) ");
+        }
+        let objects = "p0 p1 p2 p3 p4 p5 p6 p7 p8 - place t1 t2 t3 t4 t5 t6 t7 t8 - tile";
+        let problem = format!(
+            "(define (problem p) (:domain tiles) (:objects {objects}) (:init {init}) (:goal (and {goal})))"
+        );
+        small::read(DOMAIN, &problem).1
+    }
+
+    /// However many threads there are, every plan is the same, and so is what it took.
+    fn check(tiles: [usize; 9], anytime: bool, first_work: u64, solvable: bool) {
+        let ground = puzzle(tiles);
+        let run = |threads: usize| {
+            let options = ClassicalOptions {
+                anytime,
+                soft: false,
+                bound: None,
+                memory: MemoryLimit::new(None, None),
+                evaluation_limit: None,
+                threads: NonZeroUsize::new(threads),
+                first_work,
+            };
+            let mut plans = Vec::new();
+            let ended = solve(&ground, &options, &|| false, &mut |plan, cost| {
+                plans.push((plan.to_vec(), cost));
+            });
+            (plans, ended.end, ended.evaluated, ended.expanded, ended.work)
+        };
+        let alone = run(1);
+        assert_eq!(!alone.0.is_empty(), solvable, "{tiles:?}: {:?}", alone.1);
+        for threads in [2, 3, 8] {
+            assert_eq!(run(threads), alone, "{tiles:?}, {threads} threads, turns of {first_work}");
+        }
+    }
+
+    #[test]
+    fn threads_change_nothing_but_the_time() {
+        let hard = [8, 6, 7, 2, 5, 4, 3, 0, 1];
+        // Turns so short that several searches take theirs, and some more than one.
+        for first_work in [2_000, 20_000, FIRST_WORK] {
+            check(hard, false, first_work, true);
+        }
+        check([1, 0, 2, 3, 4, 5, 6, 7, 8], true, 5_000, true);
     }
 }

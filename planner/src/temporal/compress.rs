@@ -9,7 +9,7 @@ use crate::ground::{
     Action, Conjunction, Effect, Expression, Fact, GroundTask, Meaning, Metric, Outcome, Variable,
 };
 use crate::memory::MemoryLimit;
-use crate::search::run::{ClassicalOptions, solve};
+use crate::search::run::{ClassicalOptions, FIRST_WORK, solve};
 
 use super::advance::Step;
 use super::relaxed::Part;
@@ -35,6 +35,8 @@ pub(crate) fn classical_plan(
         bound: None,
         memory,
         evaluation_limit: Some(if space.tight { evaluations.min(MOST_EVALUATED) } else { evaluations }),
+        threads: None,
+        first_work: FIRST_WORK,
     };
     // The first plan is enough: what is cheap one after the other need not be quick side by side.
     let found = AtomicBool::new(false);

@@ -1,5 +1,7 @@
 //! From two texts to an outcome: what the tests of planning without times share.
 
+use std::num::NonZeroUsize;
+
 use descry_planner::{Attachments, Options, Outcome, Source, Task, Verdict, plan, validate};
 
 /// The task, which must be in order.
@@ -18,10 +20,15 @@ pub fn solve(task: &Task, options: &Options) -> (Outcome, Option<Verdict>) {
     (outcome, verdict)
 }
 
-/// The same of two runs on two texts, which must come to the same plan.
+/// The same of runs on two texts, which must come to the same plan, and with more threads in the same way.
 pub fn solve_twice(domain: &str, problem: &str, options: &Options) -> (Outcome, Option<Verdict>) {
     let task = read(domain, problem);
     let (outcome, verdict) = solve(&task, options);
-    assert_eq!(outcome.plan(), solve(&task, options).0.plan(), "the same task twice");
+    for threads in [1, 2, 3] {
+        let abreast = Options { threads: NonZeroUsize::new(threads), ..options.clone() };
+        let (again, _) = solve(&task, &abreast);
+        assert_eq!(outcome.plan(), again.plan(), "the same task with {threads} threads");
+        assert_eq!(outcome.statistics(), again.statistics(), "the same task with {threads} threads");
+    }
     (outcome, verdict)
 }

@@ -50,5 +50,6 @@ pub mod page;
 pub mod picture;
 pub mod report;
 pub mod run;
+pub mod saying;
 pub mod stop;
 pub mod weigh;

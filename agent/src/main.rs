@@ -31,7 +31,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(Ok(exit)) => exit.into(),
         Ok(Err(error)) => {
-            commands::narrate(&format!("descry: {error}"));
+            commands::narrate_fitted(&format!("descry: {error}"));
             error.exit().into()
         }
         Err(_) => Exit::Bug.into(),

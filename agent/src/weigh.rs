@@ -58,6 +58,9 @@ pub struct Expected {
 pub struct Way {
     /// The calls.
     pub steps: Vec<String>,
+    /// What each counts for, seconds; records of earlier versions do not say.
+    #[serde(default)]
+    pub each_s: Vec<f64>,
     /// What they count for, one after the other, seconds.
     pub takes_s: f64,
     /// By how much they bring the numbers that count nearer to what is wanted, together.
@@ -203,14 +206,11 @@ impl<'r> Scale<'r> {
         (if less { now - then } else { then - now }).max(0.0)
     }
 
-    /// Steps, one after the other: what they count for, seconds, and the state then; none where they cannot be taken.
-    fn after(&self, steps: &[Step]) -> Option<(f64, State)> {
+    /// Steps, one after the other: what each counts for, seconds, and the state then; none where they cannot be taken.
+    fn after(&self, steps: &[Step]) -> Option<(Vec<f64>, State)> {
         let mut state = self.state.clone();
-        let mut takes_s = 0.0;
-        for step in steps {
-            takes_s += self.apply(&mut state, step)?;
-        }
-        Some((takes_s, state))
+        let each = steps.iter().map(|step| self.apply(&mut state, step)).collect::<Option<_>>()?;
+        Some((each, state))
     }
 
     /// Applies a step; returns what it counts for, seconds.
@@ -252,12 +252,18 @@ impl<'r> Scale<'r> {
     }
 
     fn way(&self, steps: &[Step]) -> Option<Way> {
-        let (takes_s, state) = self.after(steps)?;
+        let (each_s, state) = self.after(steps)?;
         let (now, then) = (self.numbers(&self.state), self.numbers(&state));
         let gain = |(name, (now, less)): (&String, &(f64, bool))| {
             then.get(name).map_or(0.0, |(then, _)| Self::gain(*now, *then, *less))
         };
-        Some(Way { steps: steps.iter().map(call).collect(), takes_s, gains: now.iter().map(gain).sum() })
+        let takes_s = each_s.iter().sum();
+        Some(Way {
+            steps: steps.iter().map(call).collect(),
+            each_s,
+            takes_s,
+            gains: now.iter().map(gain).sum(),
+        })
     }
 
     /// The numbers that steps bring nearer to what is wanted.

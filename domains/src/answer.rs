@@ -167,7 +167,7 @@ impl Asker<'_> {
             }
             said.push(match members.len() {
                 0 => format!("there is no {}", kind.name),
-                n => format!("all of {} are found: {n}, {}", kind.name, members.join("; ")),
+                n => format!("all {}s are found: {n}, {}", kind.name, members.join("; ")),
             });
             // As sure as was asked for is not sure.
             let hidden = s.doubt_of(of).hidden;

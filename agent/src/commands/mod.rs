@@ -26,7 +26,7 @@ pub mod why_not;
 
 use clap::Subcommand;
 
-pub use input::{drawn, is_coloured, narrate};
+pub use input::{drawn, is_coloured, narrate, narrate_fitted};
 pub use line::asked;
 pub use new::write_domain;
 

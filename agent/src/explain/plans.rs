@@ -15,16 +15,16 @@ const ALIKE: f64 = 0.02;
 const MOST_KEPT: usize = crate::weigh::MOST_KEPT;
 
 /// All plans of a run.
-pub fn told(chapters: &[Chapter], asked: &Asked) -> Vec<Told> {
+pub fn told(chapters: &[Chapter], asked: &Asked<'_>) -> Vec<Told> {
     let before = std::iter::once(None).chain(chapters.iter().map(Some));
     chapters.iter().zip(before).map(|(chapter, before)| tell(chapter, before, asked)).collect()
 }
 
-fn tell(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked) -> Told {
+fn tell(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Told {
     Told {
         round: chapter.round,
         at_s: chapter.at_s,
-        cause: cause(chapter, before),
+        cause: cause(chapter, before, asked),
         intent: intent(chapter, asked),
         why: why(chapter, asked),
         outcome: chapter.deeds.iter().filter_map(outcome).collect(),
@@ -32,7 +32,7 @@ fn tell(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked) -> Told {
 }
 
 /// What a plan was caused by: the failure, or what was learned, that ended the one before; or that it had been done and was not enough.
-fn cause(chapter: &Chapter, before: Option<&Chapter>) -> String {
+fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> String {
     let Some(before) = before else { return "the run began, and there was no plan.".into() };
     let last = before.deeds.iter().rev().find(|deed| !matches!(deed, Deed::Resumed));
     if let Some(Deed::Failed { call, therefore, .. }) = last {
@@ -45,16 +45,17 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>) -> String {
     let begun = before.deeds.iter().filter(|deed| matches!(deed, Deed::Began)).count();
     let done = match before.steps.len().saturating_sub(begun) {
         0 => {
-            let now = reasons::missed(&chapter.because, "is");
+            let now = reasons::missed(&chapter.because, "is", asked.counts);
             format!("plan {} was carried out to its end, and {now}.", before.round)
         }
         left => {
-            let now = reasons::missed(&chapter.because, "would be only");
+            let now = reasons::missed(&chapter.because, "would be only", asked.counts);
             let rest = if left == 1 { "step that was".into() } else { format!("{left} steps that were") };
             format!("with what was learned, the {rest} left of plan {} would not do: {now}.", before.round)
         }
     };
-    format!("{}{done}", moved.unwrap_or_default())
+    let most = chapter.most.as_ref().map(|(name, most)| format!(" The greatest: {name}, {}.", share(*most)));
+    format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
 }
 
 /// A step as it is written in a plan, without its times.
@@ -65,7 +66,7 @@ fn bare(step: &str) -> &str {
     }
 }
 
-fn intent(chapter: &Chapter, asked: &Asked) -> Vec<String> {
+fn intent(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     let steps: Vec<&str> = chapter.steps.iter().map(|s| bare(s)).collect();
     let mut said = vec![format!("{}.", steps.join(", then "))];
     let mut numbers: Vec<&Expected> = chapter.weighed.iter().flat_map(|w| &w.numbers).collect();
@@ -84,7 +85,7 @@ fn intent(chapter: &Chapter, asked: &Asked) -> Vec<String> {
 }
 
 /// Why this plan and not another, as far as the record says.
-fn why(chapter: &Chapter, asked: &Asked) -> Vec<String> {
+fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     let Some(weighed) = &chapter.weighed else {
         return vec!["what else could have been done, and at what cost, is not in the record.".into()];
     };
@@ -95,7 +96,7 @@ fn why(chapter: &Chapter, asked: &Asked) -> Vec<String> {
         ];
     };
     if weighed.others.is_empty() {
-        return vec![format!("{} was the only way known to get further.", chosen.steps.join(" "))];
+        return vec![format!("{} was the only way known to get further.", steps(chosen))];
     }
     let mut named = Named::default();
     let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
@@ -118,7 +119,7 @@ impl Named {
     /// A way, the first time with its figures.
     fn once(&mut self, way: &Way) -> String {
         if self.0.contains(&way.steps) {
-            return way.steps.join(" ");
+            return way.steps.join(", ");
         }
         self.0.push(way.steps.clone());
         figures(way)
@@ -127,13 +128,17 @@ impl Named {
 
 /// A way with its figures.
 fn figures(way: &Way) -> String {
-    format!(
-        "{} [+{} in {:.1} s, {} a second]",
-        way.steps.join(" "),
-        share(way.gains),
-        way.takes_s,
-        rate(way.rate())
-    )
+    let gains = if way.gains < 0.01 { share(way.gains) } else { format!("{:.2}", way.gains) };
+    format!("{} [+{gains} in {:.1} s, {} a second]", steps(way), way.takes_s, rate(way.rate()))
+}
+
+/// The steps of a way, of several each with its seconds, if the record has them.
+fn steps(way: &Way) -> String {
+    if way.each_s.len() != way.steps.len() || way.steps.len() < 2 {
+        return way.steps.join(", ");
+    }
+    let each = way.steps.iter().zip(&way.each_s);
+    each.map(|(step, takes_s)| format!("{step} ({takes_s:.1} s)")).collect::<Vec<_>>().join(", ")
 }
 
 /// Three digits that count.
@@ -143,7 +148,13 @@ fn rate(rate: f64) -> String {
 }
 
 /// Where a plan's way stands among all, by what is gained a second.
-fn compared(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked, named: &mut Named) -> String {
+fn compared(
+    chapter: &Chapter,
+    weighed: &Weighed,
+    chosen: &Way,
+    asked: &Asked<'_>,
+    named: &mut Named,
+) -> String {
     let all = weighed.open;
     let ratio = |o: &Way| o.rate() / chosen.rate();
     let better: Vec<&Way> = weighed.others.iter().filter(|o| ratio(o) > 1.0 + ALIKE).collect();
@@ -165,10 +176,13 @@ fn compared(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked, n
                 Some(false) => " That one would not be expected to be enough by itself.",
                 _ => "",
             };
+            let whole = match chapter.makespan_s {
+                // Nothing in the domain takes time.
+                s if s <= 0.0 => "a whole plan".to_string(),
+                s => format!("the quickest whole plan that it finds, here {s:.1} s"),
+            };
             format!(
-                "The planner counts to the end: it takes the quickest whole plan that it finds, here {:.1} s, not what gains \
-                 most a second at first.{alone}",
-                chapter.makespan_s
+                "The planner counts to the end: it takes {whole}, not what gains most a second at first.{alone}"
             )
         }
     };
@@ -176,14 +190,14 @@ fn compared(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked, n
 }
 
 /// Whether a way by itself is expected to be enough; none where more than one number counts, or nothing says what is wanted.
-fn enough(weighed: &Weighed, way: &Way, asked: &Asked) -> Option<bool> {
+fn enough(weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
     let [only] = weighed.numbers.as_slice() else { return None };
     let wanted = asked.wanted(&only.name)?;
     Some(if only.then >= only.now { only.now + way.gains >= wanted } else { only.now - way.gains <= wanted })
 }
 
 /// The quickest way, if it is another, and why it was not taken.
-fn quickest(weighed: &Weighed, chosen: &Way, asked: &Asked, named: &mut Named) -> Option<String> {
+fn quickest(weighed: &Weighed, chosen: &Way, asked: &Asked<'_>, named: &mut Named) -> Option<String> {
     let other = weighed.others.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s))?;
     if other.takes_s > chosen.takes_s - 0.1 {
         return None;
@@ -203,7 +217,7 @@ fn outcome(deed: &Deed) -> Option<String> {
         Deed::Ended(call, said) => format!("{call}: {said}."),
         Deed::Failed { call, because, changed, .. } => {
             let since = changed.as_ref().filter(|c| !c.is_empty());
-            let since = since.map(|c| format!(" From then on {c}.")).unwrap_or_default();
+            let since = since.map(|c| format!(" From then on: {c}.")).unwrap_or_default();
             format!("{call} failed: {because}.{since}")
         }
         Deed::Resumed => {

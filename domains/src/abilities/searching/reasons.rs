@@ -148,7 +148,7 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     let more = if hidden > 1.0 - s.threshold || least.is_none() { more } else { String::new() };
     let all = s.completeness(open);
     Some(format!(
-        "all of {} are found with {all:.2} only{}{more}",
+        "all {}s are found with {all:.2} only{}{more}",
         kind.name,
         least.map(is_one).unwrap_or_default()
     ))
@@ -172,7 +172,7 @@ pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) ->
         })
     };
     let parts: Vec<String> = s.surfaces.iter().enumerate().filter_map(|(on, k)| of(on, k)).collect();
-    format!("{}; {:.3} is left", parts.join(", "), left.max(0.0))
+    format!("{}; a chance of {:.3} is left", parts.join(", "), left.max(0.0))
 }
 
 /// Where there is room for something that no look can show; none if too little hangs on it.

@@ -99,22 +99,26 @@ fn meaning(domain: &Domain, call: &str) -> Option<String> {
 
 /// The calls that an action's duration asks, by what they ask; none if it asks none that is known.
 fn counts(domain: &Domain, action: &str) -> Option<String> {
-    let text = &domain.pddl.text;
-    let declared = text.split_once(&format!("action {action}\n"))?.1;
-    let duration = declared.split_once(":duration")?.1;
-    let duration = duration.split(":condition").next()?.split(":effect").next()?;
-    let calls = duration.split('[').skip(1).filter_map(|call| call.split([' ', ']']).next());
+    let calls = duration(domain, action)?.split('[').skip(1).filter_map(|call| call.split([' ', ']']).next());
     let about = |call: &str| Some(meaning(domain, call)?.split(';').next()?.to_string());
     let all: Vec<String> = calls.filter_map(about).collect();
     (!all.is_empty()).then(|| listed(&all, all.len()))
 }
 
-/// What each action counts for beside what the domain fixes.
+/// Which actions count for more than they take.
 fn seconds(domain: &Domain) -> Option<String> {
-    let actions = domain.vocabulary.task.actions.iter();
+    let is_more = |name: &str| duration(domain, name).is_some_and(|duration| duration.contains("(+"));
+    let actions = domain.vocabulary.task.actions.iter().filter(|a| is_more(&a.name));
     let all: Vec<String> =
-        actions.filter_map(|a| Some(format!("{} has the {}", a.name, counts(domain, &a.name)?))).collect();
-    (!all.is_empty()).then(|| format!("What the domain counts as seconds: {}.", all.join("; ")))
+        actions.filter_map(|a| Some(format!("{} also the {}", a.name, counts(domain, &a.name)?))).collect();
+    (!all.is_empty())
+        .then(|| format!("Counted are, beside the time that it takes itself, of {}.", all.join("; of ")))
+}
+
+/// What stands for the duration of an action.
+fn duration<'d>(domain: &'d Domain, action: &str) -> Option<&'d str> {
+    let declared = domain.pddl.text.split_once(&format!("action {action}\n"))?.1;
+    declared.split_once(":duration")?.1.split(":condition").next()?.split(":effect").next()
 }
 
 /// How poses are called, where they are called after what is looked at.

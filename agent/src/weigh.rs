@@ -32,7 +32,7 @@ const GAINED: f64 = 1e-6;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Weighed {
-    /// The numbers that count, before the plan and as it expects them in the end; where it uses up what it gains, as soon as it has.
+    /// The numbers that count, before the plan and as it expects them in the end; where it uses up what it gains, when it has most.
     pub numbers: Vec<Expected>,
     /// The plan until it first gains something.
     pub chosen: Option<Way>,
@@ -65,6 +65,9 @@ pub struct Way {
     pub takes_s: f64,
     /// By how much they bring the numbers that count nearer to what is wanted, together.
     pub gains: f64,
+    /// Whether the goal is expected to hold then; records of earlier versions do not say.
+    #[serde(default)]
+    pub reaches: Option<bool>,
 }
 
 impl Way {
@@ -258,12 +261,10 @@ impl<'r> Scale<'r> {
             then.get(name).map_or(0.0, |(then, _)| Self::gain(*now, *then, *less))
         };
         let takes_s = each_s.iter().sum();
-        Some(Way {
-            steps: steps.iter().map(call).collect(),
-            each_s,
-            takes_s,
-            gains: now.iter().map(gain).sum(),
-        })
+        let goal = &self.semantics.task.goal;
+        let reaches = self.semantics.holds(&state, &goal.body, &mut Binding::new(goal.slots)).ok();
+        let gains = now.iter().map(gain).sum();
+        Some(Way { steps: steps.iter().map(call).collect(), each_s, takes_s, gains, reaches })
     }
 
     /// The numbers that steps bring nearer to what is wanted.
@@ -276,15 +277,22 @@ impl<'r> Scale<'r> {
         self.numbers(&self.state).into_iter().filter_map(expected).collect()
     }
 
+    /// What a plan expects of the numbers in the end; where it uses up what it gains, when it has most.
+    fn at_most(&self, steps: &[Step]) -> Vec<Expected> {
+        let whole = self.expected(steps);
+        if !whole.is_empty() {
+            return whole;
+        }
+        let gained = |all: &Vec<Expected>| all.iter().map(|n| (n.then - n.now).abs()).sum::<f64>();
+        let parts = (1..steps.len()).map(|n| self.expected(&steps[..n]));
+        parts.max_by(|a, b| gained(a).total_cmp(&gained(b))).unwrap_or_default()
+    }
+
     fn weigh(&self, plan: &Plan) -> Option<Weighed> {
         let first = (1..=plan.steps.len().min(MOST_STEPS))
             .find_map(|n| Some((n, self.way(&plan.steps[..n]).filter(|way| way.gains > GAINED)?)));
         let (n, chosen) = first?;
-        let mut numbers = self.expected(&plan.steps);
-        if numbers.is_empty() {
-            // What a look is to make sure of may no longer be so once the plan has used it.
-            numbers = self.expected(&plan.steps[..n]);
-        }
+        let numbers = self.at_most(&plan.steps);
         let others = self.others(&plan.steps[..n], &chosen);
         let open = others.len() + 1;
         Some(Weighed { numbers, chosen: Some(chosen), others: kept(others), open })

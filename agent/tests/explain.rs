@@ -148,6 +148,18 @@ fn a_recorded_body_is_explained() {
 }
 
 #[test]
+fn a_record_of_rooms_is_a_body_that_knows_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let goal = ["do", "is cup A on the desk", "--domain", "home"];
+    let first = [&goal[..], &["--seed", "71004", "--run", "first", "--json"]].concat();
+    binary::check(folder.path(), &first, 1);
+    let again = [&goal[..], &["--robot", "recorded:first", "--run", "run", "--json"]].concat();
+    let report = binary::check(folder.path(), &again, 1);
+    assert_eq!(report["answer"], "no", "{report}");
+    explained(folder.path(), &["Wanted: the certainty that cup A stands on the desk is at least 0.8"]);
+}
+
+#[test]
 fn what_the_record_does_not_say_is_said_not_to_be_known() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = ["find", "cup A", "--seed", "3", "--run", "run", "--max-bytes", "3MB"];

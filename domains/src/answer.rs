@@ -337,7 +337,8 @@ impl Asker<'_> {
     fn looks(&self) -> String {
         let known = &self.mind.known;
         let poses = known.candidates.len() - known.out_of_reach.len();
-        format!("after {} looks, with {poses} poses that can be reached", self.mind.views)
+        let looks = if self.mind.views == 1 { "look" } else { "looks" };
+        format!("after {} {looks}, with {poses} poses that can be reached", self.mind.views)
     }
 
     fn seen_of(&self, doubt: &Doubt, left: f64) -> String {

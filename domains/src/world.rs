@@ -338,7 +338,12 @@ impl<'a> World<'a> {
     pub fn explain(&self, round: &Round, call: &Call) -> String {
         match actions::because(self.setting.domain, call) {
             Some(said) => said,
-            None => self.grounded(call, 0).map_or_else(String::new, |g| g.because(&round.situation)),
+            // Of several parts, the one that the action is called after.
+            None => {
+                let parts = || (0..).map_while(|step| self.grounded(call, step));
+                let part = parts().find(|part| part.word.name == call.action).or_else(|| parts().next());
+                part.map_or_else(String::new, |part| part.because(&round.situation))
+            }
         }
     }
 

@@ -18,6 +18,8 @@ pub struct Chapter {
     pub at_s: f64,
     /// Why the plan before no longer did, as it was said.
     pub because: String,
+    /// After how much the planner's search was ended without a proof; none: it ended by itself.
+    pub cut: Option<String>,
     /// The greatest of the numbers of which one would do, and none does.
     pub most: Option<(String, f64)>,
     /// Its steps, as they were said.
@@ -76,9 +78,12 @@ pub fn of(
         let deed = match event {
             Event::Planned { round, because, steps, makespan_s, .. } => {
                 let weighed = weighed(record, document, &mut lost);
+                let cut = because.split_once("; the search ended after ").map(|(_, cut)| cut.to_string());
+                let because =
+                    because.split("; the search ended after ").next().unwrap_or_default().to_string();
                 let most = one_of(&because).and_then(|begins| states.most(document.id, &begins));
                 let deeds = Vec::new();
-                chapters.push(Chapter { round, at_s, because, most, steps, makespan_s, weighed, deeds });
+                chapters.push(Chapter { round, at_s, because, cut, most, steps, makespan_s, weighed, deeds });
                 None
             }
             Event::Goal { .. } | Event::Kept { .. } => None,

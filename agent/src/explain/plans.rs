@@ -72,8 +72,12 @@ fn intent(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     let mut numbers: Vec<&Expected> = chapter.weighed.iter().flat_map(|w| &w.numbers).collect();
     numbers.sort_by(|a, b| (b.then - b.now).abs().total_cmp(&(a.then - a.now).abs()));
     let one = |n: &&Expected| {
-        let wanted = asked.wanted(&n.name).map(|w| format!(" ({} is wanted)", share(w))).unwrap_or_default();
-        format!("{} from {} to {}{wanted}", n.name, share(n.now), share(n.then))
+        let wanted = asked.wanted(&n.name);
+        // What looks promise is added up: of what ends at 1 it may be more.
+        let is_share = wanted.is_some_and(|wanted| wanted <= 1.0) && (0.0..=1.0).contains(&n.now);
+        let then = if is_share { n.then.min(1.0) } else { n.then };
+        let wanted = wanted.map(|w| format!(" ({} is wanted)", share(w))).unwrap_or_default();
+        format!("{} from {} to {}{wanted}", n.name, share(n.now), share(then))
     };
     let named: Vec<String> = numbers.iter().take(MOST_NAMED).map(one).collect();
     if !named.is_empty() {
@@ -90,6 +94,12 @@ fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
         return vec!["what else could have been done, and at what cost, is not in the record.".into()];
     };
     let Some(chosen) = &weighed.chosen else {
+        if let Some(cut) = &chapter.cut {
+            return vec![format!(
+                "the planner's search was ended after {cut}, without a plan that it expected to reach the goal. What \
+                 promises most by itself is done."
+            )];
+        }
         return vec![
             "it does what the goal asks next. No step of it is there to learn more: nothing was compared."
                 .into(),
@@ -100,7 +110,7 @@ fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     }
     let mut named = Named::default();
     let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
-    said.extend(quickest(weighed, chosen, asked, &mut named));
+    said.extend(quickest((weighed, chapter.cut.is_none()), chosen, asked, &mut named));
     let most = weighed.others.iter().max_by(|a, b| a.gains.total_cmp(&b.gains));
     if let Some(other) = most.filter(|o| o.gains > chosen.gains * (1.0 + ALIKE)) {
         let more_s = other.takes_s - chosen.takes_s;
@@ -169,11 +179,17 @@ fn compared(
     let more = if better.len() >= MOST_KEPT { "at least " } else { "" };
     let many = if better.len() == 1 { "1 gains".into() } else { format!("{} gain", better.len()) };
     let first = named.once(better[0]);
-    let rule = match &asked.policy {
-        Some(policy) => format!("The policy {policy} goes by its own rule."),
-        None => {
+    let rule = match (&asked.policy, &chapter.cut) {
+        (Some(policy), _) => format!("The policy {policy} goes by its own rule."),
+        (None, Some(cut)) => {
+            format!("The planner's search was ended after {cut}: this is the best that it had by then.")
+        }
+        (None, None) => {
             let alone = match enough(weighed, better[0], asked) {
                 Some(false) => " That one would not be expected to be enough by itself.",
+                Some(true) if better[0].takes_s < chapter.makespan_s => {
+                    " That one would be expected to be enough, and sooner: the planner did not come upon it."
+                }
                 _ => "",
             };
             let whole = match chapter.makespan_s {
@@ -189,20 +205,34 @@ fn compared(
     format!("{mine} is one of {all} ways to get further; {more}{many} more a second, first {first}. {rule}")
 }
 
-/// Whether a way by itself is expected to be enough; none where more than one number counts, or nothing says what is wanted.
+/// Whether a way by itself is expected to be enough; none where nothing says so: it is only a part of what is to be done.
 fn enough(weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
+    let is_whole = |way: &Way| way.reaches == Some(true);
+    match way.reaches {
+        Some(true) => return Some(true),
+        Some(false) if weighed.chosen.iter().chain(&weighed.others).any(is_whole) => return Some(false),
+        _ => {}
+    }
     let [only] = weighed.numbers.as_slice() else { return None };
     let wanted = asked.wanted(&only.name)?;
     Some(if only.then >= only.now { only.now + way.gains >= wanted } else { only.now - way.gains <= wanted })
 }
 
 /// The quickest way, if it is another, and why it was not taken.
-fn quickest(weighed: &Weighed, chosen: &Way, asked: &Asked<'_>, named: &mut Named) -> Option<String> {
+fn quickest(
+    (weighed, is_whole_search): (&Weighed, bool),
+    chosen: &Way,
+    asked: &Asked<'_>,
+    named: &mut Named,
+) -> Option<String> {
     let other = weighed.others.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s))?;
     if other.takes_s > chosen.takes_s - 0.1 {
         return None;
     }
     let but = match enough(weighed, other, asked) {
+        Some(true) if asked.policy.is_none() && is_whole_search => {
+            ", and would be expected to be enough: the planner did not come upon it"
+        }
         Some(false) => ", but would not be expected to be enough by itself",
         _ if other.gains < chosen.gains => ", but gains less",
         _ => "",
@@ -233,6 +263,11 @@ fn outcome(deed: &Deed) -> Option<String> {
             let changed: String = changed.iter().map(|text| format!("; {text}")).collect();
             format!("the {on}, in {views}, shows {}{left_out}{changed}.", shown(objects.len()))
         }
+        // What to set otherwise is for who programs it.
+        Deed::Noted(Note::Nothing { because }) => {
+            let why = because.split(": ").next().unwrap_or(because);
+            format!("the look showed nothing that things could stand on: {why}.")
+        }
         Deed::Noted(note) => {
             let text = note.to_string();
             let mut lines = text.lines().map(str::trim);
@@ -253,5 +288,69 @@ fn left_out_as(said: &str) -> String {
     match said.split_once(" left out: ") {
         Some((view, why)) => format!("{view} is left out: {}", why.strip_prefix("left out: ").unwrap_or(why)),
         None => format!("left out: {said}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn way(step: &str, takes_s: f64, gains: f64, reaches: Option<bool>) -> Way {
+        Way { steps: vec![step.into()], each_s: vec![takes_s], takes_s, gains, reaches }
+    }
+
+    /// The first plan of a run, which takes ten seconds to its end, and why it was this one.
+    fn check(chosen: Option<Way>, others: &[Way], cut: Option<&str>, words: &[&str]) {
+        let numbers = vec![Expected { name: "(sure)".into(), now: 0.0, then: 1.25 }];
+        let weighed = Weighed { numbers, open: others.len() + 1, chosen, others: others.to_vec() };
+        let cut = cut.map(str::to_string);
+        let chapter = Chapter { makespan_s: 10.0, weighed: Some(weighed), cut, ..Chapter::default() };
+        let asked = Asked { goal: "(>= (sure) 0.8)".into(), policy: None, counts: &|_| None };
+        let told = tell(&chapter, None, &asked);
+        let said = [told.intent, told.why].concat().join(" ");
+        words.iter().for_each(|word| assert!(said.contains(word), "{word:?} is not in {said}"));
+    }
+
+    #[test]
+    fn it_is_said_what_the_planner_missed_and_when_it_was_stopped() {
+        let chosen = || Some(way("(go far)", 8.0, 0.9, Some(true)));
+        check(
+            chosen(),
+            &[way("(stay)", 2.0, 0.85, Some(true))],
+            None,
+            &[
+                "1 gains more a second, first (stay)",
+                "enough, and sooner: the planner did not come upon it",
+                "(stay) is the quickest, and would be expected to be enough",
+                "(sure) from 0.00 to 1.00 (0.80 is wanted)",
+            ],
+        );
+        check(
+            chosen(),
+            &[way("(stay)", 2.0, 0.85, Some(false))],
+            None,
+            &[
+                "That one would not be expected to be enough by itself",
+                "(stay) is the quickest, but would not be expected to be enough",
+            ],
+        );
+        // Of a record that does not say what would be enough, the numbers say it.
+        check(
+            Some(way("(go far)", 8.0, 0.9, None)),
+            &[way("(stay)", 2.0, 0.5, None)],
+            None,
+            &["(stay) is the quickest, but would not be expected to be enough"],
+        );
+        check(
+            chosen(),
+            &[way("(stay)", 2.0, 0.85, Some(true))],
+            Some("9 states"),
+            &[
+                "search was ended after 9 states: this is the best that it had by then",
+                "(stay) is the quickest, but gains less",
+            ],
+        );
+        check(None, &[], Some("9 states"), &["without a plan that it expected to reach the goal"]);
+        check(None, &[], None, &["nothing was compared"]);
     }
 }

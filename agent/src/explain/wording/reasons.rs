@@ -63,14 +63,15 @@ fn no_longer(because: &str) -> Option<String> {
         && let Some(found) = values.strip_prefix(number).and_then(|rest| rest.strip_prefix(" is "))
     {
         let (is, name) = (found.split(", ").next().unwrap_or(found), wanted.rsplit(' ').next().unwrap_or(""));
+        // What is wanted may be a number that has a name of its own.
         let named = values.split(", ").find_map(|v| v.strip_prefix(name)?.strip_prefix(" is "));
-        let named = named.map(|value| format!(", {}", short(value))).unwrap_or_default();
-        return Some(format!("{call} needs {number} to be {wanted}{named}, and it is {}", short(is)));
+        let wanted = named.map_or(wanted.clone(), |value| wanted.replace(name, &short(value)));
+        return Some(format!("{call} needs {number} to be {wanted}, and it is {}", short(is)));
     }
     let values = after.split_once(": ").map(|(_, values)| format!(", {}", short(values))).unwrap_or_default();
     if all_the_time {
         return Some(format!(
-            "{call} asks that {condition} as long as it lasts, which would end before{values}"
+            "{call} asks that {condition} until it has ended, which would not be so{values}"
         ));
     }
     Some(format!("{call} asks that {condition}, which is not so{values}"))
@@ -81,7 +82,8 @@ pub fn follows(therefore: &str) -> String {
     let tried = therefore.strip_prefix("try ").and_then(|tried| tried.split_once(" of "));
     match tried {
         Some((n, most)) if most.bytes().all(|b| b.is_ascii_digit()) => {
-            format!("{n} of {most} tries are used, and the plan is made anew with what is known now")
+            let are = if n == "1" { "is" } else { "are" };
+            format!("{n} of {most} tries {are} used, and the plan is made anew with what is known now")
         }
         _ => therefore.to_string(),
     }
@@ -119,8 +121,16 @@ pub fn no_plan(said: &str, meanings: Meanings<'_>) -> String {
     parts.join("; ")
 }
 
+/// What the planner says when it has looked at everything.
+const ALL_SEEN: &str = "every state that can be reached was seen, and none fulfils the whole goal";
+
 fn plain(part: &str) -> String {
-    part.trim_end_matches('.').to_string()
+    let plainer = "whatever is done next, and in whatever order, the goal is not reached: what it needs excludes each other, or \
+                   would end too late";
+    match part.split_once(ALL_SEEN) {
+        Some((before, _)) => format!("{before}{plainer}"),
+        None => part.trim_end_matches('.').to_string(),
+    }
 }
 
 /// ``the attachment of `NAME` said no to: LIST``, or how else it answered, at the end of a text.
@@ -168,7 +178,7 @@ mod tests {
             ),
             (
                 "step 1 (pick-up a) at 1.5: (>= (presence a) (sure)) does not hold at its start: (presence a) is 0.000008, (sure) is 0.8",
-                "(pick-up a) needs (presence a) to be at least (sure), 0.8, and it is 0",
+                "(pick-up a) needs (presence a) to be at least 0.8, and it is 0",
             ),
             (
                 "step 1 (go) at 1: (>= (charge) 0.5) does not hold at its start: (charge) is 0.123456",
@@ -184,7 +194,7 @@ mod tests {
             ),
             (
                 "step 1 (observe a b) at 2.26: (time-left) does not hold all the time",
-                "(observe a b) asks that (time-left) as long as it lasts, which would end before",
+                "(observe a b) asks that (time-left) until it has ended, which would not be so",
             ),
             ("something else.", "something else"),
         ];
@@ -194,7 +204,7 @@ mod tests {
 
     #[test]
     fn what_follows_from_a_failure_is_no_promise_to_do_it_again() {
-        let plain = "1 of 4 tries are used, and the plan is made anew with what is known now";
+        let plain = "1 of 4 tries is used, and the plan is made anew with what is known now";
         assert_eq!(follows("try 1 of 4"), plain);
         assert_eq!(follows("(shut study-door)"), "(shut study-door)");
     }
@@ -216,6 +226,10 @@ mod tests {
                 "v is impossible in 2 cases",
             ),
             ("nothing.", "nothing"),
+            (
+                "every state that can be reached was seen, and none fulfils the whole goal (with nothing ever taken away …)",
+                "whatever is done next, and in whatever order, the goal is not reached: what it needs excludes each other, or would end too late",
+            ),
         ];
         cases.iter().for_each(|(said, plain)| assert_eq!(no_plan(said, &about), *plain));
     }

@@ -127,7 +127,8 @@ pub fn left_in_all(s: &Situation) -> Option<String> {
     let unsure = |t: &&Track| t.certainty() < s.thresholds.confidence;
     let places: Vec<String> =
         s.belief.tracks.iter().filter(asked).filter(unsure).map(|t| place(&t.position_m)).collect();
-    if !places.is_empty() {
+    // Of kinds it is asked only which objects are of them.
+    if s.kinds.is_empty() && !places.is_empty() {
         return Some(format!("what stands at {} looks the same from every side", places.join(" and at ")));
     }
     s.doubts().into_iter().find_map(|doubt| out_of_sight(s, doubt, "more")).or_else(|| left_of_kinds(s))

@@ -155,7 +155,7 @@ fn a_record_of_rooms_is_a_body_that_knows_them() {
     binary::check(folder.path(), &first, 1);
     let again = [&goal[..], &["--robot", "recorded:first", "--run", "run", "--json"]].concat();
     let report = binary::check(folder.path(), &again, 1);
-    assert_eq!(report["answer"], "no", "{report}");
+    assert_eq!((&report["verdict"], &report["views"]), (&"cannot_tell".into(), &2.into()), "{report}");
     explained(folder.path(), &["Wanted: the certainty that cup A stands on the desk is at least 0.8"]);
 }
 
@@ -176,9 +176,8 @@ fn what_goes_wrong_in_a_scene_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = Domain::load("home").expect("a built-in domain").scenes["default"].clone();
     let fault = "\n[[fault]]\nkind = \"door_shut\"\nat = 1\ndoor = \"kitchen door\"\n";
-    let fault = format!("{fault}{}", fault.replace("kitchen", "living room"));
-    std::fs::write(folder.path().join("doors.toml"), scene + &fault).expect("a scene");
-    let run = ["find", "cup A", "--domain", "home", "--scene", "doors.toml", "--seed", "3", "--run", "run"];
+    std::fs::write(folder.path().join("doors.toml"), scene + fault).expect("a scene");
+    let run = ["find", "cup A", "--domain", "home", "--scene", "doors.toml", "--seed", "6", "--run", "run"];
     let run = binary::outcome(folder.path(), &run);
     assert!(run.status.code().is_some_and(|code| code < 2), "{}", String::from_utf8_lossy(&run.stderr));
     explained(folder.path(), &["failed: blocked: \"", "What follows from that: the ", "door is shut"]);

@@ -265,7 +265,7 @@ fn outcome(deed: &Deed) -> Option<String> {
         }
         // What to set otherwise is for who programs it.
         Deed::Noted(Note::Nothing { because }) => {
-            let why = because.split(": ").next().unwrap_or(because);
+            let why = because.split(": ").next().and_then(|why| why.split(" among the ").next()).unwrap_or(because);
             format!("the look showed nothing that things could stand on: {why}.")
         }
         Deed::Noted(note) => {

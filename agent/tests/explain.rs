@@ -183,8 +183,8 @@ fn what_goes_wrong_in_a_scene_is_explained() {
     explained(folder.path(), &["failed: blocked: \"", "What follows from that: the ", "door is shut"]);
 }
 
-/// A run in which things go wrong on purpose, explained.
-fn faulty(goal: &str, seed: u64, faults: &str) -> String {
+/// A run in which things go wrong on purpose, explained; and what it said on its way.
+fn faulty(goal: &str, seed: u64, faults: &str) -> (String, String) {
     let folder = tempfile::tempdir().expect("a folder");
     let domain = Domain::load("home").expect("a built-in domain");
     let faults = FaultPlan::parse("faults.toml", faults).expect("faults");
@@ -203,19 +203,20 @@ fn faulty(goal: &str, seed: u64, faults: &str) -> String {
         remember: None,
     };
     let chooser = policies::named(policies::PLAN, seed, None).expect("a policy");
-    let watcher = Watcher { stop: &Stop::default(), tell: &mut |_| {} };
+    let mut said = Vec::new();
+    let watcher = Watcher { stop: &Stop::default(), tell: &mut |event| said.push(event.to_string()) };
     let task = Task { domain: &domain, goal: &goal, past: None };
     let report = run::pursue(task, &body, &into, &settings, chooser, watcher).expect("it ends");
     let header = run::header(into.path()).expect("a run");
     let record = descry_agent::keeping::open(into.path()).expect("a record");
     let told = explain::of(&record, &header, Some(&report)).expect("it is explained").to_string();
     println!("{told}");
-    told.split_whitespace().collect::<Vec<_>>().join(" ")
+    (told.split_whitespace().collect::<Vec<_>>().join(" "), said.join("\n"))
 }
 
 #[test]
 fn failures_are_named_as_the_causes_of_new_plans() {
-    let told = faulty(
+    let (told, said) = faulty(
         "pick up cup A",
         2,
         "[[fault]]\nkind = \"door_shut\"\nat = 1\n\n[[fault]]\nkind = \"grasp_slips\"\nat = 1\n",
@@ -230,6 +231,9 @@ fn failures_are_named_as_the_causes_of_new_plans() {
         "achieved",
     ] {
         assert!(told.contains(words), "{words}: {told}");
+    }
+    for words in [": cup A is to be elsewhere", "because (move ", ") failed\n"] {
+        assert!(said.contains(words), "{words}: {said}");
     }
     for raw in ["the attachment of", "(move ", "(shut ", "(presence ", "(at "] {
         let told = told.replace("In PDDL: (holding cup-a).", "");

@@ -338,12 +338,8 @@ impl<'a> World<'a> {
     pub fn explain(&self, round: &Round, call: &Call) -> String {
         match actions::because(self.setting.domain, call) {
             Some(said) => said,
-            // Of several parts, the one that the action is called after.
-            None => {
-                let parts = || (0..).map_while(|step| self.grounded(call, step));
-                let part = parts().find(|part| part.word.name == call.action).or_else(|| parts().next());
-                part.map_or_else(String::new, |part| part.because(&round.situation))
-            }
+            None => actions::foremost(self.setting.domain, call)
+                .map_or_else(String::new, |part| part.because(&round.situation)),
         }
     }
 

@@ -499,7 +499,7 @@ pub fn in_a_line(p: &Percept) -> String {
     let (at, [w, d, h]) = (p.position_m, p.size_m.map(|m| m * 100.0));
     let seen = p.seen_fraction * 100.0;
     format!(
-        "{name:16} {probability:.2}  at ({:.2}, {:.2}, {:.2}) m, {w:.0} x {d:.0} x {h:.0} cm, {seen:.0} % seen",
+        "{name:16} {probability:.2} ({:.2}, {:.2}, {:.2}) m, {w:.0}x{d:.0}x{h:.0} cm, {seen:.0} % seen",
         at.x, at.y, at.z
     )
 }

@@ -202,7 +202,7 @@ function sureOf(at) {
 
 // What was seen, in three dimensions.
 const view = { yaw: -.8, pitch: .6, far: 4, centre: [0, 0, .8] };
-let gl = null, program = null, clouds = new Map(), turning = false, turned = false;
+let gl = null, program = null, inputs = {}, clouds = new Map(), turning = false, turned = false;
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
 function beginSpace() {
   const canvas = $("cloud");
@@ -215,6 +215,9 @@ function beginSpace() {
   gl.attachShader(program, part(gl.FRAGMENT_SHADER, "precision mediump float; varying vec3 shade; void main() { gl_FragColor = vec4(shade, 1.0); }"));
   gl.linkProgram(program);
   gl.useProgram(program);
+  // Asked once: each answer is waited for.
+  for (const name of ["least", "size", "seen", "dot"]) inputs[name] = gl.getUniformLocation(program, name);
+  for (const name of ["place", "colour"]) { inputs[name] = gl.getAttribLocation(program, name); gl.enableVertexAttribArray(inputs[name]); }
   gl.enable(gl.DEPTH_TEST);
 }
 // The points of each look, those that stand elsewhere now in the place of those that were there. What is told anew meanwhile goes first.
@@ -275,18 +278,16 @@ function spaceOf(at) {
     gl.viewport(0, 0, wide, high);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.uniformMatrix4fv(gl.getUniformLocation(program, "seen"), false, seen);
-    gl.uniform1f(gl.getUniformLocation(program, "dot"), .009 * high * 1.6 / 2 * 1.3);
+    gl.uniformMatrix4fv(inputs.seen, false, seen);
+    gl.uniform1f(inputs.dot, .009 * high * 1.6 / 2 * 1.3);
     const shown = [...clouds.values()].filter(c => c.at_s <= at + 1e-6);
     const share = turning ? Math.min(1, affordable() / shown.reduce((sum, c) => sum + c.count, 1)) : 1;
     for (const cloud of shown) {
-      gl.uniform3fv(gl.getUniformLocation(program, "least"), cloud.least);
-      gl.uniform3fv(gl.getUniformLocation(program, "size"), cloud.size);
+      gl.uniform3fv(inputs.least, cloud.least);
+      gl.uniform3fv(inputs.size, cloud.size);
       for (const [name, data, kind] of [["place", cloud.places, gl.UNSIGNED_SHORT], ["colour", cloud.colours, gl.UNSIGNED_BYTE]]) {
-        const where = gl.getAttribLocation(program, name);
         gl.bindBuffer(gl.ARRAY_BUFFER, data);
-        gl.enableVertexAttribArray(where);
-        gl.vertexAttribPointer(where, 3, kind, true, 0, 0);
+        gl.vertexAttribPointer(inputs[name], 3, kind, true, 0, 0);
       }
       gl.drawArrays(gl.POINTS, 0, Math.ceil(cloud.count * share));
     }

@@ -55,7 +55,7 @@ fn the_template_and_the_built_in_domains_are_faultless() {
 fn what_is_said_to_people_is_about_what_is_declared() {
     let move_ = "move = \"driving to ?to\"";
     let toml = |to: &str, code, place, words: &[&str]| check("domain.toml", (move_, to), code, place, words);
-    toml("mvoe = \"driving to ?to\"", "no-word", "mvoe", &["did you mean `move`?"]);
+    toml("mvoe = \"driving to ?to\"", "no-word", "\"driving to ?to\"", &["did you mean `move`?"]);
     toml("move = \"driving to ?too\"", "no-parameter", "?too", &["did you mean `?to`?", "?from"]);
 }
 

@@ -140,7 +140,7 @@ fn simulated(trial: &Trial<'_>) -> Result<Staged, String> {
         scene.target = None;
     }
     let share = scene.target_visible_from_start;
-    let faults = trial.faults.clone().after(&trial.spec);
+    let faults = trial.faults.clone().after(trial.spec);
     let options = SimOptions { seed: trial.seed, faults, ..SimOptions::default() };
     let robot = Arc::new(SimRobot::new(scene, options));
     let foresight = Some(foresight(&robot, trial.targets));

@@ -56,7 +56,7 @@ fn domain(lines: usize) -> String {
 /// A key in the word `linked` of the action nearest to a line; how long it takes until all findings are there.
 fn key(editor: &Connection, line: usize, n: usize) -> Duration {
     let line = (line - 8) / 6 * 6 + 8;
-    let (from, to, text) = if n % 2 == 0 { (13, 13, "x") } else { (13, 14, "") };
+    let (from, to, text) = if n.is_multiple_of(2) { (13, 13, "x") } else { (13, 14, "") };
     let range =
         json!({ "start": { "line": line, "character": from }, "end": { "line": line, "character": to } });
     let changes = json!([{ "range": range, "text": text }]);
@@ -68,7 +68,7 @@ fn key(editor: &Connection, line: usize, n: usize) -> Duration {
     );
     let found = findings(editor);
     let waited = began.elapsed();
-    assert_eq!(found > 0, n % 2 == 0, "a word that is not declared is found, and no other");
+    assert_eq!(found > 0, n.is_multiple_of(2), "a word that is not declared is found, and no other");
     waited
 }
 

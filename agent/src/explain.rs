@@ -74,7 +74,7 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
         said.push(IN_BRACKETS.into());
         said.extend(domain.as_ref().and_then(seconds));
     }
-    let name = |surface: &str| saying.name_of("surface", surface);
+    let name = |symbol: &str| saying.name_of(symbol);
     let words = verdict::Words { meanings: &meanings, name: &name };
     let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
     let verdict = verdict.iter().map(|line| saying.say(line)).collect();

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use descry_domains::goal::spoken_types;
-use descry_domains::lexicon::{Lexicon, Places};
+use descry_domains::lexicon::{Lexicon, NAMED, Places};
 use descry_domains::load::Domain;
 use descry_robots::sim::SceneSpec;
 
@@ -45,8 +45,7 @@ impl Saying {
             let parameters = domain.vocabulary.parameters(name)?;
             Some((name.clone(), (parameters, text.clone())))
         });
-        let spoken = spoken_types(domain).into_iter().map(str::to_string);
-        let spoken = spoken.chain(["kind", "surface", "room", "door", "obstacle"].map(str::to_string));
+        let spoken = spoken_types(domain).into_iter().chain(NAMED).map(str::to_string);
         Saying { forms: forms.collect(), names, spoken: spoken.collect() }
     }
 
@@ -93,9 +92,9 @@ impl Saying {
         self.forms.contains_key(name)
     }
 
-    /// What an object of a type is called.
-    pub fn name_of(&self, of: &str, symbol: &str) -> String {
-        self.name(symbol, of, &[])
+    /// What an object is called that people have a name for.
+    pub fn name_of(&self, symbol: &str) -> String {
+        self.name(symbol, NAMED[0], &[])
     }
 
     /// An expression, said; none if a part of it cannot be.

@@ -29,6 +29,8 @@ pub struct Agent<'a> {
     stop: Stop,
     tell: &'a mut dyn FnMut(&Event),
     plan: Option<Plan>,
+    /// The call that failed and left no plan.
+    failed: Option<String>,
     totals: Totals,
     /// What plans are weighed by; none where that would ask programs.
     weighed_by: Option<String>,
@@ -60,7 +62,8 @@ impl<'a> Agent<'a> {
         stop: Stop,
         tell: &'a mut dyn FnMut(&Event),
     ) -> Self {
-        Self { robot, record, stop, tell, plan: None, totals: Totals::default(), weighed_by: None }
+        let totals = Totals::default();
+        Self { robot, record, stop, tell, plan: None, failed: None, totals, weighed_by: None }
     }
 
     /// Pursues a goal until it is achieved, until nothing can help any more, or until a limit is reached.
@@ -122,7 +125,10 @@ impl<'a> Agent<'a> {
         }
         match (&self.plan, descry_planner::monitor(&round.task, &round.attachments, &self.rest())) {
             (_, Ok(())) => Ok(()),
-            (None, Err(_)) => Err("there is no plan yet".into()),
+            (None, Err(_)) => Err(match &self.failed {
+                Some(call) => format!("{call} failed"),
+                None => "there is no plan yet".into(),
+            }),
             (Some(_), Err(broken)) => Err(broken.to_string()),
         }
     }
@@ -214,7 +220,7 @@ impl<'a> Agent<'a> {
         let weighed = self.weighed_by.as_ref().map(|goal| weigh::blob(&weigh::weigh(round, &plan, goal)));
         let said = self.say_with(&event, weighed.transpose()?)?;
         self.record.hold(&[round.record, said], "plan").map_err(CommandError::broken)?;
-        self.plan = Some(plan);
+        (self.plan, self.failed) = (Some(plan), None);
         Ok(())
     }
 
@@ -366,7 +372,7 @@ impl<'a> Agent<'a> {
         failure: &SkillFailure,
     ) -> Result<(), CommandError> {
         self.check_stopped()?;
-        self.plan = None;
+        (self.plan, self.failed) = (None, Some(call.to_string()));
         let therefore = world.learn_from_failure(round, call, part, failure)?;
         if let SkillFailure::Body(body) = failure
             && matches!(

@@ -132,13 +132,13 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
     }
 }
 
-/// A simulated body in one arrangement of a scene.
+/// A simulated body in one arrangement of a scene; what goes wrong in the scene comes before what else shall.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if the scene cannot be arranged.
 pub fn simulate(spec: &SceneSpec, seed: u64, faults: FaultPlan) -> Result<Body, CommandError> {
     let scene = arrange(spec, seed).map_err(CommandError::bad_input)?;
-    let options = SimOptions { seed, faults, ..SimOptions::default() };
+    let options = SimOptions { seed, faults: faults.after(spec), ..SimOptions::default() };
     Ok(Body::simulated(Arc::new(SimRobot::new(scene, options))))
 }
 

@@ -5,7 +5,7 @@ mod chapters;
 mod plans;
 mod states;
 mod verdict;
-mod wording;
+pub mod wording;
 
 use descry_domains::abilities;
 use descry_domains::load::Domain;
@@ -16,8 +16,9 @@ use serde::Serialize;
 use crate::exit::CommandError;
 use crate::report::Report;
 use crate::run::{Beginning, Header};
+use crate::saying::Saying;
 use states::States;
-use wording::{count, wrapped};
+use wording::{count, listed, wrapped};
 
 /// What a run is explained by.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -57,17 +58,36 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let states = States::of(record)?;
     let (chapters, mut lost) = chapters::of(record, &states, &header.resumed)?;
     // The words of the domain of that time, if this version still understands it.
-    let domain = Beginning::of(record).ok().flatten().and_then(|beginning| beginning.domain().ok());
+    let beginning = Beginning::of(record).ok().flatten();
+    let domain = beginning.as_ref().and_then(|beginning| beginning.domain().ok());
+    let saying = beginning.as_ref().map(Saying::of_run).unwrap_or_default();
     let planner = descry_domains::abilities::searching::policies::PLAN;
     let policy = Some(&header.settings.policy).filter(|policy| *policy != planner).cloned();
-    let asked = Asked { goal: header.pddl_goal.clone(), policy };
-    let plans = plans::told(&chapters, &asked);
-    let is_weighed = chapters.iter().any(|c| c.weighed.as_ref().is_some_and(|w| w.chosen.is_some()));
-    let mut said = said(header, &asked, report, chapters.len(), is_weighed);
-    said.splice(1..1, domain.as_ref().and_then(|domain| numbers(domain, &chapters)));
     let meanings = |call: &str| domain.as_ref().and_then(|domain| meaning(domain, call));
-    let verdict = verdict::rests_on(record, report, &states, &meanings, &mut lost)?;
+    let counts = |action: &str| domain.as_ref().and_then(|domain| counts(domain, action));
+    let asked = Asked { goal: header.pddl_goal.clone(), policy, counts: &counts };
+    let plans = plans::told(&chapters, &asked).into_iter().map(|told| told.said(&saying)).collect();
+    let mut said = said(header, &asked, report, chapters.len(), &saying);
+    if chapters.iter().any(|c| c.weighed.as_ref().is_some_and(|w| w.chosen.is_some())) {
+        said.extend(domain.as_ref().and_then(|domain| numbers(domain, &chapters, &saying)));
+        said.extend(domain.as_ref().and_then(poses));
+        said.push(IN_BRACKETS.into());
+        said.extend(domain.as_ref().and_then(seconds));
+    }
+    let name = |symbol: &str| saying.name_of(symbol);
+    let words = verdict::Words { meanings: &meanings, name: &name };
+    let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
+    let verdict = verdict.iter().map(|line| saying.say(line)).collect();
     Ok(Explanation { asked: said, plans, verdict, lost })
+}
+
+impl Told {
+    /// With what is written in PDDL said as the domain says it.
+    fn said(self, saying: &Saying) -> Self {
+        let all = |lines: Vec<String>| lines.iter().map(|line| saying.say(line)).collect();
+        let cause = saying.say(&self.cause);
+        Told { cause, intent: all(self.intent), why: all(self.why), outcome: all(self.outcome), ..self }
+    }
 }
 
 /// What a call of the domain asks, if descry itself answers it.
@@ -77,28 +97,73 @@ fn meaning(domain: &Domain, call: &str) -> Option<String> {
     calls.find(|c| c.name == call && !own).map(|c| c.about.to_string())
 }
 
+/// The calls that an action's duration asks, by what they ask; none if it asks none that is known.
+fn counts(domain: &Domain, action: &str) -> Option<String> {
+    let calls = duration(domain, action)?.split('[').skip(1).filter_map(|call| call.split([' ', ']']).next());
+    let about = |call: &str| Some(meaning(domain, call)?.split(';').next()?.to_string());
+    let all: Vec<String> = calls.filter_map(about).collect();
+    (!all.is_empty()).then(|| listed(&all, all.len()))
+}
+
+/// Which actions count for more than they take.
+fn seconds(domain: &Domain) -> Option<String> {
+    let is_more = |name: &str| duration(domain, name).is_some_and(|duration| duration.contains("(+"));
+    let actions = domain.vocabulary.task.actions.iter().filter(|a| is_more(&a.name));
+    let all: Vec<String> =
+        actions.filter_map(|a| Some(format!("{} also the {}", a.name, counts(domain, &a.name)?))).collect();
+    (!all.is_empty())
+        .then(|| format!("Counted are, beside the time that it takes itself, of {}.", all.join("; of ")))
+}
+
+/// What stands for the duration of an action.
+fn duration<'d>(domain: &'d Domain, action: &str) -> Option<&'d str> {
+    let declared = domain.pddl.text.split_once(&format!("action {action}\n"))?.1;
+    declared.split_once(":duration")?.1.split(":condition").next()?.split(":effect").next()
+}
+
+/// How poses are called, where they are called after what is looked at.
+fn poses(domain: &Domain) -> Option<String> {
+    let text = "Poses are called after what is looked at from them, as desk-1 and desk-2 after a desk, or after a door; here-N is \
+                where the body stopped on its way.";
+    let is_searching = domain.config.uses.iter().any(|ability| ability == "searching");
+    is_searching.then(|| text.to_string())
+}
+
 /// What the numbers say that plans are to change.
-fn numbers(domain: &Domain, chapters: &[chapters::Chapter]) -> Option<String> {
+fn numbers(domain: &Domain, chapters: &[chapters::Chapter], saying: &Saying) -> Option<String> {
     let expected = chapters.iter().filter_map(|c| c.weighed.as_ref()).flat_map(|w| &w.numbers);
     let names = expected.filter_map(|n| n.name.trim_matches(['(', ')']).split(' ').next());
     let names: std::collections::BTreeSet<&str> = names.collect();
-    let about = |name: &&str| match domain.vocabulary.ground(&domain.vocabulary.word(name)?, &domain.config) {
-        Ground::Sensed(fact) => Some(format!("({name} …) is {}", fact.about)),
+    let sensed = |name: &&str| match domain.vocabulary.ground(&domain.vocabulary.word(name)?, &domain.config)
+    {
+        Ground::Sensed(fact) => Some((name.to_string(), fact.about)),
         _ => None,
     };
-    let all: Vec<String> = names.iter().filter_map(about).collect();
-    (!all.is_empty()).then(|| format!("Numbers: {}.", all.join("; ")))
+    let all: Vec<(String, &str)> = names.iter().filter_map(sensed).collect();
+    let (said, raw): (Vec<_>, Vec<_>) = all.into_iter().partition(|(name, _)| saying.has(name));
+    let raw: Vec<String> = raw.iter().map(|(name, about)| format!("({name} …) is {about}")).collect();
+    let raw = (!raw.is_empty()).then(|| format!("Numbers: {}.", raw.join("; ")));
+    let is_share = said.iter().any(|(_, about)| about.ends_with("0 to 1"));
+    let said = is_share.then(|| "A certainty is a number between 0 and 1.".to_string());
+    let all: Vec<String> = said.into_iter().chain(raw).collect();
+    (!all.is_empty()).then(|| all.join(" "))
 }
 
+/// What figures of ways mean.
+const IN_BRACKETS: &str = "In brackets behind a way: by how much it is expected to bring the numbers nearer to what is wanted, in \
+                           how many seconds, and how much that is a second; behind its steps their seconds.";
+
 /// What a run was asked, as far as plans depend on it.
-struct Asked {
+struct Asked<'a> {
     /// The goal in PDDL.
     goal: String,
     /// Who chose where to look next, if not the planner.
     policy: Option<String>,
+    /// What an action's seconds are besides those that are fixed.
+    counts: &'a dyn Fn(&str) -> Option<String>,
 }
 
-impl Asked {
+impl Asked<'_> {
     /// What the goal wants of a number: that with which it compares it, if it names it so.
     fn wanted(&self, number: &str) -> Option<f64> {
         let word = number.trim_matches(['(', ')']).split(' ').next()?;
@@ -110,18 +175,23 @@ impl Asked {
 
 fn said(
     header: &Header,
-    asked: &Asked,
+    asked: &Asked<'_>,
     report: Option<&Report>,
     plans: usize,
-    is_weighed: bool,
+    saying: &Saying,
 ) -> Vec<String> {
     let settings = &header.settings;
     let scene = settings.scene.as_ref().map(|s| format!(", scene {s}")).unwrap_or_default();
     let seed = if settings.robot == "sim" { format!(", seed {}", settings.seed) } else { String::new() };
     let mut said = vec![format!(
-        "\"{}\" was asked of the body {}{scene}{seed}, in the domain {}. It means: bring about {}.",
-        header.goal, settings.robot, settings.domain, header.pddl_goal
+        "\"{}\" was asked of the body {}{scene}{seed}, in the domain {}.",
+        header.goal, settings.robot, settings.domain
     )];
+    let (pddl, goal) = (&header.pddl_goal, saying.say(&header.pddl_goal));
+    said.push(match goal == *pddl {
+        true => format!("Wanted: {pddl}."),
+        false => format!("Wanted: {goal}. In PDDL: {pddl}."),
+    });
     if let Some(policy) = &asked.policy {
         said.push(format!("Where to look next was chosen by the policy {policy}, not by the planner."));
     }
@@ -141,13 +211,6 @@ fn said(
             n => format!("{n} times"),
         };
         said.push(format!("It was cut off {times}, and gone on with from its record."));
-    }
-    if is_weighed {
-        said.push(
-            "In brackets: by how much steps are expected to bring the numbers nearer to what is wanted, the seconds at \
-             which the domain reckons them, time for looks in vain included where it counts that, and the gain a second."
-                .into(),
-        );
     }
     said
 }
@@ -179,7 +242,7 @@ mod tests {
     #[test]
     fn what_is_wanted_stands_in_the_goal() {
         let check = |goal: &str, number: &str, expected: Option<f64>| {
-            let asked = Asked { goal: goal.into(), policy: None };
+            let asked = Asked { goal: goal.into(), policy: None, counts: &|_| None };
             assert_eq!(asked.wanted(number), expected, "{goal}: {number}");
         };
         check("(>= (confidence cup-a) 0.8)", "(confidence cup-a)", Some(0.8));

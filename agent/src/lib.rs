@@ -40,6 +40,7 @@ pub mod keeping;
 pub mod replay;
 pub mod report;
 pub mod run;
+pub mod saying;
 pub mod stop;
 pub mod template;
 pub mod weigh;

@@ -86,7 +86,8 @@ impl fmt::Display for Event {
                 write!(f, "          {makespan_s:.1} s in all; asked of attachments: {asked}")
             }
             Event::Kept { left } => {
-                write!(f, "keep      the rest of the plan still reaches the goal ({left} steps left)")
+                let steps = if *left == 1 { "step" } else { "steps" };
+                write!(f, "keep      the rest of the plan still reaches the goal ({left} {steps} left)")
             }
             Event::Acting { call, because } if because.is_empty() => write!(f, "do        {call}"),
             Event::Acting { call, because } => write!(f, "do        {call}: {because}"),
@@ -231,16 +232,20 @@ impl fmt::Display for Report {
             let on = o.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
             writeln!(f, "  {name:16} {:.2} at ({x:.3}, {y:.3}, {z:.3}) m{on}", o.confidence)?;
         }
+        let counted = |n: usize, of: &str| format!("{n} {of}{}", if n == 1 { "" } else { "s" });
         writeln!(
             f,
-            "  {} views, {} replans, {:.1} m and {:.0} s on the body's clock, {:.1} s on the wall, at most {:.3} s to plan and {:.3} s for its questions to geometry",
-            self.views,
-            self.replans,
+            "  {}, {}, {:.1} m and {:.0} s on the body's clock, {:.1} s on the wall",
+            counted(self.views, "view"),
+            counted(self.replans, "replan"),
             self.distance_m,
             self.sim_time_s,
-            self.wall_s,
-            self.planning_s,
-            self.geometry_s
+            self.wall_s
+        )?;
+        writeln!(
+            f,
+            "  at most {:.3} s to plan and {:.3} s for its questions to geometry",
+            self.planning_s, self.geometry_s
         )?;
         write!(f, "  record: {}", self.run)
     }

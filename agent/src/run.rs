@@ -32,7 +32,7 @@ use crate::keeping::Keeping;
 use crate::report::{Event, Report};
 use crate::stop::Stop;
 pub use beginning::Beginning;
-pub use files::{finish, has_ended, header, keep_header, report};
+pub use files::{finish, has_ended, header, keep_header, lost_of_header, report};
 pub use folder::Folder;
 pub use resumed::{GoingOn, Prepare, Resumed, resume};
 

@@ -32,7 +32,7 @@ const GAINED: f64 = 1e-6;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Weighed {
-    /// The numbers that count, before the plan and as it expects them in the end; where it uses up what it gains, as soon as it has.
+    /// The numbers that count, before the plan and as it expects them in the end; where it uses up what it gains, when it has most.
     pub numbers: Vec<Expected>,
     /// The plan until it first gains something.
     pub chosen: Option<Way>,
@@ -58,10 +58,16 @@ pub struct Expected {
 pub struct Way {
     /// The calls.
     pub steps: Vec<String>,
+    /// What each counts for, seconds; records of earlier versions do not say.
+    #[serde(default)]
+    pub each_s: Vec<f64>,
     /// What they count for, one after the other, seconds.
     pub takes_s: f64,
     /// By how much they bring the numbers that count nearer to what is wanted, together.
     pub gains: f64,
+    /// Whether the goal is expected to hold then; records of earlier versions do not say.
+    #[serde(default)]
+    pub reaches: Option<bool>,
 }
 
 impl Way {
@@ -203,14 +209,11 @@ impl<'r> Scale<'r> {
         (if less { now - then } else { then - now }).max(0.0)
     }
 
-    /// Steps, one after the other: what they count for, seconds, and the state then; none where they cannot be taken.
-    fn after(&self, steps: &[Step]) -> Option<(f64, State)> {
+    /// Steps, one after the other: what each counts for, seconds, and the state then; none where they cannot be taken.
+    fn after(&self, steps: &[Step]) -> Option<(Vec<f64>, State)> {
         let mut state = self.state.clone();
-        let mut takes_s = 0.0;
-        for step in steps {
-            takes_s += self.apply(&mut state, step)?;
-        }
-        Some((takes_s, state))
+        let each = steps.iter().map(|step| self.apply(&mut state, step)).collect::<Option<_>>()?;
+        Some((each, state))
     }
 
     /// Applies a step; returns what it counts for, seconds.
@@ -252,12 +255,16 @@ impl<'r> Scale<'r> {
     }
 
     fn way(&self, steps: &[Step]) -> Option<Way> {
-        let (takes_s, state) = self.after(steps)?;
+        let (each_s, state) = self.after(steps)?;
         let (now, then) = (self.numbers(&self.state), self.numbers(&state));
         let gain = |(name, (now, less)): (&String, &(f64, bool))| {
             then.get(name).map_or(0.0, |(then, _)| Self::gain(*now, *then, *less))
         };
-        Some(Way { steps: steps.iter().map(call).collect(), takes_s, gains: now.iter().map(gain).sum() })
+        let takes_s = each_s.iter().sum();
+        let goal = &self.semantics.task.goal;
+        let reaches = self.semantics.holds(&state, &goal.body, &mut Binding::new(goal.slots)).ok();
+        let gains = now.iter().map(gain).sum();
+        Some(Way { steps: steps.iter().map(call).collect(), each_s, takes_s, gains, reaches })
     }
 
     /// The numbers that steps bring nearer to what is wanted.
@@ -270,15 +277,22 @@ impl<'r> Scale<'r> {
         self.numbers(&self.state).into_iter().filter_map(expected).collect()
     }
 
+    /// What a plan expects of the numbers in the end; where it uses up what it gains, when it has most.
+    fn at_most(&self, steps: &[Step]) -> Vec<Expected> {
+        let whole = self.expected(steps);
+        if !whole.is_empty() {
+            return whole;
+        }
+        let gained = |all: &Vec<Expected>| all.iter().map(|n| (n.then - n.now).abs()).sum::<f64>();
+        let parts = (1..steps.len()).map(|n| self.expected(&steps[..n]));
+        parts.max_by(|a, b| gained(a).total_cmp(&gained(b))).unwrap_or_default()
+    }
+
     fn weigh(&self, plan: &Plan) -> Option<Weighed> {
         let first = (1..=plan.steps.len().min(MOST_STEPS))
             .find_map(|n| Some((n, self.way(&plan.steps[..n]).filter(|way| way.gains > GAINED)?)));
         let (n, chosen) = first?;
-        let mut numbers = self.expected(&plan.steps);
-        if numbers.is_empty() {
-            // What a look is to make sure of may no longer be so once the plan has used it.
-            numbers = self.expected(&plan.steps[..n]);
-        }
+        let numbers = self.at_most(&plan.steps);
         let others = self.others(&plan.steps[..n], &chosen);
         let open = others.len() + 1;
         Some(Weighed { numbers, chosen: Some(chosen), others: kept(others), open })

@@ -32,14 +32,22 @@ use texts::Texts;
 /// [`CommandError::Broken`] if the editor does not speak the protocol, or goes without a word.
 pub fn serve() -> Result<(), CommandError> {
     let (connection, threads) = Connection::stdio();
+    serve_over(&connection)?;
+    drop(connection);
+    threads.join().map_err(CommandError::broken)
+}
+
+/// Serves an editor over a connection until it goes.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the editor does not speak the protocol, or goes without a word.
+pub fn serve_over(connection: &Connection) -> Result<(), CommandError> {
     let capabilities = serde_json::to_value(capabilities()).map_err(|e| CommandError::Bug(e.to_string()))?;
     let (id, _) = connection.initialize_start().map_err(CommandError::broken)?;
     let server = json!({ "name": "descry", "version": env!("CARGO_PKG_VERSION") });
     let said = json!({ "capabilities": capabilities, "serverInfo": server });
     connection.initialize_finish(id, said).map_err(CommandError::broken)?;
-    converse(&connection)?;
-    drop(connection);
-    threads.join().map_err(CommandError::broken)
+    converse(connection)
 }
 
 fn capabilities() -> ServerCapabilities {

@@ -1,14 +1,10 @@
 //! `descry`: the command line, an interface that scripts depend on.
 
-mod commands;
-mod findings;
-mod layout;
-mod lsp;
-
 use std::process::ExitCode;
 
 use descry_agent::exit::Exit;
 use descry_agent::stop::Stop;
+use descry_cli::commands;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::filter::LevelFilter;
@@ -35,7 +31,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(Ok(exit)) => exit.into(),
         Ok(Err(error)) => {
-            commands::narrate(&format!("descry: {error}"));
+            commands::narrate_fitted(&format!("descry: {error}"));
             error.exit().into()
         }
         Err(_) => Exit::Bug.into(),

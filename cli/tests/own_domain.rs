@@ -316,7 +316,7 @@ fn a_domain_with_a_fault_is_refused_before_anything_begins() {
         let output = descry(folder.path(), arguments);
         let (out, err) = shown(&output);
         assert!(
-            err.contains("domain.toml:31") && err.contains("did you mean `observe`"),
+            err.contains("domain.toml:43") && err.contains("did you mean `observe`"),
             "{arguments:?}: {out}{err}"
         );
         assert_eq!(output.status.code(), Some(if arguments[0] == "check" { 1 } else { 2 }), "{arguments:?}");

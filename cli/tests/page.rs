@@ -49,6 +49,18 @@ fn a_page_stands_alone_and_tells_the_run() {
         deeds.iter().filter(|deed| deed["call"].as_str().is_some_and(|c| c.contains("observe"))).count(),
         looks
     );
+    // What people read is said as the domain says it; what a step is called in the plan is beside it.
+    assert_eq!(story["wanted"], "the certainty of where cup A stands is at least 0.8");
+    let calls = story["calls"].as_object().expect("calls");
+    assert!(
+        calls.values().any(|said| said.as_str().is_some_and(|s| s.starts_with("looking at the table from ")))
+    );
+    let texts: Vec<&str> =
+        story["moments"].as_array().into_iter().flatten().filter_map(|m| m["text"].as_str()).collect();
+    let raw = texts
+        .iter()
+        .find(|text| ["(move ", "(observe ", "(confidence ", "_"].iter().any(|r| text.contains(r)));
+    assert_eq!(raw, None, "this is no sentence");
     assert!(page.len() < 1_000_000 * (looks + 1), "{} bytes for {looks} looks", page.len());
     in_a_browser(folder.path());
 }

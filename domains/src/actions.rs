@@ -79,6 +79,12 @@ pub(crate) fn grounded(domain: &Domain, call: &Call, step: usize) -> Option<Grou
     Some(Grounded { word, arguments: tokens.collect() })
 }
 
+/// Of the parts of a call the one that its action is called after, else the first.
+pub(crate) fn foremost(domain: &Domain, call: &Call) -> Option<Grounded> {
+    let parts = || (0..).map_while(|step| grounded(domain, call, step));
+    parts().find(|part| part.word.name == call.action).or_else(|| parts().next())
+}
+
 /// Texts over the variables of an action, with a call's objects in their place.
 pub(crate) fn substituted(domain: &Domain, call: &Call, texts: &[String]) -> Vec<String> {
     texts.iter().map(|text| substitute(domain, call, text, None)).collect()

@@ -167,7 +167,7 @@ impl Asker<'_> {
             }
             said.push(match members.len() {
                 0 => format!("there is no {}", kind.name),
-                n => format!("all of {} are found: {n}, {}", kind.name, members.join("; ")),
+                n => format!("all {}s are found: {n}, {}", kind.name, members.join("; ")),
             });
             // As sure as was asked for is not sure.
             let hidden = s.doubt_of(of).hidden;
@@ -337,7 +337,8 @@ impl Asker<'_> {
     fn looks(&self) -> String {
         let known = &self.mind.known;
         let poses = known.candidates.len() - known.out_of_reach.len();
-        format!("after {} looks, with {poses} poses that can be reached", self.mind.views)
+        let looks = if self.mind.views == 1 { "look" } else { "looks" };
+        format!("after {} {looks}, with {poses} poses that can be reached", self.mind.views)
     }
 
     fn seen_of(&self, doubt: &Doubt, left: f64) -> String {

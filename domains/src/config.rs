@@ -45,6 +45,10 @@ pub struct Config {
     /// Where words come from that no ability states.
     #[serde(default)]
     pub word: BTreeMap<String, WordConfig>,
+    /// How people are told of an action, a word or a call, by its name; `?from` in it stands for the name of that parameter's object.
+    /// Actions read like `looking at the ?on`, words like `the ?way is shut`. What has no line is shown as PDDL.
+    #[serde(default)]
+    pub said: BTreeMap<String, String>,
     /// Objects of the domain's own types, by type.
     #[serde(default)]
     pub objects: BTreeMap<String, Vec<String>>,

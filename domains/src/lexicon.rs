@@ -21,6 +21,9 @@ pub fn symbol(name: &str) -> String {
     if symbol.starts_with(|c: char| c.is_ascii_digit()) { format!("n-{symbol}") } else { symbol }
 }
 
+/// Types whose objects have names in every domain: their symbols are these names.
+pub const NAMED: [&str; 5] = ["surface", "room", "door", "kind", "obstacle"];
+
 /// Something that can be named: its PDDL symbol, and what it is called, the usual name first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Named {

@@ -95,8 +95,9 @@ impl fmt::Display for Note {
                 let (views, mm) = (if *merged == 1 { "view" } else { "views" }, residual_m * 1e3);
                 write!(
                     f,
-                    "see       {on}: {merged} {views} merged, {points} points, {mm:.1} mm apart; {} objects",
-                    objects.len()
+                    "see       {on}: {merged} {views} merged, {points} points, {mm:.1} mm apart; {} {}",
+                    objects.len(),
+                    if objects.len() == 1 { "object" } else { "objects" }
                 )?;
                 let lines = left_out.iter().chain(objects).chain(changed);
                 lines.into_iter().try_for_each(|text| write!(f, "\n          {text}"))

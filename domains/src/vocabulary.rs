@@ -105,6 +105,17 @@ impl Vocabulary {
         Some(action.parameters.iter().map(|p| (p.name.clone(), self.type_name(&p.types))).collect())
     }
 
+    /// The parameters of an action, a predicate, a function or a call, in their order: name and type; none if nothing is called so.
+    pub fn parameters(&self, name: &str) -> Option<Vec<(String, String)>> {
+        let task = &self.task;
+        let action = task.actions.iter().find(|a| a.name == name).map(|a| &a.parameters);
+        let predicate = || task.predicates.iter().find(|p| p.name == name).map(|p| &p.parameters);
+        let function = || task.functions.iter().find(|f| f.name == name).map(|f| &f.parameters);
+        let call = || task.modules.iter().find(|m| m.name == name).map(|m| &m.parameters);
+        let found = action.or_else(predicate).or_else(function).or_else(call)?;
+        Some(found.iter().map(|p| (p.name.clone(), self.type_name(&p.types))).collect())
+    }
+
     /// The domain's constants of a type or a subtype of it.
     pub fn constants(&self, of: &str) -> Vec<String> {
         let is = |types: &[TypeId]| types.iter().any(|id| self.is_a(&self.task.type_of(*id).name, of));

@@ -338,7 +338,8 @@ impl<'a> World<'a> {
     pub fn explain(&self, round: &Round, call: &Call) -> String {
         match actions::because(self.setting.domain, call) {
             Some(said) => said,
-            None => self.grounded(call, 0).map_or_else(String::new, |g| g.because(&round.situation)),
+            None => actions::foremost(self.setting.domain, call)
+                .map_or_else(String::new, |part| part.because(&round.situation)),
         }
     }
 

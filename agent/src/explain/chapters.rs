@@ -18,6 +18,10 @@ pub struct Chapter {
     pub at_s: f64,
     /// Why the plan before no longer did, as it was said.
     pub because: String,
+    /// After how much the planner's search was ended without a proof; none: it ended by itself.
+    pub cut: Option<String>,
+    /// The greatest of the numbers of which one would do, and none does.
+    pub most: Option<(String, f64)>,
     /// Its steps, as they were said.
     pub steps: Vec<String>,
     /// What it takes to its end, seconds.
@@ -74,8 +78,12 @@ pub fn of(
         let deed = match event {
             Event::Planned { round, because, steps, makespan_s, .. } => {
                 let weighed = weighed(record, document, &mut lost);
+                let cut = because.split_once("; the search ended after ").map(|(_, cut)| cut.to_string());
+                let because =
+                    because.split("; the search ended after ").next().unwrap_or_default().to_string();
+                let most = one_of(&because).and_then(|begins| states.most(document.id, &begins));
                 let deeds = Vec::new();
-                chapters.push(Chapter { round, at_s, because, steps, makespan_s, weighed, deeds });
+                chapters.push(Chapter { round, at_s, because, cut, most, steps, makespan_s, weighed, deeds });
                 None
             }
             Event::Goal { .. } | Event::Kept { .. } => None,
@@ -93,6 +101,13 @@ pub fn of(
         }
     }
     Ok((chapters, lost))
+}
+
+/// How the numbers begin of which one would do: `(f a ` of `(exists (?x) (>= (f a ?x) …`.
+fn one_of(because: &str) -> Option<String> {
+    let (variable, rest) = because.split_once("(exists (?")?.1.split_once(')')?;
+    let number = rest.trim_start().strip_prefix("(>= ")?.split_once(')')?.0;
+    number.strip_suffix(&format!("?{variable}")).map(str::to_string)
 }
 
 /// What a plan was weighed against, if its document has it.

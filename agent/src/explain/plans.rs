@@ -15,16 +15,16 @@ const ALIKE: f64 = 0.02;
 const MOST_KEPT: usize = crate::weigh::MOST_KEPT;
 
 /// All plans of a run.
-pub fn told(chapters: &[Chapter], asked: &Asked) -> Vec<Told> {
+pub fn told(chapters: &[Chapter], asked: &Asked<'_>) -> Vec<Told> {
     let before = std::iter::once(None).chain(chapters.iter().map(Some));
     chapters.iter().zip(before).map(|(chapter, before)| tell(chapter, before, asked)).collect()
 }
 
-fn tell(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked) -> Told {
+fn tell(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Told {
     Told {
         round: chapter.round,
         at_s: chapter.at_s,
-        cause: cause(chapter, before),
+        cause: cause(chapter, before, asked),
         intent: intent(chapter, asked),
         why: why(chapter, asked),
         outcome: chapter.deeds.iter().filter_map(outcome).collect(),
@@ -32,7 +32,7 @@ fn tell(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked) -> Told {
 }
 
 /// What a plan was caused by: the failure, or what was learned, that ended the one before; or that it had been done and was not enough.
-fn cause(chapter: &Chapter, before: Option<&Chapter>) -> String {
+fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> String {
     let Some(before) = before else { return "the run began, and there was no plan.".into() };
     let last = before.deeds.iter().rev().find(|deed| !matches!(deed, Deed::Resumed));
     if let Some(Deed::Failed { call, therefore, .. }) = last {
@@ -45,16 +45,17 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>) -> String {
     let begun = before.deeds.iter().filter(|deed| matches!(deed, Deed::Began)).count();
     let done = match before.steps.len().saturating_sub(begun) {
         0 => {
-            let now = reasons::missed(&chapter.because, "is");
+            let now = reasons::missed(&chapter.because, "is", asked.counts);
             format!("plan {} was carried out to its end, and {now}.", before.round)
         }
         left => {
-            let now = reasons::missed(&chapter.because, "would be only");
+            let now = reasons::missed(&chapter.because, "would be only", asked.counts);
             let rest = if left == 1 { "step that was".into() } else { format!("{left} steps that were") };
             format!("with what was learned, the {rest} left of plan {} would not do: {now}.", before.round)
         }
     };
-    format!("{}{done}", moved.unwrap_or_default())
+    let most = chapter.most.as_ref().map(|(name, most)| format!(" The greatest: {name}, {}.", share(*most)));
+    format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
 }
 
 /// A step as it is written in a plan, without its times.
@@ -65,14 +66,18 @@ fn bare(step: &str) -> &str {
     }
 }
 
-fn intent(chapter: &Chapter, asked: &Asked) -> Vec<String> {
+fn intent(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     let steps: Vec<&str> = chapter.steps.iter().map(|s| bare(s)).collect();
     let mut said = vec![format!("{}.", steps.join(", then "))];
     let mut numbers: Vec<&Expected> = chapter.weighed.iter().flat_map(|w| &w.numbers).collect();
     numbers.sort_by(|a, b| (b.then - b.now).abs().total_cmp(&(a.then - a.now).abs()));
     let one = |n: &&Expected| {
-        let wanted = asked.wanted(&n.name).map(|w| format!(" ({} is wanted)", share(w))).unwrap_or_default();
-        format!("{} from {} to {}{wanted}", n.name, share(n.now), share(n.then))
+        let wanted = asked.wanted(&n.name);
+        // What looks promise is added up: of what ends at 1 it may be more.
+        let is_share = wanted.is_some_and(|wanted| wanted <= 1.0) && (0.0..=1.0).contains(&n.now);
+        let then = if is_share { n.then.min(1.0) } else { n.then };
+        let wanted = wanted.map(|w| format!(" ({} is wanted)", share(w))).unwrap_or_default();
+        format!("{} from {} to {}{wanted}", n.name, share(n.now), share(then))
     };
     let named: Vec<String> = numbers.iter().take(MOST_NAMED).map(one).collect();
     if !named.is_empty() {
@@ -84,22 +89,28 @@ fn intent(chapter: &Chapter, asked: &Asked) -> Vec<String> {
 }
 
 /// Why this plan and not another, as far as the record says.
-fn why(chapter: &Chapter, asked: &Asked) -> Vec<String> {
+fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     let Some(weighed) = &chapter.weighed else {
         return vec!["what else could have been done, and at what cost, is not in the record.".into()];
     };
     let Some(chosen) = &weighed.chosen else {
+        if let Some(cut) = &chapter.cut {
+            return vec![format!(
+                "the planner's search was ended after {cut}, without a plan that it expected to reach the goal. What \
+                 promises most by itself is done."
+            )];
+        }
         return vec![
             "it does what the goal asks next. No step of it is there to learn more: nothing was compared."
                 .into(),
         ];
     };
     if weighed.others.is_empty() {
-        return vec![format!("{} was the only way known to get further.", chosen.steps.join(" "))];
+        return vec![format!("{} was the only way known to get further.", steps(chosen))];
     }
     let mut named = Named::default();
     let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
-    said.extend(quickest(weighed, chosen, asked, &mut named));
+    said.extend(quickest((weighed, chapter.cut.is_none()), chosen, asked, &mut named));
     let most = weighed.others.iter().max_by(|a, b| a.gains.total_cmp(&b.gains));
     if let Some(other) = most.filter(|o| o.gains > chosen.gains * (1.0 + ALIKE)) {
         let more_s = other.takes_s - chosen.takes_s;
@@ -118,7 +129,7 @@ impl Named {
     /// A way, the first time with its figures.
     fn once(&mut self, way: &Way) -> String {
         if self.0.contains(&way.steps) {
-            return way.steps.join(" ");
+            return way.steps.join(", ");
         }
         self.0.push(way.steps.clone());
         figures(way)
@@ -127,13 +138,17 @@ impl Named {
 
 /// A way with its figures.
 fn figures(way: &Way) -> String {
-    format!(
-        "{} [+{} in {:.1} s, {} a second]",
-        way.steps.join(" "),
-        share(way.gains),
-        way.takes_s,
-        rate(way.rate())
-    )
+    let gains = if way.gains < 0.01 { share(way.gains) } else { format!("{:.2}", way.gains) };
+    format!("{} [+{gains} in {:.1} s, {} a second]", steps(way), way.takes_s, rate(way.rate()))
+}
+
+/// The steps of a way, of several each with its seconds, if the record has them.
+fn steps(way: &Way) -> String {
+    if way.each_s.len() != way.steps.len() || way.steps.len() < 2 {
+        return way.steps.join(", ");
+    }
+    let each = way.steps.iter().zip(&way.each_s);
+    each.map(|(step, takes_s)| format!("{step} ({takes_s:.1} s)")).collect::<Vec<_>>().join(", ")
 }
 
 /// Three digits that count.
@@ -143,7 +158,13 @@ fn rate(rate: f64) -> String {
 }
 
 /// Where a plan's way stands among all, by what is gained a second.
-fn compared(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked, named: &mut Named) -> String {
+fn compared(
+    chapter: &Chapter,
+    weighed: &Weighed,
+    chosen: &Way,
+    asked: &Asked<'_>,
+    named: &mut Named,
+) -> String {
     let all = weighed.open;
     let ratio = |o: &Way| o.rate() / chosen.rate();
     let better: Vec<&Way> = weighed.others.iter().filter(|o| ratio(o) > 1.0 + ALIKE).collect();
@@ -158,37 +179,60 @@ fn compared(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked, n
     let more = if better.len() >= MOST_KEPT { "at least " } else { "" };
     let many = if better.len() == 1 { "1 gains".into() } else { format!("{} gain", better.len()) };
     let first = named.once(better[0]);
-    let rule = match &asked.policy {
-        Some(policy) => format!("The policy {policy} goes by its own rule."),
-        None => {
+    let rule = match (&asked.policy, &chapter.cut) {
+        (Some(policy), _) => format!("The policy {policy} goes by its own rule."),
+        (None, Some(cut)) => {
+            format!("The planner's search was ended after {cut}: this is the best that it had by then.")
+        }
+        (None, None) => {
             let alone = match enough(weighed, better[0], asked) {
                 Some(false) => " That one would not be expected to be enough by itself.",
+                Some(true) if better[0].takes_s < chapter.makespan_s => {
+                    " That one would be expected to be enough, and sooner: the planner did not come upon it."
+                }
                 _ => "",
             };
+            let whole = match chapter.makespan_s {
+                // Nothing in the domain takes time.
+                s if s <= 0.0 => "a whole plan".to_string(),
+                s => format!("the quickest whole plan that it finds, here {s:.1} s"),
+            };
             format!(
-                "The planner counts to the end: it takes the quickest whole plan that it finds, here {:.1} s, not what gains \
-                 most a second at first.{alone}",
-                chapter.makespan_s
+                "The planner counts to the end: it takes {whole}, not what gains most a second at first.{alone}"
             )
         }
     };
     format!("{mine} is one of {all} ways to get further; {more}{many} more a second, first {first}. {rule}")
 }
 
-/// Whether a way by itself is expected to be enough; none where more than one number counts, or nothing says what is wanted.
-fn enough(weighed: &Weighed, way: &Way, asked: &Asked) -> Option<bool> {
+/// Whether a way by itself is expected to be enough; none where nothing says so: it is only a part of what is to be done.
+fn enough(weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
+    let is_whole = |way: &Way| way.reaches == Some(true);
+    match way.reaches {
+        Some(true) => return Some(true),
+        Some(false) if weighed.chosen.iter().chain(&weighed.others).any(is_whole) => return Some(false),
+        _ => {}
+    }
     let [only] = weighed.numbers.as_slice() else { return None };
     let wanted = asked.wanted(&only.name)?;
     Some(if only.then >= only.now { only.now + way.gains >= wanted } else { only.now - way.gains <= wanted })
 }
 
 /// The quickest way, if it is another, and why it was not taken.
-fn quickest(weighed: &Weighed, chosen: &Way, asked: &Asked, named: &mut Named) -> Option<String> {
+fn quickest(
+    (weighed, is_whole_search): (&Weighed, bool),
+    chosen: &Way,
+    asked: &Asked<'_>,
+    named: &mut Named,
+) -> Option<String> {
     let other = weighed.others.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s))?;
     if other.takes_s > chosen.takes_s - 0.1 {
         return None;
     }
     let but = match enough(weighed, other, asked) {
+        Some(true) if asked.policy.is_none() && is_whole_search => {
+            ", and would be expected to be enough: the planner did not come upon it"
+        }
         Some(false) => ", but would not be expected to be enough by itself",
         _ if other.gains < chosen.gains => ", but gains less",
         _ => "",
@@ -203,7 +247,7 @@ fn outcome(deed: &Deed) -> Option<String> {
         Deed::Ended(call, said) => format!("{call}: {said}."),
         Deed::Failed { call, because, changed, .. } => {
             let since = changed.as_ref().filter(|c| !c.is_empty());
-            let since = since.map(|c| format!(" From then on {c}.")).unwrap_or_default();
+            let since = since.map(|c| format!(" From then on: {c}.")).unwrap_or_default();
             format!("{call} failed: {because}.{since}")
         }
         Deed::Resumed => {
@@ -218,6 +262,11 @@ fn outcome(deed: &Deed) -> Option<String> {
             let left_out: String = left_out.iter().map(|why| format!("; {}", left_out_as(why))).collect();
             let changed: String = changed.iter().map(|text| format!("; {text}")).collect();
             format!("the {on}, in {views}, shows {}{left_out}{changed}.", shown(objects.len()))
+        }
+        // What to set otherwise is for who programs it.
+        Deed::Noted(Note::Nothing { because }) => {
+            let why = because.split(": ").next().and_then(|why| why.split(" among the ").next()).unwrap_or(because);
+            format!("the look showed nothing that things could stand on: {why}.")
         }
         Deed::Noted(note) => {
             let text = note.to_string();
@@ -239,5 +288,69 @@ fn left_out_as(said: &str) -> String {
     match said.split_once(" left out: ") {
         Some((view, why)) => format!("{view} is left out: {}", why.strip_prefix("left out: ").unwrap_or(why)),
         None => format!("left out: {said}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn way(step: &str, takes_s: f64, gains: f64, reaches: Option<bool>) -> Way {
+        Way { steps: vec![step.into()], each_s: vec![takes_s], takes_s, gains, reaches }
+    }
+
+    /// The first plan of a run, which takes ten seconds to its end, and why it was this one.
+    fn check(chosen: Option<Way>, others: &[Way], cut: Option<&str>, words: &[&str]) {
+        let numbers = vec![Expected { name: "(sure)".into(), now: 0.0, then: 1.25 }];
+        let weighed = Weighed { numbers, open: others.len() + 1, chosen, others: others.to_vec() };
+        let cut = cut.map(str::to_string);
+        let chapter = Chapter { makespan_s: 10.0, weighed: Some(weighed), cut, ..Chapter::default() };
+        let asked = Asked { goal: "(>= (sure) 0.8)".into(), policy: None, counts: &|_| None };
+        let told = tell(&chapter, None, &asked);
+        let said = [told.intent, told.why].concat().join(" ");
+        words.iter().for_each(|word| assert!(said.contains(word), "{word:?} is not in {said}"));
+    }
+
+    #[test]
+    fn it_is_said_what_the_planner_missed_and_when_it_was_stopped() {
+        let chosen = || Some(way("(go far)", 8.0, 0.9, Some(true)));
+        check(
+            chosen(),
+            &[way("(stay)", 2.0, 0.85, Some(true))],
+            None,
+            &[
+                "1 gains more a second, first (stay)",
+                "enough, and sooner: the planner did not come upon it",
+                "(stay) is the quickest, and would be expected to be enough",
+                "(sure) from 0.00 to 1.00 (0.80 is wanted)",
+            ],
+        );
+        check(
+            chosen(),
+            &[way("(stay)", 2.0, 0.85, Some(false))],
+            None,
+            &[
+                "That one would not be expected to be enough by itself",
+                "(stay) is the quickest, but would not be expected to be enough",
+            ],
+        );
+        // Of a record that does not say what would be enough, the numbers say it.
+        check(
+            Some(way("(go far)", 8.0, 0.9, None)),
+            &[way("(stay)", 2.0, 0.5, None)],
+            None,
+            &["(stay) is the quickest, but would not be expected to be enough"],
+        );
+        check(
+            chosen(),
+            &[way("(stay)", 2.0, 0.85, Some(true))],
+            Some("9 states"),
+            &[
+                "search was ended after 9 states: this is the best that it had by then",
+                "(stay) is the quickest, but gains less",
+            ],
+        );
+        check(None, &[], Some("9 states"), &["without a plan that it expected to reach the goal"]);
+        check(None, &[], None, &["nothing was compared"]);
     }
 }

@@ -86,10 +86,8 @@ impl fmt::Display for Difference {
             format!("{name} is {} instead of {}", share(*now), share(*was))
         };
         let numbers: Vec<String> = self.numbers.iter().map(number).collect();
-        let holds = |all: &[String]| if all.len() == 1 { "holds" } else { "hold" };
-        let came = (!self.came.is_empty()).then(|| format!("{} {}", facts(&self.came), holds(&self.came)));
-        let went =
-            (!self.went.is_empty()).then(|| format!("{} no longer {}", facts(&self.went), holds(&self.went)));
+        let came = (!self.came.is_empty()).then(|| facts(&self.came));
+        let went = (!self.went.is_empty()).then(|| format!("no longer: {}", facts(&self.went)));
         let numbers = (!numbers.is_empty()).then(|| listed(&numbers, MOST_NAMED));
         let all: Vec<String> = [came, went, numbers].into_iter().flatten().collect();
         f.write_str(&all.join("; "))
@@ -109,6 +107,14 @@ impl States {
         let (problems, _) = record.find_whole(&Query::of_kind("problem")).map_err(CommandError::broken)?;
         let of = |d: &descry_memory::Document| Some((d.id, State::read(d.body["pddl"].as_str()?)));
         Ok(States(problems.iter().filter_map(of).collect()))
+    }
+
+    /// The greatest of the numbers that begin so, before something that was recorded under a number.
+    pub fn most(&self, id: RecordId, begins: &str) -> Option<(String, f64)> {
+        let state = &self.0.iter().rev().find(|(round, _)| *round < id)?.1;
+        let numbers = state.numbers.iter().filter(|(name, _)| name.starts_with(begins));
+        let most = numbers.max_by(|a, b| a.1.total_cmp(b.1))?;
+        Some((most.0.clone(), *most.1))
     }
 
     /// What changed with something that was recorded under a number: from the round before it to the next.
@@ -139,12 +145,12 @@ mod tests {
         check(BEFORE, "");
         check(
             "(:init (at start) (shut door) (= (sure) 0.8) (= (presence cup-a desk) 0.400000))",
-            "(shut door) holds; (hand-free) no longer holds; (presence cup-a desk) is 0.40 instead of 0.85",
+            "(shut door); no longer: (hand-free); (presence cup-a desk) is 0.40 instead of 0.85",
         );
         check("(:init (at start) (hand-free) (= (sure) 0.8) (= (presence cup-a desk) 0.851))", "");
         check(
             "(:init (a) (b) (c) (d) (e) (f) (at start) (hand-free) (= (sure) 0.8))",
-            "(a), (b), (c), (d) and 2 more hold",
+            "(a), (b), (c), (d) and 2 more",
         );
         assert!(State::read("nothing").facts.is_empty());
     }

@@ -20,6 +20,14 @@ const MOST_NAMED: usize = 6;
 /// What an object is not with more than this is not worth a word.
 const HARDLY: f64 = 0.005;
 
+/// The words of a run's domain.
+pub struct Words<'a> {
+    /// What a call asks.
+    pub meanings: Meanings<'a>,
+    /// What a surface is called.
+    pub name: &'a dyn Fn(&str) -> String,
+}
+
 /// It, in sentences.
 ///
 /// # Errors
@@ -28,7 +36,7 @@ pub fn rests_on(
     record: &Record,
     report: Option<&Report>,
     states: &States,
-    meanings: Meanings<'_>,
+    words: &Words<'_>,
     lost: &mut Vec<String>,
 ) -> Result<Vec<String>, CommandError> {
     let Some(report) = report else {
@@ -45,14 +53,14 @@ pub fn rests_on(
         Some(answer) => format!("the answer is {answer} ({verdict})"),
         None => verdict.to_string(),
     };
-    let mut said = vec![format!("{verdict}: {}.", reasons::no_plan(why, meanings))];
+    let mut said = vec![format!("{verdict}: {}.", reasons::no_plan(why, words.meanings))];
     let (beliefs, faults) = record.find_whole(&Query::of_kind("belief")).map_err(CommandError::broken)?;
     lost.extend(faults.iter().map(ToString::to_string));
     let newest = beliefs.last().and_then(|d| serde_json::from_value::<Belief>(d.body.clone()).ok());
     match &newest {
         Some(belief) => {
             said.push("after the last look this was believed:".into());
-            said.extend(believed(belief, report));
+            said.extend(believed(belief, report, words));
             let since = beliefs.last().and_then(|look| states.since(look.id));
             let since = since.filter(|since: &Difference| !since.is_empty());
             said.extend(since.map(|since| format!("and by what was done since that look: {since}.")));
@@ -64,7 +72,7 @@ pub fn rests_on(
     match rests {
         Some(rests) => {
             said.extend(rests.in_doubt.iter().map(|doubt| seen(doubt, &looks)));
-            said.extend(left(&rests, report, meanings));
+            said.extend(left(&rests, report, words.meanings));
         }
         None => said
             .push("what was seen of each surface in the end, and what is left, is not in the record.".into()),
@@ -94,11 +102,11 @@ impl Looks {
 }
 
 /// What is believed of what was asked for; where that was not one thing, of every object, the least sure first.
-fn believed(belief: &Belief, report: &Report) -> Vec<String> {
+fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> {
     let mut tracks: Vec<&Track> = belief.tracks.iter().collect();
     let Some(name) = &report.object else {
         tracks.sort_by(|a, b| a.certainty().total_cmp(&b.certainty()));
-        let mut said: Vec<String> = tracks.iter().take(MOST_NAMED).map(|t| object(t, None)).collect();
+        let mut said: Vec<String> = tracks.iter().take(MOST_NAMED).map(|t| object(t, None, words)).collect();
         if tracks.len() > MOST_NAMED {
             said.push(format!("{} of which it is surer.", count(tracks.len() - MOST_NAMED, "more object")));
         }
@@ -106,7 +114,8 @@ fn believed(belief: &Belief, report: &Report) -> Vec<String> {
     };
     tracks.sort_by(|a, b| b.probability_of(name).total_cmp(&a.probability_of(name)));
     let may_be: Vec<&&Track> = tracks.iter().filter(|t| t.probability_of(name) > HARDLY).collect();
-    let mut said: Vec<String> = may_be.iter().take(MOST_NAMED).map(|t| object(t, Some(name))).collect();
+    let mut said: Vec<String> =
+        may_be.iter().take(MOST_NAMED).map(|t| object(t, Some(name), words)).collect();
     let (rest, known) = (tracks.len() - may_be.len(), belief.tracks.len());
     said.push(match (known, rest) {
         (0, _) => "no object is believed to stand anywhere.".into(),
@@ -118,7 +127,7 @@ fn believed(belief: &Belief, report: &Report) -> Vec<String> {
 }
 
 /// An object: what it is taken for, and by what.
-fn object(track: &Track, asked: Option<&str>) -> String {
+fn object(track: &Track, asked: Option<&str>, words: &Words<'_>) -> String {
     let mut names: Vec<(&str, f64)> = track.probabilities.iter().map(|(n, p)| (n.as_str(), *p)).collect();
     names.push(("none of the known objects", track.unknown));
     names.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -130,7 +139,10 @@ fn object(track: &Track, asked: Option<&str>) -> String {
         .map(|(n, p)| format!("{n} {}", share(*p)))
         .collect();
     let others = if others.is_empty() { String::new() } else { format!(" ({})", others.join(", ")) };
-    let on = if track.on.is_empty() { "is in the hand".into() } else { format!("stands on {}", track.on) };
+    let on = match track.on.as_str() {
+        "" => "is in the hand".into(),
+        on => format!("stands on the {}", (words.name)(on)),
+    };
     let [x, y, _]: [f64; 3] = track.position_m.coords.into();
     format!(
         "what {on} at ({x:.2}, {y:.2}) m is {} with {}{others}; {} looked at it, and {:.0} % of its outside was seen.",

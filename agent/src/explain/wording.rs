@@ -18,8 +18,11 @@ pub fn listed(all: &[String], most: usize) -> String {
     }
 }
 
-/// A share, a probability or a number of a domain: two digits, four near 0 and 1.
+/// A share, a probability or a number of a domain: two digits, three below a tenth, four near 0 and 1.
 pub fn share(value: f64) -> String {
+    if (0.01..0.1).contains(&value) {
+        return format!("{value:.3}").trim_end_matches('0').to_string();
+    }
     let near_an_end = (5e-5..0.01).contains(&value) || value > 0.99 && value < 1.0 - 5e-5;
     if !near_an_end {
         return format!("{:.2}", value + 0.0).replace("-0.00", "0.00");
@@ -106,6 +109,8 @@ mod tests {
             (-1e-9, "0.00"),
             (0.5, "0.50"),
             (0.004, "0.004"),
+            (0.0174, "0.017"),
+            (0.05, "0.05"),
             (0.00001, "0.00"),
             (0.9996, "0.9996"),
             (0.99999, "1.00"),

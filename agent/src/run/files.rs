@@ -45,6 +45,12 @@ pub fn header(folder: &Path) -> Result<Header, CommandError> {
     })
 }
 
+/// What is lost with what a folder says a run was started with, if that is missing or damaged: its record says all else.
+pub fn lost_of_header(folder: &Path) -> Option<String> {
+    let why = read_json::<Header>(&folder.join(HEADER)).err()?;
+    Some(format!("whether the run was cut off and gone on with: {why}"))
+}
+
 /// Writes what a run was started with into its folder.
 ///
 /// # Errors

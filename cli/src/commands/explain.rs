@@ -23,7 +23,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         Ok(report) => (report, None),
         Err(e) => (None, Some(e)),
     };
-    let explained = descry_agent::explain::of(&record, &header, report.as_ref())?;
+    let mut explained = descry_agent::explain::of(&record, &header, report.as_ref())?;
+    explained.lost.extend(descry_agent::run::lost_of_header(folder));
     if arguments.json {
         input::print_json(&explained)?;
     } else {

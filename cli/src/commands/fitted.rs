@@ -18,10 +18,12 @@ pub fn fitted(text: &str, width: Option<usize>) -> String {
 }
 
 fn folded(line: &str, width: usize) -> String {
-    if line.chars().count() <= width {
+    // What is drawn under a text stays under it.
+    let is_drawn = line.chars().any(|sign| ('\u{2500}'..='\u{257f}').contains(&sign));
+    if is_drawn || line.chars().count() <= width {
         return line.to_string();
     }
-    let indent = " ".repeat(hang(line, width / 2));
+    let indent = " ".repeat(hang(line, width * 3 / 5));
     let mut lines = Vec::new();
     let mut rest: Vec<char> = line.chars().collect();
     let from = indent.len();
@@ -65,5 +67,7 @@ mod tests {
         check("  [a]     one two\nb", 14, "  [a]     one\n    two\nb");
         check("averyveryverylongword and more", 10, "averyveryverylongword\n  and more");
         check("", 10, "");
+        check("a    bb ccc dddd", 14, "a    bb ccc\n     dddd");
+        check("1 │ find me in the text", 10, "1 │ find me in the text");
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use descry_memory::{Document, Fault, Near, Order, Query, Record};
 use serde_json::json;
 
-use crate::commands::input;
+use crate::commands::{fitted, input};
 use descry_agent::exit::{CommandError, Exit};
 use descry_agent::keeping;
 
@@ -240,23 +240,26 @@ impl Filter {
     }
 }
 
-/// A record in a line: number, time, kind, frame, and what of its content fits.
+/// A record in a line: number, time, kind, frame, and what of its content fits; no more than a terminal is wide.
 fn line(document: &Document) -> String {
+    /// So much of a content is shown where nobody looks at it on a terminal.
     const WIDTH: usize = 100;
-    let mut body = if document.body.is_null() { String::new() } else { document.body.to_string() };
-    if let Some((cut, _)) = body.char_indices().nth(WIDTH) {
-        body.truncate(cut);
-        body.push('…');
-    }
+    let body = if document.body.is_null() { String::new() } else { document.body.to_string() };
     let bytes: u64 = document.blobs.iter().map(|b| b.bytes).sum();
     let blobs = if bytes == 0 { String::new() } else { format!("[{:.1} kB] ", bytes as f64 / 1e3) };
-    format!(
-        "{:8} {:12.3} s  {:16} {:12} {blobs}{body}",
+    let first = format!(
+        "{:8} {:12.3} s  {:16} {:12} {blobs}",
         document.id.0,
         seconds(document.stamp_ns),
         document.kind,
         document.frame
-    )
+    );
+    let left = |width: usize| width.saturating_sub(first.chars().count() + 1);
+    let most = fitted::width(&std::io::stdout()).map_or(WIDTH, left);
+    match body.char_indices().nth(most) {
+        Some((cut, _)) => format!("{first}{}…", &body[..cut]),
+        None => first + &body,
+    }
 }
 
 fn seconds(ns: i64) -> f64 {

@@ -26,7 +26,7 @@ mod validate;
 
 use clap::Subcommand;
 
-pub use input::{is_coloured, narrate};
+pub use input::{is_coloured, narrate, narrate_fitted};
 pub use line::asked;
 
 use descry_agent::exit::{CommandError, Exit};

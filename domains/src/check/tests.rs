@@ -45,10 +45,18 @@ fn the_template_and_the_built_in_domains_are_faultless() {
     let domain = changed("domain.toml", "", "").expect("the template loads");
     assert!(findings(&domain).is_empty(), "{}", findings(&domain));
     assert_eq!(domain.config.name, "mine");
-    for name in ["tabletop", "home"] {
+    for name in ["tabletop", "home", "shapes", "survey", "learning"] {
         let domain = Domain::load(name).expect("it loads");
         assert!(findings(&domain).is_empty(), "{name}: {}", findings(&domain));
     }
+}
+
+#[test]
+fn what_is_said_to_people_is_about_what_is_declared() {
+    let move_ = "move = \"driving to ?to\"";
+    let toml = |to: &str, code, place, words: &[&str]| check("domain.toml", (move_, to), code, place, words);
+    toml("mvoe = \"driving to ?to\"", "no-word", "\"driving to ?to\"", &["did you mean `move`?"]);
+    toml("move = \"driving to ?too\"", "no-parameter", "?too", &["did you mean `?to`?", "?from"]);
 }
 
 #[test]

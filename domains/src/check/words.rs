@@ -76,6 +76,38 @@ impl Check<'_> {
             }
         }
         list.extend(self.init());
+        list.extend(self.said());
+        list
+    }
+
+    /// What is said to people is about an action, a word or a call, and about its parameters.
+    fn said(&self) -> Vec<Diagnostic> {
+        let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
+        let mut list = Vec::new();
+        for (name, text) in &config.said {
+            let path = ["said", name.as_str()];
+            let Some(parameters) = vocabulary.parameters(name) else {
+                let task = &vocabulary.task;
+                let words = vocabulary.words().into_iter().map(|w| w.name);
+                let actions = task.actions.iter().map(|a| a.name.clone());
+                let names: Vec<String> =
+                    actions.chain(words).chain(task.modules.iter().map(|m| m.name.clone())).collect();
+                let message = format!("there is no action, word or call `{name}` in domain.pddl");
+                let help = self.known(name, names.iter().map(String::as_str));
+                list.push(self.error("no-word", message, self.toml.at(&path), help));
+                continue;
+            };
+            let marks = text.split('?').skip(1);
+            let named = marks.map(|mark| {
+                let end = mark.find(|c: char| !c.is_alphanumeric() && c != '-' && c != '_');
+                format!("?{}", &mark[..end.unwrap_or(mark.len())])
+            });
+            for unknown in named.filter(|mark| parameters.iter().all(|(name, _)| name != mark)) {
+                let message = format!("`{name}` has no parameter {unknown}");
+                let help = self.known(&unknown, parameters.iter().map(|(name, _)| name.as_str()));
+                list.push(self.error("no-parameter", message, self.toml.within(&path, &unknown), help));
+            }
+        }
         list
     }
 

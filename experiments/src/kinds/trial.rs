@@ -140,7 +140,8 @@ fn simulated(trial: &Trial<'_>) -> Result<Staged, String> {
         scene.target = None;
     }
     let share = scene.target_visible_from_start;
-    let options = SimOptions { seed: trial.seed, faults: trial.faults.clone(), ..SimOptions::default() };
+    let faults = trial.faults.clone().after(trial.spec);
+    let options = SimOptions { seed: trial.seed, faults, ..SimOptions::default() };
     let robot = Arc::new(SimRobot::new(scene, options));
     let foresight = Some(foresight(&robot, trial.targets));
     Ok(Staged { body: Body::simulated(robot), goal: trial.goal.clone(), share, foresight })

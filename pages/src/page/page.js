@@ -33,7 +33,8 @@ function head() {
   if (story.lost.length) {
     $("lost").textContent = "Lost from the record: " + story.lost.join("; ");
   }
-  const facts = [["goal in PDDL", story.pddl], ["on the body's clock", seconds(story.ends_s)], ["looks", story.looks.length], ["plans", story.plans.length]];
+  const facts = [["in PDDL", story.pddl], ["on the body's clock", seconds(story.ends_s)], ["looks", story.looks.length], ["plans", story.plans.length]];
+  if (story.wanted) facts.unshift(["wanted", story.wanted]);
   if (report) facts.push(["driven", `${report.distance_m.toFixed(1)} m`], ["asked for", report.threshold]);
   if (story.begun_unix_s) facts.push(["begun", new Date(story.begun_unix_s * 1000).toLocaleString()]);
   for (const [name, value] of facts) {
@@ -76,7 +77,10 @@ function mapOf(at) {
   const least = list => list.length ? Math.min(...list) : -1, most = list => list.length ? Math.max(...list) : 1;
   const box = [least(xs) - .4, -most(ys) - .4, most(xs) - least(xs) + .8, most(ys) - least(ys) + .8];
   svg.setAttribute("viewBox", box.join(" "));
-  const em = Math.max(box[2], box[3]) / 42;
+  svg.style.aspectRatio = `${box[2]} / ${box[3]}`;
+  // Letters are 11 px high at least, however narrow the screen.
+  const scale = Math.min(svg.clientWidth / box[2], (svg.clientHeight || Infinity) / box[3]);
+  const em = Math.max(Math.max(box[2], box[3]) / 42, scale > 0 ? 11 / scale : 0);
   const words = (x, y, text, more = {}) => shape(svg, "text", { x, y: -y, "text-anchor": "middle", style: `font-size:${em}px`, ...more }, text);
   const middle = points => [0, 1].map(k => points.reduce((sum, p) => sum + p[k], 0) / points.length);
   for (const room of story.map.rooms) {
@@ -121,11 +125,11 @@ function mapOf(at) {
   // Names of neighbours make room for each other: those of objects upwards, those of surfaces downwards.
   const set = [];
   for (const { x, y: from, name, step, more } of named.sort((a, b) => a.step - b.step || a.step * (a.y - b.y))) {
-    const half = name.length * .27 * em;
+    const half = name.length * .27 * em, within = Math.max(box[0] + half, Math.min(x, box[0] + box[2] - half));
     let y = from;
-    while (set.some(o => Math.abs(o.x - x) < o.half + half && Math.abs(o.y - y) < .95 * em)) y += step * .2 * em;
-    set.push({ x, y, half });
-    words(x, y, name, more);
+    while (set.some(o => Math.abs(o.x - within) < o.half + half && Math.abs(o.y - y) < .95 * em)) y += step * .2 * em;
+    set.push({ x: within, y, half });
+    words(within, y, name, more);
   }
 }
 const titled = text => { const title = document.createElementNS(SVG, "title"); title.textContent = text; return title; };
@@ -145,19 +149,19 @@ function planOf(at) {
   const until = next?.at_s ?? Infinity;
   const steps = parsed(plan), done = story.deeds.filter(d => d.from_s >= plan.at_s - 1e-6 && d.from_s < until - 1e-6);
   const ends = Math.max(plan.at_s + 1, ...steps.map(s => s.from_s + s.lasts_s), ...done.map(d => d.to_s));
-  const wide = Math.max(420, svg.clientWidth), named = Math.min(230, .4 * wide), row = 30, x = s => named + (s - plan.at_s) / (ends - plan.at_s) * (wide - named - 12);
+  const wide = Math.max(300, svg.clientWidth), row = 44, x = s => (s - plan.at_s) / (ends - plan.at_s) * (wide - 2);
   const height = row * steps.length + 26;
   svg.setAttribute("viewBox", `0 0 ${wide} ${height}`);
   svg.style.height = `${height}px`;
   const used = new Set();
   steps.forEach((step, n) => {
     const y = n * row;
-    shape(svg, "text", { x: 0, y: y + 16 }, shortened(step.call, named / 6.6)).append(titled(step.call));
-    shape(svg, "rect", { x: x(step.from_s), y: y + 3, width: Math.max(2, x(step.from_s + step.lasts_s) - x(step.from_s)), height: 9, rx: 2, fill: "var(--planned)" });
+    shape(svg, "text", { x: 0, y: y + 12 }, shortened(story.calls[step.call] ?? step.call, wide / 6)).append(titled(step.call));
+    shape(svg, "rect", { x: x(step.from_s), y: y + 17, width: Math.max(2, x(step.from_s + step.lasts_s) - x(step.from_s)), height: 9, rx: 2, fill: "var(--planned)" });
     const deed = done.find(d => d.call === step.call && !used.has(d));
     if (!deed) return;
     used.add(deed);
-    const bar = shape(svg, "rect", { x: x(deed.from_s), y: y + 14, width: Math.max(2, x(Math.max(deed.to_s, deed.from_s)) - x(deed.from_s)), height: 9, rx: 2, fill: deed.failed ? "var(--failed)" : "var(--done)" });
+    const bar = shape(svg, "rect", { x: x(deed.from_s), y: y + 28, width: Math.max(2, x(Math.max(deed.to_s, deed.from_s)) - x(deed.from_s)), height: 9, rx: 2, fill: deed.failed ? "var(--failed)" : "var(--done)" });
     bar.append(titled(`${seconds(deed.from_s)} to ${seconds(deed.to_s)}${deed.failed ? ": " + deed.failed : ""}`));
   });
   const line = x(Math.min(Math.max(at, plan.at_s), ends));
@@ -198,7 +202,7 @@ function sureOf(at) {
 
 // What was seen, in three dimensions.
 const view = { yaw: -.8, pitch: .6, far: 4, centre: [0, 0, .8] };
-let gl = null, program = null, clouds = new Map(), turning = false, turned = false;
+let gl = null, program = null, inputs = {}, clouds = new Map(), turning = false, turned = false;
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
 function beginSpace() {
   const canvas = $("cloud");
@@ -211,6 +215,9 @@ function beginSpace() {
   gl.attachShader(program, part(gl.FRAGMENT_SHADER, "precision mediump float; varying vec3 shade; void main() { gl_FragColor = vec4(shade, 1.0); }"));
   gl.linkProgram(program);
   gl.useProgram(program);
+  // Asked once: each answer is waited for.
+  for (const name of ["least", "size", "seen", "dot"]) inputs[name] = gl.getUniformLocation(program, name);
+  for (const name of ["place", "colour"]) { inputs[name] = gl.getAttribLocation(program, name); gl.enableVertexAttribArray(inputs[name]); }
   gl.enable(gl.DEPTH_TEST);
 }
 // The points of each look, those that stand elsewhere now in the place of those that were there. What is told anew meanwhile goes first.
@@ -271,18 +278,16 @@ function spaceOf(at) {
     gl.viewport(0, 0, wide, high);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.uniformMatrix4fv(gl.getUniformLocation(program, "seen"), false, seen);
-    gl.uniform1f(gl.getUniformLocation(program, "dot"), .009 * high * 1.6 / 2 * 1.3);
+    gl.uniformMatrix4fv(inputs.seen, false, seen);
+    gl.uniform1f(inputs.dot, .009 * high * 1.6 / 2 * 1.3);
     const shown = [...clouds.values()].filter(c => c.at_s <= at + 1e-6);
     const share = turning ? Math.min(1, affordable() / shown.reduce((sum, c) => sum + c.count, 1)) : 1;
     for (const cloud of shown) {
-      gl.uniform3fv(gl.getUniformLocation(program, "least"), cloud.least);
-      gl.uniform3fv(gl.getUniformLocation(program, "size"), cloud.size);
+      gl.uniform3fv(inputs.least, cloud.least);
+      gl.uniform3fv(inputs.size, cloud.size);
       for (const [name, data, kind] of [["place", cloud.places, gl.UNSIGNED_SHORT], ["colour", cloud.colours, gl.UNSIGNED_BYTE]]) {
-        const where = gl.getAttribLocation(program, name);
         gl.bindBuffer(gl.ARRAY_BUFFER, data);
-        gl.enableVertexAttribArray(where);
-        gl.vertexAttribPointer(where, 3, kind, true, 0, 0);
+        gl.vertexAttribPointer(inputs[name], 3, kind, true, 0, 0);
       }
       gl.drawArrays(gl.POINTS, 0, Math.ceil(cloud.count * share));
     }
@@ -299,6 +304,7 @@ function drawLabels(paper, seen, wide, high, scale, at) {
   paper.font = `${12 * scale}px system-ui, sans-serif`;
   paper.textAlign = "center";
   if (!gl) { paper.fillStyle = colour("--faint"); paper.fillText("this browser draws no WebGL: the boxes alone are shown", wide / 2, 20 * scale); }
+  const named = [];
   for (const o of latest(story.beliefs, at)?.objects ?? []) {
     const tint = colour(o.name ? "--known" : "--unknown"), h = o.size_m[2];
     const foot = o.footprint_m.length > 2 ? o.footprint_m : [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, b]) => [o.position_m[0] + a * o.size_m[0] / 2, o.position_m[1] + b * o.size_m[1] / 2, o.position_m[2]]);
@@ -309,8 +315,15 @@ function drawLabels(paper, seen, wide, high, scale, at) {
     const top = onto([o.position_m[0], o.position_m[1], o.position_m[2] + h + .03]);
     if (!top || !o.name) continue;
     const text = `${o.name} ${o.probability.toFixed(2)}`, half = paper.measureText(text).width / 2 + 4 * scale;
-    paper.fillStyle = colour("--ground"); paper.globalAlpha = .8; paper.fillRect(top[0] - half, top[1] - 13 * scale, 2 * half, 17 * scale); paper.globalAlpha = 1;
-    paper.fillStyle = tint; paper.fillText(text, top[0], top[1]);
+    named.push({ x: top[0], y: top[1], half, text, tint });
+  }
+  // Names that would cover each other make room upwards, the lowest stays.
+  const set = [], high_px = 17 * scale;
+  for (const n of named.sort((a, b) => b.y - a.y)) {
+    for (let other; (other = set.find(o => Math.abs(o.x - n.x) < o.half + n.half && Math.abs(o.y - n.y) < high_px)); ) n.y = other.y - high_px;
+    set.push(n);
+    paper.fillStyle = colour("--ground"); paper.globalAlpha = .8; paper.fillRect(n.x - n.half, n.y - 13 * scale, 2 * n.half, high_px); paper.globalAlpha = 1;
+    paper.fillStyle = n.tint; paper.fillText(n.text, n.x, n.y);
   }
 }
 
@@ -320,8 +333,10 @@ function said() {
     const item = document.createElement("li"), time = document.createElement("time"), text = document.createElement("pre");
     item.className = moment.what;
     time.textContent = seconds(moment.at_s);
-    text.textContent = moment.text;
-    item.append(time, text);
+    const what = document.createElement("b"), found = moment.text.match(/^(plan \d+|\S*) +([^]*)$/);
+    what.textContent = found?.[1] ?? "";
+    text.textContent = (found?.[2] ?? moment.text).replace(/\n {1,10}/g, "\n");
+    item.append(time, what, text);
     item.addEventListener("click", () => go(moment.at_s));
     return item;
   }));

@@ -11,7 +11,10 @@ use serde_json::Value;
 
 use super::points::{self, Near, Packed};
 use descry_agent::exit::CommandError;
+use descry_agent::explain::wording::reasons;
 use descry_agent::report::{Event, Report};
+use descry_agent::run::Beginning;
+use descry_agent::saying::Saying;
 
 /// How far around the outline of a surface, below it and above it its things are drawn densely, metres.
 const BESIDE_M: f64 = 0.15;
@@ -24,6 +27,10 @@ pub struct Story {
     /// The words of the goal.
     pub goal: String,
     pddl: String,
+    /// What the goal asks for, as the domain says it.
+    wanted: Option<String>,
+    /// How the domain says each step.
+    calls: BTreeMap<String, String>,
     report: Option<Report>,
     begun_unix_s: Option<u64>,
     ends_s: f64,
@@ -147,16 +154,20 @@ pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result
         .iter()
         .filter_map(|d| Some(believed(all.s(d.stamp_ns), &part(&d.body)?)))
         .collect();
-    let (moments, plans) = told(&all, &events);
+    let saying = Beginning::of(record).ok().flatten().map(|b| Saying::of_run(&b)).unwrap_or_default();
+    let (moments, plans) = told(&all, &events, &saying);
     let deeds = deeds(&all, &events);
     let clouds = all.find("cloud")?;
     looks.tell(&mut all, &clouds, &map)?;
     let stands = stands(&all, &map, &clouds);
     let said = |name: &str| heads.first().and_then(|d| d.body[name].as_str()).unwrap_or_default().to_owned();
     let end_ns = events.iter().chain(&clouds).map(|d| d.stamp_ns).max().unwrap_or(0);
+    let pddl = said("pddl_goal");
     Ok(Story {
         goal: said("goal"),
-        pddl: said("pddl_goal"),
+        wanted: Some(saying.say(&pddl)).filter(|wanted| *wanted != pddl),
+        calls: calls(&plans, &deeds, &saying),
+        pddl,
         report: report.cloned(),
         begun_unix_s: heads.first().and_then(|d| d.body["started_unix_s"].as_u64()),
         ends_s: all.s(end_ns),
@@ -209,16 +220,19 @@ fn part<T: serde::de::DeserializeOwned>(body: &Value) -> Option<T> {
     serde_json::from_value(body.clone()).ok()
 }
 
-fn told(all: &All<'_>, events: &[Document]) -> (Vec<Moment>, Vec<Planned>) {
+fn told(all: &All<'_>, events: &[Document], saying: &Saying) -> (Vec<Moment>, Vec<Planned>) {
     let mut moments = Vec::new();
     let mut plans = Vec::new();
     for document in events {
         let at_s = all.s(document.stamp_ns);
         let Some(event) = part::<Event>(&document.body) else { continue };
-        let text = event.to_string();
+        let mut text = saying.say(&event.to_string());
         let what = match event {
             Event::Goal { .. } => "goal",
             Event::Planned { round, because, steps, .. } => {
+                let because = saying.say(&reasons::missed(&because, "is", &|_| None));
+                text = format!("plan {round:<4} because {because}");
+                text.extend(steps.iter().map(|step| format!("\n          {}", planned(step, saying))));
                 plans.push(Planned { at_s, round, because, steps });
                 "plan"
             }
@@ -230,6 +244,26 @@ fn told(all: &All<'_>, events: &[Document]) -> (Vec<Moment>, Vec<Planned>) {
         moments.push(Moment { at_s, what, text });
     }
     (moments, plans)
+}
+
+/// A step of a plan: when it begins, how the domain says it, and how long it is to take.
+fn planned(step: &str, saying: &Saying) -> String {
+    let part = || {
+        let (from, rest) = step.split_once(": ")?;
+        let (call, takes) = rest.rsplit_once(" [")?;
+        let takes = takes.trim_end_matches(']');
+        let seconds = |text: &str| text.trim().parse::<f64>().ok();
+        Some(format!("{:.1} s: {}, {:.1} s", seconds(from)?, saying.say(call), seconds(takes)?))
+    };
+    part().unwrap_or_else(|| saying.say(step))
+}
+
+/// How the domain says each step of the plans, and each that was carried out.
+fn calls(plans: &[Planned], deeds: &[Deed], saying: &Saying) -> BTreeMap<String, String> {
+    let call = |step: &String| Some(step[step.find('(')?..=step.find(')')?].to_string());
+    let steps = plans.iter().flat_map(|plan| plan.steps.iter().filter_map(call));
+    let all = steps.chain(deeds.iter().map(|deed| deed.call.clone()));
+    all.map(|call| (call.clone(), saying.say(&call))).filter(|(call, said)| call != said).collect()
 }
 
 /// Each step that began, with the first thing after it that ended it: its failure, or the next event that is not about it.

@@ -1,8 +1,8 @@
 //! The body that a recording is.
 
 use crate::body::{
-    Colour, Description, Driven, Footprint, Frames, Looked, Place, PoseEstimate, Progress, Robot, Sensed,
-    Speeds, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
+    Colour, Description, Door, Driven, Footprint, Frames, Looked, Place, PoseEstimate, Progress, Robot, Room,
+    Sensed, Speeds, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
@@ -30,6 +30,8 @@ pub struct RecordedRobot {
     frames: Box<dyn Footage>,
     description: Description,
     surfaces: Vec<SurfaceHint>,
+    rooms: Vec<Room>,
+    doors: Vec<Door>,
     stations: Vec<Station>,
     state: Mutex<State>,
 }
@@ -101,7 +103,8 @@ impl RecordedRobot {
             Description { head: None, reach_m: None, hand_opening_m: None, laser: None, ..known.description };
         let stations = known.stations.unwrap_or_default();
         let state = State { at: start.min(stations.len().saturating_sub(1)), now_ns: known.now_ns };
-        RecordedRobot { description, surfaces: known.surfaces, stations, frames, state: Mutex::new(state) }
+        let Known { surfaces, rooms, doors, .. } = known;
+        RecordedRobot { description, surfaces, rooms, doors, stations, frames, state: Mutex::new(state) }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -209,6 +212,14 @@ impl Robot for RecordedRobot {
 
     fn surfaces(&self) -> &[SurfaceHint] {
         &self.surfaces
+    }
+
+    fn rooms(&self) -> &[Room] {
+        &self.rooms
+    }
+
+    fn doors(&self) -> &[Door] {
+        &self.doors
     }
 
     fn stations(&self) -> Option<&[Station]> {

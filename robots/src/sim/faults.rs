@@ -27,6 +27,7 @@
 
 use crate::input::{self, InputError, Objection, Step};
 use crate::sim::noise::{mix, share};
+use crate::sim::scene::SceneSpec;
 use serde::{Deserialize, Serialize};
 
 /// A kind of mishap.
@@ -122,6 +123,11 @@ impl FaultPlan {
         let plan: FaultPlan = input::parse_toml(file, text)?;
         plan.check().map_err(|objection| input::draw(file, text, objection))?;
         Ok(plan)
+    }
+
+    /// What goes wrong in a scene, and then all of this.
+    pub fn after(self, scene: &SceneSpec) -> FaultPlan {
+        FaultPlan { faults: scene.faults.iter().cloned().chain(self.faults).collect() }
     }
 
     /// Checks that every fault says when.

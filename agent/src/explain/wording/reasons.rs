@@ -3,10 +3,11 @@
 /// What a call of the domain asks, in words.
 pub type Meanings<'a> = &'a dyn Fn(&str) -> Option<String>;
 
-/// Why the rest of a plan would not do; `is` stands between a number of the goal and its value.
-pub fn missed(because: &str, is: &str) -> String {
+/// Why the rest of a plan would not do; `is` stands between a number of the goal and its value, and `counts` says what an action's
+/// seconds are.
+pub fn missed(because: &str, is: &str, counts: Meanings<'_>) -> String {
     goal(because, is)
-        .or_else(|| takes(because))
+        .or_else(|| takes(because, counts))
         .or_else(|| no_longer(because))
         .unwrap_or_else(|| because.trim_end_matches('.').to_string())
 }
@@ -41,12 +42,14 @@ fn bound(condition: &str) -> Option<(&str, String)> {
 }
 
 /// `step N CALL at T takes A, B is asked for`.
-fn takes(because: &str) -> Option<String> {
+fn takes(because: &str, counts: Meanings<'_>) -> Option<String> {
     let (call, rest) = step(because)?;
     let (had, asked) = rest.split_once(" takes ")?.1.split_once(", ")?;
     let asked = asked.strip_suffix(" is asked for")?;
     let (had_s, asked_s): (f64, f64) = (had.parse().ok()?, asked.parse().ok()?);
-    Some(format!("{call} is now reckoned at {asked_s:.1} s instead of {had_s:.1} s"))
+    let counted = counts(call.trim_matches(['(', ')']).split(' ').next()?);
+    let counted = counted.map(|about| format!("; counted are the {about}")).unwrap_or_default();
+    Some(format!("{call} is now reckoned at {asked_s:.1} s instead of {had_s:.1} s{counted}"))
 }
 
 /// `step N CALL at T: C does not hold at its start…`, or not all the time.
@@ -60,15 +63,18 @@ fn no_longer(because: &str) -> Option<String> {
         && let Some(found) = values.strip_prefix(number).and_then(|rest| rest.strip_prefix(" is "))
     {
         let (is, name) = (found.split(", ").next().unwrap_or(found), wanted.rsplit(' ').next().unwrap_or(""));
+        // What is wanted may be a number that has a name of its own.
         let named = values.split(", ").find_map(|v| v.strip_prefix(name)?.strip_prefix(" is "));
-        let named = named.map(|value| format!(", {}", short(value))).unwrap_or_default();
-        return Some(format!("{call} needs {number} to be {wanted}{named}, and it is {}", short(is)));
+        let wanted = named.map_or(wanted.clone(), |value| wanted.replace(name, &short(value)));
+        return Some(format!("{call} needs {number} to be {wanted}, and it is {}", short(is)));
     }
     let values = after.split_once(": ").map(|(_, values)| format!(", {}", short(values))).unwrap_or_default();
     if all_the_time {
-        return Some(format!("{call} needs {condition} as long as it lasts, which would end before{values}"));
+        return Some(format!(
+            "{call} asks that {condition} until it has ended, which would not be so{values}"
+        ));
     }
-    Some(format!("{call} needs {condition}, which does not hold{values}"))
+    Some(format!("{call} asks that {condition}, which is not so{values}"))
 }
 
 /// What is concluded from a failure: `try N of M`, or what is true from then on.
@@ -76,7 +82,8 @@ pub fn follows(therefore: &str) -> String {
     let tried = therefore.strip_prefix("try ").and_then(|tried| tried.split_once(" of "));
     match tried {
         Some((n, most)) if most.bytes().all(|b| b.is_ascii_digit()) => {
-            format!("{n} of {most} tries are used, and the plan is made anew with what is known now")
+            let are = if n == "1" { "is" } else { "are" };
+            format!("{n} of {most} tries {are} used, and the plan is made anew with what is known now")
         }
         _ => therefore.to_string(),
     }
@@ -114,8 +121,16 @@ pub fn no_plan(said: &str, meanings: Meanings<'_>) -> String {
     parts.join("; ")
 }
 
+/// What the planner says when it has looked at everything.
+const ALL_SEEN: &str = "every state that can be reached was seen, and none fulfils the whole goal";
+
 fn plain(part: &str) -> String {
-    part.trim_end_matches('.').to_string()
+    let plainer = "whatever is done next, and in whatever order, the goal is not reached: what it needs excludes each other, or \
+                   would end too late";
+    match part.split_once(ALL_SEEN) {
+        Some((before, _)) => format!("{before}{plainer}"),
+        None => part.trim_end_matches('.').to_string(),
+    }
 }
 
 /// ``the attachment of `NAME` said no to: LIST``, or how else it answered, at the end of a text.
@@ -135,10 +150,13 @@ fn refused(part: &str, meanings: Meanings<'_>) -> Option<String> {
     let named = calls.count();
     let more =
         list.rsplit_once(" and ").and_then(|(_, more)| more.strip_suffix(" more")?.trim().parse().ok());
-    let about = meanings(name).map(|about| format!("{name} ({about})")).unwrap_or_else(|| name.to_string());
-    Some(match named + more.unwrap_or(0) {
-        0 => format!("{before}{about} is {answer} for {first}]"),
-        others => format!("{before}{about} is {answer} in all of {} cases", others + 1),
+    let cases = match named + more.unwrap_or(0) {
+        0 => format!("for {first}]"),
+        others => format!("in {} cases", others + 1),
+    };
+    Some(match meanings(name) {
+        Some(about) => format!("{before}asked {about}, the answer is {answer} {cases}"),
+        None => format!("{before}{name} is {answer} {cases}"),
     })
 }
 
@@ -156,11 +174,11 @@ mod tests {
             ("the goal (on a b) is not reached", "(on a b) does not hold"),
             (
                 "step 2 (observe a b) at 28.464493 takes 2, 12.911622 is asked for",
-                "(observe a b) is now reckoned at 12.9 s instead of 2.0 s",
+                "(observe a b) is now reckoned at 12.9 s instead of 2.0 s; counted are the seconds in vain",
             ),
             (
                 "step 1 (pick-up a) at 1.5: (>= (presence a) (sure)) does not hold at its start: (presence a) is 0.000008, (sure) is 0.8",
-                "(pick-up a) needs (presence a) to be at least (sure), 0.8, and it is 0",
+                "(pick-up a) needs (presence a) to be at least 0.8, and it is 0",
             ),
             (
                 "step 1 (go) at 1: (>= (charge) 0.5) does not hold at its start: (charge) is 0.123456",
@@ -172,20 +190,21 @@ mod tests {
             ),
             (
                 "step 2 (go) at 3: [worth x] does not hold at its start",
-                "(go) needs [worth x], which does not hold",
+                "(go) asks that [worth x], which is not so",
             ),
             (
                 "step 1 (observe a b) at 2.26: (time-left) does not hold all the time",
-                "(observe a b) needs (time-left) as long as it lasts, which would end before",
+                "(observe a b) asks that (time-left) until it has ended, which would not be so",
             ),
             ("something else.", "something else"),
         ];
-        cases.iter().for_each(|(said, plain)| assert_eq!(missed(said, "would be only"), *plain));
+        let counts = |_: &str| Some("seconds in vain".to_string());
+        cases.iter().for_each(|(said, plain)| assert_eq!(missed(said, "would be only", &counts), *plain));
     }
 
     #[test]
     fn what_follows_from_a_failure_is_no_promise_to_do_it_again() {
-        let plain = "1 of 4 tries are used, and the plan is made anew with what is known now";
+        let plain = "1 of 4 tries is used, and the plan is made anew with what is known now";
         assert_eq!(follows("try 1 of 4"), plain);
         assert_eq!(follows("(shut study-door)"), "(shut study-door)");
     }
@@ -196,17 +215,21 @@ mod tests {
         let cases = [
             (
                 "the attachment of `w` said no to: [w a b], [w c d] and 5 more (with any of these answered otherwise there might be a plan)\nthe attachment of `v` said no to: [v x] (with any …)",
-                "w (whether it is worth it) is no in all of 7 cases; v is no for [v x]",
+                "asked whether it is worth it, the answer is no in 7 cases; v is no for [v x]",
             ),
             (
                 "it cannot be told, after 2 looks: the attachment of `w` said no to: [w x]",
-                "it cannot be told, after 2 looks: w (whether it is worth it) is no for [w x]",
+                "it cannot be told, after 2 looks: asked whether it is worth it, the answer is no for [w x]",
             ),
             (
                 "the attachment of `v` called impossible (an infinite cost): [v x], [v y]",
-                "v is impossible in all of 2 cases",
+                "v is impossible in 2 cases",
             ),
             ("nothing.", "nothing"),
+            (
+                "every state that can be reached was seen, and none fulfils the whole goal (with nothing ever taken away …)",
+                "whatever is done next, and in whatever order, the goal is not reached: what it needs excludes each other, or would end too late",
+            ),
         ];
         cases.iter().for_each(|(said, plain)| assert_eq!(no_plan(said, &about), *plain));
     }

@@ -63,7 +63,7 @@ pub const ABILITY: Ability = Ability {
                 let grasp = Grasp { object: middle(s, track), width_m: track.size_m[0].min(track.size_m[1]) };
                 Ok(Box::new(PickUp { grasp }))
             },
-            because: |_, arguments| format!("{} is to be elsewhere", arguments[1]),
+            because: |s, arguments| format!("{} is to be elsewhere", thing_name(s, arguments[1])),
             learn: picked_up,
             failed: pick_up_failed,
         },
@@ -75,7 +75,10 @@ pub const ABILITY: Ability = Ability {
                 let foot = place(s, arguments)?;
                 Ok(Box::new(PutDown { placing: Placing { foot } }))
             },
-            because: |_, arguments| format!("{} is to be on {}", arguments[1], arguments[2]),
+            because: |s, arguments| {
+                let on = s.surface(arguments[2]).map_or(arguments[2], |on| &s.surfaces[on].name);
+                format!("{} is to be on the {on}", thing_name(s, arguments[1]))
+            },
             learn: put_down,
             failed: put_down_failed,
         },
@@ -117,10 +120,14 @@ fn is_held(s: &Situation, thing: &Thing, track: &Track) -> bool {
     }
 }
 
-/// `(hand-free)`.
+/// What a thing is called.
+fn thing_name<'a>(s: &'a Situation, symbol: &'a str) -> &'a str {
+    s.thing(symbol).map_or(symbol, |n| &s.things[n].name)
+}
+
+/// `(hand-free)`: who has no hand looks unhindered; that it takes nothing, `[can-grasp]` says.
 fn hand_free(s: &Situation) -> Vec<String> {
-    let has_hand = s.robot.description().hand_opening_m.is_some();
-    if s.held.is_none() && has_hand { vec!["(hand-free)".into()] } else { Vec::new() }
+    if s.held.is_none() { vec!["(hand-free)".into()] } else { Vec::new() }
 }
 
 /// What is in the hand.

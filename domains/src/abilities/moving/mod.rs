@@ -115,8 +115,11 @@ fn beside(s: &Situation) -> Vec<String> {
 
 /// `(in ?surface ?room)`: what the map says.
 fn in_room(s: &Situation) -> Vec<String> {
+    // Of a room that the map does not have nothing can be said.
+    let has = |name: &&String| s.robot.rooms().iter().any(|room| room.name == **name);
     let room = |k: &crate::situation::KnownSurface| {
-        k.room.as_ref().map(|room| format!("(in {} {})", k.symbol, crate::lexicon::symbol(room)))
+        let room = k.room.as_ref().filter(has)?;
+        Some(format!("(in {} {})", k.symbol, crate::lexicon::symbol(room)))
     };
     s.surfaces.iter().filter_map(room).collect()
 }

@@ -29,7 +29,7 @@ use crate::config::Thresholds;
 use crate::lexicon::symbol;
 use crate::mind::{Laid, Look, Mind};
 use crate::note::Note;
-use crate::situation::{KnownSurface, Situation};
+use crate::situation::{KnownSurface, Situation, Thing};
 use crate::world::WorldError;
 
 /// A side counts as seen if a surface was measured this near to where it should be.
@@ -421,8 +421,12 @@ fn believe(
     belief.tracks.sort_by_key(|track| track.id);
     let after = confidences(mind, eyes);
     let changed = mind.known.things.iter().zip(before.iter().zip(&after));
+    let named = |thing: &Thing| match thing.track {
+        Some(_) => format!("{} ({})", thing.name, thing.symbol.replace('-', " ")),
+        None => thing.name.clone(),
+    };
     let changed =
-        changed.map(|(thing, (b, a))| format!("confidence in {}: {b:.2} -> {a:.2}", thing.name)).collect();
+        changed.map(|(thing, (b, a))| format!("confidence in {}: {b:.2} -> {a:.2}", named(thing))).collect();
     let used: Vec<_> = merged.fits.iter().filter(|fit| fit.used).collect();
     let left_out = merged.fits.iter().zip(1..).filter(|(fit, _)| !fit.used);
     let note = Note::Perceived {
@@ -495,7 +499,7 @@ pub fn in_a_line(p: &Percept) -> String {
     let (at, [w, d, h]) = (p.position_m, p.size_m.map(|m| m * 100.0));
     let seen = p.seen_fraction * 100.0;
     format!(
-        "{name:16} {probability:.2}  at ({:.2}, {:.2}, {:.2}) m, {w:.0} x {d:.0} x {h:.0} cm, {seen:.0} % seen",
+        "{name:16} {probability:.2} ({:.2}, {:.2}, {:.2}) m, {w:.0}x{d:.0}x{h:.0} cm, {seen:.0} % seen",
         at.x, at.y, at.z
     )
 }

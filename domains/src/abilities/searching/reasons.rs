@@ -127,7 +127,8 @@ pub fn left_in_all(s: &Situation) -> Option<String> {
     let unsure = |t: &&Track| t.certainty() < s.thresholds.confidence;
     let places: Vec<String> =
         s.belief.tracks.iter().filter(asked).filter(unsure).map(|t| place(&t.position_m)).collect();
-    if !places.is_empty() {
+    // Of kinds it is asked only which objects are of them.
+    if s.kinds.is_empty() && !places.is_empty() {
         return Some(format!("what stands at {} looks the same from every side", places.join(" and at ")));
     }
     s.doubts().into_iter().find_map(|doubt| out_of_sight(s, doubt, "more")).or_else(|| left_of_kinds(s))
@@ -148,7 +149,7 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     let more = if hidden > 1.0 - s.threshold || least.is_none() { more } else { String::new() };
     let all = s.completeness(open);
     Some(format!(
-        "all of {} are found with {all:.2} only{}{more}",
+        "all {}s are found with {all:.2} only{}{more}",
         kind.name,
         least.map(is_one).unwrap_or_default()
     ))
@@ -172,7 +173,7 @@ pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) ->
         })
     };
     let parts: Vec<String> = s.surfaces.iter().enumerate().filter_map(|(on, k)| of(on, k)).collect();
-    format!("{}; {:.3} is left", parts.join(", "), left.max(0.0))
+    format!("{}; a chance of {:.3} is left", parts.join(", "), left.max(0.0))
 }
 
 /// Where there is room for something that no look can show; none if too little hangs on it.

@@ -112,6 +112,7 @@ pub(crate) use surface::headroom_m;
 pub use surface::{ObstacleSpec, SurfaceKind, SurfaceSpec};
 
 use crate::input::{self, InputError, Objection, Step};
+use crate::sim::faults::{Fault, FaultPlan};
 use crate::sim::stereo::Stereo;
 use check::{finite, object, positive};
 use nalgebra::Point2;
@@ -159,6 +160,9 @@ pub struct SceneSpec {
     /// Which of them this is.
     #[serde(default = "default_one")]
     pub visit: usize,
+    /// What goes wrong in it on purpose.
+    #[serde(default, rename = "fault", skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<Fault>,
 }
 
 fn default_one() -> usize {
@@ -218,6 +222,7 @@ impl SceneSpec {
     /// The first objection, with its path in the document.
     pub fn check(&self) -> Result<(), Objection> {
         self.check_rooms()?;
+        FaultPlan { faults: self.faults.clone() }.check()?;
         for (i, door) in self.doors.iter().enumerate() {
             self.check_door(i, door)?;
         }

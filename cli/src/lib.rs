@@ -1,0 +1,6 @@
+//! The command line, and what serves editors.
+
+pub mod commands;
+pub mod findings;
+pub mod layout;
+pub mod lsp;

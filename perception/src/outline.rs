@@ -22,23 +22,26 @@ const LEAST: usize = 600;
 /// Points that are looked at together.
 const BLOCK: usize = 16;
 
-/// Fits a rectangle to points by turning it: the extents bound nearly all points, the residual tells how well they keep to its edges.
+/// Fits a rectangle to points by turning it: the extents bound nearly all points, and once it is turned each edge lies amid the points
+/// that are nearest to it; the residual tells how well they keep to the edges.
 pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.len() < 8 {
         return None;
     }
     let mut turner = Turner::of(points);
-    let mut best: Option<(f64, Rectangle)> = None;
+    let mut best: Option<(f64, usize)> = None;
     for turn in 0..TURNS {
         let turned = turner.turned(turn);
         let bound = best.map_or(f64::INFINITY, |(squares, _)| squares);
         let Some(squares) = turner.squares_within(&turned, bound) else { continue };
-        let residual_m = (squares / turner.xs.len() as f64).sqrt();
-        if best.is_none_or(|(_, rectangle)| residual_m < rectangle.residual_m) {
-            best = Some((squares, turned.rectangle(residual_m)));
+        if squares < bound {
+            best = Some((squares, turn));
         }
     }
-    best.map(|(_, rectangle)| rectangle)
+    let turned = turner.turned(best?.1);
+    let turned = turner.settled(turned);
+    let squares = turner.squares_within(&turned, f64::INFINITY)?;
+    Some(turned.rectangle((squares / turner.xs.len() as f64).sqrt()))
 }
 
 /// True if some rectangle fits the points, as [`fit`] does, with a lesser residual.
@@ -99,6 +102,27 @@ impl Turner {
         let u = [left.turn(&self.us, |u| u), -right.turn(&self.us, |u| -u)];
         let v = [front.turn(&self.vs, |v| v), -back.turn(&self.vs, |v| -v)];
         Turned { sin, cos, u, v }
+    }
+
+    /// The same with each edge amid the points that are nearest to it: bounds lie as far out as noise reaches.
+    fn settled(&self, mut turned: Turned) -> Turned {
+        const ROUNDS: usize = 5;
+        /// Fewer points than this share leave an edge where it is.
+        const LEAST_SHARE: f64 = 0.03;
+        for _ in 0..ROUNDS {
+            let ([u0, u1], [v0, v1]) = (turned.u, turned.v);
+            let mut sums = [(0.0, 0.0); 4];
+            for (u, v) in self.us.iter().zip(&self.vs).take(self.xs.len()) {
+                let away = [u - u0, u - u1, v - v0, v - v1].map(f64::abs);
+                let nearest = (0..4).min_by(|&a, &b| away[a].total_cmp(&away[b])).unwrap_or(0);
+                sums[nearest].0 += if nearest < 2 { u } else { v };
+                sums[nearest].1 += 1.0;
+            }
+            let least = LEAST_SHARE * self.xs.len() as f64;
+            let amid = |n: usize, edge: f64| if sums[n].1 > least { sums[n].0 / sums[n].1 } else { edge };
+            (turned.u, turned.v) = ([amid(0, u0), amid(1, u1)], [amid(2, v0), amid(3, v1)]);
+        }
+        turned
     }
 
     /// Sum of the squared distances of the points from the nearest edge; `None` if it is more than the bound.
@@ -199,5 +223,19 @@ mod tests {
             (r.sides_m[0] - 0.12).abs() < 0.008 && (r.sides_m[1] - 0.07).abs() < 0.008 && r.residual_m < 0.003
         });
         assert!(close, "{found:?}");
+    }
+
+    #[test]
+    fn noise_does_not_carry_edges_outwards() {
+        let noise = |i: usize| 0.02 * (f64::from((i * 7919 % 101) as u32) / 100.0 - 0.5);
+        let places = (0..600).map(|i| (f64::from(i) / 600.0, noise(i as usize)));
+        let points: Vec<_> = places
+            .flat_map(|(along, off)| {
+                [Point3::new(0.12 * along, off, 0.05), Point3::new(off, 0.07 * along, 0.05)]
+            })
+            .collect();
+        let spread_m = 0.02 / 12.0_f64.sqrt();
+        let found = fit(&points).expect("a rectangle");
+        assert!(found.residual_m < 1.1 * spread_m, "{found:?}, of a spread of {spread_m} m");
     }
 }

@@ -135,7 +135,6 @@ impl Descry {
 
     fn model_log(&self, model: &ObjectModel, stance: Stance, m: &Measured) -> f64 {
         let size = height_log(Some(model.height_m), HEIGHTS, m);
-        let form = form_log(Some(model.shape), m);
         let (top, taper) = match (stance, model.top) {
             (Stance::UpsideDown, _) => {
                 (Top::Closed, Range { low: 1.0 / model.taper.high, high: 1.0 / model.taper.low })
@@ -143,10 +142,10 @@ impl Descry {
             (_, top) => (top, model.taper),
         };
         let wide = match model.shape {
-            Shape::Round => diameter_log(model.diameter_m, WIDTHS, m) + taper_log(Some(taper), m),
-            Shape::Box => sides_log(model.width_m.zip(model.depth_m), m),
+            Shape::Round => round_log(model.diameter_m, m) + taper_log(Some(taper), m),
+            Shape::Box => sides_log(model.width_m.zip(model.depth_m), m) + form_log(Some(Shape::Box), m),
         };
-        self.temper * (size + wide + form) + top_log(top, m) + handle_log(model.handle, m)
+        self.temper * (size + wide) + top_log(top, m) + handle_log(model.handle, m)
     }
 
     /// The things made like a model but for one feature; sizes are like the model's within a tenth.
@@ -206,9 +205,8 @@ fn covers(model: &ObjectModel, family: &Family, m: &Measured) -> f64 {
             0.0
         }
     };
-    let diameter_sigma = (2.0 * m.evidence.radius_sigma_m).hypot(0.003);
     inside(m.height_m, m.height_sigma_m, model.height_m)
-        * inside(2.0 * m.evidence.radius_m, diameter_sigma, width)
+        * inside(2.0 * m.evidence.radius_m, diameter_sigma_m(m), width)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -257,17 +255,23 @@ pub(super) fn kinds(models: &[ObjectModel], probabilities: &[(String, f64)]) -> 
     kinds
 }
 
+/// How often a measurement goes wrong altogether: flat tails.
+const ASTRAY: f64 = 0.002;
+
+/// Density of a measure under a range: a uniform, blurred by the measurement.
+fn within_density(value: f64, sigma: f64, r: Range) -> f64 {
+    let width = (r.high - r.low).max(1e-6);
+    // Difference of two normal distribution functions over the width.
+    let inside = normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma);
+    if width > 0.2 * sigma { inside / width } else { normal_density(value - r.middle(), sigma) }
+}
+
 /// Log density of a measure under a range (uniform, blurred by the measurement) or, without one, under everyday sizes (log-normal).
 fn measure_log(value: f64, sigma: f64, range: Option<Range>, everyday: (f64, f64)) -> f64 {
     match range {
         Some(r) => {
-            let width = (r.high - r.low).max(1e-6);
-            // The blurred uniform: difference of two normal distribution functions over the width.
-            let inside = normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma);
-            let density =
-                if width > 0.2 * sigma { inside / width } else { normal_density(value - r.middle(), sigma) };
-            // Flat tails: a measurement goes wrong altogether now and then.
-            (0.998 * density + 0.002 * everyday_density(value, everyday)).max(1e-12).ln()
+            let density = within_density(value, sigma, r);
+            ((1.0 - ASTRAY) * density + ASTRAY * everyday_density(value, everyday)).max(1e-12).ln()
         }
         None => everyday_density(value, everyday).max(1e-12).ln(),
     }
@@ -293,8 +297,22 @@ fn diameter_log(range: Option<Range>, everyday: (f64, f64), m: &Measured) -> f64
         // No circle fits; were it round, its footprint would be its diameter.
         return measure_log(m.footprint_m[0], 0.02, range, everyday);
     }
-    let sigma = (2.0 * m.evidence.radius_sigma_m).hypot(0.003);
-    measure_log(2.0 * m.evidence.radius_m, sigma, range, everyday)
+    measure_log(2.0 * m.evidence.radius_m, diameter_sigma_m(m), range, everyday)
+}
+
+/// Diameter and form of a round body together: a circle that is not as wide as the body is no circle of its side, and then its
+/// roundness says nothing for it.
+fn round_log(range: Option<Range>, m: &Measured) -> f64 {
+    let form = form_log(Some(Shape::Round), m);
+    let Some(r) = range.filter(|_| m.round.is_some()) else { return diameter_log(range, WIDTHS, m) + form };
+    let (value, sigma) = (2.0 * m.evidence.radius_m, diameter_sigma_m(m));
+    let fits = (1.0 - ASTRAY) * within_density(value, sigma, r);
+    let astray = ASTRAY * everyday_density(value, WIDTHS);
+    log_sum(&[fits.max(1e-12).ln() + form, astray.max(1e-12).ln() + form.min(LEAST_FORM)])
+}
+
+fn diameter_sigma_m(m: &Measured) -> f64 {
+    (2.0 * m.evidence.radius_sigma_m).hypot(0.003)
 }
 
 fn taper_log(range: Option<Range>, m: &Measured) -> f64 {
@@ -318,17 +336,18 @@ fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
     }
 }
 
+/// However many points: what the forms leave out (rounded boxes, bulging cups) bounds what they tell.
+const LEAST_FORM: f64 = -12.0;
+
 /// How well the side keeps to the form, against the form it keeps to best, and whether it is there at all. `None` is a form that is
 /// neither round nor a box.
 fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
-    /// However many points: what the forms leave out (rounded boxes, bulging cups) bounds what they tell.
-    const LEAST: f64 = -12.0;
     let all = [Some(Shape::Round), Some(Shape::Box), None].map(|s| raw_form_log(s, m));
     let best = all.into_iter().fold(f64::NEG_INFINITY, f64::max);
     // However round what is there: a camera that looked through the rest of the side says that it is not.
     let through = if shape == Some(Shape::Round) { -60.0 * (m.looked_through - 0.15).max(0.0) } else { 0.0 };
     let beside = if shape == Some(Shape::Round) { beside_log(m) } else { 0.0 };
-    (raw_form_log(shape, m) - best).max(LEAST) + through + beside
+    (raw_form_log(shape, m) - best).max(LEAST_FORM) + through + beside
 }
 
 /// However well a circle fits a part of the side: a round body has nothing beside it but a handle, and what views blur.

@@ -95,7 +95,7 @@ pub struct Seen {
     pub on: String,
     /// The share of it where nothing could stand unseen, 0 to 1; none while nothing is known of it.
     pub share: Option<f64>,
-    /// From so many places.
+    /// From so many places, by views that still hold.
     pub places: usize,
 }
 
@@ -142,7 +142,7 @@ pub fn weigh(round: &Round, plan: &Plan, goal: &str) -> Weighed {
 /// What is in doubt in a round about what was asked for.
 fn in_doubt(round: &Round) -> Vec<InDoubt> {
     let s = &round.situation;
-    let places = |on: usize| s.observed.iter().filter(|look| look.1 == on).count();
+    let places = |on: usize| s.spaces[on].seen_from().len();
     let told = |about: &str, doubt: &Doubt| {
         let of = |(on, surface): (usize, &KnownSurface)| {
             let (share, places) = (doubt.share_seen(on), places(on));

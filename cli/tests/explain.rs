@@ -64,7 +64,8 @@ fn what_is_not_there_is_explained() {
         1,
         &[
             "not found: cup A is not there",
-            "% of the table from 4 places",
+            "% of the table from ",
+            " places.",
             "the probability that it is there after all",
             "nothing more could be done about it: asked whether a look from there may settle anything that is in doubt, the answer is no in",
         ],

@@ -188,6 +188,12 @@ fn a_domain_and_its_problem_are_served() {
     assert!(offered.contains(&"home".to_string()) && !offered.contains(&"road".to_string()), "{offered:?}");
     let offered = labels(editor.at("textDocument/completion", &domain, &text, "?p - place)        ;", 5));
     assert_eq!(offered, ["place"]);
+    // What is put in takes the place of what was typed, the sign too.
+    let offered = editor.at("textDocument/completion", &domain, &text, "?p - place)        ;", 1);
+    let edit = &offered[0]["textEdit"];
+    let characters = ["start", "end"].map(|end| edit["range"][end]["character"].as_u64().unwrap_or(0));
+    assert_eq!(characters[1] - characters[0], 1, "{offered}");
+    assert!(edit["newText"].as_str().is_some_and(|text| text.starts_with('?')), "{offered}");
 
     let symbols =
         editor.ask("textDocument/documentSymbol", json!({ "textDocument": { "uri": uri(&domain) } }));

@@ -14,6 +14,8 @@ const SIDE: i32 = 16;
 const BLOCK: usize = (SIDE * SIDE * SIDE) as usize;
 /// Voxels along the side of a brick, of which a block has 64.
 const BRICK: i32 = 4;
+/// Viewpoints that are nearer to each other than this are one place, metres.
+const SAME_PLACE_M: f64 = 0.1;
 /// A voxel of which nothing is known.
 const UNSEEN: i8 = i8::MIN;
 /// What one look adds to a voxel on a surface, what it takes from one before it, and how far either goes.
@@ -39,6 +41,7 @@ pub struct Space {
     range_m: f64,
     blocks: FxHashMap<[i32; 3], Box<Block>>,
     opaque: Opaque,
+    seen_from: Vec<Point3<f64>>,
 }
 
 /// Where nothing can be seen through, for lines of sight: the bricks with an occupied voxel, by block, over the box that holds them all.
@@ -143,7 +146,18 @@ impl Default for Space {
 impl Space {
     /// A map of which nothing is known: the side of its voxels, and how far from a camera a view counts, metres.
     pub fn new(voxel_m: f64, range_m: f64) -> Self {
-        Self { voxel_m, range_m, blocks: FxHashMap::default(), opaque: Opaque::default() }
+        Self {
+            voxel_m,
+            range_m,
+            blocks: FxHashMap::default(),
+            opaque: Opaque::default(),
+            seen_from: Vec::new(),
+        }
+    }
+
+    /// The places from which views were taken in. What is nearer to one than a hand's breadth is the same.
+    pub fn seen_from(&self) -> &[Point3<f64>] {
+        &self.seen_from
     }
 
     /// Side of a voxel, metres.
@@ -234,6 +248,10 @@ impl Space {
         let reach_m = map.depths_m.iter().filter(|d| d.is_finite()).fold(0.0_f32, |most, &d| most.max(d));
         let reach_m = f64::from(reach_m).min(self.range_m) + self.voxel_m;
         let world_from_camera = map.camera_from_world.inverse();
+        let from = Point3::from(world_from_camera.translation.vector);
+        if self.seen_from.iter().all(|place| (place - from).norm() > SAME_PLACE_M) {
+            self.seen_from.push(from);
+        }
         let measured = self.measured(map, &world_from_camera);
         for key in self.blocks_in_view(map, &world_from_camera, reach_m) {
             let before = self.blocks.remove(&key);

@@ -393,6 +393,11 @@ async fn mishaps_happen_as_declared() {
     drive(&robot, &at(1.4, -1.2)).await.unwrap();
     assert_eq!(robot.truth().doors.iter().filter(|d| d.shut).count(), 1, "the seed chooses one");
 
+    let both = "kind = \"door_shut\"\nat = 1\ndoor = \"north door\"\n[[fault]]\nkind = \"door_shut\"\nat = 1\ndoor = \"south door\"";
+    let robot = fault(both);
+    drive(&robot, &at(1.4, -1.2)).await.unwrap();
+    assert_eq!(robot.truth().doors.iter().filter(|d| d.shut).count(), 2, "both at one drive");
+
     let robot = fault("kind = \"grasp_slips\"\nchance = 1.0");
     drive(&robot, &at(-1.2, 0.2)).await.unwrap();
     for _ in 0..5 {

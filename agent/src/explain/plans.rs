@@ -54,7 +54,9 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
             format!("with what was learned, the {rest} left of plan {} would not do: {now}.", before.round)
         }
     };
-    let most = chapter.most.as_ref().map(|(name, most)| format!(" The greatest: {name}, {}.", share(*most)));
+    // None of many that are all nothing is the greatest.
+    let most = chapter.most.as_ref().filter(|(_, most)| share(*most) != share(0.0));
+    let most = most.map(|(name, most)| format!(" The greatest: {name}, {most:.3}."));
     format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
 }
 
@@ -172,9 +174,13 @@ fn compared(
     if better.is_empty() {
         let alike = weighed.others.iter().find(|o| ratio(o) >= 1.0 - ALIKE);
         let next = weighed.others.iter().find(|o| ratio(o) < 1.0 - ALIKE);
-        let alike = alike.map(|o| format!(" As good is {}.", named.once(o))).unwrap_or_default();
+        let gains = match alike.filter(|o| ratio(o) > 1.0) {
+            Some(_) => "is among those that gain most a second",
+            None => "gains most a second",
+        };
+        let alike = alike.map(|o| format!(" About as good is {}.", named.once(o))).unwrap_or_default();
         let next = next.map(|o| format!(" Next comes {}.", named.once(o))).unwrap_or_default();
-        return format!("of {all} ways to get further, {mine} gains most a second.{alike}{next}");
+        return format!("of {all} ways to get further, {mine} {gains}.{alike}{next}");
     }
     let more = if better.len() >= MOST_KEPT { "at least " } else { "" };
     let many = if better.len() == 1 { "1 gains".into() } else { format!("{} gain", better.len()) };
@@ -186,7 +192,9 @@ fn compared(
         }
         (None, None) => {
             let alone = match enough(weighed, better[0], asked) {
-                Some(false) => " That one would not be expected to be enough by itself.",
+                Some(false) if chosen.reaches == Some(true) => {
+                    " That one would not be expected to be enough by itself."
+                }
                 Some(true) if better[0].takes_s < chapter.makespan_s => {
                     " That one would be expected to be enough, and sooner: the planner did not come upon it."
                 }

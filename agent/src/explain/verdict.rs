@@ -179,14 +179,16 @@ fn left(rests: &Rests, report: &Report, meanings: Meanings<'_>) -> Vec<String> {
 /// What was seen of where something may be.
 fn seen(doubt: &InDoubt, looks: &Looks) -> String {
     let one = |seen: &Seen| {
-        let places = looks.places(&seen.on).max(seen.places);
-        let from = count(places, "place");
-        match (seen.share, places) {
-            (None, _) => format!("the {} from {from}", seen.on),
-            (Some(part), _) => format!("{:.0} % of the {} from {from}", (part * 100.0).floor(), seen.on),
+        let from = match seen.places {
+            0 => "of which no look holds any more".to_string(),
+            places => format!("from {}", count(places, "place")),
+        };
+        match seen.share {
+            None => format!("the {} {from}", seen.on),
+            Some(part) => format!("{:.0} % of the {} {from}", (part * 100.0).floor(), seen.on),
         }
     };
-    let is_seen = |seen: &&Seen| looks.places(&seen.on).max(seen.places) > 0;
+    let is_seen = |seen: &&Seen| seen.places > 0 || looks.places(&seen.on) > 0;
     let (looked_at, others): (Vec<&Seen>, Vec<&Seen>) = doubt.seen.iter().partition(is_seen);
     let others: Vec<String> = others.iter().map(|seen| format!("the {}", seen.on)).collect();
     let not = match others.as_slice() {

@@ -6,9 +6,9 @@ use descry_domains::load::from_files;
 use descry_planner::pddl::parse::{ACTION_PARTS, DOMAIN_SECTIONS, PROBLEM_SECTIONS};
 use descry_planner::{Source, Span};
 use lsp_types::{
-    CompletionItem, CompletionItemKind, CompletionResponse, DocumentSymbol, DocumentSymbolResponse,
-    GotoDefinitionResponse, Hover, HoverContents, Location, MarkupContent, MarkupKind, Position, Range,
-    TextDocumentPositionParams, TextEdit, Uri,
+    CompletionItem, CompletionItemKind, CompletionResponse, CompletionTextEdit, DocumentSymbol,
+    DocumentSymbolResponse, GotoDefinitionResponse, Hover, HoverContents, Location, MarkupContent,
+    MarkupKind, Position, Range, TextDocumentPositionParams, TextEdit, Uri,
 };
 
 use super::declared::{self, Declared, Kind, word_at};
@@ -147,6 +147,8 @@ pub fn completion(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Comp
     let typed = &text[start..at];
     let before = text[..start].trim_end();
     let is_toml = path.extension().is_some_and(|e| e == "toml");
+    // Said in full, since editors do not agree on whether `?` and `:` belong to a word.
+    let typed_at = Lines::of(&text).range(span(start, at));
     let mut items: Vec<CompletionItem> = Vec::new();
     let mut add = |label: &str, kind: CompletionItemKind, detail: &str| {
         if !items.iter().any(|known| known.label == label) {
@@ -155,6 +157,10 @@ pub fn completion(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Comp
                 label: label.into(),
                 kind: Some(kind),
                 detail,
+                text_edit: Some(CompletionTextEdit::Edit(TextEdit {
+                    range: typed_at,
+                    new_text: label.into(),
+                })),
                 ..CompletionItem::default()
             });
         }
@@ -165,8 +171,9 @@ pub fn completion(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Comp
         return Some(CompletionResponse::Array(items));
     }
     if typed.starts_with(':') {
-        let parts = DOMAIN_SECTIONS.iter().chain(PROBLEM_SECTIONS).chain(ACTION_PARTS);
-        parts.for_each(|word| add(word, CompletionItemKind::KEYWORD, ""));
+        let sections: [&[&str]; 2] = [DOMAIN_SECTIONS, PROBLEM_SECTIONS];
+        let parts: &[&[&str]] = if before.ends_with('(') { &sections } else { &[ACTION_PARTS] };
+        parts.iter().copied().flatten().for_each(|word| add(word, CompletionItemKind::KEYWORD, ""));
         return Some(CompletionResponse::Array(items));
     }
     let wanted: &[Kind] = match before.chars().last() {
@@ -182,7 +189,8 @@ pub fn completion(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Comp
     for (_, text, declared) in in_scope(texts, &path, &text) {
         for one in declared.iter().filter(|d| wanted.contains(&d.kind)) {
             let whole = &text[one.whole.start as usize..one.whole.end as usize];
-            add(&one.name, one.kind.item(), whole.lines().next().unwrap_or_default());
+            let first = whole.lines().next().unwrap_or_default();
+            add(&one.name, one.kind.item(), &first.split_whitespace().collect::<Vec<_>>().join(" "));
         }
     }
     if is_toml {

@@ -169,16 +169,17 @@ impl FaultPlan {
         Ok(())
     }
 
-    /// The first fault of that kind that happens at drive (or frame, or grasp) `number`, from 1.
-    pub fn strikes(&self, kind: FaultKind, number: u64, seed: u64) -> Option<&Fault> {
-        self.faults.iter().enumerate().filter(|(_, f)| f.kind == kind).find_map(|(i, fault)| {
-            let drawn = mix(mix(mix(seed ^ 0xfa17) ^ i as u64) ^ number);
-            let happens = match (fault.at, fault.chance) {
+    /// The faults of that kind that happen at drive (or frame, or grasp) `number`, from 1.
+    pub fn strike(&self, kind: FaultKind, number: u64, seed: u64) -> impl Iterator<Item = &Fault> {
+        let of_kind = self.faults.iter().enumerate().filter(move |(_, f)| f.kind == kind);
+        let happens = move |(i, fault): &(usize, &Fault)| {
+            let drawn = mix(mix(mix(seed ^ 0xfa17) ^ *i as u64) ^ number);
+            match (fault.at, fault.chance) {
                 (Some(at), _) => at == number,
                 (None, Some(chance)) => share(drawn) < chance,
                 (None, None) => false,
-            };
-            happens.then_some(fault)
-        })
+            }
+        };
+        of_kind.filter(happens).map(|(_, fault)| fault)
     }
 }

@@ -128,7 +128,7 @@ impl SimRobot {
         self.work("the grasp", GRASP_S, watch).await?;
         let mut state = self.lock();
         state.grasps += 1;
-        let slips = self.strikes(FaultKind::GraspSlips, state.grasps).is_some();
+        let slips = self.is_struck(FaultKind::GraspSlips, state.grasps);
         let at = state.truth_from_estimate() * grasp.object;
         let State { scene, rng, .. } = &mut *state;
         let taken = hand::take(scene, &at, grasp.width_m, HAND_OPENING_M, slips, rng);

@@ -178,19 +178,24 @@ impl SimRobot {
         }
     }
 
-    pub(super) fn strikes(&self, kind: FaultKind, number: u64) -> Option<&Fault> {
-        self.options.faults.strikes(kind, number, self.options.seed)
+    /// All that goes wrong in a way at a drive, frame or grasp.
+    fn strike(&self, kind: FaultKind, number: u64) -> impl Iterator<Item = &Fault> {
+        self.options.faults.strike(kind, number, self.options.seed)
+    }
+
+    pub(super) fn is_struck(&self, kind: FaultKind, number: u64) -> bool {
+        self.strike(kind, number).next().is_some()
     }
 
     fn depart(&self, goal: &Pose2) -> Result<Departure, Failure> {
         let mut state = self.lock();
         state.drives += 1;
         let number = state.drives;
-        if let Some(fault) = self.strikes(FaultKind::DoorShut, number) {
+        for fault in self.strike(FaultKind::DoorShut, number) {
             state.shut_a_door(fault, self.description.footprint.radius_m());
         }
         let route = state.plan(goal)?;
-        if self.strikes(FaultKind::UnreachablePose, number).is_some() {
+        if self.is_struck(FaultKind::UnreachablePose, number) {
             state.note("the goal of this drive turns out to be unreachable");
             state.unreachable.push(*goal);
         }
@@ -198,9 +203,9 @@ impl SimRobot {
         let steps = drive::steps(&state.estimate, &route, goal, &self.description.speeds);
         let on_the_way = state.rng.random_range(0.2..0.8) * steps.len() as f64;
         let mut end = None;
-        if self.strikes(FaultKind::BlockedPath, number).is_some() {
+        if self.is_struck(FaultKind::BlockedPath, number) {
             end = Some((on_the_way as usize, End::Person));
-        } else if self.strikes(FaultKind::TimedOutDrive, number).is_some() {
+        } else if self.is_struck(FaultKind::TimedOutDrive, number) {
             end = Some((on_the_way as usize, End::Stuck));
         }
         if let Some((at, obstacle)) = state.first_bump(&steps, self.description.footprint.radius_m())
@@ -278,11 +283,11 @@ impl SimRobot {
     /// What others do while the base drives, and what falls on the way.
     fn disturb(&self, departure: &Departure, trip: &Trip) {
         for kind in [FaultKind::ObjectMoved, FaultKind::ObjectTaken, FaultKind::ObjectRelocated] {
-            if let Some(fault) = self.strikes(kind, departure.number) {
+            for fault in self.strike(kind, departure.number) {
                 self.lock().disturb(fault);
             }
         }
-        if self.strikes(FaultKind::ObjectDropped, departure.number).is_some() {
+        if self.is_struck(FaultKind::ObjectDropped, departure.number) {
             let half_way = departure.steps[..trip.done].get(trip.done / 2);
             self.lock().drop_held(half_way.map(|step| &step.pose));
         }
@@ -314,7 +319,7 @@ impl SimRobot {
         state.pass(seconds);
         state.frames += 1;
         let (number, stamp_ns) = (state.frames, state.now_ns);
-        if self.strikes(FaultKind::DroppedFrame, number).is_some() {
+        if self.is_struck(FaultKind::DroppedFrame, number) {
             state.note("a frame is lost");
             let because = format!("frame {number} was triggered and did not come");
             return Err(Failure::SensorDropped { because, stamp_ns });
@@ -486,7 +491,7 @@ impl Robot for SimRobot {
         let trip = self.travel_along(&departure, watch).await;
         self.disturb(&departure, &trip);
         let mut state = self.lock();
-        let misled = self.strikes(FaultKind::BadLocalisation, departure.number).is_some();
+        let misled = self.is_struck(FaultKind::BadLocalisation, departure.number);
         let wanted = if trip.failure.is_none() { Some(goal) } else { trip.at };
         if let Some(pose) = wanted {
             state.stop(&pose, &self.options.localisation, misled);

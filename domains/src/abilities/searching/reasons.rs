@@ -160,20 +160,26 @@ fn out_of_time(s: &Situation) -> Option<String> {
         .then(|| "there is no time left for the looks that would settle it".into())
 }
 
-/// What was seen of where a thing could be: which share of which surfaces, and how much is left.
+/// A chance below this is not told from none.
+const LEAST_SAID: f64 = 0.001;
+
+/// What was seen of where a thing could be: which share of which surfaces, from how many places, and how much is left; `looks` were
+/// taken at each.
 /// The latter is the probability that it is there after all.
 pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) -> usize) -> String {
     let of = |on: usize, surface: &KnownSurface| -> Option<String> {
         let share = doubt.share_seen(on)?;
-        let places = looks(on);
+        let places = s.spaces[on].seen_from().len();
         let (percent, word) = ((share * 100.0).floor(), if places == 1 { "place" } else { "places" });
-        Some(match places {
-            0 => format!("the {} was not looked at", surface.name),
+        Some(match (places, looks(on)) {
+            (0, 0) => format!("the {} was not looked at", surface.name),
+            (0, _) => format!("no look at the {} tells anything of it", surface.name),
             _ => format!("{percent:.0} % of the {} was seen from {places} {word}", surface.name),
         })
     };
     let parts: Vec<String> = s.surfaces.iter().enumerate().filter_map(|(on, k)| of(on, k)).collect();
-    format!("{}; a chance of {:.3} is left", parts.join(", "), left.max(0.0))
+    let left = if left < LEAST_SAID { format!("less than {LEAST_SAID}") } else { format!("{left:.3}") };
+    format!("{}; a chance of {left} is left", parts.join(", "))
 }
 
 /// Where there is room for something that no look can show; none if too little hangs on it.

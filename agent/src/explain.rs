@@ -109,10 +109,12 @@ fn counts(domain: &Domain, action: &str) -> Option<String> {
 fn seconds(domain: &Domain) -> Option<String> {
     let is_more = |name: &str| duration(domain, name).is_some_and(|duration| duration.contains("(+"));
     let actions = domain.vocabulary.task.actions.iter().filter(|a| is_more(&a.name));
-    let all: Vec<String> =
-        actions.filter_map(|a| Some(format!("{} also the {}", a.name, counts(domain, &a.name)?))).collect();
-    (!all.is_empty())
-        .then(|| format!("Counted are, beside the time that it takes itself, of {}.", all.join("; of ")))
+    let all: Vec<String> = actions
+        .filter_map(|a| Some(format!("{} also for the {}", a.name, counts(domain, &a.name)?)))
+        .collect();
+    (!all.is_empty()).then(|| {
+        format!("In a plan some actions count for more than the time that they take: {}.", all.join("; "))
+    })
 }
 
 /// What stands for the duration of an action.

@@ -14,8 +14,6 @@ use descry_agent::stop::Stop;
 use descry_agent::template::write_domain;
 use descry_domains::abilities::searching::policies;
 use descry_domains::check;
-use descry_domains::goal::{self, Goal};
-use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain, LoadError};
 use descry_robots::conformance;
 use pyo3::prelude::*;

@@ -11,7 +11,7 @@ import pytest
 
 import descry
 
-DATA = Path(__file__).parents[2] / "agent" / "tests" / "data"
+DATA = Path(__file__).parents[2] / "cli" / "tests" / "data"
 ROADS = descry.Task.read(DATA / "roads.pddl", DATA / "roads-problem.pddl")
 
 SWITCHES = """
@@ -217,3 +217,11 @@ def test_why_an_action_is_not_in_a_plan():
             descry.why_not(ROADS, wrong, attachments=calls)
     with pytest.raises(ZeroDivisionError):
         descry.why_not(ROADS, "(drive van home market)", attachments={"path-cost": lambda call: 1 / 0})
+
+
+def test_threads_change_no_plan():
+    task = descry.Task(SWITCHES, PROBLEM)
+    alone = descry.plan(task).plan
+    assert alone and str(alone) == str(descry.plan(task, threads=2).plan)
+    with pytest.raises(ValueError):
+        descry.plan(task, threads=0)

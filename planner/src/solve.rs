@@ -8,7 +8,7 @@ use crate::attachment::{Attachments, CallStatistics};
 use crate::calls::{Calls, report};
 use crate::classical::compiled::is_classical;
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::explain::{constrained, explain, is_open, narrowed};
+use crate::explain::{Explanation, constrained, explain, is_open, narrowed};
 use crate::ground::{Expression, GroundError, GroundTask, compile, ground};
 use crate::memory::MemoryLimit;
 use crate::outcome::{Options, Outcome, PlanError, Statistics};
@@ -198,18 +198,26 @@ fn search_for(
     statistics.expanded = progress.counts.expanded;
     statistics.plans = progress.plans;
     statistics.attachments = since(&before, attachments.statistics());
-    Ok(match (best, progress.reason) {
-        (Some(plan), reason @ (Reason::Exhausted | Reason::Enough)) => {
+    let why = || explain(task, &grounded, &world.calls.refusals());
+    Ok(ended(best, progress.reason, why, statistics))
+}
+
+/// What a search with times has come to.
+fn ended(
+    best: Option<Plan>,
+    reason: Reason,
+    why: impl FnOnce() -> Explanation,
+    mut statistics: Statistics,
+) -> Outcome {
+    match (best, reason) {
+        (Some(plan), Reason::Exhausted | Reason::Enough) => {
             statistics.optimal = reason == Reason::Exhausted;
             Outcome::Solved { plan, statistics }
         }
-        (None, Reason::Exhausted | Reason::Enough) => {
-            let why = explain(task, &grounded, &world.calls.refusals());
-            Outcome::Unsolvable { why, statistics }
-        }
+        (None, Reason::Exhausted | Reason::Enough) => Outcome::Unsolvable { why: why(), statistics },
         (best, Reason::Stopped | Reason::Unproven) => Outcome::OutOfTime { best, statistics },
         (best, Reason::Memory) => Outcome::OutOfMemory { best, statistics },
-    })
+    }
 }
 
 fn limits(options: &Options, memory: MemoryLimit) -> Limits {

@@ -311,19 +311,24 @@ impl<'t> Oracle<'t> {
             }
         }
         self.derive(&mut next.state);
-        let World { state, running } = &mut next;
+        self.goes_on(&mut next).then_some(next)
+    }
+
+    /// Whether what runs may go on in a state; takes from each its effects at the end whose condition has failed on the way.
+    fn goes_on(&self, next: &mut World) -> bool {
+        let World { state, running } = next;
         for own in running {
             let action = &self.task.actions[own.action];
             let over_all = action.condition[1].as_ref();
             if over_all.is_some_and(|over_all| !self.holds(over_all, true, state, &mut own.arguments.clone()))
             {
-                return None;
+                return false;
             }
             let arguments = &own.arguments;
             own.pending
                 .retain(|&(index, object)| self.met(&action.effects[index], 1, object, state, arguments));
         }
-        Some(next)
+        true
     }
 
     fn pending(&self, action: usize, arguments: &[usize], before: &State) -> Vec<(usize, usize)> {

@@ -82,7 +82,7 @@ pub(super) fn find(
             if let Some(known) = glances.get(&view.stamp_ns) {
                 return Some((Arc::clone(known), *pose));
             }
-            let glance = Arc::new(models.library.glance(view, &options).ok()?);
+            let glance = Arc::new(models.known.glance(view, &options).ok()?);
             glances.insert(view.stamp_ns, Arc::clone(&glance));
             Some((glance, *pose))
         })
@@ -100,7 +100,7 @@ pub(super) fn find(
         }
     }
     let judged = guesses.iter().filter_map(|(guess, at)| {
-        let judged = models.library.judge(guess, at, &looks, &options).ok()??;
+        let judged = models.known.judge(guess, at, &looks, &options).ok()??;
         found(news, &models, guess.model, judged)
     });
     let mut judged: Vec<Found> = judged.filter(|f| f.judged.confidence >= LEAST).collect();
@@ -145,7 +145,7 @@ fn together(
         let facing: Vec<u32> = (0..merged.len() as u32).filter(faces).collect();
         let cloud = merged.select(&facing).transformed(&pose.inverse());
         let together = View { cloud, world_from_camera: *pose, ..View::clone(view) };
-        models.library.glance(&together, &options()).map_or_else(|_| Vec::new(), |g| placed(&g, pose))
+        models.known.glance(&together, &options()).map_or_else(|_| Vec::new(), |g| placed(&g, pose))
     };
     views.iter().rev().take(TOGETHER).flat_map(seen).collect()
 }

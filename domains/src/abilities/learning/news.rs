@@ -245,7 +245,7 @@ impl Novelty {
 /// Learned things made ready to be known again.
 pub struct Models {
     /// Their surfaces and features.
-    pub(super) library: Library,
+    pub(super) known: Library,
     /// Which thing each is, in the order of [`News::things`]; of some too little was seen to know them again.
     pub(super) things: Vec<usize>,
 }
@@ -253,13 +253,13 @@ pub struct Models {
 impl Models {
     /// Makes things ready; none if there is none.
     pub(super) fn of(things: &[LearnedThing]) -> Option<Arc<Models>> {
-        let mut models = Models { library: Library::default(), things: Vec::new() };
+        let mut models = Models { known: Library::default(), things: Vec::new() };
         for (n, thing) in things.iter().enumerate() {
-            if models.library.add(&thing.cloud, &KnowOptions::default()).is_ok() {
+            if models.known.add(&thing.cloud, &KnowOptions::default()).is_ok() {
                 models.things.push(n);
             }
         }
-        (!models.library.is_empty()).then(|| Arc::new(models))
+        (!models.known.is_empty()).then(|| Arc::new(models))
     }
 }
 

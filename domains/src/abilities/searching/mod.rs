@@ -7,6 +7,7 @@ pub mod change;
 mod discover;
 pub mod doubt;
 mod facts;
+mod merging;
 pub mod obstacle;
 pub mod perceive;
 mod placing;

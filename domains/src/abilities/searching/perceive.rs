@@ -9,12 +9,12 @@ use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sight
 use descry_perception::View;
 use descry_perception::hull::Hull;
 use descry_perception::merge::{MergeOptions, Merged, ViewFit};
-use descry_perception::nalgebra::{Isometry3, Point3, Translation3, Unit, Vector3};
+use descry_perception::nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use descry_perception::noise::axial_sigma_m;
 use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
-use descry_perception::segment::{Scene, SceneOptions, segment_on};
-use descry_perception::surface::{Region, Role, SurfaceOptions, find_surface};
+use descry_perception::segment::{Scene, segment_on};
+use descry_perception::surface::{Role, SurfaceOptions, find_surface};
 use descry_perception::visibility::{DepthMap, Seen, Visibility};
 use descry_robots::{Description, Robot, Sensed};
 use serde::Serialize;
@@ -22,11 +22,12 @@ use serde_json::json;
 
 use super::change::Change;
 use super::discover;
+pub use super::merging::options;
+use super::merging::options_at;
 use super::placing;
 use super::vanished::{keep_unrefuted, set_aside_unseen, taken_away};
 use crate::abilities::learning::again;
 use crate::config::Thresholds;
-use crate::lexicon::symbol;
 use crate::mind::{Laid, Look, Mind};
 use crate::note::Note;
 use crate::situation::{KnownSurface, Situation, Thing};
@@ -34,15 +35,6 @@ use crate::world::WorldError;
 
 /// A side counts as seen if a surface was measured this near to where it should be.
 pub(super) const SIDE_TOLERANCE_M: f64 = 0.03;
-/// How far from the height at which the map has a surface points are merged that may be of it.
-const HEIGHT_TOLERANCE_M: f64 = 0.15;
-/// How far a level surface may be from there to be that one: farther, it is another, or the body is not where it believes to be.
-const SAME_HEIGHT_M: f64 = 0.08;
-/// Most angle between a surface of the map and level, as seen: localisation and the camera's mounting err by a degree or two. A
-/// steeper plane cuts through the wall behind a board and through what stands on it.
-const LEVEL_RAD: f64 = 0.045;
-/// How far beside the outline on the map points of a surface may lie: localisation errs by centimetres and degrees.
-const BESIDE_M: f64 = 0.25;
 /// What is remembered of an object that was seen again nearer than this is that one, metres.
 const SAME_M: f64 = 0.10;
 /// Points this near to a surface lie on it.
@@ -545,33 +537,6 @@ fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>, voxel_m: f64) -> bool {
 fn newest(views: &[View], merged: &Merged) -> Option<DepthMap> {
     let (fit, view) = merged.fits.last().filter(|fit| fit.used).zip(views.last())?;
     DepthMap::from_view(view, &fit.world_from_camera)
-}
-
-/// How a body's views of a surface (a symbol; none: of any) are merged and looked through. It is looked for where the map has it,
-/// if it has it; what can stand on it, and it itself, is merged; without any map, all that is in range.
-pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptions) {
-    let up = robot.description().up.map(Unit::new_normalize);
-    let asked = robot.surfaces().iter().filter(|hint| on.is_none_or(|on| symbol(&hint.name) == on));
-    let band = asked.map(|hint| hint.height_m).fold(None, |band: Option<(f64, f64)>, h| {
-        let (low, high) = band.unwrap_or((h, h));
-        Some((low.min(h), high.max(h)))
-    });
-    let within = |m: f64| band.map(|(low, high)| (low - m, high + m));
-    let surface = SurfaceOptions { up, height_band_m: within(SAME_HEIGHT_M), ..SurfaceOptions::default() };
-    let scene = SceneOptions { surface, ..SceneOptions::default() };
-    let height_band_m = within(HEIGHT_TOLERANCE_M).map(|(low, high)| (low, high + scene.tallest_m));
-    (MergeOptions { up, height_band_m, ..MergeOptions::default() }, scene)
-}
-
-/// The same for one surface: one that the map has is merged and looked for where its outline is.
-fn options_at(robot: &dyn Robot, known: &KnownSurface) -> (MergeOptions, SceneOptions) {
-    let (merging, seeking) = options(robot, Some(&known.symbol));
-    if !known.whole {
-        return (merging, seeking);
-    }
-    let region = Some(Region { corners: known.outline.clone(), margin_m: BESIDE_M });
-    let surface = SurfaceOptions { region: region.clone(), tilt_rad: LEVEL_RAD, ..seeking.surface };
-    (MergeOptions { region, ..merging }, SceneOptions { surface, ..seeking })
 }
 
 /// The part of the map that a frame shows; none if nothing returned.

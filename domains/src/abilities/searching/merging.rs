@@ -1,0 +1,47 @@
+//! How views are merged and looked through.
+
+use descry_perception::merge::MergeOptions;
+use descry_perception::nalgebra::Unit;
+use descry_perception::segment::SceneOptions;
+use descry_perception::surface::{Region, SurfaceOptions};
+use descry_robots::Robot;
+
+use crate::lexicon::symbol;
+use crate::situation::KnownSurface;
+
+/// How far from the height at which the map has a surface points are merged that may be of it.
+const HEIGHT_TOLERANCE_M: f64 = 0.15;
+/// How far a level surface may be from there to be that one: farther, it is another, or the body is not where it believes to be.
+const SAME_HEIGHT_M: f64 = 0.08;
+/// Most angle between a surface of the map and level, as seen: localisation and the camera's mounting err by a degree or two. A
+/// steeper plane cuts through the wall behind a board and through what stands on it.
+const LEVEL_RAD: f64 = 0.045;
+/// How far beside the outline on the map points of a surface may lie: localisation errs by centimetres and degrees.
+const BESIDE_M: f64 = 0.25;
+
+/// How a body's views of a surface (a symbol; none: of any) are merged and looked through. It is looked for where the map has it,
+/// if it has it; what can stand on it, and it itself, is merged; without any map, all that is in range.
+pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptions) {
+    let up = robot.description().up.map(Unit::new_normalize);
+    let asked = robot.surfaces().iter().filter(|hint| on.is_none_or(|on| symbol(&hint.name) == on));
+    let band = asked.map(|hint| hint.height_m).fold(None, |band: Option<(f64, f64)>, h| {
+        let (low, high) = band.unwrap_or((h, h));
+        Some((low.min(h), high.max(h)))
+    });
+    let within = |m: f64| band.map(|(low, high)| (low - m, high + m));
+    let surface = SurfaceOptions { up, height_band_m: within(SAME_HEIGHT_M), ..SurfaceOptions::default() };
+    let scene = SceneOptions { surface, ..SceneOptions::default() };
+    let height_band_m = within(HEIGHT_TOLERANCE_M).map(|(low, high)| (low, high + scene.tallest_m));
+    (MergeOptions { up, height_band_m, ..MergeOptions::default() }, scene)
+}
+
+/// The same for one surface: one that the map has is merged and looked for where its outline is.
+pub(super) fn options_at(robot: &dyn Robot, known: &KnownSurface) -> (MergeOptions, SceneOptions) {
+    let (merging, seeking) = options(robot, Some(&known.symbol));
+    if !known.whole {
+        return (merging, seeking);
+    }
+    let region = Some(Region { corners: known.outline.clone(), margin_m: BESIDE_M });
+    let surface = SurfaceOptions { region: region.clone(), tilt_rad: LEVEL_RAD, ..seeking.surface };
+    (MergeOptions { region, ..merging }, SceneOptions { surface, ..seeking })
+}

@@ -1,0 +1,289 @@
+//! The surfaces of solids, and where rays meet them.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+/// A surface with a closed answer for rays (the handle: to a tenth of a millimetre).
+#[derive(Clone, Debug, PartialEq)]
+pub enum Part {
+    /// Side of a cone around z between two heights: radius = `axis_m` + `slope`·z.
+    Frustum {
+        /// Radius at z = 0.
+        axis_m: f64,
+        /// Change of radius a metre.
+        slope: f64,
+        /// Lower end.
+        low_m: f64,
+        /// Upper end.
+        high_m: f64,
+    },
+    /// A level ring.
+    Disc {
+        /// Height.
+        z_m: f64,
+        /// Radius of the hole.
+        inner_m: f64,
+        /// Outer radius.
+        outer_m: f64,
+    },
+    /// Half of a torus that stands upright in the x-z plane, on the side away from the axis.
+    Handle {
+        /// Of the ring.
+        centre: Point3<f64>,
+        /// From the ring's centre to the middle of the rod.
+        major_m: f64,
+        /// Half the thickness of the rod.
+        minor_m: f64,
+    },
+    /// A box around the z axis that stands on z = 0, its upright edges rounded.
+    Rounded {
+        /// Greatest corner of the box around it.
+        high: Point3<f64>,
+        /// Radius of the edges.
+        corner_m: f64,
+    },
+    /// A box.
+    Cuboid {
+        /// Least corner.
+        low: Point3<f64>,
+        /// Greatest corner.
+        high: Point3<f64>,
+    },
+    /// An ellipsoid.
+    Ball {
+        /// Its middle.
+        middle: Point3<f64>,
+        /// Half its diameters.
+        half: Vector3<f64>,
+    },
+    /// Another surface in a frame of its own.
+    Turned {
+        /// That frame.
+        part_from_here: Isometry3<f64>,
+        /// The surface there.
+        part: Box<Part>,
+    },
+}
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// In units of the ray's direction.
+    pub t: f64,
+    /// Outward or inward, unit length.
+    pub normal: Vector3<f64>,
+}
+
+/// Hits nearer than this are the ray's own start, in units of its direction.
+const NEAREST_T: f64 = 1e-6;
+const HANDLE_TOLERANCE_M: f64 = 1e-4;
+const HANDLE_STEPS: usize = 64;
+
+impl Part {
+    pub(super) fn frustum(base_m: f64, top_m: f64, low_m: f64, high_m: f64) -> Part {
+        let slope = (top_m - base_m) / (high_m - low_m);
+        Part::Frustum { axis_m: base_m - slope * low_m, slope, low_m, high_m }
+    }
+
+    /// An ellipsoid that touches the level `low_m` from above.
+    pub(super) fn ball(half: &Vector3<f64>, low_m: f64) -> Part {
+        Part::Ball { middle: Point3::new(0.0, 0.0, low_m + half.z), half: *half }
+    }
+
+    /// The surface in another frame than its own.
+    pub(crate) fn turned(self, part_from_here: Isometry3<f64>) -> Part {
+        Part::Turned { part_from_here, part: Box::new(self) }
+    }
+
+    /// The first hit with 0 < t < `before`.
+    #[inline]
+    pub fn hit(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<Hit> {
+        match *self {
+            Part::Turned { part_from_here, ref part } => {
+                let hit = part.hit(&(part_from_here * o), &(part_from_here * d), before)?;
+                Some(Hit { normal: part_from_here.rotation.inverse() * hit.normal, ..hit })
+            }
+            Part::Ball { middle, half } => ball_hit(o, d, before, &middle, &half),
+            Part::Frustum { axis_m, slope, low_m, high_m } => {
+                frustum_hit(o, d, before, (axis_m, slope), (low_m, high_m))
+            }
+            Part::Disc { z_m, inner_m, outer_m } => {
+                let t = (z_m - o.z) / d.z;
+                if !(t > NEAREST_T && t < before) {
+                    return None;
+                }
+                let (x, y) = (o.x + t * d.x, o.y + t * d.y);
+                let square = x * x + y * y;
+                (square >= inner_m * inner_m && square <= outer_m * outer_m)
+                    .then_some(Hit { t, normal: Vector3::z() })
+            }
+            Part::Handle { centre, major_m, minor_m } => handle_hit(o, d, before, &centre, major_m, minor_m),
+            Part::Rounded { high, corner_m } => rounded_hit(o, d, before, &high, corner_m),
+            Part::Cuboid { low, high } => cuboid_hit(o, d, before, &low, &high),
+        }
+    }
+}
+
+#[inline]
+fn frustum_hit(
+    o: &Point3<f64>,
+    d: &Vector3<f64>,
+    before: f64,
+    (axis_m, slope): (f64, f64),
+    (low_m, high_m): (f64, f64),
+) -> Option<Hit> {
+    let radius = axis_m + slope * o.z;
+    let a = d.x * d.x + d.y * d.y - slope * slope * d.z * d.z;
+    let b = o.x * d.x + o.y * d.y - radius * slope * d.z;
+    let c = o.x * o.x + o.y * o.y - radius * radius;
+    let roots = if a.abs() > 1e-12 {
+        let square = b * b - a * c;
+        if square < 0.0 {
+            return None;
+        }
+        let root = square.sqrt();
+        let (first, second) = ((-b - root) / a, (-b + root) / a);
+        if first < second { [first, second] } else { [second, first] }
+    } else {
+        [-0.5 * c / b, f64::INFINITY]
+    };
+    for t in roots {
+        if !(t > NEAREST_T && t < before) {
+            continue;
+        }
+        let p = o + d * t;
+        let radius = axis_m + slope * p.z;
+        if p.z >= low_m && p.z <= high_m && radius >= 0.0 {
+            let normal = Vector3::new(p.x, p.y, -slope * radius).normalize();
+            return Some(Hit { t, normal });
+        }
+    }
+    None
+}
+
+#[inline]
+fn cuboid_hit(
+    o: &Point3<f64>,
+    d: &Vector3<f64>,
+    before: f64,
+    low: &Point3<f64>,
+    high: &Point3<f64>,
+) -> Option<Hit> {
+    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+    let (mut enter_axis, mut leave_axis) = (0, 0);
+    for axis in 0..3 {
+        if d[axis] == 0.0 {
+            if o[axis] < low[axis] || o[axis] > high[axis] {
+                return None;
+            }
+            continue;
+        }
+        let inverse = 1.0 / d[axis];
+        let (a, b) = ((low[axis] - o[axis]) * inverse, (high[axis] - o[axis]) * inverse);
+        let (near, far) = if a < b { (a, b) } else { (b, a) };
+        if near > enter {
+            (enter, enter_axis) = (near, axis);
+        }
+        if far < leave {
+            (leave, leave_axis) = (far, axis);
+        }
+    }
+    if enter > leave {
+        return None;
+    }
+    let (t, axis) = if enter > NEAREST_T { (enter, enter_axis) } else { (leave, leave_axis) };
+    if !(t > NEAREST_T && t < before) {
+        return None;
+    }
+    let mut normal = Vector3::zeros();
+    normal[axis] = 1.0;
+    Some(Hit { t, normal })
+}
+
+/// In the frame in which its half diameters are one it is a ball of radius 1.
+#[inline]
+fn ball_hit(
+    o: &Point3<f64>,
+    d: &Vector3<f64>,
+    before: f64,
+    middle: &Point3<f64>,
+    half: &Vector3<f64>,
+) -> Option<Hit> {
+    let (from, along) = ((o - middle).component_div(half), d.component_div(half));
+    let (a, b, c) = (along.norm_squared(), from.dot(&along), from.norm_squared() - 1.0);
+    let square = b * b - a * c;
+    if square < 0.0 {
+        return None;
+    }
+    let root = square.sqrt();
+    let t = [(-b - root) / a, (-b + root) / a].into_iter().find(|t| *t > NEAREST_T)?;
+    (t < before).then(|| Hit { t, normal: (from + along * t).component_div(half).normalize() })
+}
+
+/// The body is convex, two boxes and four cylinders together: from outside a ray enters it where it enters the first of them.
+fn rounded_hit(
+    o: &Point3<f64>,
+    d: &Vector3<f64>,
+    before: f64,
+    high: &Point3<f64>,
+    corner_m: f64,
+) -> Option<Hit> {
+    let (x, y) = (high.x - corner_m, high.y - corner_m);
+    let boxes = [(x, high.y), (high.x, y)]
+        .into_iter()
+        .filter_map(|(x, y)| cuboid_hit(o, d, before, &Point3::new(-x, -y, 0.0), &Point3::new(x, y, high.z)));
+    let edge = [
+        Part::frustum(corner_m, corner_m, 0.0, high.z),
+        Part::Disc { z_m: high.z, inner_m: 0.0, outer_m: corner_m },
+    ];
+    let edges = [(x, y), (-x, y), (-x, -y), (x, -y)].into_iter().flat_map(|(x, y)| {
+        let from_edge = o - Vector3::new(x, y, 0.0);
+        edge.each_ref().map(|part| part.hit(&from_edge, d, before)).into_iter().flatten()
+    });
+    boxes.chain(edges).min_by(|a, b| a.t.total_cmp(&b.t))
+}
+
+/// Sphere tracing: the distance to half a torus is known exactly, so no step can pass through it.
+fn handle_hit(
+    o: &Point3<f64>,
+    d: &Vector3<f64>,
+    before: f64,
+    centre: &Point3<f64>,
+    major_m: f64,
+    minor_m: f64,
+) -> Option<Hit> {
+    let from = o - centre;
+    let (square, along) = (d.norm_squared(), from.dot(d));
+    let reach = major_m + minor_m;
+    let spread = along * along - square * (from.norm_squared() - reach * reach);
+    if spread < 0.0 {
+        return None;
+    }
+    let (enter, leave) = ((-along - spread.sqrt()) / square, (-along + spread.sqrt()) / square);
+    let length = square.sqrt();
+    let mut t = enter.max(NEAREST_T);
+    for _ in 0..HANDLE_STEPS {
+        if t > leave.min(before) {
+            return None;
+        }
+        let p = from + d * t;
+        let ring = Vector3::new(p.x, 0.0, p.z);
+        let nearest = if p.x >= 0.0 {
+            match ring.norm() {
+                n if n > 1e-12 => ring * (major_m / n),
+                _ => Vector3::new(major_m, 0.0, 0.0),
+            }
+        } else {
+            Vector3::new(0.0, 0.0, major_m.copysign(p.z))
+        };
+        let off = p - nearest;
+        let gap = off.norm() - minor_m;
+        if gap < HANDLE_TOLERANCE_M {
+            // The ends of the rod inside the wall are no surface.
+            let at = o + d * t;
+            let outside = at.x.hypot(at.y) >= centre.x;
+            return outside.then(|| Hit { t, normal: off.normalize() });
+        }
+        t += gap / length;
+    }
+    None
+}

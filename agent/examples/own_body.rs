@@ -20,15 +20,16 @@ use descry_robots::head::{Gaze, aim, base_from_camera, camera_towards};
 use descry_robots::nalgebra::{Isometry3, Point2, Point3, Vector3};
 use descry_robots::route::Router;
 use descry_robots::{
-    Description, Driven, Failure, Footprint, Frames, Head, Looked, OccupancyGrid, Place, Pose2, PoseEstimate,
-    Progress, Robot, Sensed, Speeds, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
-    async_trait, conformance,
+    Base, Camera, Description, Driven, Failure, Footprint, Frames, Head, Looked, OccupancyGrid, Place, Pose2,
+    PoseEstimate, Progress, Robot, Sensed, Speeds, Stamp, StampedTransform, Station, SurfaceHint, Travel,
+    Watch, async_trait, conformance,
 };
 
 const ROOM_M: f64 = 2.5;
 const TABLE_M: (f64, f64) = (0.8, 0.4);
 const TABLE_TOP_M: f64 = 0.72;
 const STEP_M: f64 = 0.05;
+const SPEEDS: Speeds = Speeds { linear_m_s: 0.4, angular_rad_s: 0.8 };
 const CAMERA: Intrinsics = Intrinsics { width: 64, height: 48, fx: 58.0, fy: 58.0, cx: 31.5, cy: 23.5 };
 const HEAD: Head = Head {
     base_from_head: Point3::new(0.0, 0.0, 1.4),
@@ -54,7 +55,6 @@ struct State {
 
 impl Disc {
     fn new() -> Self {
-        let speeds = Speeds { linear_m_s: 0.4, angular_rad_s: 0.8 };
         let footprint = Footprint::Disc { radius_m: 0.25 };
         let corner = Point2::new(ROOM_M, ROOM_M);
         let mut map = OccupancyGrid::covering(-corner, corner, 0.05);
@@ -69,20 +69,23 @@ impl Disc {
         let description = Description {
             name: "disc".into(),
             simulated: true,
-            footprint: footprint.clone(),
-            speeds,
-            camera: CAMERA,
-            range_m: (0.4, 6.0),
+            base: Some(Base { footprint: footprint.clone(), speeds: SPEEDS }),
             head: Some(HEAD),
-            frames: Frames::default(),
-            reach_m: None,
-            hand_opening_m: None,
+            arm: None,
+            camera: Some(Camera {
+                frame: "camera".into(),
+                intrinsics: CAMERA,
+                range_m: (0.4, 6.0),
+                colour: false,
+            }),
             laser: None,
+            senses: Vec::new(),
+            frames: Frames::default(),
             up: Some(Vector3::z()),
             pose_sigma_m: 0.03,
             pose_sigma_rad: 0.03,
         };
-        let router = Router::new(&map, footprint.radius_m(), speeds);
+        let router = Router::new(&map, footprint.radius_m(), SPEEDS);
         let at = Pose2::new(-2.0, 0.0, 0.0);
         let state = Mutex::new(State { clock_s: 0.0, at, gaze: Gaze::default() });
         Disc { description, map, surfaces: vec![table], router, state }
@@ -101,7 +104,7 @@ impl Disc {
 
     /// Where the base comes by, and what each step takes: a turn, then straight on, and a turn at the end.
     fn steps(&self, from: &Pose2, to: &Pose2) -> Result<Vec<(Pose2, f64, f64)>, Failure> {
-        let Speeds { linear_m_s, angular_rad_s } = self.description.speeds;
+        let Speeds { linear_m_s, angular_rad_s } = SPEEDS;
         let turn = |a: f64, b: f64| descry_robots::route::turn(a, b).abs() / angular_rad_s;
         let mut steps = Vec::new();
         let mut at = *from;
@@ -289,7 +292,7 @@ pub fn pursue(said: &str, folder: &Path) -> Result<String, Box<dyn Error>> {
     let mut tell = |event: &descry_agent::report::Event| println!("{event}");
     let watcher = Watcher { stop: &Stop::default(), tell: &mut tell };
     let task = Task { domain: &domain, goal: &goal, past: None };
-    let report = run::pursue(task, &body, &folder, &settings, chooser, watcher)?;
+    let report = runtime.block_on(run::pursue(task, &body, &folder, &settings, chooser, watcher))?;
     run::finish(folder.path(), &report)?;
     Ok(report.to_string())
 }

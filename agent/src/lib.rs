@@ -27,7 +27,12 @@
 //! let watcher = Watcher { stop: &Stop::default(), tell: &mut |event| said.push(event.to_string()) };
 //! let chooser = policies::named(policies::PLAN, 3, None)?;
 //! let task = Task { domain: &domain, goal: &goal, past: None };
-//! let report = run::pursue(task, &body, &folder, &settings, chooser, watcher)?;
+//! # let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+//! # let pursued = async {
+//! let report = run::pursue(task, &body, &folder, &settings, chooser, watcher).await?;
+//! # Ok::<_, descry_agent::exit::CommandError>(report)
+//! # };
+//! # let report = runtime.block_on(pursued)?;
 //! assert_eq!(report.verdict, descry_domains::answer::Verdict::Achieved, "{said:?}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

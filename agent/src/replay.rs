@@ -55,19 +55,19 @@ pub struct Replay<'a> {
 ///
 /// # Errors
 /// [`CommandError`] if there is no run, if its record does not say what it began with, or if living through it fails.
-pub fn replay(asked: Replay<'_>, watcher: Watcher<'_>) -> Result<Replayed, CommandError> {
+pub async fn replay(asked: Replay<'_>, watcher: Watcher<'_>) -> Result<Replayed, CommandError> {
     run::header(asked.run)?;
     let source = Arc::new(keeping::open(asked.run)?);
     let damage = source.verify().map_err(CommandError::broken)?.faults;
     let replayed = match damage.is_empty() {
-        true => live_through(asked, &source, watcher)?,
+        true => live_through(asked, &source, watcher).await?,
         false => Replayed { damage, ..Replayed::default() },
     };
     Ok(Replayed { run: asked.run.display().to_string(), ..replayed })
 }
 
 /// Lives through a run whose record is whole.
-fn live_through(
+async fn live_through(
     asked: Replay<'_>,
     source: &Arc<Record>,
     watcher: Watcher<'_>,
@@ -91,7 +91,7 @@ fn live_through(
     let chooser = policies::named(&header.settings.policy, header.settings.seed, None);
     let chooser = chooser.map_err(CommandError::bad_input)?;
     let task = Task { domain: &kept.domain, goal: &goal, past: beginning.past.as_ref() };
-    let lived = run::live_through(task, &robot, &record, chooser, &scratch.folder, watcher);
+    let lived = run::live_through(task, &robot, &record, chooser, &scratch.folder, watcher).await;
     let ended = robot.ended().or_else(|| kept.ended());
     let report = match (lived, &ended) {
         (_, Some(_)) => None,

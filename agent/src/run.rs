@@ -95,11 +95,12 @@ pub struct Watcher<'a> {
     pub tell: &'a mut dyn FnMut(&Event),
 }
 
-/// Pursues a goal and reports.
+/// Pursues a goal and reports. Planning and perception go on on the thread that awaits it: give it one of its own, as a
+/// current-thread runtime does.
 ///
 /// # Errors
 /// [`CommandError`] if the body or the record fails for good, or the domain cannot be used.
-pub fn pursue(
+pub async fn pursue(
     task: Task<'_>,
     body: &Body,
     folder: &Folder,
@@ -124,7 +125,8 @@ pub fn pursue(
     let robot = Arc::new(TapedRobot::begin(Arc::clone(&body.robot), tape));
     let kept = programs::on_record(domain, &record, None, &robot, true)?;
     let task = Task { domain: &kept.domain, ..task };
-    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), watcher)?;
+    let (mut report, remembered) =
+        live_through(task, &robot, &record, chooser, folder.path(), watcher).await?;
     remember(settings, remembered.as_ref())?;
     show_true_position(&mut report, body);
     Ok(report)
@@ -168,7 +170,7 @@ fn remember(settings: &Settings, remembered: Option<&Remembered>) -> Result<(), 
 ///
 /// # Errors
 /// [`CommandError`] as for [`pursue`], or if the body is not the one of that run.
-pub fn go_on(
+pub async fn go_on(
     task: Task<'_>,
     body: &Body,
     folder: &Folder,
@@ -183,7 +185,8 @@ pub fn go_on(
     let robot = Arc::new(TapedRobot::go_on(Arc::clone(&body.robot), tape, entries));
     let kept = programs::on_record(task.domain, &record, Some(&record), &robot, true)?;
     let task = Task { domain: &kept.domain, ..task };
-    let (mut report, remembered) = live_through(task, &robot, &record, chooser, folder.path(), watcher)?;
+    let (mut report, remembered) =
+        live_through(task, &robot, &record, chooser, folder.path(), watcher).await?;
     remember(settings, remembered.as_ref())?;
     show_true_position(&mut report, body);
     Ok(report)
@@ -193,7 +196,7 @@ pub fn go_on(
 ///
 /// # Errors
 /// [`CommandError`] if the body or the record fails for good, or the domain cannot be used.
-pub fn live_through(
+pub async fn live_through(
     task: Task<'_>,
     robot: &Arc<TapedRobot>,
     record: &Record,
@@ -203,18 +206,12 @@ pub fn live_through(
 ) -> Result<(Report, Option<Remembered>), CommandError> {
     let Task { domain, goal, past } = task;
     tape::put_known(record, robot.known())?;
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|e| CommandError::broken(format!("the runtime could not be started: {e}")))?;
     let recogniser = descry_perception::recognise::Descry::default();
     let start_ns = robot.now_ns();
-    let lived = runtime.block_on(async {
-        let body: Arc<dyn Robot> = Arc::clone(robot) as _;
-        let (robot, past) = (Arc::clone(&body), past.cloned());
-        let setting = Setting { domain, goal, robot, record, recogniser: &recogniser, past };
-        Agent::new(body, record, watcher.stop.clone(), watcher.tell).pursue(setting, chooser).await
-    });
+    let body: Arc<dyn Robot> = Arc::clone(robot) as _;
+    let eyes = Arc::clone(&body);
+    let setting = Setting { domain, goal, robot: eyes, record, recogniser: &recogniser, past: past.cloned() };
+    let lived = Agent::new(body, record, watcher.stop.clone(), watcher.tell).pursue(setting, chooser).await;
     let (conclusion, totals) = lived.map_err(|error| how_to_go_on(error, folder))?;
     robot.finish().map_err(CommandError::broken)?;
     let mut report = Report::begin(goal, folder.display().to_string());

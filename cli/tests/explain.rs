@@ -207,7 +207,9 @@ fn faulty(goal: &str, seed: u64, faults: &str) -> (String, String) {
     let mut said = Vec::new();
     let watcher = Watcher { stop: &Stop::default(), tell: &mut |event| said.push(event.to_string()) };
     let task = Task { domain: &domain, goal: &goal, past: None };
-    let report = run::pursue(task, &body, &into, &settings, chooser, watcher).expect("it ends");
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+    let pursued = run::pursue(task, &body, &into, &settings, chooser, watcher);
+    let report = runtime.block_on(pursued).expect("it ends");
     let header = run::header(into.path()).expect("a run");
     let record = descry_agent::keeping::open(into.path()).expect("a record");
     let told = explain::of(&record, &header, Some(&report)).expect("it is explained").to_string();

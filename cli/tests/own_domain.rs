@@ -307,6 +307,61 @@ fn a_fact_may_be_a_program() {
     check(&rain("exit 1"), "ring", 2, &["holds of raining", "ended"], &[]);
 }
 
+/// The template robot with one thing changed, as `--robot` takes it.
+fn robot(what: &str) -> String {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/tests/programs/rogue.py");
+    format!("program:python3 '{}' '{what}'", file.display())
+}
+
+#[test]
+fn what_a_sense_of_the_body_says_is_told_to_the_programs_behind_facts() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        return eprintln!("SKIPPED: python3 is not here");
+    }
+    let labelled =
+        r#"case "$asked" in *'"readings":{"label-reader":'*TEA*) v='["(labelled)"]';; *) v='[]';; esac"#;
+    let labelled = format!("{labelled}\n{}", answers("\"value\":'$v'"));
+    let edits = [
+        replace("domain.toml", "uses = [\"searching\"]", "uses = [\"searching\", \"reading\"]"),
+        append("domain.toml", "[action.read-label]\ndoes = \"read ?by\"\nlimit_s = 5.0"),
+        append("domain.toml", "[word.labelled]\nprogram = [\"sh\", \"labelled.sh\"]"),
+        append("domain.toml", "[[goal]]\nsay = \"read the label\"\nmeans = \"(labelled)\""),
+        replace("domain.pddl", "(:predicates", "(:predicates\n    (labelled)"),
+        replace("domain.pddl", "(:types", "(:types\n    sense"),
+        action(
+            "(:durative-action read-label :parameters (?by - sense) :duration (= ?duration 1)
+               :condition (at start (not (labelled))) :effect (at end (labelled)))",
+        ),
+        program("labelled.sh", &labelled),
+    ];
+    let folder = own(&edits);
+    let with = |what: &str, run: &str| {
+        let robot = robot(what);
+        let asked = ["do", "read the label", "--domain", "own", "--robot", &robot, "--run", run];
+        descry(folder.path(), &asked)
+    };
+    let (out, err) = shown(&with("reads labels", "reads"));
+    assert!(out.contains("achieved"), "{out}{err}");
+    assert!(err.contains(r#"it says {"by":"label reader","text":"TEA"}"#), "{out}{err}");
+    let replayed = descry(folder.path(), &["replay", "reads"]);
+    assert!(replayed.status.success(), "{:?}", shown(&replayed));
+    // A body without such a sense cannot, and says so.
+    let output = with("bare", "bare");
+    assert_eq!(output.status.code(), Some(1), "{:?}", shown(&output));
+}
+
+#[test]
+fn a_body_without_a_camera_cannot_tell() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        return eprintln!("SKIPPED: python3 is not here");
+    }
+    let folder = TempDir::new().expect("a folder can be made");
+    let output = descry(folder.path(), &["find", "mug", "--robot", &robot("no camera"), "--run", "run"]);
+    let (out, err) = shown(&output);
+    assert_eq!(output.status.code(), Some(1), "{out}{err}");
+    assert!(out.contains("the body has no camera"), "{out}{err}");
+}
+
 #[test]
 fn a_domain_with_a_fault_is_refused_before_anything_begins() {
     let folder = own(&[replace("domain.toml", "\"observe ?from ?on\"", "\"observ ?from ?on\"")]);

@@ -142,6 +142,7 @@ pub(crate) fn outcome(outcome: &Outcome) -> Value {
             "looks": m.model.as_ref().map(|model| model.looks.clone()).unwrap_or_default(),
             "because": m.model.as_ref().err(),
         }),
+        Outcome::Read(r) => json!({ "stamp_ns": r.stamp_ns, "said": r.said }),
         Outcome::Pushed(p) => json!({ "moved_m": p.moved_m, "duration_s": p.duration_s }),
         Outcome::Opened(o) => json!({ "duration_s": o.duration_s }),
         Outcome::Grasped(g, hand) => {

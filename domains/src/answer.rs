@@ -4,6 +4,7 @@ use descry_memory::belief::Track;
 use descry_memory::remember::Remembered;
 use descry_perception::nalgebra::Vector3;
 use descry_planner::{FactValue, Plan, after};
+use descry_robots::Part;
 use serde::{Deserialize, Serialize};
 
 use crate::abilities::searching::adrift;
@@ -101,7 +102,7 @@ pub(crate) fn conclude(
     lexicon: &Lexicon,
     mind: &Mind,
     round: &Round,
-    lacks: Option<&'static str>,
+    lacks: Option<Part>,
     ended: &Ended,
 ) -> Conclusion {
     let s = &*round.situation;
@@ -151,7 +152,7 @@ struct Asker<'a> {
     mind: &'a Mind,
     round: &'a Round,
     /// A part that the domain needs and the body does not have.
-    lacks: Option<&'static str>,
+    lacks: Option<Part>,
     s: &'a Situation,
 }
 
@@ -211,6 +212,9 @@ impl Asker<'_> {
         let is_beyond_looks = self.goal.asked.more
             && !missing.is_empty()
             && missing.iter().all(|&n| s.doubt_about(n).can_be_settled(s));
+        if let Some(part @ (Part::Camera | Part::Laser)) = self.lacks {
+            return (Verdict::CannotTell, format!("the body has no {part}, so nothing can be looked at"));
+        }
         // No look is needed to know it where a part is missing that nothing can be brought about without.
         let is_beyond_the_body = self.goal.asked.more && self.lacks.is_some() && self.mind.views == 0;
         if (is_beyond_looks || is_beyond_the_body) && is_proven {

@@ -21,8 +21,11 @@ pub fn symbol(name: &str) -> String {
     if symbol.starts_with(|c: char| c.is_ascii_digit()) { format!("n-{symbol}") } else { symbol }
 }
 
+/// The type of the body's senses.
+pub const SENSE: &str = "sense";
+
 /// Types whose objects have names in every domain: their symbols are these names.
-pub const NAMED: [&str; 5] = ["surface", "room", "door", "kind", "obstacle"];
+pub const NAMED: [&str; 6] = ["surface", "room", "door", "kind", "obstacle", SENSE];
 
 /// Something that can be named: its PDDL symbol, and what it is called, the usual name first.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,6 +51,8 @@ pub struct Places {
     pub rooms: Vec<String>,
     /// Doors.
     pub doors: Vec<String>,
+    /// Senses of the body.
+    pub senses: Vec<String>,
 }
 
 impl Places {
@@ -57,6 +62,7 @@ impl Places {
             surfaces: robot.surfaces().iter().map(|s| s.name.clone()).collect(),
             rooms: robot.rooms().iter().map(|r| r.name.clone()).collect(),
             doors: robot.doors().iter().map(|d| d.name.clone()).collect(),
+            senses: robot.description().senses.iter().map(|s| s.name.clone()).collect(),
         }
     }
 
@@ -73,6 +79,7 @@ impl Places {
             surfaces: spec.surfaces.iter().map(|s| s.name.clone()).collect(),
             rooms: spec.rooms.iter().map(|r| r.name.clone()).filter(|name| !name.is_empty()).collect(),
             doors: spec.doors.iter().map(|d| d.name.clone()).collect(),
+            senses: Vec::new(),
         }
     }
 }
@@ -101,6 +108,7 @@ impl Lexicon {
         surfaces.iter().for_each(|name| add("surface", Named::of(name)));
         places.rooms.iter().for_each(|name| add("room", Named::of(name)));
         places.doors.iter().for_each(|name| add("door", Named::of(name)));
+        places.senses.iter().for_each(|name| add(SENSE, Named::of(name)));
         for (of, names) in &domain.config.objects {
             names.iter().for_each(|name| add(of, Named::of(name)));
         }

@@ -1,6 +1,6 @@
 //! What a world knows and keeps from round to round.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use descry_memory::RecordId;
 use descry_perception::merge::Merger;
@@ -27,6 +27,8 @@ pub struct Mind {
     pub distance_m: f64,
     /// What learned things views suggest by themselves.
     pub glances: Glances,
+    /// What each sense of the body said last, by its symbol.
+    pub readings: BTreeMap<String, serde_json::Value>,
 }
 
 /// What was done about one surface.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use descry_planner::{Attachment, Attachments, CallError};
 use descry_skills::{Asked, Call, Skill};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::config::Program;
 use crate::load::Domain;
@@ -61,17 +61,25 @@ impl Programs {
     }
 
     /// What the program behind a word says holds of it now, a line of PDDL each. It is asked
-    /// `{"id": 0, "fact": "raining", "objects": ["table", …]}` and answers `{"id": 0, "value": ["(raining)"]}`.
+    /// `{"id": 0, "fact": "raining", "objects": ["table", …]}` and answers `{"id": 0, "value": ["(raining)"]}`. Once senses of the
+    /// body were read, the question holds what each said last: `"readings": {"rain-gauge": 1.5}`.
     ///
     /// # Errors
     /// Why there is no usable answer.
-    pub fn state(&self, word: &Word, objects: &[String]) -> Result<Vec<String>, String> {
+    pub fn state(
+        &self,
+        word: &Word,
+        objects: &[String],
+        readings: &BTreeMap<String, Value>,
+    ) -> Result<Vec<String>, String> {
         let Some(program) = self.facts.get(&word.name) else { return Ok(Vec::new()) };
         let failed =
             |because: String| format!("the program that says what holds of {}: {because}", word.name);
-        let answer = program
-            .ask_one(json!({ "fact": word.name, "objects": objects }))
-            .map_err(|e| failed(e.to_string()))?;
+        let mut question = json!({ "fact": word.name, "objects": objects });
+        if !readings.is_empty() {
+            question["readings"] = json!(readings);
+        }
+        let answer = program.ask_one(question).map_err(|e| failed(e.to_string()))?;
         let lines: Vec<String> = serde_json::from_value(answer["value"].clone()).map_err(|_| {
             failed(format!("answered {answer}, expected {{\"value\": [\"({} …)\"]}}", word.name))
         })?;

@@ -357,14 +357,8 @@ impl Situation {
 
     /// Whether a point lies in the camera's field of view and range.
     pub(crate) fn in_view(&self, map_from_camera: &Isometry3<f64>, point: &Point3<f64>) -> bool {
-        let body = self.robot.description();
-        let p = map_from_camera.inverse_transform_point(point);
-        if p.z < body.range_m.0 || p.z > body.range_m.1 {
-            return false;
-        }
-        let c = &body.camera;
-        let (u, v) = (c.fx * p.x / p.z + c.cx, c.fy * p.y / p.z + c.cy);
-        u >= 0.0 && v >= 0.0 && u < c.width as f64 && v < c.height as f64
+        let camera = self.robot.description().camera.as_ref();
+        camera.is_some_and(|camera| camera.shows(&map_from_camera.inverse_transform_point(point)))
     }
 
     /// How far a look from a candidate at a surface would settle a hypothesis, 0 to 1: not at all unless most of its points are

@@ -162,7 +162,9 @@ impl<'a> World<'a> {
         let regions = known.surfaces.iter().map(|_| Region::default()).collect();
         let words = Words::begin(domain).map_err(|e| WorldError::Domain(format!("domain.toml: {e}")))?;
         let glances = Default::default();
-        let mut mind = Mind { known, words, regions, views: 0, pushes: 0, distance_m: 0.0, glances };
+        let readings = Default::default();
+        let mut mind =
+            Mind { known, words, regions, views: 0, pushes: 0, distance_m: 0.0, glances, readings };
         mind.attend();
         abilities::used(&domain.config.uses)
             .filter_map(|a| a.begins)
@@ -247,7 +249,10 @@ impl<'a> World<'a> {
             match vocabulary.ground(&word, &domain.config) {
                 crate::vocabulary::Ground::Sensed(fact) => lines.extend((fact.states)(s)),
                 crate::vocabulary::Ground::SensedByProgram => {
-                    let said = self.programs.state(&word, &symbols).map_err(WorldError::Domain)?;
+                    let said = self
+                        .programs
+                        .state(&word, &symbols, &self.mind.readings)
+                        .map_err(WorldError::Domain)?;
                     lines.extend(said);
                 }
                 _ => {}

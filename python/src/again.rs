@@ -11,7 +11,7 @@ use descry_agent::stop::Stop;
 use descry_domains::load::Domain;
 use pyo3::prelude::*;
 
-use crate::agent::{Report, carried_out};
+use crate::agent::{Report, carried_out, runtime};
 use crate::convert::to_python;
 use crate::function::{self, Given, Raised};
 
@@ -39,7 +39,7 @@ pub fn resume(
     let asked =
         GoingOn { folder: &run, said: None, robot: robot.as_deref(), allow_programs, prepare: &prepare };
     let resumed = |stop: &Stop, tell: &mut dyn FnMut(&Event)| {
-        run::resume(&asked, &mut || Ok(()), Watcher { stop, tell })
+        runtime()?.block_on(run::resume(&asked, &mut || Ok(()), Watcher { stop, tell }))
     };
     carried_out(py, &raised, on_event.as_ref(), resumed).map(|inner| Report { inner })
 }
@@ -103,7 +103,9 @@ pub fn replay(
     on_event: Option<Py<PyAny>>,
 ) -> PyResult<Replay> {
     let asked = played::Replay { run: &run, speed, out: out.as_deref() };
-    let replayed = |stop: &Stop, tell: &mut dyn FnMut(&Event)| played::replay(asked, Watcher { stop, tell });
+    let replayed = |stop: &Stop, tell: &mut dyn FnMut(&Event)| {
+        runtime()?.block_on(played::replay(asked, Watcher { stop, tell }))
+    };
     let raised = Raised::default();
     carried_out(py, &raised, on_event.as_ref(), replayed).map(|inner| Replay { inner })
 }

@@ -110,7 +110,8 @@ impl Asked {
         let settings = Settings { keeping, ..self.settings.clone() };
         let watcher = Watcher { stop, tell };
         let task = Task { domain: &self.domain, goal: &goal, past: past.as_ref() };
-        let mut report = run::pursue(task, &body, &folder, &settings, chooser, watcher)?;
+        let pursued = run::pursue(task, &body, &folder, &settings, chooser, watcher);
+        let mut report = runtime()?.block_on(pursued)?;
         report.wall_s = started.elapsed().as_secs_f64();
         run::finish(folder.path(), &report)?;
         Ok(report)
@@ -198,6 +199,12 @@ fn told(py: Python<'_>, on_event: Option<&Py<PyAny>>, event: &Event) -> PyResult
     on_event.call1(py, (told,)).map(drop)
 }
 
+/// Where runs go on.
+pub fn runtime() -> Result<tokio::runtime::Runtime, CommandError> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    runtime.map_err(|e| CommandError::broken(format!("the runtime could not be started: {e}")))
+}
+
 /// The phrases that a domain understands.
 #[pyfunction]
 #[pyo3(signature = (domain="tabletop"))]
@@ -218,13 +225,11 @@ pub fn check_robot(py: Python<'_>, robot: &str) -> PyResult<()> {
     let checked = py.detach(|| -> Result<(), CommandError> {
         let domain = Domain::load(DEFAULT).map_err(CommandError::bad_input)?;
         let body = body::open(robot, None, 1, &domain)?;
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-        let runtime = runtime.map_err(|e| CommandError::Bug(e.to_string()))?;
         let told = |breach: conformance::Breach| {
             let text = format!("every body: {}\n  this one: {}", breach.promise, breach.found);
             CommandError::Broken(text)
         };
-        runtime.block_on(conformance::check(&*body.robot)).map_err(told)
+        runtime()?.block_on(conformance::check(&*body.robot)).map_err(told)
     });
     checked.map_err(|error| failure::command(py, &error))
 }

@@ -31,7 +31,7 @@ fn flat() -> Option<Scene> {
 
 /// Poses before the surfaces of the flat.
 fn stands(scene: &Scene) -> Vec<Pose2> {
-    let router = Router::new(&scene.map(), 0.3, body::description().speeds);
+    let router = Router::new(&scene.map(), 0.3, body::SPEEDS);
     let pose = |s: &SurfaceSpec, k: usize| {
         let (centre, angle) = (s.centre_m(), std::f64::consts::TAU * k as f64 / 8.0);
         Pose2::facing(centre.x + 1.2 * angle.cos(), centre.y + 1.2 * angle.sin(), &centre)
@@ -50,29 +50,29 @@ fn ring(count: usize) -> Vec<Pose2> {
 
 #[divan::bench]
 fn render_frame(bencher: Bencher) {
-    let (Some(scene), Some(head)) = (scene(), body::description().head) else { return };
+    let (Some(scene), head) = (scene(), body::HEAD) else { return };
     let solids = scene.solids();
     let look_at = Point3::new(0.0, 0.0, 0.75);
     let camera = head::camera_towards(&head, &ring(5)[1].isometry(), Some(&look_at));
-    bencher.bench_local(|| render(&scene.room, &solids, &camera, &body::camera(), 0));
+    bencher.bench_local(|| render(&scene.room, &solids, &camera, &body::intrinsics(), 0));
 }
 
 /// From the middle of the hall of a flat, through a door.
 #[divan::bench]
 fn render_flat_frame(bencher: Bencher) {
-    let (Some(scene), Some(head)) = (flat(), body::description().head) else { return };
+    let (Some(scene), head) = (flat(), body::HEAD) else { return };
     let solids = scene.solids();
     let look_at = Point3::new(-2.7, 1.3, 0.75);
     let camera = head::camera_towards(&head, &Pose2::new(0.4, 1.2, 3.1).isometry(), Some(&look_at));
-    bencher.bench_local(|| render(&scene.room, &solids, &camera, &body::camera(), 0));
+    bencher.bench_local(|| render(&scene.room, &solids, &camera, &body::intrinsics(), 0));
 }
 
 #[divan::bench]
 fn noise_on_a_frame(bencher: Bencher) {
-    let (Some(scene), Some(head)) = (scene(), body::description().head) else { return };
+    let (Some(scene), head) = (scene(), body::HEAD) else { return };
     let look_at = Point3::new(0.0, 0.0, 0.75);
     let camera = head::camera_towards(&head, &ring(5)[1].isometry(), Some(&look_at));
-    let frame = render(&scene.room, &scene.solids(), &camera, &body::camera(), 0);
+    let frame = render(&scene.room, &scene.solids(), &camera, &body::intrinsics(), 0);
     bencher.bench_local(|| observe(&frame, &DepthNoise::default(), (0.45, 5.0), 1, 1));
 }
 
@@ -86,7 +86,7 @@ fn arrange_the_default_scene(bencher: Bencher) {
 #[divan::bench(args = [5, 16, 100])]
 fn routes_between(bencher: Bencher, poses: usize) {
     let Some(scene) = scene() else { return };
-    let (map, speeds, poses) = (scene.map(), body::description().speeds, ring(poses));
+    let (map, speeds, poses) = (scene.map(), body::SPEEDS, ring(poses));
     bencher.bench_local(|| Router::new(&map, 0.3, speeds).travel_table(&poses));
 }
 
@@ -120,7 +120,7 @@ fn take_a_frame_of_a_program(bencher: Bencher) {
 #[divan::bench(args = [true, false])]
 fn routes_in_the_flat(bencher: Bencher, anew: bool) {
     let Some(scene) = flat() else { return };
-    let (map, speeds, poses) = (scene.map(), body::description().speeds, stands(&scene));
+    let (map, speeds, poses) = (scene.map(), body::SPEEDS, stands(&scene));
     let router = Router::new(&map, 0.3, speeds);
     bencher.bench_local(|| match anew {
         true => Router::new(&map, 0.3, speeds).travel_table(&poses),
@@ -132,7 +132,7 @@ fn routes_in_the_flat(bencher: Bencher, anew: bool) {
 #[divan::bench]
 fn routes_from_one_pose_in_the_flat(bencher: Bencher) {
     let Some(scene) = flat() else { return };
-    let (map, speeds, poses) = (scene.map(), body::description().speeds, stands(&scene));
+    let (map, speeds, poses) = (scene.map(), body::SPEEDS, stands(&scene));
     let router = Router::new(&map, 0.3, speeds);
     bencher.bench_local(|| router.travel_to_each(&scene.start, &poses));
 }
@@ -141,7 +141,7 @@ fn routes_from_one_pose_in_the_flat(bencher: Bencher) {
 #[divan::bench]
 fn routes_from_one_pose(bencher: Bencher) {
     let Some(scene) = scene() else { return };
-    let (map, speeds, poses) = (scene.map(), body::description().speeds, ring(16));
+    let (map, speeds, poses) = (scene.map(), body::SPEEDS, ring(16));
     let router = Router::new(&map, 0.3, speeds);
     bencher.bench_local(|| router.travel_to_each(&scene.start, &poses));
 }

@@ -63,6 +63,10 @@ class Robot:
         """`{"map_from_base": transform}` and the bytes of the ranges: `ranges(metres)`."""
         raise Failure("unable", "there is no laser")
 
+    def read(self, request, sense):
+        """`{"said": anything that JSON can say}`: what the sense of that name says now."""
+        raise Failure("unable", f"there is no sense {sense}")
+
     def push_aside(self, request, object, direction, distance_m):
         """`{"moved_m": distance}`."""
         raise Failure("unable", "there is no arm")
@@ -87,7 +91,7 @@ class Robot:
         """Comes to a halt at once: called when a request was stopped and when nobody is left to ask."""
 
 
-REQUESTS = ("pose", "drive_to", "look_at", "sense", "scan", "push_aside", "open_door", "grasp", "place", "hand")
+REQUESTS = ("pose", "drive_to", "look_at", "sense", "scan", "read", "push_aside", "open_door", "grasp", "place", "hand")
 
 
 class Request:

@@ -1,4 +1,4 @@
-//! What every body can be asked: where it is, to drive, to look, and what it would take.
+//! What every body can be asked: where it is, to drive, to look, and what it would take. What it is made of stands in [`parts`](crate::parts).
 //!
 //! Frames: `map` (the room; z up where [`Description::up`] says so), `base` (x forward), `camera` (optical: x right, y down, z forward).
 
@@ -6,133 +6,17 @@ mod place;
 
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
+use crate::parts::{Description, Part};
 use descry_perception::laser::Scan;
 use descry_perception::{Cloud, Intrinsics, View};
 use image::RgbImage;
-use nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Vector2};
 pub use place::{Place, Pose2, Station};
 use serde::{Deserialize, Serialize};
 pub use tokio_util::sync::CancellationToken;
 
 /// Nanoseconds on the body's clock.
 pub type Stamp = i64;
-
-/// The outline of the base on the floor, in its own frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Footprint {
-    /// A disc around the base's origin.
-    Disc {
-        /// Metres.
-        radius_m: f64,
-    },
-    /// Corners in order, metres.
-    Polygon {
-        /// At least three.
-        corners_m: Vec<Point2<f64>>,
-    },
-}
-
-impl Footprint {
-    /// Radius of the least disc around the base's origin that holds the footprint, metres: a base that turns anywhere needs this much room.
-    pub fn radius_m(&self) -> f64 {
-        match self {
-            Footprint::Disc { radius_m } => *radius_m,
-            Footprint::Polygon { corners_m } => corners_m.iter().map(|c| c.coords.norm()).fold(0.0, f64::max),
-        }
-    }
-}
-
-/// How fast a body moves.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Speeds {
-    /// Along the ground, metres a second.
-    pub linear_m_s: f64,
-    /// Turning on the spot, radians a second.
-    pub angular_rad_s: f64,
-}
-
-/// The head that carries the camera.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Head {
-    /// Where the head's axes cross, in the base frame, metres. The camera looks from there.
-    pub base_from_head: Point3<f64>,
-    /// Greatest turn to either side, radians.
-    pub pan_limit_rad: f64,
-    /// Greatest turn down, radians.
-    pub tilt_down_rad: f64,
-    /// Greatest turn up, radians.
-    pub tilt_up_rad: f64,
-}
-
-/// Names of the frames in [`Sensed::transforms`].
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Frames {
-    /// The room.
-    pub map: String,
-    /// The body.
-    pub base: String,
-    /// The camera's optical frame.
-    pub camera: String,
-}
-
-impl Default for Frames {
-    fn default() -> Self {
-        Frames { map: "map".into(), base: "base".into(), camera: "camera".into() }
-    }
-}
-
-/// A laser that sweeps in a plane level with the floor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Laser {
-    /// Name of its frame, x straight ahead.
-    pub frame: String,
-    /// Where it is on the base; it does not move there.
-    pub base_from_laser: Isometry3<f64>,
-    /// Angle of the first reading, anticlockwise from straight ahead, radians.
-    pub first_rad: f64,
-    /// Angle from one reading to the next, radians.
-    pub step_rad: f64,
-    /// Readings in a sweep.
-    pub readings: usize,
-    /// Nothing farther returns, metres.
-    pub reach_m: f64,
-}
-
-/// What a body is and can do. Does not change while it lives.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Description {
-    /// For people and records.
-    pub name: String,
-    /// True if the world is simulated too.
-    pub simulated: bool,
-    /// Outline on the floor.
-    pub footprint: Footprint,
-    /// For costs and time limits.
-    pub speeds: Speeds,
-    /// The depth camera.
-    pub camera: Intrinsics,
-    /// Least and greatest depth that the camera measures, metres.
-    pub range_m: (f64, f64),
-    /// The head; `None` if the camera looks where the base's pose says.
-    pub head: Option<Head>,
-    /// Names of frames.
-    pub frames: Frames,
-    /// How far from the base's middle the arm reaches, metres; `None` if there is no arm for [`Robot::push_aside`].
-    pub reach_m: Option<f64>,
-    /// The widest thing that the hand takes, metres; `None` if there is no hand for [`Robot::grasp`].
-    #[serde(default)]
-    pub hand_opening_m: Option<f64>,
-    /// The laser; `None` if there is none for [`Robot::scan`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub laser: Option<Laser>,
-    /// Direction of "up" in the map, if it is known.
-    pub up: Option<Vector3<f64>>,
-    /// Standard deviation of localisation along each axis, metres.
-    pub pose_sigma_m: f64,
-    /// Standard deviation of the heading, radians.
-    pub pose_sigma_rad: f64,
-}
 
 /// A surface that the map knows: things may stand on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -300,6 +184,15 @@ pub struct Scanned {
     pub pose_sigma_rad: f64,
 }
 
+/// What a sense said.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reading {
+    /// When.
+    pub stamp_ns: Stamp,
+    /// Anything that JSON can say, as [`Sense::about`](crate::Sense::about) tells.
+    pub said: serde_json::Value,
+}
+
 /// A push against one object, so that what is behind it can be seen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Push {
@@ -445,8 +338,12 @@ pub trait Robot: Send + Sync {
     /// ahead if `None`), within the head's limits. A body without a head looks where the place says.
     ///
     /// # Errors
-    /// [`Failure::Unreachable`] for an unknown station, or a pose where only stations exist.
-    fn camera_at(&self, place: &Place, look_at: Option<&Point3<f64>>) -> Result<Isometry3<f64>, Failure>;
+    /// [`Failure::Unable`] without [`Description::camera`]; [`Failure::Unreachable`] for an unknown station, or a pose where only
+    /// stations exist.
+    fn camera_at(&self, place: &Place, look_at: Option<&Point3<f64>>) -> Result<Isometry3<f64>, Failure> {
+        let _ = (place, look_at);
+        Err(self.description().lacks(Part::Camera))
+    }
 
     /// Where localisation says that the base is.
     ///
@@ -454,7 +351,7 @@ pub trait Robot: Send + Sync {
     /// [`Failure::Lost`], [`Failure::Broken`].
     async fn pose(&self) -> Result<PoseEstimate, Failure>;
 
-    /// Drives there along a route on the map.
+    /// Drives there along a route on the map. A body without [`Description::base`] is where it is: any other place is unreachable.
     ///
     /// # Errors
     /// [`Failure::Unreachable`], [`Failure::Blocked`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
@@ -463,14 +360,22 @@ pub trait Robot: Send + Sync {
     /// Turns the head towards a point in the map, as far as its limits allow. A body without a head says by how much it misses.
     ///
     /// # Errors
-    /// [`Failure::Unreachable`] if a coordinate is no number; [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
-    async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure>;
+    /// [`Failure::Unable`] without [`Description::camera`]; [`Failure::Unreachable`] if a coordinate is no number;
+    /// [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
+    async fn look_at(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
+        let _ = (point, watch);
+        Err(self.description().lacks(Part::Camera))
+    }
 
     /// Takes one frame.
     ///
     /// # Errors
-    /// [`Failure::SensorDropped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
-    async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure>;
+    /// [`Failure::Unable`] without [`Description::camera`]; [`Failure::SensorDropped`], [`Failure::TimedOut`],
+    /// [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
+    async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure> {
+        let _ = watch;
+        Err(self.description().lacks(Part::Camera))
+    }
 
     /// Sweeps the laser once.
     ///
@@ -479,17 +384,27 @@ pub trait Robot: Send + Sync {
     /// [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
     async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {
         let _ = watch;
-        Err(Failure::Unable { because: format!("{} has no laser", self.description().name) })
+        Err(self.description().lacks(Part::Laser))
+    }
+
+    /// Reads one of [`Description::senses`], by its name.
+    ///
+    /// # Errors
+    /// [`Failure::Unable`] if there is none of that name; [`Failure::SensorDropped`], [`Failure::TimedOut`],
+    /// [`Failure::Cancelled`], [`Failure::Broken`].
+    async fn read(&self, sense: &str, watch: &Watch<'_>) -> Result<Reading, Failure> {
+        let _ = watch;
+        Err(self.description().lacks_sense(sense))
     }
 
     /// Pushes an object aside.
     ///
     /// # Errors
-    /// [`Failure::Unable`] without [`Description::reach_m`]; [`Failure::Unreachable`] if it is out of the arm's reach;
+    /// [`Failure::Unable`] without [`Description::arm`]; [`Failure::Unreachable`] if it is out of the arm's reach;
     /// [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
     async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
         let _ = (push, watch);
-        Err(Failure::Unable { because: format!("{} has no arm", self.description().name) })
+        Err(self.description().lacks(Part::Arm))
     }
 
     /// Opens a door from where the base stands, near it.
@@ -505,12 +420,12 @@ pub trait Robot: Send + Sync {
     /// Takes an object into the hand and lifts it.
     ///
     /// # Errors
-    /// [`Failure::Unable`] without [`Description::hand_opening_m`], if the hand is full, or if the object is too wide;
+    /// [`Failure::Unable`] without [`Arm::hand`](crate::Arm::hand), if the hand is full, or if the object is too wide;
     /// [`Failure::Unreachable`] if it is out of reach; [`Failure::Slipped`] if the hand closes on nothing or loses it;
     /// [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
     async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
         let _ = (grasp, watch);
-        Err(no_hand(self.description()))
+        Err(self.description().lacks(Part::Hand))
     }
 
     /// Puts what the hand holds down.
@@ -520,7 +435,7 @@ pub trait Robot: Send + Sync {
     /// something stands there; [`Failure::Slipped`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Broken`].
     async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
         let _ = (placing, watch);
-        Err(no_hand(self.description()))
+        Err(self.description().lacks(Part::Hand))
     }
 
     /// What the hand feels now.
@@ -528,10 +443,6 @@ pub trait Robot: Send + Sync {
     /// # Errors
     /// [`Failure::Unable`] without a hand; [`Failure::Broken`].
     async fn hand(&self) -> Result<Hand, Failure> {
-        Err(no_hand(self.description()))
+        Err(self.description().lacks(Part::Hand))
     }
-}
-
-fn no_hand(body: &Description) -> Failure {
-    Failure::Unable { because: format!("{} has no hand", body.name) }
 }

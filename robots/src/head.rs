@@ -1,6 +1,6 @@
 //! The head that turns the camera: pan about the base's z, then tilt.
 
-use crate::body::Head;
+use crate::parts::Head;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// Where the head points, in the base frame.

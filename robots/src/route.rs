@@ -5,9 +5,10 @@
 //! TFD/M's navigation module: Σ max(ds/v, dθ/ω) over the steps of the route, where a base that turns on the spot makes each turn and
 //! each straight line a step of its own.
 
-use crate::body::{Pose2, Speeds, Travel};
+use crate::body::{Pose2, Travel};
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
+use crate::parts::Speeds;
 use nalgebra::Point2;
 use pathfinding::directed::dijkstra::dijkstra_all;
 use std::collections::BTreeMap;

@@ -47,13 +47,12 @@ fn scene(seed: u64) -> Scene {
 /// The camera on a ring around the table, looking at its middle.
 fn camera_pose(angle_rad: f64, radius_m: f64) -> Isometry3<f64> {
     let pose = Pose2::facing(radius_m * angle_rad.cos(), radius_m * angle_rad.sin(), &[0.0, 0.0].into());
-    let description = body::description();
-    let head = description.head.unwrap();
+    let head = body::HEAD;
     head::camera_towards(&head, &pose.isometry(), Some(&Point3::new(0.0, 0.0, 0.75)))
 }
 
 fn small_camera() -> Intrinsics {
-    let c = body::camera();
+    let c = body::intrinsics();
     Intrinsics { width: 160, height: 120, fx: c.fx / 4.0, fy: c.fy / 4.0, cx: 79.5, cy: 59.5 }
 }
 
@@ -212,7 +211,7 @@ fn shares_agree_with_whole_pictures() {
 
 /// A wall at right angles (cosine 1) or slanted, everywhere at the same depth.
 fn flat(depth_m: f32, cosine: f32) -> Frame {
-    let intrinsics = body::camera();
+    let intrinsics = body::intrinsics();
     let pixels = intrinsics.width * intrinsics.height;
     Frame {
         intrinsics,
@@ -235,7 +234,7 @@ fn noise_along_the_ray_is_as_published() {
         let steep = deg / (90.0 - deg);
         let axial = 0.0012 + 0.0019 * (z - 0.4).powi(2) + 0.0001 * steep * steep / z.sqrt();
         // A step of disparity spreads over its width evenly.
-        let step = z * z / (body::camera().fx * 0.075 * 8.0);
+        let step = z * z / (body::intrinsics().fx * 0.075 * 8.0);
         let expected = axial.hypot(step / 12f64.sqrt());
         assert!((sigma / expected - 1.0).abs() < 0.04, "{z} m, {deg}°: σ {sigma}, expected {expected}");
         assert!((mean - z).abs() < 0.0006 * z, "{z} m, {deg}°: mean {mean}");

@@ -3,7 +3,7 @@
 use descry_robots::Pose2;
 use descry_robots::nalgebra::Point2;
 use descry_robots::route::Router;
-use descry_robots::sim::body::{SAFETY_M, description};
+use descry_robots::sim::body::{RADIUS_M, SAFETY_M, SPEEDS};
 use descry_robots::sim::{Scene, SceneSpec, arrange};
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ fn spec(file: &str) -> SceneSpec {
 }
 
 fn router(scene: &Scene) -> Router {
-    Router::new(&scene.map(), description().footprint.radius_m() + SAFETY_M, description().speeds)
+    Router::new(&scene.map(), RADIUS_M + SAFETY_M, SPEEDS)
 }
 
 /// Poses at least a metre apart around a surface from which a body can look at it, reachable with every door open.

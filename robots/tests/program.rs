@@ -3,7 +3,9 @@
 use descry_robots::conformance;
 use descry_robots::nalgebra::{Point3, Vector2};
 use descry_robots::program::{Limits, ProgramRobot};
-use descry_robots::{CancellationToken, Failure, Grasp, Place, Pose2, Push, Robot, Watch};
+use descry_robots::{
+    Answer, CancellationToken, Failure, Grasp, Place, Pose2, Push, Request, Robot, Travel, Watch,
+};
 use std::path::Path;
 use std::time::Duration;
 
@@ -169,6 +171,8 @@ fn what_is_no_robot_is_refused_with_the_reason() {
     check_refused("two tables of one name", &["two surfaces are called \"table\""]);
     check_refused("short map", &["9999 bytes follow the hello", "10000 cells"]);
     check_refused("two cameras", &["camera.base_from_camera", "there is a head"]);
+    check_refused("only a head", &["there is a head, and no camera that it turns"]);
+    check_refused("nowhere", &["it has no base", "expected one station"]);
     check_refused("no map", &["neither a map nor stations"]);
 }
 
@@ -263,6 +267,50 @@ async fn a_body_without_head_arm_and_laser_conforms_and_says_what_it_lacks() {
     assert!(looked.miss_rad < 1e-6 && looked.duration_s == 0.0, "{looked:?}");
     let behind = here * Point3::new(-1.0, 0.0, 1.4);
     assert!(robot.look_at(&behind, &watch).await.unwrap().miss_rad > 2.0);
+}
+
+/// A body whose part is not there conforms, and what takes the part is refused with the reason.
+async fn check_without(what: &str, request: Request, part: &str) {
+    let robot = ProgramRobot::start(&rogue(what), HURRIED).unwrap();
+    conformance::check(&robot).await.unwrap();
+    let (answer, _) = request.ask(&robot, &Watch::default()).await;
+    let because = format!("template has no {part}");
+    assert_eq!(answer, Answer::Failed(Failure::Unable { because }), "{what}");
+}
+
+#[tokio::test]
+async fn every_part_may_be_missing() {
+    if !has_python() {
+        return;
+    }
+    check_without("no camera", Request::Sense, "camera").await;
+    check_without("no camera", Request::LookAt(Point3::origin()), "camera").await;
+    check_without("no camera", Request::Read("smoke".into()), "sense \"smoke\"").await;
+    check_without("bolted down", Request::Hand, "hand").await;
+    let bolted = ProgramRobot::start(&rogue("bolted down"), HURRIED).unwrap();
+    let away = bolted.drive_to(&far(), &Watch::default()).await;
+    assert!(matches!(away, Err(Failure::Unreachable { .. })), "{away:?}");
+    let place = Place::Station("its place".into());
+    let stays = bolted.travel(&place, std::slice::from_ref(&place), &[]);
+    assert_eq!(stays, [Ok(Travel { distance_m: 0.0, duration_s: 0.0 })]);
+}
+
+/// Any other sensor says what JSON can say, when it is read.
+#[tokio::test]
+async fn a_sense_is_read_by_its_name() {
+    if !has_python() {
+        return;
+    }
+    let robot = ProgramRobot::start(&rogue("reads labels"), HURRIED).unwrap();
+    conformance::check(&robot).await.unwrap();
+    let before_ns = robot.now_ns();
+    let reading = robot.read("label reader", &Watch::default()).await.unwrap();
+    assert_eq!(reading.said, serde_json::json!({ "by": "label reader", "text": "TEA" }));
+    assert_eq!(reading.stamp_ns, before_ns + 200_000_000);
+    let early = ProgramRobot::start(&rogue("reads tomorrow"), HURRIED).unwrap();
+    let failure = early.read("label reader", &Watch::default()).await.unwrap_err();
+    assert_eq!(failure.kind(), "broken");
+    assert!(failure.because().contains("a reading of"), "{failure}");
 }
 
 /// What a program may do: it answers, and what is asked next is answered too.

@@ -3,8 +3,9 @@
 mod folders;
 mod scenes;
 
+use descry_robots::Pixels;
 use descry_robots::nalgebra::Point3;
-use descry_robots::recorded::{Entry, Known, Pixels, RecordedRobot, Tape, TapedRobot};
+use descry_robots::recorded::{Entry, Known, RecordedRobot, Tape, TapedRobot};
 use descry_robots::sim::{FaultPlan, SimOptions, SimRobot};
 use descry_robots::{Failure, Place, Pose2, Robot, Sensed, Stamp, Watch, conformance};
 use std::collections::BTreeMap;

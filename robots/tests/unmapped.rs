@@ -40,7 +40,7 @@ fn it_knows_nothing_of_the_scene() {
     let robot = robot();
     assert!(robot.map().is_none());
     assert!(robot.surfaces().is_empty() && robot.rooms().is_empty() && robot.doors().is_empty());
-    assert_eq!(robot.description().range_m, (0.45, 6.0));
+    assert_eq!(robot.description().camera.as_ref().unwrap().range_m, (0.45, 6.0));
 }
 
 #[tokio::test]

@@ -38,6 +38,7 @@ mod pick_up;
 mod program;
 mod push_aside;
 mod put_down;
+mod read;
 mod scan;
 mod skill;
 
@@ -52,5 +53,6 @@ pub use pick_up::PickUp;
 pub use program::{Asked, Program};
 pub use push_aside::PushAside;
 pub use put_down::PutDown;
+pub use read::Read;
 pub use scan::Scan;
 pub use skill::{Call, Context, Outcome, Skill, SkillFailure};

@@ -3,8 +3,8 @@
 use async_trait::async_trait;
 use descry_robots::perception::laser::Alignment;
 use descry_robots::{
-    CancellationToken, Driven, Failure, Grasped, Hand, Opened, Placed, Progress, Pushed, Robot, Scanned,
-    Sensed, Watch,
+    CancellationToken, Driven, Failure, Grasped, Hand, Opened, Placed, Progress, Pushed, Reading, Robot,
+    Scanned, Sensed, Watch,
 };
 
 use crate::model::Modelled;
@@ -56,6 +56,8 @@ pub enum Outcome {
     Seen(Box<Sensed>),
     /// The laser has swept.
     Scanned(Box<Scanned>),
+    /// A sense has said something.
+    Read(Reading),
     /// Scans were brought together.
     Aligned(Box<Alignment>),
     /// Looks at a thing were brought together.

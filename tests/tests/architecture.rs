@@ -216,6 +216,13 @@ fn signals_are_heard_in_main_alone() {
 }
 
 #[test]
+fn whoever_starts_a_run_brings_the_runtime() {
+    for folder in ["robots/src", "skills/src", "domains/src", "agent/src"] {
+        check_absent(folder, &["runtime::Builder", "Runtime::new", "block_on"], &[]);
+    }
+}
+
+#[test]
 fn libraries_know_no_command_line_and_print_nothing() {
     for folder in
         ["planner/src", "perception/src", "memory/src", "skills/src", "domains/src", "agent/src", "pages/src"]

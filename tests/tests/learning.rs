@@ -44,7 +44,8 @@ fn pursue(said: &str, visit: usize, folder: &Path, remembers: bool) -> Result<Re
     let chooser = policies::named(policies::PLAN, SEED, None).unwrap();
     let watcher = Watcher { stop: &Stop::default(), tell: &mut |_| {} };
     let task = Task { domain: &loaded, goal: &goal, past: past.as_ref() };
-    run::pursue(task, &body, &run, &settings, chooser, watcher)
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    runtime.block_on(run::pursue(task, &body, &run, &settings, chooser, watcher))
 }
 
 /// What the store remembers, changed.

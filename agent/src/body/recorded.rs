@@ -5,8 +5,8 @@ use std::path::Path;
 
 use descry_memory::{Document, Record, Sensing, kind};
 use descry_perception::Intrinsics;
-use descry_robots::recorded::{Footage, Known, Pixels, RecordedRobot, Settings};
-use descry_robots::{Description, Footprint, Frames, Speeds, Station};
+use descry_robots::recorded::{Footage, Known, RecordedRobot, Settings};
+use descry_robots::{Base, Camera, Description, Footprint, Frames, Pixels, Speeds, Station};
 
 use super::tape;
 use crate::exit::CommandError;
@@ -88,19 +88,23 @@ fn description(known: Option<&Known>, camera: Intrinsics, sensing: &Sensing, pla
     let unknown = || Description {
         name: String::new(),
         simulated: false,
-        footprint: Footprint::Disc { radius_m: 0.0 },
-        speeds: Speeds { linear_m_s: usual.linear_m_s, angular_rad_s: usual.angular_deg_s.to_radians() },
-        camera,
-        range_m: (usual.range_m[0], usual.range_m[1]),
+        base: Some(Base {
+            footprint: Footprint::Disc { radius_m: 0.0 },
+            speeds: Speeds { linear_m_s: usual.linear_m_s, angular_rad_s: usual.angular_deg_s.to_radians() },
+        }),
         head: None,
-        frames: Frames::default(),
-        reach_m: None,
-        hand_opening_m: None,
+        arm: None,
+        camera: None,
         laser: None,
+        senses: Vec::new(),
+        frames: Frames::default(),
         up: None,
         pose_sigma_m: sensing.pose_sigma_m,
         pose_sigma_rad: sensing.pose_sigma_rad,
     };
     let own = known.map_or_else(unknown, |k| k.description.clone());
-    Description { name: format!("record {place}"), simulated: false, camera, ..own }
+    let usual = (usual.range_m[0], usual.range_m[1]);
+    let as_made = Camera { frame: "camera".into(), intrinsics: camera, range_m: usual, colour: true };
+    let camera = Camera { intrinsics: camera, ..own.camera.unwrap_or(as_made) };
+    Description { name: format!("record {place}"), simulated: false, camera: Some(camera), ..own }
 }

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use descry_memory::{Blob, Draft, Error, Form, Query, Record, kind, viewer};
 use descry_robots::image::RgbImage;
-use descry_robots::recorded::{Answer, Entry, Known, Pixels, Tape};
+use descry_robots::recorded::{Entry, Known, Tape};
+use descry_robots::{Answer, Pixels};
 use descry_robots::{Colour, OccupancyGrid, Stamp};
 use serde_json::Value;
 

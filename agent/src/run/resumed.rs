@@ -44,7 +44,7 @@ pub struct GoingOn<'a> {
 /// # Errors
 /// [`CommandError`] as for [`super::pursue`]; if the run has another goal, if another process writes it, if its record is damaged, or
 /// if it names programs that are not allowed.
-pub fn resume(
+pub async fn resume(
     asked: &GoingOn<'_>,
     begun: &mut dyn FnMut() -> Result<(), CommandError>,
     watcher: Watcher<'_>,
@@ -85,7 +85,7 @@ pub fn resume(
         Beginning::new(header, &domain, body.scene.clone()).put(&record, body.robot.now_ns())?;
     }
     let task = Task { domain: &domain, goal: &goal, past };
-    let mut report = go_on(task, &body, &claimed, record, settings, chooser, watcher)?;
+    let mut report = go_on(task, &body, &claimed, record, settings, chooser, watcher).await?;
     report.wall_s = started.elapsed().as_secs_f64();
     files::finish(folder, &report)?;
     Ok(report)

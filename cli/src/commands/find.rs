@@ -165,7 +165,8 @@ fn begin(said: &str, with: &With, window: &mut Window, stop: &Stop) -> Result<Re
     };
     let watcher = Watcher { stop, tell: &mut tell };
     let task = Task { domain: &domain, goal: &goal, past: past.as_ref() };
-    let report = run::pursue(task, &body, &folder, &settings, chooser, watcher)?;
+    let pursued = run::pursue(task, &body, &folder, &settings, chooser, watcher);
+    let report = input::runtime()?.block_on(pursued)?;
     end(report, &folder, started)
 }
 
@@ -179,5 +180,6 @@ fn go_on(
     let said = said.map(String::as_str);
     let asked = GoingOn { folder, said, robot: None, allow_programs, prepare: &|_| Ok(()) };
     let mut begun = || window.open(Arc::new(Running::of(folder)));
-    run::resume(&asked, &mut begun, Watcher { stop, tell: &mut tell })
+    let watcher = Watcher { stop, tell: &mut tell };
+    input::runtime()?.block_on(run::resume(&asked, &mut begun, watcher))
 }

@@ -31,6 +31,12 @@ pub fn source(path: &Path) -> Result<Source, CommandError> {
     Ok(Source { name, text })
 }
 
+/// Where the commands let bodies move and runs go on.
+pub fn runtime() -> Result<tokio::runtime::Runtime, CommandError> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    runtime.map_err(|e| CommandError::broken(format!("the runtime could not be started: {e}")))
+}
+
 /// A domain that makes sense as a whole, by its name or folder.
 pub fn domain(name: &str) -> Result<Domain, CommandError> {
     let domain = Domain::load(name).map_err(CommandError::bad_input)?;

@@ -29,7 +29,9 @@ pub struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let mut tell = |event: &Event| input::narrate_fitted(&event.to_string());
     let asked = Replay { run: &arguments.run, speed: arguments.speed, out: arguments.out.as_deref() };
-    let replayed = replay(asked, Watcher { stop: &Stop::default(), tell: &mut tell })?;
+    let stop = Stop::default();
+    let watcher = Watcher { stop: &stop, tell: &mut tell };
+    let replayed = input::runtime()?.block_on(replay(asked, watcher))?;
     say(&replayed, arguments.json)?;
     Ok(if replayed.same { Exit::Done } else { Exit::No })
 }

@@ -43,10 +43,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let Arguments::Check(arguments) = arguments;
     let domain = Domain::load(DEFAULT).map_err(CommandError::bad_input)?;
     let body = body::open(&arguments.robot, None, 1, &domain)?;
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|e| CommandError::Bug(e.to_string()))?;
+    let runtime = input::runtime()?;
     let mut report = Report { robot: body.robot.description().name.clone(), kept: Vec::new(), broken: None };
     input::narrate(&format!("checking \"{}\"", report.robot));
     for (check, begin) in conformance::CHECKS {

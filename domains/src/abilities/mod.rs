@@ -3,12 +3,13 @@
 pub mod carrying;
 pub mod learning;
 pub mod moving;
+pub mod reading;
 pub mod searching;
 pub mod shapes;
 pub mod surveying;
 
 use descry_planner::{Answer, Call, CallError, Plan, Step};
-use descry_robots::Description;
+use descry_robots::Part;
 use descry_skills::{Outcome, Skill, SkillFailure};
 
 use crate::abilities::searching::perceive::Eyes;
@@ -33,8 +34,8 @@ pub struct Ability {
     pub calls: &'static [Meaning],
     /// What it can carry out.
     pub skills: &'static [SkillWord],
-    /// The part that it needs and a body does not have, if there is one.
-    pub lacks: Option<Lacks>,
+    /// The parts of a body without which it can do nothing.
+    pub needs: &'static [Part],
     /// What it prepares when a run begins, if anything.
     pub begins: Option<Begins>,
     /// Steps that are surely no waste when no plan is found, where it has some of its own.
@@ -102,9 +103,6 @@ pub type Failed =
 /// Nothing more follows from a failure.
 pub(crate) const NOTHING_MORE: Failed = |_, _, _, _, _| Ok(None);
 
-/// A part that is needed and missing, as people call it.
-pub type Lacks = fn(&Description) -> Option<&'static str>;
-
 /// Prepares a run.
 pub type Begins = fn(&mut Mind, &Domain, &Goal);
 
@@ -119,6 +117,7 @@ pub const ALL: &[&Ability] = &[
     &moving::ABILITY,
     &searching::ABILITY,
     &carrying::ABILITY,
+    &reading::ABILITY,
     &shapes::ABILITY,
     &surveying::ABILITY,
     &learning::ABILITY,

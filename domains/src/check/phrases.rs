@@ -8,6 +8,7 @@ use crate::answer::CHANGES;
 use crate::asked::mentions;
 use crate::config::GoalPhrase;
 use crate::goal::{Filled, put_in, slots_of, type_of_slot};
+use crate::lexicon::SENSE;
 
 impl Check<'_> {
     /// Every phrase.
@@ -71,8 +72,9 @@ impl Check<'_> {
 
     /// Slots that nothing can fill, where that does not depend on the body.
     fn unnamed(&self, n: &str, filled: &[Filled]) -> Vec<Diagnostic> {
-        let is_body_s =
-            |of: &str| ["surface", "room", "door"].contains(&of) && self.places.surfaces.is_empty();
+        let is_body_s = |of: &str| {
+            of == SENSE || ["surface", "room", "door"].contains(&of) && self.places.surfaces.is_empty()
+        };
         let is_empty = |f: &&Filled| {
             let of = type_of_slot(&f.slot);
             let may_be_learned = of == "thing"

@@ -4,12 +4,12 @@ use descry_planner::Diagnostic;
 
 use super::Check;
 use crate::abilities;
-use crate::lexicon::symbol;
+use crate::lexicon::{SENSE, symbol};
 use crate::vocabulary::{Ground, Word};
 use crate::words;
 
 /// Types whose objects come from the body's map, from `objects/` and from what is seen.
-const GIVEN: [&str; 7] = ["pose", "surface", "room", "door", "thing", "kind", "obstacle"];
+const GIVEN: [&str; 8] = ["pose", "surface", "room", "door", "thing", "kind", "obstacle", SENSE];
 
 impl Check<'_> {
     /// Words that an ability states have its types; words that nothing states or changes begin somewhere.

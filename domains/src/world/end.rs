@@ -63,7 +63,7 @@ impl World<'_> {
         let abilities = || abilities::used(&self.setting.domain.config.uses);
         let own = abilities().find_map(|a| a.answers);
         let body = round.situation.robot.description();
-        let lacks = abilities().find_map(|a| a.lacks?(body));
+        let lacks = abilities().flat_map(|a| a.needs).copied().find(|part| !body.has(*part));
         let goal = self.setting.goal;
         own.and_then(|answers| answers(goal, &self.mind, &round.situation, ended))
             .unwrap_or_else(|| answer::conclude(goal, &self.lexicon, &self.mind, round, lacks, ended))

@@ -6,7 +6,7 @@ use descry_robots::{PoseEstimate, Robot};
 use super::WorldError;
 use crate::abilities::learning::news::{self, News};
 use crate::goal::Goal;
-use crate::lexicon::{Lexicon, symbol};
+use crate::lexicon::{Lexicon, SENSE, symbol};
 use crate::load::Domain;
 use crate::situation::{self, Candidate, Known, KnownDoor, Past, Situation, Thing};
 
@@ -27,6 +27,7 @@ pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<
         ("shape".into(), s.floor.names.iter().map(|(symbol, _)| symbol.clone()).collect()),
         ("novelty".into(), s.news.novelties.iter().map(|n| n.symbol.clone()).collect()),
         ("door".into(), s.doors.iter().map(|d| d.symbol.clone()).collect()),
+        (SENSE.into(), lexicon.of_type(SENSE).iter().map(|n| n.symbol.clone()).collect()),
         ("room".into(), lexicon.of_type("room").iter().map(|n| n.symbol.clone()).collect()),
     ];
     for (of, names) in &domain.config.objects {

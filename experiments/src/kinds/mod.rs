@@ -16,6 +16,12 @@ use super::page::Section;
 use super::{ExperimentError, Job, Numbered, Outcome, Row, Source};
 use descry_agent::body::program;
 
+/// Where a job's run goes on.
+fn runtime() -> Result<tokio::runtime::Runtime, String> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
+    runtime.map_err(|e| format!("the runtime could not be started: {e}"))
+}
+
 /// A kind of experiment, bound to what a file says of it.
 pub trait Kind: Send + Sync {
     /// What every experiment file says.

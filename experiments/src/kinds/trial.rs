@@ -13,6 +13,7 @@ use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::truth::{TrueObject, Truth};
 use serde_json::{Value, json};
 
+use super::runtime;
 use crate::{Outcome, Row};
 use descry_agent::body::{Body, program};
 use descry_agent::keeping::{Keeping, Kept};
@@ -106,7 +107,7 @@ pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Liv
     };
     let watcher = Watcher { stop, tell: &mut count };
     let task = Task { domain: trial.domain, goal: &goal, past: None };
-    let report = run::pursue(task, &body, &folder, &settings, chooser, watcher);
+    let report = runtime()?.block_on(run::pursue(task, &body, &folder, &settings, chooser, watcher));
     let report = report.map_err(|e| e.to_string())?;
     let run_s = started.elapsed().as_secs_f64() - arranged_s;
     let mut clock = Row::new();

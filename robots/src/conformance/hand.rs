@@ -3,6 +3,7 @@
 use super::{Breach, done, ensure};
 use crate::body::{CancellationToken, Grasp, Place, Placing, Robot, Watch};
 use crate::failure::Failure;
+use crate::parts::Gripper;
 use nalgebra::Point3;
 
 /// Hands slip now and then, not always.
@@ -22,12 +23,7 @@ pub(super) async fn check_hand(robot: &dyn Robot) -> Result<(), Breach> {
         "an empty hand, or none, puts nothing down",
         || format!("{answer:?}"),
     )?;
-    let Some(opening_m) = robot.description().hand_opening_m else {
-        let grasp = robot.grasp(&Grasp { object: in_air, width_m: 0.05 }, &watch).await;
-        let hand = robot.hand().await;
-        let says_so = matches!((&grasp, &hand), (Err(Failure::Unable { .. }), Err(Failure::Unable { .. })));
-        return ensure(says_so, "who has no hand says so", || format!("{grasp:?}, {hand:?}"));
-    };
+    let Some(Gripper { opening_m }) = robot.description().hand().copied() else { return Ok(()) };
     ensure(opening_m.is_finite() && opening_m > 0.0, "a hand opens", || format!("{opening_m} m"))?;
     feels(robot, false).await?;
     let grasp = |object, width_m| Grasp { object, width_m };
@@ -99,7 +95,7 @@ pub async fn check_carrying(
     let Some(grasped) = held else {
         return Err(Breach { promise: "a hand slips now and then, not always", found: "it does".into() });
     };
-    let opening_m = robot.description().hand_opening_m.unwrap_or(0.0);
+    let opening_m = robot.description().hand().map_or(0.0, |hand| hand.opening_m);
     ensure(grasped.width_m > 0.0 && grasped.width_m <= opening_m, "a hand is as wide as it can be", || {
         format!("{grasped:?}")
     })?;

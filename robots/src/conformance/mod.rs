@@ -9,8 +9,10 @@ mod laser;
 
 pub use hand::check_carrying;
 
-use crate::body::{CancellationToken, Place, Pose2, Progress, Push, Robot, Sensed, Watch};
+use crate::body::{CancellationToken, Grasp, Place, Placing, Pose2, Progress, Push, Robot, Sensed, Watch};
 use crate::failure::Failure;
+use crate::parts::{Base, Camera, Description};
+use crate::request::{Answer, Request};
 use nalgebra::{Isometry3, Point3, Vector2};
 use std::pin::Pin;
 use std::sync::Mutex;
@@ -46,17 +48,21 @@ type Checking<'a> = Pin<Box<dyn Future<Output = Result<(), Breach>> + Send + 'a>
 type Check = for<'a> fn(&'a dyn Robot) -> Checking<'a>;
 
 /// Every check by its name, in the order in which a body goes through them.
-pub const CHECKS: [(&str, Check); 10] = [
+pub const CHECKS: [(&str, Check); 11] = [
     ("what it is", |robot| Box::pin(async { check_description(robot).and_then(|()| check_stations(robot)) })),
     ("a frame", |robot| Box::pin(check_frame(robot))),
     ("routes and a drive", |robot| {
         Box::pin(async {
+            if robot.description().base.is_none() {
+                return Ok(());
+            }
             let goal = check_travel(robot).await?;
             check_drive(robot, &goal).await
         })
     }),
     ("a frame after the drive", |robot| Box::pin(check_frame(robot))),
     ("a sweep of the laser", |robot| Box::pin(laser::check_scan(robot))),
+    ("its other senses", |robot| Box::pin(check_senses(robot))),
     ("what it refuses", |robot| Box::pin(check_refusals(robot))),
     ("doors", |robot| Box::pin(doors::check_doors(robot))),
     ("the hand", |robot| Box::pin(hand::check_hand(robot))),
@@ -78,30 +84,47 @@ pub async fn check(robot: &dyn Robot) -> Result<(), Breach> {
 fn check_description(robot: &dyn Robot) -> Result<(), Breach> {
     let d = robot.description();
     ensure(!d.name.trim().is_empty(), "a body has a name", || "it is empty".into())?;
-    let radius_m = d.footprint.radius_m();
+    let radius_m = d.radius_m();
     ensure(radius_m.is_finite() && radius_m >= 0.0, "a footprint has a size", || radius_m.to_string())?;
-    let fast = |v: f64| v.is_finite() && v > 0.0;
-    ensure(fast(d.speeds.linear_m_s) && fast(d.speeds.angular_rad_s), "speeds are above zero", || {
-        format!("{:?}", d.speeds)
-    })?;
-    let c = &d.camera;
-    ensure(c.width > 0 && c.height > 0 && fast(c.fx) && fast(c.fy), "the camera has pixels", || {
-        format!("{c:?}")
-    })?;
-    ensure(d.range_m.0 >= 0.0 && d.range_m.0 < d.range_m.1, "the range is one", || {
-        format!("{:?}", d.range_m)
-    })?;
-    ensure(fast(d.pose_sigma_m) && fast(d.pose_sigma_rad), "no body knows its pose exactly", || {
-        format!("{} m, {} rad", d.pose_sigma_m, d.pose_sigma_rad)
-    })?;
-    let f = &d.frames;
+    if let Some(Base { speeds, .. }) = &d.base {
+        ensure(
+            above_zero(speeds.linear_m_s) && above_zero(speeds.angular_rad_s),
+            "speeds are above zero",
+            || format!("{speeds:?}"),
+        )?;
+    }
+    if let Some(Camera { intrinsics: c, range_m, .. }) = &d.camera {
+        let sound = c.width > 0 && c.height > 0 && above_zero(c.fx) && above_zero(c.fy);
+        ensure(sound, "the camera has pixels", || format!("{c:?}"))?;
+        ensure(range_m.0 >= 0.0 && range_m.0 < range_m.1, "the range is one", || format!("{range_m:?}"))?;
+    }
+    if let Some(arm) = &d.arm {
+        ensure(above_zero(arm.reach_m), "an arm reaches somewhere", || format!("{arm:?}"))?;
+    }
     ensure(
-        f.map != f.base && f.base != f.camera && f.map != f.camera,
-        "frames have names of their own",
-        || format!("{f:?}"),
+        above_zero(d.pose_sigma_m) && above_zero(d.pose_sigma_rad),
+        "no body knows its pose exactly",
+        || format!("{} m, {} rad", d.pose_sigma_m, d.pose_sigma_rad),
     )?;
+    let names = frames(d);
+    let double = (1..names.len()).any(|n| names[..n].contains(&names[n]));
+    ensure(!double, "frames have names of their own", || format!("{names:?}"))?;
     let length = d.up.map_or(1.0, |up| up.norm());
     ensure((length - 1.0).abs() < ROUNDING, "\"up\" is a unit vector", || format!("of length {length}"))
+}
+
+fn above_zero(x: f64) -> bool {
+    x.is_finite() && x > 0.0
+}
+
+/// The names of the frames of a body.
+fn frames(body: &Description) -> Vec<&str> {
+    let camera = body.camera.as_ref().map(|camera| camera.frame.as_str());
+    let laser = body.laser.as_ref().map(|laser| laser.frame.as_str());
+    [Some(body.frames.map.as_str()), Some(body.frames.base.as_str()), camera, laser]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 fn check_stations(robot: &dyn Robot) -> Result<(), Breach> {
@@ -113,7 +136,10 @@ fn check_stations(robot: &dyn Robot) -> Result<(), Breach> {
         let double = stations[..i].iter().any(|other| other.name == s.name);
         ensure(!double, "stations have names of their own", || format!("two are called \"{}\"", s.name))?;
     }
-    Ok(())
+    let stays = robot.description().base.is_none();
+    ensure(!stays || stations.len() == 1, "who has no base has one station", || {
+        format!("it has {}", stations.len())
+    })
 }
 
 /// How far two transforms are apart, metres and radians, whichever is more.
@@ -133,6 +159,7 @@ async fn check_frame(robot: &dyn Robot) -> Result<(), Breach> {
         "a body with stations stands at one",
         || format!("{:?}", estimate.station),
     )?;
+    let Some(camera) = &robot.description().camera else { return Ok(()) };
     let ahead = estimate.map_from_base * Point3::new(1.0, 0.1, 0.7);
     done(robot.look_at(&ahead, &watch).await, "a body can be told where to look")?;
     let before_ns = robot.now_ns();
@@ -141,16 +168,18 @@ async fn check_frame(robot: &dyn Robot) -> Result<(), Breach> {
         format!("{} outside {before_ns} to {}", sensed.stamp_ns, robot.now_ns())
     })?;
     ensure(robot.now_ns() > before_ns, "taking a frame takes time", || "the clock stood still".into())?;
-    check_pixels(robot, &sensed)?;
-    check_chain(robot, &sensed)?;
+    check_pixels(camera, &sensed)?;
+    check_chain(robot, camera, &sensed)?;
     let expected =
         done(robot.camera_at(&estimate.place(), Some(&ahead)), "a body can say where its camera would be")?;
     let off = gap(&expected, &sensed.map_from_camera);
     ensure(off < ROUNDING, "the camera is where the body said it would be", || format!("{off} off"))
 }
 
-fn check_pixels(robot: &dyn Robot, sensed: &Sensed) -> Result<(), Breach> {
-    let camera = &robot.description().camera;
+fn check_pixels(described: &Camera, sensed: &Sensed) -> Result<(), Breach> {
+    let camera = &described.intrinsics;
+    let as_said = described.colour || sensed.colour.is_none();
+    ensure(as_said, "only who has colours gives them", || "a frame has some".into())?;
     ensure(&sensed.intrinsics == camera, "frames are of the described camera", || {
         format!("{:?}", sensed.intrinsics)
     })?;
@@ -174,7 +203,7 @@ fn check_pixels(robot: &dyn Robot, sensed: &Sensed) -> Result<(), Breach> {
     ensure(differs.is_none(), "cloud and depth image say the same", || format!("not at pixel {differs:?}"))
 }
 
-fn check_chain(robot: &dyn Robot, sensed: &Sensed) -> Result<(), Breach> {
+fn check_chain(robot: &dyn Robot, described: &Camera, sensed: &Sensed) -> Result<(), Breach> {
     let frames = &robot.description().frames;
     let [base, camera] = sensed.transforms.as_slice() else {
         return Err(Breach {
@@ -184,7 +213,7 @@ fn check_chain(robot: &dyn Robot, sensed: &Sensed) -> Result<(), Breach> {
     };
     let names = [&base.parent, &base.child, &camera.parent, &camera.child];
     ensure(
-        names == [&frames.map, &frames.base, &frames.base, &frames.camera],
+        names == [&frames.map, &frames.base, &frames.base, &described.frame],
         "the chain is map, base, camera",
         || format!("{names:?}"),
     )?;
@@ -311,22 +340,60 @@ async fn check_refusals(robot: &dyn Robot) -> Result<(), Breach> {
             format!("{place}: {answer:?}")
         })?;
     }
-    let answer = robot.look_at(&Point3::new(f64::NAN, 0.0, 0.0), &watch).await;
-    ensure(
-        matches!(answer, Err(Failure::Unreachable { .. })),
-        "a point that is none cannot be looked at",
-        || format!("{answer:?}"),
-    )?;
+    if robot.description().camera.is_some() {
+        let answer = robot.look_at(&Point3::new(f64::NAN, 0.0, 0.0), &watch).await;
+        ensure(
+            matches!(answer, Err(Failure::Unreachable { .. })),
+            "a point that is none cannot be looked at",
+            || format!("{answer:?}"),
+        )?;
+    }
+    check_missing_parts(robot, &before.map_from_base).await?;
     let after = done(robot.pose().await, "a body knows where it is")?;
     ensure(before.map_from_base == after.map_from_base, "a body that refuses does not move", || {
         format!("{} off", gap(&before.map_from_base, &after.map_from_base))
     })?;
-    if robot.description().reach_m.is_none() {
-        let push = Push { object: Point3::origin(), direction: Vector2::x(), distance_m: 0.1 };
-        let answer = robot.push_aside(&push, &watch).await;
-        ensure(matches!(answer, Err(Failure::Unable { .. })), "who has no arm says so", || {
-            format!("{answer:?}")
+    Ok(())
+}
+
+/// Whatever takes a part that the body does not have, it says that it is unable.
+async fn check_missing_parts(robot: &dyn Robot, map_from_base: &Isometry3<f64>) -> Result<(), Breach> {
+    let object = map_from_base * Point3::new(0.5, 0.0, 0.8);
+    let requests = [
+        Request::LookAt(object),
+        Request::Sense,
+        Request::Scan,
+        Request::PushAside(Push { object, direction: Vector2::x(), distance_m: 0.1 }),
+        Request::Grasp(Grasp { object, width_m: 0.05 }),
+        Request::Place(Placing { foot: object }),
+        Request::Hand,
+    ];
+    for request in requests {
+        if request.needs().is_none_or(|part| robot.description().has(part)) {
+            continue;
+        }
+        let (answer, _) = request.ask(robot, &Watch::default()).await;
+        let says_so = matches!(&answer, Answer::Failed(Failure::Unable { because }) if !because.is_empty());
+        ensure(says_so, "who lacks a part says that it is unable", || {
+            format!("asked to {request}: {answer:?}")
         })?;
+    }
+    let nothing = Request::Read("there is no sense of this name".into());
+    let (answer, _) = nothing.ask(robot, &Watch::default()).await;
+    ensure(
+        matches!(answer, Answer::Failed(Failure::Unable { .. })),
+        "a sense that is none says nothing",
+        || format!("{answer:?}"),
+    )
+}
+
+/// Each sense says something, now.
+async fn check_senses(robot: &dyn Robot) -> Result<(), Breach> {
+    for sense in &robot.description().senses {
+        let before_ns = robot.now_ns();
+        let reading = done(robot.read(&sense.name, &Watch::default()).await, "a sense can be read")?;
+        let now = (before_ns..=robot.now_ns()).contains(&reading.stamp_ns);
+        ensure(now, "a reading is of now", || format!("{}: {} ns", sense.name, reading.stamp_ns))?;
     }
     Ok(())
 }
@@ -335,6 +402,12 @@ async fn check_stops(robot: &dyn Robot) -> Result<(), Breach> {
     let cancel = CancellationToken::new();
     cancel.cancel();
     let stopped = Watch { cancel, ..Watch::default() };
+    if robot.description().camera.is_some() {
+        let answer = robot.sense(&stopped).await;
+        ensure(matches!(answer, Err(Failure::Cancelled { .. })), "taking a frame can be stopped", || {
+            format!("{:?}", answer.map(|s| s.stamp_ns))
+        })?;
+    }
     let here = done(robot.pose().await, "a body knows where it is")?.place();
     let to = places(robot);
     let far =
@@ -343,10 +416,6 @@ async fn check_stops(robot: &dyn Robot) -> Result<(), Breach> {
     let answer = robot.drive_to(far, &stopped).await;
     ensure(matches!(answer, Err(Failure::Cancelled { .. })), "a drive can be stopped", || {
         format!("{answer:?}")
-    })?;
-    let answer = robot.sense(&stopped).await;
-    ensure(matches!(answer, Err(Failure::Cancelled { .. })), "taking a frame can be stopped", || {
-        format!("{:?}", answer.map(|s| s.stamp_ns))
     })?;
     let hurried = Watch { time_limit_s: 0.01, ..Watch::default() };
     let answer = robot.drive_to(far, &hurried).await;

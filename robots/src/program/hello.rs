@@ -1,9 +1,8 @@
 //! The first message: what the body is and what its map knows.
 
-use crate::body::{
-    self, Description, Door, Footprint, Frames, Head, Room, Speeds, Stamp, Station, SurfaceHint,
-};
+use crate::body::{Door, Room, Stamp, Station, SurfaceHint};
 use crate::grid::OccupancyGrid;
+use crate::parts::{self, Description, Footprint, Frames, Gripper, Head, Sense, Speeds};
 use crate::program::message;
 use crate::recorded::Known;
 use descry_perception::Intrinsics;
@@ -34,16 +33,19 @@ pub(super) struct Hello {
     /// Where its clock begins, nanoseconds.
     #[serde(default)]
     now_ns: Stamp,
-    /// What drives.
-    base: Base,
-    /// The depth camera.
-    camera: Camera,
+    /// What drives; left out by a body that stays at its one station.
+    base: Option<Base>,
+    /// The depth camera; left out if there is none.
+    camera: Option<Camera>,
     /// What turns the camera; left out if nothing does.
     head: Option<Head>,
     /// What pushes and grasps; left out if there is none.
     arm: Option<Arm>,
     /// A laser that sweeps level; left out if there is none.
     laser: Option<Laser>,
+    /// Sensors that are neither.
+    #[serde(default)]
+    senses: Vec<Sense>,
     /// Names of its frames in records.
     #[serde(default)]
     frames: BodyFrames,
@@ -121,7 +123,7 @@ fn default_unit_m() -> f64 {
 }
 
 fn default_camera_frame() -> String {
-    Frames::default().camera
+    "camera".into()
 }
 
 #[derive(Deserialize)]
@@ -166,7 +168,7 @@ struct BodyFrames {
 
 impl Default for BodyFrames {
     fn default() -> Self {
-        let Frames { map, base, .. } = Frames::default();
+        let Frames { map, base } = Frames::default();
         BodyFrames { map, base }
     }
 }
@@ -216,15 +218,7 @@ impl Hello {
         if self.now_ns < 0 {
             return Err(format!("now_ns is {}, expected nanoseconds from 0", self.now_ns));
         }
-        above_zero(&[
-            ("base.linear_m_s", self.base.linear_m_s),
-            ("base.angular_rad_s", self.base.angular_rad_s),
-            ("camera.fx", self.camera.fx),
-            ("camera.fy", self.camera.fy),
-            ("camera.unit_m", self.camera.unit_m),
-            ("pose_sigma_m", self.pose_sigma_m),
-            ("pose_sigma_rad", self.pose_sigma_rad),
-        ])?;
+        above_zero(&[("pose_sigma_m", self.pose_sigma_m), ("pose_sigma_rad", self.pose_sigma_rad)])?;
         self.check_parts()?;
         self.check_names()?;
         let map = match &self.map {
@@ -235,39 +229,26 @@ impl Hello {
         if map.is_none() && self.stations.as_ref().is_none_or(Vec::is_empty) {
             return Err("it has neither a map nor stations: there is nowhere to go".into());
         }
+        if self.base.is_none() && self.stations.as_ref().is_none_or(|list| list.len() != 1) {
+            return Err("it has no base: expected one station, where it is".into());
+        }
         Ok(self.greeting(map))
     }
 
     fn check_parts(&self) -> Result<(), String> {
-        let c = &self.camera;
-        let pixels = c.width.checked_mul(c.height).filter(|n| (1..=MOST_CELLS).contains(n));
-        if pixels.is_none() {
-            return Err(format!(
-                "the camera has {} x {} pixels, expected 1 to {MOST_CELLS}",
-                c.width, c.height
-            ));
-        }
-        if !(c.cx.is_finite() && c.cy.is_finite()) {
-            return Err("camera.cx and camera.cy are pixels".into());
-        }
-        if !(c.range_m.0 >= 0.0 && c.range_m.0 < c.range_m.1 && c.range_m.1.is_finite()) {
-            return Err(format!("camera.range_m is {:?}, expected least and greatest depth", c.range_m));
-        }
-        if let Some(fixed) = &c.base_from_camera {
-            message::transform(fixed).map_err(|e| format!("camera.base_from_camera: {e}"))?;
-            if self.head.is_some() {
+        if let Some(camera) = &self.camera {
+            camera.check()?;
+            if camera.base_from_camera.is_some() && self.head.is_some() {
                 return Err(
                     "camera.base_from_camera is of a camera that no head turns, and there is a head".into()
                 );
             }
         }
-        let radius_m = self.base.footprint.radius_m();
-        if !(radius_m.is_finite() && radius_m >= 0.0) {
-            return Err(format!("base.footprint has a radius of {radius_m} m"));
+        if self.head.is_some() && self.camera.is_none() {
+            return Err("there is a head, and no camera that it turns".into());
         }
-        let clearance_m = self.base.clearance_m;
-        if !(clearance_m.is_finite() && clearance_m >= 0.0) {
-            return Err(format!("base.clearance_m is {clearance_m}"));
+        if let Some(base) = &self.base {
+            base.check()?;
         }
         if let Some(h) = &self.head {
             let angles = [h.pan_limit_rad, h.tilt_down_rad, h.tilt_up_rad];
@@ -304,6 +285,7 @@ impl Hello {
                 None => Ok(()),
             }
         };
+        names(&self.senses.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), "sense")?;
         names(&self.surfaces.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), "surface")?;
         names(&self.rooms.iter().map(|r| r.name.as_str()).collect::<Vec<_>>(), "room")?;
         names(&self.doors.iter().map(|d| d.name.as_str()).collect::<Vec<_>>(), "door")?;
@@ -328,21 +310,19 @@ impl Hello {
     }
 
     fn greeting(self, map: Option<OccupancyGrid>) -> Greeting {
-        let c = self.camera;
-        let fixed = c.base_from_camera.and_then(|fixed| message::transform(&fixed).ok());
-        let fixed = fixed.unwrap_or(Isometry3::identity());
+        let fixed = self.camera.as_ref().and_then(|c| message::transform(&c.base_from_camera?).ok());
+        let pixels = self.camera.as_ref().map(|c| PixelFormat { unit_m: c.unit_m, colour: c.colour });
+        let clearance_m = self.base.as_ref().map_or(0.0, |base| base.clearance_m);
         let description = Description {
             name: self.name,
             simulated: self.simulated,
-            footprint: self.base.footprint,
-            speeds: Speeds { linear_m_s: self.base.linear_m_s, angular_rad_s: self.base.angular_rad_s },
-            camera: Intrinsics { width: c.width, height: c.height, fx: c.fx, fy: c.fy, cx: c.cx, cy: c.cy },
-            range_m: c.range_m,
+            base: self.base.map(Base::part),
             head: self.head,
-            frames: Frames { map: self.frames.map, base: self.frames.base, camera: c.frame },
-            reach_m: self.arm.as_ref().map(|a| a.reach_m),
-            hand_opening_m: self.arm.as_ref().and_then(|a| a.hand_opening_m),
+            arm: self.arm.map(Arm::part),
+            camera: self.camera.map(Camera::part),
             laser: self.laser.map(Laser::part),
+            senses: self.senses,
+            frames: Frames { map: self.frames.map, base: self.frames.base },
             up: self.up.map(|up| up.normalize()),
             pose_sigma_m: self.pose_sigma_m,
             pose_sigma_rad: self.pose_sigma_rad,
@@ -362,10 +342,64 @@ impl Hello {
         };
         Greeting {
             known,
-            clearance_m: self.base.clearance_m,
-            base_from_camera: fixed,
-            pixels: PixelFormat { unit_m: c.unit_m, colour: c.colour },
+            clearance_m,
+            base_from_camera: fixed.unwrap_or(Isometry3::identity()),
+            pixels: pixels.unwrap_or(PixelFormat { unit_m: default_unit_m(), colour: false }),
         }
+    }
+}
+
+impl Base {
+    fn check(&self) -> Result<(), String> {
+        above_zero(&[("base.linear_m_s", self.linear_m_s), ("base.angular_rad_s", self.angular_rad_s)])?;
+        let radius_m = self.footprint.radius_m();
+        if !(radius_m.is_finite() && radius_m >= 0.0) {
+            return Err(format!("base.footprint has a radius of {radius_m} m"));
+        }
+        let clearance_m = self.clearance_m;
+        if !(clearance_m.is_finite() && clearance_m >= 0.0) {
+            return Err(format!("base.clearance_m is {clearance_m}"));
+        }
+        Ok(())
+    }
+
+    fn part(self) -> parts::Base {
+        let speeds = Speeds { linear_m_s: self.linear_m_s, angular_rad_s: self.angular_rad_s };
+        parts::Base { footprint: self.footprint, speeds }
+    }
+}
+
+impl Camera {
+    fn check(&self) -> Result<(), String> {
+        above_zero(&[("camera.fx", self.fx), ("camera.fy", self.fy), ("camera.unit_m", self.unit_m)])?;
+        let pixels = self.width.checked_mul(self.height).filter(|n| (1..=MOST_CELLS).contains(n));
+        if pixels.is_none() {
+            return Err(format!(
+                "the camera has {} x {} pixels, expected 1 to {MOST_CELLS}",
+                self.width, self.height
+            ));
+        }
+        if !(self.cx.is_finite() && self.cy.is_finite()) {
+            return Err("camera.cx and camera.cy are pixels".into());
+        }
+        if !(self.range_m.0 >= 0.0 && self.range_m.0 < self.range_m.1 && self.range_m.1.is_finite()) {
+            return Err(format!("camera.range_m is {:?}, expected least and greatest depth", self.range_m));
+        }
+        let fixed = self.base_from_camera.as_ref().map(message::transform).transpose();
+        fixed.map(|_| ()).map_err(|e| format!("camera.base_from_camera: {e}"))
+    }
+
+    fn part(self) -> parts::Camera {
+        let Camera { width, height, fx, fy, cx, cy, .. } = self;
+        let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
+        parts::Camera { frame: self.frame, intrinsics, range_m: self.range_m, colour: self.colour }
+    }
+}
+
+impl Arm {
+    fn part(self) -> parts::Arm {
+        let hand = self.hand_opening_m.map(|opening_m| Gripper { opening_m });
+        parts::Arm { reach_m: self.reach_m, hand }
     }
 }
 
@@ -385,10 +419,10 @@ impl Laser {
             .map_err(|e| format!("laser.base_from_laser: {e}"))
     }
 
-    fn part(self) -> body::Laser {
+    fn part(self) -> parts::Laser {
         let Laser { base_from_laser, first_rad, step_rad, readings, reach_m, frame } = self;
         let base_from_laser = message::transform(&base_from_laser).unwrap_or(Isometry3::identity());
-        body::Laser { frame, base_from_laser, first_rad, step_rad, readings, reach_m }
+        parts::Laser { frame, base_from_laser, first_rad, step_rad, readings, reach_m }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::body::{Grasp, Place, Placing, Push, Stamp};
 use crate::failure::Failure;
+use crate::request::Request;
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -27,10 +28,27 @@ pub(super) enum Arguments<'a> {
     Nothing {},
     DriveTo { to: &'a Place, route_m: &'a [Point2<f64>] },
     LookAt { point_m: &'a Point3<f64> },
+    Sense { sense: &'a str },
     Push(&'a Push),
     Door { door: &'a str },
     Grasp(&'a Grasp),
     Place(&'a Placing),
+}
+
+impl<'a> Arguments<'a> {
+    /// Of a request, and of a drive the way on the map.
+    pub fn of(request: &'a Request, route_m: &'a [Point2<f64>]) -> Self {
+        match request {
+            Request::Pose | Request::Sense | Request::Scan | Request::Hand => Arguments::Nothing {},
+            Request::DriveTo(to) => Arguments::DriveTo { to, route_m },
+            Request::LookAt(point_m) => Arguments::LookAt { point_m },
+            Request::Read(sense) => Arguments::Sense { sense },
+            Request::PushAside(push) => Arguments::Push(push),
+            Request::OpenDoor(door) => Arguments::Door { door },
+            Request::Grasp(grasp) => Arguments::Grasp(grasp),
+            Request::Place(placing) => Arguments::Place(placing),
+        }
+    }
 }
 
 /// Stops a request.
@@ -145,6 +163,16 @@ pub(super) struct ScannedSaid {
     pub stamp_ns: Option<Stamp>,
     /// Where the base was then.
     pub map_from_base: Isometry3<f64>,
+}
+
+/// What `read` is answered with.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ReadSaid {
+    /// When it was read, nanoseconds on the body's clock; as the answer's `now_ns` if left out.
+    pub stamp_ns: Option<Stamp>,
+    /// What was read.
+    pub said: serde_json::Value,
 }
 
 /// What `push_aside` is answered with.

@@ -1,10 +1,11 @@
 //! What is answered here without asking the program: where it can go at what cost, and where its camera would be. Planning asks
 //! thousands of such questions; they need no round trips.
 
-use crate::body::{Description, Door, Place, Pose2, Station, Travel};
+use crate::body::{Door, Place, Pose2, Station, Travel};
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
 use crate::head;
+use crate::parts::{Description, Part, Speeds};
 use crate::recorded::Known;
 use crate::route::Router;
 use nalgebra::{Isometry3, Point2, Point3, Rotation2, Vector3};
@@ -42,7 +43,7 @@ impl Places {
     }
 
     /// The router with some doors shut.
-    fn router(&self, known: &Known, map: &OccupancyGrid, shut: &[String]) -> Arc<Router> {
+    fn router(&self, known: &Known, (map, speeds): (&OccupancyGrid, Speeds), shut: &[String]) -> Arc<Router> {
         let mut key = shut.to_vec();
         key.sort_unstable();
         key.dedup();
@@ -56,7 +57,7 @@ impl Places {
                 close(&mut map, door);
             }
             let d = &known.description;
-            Arc::new(Router::new(&map, d.footprint.radius_m() + self.clearance_m, d.speeds))
+            Arc::new(Router::new(&map, d.radius_m() + self.clearance_m, speeds))
         };
         Arc::clone(routers.entry(key).or_insert_with(make))
     }
@@ -74,13 +75,13 @@ impl Places {
             Err(failure) => return to.iter().map(|_| Err(failure.clone())).collect(),
         };
         let goals: Vec<_> = to.iter().map(|place| stand(known, place)).collect();
-        let Some(map) = &known.map else {
+        let Some(floor) = floor(known) else {
             return goals.into_iter().map(|goal| Ok(straight(&known.description, &from, &goal?))).collect();
         };
         let nowhere = Isometry3::translation(f64::NAN, f64::NAN, 0.0);
         let poses: Vec<Pose2> =
             goals.iter().map(|g| Pose2::from_isometry(g.as_ref().unwrap_or(&nowhere))).collect();
-        let found = self.router(known, map, shut).travel_to_each(&Pose2::from_isometry(&from), &poses);
+        let found = self.router(known, floor, shut).travel_to_each(&Pose2::from_isometry(&from), &poses);
         goals.into_iter().zip(found).map(|(goal, travel)| goal.and(travel)).collect()
     }
 
@@ -96,15 +97,15 @@ impl Places {
         to: &Place,
     ) -> Result<Vec<Point2<f64>>, Failure> {
         let goal = stand(known, to)?;
-        let Some(map) = &known.map else { return Ok(Vec::new()) };
+        let Some(floor) = floor(known) else { return Ok(Vec::new()) };
         let (from, goal) = (Pose2::from_isometry(from), Pose2::from_isometry(&goal));
         let shut: Vec<String> =
             self.shut.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect();
-        let around = self.router(known, map, &shut).route(&from, &goal);
+        let around = self.router(known, floor, &shut).route(&from, &goal);
         let found = if shut.is_empty() {
             around
         } else {
-            around.or_else(|_| self.router(known, map, &[]).route(&from, &goal))
+            around.or_else(|_| self.router(known, floor, &[]).route(&from, &goal))
         };
         Ok(found?.points_m)
     }
@@ -116,6 +117,7 @@ impl Places {
         place: &Place,
         look_at: Option<&Point3<f64>>,
     ) -> Result<Isometry3<f64>, Failure> {
+        known.description.need(Part::Camera)?;
         let base = stand(known, place)?;
         let turned = known.description.head.as_ref().map(|h| head::camera_towards(h, &base, look_at));
         Ok(turned.unwrap_or(base * self.base_from_camera))
@@ -126,6 +128,11 @@ impl Places {
         let seen = (map_from_base * self.base_from_camera).inverse_transform_point(point);
         seen.coords.angle(&Vector3::z())
     }
+}
+
+/// What there is to drive on, and how fast: with a map and a base.
+fn floor(known: &Known) -> Option<(&OccupancyGrid, Speeds)> {
+    Some((known.map.as_ref()?, known.description.base.as_ref()?.speeds))
 }
 
 /// Where the base stands at a place.
@@ -153,12 +160,11 @@ pub(super) fn stand(known: &Known, place: &Place) -> Result<Isometry3<f64>, Fail
     Err(Failure::Unreachable { because })
 }
 
-/// A straight line at constant speed while turning: max(ds/v, dθ/ω).
+/// A straight line at constant speed while turning.
 fn straight(body: &Description, from: &Isometry3<f64>, to: &Isometry3<f64>) -> Travel {
     let distance_m = (from.translation.vector - to.translation.vector).norm();
     let turned_rad = from.rotation.angle_to(&to.rotation);
-    let duration_s = (distance_m / body.speeds.linear_m_s).max(turned_rad / body.speeds.angular_rad_s);
-    Travel { distance_m, duration_s }
+    Travel { distance_m, duration_s: body.duration_s(distance_m, turned_rad) }
 }
 
 /// Occupies a door's opening, half a cell thick to either side.

@@ -1,12 +1,13 @@
 //! The body that a program is.
 
 use crate::body::{
-    Colour, Description, Door, Driven, Grasp, Grasped, Hand, Laser, Looked, Opened, Place, Placed, Placing,
-    Pose2, PoseEstimate, Progress, Push, Pushed, Robot, Room, Scanned, Sensed, Stamp, StampedTransform,
-    Station, SurfaceHint, Travel, Watch,
+    Colour, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, Pose2, PoseEstimate,
+    Progress, Push, Pushed, Reading, Robot, Room, Scanned, Sensed, Stamp, StampedTransform, Station,
+    SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
+use crate::parts::{Camera, Description, Laser, Part};
 use crate::program::hello::{Hello, PROTOCOL, PixelFormat};
 use crate::program::link::{Link, Message};
 use crate::program::message::{self, Arguments, amount, answer, transform};
@@ -15,10 +16,11 @@ use crate::program::places::{self, Places};
 use crate::program::process::Process;
 use crate::program::socket::Socket;
 use crate::program::talk::{Done, Talk};
-use crate::recorded::{Exposure, Known, Pixels};
+use crate::recorded::Known;
+use crate::request::{Exposure, Pixels, Request};
 use descry_perception::laser::Scan;
 use image::RgbImage;
-use nalgebra::{Isometry2, Isometry3, Point3, Vector2};
+use nalgebra::{Isometry2, Isometry3, Point2, Point3, Vector2};
 use std::io::{Read, Write};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
@@ -101,9 +103,10 @@ impl ProgramRobot {
         let opened = Link::open(from, to, limits.hello())
             .and_then(|(link, first)| Ok((link, read_hello(&first)?.check(&first.bytes)?)));
         let (link, greeting) = opened.map_err(|because| format!("{because}{}", peer.epitaph()))?;
-        let camera = &greeting.known.description.camera;
-        let readings = greeting.known.description.laser.as_ref().map_or(0, |laser| laser.readings);
-        link.allow_bytes(greeting.pixels.bytes(camera.width * camera.height).max(4 * readings));
+        let Description { camera, laser, .. } = &greeting.known.description;
+        let pixels = camera.as_ref().map_or(0, |c| c.intrinsics.width * c.intrinsics.height);
+        let readings = laser.as_ref().map_or(0, |laser| laser.readings);
+        link.allow_bytes(greeting.pixels.bytes(pixels).max(4 * readings));
         Ok(ProgramRobot {
             places: Places::new(greeting.clearance_m, greeting.base_from_camera),
             pixels: greeting.pixels,
@@ -113,14 +116,21 @@ impl ProgramRobot {
         })
     }
 
-    async fn ask(
+    /// Asks the program, if the body has the part that it takes.
+    async fn ask(&self, request: &Request, watch: &Watch<'_>) -> Result<Done, Failure> {
+        self.ask_along(request, &[], watch).await
+    }
+
+    /// The same, of a drive with a way on the map.
+    async fn ask_along(
         &self,
-        request: &'static str,
-        with: Arguments<'_>,
+        request: &Request,
+        route_m: &[Point2<f64>],
         watch: &Watch<'_>,
     ) -> Result<Done, Failure> {
+        request.needs().map_or(Ok(()), |part| self.known.description.need(part))?;
         if watch.cancel.is_cancelled() {
-            return Err(Failure::Cancelled { because: format!("{request} was not begun") });
+            return Err(Failure::Cancelled { because: format!("{} was not begun", request.name()) });
         }
         let mut talk = self.talk.lock().await;
         let before_ns = talk.now_ns;
@@ -130,7 +140,7 @@ impl ProgramRobot {
             let elapsed_s = (now_ns - before_ns) as f64 * 1e-9;
             (watch.progress)(&Progress { elapsed_s, fraction, distance_m });
         };
-        let done = talk.ask(request, with, watch, &progress).await;
+        let done = talk.ask(request.name(), Arguments::of(request, route_m), watch, &progress).await;
         told(talk.now_ns);
         done
     }
@@ -143,7 +153,7 @@ impl ProgramRobot {
         }
     }
 
-    fn sensed(&self, done: Done) -> Result<Sensed, String> {
+    fn sensed(&self, camera: &Camera, done: Done) -> Result<Sensed, String> {
         let said: message::SensedSaid = answer("sense", done.said)?;
         let stamp_ns = stamp("a frame", said.stamp_ns, (done.before_ns, done.now_ns))?;
         let (map_from_base, base_from_camera) =
@@ -151,16 +161,16 @@ impl ProgramRobot {
         let d = &self.known.description;
         let exposure = Exposure {
             stamp_ns,
-            intrinsics: d.camera,
+            intrinsics: camera.intrinsics,
             transforms: vec![
                 link(stamp_ns, &d.frames.map, &d.frames.base, map_from_base),
-                link(stamp_ns, &d.frames.base, &d.frames.camera, base_from_camera),
+                link(stamp_ns, &d.frames.base, &camera.frame, base_from_camera),
             ],
             map_from_camera: map_from_base * base_from_camera,
             pose_sigma_m: d.pose_sigma_m,
             pose_sigma_rad: d.pose_sigma_rad,
         };
-        Ok(exposure.with(read_pixels(d, self.pixels, &done.bytes)?))
+        Ok(exposure.with(read_pixels(camera, self.pixels, &done.bytes)?))
     }
 
     fn scanned(&self, laser: &Laser, done: Done) -> Result<Scanned, String> {
@@ -236,23 +246,22 @@ fn read_hello(first: &Message) -> Result<Hello, String> {
     serde_json::from_str(&first.line).map(|first: First<Hello>| first.hello).map_err(none)
 }
 
-fn read_pixels(body: &Description, format: PixelFormat, bytes: &[u8]) -> Result<Pixels, String> {
-    let camera = &body.camera;
-    let pixels = camera.width * camera.height;
+fn read_pixels(camera: &Camera, format: PixelFormat, bytes: &[u8]) -> Result<Pixels, String> {
+    let Camera { intrinsics, range_m: (near_m, far_m), .. } = *camera;
+    let pixels = intrinsics.width * intrinsics.height;
     if bytes.len() != format.bytes(pixels) {
         return Err(format!("a frame of {} bytes, expected {}", bytes.len(), format.bytes(pixels)));
     }
     let (depths, colours) = bytes.split_at(2 * pixels);
-    let (near_m, far_m) = body.range_m;
     let metres = |steps: &[u8]| {
         let z = f64::from(u16::from_le_bytes([steps[0], steps[1]])) * format.unit_m;
         if z > 0.0 && z >= near_m && z <= far_m { z as f32 } else { f32::NAN }
     };
     let depth_m: Vec<f32> = depths.chunks_exact(2).map(metres).collect();
-    let mut cloud = camera.cloud_from_depth(&depth_m).map_err(|e| e.to_string())?;
+    let mut cloud = intrinsics.cloud_from_depth(&depth_m).map_err(|e| e.to_string())?;
     let image = format
         .colour
-        .then(|| RgbImage::from_raw(camera.width as u32, camera.height as u32, colours.to_vec()))
+        .then(|| RgbImage::from_raw(intrinsics.width as u32, intrinsics.height as u32, colours.to_vec()))
         .flatten();
     if image.is_some() {
         cloud.colours = Some(colours.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect());
@@ -299,7 +308,7 @@ impl Robot for ProgramRobot {
     }
 
     async fn pose(&self) -> Result<PoseEstimate, Failure> {
-        let done = self.ask("pose", Arguments::Nothing {}, &Watch::default()).await?;
+        let done = self.ask(&Request::Pose, &Watch::default()).await?;
         let d = &self.known.description;
         let read = |done: Done| {
             let said: message::PoseSaid = answer("pose", done.said)?;
@@ -324,7 +333,7 @@ impl Robot for ProgramRobot {
         }
         let here = self.pose().await?;
         let route_m = self.places.route(&self.known, &here.map_from_base, to)?;
-        let done = self.ask("drive_to", Arguments::DriveTo { to, route_m: &route_m }, watch).await;
+        let done = self.ask_along(&Request::DriveTo(to.clone()), &route_m, watch).await;
         if let Err(Failure::Blocked { by: Some(door), .. }) = &done
             && self.known.doors.iter().any(|d| &d.name == door)
         {
@@ -347,6 +356,7 @@ impl Robot for ProgramRobot {
         if !point.iter().all(|x| x.is_finite()) {
             return Err(Failure::Unreachable { because: format!("{point} is no point to look at") });
         }
+        self.known.description.need(Part::Camera)?;
         if self.known.description.head.is_none() {
             if watch.cancel.is_cancelled() {
                 return Err(Failure::Cancelled { because: "look_at was not begun".into() });
@@ -355,7 +365,7 @@ impl Robot for ProgramRobot {
             let here = self.pose().await?.map_from_base;
             return Ok(Looked { duration_s: 0.0, miss_rad: self.places.miss_rad(&here, point) });
         }
-        let done = self.ask("look_at", Arguments::LookAt { point_m: point }, watch).await?;
+        let done = self.ask(&Request::LookAt(*point), watch).await?;
         let duration_s = done.duration_s();
         let said = answer("look_at", done.said).and_then(|said: message::LookedSaid| {
             Ok(Looked { duration_s, miss_rad: amount("miss_rad", said.miss_rad)? })
@@ -364,25 +374,40 @@ impl Robot for ProgramRobot {
     }
 
     async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure> {
-        let done = self.ask("sense", Arguments::Nothing {}, watch).await?;
-        self.hold(self.sensed(done)).await
+        let done = self.ask(&Request::Sense, watch).await?;
+        let Some(camera) = &self.known.description.camera else { return Err(self.lacks(Part::Camera)) };
+        self.hold(self.sensed(camera, done)).await
     }
 
     async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {
-        let Some(laser) = &self.known.description.laser else { return Err(self.lacks("laser")) };
-        let done = self.ask("scan", Arguments::Nothing {}, watch).await?;
+        let done = self.ask(&Request::Scan, watch).await?;
+        let Some(laser) = &self.known.description.laser else { return Err(self.lacks(Part::Laser)) };
         self.hold(self.scanned(laser, done)).await
     }
 
+    async fn read(&self, sense: &str, watch: &Watch<'_>) -> Result<Reading, Failure> {
+        let body = &self.known.description;
+        if !body.senses.iter().any(|s| s.name == sense) {
+            return Err(body.lacks_sense(sense));
+        }
+        let done = self.ask(&Request::Read(sense.into()), watch).await?;
+        let (before_ns, now_ns) = (done.before_ns, done.now_ns);
+        let read = answer("read", done.said).and_then(|said: message::ReadSaid| {
+            let stamp_ns = stamp("a reading", said.stamp_ns, (before_ns, now_ns))?;
+            Ok(Reading { stamp_ns, said: said.said })
+        });
+        self.hold(read).await
+    }
+
     async fn push_aside(&self, push: &Push, watch: &Watch<'_>) -> Result<Pushed, Failure> {
-        let Some(reach_m) = self.known.description.reach_m else { return Err(self.lacks("arm")) };
+        let Some(reach_m) = self.known.description.reach_m() else { return Err(self.lacks(Part::Arm)) };
         let numbers = [push.object.x, push.object.y, push.object.z, push.direction.x, push.direction.y];
         let way = push.direction.norm() > 0.0 && push.distance_m.is_finite() && push.distance_m > 0.0;
         if !(numbers.iter().all(|x| x.is_finite()) && way) {
             let because = format!("a push needs a place, a direction and a distance within {reach_m} m");
             return Err(Failure::Unreachable { because });
         }
-        let done = self.ask("push_aside", Arguments::Push(push), watch).await?;
+        let done = self.ask(&Request::PushAside(*push), watch).await?;
         let duration_s = done.duration_s();
         let said = answer("push_aside", done.said).and_then(|said: message::PushedSaid| {
             Ok(Pushed { moved_m: amount("moved_m", said.moved_m)?, duration_s })
@@ -395,7 +420,7 @@ impl Robot for ProgramRobot {
             let because = format!("{} knows no door \"{door}\"", self.known.description.name);
             return Err(Failure::Unreachable { because });
         }
-        let done = self.ask("open_door", Arguments::Door { door }, watch).await?;
+        let done = self.ask(&Request::OpenDoor(door.into()), watch).await?;
         let duration_s = done.duration_s();
         let said = answer("open_door", done.said).map(|_: message::NothingSaid| Opened { duration_s });
         let opened = self.hold(said).await?;
@@ -405,7 +430,7 @@ impl Robot for ProgramRobot {
 
     async fn grasp(&self, grasp: &Grasp, watch: &Watch<'_>) -> Result<Grasped, Failure> {
         self.hand_for(&grasp.object)?;
-        let done = self.ask("grasp", Arguments::Grasp(grasp), watch).await?;
+        let done = self.ask(&Request::Grasp(*grasp), watch).await?;
         let duration_s = done.duration_s();
         let said = answer("grasp", done.said).and_then(|said: message::GraspedSaid| {
             Ok(Grasped { width_m: amount("width_m", said.width_m)?, duration_s })
@@ -415,29 +440,26 @@ impl Robot for ProgramRobot {
 
     async fn place(&self, placing: &Placing, watch: &Watch<'_>) -> Result<Placed, Failure> {
         self.hand_for(&placing.foot)?;
-        let done = self.ask("place", Arguments::Place(placing), watch).await?;
+        let done = self.ask(&Request::Place(*placing), watch).await?;
         let duration_s = done.duration_s();
         let said = answer("place", done.said).map(|_: message::NothingSaid| Placed { duration_s });
         self.hold(said).await
     }
 
     async fn hand(&self) -> Result<Hand, Failure> {
-        self.hand_for(&Point3::origin())?;
-        let done = self.ask("hand", Arguments::Nothing {}, &Watch::default()).await?;
+        let done = self.ask(&Request::Hand, &Watch::default()).await?;
         self.hold(answer("hand", done.said)).await
     }
 }
 
 impl ProgramRobot {
-    fn lacks(&self, part: &str) -> Failure {
-        Failure::Unable { because: format!("{} has no {part}", self.known.description.name) }
+    fn lacks(&self, part: Part) -> Failure {
+        self.known.description.lacks(part)
     }
 
     /// Whether there is a hand, and the point is one.
     fn hand_for(&self, point: &Point3<f64>) -> Result<(), Failure> {
-        if self.known.description.hand_opening_m.is_none() {
-            return Err(self.lacks("hand"));
-        }
+        self.known.description.need(Part::Hand)?;
         match point.iter().all(|x| x.is_finite()) {
             true => Ok(()),
             false => Err(Failure::Unreachable { because: format!("{point} is no place for a hand") }),

@@ -44,5 +44,5 @@ mod taped;
 pub use folder::{Recording, StoredFrame};
 pub use robot::{Footage, RecordedRobot};
 pub use settings::{CameraSettings, Settings};
-pub use tape::{Answer, Entry, Exposure, Known, Pixels, Question, Reply, Request, Tape};
+pub use tape::{Entry, Known, Question, Reply, Tape};
 pub use taped::TapedRobot;

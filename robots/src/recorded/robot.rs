@@ -1,14 +1,16 @@
 //! The body that a recording is.
 
 use crate::body::{
-    Colour, Description, Door, Driven, Footprint, Frames, Looked, Place, PoseEstimate, Progress, Robot, Room,
-    Sensed, Speeds, Stamp, StampedTransform, Station, SurfaceHint, Travel, Watch,
+    Colour, Door, Driven, Looked, Place, PoseEstimate, Progress, Robot, Room, Sensed, Stamp,
+    StampedTransform, Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
 use crate::input::InputError;
+use crate::parts::{Base, Camera, Description, Footprint, Frames, Part, Speeds};
 use crate::recorded::folder::Recording;
-use crate::recorded::tape::{Exposure, Known, Pixels};
+use crate::recorded::tape::Known;
+use crate::request::{Exposure, Pixels};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -56,18 +58,24 @@ impl RecordedRobot {
         let description = Description {
             name: format!("recording {}", recording.name),
             simulated: false,
-            footprint: Footprint::Disc { radius_m: 0.0 },
-            speeds: Speeds {
-                linear_m_s: settings.linear_m_s,
-                angular_rad_s: settings.angular_deg_s.to_radians(),
-            },
-            camera: recording.intrinsics,
-            range_m: (settings.range_m[0], settings.range_m[1]),
+            base: Some(Base {
+                footprint: Footprint::Disc { radius_m: 0.0 },
+                speeds: Speeds {
+                    linear_m_s: settings.linear_m_s,
+                    angular_rad_s: settings.angular_deg_s.to_radians(),
+                },
+            }),
             head: None,
-            frames: Frames::default(),
-            reach_m: None,
-            hand_opening_m: None,
+            arm: None,
+            camera: Some(Camera {
+                frame: "camera".into(),
+                intrinsics: recording.intrinsics,
+                range_m: (settings.range_m[0], settings.range_m[1]),
+                colour: recording.frames.iter().any(|f| f.colour.is_some()),
+            }),
             laser: None,
+            senses: Vec::new(),
+            frames: Frames::default(),
             up: settings.up.map(|[x, y, z]| Vector3::new(x, y, z).normalize()),
             pose_sigma_m: settings.pose_sigma_m,
             pose_sigma_rad: settings.pose_sigma_deg.to_radians(),
@@ -100,7 +108,7 @@ impl RecordedRobot {
     /// an arm or a map that is known does not count.
     pub fn of(known: Known, start: usize, frames: Box<dyn Footage>) -> RecordedRobot {
         let description =
-            Description { head: None, reach_m: None, hand_opening_m: None, laser: None, ..known.description };
+            Description { head: None, arm: None, laser: None, senses: Vec::new(), ..known.description };
         let stations = known.stations.unwrap_or_default();
         let state = State { at: start.min(stations.len().saturating_sub(1)), now_ns: known.now_ns };
         let Known { surfaces, rooms, doors, .. } = known;
@@ -135,14 +143,11 @@ impl RecordedRobot {
         let (a, b) = (&self.stations[from].map_from_base, &self.stations[to].map_from_base);
         let distance_m = (a.translation.vector - b.translation.vector).norm();
         let turned_rad = a.rotation.angle_to(&b.rotation);
-        let speeds = &self.description.speeds;
-        Travel {
-            distance_m,
-            duration_s: (distance_m / speeds.linear_m_s).max(turned_rad / speeds.angular_rad_s),
-        }
+        Travel { distance_m, duration_s: self.description.duration_s(distance_m, turned_rad) }
     }
 
     fn play(&self) -> Result<Sensed, Failure> {
+        let Some(camera) = &self.description.camera else { return Err(self.description.lacks(Part::Camera)) };
         let stamp_ns = self.pass(FRAME_S);
         let at = self.lock().at;
         let pixels =
@@ -157,10 +162,10 @@ impl RecordedRobot {
         };
         let exposure = Exposure {
             stamp_ns,
-            intrinsics: self.description.camera,
+            intrinsics: camera.intrinsics,
             transforms: vec![
                 link(&frames.map, &frames.base, map_from_camera),
-                link(&frames.base, &frames.camera, Isometry3::identity()),
+                link(&frames.base, &camera.frame, Isometry3::identity()),
             ],
             map_from_camera,
             pose_sigma_m: self.description.pose_sigma_m,

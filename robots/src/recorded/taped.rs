@@ -1,12 +1,14 @@
 //! A body whose every answer is kept on a tape, and which first gives the answers that are on it already.
 
-use super::tape::{Answer, Entry, Exposure, Known, Question, Reply, Request, Tape};
+use super::tape::{Entry, Known, Question, Reply, Tape};
 use crate::body::{
-    Description, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, PoseEstimate,
-    Push, Pushed, Robot, Room, Scanned, Sensed, Stamp, Station, SurfaceHint, Travel, Watch,
+    Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, PoseEstimate, Push, Pushed,
+    Reading, Robot, Room, Scanned, Sensed, Stamp, Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
+use crate::parts::Description;
+use crate::request::{Answer, Request};
 use nalgebra::{Isometry3, Point3};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -194,7 +196,7 @@ impl TapedRobot {
             let now_ns = self.lock().now_ns;
             return Ok((Entry { replies, done: Some((request, Answer::Failed(lost))), now_ns }, None));
         }
-        let (answer, mut sensed) = perform(&**live, &request, watch).await;
+        let (answer, mut sensed) = request.ask(&**live, watch).await;
         // Where somebody stopped the run, it goes on as if that had not been asked.
         if let Answer::Failed(failure @ Failure::Cancelled { .. }) = answer {
             return Err(failure);
@@ -230,7 +232,7 @@ impl TapedRobot {
     /// A body that begins again does again what the tape says that it did.
     async fn follow(&self, request: &Request, entry: Entry, watch: &Watch<'_>) -> Result<Entry, Failure> {
         let Some(live) = self.live.as_ref().filter(|live| live.begins_again()) else { return Ok(entry) };
-        perform(&**live, request, watch).await;
+        request.ask(&**live, watch).await;
         if live.now_ns() == entry.now_ns {
             return Ok(entry);
         }
@@ -282,26 +284,6 @@ impl State {
             self.replies.insert(serde_json::to_string(question).unwrap_or_default(), reply.clone());
         }
     }
-}
-
-/// Asks a body to do something.
-async fn perform(body: &dyn Robot, request: &Request, watch: &Watch<'_>) -> (Answer, Option<Sensed>) {
-    let answer = match request {
-        Request::Pose => body.pose().await.map(Answer::Pose),
-        Request::DriveTo(place) => body.drive_to(place, watch).await.map(Answer::Driven),
-        Request::LookAt(point) => body.look_at(point, watch).await.map(Answer::Looked),
-        Request::Scan => body.scan(watch).await.map(Answer::Scanned),
-        Request::PushAside(push) => body.push_aside(push, watch).await.map(Answer::Pushed),
-        Request::OpenDoor(door) => body.open_door(door, watch).await.map(Answer::Opened),
-        Request::Grasp(grasp) => body.grasp(grasp, watch).await.map(Answer::Grasped),
-        Request::Place(placing) => body.place(placing, watch).await.map(Answer::Placed),
-        Request::Hand => body.hand().await.map(Answer::Hand),
-        Request::Sense => match body.sense(watch).await {
-            Ok(sensed) => return (Answer::Sensed(Exposure::of(&sensed)), Some(sensed)),
-            Err(failure) => Err(failure),
-        },
-    };
-    (answer.unwrap_or_else(Answer::Failed), None)
 }
 
 /// What the tape has is no answer to what was asked: only a damaged record can say so.
@@ -393,6 +375,13 @@ impl Robot for TapedRobot {
     async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {
         match self.ask(Request::Scan, watch).await? {
             (Answer::Scanned(scanned), _) => Ok(scanned),
+            (other, _) => mixed_up(other),
+        }
+    }
+
+    async fn read(&self, sense: &str, watch: &Watch<'_>) -> Result<Reading, Failure> {
+        match self.ask(Request::Read(sense.into()), watch).await? {
+            (Answer::Read(reading), _) => Ok(reading),
             (other, _) => mixed_up(other),
         }
     }

@@ -4,7 +4,7 @@ use crate::body::Pose2;
 use crate::head;
 use crate::input::InputError;
 use crate::route::Router;
-use crate::sim::body::{self, SAFETY_M};
+use crate::sim::body::{HEAD, RADIUS_M, SAFETY_M, SPEEDS, intrinsics};
 use crate::sim::noise::{mix, share};
 use crate::sim::render::visible_share;
 use crate::sim::scene::{
@@ -57,8 +57,7 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
         stereo: spec.stereo,
         visit: spec.visit,
     };
-    let description = body::description();
-    let router = Router::new(&scene.map(), description.footprint.radius_m() + SAFETY_M, description.speeds);
+    let router = Router::new(&scene.map(), RADIUS_M + SAFETY_M, SPEEDS);
     if let Err(failure) = router.fits(&scene.start.point()) {
         return Err(InputError::whole(
             title_of(spec),
@@ -447,11 +446,9 @@ fn settle_target(
 
 fn share_from(scene: &Scene, label: u16, pose: &Pose2, stride: usize) -> f64 {
     let index = usize::from(label - LABEL_OBJECT);
-    let description = body::description();
-    let Some(head) = &description.head else { return 0.0 };
     let look_at = scene.objects[index].centre_m();
-    let map_from_camera = head::camera_towards(head, &pose.isometry(), Some(&look_at));
-    visible_share(scene, label, &map_from_camera, &description.camera, stride).unwrap_or(0.0)
+    let map_from_camera = head::camera_towards(&HEAD, &pose.isometry(), Some(&look_at));
+    visible_share(scene, label, &map_from_camera, &intrinsics(), stride).unwrap_or(0.0)
 }
 
 fn some_pose_sees(scene: &Scene, label: u16, surface: &SurfaceSpec, router: &Router, least: f64) -> bool {

@@ -1,16 +1,27 @@
 //! The body in the simulated room: a round base with a pan-tilt head that carries a Kinect, and an arm with a hand.
 
-use crate::body::{Description, Footprint, Frames, Head, Speeds};
+use crate::parts::{Arm, Base, Camera, Description, Footprint, Frames, Gripper, Head, Speeds};
 use crate::sim::laser::Laser;
 use descry_perception::Intrinsics;
 use nalgebra::{Point3, Vector3};
 
+/// The head.
+pub const HEAD: Head = Head {
+    base_from_head: Point3::new(0.0, 0.0, CAMERA_HEIGHT_M),
+    pan_limit_rad: 2.6,
+    tilt_down_rad: 1.2,
+    tilt_up_rad: 0.8,
+};
 /// Kept between the footprint and what the map shows, metres: about two standard deviations of localisation.
 pub const SAFETY_M: f64 = 0.05;
 /// How far from the base's origin the arm reaches, metres.
 pub const REACH_M: f64 = 1.8;
 /// The widest thing that the hand takes, metres.
 pub const HAND_OPENING_M: f64 = 0.12;
+/// The base is round, metres.
+pub const RADIUS_M: f64 = 0.25;
+/// How fast the base moves.
+pub const SPEEDS: Speeds = Speeds { linear_m_s: 0.4, angular_rad_s: 0.8 };
 /// How fast the head turns.
 pub const HEAD_SPEED_RAD_S: f64 = 1.0;
 
@@ -19,7 +30,7 @@ const IMAGE: (usize, usize) = (640, 480);
 const CAMERA_HEIGHT_M: f64 = 1.4;
 
 /// The camera of the published set-up: 640x480, 57° x 43°.
-pub fn camera() -> Intrinsics {
+pub fn intrinsics() -> Intrinsics {
     let (width, height) = IMAGE;
     let focal = |pixels: usize, field_deg: f64| 0.5 * pixels as f64 / (0.5 * field_deg.to_radians()).tan();
     Intrinsics {
@@ -32,25 +43,23 @@ pub fn camera() -> Intrinsics {
     }
 }
 
+/// The camera with its range.
+pub fn camera() -> Camera {
+    Camera { frame: "camera".into(), intrinsics: intrinsics(), range_m: (0.45, 5.0), colour: true }
+}
+
 /// What the simulated body is.
 pub fn description() -> Description {
     Description {
         name: "simulated tabletop robot".into(),
         simulated: true,
-        footprint: Footprint::Disc { radius_m: 0.25 },
-        speeds: Speeds { linear_m_s: 0.4, angular_rad_s: 0.8 },
-        camera: camera(),
-        range_m: (0.45, 5.0),
-        head: Some(Head {
-            base_from_head: Point3::new(0.0, 0.0, CAMERA_HEIGHT_M),
-            pan_limit_rad: 2.6,
-            tilt_down_rad: 1.2,
-            tilt_up_rad: 0.8,
-        }),
-        frames: Frames::default(),
-        reach_m: Some(REACH_M),
-        hand_opening_m: Some(HAND_OPENING_M),
+        base: Some(Base { footprint: Footprint::Disc { radius_m: RADIUS_M }, speeds: SPEEDS }),
+        head: Some(HEAD),
+        arm: Some(Arm { reach_m: REACH_M, hand: Some(Gripper { opening_m: HAND_OPENING_M }) }),
+        camera: Some(camera()),
         laser: Some(Laser::default().part()),
+        senses: Vec::new(),
+        frames: Frames::default(),
         up: Some(Vector3::z()),
         pose_sigma_m: 0.03,
         pose_sigma_rad: 2f64.to_radians(),

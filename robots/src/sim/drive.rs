@@ -1,6 +1,7 @@
 //! Motion of the simulated base: along a route in its own estimate of the map, while the truth is a little elsewhere.
 
-use crate::body::{Pose2, Speeds};
+use crate::body::Pose2;
+use crate::parts::Speeds;
 use crate::route::{Route, turn};
 use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;

@@ -1,6 +1,7 @@
 //! A planar laser in the scene: level rays against room and solids at one height, and the noise of a SICK LMS 200.
 
-use crate::body::{self, Pose2};
+use crate::body::Pose2;
+use crate::parts;
 use crate::sim::scene::RoomSpec;
 use crate::sim::world::{Scene, Solid};
 use descry_perception::laser::Scan;
@@ -44,8 +45,8 @@ impl Default for Laser {
 
 impl Laser {
     /// The laser as a part of a body, above the middle of its base.
-    pub fn part(&self) -> body::Laser {
-        body::Laser {
+    pub fn part(&self) -> parts::Laser {
+        parts::Laser {
             frame: "laser".into(),
             base_from_laser: Isometry3::translation(0.0, 0.0, self.height_m),
             first_rad: self.first_rad,

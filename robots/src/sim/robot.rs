@@ -1,14 +1,15 @@
 //! The simulated body in its room.
 
 use crate::body::{
-    CancellationToken, Colour, Description, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place,
-    Placed, Placing, Pose2, PoseEstimate, Progress, Push, Pushed, Robot, Room, Scanned, Sensed, Stamp,
-    StampedTransform, Station, SurfaceHint, Travel, Watch,
+    CancellationToken, Colour, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing,
+    Pose2, PoseEstimate, Progress, Push, Pushed, Robot, Room, Scanned, Sensed, Stamp, StampedTransform,
+    Station, SurfaceHint, Travel, Watch,
 };
 use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
 use crate::head::{self, Gaze};
-use crate::sim::body::{self, HEAD_SPEED_RAD_S, SAFETY_M};
+use crate::parts::{Camera, Description};
+use crate::sim::body::{self, HEAD, HEAD_SPEED_RAD_S, RADIUS_M, SAFETY_M, SPEEDS};
 use crate::sim::drive::{self, Localisation};
 use crate::sim::faults::{Fault, FaultKind, FaultPlan};
 use crate::sim::laser::{self, Laser};
@@ -48,6 +49,7 @@ pub struct SimOptions {
 /// A simulated body in a scene. The truth is asked of [`SimRobot::truth`]; the [`Robot`] trait shows only what a real body would.
 pub struct SimRobot {
     description: Description,
+    camera: Camera,
     options: SimOptions,
     map: OccupancyGrid,
     surfaces: Vec<SurfaceHint>,
@@ -88,8 +90,7 @@ impl SimRobot {
         description.laser = Some(options.laser.part());
         let map = scene.known_map();
         let doorways = scene.doors.iter().map(|d| d.doorway.clone()).collect();
-        let radius_m = description.footprint.radius_m() + SAFETY_M;
-        let routes = Routes::new(map.clone(), doorways, radius_m, description.speeds);
+        let routes = Routes::new(map.clone(), doorways, RADIUS_M + SAFETY_M, SPEEDS);
         let hint = |s: &SurfaceSpec| SurfaceHint {
             name: s.name.clone(),
             outline_m: s.outline_m(),
@@ -102,9 +103,9 @@ impl SimRobot {
         let room = |r: &RoomSpec| Room { name: r.name.clone(), outline_m: r.outline_m() };
         let rooms = known(scene.rooms.len()).map(|i| room(&scene.rooms[i])).collect();
         let doors = known(scene.doors.len()).map(|i| scene.doors[i].doorway.hint()).collect();
-        if let Some(stereo) = &scene.stereo {
-            description.range_m = stereo.range_m;
-        }
+        let mut camera = body::camera();
+        camera.range_m = scene.stereo.map_or(camera.range_m, |stereo| stereo.range_m);
+        description.camera = Some(camera.clone());
         let mapped = scene.mapped;
         let mut rng = ChaCha8Rng::seed_from_u64(noise::mix(options.seed));
         let error = options.localisation.error(&mut rng);
@@ -125,7 +126,17 @@ impl SimRobot {
             unknown: scene.unknown(),
             scene,
         };
-        SimRobot { description, options, map, surfaces, rooms, doors, mapped, state: Mutex::new(state) }
+        SimRobot {
+            description,
+            camera,
+            options,
+            map,
+            surfaces,
+            rooms,
+            doors,
+            mapped,
+            state: Mutex::new(state),
+        }
     }
 
     /// How everything really is. For scoring and reports: nothing that decides may ask.
@@ -141,11 +152,10 @@ impl SimRobot {
         let Some(index) = state.scene.objects.iter().position(|o| o.name == object && o.is_in_place()) else {
             return 0.0;
         };
-        let Some(head) = &self.description.head else { return 0.0 };
         let look_at = state.scene.objects[index].centre_m();
-        let map_from_camera = head::camera_towards(head, &pose.isometry(), Some(&look_at));
+        let map_from_camera = head::camera_towards(&HEAD, &pose.isometry(), Some(&look_at));
         let label = LABEL_OBJECT + index as u16;
-        visible_share(&state.scene, label, &map_from_camera, &self.description.camera, 1).unwrap_or(0.0)
+        visible_share(&state.scene, label, &map_from_camera, &self.camera.intrinsics, 1).unwrap_or(0.0)
     }
 
     /// The ideal frame that the camera would take now, with what each pixel really shows. For reports and tests.
@@ -155,14 +165,9 @@ impl SimRobot {
     }
 
     fn render(&self, state: &State) -> Frame {
-        let mount = self.base_from_camera(&state.gaze);
-        let map_from_camera = state.map_from_base() * mount;
+        let map_from_camera = state.map_from_base() * head::base_from_camera(&HEAD, &state.gaze);
         let solids = state.scene.solids();
-        render(&state.scene.room, &solids, &map_from_camera, &self.description.camera, state.now_ns)
-    }
-
-    fn base_from_camera(&self, gaze: &Gaze) -> Isometry3<f64> {
-        self.description.head.as_ref().map_or(Isometry3::identity(), |h| head::base_from_camera(h, gaze))
+        render(&state.scene.room, &solids, &map_from_camera, &self.camera.intrinsics, state.now_ns)
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, State> {
@@ -192,7 +197,7 @@ impl SimRobot {
         state.drives += 1;
         let number = state.drives;
         for fault in self.strike(FaultKind::DoorShut, number) {
-            state.shut_a_door(fault, self.description.footprint.radius_m());
+            state.shut_a_door(fault, RADIUS_M);
         }
         let route = state.plan(goal)?;
         if self.is_struck(FaultKind::UnreachablePose, number) {
@@ -200,7 +205,7 @@ impl SimRobot {
             state.unreachable.push(*goal);
         }
         state.known_unreachable(goal)?;
-        let steps = drive::steps(&state.estimate, &route, goal, &self.description.speeds);
+        let steps = drive::steps(&state.estimate, &route, goal, &SPEEDS);
         let on_the_way = state.rng.random_range(0.2..0.8) * steps.len() as f64;
         let mut end = None;
         if self.is_struck(FaultKind::BlockedPath, number) {
@@ -208,12 +213,12 @@ impl SimRobot {
         } else if self.is_struck(FaultKind::TimedOutDrive, number) {
             end = Some((on_the_way as usize, End::Stuck));
         }
-        if let Some((at, obstacle)) = state.first_bump(&steps, self.description.footprint.radius_m())
+        if let Some((at, obstacle)) = state.first_bump(&steps, RADIUS_M)
             && end.as_ref().is_none_or(|(earlier, _)| at < *earlier)
         {
             end = Some((at, End::Obstacle(obstacle)));
         }
-        if let Some((at, door)) = state.first_shut_door(&steps, self.description.footprint.radius_m())
+        if let Some((at, door)) = state.first_shut_door(&steps, RADIUS_M)
             && end.as_ref().is_none_or(|(earlier, _)| at < *earlier)
         {
             end = Some((at, End::Door(door)));
@@ -294,14 +299,11 @@ impl SimRobot {
     }
 
     fn turn_head(&self, point: &Point3<f64>, watch: &Watch<'_>) -> Result<Looked, Failure> {
-        let Some(head) = &self.description.head else {
-            return Err(Failure::Unable { because: format!("{} has no head", self.description.name) });
-        };
         if !point.iter().all(|x| x.is_finite()) {
             return Err(Failure::Unreachable { because: format!("{point} is no point to look at") });
         }
         let mut state = self.lock();
-        let (gaze, miss_rad) = head::aim(head, &state.estimate.isometry().inverse_transform_point(point));
+        let (gaze, miss_rad) = head::aim(&HEAD, &state.estimate.isometry().inverse_transform_point(point));
         let turned =
             (gaze.pan_rad - state.gaze.pan_rad).abs().max((gaze.tilt_rad - state.gaze.tilt_rad).abs());
         let duration_s = turned / HEAD_SPEED_RAD_S;
@@ -363,16 +365,16 @@ impl SimRobot {
         let number = self.trigger(&mut state, FRAME_S)?;
         let stamp_ns = state.now_ns;
         let frame = self.render(&state);
-        let base_from_camera = self.base_from_camera(&state.gaze);
+        let base_from_camera = head::base_from_camera(&HEAD, &state.gaze);
         let map_from_base = state.estimate.isometry();
         let truly = state.map_from_base() * base_from_camera;
         let (stereo, seed) = (state.scene.stereo, self.options.seed);
         drop(state);
         let depth_m = match stereo {
             Some(stereo) => stereo.observe(&frame, &truly, |label| label == LABEL_ROOM, seed, number),
-            None => noise::observe(&frame, &self.options.noise, self.description.range_m, seed, number),
+            None => noise::observe(&frame, &self.options.noise, self.camera.range_m, seed, number),
         };
-        let intrinsics = self.description.camera;
+        let intrinsics = self.camera.intrinsics;
         let mut cloud = intrinsics
             .cloud_from_depth(&depth_m)
             .map_err(|e| Failure::Broken { because: format!("the camera: {e}") })?;
@@ -392,7 +394,7 @@ impl SimRobot {
             intrinsics,
             transforms: vec![
                 link(&frames.map, &frames.base, map_from_base),
-                link(&frames.base, &frames.camera, base_from_camera),
+                link(&frames.base, &self.camera.frame, base_from_camera),
             ],
             map_from_camera: map_from_base * base_from_camera,
             pose_sigma_m: self.description.pose_sigma_m,
@@ -469,7 +471,7 @@ impl Robot for SimRobot {
 
     fn camera_at(&self, place: &Place, look_at: Option<&Point3<f64>>) -> Result<Isometry3<f64>, Failure> {
         let base = self.pose_of(place)?.isometry();
-        Ok(self.description.head.as_ref().map_or(base, |h| head::camera_towards(h, &base, look_at)))
+        Ok(head::camera_towards(&HEAD, &base, look_at))
     }
 
     async fn pose(&self) -> Result<PoseEstimate, Failure> {

@@ -1,7 +1,7 @@
 //! What the simulated body knows of ways: its map, and a router for each set of doors that counted as shut.
 
-use crate::body::Speeds;
 use crate::grid::OccupancyGrid;
+use crate::parts::Speeds;
 use crate::route::Router;
 use crate::sim::scene::Doorway;
 use crate::sim::world::MAP_RESOLUTION_M;

@@ -75,7 +75,7 @@ fn spot(at: &Point3<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::sim::arrange;
-    use crate::sim::body::camera;
+    use crate::sim::body::intrinsics;
     use crate::sim::render::render;
     use crate::sim::scene::SceneSpec;
     use crate::sim::world::LABEL_ROOM;
@@ -88,7 +88,7 @@ mod tests {
         let turn = UnitQuaternion::face_towards(&Vector3::x(), &-Vector3::z());
         let map_from_camera =
             Isometry3::from_parts(Vector3::new(3.0 - distance_m, aside_m, 1.2).into(), turn);
-        let frame = render(&scene.room, &scene.solids(), &map_from_camera, &camera(), 0);
+        let frame = render(&scene.room, &scene.solids(), &map_from_camera, &intrinsics(), 0);
         let stereo = Stereo { baseline_m: 0.1, disparity_sigma_px: 0.3, textured: 0.5, range_m: (0.4, 8.0) };
         let depth_m = stereo.observe(&frame, &map_from_camera, |label| label == LABEL_ROOM, seed, 1);
         (frame, depth_m, map_from_camera)

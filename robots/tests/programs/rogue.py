@@ -49,6 +49,16 @@ class Rogue(Template):
             hello["camera"]["base_from_camera"] = descry.base_from_camera(hello["head"], 0.1, 0.4)
         if WHAT == "bare":
             del hello["head"], hello["laser"]
+        if WHAT in ("no camera", "only a head"):
+            del hello["camera"]
+        if WHAT == "no camera":
+            del hello["head"]
+        if WHAT in ("bolted down", "nowhere"):
+            del hello["base"]
+        if WHAT == "bolted down":
+            hello["stations"] = [{"name": "its place", "map_from_base": descry.planar(*self.at)}]
+        if WHAT in ("reads labels", "reads tomorrow"):
+            hello["senses"] = [{"name": "label reader", "about": "the text of a label, or null"}]
         if WHAT == "laser beyond a turn":
             hello["laser"] = dict(hello["laser"], readings=1000)
         if WHAT == "two tables of one name":
@@ -100,6 +110,8 @@ class Rogue(Template):
         return super().look_at(request, point_m)
 
     def pose(self, request):
+        if WHAT == "bolted down":
+            return {"map_from_base": descry.planar(*self.at), "station": "its place"}
         if WHAT == "another request":
             raw(json.dumps({"id": request.id + 5, "now_ns": self.now_ns(), "done": {}}).encode() + b"\n")
         if WHAT == "answers twice" and request.id > 1:
@@ -126,6 +138,12 @@ class Rogue(Template):
         if WHAT == "frame of tomorrow":
             return dict(chain, stamp_ns=self.now_ns() + 1), depths
         return chain, depths
+
+    def read(self, request, sense):
+        if WHAT == "reads tomorrow":
+            return {"said": None, "stamp_ns": self.now_ns() + 1}
+        self.clock_s += 0.2
+        return {"said": {"by": sense, "text": "TEA"}}
 
     def scan(self, request):
         chain, ranges = super().scan(request)

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use descry_memory::belief::Track;
 use descry_perception::nalgebra::{Point3, Vector3};
 use descry_planner::{Answer, Call, CallError, Plan, Step};
-use descry_robots::{Failure, Grasp, Place, Placing};
+use descry_robots::{Failure, Grasp, Part, Place, Placing};
 use descry_skills::{Outcome, PickUp, PutDown, SkillFailure};
 
 use super::{Ability, Fact, Meaning, SkillWord, argument};
@@ -83,7 +83,7 @@ pub const ABILITY: Ability = Ability {
             failed: put_down_failed,
         },
     ],
-    lacks: Some(|body| body.hand_opening_m.is_none().then_some("hand")),
+    needs: &[Part::Hand],
     begins: None,
     fallback: Some(fallback),
     answers: None,
@@ -162,15 +162,15 @@ fn can_grasp(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let from = s.candidate(argument(call, 0)?)?;
     let body = s.robot.description();
     let within =
-        |p: Point3<f64>| distance_m(s, from, &p).zip(body.reach_m).is_some_and(|(d, reach)| d <= reach);
+        |p: Point3<f64>| distance_m(s, from, &p).zip(body.reach_m()).is_some_and(|(d, reach)| d <= reach);
     let can = match standing(s, argument(call, 1)?, argument(call, 2)?) {
         Some(track) => {
             let width_m = track.size_m[0].min(track.size_m[1]);
-            within(middle(s, track)) && body.hand_opening_m.is_some_and(|opening| width_m <= opening)
+            within(middle(s, track)) && body.hand().is_some_and(|hand| width_m <= hand.opening_m)
         }
         None => {
             let on = s.surface(argument(call, 2)?)?;
-            body.hand_opening_m.is_some() && s.surfaces[on].centre().is_some_and(within)
+            body.has(Part::Hand) && s.surfaces[on].centre().is_some_and(within)
         }
     };
     Ok(Answer::Truth(can))

@@ -26,7 +26,7 @@ pub(super) fn free(
 ) -> Option<Point3<f64>> {
     let surface = &s.surfaces[on];
     let centre = surface.centre()?;
-    let reach_m = s.robot.description().reach_m?;
+    let reach_m = s.robot.description().reach_m()?;
     let helper = if surface.up.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     let e1 = surface.up.cross(&helper).normalize();
     let e2 = surface.up.cross(&e1);

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use descry_perception::learning::LearnOptions;
 use descry_perception::nalgebra::Unit;
-use descry_robots::Place as Where;
+use descry_robots::{Part, Place as Where};
 use descry_skills::{Model, Observe, Outcome};
 
 use super::{Ability, NOTHING_MORE, SkillWord};
@@ -79,7 +79,7 @@ pub const ABILITY: Ability = Ability {
             failed: NOTHING_MORE,
         },
     ],
-    lacks: None,
+    needs: &[Part::Camera],
     begins: Some(begins),
     fallback: Some(calls::fallback),
     answers: Some(telling::answer),

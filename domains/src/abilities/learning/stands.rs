@@ -33,7 +33,7 @@ pub(super) fn make(
     let options = AroundOptions {
         lines: LINES,
         band_m: BAND_M,
-        footprint_m: robot.description().footprint.radius_m() + CLEAR_M,
+        footprint_m: robot.description().radius_m() + CLEAR_M,
         ..AroundOptions::default()
     };
     let found = stands(centre, &obstacles(robot, centre, seen, options.most_m), &options).unwrap_or_default();

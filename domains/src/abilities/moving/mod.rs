@@ -82,7 +82,7 @@ pub const ABILITY: Ability = Ability {
             failed: NOTHING_MORE,
         },
     ],
-    lacks: None,
+    needs: &[],
     begins: None,
     fallback: None,
     answers: None,

@@ -16,6 +16,7 @@ pub mod reasons;
 mod unnoticed;
 mod vanished;
 
+use descry_robots::Part;
 use descry_skills::{Observe, Outcome, PushAside, SkillFailure};
 
 use super::{Ability, SkillWord};
@@ -68,7 +69,7 @@ pub const ABILITY: Ability = Ability {
             failed: push_failed,
         },
     ],
-    lacks: None,
+    needs: &[Part::Camera],
     begins: None,
     fallback: None,
     answers: None,

@@ -59,7 +59,7 @@ impl Obstacle {
 pub(crate) fn all(situation: &Situation) -> Vec<Obstacle> {
     let alone = situation.doubts().into_iter().any(|doubt| doubt.can_be_settled(situation));
     let body = situation.robot.description();
-    if alone || body.reach_m.is_none() || situation.pushes_left == 0 {
+    if alone || body.arm.is_none() || situation.pushes_left == 0 {
         return Vec::new();
     }
     let small = |t: &&Track| t.size_m.iter().all(|&m| m < MOST_M);
@@ -89,7 +89,7 @@ pub fn push(situation: &Situation, from: usize, obstacle: &Obstacle) -> Option<P
         Vector3::new(base.x_m - obstacle.at.x, base.y_m - obstacle.at.y, 0.0).try_normalize(1e-9)?;
     let touched = obstacle.at + towards * (obstacle.radius_m - GRIP_M).max(0.0);
     let object = touched + obstacle.up * (0.5 * obstacle.height_m);
-    let reach_m = situation.robot.description().reach_m?;
+    let reach_m = situation.robot.description().reach_m()?;
     if nalgebra::distance(&object.xy(), &Point2::new(base.x_m, base.y_m)) > reach_m {
         return None;
     }

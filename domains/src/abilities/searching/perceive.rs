@@ -70,7 +70,8 @@ pub fn remember(
         record.put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
     }
     record.sync()?;
-    let frame = &eyes.robot.description().frames.camera;
+    let camera = eyes.robot.description().camera.as_ref();
+    let frame = camera.map_or("camera", |camera| camera.frame.as_str());
     put_colour(record, frame, sensed)?;
     let eye = sensed.map_from_camera.translation.vector;
     let sensing = Sensing {

@@ -12,6 +12,7 @@ mod unseen;
 use std::sync::Arc;
 
 use descry_perception::laser::{KnownShape, Verdict};
+use descry_robots::Part;
 use descry_skills::{Align, Circle, Outcome, Scan};
 
 use super::{Ability, NOTHING_MORE, SkillWord, moving};
@@ -82,7 +83,7 @@ pub const ABILITY: Ability = Ability {
             failed: NOTHING_MORE,
         },
     ],
-    lacks: None,
+    needs: &[Part::Laser],
     begins: Some(begins),
     fallback: Some(calls::fallback),
     answers: Some(telling::answer),

@@ -12,7 +12,7 @@ use descry_perception::mapping::{
 use descry_perception::nalgebra::{Isometry2, Point2, UnitComplex, Vector2, Vector3};
 use descry_perception::occupancy::{Occupancy, Space};
 use descry_robots::route::Router;
-use descry_robots::{Description, Failure, OccupancyGrid, Place, Pose2, Robot, Travel};
+use descry_robots::{Base, Camera, Description, Failure, OccupancyGrid, Place, Pose2, Robot, Travel};
 
 use crate::config::Candidates;
 use crate::lexicon::symbol;
@@ -112,10 +112,11 @@ impl Chart {
     pub(super) fn read(&mut self, body: &Description) {
         self.settle();
         let Some(map) = self.survey.as_ref().and_then(|s| s.map(&MapOptions::default()).ok()) else { return };
-        let floor = map.floor(&self.stood, body.footprint.radius_m() + CELL_M, *BODY_M.end());
+        let floor = map.floor(&self.stood, body.radius_m() + CELL_M, *BODY_M.end());
         // The grid leaves the body's room out already.
-        let room_m = body.footprint.radius_m() + CLEAR_M;
-        self.router = floor.map(|floor| Arc::new(Router::new(&grid(&floor, room_m), 0.0, body.speeds)));
+        let room_m = body.radius_m() + CLEAR_M;
+        let router = |(floor, base): (Occupancy, &Base)| Router::new(&grid(&floor, room_m), 0.0, base.speeds);
+        self.router = floor.zip(body.base.as_ref()).map(router).map(Arc::new);
         for level in map.levels.iter().filter(|l| is_surface(l)) {
             match self.surfaces.iter_mut().find(|(_, known)| is_one(known, level)) {
                 Some((_, known)) => known.clone_from(level),
@@ -132,10 +133,9 @@ impl Chart {
         body: &Description,
         given_up: impl Fn(&str) -> bool,
     ) {
-        let Some(floor) = self.floor(body) else { return };
+        let (Some(floor), Some(options)) = (self.floor(body), explore(body)) else { return };
         let mut looked = self.stood.clone();
         looked.push(self.map_from_chart.inv_mul(here));
-        let options = explore(body);
         self.open.retain(|(symbol, _)| !given_up(symbol));
         let keep: Vec<Isometry2<f64>> = self.open.iter().map(|(_, look)| look.pose).collect();
         // The body's own ways decide: what its footprint does not fit is no pose.
@@ -157,7 +157,7 @@ impl Chart {
     }
 
     fn floor(&self, body: &Description) -> Option<Occupancy> {
-        self.map.as_ref()?.floor(&self.stood, body.footprint.radius_m() + CELL_M, *BODY_M.end())
+        self.map.as_ref()?.floor(&self.stood, body.radius_m() + CELL_M, *BODY_M.end())
     }
 
     /// The poses from which more would be seen, as places to go to.
@@ -191,7 +191,7 @@ impl Chart {
     /// Where the map ends without a wall, in words: floor goes on there that was not seen. None if it ends nowhere so, or nothing was mapped.
     pub(crate) fn goes_on(&self, body: &Description) -> Option<String> {
         let floor = self.floor(body)?;
-        let ends = frontiers(&floor, &explore(body));
+        let ends = frontiers(&floor, &explore(body)?);
         let length_m = ends.iter().map(|f| f.squares.len()).sum::<usize>() as f64 * floor.cell_m;
         let near = self.map_from_chart * ends.first()?.middle;
         Some(format!(
@@ -296,7 +296,7 @@ fn put(other_from_here: &Isometry2<f64>, pose: &Pose2) -> Pose2 {
 
 fn turn_s(robot: &dyn Robot, from: &Pose2, to: &Pose2) -> f64 {
     let turn = (to.yaw_rad - from.yaw_rad).sin().atan2((to.yaw_rad - from.yaw_rad).cos());
-    turn.abs() / robot.description().speeds.angular_rad_s
+    robot.description().duration_s(0.0, turn.abs())
 }
 
 fn is_surface(level: &Level) -> bool {
@@ -328,36 +328,38 @@ fn grid(floor: &Occupancy, radius_m: f64) -> OccupancyGrid {
 }
 
 /// What the camera sees of the floor plan.
-fn field(body: &Description) -> FieldOfView {
-    let c = &body.camera;
+fn field(camera: &Camera) -> FieldOfView {
+    let c = &camera.intrinsics;
     FieldOfView {
         right_rad: -((c.width as f64 - c.cx) / c.fx).atan(),
         left_rad: (c.cx / c.fx).atan(),
-        near_m: body.range_m.0,
-        far_m: far_m(body),
+        near_m: camera.range_m.0,
+        far_m: far_m(camera),
     }
 }
 
 /// The farthest depth that is used, metres.
-pub(super) fn far_m(body: &Description) -> f64 {
-    body.range_m.1.min(FAR_M)
+pub(super) fn far_m(camera: &Camera) -> f64 {
+    camera.range_m.1.min(FAR_M)
 }
 
-fn explore(body: &Description) -> ExploreOptions {
-    let seconds = (1.0 / body.speeds.linear_m_s, 1.0 / body.speeds.angular_rad_s, LOOK_S);
-    ExploreOptions {
-        field: field(body),
-        radius_m: body.footprint.radius_m() + CLEAR_M,
+/// How the body explores; none if it does not drive or does not see.
+fn explore(body: &Description) -> Option<ExploreOptions> {
+    let (base, camera) = (body.base.as_ref()?, body.camera.as_ref()?);
+    let seconds = (1.0 / base.speeds.linear_m_s, 1.0 / base.speeds.angular_rad_s, LOOK_S);
+    Some(ExploreOptions {
+        field: field(camera),
+        radius_m: body.radius_m() + CLEAR_M,
         seconds,
         ..ExploreOptions::default()
-    }
+    })
 }
 
 /// How poses are rectified against what was seen before: from where the body believes to be, give or take what it says.
-pub(super) fn rectify(body: &Description) -> RectifyOptions {
+pub(super) fn rectify(body: &Description, camera: &Camera) -> RectifyOptions {
     RectifyOptions {
         band_m: BODY_M,
-        field: field(body),
+        field: field(camera),
         way_sigma: (0.0, body.pose_sigma_m.max(1e-3)),
         turn_sigma_rad: body.pose_sigma_rad.max(1e-3),
         ..RectifyOptions::default()

@@ -10,8 +10,8 @@ mod telling;
 
 use std::sync::Arc;
 
-use descry_robots::Place;
 use descry_robots::nalgebra::Point3;
+use descry_robots::{Part, Place};
 use descry_skills::{Observe, Outcome};
 
 use super::{Ability, NOTHING_MORE, SkillWord};
@@ -41,7 +41,7 @@ pub const ABILITY: Ability = Ability {
         learn: charted,
         failed: NOTHING_MORE,
     }],
-    lacks: None,
+    needs: &[Part::Camera],
     begins: Some(begins),
     fallback: Some(calls::fallback),
     answers: Some(telling::answer),

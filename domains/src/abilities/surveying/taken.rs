@@ -27,6 +27,7 @@ pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed)
     let body = eyes.robot.description();
     let id = perceive::remember(mind, eyes, &[], sensed)?;
     let view = eyes.record.view_at(sensed.stamp_ns, &body.frames.map)?;
+    let camera = body.camera.as_ref().ok_or_else(|| WorldError::Bug("a look without a camera".into()))?;
     let strange = |e: String| WorldError::Bug(format!("a look that maps: {e}"));
     let station = Station::of(&view).map_err(|e| strange(e.to_string()))?;
     let height_m = view.world_from_camera.translation.z;
@@ -34,9 +35,10 @@ pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed)
     chart.records.push(id);
     let believed = chart.map_from_chart.inv_mul(&station.odom_from_level);
     let survey = chart.survey().map_err(strange)?;
-    let fit = survey.locate(&station, &believed, &rectify(body)).map_err(|e| strange(e.to_string()))?;
+    let fit =
+        survey.locate(&station, &believed, &rectify(body, camera)).map_err(|e| strange(e.to_string()))?;
     let at = fit.before_from_after;
-    survey.add(&station, &at, height_m, far_m(body), &BODY_M).map_err(|e| strange(e.to_string()))?;
+    survey.add(&station, &at, height_m, far_m(camera), &BODY_M).map_err(|e| strange(e.to_string()))?;
     chart.stood.push(at);
     chart.believed.push(station.odom_from_level);
     chart.read(body);

@@ -12,6 +12,7 @@ use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::truth::Truth;
 use descry_robots::{Place, Pose2, Robot, SurfaceHint, Watch};
 
+use crate::kinds::runtime;
 use descry_agent::body::Body;
 use descry_domains::abilities::searching::perceive;
 
@@ -68,8 +69,6 @@ pub(super) fn simulated(spec: &SceneSpec, seed: u64) -> Result<Staged, String> {
 pub(super) fn take(staged: &Staged, poses: usize, distance_m: f64) -> Result<Taken, String> {
     let robot = &*staged.body.robot;
     let surface = robot.surfaces().first().cloned().ok_or("the scene has no surface to look at")?;
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_time().build().map_err(|e| e.to_string())?;
     let mut taken = Taken {
         views: Vec::new(),
         map_from_camera: Vec::new(),
@@ -77,7 +76,7 @@ pub(super) fn take(staged: &Staged, poses: usize, distance_m: f64) -> Result<Tak
         truth: staged.truth()?,
         options: perceive::options(robot, None),
     };
-    runtime.block_on(async {
+    runtime()?.block_on(async {
         let watch = Watch::default();
         let middle = middle(&surface);
         for k in 0..poses {

@@ -2,7 +2,7 @@
 
 use crate::situation::{KnownSurface, Situation};
 use descry_memory::space::Cell;
-use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
+use descry_perception::nalgebra::{Point3, Vector3};
 
 use super::Look;
 
@@ -19,18 +19,10 @@ pub(super) fn visible(situation: &Situation, look: &Look, counts: impl Fn(&Point
     let shown = |p: &Point3<f64>| {
         situation.spaces[look.on].cell(p) == Cell::Unseen
             && counts(p)
-            && in_view(situation, &map_from_camera, p)
+            && situation.in_view(&map_from_camera, p)
             && situation.spaces[look.on].line_of_sight(&eye, p, &|_| false)
     };
     above(&situation.surfaces[look.on]).iter().filter(|p| shown(p)).count() as f64
-}
-
-fn in_view(situation: &Situation, map_from_camera: &Isometry3<f64>, point: &Point3<f64>) -> bool {
-    let body = situation.robot.description();
-    let (c, p) = (&body.camera, map_from_camera.inverse_transform_point(point));
-    let (u, v) = (c.fx * p.x / p.z + c.cx, c.fy * p.y / p.z + c.cy);
-    let near = p.z > 0.0 && p.z >= body.range_m.0 && p.z <= body.range_m.1;
-    near && u >= 0.0 && v >= 0.0 && u < c.width as f64 && v < c.height as f64
 }
 
 /// The grid above a surface's outline.

@@ -1,0 +1,49 @@
+//! *reading*: the body's other senses. What they say stands in the record, and the programs behind facts are told of it.
+
+use descry_skills::{Outcome, Read};
+use serde_json::json;
+
+use super::{Ability, NOTHING_MORE, SkillWord};
+use crate::lexicon::{SENSE, symbol};
+use crate::situation::Situation;
+use crate::world::WorldError;
+
+/// The kind under which a reading is recorded.
+const READING: &str = "reading";
+
+/// See the module.
+pub const ABILITY: Ability = Ability {
+    name: "reading",
+    about: "reads the body's sensors that are neither camera nor laser, for facts by programs",
+    facts: &[],
+    calls: &[],
+    skills: &[SkillWord {
+        name: "read",
+        types: &[SENSE],
+        about: "reads a sense of the body: what it says stands in the record and in the questions to facts by programs",
+        ground: |s, arguments| {
+            let sense =
+                called(s, arguments[0]).ok_or_else(|| format!("the body has no sense {}", arguments[0]))?;
+            Ok(Box::new(Read { sense: sense.name.clone() }))
+        },
+        because: |s, arguments| called(s, arguments[0]).map_or_else(String::new, |sense| sense.about.clone()),
+        learn: |mind, eyes, s, arguments, outcome, _| {
+            let Outcome::Read(reading) = outcome else { return Err(WorldError::strange(outcome)) };
+            let about = called(s, arguments[0]).map(|sense| &sense.about);
+            let body = json!({ "sense": arguments[0], "about": about, "said": reading.said });
+            eyes.record.put_document(READING, reading.stamp_ns, body, Vec::new())?;
+            mind.readings.insert(arguments[0].into(), reading.said.clone());
+            Ok(format!("it says {}", reading.said))
+        },
+        failed: NOTHING_MORE,
+    }],
+    needs: &[],
+    begins: None,
+    fallback: None,
+    answers: None,
+};
+
+/// The sense of a symbol.
+fn called<'a>(s: &'a Situation, sense: &str) -> Option<&'a descry_robots::Sense> {
+    s.robot.description().senses.iter().find(|known| symbol(&known.name) == sense)
+}

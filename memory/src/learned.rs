@@ -33,8 +33,18 @@ pub struct LearnedThing {
     pub cloud: Cloud,
     /// Share of the directions around it from which it was seen, 0 to 1.
     pub sides: f64,
+    /// Those directions: of 36 around it, counted from its own x anticlockwise, a bit each.
+    #[serde(default)]
+    pub directions: u64,
+    /// How often it was looked at from around: what each meeting showed is in the cloud.
+    #[serde(default = "once")]
+    pub meetings: u32,
     /// Where it was seen last.
     pub seen: Place,
+}
+
+fn once() -> u32 {
+    1
 }
 
 /// Where something was seen, and when.

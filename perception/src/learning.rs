@@ -3,7 +3,7 @@
 //! The pipeline, a file a step: what differs from the static structure of a place ([`MetaRoom`], Eq. 1, 2); where to stand around it
 //! ([`stands`], [`trajectories`]); the looks that are far enough apart ([`keyframes`]) brought together ([`register`]); in each look the object is
 //! cleaned of its edge, supervoxels and planes (Eq. 3, 4), carried over from the looks before and grown ([`learn`]); all are fused by their noise
-//! ([`LearnedModel`]); and known again, with a pose and a confidence ([`Library`]).
+//! ([`LearnedModel`]); and known again, with a pose and a confidence ([`Library`]). What a later meeting shows is added ([`united`]).
 
 mod around;
 mod error;
@@ -18,6 +18,7 @@ mod planes;
 mod register;
 mod supervoxel;
 mod texture;
+mod unite;
 
 pub use around::{AroundOptions, nearest, stands, trajectories};
 pub use error::LearningError;
@@ -27,3 +28,4 @@ pub use know::{Candidate, KnowError, KnowOptions, Library, Recognised, choose, o
 pub use model::{LearnOptions, LearnedModel, Used, learn};
 pub use notice::{Appeared, MetaRoom, NoticeOptions, Visit};
 pub use register::{Keyframe, keyframes, register};
+pub use unite::{United, united};

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use descry_perception::learning::{
     AroundOptions, Keyframe, KnowError, KnowOptions, LearnOptions, LearningError, Library, MetaRoom,
-    NoticeOptions, keyframes, learn, nearest, outward, register, stands, trajectories,
+    NoticeOptions, keyframes, learn, nearest, outward, register, stands, trajectories, united,
 };
 use descry_perception::nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
 use descry_perception::{Cloud, Intrinsics, Neighbours, View};
@@ -204,6 +204,66 @@ fn a_model_grows_over_looks_without_the_table() {
         let on_table = cloud.points.iter().filter(|p| f64::from(p.z) < TABLE_M - 0.006).count();
         assert!(on_table * 50 < cloud.len(), "{name}: {on_table} of {}", cloud.len());
     }
+}
+
+/// What some directions show of a body that stands somewhere, as a model; and where it stands.
+fn met(name: &str, place: Isometry3<f64>, turns_rad: &[f64], seed: u64) -> (Cloud, Isometry3<f64>) {
+    let room = room(&[(name, place)]);
+    let foot = Point3::from(place.translation.vector);
+    let middle = foot + Vector3::z() * 0.1;
+    let views: Vec<View> = (0..)
+        .zip(turns_rad)
+        .map(|(k, turn)| {
+            let eye = middle + Vector3::new(0.55 * turn.cos(), 0.55 * turn.sin(), [0.25, 0.4][k % 2]);
+            let pose = looking(eye, middle);
+            room.look_at(&SMALL, &pose, &pose, EXACT, seed + k as u64, (middle, 0.28))
+        })
+        .collect();
+    let labels = views[0].cloud.labels.as_deref().unwrap_or_default();
+    let mask: Vec<bool> =
+        labels.iter().zip(&views[0].cloud.points).map(|(l, p)| *l == 1 && p.z.is_finite()).collect();
+    let model = learn(&views, &[], &mask, &LearnOptions::default()).expect("a sound object");
+    (model.cloud, model.world_from_model)
+}
+
+#[test]
+fn a_later_meeting_adds_the_sides_that_the_first_had_not_seen() {
+    for name in ["muesli", "kettle", "truck"] {
+        let (first, second) = (standing(0.0, 0.0, 0.5), standing(0.1, -0.1, 2.1));
+        let (known, world_from_known) = met(name, first, &[0.8, 1.1], 1);
+        // It is seen from other sides, and some of the first, and found a little off.
+        let (more, world_from_more) = met(name, second, &[2.7, 3.3, 3.9, 4.5, 5.1, 5.7], 31);
+        let off = Isometry3::new(Vector3::new(0.004, -0.005, 0.003), Vector3::z() * 0.03);
+        let start = off * world_from_known.inverse() * first * second.inverse() * world_from_more;
+        let truth = Room::surface(&body(name), 0.005).transformed(&(world_from_known.inverse() * first));
+        let one = united(&known, 1, &more, &start, 0.002).expect("they are one");
+        let (before, after) = (share_near(&truth, &known, 0.008), share_near(&truth, &one.cloud, 0.008));
+        let precision = share_near(&one.cloud, &truth, 0.008);
+        println!(
+            "{name}: {before:.3} -> {after:.3}, precision {precision:.3}, {one:.4?}",
+            one = (one.shared, one.off_m)
+        );
+        assert!(
+            after > before + 0.1 && after > 0.7 && precision > 0.95,
+            "{name}: {before} {after} {precision}"
+        );
+        assert_eq!(one.cloud.colours.is_some(), known.colours.is_some());
+    }
+}
+
+#[test]
+fn what_is_another_object_is_not_added() {
+    let all: Vec<f64> = (0..8).map(|k| TAU * f64::from(k) / 8.0).collect();
+    let place = standing(0.0, 0.0, 0.5);
+    let (kettle, _) = met("kettle", place, &all, 1);
+    let (muesli, _) = met("muesli", place, &all, 11);
+    for (known, more) in [(&kettle, &muesli), (&muesli, &kettle)] {
+        let other = united(known, 1, more, &Isometry3::identity(), 0.002).map(|one| (one.shared, one.off_m));
+        assert!(matches!(other, Err(LearningError::Disagree { .. })), "{other:?}");
+    }
+    let away = Isometry3::translation(0.2, 0.0, 0.0);
+    let far = united(&kettle, 1, &kettle, &away, 0.002).map(|one| one.shared);
+    assert!(matches!(far, Err(LearningError::Disagree { .. })), "{far:?}");
 }
 
 #[test]

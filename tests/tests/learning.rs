@@ -2,6 +2,7 @@
 //! in a run that knows of the others what they keep.
 
 use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use descry_agent::exit::CommandError;
 use descry_agent::keeping::Keeping;
@@ -53,8 +54,9 @@ fn change(folder: &Path, change: impl FnOnce(&mut Remembered)) -> Remembered {
     let store = Record::open(&folder.join("store"), Options::default()).unwrap();
     let mut remembered = Remembered::recall(&store).unwrap();
     change(&mut remembered);
-    // Later than any run: what was kept last is what is remembered.
-    remembered.keep(&store, 4e9).unwrap();
+    // What was kept last is what is remembered.
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+    remembered.keep(&store, now.as_secs_f64()).unwrap();
     remembered
 }
 
@@ -64,7 +66,7 @@ fn off_m(report: &Report) -> f64 {
 }
 
 #[test]
-fn what_is_new_is_learned_and_found_where_it_was_moved_to() {
+fn what_is_new_is_learned_known_better_when_met_again_and_found_where_it_was_moved_to() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
 
@@ -86,6 +88,21 @@ fn what_is_new_is_learned_and_found_where_it_was_moved_to() {
     let kept = change(folder, |remembered| remembered.rename("thing 1", "kettle"));
     assert_eq!(kept.things[0].name, "kettle");
     assert!(kept.things[0].sides > 0.6 && kept.things[0].cloud.len() > 5000, "{}", kept.things[0].sides);
+
+    // As if little more than one half of it had been seen: where it is met again, the rest is added.
+    let half = change(folder, |remembered| {
+        let thing = &mut remembered.things[0];
+        thing.cloud = thing.cloud.filter(|p| p.x > -0.01);
+        (thing.sides, thing.directions) = (0.5, thing.directions & ((1 << 18) - 1));
+    });
+    let before = half.things[0].cloud.len();
+    let met = pursue("learn what is new", 3, folder, true).unwrap();
+    assert!(met.why.contains("kettle stands on") && met.why.contains("its model is better"), "{}", met.why);
+    let kept = change(folder, |_| ());
+    let thing = kept.things.iter().find(|t| t.name == "kettle").unwrap();
+    let (low, high) = thing.cloud.bounds().unwrap();
+    assert!(thing.meetings == 2 && thing.sides > 0.6 && (high - low).max() < 0.4, "{thing:?}");
+    assert!(thing.cloud.len() > before + before / 4, "{} {before}", thing.cloud.len());
 
     let third = pursue("find the kettle", 3, folder, true).unwrap();
     assert_eq!(third.verdict, Verdict::Achieved, "{}", third.why);

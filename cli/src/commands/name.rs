@@ -99,6 +99,7 @@ fn described(thing: &LearnedThing, now_unix_s: f64) -> Value {
         "size_m": size_cm(thing).map(|cm| 1e-2 * cm),
         "points": thing.cloud.len(),
         "sides": thing.sides,
+        "meetings": thing.meetings,
         "seen": { "unix_s": thing.seen.unix_s, "on": thing.seen.on, "position_m": thing.seen.at_m },
     })
 }
@@ -107,11 +108,12 @@ fn line(thing: &LearnedThing, now_unix_s: f64) -> String {
     let [w, d, h] = size_cm(thing);
     let at = thing.seen.at_m;
     format!(
-        "{:24} learned on {}, {:.1} h ago: {w:.0} x {d:.0} x {h:.0} cm, {:.0} % of its sides seen\n{:24} seen last on {}, {:.1} h ago, at ({:.2}, {:.2}) m on {}",
+        "{:24} learned on {}, {:.1} h ago: {w:.0} x {d:.0} x {h:.0} cm, {:.0} % of its sides seen in {}\n{:24} seen last on {}, {:.1} h ago, at ({:.2}, {:.2}) m on {}",
         thing.name,
         weekday(thing.learned_unix_s),
         (now_unix_s - thing.learned_unix_s) / 3600.0,
         1e2 * thing.sides,
+        if thing.meetings == 1 { "one meeting".to_string() } else { format!("{} meetings", thing.meetings) },
         "",
         weekday(thing.seen.unix_s),
         (now_unix_s - thing.seen.unix_s) / 3600.0,

@@ -42,6 +42,19 @@ pub enum LearningError {
         /// How many points.
         points: usize,
     },
+    /// Two models of what should be one object.
+    #[error(
+        "both lie on each other in {:.0} % only, {:.1} mm off, after one was moved by {:.0} mm: they are not one surface",
+        1e2 * shared, 1e3 * off_m, 1e3 * moved_m
+    )]
+    Disagree {
+        /// Share of the smaller one that lies on the other.
+        shared: f64,
+        /// Root mean square by which it is off there, metres.
+        off_m: f64,
+        /// How far one was moved to fit, metres.
+        moved_m: f64,
+    },
     /// Options that mean nothing.
     #[error("learning option `{field}` is {value}: expected {expected}")]
     Option {

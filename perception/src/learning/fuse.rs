@@ -22,6 +22,8 @@ const SMOOTH_M: f32 = 0.004;
 const DEEP_M: f32 = 0.01;
 /// Measurements that are asked where a place is, at most: more tell it no better.
 const ASKED: usize = 60_000;
+/// A model of one meeting is off by so much, metres.
+const MADE_M: f64 = 0.001;
 /// Least cosine between normals of one surface.
 const SAME_SIDE: f32 = 0.6;
 
@@ -47,6 +49,19 @@ impl Measured {
                 + sigma(lateral_sigma_m(z, angle, focal)).powi(2)
                 + edge * edge
         }));
+    }
+
+    /// Adds what so many meetings have made already.
+    pub fn carry(&mut self, made: &Cloud, meetings: u32) {
+        let part = Cloud {
+            points: made.points.clone(),
+            normals: made.normals.clone(),
+            colours: made.colours.clone(),
+            ..Cloud::default()
+        };
+        self.cloud.append(&part);
+        let variance = MADE_M * MADE_M / f64::from(meetings);
+        self.variances.extend(std::iter::repeat_n(variance, part.len()));
     }
 
     /// In each cube the point of least variance; then moved along its normal to where all measurements around say, if `smooth`; without outliers.

@@ -72,6 +72,8 @@ pub struct Novelty {
     pub stands: Vec<Option<String>>,
     /// Whether the way from each to the next is no detour.
     pub joined: Vec<bool>,
+    /// What was learned that it was taken for, though too few of the sides of that are known: its number among [`News::things`].
+    pub taken_for: Option<usize>,
     /// What has become of it.
     pub fate: Fate,
 }
@@ -105,6 +107,8 @@ pub enum Fate {
         name: String,
         /// Probability of that.
         confidence: f64,
+        /// What became of its model, in words, if it was looked at from around.
+        model: Option<String>,
     },
     /// It cannot be learned.
     GivenUp(String),
@@ -209,6 +213,12 @@ impl Novelty {
     fn shown(&self, from: &Point3<f64>) -> impl Iterator<Item = usize> + use<> {
         let middle = self.direction(from) + DIRECTIONS - TO_EITHER_SIDE;
         (0..=2 * TO_EITHER_SIDE).map(move |k| (middle + k) % DIRECTIONS)
+    }
+
+    /// The directions from which it was seen, as a thing that stands turned by so much has them: a bit each.
+    pub(super) fn directions(&self, turned_rad: f64) -> u64 {
+        let turned = (turned_rad.rem_euclid(TAU) / TAU * DIRECTIONS as f64).round() as usize;
+        self.seen().iter().fold(0, |all, k| all | 1 << ((k + DIRECTIONS - turned % DIRECTIONS) % DIRECTIONS))
     }
 
     /// The directions from which it was seen.

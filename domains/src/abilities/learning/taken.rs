@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use descry_memory::RecordId;
 use descry_memory::learned::{LearnedThing, Place as Seen};
-use descry_perception::learning::{Appeared, MetaRoom, NoticeOptions, Visit};
-use descry_perception::nalgebra::{Isometry3, Point3, center};
+use descry_perception::learning::{
+    Appeared, LearnOptions, LearnedModel, MetaRoom, NoticeOptions, Visit, united,
+};
+use descry_perception::nalgebra::{Isometry3, Point3, Vector3, center};
 use descry_perception::visibility::{DepthMap, Seen as Sight};
 use descry_perception::{Cloud, View};
 use descry_robots::Sensed;
@@ -36,6 +38,8 @@ const SAME_M: f64 = 0.12;
 /// So sure must it be that something is what was learned before, and as great a share of it must be explained.
 const SURE: f64 = 0.8;
 const EXPLAINED: f64 = 0.5;
+/// A thing of which less of its sides was seen is looked at from around again when it is met.
+const KNOWN_ROUND: f64 = 0.8;
 /// A model that is along any axis longer than this many times what was noticed, and so much more (metres), has taken in what it stands on or beside.
 const GROWN: f64 = 2.0;
 const GROWN_M: f64 = 0.1;
@@ -163,10 +167,26 @@ fn take_in(
             continue;
         };
         let known = found.iter().find(|f| f.share_of(&appeared.cloud.points) >= EXPLAINED);
+        let look = (&view, appeared);
         match known {
-            Some(f) => told.came.push(known_again(mind, &surface, f)),
+            Some(f) => {
+                told.came.push(known_again(mind, &surface, f));
+                let thing = &mind.known.news.things[f.thing];
+                if thing.sides < KNOWN_ROUND {
+                    let (name, sides) = (thing.name.clone(), 1e2 * thing.sides);
+                    let symbol =
+                        new(mind, eyes, &surface.symbol, waypoint, look, &seen.points, Some(f.thing));
+                    let again = |symbol| {
+                        format!("{symbol}: {name} again, to see more than {sides:.0} % of its sides")
+                    };
+                    told.came.extend(symbol.map(again));
+                }
+            }
             None => {
-                told.came.extend(new(mind, eyes, &surface.symbol, waypoint, (&view, appeared), &seen.points))
+                let (at, size_m) = extent(&appeared.cloud);
+                let symbol = new(mind, eyes, &surface.symbol, waypoint, look, &seen.points, None);
+                let said = |symbol| format!("{symbol}: something new, {}", size(&size_m, &at));
+                told.came.extend(symbol.map(said));
             }
         }
     }
@@ -241,7 +261,7 @@ fn known_again(mind: &mut Mind, surface: &KnownSurface, f: &Found) -> String {
     format!("{name} ({p:.2}), {there}, at ({:.2}, {:.2}) m", at.x, at.y)
 }
 
-/// Something is new. Says what, if nobody had noticed it.
+/// Something is to be looked at from around: it is new, or of what it is `taken_for` too little is known. Its symbol, if nobody had noticed it.
 fn new(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -249,6 +269,7 @@ fn new(
     waypoint: &str,
     (view, appeared): (&Arc<View>, &Appeared),
     seen: &[Point3<f32>],
+    taken_for: Option<usize>,
 ) -> Option<String> {
     let (centre, size_m) = extent(&appeared.cloud);
     let look = Look { from: waypoint.into(), view: Arc::clone(view) };
@@ -271,9 +292,10 @@ fn new(
         mask: Arc::new(appeared.mask.clone()),
         stands,
         joined,
+        taken_for,
         fate: Fate::Open,
     });
-    Some(format!("{symbol}: something new, {}", size(&size_m, &centre)))
+    Some(symbol)
 }
 
 /// Things that were learned and stood on a surface, and that this look has looked through.
@@ -320,6 +342,41 @@ fn novelty<'a>(mind: &'a mut Mind, what: &str) -> Result<&'a mut Novelty, WorldE
     found.ok_or_else(|| WorldError::Bug(format!("`{what}` is gone")))
 }
 
+/// What looks from around show of a thing that is known becomes part of its model, where both are one surface. Says what has become of it.
+fn improved(mind: &mut Mind, f: &Found, looks: &Novelty, model: &LearnedModel) -> String {
+    let news = Arc::make_mut(&mut mind.known.news);
+    let thing = &mut news.things[f.thing];
+    let known_from_more = f.judged.world_from_model.inverse() * model.world_from_model;
+    let cube_m = LearnOptions::default().cube_m;
+    let one = match united(&thing.cloud, thing.meetings, &model.cloud, &known_from_more, cube_m) {
+        Ok(one) => one,
+        Err(because) => return format!("its model stays as it is: {because}"),
+    };
+    let ((_, before_m), (_, size_m)) = (extent(&thing.cloud), extent(&one.cloud));
+    if (0..3).any(|k| size_m[k] > before_m[k] + GROWN_M) {
+        return "its model stays as it is: what was taken for it now is larger than it".into();
+    }
+    let world_from_known = model.world_from_model * one.known_from_more.inverse();
+    let ahead = world_from_known * Vector3::x();
+    let sides = thing.sides;
+    thing.directions |= looks.directions(ahead.y.atan2(ahead.x));
+    thing.sides = sides.max(f64::from(thing.directions.count_ones()) / DIRECTIONS as f64);
+    thing.meetings += 1;
+    let points = (thing.cloud.len(), one.cloud.len());
+    thing.cloud = one.cloud;
+    let said = format!(
+        "its model is better by {} looks: {} points, {} before, {:.0} % of its sides seen, {:.0} % before",
+        looks.looks.len(),
+        points.1,
+        points.0,
+        1e2 * thing.sides,
+        1e2 * sides
+    );
+    news.models = Models::of(&news.things);
+    mind.glances.clear();
+    said
+}
+
 /// Looks were brought together: something was learned, or is known after all, or cannot be learned.
 pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Result<String, WorldError> {
     let of = novelty(mind, what)?.clone();
@@ -337,8 +394,17 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
     if let Some((f, surface)) = before.iter().find(|f| f.judged.confidence >= SURE).zip(surface) {
         let (name, confidence) = (mind.known.news.things[f.thing].name.clone(), f.judged.confidence);
         let said = known_again(mind, &surface, f);
-        novelty(mind, what)?.fate = Fate::Known { name, confidence };
-        return Ok(format!("it is known: {said}"));
+        let looks = Novelty { looks: used.iter().map(|&n| of.looks[n].clone()).collect(), ..of.clone() };
+        let model = modelled.model.as_ref().ok().map(|model| improved(mind, f, &looks, model));
+        let improved = model.as_ref().map(|model| format!("; {model}")).unwrap_or_default();
+        novelty(mind, what)?.fate = Fate::Known { name, confidence, model };
+        return Ok(format!("it is known: {said}{improved}"));
+    }
+    if let Some(thing) = of.taken_for {
+        let name = &mind.known.news.things[thing].name;
+        let because = format!("it was taken for {name}, which looks from around do not confirm");
+        novelty(mind, what)?.fate = Fate::GivenUp(because.clone());
+        return Ok(format!("it is not learned: {because}"));
     }
     let model = match &modelled.model {
         Ok(model) => model,
@@ -355,7 +421,8 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
         return Ok(format!("it is not learned: {because}"));
     }
     let seen = Novelty { looks: used.iter().map(|&n| of.looks[n].clone()).collect(), ..of.clone() };
-    let sides = seen.seen().len() as f64 / DIRECTIONS as f64;
+    let directions = seen.directions(0.0);
+    let sides = f64::from(directions.count_ones()) / DIRECTIONS as f64;
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
     let news = Arc::make_mut(&mut mind.known.news);
     let name = news.free_name();
@@ -365,6 +432,8 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
         learned_unix_s: now_unix_s,
         cloud: model.cloud.clone(),
         sides,
+        directions,
+        meetings: 1,
         seen: Seen { unix_s: now_unix_s, at_m, on: of.on.clone() },
     });
     news.learned += 1;

@@ -119,7 +119,10 @@ fn fate(mind: &Mind, n: &Novelty, is_to_learn: bool) -> String {
                 looks.0, looks.1
             )
         }
-        Fate::Known { name, confidence } => format!("{name} stands{on} {at} ({confidence:.2})"),
+        Fate::Known { name, confidence, model } => {
+            let model = model.as_ref().map(|model| format!(", {model}")).unwrap_or_default();
+            format!("{name} stands{on} {at} ({confidence:.2}){model}")
+        }
         Fate::GivenUp(because) => format!("something new{on} {at} could not be learned: {because}"),
         Fate::Open if is_to_learn => {
             let sides = 1e2 * n.seen().len() as f64 / DIRECTIONS as f64;
@@ -148,7 +151,7 @@ fn changed(change: &Change) -> String {
 fn believed(mind: &Mind, n: &Novelty) -> Believed {
     let (label, confidence) = match &n.fate {
         Fate::Learned { name, .. } => (Some(name.clone()), 1.0),
-        Fate::Known { name, confidence } => (Some(name.clone()), *confidence),
+        Fate::Known { name, confidence, .. } => (Some(name.clone()), *confidence),
         Fate::Open | Fate::GivenUp(_) => (None, 1.0),
     };
     let surface = mind.known.surfaces.iter().find(|s| s.symbol == n.on);

@@ -1,0 +1,76 @@
+//! A model that improves with every meeting (the paper's future work): what a later one made of the same object is laid on what is known of it, and
+//! both become one.
+
+use super::LearningError;
+use super::fuse::Measured;
+use crate::cloud::Cloud;
+use crate::register::{Method, Prepared, RegisterOptions, align};
+use nalgebra::Isometry3;
+
+/// Neighbours that a normal is made of for registration.
+const NEIGHBOURS: usize = 20;
+/// From far to near, metres.
+const WITHIN_M: [f32; 2] = [0.02, 0.006];
+/// What was found to lie there is moved no farther to fit, metres and radians: beyond that it was found wrongly.
+const MOST_MOVED: (f64, f64) = (0.03, 0.3);
+/// Least share of the smaller one that lies on the other, and how far that is off at most, metres: a model is good to two millimetres.
+const LEAST_SHARED: f64 = 0.35;
+const MOST_OFF_M: f64 = 0.003;
+
+/// Two models of one object as one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct United {
+    /// Points with normals, and colours where both had them, in the frame of what was known, metres.
+    pub cloud: Cloud,
+    /// How what came lies there.
+    pub known_from_more: Isometry3<f64>,
+    /// Share of the smaller of both that lies on the other.
+    pub shared: f64,
+    /// Root mean square by which it is off there, metres.
+    pub off_m: f64,
+}
+
+/// Lays what a later meeting made of an object on what is `known` of it from so many `meetings`, from about `known_from_more`, and fuses both in cubes of
+/// side `cube_m` (metres), each meeting with the same weight.
+///
+/// # Errors
+/// [`LearningError::Disagree`] if they are not one surface where both have some; as registration and fusing have them.
+pub fn united(
+    known: &Cloud,
+    meetings: u32,
+    more: &Cloud,
+    known_from_more: &Isometry3<f64>,
+    cube_m: f32,
+) -> Result<United, LearningError> {
+    LearningError::positive("cube_m", f64::from(cube_m))?;
+    let target = Prepared::with_normals(&known.points, NEIGHBOURS)?;
+    let source = Prepared::new(&more.points)?;
+    let mut pose = *known_from_more;
+    let mut last = None;
+    for within_m in WITHIN_M {
+        let options = RegisterOptions {
+            method: Method::PointToPlane,
+            start_target_from_source: pose,
+            within_m,
+            rounds: 30,
+            robust_m: Some(0.003),
+            ..RegisterOptions::default()
+        };
+        let fit = align(&source, &target, &options)?;
+        pose = fit.target_from_source;
+        last = Some(fit);
+    }
+    let matched = last.as_ref().map_or(0, |fit| fit.matched);
+    let off_m = last.as_ref().map_or(f64::INFINITY, |fit| fit.residual_m);
+    let shared = (matched as f64 / more.len().min(known.len()).max(1) as f64).min(1.0);
+    let moved = known_from_more.inverse() * pose;
+    let (moved_m, moved_rad) = (moved.translation.vector.norm(), moved.rotation.angle());
+    let fits = shared >= LEAST_SHARED && off_m <= MOST_OFF_M;
+    if !fits || moved_m > MOST_MOVED.0 || moved_rad > MOST_MOVED.1 {
+        return Err(LearningError::Disagree { shared, off_m, moved_m });
+    }
+    let mut measured = Measured::default();
+    measured.carry(known, meetings.max(1));
+    measured.carry(&more.transformed(&pose), 1);
+    Ok(United { cloud: measured.fused(cube_m, true)?, known_from_more: pose, shared, off_m })
+}

@@ -3,6 +3,7 @@
 
 mod chapters;
 mod looks;
+mod outcomes;
 mod plans;
 mod standings;
 mod states;
@@ -98,7 +99,7 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
 pub fn after_looks(record: &Record, saying: &Saying) -> Result<Vec<(i64, String)>, CommandError> {
     let (chapters, _) = chapters::of(record, &States::of(record)?, &[])?;
     let name = |symbol: &str| saying.name_of(symbol);
-    let all = chapters.iter().flat_map(|chapter| plans::outcomes(chapter, &name));
+    let all = chapters.iter().flat_map(|chapter| outcomes::of(chapter, &name));
     Ok(all.filter_map(|outcome| Some((outcome.stood_ns?, saying.say(&outcome.said)))).collect())
 }
 

@@ -314,7 +314,7 @@ fn a_missing_sign_hides_nothing_else_and_findings_are_mended() {
     assert!(mends[0].1.contains("(raod ?a ?b))\n    :effect"), "{}", mends[0].1);
     // Everywhere, not only where it stands first.
     assert!(
-        mends[1].1.contains("(raod") == false && mends[1].1.contains(":precondition (road ?a ?b)\n"),
+        !mends[1].1.contains("(raod") && mends[1].1.contains(":precondition (road ?a ?b)\n"),
         "{}",
         mends[1].1
     );

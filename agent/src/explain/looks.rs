@@ -204,3 +204,99 @@ fn where_it_is(track: &Track, name: Names<'_>) -> String {
         on => format!("on the {} at {}", name(on), place(track)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use descry_memory::belief::Belief;
+
+    use super::*;
+
+    /// An object on the table, with what it may be.
+    fn track(cup_a: f64, mug: f64) -> Track {
+        serde_json::from_value(serde_json::json!({
+            "id": 0, "on": "table", "position_m": [1.0, 2.0, 0.7], "position_sigma_m": 0.01, "size_m": [0.1, 0.1, 0.1],
+            "probabilities": [["cup A", cup_a], ["mug", mug]], "kinds": [], "unknown": 1.0 - cup_a - mug,
+            "seen_fraction": 0.6, "viewpoints_m": [], "evidence": descry_perception::recognise::Evidence::default(),
+            "cites": [], "first_ns": 0, "last_ns": 0,
+        }))
+        .expect("a track")
+    }
+
+    fn standing(tracks: Vec<Track>, sure: f64, hidden: f64, share: f64) -> Standing {
+        let seen = vec![Seen { on: "table".into(), share: Some(share), places: usize::from(share > 0.0) }];
+        let about = "cup A".to_string();
+        let doubt = InDoubt { about, sure: Some(sure), wanted: 0.8, hidden, seen, ..InDoubt::default() };
+        let mut belief = Belief::default();
+        belief.adopt(tracks);
+        Standing { doubts: vec![doubt], belief, ..Standing::default() }
+    }
+
+    fn perceived(left_out: &[&str]) -> Note {
+        Note::Perceived {
+            on: "table".into(),
+            merged: 1,
+            left_out: left_out.iter().map(|why| why.to_string()).collect(),
+            points: 0,
+            residual_m: 0.0,
+            objects: Vec::new(),
+            changed: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn why_it_is_no_surer_is_said() {
+        let begin = standing(Vec::new(), 0.0, 0.75, 0.0);
+        let check = |before: &Standing, after: &Standing, note: Note, words: &[&str], not: &str| {
+            let said = told(Some(before), after, &[&note], &str::to_string).join(" ");
+            words.iter().for_each(|word| assert!(said.contains(word), "{word:?} is not in {said}"));
+            assert!(not.is_empty() || !said.contains(not), "{not:?} is in {said}");
+        };
+        // Nothing stood there, and something may be hidden.
+        let empty = standing(vec![track(0.0, 0.9)], 0.0, 0.3, 0.7);
+        let words = [
+            "is still 0.00 (0.80 is wanted)",
+            "the one object that was seen is not it",
+            "with 0.30 it stands where nothing was seen yet",
+            "70 % of the table (0 % before, 30 % are left)",
+        ];
+        check(&begin, &empty, perceived(&[]), &words, "could not be used");
+        // What was taken for it is something else.
+        let taken = standing(vec![track(0.4, 0.35)], 0.3, 0.3, 0.7);
+        let words = ["may be it with 0.40 (or mug with 0.35)", "this is the place is certain with 0.75"];
+        check(&begin, &taken, perceived(&[]), &words, "");
+        check(
+            &taken,
+            &empty,
+            perceived(&[]),
+            &["what was taken for cup A with 0.40 is mug with 0.90"],
+            "before, 30",
+        );
+        check(
+            &taken,
+            &begin,
+            perceived(&[]),
+            &["with 0.40 is not seen there any more; no object was seen"],
+            "",
+        );
+        // The view failed.
+        let failed = perceived(&["view 2 left out: it contradicts"]);
+        check(&begin, &empty, failed, &["this view of the table could not be used"], "");
+        let nothing = Note::Nothing { because: "no plane".into() };
+        check(
+            &begin,
+            &begin,
+            nothing,
+            &["the look showed no surface", "Not looked at yet: the table"],
+            "Seen by now",
+        );
+        // It is sure enough.
+        let sure = standing(vec![track(0.9, 0.0)], 0.9, 0.1, 0.95);
+        check(
+            &taken,
+            &sure,
+            perceived(&[]),
+            &["is now 0.90 (0.30 before, 0.80 is wanted). Seen by now"],
+            "no more",
+        );
+    }
+}

@@ -14,7 +14,8 @@ use crate::standing::{InDoubt, Of};
 /// It; `name` is how surfaces are called.
 pub fn of(header: &Header, report: Option<&Report>, chapters: &[Chapter], name: Names<'_>) -> Vec<String> {
     let last = chapters.iter().flat_map(Chapter::stood).last();
-    let rests = report.and_then(|report| rests(report, last?, name));
+    let rests =
+        report.and_then(|report| last.and_then(|last| rests(report, last, name)).or_else(|| said_of(report)));
     let mut said = vec![asked(header), answer(report, chapters.len())];
     said.extend(rests);
     said.push(trouble(chapters));
@@ -46,6 +47,12 @@ fn answer(report: Option<&Report>, plans: usize) -> String {
         report.sim_time_s,
         report.why.split([';', ':']).next().unwrap_or_default()
     )
+}
+
+/// What the answer itself says of what it rests on.
+fn said_of(report: &Report) -> Option<String> {
+    let (_, more) = report.why.split_once("; ")?;
+    Some(format!("It rests on this: {more}."))
 }
 
 /// What an answer rests on, of the first thing that was asked for.
@@ -174,7 +181,14 @@ fn in_vain(chapters: &[Chapter]) -> Option<String> {
         1 => "the plan".into(),
         all => format!("{short} of {all} plans"),
     };
-    (short > 0).then(|| format!("{plans} brought less than was hoped{misled}"))
+    match (short, chapters) {
+        (0, [_, others @ .., _]) => {
+            let all = chapters.len();
+            Some(format!("{} of {all} plans did not yet bring about what was asked for", others.len() + 1))
+        }
+        (0, _) => None,
+        _ => Some(format!("{plans} brought less than was hoped{misled}")),
+    }
 }
 
 /// What was taken for a thing that was asked for in a plan, and was not it, with how much it was.

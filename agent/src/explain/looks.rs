@@ -212,10 +212,10 @@ mod tests {
     use super::*;
 
     /// An object on the table, with what it may be.
-    fn track(cup_a: f64, mug: f64) -> Track {
+    fn track(ring: f64, stone: f64) -> Track {
         serde_json::from_value(serde_json::json!({
             "id": 0, "on": "table", "position_m": [1.0, 2.0, 0.7], "position_sigma_m": 0.01, "size_m": [0.1, 0.1, 0.1],
-            "probabilities": [["cup A", cup_a], ["mug", mug]], "kinds": [], "unknown": 1.0 - cup_a - mug,
+            "probabilities": [["the ring", ring], ["stone", stone]], "kinds": [], "unknown": 1.0 - ring - stone,
             "seen_fraction": 0.6, "viewpoints_m": [], "evidence": descry_perception::recognise::Evidence::default(),
             "cites": [], "first_ns": 0, "last_ns": 0,
         }))
@@ -224,7 +224,7 @@ mod tests {
 
     fn standing(tracks: Vec<Track>, sure: f64, hidden: f64, share: f64) -> Standing {
         let seen = vec![Seen { on: "table".into(), share: Some(share), places: usize::from(share > 0.0) }];
-        let about = "cup A".to_string();
+        let about = "the ring".to_string();
         let doubt = InDoubt { about, sure: Some(sure), wanted: 0.8, hidden, seen, ..InDoubt::default() };
         let mut belief = Belief::default();
         belief.adopt(tracks);
@@ -262,13 +262,13 @@ mod tests {
         check(&begin, &empty, perceived(&[]), &words, "could not be used");
         // What was taken for it is something else.
         let taken = standing(vec![track(0.4, 0.35)], 0.3, 0.3, 0.7);
-        let words = ["may be it with 0.40 (or mug with 0.35)", "this is the place is certain with 0.75"];
+        let words = ["may be it with 0.40 (or stone with 0.35)", "this is the place is certain with 0.75"];
         check(&begin, &taken, perceived(&[]), &words, "");
         check(
             &taken,
             &empty,
             perceived(&[]),
-            &["what was taken for cup A with 0.40 is mug with 0.90"],
+            &["what was taken for the ring with 0.40 is stone with 0.90"],
             "before, 30",
         );
         check(

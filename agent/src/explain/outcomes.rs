@@ -112,9 +112,13 @@ fn left_out_as(said: &str) -> String {
 /// What a sweep of the laser shows; what is only seen from afar is counted.
 fn swept(things: &[String]) -> String {
     let (far, near): (Vec<&String>, Vec<&String>) = things.iter().partition(|thing| thing.ends_with(AFAR));
-    let far = (!far.is_empty()).then(|| format!("{} {AFAR}", count(far.len(), "thing")));
+    let far = (!far.is_empty()).then(|| format!("{} {AFAR}", far.len()));
     let all: Vec<String> = near.into_iter().cloned().chain(far).collect();
-    format!("{} on the floor: {}.", count(things.len(), "thing"), all.join("; "))
+    let on_the_floor = match things.len() {
+        1 => "1 thing on the floor".to_string(),
+        n => format!("{n} things on the floor"),
+    };
+    format!("{on_the_floor}: {}.", all.join("; "))
 }
 
 #[cfg(test)]
@@ -127,7 +131,7 @@ mod tests {
             .map(str::to_string);
         assert_eq!(
             swept(&things),
-            "2 things on the floor: this at (1.00, 2.00) m: 1 scan; 1 thing seen from afar."
+            "2 things on the floor: this at (1.00, 2.00) m: 1 scan; 1 seen from afar."
         );
         assert_eq!(swept(&things[..1]), "1 thing on the floor: this at (1.00, 2.00) m: 1 scan.");
     }

@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     const TOML: &str =
-        "name = \"toy\"\n\n[[goal]]\nsay = \"go\"\n\n[action.move]\ndoes = \"move ?from ?to\"\nretries = 2\n";
+        "name = \"toy\"\n\n[[goal]]\nsay = \"go\"\n\n[action.fly]\ndoes = \"move ?from ?to\"\nretries = 2\n";
 
     #[test]
     fn headings_and_keys_mean_what_the_reference_says() {
@@ -97,8 +97,8 @@ mod tests {
         check("name =", 2, Some("name"), "The domain's name.");
         check("[[goal]]", 3, Some("goal"), "What may be said.");
         check("say =", 0, Some("say"), "Words and `<slots>`");
-        check("[action.move]", 2, Some("action"), "How each action is carried out");
-        check("[action.move]", 9, Some("move"), "");
+        check("[action.fly]", 2, Some("action"), "How each action is carried out");
+        check("[action.fly]", 9, Some("fly"), "");
         check("retries", 7, Some("retries"), "tried again so often");
         check("\"move ?from", 2, None, "");
         check("\"toy\"", 2, None, "");

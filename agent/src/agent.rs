@@ -17,7 +17,7 @@ use descry_skills::{Call, Context, SkillFailure};
 use crate::exit::CommandError;
 use crate::report::Event;
 use crate::stop::Stop;
-use crate::weigh;
+use crate::{standing, weigh};
 
 /// A planning call ends after so many evaluated states; then the best plan so far, or one good look, has to do.
 const MOST_EVALUATED: u64 = 2_500;
@@ -102,7 +102,7 @@ impl<'a> Agent<'a> {
             return Ok(Some(Ended::Reached));
         }
         match self.monitor(world, round) {
-            Ok(()) => self.keep()?,
+            Ok(()) => self.keep(round)?,
             Err(because) => {
                 if let Some(ended) = self.replan(world, round, because)? {
                     return Ok(Some(ended));
@@ -218,14 +218,16 @@ impl<'a> Agent<'a> {
             calls,
         };
         let weighed = self.weighed_by.as_ref().map(|goal| weigh::blob(&weigh::weigh(round, &plan, goal)));
-        let said = self.say_with(&event, weighed.transpose()?)?;
+        let more = std::iter::once(standing::blob(round)).chain(weighed);
+        let said = self.say_with(&event, more.collect::<Result<_, _>>()?)?;
         self.record.hold(&[round.record, said], "plan").map_err(CommandError::broken)?;
         (self.plan, self.failed) = (Some(plan), None);
         Ok(())
     }
 
-    fn keep(&mut self) -> Result<(), CommandError> {
-        self.say(&Event::Kept { left: self.rest().steps.len() }).map(|_| ())
+    fn keep(&mut self, round: &Round) -> Result<(), CommandError> {
+        let event = Event::Kept { left: self.rest().steps.len() };
+        self.say_with(&event, vec![standing::blob(round)?]).map(|_| ())
     }
 
     /// The steps of the plan that are still to be done.
@@ -398,20 +400,20 @@ impl<'a> Agent<'a> {
 
     /// Records what the end of a run rests on.
     fn rest_on(&mut self, round: &Round, ended: &Ended) -> Result<(), CommandError> {
-        let body =
-            serde_json::to_value(weigh::rests(round, ended)).map_err(|e| CommandError::Bug(e.to_string()))?;
+        let body = serde_json::to_value(standing::rests(round, ended))
+            .map_err(|e| CommandError::Bug(e.to_string()))?;
         let meta = Meta { body, ..Meta::default() };
-        let draft = Draft { meta, kept: true, ..Draft::new(weigh::RESTS, self.robot.now_ns()) };
+        let draft = Draft { meta, kept: true, ..Draft::new(standing::RESTS, self.robot.now_ns()) };
         self.record.put(draft).map(|_| ()).map_err(CommandError::broken)
     }
 
     /// Tells of an event, and records it.
     fn say(&mut self, event: &Event) -> Result<RecordId, CommandError> {
-        self.say_with(event, None)
+        self.say_with(event, Vec::new())
     }
 
     /// The same with something more beside it.
-    fn say_with(&mut self, event: &Event, more: Option<Blob<'static>>) -> Result<RecordId, CommandError> {
+    fn say_with(&mut self, event: &Event, more: Vec<Blob<'static>>) -> Result<RecordId, CommandError> {
         (self.tell)(event);
         let body = serde_json::to_value(event).map_err(|e| CommandError::Bug(e.to_string()))?;
         let meta = Meta { body, ..Meta::default() };

@@ -2,8 +2,12 @@
 //! and what the verdict rests on. What the record does not say is said not to be known.
 
 mod chapters;
+mod looks;
+mod outcomes;
 mod plans;
+mod standings;
 mod states;
+mod summary;
 mod verdict;
 pub mod wording;
 
@@ -18,12 +22,14 @@ use crate::report::Report;
 use crate::run::{Beginning, Header};
 use crate::saying::Saying;
 use states::States;
-use wording::{count, listed, wrapped};
+use wording::{listed, wrapped};
 
 /// What a run is explained by.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Explanation {
-    /// What was asked for, and how it ended.
+    /// All of it in a few sentences: what was asked, what the answer is, what it rests on, the greatest trouble.
+    pub summary: Vec<String>,
+    /// What was wanted, and how to read what follows.
     pub asked: Vec<String>,
     /// The plans, one after the other.
     pub plans: Vec<Told>,
@@ -48,6 +54,8 @@ pub struct Told {
     pub why: Vec<String>,
     /// What came of it.
     pub outcome: Vec<String>,
+    /// Which of its steps were carried out, and why the others were not.
+    pub done: String,
 }
 
 /// Explains a run, from its record, what it was started with, and its report, if it has one.
@@ -65,28 +73,42 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let policy = Some(&header.settings.policy).filter(|policy| *policy != planner).cloned();
     let meanings = |call: &str| domain.as_ref().and_then(|domain| meaning(domain, call));
     let counts = |action: &str| domain.as_ref().and_then(|domain| counts(domain, action));
-    let asked = Asked { goal: header.pddl_goal.clone(), policy, counts: &counts };
+    let name = |symbol: &str| saying.name_of(symbol);
+    let goal = header.pddl_goal.clone();
+    let asked = Asked { goal, policy, counts: &counts, name: &name, has_ended: report.is_some() };
     let plans = plans::told(&chapters, &asked).into_iter().map(|told| told.said(&saying)).collect();
-    let mut said = said(header, &asked, report, chapters.len(), &saying);
+    let summary = summary::of(header, report, &chapters, &name);
+    let summary = summary.iter().map(|line| saying.say(line)).collect();
+    let mut said = said(header, &asked, &saying);
     if chapters.iter().any(|c| c.weighed.as_ref().is_some_and(|w| w.chosen.is_some())) {
         said.extend(domain.as_ref().and_then(|domain| numbers(domain, &chapters, &saying)));
-        said.extend(domain.as_ref().and_then(poses));
-        said.push(IN_BRACKETS.into());
-        said.extend(domain.as_ref().and_then(seconds));
+        said.extend(domain.as_ref().and_then(|domain| poses(domain, &header.settings.robot)));
+        said.push(WAYS.into());
+        said.extend(domain.as_ref().and_then(|domain| seconds(domain, &saying)));
     }
-    let name = |symbol: &str| saying.name_of(symbol);
     let words = verdict::Words { meanings: &meanings, name: &name };
     let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
     let verdict = verdict.iter().map(|line| saying.say(line)).collect();
-    Ok(Explanation { asked: said, plans, verdict, lost })
+    Ok(Explanation { summary, asked: said, plans, verdict, lost })
+}
+
+/// How things stood after each look, with when that was on the body's clock; nothing of a record that does not say.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the record cannot be read.
+pub fn after_looks(record: &Record, saying: &Saying) -> Result<Vec<(i64, String)>, CommandError> {
+    let (chapters, _) = chapters::of(record, &States::of(record)?, &[])?;
+    let name = |symbol: &str| saying.name_of(symbol);
+    let all = chapters.iter().flat_map(|chapter| outcomes::of(chapter, &name));
+    Ok(all.filter_map(|outcome| Some((outcome.stood_ns?, saying.say(&outcome.said)))).collect())
 }
 
 impl Told {
     /// With what is written in PDDL said as the domain says it.
     fn said(self, saying: &Saying) -> Self {
         let all = |lines: Vec<String>| lines.iter().map(|line| saying.say(line)).collect();
-        let cause = saying.say(&self.cause);
-        Told { cause, intent: all(self.intent), why: all(self.why), outcome: all(self.outcome), ..self }
+        let (cause, done) = (saying.say(&self.cause), saying.say(&self.done));
+        Told { cause, done, intent: all(self.intent), why: all(self.why), outcome: all(self.outcome), ..self }
     }
 }
 
@@ -106,14 +128,19 @@ fn counts(domain: &Domain, action: &str) -> Option<String> {
 }
 
 /// Which actions count for more than they take.
-fn seconds(domain: &Domain) -> Option<String> {
+fn seconds(domain: &Domain, saying: &Saying) -> Option<String> {
     let is_more = |name: &str| duration(domain, name).is_some_and(|duration| duration.contains("(+"));
     let actions = domain.vocabulary.task.actions.iter().filter(|a| is_more(&a.name));
     let all: Vec<String> = actions
-        .filter_map(|a| Some(format!("{} also for the {}", a.name, counts(domain, &a.name)?)))
+        .filter_map(|a| {
+            Some(format!("{} also for the {}", saying.in_general(&a.name), counts(domain, &a.name)?))
+        })
         .collect();
     (!all.is_empty()).then(|| {
-        format!("In a plan some actions count for more than the time that they take: {}.", all.join("; "))
+        format!(
+            "Seconds of a plan are not only those that pass: {}, so that what is likely comes first.",
+            all.join("; ")
+        )
     })
 }
 
@@ -124,11 +151,19 @@ fn duration<'d>(domain: &'d Domain, action: &str) -> Option<&'d str> {
 }
 
 /// How poses are called, where they are called after what is looked at.
-fn poses(domain: &Domain) -> Option<String> {
-    let text = "Poses are called after what is looked at from them, as desk-1 and desk-2 after a desk, or after a door; here-N is \
-                where the body stopped on its way.";
+fn poses(domain: &Domain, robot: &str) -> Option<String> {
+    let text = match robot.starts_with("recorded:") {
+        true => {
+            "Poses are those from which the record was taken, each called after its frame: driving to frame-7 and looking from \
+             there is reading that frame."
+        }
+        false => {
+            "Poses are called after what is looked at from them, as desk-1 and desk-2 after a desk, or after a door; here-N is \
+             where the body stopped on its way."
+        }
+    };
     let is_searching = domain.config.uses.iter().any(|ability| ability == "searching");
-    is_searching.then(|| text.to_string())
+    is_searching.then(|| format!("{text} Places are x, y and height in the map, in metres."))
 }
 
 /// What the numbers say that plans are to change.
@@ -151,9 +186,10 @@ fn numbers(domain: &Domain, chapters: &[chapters::Chapter], saying: &Saying) -> 
     (!all.is_empty()).then(|| all.join(" "))
 }
 
-/// What figures of ways mean.
-const IN_BRACKETS: &str = "In brackets behind a way: by how much it is expected to bring the numbers nearer to what is wanted, in \
-                           how many seconds, and how much that is a second; behind its steps their seconds.";
+/// What ways and their figures mean.
+const WAYS: &str = "A way to get further is what may be done next, up to the first step that is expected to bring the numbers nearer to \
+                    what is wanted. In brackets behind it: by how much it is, in how many seconds, and how much that is a \
+                    second; behind its steps their seconds.";
 
 /// What a run was asked, as far as plans depend on it.
 struct Asked<'a> {
@@ -163,50 +199,36 @@ struct Asked<'a> {
     policy: Option<String>,
     /// What an action's seconds are besides those that are fixed.
     counts: &'a dyn Fn(&str) -> Option<String>,
+    /// What surfaces are called, by symbol.
+    name: looks::Names<'a>,
+    /// Whether there is a verdict.
+    has_ended: bool,
 }
 
 impl Asked<'_> {
     /// What the goal wants of a number: that with which it compares it, if it names it so.
     fn wanted(&self, number: &str) -> Option<f64> {
-        let word = number.trim_matches(['(', ')']).split(' ').next()?;
-        let (_, rest) = self.goal.split_once(&format!("= ({word}"))?;
-        rest.starts_with([' ', ')']).then_some(())?;
-        rest.split_once(')')?.1.split(')').next()?.trim().parse().ok()
+        let number = number.trim_matches(['(', ')']);
+        let (word, of) = number.split_once(' ').unwrap_or((number, ""));
+        let begins = format!("= ({word}");
+        let compared = self.goal.split(&begins).skip(1).filter_map(|rest| rest.split_once(')'));
+        // What is wanted of a variable is wanted of any; else of what is named alone.
+        let mut fitting = compared.filter(|(about, _)| {
+            (about.is_empty() || about.starts_with(' ')) && (about.contains('?') || about.trim() == of)
+        });
+        fitting.next()?.1.split(')').next()?.trim().parse().ok()
     }
 }
 
-fn said(
-    header: &Header,
-    asked: &Asked<'_>,
-    report: Option<&Report>,
-    plans: usize,
-    saying: &Saying,
-) -> Vec<String> {
-    let settings = &header.settings;
-    let scene = settings.scene.as_ref().map(|s| format!(", scene {s}")).unwrap_or_default();
-    let seed = if settings.robot == "sim" { format!(", seed {}", settings.seed) } else { String::new() };
-    let mut said = vec![format!(
-        "\"{}\" was asked of the body {}{scene}{seed}, in the domain {}.",
-        header.goal, settings.robot, settings.domain
-    )];
+fn said(header: &Header, asked: &Asked<'_>, saying: &Saying) -> Vec<String> {
     let (pddl, goal) = (&header.pddl_goal, saying.say(&header.pddl_goal));
-    said.push(match goal == *pddl {
+    let mut said = vec![match goal == *pddl {
         true => format!("Wanted: {pddl}."),
         false => format!("Wanted: {goal}. In PDDL: {pddl}."),
-    });
+    }];
     if let Some(policy) = &asked.policy {
         said.push(format!("Where to look next was chosen by the policy {policy}, not by the planner."));
     }
-    said.push(match report {
-        Some(report) => format!(
-            "It ended after {}, {}, {:.1} m and {:.0} s.",
-            count(plans, "plan"),
-            count(report.views, "look"),
-            report.distance_m,
-            report.sim_time_s
-        ),
-        None => format!("It has not ended: the record goes as far as plan {plans}."),
-    });
     if !header.resumed.is_empty() {
         let times = match header.resumed.len() {
             1 => "once".into(),
@@ -223,6 +245,7 @@ impl std::fmt::Display for Explanation {
         let all = |f: &mut std::fmt::Formatter<'_>, lines: &[String], first: &str| {
             lines.iter().try_for_each(|line| writeln!(f, "{}", wrapped(line, first, WIDTH)))
         };
+        writeln!(f, "{}\n", wrapped(&self.summary.join(" "), "", WIDTH))?;
         all(f, &self.asked, "")?;
         for plan in &self.plans {
             writeln!(f, "\nPlan {}, at {:.1} s", plan.round, plan.at_s)?;
@@ -230,6 +253,7 @@ impl std::fmt::Display for Explanation {
             all(f, &plan.intent, "  do       ")?;
             all(f, &plan.why, "  why      ")?;
             all(f, &plan.outcome, "  then     ")?;
+            writeln!(f, "{}", wrapped(&plan.done, "  done     ", WIDTH))?;
         }
         writeln!(f, "\nWhat the verdict rests on")?;
         all(f, &self.verdict, "  - ")?;
@@ -244,7 +268,13 @@ mod tests {
     #[test]
     fn what_is_wanted_stands_in_the_goal() {
         let check = |goal: &str, number: &str, expected: Option<f64>| {
-            let asked = Asked { goal: goal.into(), policy: None, counts: &|_| None };
+            let asked = Asked {
+                goal: goal.into(),
+                policy: None,
+                counts: &|_| None,
+                name: &str::to_string,
+                has_ended: true,
+            };
             assert_eq!(asked.wanted(number), expected, "{goal}: {number}");
         };
         check("(>= (confidence cup-a) 0.8)", "(confidence cup-a)", Some(0.8));
@@ -253,5 +283,7 @@ mod tests {
         check("(>= (presence cup-a) (sure))", "(presence cup-a)", None);
         check("(on cup-a desk)", "(clarity desk)", None);
         check("(>= (unseen-part) 0.5)", "(unseen)", None);
+        check("(>= (found dell-box) 0.9)", "(found dell-box)", Some(0.9));
+        check("(>= (found dell-box) 0.9)", "(found big-chair)", None);
     }
 }

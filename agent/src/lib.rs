@@ -46,6 +46,7 @@ pub mod replay;
 pub mod report;
 pub mod run;
 pub mod saying;
+pub mod standing;
 pub mod stop;
 pub mod template;
 pub mod weigh;

@@ -19,7 +19,7 @@ use descry_domains::abilities::searching::policies;
 /// Of these kinds, what comes about again must be what was recorded, byte for byte.
 const COMPARED: [&str; 5] = ["percepts", "belief", "problem", "skill", "event"];
 /// What a report says of this run alone, or knows from a simulator.
-const OWN: [&str; 5] = ["wall_s", "run", "true_position_m", "true_on", "true_in"];
+const OWN: [&str; 7] = ["wall_s", "planning_s", "geometry_s", "run", "true_position_m", "true_on", "true_in"];
 
 /// The outcome of a replay.
 #[derive(Debug, Default, Serialize)]

@@ -150,11 +150,11 @@ pub struct Report {
     pub sim_time_s: f64,
     /// On the wall.
     pub wall_s: f64,
-    /// The longest that one planning call took, what it asked of geometry apart. Not in the JSON: it differs from run to run.
-    #[serde(skip)]
+    /// The longest that one planning call took on the wall, what it asked of geometry apart; 0: nothing was planned, or it is not known.
+    #[serde(default)]
     pub planning_s: f64,
-    /// The longest that one planning call waited for geometry. Not in the JSON either.
-    #[serde(skip)]
+    /// The longest that one planning call waited for geometry.
+    #[serde(default)]
     pub geometry_s: f64,
     /// The run's folder.
     pub run: String,
@@ -190,6 +190,15 @@ impl Report {
             geometry_s: 0.0,
             run,
         }
+    }
+}
+
+/// A time in which little happens: milliseconds below a second.
+fn brief(time_s: f64) -> String {
+    match time_s {
+        s if s >= 1.0 => format!("{s:.1} s"),
+        s if s >= 1e-3 => format!("{:.0} ms", s * 1e3),
+        _ => "less than 1 ms".into(),
     }
 }
 
@@ -242,11 +251,27 @@ impl fmt::Display for Report {
             self.sim_time_s,
             self.wall_s
         )?;
-        writeln!(
-            f,
-            "  at most {:.3} s to plan and {:.3} s for its questions to geometry",
-            self.planning_s, self.geometry_s
-        )?;
+        if self.planning_s > 0.0 {
+            let [plan, geometry] = [self.planning_s, self.geometry_s].map(brief);
+            writeln!(f, "  at most {plan} to plan and {geometry} for its questions to geometry")?;
+        }
         write!(f, "  record: {}", self.run)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_time_is_said_to_be_none() {
+        let cases = [
+            (0.0, "less than 1 ms"),
+            (0.0004, "less than 1 ms"),
+            (0.0021, "2 ms"),
+            (0.9, "900 ms"),
+            (1.26, "1.3 s"),
+        ];
+        cases.iter().for_each(|(time_s, said)| assert_eq!(brief(*time_s), *said));
     }
 }

@@ -92,6 +92,16 @@ impl Saying {
         self.forms.contains_key(name)
     }
 
+    /// What an action, a word or a call is about in general: `looking at the surface from a pose`.
+    pub fn in_general(&self, name: &str) -> String {
+        let Some((parameters, text)) = self.forms.get(name) else { return name.to_string() };
+        let general = |text: String, (variable, of): &(String, String)| {
+            text.replace(&format!("the {variable}"), &format!("the {of}"))
+                .replace(variable, &format!("a {of}"))
+        };
+        parameters.iter().fold(text.clone(), general)
+    }
+
     /// What an object is called that people have a name for.
     pub fn name_of(&self, symbol: &str) -> String {
         self.name(symbol, NAMED[0], &[])
@@ -280,5 +290,7 @@ mod tests {
         }
         check("(that is, (at start))", "(that is, it stands at start)");
         assert_eq!(Saying::default().say("(at start)"), "(at start)");
+        assert_eq!(saying.in_general("shut"), "the door is shut");
+        assert_eq!(saying.in_general("fly"), "fly");
     }
 }

@@ -4,9 +4,6 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use descry_domains::abilities::searching::doubt::Doubt;
-use descry_domains::answer::Ended;
-use descry_domains::situation::KnownSurface;
 use descry_domains::world::Round;
 use descry_memory::{Blob, Form};
 use descry_planner::semantics::{Binding, Changes, Pending};
@@ -40,6 +37,8 @@ pub struct Weighed {
     pub others: Vec<Way>,
     /// How many could have been taken in all, these among them.
     pub open: usize,
+    /// The plan until it first gains something, where several steps of it could be one.
+    pub shorter: Option<Way>,
 }
 
 /// A number of the domain.
@@ -77,54 +76,6 @@ impl Way {
     }
 }
 
-/// Something that is in doubt.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct InDoubt {
-    /// What it is about, as people call it.
-    pub about: String,
-    /// The probability that hangs on it, 0 to 1.
-    pub left: f64,
-    /// What was seen of where it may be.
-    pub seen: Vec<Seen>,
-}
-
-/// How much of a place was seen.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Seen {
-    /// The place, as people call it.
-    pub on: String,
-    /// The share of it where nothing could stand unseen, 0 to 1; none while nothing is known of it.
-    pub share: Option<f64>,
-    /// From so many places, by views that still hold.
-    pub places: usize,
-}
-
-/// What the end of a run rests on.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Rests {
-    /// Why there was nothing more to do: a word, and what was said.
-    pub ended: String,
-    /// See [`Ended`].
-    pub said: String,
-    /// What is in doubt in the end.
-    pub in_doubt: Vec<InDoubt>,
-}
-
-/// The kind under which that is recorded.
-pub const RESTS: &str = "rests-on";
-
-/// It as it is recorded.
-pub fn rests(round: &Round, ended: &Ended) -> Rests {
-    let (ended, said) = match ended {
-        Ended::Reached => ("reached", String::new()),
-        Ended::NoPlan(why) => ("no plan", why.clone()),
-        Ended::Undecided(why) => ("undecided", why.clone()),
-        Ended::Limit(why) => ("limit", why.clone()),
-        Ended::Failed(why) => ("failed", why.clone()),
-    };
-    Rests { ended: ended.into(), said, in_doubt: in_doubt(round) }
-}
-
 /// What was weighed, as it is kept beside the event.
 ///
 /// # Errors
@@ -137,26 +88,6 @@ pub fn blob(weighed: &Weighed) -> Result<Blob<'static>, CommandError> {
 /// Weighs a plan against others; `goal` says which numbers count.
 pub fn weigh(round: &Round, plan: &Plan, goal: &str) -> Weighed {
     Scale::new(round, plan, goal).and_then(|scale| scale.weigh(plan)).unwrap_or_default()
-}
-
-/// What is in doubt in a round about what was asked for.
-fn in_doubt(round: &Round) -> Vec<InDoubt> {
-    let s = &round.situation;
-    let places = |on: usize| s.spaces[on].seen_from().len();
-    let told = |about: &str, doubt: &Doubt| {
-        let of = |(on, surface): (usize, &KnownSurface)| {
-            let (share, places) = (doubt.share_seen(on), places(on));
-            (share.is_some() || places > 0).then(|| Seen { on: surface.name.clone(), share, places })
-        };
-        let seen = s.surfaces.iter().enumerate().filter_map(of).collect();
-        InDoubt { about: about.into(), left: doubt.remaining().max(0.0), seen }
-    };
-    // What was seen of a kind is no longer looked for.
-    let things = s.things.iter().enumerate().filter(|(_, t)| t.track.is_none());
-    let things = things.map(|(n, t)| told(&t.name, s.doubt_about(n)));
-    let kinds = s.kinds.iter().enumerate().map(|(n, t)| told(&t.name, s.doubt_of(n)));
-    let surfaces = s.asked.iter().map(|&on| told(&s.surfaces[on].name, s.doubt_on(on)));
-    things.chain(kinds).chain(surfaces).collect()
 }
 
 /// The numbers that count in a round, and their values now.
@@ -295,7 +226,9 @@ impl<'r> Scale<'r> {
         let numbers = self.at_most(&plan.steps);
         let others = self.others(&plan.steps[..n], &chosen);
         let open = others.len() + 1;
-        Some(Weighed { numbers, chosen: Some(chosen), others: kept(others), open })
+        let shorter = joined(&plan.steps[..n]).and_then(|steps| self.way(&steps));
+        let shorter = shorter.filter(|way| way.takes_s < chosen.takes_s && way.gains >= chosen.gains);
+        Some(Weighed { numbers, chosen: Some(chosen), others: kept(others), open, shorter })
     }
 
     /// The same steps with other objects, with what has to be done before. The last step that has a choice is varied.
@@ -370,6 +303,23 @@ impl<'r> Scale<'r> {
     }
 }
 
+/// Steps of which some that lead on from each other, by the same action from one object to another, are one; none if there are none.
+fn joined(steps: &[Step]) -> Option<Vec<Step>> {
+    let mut all: Vec<Step> = Vec::new();
+    for step in steps {
+        match (all.last_mut(), step.arguments.as_slice()) {
+            (Some(Step { action, arguments, .. }), [from, to])
+                if *action == step.action && arguments.len() == 2 && arguments[1] == *from =>
+            {
+                arguments[1] = to.clone();
+            }
+            _ => all.push(step.clone()),
+        }
+    }
+    all.retain(|step| !matches!(step.arguments.as_slice(), [from, to] if from == to));
+    (all.len() < steps.len()).then_some(all)
+}
+
 /// The words of a text in PDDL.
 fn words(text: &str) -> Vec<&str> {
     text.split(|c: char| c.is_whitespace() || "()".contains(c)).filter(|w| !w.is_empty()).collect()
@@ -394,4 +344,29 @@ fn kept(mut all: Vec<Way>) -> Vec<Way> {
     all.extend(quickest.into_iter().chain(most));
     all.dedup();
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drives_that_lead_on_from_each_other_could_be_one() {
+        let read = |text: &str| {
+            let step = |call: &str| {
+                let mut words = call.split(' ').map(str::to_string);
+                let action = words.next().expect("an action");
+                Step { start_s: None, action, arguments: words.collect(), duration_s: 1.0 }
+            };
+            text.split(", ").filter(|call| !call.is_empty()).map(step).collect::<Vec<_>>()
+        };
+        let check = |steps: &str, expected: Option<&str>| {
+            assert_eq!(joined(&read(steps)), expected.map(read), "{steps}");
+        };
+        check("move a b, look b t", None);
+        check("move a b, look b t, move b c", None);
+        check("move a b, move b c, look c t", Some("move a c, look c t"));
+        check("move a b, move b a, look a t", Some("look a t"));
+        check("move a b, open b d, move b c", None);
+    }
 }

@@ -1,8 +1,10 @@
-//! A language server: findings as one types, hover, definitions, completion, layout and symbols, for PDDL, plans and the TOML of a
+//! A language server: findings as one types with the mends that they offer, hover, definitions, completion, layout and symbols, for PDDL, plans and the TOML of a
 //! domain's folder. The findings are those of `descry check`, the layout that of `descry fmt`.
 
 mod declared;
 mod findings;
+mod keys;
+mod mends;
 mod texts;
 mod units;
 mod words;
@@ -13,12 +15,13 @@ use lsp_types::notification::{
     PublishDiagnostics,
 };
 use lsp_types::request::{
-    Completion, DocumentSymbolRequest, Formatting, GotoDefinition, HoverRequest, Request as _,
+    CodeActionRequest, Completion, DocumentSymbolRequest, Formatting, GotoDefinition, HoverRequest,
+    Request as _,
 };
 use lsp_types::{
-    CompletionOptions, HoverProviderCapability, OneOf, PublishDiagnosticsParams, SaveOptions,
-    ServerCapabilities, TextDocumentSyncCapability, TextDocumentSyncKind, TextDocumentSyncOptions,
-    TextDocumentSyncSaveOptions,
+    CodeActionKind, CodeActionOptions, CodeActionProviderCapability, CompletionOptions,
+    HoverProviderCapability, OneOf, PublishDiagnosticsParams, SaveOptions, ServerCapabilities,
+    TextDocumentSyncCapability, TextDocumentSyncKind, TextDocumentSyncOptions, TextDocumentSyncSaveOptions,
 };
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -66,6 +69,10 @@ fn capabilities() -> ServerCapabilities {
             trigger_characters: Some(triggers),
             ..CompletionOptions::default()
         }),
+        code_action_provider: Some(CodeActionProviderCapability::Options(CodeActionOptions {
+            code_action_kinds: Some(vec![CodeActionKind::QUICKFIX]),
+            ..CodeActionOptions::default()
+        })),
         document_formatting_provider: Some(OneOf::Left(true)),
         document_symbol_provider: Some(OneOf::Left(true)),
         ..ServerCapabilities::default()
@@ -81,7 +88,7 @@ fn converse(connection: &Connection) -> Result<(), CommandError> {
                 if connection.handle_shutdown(&request).map_err(CommandError::broken)? {
                     return Ok(());
                 }
-                send(connection, Message::Response(answer(&texts, request)))?;
+                send(connection, Message::Response(answer(&texts, &told, request)))?;
             }
             Message::Notification(notification) => {
                 for publish in hear(&mut texts, &mut told, notification) {
@@ -144,7 +151,7 @@ fn params<T: DeserializeOwned>(params: Value) -> Option<T> {
 }
 
 /// Answers a request.
-fn answer(texts: &Texts, request: Request) -> Response {
+fn answer(texts: &Texts, told: &findings::Told, request: Request) -> Response {
     let method = request.method.clone();
     let unknown = |id| {
         let text = format!("{method} is not served");
@@ -152,7 +159,7 @@ fn answer(texts: &Texts, request: Request) -> Response {
     };
     match request.method.as_str() {
         HoverRequest::METHOD => {
-            with::<HoverRequest>(request, |p| words::hover(texts, &p.text_document_position_params))
+            with::<HoverRequest>(request, |p| words::hover(texts, told, &p.text_document_position_params))
         }
         GotoDefinition::METHOD => {
             with::<GotoDefinition>(request, |p| words::definition(texts, &p.text_document_position_params))
@@ -160,6 +167,7 @@ fn answer(texts: &Texts, request: Request) -> Response {
         Completion::METHOD => {
             with::<Completion>(request, |p| words::completion(texts, &p.text_document_position))
         }
+        CodeActionRequest::METHOD => with::<CodeActionRequest>(request, |p| Some(mends::actions(p))),
         Formatting::METHOD => with::<Formatting>(request, |p| words::formatting(texts, &p.text_document.uri)),
         DocumentSymbolRequest::METHOD => {
             with::<DocumentSymbolRequest>(request, |p| words::symbols(texts, &p.text_document.uri))

@@ -52,9 +52,66 @@ fn what_was_found_is_explained() {
             "of the table from 2 places",
             "other objects are surely not cup A",
             "it ended because the goal held",
+            // What each look has brought, and why it was no more.
+            "looking at the table from table-5: the table, in one view, shows",
+            "the certainty of where cup A stands is now 0.",
+            "before, 0.80 is wanted). It is no more because ",
+            "Seen by now: ",
+            " % are left)",
+            "done all of its 2 steps.",
+            "Places are x, y and height in the map, in metres",
         ],
     );
     assert_eq!(told["plans"].as_array().map(Vec::len), Some(2), "{told}");
+    let summary = told["summary"].as_array().expect("a summary");
+    assert!((2..=4).contains(&summary.len()), "{told}");
+    let begins = [
+        "\"find cup A\" was asked of",
+        "The answer after 2 plans, ",
+        "It rests on this: what stands on the table at (",
+    ];
+    for (line, begins) in summary.iter().zip(begins) {
+        assert!(line.as_str().is_some_and(|line| line.starts_with(begins)), "{line}");
+    }
+    assert!(summary.last().is_some_and(|line| line.to_string().contains("trouble")), "{told}");
+}
+
+#[test]
+fn steps_that_were_left_out_are_named_and_so_is_what_was_not_looked_at() {
+    check(
+        &["find", "cup A", "--seed", "12", "--scene", "two-tables"],
+        0,
+        &[
+            "Not looked at yet: the sideboard.",
+            "done 2 of its 4 steps. Left out: driving to sideboard-7 and looking at the sideboard from sideboard-7, because \
+             plan 2 was made instead",
+        ],
+    );
+}
+
+#[test]
+fn all_on_a_surface_is_no_thing_that_may_be_somewhere() {
+    let told = check(
+        &["do", "identify all objects on the table", "--seed", "7"],
+        0,
+        &[
+            "the certainty of what stands on the table is ",
+            "something stands there unseen",
+            "of what kind each is and that there are no more",
+            "in all, this was seen: 99 % of the table",
+        ],
+    );
+    assert!(!told.to_string().contains("where table may be"), "{told}");
+}
+
+#[test]
+fn a_run_that_is_shown_again_says_how_long_planning_took() {
+    let folder = tempfile::tempdir().expect("a folder");
+    binary::check(folder.path(), &["find", "cup A", "--seed", "1", "--run", "run", "--json"], 0);
+    let shown = binary::outcome(folder.path(), &["show", "run"]);
+    let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
+    let took = shown.lines().find(|line| line.contains(" to plan and ")).expect("it is said");
+    assert!(took.contains(" ms to plan and ") && !took.contains("0.000"), "{took}");
 }
 
 #[test]
@@ -67,7 +124,7 @@ fn what_is_not_there_is_explained() {
             "% of the table from ",
             " places.",
             "the probability that it is there after all",
-            "nothing more could be done about it: asked whether a look from there may settle anything that is in doubt, the answer is no in",
+            "nothing more could be done about it: it was asked",
         ],
     );
 }
@@ -145,7 +202,12 @@ fn a_recorded_body_is_explained() {
     binary::check(folder.path(), &["find", "cup A", "--seed", "1", "--run", "first", "--json"], 0);
     let again = ["find", "cup A", "--robot", "recorded:first", "--run", "run", "--json"];
     binary::check(folder.path(), &again, 0);
-    explained(folder.path(), &["asked of the body recorded:first,", "the only way known to get further"]);
+    let words = [
+        "asked of the body recorded:first,",
+        "the only way known to get further",
+        "each called after its frame",
+    ];
+    explained(folder.path(), &words);
 }
 
 #[test]
@@ -181,7 +243,15 @@ fn what_goes_wrong_in_a_scene_is_explained() {
     let run = ["find", "cup A", "--domain", "home", "--scene", "doors.toml", "--seed", "6", "--run", "run"];
     let run = binary::outcome(folder.path(), &run);
     assert!(run.status.code().is_some_and(|code| code < 2), "{}", String::from_utf8_lossy(&run.stderr));
-    explained(folder.path(), &["failed: blocked: \"", "What follows from that: the ", "door is shut"]);
+    explained(
+        folder.path(),
+        &[
+            "failed: blocked: \"",
+            "What follows from that: the ",
+            "door is shut",
+            " failed. Left out with it: ",
+        ],
+    );
 }
 
 /// A run in which things go wrong on purpose, explained; and what it said on its way.

@@ -104,6 +104,33 @@ impl Editor {
         self.ask(method, json!({ "textDocument": { "uri": uri(path) }, "position": position }))
     }
 
+    /// What is offered to mend the findings that were last told of a file: each title, and what the text is with it.
+    fn mends(&mut self, path: &Path, text: &str) -> Vec<(String, String)> {
+        self.findings(path);
+        let of = self.published.iter().rev().find(|p| p["uri"] == uri(path));
+        let found = of.map_or(Value::Null, |p| p["diagnostics"].clone());
+        let range = json!({ "start": place(text, "", 0), "end": place(text, "", text.len()) });
+        let document = json!({ "uri": uri(path) });
+        let params = json!({ "textDocument": document, "range": range, "context": { "diagnostics": found } });
+        let offered = self.ask("textDocument/codeAction", params);
+        let mended = |action: &Value| {
+            let edits = action["edit"]["changes"][uri(path)].as_array().cloned().unwrap_or_default();
+            let mut text = text.to_string();
+            for edit in edits.iter().rev() {
+                let [from, to] = ["start", "end"].map(|end| byte(&text, &edit["range"][end]));
+                text.replace_range(from..to, edit["newText"].as_str().unwrap_or_default());
+            }
+            (action["title"].as_str().unwrap_or_default().to_string(), text)
+        };
+        offered.as_array().cloned().unwrap_or_default().iter().map(mended).collect()
+    }
+
+    /// What is said where a text stands, so many bytes in.
+    fn hover(&mut self, path: &Path, text: &str, sought: &str, further: usize) -> String {
+        let hover = self.at("textDocument/hover", path, text, sought, further);
+        hover["contents"]["value"].as_str().unwrap_or_default().to_string()
+    }
+
     fn end(mut self) {
         self.ask("shutdown", Value::Null);
         self.tell("exit", Value::Null);
@@ -120,6 +147,12 @@ fn place(text: &str, sought: &str, further: usize) -> Value {
     let at = text.find(sought).unwrap_or_else(|| panic!("{sought} is not there")) + further;
     let line = text[..at].matches('\n').count();
     json!({ "line": line, "character": at - text[..at].rfind('\n').map_or(0, |n| n + 1) })
+}
+
+/// The byte at a position.
+fn byte(text: &str, position: &Value) -> usize {
+    let number = |name: &str| position[name].as_u64().unwrap_or(0) as usize;
+    text.split_inclusive('\n').take(number("line")).map(str::len).sum::<usize>() + number("character")
 }
 
 const DOMAIN: &str = "(define (domain toy)
@@ -254,6 +287,73 @@ fn a_domain_folder_has_the_findings_of_check() {
     let hover = editor.at("textDocument/hover", &pddl, &pddl_text, &word, 2);
     let said = hover["contents"]["value"].as_str().expect("a text");
     assert!(said.contains("sensed:"), "{said}");
+    editor.end();
+}
+
+#[test]
+fn a_missing_sign_hides_nothing_else_and_findings_are_mended() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("d.pddl");
+    let come = "  (:action come\n    :parameters (?a ?b - place)\n    :precondition (raod ?a ?b)\n    :effect (at ?b)))\n";
+    let open = DOMAIN
+        .replace("(road ?a ?b))\n", "(raod ?a ?b)\n")
+        .replace("(at ?b))))\n", &format!("(at ?b)))\n{come}"));
+    let mut editor = Editor::begin();
+    editor.open(&path, &open);
+    let found = editor.findings(&path);
+    let codes: Vec<&str> = found.iter().map(|(code, _)| code.as_str()).collect();
+    assert_eq!(codes, ["unbalanced", "undeclared-predicate"], "{found:?}");
+
+    // A call that is not closed is one nevertheless.
+    let said = editor.hover(&path, &open, "(at ?a) (raod", 1);
+    assert!(said.contains("(at ?p - place)") && said.contains("where one is"), "{said}");
+
+    let mends = editor.mends(&path, &open);
+    let titles: Vec<&str> = mends.iter().map(|(title, _)| title.as_str()).collect();
+    assert_eq!(titles, ["Add `)`", "Write `road`"]);
+    assert!(mends[0].1.contains("(raod ?a ?b))\n    :effect"), "{}", mends[0].1);
+    // Everywhere, not only where it stands first.
+    assert!(
+        !mends[1].1.contains("(raod") && mends[1].1.contains(":precondition (road ?a ?b)\n"),
+        "{}",
+        mends[1].1
+    );
+    let whole = mends[0].1.replace("raod", "road");
+    editor.edit(&path, &mut open.clone(), &open, &whole);
+    assert_eq!(editor.findings(&path), []);
+    assert_eq!(editor.mends(&path, &whole), []);
+    editor.end();
+}
+
+#[test]
+fn words_keys_and_headings_are_told_in_texts_that_are_not_finished() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let made = binary::outcome(folder.path(), &["new", "own"]);
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let (pddl, toml) = (folder.path().join("own/domain.pddl"), folder.path().join("own/domain.toml"));
+    let read = |path: &Path| std::fs::read_to_string(path).expect("text");
+    let (mut text, keys) = (read(&pddl), read(&toml));
+    let at = text.find(":effect").expect("an effect");
+    let closed = text[..at].rfind("))").expect("a condition is closed");
+    text.replace_range(closed..closed + 2, ")");
+
+    let mut editor = Editor::begin();
+    editor.open(&pddl, &text);
+    assert!(editor.findings(&pddl).iter().any(|(code, _)| code == "unbalanced"));
+    let said = editor.hover(&pddl, &text, "(at start (at ?", 12);
+    assert!(said.contains("sensed:"), "{said}");
+
+    let action = "[action.observe]";
+    editor.open(&toml, &keys);
+    for (sought, further, word) in [
+        (action, 10, ":parameters"),
+        (action, 3, "How each action is carried out"),
+        ("retries", 2, "tried again so often"),
+        ("[[goal]]", 4, "What may be said"),
+    ] {
+        let said = editor.hover(&toml, &keys, sought, further);
+        assert!(said.contains(word), "{sought}: {said}");
+    }
     editor.end();
 }
 

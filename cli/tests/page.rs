@@ -61,6 +61,13 @@ fn a_page_stands_alone_and_tells_the_run() {
         .iter()
         .find(|text| ["(move ", "(observe ", "(confidence ", "_"].iter().any(|r| text.contains(r)));
     assert_eq!(raw, None, "this is no sentence");
+    // After each look it is said how sure it is, why it is no surer, and how much is unseen.
+    let known: Vec<&str> =
+        story["known"].as_array().into_iter().flatten().filter_map(|k| k["text"].as_str()).collect();
+    assert_eq!(known.len(), looks, "{known:?}");
+    for word in ["The certainty of where cup A stands is now 0.", "It is no more because ", "% are left)"] {
+        assert!(known[0].contains(word), "{word}: {}", known[0]);
+    }
     assert!(page.len() < 1_000_000 * (looks + 1), "{} bytes for {looks} looks", page.len());
     in_a_browser(folder.path());
 }
@@ -82,7 +89,7 @@ fn in_a_browser(folder: &Path) {
         return;
     };
     let drawn = String::from_utf8_lossy(&drawn.stdout);
-    for part in ["<b>achieved</b>", "<title>cup A ", "<polyline", "class=\"see now\""] {
+    for part in ["<b>achieved</b>", "<title>cup A ", "<polyline", "class=\"see now\"", "Seen by now: "] {
         assert!(drawn.contains(part), "{part} is not drawn");
     }
 }

@@ -126,7 +126,7 @@ impl fmt::Display for Note {
                 let round = and_round(*cylinders);
                 write!(
                     f,
-                    "map       {walls} walls of {walls_m:.1} m{round}, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; stood {cm:.1} cm and {degrees:.1}° off"
+                    "map       {walls} walls of {walls_m:.1} m{round}, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; the body stood {cm:.1} cm and {degrees:.1}° from where it believed"
                 )?;
                 surfaces.iter().try_for_each(|text| write!(f, "\n          {text}"))
             }
@@ -137,7 +137,8 @@ impl fmt::Display for Note {
                     (_, n, true) => write!(f, "visit     {waypoint}, {n} times so far: as it was")?,
                     (_, n, false) => write!(f, "visit     {waypoint}, {n} times so far")?,
                 }
-                write!(f, "; stood {:.1} cm and {:.1}° off", 1e2 * moved_m, turned_rad.to_degrees())?;
+                let (cm, degrees) = (1e2 * moved_m, turned_rad.to_degrees());
+                write!(f, "; the body stood {cm:.1} cm and {degrees:.1}° from where it believed")?;
                 came.iter().try_for_each(|text| write!(f, "\n          came: {text}"))?;
                 gone.iter().try_for_each(|text| write!(f, "\n          gone: {text}"))
             }

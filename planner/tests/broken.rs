@@ -29,6 +29,7 @@ fn each_fault_is_drawn_where_it_is() {
         ("goal-of-wrong-type", "base-domain.pddl", Some("goal-of-wrong-type.pddl")),
         ("missing-parenthesis", "missing-parenthesis.pddl", None),
         ("missing-inner-parenthesis", "missing-inner-parenthesis.pddl", None),
+        ("missing-hanging-parenthesis", "missing-hanging-parenthesis.pddl", None),
         ("missing-last-parenthesis", "missing-last-parenthesis.pddl", None),
         ("surplus-parenthesis", "surplus-parenthesis.pddl", None),
         ("wrong-argument-type", "wrong-argument-type.pddl", None),

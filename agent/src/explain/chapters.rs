@@ -3,6 +3,7 @@
 use descry_domains::note::Note;
 use descry_memory::{Document, Query, Record, RecordId};
 
+use super::standings::{Standing, Standings};
 use super::states::{Difference, States};
 use crate::exit::CommandError;
 use crate::report::Event;
@@ -26,6 +27,8 @@ pub struct Chapter {
     pub steps: Vec<String>,
     /// What it takes to its end, seconds.
     pub makespan_s: f64,
+    /// How things stood when it was made; none: the record does not say.
+    pub before: Option<Standing>,
     /// What it was weighed against; none: the record does not say.
     pub weighed: Option<Weighed>,
     /// What happened from then on.
@@ -36,7 +39,9 @@ pub struct Chapter {
 #[derive(Debug)]
 pub enum Deed {
     /// A step began.
-    Began,
+    Began(String),
+    /// How things stand by then.
+    Stands(Standing),
     /// What came of a step.
     Ended(String, String),
     /// A step failed.
@@ -67,6 +72,7 @@ pub fn of(
 ) -> Result<(Vec<Chapter>, Vec<String>), CommandError> {
     let found = record.find_whole(&Query::of_kind("event")).map_err(CommandError::broken)?;
     let (documents, faults) = found;
+    let standings = Standings::of(record)?;
     let mut lost: Vec<String> = faults.iter().map(ToString::to_string).collect();
     let first_ns = documents.first().map_or(0, |d| d.stamp_ns);
     let mut chapters: Vec<Chapter> = Vec::new();
@@ -82,12 +88,28 @@ pub fn of(
                 let because =
                     because.split("; the search ended after ").next().unwrap_or_default().to_string();
                 let most = one_of(&because).and_then(|begins| states.most(document.id, &begins));
-                let deeds = Vec::new();
-                chapters.push(Chapter { round, at_s, because, cut, most, steps, makespan_s, weighed, deeds });
+                let before = standings.at(document);
+                if let (Some(chapter), Some(standing)) = (chapters.last_mut(), &before) {
+                    chapter.deeds.push(Deed::Stands(standing.clone()));
+                }
+                let made = Chapter {
+                    round,
+                    at_s,
+                    because,
+                    cut,
+                    most,
+                    steps,
+                    makespan_s,
+                    before,
+                    weighed,
+                    deeds: Vec::new(),
+                };
+                chapters.push(made);
                 None
             }
-            Event::Goal { .. } | Event::Kept { .. } => None,
-            Event::Acting { .. } => Some(Deed::Began),
+            Event::Goal { .. } => None,
+            Event::Kept { .. } => standings.at(document).map(Deed::Stands),
+            Event::Acting { call, .. } => Some(Deed::Began(call)),
             Event::Acted { call, outcome } => Some(Deed::Ended(call, outcome)),
             Event::Failed { call, because, therefore } => {
                 Some(Deed::Failed { call, because, therefore, changed: states.across(document.id) })
@@ -100,7 +122,55 @@ pub fn of(
             chapter.deeds.extend((0..std::mem::take(&mut cuts)).map(|_| Deed::Resumed));
         }
     }
+    if let Some(chapter) = chapters.last_mut() {
+        chapter.deeds.extend(standings.last().map(Deed::Stands));
+    }
     Ok((chapters, lost))
+}
+
+impl Chapter {
+    /// Its steps as they are written in a plan, without their times: those that were carried out to their end, and the others.
+    pub fn steps_done(&self) -> (Vec<&str>, Vec<&str>) {
+        let mut done: Vec<&str> = Vec::new();
+        for deed in &self.deeds {
+            match deed {
+                Deed::Began(call) => done.push(call),
+                Deed::Failed { call, .. } => done.retain(|began| began != call),
+                _ => {}
+            }
+        }
+        let mut began = done.clone();
+        let is_open = |step: &&str| match began.iter().position(|call| call == step) {
+            Some(at) => {
+                began.remove(at);
+                false
+            }
+            None => true,
+        };
+        let open = self.steps.iter().map(|step| bare(step)).filter(is_open).collect();
+        (done, open)
+    }
+
+    /// How things stood after each of its steps.
+    pub fn stood(&self) -> impl Iterator<Item = &Standing> {
+        self.deeds.iter().filter_map(|deed| if let Deed::Stands(now) = deed { Some(now) } else { None })
+    }
+
+    /// What failed in it.
+    pub fn failures(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.deeds.iter().filter_map(|deed| match deed {
+            Deed::Failed { call, because, .. } => Some((call.as_str(), because.as_str())),
+            _ => None,
+        })
+    }
+}
+
+/// A step as it is written in a plan, without its times.
+pub fn bare(step: &str) -> &str {
+    match (step.find('('), step.find(')')) {
+        (Some(from), Some(to)) if from < to => &step[from..=to],
+        _ => step,
+    }
 }
 
 /// How the numbers begin of which one would do: `(f a ` of `(exists (?x) (>= (f a ?x) …`.

@@ -2,13 +2,15 @@
 
 use descry_domains::note::Note;
 
-use super::chapters::{Chapter, Deed};
-use super::wording::{count, reasons, share};
-use super::{Asked, Told};
+use super::chapters::{Chapter, Deed, bare};
+use super::wording::{capital, listed, reasons, share};
+use super::{Asked, Told, outcomes};
 use crate::weigh::{Expected, Way, Weighed};
 
 /// Numbers that are named; the rest are counted.
 const MOST_NAMED: usize = 3;
+/// Steps left out that are named; the rest are counted.
+const MOST_LEFT_OUT: usize = 4;
 /// Rates nearer to each other than this share are alike.
 const ALIKE: f64 = 0.02;
 /// As many ways as are kept in the order of their rates.
@@ -16,25 +18,53 @@ const MOST_KEPT: usize = crate::weigh::MOST_KEPT;
 
 /// All plans of a run.
 pub fn told(chapters: &[Chapter], asked: &Asked<'_>) -> Vec<Told> {
-    let before = std::iter::once(None).chain(chapters.iter().map(Some));
-    chapters.iter().zip(before).map(|(chapter, before)| tell(chapter, before, asked)).collect()
+    let at = |n: usize| chapters.get(n);
+    let all = chapters.iter().enumerate();
+    all.map(|(n, chapter)| tell(chapter, n.checked_sub(1).and_then(at), at(n + 1), asked)).collect()
 }
 
-fn tell(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Told {
+fn tell(chapter: &Chapter, before: Option<&Chapter>, after: Option<&Chapter>, asked: &Asked<'_>) -> Told {
     Told {
         round: chapter.round,
         at_s: chapter.at_s,
         cause: cause(chapter, before, asked),
         intent: intent(chapter, asked),
         why: why(chapter, asked),
-        outcome: chapter.deeds.iter().filter_map(outcome).collect(),
+        outcome: outcomes::of(chapter, asked.name).into_iter().map(|outcome| outcome.said).collect(),
+        done: done(chapter, after, asked),
     }
+}
+
+/// Which steps of a plan were carried out, which were not, and why.
+fn done(chapter: &Chapter, after: Option<&Chapter>, asked: &Asked<'_>) -> String {
+    let (_, open) = chapter.steps_done();
+    let all = chapter.steps.len();
+    if open.is_empty() {
+        return if all == 1 { "its only step.".into() } else { format!("all of its {all} steps.") };
+    }
+    let done = if open.len() == all { "none".into() } else { (all - open.len()).to_string() };
+    let failed = chapter.failures().last().map(|(call, _)| call);
+    let left_out: Vec<String> =
+        open.iter().filter(|step| failed != Some(**step)).map(|step| step.to_string()).collect();
+    let left_out = listed(&left_out, MOST_LEFT_OUT);
+    let because = match (failed, after) {
+        (Some(call), _) if left_out.is_empty() => {
+            return format!("{done} of its {all} steps: {call} failed.");
+        }
+        (Some(call), _) => {
+            return format!("{done} of its {all} steps: {call} failed. Left out with it: {left_out}.");
+        }
+        (None, Some(after)) => format!("plan {} was made instead, for what is said there", after.round),
+        (None, None) if asked.has_ended => "the run ended before, for what is said below".into(),
+        (None, None) => "the record ends here".into(),
+    };
+    format!("{done} of its {all} steps. Left out: {left_out}, because {because}.")
 }
 
 /// What a plan was caused by: the failure, or what was learned, that ended the one before; or that it had been done and was not enough.
 fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> String {
     let Some(before) = before else { return "the run began, and there was no plan.".into() };
-    let last = before.deeds.iter().rev().find(|deed| !matches!(deed, Deed::Resumed));
+    let last = before.deeds.iter().rev().find(|deed| !matches!(deed, Deed::Resumed | Deed::Stands(_)));
     if let Some(Deed::Failed { call, therefore, .. }) = last {
         return format!("{call} failed. What follows from that: {}.", reasons::follows(therefore));
     }
@@ -42,8 +72,7 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
         Deed::Noted(Note::Changed { because }) => Some(format!("something was moved: {because}. ")),
         _ => None,
     });
-    let begun = before.deeds.iter().filter(|deed| matches!(deed, Deed::Began)).count();
-    let done = match before.steps.len().saturating_sub(begun) {
+    let done = match before.steps_done().1.len() {
         0 => {
             let now = reasons::missed(&chapter.because, "is", asked.counts);
             format!("plan {} was carried out to its end, and {now}.", before.round)
@@ -54,18 +83,11 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
             format!("with what was learned, the {rest} left of plan {} would not do: {now}.", before.round)
         }
     };
+    let done = if moved.is_some() { capital(&done) } else { done };
     // None of many that are all nothing is the greatest.
     let most = chapter.most.as_ref().filter(|(_, most)| share(*most) != share(0.0));
     let most = most.map(|(name, most)| format!(" The greatest: {name}, {most:.3}."));
     format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
-}
-
-/// A step as it is written in a plan, without its times.
-fn bare(step: &str) -> &str {
-    match (step.find('('), step.find(')')) {
-        (Some(from), Some(to)) if from < to => &step[from..=to],
-        _ => step,
-    }
 }
 
 fn intent(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
@@ -107,8 +129,17 @@ fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
                 .into(),
         ];
     };
+    let longer = weighed.shorter.as_ref().map(|way| {
+        format!(
+            "{} would do the same in {:.1} s instead of {:.1} s: the planner did not come upon that.",
+            steps(way),
+            way.takes_s,
+            chosen.takes_s
+        )
+    });
     if weighed.others.is_empty() {
-        return vec![format!("{} was the only way known to get further.", steps(chosen))];
+        let only = format!("{} was the only way known to get further.", steps(chosen));
+        return std::iter::once(only).chain(longer).collect();
     }
     let mut named = Named::default();
     let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
@@ -120,6 +151,7 @@ fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
             if more_s > 0.0 { format!(", but is reckoned at {more_s:.1} s more") } else { String::new() };
         said.push(format!("{} gains most{more}.", named.once(other)));
     }
+    said.extend(longer);
     said
 }
 
@@ -248,57 +280,6 @@ fn quickest(
     Some(format!("{} is the quickest{but}.", named.once(other)))
 }
 
-/// What came of a step, in a sentence; none where nothing did that has not been said.
-fn outcome(deed: &Deed) -> Option<String> {
-    Some(match deed {
-        Deed::Began => return None,
-        Deed::Ended(call, said) => format!("{call}: {said}."),
-        Deed::Failed { call, because, changed, .. } => {
-            let since = changed.as_ref().filter(|c| !c.is_empty());
-            let since = since.map(|c| format!(" From then on: {c}.")).unwrap_or_default();
-            format!("{call} failed: {because}.{since}")
-        }
-        Deed::Resumed => {
-            "here the run was cut off; it was gone on with from its record, and what had been done was not done again."
-                .into()
-        }
-        Deed::Noted(Note::Perceived { on, merged, left_out, residual_m, objects, changed, .. }) => {
-            let views = match merged {
-                1 => "one view".to_string(),
-                n => format!("{n} views ({:.1} mm apart)", residual_m * 1e3),
-            };
-            let left_out: String = left_out.iter().map(|why| format!("; {}", left_out_as(why))).collect();
-            let changed: String = changed.iter().map(|text| format!("; {text}")).collect();
-            format!("the {on}, in {views}, shows {}{left_out}{changed}.", shown(objects.len()))
-        }
-        // What to set otherwise is for who programs it.
-        Deed::Noted(Note::Nothing { because }) => {
-            let why = because.split(": ").next().and_then(|why| why.split(" among the ").next()).unwrap_or(because);
-            format!("the look showed nothing that things could stand on: {why}.")
-        }
-        Deed::Noted(note) => {
-            let text = note.to_string();
-            let mut lines = text.lines().map(str::trim);
-            let first = lines.next().unwrap_or_default();
-            let first = first.split_once(' ').map_or(first, |(_, rest)| rest.trim());
-            let all: Vec<&str> = std::iter::once(first).chain(lines).collect();
-            format!("{}.", all.join("; "))
-        }
-    })
-}
-
-fn shown(objects: usize) -> String {
-    if objects == 0 { "no object".into() } else { count(objects, "object") }
-}
-
-/// Why a view is left out: `view 1 left out: left out: …` says it twice.
-fn left_out_as(said: &str) -> String {
-    match said.split_once(" left out: ") {
-        Some((view, why)) => format!("{view} is left out: {}", why.strip_prefix("left out: ").unwrap_or(why)),
-        None => format!("left out: {said}"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -310,11 +291,18 @@ mod tests {
     /// The first plan of a run, which takes ten seconds to its end, and why it was this one.
     fn check(chosen: Option<Way>, others: &[Way], cut: Option<&str>, words: &[&str]) {
         let numbers = vec![Expected { name: "(sure)".into(), now: 0.0, then: 1.25 }];
-        let weighed = Weighed { numbers, open: others.len() + 1, chosen, others: others.to_vec() };
+        let weighed =
+            Weighed { numbers, open: others.len() + 1, chosen, others: others.to_vec(), shorter: None };
         let cut = cut.map(str::to_string);
         let chapter = Chapter { makespan_s: 10.0, weighed: Some(weighed), cut, ..Chapter::default() };
-        let asked = Asked { goal: "(>= (sure) 0.8)".into(), policy: None, counts: &|_| None };
-        let told = tell(&chapter, None, &asked);
+        let asked = Asked {
+            goal: "(>= (sure) 0.8)".into(),
+            policy: None,
+            counts: &|_| None,
+            name: &str::to_string,
+            has_ended: true,
+        };
+        let told = tell(&chapter, None, None, &asked);
         let said = [told.intent, told.why].concat().join(" ");
         words.iter().for_each(|word| assert!(said.contains(word), "{word:?} is not in {said}"));
     }

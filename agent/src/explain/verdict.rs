@@ -10,10 +10,10 @@ use descry_memory::{Document, Query, Record};
 
 use super::states::{Difference, States};
 use super::wording::reasons::{self, Meanings};
-use super::wording::{count, listed, share};
+use super::wording::{count, listed, place, share};
 use crate::exit::CommandError;
 use crate::report::{self, Report};
-use crate::weigh::{self, InDoubt, Rests, Seen};
+use crate::standing::{self, InDoubt, Of, Rests, Seen};
 
 /// Objects that are described one by one; the rest are counted.
 const MOST_NAMED: usize = 6;
@@ -42,7 +42,7 @@ pub fn rests_on(
     let Some(report) = report else {
         return Ok(vec!["there is no verdict: the run was cut off (descry do --resume goes on with it), or its report is lost.".into()]);
     };
-    let rests = record.newest(weigh::RESTS).map_err(CommandError::broken)?;
+    let rests = record.newest(standing::RESTS).map_err(CommandError::broken)?;
     let rests = rests.and_then(|d| serde_json::from_value::<Rests>(d.body).ok());
     // Why it ended is said last.
     let end = rests.as_ref().map(|rests| rests.said.as_str()).filter(|end| !end.is_empty());
@@ -65,7 +65,7 @@ pub fn rests_on(
             let since = since.filter(|since: &Difference| !since.is_empty());
             said.extend(since.map(|since| format!("and by what was done since that look: {since}.")));
         }
-        None if report.objects.is_empty() => said.push("nothing was believed to be anywhere.".into()),
+        None if report.objects.is_empty() => said.push("no object was looked for.".into()),
         None => said.push("what was believed of each object is not in the record.".into()),
     }
     let looks = Looks::of(record)?;
@@ -118,8 +118,10 @@ fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> 
         may_be.iter().take(MOST_NAMED).map(|t| object(t, Some(name), words)).collect();
     let (rest, known) = (tracks.len() - may_be.len(), belief.tracks.len());
     said.push(match (known, rest) {
-        (0, _) => "no object is believed to stand anywhere.".into(),
-        (_, 0) => format!("there is no other object: {} in all.", count(known, "object")),
+        (0, _) => "no object was seen.".into(),
+        (_, 0) => format!("no other object was seen: {} in all.", count(known, "object")),
+        (1, 1) => format!("the one object that was seen is surely not {name}."),
+        (_, rest) if rest == known => format!("all {rest} objects that were seen are surely not {name}."),
         (_, 1) => format!("one other object is surely not {name}."),
         (_, rest) => format!("{rest} other objects are surely not {name}."),
     });
@@ -143,9 +145,9 @@ fn object(track: &Track, asked: Option<&str>, words: &Words<'_>) -> String {
         "" => "is in the hand".into(),
         on => format!("stands on the {}", (words.name)(on)),
     };
-    let [x, y, _]: [f64; 3] = track.position_m.coords.into();
     format!(
-        "what {on} at ({x:.2}, {y:.2}) m is {} with {}{others}; {} looked at it, and {:.0} % of its outside was seen.",
+        "what {on} at {} is {} with a probability of {}{others}; {} showed it, and {:.0} % of its outside was seen.",
+        place(track),
         first.0,
         share(first.1),
         count(track.evidence.views, "view"),
@@ -198,8 +200,13 @@ fn seen(doubt: &InDoubt, looks: &Looks) -> String {
             format!("{} {were}", listed(others, others.len()))
         }),
     };
+    let about = match doubt.of {
+        Of::Thing => format!("of where {} may be", doubt.about),
+        Of::Kind => format!("of where a {} may be", doubt.about),
+        Of::Surface => "in all".into(),
+    };
     match looked_at.into_iter().map(one).collect::<Vec<_>>().as_slice() {
-        [] => format!("nothing was seen of where {} may be{not}.", doubt.about),
-        all => format!("of where {} may be, this was seen: {}{not}.", doubt.about, all.join(", ")),
+        [] => format!("nothing was seen {about}{not}."),
+        all => format!("{about}, this was seen: {}{not}.", all.join(", ")),
     }
 }

@@ -2,6 +2,8 @@
 
 pub mod reasons;
 
+use descry_memory::belief::Track;
+
 /// So many of something.
 pub fn count(n: usize, of: &str) -> String {
     let all = if n == 1 { "" } else { "s" };
@@ -18,6 +20,18 @@ pub fn listed(all: &[String], most: usize) -> String {
     }
 }
 
+/// A sentence, which begins with a capital.
+pub fn capital(text: &str) -> String {
+    let mut signs = text.chars();
+    signs.next().map(|first| first.to_uppercase().chain(signs).collect()).unwrap_or_default()
+}
+
+/// Where an object stands, in the map.
+pub fn place(track: &Track) -> String {
+    let [x, y, z]: [f64; 3] = track.position_m.coords.into();
+    format!("({x:.2}, {y:.2}, {z:.2}) m")
+}
+
 /// A share, a probability or a number of a domain: two digits, three below a tenth, four near 0 and 1.
 pub fn share(value: f64) -> String {
     if (0.01..0.1).contains(&value) {
@@ -28,6 +42,17 @@ pub fn share(value: f64) -> String {
         return format!("{:.2}", value + 0.0).replace("-0.00", "0.00");
     }
     format!("{value:.4}").trim_end_matches('0').to_string()
+}
+
+/// A share where another is wanted: with more digits where it is less and would read the same.
+pub fn share_of(value: f64, wanted: f64) -> String {
+    let said = share(value);
+    if value < wanted && said == share(wanted) { below(value) } else { said }
+}
+
+/// Four digits, never more than the number is.
+pub fn below(value: f64) -> String {
+    format!("{:.4}", (value * 1e4).floor() / 1e4)
 }
 
 /// A text in lines of at most so many letters, the first behind a sign, the others as far in.
@@ -118,5 +143,6 @@ mod tests {
             (9.1364, "9.14"),
         ];
         cases.iter().for_each(|(value, text)| assert_eq!(share(*value), *text));
+        assert_eq!([share_of(0.89967, 0.9), share_of(0.912, 0.9)], ["0.8996", "0.91"]);
     }
 }

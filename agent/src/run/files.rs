@@ -89,7 +89,8 @@ pub fn has_ended(folder: &Path) -> bool {
 /// # Errors
 /// [`CommandError::Broken`] if it cannot be kept.
 pub(super) fn put_report(record: &Record, now_ns: i64, report: &Report) -> Result<(), CommandError> {
-    let report = Report { run: String::new(), wall_s: 0.0, ..report.clone() };
+    let report =
+        Report { run: String::new(), wall_s: 0.0, planning_s: 0.0, geometry_s: 0.0, ..report.clone() };
     let mut draft = Draft { kept: true, ..Draft::new(REPORTED, now_ns.max(0)) };
     draft.meta.body = serde_json::to_value(report).map_err(|e| CommandError::Bug(e.to_string()))?;
     record.put(draft).map(|_| ()).map_err(CommandError::broken)

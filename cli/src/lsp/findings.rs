@@ -12,6 +12,7 @@ use lsp_types::{
     PublishDiagnosticsParams, Uri,
 };
 
+use super::mends;
 use super::texts::{Lines, Texts, path_of, uri_of};
 use super::units::{self, Unit};
 
@@ -19,6 +20,8 @@ use super::units::{self, Unit};
 #[derive(Default)]
 pub struct Told {
     files: BTreeSet<PathBuf>,
+    /// How the words of a domain's folder were grounded when it could be read last.
+    grounded: BTreeMap<PathBuf, Vec<String>>,
 }
 
 impl Told {
@@ -26,8 +29,12 @@ impl Told {
     pub fn after(&mut self, texts: &Texts, uri: &Uri) -> Vec<PublishDiagnosticsParams> {
         let path = path_of(uri);
         let text = texts.text(&path).unwrap_or_default();
-        let mut said: BTreeMap<PathBuf, Vec<Shown>> = of_text(texts, &path, &text);
-        if matches!(units::of(texts, &path, &text), Unit::Domain | Unit::Folder(_)) {
+        let unit = units::of(texts, &path, &text);
+        let mut said: BTreeMap<PathBuf, Vec<Shown>> = match &unit {
+            Unit::Folder(folder) => self.of_folder(texts, folder),
+            _ => of_text(texts, &path, &text),
+        };
+        if matches!(unit, Unit::Domain | Unit::Folder(_)) {
             for other in texts.paths().filter(|other| **other != path) {
                 let text = texts.text(other).unwrap_or_default();
                 let depends = units::of(texts, other, &text) == Unit::Problem
@@ -53,6 +60,22 @@ impl Told {
         said.into_iter().filter_map(publish).collect()
     }
 
+    /// What is to be said about a domain's folder; keeps how its words are grounded, of a text that is not finished as far as that can
+    /// be read once what is open is closed.
+    fn of_folder(&mut self, texts: &Texts, folder: &Path) -> BTreeMap<PathBuf, Vec<Shown>> {
+        let (said, grounding) = of_folder(texts, folder);
+        let is_known = self.grounded.contains_key(folder);
+        let grounding =
+            grounding.or_else(|| if is_known { None } else { grounding_once_closed(texts, folder) });
+        self.grounded.extend(grounding.map(|grounding| (folder.to_path_buf(), grounding)));
+        said
+    }
+
+    /// How the words of a folder are grounded, or were when it could be read last; that may be as long as an author types.
+    pub fn grounding(&self, folder: &Path) -> &[String] {
+        self.grounded.get(folder).map_or(&[], Vec::as_slice)
+    }
+
     /// Nothing is said any more about a text that was closed.
     pub fn forget(&mut self, uri: &Uri) -> PublishDiagnosticsParams {
         self.files.remove(&path_of(uri));
@@ -63,7 +86,7 @@ impl Told {
 /// What is to be said about a text and what it is a part of, by file.
 fn of_text(texts: &Texts, path: &Path, text: &str) -> BTreeMap<PathBuf, Vec<Shown>> {
     match units::of(texts, path, text) {
-        Unit::Folder(folder) => of_folder(texts, &folder),
+        Unit::Folder(folder) => of_folder(texts, &folder).0,
         Unit::Other => BTreeMap::new(),
         Unit::Domain => match units::source(texts, path) {
             Some(domain) => by_file(&descry_planner::check(&domain, None)),
@@ -96,14 +119,25 @@ fn of_problem(texts: &Texts, path: &Path, text: &str) -> BTreeMap<PathBuf, Vec<S
     by_file(&descry_planner::check(&domain, Some(&source)))
 }
 
-/// The whole folder of a domain: what `descry check DIR` says.
-fn of_folder(texts: &Texts, folder: &Path) -> BTreeMap<PathBuf, Vec<Shown>> {
+/// How the words of a folder are grounded once the lists that are open in its PDDL are closed.
+fn grounding_once_closed(texts: &Texts, folder: &Path) -> Option<Vec<String>> {
+    let mut files = units::files(texts, folder);
+    let (_, text) = files.get_mut("domain.pddl")?;
+    *text = mends::all_closed(text)?;
+    let domain = from_files(files, Some(folder.to_path_buf())).ok()?;
+    Some(descry_domains::check::grounding(&domain))
+}
+
+/// The whole folder of a domain: what `descry check DIR` says, and how its words are grounded where it can be read.
+fn of_folder(texts: &Texts, folder: &Path) -> (BTreeMap<PathBuf, Vec<Shown>>, Option<Vec<String>>) {
     let files = units::files(texts, folder);
     let mut all: BTreeMap<PathBuf, Vec<Shown>> =
         files.values().map(|(name, _)| (PathBuf::from(name), Vec::new())).collect();
     let loaded = from_files(files.clone(), Some(folder.to_path_buf()));
+    let mut known = None;
     match crate::findings::of_folder(loaded) {
-        Ok((findings, _)) => {
+        Ok((findings, grounding)) => {
+            known = Some(grounding).filter(|grounding| !grounding.is_empty());
             let mut said = by_file(&findings);
             // Beside a fault of `domain.toml` those of the PDDL are worth their place.
             if findings.has_errors()
@@ -127,7 +161,7 @@ fn of_folder(texts: &Texts, folder: &Path) -> BTreeMap<PathBuf, Vec<Shown>> {
             }
         }
     }
-    all
+    (all, known)
 }
 
 /// Where an error is that is no finding: its file, the place in it, and what is said.
@@ -213,6 +247,7 @@ fn shown(finding: &Diagnostic, text: &str, all: Option<&Findings>) -> Shown {
         source: Some("descry".into()),
         message,
         related_information: (!related.is_empty()).then_some(related),
+        data: mends::of(finding, text),
         ..Shown::default()
     }
 }

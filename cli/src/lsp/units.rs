@@ -49,6 +49,13 @@ pub fn of(texts: &Texts, path: &Path, text: &str) -> Unit {
     }
 }
 
+/// The part of a domain's folder that a TOML file is by its name: `domain.toml`, or the folder that it stands in.
+pub fn part_of(path: &Path) -> Option<&str> {
+    path.extension().filter(|e| *e == "toml")?;
+    let name = path.file_name()?.to_str()?;
+    if name == "domain.toml" { Some(name) } else { path.parent()?.file_name()?.to_str() }
+}
+
 /// The folder of the domain that a file is a part of.
 fn folder_of(texts: &Texts, path: &Path) -> Option<PathBuf> {
     let is_domain =

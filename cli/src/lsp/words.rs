@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use descry_domains::load::from_files;
 use descry_planner::pddl::parse::{ACTION_PARTS, DOMAIN_SECTIONS, PROBLEM_SECTIONS};
 use descry_planner::{Source, Span};
 use lsp_types::{
@@ -12,6 +11,8 @@ use lsp_types::{
 };
 
 use super::declared::{self, Declared, Kind, word_at};
+use super::findings::Told;
+use super::keys;
 use super::texts::{Lines, Texts, offset, path_of, uri_of};
 use super::units::{self, Unit};
 
@@ -56,14 +57,31 @@ fn here(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Here> {
     Some(Here { path, text, at })
 }
 
-/// What a word is: its declaration with what is written about it, and in a domain's folder how it is grounded.
-pub fn hover(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Hover> {
-    const LONGEST: usize = 2_000;
+/// What a word is: its declaration with what is written about it, in a domain's folder how it is grounded, and what a heading or a
+/// key of TOML means.
+pub fn hover(texts: &Texts, told: &Told, at: &TextDocumentPositionParams) -> Option<Hover> {
     let Here { path, text, at } = here(texts, at)?;
-    let (start, word) = word_at(&text, at);
-    let name = word.to_lowercase();
+    let key = units::part_of(&path).and_then(|part| keys::here(part, &text, at));
+    let (start, word) = key.as_ref().map_or_else(|| word_at(&text, at), |key| key.name);
+    let meaning = key.as_ref().map(|key| key.meaning.clone()).filter(|meaning| !meaning.is_empty());
+    // A key is no word of the domain, however it is called.
+    let parts = match meaning {
+        Some(meaning) => vec![meaning],
+        None => about(texts, told, (&path, &text), &word.to_lowercase()),
+    };
+    if parts.is_empty() {
+        return None;
+    }
+    let range = Lines::of(&text).range(span(start, start + word.len()));
+    let contents = MarkupContent { kind: MarkupKind::Markdown, value: parts.join("\n\n") };
+    Some(Hover { contents: HoverContents::Markup(contents), range: Some(range) })
+}
+
+/// What a name is where a text can name it.
+fn about(texts: &Texts, told: &Told, (path, text): (&Path, &str), name: &str) -> Vec<String> {
+    const LONGEST: usize = 2_000;
     let mut parts: Vec<String> = Vec::new();
-    for (_, text, declared) in in_scope(texts, &path, &text) {
+    for (_, text, declared) in in_scope(texts, path, text) {
         for one in declared.iter().filter(|d| d.name == name) {
             let whole: String =
                 text[one.whole.start as usize..one.whole.end as usize].chars().take(LONGEST).collect();
@@ -72,28 +90,19 @@ pub fn hover(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Hover> {
             parts.extend((!comments.is_empty()).then(|| comments.join("\n")));
         }
     }
-    if let Unit::Folder(folder) = units::of(texts, &path, &text)
-        && let Ok(domain) = from_files(units::files(texts, &folder), Some(folder))
-    {
+    if let Unit::Folder(folder) = units::of(texts, path, text) {
         let is_it = |line: &&String| {
             let line = line.trim_start();
             let named = |open: char, close: char| {
-                let rest = line.strip_prefix(open).and_then(|l| l.strip_prefix(name.as_str()));
+                let rest = line.strip_prefix(open).and_then(|l| l.strip_prefix(name));
                 rest.is_some_and(|rest| rest.starts_with([' ', close]))
             };
             named('(', ')') || named('[', ']')
         };
-        let grounding = descry_domains::check::grounding(&domain);
-        let said =
-            grounding.iter().filter(is_it).map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "));
-        parts.extend(said);
+        let said = told.grounding(&folder).iter().filter(is_it);
+        parts.extend(said.map(|line| line.split_whitespace().collect::<Vec<_>>().join(" ")));
     }
-    if parts.is_empty() {
-        return None;
-    }
-    let range = Lines::of(&text).range(span(start, start + word.len()));
-    let contents = MarkupContent { kind: MarkupKind::Markdown, value: parts.join("\n\n") };
-    Some(Hover { contents: HoverContents::Markup(contents), range: Some(range) })
+    parts
 }
 
 fn span(start: usize, end: usize) -> Span {

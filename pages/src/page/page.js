@@ -171,6 +171,10 @@ function planOf(at) {
 
 // How sure: the best probability of each known object after each look.
 function sureOf(at) {
+  // Several things may be asked for: of each, how it stands by now.
+  const by = latest(story.known, at)?.at_s;
+  $("known").textContent = story.known.filter(k => k.at_s === by).map(k => k.text).join(" ") || "Nothing was looked at yet.";
+  $("known").hidden = !story.known.length;
   const svg = $("sure"), names = [...new Set(story.beliefs.flatMap(b => Object.keys(b.best)))];
   svg.replaceChildren();
   // What is hidden has no width: this comes first.

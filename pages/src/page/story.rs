@@ -11,7 +11,8 @@ use serde_json::Value;
 
 use super::points::{self, Near, Packed};
 use descry_agent::exit::CommandError;
-use descry_agent::explain::wording::reasons;
+use descry_agent::explain;
+use descry_agent::explain::wording::{capital, reasons};
 use descry_agent::report::{Event, Report};
 use descry_agent::run::Beginning;
 use descry_agent::saying::Saying;
@@ -41,6 +42,7 @@ pub struct Story {
     looks: Vec<Look>,
     stands: Vec<Stand>,
     beliefs: Vec<Believed>,
+    known: Vec<Known>,
     lost: Vec<String>,
 }
 
@@ -131,6 +133,13 @@ struct Believed {
     best: BTreeMap<String, f64>,
 }
 
+/// How things stood after a look: how sure it is of what was asked for, why it is no surer, and what is unseen.
+#[derive(Debug, Serialize)]
+struct Known {
+    at_s: f64,
+    text: String,
+}
+
 #[derive(Debug, Serialize)]
 struct Object {
     name: Option<String>,
@@ -157,6 +166,8 @@ pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result
     let saying = Beginning::of(record).ok().flatten().map(|b| Saying::of_run(&b)).unwrap_or_default();
     let (moments, plans) = told(&all, &events, &saying);
     let deeds = deeds(&all, &events);
+    let known = explain::after_looks(record, &saying)?.into_iter();
+    let known = known.map(|(stamp_ns, text)| Known { at_s: all.s(stamp_ns), text: capital(&text) }).collect();
     let clouds = all.find("cloud")?;
     looks.tell(&mut all, &clouds, &map)?;
     let stands = stands(&all, &map, &clouds);
@@ -178,6 +189,7 @@ pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result
         looks: looks.in_time(),
         stands,
         beliefs,
+        known,
         lost: all.lost,
     })
 }
@@ -230,7 +242,8 @@ fn told(all: &All<'_>, events: &[Document], saying: &Saying) -> (Vec<Moment>, Ve
         let what = match event {
             Event::Goal { .. } => "goal",
             Event::Planned { round, because, steps, .. } => {
-                let because = saying.say(&reasons::missed(&because, "is", &|_| None));
+                let because = because.split("; the search ended after ").next().unwrap_or_default();
+                let because = saying.say(&reasons::missed(because, "is", &|_| None));
                 text = format!("plan {round:<4} because {because}");
                 text.extend(steps.iter().map(|step| format!("\n          {}", planned(step, saying))));
                 plans.push(Planned { at_s, round, because, steps });

@@ -351,10 +351,20 @@ impl Builder<'_> {
         }
         if let Some(&list) = self.open.last() {
             let start = self.tree.nodes[list].start as usize;
-            if start < self.line_start && self.column(at) <= self.column(start) {
+            if start < self.line_start && self.column(at) <= self.edge(start) {
                 self.suspect = Some((list, at as u32));
             }
         }
+    }
+
+    /// The column that what belongs to a list stands right of: that of its sign; where nothing but its first word stands in its line,
+    /// that of the line.
+    fn edge(&self, start: usize) -> usize {
+        let line = self.text[..start].rfind('\n').map_or(0, |newline| newline + 1);
+        let rest = self.text[start + 1..].lines().next().unwrap_or_default();
+        let hangs = rest.split(';').next().unwrap_or_default().split_whitespace().count() <= 1;
+        let blanks = self.bytes[line..].iter().take_while(|byte| b" \t".contains(byte)).count();
+        self.column(if hangs { line + blanks } else { start })
     }
 
     /// Column of a byte, tabs to the next multiple of eight.

@@ -22,20 +22,33 @@ fn goal(because: &str, is: &str) -> Option<String> {
     }
     let found = short(&values.replacen(" is ", &format!(" {is} "), 1));
     Some(match bound(goal) {
-        Some((number, wanted)) if values.starts_with(number) => format!("{found}, and {wanted} is wanted"),
+        Some((number, wanted)) if values.starts_with(number) => {
+            format!("{}, and {wanted} is wanted", unlike(&found, values, &wanted))
+        }
         _ => format!("{found} where {goal} is wanted"),
     })
+}
+
+/// What was found, with more digits where it would read as what is wanted, and is less.
+fn unlike(found: &str, values: &str, wanted: &str) -> String {
+    let number = |text: &str| text.rsplit(' ').next().and_then(|last| last.parse::<f64>().ok());
+    match (number(values), number(wanted), found.rsplit_once(' ')) {
+        (Some(value), Some(least), Some((before, said))) if value < least && said.parse() == Ok(least) => {
+            format!("{before} {}", super::below(value))
+        }
+        _ => found.to_string(),
+    }
 }
 
 /// The number that a comparison is about, and what it has to be: `(>= N V)`.
 fn bound(condition: &str) -> Option<(&str, String)> {
     let rest = condition.strip_suffix(')')?;
-    let (most, rest) = match rest.strip_prefix("(>= (") {
-        Some(rest) => ("at least", rest),
-        None => ("at most", rest.strip_prefix("(<= (")?),
-    };
+    const SIGNS: [(&str, &str); 4] =
+        [("(>= (", "at least"), ("(<= (", "at most"), ("(> (", "more than"), ("(< (", "less than")];
+    let (most, rest) = SIGNS.iter().find_map(|(sign, most)| Some((*most, rest.strip_prefix(sign)?)))?;
     let end = rest.find(')')?;
-    let number = &condition[4..4 + end + 2];
+    let from = condition.len() - 1 - rest.len() - 1;
+    let number = &condition[from..from + end + 2];
     let value = rest[end + 1..].trim();
     let is_one = !value.contains(' ') && !value.is_empty();
     is_one.then(|| (number, format!("{most} {value}")))
@@ -150,13 +163,16 @@ fn refused(part: &str, meanings: Meanings<'_>) -> Option<String> {
     let named = calls.count();
     let more =
         list.rsplit_once(" and ").and_then(|(_, more)| more.strip_suffix(" more")?.trim().parse().ok());
-    let cases = match named + more.unwrap_or(0) {
-        0 => format!("for {first}]"),
-        others => format!("in {} cases", others + 1),
-    };
-    Some(match meanings(name) {
-        Some(about) => format!("{before}asked {about}, the answer is {answer} {cases}"),
-        None => format!("{before}{name} is {answer} {cases}"),
+    Some(match (meanings(name), named + more.unwrap_or(0)) {
+        (Some(about), 0) => format!("{before}asked {about}, the answer is {answer} for {first}]"),
+        (Some(about), others) => {
+            format!(
+                "{before}it was asked {} times {about}, and each time the answer was {answer}",
+                others + 1
+            )
+        }
+        (None, 0) => format!("{before}{name} is {answer} for {first}]"),
+        (None, others) => format!("{before}{name} is {answer} in {} cases", others + 1),
     })
 }
 
@@ -171,6 +187,10 @@ mod tests {
                 "the goal (>= (confidence cup-a) 0.8) is not reached: (confidence cup-a) is 0.628928",
                 "(confidence cup-a) would be only 0.629, and at least 0.8 is wanted",
             ),
+            (
+                "the goal (>= (completeness cup) 0.9) is not reached: (completeness cup) is 0.899671",
+                "(completeness cup) would be only 0.8996, and at least 0.9 is wanted",
+            ),
             ("the goal (on a b) is not reached", "(on a b) does not hold"),
             (
                 "step 2 (observe a b) at 28.464493 takes 2, 12.911622 is asked for",
@@ -183,6 +203,10 @@ mod tests {
             (
                 "step 1 (go) at 1: (>= (charge) 0.5) does not hold at its start: (charge) is 0.123456",
                 "(go) needs (charge) to be at least 0.5, and it is 0.123",
+            ),
+            (
+                "step 2 (merge a) at 5.1: (< (open a) 1) does not hold at its start: (open a) is 1",
+                "(merge a) needs (open a) to be less than 1, and it is 1",
             ),
             (
                 "the goal (<= (unseen) 0.1) is not reached: (unseen) is 0.25",
@@ -215,7 +239,7 @@ mod tests {
         let cases = [
             (
                 "the attachment of `w` said no to: [w a b], [w c d] and 5 more (with any of these answered otherwise there might be a plan)\nthe attachment of `v` said no to: [v x] (with any …)",
-                "asked whether it is worth it, the answer is no in 7 cases; v is no for [v x]",
+                "it was asked 7 times whether it is worth it, and each time the answer was no; v is no for [v x]",
             ),
             (
                 "it cannot be told, after 2 looks: the attachment of `w` said no to: [w x]",

@@ -60,10 +60,12 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
         }
     }
     let Checker { task, mut findings, .. } = checker;
-    // What follows from a missing parenthesis, or from what is not read, is no finding of its own.
+    // What follows from a missing parenthesis, or from what is not read, is no finding of its own; a misspelt name is.
     findings.retain(|finding| {
         let place = finding.labels.first().map_or(Span::default(), |label| label.span);
-        is_torn(finding) || !torn.iter().any(|&span| same_section(&sources, span, place))
+        is_torn(finding)
+            || is_misspelt(finding)
+            || !torn.iter().any(|&span| same_section(&sources, span, place))
     });
     // Stable: findings at one place stay in the order in which they were made.
     findings.sort_by_key(|finding: &Diagnostic| finding.labels.first().map(|label| label.span));
@@ -73,6 +75,12 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
 /// Whether a text could not be read as the lists that were meant.
 fn is_torn(finding: &Diagnostic) -> bool {
     matches!(finding.code, "unbalanced" | "too-deep")
+}
+
+/// Whether a name is meant to be another that is declared.
+fn is_misspelt(finding: &Diagnostic) -> bool {
+    let is_near = finding.help.as_ref().is_some_and(|help| help.starts_with("did you mean"));
+    matches!(finding.code, "undeclared-predicate" | "undeclared-function") && is_near
 }
 
 /// Whether two places are in one section, which begins with `(:` at the start of a line.

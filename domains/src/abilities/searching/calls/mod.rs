@@ -23,13 +23,13 @@ pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "can-see",
         reads: &[],
-        about: "whether a look from there shows any of the surface",
+        about: "whether a look from a pose shows any of a surface",
         answers: can_see::answer,
     },
     Meaning {
         name: "worth-a-look",
         reads: &["pushed"],
-        about: "whether a look from there may settle anything that is in doubt",
+        about: "whether a look from a pose may settle anything that is in doubt",
         answers: worth_a_look::answer,
     },
     Meaning {

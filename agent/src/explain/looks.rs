@@ -1,0 +1,302 @@
+//! What a look has brought: how sure it is now of what was asked for, why it is no surer, and what of the places has been seen.
+
+use descry_domains::lexicon::symbol;
+use descry_domains::note::Note;
+use descry_memory::belief::Track;
+
+use super::standings::{Standing, certainty};
+use super::wording::{count, listed, place, share, share_of};
+use crate::standing::{InDoubt, Of, Seen};
+
+/// What an object is not with more than this is not worth a word.
+const HARDLY: f64 = 0.005;
+/// An object that is it with more than this may be it.
+const MAY_BE: f64 = 0.05;
+/// A place that is certain with more than this needs no word.
+const SURELY: f64 = 0.99;
+/// Doubts that are told of one by one.
+const MOST_DOUBTS: usize = 3;
+/// Places that are named; the rest are counted.
+const MOST_PLACES: usize = 4;
+
+/// What surfaces are called, by symbol.
+pub type Names<'a> = &'a dyn Fn(&str) -> String;
+
+/// How things stand after looks, of each doubt in a few sentences.
+pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], name: Names<'_>) -> Vec<String> {
+    let told = |doubt: &InDoubt| {
+        let was = before.and_then(|before| before.same(doubt));
+        let because = why_no_surer(doubt, before, after, looks, name);
+        let because = because.map(|because| format!(" It is no more because {because}.")).unwrap_or_default();
+        Some(format!("{}.{because}{}", sureness(doubt, was)?, seen(doubt, was)))
+    };
+    after.doubts.iter().take(MOST_DOUBTS).filter_map(told).collect()
+}
+
+/// `the certainty of where it stands is now 0.27 (0.00 before, 0.80 is wanted)`.
+fn sureness(doubt: &InDoubt, was: Option<&InDoubt>) -> Option<String> {
+    let told = |sure| share_of(sure, doubt.wanted);
+    let (now, wanted) = (told(doubt.sure?), share(doubt.wanted));
+    let was = was.and_then(|was| was.sure).map(told);
+    let certain = certainty(doubt);
+    Some(match was {
+        Some(was) if was == now => format!("{certain} is still {now} ({wanted} is wanted)"),
+        Some(was) => format!("{certain} is now {now} ({was} before, {wanted} is wanted)"),
+        None => format!("{certain} is now {now} ({wanted} is wanted)"),
+    })
+}
+
+/// What has been seen of where it may be, and where nothing has.
+fn seen(doubt: &InDoubt, was: Option<&InDoubt>) -> String {
+    let before = |seen: &Seen| was.and_then(|was| was.seen.iter().find(|s| s.on == seen.on));
+    let percent = |share: f64| format!("{:.0} %", (share * 100.0).floor());
+    let one = |seen: &Seen| {
+        let now = percent(seen.share?);
+        let was = before(seen).and_then(|was| was.share).map(percent);
+        let is_new = before(seen).is_none_or(|was| was.places != seen.places);
+        let changed = seen.places > 0 && (is_new || was.as_ref() != Some(&now));
+        let was = was.filter(|was| *was != now).map(|was| format!("{was} before"));
+        let left = 100.0 - (seen.share? * 100.0).floor();
+        let left = (left > 0.0).then(|| format!("{left:.0} % are left"));
+        let beside: Vec<String> = was.into_iter().chain(left).collect();
+        let beside = if beside.is_empty() { String::new() } else { format!(" ({})", beside.join(", ")) };
+        changed.then(|| format!("{now} of the {}{beside}", seen.on))
+    };
+    let now: Vec<String> = doubt.seen.iter().filter_map(one).collect();
+    let open = |seen: &&Seen| seen.places == 0;
+    let open: Vec<String> = doubt.seen.iter().filter(open).map(|seen| format!("the {}", seen.on)).collect();
+    let now = match now.len() {
+        0 => String::new(),
+        n => format!(" Seen by now: {}.", listed(&now, n)),
+    };
+    match open.len() {
+        0 => now,
+        _ => format!("{now} Not looked at yet: {}.", listed(&open, MOST_PLACES)),
+    }
+}
+
+/// Why it is no surer than it is; none where it is sure enough, or nothing says it.
+fn why_no_surer(
+    doubt: &InDoubt,
+    before: Option<&Standing>,
+    after: &Standing,
+    looks: &[&Note],
+    name: Names<'_>,
+) -> Option<String> {
+    doubt.sure.filter(|sure| *sure < doubt.wanted)?;
+    let mut why: Vec<String> = looks.iter().filter_map(|note| in_vain(note)).collect();
+    match doubt.of {
+        Of::Thing => {
+            why.extend(before.and_then(|before| lost(&doubt.about, before, after)).map(|(_, lost)| lost));
+            why.push(may_be(doubt, after, name).unwrap_or_else(|| none_may_be(after)));
+        }
+        Of::Kind => why.extend(unsure_of(doubt, after, name)),
+        Of::Surface => why.extend(untold(doubt, after)),
+    }
+    why.extend(hidden(doubt));
+    (!why.is_empty()).then(|| why.join("; "))
+}
+
+/// Why a look brought nothing.
+fn in_vain(note: &Note) -> Option<String> {
+    match note {
+        Note::Nothing { .. } => Some("the look showed no surface".into()),
+        Note::Perceived { on, merged, left_out, .. } => {
+            let newest = format!("view {} ", merged + left_out.len());
+            let is_newest = |why: &String| why.trim_start().starts_with(&newest);
+            left_out.iter().any(is_newest).then(|| format!("this view of the {on} could not be used"))
+        }
+        Note::Changed { .. } => Some("what was seen before the last look no longer holds".into()),
+        _ => None,
+    }
+}
+
+/// What was taken for a thing before and is not any more, and with how much it was.
+pub fn lost(thing: &str, before: &Standing, after: &Standing) -> Option<(f64, String)> {
+    let (track, was) = before.best(thing).filter(|(_, was)| *was >= MAY_BE)?;
+    let now = after.belief.tracks.iter().find(|now| now.id == track.id);
+    let is = match now {
+        Some(now) if now.probability_of(thing) * 2.0 > was => return None,
+        Some(now) => {
+            let (other, p) = likeliest(now, thing);
+            format!("is {other} with {}", share(p))
+        }
+        None => "is not seen there any more".into(),
+    };
+    Some((was, format!("what was taken for {thing} with {} {is}", share(was))))
+}
+
+/// The object that may be it; none if none may.
+pub fn may_be(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<String> {
+    let thing = &doubt.about;
+    let (track, p) = after.best(thing).filter(|(_, p)| *p >= MAY_BE)?;
+    let (other, q) = likeliest(track, thing);
+    let other = if q > HARDLY { format!(" (or {other} with {})", share(q)) } else { String::new() };
+    let (percent, views) = (track.seen_fraction * 100.0, count(track.evidence.views, "view"));
+    let stands = where_it_is(track, name);
+    let so_far = format!(
+        "what stands {stands} may be it with {}{other}, by {views} of {percent:.0} % of its outside",
+        share(p)
+    );
+    // How sure it is of where something stands is also how sure it is that this is the place.
+    let right = doubt.sure.unwrap_or(p) / p;
+    Some(match right < SURELY {
+        true => format!("{so_far}, and that this is the place is certain with {}", share(right)),
+        false => so_far,
+    })
+}
+
+fn none_may_be(after: &Standing) -> String {
+    match after.belief.tracks.len() {
+        0 => "no object was seen".into(),
+        1 => "the one object that was seen is not it".into(),
+        n => format!("none of the {n} objects that were seen may be it"),
+    }
+}
+
+/// The least sure object where all of a kind are wanted.
+fn unsure_of(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<String> {
+    let p = |track: &Track| track.probability_of(&doubt.about);
+    let open = |track: &Track| p(track).min(1.0 - p(track));
+    let least = after.belief.tracks.iter().max_by(|a, b| open(a).total_cmp(&open(b)))?;
+    (open(least) >= MAY_BE)
+        .then(|| format!("what stands {} is one with {}", where_it_is(least, name), share(p(least))))
+}
+
+/// The object on a surface that is told least from others.
+fn untold(doubt: &InDoubt, after: &Standing) -> Option<String> {
+    let on = symbol(&doubt.about);
+    let there = after.belief.tracks.iter().filter(|track| track.on == on);
+    let open: Vec<&Track> = there.filter(|track| track.certainty() < doubt.wanted).collect();
+    let least = open.iter().min_by(|a, b| a.certainty().total_cmp(&b.certainty()))?;
+    let others = match open.len() {
+        1 => "the object".to_string(),
+        n => format!("the kinds of {n} objects are not sure, the least that of the one"),
+    };
+    let (percent, sure) = (least.seen_fraction * 100.0, share(least.certainty()));
+    let kind = least.kind().unwrap_or("none that is known");
+    Some(format!(
+        "{others} at {}, {kind}, is told with only {sure} ({percent:.0} % of its outside was seen)",
+        place(least)
+    ))
+}
+
+/// What hangs on the places where nothing was seen.
+fn hidden(doubt: &InDoubt) -> Option<String> {
+    let hidden = (doubt.hidden > HARDLY).then(|| share(doubt.hidden))?;
+    Some(match doubt.of {
+        Of::Thing => format!("with {hidden} it stands where nothing was seen yet"),
+        Of::Kind => format!("with {hidden} there are more where nothing was seen yet"),
+        Of::Surface => format!("with {hidden} something stands there unseen"),
+    })
+}
+
+/// What an object most likely is, besides something.
+fn likeliest(track: &Track, besides: &str) -> (String, f64) {
+    let names = track.probabilities.iter().filter(|(name, _)| name != besides);
+    let best = names.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, p)| *p > track.unknown);
+    best.cloned().unwrap_or_else(|| ("none of the known objects".into(), track.unknown))
+}
+
+fn where_it_is(track: &Track, name: Names<'_>) -> String {
+    match track.on.as_str() {
+        "" => "in the hand".into(),
+        on => format!("on the {} at {}", name(on), place(track)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use descry_memory::belief::Belief;
+
+    use super::*;
+
+    /// An object on the table, with what it may be.
+    fn track(ring: f64, stone: f64) -> Track {
+        serde_json::from_value(serde_json::json!({
+            "id": 0, "on": "table", "position_m": [1.0, 2.0, 0.7], "position_sigma_m": 0.01, "size_m": [0.1, 0.1, 0.1],
+            "probabilities": [["the ring", ring], ["stone", stone]], "kinds": [], "unknown": 1.0 - ring - stone,
+            "seen_fraction": 0.6, "viewpoints_m": [], "evidence": descry_perception::recognise::Evidence::default(),
+            "cites": [], "first_ns": 0, "last_ns": 0,
+        }))
+        .expect("a track")
+    }
+
+    fn standing(tracks: Vec<Track>, sure: f64, hidden: f64, share: f64) -> Standing {
+        let seen = vec![Seen { on: "table".into(), share: Some(share), places: usize::from(share > 0.0) }];
+        let about = "the ring".to_string();
+        let doubt = InDoubt { about, sure: Some(sure), wanted: 0.8, hidden, seen, ..InDoubt::default() };
+        let mut belief = Belief::default();
+        belief.adopt(tracks);
+        Standing { doubts: vec![doubt], belief, ..Standing::default() }
+    }
+
+    fn perceived(left_out: &[&str]) -> Note {
+        Note::Perceived {
+            on: "table".into(),
+            merged: 1,
+            left_out: left_out.iter().map(|why| why.to_string()).collect(),
+            points: 0,
+            residual_m: 0.0,
+            objects: Vec::new(),
+            changed: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn why_it_is_no_surer_is_said() {
+        let begin = standing(Vec::new(), 0.0, 0.75, 0.0);
+        let check = |before: &Standing, after: &Standing, note: Note, words: &[&str], not: &str| {
+            let said = told(Some(before), after, &[&note], &str::to_string).join(" ");
+            words.iter().for_each(|word| assert!(said.contains(word), "{word:?} is not in {said}"));
+            assert!(not.is_empty() || !said.contains(not), "{not:?} is in {said}");
+        };
+        // Nothing stood there, and something may be hidden.
+        let empty = standing(vec![track(0.0, 0.9)], 0.0, 0.3, 0.7);
+        let words = [
+            "is still 0.00 (0.80 is wanted)",
+            "the one object that was seen is not it",
+            "with 0.30 it stands where nothing was seen yet",
+            "70 % of the table (0 % before, 30 % are left)",
+        ];
+        check(&begin, &empty, perceived(&[]), &words, "could not be used");
+        // What was taken for it is something else.
+        let taken = standing(vec![track(0.4, 0.35)], 0.3, 0.3, 0.7);
+        let words = ["may be it with 0.40 (or stone with 0.35)", "this is the place is certain with 0.75"];
+        check(&begin, &taken, perceived(&[]), &words, "");
+        check(
+            &taken,
+            &empty,
+            perceived(&[]),
+            &["what was taken for the ring with 0.40 is stone with 0.90"],
+            "before, 30",
+        );
+        check(
+            &taken,
+            &begin,
+            perceived(&[]),
+            &["with 0.40 is not seen there any more; no object was seen"],
+            "",
+        );
+        // The view failed.
+        let failed = perceived(&["view 2 left out: it contradicts"]);
+        check(&begin, &empty, failed, &["this view of the table could not be used"], "");
+        let nothing = Note::Nothing { because: "no plane".into() };
+        check(
+            &begin,
+            &begin,
+            nothing,
+            &["the look showed no surface", "Not looked at yet: the table"],
+            "Seen by now",
+        );
+        // It is sure enough.
+        let sure = standing(vec![track(0.9, 0.0)], 0.9, 0.1, 0.95);
+        check(
+            &taken,
+            &sure,
+            perceived(&[]),
+            &["is now 0.90 (0.30 before, 0.80 is wanted). Seen by now"],
+            "no more",
+        );
+    }
+}

@@ -1,0 +1,138 @@
+//! What came of a plan's steps, and how things stood after each look.
+
+use descry_domains::note::Note;
+
+use super::chapters::{Chapter, Deed};
+use super::looks;
+use super::standings::Standing;
+use super::wording::count;
+
+/// How the line of a thing ends of which nothing else is known.
+const AFAR: &str = "seen from afar";
+
+/// What is told of a plan's steps; of how things stood after a look with when that was.
+#[derive(Debug)]
+pub struct Outcome {
+    /// When it stood so; none of what a step has brought.
+    pub stood_ns: Option<i64>,
+    /// The sentences.
+    pub said: String,
+}
+
+/// What came of a plan's steps, one after the other, and how things stood after each look.
+pub fn of(chapter: &Chapter, name: looks::Names<'_>) -> Vec<Outcome> {
+    let mut said = Vec::new();
+    let mut before: Option<&Standing> = chapter.before.as_ref();
+    let mut noted: Vec<&Note> = Vec::new();
+    let mut under_way: Vec<&str> = Vec::new();
+    let mut was_begun = false;
+    for deed in &chapter.deeds {
+        match deed {
+            Deed::Began(call) => {
+                if !was_begun {
+                    under_way.clear();
+                }
+                under_way.push(call);
+            }
+            Deed::Stands(now) => {
+                let is_look = |note: &&Note| matches!(note, Note::Perceived { .. } | Note::Nothing { .. });
+                if noted.iter().any(is_look) {
+                    let stood = |said| Outcome { stood_ns: Some(now.stamp_ns), said };
+                    said.extend(looks::told(before, now, &noted, name).into_iter().map(stood));
+                    before = Some(now);
+                }
+                noted.clear();
+            }
+            Deed::Noted(note) => noted.push(note),
+            _ => {}
+        }
+        was_begun = matches!(deed, Deed::Began(_));
+        let doing = if let [only] = under_way.as_slice() { Some(*only) } else { None };
+        let came = outcome(deed, doing, chapter.before.is_some());
+        said.extend(came.map(|said| Outcome { stood_ns: None, said }));
+    }
+    said
+}
+
+/// What came of a step, in a sentence; none where nothing did that has not been said. `doing` is the only step under way; how sure
+/// it is after a look is said elsewhere where the record has how things stood.
+fn outcome(deed: &Deed, doing: Option<&str>, has_standings: bool) -> Option<String> {
+    let by = doing.map(|call| format!("{call}: ")).unwrap_or_default();
+    Some(match deed {
+        Deed::Began(_) | Deed::Stands(_) => return None,
+        Deed::Ended(call, said) => format!("{call}: {said}."),
+        Deed::Failed { call, because, changed, .. } => {
+            let since = changed.as_ref().filter(|c| !c.is_empty());
+            let since = since.map(|c| format!(" From then on: {c}.")).unwrap_or_default();
+            format!("{call} failed: {because}.{since}")
+        }
+        Deed::Resumed => {
+            "here the run was cut off; it was gone on with from its record, and what had been done was not done again."
+                .into()
+        }
+        Deed::Noted(Note::Perceived { on, merged, left_out, residual_m, objects, changed, .. }) => {
+            let views = match merged {
+                1 => "one view".to_string(),
+                n => format!("{n} views ({:.1} mm apart)", residual_m * 1e3),
+            };
+            let left_out: String = left_out.iter().map(|why| format!("; {}", left_out_as(why))).collect();
+            let is_said = |text: &&String| has_standings && text.starts_with("confidence in ");
+            let changed: String = changed.iter().filter(|c| !is_said(c)).map(|text| format!("; {text}")).collect();
+            format!("{by}the {on}, in {views}, shows {}{left_out}{changed}.", shown(objects.len()))
+        }
+        // What to set otherwise is for who programs it.
+        Deed::Noted(Note::Nothing { because }) => {
+            let why = because.split(": ").next().and_then(|why| why.split(" among the ").next()).unwrap_or(because);
+            format!("{by}the look showed nothing that things could stand on: {why}.")
+        }
+        Deed::Noted(Note::Swept { things }) => swept(things),
+        Deed::Noted(note) => {
+            let text = note.to_string();
+            let mut lines = text.lines().map(str::trim);
+            let first = lines.next().unwrap_or_default();
+            let first = first.split_once(' ').map_or(first, |(_, rest)| rest.trim());
+            let all: Vec<&str> = std::iter::once(first).chain(lines).collect();
+            format!("{}.", all.join("; "))
+        }
+    })
+}
+
+fn shown(objects: usize) -> String {
+    if objects == 0 { "no object".into() } else { count(objects, "object") }
+}
+
+/// Why a view is left out: `view 1 left out: left out: …` says it twice.
+fn left_out_as(said: &str) -> String {
+    match said.split_once(" left out: ") {
+        Some((view, why)) => format!("{view} is left out: {}", why.strip_prefix("left out: ").unwrap_or(why)),
+        None => format!("left out: {said}"),
+    }
+}
+
+/// What a sweep of the laser shows; what is only seen from afar is counted.
+fn swept(things: &[String]) -> String {
+    let (far, near): (Vec<&String>, Vec<&String>) = things.iter().partition(|thing| thing.ends_with(AFAR));
+    let far = (!far.is_empty()).then(|| format!("{} {AFAR}", far.len()));
+    let all: Vec<String> = near.into_iter().cloned().chain(far).collect();
+    let on_the_floor = match things.len() {
+        1 => "1 thing on the floor".to_string(),
+        n => format!("{n} things on the floor"),
+    };
+    format!("{on_the_floor}: {}.", all.join("; "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_far_away_is_counted() {
+        let things = ["this at (1.00, 2.00) m: 1 scan", "thing-2 at (3.00, 1.00) m: seen from afar"]
+            .map(str::to_string);
+        assert_eq!(
+            swept(&things),
+            "2 things on the floor: this at (1.00, 2.00) m: 1 scan; 1 seen from afar."
+        );
+        assert_eq!(swept(&things[..1]), "1 thing on the floor: this at (1.00, 2.00) m: 1 scan.");
+    }
+}

@@ -1,0 +1,202 @@
+//! A run in a few sentences: what was asked, what the answer is, what it rests on, and what was the greatest trouble.
+
+use descry_domains::answer::Verdict;
+use descry_domains::note::Note;
+
+use super::chapters::{Chapter, Deed};
+use super::looks::{self, Names};
+use super::standings::Standing;
+use super::wording::{count, listed, place, share};
+use crate::report::{self, Report};
+use crate::run::Header;
+use crate::standing::{InDoubt, Of};
+
+/// It; `name` is how surfaces are called.
+pub fn of(header: &Header, report: Option<&Report>, chapters: &[Chapter], name: Names<'_>) -> Vec<String> {
+    let last = chapters.iter().flat_map(Chapter::stood).last();
+    let rests =
+        report.and_then(|report| last.and_then(|last| rests(report, last, name)).or_else(|| said_of(report)));
+    let mut said = vec![asked(header), answer(report, chapters.len())];
+    said.extend(rests);
+    said.push(trouble(chapters));
+    said
+}
+
+fn asked(header: &Header) -> String {
+    let settings = &header.settings;
+    let scene = settings.scene.as_ref().map(|s| format!(", scene {s}")).unwrap_or_default();
+    let seed = if settings.robot == "sim" { format!(", seed {}", settings.seed) } else { String::new() };
+    let (goal, robot, domain) = (&header.goal, &settings.robot, &settings.domain);
+    format!("\"{goal}\" was asked of the body {robot}{scene}{seed}, in the domain {domain}.")
+}
+
+fn answer(report: Option<&Report>, plans: usize) -> String {
+    let Some(report) = report else {
+        return format!("It has not ended: the record goes as far as plan {plans}.");
+    };
+    let verdict = report::words(report.verdict);
+    let verdict = match &report.answer {
+        Some(answer) => format!("{answer} ({verdict})"),
+        None => verdict.to_string(),
+    };
+    format!(
+        "The answer after {}, {}, {:.1} m and {:.0} s: {verdict}: {}.",
+        count(plans, "plan"),
+        count(report.views, "look"),
+        report.distance_m,
+        report.sim_time_s,
+        report.why.split([';', ':']).next().unwrap_or_default()
+    )
+}
+
+/// What the answer itself says of what it rests on.
+fn said_of(report: &Report) -> Option<String> {
+    let (_, more) = report.why.split_once("; ")?;
+    Some(format!("It rests on this: {more}."))
+}
+
+/// What an answer rests on, of the first thing that was asked for.
+fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
+    let doubt = last.doubts.first()?;
+    let seen = seen(doubt);
+    let objects = match last.belief.tracks.len() {
+        0 => "no object was seen".to_string(),
+        1 => "one object was seen".into(),
+        n => format!("{n} objects were seen"),
+    };
+    let by = match (doubt.of, last.best(&doubt.about)) {
+        (Of::Thing, Some((track, p))) if p >= doubt.wanted => {
+            let on = match track.on.as_str() {
+                "" => "is in the hand".into(),
+                on => format!("stands on the {} at {}", name(on), place(track)),
+            };
+            format!(
+                "what {on} is {} with a probability of {}, by {} of it",
+                doubt.about,
+                share(p),
+                count(track.evidence.views, "view")
+            )
+        }
+        (Of::Thing, _) => looks::may_be(doubt, last, name)
+            .unwrap_or_else(|| format!("{objects}, none of which may be {}", doubt.about)),
+        (Of::Kind, _) => format!(
+            "{objects}, and it is certain with {} which of them are {}s and that there are no more",
+            share(doubt.sure?),
+            doubt.about
+        ),
+        (Of::Surface, _) => {
+            format!(
+                "{objects}, and it is certain with {} of what kind each is and that there are no more",
+                share(doubt.sure?)
+            )
+        }
+    };
+    let left = match report.remaining.filter(|_| report.verdict != Verdict::Achieved) {
+        Some(left) => format!("; the probability that it is there after all is {}", share(left)),
+        None => String::new(),
+    };
+    let seen = if seen.is_empty() {
+        "nothing was seen of where it may be".into()
+    } else {
+        format!("{seen} was seen")
+    };
+    Some(format!("It rests on this: {by}; {seen}{left}."))
+}
+
+/// How much of which surfaces was seen.
+fn seen(doubt: &InDoubt) -> String {
+    let looked_at = doubt.seen.iter().filter(|seen| seen.places > 0);
+    let one = |seen: &crate::standing::Seen| {
+        Some(format!("{:.0} % of the {}", (seen.share? * 100.0).floor(), seen.on))
+    };
+    let all: Vec<String> = looked_at.filter_map(one).collect();
+    let open = doubt.seen.iter().filter(|seen| seen.places == 0).count();
+    let open = if open > 0 && !all.is_empty() {
+        format!(", and nothing of {}", count(open, "other surface"))
+    } else {
+        String::new()
+    };
+    listed(&all, all.len()) + &open
+}
+
+/// What went wrong on the way, the gravest first.
+fn trouble(chapters: &[Chapter]) -> String {
+    let deeds = || chapters.iter().flat_map(|chapter| &chapter.deeds);
+    let notes = || deeds().filter_map(|deed| if let Deed::Noted(note) = deed { Some(note) } else { None });
+    let failures: Vec<(&str, &str)> = chapters.iter().flat_map(Chapter::failures).collect();
+    let moved: Vec<&String> = notes()
+        .filter_map(|n| if let Note::Changed { because } = n { Some(because) } else { None })
+        .collect();
+    let left_out = notes()
+        .filter_map(|n| if let Note::Perceived { left_out, .. } = n { Some(left_out.len()) } else { None });
+    let bare = notes().filter(|note| matches!(note, Note::Nothing { .. })).count();
+    let cuts = deeds().filter(|deed| matches!(deed, Deed::Resumed)).count();
+    let first =
+        |n: usize, first: &str| if n > 1 { format!("; the first: {first}") } else { format!(": {first}") };
+    let mut all: Vec<String> = Vec::new();
+    all.extend(
+        moved.first().map(|because| format!("things were moved meanwhile{}", first(moved.len(), because))),
+    );
+    all.extend(failures.first().map(|(call, because)| {
+        format!(
+            "{} failed{}",
+            count(failures.len(), "step"),
+            first(failures.len(), &format!("{call}, {because}"))
+        )
+    }));
+    all.extend(
+        left_out
+            .max()
+            .filter(|n| *n > 0)
+            .map(|n| format!("{} of a surface did not fit the others", count(n, "view"))),
+    );
+    all.extend((bare > 0).then(|| format!("{} showed no surface", count(bare, "look"))));
+    all.extend((cuts > 0).then(|| {
+        format!("the run was cut off {}", if cuts == 1 { "once".into() } else { format!("{cuts} times") })
+    }));
+    let vain = in_vain(chapters);
+    match (all.split_first(), vain) {
+        (None, None) => "Everything went as it was planned.".into(),
+        (None, Some(vain)) => format!("The greatest trouble: {vain}."),
+        (Some((first, more)), vain) => {
+            let more: Vec<String> = more.iter().cloned().chain(vain).collect();
+            let more =
+                if more.is_empty() { String::new() } else { format!(" Besides, {}.", more.join("; ")) };
+            format!("The greatest trouble: {first}.{more}")
+        }
+    }
+}
+
+/// How many plans have not brought what was hoped of them, and what of all that was seen misled most; none if none.
+fn in_vain(chapters: &[Chapter]) -> Option<String> {
+    let is_short = |chapter: &&Chapter| {
+        let hoped = chapter.weighed.as_ref().is_some_and(|weighed| !weighed.numbers.is_empty());
+        let is_open = |doubt: &InDoubt| doubt.sure.is_some_and(|sure| sure < doubt.wanted);
+        hoped && chapter.stood().last().is_some_and(|now| now.doubts.iter().any(is_open))
+    };
+    let short = chapters.iter().filter(is_short).count();
+    let misled = chapters.iter().flat_map(misled).max_by(|a, b| a.0.total_cmp(&b.0));
+    let misled = misled.map(|(_, what)| format!("; {what}")).unwrap_or_default();
+    let plans = match chapters.len() {
+        1 => "the plan".into(),
+        all => format!("{short} of {all} plans"),
+    };
+    match (short, chapters) {
+        (0, [_, others @ .., _]) => {
+            let all = chapters.len();
+            Some(format!("{} of {all} plans did not yet bring about what was asked for", others.len() + 1))
+        }
+        (0, _) => None,
+        _ => Some(format!("{plans} brought less than was hoped{misled}")),
+    }
+}
+
+/// What was taken for a thing that was asked for in a plan, and was not it, with how much it was.
+fn misled(chapter: &Chapter) -> Vec<(f64, String)> {
+    let all: Vec<&Standing> = chapter.before.iter().chain(chapter.stood()).collect();
+    let lost = |pair: &[&Standing]| {
+        let doubts = pair[1].doubts.iter().filter(|doubt| doubt.of == Of::Thing);
+        doubts.filter_map(|doubt| looks::lost(&doubt.about, pair[0], pair[1])).collect::<Vec<_>>()
+    };
+    all.windows(2).flat_map(lost).collect()
+}

@@ -1,0 +1,122 @@
+//! How a run stands: how sure it is of what was asked for, what of the places was seen where that may be, and what hangs on the rest. It is
+//! kept with every plan and whenever a plan is kept, so that it can be told later what each look has brought.
+
+use descry_domains::abilities::searching::doubt::Doubt;
+use descry_domains::answer::Ended;
+use descry_domains::situation::KnownSurface;
+use descry_domains::world::Round;
+use descry_memory::{Blob, Form};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::exit::CommandError;
+
+/// The blob under which it is kept beside the event of a plan.
+pub const BLOB: &str = "in-doubt";
+/// The kind under which it is recorded what the end of a run rests on.
+pub const RESTS: &str = "rests-on";
+
+/// Something that is in doubt.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct InDoubt {
+    /// What it is about, as people call it.
+    pub about: String,
+    /// What that is.
+    pub of: Of,
+    /// How sure it is of it, 0 to 1; records of earlier versions do not say.
+    pub sure: Option<f64>,
+    /// How sure it has to be.
+    pub wanted: f64,
+    /// The probability that hangs on it, 0 to 1.
+    pub left: f64,
+    /// The part of that for which it is where nothing was seen.
+    pub hidden: f64,
+    /// What was seen of where it may be.
+    pub seen: Vec<Seen>,
+}
+
+/// What a doubt is about.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Of {
+    /// Where a thing stands.
+    #[default]
+    Thing,
+    /// Which objects are of a kind.
+    Kind,
+    /// What stands on a surface.
+    Surface,
+}
+
+/// How much of a place was seen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Seen {
+    /// The place, as people call it.
+    pub on: String,
+    /// The share of it where nothing could stand unseen, 0 to 1; none while nothing is known of it.
+    pub share: Option<f64>,
+    /// From so many places, by views that still hold.
+    pub places: usize,
+}
+
+/// What the end of a run rests on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rests {
+    /// Why there was nothing more to do: a word, and what was said.
+    pub ended: String,
+    /// See [`Ended`].
+    pub said: String,
+    /// What is in doubt in the end.
+    pub in_doubt: Vec<InDoubt>,
+}
+
+/// What the end of a run rests on, as it is recorded.
+pub fn rests(round: &Round, ended: &Ended) -> Rests {
+    let (ended, said) = match ended {
+        Ended::Reached => ("reached", String::new()),
+        Ended::NoPlan(why) => ("no plan", why.clone()),
+        Ended::Undecided(why) => ("undecided", why.clone()),
+        Ended::Limit(why) => ("limit", why.clone()),
+        Ended::Failed(why) => ("failed", why.clone()),
+    };
+    Rests { ended: ended.into(), said, in_doubt: in_doubt(round) }
+}
+
+/// How things stand in a round, as it is kept beside an event.
+///
+/// # Errors
+/// [`CommandError::Bug`] if it cannot be written as JSON.
+pub fn blob(round: &Round) -> Result<Blob<'static>, CommandError> {
+    let data = serde_json::to_vec(&in_doubt(round)).map_err(|e| CommandError::Bug(e.to_string()))?;
+    Ok(Blob { name: BLOB.into(), form: Form::Bytes, layout: Value::Null, data: data.into() })
+}
+
+/// What is in doubt in a round about what was asked for.
+fn in_doubt(round: &Round) -> Vec<InDoubt> {
+    let s = &round.situation;
+    let places = |on: usize| s.spaces[on].seen_from().len();
+    let told = |about: &str, of: Of, sure: f64, doubt: &Doubt| {
+        let on = |(on, surface): (usize, &KnownSurface)| {
+            let (share, places) = (doubt.share_seen(on), places(on));
+            (share.is_some() || places > 0).then(|| Seen { on: surface.name.clone(), share, places })
+        };
+        InDoubt {
+            about: about.into(),
+            of,
+            sure: Some(sure),
+            wanted: s.threshold,
+            left: doubt.remaining().max(0.0),
+            hidden: doubt.hidden.max(0.0),
+            seen: s.surfaces.iter().enumerate().filter_map(on).collect(),
+        }
+    };
+    // What was seen of a kind is no longer looked for.
+    let things = s.things.iter().enumerate().filter(|(_, t)| t.track.is_none());
+    let things = things.map(|(n, t)| told(&t.name, Of::Thing, s.confidence(n), s.doubt_about(n)));
+    let kinds = s.kinds.iter().enumerate();
+    let kinds = kinds.map(|(n, t)| told(&t.name, Of::Kind, s.completeness(n), s.doubt_of(n)));
+    let surfaces = s.asked.iter();
+    let surfaces = surfaces.map(|&on| told(&s.surfaces[on].name, Of::Surface, s.clarity(on), s.doubt_on(on)));
+    things.chain(kinds).chain(surfaces).collect()
+}

@@ -1,0 +1,106 @@
+//! What the headings and keys of a domain's TOML files mean: the tables of the reference, which are made from the types that read them.
+
+/// The page of the reference that tells of a file, by the folder that it stands in; none: `domain.toml`.
+const PAGES: [(&str, &str); 3] = [
+    ("domain.toml", include_str!("../../../docs/reference/domain.md")),
+    ("objects", include_str!("../../../docs/reference/objects.md")),
+    ("scenes", include_str!("../../../docs/reference/scenes.md")),
+];
+
+/// A heading of TOML around a place, as the names between its dots, with where it begins; none before the first.
+fn heading(text: &str, at: usize) -> Option<(usize, Vec<&str>)> {
+    let mut start = 0;
+    let mut found = None;
+    for line in text.split_inclusive('\n') {
+        if start > at {
+            break;
+        }
+        if line.starts_with('[') {
+            let names = line.trim_start_matches('[').split(']').next().unwrap_or_default();
+            found = Some((start, names.split('.').map(str::trim).collect()));
+        }
+        start += line.len();
+    }
+    found
+}
+
+/// What stands at a byte of a TOML file: the name of a heading that is pointed at, and what is said of it.
+pub struct Here<'t> {
+    /// Where the name begins, and the name.
+    pub name: (usize, &'t str),
+    /// What the reference says; empty of a name that a domain gives.
+    pub meaning: String,
+}
+
+/// What the name at a byte is, in a heading or in front of an equals sign; `part` is the file or folder that the text is.
+pub fn here<'t>(part: &str, text: &'t str, at: usize) -> Option<Here<'t>> {
+    let page = PAGES.iter().find(|(of, _)| *of == part)?.1;
+    let line = text[..at].rfind('\n').map_or(0, |n| n + 1);
+    let is_part = |c: char| c.is_alphanumeric() || "-_".contains(c);
+    let start =
+        text[..at].char_indices().rev().take_while(|(_, c)| is_part(*c)).last().map_or(at, |(n, _)| n);
+    let name = &text[start..start + text[start..].find(|c| !is_part(c)).unwrap_or(text.len() - start)];
+    let behind = text[start + name.len()..].trim_start_matches([' ', '\t']);
+    let in_heading = text[line..].starts_with('[');
+    let is_key = !in_heading && behind.starts_with('=') && text[line..start].trim().is_empty();
+    if name.is_empty() || !(in_heading || is_key) {
+        return None;
+    }
+    let names = heading(text, at).map(|(_, names)| names).unwrap_or_default();
+    let meaning = match (is_key, names.as_slice()) {
+        (true, []) => row(section(page, None)?, name),
+        (true, [table, ..]) => section(page, Some(table)).and_then(|section| row(section, name)),
+        (false, [table, ..]) if *table == name => row(section(page, None)?, name),
+        (false, _) => None,
+    };
+    Some(Here { name: (start, name), meaning: meaning.unwrap_or_default() })
+}
+
+/// The part of a page about a table; none: what stands before the first.
+fn section<'p>(page: &'p str, table: Option<&str>) -> Option<&'p str> {
+    let mut parts = page.split("\n## ");
+    let Some(table) = table else { return parts.next() };
+    let of = |part: &&str| {
+        let title = part.lines().next().unwrap_or_default().trim_start_matches(['`', '[']);
+        title
+            .strip_prefix(table)
+            .is_some_and(|rest| rest.starts_with(['`', ']', '.', ':']) || rest.is_empty())
+    };
+    parts.skip(1).find(of)
+}
+
+/// What the first table of a part says of a key.
+fn row(part: &str, key: &str) -> Option<String> {
+    let rows = part.lines().filter(|line| line.starts_with('|'));
+    let mut cells = rows.map(|line| line.trim_matches('|').split(" | ").map(str::trim).collect::<Vec<_>>());
+    let found = cells.find(|cells| cells.first() == Some(&format!("`{key}`").as_str()))?;
+    let [_, what, left_out, meaning] = found.as_slice() else { return None };
+    Some(format!("{meaning}\n\n{what}; if left out: {left_out}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TOML: &str =
+        "name = \"toy\"\n\n[[goal]]\nsay = \"go\"\n\n[action.fly]\ndoes = \"move ?from ?to\"\nretries = 2\n";
+
+    #[test]
+    fn headings_and_keys_mean_what_the_reference_says() {
+        let check = |sought: &str, further: usize, name: Option<&str>, words: &str| {
+            let at = TOML.find(sought).expect("it is there") + further;
+            let found = here("domain.toml", TOML, at);
+            assert_eq!(found.as_ref().map(|here| here.name.1), name, "{sought}");
+            let meaning = found.map(|here| here.meaning).unwrap_or_default();
+            assert!(meaning.contains(words), "{sought}: {meaning}");
+        };
+        check("name =", 2, Some("name"), "The domain's name.");
+        check("[[goal]]", 3, Some("goal"), "What may be said.");
+        check("say =", 0, Some("say"), "Words and `<slots>`");
+        check("[action.fly]", 2, Some("action"), "How each action is carried out");
+        check("[action.fly]", 9, Some("fly"), "");
+        check("retries", 7, Some("retries"), "tried again so often");
+        check("\"move ?from", 2, None, "");
+        check("\"toy\"", 2, None, "");
+    }
+}

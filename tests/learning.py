@@ -1,11 +1,12 @@
 """Things of a household learned and found again, over seeds: what the learning domain promises, counted.
 
     cargo build --release && cargo build --release -p descry-robots --example arrangement
-    python3 tests/learning.py 101 112 [household|chairs] [FOLDER]
+    python3 tests/learning.py 101 112 [household|chairs|mujoco] [FOLDER]
 
 For each seed one of the things of a household comes before the second visit and another before the third, by the scene of the domain with their names
 in it. In separate processes: a first visit; a second, that learns; a search for what was learned where it has been moved to, beside the other;
-and one where it is gone and the other stands. A line of JSON a seed, and the counts.
+and one where it is gone and the other stands. A line of JSON a seed, and the counts. `mujoco` is the same on the body of robots/mujoco, whose
+things, camera and physics are its own; the environment of its README is active.
 """
 
 import json
@@ -44,29 +45,63 @@ def off_m(a, b):
     return math.dist(a[:2], b[:2])
 
 
+class Simulated:
+    """Our simulator: the scene of the domain with the names of other things in it."""
+
+    def __init__(self, seed, scene_name, folder):
+        self.seed = seed
+        self.thing, self.other = THINGS[seed % len(THINGS)], THINGS[(seed + 5) % len(THINGS)]
+        text = (ROOT / f"domains/learning/scenes/{scene_name}.toml").read_text()
+        text = text.replace('"kettle"', '"THING"').replace('"teddy"', f'"{self.other}"').replace('"THING"', f'"{self.thing}"')
+        self.of_visit = {}
+        for visit in (1, 2, 3, 4):
+            self.of_visit[visit] = folder / f"scene-{seed}-{visit}.toml"
+            self.of_visit[visit].write_text(f"visit = {visit}\n{text}")
+
+    def body(self, visit):
+        return "--scene", str(self.of_visit[visit]), "--seed", str(self.seed)
+
+    def truth(self, visit):
+        return truth(self.of_visit[visit], self.seed, visit)
+
+
+class Mujoco:
+    """A body that shares nothing with our simulator."""
+
+    def __init__(self, seed, _, folder):
+        self.seed, self.folder = seed, folder
+        sys.path.append(str(ROOT / "robots/mujoco"))
+        from descry_mujoco.household import coming
+
+        self.thing, self.other = coming(seed)
+
+    def told(self, visit):
+        return self.folder / f"truth-{self.seed}-{visit}.json"
+
+    def body(self, visit):
+        serve = f"serve --scene household --visit {visit} --seed {self.seed} --truth '{self.told(visit)}'"
+        return "--robot", f"program:PYTHONPATH='{ROOT}/robots/mujoco' python3 -m descry_mujoco {serve}"
+
+    def truth(self, visit):
+        return {o["name"]: o for o in json.loads(self.told(visit).read_text())["objects"]}
+
+
 def seed_of(seed, scene_name, folder):
-    thing, other = THINGS[seed % len(THINGS)], THINGS[(seed + 5) % len(THINGS)]
-    text = (ROOT / f"domains/learning/scenes/{scene_name}.toml").read_text()
-    text = text.replace('"kettle"', '"THING"').replace('"teddy"', f'"{other}"').replace('"THING"', f'"{thing}"')
-    scene = folder / f"scene-{seed}.toml"
-    scene.write_text(text)
-    of_visit = {}
-    for visit in (1, 2, 3, 4):
-        of_visit[visit] = folder / f"scene-{seed}-{visit}.toml"
-        of_visit[visit].write_text(f"visit = {visit}\n{text}")
+    place = (Mujoco if scene_name == "mujoco" else Simulated)(seed, scene_name, folder)
+    thing, other = place.thing, place.other
     store = folder / f"store-{seed}"
 
     def pursue(goal, visit, remember=True):
         keep = ("--remember", str(store)) if remember else ()
-        place = ("--scene", str(of_visit[visit]), "--seed", str(seed), "--run", str(folder / f"run-{seed}-{visit}-{goal[:5]}"))
-        return descry("do", goal, "--domain", "learning", *place, *keep)
+        run_of = ("--run", str(folder / f"run-{seed}-{visit}-{goal[:5]}"))
+        return descry("do", goal, "--domain", "learning", *place.body(visit), *run_of, *keep)
 
     row = {"seed": seed, "thing": thing, "other": other}
     first = pursue("learn what is new", 1)
     second = pursue("learn what is new", 2)
     row["first"], row["second"], row["why"] = first["verdict"], second["verdict"], second["why"][:400]
     row["looks"], row["seconds"], row["wall_s"] = second.get("views"), second.get("sim_time_s"), second.get("wall_s")
-    there = truth(scene, seed, 2)[thing]["centre_m"]
+    there = place.truth(2)[thing]["centre_m"]
     learned, _ = run(DESCRY, "name", str(store), "--json")
     learned = json.loads(learned)["things"] if learned.strip() else []
     right = [t for t in learned if off_m(t["seen"]["position_m"], there) < NEAR_M]
@@ -78,7 +113,7 @@ def seed_of(seed, scene_name, folder):
     for visit, key in ((3, "moved"), (4, "gone")):
         found = pursue(f"find {thing}", visit)
         row[key] = {"verdict": found["verdict"], "confidence": found.get("confidence"), "views": found.get("views")}
-        true = truth(scene, seed, visit)
+        true = place.truth(visit)
         if found["verdict"] == "achieved":
             at = found["position_m"]
             row[key]["off_m"] = off_m(at, true[thing]["centre_m"]) if thing in true else None

@@ -78,6 +78,37 @@ fn what_comes_and_goes_is_noticed_and_what_was_hidden_is_learned() {
     assert!(back.appeared.len() == 1 && near(&back.appeared[0].centre(), left.0, left.1));
 }
 
+/// The view with errors that are larger than those of the sensor that is assumed, and the same in patches of pixels.
+fn with_patchy_noise(mut view: View, draws: &mut Draws) -> View {
+    const PATCH: usize = 12;
+    let columns = SMALL.width.div_ceil(PATCH);
+    let errors: Vec<f64> = (0..columns * SMALL.height.div_ceil(PATCH)).map(|_| draws.normal()).collect();
+    for (i, p) in view.cloud.points.iter_mut().enumerate().filter(|(_, p)| p.z.is_finite()) {
+        let error = errors[i / SMALL.width / PATCH * columns + i % SMALL.width / PATCH];
+        let z = f64::from(p.z);
+        *p *= (1.0 + 0.0025 * z * error) as f32;
+    }
+    view
+}
+
+#[test]
+fn nothing_is_gone_where_the_camera_errs_by_more_than_is_known() {
+    let mut draws = Draws(17);
+    let things = [("tin", standing(0.0, -0.22, 0.0)), ("muesli", standing(0.05, 0.2, 1.0))];
+    let pose = around(0.3, 1.6, 0.9);
+    let mut visit = |things: &[(&str, Isometry3<f64>)], seed: u64| {
+        vec![with_patchy_noise(look(&room(things), &pose, &pose, seed), &mut draws)]
+    };
+    let mut meta = MetaRoom::new(&visit(&things, 1), NoticeOptions::default()).expect("a sound visit");
+    for seed in 2..5 {
+        let same = meta.visit(&visit(&things, seed)).expect("a sound visit");
+        let gone: Vec<usize> = same.gone.iter().map(Cloud::len).collect();
+        assert!(gone.is_empty(), "visit {seed}: {gone:?}");
+    }
+    let went = meta.visit(&visit(&things[..1], 9)).expect("a sound visit");
+    assert_eq!(went.gone.len(), 1);
+}
+
 #[test]
 fn stands_are_found_around_obstacles_and_strung_together() {
     let object = Point3::new(0.0, 0.0, 0.8);

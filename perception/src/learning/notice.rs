@@ -92,6 +92,9 @@ pub struct Visit {
 
 /// Half the side of a square that a point of the static structure covers when it is looked at, in voxels.
 const COVER: f64 = 0.75;
+/// What is looked through by so many times what is tolerated is so by far: two measurements of one surface are not, nor if the camera errs by
+/// twice as much as is known of it.
+const FAR: f64 = 2.5;
 /// Background is kept up to this, metres: to have seen it is to have seen past what stands before it now.
 const BACKGROUND_M: f32 = 8.0;
 
@@ -259,25 +262,28 @@ impl MetaRoom {
         Ok(clusters.iter().filter_map(of_cluster).collect())
     }
 
-    /// Drops what the visit looked through (D_2 without what is hidden): what went, by clusters, and how many points.
+    /// Drops what the visit looked through (D_2 without what is hidden): what went, by clusters, and how many points. A cluster went if most of
+    /// it was looked through by far: of a wall or a floor whose two measurements err, neither does.
     fn remove(&mut self, maps: &[DepthMap]) -> Result<(Vec<Cloud>, usize), LearningError> {
-        let through = |p: &Point3<f32>| {
+        let through = |p: &Point3<f32>, times: f64| {
             maps.iter().any(|map| {
                 let q = map.camera_from_world * p.cast::<f64>();
                 let near = q.z > 0.0 && q.z <= self.options.range_m;
-                near && map.look_from(&q, f64::from(self.tolerance_m(q.z as f32))) == Seen::Free
+                near && map.look_from(&q, times * f64::from(self.tolerance_m(q.z as f32))) == Seen::Free
             })
         };
-        let gone: Vec<bool> = self.cloud.points.par_iter().map(through).collect();
+        let gone: Vec<bool> = self.cloud.points.par_iter().map(|p| through(p, 1.0)).collect();
         let pick = |wanted: bool| -> Vec<u32> {
             (0u32..).zip(&gone).filter(|(_, g)| **g == wanted).map(|(i, _)| i).collect()
         };
         let lost = self.cloud.select(&pick(true));
+        let by_far: Vec<bool> = lost.points.par_iter().map(|p| through(p, FAR)).collect();
         self.cloud = self.cloud.select(&pick(false));
         // Thinned to voxels, a cluster of so many pixels is about so many points.
         let least = self.options.least_pixels / 4;
         let clusters = cluster::euclidean(&lost.points, self.options.cluster_step_m, least)?;
-        Ok((clusters.iter().map(|c| lost.select(c)).collect(), lost.len()))
+        let went = |c: &&Vec<u32>| 2 * c.iter().filter(|&&i| by_far[i as usize]).count() > c.len();
+        Ok((clusters.iter().filter(went).map(|c| lost.select(c)).collect(), lost.len()))
     }
 
     /// Adds what was hidden or never seen before: how many points. What was never seen and hangs together with something new may be of it.

@@ -39,10 +39,11 @@ def arguments() -> argparse.Namespace:
     serve.add_argument("--pose-error", type=pose_error, default=(0.03, 2.0), metavar="METRES,DEGREES", help="standard deviations of localisation")
     serve.add_argument("--truth", type=Path, help="write there how everything really stands, for reports")
     serve.add_argument("--listen", metavar="HOST:PORT", help="wait for who connects, instead of standard input and output")
+    serve.add_argument("--visit", type=int, choices=range(1, 5), default=1, help="of the scene household: what has come by then")
     serve.add_argument("--without", default="", metavar="KINDS", help="kinds of things that are taken away first, with commas between")
     for command in (record, serve):
         # A recording goes round tables that stand together.
-        known = sorted(name for name in SCENES if command is serve or name != "home")
+        known = sorted(name for name in SCENES if command is serve or name not in ("home", "household"))
         command.add_argument("--scene", choices=known, default="search")
         command.add_argument("--seed", type=int, default=1)
         command.add_argument("--holes", type=share, default=0.002, help="share of pixels without a return, 0 to 0.1; more on steep sides")
@@ -64,13 +65,17 @@ def record(given: argparse.Namespace) -> None:
 def serve(given: argparse.Namespace) -> None:
     import descry_robot
 
-    from . import body, stage
+    from . import body, household, stage
 
     scene = stage.arrange(given.scene, given.seed)
+    # Nobody errs in the same way at every visit.
+    seed = given.seed + 1_000_003 * (given.visit - 1)
+    if given.scene == "household":
+        scene = household.of_visit(scene, given.visit)
     scene.start = stage.start_pose(scene)
     scene = scene.without(given.without.split(","))
     metres, degrees = given.pose_error
-    settings = body.Settings(given.seed, metres, math.radians(degrees), given.holes, given.noise, given.truth)
+    settings = body.Settings(seed, metres, math.radians(degrees), given.holes, given.noise, given.truth)
     descry_robot.serve(body.Body(scene, settings), given.listen)
 
 

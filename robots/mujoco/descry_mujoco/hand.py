@@ -165,7 +165,7 @@ class Hand:
             raise descry.Failure("slipped", because, moved_m=0.0)
         thing = things[felt.pop()]
         aside_m = float(np.linalg.norm(self.data.body(thing.name).xpos[:2] - at[:2]))
-        narrow = min(thing.size["x"], thing.size["y"]) if thing.shape == "box" else 2.0 * thing.radius_m
+        narrow = min(thing.size["x"], thing.size["y"]) if thing.is_box else 2.0 * thing.radius_m
         if aside_m > ASIDE_M or narrow > opening_m:
             raise descry.Failure("slipped", "it slid out of the hand", moved_m=0.0)
         return thing

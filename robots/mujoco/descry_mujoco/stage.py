@@ -5,13 +5,13 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from . import home, machine, noise, scenes, world
+from . import home, household, machine, noise, scenes, world
 from .camera import FOCAL_PX, HEIGHT, WIDTH, Camera, Frame, aim_eye
 from .scenes import Scene
 
 SCENES = {
     "floor": scenes.floor, "two-tables": scenes.two_tables, "absent": scenes.absent, "present": scenes.present,
-    "search": scenes.search, "four-cups": scenes.four_cups, "home": home.home,
+    "search": scenes.search, "four-cups": scenes.four_cups, "home": home.home, "household": household.household,
 }
 # Visibility is measured on small images.
 SHARE_SCALE = 4
@@ -121,6 +121,8 @@ def ring_poses(scene: Scene, count: int, seed: int) -> list[np.ndarray]:
 
 def arrange(name: str, seed: int, views: int = RING_VIEWS) -> Scene:
     """The scene of a seed, its target hidden as it asks for from views all round."""
+    if name == "household":
+        return scenes.arrange(SCENES[name], seed)
     return scenes.arrange(SCENES[name], seed, lambda scene: hides_its_target(scene, ring_poses(scene, views, seed)))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from . import meshes
 
 HANDLED = "mug"
+Colour = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -24,25 +25,36 @@ class Thing:
     # 0 is matt; 1 loses most of its steep sides to the depth camera.
     shine: float = 0.0
     mass_kg: float = 0.15
+    # Of a thing that is no form of `FORMS`: its closed parts, each with its colour.
+    parts: tuple[meshes.Mesh, ...] = ()
+    colours: tuple[Colour, ...] = ()
+
+    @property
+    def is_box(self) -> bool:
+        """What collides is a box around it, and so is what it needs on a table."""
+        return self.shape == "box" or bool(self.parts)
 
     @property
     def height_m(self) -> float:
-        return self.size["z"] if self.shape == "box" else self.size["height"]
+        return self.size["z"] if self.is_box else self.size["height"]
 
     @property
     def radius_m(self) -> float:
         """Of the body without its handle, where it is widest; of a box, to its corners."""
-        if self.shape == "box":
+        if self.is_box:
             return 0.5 * math.hypot(self.size["x"], self.size["y"])
         return 0.5 * max(v for k, v in self.size.items() if k in ("diameter", "base", "lid_diameter"))
 
     def meshes(self) -> list[meshes.Mesh]:
         """Closed surfaces that overlap at most where a handle stands in a wall."""
-        return FORMS[self.shape](self.size)
+        return list(self.parts) or FORMS[self.shape](self.size)
+
+    def colour_of(self, part: int) -> Colour:
+        return self.colours[part] if self.colours else self.colour
 
     def outline(self) -> "Outline":
         """What it needs on a table."""
-        if self.shape == "box":
+        if self.is_box:
             return Outline(half_m=(0.5 * self.size["x"], 0.5 * self.size["y"]))
         return Outline(radius_m=self.radius_m + (self.size["reach"] if self.shape == HANDLED else 0.0))
 

@@ -121,12 +121,12 @@ def _add_thing(spec: mujoco.MjSpec, placed: Placed) -> None:
         mesh = spec.add_mesh(name=f"{thing.name} {k}", uservert=vertices.ravel(), userface=faces.ravel().astype(int))
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
         body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, rgba=[*thing.colour, 1], mass=0.0,
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, rgba=[*thing.colour_of(k), 1], mass=0.0,
             contype=0, conaffinity=0, group=SEEN,
         )
     half = 0.5 * thing.height_m
     felt = dict(pos=[0, 0, half], group=FELT, friction=[0.6, 0.005, 0.0001], condim=4)
-    if thing.shape == "box":
+    if thing.is_box:
         size = [0.5 * thing.size["x"], 0.5 * thing.size["y"], half]
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=size, mass=thing.mass_kg, **felt)
         return

@@ -37,6 +37,33 @@ class Meshes(unittest.TestCase):
 
 
 @needs_mujoco
+class Household(unittest.TestCase):
+    def test_parts_are_closed_and_stand_on_their_foot(self):
+        from descry_mujoco import household, meshes
+
+        for name in household.THINGS:
+            thing = household.thing(name)
+            self.assertEqual(len(thing.parts), len(thing.colours))
+            low = min(part[0][:, 2].min() for part in thing.parts)
+            self.assertAlmostEqual(low, 0.0, delta=1e-6, msg=name)
+            for part in thing.parts:
+                self.assertGreater(meshes.volume(part), 1e-7, name)
+
+    def test_a_thing_comes_is_moved_and_goes_and_the_others_stay(self):
+        from descry_mujoco import household, stage
+
+        for seed in range(1, 9):
+            scene = stage.arrange("household", seed)
+            visits = [{p.thing.name: (p.x_m, p.y_m, p.surface) for p in household.of_visit(scene, n).placed} for n in range(1, 5)]
+            first, second = household.coming(seed)
+            self.assertEqual([sorted(v) for v in visits], [sorted([*household.ALWAYS, *more]) for more in ([], [first], [first, second], [second])])
+            self.assertNotEqual(visits[1][first][2], visits[2][first][2])
+            self.assertEqual(visits[2][second], visits[3][second])
+            for name in household.ALWAYS:
+                self.assertEqual(len({v[name] for v in visits}), 1)
+
+
+@needs_mujoco
 class Noise(unittest.TestCase):
     def test_disparity_errs_as_much_and_as_far_together_as_measured(self):
         from descry_mujoco import noise

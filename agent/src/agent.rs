@@ -22,6 +22,9 @@ use crate::{standing, weigh};
 /// A planning call ends after so many evaluated states; then the best plan so far, or one good look, has to do.
 const MOST_EVALUATED: u64 = 2_500;
 
+/// Before what is said of the goal where steps of the plan are left that were to reach it.
+pub(crate) const AT_THE_END: &str = "at the end of the plan ";
+
 /// An agent at work on one goal.
 pub struct Agent<'a> {
     robot: Arc<dyn Robot>,
@@ -129,6 +132,9 @@ impl<'a> Agent<'a> {
                 Some(call) => format!("{call} failed"),
                 None => "there is no plan yet".into(),
             }),
+            (Some(_), Err(broken)) if broken.step.is_none() && !self.rest().steps.is_empty() => {
+                Err(format!("{AT_THE_END}{broken}"))
+            }
             (Some(_), Err(broken)) => Err(broken.to_string()),
         }
     }

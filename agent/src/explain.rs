@@ -187,7 +187,7 @@ fn numbers(domain: &Domain, chapters: &[chapters::Chapter], saying: &Saying) -> 
 }
 
 /// What ways and their figures mean.
-const WAYS: &str = "A way to get further is what may be done next, up to the first step that is expected to bring the numbers nearer to \
+const WAYS: &str = "A way to get further is what may be done next, up to the first step that may bring the numbers nearer to \
                     what is wanted. In brackets behind it: by how much it is, in how many seconds, and how much that is a \
                     second; behind its steps their seconds.";
 

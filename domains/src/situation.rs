@@ -439,7 +439,8 @@ impl Situation {
         let thing = &self.things[what];
         let none_is =
             self.belief.tracks.iter().map(|t| 1.0 - thing.probability(t, &self.surfaces)).product::<f64>();
-        1.0 - none_is * (1.0 - self.doubt_about(what).hidden)
+        // What hangs on hidden places is reckoned with what the objects leave of it already.
+        (1.0 - none_is + self.doubt_about(what).hidden).min(1.0)
     }
 
     /// How sure it is what each object on a surface is and that none is hidden, 0 to 1.

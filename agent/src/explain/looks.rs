@@ -5,13 +5,15 @@ use descry_domains::note::Note;
 use descry_memory::belief::Track;
 
 use super::standings::{Standing, certainty};
-use super::wording::{count, listed, place, share, share_of};
+use super::wording::{listed, place, share, share_of};
 use crate::standing::{InDoubt, Of, Seen};
 
 /// What an object is not with more than this is not worth a word.
 const HARDLY: f64 = 0.005;
 /// An object that is it with more than this may be it.
 const MAY_BE: f64 = 0.05;
+/// What stands this near to where something stood is that, or has taken it in, metres: a mug's half width.
+const BESIDE_M: f64 = 0.06;
 /// A place that is certain with more than this needs no word.
 const SURELY: f64 = 0.99;
 /// Doubts that are told of one by one.
@@ -121,9 +123,24 @@ pub fn lost(thing: &str, before: &Standing, after: &Standing) -> Option<(f64, St
             let (other, p) = likeliest(now, thing);
             format!("is {other} with {}", share(p))
         }
-        None => "is not seen there any more".into(),
+        // It may go on under another number, or as a part of what was made out better.
+        None => match there(track, after) {
+            Some(now) if now.probability_of(thing) * 2.0 > was => return None,
+            Some(now) => {
+                let (other, p) = likeliest(now, thing);
+                format!("is seen as {other} now, with {}", share(p))
+            }
+            None => "is not seen there any more".into(),
+        },
     };
     Some((was, format!("what was taken for {thing} with {} {is}", share(was))))
+}
+
+/// What stands now where an object stood, or beside it.
+fn there<'a>(track: &Track, after: &'a Standing) -> Option<&'a Track> {
+    let apart_m = |other: &Track| (other.position_m - track.position_m).norm();
+    let nearest = after.belief.tracks.iter().min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
+    (apart_m(nearest) < BESIDE_M).then_some(nearest)
 }
 
 /// The object that may be it; none if none may.
@@ -132,10 +149,10 @@ pub fn may_be(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<Stri
     let (track, p) = after.best(thing).filter(|(_, p)| *p >= MAY_BE)?;
     let (other, q) = likeliest(track, thing);
     let other = if q > HARDLY { format!(" (or {other} with {})", share(q)) } else { String::new() };
-    let (percent, views) = (track.seen_fraction * 100.0, count(track.evidence.views, "view"));
+    let percent = track.seen_fraction * 100.0;
     let stands = where_it_is(track, name);
     let so_far = format!(
-        "what stands {stands} may be it with {}{other}, by {views} of {percent:.0} % of its outside",
+        "what stands {stands} may be it with {}{other}; {percent:.0} % of its outside was seen",
         share(p)
     );
     // How sure it is of where something stands is also how sure it is that this is the place.
@@ -167,7 +184,12 @@ fn unsure_of(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<Strin
 fn untold(doubt: &InDoubt, after: &Standing) -> Option<String> {
     let on = symbol(&doubt.about);
     let there = after.belief.tracks.iter().filter(|track| track.on == on);
-    let open: Vec<&Track> = there.filter(|track| track.certainty() < doubt.wanted).collect();
+    // Where each is sure enough by itself, the least sure one still counts.
+    let is_open = |track: &&Track| track.certainty() < doubt.wanted.max(SURELY);
+    let mut open: Vec<&Track> = there.filter(is_open).collect();
+    if open.iter().any(|track| track.certainty() < doubt.wanted) {
+        open.retain(|track| track.certainty() < doubt.wanted);
+    }
     let least = open.iter().min_by(|a, b| a.certainty().total_cmp(&b.certainty()))?;
     let others = match open.len() {
         1 => "the object".to_string(),

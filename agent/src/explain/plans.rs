@@ -107,7 +107,7 @@ fn intent(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     if !named.is_empty() {
         let more = numbers.len().saturating_sub(MOST_NAMED);
         let more = if more > 0 { format!(", and {more} more") } else { String::new() };
-        said.push(format!("Hoped of it: {}{more}.", named.join(", ")));
+        said.push(format!("At best: {}{more}.", named.join(", ")));
     }
     said
 }
@@ -225,10 +225,10 @@ fn compared(
         (None, None) => {
             let alone = match enough(weighed, better[0], asked) {
                 Some(false) if chosen.reaches == Some(true) => {
-                    " That one would not be expected to be enough by itself."
+                    " That one would not be enough by itself, even at best."
                 }
                 Some(true) if better[0].takes_s < chapter.makespan_s => {
-                    " That one would be expected to be enough, and sooner: the planner did not come upon it."
+                    " That one would be enough at best, and sooner: the planner did not come upon it."
                 }
                 _ => "",
             };
@@ -245,7 +245,7 @@ fn compared(
     format!("{mine} is one of {all} ways to get further; {more}{many} more a second, first {first}. {rule}")
 }
 
-/// Whether a way by itself is expected to be enough; none where nothing says so: it is only a part of what is to be done.
+/// Whether a way by itself would be enough if it brings what is hoped; none where nothing says so: it is only a part of what is to be done.
 fn enough(weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
     let is_whole = |way: &Way| way.reaches == Some(true);
     match way.reaches {
@@ -271,9 +271,9 @@ fn quickest(
     }
     let but = match enough(weighed, other, asked) {
         Some(true) if asked.policy.is_none() && is_whole_search => {
-            ", and would be expected to be enough: the planner did not come upon it"
+            ", and would be enough at best: the planner did not come upon it"
         }
-        Some(false) => ", but would not be expected to be enough by itself",
+        Some(false) => ", but would not be enough by itself, even at best",
         _ if other.gains < chosen.gains => ", but gains less",
         _ => "",
     };
@@ -317,7 +317,7 @@ mod tests {
             &[
                 "1 gains more a second, first (stay)",
                 "enough, and sooner: the planner did not come upon it",
-                "(stay) is the quickest, and would be expected to be enough",
+                "(stay) is the quickest, and would be enough at best",
                 "(sure) from 0.00 to 1.00 (0.80 is wanted)",
             ],
         );
@@ -326,8 +326,8 @@ mod tests {
             &[way("(stay)", 2.0, 0.85, Some(false))],
             None,
             &[
-                "That one would not be expected to be enough by itself",
-                "(stay) is the quickest, but would not be expected to be enough",
+                "That one would not be enough by itself, even at best",
+                "(stay) is the quickest, but would not be enough",
             ],
         );
         // Of a record that does not say what would be enough, the numbers say it.
@@ -335,7 +335,7 @@ mod tests {
             Some(way("(go far)", 8.0, 0.9, None)),
             &[way("(stay)", 2.0, 0.5, None)],
             None,
-            &["(stay) is the quickest, but would not be expected to be enough"],
+            &["(stay) is the quickest, but would not be enough"],
         );
         check(
             chosen(),

@@ -71,10 +71,10 @@ fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
                 on => format!("stands on the {} at {}", name(on), place(track)),
             };
             format!(
-                "what {on} is {} with a probability of {}, by {} of it",
+                "what {on} is {} with a probability of {}; {:.0} % of its outside was seen",
                 doubt.about,
                 share(p),
-                count(track.evidence.views, "view")
+                track.seen_fraction * 100.0
             )
         }
         (Of::Thing, _) => looks::may_be(doubt, last, name)
@@ -86,7 +86,7 @@ fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
         ),
         (Of::Surface, _) => {
             format!(
-                "{objects}, and it is certain with {} of what kind each is and that there are no more",
+                "{objects}, and of what kind the least sure one is, and that there are no more, is certain with {}",
                 share(doubt.sure?)
             )
         }

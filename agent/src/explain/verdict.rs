@@ -146,11 +146,10 @@ fn object(track: &Track, asked: Option<&str>, words: &Words<'_>) -> String {
         on => format!("stands on the {}", (words.name)(on)),
     };
     format!(
-        "what {on} at {} is {} with a probability of {}{others}; {} showed it, and {:.0} % of its outside was seen.",
+        "what {on} at {} is {} with a probability of {}{others}; {:.0} % of its outside was seen.",
         place(track),
         first.0,
         share(first.1),
-        count(track.evidence.views, "view"),
         track.seen_fraction * 100.0
     )
 }
@@ -171,8 +170,8 @@ fn left(rests: &Rests, report: &Report, meanings: Meanings<'_>) -> Vec<String> {
     let because = reasons::no_plan(&rests.said, meanings);
     said.push(match rests.ended.as_str() {
         "reached" => "it ended because the goal held.".into(),
-        "no plan" if because.is_empty() => "it ended because nothing more could be done about it.".into(),
-        "no plan" => format!("it ended because nothing more could be done about it: {because}."),
+        "no plan" if because.is_empty() => "it ended because no plan would still bring it about.".into(),
+        "no plan" => format!("it ended because no plan would still bring it about: {because}."),
         _ => format!("it ended because {because}."),
     });
     said

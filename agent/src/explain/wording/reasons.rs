@@ -1,5 +1,7 @@
 //! What the monitor and the planner said, in fewer and plainer words. What is not known here is passed on as it is.
 
+use crate::agent::AT_THE_END;
+
 /// What a call of the domain asks, in words.
 pub type Meanings<'a> = &'a dyn Fn(&str) -> Option<String>;
 
@@ -12,9 +14,9 @@ pub fn missed(because: &str, is: &str, counts: Meanings<'_>) -> String {
         .unwrap_or_else(|| because.trim_end_matches('.').to_string())
 }
 
-/// `the goal G is not reached: N is V`, of which the last part may be missing.
+/// `the goal G is not reached: N is V`, of which the last part may be missing; at the end of a plan, or now.
 fn goal(because: &str, is: &str) -> Option<String> {
-    let rest = because.strip_prefix("the goal ")?;
+    let rest = because.strip_prefix(AT_THE_END).unwrap_or(because).strip_prefix("the goal ")?;
     let (goal, values) = rest.split_once(" is not reached")?;
     let values = values.trim_start_matches(':').trim();
     if values.is_empty() {

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use descry_memory::learned::LearnedThing;
 use descry_perception::learning::{Glance, Guess, Judged, KnowOptions};
 use descry_perception::nalgebra::{Isometry3, Point3};
 use descry_perception::recognise::Percept;
@@ -33,6 +34,8 @@ const ABOVE_M: (f64, f64) = (-0.02, 0.6);
 /// searches of `tests/learning.py`, which is 1 of 2.5.
 const PRIOR: f64 = 0.3;
 const MISSED: f64 = 0.4;
+/// A thing of which less of its sides was seen may be larger than its model.
+const HALF: f64 = 0.5;
 /// An object that is longer than a thing by more than this is not it, metres, nor one that is well seen and, with all that stands so near that it may be
 /// a part of it, has less than this share of its length; what stays of the probability then.
 const LONGER_M: f64 = 0.03;
@@ -248,7 +251,7 @@ fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
     for (n, thing) in news.things.iter().enumerate() {
         let p = match is {
             Some((it, p)) if it == n => p,
-            _ => left * missed(percept, &thing.cloud, found.err()),
+            _ => left * missed(percept, thing, found.err()),
         };
         of_things.push((thing.name.clone(), p));
     }
@@ -271,16 +274,58 @@ fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
     }
 }
 
-/// The probability that an object is a thing which looks at it have not told. With all that may be of it, it is so long at most, metres.
-fn missed(percept: &Percept, thing: &Cloud, together_m: Option<f64>) -> f64 {
-    let (low, high) = thing.bounds().unwrap_or_default();
+/// The probability that an object is a thing which looks at it have not told. With all that may be of it, it is so long at most, metres. A look at
+/// a side that was never seen tells nothing, and what was seen from few sides may be longer than is known.
+fn missed(percept: &Percept, thing: &LearnedThing, together_m: Option<f64>) -> f64 {
+    let (low, high) = thing.cloud.bounds().unwrap_or_default();
     let longest_m = f64::from((high - low).norm());
     let [w, d, h] = percept.size_m;
-    let is_longer = w.hypot(d).hypot(h) > longest_m + LONGER_M;
+    let is_longer = w.hypot(d).hypot(h) > longest_m + LONGER_M && thing.sides >= HALF;
     let is_shorter = together_m.is_some_and(|m| m < SHORTER * longest_m) && percept.seen_fraction > 0.5;
     if is_longer || is_shorter {
         return NOT_IT;
     }
-    let not_told = MISSED.powi(percept.evidence.views as i32);
+    let not_told = MISSED.max(1.0 - thing.sides).powi(percept.evidence.views as i32);
     PRIOR * not_told / (PRIOR * not_told + 1.0 - PRIOR)
+}
+
+#[cfg(test)]
+mod tests {
+    use descry_memory::learned::Place;
+    use descry_perception::recognise::{Evidence, Stance};
+
+    use super::*;
+
+    /// A thing 20 cm long of which so much was seen, and an object that looks have not told.
+    fn chance(sides: f64, views: usize, height_m: f64) -> f64 {
+        let cloud = Cloud::from_points(vec![Point3::origin(), Point3::new(0.0, 0.0, 0.2)]);
+        let seen = Place { unix_s: 0.0, at_m: Point3::origin(), on: "table".into() };
+        let (name, learned_unix_s) = ("lamp".into(), 0.0);
+        let thing = LearnedThing { name, learned_unix_s, cloud, sides, directions: 0, meetings: 1, seen };
+        let percept = Percept {
+            label: None,
+            kind: None,
+            probabilities: Vec::new(),
+            kinds: Vec::new(),
+            unknown: 1.0,
+            position_m: Point3::origin(),
+            position_sigma_m: 0.001,
+            size_m: [0.05, 0.05, height_m],
+            stance: Stance::Upright,
+            points: 100,
+            seen_fraction: 0.9,
+            evidence: Evidence { views, ..Evidence::default() },
+            indices: Vec::new(),
+        };
+        missed(&percept, &thing, None)
+    }
+
+    #[test]
+    fn looks_tell_less_of_what_was_seen_from_few_sides() {
+        // Three looks exclude what is known from all sides, and hardly what is known from a fifth of them.
+        assert!(chance(1.0, 3, 0.2) < 0.03 && chance(0.2, 3, 0.2) > 0.15);
+        // What is longer than it is not it, unless its model may lack a part.
+        assert_eq!(chance(1.0, 0, 0.3), NOT_IT);
+        assert!(chance(0.2, 0, 0.3) > 0.25);
+    }
 }

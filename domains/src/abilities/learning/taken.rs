@@ -31,6 +31,9 @@ const ON_M: f64 = 0.06;
 const BESIDE_M: f64 = 0.05;
 /// What came or went with a second side shorter than this is an edge that was measured otherwise, metres.
 const SLIVER_M: f64 = 0.04;
+/// So is what is this wide and this many times as long: the edge of a table, a leg.
+const EDGE_M: f64 = 0.08;
+const LONG: f64 = 6.0;
 /// What came so near to something new, beside how far that reaches, is of it, metres.
 const OF_IT_M: f64 = 0.1;
 /// Things nearer to each other than this are one, metres.
@@ -182,6 +185,7 @@ fn take_in(
                     told.came.extend(symbol.map(again));
                 }
             }
+            None if is_known_there(mind, &appeared.cloud) => {}
             None => {
                 let (at, size_m) = extent(&appeared.cloud);
                 let symbol = new(mind, eyes, &surface.symbol, waypoint, look, &seen.points, None);
@@ -208,7 +212,7 @@ fn extent(cloud: &Cloud) -> (Point3<f64>, [f64; 3]) {
 fn is_sliver(cloud: &Cloud) -> bool {
     let (_, mut size_m) = extent(cloud);
     size_m.sort_by(f64::total_cmp);
-    size_m[1] < SLIVER_M
+    size_m[1] < SLIVER_M || size_m[1] < EDGE_M && size_m[2] > LONG * size_m[1]
 }
 
 /// A size and a place, for people.
@@ -244,7 +248,15 @@ fn change(mind: &mut Mind, change: Change) {
     }
 }
 
-/// Something that was learned stands there.
+/// Whether something that was learned was known there in this run, from another waypoint.
+fn is_known_there(mind: &Mind, cloud: &Cloud) -> bool {
+    let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
+    let (at, size_m) = extent(cloud);
+    let near_m = SAME_M.max(0.5 * size_m[0].hypot(size_m[1]));
+    mind.known.news.things.iter().any(|t| t.seen.unix_s == now_unix_s && (t.seen.at_m - at).norm() < near_m)
+}
+
+/// Something that was learned stands there. Nothing that was noticed there before is new.
 fn known_again(mind: &mut Mind, surface: &KnownSurface, f: &Found) -> String {
     let at = Point3::from(f.judged.world_from_model.translation.vector);
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
@@ -253,11 +265,20 @@ fn known_again(mind: &mut Mind, surface: &KnownSurface, f: &Found) -> String {
         std::mem::replace(&mut thing.seen, Seen { unix_s: now_unix_s, at_m: at, on: surface.symbol.clone() });
     let name = thing.name.clone();
     let p = f.judged.confidence;
+    let is_it = |n: &&mut Novelty| n.fate == Fate::Open && (n.centre - at).norm() < SAME_M.max(n.radius_m());
+    let noticed = Arc::make_mut(&mut mind.known.news)
+        .novelties
+        .iter_mut()
+        .filter(|n| n.taken_for.is_none())
+        .find(is_it);
+    if let Some(novelty) = noticed {
+        novelty.fate = Fate::Known { name: name.clone(), confidence: p, model: None };
+    }
     let is_moved = (before.at_m - at).norm() > SAME_M;
     if is_moved {
         change(mind, Change::Came { name: name.clone(), at, before: before.at_m });
     }
-    let there = if is_moved { "which stood elsewhere" } else { "where it stood" };
+    let there = if is_moved { "which stood elsewhere" } else { "as before" };
     format!("{name} ({p:.2}), {there}, at ({:.2}, {:.2}) m", at.x, at.y)
 }
 

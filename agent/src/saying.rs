@@ -288,7 +288,7 @@ mod tests {
         {
             check(same, same);
         }
-        check("(that is, (at start))", "(that is, it stands at start)");
+        check("(that is, (at start))", "(that is, the robot stands at start)");
         assert_eq!(Saying::default().say("(at start)"), "(at start)");
         assert_eq!(saying.in_general("shut"), "the door is shut");
         assert_eq!(saying.in_general("fly"), "fly");

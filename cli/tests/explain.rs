@@ -97,7 +97,7 @@ fn all_on_a_surface_is_no_thing_that_may_be_somewhere() {
         &[
             "the certainty of what stands on the table is ",
             "something stands there unseen",
-            "of what kind each is and that there are no more",
+            "of what kind the least sure one is, and that there are no more",
             "in all, this was seen: 99 % of the table",
         ],
     );
@@ -191,7 +191,7 @@ fn what_is_nearly_hidden_is_pushed_for_and_what_a_slip_leaves_is_said() {
         0,
         &[
             "pushing object 0 aside from table-3 failed: slipped",
-            "From then on: it stands at here-9; no longer: it stands at table-3",
+            "From then on: the robot stands at here-9; no longer: the robot stands at table-3",
         ],
     );
 }
@@ -297,7 +297,7 @@ fn failures_are_named_as_the_causes_of_new_plans() {
     for words in [
         "failed: blocked:",
         "What follows from that: the ",
-        "failed: slipped: it slid out of the hand. From then on: it stands at ",
+        "failed: slipped: it slid out of the hand. From then on: the robot stands at ",
         "the certainty of where cup A stands is 0.",
         "At best: the certainty that cup A stands on the ",
         "and by what was done since that look: cup A is in the hand",

@@ -316,7 +316,7 @@ mod tests {
             None,
             &[
                 "1 gains more a second, first (stay)",
-                "enough, and sooner: the planner did not come upon it",
+                "enough at best, and sooner: the planner did not come upon it",
                 "(stay) is the quickest, and would be enough at best",
                 "(sure) from 0.00 to 1.00 (0.80 is wanted)",
             ],

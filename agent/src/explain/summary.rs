@@ -18,7 +18,8 @@ pub fn of(header: &Header, report: Option<&Report>, chapters: &[Chapter], name: 
         report.and_then(|report| last.and_then(|last| rests(report, last, name)).or_else(|| said_of(report)));
     let mut said = vec![asked(header), answer(report, chapters.len())];
     said.extend(rests);
-    said.push(trouble(chapters));
+    let is_absent = report.is_some_and(|report| report.verdict == Verdict::NotFound);
+    said.extend(trouble(chapters, is_absent));
     said
 }
 
@@ -120,7 +121,7 @@ fn seen(doubt: &InDoubt) -> String {
 }
 
 /// What went wrong on the way, the gravest first.
-fn trouble(chapters: &[Chapter]) -> String {
+fn trouble(chapters: &[Chapter], is_absent: bool) -> Option<String> {
     let deeds = || chapters.iter().flat_map(|chapter| &chapter.deeds);
     let notes = || deeds().filter_map(|deed| if let Deed::Noted(note) = deed { Some(note) } else { None });
     let failures: Vec<(&str, &str)> = chapters.iter().flat_map(Chapter::failures).collect();
@@ -154,8 +155,10 @@ fn trouble(chapters: &[Chapter]) -> String {
     all.extend((cuts > 0).then(|| {
         format!("the run was cut off {}", if cuts == 1 { "once".into() } else { format!("{cuts} times") })
     }));
-    let vain = in_vain(chapters);
-    match (all.split_first(), vain) {
+    // Where a thing is not there, that looks brought less than was hoped is the answer and no trouble.
+    let vain = in_vain(chapters).filter(|_| !is_absent);
+    Some(match (all.split_first(), vain) {
+        (None, None) if is_absent => return None,
         (None, None) => "Everything went as it was planned.".into(),
         (None, Some(vain)) => format!("The greatest trouble: {vain}."),
         (Some((first, more)), vain) => {
@@ -164,7 +167,7 @@ fn trouble(chapters: &[Chapter]) -> String {
                 if more.is_empty() { String::new() } else { format!(" Besides, {}.", more.join("; ")) };
             format!("The greatest trouble: {first}.{more}")
         }
-    }
+    })
 }
 
 /// How many plans have not brought what was hoped of them, and what of all that was seen misled most; none if none.

@@ -16,7 +16,7 @@ use crate::report::{self, Report};
 use crate::standing::{self, InDoubt, Of, Rests, Seen};
 
 /// Objects that are described one by one; the rest are counted.
-const MOST_NAMED: usize = 6;
+const MOST_NAMED: usize = 12;
 /// What an object is not with more than this is not worth a word.
 const HARDLY: f64 = 0.005;
 

@@ -231,6 +231,36 @@ fn libraries_know_no_command_line_and_print_nothing() {
     }
 }
 
+/// A crate that is packaged holds everything that it is compiled from; what stands elsewhere is linked into it.
+#[test]
+fn what_is_compiled_into_a_crate_lies_in_it() {
+    for package in [
+        "planner",
+        "perception",
+        "memory",
+        "robots",
+        "skills",
+        "domains",
+        "agent",
+        "pages",
+        "experiments",
+        "cli",
+    ] {
+        let own = root().join(package);
+        for file in sources(&own.join("src")) {
+            let code = code(&file);
+            let pasted = ["include_str!(\"", "include_bytes!(\""]
+                .into_iter()
+                .flat_map(|sign| code.split(sign).skip(1));
+            for path in pasted.filter_map(|rest| rest.split('"').next()) {
+                let ups = path.split('/').filter(|part| *part == "..").count();
+                let depth = file.strip_prefix(&own).expect("it lies there").components().count() - 1;
+                assert!(ups <= depth, "{}: {path} lies beside the crate {package}", file.display());
+            }
+        }
+    }
+}
+
 #[test]
 fn versions_are_written_once() {
     for package in [

@@ -2,9 +2,9 @@
 
 /// The page of the reference that tells of a file, by the folder that it stands in; none: `domain.toml`.
 const PAGES: [(&str, &str); 3] = [
-    ("domain.toml", include_str!("../../../docs/reference/domain.md")),
-    ("objects", include_str!("../../../docs/reference/objects.md")),
-    ("scenes", include_str!("../../../docs/reference/scenes.md")),
+    ("domain.toml", include_str!("reference/domain.md")),
+    ("objects", include_str!("reference/objects.md")),
+    ("scenes", include_str!("reference/scenes.md")),
 ];
 
 /// A heading of TOML around a place, as the names between its dots, with where it begins; none before the first.

@@ -9,7 +9,7 @@ use super::wording::{listed, place, share, share_of};
 use crate::standing::{InDoubt, Of, Seen};
 
 /// What an object is not with more than this is not worth a word.
-const HARDLY: f64 = 0.005;
+pub const HARDLY: f64 = 0.005;
 /// An object that is it with more than this may be it.
 const MAY_BE: f64 = 0.05;
 /// What stands this near to where something stood is that, or has taken it in, metres: a mug's half width.

@@ -8,6 +8,7 @@ use descry_domains::lexicon::symbol;
 use descry_memory::belief::{Belief, Track};
 use descry_memory::{Document, Query, Record};
 
+use super::looks::HARDLY;
 use super::states::{Difference, States};
 use super::wording::reasons::{self, Meanings};
 use super::wording::{count, listed, place, share};
@@ -17,8 +18,6 @@ use crate::standing::{self, InDoubt, Of, Rests, Seen};
 
 /// Objects that are described one by one; the rest are counted.
 const MOST_NAMED: usize = 12;
-/// What an object is not with more than this is not worth a word.
-const HARDLY: f64 = 0.005;
 
 /// The words of a run's domain.
 pub struct Words<'a> {

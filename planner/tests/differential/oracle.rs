@@ -298,18 +298,7 @@ impl<'t> Oracle<'t> {
             }
         }
         next.state.facts = next.state.facts & !deleted | added;
-        for (place, how, amount) in changes {
-            let value = &mut next.state.numbers[place];
-            match how {
-                "assign" => *value = amount,
-                "increase" => *value += amount,
-                "decrease" => *value -= amount,
-                _ => *value *= amount,
-            }
-            if !value.is_finite() {
-                return None;
-            }
-        }
+        reckon(&mut next.state.numbers, &changes)?;
         self.derive(&mut next.state);
         self.goes_on(&mut next).then_some(next)
     }
@@ -511,4 +500,21 @@ fn bound(effect: &Effect, object: usize, arguments: &[usize]) -> Vec<usize> {
         binding[variable] = object;
     }
     binding
+}
+
+/// Changes numbers one after the other; `None` if one is none then.
+fn reckon(numbers: &mut [f64], changes: &[(usize, &str, f64)]) -> Option<()> {
+    for &(place, how, amount) in changes {
+        let value = &mut numbers[place];
+        match how {
+            "assign" => *value = amount,
+            "increase" => *value += amount,
+            "decrease" => *value -= amount,
+            _ => *value *= amount,
+        }
+        if !value.is_finite() {
+            return None;
+        }
+    }
+    Some(())
 }

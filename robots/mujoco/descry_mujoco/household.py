@@ -139,7 +139,6 @@ def household(seed: int, rng: np.random.Generator) -> Scene:
     # The first comes, and is moved to the other table when the second comes, which stays.
     for name, on in ((f"{first}@2", here), (f"{first}@3", 1 - here), (f"{second}@3,4", int(rng.integers(2)))):
         put.put(thing(name.split("@")[0], name), tables[on], (1.0, 0.6), gap=APART_M)
-    scene.target = first
     return scene
 
 
@@ -150,4 +149,4 @@ def of_visit(scene: Scene, visit: int) -> Scene:
 
     there = [p for p in scene.placed if stands(p.thing.name)]
     named = [replace(p, thing=replace(p.thing, name=p.thing.name.split("@")[0])) for p in there]
-    return replace(scene, placed=named, target=None)
+    return replace(scene, placed=named)

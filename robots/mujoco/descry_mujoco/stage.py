@@ -121,8 +121,6 @@ def ring_poses(scene: Scene, count: int, seed: int) -> list[np.ndarray]:
 
 def arrange(name: str, seed: int, views: int = RING_VIEWS) -> Scene:
     """The scene of a seed, its target hidden as it asks for from views all round."""
-    if name == "household":
-        return scenes.arrange(SCENES[name], seed)
     return scenes.arrange(SCENES[name], seed, lambda scene: hides_its_target(scene, ring_poses(scene, views, seed)))
 
 

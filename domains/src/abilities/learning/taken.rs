@@ -393,9 +393,22 @@ fn improved(mind: &mut Mind, f: &Found, looks: &Novelty, model: &LearnedModel) -
         1e2 * thing.sides,
         1e2 * sides
     );
+    make_ready(mind);
+    said
+}
+
+/// Something is not learned, and why.
+fn given_up(mind: &mut Mind, what: &str, because: String) -> Result<String, WorldError> {
+    let said = format!("it is not learned: {because}");
+    novelty(mind, what)?.fate = Fate::GivenUp(because);
+    Ok(said)
+}
+
+/// Things that are known have changed: they are made ready to be known again.
+fn make_ready(mind: &mut Mind) {
+    let news = Arc::make_mut(&mut mind.known.news);
     news.models = Models::of(&news.things);
     mind.glances.clear();
-    said
 }
 
 /// Looks were brought together: something was learned, or is known after all, or cannot be learned.
@@ -407,6 +420,7 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
         Err(_) => modelled.keyframes.get(n).is_some_and(|k| k.used),
     };
     let used: Vec<usize> = (0..of.looks.len()).filter(|&n| is_used(n)).collect();
+    let seen = Novelty { looks: used.iter().map(|&n| of.looks[n].clone()).collect(), ..of.clone() };
     let views: Vec<(&View, Isometry3<f64>)> =
         used.iter().filter_map(|&n| Some((&*of.looks[n].view, poses(n)?))).collect();
     let near = |p: &Point3<f64>| (p - of.centre).norm() < SAME_M.max(of.radius_m());
@@ -415,8 +429,7 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
     if let Some((f, surface)) = before.iter().find(|f| f.judged.confidence >= SURE).zip(surface) {
         let (name, confidence) = (mind.known.news.things[f.thing].name.clone(), f.judged.confidence);
         let said = known_again(mind, &surface, f);
-        let looks = Novelty { looks: used.iter().map(|&n| of.looks[n].clone()).collect(), ..of.clone() };
-        let model = modelled.model.as_ref().ok().map(|model| improved(mind, f, &looks, model));
+        let model = modelled.model.as_ref().ok().map(|model| improved(mind, f, &seen, model));
         let improved = model.as_ref().map(|model| format!("; {model}")).unwrap_or_default();
         novelty(mind, what)?.fate = Fate::Known { name, confidence, model };
         return Ok(format!("it is known: {said}{improved}"));
@@ -424,30 +437,40 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
     if let Some(thing) = of.taken_for {
         let name = &mind.known.news.things[thing].name;
         let because = format!("it was taken for {name}, which looks from around do not confirm");
-        novelty(mind, what)?.fate = Fate::GivenUp(because.clone());
-        return Ok(format!("it is not learned: {because}"));
+        return given_up(mind, what, because);
     }
     let model = match &modelled.model {
         Ok(model) => model,
-        Err(because) => {
-            novelty(mind, what)?.fate = Fate::GivenUp(because.clone());
-            return Ok(format!("it is not learned: {because}"));
-        }
+        Err(because) => return given_up(mind, what, because.clone()),
     };
     let (_, size_m) = extent(&model.cloud);
     if (0..3).any(|k| size_m[k] > GROWN * of.size_m[k] + GROWN_M) {
         let at = Point3::from(model.world_from_model.translation.vector);
         let because = format!("what was taken for it grew beyond what had come, to {}", size(&size_m, &at));
-        novelty(mind, what)?.fate = Fate::GivenUp(because.clone());
-        return Ok(format!("it is not learned: {because}"));
+        return given_up(mind, what, because);
     }
-    let seen = Novelty { looks: used.iter().map(|&n| of.looks[n].clone()).collect(), ..of.clone() };
+    let left_out = (0..of.looks.len()).filter(|n| !used.contains(n)).filter_map(|n| {
+        let own = modelled.keyframes.get(n).filter(|k| !k.used).map(|k| k.why.clone());
+        let why = own.or_else(|| model.looks[n].left_out.clone())?;
+        Some(format!("\n          look {} left out: {why}", n + 1))
+    });
+    let said = keep(mind, what, (&seen, of.looks.len()), model)?;
+    Ok(said + &left_out.collect::<String>())
+}
+
+/// A model of something new, made of the looks that fit out of so many, is kept under a name of its own. Says so.
+fn keep(
+    mind: &mut Mind,
+    what: &str,
+    (seen, looks): (&Novelty, usize),
+    model: &LearnedModel,
+) -> Result<String, WorldError> {
     let directions = seen.directions(0.0);
     let sides = f64::from(directions.count_ones()) / DIRECTIONS as f64;
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
+    let at_m = Point3::from(model.world_from_model.translation.vector);
     let news = Arc::make_mut(&mut mind.known.news);
     let name = news.free_name();
-    let at_m = Point3::from(model.world_from_model.translation.vector);
     news.things.push(LearnedThing {
         name: name.clone(),
         learned_unix_s: now_unix_s,
@@ -455,28 +478,19 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
         sides,
         directions,
         meetings: 1,
-        seen: Seen { unix_s: now_unix_s, at_m, on: of.on.clone() },
+        seen: Seen { unix_s: now_unix_s, at_m, on: seen.on.clone() },
     });
     news.learned += 1;
-    news.models = Models::of(&news.things);
-    mind.glances.clear();
-    let looks = (used.len(), of.looks.len());
-    let points = model.cloud.len();
+    make_ready(mind);
+    let looks = (seen.looks.len(), looks);
     novelty(mind, what)?.fate = Fate::Learned { name: name.clone(), looks, sides };
-    let left_out = (0..of.looks.len()).filter(|n| !used.contains(n)).filter_map(|n| {
-        let own = modelled.keyframes.get(n).filter(|k| !k.used).map(|k| k.why.clone());
-        Some(format!(
-            "\n          look {} left out: {}",
-            n + 1,
-            own.or_else(|| model.looks[n].left_out.clone())?
-        ))
-    });
+    let (_, size_m) = extent(&model.cloud);
     Ok(format!(
-        "{name} is learned from {} of {} looks: {points} points, {}, {:.0} % of its sides seen{}",
+        "{name} is learned from {} of {} looks: {} points, {}, {:.0} % of its sides seen",
         looks.0,
         looks.1,
+        model.cloud.len(),
         size(&size_m, &at_m),
-        1e2 * sides,
-        left_out.collect::<String>()
+        1e2 * sides
     ))
 }

@@ -16,7 +16,12 @@ pub fn missed(because: &str, is: &str, counts: Meanings<'_>) -> String {
 
 /// `the goal G is not reached: N is V`, of which the last part may be missing; at the end of a plan, or now.
 fn goal(because: &str, is: &str) -> Option<String> {
-    let rest = because.strip_prefix(AT_THE_END).unwrap_or(because).strip_prefix("the goal ")?;
+    // What is so at the end of a plan is not so now.
+    let (because, is) = match because.strip_prefix(AT_THE_END) {
+        Some(at_the_end) => (at_the_end, "would be only"),
+        None => (because, is),
+    };
+    let rest = because.strip_prefix("the goal ")?;
     let (goal, values) = rest.split_once(" is not reached")?;
     let values = values.trim_start_matches(':').trim();
     if values.is_empty() {
@@ -226,6 +231,12 @@ mod tests {
         ];
         let counts = |_: &str| Some("seconds in vain".to_string());
         cases.iter().for_each(|(said, plain)| assert_eq!(missed(said, "would be only", &counts), *plain));
+        // What is told with the value of now tells what a plan ends with as that.
+        let now = "the goal (>= (sure) 0.8) is not reached: (sure) is 0.5";
+        let end = format!("{AT_THE_END}{now}");
+        let told = |because: &str| missed(because, "is", &counts);
+        assert_eq!(told(now), "(sure) is 0.5, and at least 0.8 is wanted");
+        assert_eq!(told(&end), "(sure) would be only 0.5, and at least 0.8 is wanted");
     }
 
     #[test]

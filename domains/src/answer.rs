@@ -250,11 +250,14 @@ impl Asker<'_> {
         (Verdict::Impossible, self.impossible(&says))
     }
 
-    /// Why looks for a thing prove nothing: they showed nothing that it could stand on, or contradict each other.
+    /// Why looks for a thing prove nothing: they showed nothing that it could stand on, or too few agree.
     fn nothing_seen(&self, thing: &Thing) -> Option<String> {
         let asked = || self.mind.regions.iter().enumerate().filter(|(on, _)| thing.may_be_on(*on));
         if let Some((on, _)) = asked().find(|(_, region)| region.disputed) {
-            return Some(format!("views of the {} contradict each other", self.s.surfaces[on].name));
+            return Some(format!(
+                "too few views of the {} can be laid on each other",
+                self.s.surfaces[on].name
+            ));
         }
         let regions = asked();
         let named =

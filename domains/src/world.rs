@@ -380,7 +380,8 @@ impl<'a> World<'a> {
         notes: &mut Vec<Note>,
     ) -> Result<String, WorldError> {
         let said = json!({ "call": call.to_string(), "outcome": actions::outcome(outcome) });
-        perceive::put(self.setting.record, "skill", self.setting.robot.now_ns(), &said)?;
+        // With what it brings about: a look that came to its end is not in the record without its view.
+        self.setting.record.put_soon(perceive::draft("skill", self.setting.robot.now_ns(), &said)?)?;
         if let Outcome::Told(word) = outcome {
             return Ok(word.clone());
         }

@@ -234,29 +234,18 @@ impl Record {
     /// # Errors
     /// [`Error::Input`] if its pixels do not fit its size; [`Error::Full`].
     pub fn put_image(&self, stamp_ns: i64, frame: &str, image: Image, meta: Meta) -> Result<RecordId, Error> {
-        let (form, layout, data) = match image {
-            Image::Compressed { format, data } => (Form::CompressedImage, json!({ "format": format }), data),
-            Image::Raw { width, height, encoding, data } => {
-                let step = data.len() / height.max(1) as usize;
-                if width == 0
-                    || step == 0
-                    || step * height as usize != data.len()
-                    || !step.is_multiple_of(width as usize)
-                {
-                    return Err(Error::Input {
-                        what: format!("{} bytes are no image of {width} x {height} pixels", data.len()),
-                        mend: "give every row the same number of bytes, and each pixel as well".into(),
-                    });
-                }
-                (
-                    Form::RawImage,
-                    json!({ "width": width, "height": height, "encoding": encoding, "step": step }),
-                    data,
-                )
-            }
-        };
-        let blobs = vec![Blob { name: "image".into(), form, layout, data: data.into() }];
-        self.put(Draft { frame: frame.into(), meta, blobs, ..Draft::new(kind::IMAGE, stamp_ns) })
+        self.put(image_draft(stamp_ns, frame, image, meta)?)
+    }
+
+    /// The same together with what is put next: see [`Record::put_soon`].
+    ///
+    /// # Errors
+    /// As [`Record::put_image`].
+    pub fn put_image_soon(&self, stamp_ns: i64, frame: &str, image: Image, meta: Meta) -> Result<(), Error> {
+        let Draft { kind, end_ns, frame, kept, meta, blobs, .. } = image_draft(stamp_ns, frame, image, meta)?;
+        let blobs =
+            blobs.into_iter().map(|blob| Blob { data: blob.data.into_owned().into(), ..blob }).collect();
+        self.put_soon(Draft { kind, stamp_ns, end_ns, frame, kept, meta, blobs })
     }
 
     /// Records where a frame stood. It is there for lookups at once, on the disk when its group is full or at [`Record::sync`].
@@ -280,7 +269,8 @@ impl Record {
         if self.flusher.has_failed() {
             self.flusher.drain()?;
         }
-        if self.is_measured(stamp_ns, parent, child)? {
+        let sample = Sample { stamp_ns, parent_from_child: *parent_from_child };
+        if self.is_measured(parent, child, &sample)? {
             return Ok(());
         }
         let span = stamp_ns / self.options.group_ns.max(1);
@@ -290,9 +280,28 @@ impl Record {
             self.flusher.send(groups.take());
             groups.span = span;
         }
-        let sample = Sample { stamp_ns, parent_from_child: *parent_from_child };
         groups.open.entry((child.into(), parent.into())).or_default().push(sample);
         Ok(())
+    }
+
+    /// Records where a frame stood together with what is put next: see [`Record::put_soon`].
+    ///
+    /// # Errors
+    /// As [`Record::put_transform`].
+    pub fn put_transform_soon(
+        &self,
+        stamp_ns: i64,
+        parent: &str,
+        child: &str,
+        parent_from_child: &Isometry3<f64>,
+    ) -> Result<(), Error> {
+        transforms::check(stamp_ns, parent, child, parent_from_child)?;
+        let sample = Sample { stamp_ns, parent_from_child: *parent_from_child };
+        if self.is_measured(parent, child, &sample)? {
+            return Ok(());
+        }
+        let group = Group { parent: parent.into(), child: child.into(), samples: vec![sample] };
+        self.put_soon(group.draft(kind::TRANSFORMS))
     }
 
     /// Records a transform that holds at all times for which nothing was measured.
@@ -506,6 +515,33 @@ impl Record {
     pub fn stats(&self) -> Result<Stats, Error> {
         self.store.stats()
     }
+}
+
+/// An image as it is recorded.
+fn image_draft<'a>(stamp_ns: i64, frame: &str, image: Image<'a>, meta: Meta) -> Result<Draft<'a>, Error> {
+    let (form, layout, data) = match image {
+        Image::Compressed { format, data } => (Form::CompressedImage, json!({ "format": format }), data),
+        Image::Raw { width, height, encoding, data } => {
+            let step = data.len() / height.max(1) as usize;
+            if width == 0
+                || step == 0
+                || step * height as usize != data.len()
+                || !step.is_multiple_of(width as usize)
+            {
+                return Err(Error::Input {
+                    what: format!("{} bytes are no image of {width} x {height} pixels", data.len()),
+                    mend: "give every row the same number of bytes, and each pixel as well".into(),
+                });
+            }
+            (
+                Form::RawImage,
+                json!({ "width": width, "height": height, "encoding": encoding, "step": step }),
+                data,
+            )
+        }
+    };
+    let blobs = vec![Blob { name: "image".into(), form, layout, data: data.into() }];
+    Ok(Draft { frame: frame.into(), meta, blobs, ..Draft::new(kind::IMAGE, stamp_ns) })
 }
 
 impl Groups {

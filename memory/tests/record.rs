@@ -316,6 +316,38 @@ fn segments_are_mcap_to_python() {
 }
 
 #[test]
+fn a_view_is_in_the_record_with_its_place_or_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = Record::create(folder.path(), Options::default()).unwrap();
+    let count = || Record::open_shared(folder.path()).unwrap().stats().unwrap().records;
+    record.put_document("note", 0, json!({}), Vec::new()).unwrap();
+    record.put_soon(Draft::new("answer", S)).unwrap();
+    record.put_transform_soon(S, "map", "camera", &turn(1.0, 0.1)).unwrap();
+    let image = Image::Compressed { format: "png", data: b"no png" };
+    record.put_image_soon(S, "camera", image, Meta::default()).unwrap();
+    // Whoever pulls the plug now takes all of the view along.
+    assert_eq!(count(), 1);
+    record.put_cloud(S, "camera", &cloud(1.0), &Sensing::default(), Meta::default()).unwrap();
+    assert_eq!(count(), 5);
+    assert_eq!(record.view_at(S, "map").unwrap().world_from_camera, turn(1.0, 0.1));
+}
+
+#[test]
+fn what_stood_elsewhere_does_not_place_what_is_recorded_later() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = Record::create(folder.path(), Options::default()).unwrap();
+    record.put_transform(S, "map", "camera", &turn(1.0, 0.1)).unwrap();
+    record.sync().unwrap();
+    drop(record);
+    let record = Record::resume(folder.path(), Options::default()).unwrap();
+    record.put_transform_soon(S, "map", "camera", &turn(1.0, 0.1)).unwrap();
+    for other in [turn(1.0, 0.2), turn(1.1, 0.1)] {
+        let refused = record.put_transform_soon(S, "map", "camera", &other).unwrap_err();
+        assert!(refused.to_string().contains("camera stood elsewhere in map"), "{refused}");
+    }
+}
+
+#[test]
 fn what_cannot_be_an_image_or_a_cloud_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let record = Record::create(dir.path(), Options::default()).unwrap();

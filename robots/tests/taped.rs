@@ -5,6 +5,7 @@ mod scenes;
 
 use descry_robots::Pixels;
 use descry_robots::nalgebra::Point3;
+use descry_robots::program::{Limits, ProgramRobot};
 use descry_robots::recorded::{Entry, Known, RecordedRobot, Tape, TapedRobot};
 use descry_robots::sim::{FaultPlan, SimOptions, SimRobot};
 use descry_robots::{Failure, Place, Pose2, Robot, Sensed, Stamp, Watch, conformance};
@@ -161,6 +162,35 @@ async fn what_is_not_on_the_tape_ends_it() {
     }
     let broken = |a: &Result<(), Failure>| matches!(a, Err(Failure::Broken { because }) if because.contains("not the body"));
     assert!(answers.iter().any(broken), "{answers:?}");
+}
+
+/// The template as a program; none without Python.
+fn started() -> Option<Arc<dyn Robot>> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/template.py");
+    if !std::process::Command::new("python3").arg("--version").output().is_ok_and(|o| o.status.success()) {
+        println!("SKIPPED: python3 is not here");
+        return None;
+    }
+    let command = format!("python3 '{}'", file.display());
+    Some(Arc::new(ProgramRobot::start(&command, Limits::default()).unwrap()))
+}
+
+#[tokio::test]
+async fn a_frame_is_of_what_the_head_was_told_to_look_at_also_by_a_body_that_was_started_anew() {
+    let (Some(first), Some(second)) = (started(), started()) else { return };
+    let tape = Arc::new(Memory::default());
+    let begun = TapedRobot::begin(first, tape.clone());
+    let (watch, aside) = (Watch::default(), Point3::new(-1.0, 1.0, 0.0));
+    begun.pose().await.unwrap();
+    begun.look_at(&aside, &watch).await.unwrap();
+    let entries = tape.entries();
+    let wanted = begun.sense(&watch).await.unwrap();
+
+    let goes_on = TapedRobot::go_on(second, tape.clone(), entries);
+    goes_on.pose().await.unwrap();
+    goes_on.look_at(&aside, &watch).await.unwrap();
+    let taken = goes_on.sense(&watch).await.unwrap();
+    assert_eq!(taken.map_from_camera, wanted.map_from_camera);
 }
 
 #[tokio::test]

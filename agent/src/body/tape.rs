@@ -31,8 +31,12 @@ impl Tape for RecordTape {
         let body = serde_json::to_value(entry).map_err(|e| e.to_string())?;
         let mut draft = Draft { kept: true, ..Draft::new(ANSWER, entry.now_ns) };
         draft.meta.body = body;
-        let kept = self.into.put(draft);
-        kept.map(|_| ()).map_err(|e| e.to_string())
+        // A frame counts as taken once its pixels are in the record: they come next, and the answer is kept with them.
+        let kept = match entry.done {
+            Some((_, Answer::Sensed(_))) => self.into.put_soon(draft),
+            _ => self.into.put(draft).map(|_| ()),
+        };
+        kept.map_err(|e| e.to_string())
     }
 
     fn pixels(&self, stamp_ns: Stamp) -> Result<Pixels, String> {

@@ -101,10 +101,10 @@ fn shown(objects: usize) -> String {
     if objects == 0 { "no object".into() } else { count(objects, "object") }
 }
 
-/// Why a view is left out: `view 1 left out: left out: …` says it twice.
+/// Why a view is left out, of which its note says `view 1 left out: …`.
 fn left_out_as(said: &str) -> String {
     match said.split_once(" left out: ") {
-        Some((view, why)) => format!("{view} is left out: {}", why.strip_prefix("left out: ").unwrap_or(why)),
+        Some((view, why)) => format!("{view} is left out: {why}"),
         None => format!("left out: {said}"),
     }
 }

@@ -204,7 +204,11 @@ impl Record {
     }
 
     /// Whether a record that is retraced holds a transform already.
-    pub(super) fn is_measured(&self, stamp_ns: i64, parent: &str, child: &str) -> Result<bool, Error> {
+    ///
+    /// # Errors
+    /// [`Error::Input`] if it holds another of that moment: what is placed by the one is not placed by the other.
+    pub(super) fn is_measured(&self, parent: &str, child: &str, sample: &Sample) -> Result<bool, Error> {
+        let stamp_ns = sample.stamp_ns;
         if self.retrace.as_ref().is_none_or(|r| stamp_ns > r.newest_ns) {
             return Ok(false);
         }
@@ -216,13 +220,24 @@ impl Record {
         };
         for document in self.store.find(&at)? {
             let (of, samples) = self.samples(&document)?;
-            if of == parent && samples.iter().any(|s| s.stamp_ns == stamp_ns) {
-                return Ok(true);
+            let Some(found) = samples.iter().find(|s| of == parent && s.stamp_ns == stamp_ns) else {
+                continue;
+            };
+            let (here, there) = (&sample.parent_from_child, &found.parent_from_child);
+            if (here.to_homogeneous() - there.to_homogeneous()).amax() > SAME_TRANSFORM {
+                return Err(Error::Input {
+                    what: format!("{child} stood elsewhere in {parent} at {stamp_ns} ns, as record {} has it", document.id),
+                    mend: "what was recorded of that moment does not go with what is recorded now; begin a new record".into(),
+                });
             }
+            return Ok(true);
         }
         Ok(false)
     }
 }
+
+/// Transforms whose matrices differ by no more in any entry are the same, written and read again.
+const SAME_TRANSFORM: f64 = 1e-6;
 
 /// The robot that a query asks for: none if it has no name.
 pub(super) fn named(robot: &str) -> Option<String> {

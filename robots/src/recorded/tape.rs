@@ -91,7 +91,7 @@ pub struct Entry {
 
 /// Where a body's answers are kept.
 pub trait Tape: Send + Sync {
-    /// Keeps an entry: when this returns it is safe.
+    /// Keeps an entry: when this returns it is safe, but a frame only with its pixels, which come next.
     ///
     /// # Errors
     /// Why it cannot be kept.

@@ -44,6 +44,8 @@ struct State {
     ended: Option<String>,
     /// Where the base was last, as it said.
     at: Option<Isometry3<f64>>,
+    /// What the head was told to look at, if nothing else has moved since.
+    gaze: Option<Point3<f64>>,
     /// Whether the live body was asked where it is, since the tape ended.
     met: bool,
     /// How much the run's clock is ahead of the live body's.
@@ -76,6 +78,7 @@ impl TapedRobot {
             pending: Vec::new(),
             ended: None,
             at: None,
+            gaze: None,
             met: live.as_ref().is_none_or(|live| live.begins_again()),
             ahead_ns: 0,
         };
@@ -172,9 +175,14 @@ impl TapedRobot {
         self.wait_until(entry.now_ns).await;
         self.lock().now_ns = entry.now_ns;
         match entry.done {
-            Some((_, answer)) => {
+            Some((request, answer)) => {
                 let mut state = self.lock();
                 state.at = answer.place().copied().or(state.at);
+                match request {
+                    Request::LookAt(point) => state.gaze = Some(point),
+                    Request::Pose | Request::Sense | Request::Scan | Request::Read(_) | Request::Hand => {}
+                    _ => state.gaze = None,
+                }
                 Ok((answer, sensed))
             }
             None => Err(Failure::Broken { because: "an answer without its request".into() }),
@@ -189,12 +197,21 @@ impl TapedRobot {
         let Some(live) = &self.live else {
             return Err(Failure::Broken { because: "there is no live body".into() });
         };
-        if let Some(lost) = self.meet(&**live).await?
-            && request != Request::Pose
-        {
+        let unmet = match self.meet(&**live).await? {
+            Met::Here => None,
+            Met::Elsewhere(_) if request == Request::Pose => None,
+            Met::Elsewhere(lost) => Some(lost),
+            // Who was started anew looks elsewhere; the frame that is asked for is one of what it was told to look at.
+            Met::Looking(at) if request == Request::Sense => live.look_at(&at, watch).await.err(),
+            Met::Looking(_) => None,
+        };
+        if let Some(failure @ Failure::Cancelled { .. }) = unmet {
+            return Err(failure);
+        }
+        if let Some(failure) = unmet {
             let replies = std::mem::take(&mut self.lock().pending);
             let now_ns = self.lock().now_ns;
-            return Ok((Entry { replies, done: Some((request, Answer::Failed(lost))), now_ns }, None));
+            return Ok((Entry { replies, done: Some((request, Answer::Failed(failure))), now_ns }, None));
         }
         let (answer, mut sensed) = request.ask(&**live, watch).await;
         // Where somebody stopped the run, it goes on as if that had not been asked.
@@ -211,22 +228,23 @@ impl TapedRobot {
         Ok((Entry { replies, done, now_ns: live.now_ns() + ahead_ns }, sensed))
     }
 
-    /// Asks a body that is where it is, once, where that is. Returns what is wrong if the tape leaves it elsewhere.
-    async fn meet(&self, live: &dyn Robot) -> Result<Option<Failure>, Failure> {
+    /// Asks a body that is where it is, once, where that is.
+    async fn meet(&self, live: &dyn Robot) -> Result<Met, Failure> {
         if std::mem::replace(&mut self.lock().met, true) {
-            return Ok(None);
+            return Ok(Met::Here);
         }
         let here = live.pose().await?;
         let mut state = self.lock();
         state.ahead_ns = (state.now_ns - live.now_ns()).max(0);
-        let Some(left) = state.at else { return Ok(None) };
+        let Some(left) = state.at else { return Ok(Met::Here) };
         let apart_m = (here.map_from_base.translation.vector - left.translation.vector).norm();
         let apart_rad = here.map_from_base.rotation.angle_to(&left.rotation);
-        let same =
-            apart_m < SAME_PLACE_M + 3.0 * here.sigma_m && apart_rad < SAME_PLACE_RAD + 3.0 * here.sigma_rad;
+        if apart_m < SAME_PLACE_M + 3.0 * here.sigma_m && apart_rad < SAME_PLACE_RAD + 3.0 * here.sigma_rad {
+            return Ok(state.gaze.map_or(Met::Here, Met::Looking));
+        }
         let because =
-            || format!("it stands {apart_m:.2} m and {apart_rad:.2} rad from where the record leaves it");
-        Ok((!same).then(|| Failure::Lost { because: because() }))
+            format!("it stands {apart_m:.2} m and {apart_rad:.2} rad from where the record leaves it");
+        Ok(Met::Elsewhere(Failure::Lost { because }))
     }
 
     /// A body that begins again does again what the tape says that it did.
@@ -284,6 +302,16 @@ impl State {
             self.replies.insert(serde_json::to_string(question).unwrap_or_default(), reply.clone());
         }
     }
+}
+
+/// How a body is met where a tape ends.
+enum Met {
+    /// Where the tape leaves it, or it was met before.
+    Here,
+    /// There, and the last that it did was to look at this.
+    Looking(Point3<f64>),
+    /// Elsewhere.
+    Elsewhere(Failure),
 }
 
 /// What the tape has is no answer to what was asked: only a damaged record can say so.

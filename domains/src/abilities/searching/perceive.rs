@@ -57,8 +57,8 @@ pub struct Eyes<'a> {
     pub thresholds: Thresholds,
 }
 
-/// Puts a view of some surfaces into the record: its transforms and colours, then its cloud, so that a cloud is never without its
-/// place. When this returns it survives a crash.
+/// Puts a view of some surfaces into the record: its transforms, its colours and its cloud together, so that none is ever without
+/// the others. When this returns it survives a crash.
 pub fn remember(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -67,9 +67,8 @@ pub fn remember(
 ) -> Result<RecordId, WorldError> {
     let record = eyes.record;
     for t in &sensed.transforms {
-        record.put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
+        record.put_transform_soon(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
     }
-    record.sync()?;
     let camera = eyes.robot.description().camera.as_ref();
     let frame = camera.map_or("camera", |camera| camera.frame.as_str());
     put_colour(record, frame, sensed)?;
@@ -113,8 +112,7 @@ fn put_colour(record: &Record, frame: &str, sensed: &Sensed) -> Result<(), World
         data: colour.image.as_raw(),
     };
     let meta = Meta { body: json!({ "registered": colour.registered }), ..Meta::default() };
-    record.put_image(sensed.stamp_ns, frame, image, meta)?;
-    Ok(())
+    Ok(record.put_image_soon(sensed.stamp_ns, frame, image, meta)?)
 }
 
 /// The records of all views that still hold.
@@ -425,7 +423,7 @@ fn believe(
     let note = Note::Perceived {
         on: surface.name,
         merged: used.len(),
-        left_out: left_out.map(|(fit, n)| format!("view {n} left out: {}", fit.why)).collect(),
+        left_out: left_out.map(|(fit, n)| format!("view {n} {}", fit.why)).collect(),
         points: merged.cloud.points.len(),
         residual_m: used.iter().map(|fit| fit.residual_m).fold(0.0, f64::max),
         objects: percepts.iter().map(in_a_line).collect(),
@@ -475,9 +473,14 @@ pub(crate) fn put(
     stamp_ns: i64,
     body: &impl Serialize,
 ) -> Result<RecordId, WorldError> {
+    Ok(record.put(draft(kind, stamp_ns, body)?)?)
+}
+
+/// A document to be recorded.
+pub(crate) fn draft(kind: &str, stamp_ns: i64, body: &impl Serialize) -> Result<Draft<'static>, WorldError> {
     let body = serde_json::to_value(body).map_err(|e| WorldError::Bug(e.to_string()))?;
     let meta = Meta { body, ..Meta::default() };
-    Ok(record.put(Draft { meta, ..Draft::new(kind, stamp_ns) })?)
+    Ok(Draft { meta, ..Draft::new(kind, stamp_ns) })
 }
 
 fn confidences(mind: &Mind, eyes: Eyes<'_>) -> Vec<f64> {

@@ -86,13 +86,12 @@ pub(super) fn take(
     Ok(note(&mind.known.floor, from))
 }
 
-/// Puts a sweep into the record, its transforms first, and reads it back by its timestamp.
+/// Puts a sweep into the record together with its transforms, and reads it back by its timestamp.
 fn remember(mind: &mut Mind, eyes: Eyes<'_>, from: &str, scanned: &Scanned) -> Result<Scan, WorldError> {
     let (record, body) = (eyes.record, eyes.robot.description());
     for t in &scanned.transforms {
-        record.put_transform(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
+        record.put_transform_soon(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
     }
-    record.sync()?;
     let frame = body.laser.as_ref().map_or("laser", |laser| laser.frame.as_str());
     let at = scanned.scan.map_from_laser.translation.vector;
     let meta =

@@ -132,14 +132,12 @@ fn seconds(domain: &Domain, saying: &Saying) -> Option<String> {
     let is_more = |name: &str| duration(domain, name).is_some_and(|duration| duration.contains("(+"));
     let actions = domain.vocabulary.task.actions.iter().filter(|a| is_more(&a.name));
     let all: Vec<String> = actions
-        .filter_map(|a| {
-            Some(format!("{} also for the {}", saying.in_general(&a.name), counts(domain, &a.name)?))
-        })
+        .filter_map(|a| Some(format!("{}, the {}", saying.in_general(&a.name), counts(domain, &a.name)?)))
         .collect();
     (!all.is_empty()).then(|| {
         format!(
-            "Seconds of a plan are not only those that pass: {}, so that what is likely comes first.",
-            all.join("; ")
+            "More seconds are counted than pass, so that what is likely comes first: for {}.",
+            all.join("; for ")
         )
     })
 }

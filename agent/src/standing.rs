@@ -58,6 +58,12 @@ pub struct Seen {
     pub share: Option<f64>,
     /// From so many places, by views that still hold.
     pub places: usize,
+    /// The probability that it is there where it was not seen, 0 to 1; records of earlier versions do not say.
+    #[serde(default)]
+    pub hidden: f64,
+    /// The part of that where something was measured that no object explains.
+    #[serde(default)]
+    pub measured: f64,
 }
 
 /// What the end of a run rests on.
@@ -99,7 +105,9 @@ fn in_doubt(round: &Round) -> Vec<InDoubt> {
     let told = |about: &str, of: Of, sure: f64, doubt: &Doubt| {
         let on = |(on, surface): (usize, &KnownSurface)| {
             let (share, places) = (doubt.share_seen(on), places(on));
-            (share.is_some() || places > 0).then(|| Seen { on: surface.name.clone(), share, places })
+            let (hidden, measured) = doubt.hidden_share(on);
+            let on = surface.name.clone();
+            (share.is_some() || places > 0).then_some(Seen { on, share, places, hidden, measured })
         };
         InDoubt {
             about: about.into(),

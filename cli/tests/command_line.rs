@@ -179,6 +179,8 @@ fn goals_lists_what_may_be_said() {
     let (out, _) = check(&["goals"], 0, &["find <thing>", "cup A, green cup, small cup", "table"]);
     assert!(!out.is_empty(), "the list is the result: it goes to standard output");
     assert_eq!(json(&["goals", "--json"], 0)["domain"], "tabletop");
+    check(&["goals", "--scene", "two-tables"], 0, &["sideboard"]);
+    check(&["goals", "--scene", "no-such"], 2, &["expected a TOML file, or one of: "]);
 }
 
 #[test]

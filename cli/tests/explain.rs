@@ -45,7 +45,7 @@ fn what_was_found_is_explained() {
             "the run began, and there was no plan",
             "of 9 ways to get further, driving to table-5 (",
             " s), looking at the table from table-5 (2.0 s) [+",
-            "is the quickest, but would not be enough by itself, even at best",
+            "is the quickest, but by what is hoped of it would not be enough by itself",
             "plan 1 was carried out to its end, and the certainty of where cup A stands is 0",
             "achieved: cup A stands on the table",
             "of where cup A may be, this was seen:",
@@ -82,7 +82,7 @@ fn steps_that_were_left_out_are_named_and_so_is_what_was_not_looked_at() {
         &["find", "cup A", "--seed", "12", "--scene", "two-tables"],
         0,
         &[
-            "Not looked at yet: the sideboard.",
+            "Nothing was seen yet of the sideboard.",
             "done 2 of its 4 steps. Left out: driving to sideboard-7 and looking at the sideboard from sideboard-7, because \
              plan 2 was made instead",
         ],
@@ -299,7 +299,7 @@ fn failures_are_named_as_the_causes_of_new_plans() {
         "What follows from that: the ",
         "failed: slipped: it slid out of the hand. From then on: the robot stands at ",
         "the certainty of where cup A stands is 0.",
-        "At best: the certainty that cup A stands on the ",
+        "Hoped for: the certainty that cup A stands on the ",
         "and by what was done since that look: cup A is in the hand",
         "achieved",
     ] {

@@ -14,6 +14,8 @@ pub const HARDLY: f64 = 0.005;
 const MAY_BE: f64 = 0.05;
 /// What stands this near to where something stood is that, or has taken it in, metres: a mug's half width.
 const BESIDE_M: f64 = 0.06;
+/// An object that is it with more than this is taken for it.
+const TAKEN: f64 = 0.5;
 /// A place that is certain with more than this needs no word.
 const SURELY: f64 = 0.99;
 /// Doubts that are told of one by one.
@@ -73,7 +75,7 @@ fn seen(doubt: &InDoubt, was: Option<&InDoubt>) -> String {
     };
     match open.len() {
         0 => now,
-        _ => format!("{now} Not looked at yet: {}.", listed(&open, MOST_PLACES)),
+        _ => format!("{now} Nothing was seen yet of {}.", listed(&open, MOST_PLACES)),
     }
 }
 
@@ -95,7 +97,7 @@ fn why_no_surer(
         Of::Kind => why.extend(unsure_of(doubt, after, name)),
         Of::Surface => why.extend(untold(doubt, after)),
     }
-    why.extend(hidden(doubt));
+    why.extend(hidden(doubt, after.best(&doubt.about).map_or(0.0, |(_, p)| p)));
     (!why.is_empty()).then(|| why.join("; "))
 }
 
@@ -130,10 +132,26 @@ pub fn lost(thing: &str, before: &Standing, after: &Standing) -> Option<(f64, St
                 let (other, p) = likeliest(now, thing);
                 format!("is seen as {other} now, with {}", share(p))
             }
+            None if counts_less(track, before, after) => {
+                "is not counted on any more: what was seen there before no longer holds".into()
+            }
             None => "is not seen there any more".into(),
         },
     };
-    Some((was, format!("what was taken for {thing} with {} {is}", share(was))))
+    let taken = match was >= TAKEN {
+        true => format!("was taken for {thing} with {}", share(was)),
+        false => format!("might have been {thing}, with {},", share(was)),
+    };
+    Some((was, format!("what {taken} {is}")))
+}
+
+/// Whether of the surface where something stood less is seen than before.
+fn counts_less(track: &Track, before: &Standing, after: &Standing) -> bool {
+    let places = |standing: &Standing| -> usize {
+        let seen = standing.doubts.iter().flat_map(|doubt| &doubt.seen);
+        seen.filter(|seen| symbol(&seen.on) == track.on).map(|seen| seen.places).max().unwrap_or(0)
+    };
+    places(after) < places(before)
 }
 
 /// What stands now where an object stood, or beside it.
@@ -171,13 +189,22 @@ fn none_may_be(after: &Standing) -> String {
     }
 }
 
-/// The least sure object where all of a kind are wanted.
+/// The objects that are not surely of a kind, or not, where all of it are wanted: how sure it is of all of them, and the least sure.
 fn unsure_of(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<String> {
     let p = |track: &Track| track.probability_of(&doubt.about);
     let open = |track: &Track| p(track).min(1.0 - p(track));
-    let least = after.belief.tracks.iter().max_by(|a, b| open(a).total_cmp(&open(b)))?;
-    (open(least) >= MAY_BE)
-        .then(|| format!("what stands {} is one with {}", where_it_is(least, name), share(p(least))))
+    let unsure: Vec<&Track> = after.belief.tracks.iter().filter(|track| open(track) > HARDLY).collect();
+    let least = unsure.iter().max_by(|a, b| open(a).total_cmp(&open(b)))?;
+    let all: f64 = unsure.iter().map(|track| 1.0 - open(track)).product();
+    let kind = &doubt.about;
+    let one = format!("what stands {} is a {kind} with {}", where_it_is(least, name), share(p(least)));
+    (all < SURELY).then(|| match unsure.len() {
+        1 => one,
+        n => format!(
+            "which of {n} objects are {kind}s is certain with {} for all together, least of one: {one}",
+            share(all)
+        ),
+    })
 }
 
 /// The object on a surface that is told least from others.
@@ -204,13 +231,44 @@ fn untold(doubt: &InDoubt, after: &Standing) -> Option<String> {
 }
 
 /// What hangs on the places where nothing was seen.
-fn hidden(doubt: &InDoubt) -> Option<String> {
+fn hidden(doubt: &InDoubt, best: f64) -> Option<String> {
     let hidden = (doubt.hidden > HARDLY).then(|| share(doubt.hidden))?;
+    let places = hidden_places(doubt);
+    let nowhere = 1.0 - doubt.hidden - best;
+    let nowhere = if nowhere > HARDLY {
+        format!("; with {} it is not there at all", share(nowhere))
+    } else {
+        String::new()
+    };
     Some(match doubt.of {
-        Of::Thing => format!("with {hidden} it stands where nothing was seen yet"),
-        Of::Kind => format!("with {hidden} there are more where nothing was seen yet"),
-        Of::Surface => format!("with {hidden} something stands there unseen"),
+        Of::Thing => format!("with {hidden} it stands where it could not be seen yet{places}{nowhere}"),
+        Of::Kind => format!("with {hidden} there are more where they could not be seen yet{places}"),
+        Of::Surface => format!("with {hidden} something stands there unseen{places}"),
     })
+}
+
+/// On which surfaces that is, the likeliest first, and whether there is something.
+fn hidden_places(doubt: &InDoubt) -> String {
+    const NAMED: usize = 3;
+    let mut places: Vec<&Seen> = doubt.seen.iter().filter(|seen| seen.hidden > HARDLY).collect();
+    places.sort_by(|a, b| b.hidden.total_cmp(&a.hidden));
+    let is_measured = |seen: &&Seen| seen.measured > seen.hidden / 2.0;
+    if places.is_empty() || (doubt.seen.len() == 1 && !is_measured(&places[0])) {
+        return String::new();
+    }
+    let named = places.iter().take(NAMED).map(|seen| {
+        let measured = if is_measured(seen) {
+            ", mostly where something was measured that no object explains"
+        } else {
+            ""
+        };
+        format!("{} on the {}{measured}", share(seen.hidden), seen.on)
+    });
+    let more = match places.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        n => format!("; less on {n} more"),
+    };
+    format!(" ({}{more})", named.collect::<Vec<_>>().join("; "))
 }
 
 /// What an object most likely is, besides something.
@@ -245,7 +303,14 @@ mod tests {
     }
 
     fn standing(tracks: Vec<Track>, sure: f64, hidden: f64, share: f64) -> Standing {
-        let seen = vec![Seen { on: "table".into(), share: Some(share), places: usize::from(share > 0.0) }];
+        let seen = Seen {
+            on: "table".into(),
+            share: Some(share),
+            places: usize::from(share > 0.0),
+            hidden,
+            measured: 0.0,
+        };
+        let seen = vec![seen];
         let about = "the ring".to_string();
         let doubt = InDoubt { about, sure: Some(sure), wanted: 0.8, hidden, seen, ..InDoubt::default() };
         let mut belief = Belief::default();
@@ -278,10 +343,20 @@ mod tests {
         let words = [
             "is still 0.00 (0.80 is wanted)",
             "the one object that was seen is not it",
-            "with 0.30 it stands where nothing was seen yet",
+            "with 0.30 it stands where it could not be seen yet",
             "70 % of the table (0 % before, 30 % are left)",
         ];
         check(&begin, &empty, perceived(&[]), &words, "could not be used");
+        // On several surfaces it is said on which, and where something is that no object explains.
+        let mut several = empty.clone();
+        let desk = Seen { on: "desk".into(), share: Some(0.0), places: 0, hidden: 0.1, measured: 0.0 };
+        several.doubts[0].seen.push(desk);
+        several.doubts[0].seen[0].measured = 0.25;
+        let words = [
+            "with 0.30 it stands where it could not be seen yet (0.30 on the table, mostly where something was measured that no object \
+             explains; 0.10 on the desk)",
+        ];
+        check(&begin, &several, perceived(&[]), &words, "less on");
         // What was taken for it is something else.
         let taken = standing(vec![track(0.4, 0.35)], 0.3, 0.3, 0.7);
         let words = ["may be it with 0.40 (or stone with 0.35)", "this is the place is certain with 0.75"];
@@ -290,16 +365,16 @@ mod tests {
             &taken,
             &empty,
             perceived(&[]),
-            &["what was taken for the ring with 0.40 is stone with 0.90"],
+            &["what might have been the ring, with 0.40, is stone with 0.90"],
             "before, 30",
         );
-        check(
-            &taken,
-            &begin,
-            perceived(&[]),
-            &["with 0.40 is not seen there any more; no object was seen"],
-            "",
-        );
+        // It went, or only what had been seen of it does not hold any more.
+        let gone = standing(Vec::new(), 0.0, 0.3, 0.7);
+        let words =
+            ["with 0.40, is not seen there any more; no object was seen", "with 0.70 it is not there at all"];
+        check(&taken, &gone, perceived(&[]), &words, "no longer holds");
+        let words = ["with 0.40, is not counted on any more: what was seen there before no longer holds"];
+        check(&taken, &begin, perceived(&[]), &words, "not seen there any more");
         // The view failed.
         let failed = perceived(&["view 2 left out: it contradicts"]);
         check(&begin, &empty, failed, &["this view of the table could not be used"], "");
@@ -308,7 +383,7 @@ mod tests {
             &begin,
             &begin,
             nothing,
-            &["the look showed no surface", "Not looked at yet: the table"],
+            &["the look showed no surface", "Nothing was seen yet of the table"],
             "Seen by now",
         );
         // It is sure enough.

@@ -73,7 +73,7 @@ fn outcome(deed: &Deed, doing: Option<&str>, has_standings: bool) -> Option<Stri
         Deed::Noted(Note::Perceived { on, merged, left_out, residual_m, objects, changed, .. }) => {
             let views = match merged {
                 1 => "one view".to_string(),
-                n => format!("{n} views ({:.1} mm apart)", residual_m * 1e3),
+                n => format!("{n} views (laid on each other to {:.1} mm)", residual_m * 1e3),
             };
             let left_out: String = left_out.iter().map(|why| format!("; {}", left_out_as(why))).collect();
             let is_said = |text: &&String| has_standings && text.starts_with("confidence in ");

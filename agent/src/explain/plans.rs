@@ -54,6 +54,12 @@ fn done(chapter: &Chapter, after: Option<&Chapter>, asked: &Asked<'_>) -> String
         (Some(call), _) => {
             return format!("{done} of its {all} steps: {call} failed. Left out with it: {left_out}.");
         }
+        (None, Some(after)) if after.steps.iter().map(|step| bare(step)).eq(open.iter().copied()) => {
+            return format!(
+                "{done} of its {all} steps. Left to plan {}, which has the same steps: {left_out}.",
+                after.round
+            );
+        }
         (None, Some(after)) => format!("plan {} was made instead, for what is said there", after.round),
         (None, None) if asked.has_ended => "the run ended before, for what is said below".into(),
         (None, None) => "the record ends here".into(),
@@ -78,15 +84,21 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
             format!("plan {} was carried out to its end, and {now}.", before.round)
         }
         left => {
-            let now = reasons::missed(&chapter.because, "would be only", asked.counts);
             let rest = if left == 1 { "step that was".into() } else { format!("{left} steps that were") };
-            format!("with what was learned, the {rest} left of plan {} would not do: {now}.", before.round)
+            let rest = format!("the {rest} left of plan {}", before.round);
+            match reasons::reckoned(&chapter.because, asked.counts) {
+                Some(now) => format!("with what was learned, {rest} count differently: {now}."),
+                None => {
+                    let now = reasons::missed(&chapter.because, "would be only", asked.counts);
+                    format!("with what was learned, {rest} would not do: {now}.")
+                }
+            }
         }
     };
     let done = if moved.is_some() { capital(&done) } else { done };
     // None of many that are all nothing is the greatest.
     let most = chapter.most.as_ref().filter(|(_, most)| share(*most) != share(0.0));
-    let most = most.map(|(name, most)| format!(" The greatest: {name}, {most:.3}."));
+    let most = most.map(|(name, most)| format!(" The greatest: {name}, {}.", share(*most)));
     format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
 }
 
@@ -107,7 +119,7 @@ fn intent(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     if !named.is_empty() {
         let more = numbers.len().saturating_sub(MOST_NAMED);
         let more = if more > 0 { format!(", and {more} more") } else { String::new() };
-        said.push(format!("At best: {}{more}.", named.join(", ")));
+        said.push(format!("Hoped for: {}{more}.", named.join(", ")));
     }
     said
 }
@@ -215,7 +227,10 @@ fn compared(
         return format!("of {all} ways to get further, {mine} {gains}.{alike}{next}");
     }
     let more = if better.len() >= MOST_KEPT { "at least " } else { "" };
-    let many = if better.len() == 1 { "1 gains".into() } else { format!("{} gain", better.len()) };
+    let many = match better.len() {
+        1 => "1 gains more a second:".into(),
+        n => format!("{more}{n} gain more a second, most of all"),
+    };
     let first = named.once(better[0]);
     let rule = match (&asked.policy, &chapter.cut) {
         (Some(policy), _) => format!("The policy {policy} goes by its own rule."),
@@ -225,10 +240,10 @@ fn compared(
         (None, None) => {
             let alone = match enough(weighed, better[0], asked) {
                 Some(false) if chosen.reaches == Some(true) => {
-                    " That one would not be enough by itself, even at best."
+                    " By what is hoped of it, that one would not be enough by itself."
                 }
                 Some(true) if better[0].takes_s < chapter.makespan_s => {
-                    " That one would be enough at best, and sooner: the planner did not come upon it."
+                    " By what is hoped of it, that one would be enough, and sooner: the planner did not come upon it."
                 }
                 _ => "",
             };
@@ -242,7 +257,7 @@ fn compared(
             )
         }
     };
-    format!("{mine} is one of {all} ways to get further; {more}{many} more a second, first {first}. {rule}")
+    format!("{mine} is one of {all} ways to get further; {many} {first}. {rule}")
 }
 
 /// Whether a way by itself would be enough if it brings what is hoped; none where nothing says so: it is only a part of what is to be done.
@@ -266,16 +281,20 @@ fn quickest(
     named: &mut Named,
 ) -> Option<String> {
     let other = weighed.others.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s))?;
-    if other.takes_s > chosen.takes_s - 0.1 {
+    let would_do = enough(weighed, other, asked);
+    // Of what was named as better and enough it has been said.
+    let is_said =
+        would_do == Some(true) && asked.policy.is_none() && is_whole_search && named.0.contains(&other.steps);
+    if other.takes_s > chosen.takes_s - 0.1 || is_said {
         return None;
     }
-    let but = match enough(weighed, other, asked) {
+    let but = match would_do {
         Some(true) if asked.policy.is_none() && is_whole_search => {
-            ", and would be enough at best: the planner did not come upon it"
+            ", and by what is hoped of it would be enough: the planner did not come upon it"
         }
-        Some(false) => ", but would not be enough by itself, even at best",
+        Some(false) => ", but by what is hoped of it would not be enough by itself",
         _ if other.gains < chosen.gains => ", but gains less",
-        _ => "",
+        _ => ", and gains no less: the rest of the plan counts as well",
     };
     Some(format!("{} is the quickest{but}.", named.once(other)))
 }
@@ -315,9 +334,8 @@ mod tests {
             &[way("(stay)", 2.0, 0.85, Some(true))],
             None,
             &[
-                "1 gains more a second, first (stay)",
-                "enough at best, and sooner: the planner did not come upon it",
-                "(stay) is the quickest, and would be enough at best",
+                "1 gains more a second: (stay)",
+                "that one would be enough, and sooner: the planner did not come upon it",
                 "(sure) from 0.00 to 1.00 (0.80 is wanted)",
             ],
         );
@@ -326,8 +344,8 @@ mod tests {
             &[way("(stay)", 2.0, 0.85, Some(false))],
             None,
             &[
-                "That one would not be enough by itself, even at best",
-                "(stay) is the quickest, but would not be enough",
+                "By what is hoped of it, that one would not be enough by itself",
+                "(stay) is the quickest, but by what is hoped of it would not be enough",
             ],
         );
         // Of a record that does not say what would be enough, the numbers say it.
@@ -335,7 +353,7 @@ mod tests {
             Some(way("(go far)", 8.0, 0.9, None)),
             &[way("(stay)", 2.0, 0.5, None)],
             None,
-            &["(stay) is the quickest, but would not be enough"],
+            &["(stay) is the quickest, but by what is hoped of it would not be enough"],
         );
         check(
             chosen(),

@@ -11,6 +11,9 @@ use crate::report::{self, Report};
 use crate::run::Header;
 use crate::standing::{InDoubt, Of};
 
+/// Failures that are named; the rest are counted.
+const MOST_FAILURES: usize = 4;
+
 /// It; `name` is how surfaces are called.
 pub fn of(header: &Header, report: Option<&Report>, chapters: &[Chapter], name: Names<'_>) -> Vec<String> {
     let last = chapters.iter().flat_map(Chapter::stood).last();
@@ -134,16 +137,14 @@ fn trouble(chapters: &[Chapter], is_absent: bool) -> Option<String> {
     let cuts = deeds().filter(|deed| matches!(deed, Deed::Resumed)).count();
     let first =
         |n: usize, first: &str| if n > 1 { format!("; the first: {first}") } else { format!(": {first}") };
+    let failed: Vec<String> = failures.iter().map(|(call, because)| format!("{call}, {because}")).collect();
     let mut all: Vec<String> = Vec::new();
     all.extend(
         moved.first().map(|because| format!("things were moved meanwhile{}", first(moved.len(), because))),
     );
-    all.extend(failures.first().map(|(call, because)| {
-        format!(
-            "{} failed{}",
-            count(failures.len(), "step"),
-            first(failures.len(), &format!("{call}, {because}"))
-        )
+    all.extend((!failed.is_empty()).then(|| {
+        let steps = count(failed.len(), "step");
+        format!("{steps} failed: {}", listed_apart(&failed, MOST_FAILURES))
     }));
     all.extend(
         left_out
@@ -170,12 +171,20 @@ fn trouble(chapters: &[Chapter], is_absent: bool) -> Option<String> {
     })
 }
 
-/// How many plans have not brought what was hoped of them, and what of all that was seen misled most; none if none.
+/// Parts that have commas of their own.
+fn listed_apart(all: &[String], most: usize) -> String {
+    let more = all.len().saturating_sub(most);
+    let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+    all[..all.len() - all.len().saturating_sub(most)].join("; ") + &more
+}
+
+/// How many plans were carried out and have not brought what was hoped of them, and what of all that was seen misled most; none if none.
 fn in_vain(chapters: &[Chapter]) -> Option<String> {
     let is_short = |chapter: &&Chapter| {
         let hoped = chapter.weighed.as_ref().is_some_and(|weighed| !weighed.numbers.is_empty());
         let is_open = |doubt: &InDoubt| doubt.sure.is_some_and(|sure| sure < doubt.wanted);
-        hoped && chapter.stood().last().is_some_and(|now| now.doubts.iter().any(is_open))
+        let is_done = chapter.steps_done().1.is_empty();
+        hoped && is_done && chapter.stood().last().is_some_and(|now| now.doubts.iter().any(is_open))
     };
     let short = chapters.iter().filter(is_short).count();
     let misled = chapters.iter().flat_map(misled).max_by(|a, b| a.0.total_cmp(&b.0));
@@ -190,7 +199,7 @@ fn in_vain(chapters: &[Chapter]) -> Option<String> {
             Some(format!("{} of {all} plans did not yet bring about what was asked for", others.len() + 1))
         }
         (0, _) => None,
-        _ => Some(format!("{plans} brought less than was hoped{misled}")),
+        _ => Some(format!("{plans} brought less to their ends than was hoped{misled}")),
     }
 }
 

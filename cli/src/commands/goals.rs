@@ -6,6 +6,7 @@ use descry_domains::load::DEFAULT;
 use serde_json::json;
 
 use crate::commands::input;
+use descry_agent::body::scene_spec;
 use descry_agent::exit::{CommandError, Exit};
 
 /// Arguments of `descry goals`.
@@ -14,6 +15,9 @@ pub struct Arguments {
     /// Built-in domain or a domain's folder
     #[arg(long, default_value = DEFAULT)]
     domain: String,
+    /// Scene whose places are listed: a name of the domain or a TOML file [default: that of the domain]
+    #[arg(long)]
+    scene: Option<String>,
     /// Print the phrases as one JSON object
     #[arg(long)]
     json: bool,
@@ -21,7 +25,11 @@ pub struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let domain = input::domain(&arguments.domain)?;
-    let lexicon = Lexicon::new(&domain, &Places::of_scene(&domain));
+    let places = match &arguments.scene {
+        Some(scene) => Places::of_spec(&scene_spec(Some(scene), &domain)?),
+        None => Places::of_scene(&domain),
+    };
+    let lexicon = Lexicon::new(&domain, &places);
     let names = |of: &str| -> Vec<Vec<String>> {
         lexicon.of_type(of).iter().map(|named| named.names.clone()).collect()
     };

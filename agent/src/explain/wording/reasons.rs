@@ -9,7 +9,7 @@ pub type Meanings<'a> = &'a dyn Fn(&str) -> Option<String>;
 /// seconds are.
 pub fn missed(because: &str, is: &str, counts: Meanings<'_>) -> String {
     goal(because, is)
-        .or_else(|| takes(because, counts))
+        .or_else(|| reckoned(because, counts))
         .or_else(|| no_longer(because))
         .unwrap_or_else(|| because.trim_end_matches('.').to_string())
 }
@@ -56,13 +56,14 @@ fn bound(condition: &str) -> Option<(&str, String)> {
     let end = rest.find(')')?;
     let from = condition.len() - 1 - rest.len() - 1;
     let number = &condition[from..from + end + 2];
-    let value = rest[end + 1..].trim();
+    let value = &short(rest[end + 1..].trim());
     let is_one = !value.contains(' ') && !value.is_empty();
     is_one.then(|| (number, format!("{most} {value}")))
 }
 
-/// `step N CALL at T takes A, B is asked for`.
-fn takes(because: &str, counts: Meanings<'_>) -> Option<String> {
+/// `step N CALL at T takes A, B is asked for`: nothing is wrong with the rest of a plan, but it counts for more or less. None for
+/// another reason.
+pub fn reckoned(because: &str, counts: Meanings<'_>) -> Option<String> {
     let (call, rest) = step(because)?;
     let (had, asked) = rest.split_once(" takes ")?.1.split_once(", ")?;
     let asked = asked.strip_suffix(" is asked for")?;
@@ -117,11 +118,14 @@ fn step(because: &str) -> Option<(&str, &str)> {
     Some((&rest[from..to], &rest[to..]))
 }
 
-/// Numbers with at most three digits behind the point.
+/// Numbers with at most three digits behind the point; what may be a share as shares are told.
 fn short(text: &str) -> String {
     let word = |word: &str| {
         let bare = word.trim_end_matches([',', '.', ';']);
         match bare.parse::<f64>() {
+            Ok(value) if bare.contains('.') && (0.0..=1.0).contains(&value) => {
+                format!("{}{}", super::share(value), &word[bare.len()..])
+            }
             Ok(value) if bare.contains('.') => {
                 let digits = format!("{value:.3}");
                 format!("{}{}", digits.trim_end_matches('0').trim_end_matches('.'), &word[bare.len()..])
@@ -192,11 +196,11 @@ mod tests {
         let cases = [
             (
                 "the goal (>= (confidence cup-a) 0.8) is not reached: (confidence cup-a) is 0.628928",
-                "(confidence cup-a) would be only 0.629, and at least 0.8 is wanted",
+                "(confidence cup-a) would be only 0.63, and at least 0.80 is wanted",
             ),
             (
                 "the goal (>= (completeness cup) 0.9) is not reached: (completeness cup) is 0.899671",
-                "(completeness cup) would be only 0.8996, and at least 0.9 is wanted",
+                "(completeness cup) would be only 0.8996, and at least 0.90 is wanted",
             ),
             ("the goal (on a b) is not reached", "(on a b) does not hold"),
             (
@@ -205,11 +209,11 @@ mod tests {
             ),
             (
                 "step 1 (pick-up a) at 1.5: (>= (presence a) (sure)) does not hold at its start: (presence a) is 0.000008, (sure) is 0.8",
-                "(pick-up a) needs (presence a) to be at least 0.8, and it is 0",
+                "(pick-up a) needs (presence a) to be at least 0.80, and it is 0.00",
             ),
             (
                 "step 1 (go) at 1: (>= (charge) 0.5) does not hold at its start: (charge) is 0.123456",
-                "(go) needs (charge) to be at least 0.5, and it is 0.123",
+                "(go) needs (charge) to be at least 0.50, and it is 0.12",
             ),
             (
                 "step 2 (merge a) at 5.1: (< (open a) 1) does not hold at its start: (open a) is 1",
@@ -217,7 +221,7 @@ mod tests {
             ),
             (
                 "the goal (<= (unseen) 0.1) is not reached: (unseen) is 0.25",
-                "(unseen) would be only 0.25, and at most 0.1 is wanted",
+                "(unseen) would be only 0.25, and at most 0.10 is wanted",
             ),
             (
                 "step 2 (go) at 3: [worth x] does not hold at its start",
@@ -235,8 +239,8 @@ mod tests {
         let now = "the goal (>= (sure) 0.8) is not reached: (sure) is 0.5";
         let end = format!("{AT_THE_END}{now}");
         let told = |because: &str| missed(because, "is", &counts);
-        assert_eq!(told(now), "(sure) is 0.5, and at least 0.8 is wanted");
-        assert_eq!(told(&end), "(sure) would be only 0.5, and at least 0.8 is wanted");
+        assert_eq!(told(now), "(sure) is 0.50, and at least 0.80 is wanted");
+        assert_eq!(told(&end), "(sure) would be only 0.50, and at least 0.80 is wanted");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use descry_memory::space::Cell;
 use descry_perception::nalgebra::{Point3, Vector3};
 use descry_perception::noise::normal_cdf;
 
-use super::doubt::Hypothesis;
+use super::doubt::{Ground, Hypothesis};
 use crate::situation::{KnownSurface, Situation};
 
 /// A thing that is farther than this from where it is said to stand is not there, metres: nobody would grasp it.
@@ -96,5 +96,12 @@ fn end(
     let points: Vec<Point3<f64>> = (0..steps).map(point).collect();
     let unseen = points.iter().filter(|p| s.spaces[on].cell(p) == Cell::Unseen).count();
     let centre = a + (b - a) / 2.0;
-    (2 * unseen > steps).then_some(Hypothesis { weight: 0.0, on, centre, points, facing: None })
+    (2 * unseen > steps).then_some(Hypothesis {
+        weight: 0.0,
+        on,
+        centre,
+        points,
+        facing: None,
+        ground: Ground::Object,
+    })
 }

@@ -37,6 +37,19 @@ pub struct Hypothesis {
     pub points: Vec<Point3<f64>>,
     /// The side from which it must be seen, as a unit vector away from it; none if any will do.
     pub facing: Option<Vector3<f64>>,
+    /// What makes it possible.
+    pub ground: Ground,
+}
+
+/// What makes a hypothesis possible.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ground {
+    /// Nothing is known of the place.
+    NotSeen,
+    /// Something was measured there that no object explains.
+    Measured,
+    /// An object was seen that may be it.
+    Object,
 }
 
 /// Everything that is in doubt about a thing or a surface.
@@ -210,8 +223,18 @@ impl Doubt {
     /// nothing is known of the surface.
     pub fn share_seen(&self, on: usize) -> Option<f64> {
         let places = *self.places.get(&on)?;
-        let hidden = self.hypotheses.iter().filter(|h| h.facing.is_none() && h.on == on).count();
+        let hidden = self.hidden_at(on).count();
         Some(1.0 - hidden as f64 / (places.max(1)) as f64)
+    }
+
+    /// The probability that it is on a surface where it was not seen, and the part of that where something was measured.
+    pub fn hidden_share(&self, on: usize) -> (f64, f64) {
+        let measured = self.hidden_at(on).filter(|h| h.ground == Ground::Measured);
+        (self.hidden_at(on).map(|h| h.weight).sum(), measured.map(|h| h.weight).sum())
+    }
+
+    fn hidden_at(&self, on: usize) -> impl Iterator<Item = &Hypothesis> {
+        self.hypotheses.iter().filter(move |h| h.on == on && h.ground != Ground::Object)
     }
 
     /// The probability that hangs on all that is in doubt.
@@ -278,8 +301,9 @@ impl Doubt {
                     let space = &situation.spaces[on];
                     let Unseen { points, likely } =
                         unseen_volume(surface, space, &standing, &centre, size_m)?;
-                    let weight = each * if likely { MEASURED_WEIGHT } else { 1.0 };
-                    Some(Hypothesis { weight, on, centre, points, facing: None })
+                    let (ground, times) =
+                        if likely { (Ground::Measured, MEASURED_WEIGHT) } else { (Ground::NotSeen, 1.0) };
+                    Some(Hypothesis { weight: each * times, on, centre, points, facing: None, ground })
                 })
             }));
         }
@@ -345,6 +369,7 @@ fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypoth
         centre,
         points: vec![centre + side * (radius + 0.02)],
         facing: Some(*side),
+        ground: Ground::Object,
     };
     open.iter().map(hypothesis).collect()
 }

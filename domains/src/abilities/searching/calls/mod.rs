@@ -59,7 +59,7 @@ pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "search-cost",
         reads: &["observed"],
-        about: "seconds that looking there first may have been in vain for",
+        about: "seconds for having looked there in vain: the more, the less likely a look finds it there",
         answers: search_cost::answer,
     },
     Meaning {

@@ -242,7 +242,7 @@ impl<'a> Agent<'a> {
     }
 
     /// Takes the next steps off the plan: the first, and those that begin before any of them has ended. There is one: where
-    /// nothing is left to do, the goal holds. Their times count from the first one's start.
+    /// nothing is left to do, the goal holds. Their times count from the first one's start, and those of what is left from the next.
     fn next_steps(&mut self) -> Vec<Step> {
         let plan = self.plan.get_or_insert_with(Plan::default);
         let first_s = plan.steps.first().and_then(|s| s.start_s).unwrap_or(0.0);
@@ -257,7 +257,13 @@ impl<'a> Agent<'a> {
             count += 1;
         }
         let mut steps: Vec<Step> = plan.steps.drain(..count).collect();
-        steps.iter_mut().for_each(|s| s.start_s = s.start_s.map(|start_s| start_s - first_s));
+        let from = |steps: &mut [Step], first_s: f64| {
+            steps.iter_mut().for_each(|s| s.start_s = s.start_s.map(|start_s| start_s - first_s));
+        };
+        from(&mut steps, first_s);
+        // What is left begins when these have ended.
+        let next_s = plan.steps.first().and_then(|s| s.start_s).unwrap_or(0.0);
+        from(&mut plan.steps, next_s);
         steps
     }
 

@@ -12,6 +12,7 @@ mod verdict;
 pub mod wording;
 
 use descry_domains::abilities;
+use descry_domains::abilities::searching::policies;
 use descry_domains::load::Domain;
 use descry_domains::vocabulary::Ground;
 use descry_memory::Record;
@@ -84,7 +85,7 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
         said.extend(domain.as_ref().and_then(|domain| numbers(domain, &chapters, &saying)));
         said.extend(domain.as_ref().and_then(|domain| poses(domain, &header.settings.robot)));
         said.push(WAYS.into());
-        said.extend(domain.as_ref().and_then(|domain| seconds(domain, &saying)));
+        said.extend(domain.as_ref().and_then(|domain| seconds(domain, &saying, &chapters)));
     }
     let words = verdict::Words { meanings: &meanings, name: &name };
     let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
@@ -127,9 +128,14 @@ fn counts(domain: &Domain, action: &str) -> Option<String> {
     (!all.is_empty()).then(|| listed(&all, all.len()))
 }
 
-/// Which actions count for more than they take.
-fn seconds(domain: &Domain, saying: &Saying) -> Option<String> {
-    let is_more = |name: &str| duration(domain, name).is_some_and(|duration| duration.contains("(+"));
+/// Which actions count for more than they take, and do so in this run.
+fn seconds(domain: &Domain, saying: &Saying, chapters: &[chapters::Chapter]) -> Option<String> {
+    let is_more = |name: &str| {
+        let takes_s = duration(domain, name).and_then(|duration| {
+            duration.split_once("(+ ")?.1.split_whitespace().next()?.parse::<f64>().ok()
+        });
+        takes_s.is_some_and(|takes_s| chapters.iter().any(|chapter| chapter.counts_more(name, takes_s)))
+    };
     let actions = domain.vocabulary.task.actions.iter().filter(|a| is_more(&a.name));
     let all: Vec<String> = actions
         .filter_map(|a| Some(format!("{}, the {}", saying.in_general(&a.name), counts(domain, &a.name)?)))
@@ -225,7 +231,8 @@ fn said(header: &Header, asked: &Asked<'_>, saying: &Saying) -> Vec<String> {
         false => format!("Wanted: {goal}. In PDDL: {pddl}."),
     }];
     if let Some(policy) = &asked.policy {
-        said.push(format!("Where to look next was chosen by the policy {policy}, not by the planner."));
+        let rule = policies::about(policy).map(|about| format!(" It {about}.")).unwrap_or_default();
+        said.push(format!("Where to look next was chosen by the policy {policy}, not by the planner.{rule}"));
     }
     if !header.resumed.is_empty() {
         let times = match header.resumed.len() {

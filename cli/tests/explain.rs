@@ -134,7 +134,11 @@ fn a_policy_is_not_called_the_planner() {
     check(
         &["find", "cup A", "--seed", "9", "--policy", "nearest"],
         0,
-        &["chosen by the policy nearest", "The policy nearest goes by its own rule"],
+        &[
+            "chosen by the policy nearest",
+            "It looks from the nearest pose that it has not looked from.",
+            "The policy nearest goes by its own rule",
+        ],
     );
 }
 
@@ -235,14 +239,42 @@ fn what_the_record_does_not_say_is_said_not_to_be_known() {
 }
 
 #[test]
+fn what_is_left_of_a_plan_has_the_time_that_is_left_now() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = ["do", "find cup A within 25 seconds", "--domain", "home", "--seed", "65", "--run", "run"];
+    let run = binary::outcome(folder.path(), &run);
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(said.contains("the rest of the plan still reaches the goal"), "{said}");
+    assert!(!said.contains("(time-left) does not hold"), "the last look ends in time: {said}");
+}
+
+#[test]
 fn what_goes_wrong_in_a_scene_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = Domain::load("home").expect("a built-in domain").scenes["default"].clone();
     let fault = "\n[[fault]]\nkind = \"door_shut\"\nat = 1\ndoor = \"kitchen door\"\n";
     std::fs::write(folder.path().join("doors.toml"), scene + fault).expect("a scene");
-    let run = ["find", "cup A", "--domain", "home", "--scene", "doors.toml", "--seed", "6", "--run", "run"];
+    let run = [
+        "find",
+        "cup A",
+        "--domain",
+        "home",
+        "--scene",
+        "doors.toml",
+        "--seed",
+        "6",
+        "--run",
+        "run",
+        "--json",
+    ];
     let run = binary::outcome(folder.path(), &run);
-    assert!(run.status.code().is_some_and(|code| code < 2), "{}", String::from_utf8_lossy(&run.stderr));
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.code().is_some_and(|code| code < 2), "{said}");
+    // What was driven up to the door counts as well.
+    let report: Value = serde_json::from_slice(&run.stdout).expect("a report");
+    let arrived = said.split("drove ").skip(1).filter_map(|rest| rest.split(' ').next()?.parse::<f64>().ok());
+    let (arrived_m, all_m) = (arrived.sum::<f64>(), report["distance_m"].as_f64().expect("metres"));
+    assert!(all_m > arrived_m + 0.5, "{all_m} m, of which drives that arrived {arrived_m} m");
     explained(
         folder.path(),
         &[

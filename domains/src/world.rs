@@ -516,6 +516,13 @@ impl<'a> World<'a> {
     pub fn stands_at(&mut self, here: &PoseEstimate) {
         let place = here.place();
         let known = &mut self.mind.known;
+        // The way of a drive that did not arrive was driven all the same, as far as it came.
+        let from = &known.candidates[known.at].place;
+        if *from != place
+            && let Some(Ok(way)) = self.setting.robot.travel(from, std::slice::from_ref(&place), &[]).first()
+        {
+            self.mind.distance_m += way.distance_m;
+        }
         let found = known.candidates.iter().position(|c| c.place == place);
         known.at = found.unwrap_or_else(|| {
             let symbol = format!("here-{}", known.candidates.len());

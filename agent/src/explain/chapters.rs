@@ -151,6 +151,17 @@ impl Chapter {
         (done, open)
     }
 
+    /// Whether a step of an action counts for more seconds in its plan than it takes.
+    pub fn counts_more(&self, action: &str, takes_s: f64) -> bool {
+        let counted_s = |step: &String| {
+            let called = bare(step).trim_start_matches('(').split(' ').next()?;
+            let (_, counted) = step.rsplit_once('[')?;
+            let counted_s: f64 = counted.trim_end_matches(']').parse().ok()?;
+            (called == action).then_some(counted_s)
+        };
+        self.steps.iter().filter_map(counted_s).any(|counted_s| counted_s > takes_s + 0.05)
+    }
+
     /// How things stood after each of its steps.
     pub fn stood(&self) -> impl Iterator<Item = &Standing> {
         self.deeds.iter().filter_map(|deed| if let Deed::Stands(now) = deed { Some(now) } else { None })

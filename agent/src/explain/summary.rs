@@ -81,6 +81,7 @@ fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
                 track.seen_fraction * 100.0
             )
         }
+        (Of::Thing, _) if last.belief.tracks.is_empty() => objects,
         (Of::Thing, _) => looks::may_be(doubt, last, name)
             .unwrap_or_else(|| format!("{objects}, none of which may be {}", doubt.about)),
         (Of::Kind, _) => format!(

@@ -144,13 +144,13 @@ fn object(track: &Track, asked: Option<&str>, words: &Words<'_>) -> String {
         "" => "is in the hand".into(),
         on => format!("stands on the {}", (words.name)(on)),
     };
-    format!(
-        "what {on} at {} is {} with a probability of {}{others}; {:.0} % of its outside was seen.",
-        place(track),
-        first.0,
-        share(first.1),
-        track.seen_fraction * 100.0
-    )
+    // Of what no model fits it is not known how large its outside is.
+    let seen = match track.seen_fraction > 0.0 {
+        true => format!("; {:.0} % of its outside was seen", track.seen_fraction * 100.0),
+        false => String::new(),
+    };
+    let at = place(track);
+    format!("what {on} at {at} is {} with a probability of {}{others}{seen}.", first.0, share(first.1))
 }
 
 /// Why there was nothing more to do, and what is left.

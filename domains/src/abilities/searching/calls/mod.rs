@@ -59,7 +59,7 @@ pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "search-cost",
         reads: &["observed"],
-        about: "seconds for having looked there in vain: the more, the less likely a look finds it there",
+        about: "seconds for having looked there in vain: the more, the less likely a look finds it there and the longer the way",
         answers: search_cost::answer,
     },
     Meaning {

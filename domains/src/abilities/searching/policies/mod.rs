@@ -79,16 +79,30 @@ impl From<By> for Chooser {
 /// Makes a policy for a run: the seed of the run, and foresight where there is any.
 type Make = fn(u64, Option<Foresight>) -> Option<Box<dyn Policy>>;
 
-/// Every policy by its name.
-const ALL: [(&str, Make); 8] = [
-    ("sweep", |_, _| Some(Box::new(sweep::Sweep))),
-    ("nearest", |_, _| Some(Box::new(nearest::Nearest))),
-    ("nearest-surface", |_, _| Some(Box::<nearest_surface::NearestSurface>::default())),
-    ("random", |seed, _| Some(Box::new(random::Random::new(seed)))),
-    ("most-unknown", |_, _| Some(Box::new(most_unknown::MostUnknown))),
-    ("rear-side", |_, _| Some(Box::new(rear_side::RearSide))),
-    ("gain-per-second", |_, _| Some(Box::new(gain_per_second::GainPerSecond))),
-    ("oracle", |_, foresight| Some(Box::new(oracle::Oracle::new(foresight?)))),
+/// Every policy by its name, and what it does.
+const ALL: [(&str, &str, Make); 8] = [
+    ("sweep", "goes all around from the nearest pose, whatever is seen", |_, _| Some(Box::new(sweep::Sweep))),
+    ("nearest", "looks from the nearest pose that it has not looked from", |_, _| {
+        Some(Box::new(nearest::Nearest))
+    }),
+    (
+        "nearest-surface",
+        "goes to the nearest surface with something in doubt, looks until no look there is worth it, and then to the next",
+        |_, _| Some(Box::<nearest_surface::NearestSurface>::default()),
+    ),
+    ("random", "takes any look", |seed, _| Some(Box::new(random::Random::new(seed)))),
+    ("most-unknown", "takes the look that shows most of the space that no view has shown", |_, _| {
+        Some(Box::new(most_unknown::MostUnknown))
+    }),
+    ("rear-side", "takes the look that shows most of the unseen space behind what was seen", |_, _| {
+        Some(Box::new(rear_side::RearSide))
+    }),
+    ("gain-per-second", "takes the look that is expected to settle most of the doubt a second", |_, _| {
+        Some(Box::new(gain_per_second::GainPerSecond))
+    }),
+    ("oracle", "knows in advance what each look shows", |_, foresight| {
+        Some(Box::new(oracle::Oracle::new(foresight?)))
+    }),
 ];
 
 /// Why there is no such policy.
@@ -114,7 +128,12 @@ pub enum PolicyError {
 
 /// The names of all policies, the planner's first.
 pub fn names() -> Vec<&'static str> {
-    std::iter::once(PLAN).chain(ALL.iter().map(|(name, _)| *name)).collect()
+    std::iter::once(PLAN).chain(ALL.iter().map(|(name, ..)| *name)).collect()
+}
+
+/// What a policy does, said after its name; none if there is none of that name.
+pub fn about(name: &str) -> Option<&'static str> {
+    ALL.iter().find(|(known, ..)| *known == name).map(|(_, about, _)| *about)
 }
 
 /// The policy of a name.
@@ -125,7 +144,7 @@ pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Choo
     if name == PLAN {
         return Ok(By::Planner.into());
     }
-    let Some((_, make)) = ALL.iter().find(|(known, _)| *known == name) else {
+    let Some((.., make)) = ALL.iter().find(|(known, ..)| *known == name) else {
         return Err(PolicyError::Unknown { name: name.into(), known: names().join(", ") });
     };
     make(seed, foresight)

@@ -259,18 +259,11 @@ impl Record {
         child: &str,
         parent_from_child: &Isometry3<f64>,
     ) -> Result<(), Error> {
-        transforms::check(stamp_ns, parent, child, parent_from_child)?;
-        if stamp_ns < 0 {
-            return Err(Error::Input {
-                what: format!("the stamp {stamp_ns} ns is negative"),
-                mend: "count from the start of the recording".into(),
-            });
-        }
         if self.flusher.has_failed() {
             self.flusher.drain()?;
         }
         let sample = Sample { stamp_ns, parent_from_child: *parent_from_child };
-        if self.is_measured(parent, child, &sample)? {
+        if !self.is_news(parent, child, &sample)? {
             return Ok(());
         }
         let span = stamp_ns / self.options.group_ns.max(1);
@@ -295,13 +288,28 @@ impl Record {
         child: &str,
         parent_from_child: &Isometry3<f64>,
     ) -> Result<(), Error> {
-        transforms::check(stamp_ns, parent, child, parent_from_child)?;
         let sample = Sample { stamp_ns, parent_from_child: *parent_from_child };
-        if self.is_measured(parent, child, &sample)? {
+        if !self.is_news(parent, child, &sample)? {
             return Ok(());
         }
         let group = Group { parent: parent.into(), child: child.into(), samples: vec![sample] };
         self.put_soon(group.draft(kind::TRANSFORMS))
+    }
+
+    /// Whether a measured transform is not in the record yet.
+    ///
+    /// # Errors
+    /// If it is unsound, or contradicts what is there.
+    fn is_news(&self, parent: &str, child: &str, sample: &Sample) -> Result<bool, Error> {
+        let stamp_ns = sample.stamp_ns;
+        transforms::check(stamp_ns, parent, child, &sample.parent_from_child)?;
+        if stamp_ns < 0 {
+            return Err(Error::Input {
+                what: format!("the stamp {stamp_ns} ns is negative"),
+                mend: "count from the start of the recording".into(),
+            });
+        }
+        Ok(!self.is_measured(parent, child, sample)?)
     }
 
     /// Records a transform that holds at all times for which nothing was measured.

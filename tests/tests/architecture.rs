@@ -231,21 +231,24 @@ fn libraries_know_no_command_line_and_print_nothing() {
     }
 }
 
+/// The crates that others may build from.
+const PACKAGED: [&str; 10] = [
+    "planner",
+    "perception",
+    "memory",
+    "robots",
+    "skills",
+    "domains",
+    "agent",
+    "pages",
+    "experiments",
+    "cli",
+];
+
 /// A crate that is packaged holds everything that it is compiled from; what stands elsewhere is linked into it.
 #[test]
 fn what_is_compiled_into_a_crate_lies_in_it() {
-    for package in [
-        "planner",
-        "perception",
-        "memory",
-        "robots",
-        "skills",
-        "domains",
-        "agent",
-        "pages",
-        "experiments",
-        "cli",
-    ] {
+    for package in PACKAGED {
         let own = root().join(package);
         for file in sources(&own.join("src")) {
             let code = code(&file);
@@ -263,19 +266,7 @@ fn what_is_compiled_into_a_crate_lies_in_it() {
 
 #[test]
 fn versions_are_written_once() {
-    for package in [
-        "planner",
-        "perception",
-        "memory",
-        "robots",
-        "skills",
-        "domains",
-        "agent",
-        "pages",
-        "experiments",
-        "cli",
-        "tests",
-    ] {
+    for package in PACKAGED.into_iter().chain(["tests"]) {
         let text =
             fs::read_to_string(root().join(package).join("Cargo.toml")).expect("every crate has a manifest");
         let manifest: toml::Table = text.parse().expect("a manifest is TOML");

@@ -97,7 +97,8 @@ fn why_no_surer(
         Of::Kind => why.extend(unsure_of(doubt, after, name)),
         Of::Surface => why.extend(untold(doubt, after)),
     }
-    why.extend(hidden(doubt, after.best(&doubt.about).map_or(0.0, |(_, p)| p)));
+    let seen: f64 = after.belief.tracks.iter().map(|track| track.probability_of(&doubt.about)).sum();
+    why.extend(hidden(doubt, seen));
     (!why.is_empty()).then(|| why.join("; "))
 }
 
@@ -230,11 +231,11 @@ fn untold(doubt: &InDoubt, after: &Standing) -> Option<String> {
     ))
 }
 
-/// What hangs on the places where nothing was seen.
-fn hidden(doubt: &InDoubt, best: f64) -> Option<String> {
+/// What hangs on the places where nothing was seen, and on none; objects that were seen are it with so much in all.
+fn hidden(doubt: &InDoubt, seen: f64) -> Option<String> {
     let hidden = (doubt.hidden > HARDLY).then(|| share(doubt.hidden))?;
     let places = hidden_places(doubt);
-    let nowhere = 1.0 - doubt.hidden - best;
+    let nowhere = 1.0 - doubt.hidden - seen;
     let nowhere = if nowhere > HARDLY {
         format!("; with {} it is not there at all", share(nowhere))
     } else {

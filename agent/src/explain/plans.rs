@@ -84,10 +84,13 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
             format!("plan {} was carried out to its end, and {now}.", before.round)
         }
         left => {
-            let rest = if left == 1 { "step that was".into() } else { format!("{left} steps that were") };
+            let (rest, count) = match left {
+                1 => ("step that was".into(), "counts"),
+                _ => (format!("{left} steps that were"), "count"),
+            };
             let rest = format!("the {rest} left of plan {}", before.round);
             match reasons::reckoned(&chapter.because, asked.counts) {
-                Some(now) => format!("with what was learned, {rest} count differently: {now}."),
+                Some(now) => format!("with what was learned, {rest} {count} differently: {now}."),
                 None => {
                     let now = reasons::missed(&chapter.because, "would be only", asked.counts);
                     format!("with what was learned, {rest} would not do: {now}.")

@@ -293,7 +293,9 @@ impl Record {
             return Ok(());
         }
         let group = Group { parent: parent.into(), child: child.into(), samples: vec![sample] };
-        self.put_soon(group.draft(kind::TRANSFORMS))
+        // What is there already was told by its stamp, not by its turn.
+        self.hold_back(group.draft(kind::TRANSFORMS));
+        Ok(())
     }
 
     /// Whether a measured transform is not in the record yet.
@@ -390,8 +392,12 @@ impl Record {
         {
             return Ok(());
         }
-        self.soon.lock().unwrap_or_else(PoisonError::into_inner).push(draft);
+        self.hold_back(draft);
         Ok(())
+    }
+
+    fn hold_back(&self, draft: Draft<'static>) {
+        self.soon.lock().unwrap_or_else(PoisonError::into_inner).push(draft);
     }
 
     fn flush_soon(&self) -> Result<(), Error> {

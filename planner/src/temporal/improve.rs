@@ -11,6 +11,7 @@ use super::advance::{Situation, Step};
 use super::compress::classical_plan;
 use super::destroy::{Chance, keep_for, taken_apart};
 use super::envelope::{all_apart, envelopes, in_one_go_suffices};
+use super::joined::shortened;
 use super::mentions::keep_apart;
 use super::relaxed::{Part, Relaxed};
 use super::schedule::tightened;
@@ -247,7 +248,8 @@ impl Run<'_, '_, '_> {
         {
             (measured, steps, base) = (leaner, lean, lean_base);
         }
-        (measured, steps, base) = tightened(self.space, (measured, steps, base), self.stop)?;
+        let shorter = shortened(self.space, (measured, steps, base), self.stop)?;
+        (measured, steps, base) = tightened(self.space, shorter, self.stop)?;
         let ready_s = base.track.order.ready_s();
         let goal = &self.space.world.ground.goal.facts;
         let slowness_s: f64 = goal.iter().map(|fact| ready_s[fact.variable as usize]).sum();

@@ -7,6 +7,7 @@ mod direction;
 mod envelope;
 mod estimate;
 mod improve;
+mod joined;
 mod mentions;
 mod order;
 mod relaxed;

@@ -157,11 +157,13 @@ pub(crate) fn outcome(outcome: &Outcome) -> Value {
 pub(crate) struct Bound {
     pub situation: Arc<Situation>,
     pub meaning: &'static Meaning,
+    /// The facts that its answer depends on, as the planner is told.
+    pub reads: Vec<Read>,
 }
 
 impl Attachment for Bound {
     fn reads(&self) -> Vec<Read> {
-        self.meaning.reads.iter().map(|symbol| Read::All((*symbol).into())).collect()
+        self.reads.clone()
     }
 
     fn evaluate(&self, call: &descry_planner::Call) -> Result<Answer, CallError> {

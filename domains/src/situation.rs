@@ -107,6 +107,10 @@ pub struct Known {
     pub at: usize,
     /// The one from which the last look was taken; in the beginning where the body stood.
     pub looked_from: usize,
+    /// Since when the body stands where it does.
+    pub stands_since_ns: i64,
+    /// How localisation errs there, as the last look from there shows it: `map_from_localised`. None before one.
+    pub errs_by: Option<Isometry3<f64>>,
     /// What is looked for.
     pub things: Vec<Thing>,
     /// Of what all are looked for.
@@ -174,6 +178,13 @@ impl std::ops::Deref for Situation {
 
     fn deref(&self) -> &Known {
         &self.known
+    }
+}
+
+impl Known {
+    /// The body has moved, until now: how localisation errs where it stands is to be seen.
+    pub fn has_moved(&mut self) {
+        (self.stands_since_ns, self.errs_by) = (self.robot.now_ns(), None);
     }
 }
 
@@ -498,6 +509,11 @@ impl Situation {
             let way_s = to.map(way_s).filter(|s| s.is_finite()).reduce(f64::min);
             reasons::LOOK_S + way_s.unwrap_or_default()
         })
+    }
+
+    /// Where a place of the map is in the frame that localisation has where the body stands, in which it moves its hand.
+    pub(crate) fn as_localised(&self, p: &Point3<f64>) -> Point3<f64> {
+        self.errs_by.map_or(*p, |map_from_localised| map_from_localised.inverse() * p)
     }
 
     /// What is in doubt on a surface.

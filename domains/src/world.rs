@@ -36,6 +36,9 @@ use crate::words::{self, Words};
 pub use error::WorldError;
 use grounds::{asked_for, doors, expected, kinds, known_by_map, members, no_surface, objects, recalled};
 
+/// How the reason begins why a step failed that came to its end, but not as the domain says.
+pub const NOT_AS_SAID: &str = "it has ended, but not as the domain says: ";
+
 /// What a world is made of.
 #[derive(Clone)]
 pub struct Setting<'a> {
@@ -140,6 +143,8 @@ impl<'a> World<'a> {
             candidates: poses,
             at,
             looked_from: at,
+            stands_since_ns: setting.robot.now_ns(),
+            errs_by: None,
             things: asked.clone(),
             kinds: kinds(domain, goal, &surfaces),
             asked: goal.asked.surfaces.iter().map(index).collect::<Result<_, _>>()?,
@@ -274,11 +279,15 @@ impl<'a> World<'a> {
     /// Every call, bound to a situation. A program of the domain's own replaces what is built in.
     fn bind(&self, situation: &Arc<Situation>) -> Attachments {
         let started = Instant::now();
+        let vocabulary = &self.setting.domain.vocabulary;
         let mut attachments = Attachments::new().with_clock(move || started.elapsed().as_secs_f64());
         for ability in abilities::used(&self.setting.domain.config.uses) {
             for meaning in ability.calls {
-                attachments
-                    .insert(meaning.name, actions::Bound { situation: Arc::clone(situation), meaning });
+                let parameters = vocabulary.parameters(meaning.name).unwrap_or_default();
+                let types: Vec<String> = parameters.into_iter().map(|(_, of)| of).collect();
+                let reads = meaning.reads.iter().map(|reads| reads.of_call(vocabulary, &types)).collect();
+                let situation = Arc::clone(situation);
+                attachments.insert(meaning.name, actions::Bound { situation, meaning, reads });
             }
         }
         self.programs.bind(&mut attachments);
@@ -408,7 +417,7 @@ impl<'a> World<'a> {
             // A policy may look where nothing is promised: what was seen is believed all the same.
             Err(_) if self.takes_steps_unasked() => {}
             Err(broken) => {
-                let because = format!("its effects are not taken over: {broken}");
+                let because = format!("{NOT_AS_SAID}{broken}");
                 return Ok(done
                     .iter()
                     .map(|d| {
@@ -518,10 +527,14 @@ impl<'a> World<'a> {
         let known = &mut self.mind.known;
         // The way of a drive that did not arrive was driven all the same, as far as it came.
         let from = &known.candidates[known.at].place;
-        if *from != place
+        let has_moved = *from != place;
+        if has_moved
             && let Some(Ok(way)) = self.setting.robot.travel(from, std::slice::from_ref(&place), &[]).first()
         {
             self.mind.distance_m += way.distance_m;
+        }
+        if has_moved {
+            known.has_moved();
         }
         let found = known.candidates.iter().position(|c| c.place == place);
         known.at = found.unwrap_or_else(|| {

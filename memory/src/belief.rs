@@ -10,6 +10,8 @@ use crate::document::RecordId;
 
 /// A percept farther from an object than this is another object.
 const GATE_M: f64 = 0.10;
+/// What is found again stands at most this far from where it was touched, metres: it may have slid, and the hand may have pushed it.
+const MISLAID_M: f64 = 0.25;
 /// An unknown thing of this many times the volume of a known object is not that object.
 const MUCH_LARGER: f64 = 3.0;
 
@@ -68,6 +70,9 @@ pub struct Belief {
     pub tracks: Vec<Track>,
     /// Objects that were believed in and are no longer seen: gone, or never there.
     pub gone: Vec<Track>,
+    /// Objects that were touched and have not been seen since: what is first seen like one, near where it stood, is that one.
+    #[serde(default)]
+    pub mislaid: Vec<Track>,
     next_id: u64,
 }
 
@@ -126,8 +131,14 @@ impl Belief {
             }
         }
         for n in partner.new {
-            kept.push(Track { id: self.next_id, ..seen(on, &sighted[n], stamp_ns, cites) });
-            self.next_id += 1;
+            let new = seen(on, &sighted[n], stamp_ns, cites);
+            kept.push(match self.found_again(&new) {
+                Some(old) => Track { id: old.id, first_ns: old.first_ns, ..new },
+                None => {
+                    self.next_id += 1;
+                    Track { id: self.next_id - 1, ..new }
+                }
+            });
         }
         kept.sort_by_key(|track| track.id);
         self.tracks = kept;
@@ -141,11 +152,20 @@ impl Belief {
         }
     }
 
-    /// The object of a number is no longer believed in.
-    pub fn lose(&mut self, id: u64) {
+    /// The object of a number was touched: it is no longer believed in where it was, and where it is has to be seen.
+    pub fn mislay(&mut self, id: u64) {
         if let Some(at) = self.tracks.iter().position(|t| t.id == id) {
-            self.gone.push(self.tracks.remove(at));
+            self.mislaid.push(self.tracks.remove(at));
         }
+    }
+
+    /// The mislaid object that one which is seen for the first time is.
+    fn found_again(&mut self, new: &Track) -> Option<Track> {
+        let apart_m = |old: &Track| (old.position_m - new.position_m).norm();
+        let may_be = |old: &Track| old.kind() == new.kind() && apart_m(old) < MISLAID_M;
+        let all = self.mislaid.iter().enumerate().filter(|(_, old)| may_be(old));
+        let nearest = all.min_by(|(_, a), (_, b)| apart_m(a).total_cmp(&apart_m(b)))?.0;
+        Some(self.mislaid.remove(nearest))
     }
 
     /// The percept of each track, and the percepts of none: the assignment of least distance within the gate.
@@ -254,6 +274,31 @@ mod tests {
         check(&[&[0.0], &[0.2]], &[1], &[0]);
         check(&[&[0.0, 0.08], &[0.06, 0.14]], &[0, 1], &[]);
         check(&[&[], &[0.0], &[]], &[], &[0]);
+    }
+
+    #[test]
+    fn what_was_touched_is_itself_when_it_is_seen_again() {
+        let check = |again: f64, sure: f64, expected: &[u64]| {
+            let mut belief = Belief::default();
+            let see = |belief: &mut Belief, places: &[(f64, f64)], stamp_ns: i64| {
+                let percepts: Vec<Percept> = places.iter().map(|&(x, cup)| percept(x, cup)).collect();
+                let sighted: Vec<Sighted<'_>> = percepts
+                    .iter()
+                    .map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] })
+                    .collect();
+                belief.update("table", &sighted, stamp_ns, &[]);
+            };
+            see(&mut belief, &[(0.0, 0.9), (1.0, 0.9)], 1);
+            belief.mislay(0);
+            assert_eq!(belief.tracks.len(), 1, "where it is has to be seen");
+            see(&mut belief, &[(again, sure), (1.0, 0.9)], 2);
+            let ids: Vec<u64> = belief.tracks.iter().map(|t| t.id).collect();
+            assert_eq!((ids.as_slice(), belief.gone.len()), (expected, 0), "{again} {sure}");
+        };
+        check(0.0, 0.9, &[0, 1]);
+        check(0.2, 0.9, &[0, 1]);
+        check(0.5, 0.9, &[1, 2]);
+        check(0.1, 0.1, &[1, 2]);
     }
 
     #[test]

@@ -70,8 +70,8 @@ pub struct Reading {
 pub enum Read {
     /// Every ground instance of a predicate or function.
     All(String),
-    /// One instance: the symbol, and for each of its arguments the position among the call's arguments.
-    At(String, Vec<usize>),
+    /// The instances of a symbol of which each argument is what stands at that position among the call's arguments; `None`: anything.
+    At(String, Vec<Option<usize>>),
     /// The whole state. The cache then helps only where a state recurs.
     Everything,
 }

@@ -33,6 +33,8 @@ struct Asked<'a> {
     writes: usize,
     /// Counts answers that were known already, for the statistics of the attachment.
     hits: Option<&'a AtomicU64>,
+    /// The positions of the arguments on which it depends what a call reads.
+    positions: Vec<usize>,
     /// What its calls read, where their arguments make no difference to that.
     sources: Option<Arc<Sources>>,
 }
@@ -114,8 +116,14 @@ impl<'a> Calls<'a> {
             calls.terms = Terms::new(ground);
         }
         calls.asked = task.modules.iter().map(|module| calls.asked(module)).collect();
+        // What is read at positions of the arguments is the same for all that agree there.
+        let mut known: FxHashMap<(usize, Vec<u32>), Arc<Sources>> = FxHashMap::default();
         for call in &ground.calls {
-            calls.sources.push(calls.sources_of(call.origin.schema as usize, &call.origin.arguments));
+            let (module, arguments) = (call.origin.schema as usize, &call.origin.arguments);
+            let positions = &calls.asked[module].positions;
+            let there = positions.iter().filter_map(|&at| arguments.get(at)).copied().collect();
+            let sources = known.entry((module, there)).or_insert_with(|| calls.sources_of(module, arguments));
+            calls.sources.push(Arc::clone(sources));
         }
         Ok(calls)
     }
@@ -124,12 +132,17 @@ impl<'a> Calls<'a> {
         let attachment =
             self.attachments.resolve(&declared.function, &declared.name).unwrap_or_default().to_string();
         let reads = self.attachments.reads(&attachment);
+        let at = |read: &Read| if let Read::At(_, positions) = read { positions.clone() } else { Vec::new() };
+        let mut positions: Vec<usize> = reads.iter().flat_map(at).flatten().collect();
+        positions.sort_unstable();
+        positions.dedup();
         let apart = reads.iter().any(|read| matches!(read, Read::At(..)));
         Asked {
             module: declared.name.as_str().into(),
             kind: declared.kind,
             writes: declared.writes.len(),
             hits: self.attachments.hits(&attachment),
+            positions,
             sources: (!apart).then(|| Arc::new(self.read_by(&attachment, &[]))),
             attachment,
         }

@@ -10,7 +10,7 @@ struct Expected;
 
 impl Attachment for Expected {
     fn reads(&self) -> Vec<Read> {
-        vec![Read::At("confidence".to_string(), vec![1])]
+        vec![Read::At("confidence".to_string(), vec![Some(1)])]
     }
 
     fn evaluate(&self, call: &Call) -> Result<Answer, CallError> {

@@ -46,7 +46,7 @@ struct Count {
 
 impl Attachment for Count {
     fn reads(&self) -> Vec<Read> {
-        let positions = if self.of_argument { vec![0] } else { Vec::new() };
+        let positions = if self.of_argument { vec![Some(0)] } else { Vec::new() };
         vec![Read::At(self.symbol.to_string(), positions)]
     }
 

@@ -25,7 +25,7 @@ struct Nearby;
 
 impl descry_planner::Attachment for Nearby {
     fn reads(&self) -> Vec<Read> {
-        vec![Read::At("height".to_string(), vec![0])]
+        vec![Read::At("height".to_string(), vec![Some(0)])]
     }
 
     fn evaluate(&self, call: &Call) -> Result<Answer, CallError> {

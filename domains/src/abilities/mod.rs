@@ -8,7 +8,7 @@ pub mod searching;
 pub mod shapes;
 pub mod surveying;
 
-use descry_planner::{Answer, Call, CallError, Plan, Step};
+use descry_planner::{Answer, Call, CallError, Plan, Read, Step};
 use descry_robots::Part;
 use descry_skills::{Outcome, Skill, SkillFailure};
 
@@ -19,6 +19,7 @@ use crate::load::Domain;
 use crate::mind::Mind;
 use crate::note::Note;
 use crate::situation::Situation;
+use crate::vocabulary::Vocabulary;
 use crate::world::WorldError;
 
 /// What a body can do and know, in the words of a domain.
@@ -57,13 +58,46 @@ pub struct Fact {
     pub states: fn(&Situation) -> Vec<String>,
 }
 
+/// Facts on which the answer of a call depends besides its arguments.
+#[derive(Debug)]
+pub struct Reads {
+    /// The predicate.
+    pub word: &'static str,
+    /// Of its arguments, where not all make a difference: those that are the call's one argument of a type; `None`: any.
+    pub of: &'static [Option<&'static str>],
+}
+
+impl Reads {
+    /// All of a predicate.
+    pub const fn all(word: &'static str) -> Reads {
+        Reads { word, of: &[] }
+    }
+
+    /// The same for the planner, of a call with parameters of these types; where a type is not that of one parameter, all of them.
+    pub fn of_call(&self, vocabulary: &Vocabulary, types: &[String]) -> Read {
+        let one = |wanted: &str| {
+            let mut fitting = (0..types.len()).filter(|&n| vocabulary.is_a(&types[n], wanted));
+            fitting.next().filter(|_| fitting.next().is_none())
+        };
+        let at = |wanted: &Option<&str>| match wanted {
+            None => Some(None),
+            Some(wanted) => one(wanted).map(Some),
+        };
+        let positions: Option<Vec<Option<usize>>> = self.of.iter().map(at).collect();
+        match positions.filter(|positions| !positions.is_empty()) {
+            Some(positions) => Read::At(self.word.into(), positions),
+            None => Read::All(self.word.into()),
+        }
+    }
+}
+
 /// A call that an ability answers.
 #[derive(Debug)]
 pub struct Meaning {
     /// The module's name.
     pub name: &'static str,
     /// The facts that its answer depends on besides its arguments.
-    pub reads: &'static [&'static str],
+    pub reads: &'static [Reads],
     /// What it says, in a line.
     pub about: &'static str,
     /// The answer.

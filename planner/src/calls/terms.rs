@@ -6,7 +6,8 @@ use rustc_hash::FxHashMap;
 
 use crate::attachment::{FactValue, Read};
 use crate::ground::{GroundTask, Meaning, NumericId, VariableId};
-use crate::task::{FunctionId, ObjectId, PredicateId, Task};
+use crate::semantics::calls::{Symbol, instances};
+use crate::task::{ObjectId, Task};
 
 /// Where a reading comes from.
 #[derive(Debug, Clone)]
@@ -91,35 +92,12 @@ impl Terms {
         read: &Read,
         arguments: &[u32],
     ) -> Vec<Source> {
-        let mut found = Vec::new();
-        let mut add = |symbol: Symbol, arguments: Vec<u32>| {
-            let (name, origin) = self.origin(task, names, symbol, &arguments);
-            found.push((
-                Arc::from(name),
-                arguments.iter().map(|&a| names[a as usize].clone()).collect(),
-                origin,
-            ));
+        let arguments: Vec<ObjectId> = arguments.iter().map(|&argument| ObjectId(argument)).collect();
+        let source = |(symbol, instance): (Symbol, Vec<ObjectId>)| {
+            let (name, origin) = self.origin(task, names, symbol, &instance);
+            (name.into(), instance.iter().map(|a| names[a.index()].clone()).collect(), origin)
         };
-        match read {
-            Read::At(name, positions) => {
-                let picked: Option<Vec<u32>> =
-                    positions.iter().map(|&position| arguments.get(position).copied()).collect();
-                if let (Some(symbol), Some(picked)) = (symbol_named(task, name), picked) {
-                    add(symbol, picked);
-                }
-            }
-            Read::All(name) => {
-                if let Some(symbol) = symbol_named(task, name) {
-                    instances(task, symbol).into_iter().for_each(|instance| add(symbol, instance));
-                }
-            }
-            Read::Everything => {
-                for symbol in every_symbol(task) {
-                    instances(task, symbol).into_iter().for_each(|instance| add(symbol, instance));
-                }
-            }
-        }
-        found
+        instances(task, read, &arguments).into_iter().map(source).collect()
     }
 
     fn origin<'t>(
@@ -127,10 +105,10 @@ impl Terms {
         task: &'t Task,
         names: &[Arc<str>],
         symbol: Symbol,
-        arguments: &[u32],
+        arguments: &[ObjectId],
     ) -> (&'t str, Origin) {
-        let key = |id: u32| (id, arguments.to_vec());
-        let same = |objects: &[ObjectId]| objects.iter().map(|object| object.0).eq(arguments.iter().copied());
+        let key = |id: u32| (id, arguments.iter().map(|object| object.0).collect::<Vec<_>>());
+        let same = |objects: &[ObjectId]| *objects == *arguments;
         match symbol {
             Symbol::Predicate(id) => {
                 let origin = match self.facts.get(&key(id.0)) {
@@ -165,44 +143,4 @@ impl Terms {
             }
         }
     }
-}
-
-#[derive(Clone, Copy)]
-enum Symbol {
-    Predicate(PredicateId),
-    Function(FunctionId),
-}
-
-fn symbol_named(task: &Task, name: &str) -> Option<Symbol> {
-    let predicate = task.predicates.iter().position(|p| p.name.eq_ignore_ascii_case(name));
-    let function = task.functions.iter().position(|f| f.name.eq_ignore_ascii_case(name));
-    predicate
-        .map(|index| Symbol::Predicate(PredicateId(index as u32)))
-        .or(function.map(|index| Symbol::Function(FunctionId(index as u32))))
-}
-
-fn every_symbol(task: &Task) -> Vec<Symbol> {
-    let predicates = (0..task.predicates.len()).map(|index| Symbol::Predicate(PredicateId(index as u32)));
-    predicates
-        .chain((0..task.functions.len()).map(|index| Symbol::Function(FunctionId(index as u32))))
-        .collect()
-}
-
-fn instances(task: &Task, symbol: Symbol) -> Vec<Vec<u32>> {
-    let parameters = match symbol {
-        Symbol::Predicate(id) => &task.predicate(id).parameters,
-        Symbol::Function(id) => &task.function(id).parameters,
-    };
-    parameters.iter().fold(vec![Vec::new()], |instances, parameter| {
-        instances
-            .iter()
-            .flat_map(|instance| {
-                parameter.objects.iter().map(|object| {
-                    let mut longer: Vec<u32> = instance.clone();
-                    longer.push(object.0);
-                    longer
-                })
-            })
-            .collect()
-    })
 }

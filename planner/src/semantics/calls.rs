@@ -95,9 +95,13 @@ impl Semantics<'_> {
 pub(crate) fn instances(task: &Task, read: &Read, arguments: &[ObjectId]) -> Vec<(Symbol, Vec<ObjectId>)> {
     match read {
         Read::At(name, positions) => {
-            let chosen: Option<Vec<ObjectId>> =
-                positions.iter().map(|&position| arguments.get(position).copied()).collect();
-            find(task, name).zip(chosen).into_iter().collect()
+            // What stands at a position that the call does not have is nothing.
+            let chosen: Option<Vec<Option<ObjectId>>> = positions
+                .iter()
+                .map(|position| position.map_or(Some(None), |at| arguments.get(at).copied().map(Some)))
+                .collect();
+            let chosen = find(task, name).zip(chosen);
+            chosen.map(|(symbol, chosen)| instances_with(task, symbol, &chosen)).unwrap_or_default()
         }
         Read::All(name) => find(task, name).map(|symbol| all_instances(task, symbol)).unwrap_or_default(),
         Read::Everything => {
@@ -117,15 +121,28 @@ fn find(task: &Task, name: &str) -> Option<Symbol> {
 }
 
 fn all_instances(task: &Task, symbol: Symbol) -> Vec<(Symbol, Vec<ObjectId>)> {
-    let parameters: &[Parameter] = match symbol {
+    instances_with(task, symbol, &vec![None; parameters(task, symbol).len()])
+}
+
+fn parameters(task: &Task, symbol: Symbol) -> &[Parameter] {
+    match symbol {
         Symbol::Predicate(id) => &task.predicate(id).parameters,
         Symbol::Function(id) => &task.function(id).parameters,
-    };
+    }
+}
+
+/// The instances with these arguments; `None`: any that the parameter allows.
+fn instances_with(
+    task: &Task,
+    symbol: Symbol,
+    arguments: &[Option<ObjectId>],
+) -> Vec<(Symbol, Vec<ObjectId>)> {
     let mut all: Vec<Vec<ObjectId>> = vec![Vec::new()];
-    for parameter in parameters {
-        let longer = all.iter().flat_map(|known| {
-            parameter.objects.iter().map(|&object| known.iter().copied().chain([object]).collect())
-        });
+    for (parameter, argument) in parameters(task, symbol).iter().zip(arguments) {
+        let objects = argument.as_ref().map_or(&*parameter.objects, std::slice::from_ref);
+        let longer = all
+            .iter()
+            .flat_map(|known| objects.iter().map(|&object| known.iter().copied().chain([object]).collect()));
         all = longer.collect();
     }
     all.into_iter().map(|arguments| (symbol, arguments)).collect()

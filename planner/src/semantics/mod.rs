@@ -3,7 +3,7 @@
 //! The validator, the monitor and the executive use it directly. PDDL 2.1 (Fox and Long 2003), section 8, says what the
 //! temporal parts mean.
 
-mod calls;
+pub(crate) mod calls;
 mod conditions;
 mod derive;
 mod describe;

@@ -60,7 +60,8 @@ pub const ABILITY: Ability = Ability {
             ground: |s, arguments| {
                 let track =
                     standing(s, arguments[1], arguments[2]).ok_or("it is not known where that stands")?;
-                let grasp = Grasp { object: middle(s, track), width_m: track.size_m[0].min(track.size_m[1]) };
+                let object = s.as_localised(&middle(s, track));
+                let grasp = Grasp { object, width_m: track.size_m[0].min(track.size_m[1]) };
                 Ok(Box::new(PickUp { grasp }))
             },
             because: |s, arguments| format!("{} is to be elsewhere", thing_name(s, arguments[1])),
@@ -72,7 +73,7 @@ pub const ABILITY: Ability = Ability {
             types: &["pose", "thing", "surface"],
             about: "puts what is in the hand down where there is room on the surface",
             ground: |s, arguments| {
-                let foot = place(s, arguments)?;
+                let foot = s.as_localised(&place(s, arguments)?);
                 Ok(Box::new(PutDown { placing: Placing { foot } }))
             },
             because: |s, arguments| {
@@ -238,7 +239,7 @@ fn pick_up_failed(
     {
         void(mind, eyes, track, SLIPPED_M)?;
         // Where it stands now, the next look will say.
-        Arc::make_mut(&mut mind.known.belief).lose(track.id);
+        Arc::make_mut(&mut mind.known.belief).mislay(track.id);
     }
     Ok(None)
 }
@@ -280,7 +281,7 @@ fn put_down_failed(
 ) -> Result<Option<String>, WorldError> {
     if let (SkillFailure::Body(Failure::Slipped { .. }), Some(held)) = (failure, mind.known.held.clone()) {
         mind.known.held = None;
-        Arc::make_mut(&mut mind.known.belief).lose(held.track);
+        Arc::make_mut(&mut mind.known.belief).mislay(held.track);
         return Ok(Some("what it held was lost".into()));
     }
     Ok(None)

@@ -6,13 +6,13 @@ use descry_planner::{Answer, Call, CallError, Plan};
 
 use super::news::{DIRECTIONS, Fate, Novelty};
 use crate::abilities::searching::reasons;
-use crate::abilities::{Meaning, argument, one_after_another};
+use crate::abilities::{Meaning, Reads, argument, one_after_another};
 use crate::situation::{Situation, holding};
 
 /// Every call.
 pub(super) const ALL: &[Meaning] = &[Meaning {
     name: "expected-sides",
-    reads: &["faced"],
+    reads: &[Reads::all("faced")],
     about: "share of the directions around it that a look from there would show beyond those before it",
     answers: expected_sides,
 }];

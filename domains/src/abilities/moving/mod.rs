@@ -6,7 +6,7 @@ mod time_left;
 
 use descry_skills::{Circle, Move, OpenDoor, Outcome};
 
-use super::{Ability, Fact, Meaning, NOTHING_MORE, SkillWord};
+use super::{Ability, Fact, Meaning, NOTHING_MORE, Reads, SkillWord};
 use crate::abilities::searching::perceive::Eyes;
 use crate::mind::Mind;
 use crate::note::Note;
@@ -40,7 +40,7 @@ pub const ABILITY: Ability = Ability {
     ],
     calls: &[Meaning {
         name: "path-cost",
-        reads: &["shut"],
+        reads: &[Reads::all("shut")],
         about: "seconds that the drive takes past shut doors; infinite where no route leads",
         answers: path_cost::answer,
     }],
@@ -99,6 +99,7 @@ pub(super) fn driven(
 ) -> Result<String, WorldError> {
     let Outcome::Driven(driven) = outcome else { return Err(WorldError::strange(outcome)) };
     mind.known.at = situation.candidate(arguments[1]).map_err(|e| WorldError::Bug(e.to_string()))?;
+    mind.known.has_moved();
     mind.distance_m += driven.distance_m;
     Ok(format!("drove {:.2} m in {:.1} s", driven.distance_m, driven.duration_s))
 }

@@ -28,7 +28,7 @@ use super::placing;
 use super::vanished::{keep_unrefuted, set_aside_unseen, taken_away};
 use crate::abilities::learning::again;
 use crate::config::Thresholds;
-use crate::mind::{Laid, Look, Mind};
+use crate::mind::{Laid, Look, Mind, Region};
 use crate::note::Note;
 use crate::situation::{KnownSurface, Situation, Thing};
 use crate::world::WorldError;
@@ -166,6 +166,8 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     }
     let merged = without_walls(&mind.known.surfaces[on], merged);
     take_in(mind, on, &views, &merged);
+    let since_ns = mind.known.stands_since_ns;
+    mind.known.errs_by = errs_by(&mind.regions[on], &views, &merged, since_ns).or(mind.known.errs_by);
     let newest = newest(&views, &merged);
     let scene = segment_on(&merged.cloud, &merged.visibility, surface, &seeking);
     let mut percepts = eyes.recogniser.recognise(&scene, &merged.visibility, eyes.objects);
@@ -296,11 +298,7 @@ fn without_astray(
         return false;
     }
     let has_strayed = |(look, (view, fit)): (&Look, (&View, &ViewFit))| {
-        let localised = match look.laid {
-            Laid::By(map_from_localised) => map_from_localised.inverse() * view.world_from_camera,
-            Laid::AsLocalised | Laid::Nowhere => view.world_from_camera,
-        };
-        fit.used && is_astray(body, &localised, &fit.world_from_camera)
+        fit.used && is_astray(body, &localised(look, view), &fit.world_from_camera)
     };
     let placed = views.iter().zip(&merged.fits);
     let astray: Vec<bool> = looks.iter().zip(placed).map(has_strayed).collect();
@@ -310,6 +308,22 @@ fn without_astray(
     let mut astray = astray.into_iter();
     looks.retain(|_| !astray.next().unwrap_or(false));
     true
+}
+
+/// Where localisation has the camera of a view that may have been laid on the outline of its surface.
+fn localised(look: &Look, view: &View) -> Isometry3<f64> {
+    match look.laid {
+        Laid::By(map_from_localised) => map_from_localised.inverse() * view.world_from_camera,
+        Laid::AsLocalised | Laid::Nowhere => view.world_from_camera,
+    }
+}
+
+/// How localisation errs, by where the newest view lies among the others: `map_from_localised`; none if it lies nowhere, or was taken
+/// before the body came to stand where it does.
+fn errs_by(region: &Region, views: &[View], merged: &Merged, since_ns: i64) -> Option<Isometry3<f64>> {
+    let (look, view) = region.looks.last().zip(views.last()).filter(|(look, _)| look.stamp_ns >= since_ns)?;
+    let fit = merged.fits.last().filter(|fit| fit.used)?;
+    Some(fit.world_from_camera * localised(look, view).inverse())
 }
 
 /// Reads the views of a surface back from the record by their timestamps, with the transforms of those times. What a view shows

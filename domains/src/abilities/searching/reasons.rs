@@ -84,7 +84,9 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     let p = |t: &Track| thing.probability(t, &s.surfaces);
     let best = s.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b)));
     if let Some(track) = best.filter(|t| p(t) > 1.0 - s.thresholds.confidence) {
-        return Some(format!("what stands at {} may be it ({:.2})", place(&track.position_m), p(track)));
+        // Never more than it is: what is wanted may be just above.
+        let p = (p(track) * 100.0).floor() / 100.0;
+        return Some(format!("what stands at {} may be it ({p:.2})", place(&track.position_m)));
     }
     if let Some(floor) = may_be_floor(s, thing) {
         return Some(floor);

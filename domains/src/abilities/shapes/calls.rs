@@ -4,10 +4,10 @@ use descry_planner::{Answer, Call, CallError, Plan};
 
 use super::floor::{NOTHING_KNOWN_M, THIS, Thing, thing};
 use super::poses;
-use crate::abilities::{Meaning, argument, one_after_another};
+use crate::abilities::{Meaning, Reads, argument, one_after_another};
 use crate::situation::{Situation, holding};
 
-const SCANS: &[&str] = &["scanned"];
+const SCANS: &[Reads] = &[Reads::all("scanned")];
 
 /// Every call.
 pub(super) const ALL: &[Meaning] = &[

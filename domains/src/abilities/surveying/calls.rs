@@ -5,20 +5,20 @@ use descry_planner::{Answer, Call, CallError, Plan};
 
 use super::chart::{LOOK_S, NOTHING_SEEN_M2};
 use crate::abilities::searching::reasons;
-use crate::abilities::{Meaning, argument, one_after_another};
+use crate::abilities::{Meaning, Reads, argument, one_after_another};
 use crate::situation::{Situation, holding};
 
 /// Every call.
 pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "expected-view",
-        reads: &["charted"],
+        reads: &[Reads::all("charted")],
         about: "unknown floor that a look from there is expected to show beyond those before it, square metres",
         answers: expected_view,
     },
     Meaning {
         name: "expected-discovery",
-        reads: &["charted"],
+        reads: &[Reads::all("charted")],
         about: "by how much it would raise the confidence in a thing if that stood on what is not known yet",
         answers: expected_discovery,
     },

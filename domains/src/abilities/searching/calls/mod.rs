@@ -13,10 +13,13 @@ mod worth_a_push;
 use descry_planner::{Call, CallError};
 
 use crate::abilities::searching::doubt::{Doubt, Taken};
-use crate::abilities::{Meaning, argument};
+use crate::abilities::{Meaning, Reads, argument};
 use crate::situation::Situation;
 
-const LOOKS: &[&str] = &["observed", "pushed"];
+/// The looks at the surface that the call is about; of a call that is about none, all.
+const OBSERVED: Reads = Reads { word: "observed", of: &[None, Some("surface")] };
+const PUSHED: Reads = Reads::all("pushed");
+const LOOKS: &[Reads] = &[OBSERVED, PUSHED];
 
 /// Every call.
 pub(super) const ALL: &[Meaning] = &[
@@ -28,13 +31,13 @@ pub(super) const ALL: &[Meaning] = &[
     },
     Meaning {
         name: "worth-a-look",
-        reads: &["pushed"],
+        reads: &[PUSHED],
         about: "whether a look from a pose may settle anything that is in doubt",
         answers: worth_a_look::answer,
     },
     Meaning {
         name: "worth-a-push",
-        reads: &["pushed"],
+        reads: &[PUSHED],
         about: "whether a push would uncover what no look shows",
         answers: worth_a_push::answer,
     },
@@ -58,8 +61,8 @@ pub(super) const ALL: &[Meaning] = &[
     },
     Meaning {
         name: "search-cost",
-        reads: &["observed"],
-        about: "seconds for having looked there in vain: the more, the less likely a look finds it there and the longer the way",
+        reads: &[OBSERVED],
+        about: "seconds for having looked there in vain, at the first look there: the more, the less likely a look finds it there and the longer the way",
         answers: search_cost::answer,
     },
     Meaning {

@@ -15,8 +15,12 @@ const MOST_S: f64 = 10_000.0;
 pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
     let on = situation.surface(argument(call, 0)?)?;
     let begun = situation.planned_looks(call).iter().any(|look| look.1 == on);
-    let open: Vec<usize> =
-        (0..situation.things.len()).filter(|&n| situation.confidence(n) < situation.threshold).collect();
+    let is_open = |n: &usize| situation.confidence(*n) < situation.threshold;
+    let mut open: Vec<usize> = (0..situation.things.len()).filter(is_open).collect();
+    // What has been found is looked for in vain elsewhere, too.
+    if open.is_empty() {
+        open = (0..situation.things.len()).collect();
+    }
     let all = open.is_empty() || !situation.kinds.is_empty();
     if begun || all || situation.time_left_s.is_some() {
         return Ok(Answer::Number(0.0));

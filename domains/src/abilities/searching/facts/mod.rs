@@ -66,7 +66,7 @@ pub(super) const ALL: &[Fact] = &[
     Fact {
         name: "completeness-in",
         types: &["kind", "room"],
-        about: "the same of those in the room that is asked about",
+        about: "how sure it is that all of the kind are found that are in the room that is asked about, 0 to 1",
         states: completeness_in::state,
     },
     Fact { name: "sure", types: &[], about: "the confidence that was asked for", states: sure::state },

@@ -1,0 +1,36 @@
+//! What a hand is for, in a flat where not everything goes well.
+
+mod binary;
+
+use std::fs;
+
+use descry_domains::load::Domain;
+use tempfile::TempDir;
+
+/// Pursues a goal in the flat, in which there are such faults, until it is achieved; what was said on the way.
+fn achieved(goal: &str, seed: u64, faults: &str) -> String {
+    let folder = TempDir::new().expect("a folder can be made");
+    let scene = Domain::load("home").expect("a built-in domain").scenes["default"].clone();
+    fs::write(folder.path().join("flat.toml"), format!("{scene}\n{faults}")).expect("a scene");
+    let seed = seed.to_string();
+    let run = ["do", goal, "--domain", "home", "--scene", "flat.toml", "--seed", &seed, "--run", "run"];
+    let output = binary::outcome(folder.path(), &run);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    said
+}
+
+#[test]
+fn the_hand_reaches_for_what_was_seen_from_where_the_body_stands() {
+    let faults = "[[fault]]\nkind = \"bad_localisation\"\nchance = 0.5\n";
+    let said = achieved("pick up cup A", 92005, faults);
+    assert!(!said.contains("the hand closed on nothing"), "{said}");
+}
+
+#[test]
+fn what_was_found_is_not_looked_for_elsewhere() {
+    let said = achieved("bring cup A to the desk", 91004, "[[fault]]\nkind = \"grasp_slips\"\nat = 1\n");
+    let taken = said.find("the hand is closed to").expect("it was taken");
+    assert!(said[..taken].contains("cup A            0.8"), "it had been found: {said}");
+    assert!(!said[..taken].contains("do        (observe desk"), "{said}");
+}

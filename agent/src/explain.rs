@@ -3,6 +3,7 @@
 
 mod chapters;
 mod looks;
+pub(crate) mod numbers;
 mod outcomes;
 mod plans;
 mod standings;
@@ -78,29 +79,30 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let goal = header.pddl_goal.clone();
     let asked = Asked { goal, policy, counts: &counts, name: &name, has_ended: report.is_some() };
     let plans = plans::told(&chapters, &asked).into_iter().map(|told| told.said(&saying)).collect();
-    let summary = summary::of(header, report, &chapters, &name);
+    let summary = summary::of(header, report, &chapters, states.left_s(), &name);
     let summary = summary.iter().map(|line| saying.say(line)).collect();
-    let mut said = said(header, &asked, &saying);
+    let mut said = said(header, &asked, states.given_s(), &saying);
     if chapters.iter().any(|c| c.weighed.as_ref().is_some_and(|w| w.chosen.is_some())) {
         said.extend(domain.as_ref().and_then(|domain| numbers(domain, &chapters, &saying)));
         said.extend(domain.as_ref().and_then(|domain| poses(domain, &header.settings.robot)));
         said.push(WAYS.into());
         said.extend(domain.as_ref().and_then(|domain| seconds(domain, &saying, &chapters)));
     }
-    let words = verdict::Words { meanings: &meanings, name: &name };
+    let not_there = domain.as_ref().map(|domain| domain.config.thresholds.not_there);
+    let words = verdict::Words { meanings: &meanings, name: &name, not_there };
     let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
     let verdict = verdict.iter().map(|line| saying.say(line)).collect();
     Ok(Explanation { summary, asked: said, plans, verdict, lost })
 }
 
-/// How things stood after each look, with when that was on the body's clock; nothing of a record that does not say.
+/// How things stood after each look, with when that was on the body's clock; nothing of a record that does not say. `goal` is in PDDL.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
-pub fn after_looks(record: &Record, saying: &Saying) -> Result<Vec<(i64, String)>, CommandError> {
+pub fn after_looks(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<(i64, String)>, CommandError> {
     let (chapters, _) = chapters::of(record, &States::of(record)?, &[])?;
     let name = |symbol: &str| saying.name_of(symbol);
-    let all = chapters.iter().flat_map(|chapter| outcomes::of(chapter, &name));
+    let all = chapters.iter().flat_map(|chapter| outcomes::of(chapter, goal, &name));
     Ok(all.filter_map(|outcome| Some((outcome.stood_ns?, saying.say(&outcome.said)))).collect())
 }
 
@@ -192,8 +194,9 @@ fn numbers(domain: &Domain, chapters: &[chapters::Chapter], saying: &Saying) -> 
 
 /// What ways and their figures mean.
 const WAYS: &str = "A way to get further is what may be done next, up to the first step that may bring the numbers nearer to \
-                    what is wanted. In brackets behind it: by how much it is, in how many seconds, and how much that is a \
-                    second; behind its steps their seconds.";
+                    what is wanted. In brackets behind it: by how much it is, of all numbers together, in how many seconds, and how much that is a \
+                    second; behind its steps their seconds. What is hoped for is what comes if all is \
+                    as well as it may be: a look shows what it is taken for, if it is there.";
 
 /// What a run was asked, as far as plans depend on it.
 struct Asked<'a> {
@@ -212,24 +215,17 @@ struct Asked<'a> {
 impl Asked<'_> {
     /// What the goal wants of a number: that with which it compares it, if it names it so.
     fn wanted(&self, number: &str) -> Option<f64> {
-        let number = number.trim_matches(['(', ')']);
-        let (word, of) = number.split_once(' ').unwrap_or((number, ""));
-        let begins = format!("= ({word}");
-        let compared = self.goal.split(&begins).skip(1).filter_map(|rest| rest.split_once(')'));
-        // What is wanted of a variable is wanted of any; else of what is named alone.
-        let mut fitting = compared.filter(|(about, _)| {
-            (about.is_empty() || about.starts_with(' ')) && (about.contains('?') || about.trim() == of)
-        });
-        fitting.next()?.1.split(')').next()?.trim().parse().ok()
+        numbers::wanted(&self.goal, number)
     }
 }
 
-fn said(header: &Header, asked: &Asked<'_>, saying: &Saying) -> Vec<String> {
+fn said(header: &Header, asked: &Asked<'_>, given_s: Option<f64>, saying: &Saying) -> Vec<String> {
     let (pddl, goal) = (&header.pddl_goal, saying.say(&header.pddl_goal));
     let mut said = vec![match goal == *pddl {
         true => format!("Wanted: {pddl}."),
         false => format!("Wanted: {goal}. In PDDL: {pddl}."),
     }];
+    said.extend(given_s.map(|given_s| format!("It was to be done within {given_s:.0} s.")));
     if let Some(policy) = &asked.policy {
         let rule = policies::about(policy).map(|about| format!(" It {about}.")).unwrap_or_default();
         said.push(format!("Where to look next was chosen by the policy {policy}, not by the planner.{rule}"));
@@ -263,32 +259,5 @@ impl std::fmt::Display for Explanation {
         writeln!(f, "\nWhat the verdict rests on")?;
         all(f, &self.verdict, "  - ")?;
         all(f, &self.lost, "lost: ")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_wanted_stands_in_the_goal() {
-        let check = |goal: &str, number: &str, expected: Option<f64>| {
-            let asked = Asked {
-                goal: goal.into(),
-                policy: None,
-                counts: &|_| None,
-                name: &str::to_string,
-                has_ended: true,
-            };
-            assert_eq!(asked.wanted(number), expected, "{goal}: {number}");
-        };
-        check("(>= (confidence cup-a) 0.8)", "(confidence cup-a)", Some(0.8));
-        check("(exists (?s - surface) (>= (presence cup-a ?s) 0.9))", "(presence cup-a desk)", Some(0.9));
-        check("(and (a) (<= (unseen) 0.5))", "(unseen)", Some(0.5));
-        check("(>= (presence cup-a) (sure))", "(presence cup-a)", None);
-        check("(on cup-a desk)", "(clarity desk)", None);
-        check("(>= (unseen-part) 0.5)", "(unseen)", None);
-        check("(>= (found dell-box) 0.9)", "(found dell-box)", Some(0.9));
-        check("(>= (found dell-box) 0.9)", "(found big-chair)", None);
     }
 }

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::exit::CommandError;
+use crate::explain::numbers;
 
 /// The blob under which it is kept beside the event of a plan.
 pub const BLOB: &str = "weighed";
@@ -96,6 +97,8 @@ struct Scale<'r> {
     state: State,
     /// Functions of the task that count, each with whether less of it is wanted.
     counting: Vec<(FunctionId, bool)>,
+    /// What says so.
+    asked: String,
 }
 
 impl<'r> Scale<'r> {
@@ -109,15 +112,16 @@ impl<'r> Scale<'r> {
             let named = functions.filter(|(_, f)| words.contains(&f.name.as_str()));
             named.map(|(n, f)| (FunctionId(n), less_is_wanted(&words, &f.name))).collect()
         };
-        let mut counting = named(goal);
+        let (mut counting, mut by) = (named(goal), goal.to_string());
         if counting.is_empty() {
             let asked = |step: &Step| {
                 let (action, binding) = semantics.bind(step).ok()?;
                 Some(semantics.condition_text(&round.task.action(action).condition.start, &binding))
             };
-            counting = named(&plan.steps.iter().filter_map(asked).collect::<Vec<_>>().join(" "));
+            by = plan.steps.iter().filter_map(asked).collect::<Vec<_>>().join(" ");
+            counting = named(&by);
         }
-        Some(Scale { semantics, state, counting })
+        Some(Scale { semantics, state, counting, asked: by })
     }
 
     /// The numbers that count in a state, by name, each with whether less of it is wanted.
@@ -130,7 +134,12 @@ impl<'r> Scale<'r> {
                     arguments.iter().map(|&a| format!(" {}", task.object(a).name)).collect();
                 (format!("({name}{arguments})"), (value, less))
             });
-            named.collect::<Vec<_>>()
+            let compared: Vec<Vec<&str>> =
+                numbers::named(&self.asked).filter(|(word, _)| word == name).map(|(_, of)| of).collect();
+            let counts = move |(number, _): &(String, (f64, bool))| {
+                compared.is_empty() || compared.iter().any(|of| numbers::is_named(number, name, of))
+            };
+            named.filter(counts).collect::<Vec<_>>()
         };
         self.counting.iter().flat_map(of).collect()
     }

@@ -72,7 +72,7 @@ pub fn of(
 ) -> Result<(Vec<Chapter>, Vec<String>), CommandError> {
     let found = record.find_whole(&Query::of_kind("event")).map_err(CommandError::broken)?;
     let (documents, faults) = found;
-    let standings = Standings::of(record)?;
+    let standings = Standings::of(record, states)?;
     let mut lost: Vec<String> = faults.iter().map(ToString::to_string).collect();
     let first_ns = documents.first().map_or(0, |d| d.stamp_ns);
     let mut chapters: Vec<Chapter> = Vec::new();

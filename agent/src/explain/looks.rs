@@ -4,9 +4,11 @@ use descry_domains::lexicon::symbol;
 use descry_domains::note::Note;
 use descry_memory::belief::Track;
 
+use super::numbers::{self, Sure};
 use super::standings::{Standing, certainty};
 use super::wording::{listed, place, share, share_of};
 use crate::standing::{InDoubt, Of, Seen};
+use crate::weigh::Expected;
 
 /// What an object is not with more than this is not worth a word.
 pub const HARDLY: f64 = 0.005;
@@ -26,28 +28,51 @@ const MOST_PLACES: usize = 4;
 /// What surfaces are called, by symbol.
 pub type Names<'a> = &'a dyn Fn(&str) -> String;
 
+/// What was asked, and what a plan hoped for.
+pub struct Asked<'a> {
+    /// The goal in PDDL.
+    pub goal: &'a str,
+    /// The numbers that the plan was to bring nearer to what is wanted.
+    pub hoped: &'a [Expected],
+    /// What surfaces are called.
+    pub name: Names<'a>,
+}
+
 /// How things stand after looks, of each doubt in a few sentences.
-pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], name: Names<'_>) -> Vec<String> {
+pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], asked: &Asked<'_>) -> Vec<String> {
     let told = |doubt: &InDoubt| {
         let was = before.and_then(|before| before.same(doubt));
-        let because = why_no_surer(doubt, before, after, looks, name);
+        let sure = match numbers::of(doubt, before, after, asked.goal, asked.hoped) {
+            all if all.is_empty() => vec![Sure {
+                name: certainty(doubt),
+                was: was.and_then(|was| was.sure),
+                now: doubt.sure?,
+                wanted: doubt.wanted,
+            }],
+            all => all,
+        };
+        let is_open = sure.iter().any(|sure| sure.now < sure.wanted);
+        let because = is_open.then(|| why_no_surer(doubt, before, after, looks, asked.name)).flatten();
         let because = because.map(|because| format!(" It is no more because {because}.")).unwrap_or_default();
-        Some(format!("{}.{because}{}", sureness(doubt, was)?, seen(doubt, was)))
+        Some(format!("{}.{because}{}", sureness(&sure), seen(doubt, was)))
     };
     after.doubts.iter().take(MOST_DOUBTS).filter_map(told).collect()
 }
 
-/// `the certainty of where it stands is now 0.27 (0.00 before, 0.80 is wanted)`.
-fn sureness(doubt: &InDoubt, was: Option<&InDoubt>) -> Option<String> {
-    let told = |sure| share_of(sure, doubt.wanted);
-    let (now, wanted) = (told(doubt.sure?), share(doubt.wanted));
-    let was = was.and_then(|was| was.sure).map(told);
-    let certain = certainty(doubt);
-    Some(match was {
-        Some(was) if was == now => format!("{certain} is still {now} ({wanted} is wanted)"),
-        Some(was) => format!("{certain} is now {now} ({was} before, {wanted} is wanted)"),
-        None => format!("{certain} is now {now} ({wanted} is wanted)"),
-    })
+/// `the certainty of where it stands is now 0.27 (0.00 before, 0.80 is wanted)`; of several numbers the first, and those that are not enough.
+fn sureness(all: &[Sure]) -> String {
+    let one = |sure: &Sure| {
+        let told = |value| share_of(value, sure.wanted);
+        let (now, wanted, certain) = (told(sure.now), share(sure.wanted), &sure.name);
+        match sure.was.map(told) {
+            Some(was) if was == now => format!("{certain} is still {now} ({wanted} is wanted)"),
+            Some(was) => format!("{certain} is now {now} ({was} before, {wanted} is wanted)"),
+            None => format!("{certain} is now {now} ({wanted} is wanted)"),
+        }
+    };
+    let counts = |(n, sure): &(usize, &Sure)| *n == 0 || sure.now < sure.wanted;
+    let said: Vec<String> = all.iter().enumerate().filter(counts).map(|(_, sure)| one(sure)).collect();
+    listed(&said, said.len())
 }
 
 /// What has been seen of where it may be, and where nothing has.
@@ -59,7 +84,11 @@ fn seen(doubt: &InDoubt, was: Option<&InDoubt>) -> String {
         let was = before(seen).and_then(|was| was.share).map(percent);
         let is_new = before(seen).is_none_or(|was| was.places != seen.places);
         let changed = seen.places > 0 && (is_new || was.as_ref() != Some(&now));
-        let was = was.filter(|was| *was != now).map(|was| format!("{was} before"));
+        let is_less = before(seen).and_then(|was| was.share) > seen.share;
+        let was = was.filter(|was| *was != now).map(|was| match is_less {
+            false => format!("{was} before"),
+            true => format!("{was} before: views of it lie otherwise than was thought, or no longer hold"),
+        });
         let left = 100.0 - (seen.share? * 100.0).floor();
         let left = (left > 0.0).then(|| format!("{left:.0} % are left"));
         let beside: Vec<String> = was.into_iter().chain(left).collect();
@@ -79,7 +108,7 @@ fn seen(doubt: &InDoubt, was: Option<&InDoubt>) -> String {
     }
 }
 
-/// Why it is no surer than it is; none where it is sure enough, or nothing says it.
+/// Why it is no surer than it is; none where nothing says it.
 fn why_no_surer(
     doubt: &InDoubt,
     before: Option<&Standing>,
@@ -87,12 +116,11 @@ fn why_no_surer(
     looks: &[&Note],
     name: Names<'_>,
 ) -> Option<String> {
-    doubt.sure.filter(|sure| *sure < doubt.wanted)?;
     let mut why: Vec<String> = looks.iter().filter_map(|note| in_vain(note)).collect();
     match doubt.of {
         Of::Thing => {
             why.extend(before.and_then(|before| lost(&doubt.about, before, after)).map(|(_, lost)| lost));
-            why.push(may_be(doubt, after, name).unwrap_or_else(|| none_may_be(after)));
+            why.push(may_be(doubt, after, name).unwrap_or_else(|| none_may_be(doubt, after)));
         }
         Of::Kind => why.extend(unsure_of(doubt, after, name)),
         Of::Surface => why.extend(untold(doubt, after)),
@@ -182,11 +210,15 @@ pub fn may_be(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<Stri
     })
 }
 
-fn none_may_be(after: &Standing) -> String {
-    match after.belief.tracks.len() {
-        0 => "no object was seen".into(),
-        1 => "the one object that was seen is not it".into(),
-        n => format!("none of the {n} objects that were seen may be it"),
+/// That no object may be it, or hardly.
+pub fn none_may_be(doubt: &InDoubt, after: &Standing) -> String {
+    let p = after.best(&doubt.about).map(|(_, p)| p).filter(|p| *p > HARDLY);
+    match (after.belief.tracks.len(), p.map(share)) {
+        (0, _) => "no object was seen".into(),
+        (1, None) => "the one object that was seen is not it".into(),
+        (1, Some(p)) => format!("the one object that was seen is it with only {p}"),
+        (n, None) => format!("none of the {n} objects that were seen may be it"),
+        (n, Some(p)) => format!("none of the {n} objects that were seen is it with more than {p}"),
     }
 }
 
@@ -335,7 +367,8 @@ mod tests {
     fn why_it_is_no_surer_is_said() {
         let begin = standing(Vec::new(), 0.0, 0.75, 0.0);
         let check = |before: &Standing, after: &Standing, note: Note, words: &[&str], not: &str| {
-            let said = told(Some(before), after, &[&note], &str::to_string).join(" ");
+            let asked = Asked { goal: "(found the-ring)", hoped: &[], name: &str::to_string };
+            let said = told(Some(before), after, &[&note], &asked).join(" ");
             words.iter().for_each(|word| assert!(said.contains(word), "{word:?} is not in {said}"));
             assert!(not.is_empty() || !said.contains(not), "{not:?} is in {said}");
         };

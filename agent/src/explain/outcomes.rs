@@ -5,7 +5,8 @@ use descry_domains::note::Note;
 use super::chapters::{Chapter, Deed};
 use super::looks;
 use super::standings::Standing;
-use super::wording::count;
+use super::wording::{count, reasons};
+use crate::weigh::Expected;
 
 /// How the line of a thing ends of which nothing else is known.
 const AFAR: &str = "seen from afar";
@@ -19,8 +20,10 @@ pub struct Outcome {
     pub said: String,
 }
 
-/// What came of a plan's steps, one after the other, and how things stood after each look.
-pub fn of(chapter: &Chapter, name: looks::Names<'_>) -> Vec<Outcome> {
+/// What came of a plan's steps, one after the other, and how things stood after each look; the goal is in PDDL.
+pub fn of(chapter: &Chapter, goal: &str, name: looks::Names<'_>) -> Vec<Outcome> {
+    let hoped: &[Expected] = chapter.weighed.as_ref().map_or(&[], |weighed| &weighed.numbers);
+    let asked = looks::Asked { goal, hoped, name };
     let mut said = Vec::new();
     let mut before: Option<&Standing> = chapter.before.as_ref();
     let mut noted: Vec<&Note> = Vec::new();
@@ -38,7 +41,7 @@ pub fn of(chapter: &Chapter, name: looks::Names<'_>) -> Vec<Outcome> {
                 let is_look = |note: &&Note| matches!(note, Note::Perceived { .. } | Note::Nothing { .. });
                 if noted.iter().any(is_look) {
                     let stood = |said| Outcome { stood_ns: Some(now.stamp_ns), said };
-                    said.extend(looks::told(before, now, &noted, name).into_iter().map(stood));
+                    said.extend(looks::told(before, now, &noted, &asked).into_iter().map(stood));
                     before = Some(now);
                 }
                 noted.clear();
@@ -64,7 +67,7 @@ fn outcome(deed: &Deed, doing: Option<&str>, has_standings: bool) -> Option<Stri
         Deed::Failed { call, because, changed, .. } => {
             let since = changed.as_ref().filter(|c| !c.is_empty());
             let since = since.map(|c| format!(" From then on: {c}.")).unwrap_or_default();
-            format!("{call} failed: {because}.{since}")
+            format!("{call} failed: {}.{since}", reasons::failed(because))
         }
         Deed::Resumed => {
             "here the run was cut off; it was gone on with from its record, and what had been done was not done again."

@@ -3,7 +3,7 @@
 use descry_domains::note::Note;
 
 use super::chapters::{Chapter, Deed, bare};
-use super::wording::{capital, listed, reasons, share};
+use super::wording::{capital, listed, reasons, share, share_of};
 use super::{Asked, Told, outcomes};
 use crate::weigh::{Expected, Way, Weighed};
 
@@ -30,7 +30,10 @@ fn tell(chapter: &Chapter, before: Option<&Chapter>, after: Option<&Chapter>, as
         cause: cause(chapter, before, asked),
         intent: intent(chapter, asked),
         why: why(chapter, asked),
-        outcome: outcomes::of(chapter, asked.name).into_iter().map(|outcome| outcome.said).collect(),
+        outcome: outcomes::of(chapter, &asked.goal, asked.name)
+            .into_iter()
+            .map(|outcome| outcome.said)
+            .collect(),
         done: done(chapter, after, asked),
     }
 }
@@ -93,7 +96,14 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
                 Some(now) => format!("with what was learned, {rest} {count} differently: {now}."),
                 None => {
                     let now = reasons::missed(&chapter.because, "would be only", asked.counts);
-                    format!("with what was learned, {rest} would not do: {now}.")
+                    let open = before.steps_done().1;
+                    match chapter.steps.iter().map(|step| bare(step)).eq(open.iter().copied()) {
+                        true => format!(
+                            "{rest} would not do, and no plan that would is known: they are what promises most, and are gone on with. {}.",
+                            capital(&now)
+                        ),
+                        false => format!("with what was learned, {rest} would not do: {now}."),
+                    }
                 }
             }
         }
@@ -101,7 +111,8 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
     let done = if moved.is_some() { capital(&done) } else { done };
     // None of many that are all nothing is the greatest.
     let most = chapter.most.as_ref().filter(|(_, most)| share(*most) != share(0.0));
-    let most = most.map(|(name, most)| format!(" The greatest: {name}, {}.", share(*most)));
+    let least = |name: &str| asked.wanted(name).unwrap_or(0.0);
+    let most = most.map(|(name, most)| format!(" The greatest: {name}, {}.", share_of(*most, least(name))));
     format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
 }
 
@@ -158,12 +169,17 @@ fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     }
     let mut named = Named::default();
     let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
-    said.extend(quickest((weighed, chapter.cut.is_none()), chosen, asked, &mut named));
+    said.extend(quickest(chapter, weighed, chosen, asked, &mut named));
     let most = weighed.others.iter().max_by(|a, b| a.gains.total_cmp(&b.gains));
     if let Some(other) = most.filter(|o| o.gains > chosen.gains * (1.0 + ALIKE)) {
         let more_s = other.takes_s - chosen.takes_s;
-        let more =
-            if more_s > 0.0 { format!(", but is reckoned at {more_s:.1} s more") } else { String::new() };
+        let more = match (more_s > 0.0, &chapter.cut, &asked.policy) {
+            (true, ..) => format!(", but is reckoned at {more_s:.1} s more"),
+            (false, Some(cut), None) => format!(
+                ", and takes no longer: the planner's search was ended after {cut}, before it came upon that"
+            ),
+            (false, ..) => ", and takes no longer: what follows counts as well".to_string(),
+        };
         said.push(format!("{} gains most{more}.", named.once(other)));
     }
     said.extend(longer);
@@ -241,8 +257,8 @@ fn compared(
             format!("The planner's search was ended after {cut}: this is the best that it had by then.")
         }
         (None, None) => {
-            let alone = match enough(weighed, better[0], asked) {
-                Some(false) if chosen.reaches == Some(true) => {
+            let alone = match enough(chapter, weighed, better[0], asked) {
+                Some(false) if chosen.reaches == Some(true) || better[0].takes_s < chapter.makespan_s => {
                     " By what is hoped of it, that one would not be enough by itself."
                 }
                 Some(true) if better[0].takes_s < chapter.makespan_s => {
@@ -264,11 +280,14 @@ fn compared(
 }
 
 /// Whether a way by itself would be enough if it brings what is hoped; none where nothing says so: it is only a part of what is to be done.
-fn enough(weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
-    let is_whole = |way: &Way| way.reaches == Some(true);
+fn enough(chapter: &Chapter, weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
+    // That a part is not the whole says nothing of it: it is held against plans that end with such a step.
+    let action = |step: &str| step.trim_start_matches('(').split([' ', ')']).next().map(str::to_string);
+    let last = |steps: &[String]| steps.last().and_then(|step| action(bare(step)));
+    let is_alike = || last(&way.steps) == last(&chapter.steps);
     match way.reaches {
         Some(true) => return Some(true),
-        Some(false) if weighed.chosen.iter().chain(&weighed.others).any(is_whole) => return Some(false),
+        Some(false) if is_alike() => return Some(false),
         _ => {}
     }
     let [only] = weighed.numbers.as_slice() else { return None };
@@ -278,13 +297,16 @@ fn enough(weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
 
 /// The quickest way, if it is another, and why it was not taken.
 fn quickest(
-    (weighed, is_whole_search): (&Weighed, bool),
+    chapter: &Chapter,
+    weighed: &Weighed,
     chosen: &Way,
     asked: &Asked<'_>,
     named: &mut Named,
 ) -> Option<String> {
     let other = weighed.others.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s))?;
-    let would_do = enough(weighed, other, asked);
+    let is_whole_search = chapter.cut.is_none();
+    // Where what is done is not enough either, that says nothing against another.
+    let would_do = enough(chapter, weighed, other, asked).filter(|enough| *enough || is_whole_search);
     // Of what was named as better and enough it has been said.
     let is_said =
         would_do == Some(true) && asked.policy.is_none() && is_whole_search && named.0.contains(&other.steps);
@@ -316,7 +338,8 @@ mod tests {
         let weighed =
             Weighed { numbers, open: others.len() + 1, chosen, others: others.to_vec(), shorter: None };
         let cut = cut.map(str::to_string);
-        let chapter = Chapter { makespan_s: 10.0, weighed: Some(weighed), cut, ..Chapter::default() };
+        let steps = vec!["0.000: (go far) [8.000]".to_string()];
+        let chapter = Chapter { steps, makespan_s: 10.0, weighed: Some(weighed), cut, ..Chapter::default() };
         let asked = Asked {
             goal: "(>= (sure) 0.8)".into(),
             policy: None,
@@ -334,37 +357,37 @@ mod tests {
         let chosen = || Some(way("(go far)", 8.0, 0.9, Some(true)));
         check(
             chosen(),
-            &[way("(stay)", 2.0, 0.85, Some(true))],
+            &[way("(go near)", 2.0, 0.85, Some(true))],
             None,
             &[
-                "1 gains more a second: (stay)",
+                "1 gains more a second: (go near)",
                 "that one would be enough, and sooner: the planner did not come upon it",
                 "(sure) from 0.00 to 1.00 (0.80 is wanted)",
             ],
         );
         check(
             chosen(),
-            &[way("(stay)", 2.0, 0.85, Some(false))],
+            &[way("(go near)", 2.0, 0.85, Some(false))],
             None,
             &[
                 "By what is hoped of it, that one would not be enough by itself",
-                "(stay) is the quickest, but by what is hoped of it would not be enough",
+                "(go near) is the quickest, but by what is hoped of it would not be enough",
             ],
         );
         // Of a record that does not say what would be enough, the numbers say it.
         check(
             Some(way("(go far)", 8.0, 0.9, None)),
-            &[way("(stay)", 2.0, 0.5, None)],
+            &[way("(go near)", 2.0, 0.5, None)],
             None,
-            &["(stay) is the quickest, but by what is hoped of it would not be enough"],
+            &["(go near) is the quickest, but by what is hoped of it would not be enough"],
         );
         check(
             chosen(),
-            &[way("(stay)", 2.0, 0.85, Some(true))],
+            &[way("(go near)", 2.0, 0.85, Some(true))],
             Some("9 states"),
             &[
                 "search was ended after 9 states: this is the best that it had by then",
-                "(stay) is the quickest, but gains less",
+                "(go near) is the quickest, but gains less",
             ],
         );
         check(None, &[], Some("9 states"), &["without a plan that it expected to reach the goal"]);

@@ -1,8 +1,11 @@
 //! How a run stood at each plan and whenever one was kept: what was in doubt, and what was believed.
 
+use std::collections::BTreeMap;
+
 use descry_memory::belief::{Belief, Track};
 use descry_memory::{Document, Query, Record, RecordId};
 
+use super::states::States;
 use crate::exit::CommandError;
 use crate::standing::{self, InDoubt, Of};
 
@@ -15,6 +18,8 @@ pub struct Standing {
     pub doubts: Vec<InDoubt>,
     /// What was believed of the objects.
     pub belief: Belief,
+    /// The numbers of the domain, as they are written in PDDL.
+    pub numbers: BTreeMap<String, f64>,
 }
 
 impl Standing {
@@ -33,6 +38,7 @@ impl Standing {
 /// All of them.
 pub struct Standings<'a> {
     record: &'a Record,
+    states: &'a States,
     beliefs: Vec<(RecordId, Belief)>,
 }
 
@@ -41,10 +47,10 @@ impl<'a> Standings<'a> {
     ///
     /// # Errors
     /// [`CommandError::Broken`] if the record cannot be read.
-    pub fn of(record: &'a Record) -> Result<Self, CommandError> {
+    pub fn of(record: &'a Record, states: &'a States) -> Result<Self, CommandError> {
         let (found, _) = record.find_whole(&Query::of_kind("belief")).map_err(CommandError::broken)?;
         let belief = |d: &Document| Some((d.id, serde_json::from_value(d.body.clone()).ok()?));
-        Ok(Standings { record, beliefs: found.iter().filter_map(belief).collect() })
+        Ok(Standings { record, states, beliefs: found.iter().filter_map(belief).collect() })
     }
 
     /// How things stood at an event; none of a record of earlier versions, and of a part that is lost.
@@ -68,6 +74,7 @@ impl<'a> Standings<'a> {
             stamp_ns: document.stamp_ns,
             doubts,
             belief: belief.map(|(_, belief)| belief.clone()).unwrap_or_default(),
+            numbers: self.states.numbers(document.id).cloned().unwrap_or_default(),
         }
     }
 }

@@ -18,6 +18,8 @@ const SAME: f64 = 5e-3;
 struct State {
     facts: BTreeSet<String>,
     numbers: BTreeMap<String, f64>,
+    /// When the first of what is to come by itself comes, seconds from then.
+    comes_s: Option<f64>,
 }
 
 impl State {
@@ -44,6 +46,11 @@ impl State {
     }
 
     fn take(&mut self, stated: &str) {
+        let timed = stated.strip_prefix("(at ").and_then(|rest| rest.split_once(" ("));
+        if let Some(at_s) = timed.and_then(|(at, _)| at.trim().parse::<f64>().ok()) {
+            self.comes_s = Some(self.comes_s.map_or(at_s, |first| first.min(at_s)));
+            return;
+        }
         let number = stated.strip_prefix("(= (").and_then(|rest| rest.split_once(')'));
         match number.and_then(|(name, value)| Some((name, value.trim_end_matches(')').trim().parse().ok()?)))
         {
@@ -109,10 +116,25 @@ impl States {
         Ok(States(problems.iter().filter_map(of).collect()))
     }
 
+    /// The numbers of the round before something that was recorded under a number.
+    pub fn numbers(&self, id: RecordId) -> Option<&BTreeMap<String, f64>> {
+        self.0.iter().rev().find(|(round, _)| *round < id).map(|(_, state)| &state.numbers)
+    }
+
+    /// Seconds that there were in the first round until something came by itself.
+    pub fn given_s(&self) -> Option<f64> {
+        self.0.first()?.1.comes_s
+    }
+
+    /// Seconds that were left in the last round until something came by itself, as a deadline does: 0 after it; none if nothing did.
+    pub fn left_s(&self) -> Option<f64> {
+        let was_to_come = self.0.iter().any(|(_, state)| state.comes_s.is_some());
+        was_to_come.then(|| self.0.last().and_then(|(_, state)| state.comes_s).unwrap_or(0.0))
+    }
+
     /// The greatest of the numbers that begin so, before something that was recorded under a number.
     pub fn most(&self, id: RecordId, begins: &str) -> Option<(String, f64)> {
-        let state = &self.0.iter().rev().find(|(round, _)| *round < id)?.1;
-        let numbers = state.numbers.iter().filter(|(name, _)| name.starts_with(begins));
+        let numbers = self.numbers(id)?.iter().filter(|(name, _)| name.starts_with(begins));
         let most = numbers.max_by(|a, b| a.1.total_cmp(b.1))?;
         Some((most.0.clone(), *most.1))
     }
@@ -148,10 +170,14 @@ mod tests {
             "(shut door); no longer: (hand-free); (presence cup-a desk) is 0.40 instead of 0.85",
         );
         check("(:init (at start) (hand-free) (= (sure) 0.8) (= (presence cup-a desk) 0.851))", "");
+        // That time passes is no change.
+        check("(:init (at start) (hand-free) (at 5.5 (not (time-left))) (= (presence cup-a desk) 0.85))", "");
         check(
             "(:init (a) (b) (c) (d) (e) (f) (at start) (hand-free) (= (sure) 0.8))",
             "(a), (b), (c), (d) and 2 more",
         );
         assert!(State::read("nothing").facts.is_empty());
+        let timed = State::read("(:init (at start) (at 60.5 (not (a))) (at 9.25 (b)))");
+        assert_eq!((timed.comes_s, timed.facts.len()), (Some(9.25), 1));
     }
 }

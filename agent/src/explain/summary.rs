@@ -6,7 +6,7 @@ use descry_domains::note::Note;
 use super::chapters::{Chapter, Deed};
 use super::looks::{self, Names};
 use super::standings::Standing;
-use super::wording::{count, listed, place, share};
+use super::wording::{count, listed, place, reasons, share};
 use crate::report::{self, Report};
 use crate::run::Header;
 use crate::standing::{InDoubt, Of};
@@ -14,15 +14,22 @@ use crate::standing::{InDoubt, Of};
 /// Failures that are named; the rest are counted.
 const MOST_FAILURES: usize = 4;
 
-/// It; `name` is how surfaces are called.
-pub fn of(header: &Header, report: Option<&Report>, chapters: &[Chapter], name: Names<'_>) -> Vec<String> {
+/// It; `left_s` is how long there was still time in the end, if there was not for ever; `name` is how surfaces are called.
+pub fn of(
+    header: &Header,
+    report: Option<&Report>,
+    chapters: &[Chapter],
+    left_s: Option<f64>,
+    name: Names<'_>,
+) -> Vec<String> {
     let last = chapters.iter().flat_map(Chapter::stood).last();
     let rests =
         report.and_then(|report| last.and_then(|last| rests(report, last, name)).or_else(|| said_of(report)));
     let mut said = vec![asked(header), answer(report, chapters.len())];
     said.extend(rests);
     let is_absent = report.is_some_and(|report| report.verdict == Verdict::NotFound);
-    said.extend(trouble(chapters, is_absent));
+    let is_open = report.is_some_and(|report| report.verdict == Verdict::CannotTell);
+    said.extend(trouble(chapters, left_s.filter(|_| is_open), is_absent));
     said
 }
 
@@ -81,9 +88,7 @@ fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
                 track.seen_fraction * 100.0
             )
         }
-        (Of::Thing, _) if last.belief.tracks.is_empty() => objects,
-        (Of::Thing, _) => looks::may_be(doubt, last, name)
-            .unwrap_or_else(|| format!("{objects}, none of which may be {}", doubt.about)),
+        (Of::Thing, _) => looks::may_be(doubt, last, name).unwrap_or_else(|| looks::none_may_be(doubt, last)),
         (Of::Kind, _) => format!(
             "{objects}, and it is certain with {} which of them are {}s and that there are no more",
             share(doubt.sure?),
@@ -124,8 +129,8 @@ fn seen(doubt: &InDoubt) -> String {
     listed(&all, all.len()) + &open
 }
 
-/// What went wrong on the way, the gravest first.
-fn trouble(chapters: &[Chapter], is_absent: bool) -> Option<String> {
+/// What went wrong on the way, the gravest first; `short_s` is how long there was still time where that was too little.
+fn trouble(chapters: &[Chapter], short_s: Option<f64>, is_absent: bool) -> Option<String> {
     let deeds = || chapters.iter().flat_map(|chapter| &chapter.deeds);
     let notes = || deeds().filter_map(|deed| if let Deed::Noted(note) = deed { Some(note) } else { None });
     let failures: Vec<(&str, &str)> = chapters.iter().flat_map(Chapter::failures).collect();
@@ -138,8 +143,15 @@ fn trouble(chapters: &[Chapter], is_absent: bool) -> Option<String> {
     let cuts = deeds().filter(|deed| matches!(deed, Deed::Resumed)).count();
     let first =
         |n: usize, first: &str| if n > 1 { format!("; the first: {first}") } else { format!(": {first}") };
-    let failed: Vec<String> = failures.iter().map(|(call, because)| format!("{call}, {because}")).collect();
+    let failed: Vec<String> =
+        failures.iter().map(|(call, because)| format!("{call}, {}", reasons::failed(because))).collect();
     let mut all: Vec<String> = Vec::new();
+    all.extend(short_s.map(|left_s| {
+        match left_s > 0.0 {
+            true => format!("the time that was given did not do: {left_s:.1} s of it were left, too few for any way to get further"),
+            false => "the time that was given was over".into(),
+        }
+    }));
     all.extend(
         moved.first().map(|because| format!("things were moved meanwhile{}", first(moved.len(), because))),
     );

@@ -25,6 +25,8 @@ pub struct Words<'a> {
     pub meanings: Meanings<'a>,
     /// What a surface is called.
     pub name: &'a dyn Fn(&str) -> String,
+    /// A thing that is there with less is said not to be there.
+    pub not_there: Option<f64>,
 }
 
 /// It, in sentences.
@@ -71,7 +73,7 @@ pub fn rests_on(
     match rests {
         Some(rests) => {
             said.extend(rests.in_doubt.iter().map(|doubt| seen(doubt, &looks)));
-            said.extend(left(&rests, report, words.meanings));
+            said.extend(left(&rests, report, states.left_s(), words));
         }
         None => said
             .push("what was seen of each surface in the end, and what is left, is not in the record.".into()),
@@ -154,23 +156,31 @@ fn object(track: &Track, asked: Option<&str>, words: &Words<'_>) -> String {
 }
 
 /// Why there was nothing more to do, and what is left.
-fn left(rests: &Rests, report: &Report, meanings: Meanings<'_>) -> Vec<String> {
+fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) -> Vec<String> {
     let mut said = Vec::new();
     if let Some(left) = report.remaining.filter(|_| report.verdict != Verdict::Achieved) {
         said.push(format!(
-            "the probability that it is there after all, unseen or as one of the objects that were seen, is {}.",
-            share(left)
+            "the probability that it is there after all, unseen or as one of the objects that were seen, is {}{}.",
+            share(left),
+            words.not_there.map(|least| format!(" (it is said not to be there below {})", share(least))).unwrap_or_default()
         ));
     }
     if report.remaining.is_none() && report.verdict != Verdict::Achieved {
-        let open = rests.in_doubt.iter().filter(|doubt| doubt.left > HARDLY);
+        // Of many objects together it says little what hangs on each.
+        let open = rests.in_doubt.iter().filter(|doubt| doubt.of == Of::Thing && doubt.left > HARDLY);
         said.extend(open.map(|d| format!("about {}, {} is still open in all.", d.about, share(d.left))));
     }
-    let because = reasons::no_plan(&rests.said, meanings);
-    said.push(match rests.ended.as_str() {
-        "reached" => "it ended because the goal held.".into(),
-        "no plan" if because.is_empty() => "it ended because no plan would still bring it about.".into(),
-        "no plan" => format!("it ended because no plan would still bring it about: {because}."),
+    let because = reasons::no_plan(&rests.said, words.meanings);
+    said.push(match (rests.ended.as_str(), left_s) {
+        ("reached", _) => "it ended because the goal held.".into(),
+        ("no plan", Some(left_s)) if left_s > 0.0 => {
+            format!(
+                "it ended because no plan would still bring it about in the {left_s:.1} s that were left."
+            )
+        }
+        ("no plan", Some(_)) => "it ended because the time that was given was over.".into(),
+        ("no plan", _) if because.is_empty() => "it ended because no plan would still bring it about.".into(),
+        ("no plan", _) => format!("it ended because no plan would still bring it about: {because}."),
         _ => format!("it ended because {because}."),
     });
     said

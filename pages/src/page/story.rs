@@ -164,16 +164,16 @@ pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result
         .filter_map(|d| Some(believed(all.s(d.stamp_ns), &part(&d.body)?)))
         .collect();
     let saying = Beginning::of(record).ok().flatten().map(|b| Saying::of_run(&b)).unwrap_or_default();
+    let said = |name: &str| heads.first().and_then(|d| d.body[name].as_str()).unwrap_or_default().to_owned();
+    let pddl = said("pddl_goal");
     let (moments, plans) = told(&all, &events, &saying);
     let deeds = deeds(&all, &events);
-    let known = explain::after_looks(record, &saying)?.into_iter();
+    let known = explain::after_looks(record, &pddl, &saying)?.into_iter();
     let known = known.map(|(stamp_ns, text)| Known { at_s: all.s(stamp_ns), text: capital(&text) }).collect();
     let clouds = all.find("cloud")?;
     looks.tell(&mut all, &clouds, &map)?;
     let stands = stands(&all, &map, &clouds);
-    let said = |name: &str| heads.first().and_then(|d| d.body[name].as_str()).unwrap_or_default().to_owned();
     let end_ns = events.iter().chain(&clouds).map(|d| d.stamp_ns).max().unwrap_or(0);
-    let pddl = said("pddl_goal");
     Ok(Story {
         goal: said("goal"),
         wanted: Some(saying.say(&pddl)).filter(|wanted| *wanted != pddl),

@@ -1,5 +1,7 @@
 //! What the monitor and the planner said, in fewer and plainer words. What is not known here is passed on as it is.
 
+use descry_domains::world::NOT_AS_SAID;
+
 use crate::agent::AT_THE_END;
 
 /// What a call of the domain asks, in words.
@@ -98,13 +100,28 @@ fn no_longer(because: &str) -> Option<String> {
     Some(format!("{call} asks that {condition}, which is not so{values}"))
 }
 
+/// Why a step failed.
+pub fn failed(because: &str) -> String {
+    let condition = because
+        .strip_prefix(NOT_AS_SAID)
+        .and_then(|broken| broken.split_once(": ")?.1.split_once(" does not hold all the time"));
+    match condition {
+        Some((condition, _)) => {
+            format!("it came to its end, but until then it was not always so that {condition}")
+        }
+        None => because.to_string(),
+    }
+}
+
 /// What is concluded from a failure: `try N of M`, or what is true from then on.
 pub fn follows(therefore: &str) -> String {
     let tried = therefore.strip_prefix("try ").and_then(|tried| tried.split_once(" of "));
     match tried {
         Some((n, most)) if most.bytes().all(|b| b.is_ascii_digit()) => {
             let are = if n == "1" { "is" } else { "are" };
-            format!("{n} of {most} tries {are} used, and the plan is made anew with what is known now")
+            format!(
+                "{n} of {most} tries of this very step {are} used, and the plan is made anew with what is known now"
+            )
         }
         _ => therefore.to_string(),
     }
@@ -174,7 +191,18 @@ fn refused(part: &str, meanings: Meanings<'_>) -> Option<String> {
     let named = calls.count();
     let more =
         list.rsplit_once(" and ").and_then(|(_, more)| more.strip_suffix(" more")?.trim().parse().ok());
-    Some(match (meanings(name), named + more.unwrap_or(0)) {
+    // What a number is stands before what it is in cases that are rare.
+    let about = meanings(name).map(|about| {
+        let about = about.split(';').next().unwrap_or_default().to_string();
+        if about.starts_with("whether ") { about } else { format!("for the {about}") }
+    });
+    if let (Some(about), "impossible") = (&about, answer) {
+        let times = named + more.unwrap_or(0) + 1;
+        return Some(format!(
+            "{before}it was asked {about}, and {times} times there were none: it is impossible"
+        ));
+    }
+    Some(match (about, named + more.unwrap_or(0)) {
         (Some(about), 0) => format!("{before}asked {about}, the answer is {answer} for {first}]"),
         (Some(about), others) => {
             format!("{before}it was asked {about}, and {} times the answer was {answer}", others + 1)
@@ -187,6 +215,16 @@ fn refused(part: &str, meanings: Meanings<'_>) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_step_that_ended_too_late_is_told_so() {
+        let broken = format!("{NOT_AS_SAID}step 1 (go a) at 0: (time-left) does not hold all the time");
+        assert_eq!(
+            failed(&broken),
+            "it came to its end, but until then it was not always so that (time-left)"
+        );
+        assert_eq!(failed("blocked: a door"), "blocked: a door");
+    }
 
     #[test]
     fn what_the_monitor_says_is_made_plain() {
@@ -242,7 +280,8 @@ mod tests {
 
     #[test]
     fn what_follows_from_a_failure_is_no_promise_to_do_it_again() {
-        let plain = "1 of 4 tries is used, and the plan is made anew with what is known now";
+        let plain =
+            "1 of 4 tries of this very step is used, and the plan is made anew with what is known now";
         assert_eq!(follows("try 1 of 4"), plain);
         assert_eq!(follows("(shut study-door)"), "(shut study-door)");
     }

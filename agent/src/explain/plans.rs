@@ -99,8 +99,9 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
                     let open = before.steps_done().1;
                     match chapter.steps.iter().map(|step| bare(step)).eq(open.iter().copied()) {
                         true => format!(
-                            "{rest} would not do, and no plan that would is known: they are what promises most, and are gone on with. {}.",
-                            capital(&now)
+                            "what was left of plan {} would not do: {now}. No plan that would is known: it promises most, \
+                             and is gone on with.",
+                            before.round
                         ),
                         false => format!("with what was learned, {rest} would not do: {now}."),
                     }

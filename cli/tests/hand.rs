@@ -28,6 +28,14 @@ fn the_hand_reaches_for_what_was_seen_from_where_the_body_stands() {
 }
 
 #[test]
+fn what_slid_out_of_the_hand_is_looked_for_where_it_did() {
+    let said = achieved("bring cup A to the desk", 93014, "[[fault]]\nkind = \"grasp_slips\"\nat = 1\n");
+    let (_, after) = said.split_once("it slid out of the hand").expect("it slips once");
+    let look = after.split("do        (observe ").nth(1).and_then(|look| look.split(')').next());
+    assert!(look.is_some_and(|look| look.ends_with(" kitchen-table")), "{look:?}: {said}");
+}
+
+#[test]
 fn what_was_found_is_not_looked_for_elsewhere() {
     let said = achieved("bring cup A to the desk", 91004, "[[fault]]\nkind = \"grasp_slips\"\nat = 1\n");
     let taken = said.find("the hand is closed to").expect("it was taken");

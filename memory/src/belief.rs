@@ -11,7 +11,7 @@ use crate::document::RecordId;
 /// A percept farther from an object than this is another object.
 const GATE_M: f64 = 0.10;
 /// What is found again stands at most this far from where it was touched, metres: it may have slid, and the hand may have pushed it.
-const MISLAID_M: f64 = 0.25;
+pub const MISLAID_M: f64 = 0.25;
 /// An unknown thing of this many times the volume of a known object is not that object.
 const MUCH_LARGER: f64 = 3.0;
 

@@ -161,6 +161,9 @@ pub fn lost(thing: &str, before: &Standing, after: &Standing) -> Option<(f64, St
                 let (other, p) = likeliest(now, thing);
                 format!("is seen as {other} now, with {}", share(p))
             }
+            None if after.belief.mislaid.iter().any(|touched| touched.id == track.id) => {
+                "was touched since, and where it stands has to be seen again".into()
+            }
             None if counts_less(track, before, after) => {
                 "is not counted on any more: what was seen there before no longer holds".into()
             }

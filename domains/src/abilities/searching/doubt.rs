@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-use descry_memory::belief::Track;
+use descry_memory::belief::{MISLAID_M, Track};
 use descry_perception::nalgebra::{Point3, Vector3};
 use descry_perception::recognise::ObjectModel;
 
@@ -145,7 +145,30 @@ impl Doubt {
         let size = thing.models.first().map_or(SMALL_M, size_m);
         let surfaces = (0..situation.surfaces.len()).filter(|&on| thing.may_be_on(on));
         let weighted: Vec<(usize, f64)> = surfaces.map(|on| (on, expected[on])).collect();
-        Self::hidden_on(situation, &weighted, size)
+        let mut doubt = Self::hidden_on(situation, &weighted, size);
+        doubt.expect_again(situation, thing);
+        doubt
+    }
+
+    /// What was touched stands near where it stood, until that has been seen: with the probability that it was the thing, and with the rest
+    /// all is as if there were no such object.
+    fn expect_again(&mut self, situation: &Situation, thing: &Thing) {
+        for track in &situation.belief.mislaid {
+            let p = thing.probability(track, &situation.surfaces);
+            let is_near = |h: &Hypothesis| {
+                situation.surfaces[h.on].symbol == track.on
+                    && (h.centre - track.position_m).norm() < MISLAID_M
+            };
+            let near: f64 = self.hypotheses.iter().filter(|h| is_near(h)).map(|h| h.weight).sum();
+            if p <= NEGLIGIBLE || near <= 0.0 {
+                continue;
+            }
+            for h in &mut self.hypotheses {
+                let share = if is_near(h) { h.weight / near } else { 0.0 };
+                h.weight = p * share + (1.0 - p) * h.weight;
+            }
+            self.hidden = p + (1.0 - p) * self.hidden;
+        }
     }
 
     /// The share of the doubt that a look, a candidate and a surface, would settle beyond what the plan does before it, 0 to 1. Doubt that no

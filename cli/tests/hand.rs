@@ -7,17 +7,31 @@ use std::fs;
 use descry_domains::load::Domain;
 use tempfile::TempDir;
 
-/// Pursues a goal in the flat, in which there are such faults, until it is achieved; what was said on the way.
-fn achieved(goal: &str, seed: u64, faults: &str) -> String {
+/// Pursues a goal in the flat, in which there are such faults; with which code it ends, and what was said.
+fn pursued(goal: &str, seed: u64, faults: &str) -> (Option<i32>, String) {
     let folder = TempDir::new().expect("a folder can be made");
     let scene = Domain::load("home").expect("a built-in domain").scenes["default"].clone();
     fs::write(folder.path().join("flat.toml"), format!("{scene}\n{faults}")).expect("a scene");
     let seed = seed.to_string();
     let run = ["do", goal, "--domain", "home", "--scene", "flat.toml", "--seed", &seed, "--run", "run"];
     let output = binary::outcome(folder.path(), &run);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(0), "{said}");
+    let said = [output.stderr, output.stdout].concat();
+    (output.status.code(), String::from_utf8_lossy(&said).into_owned())
+}
+
+/// The same until it is achieved; what was said on the way.
+fn achieved(goal: &str, seed: u64, faults: &str) -> String {
+    let (code, said) = pursued(goal, seed, faults);
+    assert_eq!(code, Some(0), "{said}");
     said
+}
+
+#[test]
+fn what_was_lost_out_of_the_hand_is_not_said_not_to_be_there() {
+    let faults = "[[fault]]\nkind = \"object_dropped\"\nchance = 1.0\n";
+    let (code, said) = pursued("bring cup A to the desk", 92002, faults);
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("cannot tell: ") && said.contains("it was lost out of the hand"), "{said}");
 }
 
 #[test]

@@ -151,7 +151,7 @@ impl Doubt {
     }
 
     /// What was touched stands near where it stood, until that has been seen: with the probability that it was the thing, and with the rest
-    /// all is as if there were no such object.
+    /// all is as if there were no such object. What was lost out of the hand lies where no look at a surface shows it.
     fn expect_again(&mut self, situation: &Situation, thing: &Thing) {
         for track in &situation.belief.mislaid {
             let p = thing.probability(track, &situation.surfaces);
@@ -160,11 +160,12 @@ impl Doubt {
                     && (h.centre - track.position_m).norm() < MISLAID_M
             };
             let near: f64 = self.hypotheses.iter().filter(|h| is_near(h)).map(|h| h.weight).sum();
-            if p <= NEGLIGIBLE || near <= 0.0 {
+            let is_lost = track.on.is_empty();
+            if p <= NEGLIGIBLE || (near <= 0.0 && !is_lost) {
                 continue;
             }
             for h in &mut self.hypotheses {
-                let share = if is_near(h) { h.weight / near } else { 0.0 };
+                let share = if is_near(h) && !is_lost { h.weight / near } else { 0.0 };
                 h.weight = p * share + (1.0 - p) * h.weight;
             }
             self.hidden = p + (1.0 - p) * self.hidden;

@@ -3,7 +3,7 @@
 
 mod chapters;
 mod looks;
-pub(crate) mod numbers;
+mod numbers;
 mod outcomes;
 mod plans;
 mod standings;
@@ -19,6 +19,7 @@ use descry_domains::vocabulary::Ground;
 use descry_memory::Record;
 use serde::Serialize;
 
+use crate::compared;
 use crate::exit::CommandError;
 use crate::report::Report;
 use crate::run::{Beginning, Header};
@@ -194,9 +195,9 @@ fn numbers(domain: &Domain, chapters: &[chapters::Chapter], saying: &Saying) -> 
 
 /// What ways and their figures mean.
 const WAYS: &str = "A way to get further is what may be done next, up to the first step that may bring the numbers nearer to \
-                    what is wanted. In brackets behind it: by how much it is, of all numbers together, in how many seconds, and how much that is a \
-                    second; behind its steps their seconds. What is hoped for is what comes if all is \
-                    as well as it may be: a look shows what it is taken for, if it is there.";
+                    what is wanted. In brackets behind it: by how much it is, of all numbers together, in how many \
+                    seconds, and how much that is a second; behind its steps their seconds. What is hoped for is what \
+                    comes if all is as well as it may be: a look shows what it is taken for, if it is there.";
 
 /// What a run was asked, as far as plans depend on it.
 struct Asked<'a> {
@@ -215,7 +216,7 @@ struct Asked<'a> {
 impl Asked<'_> {
     /// What the goal wants of a number: that with which it compares it, if it names it so.
     fn wanted(&self, number: &str) -> Option<f64> {
-        numbers::wanted(&self.goal, number)
+        compared::wanted(&self.goal, number)
     }
 }
 

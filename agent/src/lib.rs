@@ -39,6 +39,7 @@
 
 pub mod agent;
 pub mod body;
+mod compared;
 pub mod exit;
 pub mod explain;
 pub mod keeping;

@@ -12,8 +12,8 @@ use descry_planner::{Plan, Semantics, State, Step};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::compared::{self, Compared};
 use crate::exit::CommandError;
-use crate::explain::numbers;
 
 /// The blob under which it is kept beside the event of a plan.
 pub const BLOB: &str = "weighed";
@@ -110,7 +110,9 @@ impl<'r> Scale<'r> {
             let words = words(text);
             let functions = (0..).zip(&round.task.functions).filter(|(_, f)| f.result.is_none());
             let named = functions.filter(|(_, f)| words.contains(&f.name.as_str()));
-            named.map(|(n, f)| (FunctionId(n), less_is_wanted(&words, &f.name))).collect()
+            named
+                .map(|(n, f)| (FunctionId(n), compared::all(text).any(|c| c.less && c.word == f.name)))
+                .collect()
         };
         let (mut counting, mut by) = (named(goal), goal.to_string());
         if counting.is_empty() {
@@ -134,10 +136,10 @@ impl<'r> Scale<'r> {
                     arguments.iter().map(|&a| format!(" {}", task.object(a).name)).collect();
                 (format!("({name}{arguments})"), (value, less))
             });
-            let compared: Vec<Vec<&str>> =
-                numbers::named(&self.asked).filter(|(word, _)| word == name).map(|(_, of)| of).collect();
+            let compared: Vec<Compared<'_>> =
+                compared::all(&self.asked).filter(|compared| compared.word == name).collect();
             let counts = move |(number, _): &(String, (f64, bool))| {
-                compared.is_empty() || compared.iter().any(|of| numbers::is_named(number, name, of))
+                compared.is_empty() || compared.iter().any(|compared| compared.fits(number))
             };
             named.filter(counts).collect::<Vec<_>>()
         };
@@ -332,11 +334,6 @@ fn joined(steps: &[Step]) -> Option<Vec<Step>> {
 /// The words of a text in PDDL.
 fn words(text: &str) -> Vec<&str> {
     text.split(|c: char| c.is_whitespace() || "()".contains(c)).filter(|w| !w.is_empty()).collect()
-}
-
-/// Whether a goal asks for at most so much of a number.
-fn less_is_wanted(goal: &[&str], name: &str) -> bool {
-    goal.windows(2).any(|pair| matches!(pair[0], "<=" | "<") && pair[1] == name)
 }
 
 fn call(step: &Step) -> String {

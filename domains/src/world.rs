@@ -525,15 +525,13 @@ impl<'a> World<'a> {
     pub fn stands_at(&mut self, here: &PoseEstimate) {
         let place = here.place();
         let known = &mut self.mind.known;
-        // The way of a drive that did not arrive was driven all the same, as far as it came.
         let from = &known.candidates[known.at].place;
-        let has_moved = *from != place;
-        if has_moved
-            && let Some(Ok(way)) = self.setting.robot.travel(from, std::slice::from_ref(&place), &[]).first()
-        {
-            self.mind.distance_m += way.distance_m;
-        }
-        if has_moved {
+        if *from != place {
+            // The way of a drive that did not arrive was driven all the same, as far as it came.
+            let way = self.setting.robot.travel(from, std::slice::from_ref(&place), &[]);
+            if let Some(Ok(way)) = way.first() {
+                self.mind.distance_m += way.distance_m;
+            }
             known.has_moved();
         }
         let found = known.candidates.iter().position(|c| c.place == place);

@@ -136,14 +136,13 @@ impl<'a> Calls<'a> {
         let mut positions: Vec<usize> = reads.iter().flat_map(at).flatten().collect();
         positions.sort_unstable();
         positions.dedup();
-        let apart = reads.iter().any(|read| matches!(read, Read::At(..)));
         Asked {
             module: declared.name.as_str().into(),
             kind: declared.kind,
             writes: declared.writes.len(),
             hits: self.attachments.hits(&attachment),
+            sources: positions.is_empty().then(|| Arc::new(self.read_by(&attachment, &[]))),
             positions,
-            sources: (!apart).then(|| Arc::new(self.read_by(&attachment, &[]))),
             attachment,
         }
     }

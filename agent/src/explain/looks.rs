@@ -5,7 +5,7 @@ use descry_domains::note::Note;
 use descry_memory::belief::Track;
 
 use super::numbers::{self, Sure};
-use super::standings::{Standing, certainty};
+use super::standings::Standing;
 use super::wording::{listed, place, share, share_of};
 use crate::standing::{InDoubt, Of, Seen};
 use crate::weigh::Expected;
@@ -42,15 +42,10 @@ pub struct Asked<'a> {
 pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], asked: &Asked<'_>) -> Vec<String> {
     let told = |doubt: &InDoubt| {
         let was = before.and_then(|before| before.same(doubt));
-        let sure = match numbers::of(doubt, before, after, asked.goal, asked.hoped) {
-            all if all.is_empty() => vec![Sure {
-                name: certainty(doubt),
-                was: was.and_then(|was| was.sure),
-                now: doubt.sure?,
-                wanted: doubt.wanted,
-            }],
-            all => all,
-        };
+        let sure = numbers::of(doubt, before, after, asked.goal, asked.hoped);
+        if sure.is_empty() {
+            return None;
+        }
         let is_open = sure.iter().any(|sure| sure.now < sure.wanted);
         let because = is_open.then(|| why_no_surer(doubt, before, after, looks, asked.name)).flatten();
         let because = because.map(|because| format!(" It is no more because {because}.")).unwrap_or_default();

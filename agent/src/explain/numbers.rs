@@ -2,77 +2,18 @@
 
 use descry_domains::lexicon::symbol;
 
-use super::standings::Standing;
+use super::standings::{Standing, certainty};
+use crate::compared::{self, words};
 use crate::standing::InDoubt;
 use crate::weigh::Expected;
 
 /// A number that is less says nothing of where something is.
 const NEXT_TO_NOTHING: f64 = 0.05;
 
-/// What a goal in PDDL wants of a number: `(>= (presence a-ring ?s) 0.8)`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Compared<'g> {
-    word: &'g str,
-    of: Vec<&'g str>,
-    wanted: f64,
-    at_least: bool,
-    /// Whether it is wanted of all that its variables may stand for, not of one.
-    of_all: bool,
-}
-
-/// All that a goal wants of numbers.
-pub fn compared(goal: &str) -> impl Iterator<Item = Compared<'_>> {
-    goal.match_indices("= (").filter_map(move |(at, sign)| {
-        let (number, rest) = goal[at + sign.len()..].split_once(')')?;
-        let wanted = rest.split(')').next()?.trim().parse().ok()?;
-        let mut words = number.split_whitespace();
-        let (word, of): (_, Vec<&str>) = (words.next()?, words.collect());
-        let is_of_all = |variable: &&str| goal.contains(&format!("(forall ({variable}"));
-        let of_all = of.iter().any(is_of_all);
-        Some(Compared { word, of, wanted, at_least: !goal[..at].ends_with('<'), of_all })
-    })
-}
-
-/// The numbers that a condition compares, as it writes them: their words, and what they are of.
-pub fn named(condition: &str) -> impl Iterator<Item = (&str, Vec<&str>)> {
-    const SIGNS: [&str; 5] = ["(>= (", "(<= (", "(> (", "(< (", "(= ("];
-    let begins = SIGNS.iter().flat_map(move |sign| condition.match_indices(sign));
-    begins.filter_map(|(at, sign)| {
-        let mut words = condition[at + sign.len()..].split_once(')')?.0.split_whitespace();
-        Some((words.next()?, words.collect()))
-    })
-}
-
-/// Whether a number, as it is written in PDDL, is one that was named so; what is said of a variable is said of any.
-pub fn is_named(number: &str, word: &str, of: &[&str]) -> bool {
-    let mut own = words(number);
-    let is_word = own.next() == Some(word);
-    let own: Vec<&str> = own.collect();
-    let same = |(named, is): (&&str, &&str)| named.starts_with('?') || named == is;
-    is_word && of.len() == own.len() && of.iter().zip(&own).all(same)
-}
-
-/// What a goal wants of a number: that with which it compares it, if it names it so.
-pub fn wanted(goal: &str, number: &str) -> Option<f64> {
-    compared(goal).find(|compared| compared.fits(number)).map(|compared| compared.wanted)
-}
-
-/// The words of a number as it is written in PDDL.
-fn words(number: &str) -> impl Iterator<Item = &str> {
-    number.trim_matches(['(', ')']).split_whitespace()
-}
-
-impl Compared<'_> {
-    /// Whether it is about a number; what is wanted of a variable is about any.
-    fn fits(&self, number: &str) -> bool {
-        is_named(number, self.word, &self.of)
-    }
-}
-
 /// A number that says how sure it is of something.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sure {
-    /// As it is written in PDDL.
+    /// As it is written in PDDL, or said.
     pub name: String,
     /// What it was; none if that is not known.
     pub was: Option<f64>,
@@ -82,8 +23,8 @@ pub struct Sure {
     pub wanted: f64,
 }
 
-/// The numbers that say how sure it is of a doubt: those that the goal compares; else those that the plan hopes for. None of a record that
-/// does not say.
+/// The numbers that say how sure it is of a doubt: those that the goal compares; else those that the plan hopes for; else how
+/// sure it is said to be. None of a record that does not say.
 pub fn of(
     doubt: &InDoubt,
     before: Option<&Standing>,
@@ -96,8 +37,10 @@ pub fn of(
         let was = before.and_then(|before| before.numbers.get(name)).copied();
         Sure { name: name.to_owned(), was, now, wanted }
     };
-    let asked = compared(goal).filter(|compared| compared.at_least && compared.of.contains(&about.as_str()));
+    let asked =
+        compared::all(goal).filter(|compared| !compared.less && compared.of.contains(&about.as_str()));
     let asked = asked.filter_map(|compared| {
+        let wanted = compared.wanted?;
         let fitting = || after.numbers.iter().filter(|(name, _)| compared.fits(name));
         let by_value = |a: &(&String, &f64), b: &(&String, &f64)| a.1.total_cmp(b.1);
         let decisive = if compared.of_all { fitting().min_by(by_value) } else { fitting().max_by(by_value) }?;
@@ -108,7 +51,7 @@ pub fn of(
         } else {
             decisive
         };
-        Some(sure(name, *now, compared.wanted))
+        Some(sure(name, *now, wanted))
     });
     let asked: Vec<Sure> = asked.collect();
     if !asked.is_empty() {
@@ -130,28 +73,17 @@ pub fn of(
     };
     let mut all: Vec<Sure> = hoped.filter_map(decisive).collect();
     all.dedup();
+    if all.is_empty() {
+        let was = before.and_then(|before| before.same(doubt)?.sure);
+        let name = certainty(doubt);
+        all.extend(doubt.sure.map(|now| Sure { name, was, now, wanted: doubt.wanted }));
+    }
     all
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_is_wanted_stands_in_the_goal() {
-        let check = |goal: &str, number: &str, expected: Option<f64>| {
-            assert_eq!(wanted(goal, number), expected, "{goal}: {number}");
-        };
-        check("(>= (confidence a-ring) 0.8)", "(confidence a-ring)", Some(0.8));
-        check("(exists (?s - place) (>= (presence a-ring ?s) 0.9))", "(presence a-ring shelf)", Some(0.9));
-        check("(exists (?s - place) (>= (presence a-ring ?s) 0.9))", "(presence stone shelf)", None);
-        check("(and (a) (<= (unseen) 0.5))", "(unseen)", Some(0.5));
-        check("(>= (presence a-ring) (sure))", "(presence a-ring)", None);
-        check("(on a-ring shelf)", "(clarity shelf)", None);
-        check("(>= (unseen-part) 0.5)", "(unseen)", None);
-        check("(>= (found red-stone) 0.9)", "(found red-stone)", Some(0.9));
-        check("(>= (found red-stone) 0.9)", "(found big-stone)", None);
-    }
 
     #[test]
     fn how_sure_it_is_is_said_by_the_numbers_that_the_goal_compares() {

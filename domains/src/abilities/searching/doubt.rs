@@ -165,7 +165,7 @@ impl Doubt {
                 continue;
             }
             for h in &mut self.hypotheses {
-                let share = if is_near(h) && !is_lost { h.weight / near } else { 0.0 };
+                let share = if is_near(h) { h.weight / near } else { 0.0 };
                 h.weight = p * share + (1.0 - p) * h.weight;
             }
             self.hidden = p + (1.0 - p) * self.hidden;

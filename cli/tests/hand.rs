@@ -56,3 +56,9 @@ fn what_was_found_is_not_looked_for_elsewhere() {
     assert!(said[..taken].contains("cup A            0.8"), "it had been found: {said}");
     assert!(!said[..taken].contains("do        (observe desk"), "{said}");
 }
+
+#[test]
+fn what_is_just_beyond_the_hand_is_taken_from_elsewhere() {
+    let said = achieved("bring cup A to the desk", 82001, "");
+    assert!(!said.contains("the arm reaches"), "{said}");
+}

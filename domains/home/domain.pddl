@@ -44,6 +44,7 @@
     (hand-free)
     (holding ?what - thing)
     (slippery ?what - thing)                    ; it could not be taken
+    (beyond ?from - pose ?what - thing ?on - surface) ; from that pose the hand could not reach it there
     (full ?from - pose ?on - surface))          ; nothing could be put there from that pose
 
   (:functions
@@ -113,6 +114,7 @@
       (at start (at ?from))
       (at start (hand-free))
       (at start (not (slippery ?what)))
+      (at start (not (beyond ?from ?what ?on)))
       (at start (>= (presence ?what ?on) (sure)))
       (at start ([can-grasp ?from ?what ?on])))
     :effect (and

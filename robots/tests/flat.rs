@@ -324,6 +324,17 @@ async fn a_cup_is_carried_to_another_room() {
 }
 
 #[tokio::test]
+async fn the_hand_does_not_reach_through_a_wall() {
+    let robot = robot_in(&FLAT.replace("position_m = [-2.2, 0.0]", "position_m = [-0.7, 0.0]"), 4, "");
+    drive(&robot, &at(1.0, 0.1)).await.unwrap();
+    let walled = robot.grasp(&grasp_of(&object(&robot, "cup"), 0.07), &Watch::default()).await;
+    let Err(Failure::Unreachable { because }) = &walled else { panic!("{walled:?}") };
+    assert!(because.contains("wall"), "{because}");
+    drive(&robot, &at(-0.9, -1.2)).await.unwrap();
+    take(&robot, "cup", 0.07).await;
+}
+
+#[tokio::test]
 async fn a_hand_has_limits() {
     let robot = robot_in(FLAT, 4, "");
     let watch = Watch::default();

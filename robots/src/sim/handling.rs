@@ -42,11 +42,16 @@ fn unable(because: impl Into<String>) -> Failure {
     Failure::Unable { because: because.into() }
 }
 
-/// Where the arm is asked to go must be a point within its reach.
+/// Where the arm is asked to go must be a point within its reach, with no wall before it.
 fn in_reach(state: &State, what: &str, at: &Point3<f64>) -> Result<(), Failure> {
     let reach_m = (at.xy() - state.estimate.point()).norm();
     if reach_m <= REACH_M && at.z.is_finite() {
-        return Ok(());
+        let really = state.truth_from_estimate() * at;
+        let base = state.map_from_base().translation;
+        return match state.scene.is_between(&Point3::new(base.x, base.y, really.z), &really) {
+            true => Err(unreachable(format!("there is a wall before {what}"))),
+            false => Ok(()),
+        };
     }
     if !(reach_m.is_finite() && at.z.is_finite()) {
         return Err(unreachable(format!("{at} is no place for {what}")));

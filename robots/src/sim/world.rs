@@ -323,12 +323,24 @@ impl ObstacleSpec {
 }
 
 impl Scene {
+    /// The walls between the rooms, and the doors that are shut.
+    fn partitions(&self) -> impl Iterator<Item = Solid> {
+        let walls = self.walls.iter().map(|w| Solid::of_room(w.low, w.high, WALL_COLOUR));
+        walls.chain(self.doors.iter().filter(|d| d.shut).map(HungDoor::panel))
+    }
+
+    /// Whether a wall or a shut door stands between two points of the map.
+    pub(super) fn is_between(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
+        self.partitions().any(|solid| {
+            let solid_from_map = solid.map_from_solid.inverse();
+            solid.hit(&(solid_from_map * from), &(solid_from_map * (to - from)), 1.0).is_some()
+        })
+    }
+
     /// Everything that a ray can meet but the floor and the walls around it all; objects carry their labels.
     pub fn solids(&self) -> Vec<Solid> {
-        let walls = self.walls.iter().map(|w| Solid::of_room(w.low, w.high, WALL_COLOUR));
-        let shut = self.doors.iter().filter(|d| d.shut).map(HungDoor::panel);
         let surfaces = self.surfaces.iter().flat_map(SurfaceSpec::solids);
-        let mut solids: Vec<Solid> = walls.chain(shut).chain(surfaces).collect();
+        let mut solids: Vec<Solid> = self.partitions().chain(surfaces).collect();
         solids.extend(self.obstacles.iter().map(ObstacleSpec::solid));
         for (label, o) in (LABEL_OBJECT..).zip(&self.objects) {
             if o.is_in_place() {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use descry_memory::belief::Track;
 use descry_perception::nalgebra::{Point3, Vector3};
 use descry_planner::{Answer, Call, CallError, Plan, Step};
-use descry_robots::{Failure, Grasp, Part, Place, Placing};
+use descry_robots::{Description, Failure, Grasp, Part, Place, Placing};
 use descry_skills::{Outcome, PickUp, PutDown, SkillFailure};
 
 use super::{Ability, Fact, Meaning, SkillWord, argument};
@@ -152,18 +152,34 @@ fn middle(s: &Situation, track: &Track) -> Point3<f64> {
     track.position_m + up * (0.5 * track.size_m[2])
 }
 
-/// How far a point is from the body at a candidate, along the floor.
+/// How far a point is from the body at a candidate, along the floor; none if a wall is between.
 fn distance_m(s: &Situation, from: usize, p: &Point3<f64>) -> Option<f64> {
     let Place::Pose(base) = &s.candidates[from].place else { return None };
-    Some((p.xy() - base.point()).norm())
+    (!s.is_walled_off(&base.point(), &p.xy())).then(|| (p.xy() - base.point()).norm())
+}
+
+/// How far localisation may be off where something is looked at, metres.
+fn astray_m(body: &Description) -> f64 {
+    ASTRAY * (body.pose_sigma_m + body.pose_sigma_rad * FROM_M)
+}
+
+/// Whether the hand reaches a point from a candidate, past every wall and however far localisation may be off; where it is too far
+/// from every one for that, the nearest is tried.
+fn reaches(s: &Situation, from: usize, p: &Point3<f64>) -> bool {
+    let body = s.robot.description();
+    let Some((d_m, reach_m)) = distance_m(s, from, p).zip(body.reach_m()) else { return false };
+    let is_nearest = || {
+        let others = (0..s.candidates.len()).filter(|&other| s.can_drive_to(other));
+        others.filter_map(|other| distance_m(s, other, p)).all(|other_m| d_m <= other_m)
+    };
+    d_m <= reach_m && (d_m + astray_m(body) <= reach_m || is_nearest())
 }
 
 /// `[can-grasp ?from ?what ?on]`: what has not been found yet may stand anywhere on the surface.
 fn can_grasp(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let from = s.candidate(argument(call, 0)?)?;
     let body = s.robot.description();
-    let within =
-        |p: Point3<f64>| distance_m(s, from, &p).zip(body.reach_m()).is_some_and(|(d, reach)| d <= reach);
+    let within = |p: Point3<f64>| reaches(s, from, &p);
     let can = match standing(s, argument(call, 1)?, argument(call, 2)?) {
         Some(track) => {
             let width_m = track.size_m[0].min(track.size_m[1]);
@@ -196,13 +212,12 @@ fn place(s: &Situation, arguments: &[&str]) -> Result<Point3<f64>, String> {
 fn void(mind: &mut Mind, eyes: Eyes<'_>, track: &Track, more_m: f64) -> Result<(), WorldError> {
     let Some(on) = mind.known.surfaces.iter().position(|k| k.symbol == track.on) else { return Ok(()) };
     let body = eyes.robot.description();
-    // Where the hand was, and where a view was taken from, localisation says.
-    let astray_m = ASTRAY * (body.pose_sigma_m + body.pose_sigma_rad * FROM_M);
     let change = Change {
         stamp_ns: eyes.robot.now_ns(),
         foot: track.position_m,
         up: mind.known.surfaces[on].up,
-        radius_m: 0.5 * track.size_m[0].max(track.size_m[1]) + more_m + astray_m,
+        // Where the hand was, and where a view was taken from, localisation says.
+        radius_m: 0.5 * track.size_m[0].max(track.size_m[1]) + more_m + astray_m(body),
         height_m: track.size_m[2] + TOUCHED_M,
     };
     perceive::something_moved(mind, eyes.record, on, change)

@@ -3,7 +3,7 @@
 use descry_memory::space::Cell;
 use descry_perception::nalgebra::{Point3, Vector3};
 
-use super::distance_m;
+use super::{distance_m, reaches};
 use crate::situation::Situation;
 
 /// Radius of a thing that is not known yet: that of a cup with its handle, metres.
@@ -26,7 +26,6 @@ pub(super) fn free(
 ) -> Option<Point3<f64>> {
     let surface = &s.surfaces[on];
     let centre = surface.centre()?;
-    let reach_m = s.robot.description().reach_m()?;
     let helper = if surface.up.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     let e1 = surface.up.cross(&helper).normalize();
     let e2 = surface.up.cross(&e1);
@@ -49,7 +48,7 @@ pub(super) fn free(
             (t.position_m - p).norm() >= own + radius_m + GAP_M
         })
     };
-    let near = |p: &Point3<f64>| distance_m(s, from, p).filter(|d| *d <= reach_m);
+    let near = |p: &Point3<f64>| distance_m(s, from, p).filter(|_| reaches(s, from, p));
     (-steps..=steps)
         .flat_map(|i| (-steps..=steps).map(move |j| (i, j)))
         .map(|(i, j)| centre + (e1 * i as f64 + e2 * j as f64) * GRID_M)

@@ -75,10 +75,14 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let planner = descry_domains::abilities::searching::policies::PLAN;
     let policy = Some(&header.settings.policy).filter(|policy| *policy != planner).cloned();
     let meanings = |call: &str| domain.as_ref().and_then(|domain| meaning(domain, call));
-    let counts = |action: &str| domain.as_ref().and_then(|domain| counts(domain, action));
+    let briefly = |about: String| about.split(';').next().unwrap_or_default().to_string();
+    let counts = |action: &str| domain.as_ref().and_then(|domain| counts(domain, action, briefly));
     let name = |symbol: &str| saying.name_of(symbol);
     let goal = header.pddl_goal.clone();
-    let asked = Asked { goal, policy, counts: &counts, name: &name, has_ended: report.is_some() };
+    let in_vain = domain.as_ref().and_then(|domain| seconds(domain, &saying, &chapters));
+    let counts_in_vain = in_vain.is_some();
+    let asked =
+        Asked { goal, policy, counts: &counts, name: &name, has_ended: report.is_some(), counts_in_vain };
     let plans = plans::told(&chapters, &asked).into_iter().map(|told| told.said(&saying)).collect();
     let summary = summary::of(header, report, &chapters, states.left_s(), &name);
     let summary = summary.iter().map(|line| saying.say(line)).collect();
@@ -87,7 +91,7 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
         said.extend(domain.as_ref().and_then(|domain| numbers(domain, &chapters, &saying)));
         said.extend(domain.as_ref().and_then(|domain| poses(domain, &header.settings.robot)));
         said.push(WAYS.into());
-        said.extend(domain.as_ref().and_then(|domain| seconds(domain, &saying, &chapters)));
+        said.extend(in_vain);
     }
     let not_there = domain.as_ref().map(|domain| domain.config.thresholds.not_there);
     let words = verdict::Words { meanings: &meanings, name: &name, not_there };
@@ -123,25 +127,26 @@ fn meaning(domain: &Domain, call: &str) -> Option<String> {
     calls.find(|c| c.name == call && !own).map(|c| c.about.to_string())
 }
 
-/// The calls that an action's duration asks, by what they ask; none if it asks none that is known.
-fn counts(domain: &Domain, action: &str) -> Option<String> {
+/// The calls that an action's duration asks, by what they ask, as it is told; none if it asks none that is known.
+fn counts(domain: &Domain, action: &str, told: impl Fn(String) -> String) -> Option<String> {
     let calls = duration(domain, action)?.split('[').skip(1).filter_map(|call| call.split([' ', ']']).next());
-    let about = |call: &str| Some(meaning(domain, call)?.split(';').next()?.to_string());
-    let all: Vec<String> = calls.filter_map(about).collect();
+    let all: Vec<String> = calls.filter_map(|call| meaning(domain, call)).map(told).collect();
     (!all.is_empty()).then(|| listed(&all, all.len()))
 }
 
 /// Which actions count for more than they take, and do so in this run.
 fn seconds(domain: &Domain, saying: &Saying, chapters: &[chapters::Chapter]) -> Option<String> {
     let is_more = |name: &str| {
-        let takes_s = duration(domain, name).and_then(|duration| {
-            duration.split_once("(+ ")?.1.split_whitespace().next()?.parse::<f64>().ok()
-        });
-        takes_s.is_some_and(|takes_s| chapters.iter().any(|chapter| chapter.counts_more(name, takes_s)))
+        fixed_s(domain, name)
+            .is_some_and(|takes_s| chapters.iter().any(|chapter| chapter.counts_more(name, takes_s)))
     };
     let actions = domain.vocabulary.task.actions.iter().filter(|a| is_more(&a.name));
     let all: Vec<String> = actions
-        .filter_map(|a| Some(format!("{}, the {}", saying.in_general(&a.name), counts(domain, &a.name)?)))
+        .filter_map(|a| {
+            let counts = counts(domain, &a.name, |about| about.replace(';', ":"))?;
+            let takes_s = fixed_s(domain, &a.name)?;
+            Some(format!("{}, besides its {takes_s:.1} s, the {counts}", saying.in_general(&a.name)))
+        })
         .collect();
     (!all.is_empty()).then(|| {
         format!(
@@ -149,6 +154,11 @@ fn seconds(domain: &Domain, saying: &Saying, chapters: &[chapters::Chapter]) -> 
             all.join("; for ")
         )
     })
+}
+
+/// The seconds that are fixed where an action's duration adds to them.
+fn fixed_s(domain: &Domain, action: &str) -> Option<f64> {
+    duration(domain, action)?.split_once("(+ ")?.1.split_whitespace().next()?.parse().ok()
 }
 
 /// What stands for the duration of an action.
@@ -197,7 +207,8 @@ fn numbers(domain: &Domain, chapters: &[chapters::Chapter], saying: &Saying) -> 
 const WAYS: &str = "A way to get further is what may be done next, up to the first step that may bring the numbers nearer to \
                     what is wanted. In brackets behind it: by how much it is, of all numbers together, in how many \
                     seconds, and how much that is a second; behind its steps their seconds. What is hoped for is what \
-                    comes if all is as well as it may be: a look shows what it is taken for, if it is there.";
+                    is reckoned with if what is looked for is there: a look may show more, or less. The rest of the plan behind \
+                    another way is the plan's own, with what the way has otherwise put in its place, as far as it is needed.";
 
 /// What a run was asked, as far as plans depend on it.
 struct Asked<'a> {
@@ -211,6 +222,8 @@ struct Asked<'a> {
     name: looks::Names<'a>,
     /// Whether there is a verdict.
     has_ended: bool,
+    /// Whether seconds are counted that do not pass: for having looked in vain.
+    counts_in_vain: bool,
 }
 
 impl Asked<'_> {

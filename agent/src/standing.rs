@@ -1,6 +1,7 @@
 //! How a run stands: how sure it is of what was asked for, what of the places was seen where that may be, and what hangs on the rest. It is
 //! kept with every plan and whenever a plan is kept, so that it can be told later what each look has brought.
 
+pub use descry_domains::abilities::searching::FirstLook;
 use descry_domains::abilities::searching::doubt::Doubt;
 use descry_domains::answer::Ended;
 use descry_domains::situation::KnownSurface;
@@ -32,6 +33,8 @@ pub struct InDoubt {
     pub left: f64,
     /// The part of that for which it is where nothing was seen.
     pub hidden: f64,
+    /// The part of that for which it was lost out of the hand, and no look at a surface shows it.
+    pub lost: f64,
     /// What was seen of where it may be.
     pub seen: Vec<Seen>,
 }
@@ -50,7 +53,7 @@ pub enum Of {
 }
 
 /// How much of a place was seen.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
     /// The place, as people call it.
     pub on: String,
@@ -64,6 +67,9 @@ pub struct Seen {
     /// The part of that where something was measured that no object explains.
     #[serde(default)]
     pub measured: f64,
+    /// What counts for a first look there, where looks in vain are counted; records of earlier versions do not say.
+    #[serde(default)]
+    pub first: Option<FirstLook>,
 }
 
 /// What the end of a run rests on.
@@ -103,11 +109,12 @@ fn in_doubt(round: &Round) -> Vec<InDoubt> {
     let s = &round.situation;
     let places = |on: usize| s.spaces[on].seen_from().len();
     let told = |about: &str, of: Of, sure: f64, doubt: &Doubt| {
-        let on = |(on, surface): (usize, &KnownSurface)| {
-            let (share, places) = (doubt.share_seen(on), places(on));
-            let (hidden, measured) = doubt.hidden_share(on);
+        let on = |(n, surface): (usize, &KnownSurface)| {
+            let (share, places) = (doubt.share_seen(n), places(n));
+            let (hidden, measured) = doubt.hidden_share(n);
             let on = surface.name.clone();
-            (share.is_some() || places > 0).then_some(Seen { on, share, places, hidden, measured })
+            let first = s.first_look(n);
+            (share.is_some() || places > 0).then_some(Seen { on, share, places, hidden, measured, first })
         };
         InDoubt {
             about: about.into(),
@@ -116,12 +123,18 @@ fn in_doubt(round: &Round) -> Vec<InDoubt> {
             wanted: s.threshold,
             left: doubt.remaining().max(0.0),
             hidden: doubt.hidden.max(0.0),
+            lost: 0.0,
             seen: s.surfaces.iter().enumerate().filter_map(on).collect(),
         }
     };
     // What was seen of a kind is no longer looked for.
     let things = s.things.iter().enumerate().filter(|(_, t)| t.track.is_none());
-    let things = things.map(|(n, t)| told(&t.name, Of::Thing, s.confidence(n), s.doubt_about(n)));
+    let things = things.map(|(n, t)| {
+        let doubt = told(&t.name, Of::Thing, s.confidence(n), s.doubt_about(n));
+        let on_surfaces: f64 = (0..s.surfaces.len()).map(|on| s.doubt_about(n).hidden_share(on).0).sum();
+        let lost = if s.chance_lost(n) > 0.0 { (doubt.hidden - on_surfaces).max(0.0) } else { 0.0 };
+        InDoubt { lost, ..doubt }
+    });
     let kinds = s.kinds.iter().enumerate();
     let kinds = kinds.map(|(n, t)| told(&t.name, Of::Kind, s.completeness(n), s.doubt_of(n)));
     let surfaces = s.asked.iter();

@@ -1,6 +1,7 @@
 //! What a plan was weighed against: the same steps with other objects, what each would take and gain, by the answers of the calls
 //! that the plan itself rests on. It is kept beside the plan, so that it can be told later why it was this one.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -8,7 +9,7 @@ use descry_domains::world::Round;
 use descry_memory::{Blob, Form};
 use descry_planner::semantics::{Binding, Changes, Pending};
 use descry_planner::task::{Action, Comparison, Effect, FunctionId, ObjectId};
-use descry_planner::{Plan, Semantics, State, Step};
+use descry_planner::{Plan, SEPARATION_S, Semantics, State, Step, monitor};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -23,6 +24,10 @@ const MOST_TRIED: usize = 600;
 pub const MOST_KEPT: usize = 12;
 /// Plans with more steps than this until something is gained are not compared.
 const MOST_STEPS: usize = 6;
+/// What is shorter by less than this, seconds, is as long.
+const SHORTER_S: f64 = 0.05;
+/// A way this many times as long is none.
+const FAR: f64 = 2.0;
 /// Less than this is no gain.
 const GAINED: f64 = 1e-6;
 
@@ -40,6 +45,8 @@ pub struct Weighed {
     pub open: usize,
     /// The plan until it first gains something, where several steps of it could be one.
     pub shorter: Option<Way>,
+    /// The same with a step more, that makes one of its steps shorter: a door opened on the way. The quickest.
+    pub through: Option<Way>,
 }
 
 /// A number of the domain.
@@ -54,7 +61,7 @@ pub struct Expected {
 }
 
 /// Steps, and what they bring.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Way {
     /// The calls.
     pub steps: Vec<String>,
@@ -68,6 +75,24 @@ pub struct Way {
     /// Whether the goal is expected to hold then; records of earlier versions do not say.
     #[serde(default)]
     pub reaches: Option<bool>,
+    /// What it comes to with the rest of the plan behind it; none where that cannot be done then, and in records of earlier
+    /// versions.
+    #[serde(default)]
+    pub whole: Option<Whole>,
+    /// Why the rest of the plan cannot be done behind it, where it cannot, as the monitor says it.
+    #[serde(default)]
+    pub stuck: Option<String>,
+}
+
+/// A way to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Whole {
+    /// What its steps count for, one after the other, seconds.
+    pub takes_s: f64,
+    /// How many they are.
+    pub steps: usize,
+    /// Whether the goal is expected to hold then.
+    pub reaches: bool,
 }
 
 impl Way {
@@ -99,6 +124,8 @@ struct Scale<'r> {
     counting: Vec<(FunctionId, bool)>,
     /// What says so.
     asked: String,
+    /// The goal, where it does not say so itself.
+    goal: Option<String>,
 }
 
 impl<'r> Scale<'r> {
@@ -123,7 +150,8 @@ impl<'r> Scale<'r> {
             by = plan.steps.iter().filter_map(asked).collect::<Vec<_>>().join(" ");
             counting = named(&by);
         }
-        Some(Scale { semantics, state, counting, asked: by })
+        let goal = (by != goal).then(|| goal.to_string());
+        Some(Scale { semantics, state, counting, asked: by, goal })
     }
 
     /// The numbers that count in a state, by name, each with whether less of it is wanted.
@@ -136,14 +164,24 @@ impl<'r> Scale<'r> {
                     arguments.iter().map(|&a| format!(" {}", task.object(a).name)).collect();
                 (format!("({name}{arguments})"), (value, less))
             });
-            let compared: Vec<Compared<'_>> =
-                compared::all(&self.asked).filter(|compared| compared.word == name).collect();
+            let compared: Vec<Compared<'_>> = compared::all(&self.asked)
+                .filter(|compared| compared.word == name)
+                .map(|compared| Compared { of: self.any(compared.of), ..compared })
+                .collect();
             let counts = move |(number, _): &(String, (f64, bool))| {
                 compared.is_empty() || compared.iter().any(|compared| compared.fits(number))
             };
             named.filter(counts).collect::<Vec<_>>()
         };
         self.counting.iter().flat_map(of).collect()
+    }
+
+    /// The objects of a number that a step asks about: those of which the goal says nothing may be others in another plan.
+    fn any<'o>(&self, of: Vec<&'o str>) -> Vec<&'o str> {
+        let Some(goal) = &self.goal else { return of };
+        let named = words(goal);
+        let is_named = of.iter().any(|object| named.contains(object));
+        of.into_iter().map(|object| if !is_named || named.contains(&object) { object } else { "?" }).collect()
     }
 
     /// By how much a number comes nearer to what is wanted.
@@ -158,18 +196,20 @@ impl<'r> Scale<'r> {
         Some((each, state))
     }
 
+    /// What a step counts for in a state, seconds.
+    fn takes_s(&self, state: &State, step: &Step) -> Option<f64> {
+        let (id, binding) = self.semantics.bind(step).ok()?;
+        let Some(bounds) = &self.semantics.task.action(id).duration else { return Some(0.0) };
+        let bound = bounds.iter().find(|b| b.comparison == Comparison::Equal)?;
+        self.semantics.number(state, &bound.value, &binding).ok()?.filter(|s| s.is_finite())
+    }
+
     /// Applies a step; returns what it counts for, seconds.
     fn apply(&self, state: &mut State, step: &Step) -> Option<f64> {
         let semantics = &self.semantics;
         let (id, mut binding) = semantics.bind(step).ok()?;
         let action = semantics.task.action(id);
-        let takes_s = match &action.duration {
-            None => 0.0,
-            Some(bounds) => {
-                let bound = bounds.iter().find(|b| b.comparison == Comparison::Equal)?;
-                semantics.number(state, &bound.value, &binding).ok()?.filter(|s| s.is_finite())?
-            }
-        };
+        let takes_s = self.takes_s(state, step)?;
         binding.duration_s = action.is_durative().then_some(takes_s);
         if !semantics.holds(state, &action.condition.start, &mut binding).ok()? {
             return None;
@@ -203,10 +243,68 @@ impl<'r> Scale<'r> {
             then.get(name).map_or(0.0, |(then, _)| Self::gain(*now, *then, *less))
         };
         let takes_s = each_s.iter().sum();
-        let goal = &self.semantics.task.goal;
-        let reaches = self.semantics.holds(&state, &goal.body, &mut Binding::new(goal.slots)).ok();
         let gains = now.iter().map(gain).sum();
-        Some(Way { steps: steps.iter().map(call).collect(), each_s, takes_s, gains, reaches })
+        let reaches = self.reaches(&state);
+        let steps = steps.iter().map(call).collect();
+        Some(Way { steps, each_s, takes_s, gains, reaches, ..Way::default() })
+    }
+
+    /// Whether the goal holds in a state; none where it cannot be told.
+    fn reaches(&self, state: &State) -> Option<bool> {
+        let goal = &self.semantics.task.goal;
+        self.semantics.holds(state, &goal.body, &mut Binding::new(goal.slots)).ok()
+    }
+
+    /// What steps come to, one after the other.
+    fn whole(&self, steps: &[Step]) -> Option<Whole> {
+        let (each_s, state) = self.after(steps)?;
+        Some(Whole { takes_s: each_s.iter().sum(), steps: steps.len(), reaches: self.reaches(&state)? })
+    }
+
+    /// What other steps come to with the rest of a plan behind them, or with so much of it as is needed then: with objects
+    /// exchanged, or once a step has led to where it begins. Where that cannot be done, why.
+    fn led_on(&self, other: &Other, rest: &[Step]) -> (Option<Whole>, Option<String>) {
+        let Some((_, there)) = self.after(&other.steps) else { return (None, None) };
+        let exchanged: Vec<Step> = rest.iter().map(|step| other.instead.exchanged(step)).collect();
+        let put: Vec<Step> = rest.iter().map(|step| other.instead.in_step(step)).collect();
+        let mut ends = vec![Vec::new(), exchanged.clone(), put];
+        if let Some(last) = other.steps.last() {
+            // What only looks again need not be done where one look is enough.
+            let begins = (0..rest.len()).filter(|&n| n == 0 || rest[n - 1].action == last.action);
+            for (steps, n) in begins.flat_map(|n| [(&exchanged[n..], n), (&rest[n..], n)]) {
+                ends.extend((n > 0).then(|| steps.to_vec()));
+                let pairs = last
+                    .arguments
+                    .iter()
+                    .flat_map(|from| steps[0].arguments.iter().map(move |to| (from, to)));
+                let bridges = pairs.flat_map(|(from, to)| self.bridges(from, to, last));
+                let led = bridges.filter(|bridge| self.apply(&mut there.clone(), bridge).is_some());
+                ends.extend(led.map(|bridge| [std::slice::from_ref(&bridge), steps].concat()));
+            }
+        }
+        let wholes = ends.iter().filter_map(|end| self.whole(&[&other.steps, end.as_slice()].concat()));
+        let rank = |whole: &Whole| (!whole.reaches, whole.takes_s);
+        let best = wholes.min_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal));
+        match best {
+            Some(whole) if whole.reaches || whole.steps > other.steps.len() => (Some(whole), None),
+            _ => (None, self.stuck(&[&other.steps, exchanged.as_slice()].concat())),
+        }
+    }
+
+    /// Why steps cannot be taken one after the other, as the monitor says it.
+    fn stuck(&self, steps: &[Step]) -> Option<String> {
+        let (mut state, mut begins_s, mut timed) = (self.state.clone(), 0.0, Vec::new());
+        for step in steps {
+            let duration_s = self.takes_s(&state, step).unwrap_or_default();
+            timed.push(Step { start_s: Some(begins_s), duration_s, ..step.clone() });
+            begins_s += duration_s + 2.0 * SEPARATION_S;
+            if self.apply(&mut state, step).is_none() {
+                break;
+            }
+        }
+        let plan = Plan { steps: timed, ..Plan::default() };
+        let Semantics { task, attachments, .. } = self.semantics;
+        monitor(task, attachments, &plan).err().map(|broken| broken.to_string())
     }
 
     /// The numbers that steps bring nearer to what is wanted.
@@ -233,17 +331,74 @@ impl<'r> Scale<'r> {
     fn weigh(&self, plan: &Plan) -> Option<Weighed> {
         let first = (1..=plan.steps.len().min(MOST_STEPS))
             .find_map(|n| Some((n, self.way(&plan.steps[..n]).filter(|way| way.gains > GAINED)?)));
-        let (n, chosen) = first?;
+        let (n, mut chosen) = first?;
         let numbers = self.at_most(&plan.steps);
-        let others = self.others(&plan.steps[..n], &chosen);
+        let (way, rest) = plan.steps.split_at(n);
+        let others = self.others(way, &chosen);
         let open = others.len() + 1;
-        let shorter = joined(&plan.steps[..n]).and_then(|steps| self.way(&steps));
+        let led = |other: Other| {
+            let (whole, stuck) = self.led_on(&other, rest);
+            Way { whole, stuck, ..other.way }
+        };
+        let others = kept(others).into_iter().map(led).collect();
+        chosen.whole = self.whole(&plan.steps);
+        let shorter = joined(way).and_then(|steps| self.way(&steps));
         let shorter = shorter.filter(|way| way.takes_s < chosen.takes_s && way.gains >= chosen.gains);
-        Some(Weighed { numbers, chosen: Some(chosen), others: kept(others), open, shorter })
+        let through = self.through(way).and_then(|steps| {
+            let through = self.way(&steps)?;
+            Some(Way { whole: self.whole(&[&steps, rest].concat()), ..through })
+        });
+        Some(Weighed { numbers, chosen: Some(chosen), others, open, shorter, through })
+    }
+
+    /// The quickest of all ways to take steps with one more among them, after which one that leads from an object to another is
+    /// shorter from there than it was.
+    fn through(&self, steps: &[Step]) -> Option<Vec<Step>> {
+        let task = self.semantics.task;
+        let step = |action: &str, arguments: [&str; 2]| Step {
+            start_s: None,
+            action: action.into(),
+            arguments: arguments.map(str::to_string).to_vec(),
+            duration_s: 0.0,
+        };
+        let mut best: Option<(f64, Vec<Step>)> = None;
+        for (n, lead) in steps.iter().enumerate() {
+            let [from, to] = lead.arguments.as_slice() else { continue };
+            let Some((_, before)) = self.after(&steps[..n]) else { continue };
+            let Some(lead_s) = self.apply(&mut before.clone(), lead) else { continue };
+            let others = task.actions.iter().filter(|a| a.name != lead.action && a.parameters.len() == 2);
+            for (action, by) in others.flat_map(|a| a.parameters[0].objects.iter().map(move |by| (a, by))) {
+                let by = task.object(*by).name.as_str();
+                let mut there = before.clone();
+                let first = (by != from).then(|| step(&lead.action, [from, by]));
+                let Some(first_s) = first.as_ref().map_or(Some(0.0), |first| self.apply(&mut there, first))
+                else {
+                    continue;
+                };
+                for what in action.parameters[1].objects.iter() {
+                    let more = step(&action.name, [by, &task.object(*what).name]);
+                    let on = step(&lead.action, [by, to]);
+                    let mut then = there.clone();
+                    let Some(more_s) = self.apply(&mut then, &more) else { continue };
+                    let Some(on_s) = self.apply(&mut then, &on) else { continue };
+                    let is_shorter =
+                        self.apply(&mut there.clone(), &on).is_none_or(|old_s| on_s < old_s - SHORTER_S);
+                    let takes_s = first_s + more_s + on_s;
+                    // What is that much longer nobody would think of.
+                    let is_near = takes_s <= FAR * lead_s;
+                    if is_near && is_shorter && best.as_ref().is_none_or(|(best_s, _)| takes_s < *best_s) {
+                        let led = first.clone().into_iter().chain([more, on]);
+                        let all = steps[..n].iter().cloned().chain(led).chain(steps[n + 1..].iter().cloned());
+                        best = Some((takes_s, all.collect()));
+                    }
+                }
+            }
+        }
+        best.map(|(_, steps)| steps)
     }
 
     /// The same steps with other objects, with what has to be done before. The last step that has a choice is varied.
-    fn others(&self, steps: &[Step], chosen: &Way) -> Vec<Way> {
+    fn others(&self, steps: &[Step], chosen: &Way) -> Vec<Other> {
         let task = self.semantics.task;
         let choices = |step: &Step| -> Option<Vec<Arc<[ObjectId]>>> {
             let (action, _) = self.semantics.bind(step).ok()?;
@@ -271,29 +426,20 @@ impl<'r> Scale<'r> {
         };
         let ways = (0..count(&all)).map(other).filter(|other| call(other) != call(&steps[at]));
         let ways = ways.filter_map(|other| self.in_place(steps, at, &other));
-        ways.filter(|way| way.gains > GAINED && way.steps != chosen.steps).collect()
+        ways.filter(|other| other.way.gains > GAINED && other.way.steps != chosen.steps).collect()
     }
 
     /// Steps with another in the place of one: at once, as the plan leads there, or by one step from where it begins.
-    fn in_place(&self, steps: &[Step], at: usize, other: &Step) -> Option<Way> {
-        let old = &steps[at];
-        let changed: Vec<(&String, &String)> =
-            old.arguments.iter().zip(&other.arguments).filter(|(old, new)| old != new).collect();
-        let put = |name: &String| {
-            changed
-                .iter()
-                .find(|(old, _)| *old == name)
-                .map_or_else(|| name.clone(), |(_, new)| (*new).clone())
-        };
-        let same = |step: &Step| Step { arguments: step.arguments.iter().map(put).collect(), ..step.clone() };
-        let mut all: Vec<Step> = steps.iter().map(same).collect();
+    fn in_place(&self, steps: &[Step], at: usize, other: &Step) -> Option<Other> {
+        let pairs = steps[at].arguments.iter().zip(&other.arguments).filter(|(old, new)| old != new);
+        let instead = Instead(pairs.map(|(old, new)| (old.clone(), new.clone())).collect());
+        let mut all: Vec<Step> = steps.iter().map(|step| instead.in_step(step)).collect();
         all[at] = other.clone();
-        self.way(&all[at..]).or_else(|| self.way(&all)).or_else(|| {
-            changed.iter().flat_map(|(old, new)| self.bridges(old, new, other)).find_map(|bridge| {
-                let led: Vec<Step> = std::iter::once(bridge).chain(all[at..].iter().cloned()).collect();
-                self.way(&led)
-            })
-        })
+        let led = |bridge: Step| std::iter::once(bridge).chain(all[at..].iter().cloned()).collect::<Vec<_>>();
+        let bridges = instead.0.iter().flat_map(|(old, new)| self.bridges(old, new, other)).map(led);
+        let mut tried = [all[at..].to_vec(), all.clone()].into_iter().chain(bridges);
+        let (steps, way) = tried.find_map(|steps| self.way(&steps).map(|way| (steps, way)))?;
+        Some(Other { steps, instead, way })
     }
 
     /// Steps that may lead from an object to another, for what a step is about.
@@ -311,6 +457,36 @@ impl<'r> Scale<'r> {
                 _ => Vec::new(),
             })
             .collect()
+    }
+}
+
+/// Other steps than those of a plan.
+struct Other {
+    steps: Vec<Step>,
+    instead: Instead,
+    way: Way,
+}
+
+/// Objects, and which are in their place.
+struct Instead(Vec<(String, String)>);
+
+impl Instead {
+    /// A step with the others in it.
+    fn in_step(&self, step: &Step) -> Step {
+        self.put(step, |name| self.0.iter().find(|(old, _)| old == name).map(|(_, new)| new))
+    }
+
+    /// A step with the others in it, and those in the place of the others: what comes first otherwise comes later then.
+    fn exchanged(&self, step: &Step) -> Step {
+        let back = |name: &str| self.0.iter().find(|(_, new)| new == name).map(|(old, _)| old);
+        self.put(step, |name| {
+            self.0.iter().find(|(old, _)| old == name).map(|(_, new)| new).or_else(|| back(name))
+        })
+    }
+
+    fn put<'a>(&self, step: &Step, by: impl Fn(&str) -> Option<&'a String>) -> Step {
+        let arguments = step.arguments.iter().map(|name| by(name).unwrap_or(name).clone());
+        Step { arguments: arguments.collect(), ..step.clone() }
     }
 }
 
@@ -342,13 +518,16 @@ fn call(step: &Step) -> String {
 }
 
 /// Those that gain most a second, and of the others the quickest and the one that gains most.
-fn kept(mut all: Vec<Way>) -> Vec<Way> {
-    all.sort_by(|a, b| b.rate().total_cmp(&a.rate()).then_with(|| a.steps.cmp(&b.steps)));
-    let rest = all.split_off(MOST_KEPT.min(all.len()));
-    let quickest = rest.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s)).cloned();
-    let most = rest.iter().max_by(|a, b| a.gains.total_cmp(&b.gains)).cloned();
-    all.extend(quickest.into_iter().chain(most));
-    all.dedup();
+fn kept(mut all: Vec<Other>) -> Vec<Other> {
+    let rate = |a: &Other, b: &Other| b.way.rate().total_cmp(&a.way.rate());
+    all.sort_by(|a, b| rate(a, b).then_with(|| a.way.steps.cmp(&b.way.steps)));
+    let mut rest = all.split_off(MOST_KEPT.min(all.len()));
+    let by = |rest: &[Other], of: fn(&Way) -> f64| {
+        (0..rest.len()).min_by(|a, b| of(&rest[*a].way).total_cmp(&of(&rest[*b].way)))
+    };
+    for of in [(|way| way.takes_s) as fn(&Way) -> f64, |way| -way.gains] {
+        all.extend(by(&rest, of).map(|n| rest.remove(n)));
+    }
     all
 }
 

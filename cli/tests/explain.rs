@@ -43,9 +43,11 @@ fn what_was_found_is_explained() {
         0,
         &[
             "the run began, and there was no plan",
-            "of 9 ways to get further, driving to table-5 (",
+            "why driving to table-5 (",
             " s), looking at the table from table-5 (2.0 s) [+",
-            "is the quickest, but by what is hoped of it would not be enough by itself",
+            "is one of 9 ways to get further. With the rest of the plan it takes",
+            "and the planner takes the quickest whole plan that it finds",
+            "is the quickest; it would not be enough: the certainty of where cup A stands would be",
             "plan 1 was carried out to its end, and the certainty of where cup A stands is 0",
             "achieved: cup A stands on the table",
             "of where cup A may be, this was seen:",

@@ -445,6 +445,12 @@ impl Situation {
             .fold(0.0, f64::max)
     }
 
+    /// The probability that a thing is what was lost out of the hand, where it lies no look at a surface shows.
+    pub fn chance_lost(&self, what: usize) -> f64 {
+        let lost = self.belief.mislaid.iter().filter(|t| t.on.is_empty());
+        lost.map(|t| self.things[what].probability(t, &self.surfaces)).fold(0.0, f64::max)
+    }
+
     /// The probability that a thing is there, where it is asked about: as one of the objects that were seen, or hidden.
     pub fn chance_there(&self, what: usize) -> f64 {
         let thing = &self.things[what];

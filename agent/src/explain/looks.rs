@@ -120,7 +120,13 @@ fn why_no_surer(
         Of::Kind => why.extend(unsure_of(doubt, after, name)),
         Of::Surface => why.extend(untold(doubt, after)),
     }
-    let seen: f64 = after.belief.tracks.iter().map(|track| track.probability_of(&doubt.about)).sum();
+    let is_seen = |track: &&Track| !track.on.is_empty() || doubt.lost <= HARDLY;
+    let tracks = after.belief.tracks.iter().filter(is_seen);
+    let seen: f64 = tracks.map(|track| track.probability_of(&doubt.about)).sum();
+    let others = best_seen(doubt, after).filter(|(_, p)| *p >= MAY_BE).map_or(0.0, |(_, p)| seen - p);
+    if doubt.of == Of::Thing && others > HARDLY {
+        why.push(format!("with {} it is another of the objects", share(others)));
+    }
     why.extend(hidden(doubt, seen));
     (!why.is_empty()).then(|| why.join("; "))
 }
@@ -191,7 +197,7 @@ fn there<'a>(track: &Track, after: &'a Standing) -> Option<&'a Track> {
 /// The object that may be it; none if none may.
 pub fn may_be(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<String> {
     let thing = &doubt.about;
-    let (track, p) = after.best(thing).filter(|(_, p)| *p >= MAY_BE)?;
+    let (track, p) = best_seen(doubt, after).filter(|(_, p)| *p >= MAY_BE)?;
     let (other, q) = likeliest(track, thing);
     let other = if q > HARDLY { format!(" (or {other} with {})", share(q)) } else { String::new() };
     let percent = track.seen_fraction * 100.0;
@@ -208,9 +214,17 @@ pub fn may_be(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<Stri
     })
 }
 
+/// The object that a thing most likely is, but for what was lost out of the hand.
+fn best_seen<'s>(doubt: &InDoubt, after: &'s Standing) -> Option<(&'s Track, f64)> {
+    let is_seen = |track: &&Track| !track.on.is_empty() || doubt.lost <= HARDLY;
+    let seen = after.belief.tracks.iter().filter(is_seen);
+    let seen = seen.map(|track| (track, track.probability_of(&doubt.about)));
+    seen.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
 /// That no object may be it, or hardly.
 pub fn none_may_be(doubt: &InDoubt, after: &Standing) -> String {
-    let p = after.best(&doubt.about).map(|(_, p)| p).filter(|p| *p > HARDLY);
+    let p = best_seen(doubt, after).map(|(_, p)| p).filter(|p| *p > HARDLY);
     match (after.belief.tracks.len(), p.map(share)) {
         (0, _) => "no object was seen".into(),
         (1, None) => "the one object that was seen is not it".into(),
@@ -263,7 +277,15 @@ fn untold(doubt: &InDoubt, after: &Standing) -> Option<String> {
 
 /// What hangs on the places where nothing was seen, and on none; objects that were seen are it with so much in all.
 fn hidden(doubt: &InDoubt, seen: f64) -> Option<String> {
-    let hidden = (doubt.hidden > HARDLY).then(|| share(doubt.hidden))?;
+    (doubt.hidden > HARDLY).then_some(())?;
+    let lost = match doubt.lost > HARDLY {
+        true => format!(
+            "with {} it was lost out of the hand, and lies where no look shows it; ",
+            share(doubt.lost)
+        ),
+        false => String::new(),
+    };
+    let hidden = share((doubt.hidden - doubt.lost).max(0.0));
     let places = hidden_places(doubt);
     let nowhere = 1.0 - doubt.hidden - seen;
     let nowhere = if nowhere > HARDLY {
@@ -272,7 +294,7 @@ fn hidden(doubt: &InDoubt, seen: f64) -> Option<String> {
         String::new()
     };
     Some(match doubt.of {
-        Of::Thing => format!("with {hidden} it stands where it could not be seen yet{places}{nowhere}"),
+        Of::Thing => format!("{lost}with {hidden} it stands where it could not be seen yet{places}{nowhere}"),
         Of::Kind => format!("with {hidden} there are more where they could not be seen yet{places}"),
         Of::Surface => format!("with {hidden} something stands there unseen{places}"),
     })
@@ -297,7 +319,7 @@ fn hidden_places(doubt: &InDoubt) -> String {
     });
     let more = match places.len().saturating_sub(NAMED) {
         0 => String::new(),
-        n => format!("; less on {n} more"),
+        n => format!("; as much or less on {n} more"),
     };
     format!(" ({}{more})", named.collect::<Vec<_>>().join("; "))
 }
@@ -339,7 +361,7 @@ mod tests {
             share: Some(share),
             places: usize::from(share > 0.0),
             hidden,
-            measured: 0.0,
+            ..Seen::default()
         };
         let seen = vec![seen];
         let about = "the ring".to_string();
@@ -381,7 +403,7 @@ mod tests {
         check(&begin, &empty, perceived(&[]), &words, "could not be used");
         // On several surfaces it is said on which, and where something is that no object explains.
         let mut several = empty.clone();
-        let desk = Seen { on: "desk".into(), share: Some(0.0), places: 0, hidden: 0.1, measured: 0.0 };
+        let desk = Seen { on: "desk".into(), share: Some(0.0), hidden: 0.1, ..Seen::default() };
         several.doubts[0].seen.push(desk);
         several.doubts[0].seen[0].measured = 0.25;
         let words = [

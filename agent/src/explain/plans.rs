@@ -5,6 +5,7 @@ use descry_domains::note::Note;
 use super::chapters::{Chapter, Deed, bare};
 use super::wording::{capital, listed, reasons, share, share_of};
 use super::{Asked, Told, outcomes};
+use crate::standing::{FirstLook, InDoubt, Of, Seen};
 use crate::weigh::{Expected, Way, Weighed};
 
 /// Numbers that are named; the rest are counted.
@@ -13,6 +14,8 @@ const MOST_NAMED: usize = 3;
 const MOST_LEFT_OUT: usize = 4;
 /// Rates nearer to each other than this share are alike.
 const ALIKE: f64 = 0.02;
+/// What takes less longer than this, seconds, takes as long.
+const LONGER_S: f64 = 0.05;
 /// As many ways as are kept in the order of their rates.
 const MOST_KEPT: usize = crate::weigh::MOST_KEPT;
 
@@ -75,7 +78,8 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
     let Some(before) = before else { return "the run began, and there was no plan.".into() };
     let last = before.deeds.iter().rev().find(|deed| !matches!(deed, Deed::Resumed | Deed::Stands(_)));
     if let Some(Deed::Failed { call, therefore, .. }) = last {
-        return format!("{call} failed. What follows from that: {}.", reasons::follows(therefore));
+        let follows = reasons::follows(therefore);
+        return format!("{call} failed. What follows from that: {follows}.{}", seen_less(chapter, before));
     }
     let moved = before.deeds.iter().rev().find_map(|deed| match deed {
         Deed::Noted(Note::Changed { because }) => Some(format!("something was moved: {because}. ")),
@@ -93,7 +97,17 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
             };
             let rest = format!("the {rest} left of plan {}", before.round);
             match reasons::reckoned(&chapter.because, asked.counts) {
-                Some(now) => format!("with what was learned, {rest} {count} differently: {now}."),
+                Some(now) => {
+                    let first = if is_first_now(chapter, before) {
+                        "; it was a further look there, and would be the first of a plan now"
+                    } else {
+                        ""
+                    };
+                    format!(
+                        "with what was learned, {rest} {count} differently: {now}{first}.{}",
+                        enough_now(chapter, before)
+                    )
+                }
                 None => {
                     let now = reasons::missed(&chapter.because, "would be only", asked.counts);
                     let open = before.steps_done().1;
@@ -115,6 +129,58 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
     let least = |name: &str| asked.wanted(name).unwrap_or(0.0);
     let most = most.map(|(name, most)| format!(" The greatest: {name}, {}.", share_of(*most, least(name))));
     format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
+}
+
+/// Whether the step that counts differently comes after another like it in the plan before, about the same.
+fn is_first_now(chapter: &Chapter, before: &Chapter) -> bool {
+    let like = |step: &str| {
+        let words: Vec<&str> = step.trim_matches(['(', ')']).split(' ').collect();
+        Some((words.first()?.to_string(), words.last()?.to_string()))
+    };
+    let step = like(bare(&chapter.because));
+    step.is_some() && before.steps_done().0.iter().any(|done| like(done) == step)
+}
+
+/// What has come to be sure enough since the plan before was made.
+fn enough_now(chapter: &Chapter, before: &Chapter) -> String {
+    let (Some(now), Some(then)) = (&chapter.before, &before.before) else { return String::new() };
+    let is_new = |doubt: &&InDoubt| {
+        let is_enough = |doubt: &InDoubt| doubt.sure.is_some_and(|sure| sure >= doubt.wanted);
+        doubt.of == Of::Thing && is_enough(doubt) && then.same(doubt).is_some_and(|then| !is_enough(then))
+    };
+    let all = now.doubts.iter().filter(is_new);
+    let told = all.filter_map(|doubt| {
+        let sure = share(doubt.sure?);
+        Some(format!(" It is sure enough of where {} stands by now, with {sure}.", doubt.about))
+    });
+    told.collect()
+}
+
+/// Where less counts as seen than after the last look of the plan before.
+fn seen_less(chapter: &Chapter, before: &Chapter) -> String {
+    let (Some(now), Some(then)) = (&chapter.before, before.stood().last()) else { return String::new() };
+    let percent = |share: f64| (share * 100.0).floor();
+    let mut all: Vec<String> = Vec::new();
+    for (now, then) in now.doubts.iter().filter_map(|now| Some((now, then.same(now)?))) {
+        for (now, then) in now.seen.iter().filter_map(|s| Some((s, then.seen.iter().find(|t| t.on == s.on)?)))
+        {
+            if let (Some(less), Some(was)) = (now.share, then.share)
+                && percent(less) < percent(was)
+            {
+                all.push(format!(
+                    "{:.0} % of the {} instead of {:.0} %",
+                    percent(less),
+                    now.on,
+                    percent(was)
+                ));
+            }
+        }
+    }
+    all.dedup();
+    match all.len() {
+        0 => String::new(),
+        n => format!(" What was touched counts as not seen: {} is seen by now.", listed(&all, n)),
+    }
 }
 
 fn intent(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
@@ -164,10 +230,86 @@ fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
             chosen.takes_s
         )
     });
-    if weighed.others.is_empty() {
-        let only = format!("{} was the only way known to get further.", steps(chosen));
-        return std::iter::once(only).chain(longer).collect();
+    let through = weighed.through.as_ref().map(|way| {
+        let against = against(way, chosen, asked).map(|against| format!("; {against}")).unwrap_or_default();
+        format!("By another way, with a step more: {}{against}.", figures(way))
+    });
+    let said = match (weighed.others.is_empty(), by_the_end(chapter, weighed, chosen, asked)) {
+        (true, _) => vec![format!("{} was the only way known to get further.", steps(chosen))],
+        (false, Some(said)) => said,
+        (false, None) => by_the_second(chapter, weighed, chosen, asked),
+    };
+    let first = first_looks(chapter).filter(|_| asked.counts_in_vain);
+    said.into_iter().chain(longer).chain(through).chain(first).collect()
+}
+
+/// Why a plan was made that the planner counted to its end: what the others would take to theirs. None where that is not known.
+fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<Vec<String>> {
+    let whole_s = whole_s(chosen).filter(|_| asked.policy.is_none())?;
+    let rule = match &chapter.cut {
+        Some(cut) => {
+            format!("the planner's search was ended after {cut}: this is the best that it had by then")
+        }
+        None => "the planner takes the quickest whole plan that it finds".to_string(),
+    };
+    let first = format!(
+        "{} is one of {} ways to get further. With the rest of the plan it takes {whole_s:.1} s, and {rule}.",
+        figures(chosen),
+        weighed.open
+    );
+    let others = || weighed.others.iter();
+    let rate = others().max_by(|a, b| a.rate().total_cmp(&b.rate()));
+    let quickest = others().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s));
+    let most = others().max_by(|a, b| a.gains.total_cmp(&b.gains));
+    let is_more = |o: &&Way, of: fn(&Way) -> f64| of(o) > of(chosen) * (1.0 + ALIKE);
+    let rate_role = match rate.filter(|o| is_more(o, Way::rate)) {
+        Some(_) => "gains most a second",
+        None => "gains most a second of the others",
+    };
+    let roles = [
+        (rate, rate_role),
+        (quickest.filter(|o| o.takes_s < chosen.takes_s - LONGER_S), "is the quickest"),
+        (most.filter(|o| is_more(o, |way| way.gains)), "gains most in all"),
+    ];
+    let mut rivals: Vec<(&Way, Vec<String>)> = Vec::new();
+    for (way, role) in roles.into_iter().filter_map(|(way, role)| Some((way?, role.to_string()))) {
+        match rivals.iter_mut().find(|(other, _)| other.steps == way.steps) {
+            Some((_, roles)) => roles.push(role),
+            None => rivals.push((way, vec![role])),
+        }
     }
+    let rivals = rivals.into_iter().map(|(way, roles)| {
+        let against = against(way, chosen, asked).map(|against| format!("; {against}")).unwrap_or_default();
+        format!("{} {}{against}.", figures(way), listed(&roles, roles.len()))
+    });
+    Some(std::iter::once(first).chain(rivals).collect())
+}
+
+/// What a look has for it where seconds are counted for looking in vain.
+fn first_looks(chapter: &Chapter) -> Option<String> {
+    let doubts = chapter.before.iter().flat_map(|standing| &standing.doubts);
+    let looks = doubts.flat_map(|doubt| &doubt.seen).filter_map(|seen| Some((seen, seen.first?)));
+    let mut all: Vec<(&Seen, FirstLook)> = Vec::new();
+    for (on, look) in looks {
+        if all.iter().all(|(known, _)| known.on != on.on) {
+            all.push((on, look));
+        }
+    }
+    all.sort_by(|a, b| b.1.finds.total_cmp(&a.1.finds));
+    let one = |(seen, look): &(&Seen, FirstLook)| {
+        let unseen = match seen.hidden > 0.0 {
+            true => format!("it stands there unseen with {}; ", share(seen.hidden)),
+            false => String::new(),
+        };
+        let finds = share(look.finds);
+        format!("{finds} for the {} ({unseen}going there and looking takes {:.1} s)", seen.on, look.takes_s)
+    };
+    let said: Vec<String> = all.iter().map(one).collect();
+    (!said.is_empty()).then(|| format!("p is {}.", listed(&said, said.len())))
+}
+
+/// Why a plan was made of which it is not known what others would have taken to their ends: what each gains a second.
+fn by_the_second(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Vec<String> {
     let mut named = Named::default();
     let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
     said.extend(quickest(chapter, weighed, chosen, asked, &mut named));
@@ -183,8 +325,44 @@ fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
         };
         said.push(format!("{} gains most{more}.", named.once(other)));
     }
-    said.extend(longer);
     said
+}
+
+/// What speaks for or against another way by what it comes to with the rest of the plan behind it; none where that is not known of
+/// both, and where nobody counted it.
+fn against(other: &Way, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
+    let chosen_s = whole_s(chosen).filter(|_| asked.policy.is_none())?;
+    let Some(whole) = other.whole else {
+        let stuck = other.stuck.as_deref().unwrap_or_default();
+        let but = match (stuck.starts_with("the goal "), chosen.steps.len() == chosen.whole?.steps) {
+            (true, true) => "it would not be enough",
+            (true, false) => "with the rest of the plan, it would not be enough",
+            (false, _) => "the rest of the plan could not follow it",
+        };
+        let why = Some(stuck).filter(|stuck| !stuck.is_empty());
+        let missed = |stuck| reasons::missed(stuck, "would be", asked.counts);
+        let why =
+            why.map(|stuck| format!(": {}", missed(stuck).replacen(", and it is ", ", and it would be ", 1)));
+        return Some(format!("{but}{}", why.unwrap_or_default()));
+    };
+    if !whole.reaches {
+        return Some("with the rest of the plan, it would not be enough".into());
+    }
+    let alone =
+        if whole.steps == other.steps.len() { "alone it would be enough, in" } else { "to its end it takes" };
+    let tenths = |s: f64| (s * 10.0).round() / 10.0;
+    let more_s = tenths(whole.takes_s) - tenths(chosen_s);
+    let said = format!("{alone} {:.1} s", whole.takes_s);
+    Some(match more_s.abs() {
+        off_s if off_s <= LONGER_S => format!("{said}, which is as long"),
+        off_s if more_s > 0.0 => format!("{said}, {off_s:.1} s more"),
+        off_s => format!("{said}, {off_s:.1} s less: the planner did not come upon that"),
+    })
+}
+
+/// What a way takes with the rest of the plan behind it, if it is expected to be enough then, seconds.
+fn whole_s(way: &Way) -> Option<f64> {
+    way.whole.filter(|whole| whole.reaches).map(|whole| whole.takes_s)
 }
 
 /// The ways of which the figures were given.
@@ -328,16 +506,17 @@ fn quickest(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::weigh::Whole;
 
     fn way(step: &str, takes_s: f64, gains: f64, reaches: Option<bool>) -> Way {
-        Way { steps: vec![step.into()], each_s: vec![takes_s], takes_s, gains, reaches }
+        Way { steps: vec![step.into()], each_s: vec![takes_s], takes_s, gains, reaches, ..Way::default() }
     }
 
     /// The first plan of a run, which takes ten seconds to its end, and why it was this one.
     fn check(chosen: Option<Way>, others: &[Way], cut: Option<&str>, words: &[&str]) {
         let numbers = vec![Expected { name: "(sure)".into(), now: 0.0, then: 1.25 }];
-        let weighed =
-            Weighed { numbers, open: others.len() + 1, chosen, others: others.to_vec(), shorter: None };
+        let open = others.len() + 1;
+        let weighed = Weighed { numbers, open, chosen, others: others.to_vec(), ..Weighed::default() };
         let cut = cut.map(str::to_string);
         let steps = vec!["0.000: (go far) [8.000]".to_string()];
         let chapter = Chapter { steps, makespan_s: 10.0, weighed: Some(weighed), cut, ..Chapter::default() };
@@ -347,6 +526,7 @@ mod tests {
             counts: &|_| None,
             name: &str::to_string,
             has_ended: true,
+            counts_in_vain: false,
         };
         let told = tell(&chapter, None, None, &asked);
         let said = [told.intent, told.why].concat().join(" ");
@@ -375,6 +555,34 @@ mod tests {
                 "(go near) is the quickest, but by what is hoped of it would not be enough",
             ],
         );
+        // With the rest of the plan behind it, it may be longer, shorter, not enough, or not possible.
+        let whole =
+            |way: Way, takes_s, steps, reaches| Way { whole: Some(Whole { takes_s, steps, reaches }), ..way };
+        let near = || way("(go near)", 2.0, 0.85, Some(false));
+        let far = || Some(whole(way("(go far)", 8.0, 0.9, Some(false)), 10.0, 2, true));
+        let stuck = "step 2 (take it) at 2: (>= (sure) 0.8) does not hold at its start: (sure) is 0.79";
+        let ends = [
+            (whole(near(), 12.0, 2, true), "and is the quickest; to its end it takes 12.0 s, 2.0 s more."),
+            (whole(near(), 10.0, 2, true), "to its end it takes 10.0 s, which is as long."),
+            (
+                whole(near(), 9.0, 1, true),
+                "enough, in 9.0 s, 1.0 s less: the planner did not come upon that.",
+            ),
+            (whole(near(), 9.0, 2, false), "with the rest of the plan, it would not be enough."),
+            (near(), "the rest of the plan could not follow it."),
+            (
+                Way { stuck: Some(stuck.into()), ..near() },
+                "could not follow it: (take it) needs (sure) to be at least 0.80, and it would be 0.79.",
+            ),
+        ];
+        let first =
+            "With the rest of the plan it takes 10.0 s, and the planner takes the quickest whole plan";
+        for (other, said) in ends {
+            check(far(), &[other], None, &[first, "(go near)", "gains most a second", said]);
+        }
+        let other = whole(way("(go farther)", 9.0, 1.0, Some(false)), 11.0, 2, true);
+        let said = "gains most a second of the others and gains most in all; to its end";
+        check(far(), &[other], Some("9 states"), &[said, "ended after 9 states: this is the best"]);
         // Of a record that does not say what would be enough, the numbers say it.
         check(
             Some(way("(go far)", 8.0, 0.9, None)),

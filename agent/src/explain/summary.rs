@@ -206,14 +206,7 @@ fn in_vain(chapters: &[Chapter]) -> Option<String> {
         1 => "the plan".into(),
         all => format!("{short} of {all} plans"),
     };
-    match (short, chapters) {
-        (0, [_, others @ .., _]) => {
-            let all = chapters.len();
-            Some(format!("{} of {all} plans did not yet bring about what was asked for", others.len() + 1))
-        }
-        (0, _) => None,
-        _ => Some(format!("{plans} brought less to their ends than was hoped{misled}")),
-    }
+    (short > 0).then(|| format!("{plans} brought less to their ends than was hoped{misled}"))
 }
 
 /// What was taken for a thing that was asked for in a plan, and was not it, with how much it was.

@@ -117,6 +117,9 @@ fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> 
     let may_be: Vec<&&Track> = tracks.iter().filter(|t| t.probability_of(name) > HARDLY).collect();
     let mut said: Vec<String> =
         may_be.iter().take(MOST_NAMED).map(|t| object(t, Some(name), words)).collect();
+    if may_be.iter().map(|t| t.probability_of(name)).sum::<f64>() > 1.0 + HARDLY {
+        said.push(format!("each is judged by itself, since more than one may be as {name} is."));
+    }
     let (rest, known) = (tracks.len() - may_be.len(), belief.tracks.len());
     said.push(match (known, rest) {
         (0, _) => "no object was seen.".into(),
@@ -172,6 +175,13 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) 
     }
     let because = reasons::no_plan(&rests.said, words.meanings);
     said.push(match (rests.ended.as_str(), left_s) {
+        ("reached", _) if report.verdict == Verdict::CannotTell => {
+            let least = words.not_there.map(|least| format!(", which is said only below {}", share(least)));
+            format!(
+                "it ended because the goal held: it is sure enough that no more is to be found, but not that there is none{}.",
+                least.unwrap_or_default()
+            )
+        }
         ("reached", _) => "it ended because the goal held.".into(),
         ("no plan", Some(left_s)) if left_s > 0.0 => {
             format!(

@@ -89,7 +89,8 @@ fn no_longer(because: &str) -> Option<String> {
         // What is wanted may be a number that has a name of its own.
         let named = values.split(", ").find_map(|v| v.strip_prefix(name)?.strip_prefix(" is "));
         let wanted = named.map_or(wanted.clone(), |value| wanted.replace(name, &short(value)));
-        return Some(format!("{call} needs {number} to be {wanted}, and it is {}", short(is)));
+        let is = unlike(&format!("it is {}", short(is)), is, &wanted);
+        return Some(format!("{call} needs {number} to be {wanted}, and {is}"));
     }
     let values = after.split_once(": ").map(|(_, values)| format!(", {}", short(values))).unwrap_or_default();
     if all_the_time {
@@ -198,9 +199,7 @@ fn refused(part: &str, meanings: Meanings<'_>) -> Option<String> {
     });
     if let (Some(about), "impossible") = (&about, answer) {
         let times = named + more.unwrap_or(0) + 1;
-        return Some(format!(
-            "{before}it was asked {about}, and {times} times there were none: it is impossible"
-        ));
+        return Some(format!("{before}it was asked {about}, and {times} times there were none"));
     }
     Some(match (about, named + more.unwrap_or(0)) {
         (Some(about), 0) => format!("{before}asked {about}, the answer is {answer} for {first}]"),

@@ -16,6 +16,8 @@ pub mod reasons;
 mod unnoticed;
 mod vanished;
 
+pub use calls::FirstLook;
+
 use descry_robots::Part;
 use descry_skills::{Observe, Outcome, PushAside, SkillFailure};
 

@@ -88,8 +88,7 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
         let p = (p(track) * 100.0).floor() / 100.0;
         return Some(format!("what stands at {} may be it ({p:.2})", place(&track.position_m)));
     }
-    let is_lost = |t: &&Track| t.on.is_empty() && p(t) > s.thresholds.not_there;
-    if s.belief.mislaid.iter().any(|t| is_lost(&t)) {
+    if s.chance_lost(what) > s.thresholds.not_there {
         return Some("it was lost out of the hand, and where it lies was not seen".into());
     }
     if let Some(floor) = may_be_floor(s, thing) {

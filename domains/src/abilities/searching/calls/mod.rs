@@ -10,6 +10,8 @@ mod search_cost;
 mod worth_a_look;
 mod worth_a_push;
 
+pub use search_cost::FirstLook;
+
 use descry_planner::{Call, CallError};
 
 use crate::abilities::searching::doubt::{Doubt, Taken};
@@ -62,7 +64,7 @@ pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "search-cost",
         reads: &[OBSERVED],
-        about: "seconds for having looked there in vain, at the first look there: the more, the less likely a look finds it there and the longer the way",
+        about: "seconds for having looked there in vain; at the first look of a plan there they are (1 - p) / p of those that going there from where the last look was taken and looking takes, at most 10,000, with p the probability that the best look that is left there finds it; for each surface alike, from whichever pose",
         answers: search_cost::answer,
     },
     Meaning {

@@ -5,6 +5,7 @@
 //! count.
 
 use descry_planner::{Answer, Call, CallError};
+use serde::{Deserialize, Serialize};
 
 use crate::abilities::argument;
 use crate::situation::Situation;
@@ -12,21 +13,37 @@ use crate::situation::Situation;
 /// No look costs more than so many seconds for being in vain: where next to nothing is left, one look is as vain as another.
 const MOST_S: f64 = 10_000.0;
 
+/// What counts for a first look at a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FirstLook {
+    /// The probability that it finds what is asked for, 0 to 1.
+    pub finds: f64,
+    /// What going there and looking takes, seconds.
+    pub takes_s: f64,
+}
+
+impl Situation {
+    /// What counts for a first look at a surface; none where looks in vain are not counted.
+    pub fn first_look(&self, on: usize) -> Option<FirstLook> {
+        let is_open = |n: &usize| self.confidence(*n) < self.threshold;
+        let mut open: Vec<usize> = (0..self.things.len()).filter(is_open).collect();
+        // What has been found is looked for in vain elsewhere, too.
+        if open.is_empty() {
+            open = (0..self.things.len()).collect();
+        }
+        if open.is_empty() || !self.kinds.is_empty() || self.time_left_s.is_some() {
+            return None;
+        }
+        let finds = |&n: &usize| self.doubt_about(n).most_settled_on(self, on) + self.presence(n, on);
+        let finds = open.iter().map(finds).fold(0.0, f64::max).clamp(1e-6, 1.0);
+        Some(FirstLook { finds, takes_s: self.going_there_s(on) })
+    }
+}
+
 pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
     let on = situation.surface(argument(call, 0)?)?;
-    let begun = situation.planned_looks(call).iter().any(|look| look.1 == on);
-    let is_open = |n: &usize| situation.confidence(*n) < situation.threshold;
-    let mut open: Vec<usize> = (0..situation.things.len()).filter(is_open).collect();
-    // What has been found is looked for in vain elsewhere, too.
-    if open.is_empty() {
-        open = (0..situation.things.len()).collect();
-    }
-    let all = open.is_empty() || !situation.kinds.is_empty();
-    if begun || all || situation.time_left_s.is_some() {
-        return Ok(Answer::Number(0.0));
-    }
-    let finds =
-        |&n: &usize| situation.doubt_about(n).most_settled_on(situation, on) + situation.presence(n, on);
-    let p = open.iter().map(finds).fold(0.0, f64::max).clamp(1e-6, 1.0);
-    Ok(Answer::Number(((1.0 - p) / p * situation.going_there_s(on)).min(MOST_S)))
+    let is_begun = situation.planned_looks(call).iter().any(|look| look.1 == on);
+    let first = if is_begun { None } else { situation.first_look(on) };
+    let in_vain_s = first.map(|FirstLook { finds, takes_s }| ((1.0 - finds) / finds * takes_s).min(MOST_S));
+    Ok(Answer::Number(in_vain_s.unwrap_or(0.0)))
 }

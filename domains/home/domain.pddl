@@ -43,9 +43,9 @@
     (is ?what - thing ?of - kind)               ; it was seen, and is surely of the kind
     (hand-free)
     (holding ?what - thing)
-    (slippery ?what - thing)                    ; it could not be taken
-    (beyond ?from - pose ?what - thing ?on - surface) ; from that pose the hand could not reach it there
-    (full ?from - pose ?on - surface))          ; nothing could be put there from that pose
+    (slippery ?what - thing)                           ; it could not be taken
+    (beyond ?from - pose ?what - thing ?on - surface)  ; from that pose the hand could not reach it there
+    (full ?from - pose ?on - surface))                 ; nothing could be put there from that pose
 
   (:functions
     (confidence ?what - thing)                  ; how sure we are that it stands where we believe it does, 0 to 1

@@ -285,10 +285,22 @@ impl<'r> Scale<'r> {
         let wholes = ends.iter().filter_map(|end| self.whole(&[&other.steps, end.as_slice()].concat()));
         let rank = |whole: &Whole| (!whole.reaches, whole.takes_s);
         let best = wholes.min_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal));
-        match best {
-            Some(whole) if whole.reaches || whole.steps > other.steps.len() => (Some(whole), None),
-            _ => (None, self.stuck(&[&other.steps, exchanged.as_slice()].concat())),
+        match best.filter(|whole| whole.reaches || whole.steps > other.steps.len()) {
+            Some(whole) => (Some(whole), None),
+            None => (None, self.short_of(other, rest)),
         }
+    }
+
+    /// Why the rest of a plan cannot be done behind other steps: that a number is too small then for what is left to do but looking, or
+    /// else the first that is in the way of all of it.
+    fn short_of(&self, other: &Other, rest: &[Step]) -> Option<String> {
+        let is_look = |step: &Step| other.steps.last().is_some_and(|last| last.action == step.action);
+        let looked = rest.iter().rposition(is_look).map_or(0, |n| n + 1);
+        let needed: Vec<Step> = rest[looked..].iter().map(|step| other.instead.in_step(step)).collect();
+        let exchanged: Vec<Step> = rest.iter().map(|step| other.instead.exchanged(step)).collect();
+        let stuck = |end: &Vec<Step>| self.stuck(&[&other.steps, end.as_slice()].concat());
+        let by_number = stuck(&needed).filter(|why| why.contains("(>= "));
+        by_number.or_else(|| stuck(&exchanged))
     }
 
     /// Why steps cannot be taken one after the other, as the monitor says it.

@@ -168,6 +168,11 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) 
             words.not_there.map(|least| format!(" (it is said not to be there below {})", share(least))).unwrap_or_default()
         ));
     }
+    let lost = rests.in_doubt.iter().filter(|doubt| doubt.lost > HARDLY);
+    said.extend(lost.map(|doubt| {
+        let (lost, about) = (share(doubt.lost), &doubt.about);
+        format!("of that, {lost} is that {about} was lost out of the hand, and lies where no look shows it.")
+    }));
     if report.remaining.is_none() && report.verdict != Verdict::Achieved {
         // Of many objects together it says little what hangs on each.
         let open = rests.in_doubt.iter().filter(|doubt| doubt.of == Of::Thing && doubt.left > HARDLY);

@@ -223,7 +223,9 @@ impl<'a> Agent<'a> {
             makespan_s: plan.makespan_s().unwrap_or(0.0),
             calls,
         };
-        let weighed = self.weighed_by.as_ref().map(|goal| weigh::blob(&weigh::weigh(round, &plan, goal)));
+        let left = self.rest();
+        let weighed =
+            self.weighed_by.as_ref().map(|goal| weigh::blob(&weigh::weigh(round, &plan, &left, goal)));
         let more = std::iter::once(standing::blob(round)).chain(weighed);
         let said = self.say_with(&event, more.collect::<Result<_, _>>()?)?;
         self.record.hold(&[round.record, said], "plan").map_err(CommandError::broken)?;

@@ -47,6 +47,8 @@ pub struct Weighed {
     pub shorter: Option<Way>,
     /// The same with a step more, that makes one of its steps shorter: a door opened on the way. The quickest.
     pub through: Option<Way>,
+    /// What was left of the plan before, where that is another.
+    pub left: Option<Way>,
 }
 
 /// A number of the domain.
@@ -111,9 +113,11 @@ pub fn blob(weighed: &Weighed) -> Result<Blob<'static>, CommandError> {
     Ok(Blob { name: BLOB.into(), form: Form::Bytes, layout: Value::Null, data: data.into() })
 }
 
-/// Weighs a plan against others; `goal` says which numbers count.
-pub fn weigh(round: &Round, plan: &Plan, goal: &str) -> Weighed {
-    Scale::new(round, plan, goal).and_then(|scale| scale.weigh(plan)).unwrap_or_default()
+/// Weighs a plan against others, and what is left of the one before; `goal` says which numbers count.
+pub fn weigh(round: &Round, plan: &Plan, left: &Plan, goal: &str) -> Weighed {
+    let Some(scale) = Scale::new(round, plan, goal) else { return Weighed::default() };
+    let weighed = scale.weigh(plan).unwrap_or_default();
+    Weighed { left: scale.left(plan, left), ..weighed }
 }
 
 /// The numbers that count in a round, and their values now.
@@ -358,9 +362,21 @@ impl<'r> Scale<'r> {
         let shorter = shorter.filter(|way| way.takes_s < chosen.takes_s && way.gains >= chosen.gains);
         let through = self.through(way).and_then(|steps| {
             let through = self.way(&steps)?;
-            Some(Way { whole: self.whole(&[&steps, rest].concat()), ..through })
+            let whole = self.whole(&[&steps, rest].concat())?;
+            Some(Way { whole: Some(whole), ..through })
         });
-        Some(Weighed { numbers, chosen: Some(chosen), others, open, shorter, through })
+        Some(Weighed { numbers, chosen: Some(chosen), others, open, shorter, through, left: None })
+    }
+
+    /// What is left of the plan before, and what it comes to, or why it would not do.
+    fn left(&self, plan: &Plan, left: &Plan) -> Option<Way> {
+        let steps: Vec<String> = left.steps.iter().map(call).collect();
+        if steps.is_empty() || plan.steps.iter().map(call).eq(steps.iter().cloned()) {
+            return None;
+        }
+        let whole = self.whole(&left.steps).filter(|whole| whole.reaches);
+        let stuck = if whole.is_none() { self.stuck(&left.steps) } else { None };
+        Some(Way { steps, whole, stuck, ..Way::default() })
     }
 
     /// The quickest of all ways to take steps with one more among them, after which one that leads from an object to another is

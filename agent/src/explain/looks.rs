@@ -125,7 +125,13 @@ fn why_no_surer(
     let seen: f64 = tracks.map(|track| track.probability_of(&doubt.about)).sum();
     let others = best_seen(doubt, after).filter(|(_, p)| *p >= MAY_BE).map_or(0.0, |(_, p)| seen - p);
     if doubt.of == Of::Thing && others > HARDLY {
-        why.push(format!("with {} it is another of the objects", share(others)));
+        let p = best_seen(doubt, after).map_or(0.0, |(_, p)| p);
+        why.push(match others + p + doubt.hidden > 1.0 + HARDLY {
+            true => {
+                format!("others may be it as well, with {} in all: each is judged by itself", share(others))
+            }
+            false => format!("with {} it is another of the objects", share(others)),
+        });
     }
     why.extend(hidden(doubt, seen));
     (!why.is_empty()).then(|| why.join("; "))

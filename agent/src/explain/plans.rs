@@ -239,8 +239,9 @@ fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
         (false, Some(said)) => said,
         (false, None) => by_the_second(chapter, weighed, chosen, asked),
     };
+    let left = left(chapter, weighed, chosen, asked);
     let first = first_looks(chapter).filter(|_| asked.counts_in_vain);
-    said.into_iter().chain(longer).chain(through).chain(first).collect()
+    said.into_iter().chain(left).chain(longer).chain(through).chain(first).collect()
 }
 
 /// Why a plan was made that the planner counted to its end: what the others would take to theirs. None where that is not known.
@@ -283,6 +284,38 @@ fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<
         format!("{} {}{against}.", figures(way), listed(&roles, roles.len()))
     });
     Some(std::iter::once(first).chain(rivals).collect())
+}
+
+/// Why what was left of the plan before was not gone on with, where all that ended it was that it counts differently.
+fn left(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
+    let left =
+        weighed.left.as_ref().filter(|_| reasons::reckoned(&chapter.because, asked.counts).is_some())?;
+    let what = format!("what was left of plan {}", chapter.round - 1);
+    let Some(whole_s) = whole_s(left) else {
+        let why = left.stuck.as_ref().map(|stuck| would_be(stuck, asked));
+        return Some(format!(
+            "{what} would not do{}.",
+            why.map(|why| format!(": {why}")).unwrap_or_default()
+        ));
+    };
+    let chosen_s = self::whole_s(chosen).filter(|_| asked.policy.is_none())?;
+    Some(format!("{what} would do, and takes {whole_s:.1} s{}.", more_than(whole_s, chosen_s)))
+}
+
+/// Why steps would not do, as the monitor says it, of what is not so yet.
+fn would_be(stuck: &str, asked: &Asked<'_>) -> String {
+    reasons::missed(stuck, "would be", asked.counts).replacen(", and it is ", ", and it would be ", 1)
+}
+
+/// How much longer something takes than what was chosen, as both are told.
+fn more_than(whole_s: f64, chosen_s: f64) -> String {
+    let tenths = |s: f64| (s * 10.0).round() / 10.0;
+    let more_s = tenths(whole_s) - tenths(chosen_s);
+    match more_s.abs() {
+        off_s if off_s <= LONGER_S => ", which is as long".into(),
+        off_s if more_s > 0.0 => format!(", {off_s:.1} s more"),
+        off_s => format!(", {off_s:.1} s less: the planner did not come upon that"),
+    }
 }
 
 /// What a look has for it where seconds are counted for looking in vain.
@@ -340,9 +373,7 @@ fn against(other: &Way, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
             (false, _) => "the rest of the plan could not follow it",
         };
         let why = Some(stuck).filter(|stuck| !stuck.is_empty());
-        let missed = |stuck| reasons::missed(stuck, "would be", asked.counts);
-        let why =
-            why.map(|stuck| format!(": {}", missed(stuck).replacen(", and it is ", ", and it would be ", 1)));
+        let why = why.map(|stuck| format!(": {}", would_be(stuck, asked)));
         return Some(format!("{but}{}", why.unwrap_or_default()));
     };
     if !whole.reaches {
@@ -350,14 +381,7 @@ fn against(other: &Way, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
     }
     let alone =
         if whole.steps == other.steps.len() { "alone it would be enough, in" } else { "to its end it takes" };
-    let tenths = |s: f64| (s * 10.0).round() / 10.0;
-    let more_s = tenths(whole.takes_s) - tenths(chosen_s);
-    let said = format!("{alone} {:.1} s", whole.takes_s);
-    Some(match more_s.abs() {
-        off_s if off_s <= LONGER_S => format!("{said}, which is as long"),
-        off_s if more_s > 0.0 => format!("{said}, {off_s:.1} s more"),
-        off_s => format!("{said}, {off_s:.1} s less: the planner did not come upon that"),
-    })
+    Some(format!("{alone} {:.1} s{}", whole.takes_s, more_than(whole.takes_s, chosen_s)))
 }
 
 /// What a way takes with the rest of the plan behind it, if it is expected to be enough then, seconds.

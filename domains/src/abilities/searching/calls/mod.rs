@@ -64,7 +64,7 @@ pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "search-cost",
         reads: &[OBSERVED],
-        about: "seconds for having looked there in vain; at the first look of a plan there they are (1 - p) / p of those that going there from where the last look was taken and looking takes, at most 10,000, with p the probability that the best look that is left there finds it; for each surface alike, from whichever pose",
+        about: "seconds for having looked there in vain; at the first look of a plan there they are (1 - p) / p of those that looking there takes with the shortest drive from where the last look was taken, all doors open, at most 10,000, with p, at most 1, how sure it is that it stands there and what the best look that is left there may settle; for each surface alike, from whichever pose",
         answers: search_cost::answer,
     },
     Meaning {

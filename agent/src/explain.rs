@@ -94,7 +94,8 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
         said.extend(in_vain);
     }
     let not_there = domain.as_ref().map(|domain| domain.config.thresholds.not_there);
-    let words = verdict::Words { meanings: &meanings, name: &name, not_there };
+    let negligible = domain.as_ref().map(|domain| domain.config.thresholds.remaining);
+    let words = verdict::Words { meanings: &meanings, name: &name, not_there, negligible };
     let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
     let verdict = verdict.iter().map(|line| saying.say(line)).collect();
     Ok(Explanation { summary, asked: said, plans, verdict, lost })

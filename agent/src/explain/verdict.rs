@@ -27,6 +27,8 @@ pub struct Words<'a> {
     pub name: &'a dyn Fn(&str) -> String,
     /// A thing that is there with less is said not to be there.
     pub not_there: Option<f64>,
+    /// What may settle less is not worth a look.
+    pub negligible: Option<f64>,
 }
 
 /// It, in sentences.
@@ -198,6 +200,11 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) 
         ("no plan", _) => format!("it ended because no plan would still bring it about: {because}."),
         _ => format!("it ended because {because}."),
     });
+    if let ("no plan", Verdict::CannotTell, Some(least)) =
+        (rests.ended.as_str(), report.verdict, words.negligible)
+    {
+        said.push(format!("what looks may settle counts from {} on: for less none is taken.", share(least)));
+    }
     said
 }
 

@@ -221,7 +221,7 @@ pub fn may_be(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<Stri
 }
 
 /// The object that a thing most likely is, but for what was lost out of the hand.
-fn best_seen<'s>(doubt: &InDoubt, after: &'s Standing) -> Option<(&'s Track, f64)> {
+pub fn best_seen<'s>(doubt: &InDoubt, after: &'s Standing) -> Option<(&'s Track, f64)> {
     let is_seen = |track: &&Track| !track.on.is_empty() || doubt.lost <= HARDLY;
     let seen = after.belief.tracks.iter().filter(is_seen);
     let seen = seen.map(|track| (track, track.probability_of(&doubt.about)));

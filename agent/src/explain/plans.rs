@@ -218,7 +218,7 @@ fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
             )];
         }
         return vec![
-            "it does what the goal asks next. No step of it is there to learn more: nothing was compared."
+            "it does what the goal asks next. Nothing was compared: no step of it is there to learn more, or only after many others."
                 .into(),
         ];
     };

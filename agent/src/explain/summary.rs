@@ -75,7 +75,7 @@ fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
         1 => "one object was seen".into(),
         n => format!("{n} objects were seen"),
     };
-    let by = match (doubt.of, last.best(&doubt.about)) {
+    let by = match (doubt.of, looks::best_seen(doubt, last)) {
         (Of::Thing, Some((track, p))) if p >= doubt.wanted => {
             let on = match track.on.as_str() {
                 "" => "is in the hand".into(),

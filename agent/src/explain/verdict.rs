@@ -59,7 +59,11 @@ pub fn rests_on(
     let mut said = vec![format!("{verdict}: {}.", reasons::no_plan(why, words.meanings))];
     let (beliefs, faults) = record.find_whole(&Query::of_kind("belief")).map_err(CommandError::broken)?;
     lost.extend(faults.iter().map(ToString::to_string));
-    let newest = beliefs.last().and_then(|d| serde_json::from_value::<Belief>(d.body.clone()).ok());
+    let mut newest = beliefs.last().and_then(|d| serde_json::from_value::<Belief>(d.body.clone()).ok());
+    if rests.iter().flat_map(|rests| &rests.in_doubt).any(|doubt| doubt.lost > HARDLY) {
+        // It was in the hand at the last look, and no longer is.
+        newest.iter_mut().for_each(|belief| belief.tracks.retain(|track| !track.on.is_empty()));
+    }
     match &newest {
         Some(belief) => {
             said.push("after the last look this was believed:".into());
@@ -167,10 +171,11 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) 
         said.push(format!(
             "the probability that it is there after all, unseen or as one of the objects that were seen, is {}{}.",
             share(left),
-            words.not_there.map(|least| format!(" (it is said not to be there below {})", share(least))).unwrap_or_default()
+            words.not_there.filter(|least| left >= *least || report.verdict == Verdict::NotFound).map(|least| format!(" (it is said not to be there below {})", share(least))).unwrap_or_default()
         ));
     }
-    let lost = rests.in_doubt.iter().filter(|doubt| doubt.lost > HARDLY);
+    let is_told = |doubt: &&InDoubt| doubt.lost > HARDLY && report.verdict != Verdict::Achieved;
+    let lost = rests.in_doubt.iter().filter(is_told);
     said.extend(lost.map(|doubt| {
         let (lost, about) = (share(doubt.lost), &doubt.about);
         format!("of that, {lost} is that {about} was lost out of the hand, and lies where no look shows it.")

@@ -251,6 +251,21 @@ fn what_is_left_of_a_plan_has_the_time_that_is_left_now() {
 }
 
 #[test]
+fn a_look_that_would_come_too_late_is_not_gone_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = ["do", "find cup A within 25 seconds", "--domain", "home", "--seed", "86210", "--run", "run"];
+    let run = binary::outcome(folder.path(), &run);
+    assert_eq!(run.status.code(), Some(1), "{}", String::from_utf8_lossy(&run.stderr));
+    let told = explained(folder.path(), &["The planner's search was ended after"]);
+    for plan in told["plans"].as_array().expect("plans") {
+        let why = plan["why"][0].as_str().expect("a reason");
+        let takes = why.split_once("[+").and_then(|(_, gains)| gains.split_once(" in ")).expect("a way").1;
+        let takes_s: f64 = takes.split(' ').next().and_then(|s| s.parse().ok()).expect("seconds");
+        assert!(plan["at_s"].as_f64().expect("a time") + takes_s <= 25.0, "{plan}");
+    }
+}
+
+#[test]
 fn what_goes_wrong_in_a_scene_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = Domain::load("home").expect("a built-in domain").scenes["default"].clone();

@@ -10,14 +10,17 @@ use crate::situation::{KnownSurface, Situation, Thing};
 /// What a look takes, as in the domain.
 pub(crate) const LOOK_S: f64 = 2.0;
 
-/// The single look that settles most a second; none if no look settles anything.
+/// The single look that settles most a second; none if no look settles anything in the time that is left.
 pub fn one_look(s: &Situation) -> Option<Plan> {
     let looks = (0..s.candidates.len()).flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));
-    let open =
-        looks.filter(|look| !s.observed.contains(look) && s.can_drive_to(look.0) && s.sees(look.0, look.1));
+    let takes_s = |from: usize| s.travel_s(s.at, from) + LOOK_S;
+    let is_in_time = |from: usize| s.time_left_s.is_none_or(|left_s| takes_s(from) <= left_s);
+    let open = looks.filter(|&(from, on)| {
+        !s.observed.contains(&(from, on)) && s.can_drive_to(from) && is_in_time(from) && s.sees(from, on)
+    });
     let rate = |&look: &(usize, usize)| {
         let share: f64 = s.doubts().iter().map(|d| d.share_settled(s, look, Taken::default())).sum();
-        share / (s.travel_s(s.at, look.0) + LOOK_S)
+        share / takes_s(look.0)
     };
     let (from, on) = open.filter(|look| rate(look) > 0.0).max_by(|a, b| rate(a).total_cmp(&rate(b)))?;
     Some(look(s, from, on))

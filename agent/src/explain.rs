@@ -6,6 +6,7 @@ mod looks;
 mod numbers;
 mod outcomes;
 mod plans;
+mod rivals;
 mod standings;
 mod states;
 mod summary;

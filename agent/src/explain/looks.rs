@@ -120,9 +120,7 @@ fn why_no_surer(
         Of::Kind => why.extend(unsure_of(doubt, after, name)),
         Of::Surface => why.extend(untold(doubt, after)),
     }
-    let is_seen = |track: &&Track| !track.on.is_empty() || doubt.lost <= HARDLY;
-    let tracks = after.belief.tracks.iter().filter(is_seen);
-    let seen: f64 = tracks.map(|track| track.probability_of(&doubt.about)).sum();
+    let seen: f64 = seen_objects(doubt, after).map(|(_, p)| p).sum();
     let others = best_seen(doubt, after).filter(|(_, p)| *p >= MAY_BE).map_or(0.0, |(_, p)| seen - p);
     if doubt.of == Of::Thing && others > HARDLY {
         let p = best_seen(doubt, after).map_or(0.0, |(_, p)| p);
@@ -220,12 +218,15 @@ pub fn may_be(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<Stri
     })
 }
 
-/// The object that a thing most likely is, but for what was lost out of the hand.
-pub fn best_seen<'s>(doubt: &InDoubt, after: &'s Standing) -> Option<(&'s Track, f64)> {
-    let is_seen = |track: &&Track| !track.on.is_empty() || doubt.lost <= HARDLY;
-    let seen = after.belief.tracks.iter().filter(is_seen);
-    let seen = seen.map(|track| (track, track.probability_of(&doubt.about)));
-    seen.max_by(|a, b| a.1.total_cmp(&b.1))
+/// The objects, each with how probably a thing is it; but for what was lost out of the hand.
+fn seen_objects<'s>(doubt: &'s InDoubt, after: &'s Standing) -> impl Iterator<Item = (&'s Track, f64)> {
+    let seen = after.belief.tracks.iter().filter(|track| !track.on.is_empty() || doubt.lost <= HARDLY);
+    seen.map(|track| (track, track.probability_of(&doubt.about)))
+}
+
+/// The one of them that a thing most likely is.
+pub fn best_seen<'s>(doubt: &'s InDoubt, after: &'s Standing) -> Option<(&'s Track, f64)> {
+    seen_objects(doubt, after).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// That no object may be it, or hardly.

@@ -1,23 +1,17 @@
-//! Why each plan was made, why it was this one, and what came of it.
+//! Why each plan was made, what it was to do, and what came of it.
 
 use descry_domains::note::Note;
 
 use super::chapters::{Chapter, Deed, bare};
 use super::wording::{capital, listed, reasons, share, share_of};
-use super::{Asked, Told, outcomes};
-use crate::standing::{FirstLook, InDoubt, Of, Seen};
-use crate::weigh::{Expected, Way, Weighed};
+use super::{Asked, Told, outcomes, rivals};
+use crate::standing::{InDoubt, Of};
+use crate::weigh::Expected;
 
 /// Numbers that are named; the rest are counted.
 const MOST_NAMED: usize = 3;
 /// Steps left out that are named; the rest are counted.
 const MOST_LEFT_OUT: usize = 4;
-/// Rates nearer to each other than this share are alike.
-const ALIKE: f64 = 0.02;
-/// What takes less longer than this, seconds, takes as long.
-const LONGER_S: f64 = 0.05;
-/// As many ways as are kept in the order of their rates.
-const MOST_KEPT: usize = crate::weigh::MOST_KEPT;
 
 /// All plans of a run.
 pub fn told(chapters: &[Chapter], asked: &Asked<'_>) -> Vec<Told> {
@@ -32,7 +26,7 @@ fn tell(chapter: &Chapter, before: Option<&Chapter>, after: Option<&Chapter>, as
         at_s: chapter.at_s,
         cause: cause(chapter, before, asked),
         intent: intent(chapter, asked),
-        why: why(chapter, asked),
+        why: rivals::why(chapter, asked),
         outcome: outcomes::of(chapter, &asked.goal, asked.name)
             .into_iter()
             .map(|outcome| outcome.said)
@@ -205,332 +199,10 @@ fn intent(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     said
 }
 
-/// Why this plan and not another, as far as the record says.
-fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
-    let Some(weighed) = &chapter.weighed else {
-        return vec!["what else could have been done, and at what cost, is not in the record.".into()];
-    };
-    let Some(chosen) = &weighed.chosen else {
-        if let Some(cut) = &chapter.cut {
-            return vec![format!(
-                "the planner's search was ended after {cut}, without a plan that it expected to reach the goal. What \
-                 promises most by itself is done."
-            )];
-        }
-        return vec![
-            "it does what the goal asks next. Nothing was compared: no step of it is there to learn more, or only after many others."
-                .into(),
-        ];
-    };
-    let longer = weighed.shorter.as_ref().map(|way| {
-        format!(
-            "{} would do the same in {:.1} s instead of {:.1} s: the planner did not come upon that.",
-            steps(way),
-            way.takes_s,
-            chosen.takes_s
-        )
-    });
-    let through = weighed.through.as_ref().map(|way| {
-        let against = against(way, chosen, asked).map(|against| format!("; {against}")).unwrap_or_default();
-        format!("By another way, with a step more: {}{against}.", figures(way))
-    });
-    let said = match (weighed.others.is_empty(), by_the_end(chapter, weighed, chosen, asked)) {
-        (true, _) => vec![format!("{} was the only way known to get further.", steps(chosen))],
-        (false, Some(said)) => said,
-        (false, None) => by_the_second(chapter, weighed, chosen, asked),
-    };
-    let left = left(chapter, weighed, chosen, asked);
-    let first = first_looks(chapter).filter(|_| asked.counts_in_vain);
-    said.into_iter().chain(left).chain(longer).chain(through).chain(first).collect()
-}
-
-/// Why a plan was made that the planner counted to its end: what the others would take to theirs. None where that is not known.
-fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<Vec<String>> {
-    let whole_s = whole_s(chosen).filter(|_| asked.policy.is_none())?;
-    let rule = match &chapter.cut {
-        Some(cut) => {
-            format!("the planner's search was ended after {cut}: this is the best that it had by then")
-        }
-        None => "the planner takes the quickest whole plan that it finds".to_string(),
-    };
-    let first = format!(
-        "{} is one of {} ways to get further. With the rest of the plan it takes {whole_s:.1} s, and {rule}.",
-        figures(chosen),
-        weighed.open
-    );
-    let others = || weighed.others.iter();
-    let rate = others().max_by(|a, b| a.rate().total_cmp(&b.rate()));
-    let quickest = others().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s));
-    let most = others().max_by(|a, b| a.gains.total_cmp(&b.gains));
-    let is_more = |o: &&Way, of: fn(&Way) -> f64| of(o) > of(chosen) * (1.0 + ALIKE);
-    let rate_role = match rate.filter(|o| is_more(o, Way::rate)) {
-        Some(_) => "gains most a second",
-        None => "gains most a second of the others",
-    };
-    let roles = [
-        (rate, rate_role),
-        (quickest.filter(|o| o.takes_s < chosen.takes_s - LONGER_S), "is the quickest"),
-        (most.filter(|o| is_more(o, |way| way.gains)), "gains most in all"),
-    ];
-    let mut rivals: Vec<(&Way, Vec<String>)> = Vec::new();
-    for (way, role) in roles.into_iter().filter_map(|(way, role)| Some((way?, role.to_string()))) {
-        match rivals.iter_mut().find(|(other, _)| other.steps == way.steps) {
-            Some((_, roles)) => roles.push(role),
-            None => rivals.push((way, vec![role])),
-        }
-    }
-    let rivals = rivals.into_iter().map(|(way, roles)| {
-        let against = against(way, chosen, asked).map(|against| format!("; {against}")).unwrap_or_default();
-        format!("{} {}{against}.", figures(way), listed(&roles, roles.len()))
-    });
-    Some(std::iter::once(first).chain(rivals).collect())
-}
-
-/// Why what was left of the plan before was not gone on with, where all that ended it was that it counts differently.
-fn left(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
-    let left =
-        weighed.left.as_ref().filter(|_| reasons::reckoned(&chapter.because, asked.counts).is_some())?;
-    let what = format!("what was left of plan {}", chapter.round - 1);
-    let Some(whole_s) = whole_s(left) else {
-        let why = left.stuck.as_ref().map(|stuck| would_be(stuck, asked));
-        return Some(format!(
-            "{what} would not do{}.",
-            why.map(|why| format!(": {why}")).unwrap_or_default()
-        ));
-    };
-    let chosen_s = self::whole_s(chosen).filter(|_| asked.policy.is_none())?;
-    Some(format!("{what} would do, and takes {whole_s:.1} s{}.", more_than(whole_s, chosen_s)))
-}
-
-/// Why steps would not do, as the monitor says it, of what is not so yet.
-fn would_be(stuck: &str, asked: &Asked<'_>) -> String {
-    reasons::missed(stuck, "would be", asked.counts).replacen(", and it is ", ", and it would be ", 1)
-}
-
-/// How much longer something takes than what was chosen, as both are told.
-fn more_than(whole_s: f64, chosen_s: f64) -> String {
-    let tenths = |s: f64| (s * 10.0).round() / 10.0;
-    let more_s = tenths(whole_s) - tenths(chosen_s);
-    match more_s.abs() {
-        off_s if off_s <= LONGER_S => ", which is as long".into(),
-        off_s if more_s > 0.0 => format!(", {off_s:.1} s more"),
-        off_s => format!(", {off_s:.1} s less: the planner did not come upon that"),
-    }
-}
-
-/// What a look has for it where seconds are counted for looking in vain.
-fn first_looks(chapter: &Chapter) -> Option<String> {
-    let doubts = chapter.before.iter().flat_map(|standing| &standing.doubts);
-    let looks = doubts.flat_map(|doubt| &doubt.seen).filter_map(|seen| Some((seen, seen.first?)));
-    let mut all: Vec<(&Seen, FirstLook)> = Vec::new();
-    for (on, look) in looks {
-        if all.iter().all(|(known, _)| known.on != on.on) {
-            all.push((on, look));
-        }
-    }
-    all.sort_by(|a, b| b.1.finds.total_cmp(&a.1.finds));
-    let one = |(seen, look): &(&Seen, FirstLook)| {
-        let unseen = match seen.hidden > 0.0 {
-            true => format!("it stands there unseen with {}; ", share(seen.hidden)),
-            false => String::new(),
-        };
-        let finds = share(look.finds);
-        format!("{finds} for the {} ({unseen}going there and looking takes {:.1} s)", seen.on, look.takes_s)
-    };
-    let said: Vec<String> = all.iter().map(one).collect();
-    (!said.is_empty()).then(|| format!("p is {}.", listed(&said, said.len())))
-}
-
-/// Why a plan was made of which it is not known what others would have taken to their ends: what each gains a second.
-fn by_the_second(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Vec<String> {
-    let mut named = Named::default();
-    let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
-    said.extend(quickest(chapter, weighed, chosen, asked, &mut named));
-    let most = weighed.others.iter().max_by(|a, b| a.gains.total_cmp(&b.gains));
-    if let Some(other) = most.filter(|o| o.gains > chosen.gains * (1.0 + ALIKE)) {
-        let more_s = other.takes_s - chosen.takes_s;
-        let more = match (more_s > 0.0, &chapter.cut, &asked.policy) {
-            (true, ..) => format!(", but is reckoned at {more_s:.1} s more"),
-            (false, Some(cut), None) => format!(
-                ", and takes no longer: the planner's search was ended after {cut}, before it came upon that"
-            ),
-            (false, ..) => ", and takes no longer: what follows counts as well".to_string(),
-        };
-        said.push(format!("{} gains most{more}.", named.once(other)));
-    }
-    said
-}
-
-/// What speaks for or against another way by what it comes to with the rest of the plan behind it; none where that is not known of
-/// both, and where nobody counted it.
-fn against(other: &Way, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
-    let chosen_s = whole_s(chosen).filter(|_| asked.policy.is_none())?;
-    let Some(whole) = other.whole else {
-        let stuck = other.stuck.as_deref().unwrap_or_default();
-        let but = match (stuck.starts_with("the goal "), chosen.steps.len() == chosen.whole?.steps) {
-            (true, true) => "it would not be enough",
-            (true, false) => "with the rest of the plan, it would not be enough",
-            (false, _) => "the rest of the plan could not follow it",
-        };
-        let why = Some(stuck).filter(|stuck| !stuck.is_empty());
-        let why = why.map(|stuck| format!(": {}", would_be(stuck, asked)));
-        return Some(format!("{but}{}", why.unwrap_or_default()));
-    };
-    if !whole.reaches {
-        return Some("with the rest of the plan, it would not be enough".into());
-    }
-    let alone =
-        if whole.steps == other.steps.len() { "alone it would be enough, in" } else { "to its end it takes" };
-    Some(format!("{alone} {:.1} s{}", whole.takes_s, more_than(whole.takes_s, chosen_s)))
-}
-
-/// What a way takes with the rest of the plan behind it, if it is expected to be enough then, seconds.
-fn whole_s(way: &Way) -> Option<f64> {
-    way.whole.filter(|whole| whole.reaches).map(|whole| whole.takes_s)
-}
-
-/// The ways of which the figures were given.
-#[derive(Default)]
-struct Named(Vec<Vec<String>>);
-
-impl Named {
-    /// A way, the first time with its figures.
-    fn once(&mut self, way: &Way) -> String {
-        if self.0.contains(&way.steps) {
-            return way.steps.join(", ");
-        }
-        self.0.push(way.steps.clone());
-        figures(way)
-    }
-}
-
-/// A way with its figures.
-fn figures(way: &Way) -> String {
-    let gains = if way.gains < 0.01 { share(way.gains) } else { format!("{:.2}", way.gains) };
-    format!("{} [+{gains} in {:.1} s, {} a second]", steps(way), way.takes_s, rate(way.rate()))
-}
-
-/// The steps of a way, of several each with its seconds, if the record has them.
-fn steps(way: &Way) -> String {
-    if way.each_s.len() != way.steps.len() || way.steps.len() < 2 {
-        return way.steps.join(", ");
-    }
-    let each = way.steps.iter().zip(&way.each_s);
-    each.map(|(step, takes_s)| format!("{step} ({takes_s:.1} s)")).collect::<Vec<_>>().join(", ")
-}
-
-/// Three digits that count.
-fn rate(rate: f64) -> String {
-    let digits = if rate > 0.0 { (2.0 - rate.log10().floor()).clamp(1.0, 8.0) as usize } else { 1 };
-    format!("{rate:.digits$}")
-}
-
-/// Where a plan's way stands among all, by what is gained a second.
-fn compared(
-    chapter: &Chapter,
-    weighed: &Weighed,
-    chosen: &Way,
-    asked: &Asked<'_>,
-    named: &mut Named,
-) -> String {
-    let all = weighed.open;
-    let ratio = |o: &Way| o.rate() / chosen.rate();
-    let better: Vec<&Way> = weighed.others.iter().filter(|o| ratio(o) > 1.0 + ALIKE).collect();
-    let mine = named.once(chosen);
-    if better.is_empty() {
-        let alike = weighed.others.iter().find(|o| ratio(o) >= 1.0 - ALIKE);
-        let next = weighed.others.iter().find(|o| ratio(o) < 1.0 - ALIKE);
-        let gains = match alike.filter(|o| ratio(o) > 1.0) {
-            Some(_) => "is among those that gain most a second",
-            None => "gains most a second",
-        };
-        let alike = alike.map(|o| format!(" About as good is {}.", named.once(o))).unwrap_or_default();
-        let next = next.map(|o| format!(" Next comes {}.", named.once(o))).unwrap_or_default();
-        return format!("of {all} ways to get further, {mine} {gains}.{alike}{next}");
-    }
-    let more = if better.len() >= MOST_KEPT { "at least " } else { "" };
-    let many = match better.len() {
-        1 => "1 gains more a second:".into(),
-        n => format!("{more}{n} gain more a second, most of all"),
-    };
-    let first = named.once(better[0]);
-    let rule = match (&asked.policy, &chapter.cut) {
-        (Some(policy), _) => format!("The policy {policy} goes by its own rule."),
-        (None, Some(cut)) => {
-            format!("The planner's search was ended after {cut}: this is the best that it had by then.")
-        }
-        (None, None) => {
-            let alone = match enough(chapter, weighed, better[0], asked) {
-                Some(false) if chosen.reaches == Some(true) || better[0].takes_s < chapter.makespan_s => {
-                    " By what is hoped of it, that one would not be enough by itself."
-                }
-                Some(true) if better[0].takes_s < chapter.makespan_s => {
-                    " By what is hoped of it, that one would be enough, and sooner: the planner did not come upon it."
-                }
-                _ => "",
-            };
-            let whole = match chapter.makespan_s {
-                // Nothing in the domain takes time.
-                s if s <= 0.0 => "a whole plan".to_string(),
-                s => format!("the quickest whole plan that it finds, here {s:.1} s"),
-            };
-            format!(
-                "The planner counts to the end: it takes {whole}, not what gains most a second at first.{alone}"
-            )
-        }
-    };
-    format!("{mine} is one of {all} ways to get further; {many} {first}. {rule}")
-}
-
-/// Whether a way by itself would be enough if it brings what is hoped; none where nothing says so: it is only a part of what is to be done.
-fn enough(chapter: &Chapter, weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
-    // That a part is not the whole says nothing of it: it is held against plans that end with such a step.
-    let action = |step: &str| step.trim_start_matches('(').split([' ', ')']).next().map(str::to_string);
-    let last = |steps: &[String]| steps.last().and_then(|step| action(bare(step)));
-    let is_alike = || last(&way.steps) == last(&chapter.steps);
-    match way.reaches {
-        Some(true) => return Some(true),
-        Some(false) if is_alike() => return Some(false),
-        _ => {}
-    }
-    let [only] = weighed.numbers.as_slice() else { return None };
-    let wanted = asked.wanted(&only.name)?;
-    Some(if only.then >= only.now { only.now + way.gains >= wanted } else { only.now - way.gains <= wanted })
-}
-
-/// The quickest way, if it is another, and why it was not taken.
-fn quickest(
-    chapter: &Chapter,
-    weighed: &Weighed,
-    chosen: &Way,
-    asked: &Asked<'_>,
-    named: &mut Named,
-) -> Option<String> {
-    let other = weighed.others.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s))?;
-    let is_whole_search = chapter.cut.is_none();
-    // Where what is done is not enough either, that says nothing against another.
-    let would_do = enough(chapter, weighed, other, asked).filter(|enough| *enough || is_whole_search);
-    // Of what was named as better and enough it has been said.
-    let is_said =
-        would_do == Some(true) && asked.policy.is_none() && is_whole_search && named.0.contains(&other.steps);
-    if other.takes_s > chosen.takes_s - 0.1 || is_said {
-        return None;
-    }
-    let but = match would_do {
-        Some(true) if asked.policy.is_none() && is_whole_search => {
-            ", and by what is hoped of it would be enough: the planner did not come upon it"
-        }
-        Some(false) => ", but by what is hoped of it would not be enough by itself",
-        _ if other.gains < chosen.gains => ", but gains less",
-        _ => ", and gains no less: the rest of the plan counts as well",
-    };
-    Some(format!("{} is the quickest{but}.", named.once(other)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::weigh::Whole;
+    use crate::weigh::{Way, Weighed, Whole};
 
     fn way(step: &str, takes_s: f64, gains: f64, reaches: Option<bool>) -> Way {
         Way { steps: vec![step.into()], each_s: vec![takes_s], takes_s, gains, reaches, ..Way::default() }
@@ -624,6 +296,6 @@ mod tests {
             ],
         );
         check(None, &[], Some("9 states"), &["without a plan that it expected to reach the goal"]);
-        check(None, &[], None, &["nothing was compared"]);
+        check(None, &[], None, &["Nothing was compared"]);
     }
 }

@@ -54,6 +54,16 @@ pub struct Totals {
     pub geometry_s: f64,
 }
 
+/// What came of a choice of the world.
+enum Taken {
+    /// It is the plan now.
+    Up,
+    /// There is nothing to choose, and why.
+    Nothing(String),
+    /// The planner is to say.
+    LeftToPlanner,
+}
+
 /// How a call went: the part that was reached, and how that ended.
 type Performed = (usize, Result<(), SkillFailure>);
 
@@ -147,32 +157,57 @@ impl<'a> Agent<'a> {
         because: String,
     ) -> Result<Option<Ended>, CommandError> {
         world.planned();
-        loop {
-            match world.choice(round)? {
-                Choice::Nothing(why) => return Ok(Some(Ended::Undecided(why))),
-                Choice::Steps(plan) => return self.intend(round, plan, because, Vec::new()).map(|()| None),
-                Choice::Planner => break,
-                Choice::Towards { task, then } => match self.plan(&task, round)? {
-                    Planned::Solved { plan, statistics } => {
-                        self.adopt(round, one_then(plan, then), &statistics, because)?;
-                        return Ok(None);
-                    }
-                    _ => world.bar(),
-                },
-            }
+        match self.take_up(world, round, &because, Vec::new(), World::choice)? {
+            Taken::Up => return Ok(None),
+            Taken::Nothing(why) => return Ok(Some(Ended::Undecided(why))),
+            Taken::LeftToPlanner => {}
         }
         match self.plan(&round.task, round)? {
             Planned::Unsolvable { why, .. } => return Ok(Some(Ended::NoPlan(why.to_string()))),
             Planned::Solved { plan, statistics } => self.adopt(round, plan, &statistics, because)?,
             Planned::OutOfTime { best, statistics } | Planned::OutOfMemory { best, statistics } => {
-                let because = format!("{because}; the search ended after {MOST_EVALUATED} states");
-                let plan = best.or_else(|| world.fallback(round));
-                let why = || format!("the search ended after {MOST_EVALUATED} states");
-                let Some(plan) = plan else { return Ok(Some(Ended::Undecided(why()))) };
-                self.adopt(round, plan, &statistics, because)?;
+                let ended = format!("the search ended after {MOST_EVALUATED} states");
+                let because = format!("{because}; {ended}");
+                match best {
+                    Some(plan) => self.adopt(round, plan, &statistics, because)?,
+                    None => {
+                        match self.take_up(world, round, &because, asked_of(&statistics), World::fallback)? {
+                            Taken::Up => {}
+                            _ => return Ok(Some(Ended::Undecided(ended))),
+                        }
+                    }
+                }
             }
         }
         Ok(None)
+    }
+
+    /// Takes up what the world chooses.
+    fn take_up<'w>(
+        &mut self,
+        world: &mut World<'w>,
+        round: &Round,
+        because: &str,
+        calls: Vec<(String, u64)>,
+        choose: fn(&mut World<'w>, &Round) -> Result<Choice, WorldError>,
+    ) -> Result<Taken, CommandError> {
+        loop {
+            match choose(world, round)? {
+                Choice::Nothing(why) => return Ok(Taken::Nothing(why)),
+                Choice::Planner => return Ok(Taken::LeftToPlanner),
+                Choice::Steps(plan) => {
+                    self.intend(round, plan, because.into(), calls)?;
+                    return Ok(Taken::Up);
+                }
+                Choice::Towards { task, then } => match self.plan(&task, round)? {
+                    Planned::Solved { plan, statistics } => {
+                        self.adopt(round, one_then(plan, then), &statistics, because.into())?;
+                        return Ok(Taken::Up);
+                    }
+                    _ => world.bar(),
+                },
+            }
+        }
     }
 
     /// Asks the planner, and notes how long it took.
@@ -202,9 +237,7 @@ impl<'a> Agent<'a> {
         statistics: &Statistics,
         because: String,
     ) -> Result<(), CommandError> {
-        let calls = statistics.attachments.iter();
-        let calls = calls.map(|(name, c)| (name.clone(), c.calls + c.relaxed)).collect();
-        self.intend(round, plan, because, calls)
+        self.intend(round, plan, because, asked_of(statistics))
     }
 
     /// Takes a plan up and says so.
@@ -445,4 +478,9 @@ impl<'a> Agent<'a> {
 /// Does the goal hold now, with nothing more to do?
 fn reached(round: &Round) -> bool {
     descry_planner::monitor(&round.task, &round.attachments, &Plan::default()).is_ok()
+}
+
+/// How often each attachment was asked.
+fn asked_of(statistics: &Statistics) -> Vec<(String, u64)> {
+    statistics.attachments.iter().map(|(name, c)| (name.clone(), c.calls + c.relaxed)).collect()
 }

@@ -1,6 +1,7 @@
 //! Why a run went as it did, from its record alone, in plain sentences: why each plan was made and why it was this one, what came of it,
 //! and what the verdict rests on. What the record does not say is said not to be known.
 
+mod brief;
 mod chapters;
 mod looks;
 mod numbers;
@@ -35,6 +36,8 @@ pub struct Explanation {
     pub summary: Vec<String>,
     /// What was wanted, and how to read what follows.
     pub asked: Vec<String>,
+    /// How to read the figures.
+    pub reading: Vec<String>,
     /// The plans, one after the other.
     pub plans: Vec<Told>,
     /// What the verdict rests on.
@@ -56,6 +59,8 @@ pub struct Told {
     pub intent: Vec<String>,
     /// Why this and nothing else.
     pub why: Vec<String>,
+    /// The same with all figures: what each way to get further takes and gains.
+    pub figures: Vec<String>,
     /// What came of it.
     pub outcome: Vec<String>,
     /// Which of its steps were carried out, and why the others were not.
@@ -88,18 +93,21 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let summary = summary::of(header, report, &chapters, states.left_s(), &name);
     let summary = summary.iter().map(|line| saying.say(line)).collect();
     let mut said = said(header, &asked, states.given_s(), &saying);
+    let mut reading = Vec::new();
     if chapters.iter().any(|c| c.weighed.as_ref().is_some_and(|w| w.chosen.is_some())) {
         said.extend(domain.as_ref().and_then(|domain| numbers(domain, &chapters, &saying)));
         said.extend(domain.as_ref().and_then(|domain| poses(domain, &header.settings.robot)));
-        said.push(WAYS.into());
-        said.extend(in_vain);
+        said.push(OTHERWISE.into());
+        said.extend(in_vain.as_ref().map(|_| COUNTED.to_string()));
+        reading.push(WAYS.into());
+        reading.extend(in_vain);
     }
     let not_there = domain.as_ref().map(|domain| domain.config.thresholds.not_there);
     let negligible = domain.as_ref().map(|domain| domain.config.thresholds.remaining);
     let words = verdict::Words { meanings: &meanings, name: &name, not_there, negligible };
     let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
     let verdict = verdict.iter().map(|line| saying.say(line)).collect();
-    Ok(Explanation { summary, asked: said, plans, verdict, lost })
+    Ok(Explanation { summary, asked: said, reading, plans, verdict, lost })
 }
 
 /// How things stood after each look, with when that was on the body's clock; nothing of a record that does not say. `goal` is in PDDL.
@@ -118,7 +126,15 @@ impl Told {
     fn said(self, saying: &Saying) -> Self {
         let all = |lines: Vec<String>| lines.iter().map(|line| saying.say(line)).collect();
         let (cause, done) = (saying.say(&self.cause), saying.say(&self.done));
-        Told { cause, done, intent: all(self.intent), why: all(self.why), outcome: all(self.outcome), ..self }
+        Told {
+            cause,
+            done,
+            intent: all(self.intent),
+            why: all(self.why),
+            figures: all(self.figures),
+            outcome: all(self.outcome),
+            ..self
+        }
     }
 }
 
@@ -209,8 +225,14 @@ fn numbers(domain: &Domain, chapters: &[chapters::Chapter], saying: &Saying) -> 
 const WAYS: &str = "A way to get further is what may be done next, up to the first step that may bring the numbers nearer to \
                     what is wanted. In brackets behind it: by how much it is, of all numbers together, in how many \
                     seconds, and how much that is a second; behind its steps their seconds. What is hoped for is what \
-                    is reckoned with if what is looked for is there: a look may show more, or less. The rest of the plan behind \
-                    another way is the plan's own, with what the way has otherwise put in its place, as far as it is needed.";
+                    is reckoned with if what is looked for is there: a look may show more, or less.";
+
+/// What other ways are told with.
+const OTHERWISE: &str = "What a plan would come to that begins otherwise is told with the rest of the plan behind it, as far as it \
+                         can follow and is needed.";
+/// What seconds mean where more are counted than pass.
+const COUNTED: &str = "Where it is unlikely that a look finds something, the planner counts more seconds for it than it takes, so that \
+                       what is likely comes first (--figures says how).";
 
 /// What a run was asked, as far as plans depend on it.
 struct Asked<'a> {
@@ -256,24 +278,32 @@ fn said(header: &Header, asked: &Asked<'_>, given_s: Option<f64>, saying: &Sayin
     said
 }
 
+impl Explanation {
+    /// It as a text of lines of 80 letters, with all figures or in short.
+    pub fn text(&self, has_figures: bool) -> String {
+        const WIDTH: usize = 80;
+        let all = |lines: &[String], first: &str| -> String {
+            lines.iter().map(|line| wrapped(line, first, WIDTH) + "\n").collect()
+        };
+        let mut text = wrapped(&self.summary.join(" "), "", WIDTH) + "\n\n" + &all(&self.asked, "");
+        if has_figures {
+            text += &all(&self.reading, "");
+        }
+        for plan in &self.plans {
+            text += &format!("\nPlan {}, at {:.1} s\n", plan.round, plan.at_s);
+            text += &all(std::slice::from_ref(&plan.cause), "  because  ");
+            text += &all(&plan.intent, "  do       ");
+            text += &all(if has_figures { &plan.figures } else { &plan.why }, "  why      ");
+            text += &all(&plan.outcome, "  then     ");
+            text += &all(std::slice::from_ref(&plan.done), "  done     ");
+        }
+        text += &format!("\nWhat the verdict rests on\n{}", all(&self.verdict, "  - "));
+        text + &all(&self.lost, "lost: ")
+    }
+}
+
 impl std::fmt::Display for Explanation {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        const WIDTH: usize = 80;
-        let all = |f: &mut std::fmt::Formatter<'_>, lines: &[String], first: &str| {
-            lines.iter().try_for_each(|line| writeln!(f, "{}", wrapped(line, first, WIDTH)))
-        };
-        writeln!(f, "{}\n", wrapped(&self.summary.join(" "), "", WIDTH))?;
-        all(f, &self.asked, "")?;
-        for plan in &self.plans {
-            writeln!(f, "\nPlan {}, at {:.1} s", plan.round, plan.at_s)?;
-            writeln!(f, "{}", wrapped(&plan.cause, "  because  ", WIDTH))?;
-            all(f, &plan.intent, "  do       ")?;
-            all(f, &plan.why, "  why      ")?;
-            all(f, &plan.outcome, "  then     ")?;
-            writeln!(f, "{}", wrapped(&plan.done, "  done     ", WIDTH))?;
-        }
-        writeln!(f, "\nWhat the verdict rests on")?;
-        all(f, &self.verdict, "  - ")?;
-        all(f, &self.lost, "lost: ")
+        f.write_str(&self.text(false))
     }
 }

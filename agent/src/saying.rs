@@ -13,6 +13,11 @@ use crate::run::Beginning;
 /// What a line of `[said]` is about: the parameters, in their order, with their types.
 type Form = (Vec<(String, String)>, String);
 
+/// What stands behind an expression that does not hold.
+const DOES_NOT_HOLD: &str = " does not hold";
+/// What stands behind one that would not, at the end of what is told.
+pub const WOULD_NOT_HOLD: &str = " would not hold";
+
 /// How a domain says what is written in PDDL.
 #[derive(Debug, Default)]
 pub struct Saying {
@@ -68,15 +73,17 @@ impl Saying {
                 rest = &rest[1..];
                 continue;
             };
-            let is_not = after.strip_prefix(" does not hold");
-            let said = match is_not {
-                Some(_) => self.denied(&expression, &[]),
-                None => self.told(&expression, &[]),
+            let is_not = after.strip_prefix(DOES_NOT_HOLD);
+            let would_not = after.strip_prefix(WOULD_NOT_HOLD);
+            let said = match (is_not, would_not) {
+                (None, None) => self.told(&expression, &[]),
+                (_, None) => self.denied(&expression, &[]),
+                (_, Some(_)) => self.denied(&expression, &[]).map(|said| would_be(&said)),
             };
             match said {
                 Some(said) => {
                     out.push_str(&said);
-                    rest = is_not.unwrap_or(after);
+                    rest = is_not.or(would_not).unwrap_or(after);
                 }
                 None => {
                     out.push_str(&rest[..1]);
@@ -255,6 +262,13 @@ fn expression(text: &str) -> Option<(Written<'_>, &str)> {
     }
 }
 
+/// What is not so, as what would not be so.
+fn would_be(denied: &str) -> String {
+    const TOLD: [(&str, &str); 2] =
+        [("there is no ", "there would be no "), ("it is not so ", "it would not be so ")];
+    TOLD.iter().fold(denied.to_string(), |said, (is, would)| said.replacen(is, would, 1))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -274,6 +288,10 @@ mod tests {
         check(
             "(exists (?s) (>= (presence cup-a ?s) 0.8)) does not hold",
             "there is no surface for which the certainty that cup A stands on it is at least 0.8",
+        );
+        check(
+            "(exists (?s) (>= (presence cup-a ?s) 0.8)) would not hold",
+            "there would be no surface for which the certainty that cup A stands on it is at least 0.8",
         );
         check(
             "(and (>= (completeness cup) 0.8) (forall (?t - thing) (imply (is ?t cup) (on ?t kitchen-table))))",

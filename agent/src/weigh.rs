@@ -1,7 +1,8 @@
 //! What a plan was weighed against: the same steps with other objects, what each would take and gain, by the answers of the calls
 //! that the plan itself rests on. It is kept beside the plan, so that it can be told later why it was this one.
 
-use std::cmp::Ordering;
+mod steps;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -15,6 +16,7 @@ use serde_json::Value;
 
 use crate::compared::{self, Compared};
 use crate::exit::CommandError;
+use steps::{Instead, call, joined, words};
 
 /// The blob under which it is kept beside the event of a plan.
 pub const BLOB: &str = "weighed";
@@ -276,7 +278,12 @@ impl<'r> Scale<'r> {
             // What only looks again need not be done where one look is enough.
             let begins = (0..rest.len()).filter(|&n| n == 0 || rest[n - 1].action == last.action);
             for (steps, n) in begins.flat_map(|n| [(&exchanged[n..], n), (&rest[n..], n)]) {
-                ends.extend((n > 0).then(|| steps.to_vec()));
+                if n > 0 {
+                    // What is done from where the plan looks last is done from where the other does.
+                    let there = Instead::of(&rest[n - 1], last);
+                    ends.push(rest[n..].iter().map(|step| there.in_step(step)).collect());
+                    ends.push(steps.to_vec());
+                }
                 let pairs = last
                     .arguments
                     .iter()
@@ -286,11 +293,16 @@ impl<'r> Scale<'r> {
                 ends.extend(led.map(|bridge| [std::slice::from_ref(&bridge), steps].concat()));
             }
         }
-        let wholes = ends.iter().filter_map(|end| self.whole(&[&other.steps, end.as_slice()].concat()));
-        let rank = |whole: &Whole| (!whole.reaches, whole.takes_s);
-        let best = wholes.min_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal));
-        match best.filter(|whole| whole.reaches || whole.steps > other.steps.len()) {
-            Some(whole) => (Some(whole), None),
+        let all = ends.iter().map(|end| [&other.steps, end.as_slice()].concat());
+        let all: Vec<_> = all.filter_map(|steps| Some((self.whole(&steps)?, steps))).collect();
+        let quickest = all.iter().map(|(whole, _)| *whole).filter(|whole| whole.reaches);
+        if let Some(whole) = quickest.min_by(|a, b| a.takes_s.total_cmp(&b.takes_s)) {
+            return (Some(whole), None);
+        }
+        let longer = all.iter().map(|(_, steps)| steps).filter(|steps| steps.len() > other.steps.len());
+        let farthest = longer.filter_map(|steps| Some((self.way(steps)?.gains, steps)));
+        match farthest.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((_, steps)) => (None, self.stuck(steps)),
             None => (None, self.short_of(other, rest)),
         }
     }
@@ -299,8 +311,11 @@ impl<'r> Scale<'r> {
     /// else the first that is in the way of all of it.
     fn short_of(&self, other: &Other, rest: &[Step]) -> Option<String> {
         let is_look = |step: &Step| other.steps.last().is_some_and(|last| last.action == step.action);
-        let looked = rest.iter().rposition(is_look).map_or(0, |n| n + 1);
-        let needed: Vec<Step> = rest[looked..].iter().map(|step| other.instead.in_step(step)).collect();
+        let looked = rest.iter().rposition(is_look);
+        let there = looked.and_then(|n| Some(Instead::of(&rest[n], other.steps.last()?)));
+        let there = there.as_ref().unwrap_or(&other.instead);
+        let needed = &rest[looked.map_or(0, |n| n + 1)..];
+        let needed: Vec<Step> = needed.iter().map(|step| there.in_step(step)).collect();
         let exchanged: Vec<Step> = rest.iter().map(|step| other.instead.exchanged(step)).collect();
         let stuck = |end: &Vec<Step>| self.stuck(&[&other.steps, end.as_slice()].concat());
         let by_number = stuck(&needed).filter(|why| why.contains("(>= "));
@@ -459,8 +474,7 @@ impl<'r> Scale<'r> {
 
     /// Steps with another in the place of one: at once, as the plan leads there, or by one step from where it begins.
     fn in_place(&self, steps: &[Step], at: usize, other: &Step) -> Option<Other> {
-        let pairs = steps[at].arguments.iter().zip(&other.arguments).filter(|(old, new)| old != new);
-        let instead = Instead(pairs.map(|(old, new)| (old.clone(), new.clone())).collect());
+        let instead = Instead::of(&steps[at], other);
         let mut all: Vec<Step> = steps.iter().map(|step| instead.in_step(step)).collect();
         all[at] = other.clone();
         let led = |bridge: Step| std::iter::once(bridge).chain(all[at..].iter().cloned()).collect::<Vec<_>>();
@@ -495,56 +509,6 @@ struct Other {
     way: Way,
 }
 
-/// Objects, and which are in their place.
-struct Instead(Vec<(String, String)>);
-
-impl Instead {
-    /// A step with the others in it.
-    fn in_step(&self, step: &Step) -> Step {
-        self.put(step, |name| self.0.iter().find(|(old, _)| old == name).map(|(_, new)| new))
-    }
-
-    /// A step with the others in it, and those in the place of the others: what comes first otherwise comes later then.
-    fn exchanged(&self, step: &Step) -> Step {
-        let back = |name: &str| self.0.iter().find(|(_, new)| new == name).map(|(old, _)| old);
-        self.put(step, |name| {
-            self.0.iter().find(|(old, _)| old == name).map(|(_, new)| new).or_else(|| back(name))
-        })
-    }
-
-    fn put<'a>(&self, step: &Step, by: impl Fn(&str) -> Option<&'a String>) -> Step {
-        let arguments = step.arguments.iter().map(|name| by(name).unwrap_or(name).clone());
-        Step { arguments: arguments.collect(), ..step.clone() }
-    }
-}
-
-/// Steps of which some that lead on from each other, by the same action from one object to another, are one; none if there are none.
-fn joined(steps: &[Step]) -> Option<Vec<Step>> {
-    let mut all: Vec<Step> = Vec::new();
-    for step in steps {
-        match (all.last_mut(), step.arguments.as_slice()) {
-            (Some(Step { action, arguments, .. }), [from, to])
-                if *action == step.action && arguments.len() == 2 && arguments[1] == *from =>
-            {
-                arguments[1] = to.clone();
-            }
-            _ => all.push(step.clone()),
-        }
-    }
-    all.retain(|step| !matches!(step.arguments.as_slice(), [from, to] if from == to));
-    (all.len() < steps.len()).then_some(all)
-}
-
-/// The words of a text in PDDL.
-fn words(text: &str) -> Vec<&str> {
-    text.split(|c: char| c.is_whitespace() || "()".contains(c)).filter(|w| !w.is_empty()).collect()
-}
-
-fn call(step: &Step) -> String {
-    let arguments: String = step.arguments.iter().map(|a| format!(" {a}")).collect();
-    format!("({}{arguments})", step.action)
-}
-
 /// Those that gain most a second, and of the others the quickest and the one that gains most.
 fn kept(mut all: Vec<Other>) -> Vec<Other> {
     let rate = |a: &Other, b: &Other| b.way.rate().total_cmp(&a.way.rate());
@@ -557,29 +521,4 @@ fn kept(mut all: Vec<Other>) -> Vec<Other> {
         all.extend(by(&rest, of).map(|n| rest.remove(n)));
     }
     all
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn drives_that_lead_on_from_each_other_could_be_one() {
-        let read = |text: &str| {
-            let step = |call: &str| {
-                let mut words = call.split(' ').map(str::to_string);
-                let action = words.next().expect("an action");
-                Step { start_s: None, action, arguments: words.collect(), duration_s: 1.0 }
-            };
-            text.split(", ").filter(|call| !call.is_empty()).map(step).collect::<Vec<_>>()
-        };
-        let check = |steps: &str, expected: Option<&str>| {
-            assert_eq!(joined(&read(steps)), expected.map(read), "{steps}");
-        };
-        check("move a b, look b t", None);
-        check("move a b, look b t, move b c", None);
-        check("move a b, move b c, look c t", Some("move a c, look c t"));
-        check("move a b, move b a, look a t", Some("look a t"));
-        check("move a b, open b d, move b c", None);
-    }
 }

@@ -22,16 +22,24 @@ fn check(arguments: &[&str], exit: i32, words: &[&str]) -> Value {
     explained(folder.path(), words)
 }
 
+/// The explanation of a run in short and with all figures, of which each is whole; the words that they must have.
 fn explained(folder: &Path, words: &[&str]) -> Value {
-    let said = binary::outcome(folder, &["explain", "run"]);
-    let text = String::from_utf8_lossy(&said.stdout).into_owned();
-    assert!(said.status.success(), "{text}\n{}", String::from_utf8_lossy(&said.stderr));
-    // A line holds 80 letters; what stands in one piece may be longer.
-    let long = text.lines().find(|l| l.chars().count() > 80 && l.trim().contains(' ') && !l.contains('('));
-    assert_eq!(long, None, "{text}");
-    let one_line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let told = [&["explain", "run"][..], &["explain", "run", "--figures"]].map(|arguments| {
+        let said = binary::outcome(folder, arguments);
+        let text = String::from_utf8_lossy(&said.stdout).into_owned();
+        assert!(said.status.success(), "{text}\n{}", String::from_utf8_lossy(&said.stderr));
+        // A line holds 80 letters; what stands in one piece may be longer.
+        let long =
+            text.lines().find(|l| l.chars().count() > 80 && l.trim().contains(' ') && !l.contains('('));
+        assert_eq!(long, None, "{text}");
+        text
+    });
+    let [brief, figures] = &told;
+    assert!(brief.len() <= figures.len(), "{brief}");
+    assert_eq!(brief.matches("\nPlan ").count(), figures.matches("\nPlan ").count(), "{brief}");
+    let one_line = told.concat().split_whitespace().collect::<Vec<_>>().join(" ");
     for word in words {
-        assert!(one_line.contains(word), "{word:?} is not in\n{text}");
+        assert!(one_line.contains(word), "{word:?} is not in\n{brief}\n{figures}");
     }
     binary::check(folder, &["explain", "run", "--json"], 0)
 }
@@ -43,6 +51,9 @@ fn what_was_found_is_explained() {
         0,
         &[
             "the run began, and there was no plan",
+            "of 9 ways to begin, this makes the quickest whole plan that was found: ",
+            "begun otherwise: looking at the table from table-",
+            " would not be enough (the certainty of where cup A stands would be 0.",
             "why driving to table-5 (",
             " s), looking at the table from table-5 (2.0 s) [+",
             "is one of 9 ways to get further. With the rest of the plan it takes",
@@ -126,7 +137,8 @@ fn what_is_not_there_is_explained() {
             "% of the table from ",
             " places.",
             "the probability that it is there after all",
-            "no plan would still bring it about: it was asked",
+            "no plan would still bring it about: it was asked whether ",
+            " times, and each time the answer was no",
         ],
     );
 }
@@ -258,7 +270,7 @@ fn a_look_that_would_come_too_late_is_not_gone_for() {
     assert_eq!(run.status.code(), Some(1), "{}", String::from_utf8_lossy(&run.stderr));
     let told = explained(folder.path(), &["The planner's search was ended after"]);
     for plan in told["plans"].as_array().expect("plans") {
-        let why = plan["why"][0].as_str().expect("a reason");
+        let why = plan["figures"][0].as_str().expect("a reason");
         let takes = why.split_once("[+").and_then(|(_, gains)| gains.split_once(" in ")).expect("a way").1;
         let takes_s: f64 = takes.split(' ').next().and_then(|s| s.parse().ok()).expect("seconds");
         assert!(plan["at_s"].as_f64().expect("a time") + takes_s <= 25.0, "{plan}");

@@ -21,7 +21,7 @@ use crate::abilities::learning::news::News;
 use crate::abilities::searching::candidates;
 use crate::abilities::searching::perceive::{self, Eyes};
 pub use crate::abilities::searching::policies::Chooser;
-use crate::abilities::searching::policies::{self, By};
+use crate::abilities::searching::policies::{self, By, Look};
 use crate::abilities::searching::reasons;
 use crate::abilities::surveying::chart::Chart;
 use crate::actions::{self, Carried, Grounded};
@@ -38,6 +38,8 @@ use grounds::{asked_for, doors, expected, kinds, known_by_map, members, no_surfa
 
 /// How the reason begins why a step failed that came to its end, but not as the domain says.
 pub const NOT_AS_SAID: &str = "it has ended, but not as the domain says: ";
+/// Why there is nothing to choose.
+const NOTHING_LEFT: &str = "no look that is left promises to settle anything";
 
 /// What a world is made of.
 #[derive(Clone)]
@@ -312,8 +314,14 @@ impl<'a> World<'a> {
             _ => return Ok(Choice::Planner),
         };
         let Some(look) = policies::next(&mut **policy, s, &self.barred) else {
-            return Ok(Choice::Nothing("no look that is left promises to settle anything".into()));
+            return Ok(Choice::Nothing(NOTHING_LEFT.into()));
         };
+        self.head_for(round, look)
+    }
+
+    /// A look that was chosen: at once, or by a plan that opens what is shut on the way.
+    fn head_for(&mut self, round: &Round, look: Look) -> Result<Choice, WorldError> {
+        let s = &round.situation;
         self.heading_for = Some((look.from, look.on));
         if s.can_drive_to(look.from) {
             return Ok(Choice::Steps(reasons::look(s, look.from, look.on)));
@@ -336,10 +344,19 @@ impl<'a> World<'a> {
         self.heading_for.is_some()
     }
 
-    /// A step that is surely no waste, for when the planner has run out of states; none if there is none.
-    pub fn fallback(&self, round: &Round) -> Option<Plan> {
+    /// What is surely no waste, for when the planner has run out of states: a step, or else a look behind what is shut.
+    ///
+    /// # Errors
+    /// [`WorldError::Domain`] if the domain has no word for being at a pose.
+    pub fn fallback(&mut self, round: &Round) -> Result<Choice, WorldError> {
+        let s = &round.situation;
+        self.heading_for = None;
         let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.fallback);
-        own.map_or_else(|| reasons::one_look(&round.situation), |fallback| fallback(&round.situation))
+        if let Some(plan) = own.map_or_else(|| reasons::one_look(s), |fallback| fallback(s)) {
+            return Ok(Choice::Steps(plan));
+        }
+        let look = policies::behind(s, &self.barred).filter(|_| s.held.is_none());
+        look.map_or_else(|| Ok(Choice::Nothing(NOTHING_LEFT.into())), |look| self.head_for(round, look))
     }
 
     /// A plan was made.

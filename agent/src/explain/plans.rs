@@ -4,7 +4,7 @@ use descry_domains::note::Note;
 
 use super::chapters::{Chapter, Deed, bare};
 use super::wording::{capital, listed, reasons, share, share_of};
-use super::{Asked, Told, outcomes, rivals};
+use super::{Asked, Told, brief, outcomes, rivals};
 use crate::standing::{InDoubt, Of};
 use crate::weigh::Expected;
 
@@ -26,7 +26,8 @@ fn tell(chapter: &Chapter, before: Option<&Chapter>, after: Option<&Chapter>, as
         at_s: chapter.at_s,
         cause: cause(chapter, before, asked),
         intent: intent(chapter, asked),
-        why: rivals::why(chapter, asked),
+        why: brief::why(chapter, asked),
+        figures: rivals::why(chapter, asked),
         outcome: outcomes::of(chapter, &asked.goal, asked.name)
             .into_iter()
             .map(|outcome| outcome.said)
@@ -225,7 +226,7 @@ mod tests {
             counts_in_vain: false,
         };
         let told = tell(&chapter, None, None, &asked);
-        let said = [told.intent, told.why].concat().join(" ");
+        let said = [told.intent, told.figures].concat().join(" ");
         words.iter().for_each(|word| assert!(said.contains(word), "{word:?} is not in {said}"));
     }
 
@@ -277,7 +278,7 @@ mod tests {
             check(far(), &[other], None, &[first, "(go near)", "gains most a second", said]);
         }
         let other = whole(way("(go farther)", 9.0, 1.0, Some(false)), 11.0, 2, true);
-        let said = "gains most a second of the others and gains most in all; to its end";
+        let said = "gains about as much a second and gains most in all; to its end";
         check(far(), &[other], Some("9 states"), &[said, "ended after 9 states: this is the best"]);
         // Of a record that does not say what would be enough, the numbers say it.
         check(

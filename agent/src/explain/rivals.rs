@@ -4,13 +4,14 @@
 use super::Asked;
 use super::chapters::{Chapter, bare};
 use super::wording::{listed, reasons, share};
+use crate::saying::WOULD_NOT_HOLD;
 use crate::standing::{FirstLook, Seen};
 use crate::weigh::{Way, Weighed};
 
 /// Rates nearer to each other than this share are alike.
 const ALIKE: f64 = 0.02;
 /// What takes less longer than this, seconds, takes as long.
-const LONGER_S: f64 = 0.05;
+pub const LONGER_S: f64 = 0.05;
 /// As many ways as are kept in the order of their rates.
 const MOST_KEPT: usize = crate::weigh::MOST_KEPT;
 
@@ -31,14 +32,7 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
                 .into(),
         ];
     };
-    let longer = weighed.shorter.as_ref().map(|way| {
-        format!(
-            "{} would do the same in {:.1} s instead of {:.1} s: the planner did not come upon that.",
-            steps(way),
-            way.takes_s,
-            chosen.takes_s
-        )
-    });
+    let longer = longer(weighed, chosen);
     let through = weighed.through.as_ref().map(|way| {
         let against = against(way, chosen, asked).map(|against| format!("; {against}")).unwrap_or_default();
         format!("By another way, with a step more: {}{against}.", figures(way))
@@ -51,6 +45,15 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     let left = left(chapter, weighed, chosen, asked);
     let first = first_looks(chapter).filter(|_| asked.counts_in_vain);
     said.into_iter().chain(left).chain(longer).chain(through).chain(first).collect()
+}
+
+/// What the planner has missed: several of its steps could be one.
+pub fn longer(weighed: &Weighed, chosen: &Way) -> Option<String> {
+    let way = weighed.shorter.as_ref()?;
+    let (steps, takes_s, chosen_s) = (steps(way), way.takes_s, chosen.takes_s);
+    Some(format!(
+        "{steps} would do the same in {takes_s:.1} s instead of {chosen_s:.1} s: the planner did not come upon that."
+    ))
 }
 
 /// Why a plan was made that the planner counted to its end: what the others would take to theirs. None where that is not known.
@@ -67,14 +70,24 @@ fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<
         figures(chosen),
         weighed.open
     );
+    let rivals = rivals(weighed, chosen).into_iter().map(|(way, roles)| {
+        let against = against(way, chosen, asked).map(|against| format!("; {against}")).unwrap_or_default();
+        format!("{} {}{against}.", figures(way), listed(&roles, roles.len()))
+    });
+    Some(std::iter::once(first).chain(rivals).collect())
+}
+
+/// The others that stand out, each with what it stands out by.
+pub fn rivals<'w>(weighed: &'w Weighed, chosen: &Way) -> Vec<(&'w Way, Vec<String>)> {
     let others = || weighed.others.iter();
     let rate = others().max_by(|a, b| a.rate().total_cmp(&b.rate()));
     let quickest = others().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s));
     let most = others().max_by(|a, b| a.gains.total_cmp(&b.gains));
     let is_more = |o: &&Way, of: fn(&Way) -> f64| of(o) > of(chosen) * (1.0 + ALIKE);
-    let rate_role = match rate.filter(|o| is_more(o, Way::rate)) {
-        Some(_) => "gains most a second",
-        None => "gains most a second of the others",
+    let rate_role = match rate.map(|o| o.rate() / chosen.rate()) {
+        Some(ratio) if ratio > 1.0 + ALIKE => "gains most a second",
+        Some(ratio) if ratio > 1.0 - ALIKE => "gains about as much a second",
+        _ => "gains most a second of the others",
     };
     let roles = [
         (rate, rate_role),
@@ -88,15 +101,11 @@ fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<
             None => rivals.push((way, vec![role])),
         }
     }
-    let rivals = rivals.into_iter().map(|(way, roles)| {
-        let against = against(way, chosen, asked).map(|against| format!("; {against}")).unwrap_or_default();
-        format!("{} {}{against}.", figures(way), listed(&roles, roles.len()))
-    });
-    Some(std::iter::once(first).chain(rivals).collect())
+    rivals
 }
 
 /// Why what was left of the plan before was not gone on with, where all that ended it was that it counts differently.
-fn left(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
+pub fn left(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
     let left =
         weighed.left.as_ref().filter(|_| reasons::reckoned(&chapter.because, asked.counts).is_some())?;
     let what = format!("what was left of plan {}", chapter.round - 1);
@@ -112,8 +121,9 @@ fn left(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -
 }
 
 /// Why steps would not do, as the monitor says it, of what is not so yet.
-fn would_be(stuck: &str, asked: &Asked<'_>) -> String {
-    reasons::missed(stuck, "would be", asked.counts).replacen(", and it is ", ", and it would be ", 1)
+pub fn would_be(stuck: &str, asked: &Asked<'_>) -> String {
+    let said = reasons::missed(stuck, "would be", asked.counts);
+    said.replacen(", and it is ", ", and it would be ", 1).replacen(" does not hold", WOULD_NOT_HOLD, 1)
 }
 
 /// How much longer something takes than what was chosen, as both are told.
@@ -194,7 +204,7 @@ fn against(other: &Way, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
 }
 
 /// What a way takes with the rest of the plan behind it, if it is expected to be enough then, seconds.
-fn whole_s(way: &Way) -> Option<f64> {
+pub fn whole_s(way: &Way) -> Option<f64> {
     way.whole.filter(|whole| whole.reaches).map(|whole| whole.takes_s)
 }
 

@@ -47,8 +47,8 @@ fn answer(report: Option<&Report>, plans: usize) -> String {
     };
     let verdict = report::words(report.verdict);
     let verdict = match &report.answer {
-        Some(answer) => format!("{answer} ({verdict})"),
-        None => verdict.to_string(),
+        Some(answer) if answer != verdict => format!("{answer} ({verdict})"),
+        _ => verdict.to_string(),
     };
     format!(
         "The answer after {}, {}, {:.1} m and {:.0} s: {verdict}: {}.",

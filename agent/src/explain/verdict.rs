@@ -1,7 +1,7 @@
 //! What the verdict of a run rests on: what is believed of what was asked for and by how many views, what was seen of where it may be,
 //! and what is left.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use descry_domains::answer::Verdict;
 use descry_domains::lexicon::symbol;
@@ -53,7 +53,8 @@ pub fn rests_on(
     let why = why.filter(|why| !why.is_empty()).unwrap_or(&report.why);
     let verdict = report::words(report.verdict);
     let verdict = match &report.answer {
-        Some(answer) => format!("the answer is {answer} ({verdict})"),
+        Some(answer) if answer != verdict => format!("the answer is {answer} ({verdict})"),
+        Some(answer) => format!("the answer is {answer}"),
         None => verdict.to_string(),
     };
     let mut said = vec![format!("{verdict}: {}.", reasons::no_plan(why, words.meanings))];
@@ -112,11 +113,14 @@ impl Looks {
 fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> {
     let mut tracks: Vec<&Track> = belief.tracks.iter().collect();
     let Some(name) = &report.object else {
+        let (strange, mut tracks): (Vec<&Track>, Vec<&Track>) =
+            tracks.into_iter().partition(|track| track.unknown > 1.0 - HARDLY);
         tracks.sort_by(|a, b| a.certainty().total_cmp(&b.certainty()));
         let mut said: Vec<String> = tracks.iter().take(MOST_NAMED).map(|t| object(t, None, words)).collect();
         if tracks.len() > MOST_NAMED {
             said.push(format!("{} of which it is surer.", count(tracks.len() - MOST_NAMED, "more object")));
         }
+        said.extend(surely_none(&strange, words));
         return said;
     };
     tracks.sort_by(|a, b| b.probability_of(name).total_cmp(&a.probability_of(name)));
@@ -136,6 +140,19 @@ fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> 
         (_, rest) => format!("{rest} other objects are surely not {name}."),
     });
     said
+}
+
+/// Objects of which it is sure that they are none of the known ones, by where they are.
+fn surely_none(strange: &[&Track], words: &Words<'_>) -> Option<String> {
+    let mut on: BTreeMap<&str, usize> = BTreeMap::new();
+    strange.iter().for_each(|track| *on.entry(&track.on).or_default() += 1);
+    let one = |(on, many): (&&str, &usize)| match *on {
+        "" => format!("{many} in the hand"),
+        on => format!("{many} on the {}", (words.name)(on)),
+    };
+    let all: Vec<String> = on.iter().map(one).collect();
+    let are = if strange.len() == 1 { "is" } else { "are" };
+    (!all.is_empty()).then(|| format!("{} {are} surely none of the known objects.", listed(&all, all.len())))
 }
 
 /// An object: what it is taken for, and by what.

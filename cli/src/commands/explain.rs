@@ -10,6 +10,9 @@ use descry_agent::exit::{CommandError, Exit};
 pub struct Arguments {
     /// The run's folder
     run: PathBuf,
+    /// With what each way to get further takes and gains, and what is counted for it
+    #[arg(long)]
+    figures: bool,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -28,7 +31,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     if arguments.json {
         input::print_json(&explained)?;
     } else {
-        input::print_text(explained.to_string().trim_end())?;
+        input::print_text(explained.text(arguments.figures).trim_end())?;
     }
     if let Some(damaged) = &damaged {
         input::narrate(&format!("descry: lost: {damaged}"));

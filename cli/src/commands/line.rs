@@ -77,7 +77,7 @@ const EXAMPLES: [(&str, &[&str]); 22] = [
     ),
     ("robot", &["descry robot check \"program:python3 robot.py\""]),
     ("show", &["descry show runs/mug", "descry show runs/mug --html mug.html"]),
-    ("explain", &["descry explain runs/mug", "descry explain runs/mug --json"]),
+    ("explain", &["descry explain runs/mug", "descry explain runs/mug --figures"]),
     ("replay", &["descry replay runs/mug", "descry replay runs/mug --speed 10"]),
     ("runs", &["descry runs", "descry runs elsewhere --json"]),
     (

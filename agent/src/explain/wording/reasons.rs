@@ -204,7 +204,10 @@ fn refused(part: &str, meanings: Meanings<'_>) -> Option<String> {
     Some(match (about, named + more.unwrap_or(0)) {
         (Some(about), 0) => format!("{before}asked {about}, the answer is {answer} for {first}]"),
         (Some(about), others) => {
-            format!("{before}it was asked {about}, and {} times the answer was {answer}", others + 1)
+            format!(
+                "{before}it was asked {about}, {} times, and each time the answer was {answer}",
+                others + 1
+            )
         }
         (None, 0) => format!("{before}{name} is {answer} for {first}]"),
         (None, others) => format!("{before}{name} is {answer} in {} cases", others + 1),
@@ -291,7 +294,7 @@ mod tests {
         let cases = [
             (
                 "the attachment of `w` said no to: [w a b], [w c d] and 5 more (with any of these answered otherwise there might be a plan)\nthe attachment of `v` said no to: [v x] (with any …)",
-                "it was asked whether it is worth it, and 7 times the answer was no; v is no for [v x]",
+                "it was asked whether it is worth it, 7 times, and each time the answer was no; v is no for [v x]",
             ),
             (
                 "it cannot be told, after 2 looks: the attachment of `w` said no to: [w x]",

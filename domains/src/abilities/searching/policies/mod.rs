@@ -174,6 +174,16 @@ pub fn next(
     if looks.is_empty() { None } else { policy.choose(situation, &looks) }
 }
 
+/// The look that is expected to settle most a second of those to which the body cannot drive before it has opened something; none if
+/// there is none that is not barred.
+pub fn behind(situation: &Situation, barred: &BTreeSet<(usize, usize)>) -> Option<Look> {
+    let is_behind =
+        |look: &Look| !situation.can_drive_to(look.from) && !barred.contains(&(look.from, look.on));
+    let looks: Vec<Look> =
+        open(situation).into_iter().filter(|look| look.gain > 0.0 && is_behind(look)).collect();
+    gain_per_second::GainPerSecond.choose(situation, &looks)
+}
+
 /// The look from where the body stands that is expected to settle most; none if it can take none there.
 pub fn here(situation: &Situation) -> Option<Look> {
     let looks: Vec<Look> = open(situation).into_iter().filter(|look| look.from == situation.at).collect();

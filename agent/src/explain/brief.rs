@@ -1,0 +1,101 @@
+//! Why a plan was this one, in short: what it takes as the planner counts, and what each rival would have taken instead.
+
+use super::Asked;
+use super::chapters::Chapter;
+use super::rivals::{self, LONGER_S, whole_s};
+use super::wording::{listed, share};
+use crate::standing::{Of, Seen};
+use crate::weigh::{Way, Weighed};
+
+/// Surfaces that are named; the rest are counted.
+const MOST_NAMED: usize = 3;
+
+/// Why this plan and not another, as far as the record says; where the planner did not count to the end, with all figures.
+pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
+    let known = chapter.weighed.as_ref().and_then(|weighed| {
+        let chosen = weighed.chosen.as_ref()?;
+        let whole_s = whole_s(chosen).filter(|_| asked.policy.is_none() && !weighed.others.is_empty())?;
+        Some((weighed, chosen, whole_s))
+    });
+    let Some((weighed, chosen, whole_s)) = known else { return rivals::why(chapter, asked) };
+    let of = format!("of {} ways to begin", weighed.open);
+    let first = match &chapter.cut {
+        Some(cut) => format!(
+            "{of}, this is the best whole plan that the planner had when its search was ended after {cut}: {whole_s:.1} s \
+             as it counts."
+        ),
+        None => format!(
+            "{of}, this makes the quickest whole plan that was found: {whole_s:.1} s as the planner counts."
+        ),
+    };
+    let mut said = vec![first];
+    said.extend(instead(weighed, chosen, whole_s, asked));
+    said.extend(rivals::left(chapter, weighed, chosen, asked));
+    said.extend(rivals::longer(weighed, chosen));
+    said.extend(unseen(chapter));
+    said
+}
+
+/// What the others that stand out would have come to.
+fn instead(weighed: &Weighed, chosen: &Way, whole_s: f64, asked: &Asked<'_>) -> Option<String> {
+    let through = weighed.through.iter().map(|way| (way, Vec::new()));
+    let rivals: Vec<&Way> =
+        rivals::rivals(weighed, chosen).into_iter().chain(through).map(|(way, _)| way).collect();
+    let all: Vec<String> = rivals
+        .iter()
+        .map(|way| format!("{} {}", called(way, chosen, &rivals), comes_to(way, whole_s, asked)))
+        .collect();
+    (!all.is_empty()).then(|| format!("begun otherwise: {}.", all.join("; ")))
+}
+
+/// A way by its last step, for which the others are; by all where that is another's last, too.
+fn called(way: &Way, chosen: &Way, rivals: &[&Way]) -> String {
+    let alike = rivals.iter().copied().chain([chosen]).filter(|other| other.steps.last() == way.steps.last());
+    match way.steps.last() {
+        Some(last) if alike.count() <= 1 => last.clone(),
+        _ => way.steps.join(", then "),
+    }
+}
+
+/// What a way comes to with the rest of the plan behind it.
+fn comes_to(way: &Way, whole_s: f64, asked: &Asked<'_>) -> String {
+    let stuck = way.stuck.as_deref().unwrap_or_default();
+    match way.whole {
+        Some(whole) if whole.reaches => match whole.takes_s - whole_s {
+            more_s if more_s.abs() <= LONGER_S => "would take as long".into(),
+            more_s if more_s > 0.0 => format!("would take {more_s:.1} s more"),
+            more_s => format!("would take {:.1} s less: the planner did not come upon that", -more_s),
+        },
+        Some(_) => "would not be enough".into(),
+        None if stuck.starts_with("the goal ") => {
+            let why = rivals::would_be(stuck, asked);
+            // What is wanted stands above; of a number how much it would be.
+            match why.split_once(", and ") {
+                Some((number, _)) => format!("would not be enough ({number})"),
+                None => "would not be enough".into(),
+            }
+        }
+        None if stuck.is_empty() => "could not be followed by the rest of the plan".into(),
+        None => {
+            format!("could not be followed by the rest of the plan: {}", rivals::would_be(stuck, asked))
+        }
+    }
+}
+
+/// Where a thing may be before anything was seen; later the looks say it.
+fn unseen(chapter: &Chapter) -> Option<String> {
+    let before = chapter.before.as_ref().filter(|_| chapter.round == 1)?;
+    let doubt = before.doubts.iter().find(|doubt| doubt.of == Of::Thing && doubt.seen.len() > 1)?;
+    let mut places: Vec<&Seen> = doubt.seen.iter().filter(|seen| seen.hidden > 0.0).collect();
+    places.sort_by(|a, b| b.hidden.total_cmp(&a.hidden));
+    let named =
+        places.iter().take(MOST_NAMED).map(|seen| format!("{} for the {}", share(seen.hidden), seen.on));
+    let named: Vec<String> = named.collect();
+    let more = match places.len().saturating_sub(MOST_NAMED) {
+        0 => String::new(),
+        n => format!("; as much or less for {n} more"),
+    };
+    (!named.is_empty()).then(|| {
+        format!("where {} may be before a first look: {}{more}.", doubt.about, listed(&named, named.len()))
+    })
+}

@@ -1,0 +1,85 @@
+//! Steps with other objects in them, and steps that could be one.
+
+use descry_planner::Step;
+
+/// Objects, each with the one in its place.
+pub struct Instead(pub Vec<(String, String)>);
+
+impl Instead {
+    /// The objects of a step, and in their place those of another.
+    pub fn of(old: &Step, new: &Step) -> Self {
+        let pairs = old.arguments.iter().zip(&new.arguments).filter(|(old, new)| old != new);
+        Instead(pairs.map(|(old, new)| (old.clone(), new.clone())).collect())
+    }
+
+    /// A step with the others in it.
+    pub fn in_step(&self, step: &Step) -> Step {
+        self.put(step, |name| self.0.iter().find(|(old, _)| old == name).map(|(_, new)| new))
+    }
+
+    /// A step with the others in it, and those in the place of the others: what comes first otherwise comes later then.
+    pub fn exchanged(&self, step: &Step) -> Step {
+        let back = |name: &str| self.0.iter().find(|(_, new)| new == name).map(|(old, _)| old);
+        self.put(step, |name| {
+            self.0.iter().find(|(old, _)| old == name).map(|(_, new)| new).or_else(|| back(name))
+        })
+    }
+
+    fn put<'a>(&self, step: &Step, by: impl Fn(&str) -> Option<&'a String>) -> Step {
+        let arguments = step.arguments.iter().map(|name| by(name).unwrap_or(name).clone());
+        Step { arguments: arguments.collect(), ..step.clone() }
+    }
+}
+
+/// Steps of which some that lead on from each other, by the same action from one object to another, are one; none if there are none.
+pub fn joined(steps: &[Step]) -> Option<Vec<Step>> {
+    let mut all: Vec<Step> = Vec::new();
+    for step in steps {
+        match (all.last_mut(), step.arguments.as_slice()) {
+            (Some(Step { action, arguments, .. }), [from, to])
+                if *action == step.action && arguments.len() == 2 && arguments[1] == *from =>
+            {
+                arguments[1] = to.clone();
+            }
+            _ => all.push(step.clone()),
+        }
+    }
+    all.retain(|step| !matches!(step.arguments.as_slice(), [from, to] if from == to));
+    (all.len() < steps.len()).then_some(all)
+}
+
+/// The words of a text in PDDL.
+pub fn words(text: &str) -> Vec<&str> {
+    text.split(|c: char| c.is_whitespace() || "()".contains(c)).filter(|w| !w.is_empty()).collect()
+}
+
+/// A step as a call in PDDL.
+pub fn call(step: &Step) -> String {
+    let arguments: String = step.arguments.iter().map(|a| format!(" {a}")).collect();
+    format!("({}{arguments})", step.action)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drives_that_lead_on_from_each_other_could_be_one() {
+        let read = |text: &str| {
+            let step = |call: &str| {
+                let mut words = call.split(' ').map(str::to_string);
+                let action = words.next().expect("an action");
+                Step { start_s: None, action, arguments: words.collect(), duration_s: 1.0 }
+            };
+            text.split(", ").filter(|call| !call.is_empty()).map(step).collect::<Vec<_>>()
+        };
+        let check = |steps: &str, expected: Option<&str>| {
+            assert_eq!(joined(&read(steps)), expected.map(read), "{steps}");
+        };
+        check("move a b, look b t", None);
+        check("move a b, look b t, move b c", None);
+        check("move a b, move b c, look c t", Some("move a c, look c t"));
+        check("move a b, move b a, look a t", Some("look a t"));
+        check("move a b, open b d, move b c", None);
+    }
+}

@@ -415,8 +415,8 @@ class Record:
     def report(self) -> Optional[Dict[str, Any]]:
         """The result of the run, if it came to one."""
 
-    def explain(self) -> str:
-        """Why the run went as it did, as ``descry explain`` says it."""
+    def explain(self, *, figures: bool = False) -> str:
+        """Why the run went as it did, as ``descry explain`` says it; with all figures if asked."""
 
     def verify(self) -> List[str]:
         """Reads every byte; returns what is damaged."""

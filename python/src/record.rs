@@ -119,14 +119,15 @@ impl Record {
         to_python(py, &run::report(&self.place).map_err(|error| failure::command(py, &error))?)
     }
 
-    fn explain(&self, py: Python<'_>) -> PyResult<String> {
+    #[pyo3(signature = (*, figures=false))]
+    fn explain(&self, py: Python<'_>, figures: bool) -> PyResult<String> {
         let told = || {
             let header = run::header(&self.place)?;
             let report = run::report(&self.place)?;
             explain::of(&self.inner, &header, report.as_ref())
         };
         let told = py.detach(told).map_err(|error| failure::command(py, &error))?;
-        Ok(told.to_string())
+        Ok(told.text(figures))
     }
 
     fn verify(&self, py: Python<'_>) -> PyResult<Vec<String>> {

@@ -3,12 +3,9 @@
 use super::Asked;
 use super::chapters::Chapter;
 use super::rivals::{self, LONGER_S, whole_s};
-use super::wording::{listed, share};
+use super::wording::by_share;
 use crate::standing::{Of, Seen};
 use crate::weigh::{Way, Weighed};
-
-/// Surfaces that are named; the rest are counted.
-const MOST_NAMED: usize = 3;
 
 /// Why this plan and not another, as far as the record says; where the planner did not count to the end, with all figures.
 pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
@@ -88,14 +85,6 @@ fn unseen(chapter: &Chapter) -> Option<String> {
     let doubt = before.doubts.iter().find(|doubt| doubt.of == Of::Thing && doubt.seen.len() > 1)?;
     let mut places: Vec<&Seen> = doubt.seen.iter().filter(|seen| seen.hidden > 0.0).collect();
     places.sort_by(|a, b| b.hidden.total_cmp(&a.hidden));
-    let named =
-        places.iter().take(MOST_NAMED).map(|seen| format!("{} for the {}", share(seen.hidden), seen.on));
-    let named: Vec<String> = named.collect();
-    let more = match places.len().saturating_sub(MOST_NAMED) {
-        0 => String::new(),
-        n => format!("; as much or less for {n} more"),
-    };
-    (!named.is_empty()).then(|| {
-        format!("where {} may be before a first look: {}{more}.", doubt.about, listed(&named, named.len()))
-    })
+    let named = by_share(places.iter().map(|seen| (seen.hidden, format!("on the {}", seen.on))));
+    (!named.is_empty()).then(|| format!("where {} may be before a first look: {named}.", doubt.about))
 }

@@ -6,7 +6,7 @@ use descry_memory::belief::Track;
 
 use super::numbers::{self, Sure};
 use super::standings::Standing;
-use super::wording::{listed, place, share, share_of};
+use super::wording::{by_share, listed, place, share, share_of};
 use crate::standing::{InDoubt, Of, Seen};
 use crate::weigh::Expected;
 
@@ -309,26 +309,21 @@ fn hidden(doubt: &InDoubt, seen: f64) -> Option<String> {
 
 /// On which surfaces that is, the likeliest first, and whether there is something.
 fn hidden_places(doubt: &InDoubt) -> String {
-    const NAMED: usize = 3;
     let mut places: Vec<&Seen> = doubt.seen.iter().filter(|seen| seen.hidden > HARDLY).collect();
     places.sort_by(|a, b| b.hidden.total_cmp(&a.hidden));
     let is_measured = |seen: &&Seen| seen.measured > seen.hidden / 2.0;
     if places.is_empty() || (doubt.seen.len() == 1 && !is_measured(&places[0])) {
         return String::new();
     }
-    let named = places.iter().take(NAMED).map(|seen| {
+    let named = by_share(places.iter().map(|seen| {
         let measured = if is_measured(seen) {
             ", mostly where something was measured that no object explains"
         } else {
             ""
         };
-        format!("{} on the {}{measured}", share(seen.hidden), seen.on)
-    });
-    let more = match places.len().saturating_sub(NAMED) {
-        0 => String::new(),
-        n => format!("; as much or less on {n} more"),
-    };
-    format!(" ({}{more})", named.collect::<Vec<_>>().join("; "))
+        (seen.hidden, format!("on the {}{measured}", seen.on))
+    }));
+    format!(" ({named})")
 }
 
 /// What an object most likely is, besides something.

@@ -93,13 +93,17 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
             let rest = format!("the {rest} left of plan {}", before.round);
             match reasons::reckoned(&chapter.because, asked.counts) {
                 Some(now) => {
-                    let first = if is_first_now(chapter, before) {
-                        "; it was a further look there, and would be the first of a plan now"
-                    } else {
-                        ""
+                    let counted = step_of(&chapter.because).and_then(|action| (asked.counts)(action));
+                    let now = match counted.filter(|_| is_first_now(chapter, before)) {
+                        Some(counted) => format!(
+                            "{}: it was a further look there, and would be the first of a new plan, with which the {counted} \
+                             are counted",
+                            reasons::reckoned(&chapter.because, &|_| None).unwrap_or(now)
+                        ),
+                        None => now,
                     };
                     format!(
-                        "with what was learned, {rest} {count} differently: {now}{first}.{}",
+                        "with what was learned, {rest} {count} differently: {now}.{}",
                         enough_now(chapter, before)
                     )
                 }
@@ -124,6 +128,11 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
     let least = |name: &str| asked.wanted(name).unwrap_or(0.0);
     let most = most.map(|(name, most)| format!(" The greatest: {name}, {}.", share_of(*most, least(name))));
     format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
+}
+
+/// The action of a step as the monitor names it.
+fn step_of(because: &str) -> Option<&str> {
+    bare(because).trim_start_matches('(').split([' ', ')']).next()
 }
 
 /// Whether the step that counts differently comes after another like it in the plan before, about the same.

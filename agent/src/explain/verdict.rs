@@ -222,9 +222,8 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) 
         ("no plan", _) => format!("it ended because no plan would still bring it about: {because}."),
         _ => format!("it ended because {because}."),
     });
-    if let ("no plan", Verdict::CannotTell, Some(least)) =
-        (rests.ended.as_str(), report.verdict, words.negligible)
-    {
+    let is_negative = matches!(report.verdict, Verdict::CannotTell | Verdict::NotFound);
+    if let ("no plan", Some(least)) = (rests.ended.as_str(), words.negligible.filter(|_| is_negative)) {
         said.push(format!("what looks may settle counts from {} on: for less none is taken.", share(least)));
     }
     said

@@ -20,6 +20,23 @@ pub fn listed(all: &[String], most: usize) -> String {
     }
 }
 
+/// What shares are of, those with the same share as it reads together.
+pub fn by_share(all: impl IntoIterator<Item = (f64, String)>) -> String {
+    let mut alike: Vec<(String, Vec<String>)> = Vec::new();
+    for (value, of) in all {
+        let said = share(value);
+        match alike.last_mut().filter(|(last, _)| *last == said) {
+            Some((_, like)) => like.push(of),
+            None => alike.push((said, vec![of])),
+        }
+    }
+    let one = |(said, of): &(String, Vec<String>)| {
+        let each = if of.len() > 1 { " each" } else { "" };
+        format!("{said}{each} {}", listed(of, of.len()))
+    };
+    alike.iter().map(one).collect::<Vec<_>>().join("; ")
+}
+
 /// A sentence, which begins with a capital.
 pub fn capital(text: &str) -> String {
     let mut signs = text.chars();
@@ -124,6 +141,16 @@ mod tests {
         assert_eq!(wrapped("", "- ", 30), "- ");
         let passing = wrapped("cup A with 0.80 (other cup 0.10, mug 0.05)", "", 26);
         assert_eq!(passing, "cup A with 0.80 (other cup\n0.10, mug 0.05)");
+    }
+
+    #[test]
+    fn what_has_the_same_share_is_said_together() {
+        let check = |all: &[(f64, &str)], said: &str| {
+            assert_eq!(by_share(all.iter().map(|(value, of)| (*value, of.to_string()))), said);
+        };
+        check(&[], "");
+        check(&[(0.5, "on a")], "0.50 on a");
+        check(&[(0.5, "on a"), (0.075, "on b"), (0.0751, "on c")], "0.50 on a; 0.075 each on b and on c");
     }
 
     #[test]

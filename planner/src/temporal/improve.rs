@@ -4,6 +4,8 @@
 //! the goal seems (restarting weighted A*, Richter, Thayer and Ruml 2010), and then a large neighbourhood search: a part
 //! of the plan is taken out, what is left is kept, and the goal is reached again from there within the bound.
 
+use std::cell::OnceCell;
+
 use crate::calls::Failure;
 use crate::memory::MemoryLimit;
 
@@ -14,9 +16,10 @@ use super::envelope::{all_apart, envelopes, in_one_go_suffices};
 use super::joined::shortened;
 use super::mentions::keep_apart;
 use super::relaxed::{Part, Relaxed};
-use super::schedule::tightened;
+use super::schedule::{Replayed, tightened};
 use super::search::{Counts, End, Manner, Search};
 use super::space::{Base, Measure, Space};
+use super::tours::Tours;
 use super::world::World;
 
 /// How far to go.
@@ -122,10 +125,12 @@ pub(crate) fn search_plans(
             progress,
             on_plan,
             best: None,
+            tours: OnceCell::new(),
         };
         run.first()?;
         if run.best.is_some() {
             run.improve()?;
+            run.polish()?;
             return Ok(run.progress);
         }
         progress = run.progress;
@@ -154,6 +159,7 @@ struct Run<'r, 'w, 'a> {
     progress: Progress,
     on_plan: &'r mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
     best: Option<Best>,
+    tours: OnceCell<Option<Tours<'w, 'a>>>,
 }
 
 /// The best plan so far.
@@ -249,6 +255,7 @@ impl Run<'_, '_, '_> {
             (measured, steps, base) = (leaner, lean, lean_base);
         }
         let shorter = shortened(self.space, (measured, steps, base), self.stop)?;
+        let shorter = self.rearranged(shorter, false)?;
         (measured, steps, base) = tightened(self.space, shorter, self.stop)?;
         let ready_s = base.track.order.ready_s();
         let goal = &self.space.world.ground.goal.facts;
@@ -274,6 +281,28 @@ impl Run<'_, '_, '_> {
             (self.on_plan)(&plan)?;
         }
         Ok(better)
+    }
+
+    /// A plan with its tours in another order, where that is better; if `elsewhere`, with other places on them too.
+    fn rearranged(&self, plan: Replayed, elsewhere: bool) -> Result<Replayed, Failure> {
+        match self.tours.get_or_init(|| Tours::new(self.space.world)) {
+            Some(tours) => tours.rearranged(self.space, plan, elsewhere, self.stop),
+            None => Ok(plan),
+        }
+    }
+
+    /// The best plan with other places on its tours, where that is better and nothing says that there is no better one.
+    fn polish(&mut self) -> Result<(), Failure> {
+        let Some(Best { steps, .. }) = &self.best else { return Ok(()) };
+        let mut steps = steps.clone();
+        if self.progress.reason == Reason::Exhausted {
+            return Ok(());
+        }
+        if let Some((measured, base)) = self.space.replay_to_goal(&mut steps)? {
+            let (_, steps, _) = self.rearranged((measured, steps, base), true)?;
+            self.take(steps)?;
+        }
+        Ok(())
     }
 
     fn improve(&mut self) -> Result<(), Failure> {

@@ -18,6 +18,7 @@ mod space;
 mod store;
 mod together;
 mod touch;
+mod tours;
 mod world;
 
 pub(crate) use improve::{Limits, Progress, Reason, Timed, search_plans};

@@ -1,0 +1,306 @@
+//! Tours of a plan put in another order: where steps of one action lead from place to place, as drives do, what is done at a place is
+//! done earlier, later, from another place or not at all, and the steps that lead there are made anew (local search for tours, Croes
+//! 1958, Or 1976). A search that adds step to step sees each order as plans of their own, which are too many.
+
+use std::collections::{BTreeMap, HashMap};
+
+use crate::calls::Failure;
+
+use super::advance::Step;
+use super::relaxed::Part;
+use super::schedule::Replayed;
+use super::space::Space;
+use super::world::{Span, World};
+
+/// Steps that are replayed at most for one plan.
+const MOST_REPLAYED: usize = 20_000;
+/// In tasks with more actions than this, none is looked up by its arguments.
+const MOST_ACTS: usize = 200_000;
+/// What is better by less than this is as good.
+const BETTER: f64 = 1e-6;
+
+/// The actions of a task by what they are about.
+pub(crate) struct Tours<'w, 'a> {
+    acts: HashMap<(u32, &'a [u32]), u32>,
+    world: &'w World<'a>,
+}
+
+/// A part of a plan that leads from place to place.
+struct Tour {
+    /// The action that leads on, and which of its arguments are where it begins and where it ends.
+    schema: u32,
+    from: usize,
+    to: usize,
+    /// The arguments of one of them.
+    arguments: Vec<u32>,
+    /// Steps before the first of them.
+    before: Vec<Step>,
+    /// What is done where they lead.
+    stops: Vec<Stop>,
+}
+
+/// A place, and what is done there before the tour leads on.
+#[derive(Clone)]
+struct Stop {
+    place: u32,
+    steps: Vec<Step>,
+}
+
+impl<'w, 'a> Tours<'w, 'a> {
+    /// Of a world; none where it has too many actions.
+    pub fn new(world: &'w World<'a>) -> Option<Self> {
+        if world.acts.len() > MOST_ACTS {
+            return None;
+        }
+        let mut acts = HashMap::with_capacity(world.acts.len());
+        for (act, n) in world.acts.iter().zip(0..) {
+            acts.entry((act.origin.schema, act.origin.arguments.as_slice())).or_insert(n);
+        }
+        Some(Tours { acts, world })
+    }
+
+    /// The plan with its tours in another order, and if `elsewhere` with what is done at a place done from another, as long as that
+    /// makes it better; always replayed.
+    pub fn rearranged(
+        &self,
+        space: &Space,
+        mut plan: Replayed,
+        elsewhere: bool,
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Replayed, Failure> {
+        let mut left = MOST_REPLAYED;
+        'better: loop {
+            for tour in self.tours(&plan.1) {
+                let others =
+                    tour.orders().chain(elsewhere.then(|| self.elsewhere(&tour)).into_iter().flatten());
+                for stops in others {
+                    let Some(mut steps) = self.assembled(&tour, &stops) else { continue };
+                    left = left.saturating_sub(steps.len());
+                    if left == 0 || stop() {
+                        return Ok(plan);
+                    }
+                    if let Some((measured, base)) = space.replay_to_goal(&mut steps)?
+                        && measured < plan.0 - BETTER
+                    {
+                        plan = (measured, steps, base);
+                        continue 'better;
+                    }
+                }
+            }
+            return Ok(plan);
+        }
+    }
+
+    /// The tours of a plan with two steps that lead on or more.
+    fn tours(&self, steps: &[Step]) -> Vec<Tour> {
+        let origin = |step: &Step| self.world.acts[step.act as usize].origin;
+        let is_whole = |step: &Step| step.part == Part::Whole && step.proposal.is_none();
+        let mut by_schema: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (at, step) in steps.iter().enumerate().filter(|(_, step)| is_whole(step)) {
+            by_schema.entry(origin(step).schema).or_default().push(at);
+        }
+        let mut tours = Vec::new();
+        for (schema, all) in by_schema {
+            let arguments: Vec<&[u32]> =
+                all.iter().map(|&at| origin(&steps[at]).arguments.as_slice()).collect();
+            let Some((from, to)) = leads(&arguments) else { continue };
+            let mut at = 0;
+            while at < all.len() {
+                let end = (at + 1..all.len()).find(|&n| !follows(arguments[n - 1], arguments[n], from, to));
+                let end = end.unwrap_or(all.len());
+                if end - at >= 2 {
+                    let links = &all[at..end];
+                    let ends = links.iter().skip(1).copied().chain([steps.len()]);
+                    let stops =
+                        links.iter().zip(ends).zip(&arguments[at..end]).map(|((&link, end), arguments)| {
+                            Stop { place: arguments[to], steps: steps[link + 1..end].to_vec() }
+                        });
+                    tours.push(Tour {
+                        schema,
+                        from,
+                        to,
+                        arguments: arguments[at].to_vec(),
+                        before: steps[..links[0]].to_vec(),
+                        stops: stops.collect(),
+                    });
+                }
+                at = end;
+            }
+        }
+        tours
+    }
+
+    /// The tour with other stops, in a plan; none where no action leads from one to the next.
+    fn assembled(&self, tour: &Tour, stops: &[Stop]) -> Option<Vec<Step>> {
+        let mut steps = tour.before.clone();
+        let mut at = tour.arguments[tour.from];
+        for stop in stops {
+            if stop.place != at {
+                let mut arguments = tour.arguments.clone();
+                (arguments[tour.from], arguments[tour.to]) = (at, stop.place);
+                steps.push(whole(*self.acts.get(&(tour.schema, arguments.as_slice()))?));
+                at = stop.place;
+            }
+            steps.extend(stop.steps.iter().cloned());
+        }
+        Some(steps)
+    }
+
+    /// The stops of a tour with one of them elsewhere: what is done there is about another place then.
+    fn elsewhere<'t>(&'t self, tour: &'t Tour) -> impl Iterator<Item = Vec<Stop>> + 't {
+        let places =
+            (0..tour.stops.len()).flat_map(|n| self.places(tour).into_iter().map(move |place| (n, place)));
+        places.filter_map(|(n, place)| {
+            let stop = &tour.stops[n];
+            let moved = stop.steps.iter().map(|step| self.about(step, stop.place, place));
+            let steps = (place != stop.place).then(|| moved.collect::<Option<Vec<Step>>>())??;
+            let mut stops = tour.stops.clone();
+            stops[n] = Stop { place, steps };
+            Some(stops)
+        })
+    }
+
+    /// Where the action of a tour leads from where it begins.
+    fn places(&self, tour: &Tour) -> Vec<u32> {
+        let acts = self.world.acts.iter().map(|act| act.origin);
+        let is_alike = |arguments: &[u32]| {
+            arguments
+                .iter()
+                .zip(&tour.arguments)
+                .enumerate()
+                .all(|(n, (own, other))| n == tour.to || own == other)
+        };
+        let leading = acts.filter(|origin| origin.schema == tour.schema && is_alike(&origin.arguments));
+        leading.map(|origin| origin.arguments[tour.to]).collect()
+    }
+
+    /// A step with another place in it; none if there is no such action.
+    fn about(&self, step: &Step, place: u32, other: u32) -> Option<Step> {
+        let origin = self.world.acts[step.act as usize].origin;
+        let put = |&own: &u32| if own == place { other } else { own };
+        let arguments: Vec<u32> = origin.arguments.iter().map(put).collect();
+        let act = *self.acts.get(&(origin.schema, arguments.as_slice()))?;
+        (step.part == Part::Whole && step.proposal.is_none()).then(|| whole(act))
+    }
+}
+
+impl Tour {
+    /// Its stops with one left out, with some of them the other way round, and with one earlier or later.
+    fn orders(&self) -> impl Iterator<Item = Vec<Stop>> + '_ {
+        let all = self.stops.len();
+        let less = (0..all).map(|n| {
+            let mut stops = self.stops.clone();
+            stops.remove(n);
+            stops
+        });
+        let pairs = || (0..all).flat_map(move |a| (0..all).map(move |b| (a, b)));
+        let turned = pairs().filter(|(a, b)| a < b).map(|(a, b)| {
+            let mut stops = self.stops.clone();
+            stops[a..=b].reverse();
+            stops
+        });
+        // Neighbours that change places have been turned round.
+        let moved = pairs().filter(|(a, b)| a.abs_diff(*b) > 1).map(|(a, b)| {
+            let mut stops = self.stops.clone();
+            let one = stops.remove(a);
+            stops.insert(b, one);
+            stops
+        });
+        less.chain(turned).chain(moved)
+    }
+}
+
+/// Which argument of an action is where it begins, and which where it ends, told from such as follow each other.
+fn leads(all: &[&[u32]]) -> Option<(usize, usize)> {
+    let width = all.first()?.len();
+    let pairs =
+        (0..width).flat_map(|from| (0..width).map(move |to| (from, to))).filter(|(from, to)| from != to);
+    let count = |&(from, to): &(usize, usize)| {
+        all.windows(2).filter(|pair| follows(pair[0], pair[1], from, to)).count()
+    };
+    let (most, best) = pairs.map(|pair| (count(&pair), pair)).max_by_key(|(count, _)| *count)?;
+    (most > 0).then_some(best)
+}
+
+/// Whether an action begins where one of its kind has ended, and is about the same otherwise.
+fn follows(first: &[u32], second: &[u32], from: usize, to: usize) -> bool {
+    let is_same = |n: usize| n == from || n == to || first[n] == second[n];
+    first[to] == second[from] && (0..first.len()).all(is_same)
+}
+
+fn whole(act: u32) -> Step {
+    Step { act, part: Part::Whole, proposal: None, span: Span { least_s: 0.0, most_s: 0.0 } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attachment::Attachments;
+    use crate::calls::Calls;
+    use crate::small;
+    use crate::temporal::envelope::envelopes;
+    use crate::temporal::space::Measure;
+    use crate::temporal::world::Act;
+
+    const LINE: &str =
+        "(define (domain line) (:requirements :durative-actions :typing :numeric-fluents) (:types place thing)
+      (:predicates (at ?p - place) (seen ?t - thing) (sees ?p - place ?t - thing)) (:functions (far ?a ?b - place))
+      (:durative-action go :parameters (?a ?b - place) :duration (= ?duration (far ?a ?b))
+        :condition (at start (at ?a)) :effect (and (at start (not (at ?a))) (at end (at ?b))))
+      (:durative-action see :parameters (?p - place ?t - thing) :duration (= ?duration 1)
+        :condition (and (over all (at ?p)) (at start (sees ?p ?t))) :effect (at end (seen ?t))))";
+
+    /// Places a, b, c and d on a line, 2 apart; which things are seen from where; what is made of a plan that begins at a.
+    fn check(sees: &[&str], goal: &[&str], elsewhere: bool, plan: &str, expected: &str) {
+        let places = ["a", "b", "c", "d"];
+        let far = (0..4_usize).flat_map(|n| (0..4).map(move |m| (n, m))).filter(|(n, m)| n != m);
+        let far: String = far
+            .map(|(n, m)| format!("(= (far {} {}) {}) ", places[n], places[m], 2 * n.abs_diff(m)))
+            .collect();
+        let sees: String = sees.iter().map(|sees| format!("(sees {sees}) ")).collect();
+        let goal: String = goal.iter().map(|thing| format!("(seen {thing}) ")).collect();
+        let problem = format!(
+            "(define (problem p) (:domain line) (:objects a b c d - place t u v - thing) (:init (at a) {far} {sees})
+               (:goal (and {goal})))"
+        );
+        let (task, grounded) = small::read(LINE, &problem);
+        let nobody = Attachments::default();
+        let calls = Calls::bind(&task, &grounded, &nobody).expect("nothing to bind");
+        let world = World::new(&task, &grounded, calls);
+        let space = Space::new(&world, envelopes(&world), Measure::Makespan);
+        let called = |act: &Act| {
+            let name = &task.actions[act.origin.schema as usize].name;
+            let names = act.origin.arguments.iter().map(|&o| format!(" {}", task.objects[o as usize].name));
+            format!("{name}{}", names.collect::<String>())
+        };
+        let step = |call: &str| {
+            whole(world.acts.iter().position(|act| called(act) == call).expect("an action") as u32)
+        };
+        let mut steps: Vec<Step> = plan.split(", ").map(step).collect();
+        let (measured, base) = space.replay_to_goal(&mut steps).expect("no call").expect("a plan");
+        let tours = Tours::new(&world).expect("they are few");
+        let better = tours.rearranged(&space, (measured, steps, base), elsewhere, &|| false);
+        let (better, steps, _) = better.expect("no call");
+        assert!(better <= measured, "{better} {measured}");
+        let left: Vec<String> = steps.iter().map(|step| called(&world.acts[step.act as usize])).collect();
+        assert_eq!(left.join(", "), expected, "{goal}{sees}");
+    }
+
+    #[test]
+    fn what_is_on_the_way_is_done_on_the_way() {
+        let each = ["b t", "c u", "d v"];
+        let sorted = "go a b, see b t, go b c, see c u, go c d, see d v";
+        check(&each, &["t", "u", "v"], false, "go a d, see d v, go d b, see b t, go b c, see c u", sorted);
+        check(&each, &["t", "u", "v"], false, "go a d, see d v, go d c, see c u, go c b, see b t", sorted);
+        check(&each, &["t", "u", "v"], false, sorted, sorted);
+        // What is seen twice is left out once, and so is the way there.
+        check(&["b t", "d t"], &["t"], false, "go a d, see d t, go d b, see b t", "go a b, see b t");
+    }
+
+    #[test]
+    fn what_is_seen_from_elsewhere_too_is_seen_from_the_nearest_place() {
+        let (sees, far) = (["b t", "b u", "d u"], "go a b, see b t, go b d, see d u");
+        check(&sees, &["t", "u"], true, far, "go a b, see b t, see b u");
+        check(&sees, &["t", "u"], false, far, far);
+    }
+}

@@ -5,7 +5,9 @@ mod binary;
 use std::path::Path;
 
 use descry_agent::body::{scene_spec, simulate};
+use descry_agent::exit::CommandError;
 use descry_agent::explain;
+use descry_agent::report::{Event, Report};
 use descry_agent::run::{self, Folder, Settings, Task, Watcher};
 use descry_agent::stop::Stop;
 use descry_domains::abilities::searching::policies;
@@ -315,16 +317,21 @@ fn what_goes_wrong_in_a_scene_is_explained() {
     );
 }
 
-/// A run in which things go wrong on purpose, explained; and what it said on its way.
-fn faulty(goal: &str, seed: u64, faults: &str) -> (String, String) {
-    let folder = tempfile::tempdir().expect("a folder");
+/// A run in which things go wrong on purpose, in a folder, which is stopped when it says something; its report and what it said.
+fn run_with(
+    folder: &Path,
+    goal: &str,
+    seed: u64,
+    faults: &str,
+    until: &str,
+) -> (Result<Report, CommandError>, Vec<String>) {
     let domain = Domain::load("home").expect("a built-in domain");
     let faults = FaultPlan::parse("faults.toml", faults).expect("faults");
     let spec = scene_spec(None, &domain).expect("a scene");
     let body = simulate(&spec, seed, faults).expect("a body");
     let lexicon = Lexicon::new(&domain, &Places::of_body(&*body.robot));
     let goal = descry_domains::goal::read(goal, &domain, &lexicon).expect("it is understood");
-    let into = Folder::of_new_run(Some(&folder.path().join("run")), &goal).expect("a folder");
+    let into = Folder::of_new_run(Some(folder), &goal).expect("a folder");
     let settings = Settings {
         robot: "sim".into(),
         scene: None,
@@ -335,17 +342,43 @@ fn faulty(goal: &str, seed: u64, faults: &str) -> (String, String) {
         remember: None,
     };
     let chooser = policies::named(policies::PLAN, seed, None).expect("a policy");
-    let mut said = Vec::new();
-    let watcher = Watcher { stop: &Stop::default(), tell: &mut |event| said.push(event.to_string()) };
+    let (stop, mut said) = (Stop::default(), Vec::new());
+    let mut tell = |event: &Event| {
+        said.push(event.to_string());
+        if said.last().is_some_and(|said| said.starts_with(until)) {
+            stop.ask(2);
+        }
+    };
+    let watcher = Watcher { stop: &stop, tell: &mut tell };
     let task = Task { domain: &domain, goal: &goal, past: None };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
-    let pursued = run::pursue(task, &body, &into, &settings, chooser, watcher);
-    let report = runtime.block_on(pursued).expect("it ends");
-    let header = run::header(into.path()).expect("a run");
-    let record = descry_agent::keeping::open(into.path()).expect("a record");
+    let report = runtime.block_on(run::pursue(task, &body, &into, &settings, chooser, watcher));
+    (report, said)
+}
+
+/// A run in which things go wrong on purpose, explained; and what it said on its way.
+fn faulty(goal: &str, seed: u64, faults: &str) -> (String, String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run");
+    let (report, said) = run_with(&path, goal, seed, faults, "no such word");
+    let report = report.expect("it ends");
+    let header = run::header(&path).expect("a run");
+    let record = descry_agent::keeping::open(&path).expect("a record");
     let told = explain::of(&record, &header, Some(&report)).expect("it is explained").to_string();
     println!("{told}");
     (told.split_whitespace().collect::<Vec<_>>().join(" "), said.join("\n"))
+}
+
+#[test]
+fn what_lies_behind_shut_doors_is_gone_for_when_the_planner_finds_nothing() {
+    let doors = ["kitchen door", "study door", "living room door"];
+    let shut = |door| format!("[[fault]]\nkind = \"door_shut\"\nat = 1\ndoor = \"{door}\"\n");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run");
+    let (report, said) = run_with(&path, "find all cups", 95005, &doors.map(shut).concat(), "see ");
+    let said = said.join("\n");
+    assert!(matches!(report, Err(CommandError::Stopped { .. })), "it sees something: {said}");
+    assert!(said.contains("the search ended after") && said.contains("(open-door "), "{said}");
 }
 
 #[test]

@@ -130,7 +130,6 @@ pub(crate) fn search_plans(
         run.first()?;
         if run.best.is_some() {
             run.improve()?;
-            run.polish()?;
             return Ok(run.progress);
         }
         progress = run.progress;
@@ -255,7 +254,7 @@ impl Run<'_, '_, '_> {
             (measured, steps, base) = (leaner, lean, lean_base);
         }
         let shorter = shortened(self.space, (measured, steps, base), self.stop)?;
-        let shorter = self.rearranged(shorter, false)?;
+        let shorter = self.rearranged(shorter)?;
         (measured, steps, base) = tightened(self.space, shorter, self.stop)?;
         let ready_s = base.track.order.ready_s();
         let goal = &self.space.world.ground.goal.facts;
@@ -283,26 +282,12 @@ impl Run<'_, '_, '_> {
         Ok(better)
     }
 
-    /// A plan with its tours in another order, where that is better; if `elsewhere`, with other places on them too.
-    fn rearranged(&self, plan: Replayed, elsewhere: bool) -> Result<Replayed, Failure> {
+    /// A plan with its tours in another order, where that is better.
+    fn rearranged(&self, plan: Replayed) -> Result<Replayed, Failure> {
         match self.tours.get_or_init(|| Tours::new(self.space.world)) {
-            Some(tours) => tours.rearranged(self.space, plan, elsewhere, self.stop),
+            Some(tours) => tours.rearranged(self.space, plan, self.stop),
             None => Ok(plan),
         }
-    }
-
-    /// The best plan with other places on its tours, where that is better and nothing says that there is no better one.
-    fn polish(&mut self) -> Result<(), Failure> {
-        let Some(Best { steps, .. }) = &self.best else { return Ok(()) };
-        let mut steps = steps.clone();
-        if self.progress.reason == Reason::Exhausted {
-            return Ok(());
-        }
-        if let Some((measured, base)) = self.space.replay_to_goal(&mut steps)? {
-            let (_, steps, _) = self.rearranged((measured, steps, base), true)?;
-            self.take(steps)?;
-        }
-        Ok(())
     }
 
     fn improve(&mut self) -> Result<(), Failure> {

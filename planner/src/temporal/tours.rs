@@ -1,5 +1,5 @@
 //! Tours of a plan put in another order: where steps of one action lead from place to place, as drives do, what is done at a place is
-//! done earlier, later, from another place or not at all, and the steps that lead there are made anew (local search for tours, Croes
+//! done earlier, later or not at all, and the steps that lead there are made anew (local search for tours, Croes
 //! 1958, Or 1976). A search that adds step to step sees each order as plans of their own, which are too many.
 
 use std::collections::{BTreeMap, HashMap};
@@ -59,21 +59,17 @@ impl<'w, 'a> Tours<'w, 'a> {
         Some(Tours { acts, world })
     }
 
-    /// The plan with its tours in another order, and if `elsewhere` with what is done at a place done from another, as long as that
-    /// makes it better; always replayed.
+    /// The plan with its tours in another order as long as that makes it better; always replayed.
     pub fn rearranged(
         &self,
         space: &Space,
         mut plan: Replayed,
-        elsewhere: bool,
         stop: &dyn Fn() -> bool,
     ) -> Result<Replayed, Failure> {
         let mut left = MOST_REPLAYED;
         'better: loop {
             for tour in self.tours(&plan.1) {
-                let others =
-                    tour.orders().chain(elsewhere.then(|| self.elsewhere(&tour)).into_iter().flatten());
-                for stops in others {
+                for stops in tour.orders() {
                     let Some(mut steps) = self.assembled(&tour, &stops) else { continue };
                     left = left.saturating_sub(steps.len());
                     if left == 0 || stop() {
@@ -145,43 +141,6 @@ impl<'w, 'a> Tours<'w, 'a> {
         }
         Some(steps)
     }
-
-    /// The stops of a tour with one of them elsewhere: what is done there is about another place then.
-    fn elsewhere<'t>(&'t self, tour: &'t Tour) -> impl Iterator<Item = Vec<Stop>> + 't {
-        let places =
-            (0..tour.stops.len()).flat_map(|n| self.places(tour).into_iter().map(move |place| (n, place)));
-        places.filter_map(|(n, place)| {
-            let stop = &tour.stops[n];
-            let moved = stop.steps.iter().map(|step| self.about(step, stop.place, place));
-            let steps = (place != stop.place).then(|| moved.collect::<Option<Vec<Step>>>())??;
-            let mut stops = tour.stops.clone();
-            stops[n] = Stop { place, steps };
-            Some(stops)
-        })
-    }
-
-    /// Where the action of a tour leads from where it begins.
-    fn places(&self, tour: &Tour) -> Vec<u32> {
-        let acts = self.world.acts.iter().map(|act| act.origin);
-        let is_alike = |arguments: &[u32]| {
-            arguments
-                .iter()
-                .zip(&tour.arguments)
-                .enumerate()
-                .all(|(n, (own, other))| n == tour.to || own == other)
-        };
-        let leading = acts.filter(|origin| origin.schema == tour.schema && is_alike(&origin.arguments));
-        leading.map(|origin| origin.arguments[tour.to]).collect()
-    }
-
-    /// A step with another place in it; none if there is no such action.
-    fn about(&self, step: &Step, place: u32, other: u32) -> Option<Step> {
-        let origin = self.world.acts[step.act as usize].origin;
-        let put = |&own: &u32| if own == place { other } else { own };
-        let arguments: Vec<u32> = origin.arguments.iter().map(put).collect();
-        let act = *self.acts.get(&(origin.schema, arguments.as_slice()))?;
-        (step.part == Part::Whole && step.proposal.is_none()).then(|| whole(act))
-    }
 }
 
 impl Tour {
@@ -251,7 +210,7 @@ mod tests {
         :condition (and (over all (at ?p)) (at start (sees ?p ?t))) :effect (at end (seen ?t))))";
 
     /// Places a, b, c and d on a line, 2 apart; which things are seen from where; what is made of a plan that begins at a.
-    fn check(sees: &[&str], goal: &[&str], elsewhere: bool, plan: &str, expected: &str) {
+    fn check(sees: &[&str], goal: &[&str], plan: &str, expected: &str) {
         let places = ["a", "b", "c", "d"];
         let far = (0..4_usize).flat_map(|n| (0..4).map(move |m| (n, m))).filter(|(n, m)| n != m);
         let far: String = far
@@ -279,7 +238,7 @@ mod tests {
         let mut steps: Vec<Step> = plan.split(", ").map(step).collect();
         let (measured, base) = space.replay_to_goal(&mut steps).expect("no call").expect("a plan");
         let tours = Tours::new(&world).expect("they are few");
-        let better = tours.rearranged(&space, (measured, steps, base), elsewhere, &|| false);
+        let better = tours.rearranged(&space, (measured, steps, base), &|| false);
         let (better, steps, _) = better.expect("no call");
         assert!(better <= measured, "{better} {measured}");
         let left: Vec<String> = steps.iter().map(|step| called(&world.acts[step.act as usize])).collect();
@@ -290,17 +249,10 @@ mod tests {
     fn what_is_on_the_way_is_done_on_the_way() {
         let each = ["b t", "c u", "d v"];
         let sorted = "go a b, see b t, go b c, see c u, go c d, see d v";
-        check(&each, &["t", "u", "v"], false, "go a d, see d v, go d b, see b t, go b c, see c u", sorted);
-        check(&each, &["t", "u", "v"], false, "go a d, see d v, go d c, see c u, go c b, see b t", sorted);
-        check(&each, &["t", "u", "v"], false, sorted, sorted);
+        check(&each, &["t", "u", "v"], "go a d, see d v, go d b, see b t, go b c, see c u", sorted);
+        check(&each, &["t", "u", "v"], "go a d, see d v, go d c, see c u, go c b, see b t", sorted);
+        check(&each, &["t", "u", "v"], sorted, sorted);
         // What is seen twice is left out once, and so is the way there.
-        check(&["b t", "d t"], &["t"], false, "go a d, see d t, go d b, see b t", "go a b, see b t");
-    }
-
-    #[test]
-    fn what_is_seen_from_elsewhere_too_is_seen_from_the_nearest_place() {
-        let (sees, far) = (["b t", "b u", "d u"], "go a b, see b t, go b d, see d u");
-        check(&sees, &["t", "u"], true, far, "go a b, see b t, see b u");
-        check(&sees, &["t", "u"], false, far, far);
+        check(&["b t", "d t"], &["t"], "go a d, see d t, go d b, see b t", "go a b, see b t");
     }
 }

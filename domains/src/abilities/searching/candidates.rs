@@ -32,11 +32,27 @@ pub fn candidates(
     for surface in surfaces {
         let Some(centre) = surface.centre() else { continue };
         let ring = ring(robot, chart, &here.place(), &centre, config);
-        all.extend(
-            ring.into_iter().map(|(k, place)| Candidate { symbol: format!("{}-{k}", surface.symbol), place }),
-        );
+        // Boards one above the other are looked at from the same poses.
+        let own = ring.into_iter().filter(|(_, place)| !all.iter().any(|known| is_same(&known.place, place)));
+        let own: Vec<Candidate> =
+            own.map(|(k, place)| Candidate { symbol: format!("{}-{k}", surface.symbol), place }).collect();
+        all.extend(own);
     }
     (all, 0)
+}
+
+/// Whether two poses are one and the same to look from.
+fn is_same(one: &Place, other: &Place) -> bool {
+    const SAME_M: f64 = 0.01;
+    const SAME_RAD: f64 = 0.02;
+    match (one, other) {
+        (Place::Pose(one), Place::Pose(other)) => {
+            let turned_rad = (one.yaw_rad - other.yaw_rad).rem_euclid(std::f64::consts::TAU);
+            (one.point() - other.point()).norm() < SAME_M
+                && turned_rad.min(std::f64::consts::TAU - turned_rad) < SAME_RAD
+        }
+        (one, other) => one == other,
+    }
 }
 
 /// A PDDL symbol must not begin with a digit.
@@ -101,4 +117,35 @@ pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
             placed: None,
         });
     on_map.chain(named).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use descry_perception::nalgebra::Isometry3;
+    use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};
+
+    use super::*;
+
+    #[test]
+    fn boards_one_above_the_other_are_looked_at_from_the_same_poses() {
+        let domain = Domain::load("home").expect("a built-in domain");
+        let spec = SceneSpec::parse("default.toml", &domain.scenes["default"]).expect("a scene");
+        let robot = SimRobot::new(arrange(&spec, 1).expect("an arrangement"), SimOptions::default());
+        let here = PoseEstimate {
+            stamp_ns: 0,
+            map_from_base: Isometry3::translation(-0.5, 0.0, 0.0),
+            sigma_m: 0.0,
+            sigma_rad: 0.0,
+            station: None,
+        };
+        let all = surfaces(&domain, &robot);
+        let chart = Chart::begin(&domain, None, &robot);
+        let (poses, _) = candidates(&robot, &chart, &all, &domain.config.candidates, &here);
+        let around = |surface: &str| poses.iter().filter(|pose| pose.symbol.starts_with(surface)).count();
+        assert!(around("lower-board-") > 0 && around("desk-") > 0);
+        assert_eq!(around("upper-board-"), 0, "{:?}", poses.iter().map(|p| &p.symbol).collect::<Vec<_>>());
+        for (n, one) in poses.iter().enumerate() {
+            assert!(poses[..n].iter().all(|other| !is_same(&one.place, &other.place)), "{}", one.symbol);
+        }
+    }
 }

@@ -29,6 +29,8 @@ pub(crate) struct Strategy {
     pub newest: bool,
     /// Whether the number of landmarks left orders open lists of its own.
     pub landmarks: bool,
+    /// Whether operators that bring about landmarks are preferred too.
+    pub towards_landmarks: bool,
     /// Only plans cheaper than this (in the search's costs) are of interest.
     pub bound: u32,
     /// Give up after this much work (see [`Relaxed::work`]).
@@ -319,7 +321,7 @@ impl<'a, 's> Search<'a, 's> {
         self.shared.successors.applicable(task, &self.state, &mut self.applicable);
         self.preferred.clear();
         self.preferred.extend_from_slice(&self.relaxed.preferred);
-        if self.strategy.landmarks {
+        if self.strategy.landmarks && self.strategy.towards_landmarks {
             let ahead = |op: &&u32| self.status.advances(self.shared.landmarks, task, id, **op);
             let more: Vec<u32> = self.applicable.iter().filter(ahead).copied().collect();
             self.preferred.extend(more);

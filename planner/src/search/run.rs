@@ -123,6 +123,7 @@ const GREEDY: Strategy = Strategy {
     lookahead: true,
     newest: false,
     landmarks: true,
+    towards_landmarks: true,
     bound: u32::MAX,
     work_limit: u64::MAX,
     evaluation_limit: u64::MAX,
@@ -150,7 +151,11 @@ impl<'a, 's> Kept<'a, 's> {
             return Kept::Novelty(Box::new(novelty::Search::new(shared, bound)));
         }
         let (lookahead, newest) = (place < NOVELTY, matches!(place, 1 | 4));
-        Kept::Lazy(Box::new(lazy::Search::new(shared, Strategy { bound, lookahead, newest, ..GREEDY })))
+        // Costs mislead where what is cheap leads nowhere: only the first search counts them.
+        let counting = if place == 0 { GREEDY.counting } else { Counting::Steps };
+        let towards_landmarks = place != PLAIN;
+        let strategy = Strategy { bound, lookahead, newest, counting, towards_landmarks, ..GREEDY };
+        Kept::Lazy(Box::new(lazy::Search::new(shared, strategy)))
     }
 
     fn run(&mut self, allowed: Allowed<'_>) -> End {

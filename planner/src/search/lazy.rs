@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::classical::compiled::Compiled;
 use crate::classical::successor::Successors;
+use crate::ground::Fact;
 use crate::heuristics::landmarks::{Landmarks, Status};
 use crate::heuristics::relaxed::{Counting, Relaxed};
 use crate::memory::MemoryLimit;
@@ -67,6 +68,8 @@ pub(crate) struct Shared<'a> {
     pub task: &'a Compiled,
     pub successors: &'a Successors,
     pub landmarks: &'a Landmarks,
+    /// Facts of which one holds at most.
+    pub mutex_groups: &'a [Vec<Fact>],
     pub memory: MemoryLimit,
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }

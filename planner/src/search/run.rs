@@ -136,20 +136,22 @@ const GREEDY: Strategy = Strategy {
     evaluation_limit: u64::MAX,
 };
 
-/// The searches for a first plan in the order of their turns, two rounds: with lookahead, by novelty, plainly, and by
-/// clauses; every other round those that order states by estimates take the newest of equally good ones first.
-const ORDER: [usize; 2 * TURNS] = [0, NOVELTY, PLAIN, HORIZON, 1, NOVELTY, PLAIN + 1, HORIZON];
+/// The searches for a first plan in the order of their turns, two rounds: with lookahead, by novelty (narrow, then in full),
+/// plainly, and by clauses; every other round those that order states by estimates take the newest of equally good ones first.
+const ORDER: [usize; 2 * TURNS] =
+    [0, NARROW, NOVELTY, PLAIN, HORIZON, 1, NARROW, NOVELTY, PLAIN + 1, HORIZON];
 /// Turns of a round, each of another search.
-const TURNS: usize = 4;
+const TURNS: usize = 5;
 /// From this turn on, a search that runs out of memory is the last one: others may do with less before.
-const LAST_RESORT: usize = 2;
+const LAST_RESORT: usize = 3;
 /// Place of the search by novelty; before it, those with lookahead.
 const NOVELTY: usize = 2;
 /// Places of the two searches without lookahead begin here.
 const PLAIN: usize = 3;
-/// Place of the search by clauses, which proves nothing by ending.
-const HORIZON: usize = 5;
-const PLACES: usize = 6;
+/// Places of searches that prove nothing by ending.
+const NARROW: usize = 5;
+const HORIZON: usize = 6;
+const PLACES: usize = 7;
 
 /// A search for a first plan that can be gone on with.
 enum Kept<'a, 's> {
@@ -163,7 +165,7 @@ enum Kept<'a, 's> {
 impl<'a, 's> Kept<'a, 's> {
     fn new(shared: &'s Shared<'a>, place: usize, bound: u32) -> Self {
         match place {
-            NOVELTY => Kept::Novelty(Box::new(novelty::Search::new(shared, bound))),
+            NOVELTY | NARROW => Kept::Novelty(Box::new(novelty::Search::new(shared, bound, place == NARROW))),
             HORIZON => Kept::Horizon(Box::new(horizon::Search::new(shared, bound))),
             _ => {
                 let (lookahead, newest) = (place < NOVELTY, matches!(place, 1 | 4));
@@ -294,7 +296,7 @@ impl<'a, 's> Run<'a, 's> {
     /// anything.
     fn proves(&self, place: usize) -> bool {
         match place {
-            HORIZON => false,
+            NARROW | HORIZON => false,
             _ => place >= PLAIN || self.bound == u32::MAX,
         }
     }

@@ -322,6 +322,8 @@ impl<'a, 's> Run<'a, 's> {
         for &place in places {
             let mut search = kept[place].take().unwrap_or_else(|| Kept::new(self.shared, place, self.bound));
             let memory = self.shared.memory.beside(kept.iter().flatten().map(Kept::bytes).sum());
+            // What these do not find soon they hardly find at all: later rounds are for the others.
+            let work = if matches!(place, NARROW | HORIZON) { self.options.first_work } else { work };
             jobs.push(move |cancelled: &AtomicBool| {
                 let before = search.counts();
                 let work = before.work.saturating_add(work);

@@ -25,6 +25,7 @@
 mod attachment;
 mod calls;
 mod classical;
+mod clauses;
 pub mod diagnostic;
 mod explain;
 pub mod ground;

@@ -73,6 +73,11 @@ impl<T> Rows<T> {
         self.len
     }
 
+    /// Items of a row.
+    pub(crate) fn width(&self) -> usize {
+        self.width
+    }
+
     /// Forgets all rows.
     pub(crate) fn clear(&mut self) {
         self.pieces.truncate(1);

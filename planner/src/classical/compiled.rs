@@ -37,6 +37,11 @@ impl<T> Lists<T> {
         &self.items[self.starts[index] as usize..self.starts[index + 1] as usize]
     }
 
+    /// The items of all lists.
+    pub(crate) fn all(&self) -> &[T] {
+        &self.items
+    }
+
     /// How many lists.
     pub(crate) fn len(&self) -> usize {
         self.starts.len() - 1

@@ -36,6 +36,8 @@ pub(crate) struct Landmarks {
     all: Vec<Landmark>,
     /// By fact: landmarks that it makes true.
     by_fact: Lists<u32>,
+    /// Those that the goal asks for.
+    goals: Vec<u32>,
     words: usize,
 }
 
@@ -75,7 +77,8 @@ impl Landmarks {
         order_reasonably(task, mutex_groups, &mut all);
         let pairs = (0..all.len()).flat_map(|l| all[l].facts.iter().map(move |&f| (f, l as u32)));
         let by_fact = Lists::group(task.facts, pairs);
-        Landmarks { words: all.len().div_ceil(64).max(1), by_fact, all }
+        let goals = (0..all.len() as u32).filter(|&l| all[l as usize].goal).collect();
+        Landmarks { words: all.len().div_ceil(64).max(1), by_fact, goals, all }
     }
 
     /// How many there are.
@@ -469,6 +472,15 @@ impl Status {
             }
         }
         left
+    }
+
+    /// How many goals are still to come, or to come again; one that came before others it would have to be given up for is.
+    pub(crate) fn goals_left(&self, landmarks: &Landmarks, task: &Compiled, id: u32, state: &[u32]) -> u32 {
+        let bits = self.of(id);
+        let open = |&&goal: &&u32| {
+            !Self::has(bits, goal) || !task.holds(landmarks.all[goal as usize].facts[0], state)
+        };
+        landmarks.goals.iter().filter(open).count() as u32
     }
 
     /// Whether an operator brings about a landmark that is due.

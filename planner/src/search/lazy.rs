@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::classical::compiled::Compiled;
 use crate::classical::successor::Successors;
+use crate::ground::Fact;
 use crate::heuristics::landmarks::{Landmarks, Status};
 use crate::heuristics::relaxed::{Counting, Relaxed};
 use crate::memory::MemoryLimit;
@@ -29,6 +30,8 @@ pub(crate) struct Strategy {
     pub newest: bool,
     /// Whether the number of landmarks left orders open lists of its own.
     pub landmarks: bool,
+    /// Whether operators that bring about landmarks are preferred too.
+    pub towards_landmarks: bool,
     /// Only plans cheaper than this (in the search's costs) are of interest.
     pub bound: u32,
     /// Give up after this much work (see [`Relaxed::work`]).
@@ -65,6 +68,8 @@ pub(crate) struct Shared<'a> {
     pub task: &'a Compiled,
     pub successors: &'a Successors,
     pub landmarks: &'a Landmarks,
+    /// Facts of which one holds at most.
+    pub mutex_groups: &'a [Vec<Fact>],
     pub memory: MemoryLimit,
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -319,7 +324,7 @@ impl<'a, 's> Search<'a, 's> {
         self.shared.successors.applicable(task, &self.state, &mut self.applicable);
         self.preferred.clear();
         self.preferred.extend_from_slice(&self.relaxed.preferred);
-        if self.strategy.landmarks {
+        if self.strategy.landmarks && self.strategy.towards_landmarks {
             let ahead = |op: &&u32| self.status.advances(self.shared.landmarks, task, id, **op);
             let more: Vec<u32> = self.applicable.iter().filter(ahead).copied().collect();
             self.preferred.extend(more);

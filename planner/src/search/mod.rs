@@ -2,6 +2,7 @@
 
 mod abreast;
 pub(crate) mod classical;
+mod horizon;
 mod improve;
 pub(crate) mod lazy;
 mod lookahead;

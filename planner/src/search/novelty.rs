@@ -1,6 +1,9 @@
 //! Best-first width search: states that show something new come first (Lipovetzky and Geffner 2017, BFWS with
-//! evaluation f5). What is new is judged among states with as many landmarks left and as much of the last relaxed plan
-//! made true. No heuristic is computed for most states, so this is fast, and strong where relaxed plans mislead.
+//! evaluation f5). What is new is judged among states of a kind: with as many landmarks left and as much of the last relaxed
+//! plan made true. No heuristic is computed for most states, so this is fast, and strong where relaxed plans mislead.
+//!
+//! A narrow search counts goals left instead of landmarks, and keeps only states that show a new fact (the first pass of
+//! Dual-BFWS): it ends soon, and often with a plan.
 
 use rustc_hash::FxHashMap;
 
@@ -14,19 +17,22 @@ use super::store::{NO_STATE, Store};
 
 /// Pairs of facts are told apart only where their tables stay below this.
 const PAIR_TABLE_BYTES: usize = 256 << 20;
-/// Facts of a relaxed plan that are followed.
-const FOLLOWED: usize = 128;
-/// Work that a state costs, in the units of the heuristics.
+/// Words of facts of a relaxed plan that are followed, at least and at most.
+const FOLLOWED_WORDS: [usize; 2] = [2, 8];
+/// Bits of a key that tell how deep a state lies.
+const DEPTH_BITS: u32 = 12;
+/// Work that a state costs, in the units of the heuristics, and in a narrow search, which soon ends or does not help.
 const STATE_WORK: u64 = 30;
+const NARROW_STATE_WORK: u64 = 100;
 
 /// What is remembered of a state besides what the store holds.
 #[derive(Clone, Copy)]
 struct Memory {
     /// Index of the relaxed plan that is followed.
     anchor: u32,
-    /// Which of its facts have been true on the way.
-    done: u128,
     left: u32,
+    /// Operators on the way.
+    depth: u32,
 }
 
 struct Novelty {
@@ -89,10 +95,13 @@ pub(crate) struct Search<'a, 's> {
     shared: &'s Shared<'a>,
     /// Only cheaper plans (in the search's costs) are of interest.
     bound: u32,
+    narrow: bool,
     started: bool,
     store: Store,
     status: Status,
     memory: Rows<Memory>,
+    /// By state: which facts of the relaxed plan that is followed have been true on the way.
+    done: Rows<u64>,
     /// Relaxed plans that are followed: their facts.
     anchors: Vec<Vec<u32>>,
     relaxed: Relaxed,
@@ -106,18 +115,20 @@ pub(crate) struct Search<'a, 's> {
 
 impl<'a, 's> Search<'a, 's> {
     /// A search that has not begun.
-    pub(crate) fn new(shared: &'s Shared<'a>, bound: u32) -> Search<'a, 's> {
+    pub(crate) fn new(shared: &'s Shared<'a>, bound: u32, narrow: bool) -> Search<'a, 's> {
         let task = shared.task;
         Search {
             shared,
             bound,
+            narrow,
             started: false,
             store: Store::new(task),
             status: Status::new(shared.landmarks),
             memory: Rows::default(),
+            done: Rows::default(),
             anchors: Vec::new(),
             relaxed: Relaxed::new(task, Counting::Steps),
-            novelty: Novelty { facts: task.facts, pairs: true, seen: FxHashMap::default(), bytes: 0 },
+            novelty: Novelty { facts: task.facts, pairs: !narrow, seen: FxHashMap::default(), bytes: 0 },
             open: OpenList::default(),
             facts: Vec::new(),
             counts: Counts::default(),
@@ -139,10 +150,24 @@ impl<'a, 's> Search<'a, 's> {
         let task = self.shared.task;
         let (first, _) = self.store.insert(&task.initial, NO_STATE, 0, 0);
         self.status.initial(self.shared.landmarks, task, &task.initial);
-        let left = self.status.left(self.shared.landmarks, task, first, &task.initial);
-        self.memory.push(Memory { anchor: 0, done: 0, left });
+        let left = self.left(first, &task.initial);
+        self.memory.push(Memory { anchor: 0, left, depth: 0 });
         self.open.push(0, (first, 0));
-        self.anchor(&task.initial).is_some()
+        let reachable = self.anchor(&task.initial).is_some();
+        let [least, most] = FOLLOWED_WORDS;
+        self.done =
+            Rows::new(self.anchors.first().map_or(least, |a| a.len().div_ceil(64).clamp(least, most)));
+        self.done.push_row(&vec![0; self.done.width()]);
+        reachable
+    }
+
+    /// How much is left to come: landmarks, or goals.
+    fn left(&self, id: u32, state: &[u32]) -> u32 {
+        let (landmarks, task) = (self.shared.landmarks, self.shared.task);
+        match self.narrow {
+            true => self.status.goals_left(landmarks, task, id, state),
+            false => self.status.left(landmarks, task, id, state),
+        }
     }
 
     /// Searches on as far as is allowed.
@@ -194,7 +219,7 @@ impl<'a, 's> Search<'a, 's> {
                 continue;
             }
             task.apply(operator, state, next);
-            self.counts.work += STATE_WORK;
+            self.counts.work += if self.narrow { NARROW_STATE_WORK } else { STATE_WORK };
             let (child, new) = self.store.insert(next, id, operator, cost);
             if !new {
                 continue;
@@ -214,6 +239,7 @@ impl<'a, 's> Search<'a, 's> {
             + self.status.bytes()
             + self.novelty.bytes
             + self.memory.bytes()
+            + self.done.bytes()
             + self.open.bytes()
             + self.anchors.iter().map(|a| a.len() * 4 + 24).sum::<usize>()
     }
@@ -236,55 +262,115 @@ impl<'a, 's> Search<'a, 's> {
             .collect();
         facts.sort_unstable();
         facts.dedup();
-        facts.truncate(FOLLOWED);
+        facts.truncate(64 * FOLLOWED_WORDS[1]);
         self.anchors.push(facts);
         Some(self.anchors.len() as u32 - 1)
     }
 
     fn evaluate(&mut self, parent: u32, operator: u32, child: u32, state: &[u32]) {
         let task = self.shared.task;
-        let left = self.status.left(self.shared.landmarks, task, child, state);
         let before = self.memory[parent as usize];
-        let mut memory = Memory { left, ..before };
-        if left < before.left {
+        let mut done = self.done.row(parent as usize).to_vec();
+        let mut memory = Memory { left: self.left(child, state), depth: before.depth + 1, ..before };
+        let achieved = task.effects.get(operator as usize).iter().map(|e| task.id(e.fact));
+        if memory.left < before.left {
+            done.fill(0);
             match self.anchor(state) {
-                Some(anchor) => memory = Memory { anchor, done: 0, left },
+                Some(anchor) => memory.anchor = anchor,
                 None => {
                     self.memory.push(memory);
+                    self.done.push_row(&done);
                     return;
                 }
             }
         } else {
-            for effect in task.effects.get(operator as usize) {
-                let fact = task.id(effect.fact);
-                if let Ok(place) = self.anchors[memory.anchor as usize].binary_search(&fact) {
-                    memory.done |= 1 << place;
+            for fact in achieved.clone() {
+                let place = self.anchors[memory.anchor as usize].binary_search(&fact);
+                if let Some(place) = place.ok().filter(|place| place / 64 < done.len()) {
+                    done[place / 64] |= 1 << (place % 64);
                 }
             }
         }
         self.memory.push(memory);
+        self.done.push_row(&done);
         self.facts.clear();
         self.facts.extend(task.offsets.iter().zip(state).map(|(&offset, &value)| offset + value));
-        let changed: Vec<u32> = task
-            .effects
-            .get(operator as usize)
-            .iter()
-            .map(|e| task.id(e.fact))
-            .filter(|&f| task.holds(f, state))
-            .collect();
-        let novelty = self.novelty.of((left, memory.done.count_ones()), &self.facts, &changed);
+        let (kind, parents) = (self.kind(child), self.kind(parent));
+        let changed: Vec<u32> = match self.narrow && kind != parents {
+            // What else holds may be new among states of this kind.
+            true => self.facts.clone(),
+            false => achieved.filter(|&f| task.holds(f, state)).collect(),
+        };
+        let novelty = self.novelty.of(kind, &self.facts, &changed);
         self.counts.work +=
             (changed.len() * if self.novelty.pairs { self.facts.len() } else { 1 }) as u64 / 8;
-        let key = (novelty - 1).saturating_mul(1 << 20).saturating_add(left);
+        if self.narrow {
+            if novelty == 1 {
+                self.open
+                    .push(memory.left << DEPTH_BITS | memory.depth.min((1 << DEPTH_BITS) - 1), (child, 0));
+            }
+            return;
+        }
+        let key = (novelty - 1).saturating_mul(1 << 20).saturating_add(memory.left);
         self.open.push(key, (child, 0));
+    }
+
+    /// What is left to come, and how many facts of the relaxed plan have been made true.
+    fn kind(&self, id: u32) -> (u32, u32) {
+        let done = self.done.row(id as usize);
+        (self.memory[id as usize].left, done.iter().map(|word| word.count_ones()).sum())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicBool;
+
     use rustc_hash::FxHashMap;
 
-    use super::Novelty;
+    use super::*;
+    use crate::classical::compiled::Compiled;
+    use crate::classical::successor::Successors;
+    use crate::heuristics::landmarks::Landmarks;
+    use crate::small;
+
+    /// How a search ends, and whether with a plan.
+    fn check(problem: &str, narrow: bool, solvable: bool) {
+        let (_, ground) = small::read(small::SHUTTLE, problem);
+        let task = &Compiled::new(&ground);
+        let shared = Shared {
+            task,
+            successors: &Successors::new(task),
+            landmarks: &Landmarks::new(task, &ground.mutex_groups, &|| false),
+            mutex_groups: &ground.mutex_groups,
+            memory: MemoryLimit::new(None, None),
+            stop: &|| false,
+        };
+        let mut search = Search::new(&shared, u32::MAX, narrow);
+        let cancelled = &AtomicBool::new(false);
+        let all = Allowed { work: u64::MAX, evaluations: u64::MAX, memory: shared.memory, cancelled };
+        let End::Plan(plan) = search.run(all) else {
+            assert!(!solvable, "{problem}");
+            return;
+        };
+        let mut state = task.initial.clone();
+        for &operator in &plan {
+            assert!(task.applicable(operator, &state));
+            task.advance(operator, &mut state);
+        }
+        assert!(solvable && task.is_goal(&state), "{problem}");
+    }
+
+    #[test]
+    fn narrow_or_in_full_a_plan_is_found() {
+        let two = small::ROW.replace("x - box", "x y - box").replace("(lies x a)", "(lies x a) (lies y b)");
+        let both = two.replace("(:goal (lies x c))", "(:goal (and (lies x c) (lies y a) (at b)))");
+        for narrow in [true, false] {
+            check(small::ROW, narrow, true);
+            check(&both, narrow, true);
+            check(&small::ROW.replace("(road b c)", ""), narrow, false);
+        }
+    }
 
     #[test]
     fn a_fact_is_new_once_and_then_its_pairs_are() {

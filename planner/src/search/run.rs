@@ -14,6 +14,7 @@ use crate::heuristics::relaxed::Counting;
 use crate::memory::MemoryLimit;
 
 use super::abreast::in_order;
+use super::horizon;
 use super::improve::Improve;
 use super::lazy::{self, Allowed, Counts, End, Shared, Strategy, search};
 use super::novelty;
@@ -81,8 +82,14 @@ pub(crate) fn solve(
         return stopped;
     }
     let landmarks = debug_span!("landmarks").in_scope(|| Landmarks::new(&task, &ground.mutex_groups, stop));
-    let shared =
-        Shared { task: &task, successors: &successors, landmarks: &landmarks, memory: options.memory, stop };
+    let shared = Shared {
+        task: &task,
+        successors: &successors,
+        landmarks: &landmarks,
+        mutex_groups: &ground.mutex_groups,
+        memory: options.memory,
+        stop,
+    };
     let bound = options.bound.filter(|_| task.measure.is_sum()).map_or(u32::MAX, |bound| task.scaled(bound));
     let mut run = Run {
         task: &task,
@@ -123,40 +130,60 @@ const GREEDY: Strategy = Strategy {
     lookahead: true,
     newest: false,
     landmarks: true,
+    towards_landmarks: true,
     bound: u32::MAX,
     work_limit: u64::MAX,
     evaluation_limit: u64::MAX,
 };
 
-/// The searches for a first plan in the order of their turns, two rounds: with lookahead, by novelty, plainly; every other
-/// round those that order states by estimates take the newest of equally good ones first.
-const ORDER: [usize; 6] = [0, NOVELTY, PLAIN, 1, NOVELTY, PLAIN + 1];
+/// The searches for a first plan in the order of their turns, two rounds: with lookahead, by novelty (narrow, then in full),
+/// plainly, and by clauses; every other round those that order states by estimates take the newest of equally good ones first.
+const ORDER: [usize; 2 * TURNS] =
+    [0, NARROW, NOVELTY, PLAIN, HORIZON, 1, NARROW, NOVELTY, PLAIN + 1, HORIZON];
 /// Turns of a round, each of another search.
-const TURNS: usize = 3;
-/// Place of the search by novelty.
+const TURNS: usize = 5;
+/// From this turn on, a search that runs out of memory is the last one: others may do with less before.
+const LAST_RESORT: usize = 3;
+/// Place of the search by novelty; before it, those with lookahead.
 const NOVELTY: usize = 2;
-/// Places of the searches without lookahead begin here.
+/// Places of the two searches without lookahead begin here.
 const PLAIN: usize = 3;
+/// Places of searches that prove nothing by ending.
+const NARROW: usize = 5;
+const HORIZON: usize = 6;
+const PLACES: usize = 7;
 
 /// A search for a first plan that can be gone on with.
 enum Kept<'a, 's> {
     Lazy(Box<lazy::Search<'a, 's>>),
     Novelty(Box<novelty::Search<'a, 's>>),
+    Horizon(Box<horizon::Search<'a, 's>>),
+    /// One that came to its end.
+    Spent,
 }
 
 impl<'a, 's> Kept<'a, 's> {
     fn new(shared: &'s Shared<'a>, place: usize, bound: u32) -> Self {
-        if place == NOVELTY {
-            return Kept::Novelty(Box::new(novelty::Search::new(shared, bound)));
+        match place {
+            NOVELTY | NARROW => Kept::Novelty(Box::new(novelty::Search::new(shared, bound, place == NARROW))),
+            HORIZON => Kept::Horizon(Box::new(horizon::Search::new(shared, bound))),
+            _ => {
+                let (lookahead, newest) = (place < NOVELTY, matches!(place, 1 | 4));
+                // Costs mislead where what is cheap leads nowhere: only the first search counts them.
+                let counting = if place == 0 { GREEDY.counting } else { Counting::Steps };
+                let towards_landmarks = place != PLAIN;
+                let strategy = Strategy { bound, lookahead, newest, counting, towards_landmarks, ..GREEDY };
+                Kept::Lazy(Box::new(lazy::Search::new(shared, strategy)))
+            }
         }
-        let (lookahead, newest) = (place < NOVELTY, matches!(place, 1 | 4));
-        Kept::Lazy(Box::new(lazy::Search::new(shared, Strategy { bound, lookahead, newest, ..GREEDY })))
     }
 
     fn run(&mut self, allowed: Allowed<'_>) -> End {
         match self {
             Kept::Lazy(search) => search.run(allowed),
             Kept::Novelty(search) => search.run(allowed),
+            Kept::Horizon(search) => search.run(allowed),
+            Kept::Spent => End::Exhausted,
         }
     }
 
@@ -164,6 +191,8 @@ impl<'a, 's> Kept<'a, 's> {
         match self {
             Kept::Lazy(search) => search.counts(),
             Kept::Novelty(search) => search.counts(),
+            Kept::Horizon(search) => search.counts(),
+            Kept::Spent => Counts::default(),
         }
     }
 
@@ -171,6 +200,8 @@ impl<'a, 's> Kept<'a, 's> {
         match self {
             Kept::Lazy(search) => search.bytes(),
             Kept::Novelty(search) => search.bytes(),
+            Kept::Horizon(search) => search.bytes(),
+            Kept::Spent => 0,
         }
     }
 }
@@ -230,7 +261,7 @@ impl<'a, 's> Run<'a, 's> {
     ///
     /// Several searches take turns, each going on where it stopped, with more and more work each round.
     fn first(&mut self) -> Result<(Vec<u32>, bool), ClassicalEnd> {
-        let mut kept: [Option<Kept<'a, 's>>; 5] = Default::default();
+        let mut kept: [Option<Kept<'a, 's>>; PLACES] = Default::default();
         let mut work_limit = self.options.first_work;
         let mut turn = 0usize;
         loop {
@@ -240,15 +271,16 @@ impl<'a, 's> Run<'a, 's> {
             {
                 self.counts.add(taken.took);
                 tracing::debug!(turn, self.counts.evaluated, self.counts.work);
-                if !matches!(taken.end, End::Memory | End::Exhausted) {
-                    kept[place] = Some(taken.search);
-                }
+                kept[place] = match taken.end {
+                    End::Memory => None,
+                    End::Exhausted => Some(Kept::Spent),
+                    _ => Some(taken.search),
+                };
                 match taken.end {
                     End::Plan(plan) => return Ok((plan, turn == 0)),
                     End::Exhausted if self.proves(place) => return Err(ClassicalEnd::Exhausted),
                     End::Stopped => return Err(ClassicalEnd::Stopped),
-                    // Another search may do with less.
-                    End::Memory if turn >= 2 => return Err(ClassicalEnd::Memory),
+                    End::Memory if turn >= LAST_RESORT => return Err(ClassicalEnd::Memory),
                     End::Limit if self.limited() => return Err(ClassicalEnd::Stopped),
                     End::Memory | End::Limit | End::Exhausted => {}
                 }
@@ -263,7 +295,10 @@ impl<'a, 's> Run<'a, 's> {
     /// Whether there is no plan once a search is exhausted: with a bound, only one that follows cheaper ways to known states proves
     /// anything.
     fn proves(&self, place: usize) -> bool {
-        place >= PLAIN || self.bound == u32::MAX
+        match place {
+            NARROW | HORIZON => false,
+            _ => place >= PLAIN || self.bound == u32::MAX,
+        }
     }
 
     /// The turns from this one on that may be taken side by side, in a round of so many.
@@ -277,7 +312,7 @@ impl<'a, 's> Run<'a, 's> {
     /// Lets searches for a first plan go on side by side, for so much work each; what they come to, up to the first plan.
     fn take_turns(
         &self,
-        kept: &mut [Option<Kept<'a, 's>>; 5],
+        kept: &mut [Option<Kept<'a, 's>>; PLACES],
         places: &[usize],
         work: u64,
     ) -> Vec<Taken<'a, 's>> {
@@ -287,6 +322,8 @@ impl<'a, 's> Run<'a, 's> {
         for &place in places {
             let mut search = kept[place].take().unwrap_or_else(|| Kept::new(self.shared, place, self.bound));
             let memory = self.shared.memory.beside(kept.iter().flatten().map(Kept::bytes).sum());
+            // What these do not find soon they hardly find at all: later rounds are for the others.
+            let work = if matches!(place, NARROW | HORIZON) { self.options.first_work } else { work };
             jobs.push(move |cancelled: &AtomicBool| {
                 let before = search.counts();
                 let work = before.work.saturating_add(work);

@@ -1,0 +1,471 @@
+//! Search with learned clauses (Marques-Silva and Sakallah 1999; watched literals after Moskewicz et al. 2001; what to
+//! forget after Audemard and Simon 2009). What to try next is left to the caller, who knows what the variables mean.
+
+use super::Literal;
+
+/// Where a clause lies in the arena; [`NONE`] for no reason.
+pub(super) type Place = u32;
+pub(super) const NONE: Place = u32::MAX;
+/// Set in a reason that is a clause of two: the other literal.
+pub(super) const PAIR: u32 = 1 << 31;
+/// Words before the literals of a clause: how many there are, and its rank (0 for one that was given).
+pub(super) const HEAD: usize = 2;
+
+/// Conflicts of the shortest run between restarts.
+const RESTART: u64 = 64;
+/// Learned clauses that are kept at first, and how many more after each time some are forgotten.
+const KEPT: usize = 2_000;
+const KEPT_MORE: usize = 500;
+/// Learned clauses with literals of so few levels are never forgotten.
+const GLUE: u32 = 2;
+
+/// What came of a search.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Answer {
+    /// All clauses hold under the values.
+    Satisfied,
+    /// No values satisfy the clauses.
+    Unsatisfiable,
+    /// The work was done, or the caller wanted to stop: it can be gone on with.
+    Interrupted,
+}
+
+/// Says what to try next.
+pub(crate) trait Decide {
+    /// Appends literals to be tried in this order, as far as they are still open. None where nothing is left that matters: then
+    /// all that is open is taken to be false. Returns the work done (see [`Solver::work`]).
+    fn next(&mut self, solver: &Solver, out: &mut Vec<Literal>) -> u64;
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct Watch {
+    clause: Place,
+    /// A literal of the clause: where it holds, the clause need not be looked at.
+    blocker: Literal,
+}
+
+/// The clauses and what is known of the variables.
+pub(crate) struct Solver {
+    /// Clauses of three and more, one after another.
+    pub(super) arena: Vec<u32>,
+    learned: Vec<Place>,
+    kept: usize,
+    /// By literal: the others of the clauses of two with its negation.
+    pairs: Vec<Vec<Literal>>,
+    /// By literal: clauses that watch it.
+    watches: Vec<Vec<Watch>>,
+    /// By literal: 1 true, -1 false, 0 open.
+    values: Vec<i8>,
+    /// By variable.
+    pub(super) levels: Vec<u32>,
+    pub(super) reasons: Vec<u32>,
+    /// By variable: how much it had to do with late conflicts.
+    activity: Vec<f64>,
+    bump: f64,
+    pub(super) trail: Vec<Literal>,
+    starts: Vec<usize>,
+    /// Up to where the trail was followed.
+    followed: usize,
+    contradiction: bool,
+    /// What is to be tried next, the last one first.
+    plan: Vec<Literal>,
+    conflicts: u64,
+    restart_at: u64,
+    restarts: u64,
+    /// Watches looked at since the beginning: a measure of work that no clock is part of.
+    pub work: u64,
+    pub(super) seen: Vec<bool>,
+    bytes: usize,
+}
+
+impl Solver {
+    /// No clauses over so many variables.
+    pub(crate) fn new(variables: usize) -> Solver {
+        Solver {
+            arena: Vec::new(),
+            learned: Vec::new(),
+            kept: KEPT,
+            pairs: vec![Vec::new(); 2 * variables],
+            watches: vec![Vec::new(); 2 * variables],
+            values: vec![0; 2 * variables],
+            levels: vec![0; variables],
+            reasons: vec![NONE; variables],
+            activity: vec![0.0; variables],
+            bump: 1.0,
+            trail: Vec::new(),
+            starts: Vec::new(),
+            followed: 0,
+            contradiction: false,
+            plan: Vec::new(),
+            conflicts: 0,
+            restart_at: RESTART,
+            restarts: 0,
+            work: 0,
+            seen: vec![false; variables],
+            bytes: variables * 100,
+        }
+    }
+
+    /// Bytes taken, about.
+    pub(crate) fn bytes(&self) -> usize {
+        self.bytes + self.arena.capacity() * 4
+    }
+
+    /// Whether a literal is known to be true, or not; `None` while it is open.
+    pub(crate) fn value(&self, literal: Literal) -> Option<bool> {
+        match self.values[literal.at()] {
+            0 => None,
+            value => Some(value > 0),
+        }
+    }
+
+    /// How much a variable had to do with late conflicts.
+    pub(crate) fn activity(&self, variable: u32) -> f64 {
+        self.activity[variable as usize]
+    }
+
+    /// Adds a clause, before the search begins.
+    pub(crate) fn add(&mut self, clause: &[Literal]) {
+        let mut open = Vec::with_capacity(clause.len());
+        for &literal in clause {
+            match self.value(literal) {
+                Some(true) => return,
+                Some(false) => {}
+                None => open.push(literal),
+            }
+        }
+        match open[..] {
+            [] => self.contradiction = true,
+            [one] => self.set(one, NONE),
+            _ => {
+                self.store(&open, 0);
+            }
+        }
+    }
+
+    /// Keeps a clause of two or more; what it is a reason by.
+    fn store(&mut self, clause: &[Literal], rank: u32) -> u32 {
+        self.bytes += 24;
+        if let [one, other] = *clause {
+            self.pairs[one.negated().at()].push(other);
+            self.pairs[other.negated().at()].push(one);
+            return PAIR | other.0;
+        }
+        let place = self.arena.len() as Place;
+        self.arena.extend([clause.len() as u32, rank]);
+        self.arena.extend(clause.iter().map(|literal| literal.0));
+        self.watches[clause[0].at()].push(Watch { clause: place, blocker: clause[1] });
+        self.watches[clause[1].at()].push(Watch { clause: place, blocker: clause[0] });
+        if rank > 0 {
+            self.learned.push(place);
+        }
+        place
+    }
+
+    pub(super) fn level(&self) -> u32 {
+        self.starts.len() as u32
+    }
+
+    fn set(&mut self, literal: Literal, reason: u32) {
+        self.values[literal.at()] = 1;
+        self.values[literal.negated().at()] = -1;
+        self.levels[literal.variable() as usize] = self.level();
+        self.reasons[literal.variable() as usize] = reason;
+        self.trail.push(literal);
+    }
+
+    fn back_to(&mut self, level: u32) {
+        let Some(&start) = self.starts.get(level as usize) else { return };
+        for literal in self.trail.drain(start..) {
+            self.values[literal.at()] = 0;
+            self.values[literal.negated().at()] = 0;
+        }
+        self.starts.truncate(level as usize);
+        self.followed = start;
+        self.plan.clear();
+    }
+
+    /// Draws what follows from what was set; the literals of a clause that does not hold, if there is one.
+    fn propagate(&mut self) -> Option<Vec<Literal>> {
+        while self.followed < self.trail.len() {
+            let literal = self.trail[self.followed];
+            self.followed += 1;
+            let pairs = std::mem::take(&mut self.pairs[literal.at()]);
+            self.work += pairs.len() as u64 / 2 + 1;
+            let mut broken = None;
+            for &other in &pairs {
+                match self.values[other.at()] {
+                    0 => self.set(other, PAIR | literal.negated().0),
+                    1 => {}
+                    _ => {
+                        broken = Some(vec![other, literal.negated()]);
+                        break;
+                    }
+                }
+            }
+            self.pairs[literal.at()] = pairs;
+            if broken.is_some() {
+                return broken;
+            }
+            if let Some(place) = self.follow(literal.negated()) {
+                return Some(self.literals(place).collect());
+            }
+        }
+        None
+    }
+
+    /// Looks at the clauses that watch a literal which has become false; one that does not hold, if there is one.
+    fn follow(&mut self, gone: Literal) -> Option<Place> {
+        let mut watches = std::mem::take(&mut self.watches[gone.at()]);
+        self.work += 2 * watches.len() as u64;
+        let (mut from, mut to, mut broken) = (0, 0, None);
+        'watches: while from < watches.len() {
+            let watch = watches[from];
+            from += 1;
+            if self.values[watch.blocker.at()] > 0 {
+                watches[to] = watch;
+                to += 1;
+                continue;
+            }
+            let start = watch.clause as usize + HEAD;
+            let length = self.arena[watch.clause as usize] as usize;
+            if self.arena[start] == gone.0 {
+                self.arena.swap(start, start + 1);
+            }
+            let first = Literal(self.arena[start]);
+            if self.values[first.at()] <= 0 {
+                for other in start + 2..start + length {
+                    if self.values[self.arena[other] as usize] >= 0 {
+                        self.arena.swap(start + 1, other);
+                        let watched = self.arena[start + 1] as usize;
+                        self.watches[watched].push(Watch { clause: watch.clause, blocker: first });
+                        continue 'watches;
+                    }
+                }
+            }
+            watches[to] = Watch { clause: watch.clause, blocker: first };
+            to += 1;
+            match self.values[first.at()] {
+                0 => self.set(first, watch.clause),
+                1 => {}
+                _ => {
+                    broken = Some(watch.clause);
+                    break;
+                }
+            }
+        }
+        watches.copy_within(from.., to);
+        watches.truncate(watches.len() - (from - to));
+        self.watches[gone.at()] = watches;
+        broken
+    }
+
+    pub(super) fn literals(&self, place: Place) -> impl Iterator<Item = Literal> + '_ {
+        let start = place as usize + HEAD;
+        self.arena[start..start + self.arena[place as usize] as usize].iter().map(|&l| Literal(l))
+    }
+
+    pub(super) fn bump(&mut self, variable: u32) {
+        self.activity[variable as usize] += self.bump;
+        if self.activity[variable as usize] > 1e100 {
+            self.activity.iter_mut().for_each(|a| *a *= 1e-100);
+            self.bump *= 1e-100;
+        }
+    }
+
+    /// Searches until so much work is done in all, or `stop` says true.
+    pub(crate) fn run(&mut self, decide: &mut dyn Decide, work: u64, stop: &dyn Fn() -> bool) -> Answer {
+        if self.contradiction {
+            return Answer::Unsatisfiable;
+        }
+        loop {
+            if let Some(broken) = self.propagate() {
+                if self.level() == 0 {
+                    self.contradiction = true;
+                    return Answer::Unsatisfiable;
+                }
+                self.resolve(broken);
+                if self.conflicts >= self.restart_at {
+                    self.restarts += 1;
+                    self.restart_at = self.conflicts + RESTART * luby(self.restarts);
+                    self.back_to(0);
+                }
+                continue;
+            }
+            if self.work > work || stop() {
+                return Answer::Interrupted;
+            }
+            if self.learned.len() > self.kept + self.trail.len() {
+                self.forget();
+            }
+            if !self.try_next(decide) {
+                return Answer::Satisfied;
+            }
+        }
+    }
+
+    /// Learns from a clause that does not hold and goes back.
+    fn resolve(&mut self, broken: Vec<Literal>) {
+        self.conflicts += 1;
+        let learned = self.learn(broken);
+        self.back_to(learned.level);
+        let reason = match learned.clause.len() {
+            1 => NONE,
+            _ => self.store(&learned.clause, learned.rank),
+        };
+        self.set(learned.clause[0], reason);
+        self.bump /= 0.95;
+    }
+
+    /// Sets the next literal; `false` if none is open.
+    fn try_next(&mut self, decide: &mut dyn Decide) -> bool {
+        let next = loop {
+            match self.plan.pop() {
+                Some(literal) if self.value(literal).is_none() => break Some(literal),
+                Some(_) => {}
+                None => {
+                    let mut plan = std::mem::take(&mut self.plan);
+                    self.work += decide.next(self, &mut plan);
+                    plan.retain(|&literal| self.value(literal).is_none());
+                    plan.reverse();
+                    self.plan = plan;
+                    if self.plan.is_empty() {
+                        break None;
+                    }
+                }
+            }
+        };
+        let first_open = || (0..self.levels.len() as u32).map(|v| Literal::new(v, false));
+        let Some(next) = next.or_else(|| first_open().find(|&l| self.value(l).is_none())) else {
+            return false;
+        };
+        self.starts.push(self.trail.len());
+        self.set(next, NONE);
+        true
+    }
+
+    /// Forgets the worse half of what was learned.
+    fn forget(&mut self) {
+        let mut learned = std::mem::take(&mut self.learned);
+        let rank = |place: Place| self.arena[place as usize + 1];
+        learned.sort_by_key(|&place| (rank(place), std::cmp::Reverse(place)));
+        let mut dropped: Vec<Place> = learned.split_off(learned.len() / 2);
+        dropped.retain(|&place| {
+            let first = self.arena[place as usize + HEAD];
+            let is_reason = self.reasons[first as usize >> 1] == place && self.values[first as usize] > 0;
+            let keep = rank(place) <= GLUE || is_reason;
+            if keep {
+                learned.push(place);
+            }
+            !keep
+        });
+        dropped.sort_unstable();
+        for watches in &mut self.watches {
+            watches.retain(|watch| dropped.binary_search(&watch.clause).is_err());
+        }
+        self.learned = learned;
+        self.kept += KEPT_MORE;
+    }
+}
+
+/// 1 1 2 1 1 2 4 … (Luby, Sinclair and Zuckerman 1993), from 1.
+fn luby(mut index: u64) -> u64 {
+    loop {
+        let bits = u64::BITS - index.leading_zeros();
+        if index + 1 == 1 << bits {
+            return 1 << (bits - 1);
+        }
+        index -= (1 << (bits - 1)) - 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Nothing;
+    impl Decide for Nothing {
+        fn next(&mut self, _: &Solver, _: &mut Vec<Literal>) -> u64 {
+            0
+        }
+    }
+
+    /// Clauses in numbers: variables from 1, negative for negated ones.
+    fn check(variables: usize, clauses: &[Vec<i32>], satisfiable: bool) {
+        let mut solver = Solver::new(variables);
+        let literal = |l: i32| Literal::new(l.unsigned_abs() - 1, l > 0);
+        for clause in clauses {
+            solver.add(&clause.iter().map(|&l| literal(l)).collect::<Vec<_>>());
+        }
+        let answer = loop {
+            // In small pieces: going on must make no difference.
+            let more = solver.work + 1_000;
+            match solver.run(&mut Nothing, more, &|| false) {
+                Answer::Interrupted => {}
+                answer => break answer,
+            }
+        };
+        assert_eq!(answer == Answer::Satisfied, satisfiable, "{clauses:?}");
+        if satisfiable {
+            let holds = |c: &Vec<i32>| c.iter().any(|&l| solver.value(literal(l)) == Some(true));
+            assert!(clauses.iter().all(holds), "{clauses:?}");
+        }
+    }
+
+    /// Every pigeon in a hole, no two in the same.
+    fn pigeons(pigeons: i32, holes: i32) -> Vec<Vec<i32>> {
+        let at = |p: i32, h: i32| p * holes + h + 1;
+        let mut clauses: Vec<Vec<i32>> =
+            (0..pigeons).map(|p| (0..holes).map(|h| at(p, h)).collect()).collect();
+        for h in 0..holes {
+            for p in 0..pigeons {
+                clauses.extend((0..p).map(|q| vec![-at(p, h), -at(q, h)]));
+            }
+        }
+        clauses
+    }
+
+    #[test]
+    fn clauses_are_satisfied_or_proven_not_to_be() {
+        check(1, &[], true);
+        check(1, &[vec![1], vec![-1]], false);
+        check(2, &[vec![1, 2], vec![-1, 2], vec![1, -2]], true);
+        check(2, &[vec![1, 2], vec![-1, 2], vec![1, -2], vec![-1, -2]], false);
+        check(20, &pigeons(5, 4), false);
+        check(20, &pigeons(4, 5), true);
+        check(56, &pigeons(8, 7), false);
+    }
+
+    #[test]
+    fn as_trying_all_values_says() {
+        let mut seed = 7u64;
+        let mut random = move |below: u64| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (seed >> 33) % below
+        };
+        for round in 0..300 {
+            let clauses: Vec<Vec<i32>> = (0..30 + round % 20)
+                .map(|_| {
+                    let mut clause: Vec<i32> = Vec::new();
+                    while clause.len() < 3 {
+                        let variable = random(9) as i32 + 1;
+                        if !clause.iter().any(|l| l.abs() == variable) {
+                            clause.push(if random(2) == 0 { variable } else { -variable });
+                        }
+                    }
+                    clause
+                })
+                .collect();
+            let holds = |values: i32, l: i32| (values >> (l.abs() - 1) & 1 == 1) == (l > 0);
+            let satisfiable =
+                (0..1 << 9).any(|values| clauses.iter().all(|c| c.iter().any(|&l| holds(values, l))));
+            check(9, &clauses, satisfiable);
+        }
+    }
+
+    #[test]
+    fn runs_between_restarts_grow_slowly() {
+        let found: Vec<u64> = (1..=15).map(luby).collect();
+        assert_eq!(found, [1, 1, 2, 1, 1, 2, 4, 1, 1, 2, 1, 1, 2, 4, 8]);
+    }
+}

@@ -1,0 +1,89 @@
+//! An order of goals: one that cannot be brought about any more once another holds comes before that one, also where this is so
+//! only because others come before it (reasonable orders, Koehler and Hoffmann 2000, taken to their closure).
+
+use crate::classical::compiled::{Compiled, Lists};
+use crate::ground::Fact;
+
+/// The goals' facts in order.
+pub(super) fn in_order(task: &Compiled, mutex_groups: &[Vec<Fact>], adders: &Lists<u32>) -> Vec<u32> {
+    let goals: Vec<u32> = task.goal.iter().map(|&goal| task.id(goal)).collect();
+    let excluded = excluded(task, mutex_groups, &goals);
+    let clashes = |operator: u32| -> Vec<u32> {
+        let needs = task.preconditions.get(operator as usize).iter().map(|&fact| task.id(fact));
+        let effects = task.effects.get(operator as usize).iter().map(|effect| task.id(effect.fact));
+        let facts: Vec<u32> = needs.chain(effects).collect();
+        let clash = |&goal: &u32| facts.iter().any(|&fact| excluded[goal as usize][fact as usize]);
+        (0..goals.len() as u32).filter(clash).collect()
+    };
+    let ways = |goal: &u32| adders.get(*goal as usize).iter().map(|&operator| clashes(operator)).collect();
+    let ways: Vec<Vec<Vec<u32>>> = goals.iter().map(ways).collect();
+    arranged(&ways).into_iter().map(|goal| goals[goal as usize]).collect()
+}
+
+/// By goal and fact: whether they exclude each other.
+fn excluded(task: &Compiled, mutex_groups: &[Vec<Fact>], goals: &[u32]) -> Vec<Vec<bool>> {
+    let with = |&goal: &u32| {
+        let mut excluded = vec![false; task.facts];
+        let variable = task.variables[goal as usize];
+        let offset = task.offsets[variable as usize];
+        (offset..offset + task.domains[variable as usize]).for_each(|fact| excluded[fact as usize] = true);
+        for group in mutex_groups.iter().filter(|group| group.iter().any(|&fact| task.id(fact) == goal)) {
+            group.iter().for_each(|&fact| excluded[task.id(fact) as usize] = true);
+        }
+        excluded[goal as usize] = false;
+        excluded
+    };
+    goals.iter().map(with).collect()
+}
+
+/// From the ways to bring each goal about, each with the goals that it clashes with: the goals in order.
+fn arranged(ways: &[Vec<Vec<u32>>]) -> Vec<u32> {
+    let goals = ways.len();
+    // By goal: those that come before it, directly or not.
+    let mut before = vec![vec![false; goals]; goals];
+    let mut changed = true;
+    while std::mem::take(&mut changed) {
+        for goal in 0..goals {
+            let open = |way: &&Vec<u32>| !way.iter().any(|&other| before[goal][other as usize]);
+            let mut ways = ways[goal].iter().filter(open);
+            let Some(first) = ways.next() else { continue };
+            let rest: Vec<&Vec<u32>> = ways.collect();
+            let all = |other: &&u32| rest.iter().all(|way| way.contains(other));
+            for &later in first.iter().filter(all) {
+                let later = later as usize;
+                if later == goal || before[later][goal] || before[goal][later] {
+                    continue;
+                }
+                changed = true;
+                let earlier: Vec<usize> = (0..goals).filter(|&g| g == goal || before[goal][g]).collect();
+                for after in (0..goals).filter(|&g| g == later || before[g][later]).collect::<Vec<_>>() {
+                    earlier.iter().for_each(|&g| before[after][g] = true);
+                }
+            }
+        }
+    }
+    let mut order: Vec<u32> = (0..goals as u32).collect();
+    order.sort_by_key(|&goal| before[goal as usize].iter().filter(|&&earlier| earlier).count());
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::arranged;
+
+    #[test]
+    fn goals_that_would_be_cut_off_come_first() {
+        for (ways, expected) in [
+            (vec![vec![vec![]], vec![vec![]]], vec![0, 1]),
+            // The first cannot be had once the second holds.
+            (vec![vec![vec![1]], vec![vec![]]], vec![0, 1]),
+            (vec![vec![vec![]], vec![vec![0]]], vec![1, 0]),
+            // A row: from the far end, since the last has one way only, and each then cuts off another way of its neighbour.
+            (vec![vec![vec![], vec![1]], vec![vec![0], vec![2]], vec![vec![1]]], vec![2, 1, 0]),
+            // Each is in the other's way.
+            (vec![vec![vec![1]], vec![vec![0]]], vec![0, 1]),
+        ] {
+            assert_eq!(arranged(&ways), expected, "{ways:?}");
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! Plans as values that satisfy clauses, for several horizons side by side (Rintanen, Heljanko and Niemelä 2006). Strong
+//! where many operators can share a step and estimates mislead; only for small tasks.
+
+mod form;
+mod goals;
+mod order;
+mod support;
+
+use crate::clauses::Literal;
+use crate::clauses::solver::{Answer, Solver};
+
+use crate::memory::MemoryLimit;
+
+use self::form::Form;
+use self::support::Support;
+
+use super::lazy::{Allowed, Counts, End, Shared};
+
+/// Horizons that are searched side by side.
+const ABREAST: usize = 6;
+/// Work of each horizon's turn.
+const TURN_WORK: u64 = 400_000;
+/// Steps of the longest plans looked for.
+const MOST_STEPS: usize = 1_000;
+/// Literals of all steps of a horizon at most.
+const MOST_LITERALS: usize = 4_000_000;
+/// Work that a literal costs when clauses are made, and bytes that it takes.
+const LITERAL_WORK: u64 = 4;
+const LITERAL_BYTES: usize = 16;
+
+/// Plans of so many steps.
+struct Horizon {
+    steps: usize,
+    solver: Solver,
+}
+
+/// The search, which can be gone on with after it ended with [`End::Limit`].
+pub(crate) struct Search<'a, 's> {
+    shared: &'s Shared<'a>,
+    /// Only cheaper plans (in the search's costs) are of interest.
+    bound: u32,
+    started: bool,
+    /// `None` for tasks of another kind.
+    form: Option<Form>,
+    open: Vec<Horizon>,
+    /// Steps of the next horizon.
+    next: usize,
+    counts: Counts,
+}
+
+impl<'a, 's> Search<'a, 's> {
+    /// A search that has not begun.
+    pub(crate) fn new(shared: &'s Shared<'a>, bound: u32) -> Search<'a, 's> {
+        let counts = Counts::default();
+        Search { shared, bound, started: false, form: None, open: Vec::new(), next: 0, counts }
+    }
+
+    /// What the search took so far.
+    pub(crate) fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// Bytes taken.
+    pub(crate) fn bytes(&self) -> usize {
+        self.open.iter().map(|horizon| horizon.solver.bytes()).sum()
+    }
+
+    /// Searches on as far as is allowed. Ends with [`End::Exhausted`] where it can do no more, which proves nothing.
+    pub(crate) fn run(&mut self, allowed: Allowed) -> End {
+        if !std::mem::replace(&mut self.started, true) {
+            self.form = Form::new(self.shared.task, self.shared.mutex_groups);
+            let earliest = self.form.as_ref().and_then(|form| form.earliest(self.shared.task));
+            self.next = earliest.unwrap_or(usize::MAX).max(1);
+        }
+        loop {
+            if allowed.has_ended(self.shared) {
+                return End::Stopped;
+            }
+            while self.open.len() < ABREAST && self.lengthen(&allowed.memory) {}
+            if self.open.is_empty() {
+                return End::Exhausted;
+            }
+            if let Some(end) = self.turn(&allowed) {
+                return end;
+            }
+        }
+    }
+
+    /// Adds a longer horizon, if there may be one.
+    fn lengthen(&mut self, memory: &MemoryLimit) -> bool {
+        let Some(form) = &self.form else { return false };
+        let steps = self.next;
+        let literals = steps.saturating_mul(form.size());
+        let fits = steps <= MOST_STEPS && literals <= MOST_LITERALS;
+        if !fits || !memory.has_room(|| self.bytes(), literals * LITERAL_BYTES) {
+            return false;
+        }
+        self.open.push(Horizon { steps, solver: form.solver(self.shared.task, steps) });
+        self.counts.work += literals as u64 * LITERAL_WORK;
+        self.next = steps + (steps / 4).max(2);
+        true
+    }
+
+    /// Lets each horizon search on; what this comes to, if it is an end.
+    fn turn(&mut self, allowed: &Allowed) -> Option<End> {
+        for place in 0..self.open.len() {
+            if self.counts.work > allowed.work {
+                return Some(End::Limit);
+            }
+            let form = self.form.as_ref()?;
+            let Horizon { steps, solver } = &mut self.open[place];
+            let mut support = Support { task: self.shared.task, form, horizon: *steps };
+            let before = solver.work;
+            let answer = solver.run(&mut support, before + TURN_WORK, &|| allowed.has_ended(self.shared));
+            self.counts.work += solver.work - before;
+            match answer {
+                Answer::Satisfied => return Some(self.found(place)),
+                // Nor is there a shorter plan.
+                Answer::Unsatisfiable => {
+                    self.open.drain(..=place);
+                    return None;
+                }
+                Answer::Interrupted => {}
+            }
+        }
+        None
+    }
+
+    /// The plan of a horizon that was satisfied.
+    fn found(&self, place: usize) -> End {
+        let (Some(form), Horizon { steps, solver }) = (&self.form, &self.open[place]) else {
+            return End::Exhausted;
+        };
+        let applied = |step: usize, operator: u32| {
+            solver.value(Literal::new(form.operator(operator, step), true)) == Some(true)
+        };
+        let plan: Vec<u32> = (0..*steps)
+            .flat_map(|step| form.order.iter().copied().filter(move |&operator| applied(step, operator)))
+            .collect();
+        match self.shared.task.search_cost(&plan) < self.bound {
+            true => End::Plan(plan),
+            false => End::Exhausted,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+    use crate::classical::compiled::Compiled;
+    use crate::classical::successor::Successors;
+    use crate::heuristics::landmarks::Landmarks;
+    use crate::small;
+
+    /// What comes of a search for plans cheaper than a bound: how many operators, if there is a plan.
+    fn check(domain: &str, problem: &str, bound: u32, expected: Option<usize>) {
+        let (_, ground) = small::read(domain, problem);
+        let task = &Compiled::new(&ground);
+        let shared = Shared {
+            task,
+            successors: &Successors::new(task),
+            landmarks: &Landmarks::new(task, &ground.mutex_groups, &|| false),
+            mutex_groups: &ground.mutex_groups,
+            memory: MemoryLimit::new(None, None),
+            stop: &|| false,
+        };
+        let mut search = Search::new(&shared, bound);
+        let end = loop {
+            // In pieces: going on must make no difference.
+            let work = search.counts().work + 200_000;
+            let cancelled = &AtomicBool::new(false);
+            match search.run(Allowed { work, evaluations: u64::MAX, memory: shared.memory, cancelled }) {
+                End::Limit => {}
+                end => break end,
+            }
+        };
+        let plan = match &end {
+            End::Plan(plan) => Some(plan),
+            _ => None,
+        };
+        assert_eq!(plan.map(Vec::len), expected, "{end:?}");
+        let mut state = task.initial.clone();
+        for &operator in plan.into_iter().flatten() {
+            assert!(task.applicable(operator, &state));
+            task.advance(operator, &mut state);
+        }
+        assert_eq!(task.is_goal(&state), expected.is_some());
+    }
+
+    const LAMPS: &str = "(define (domain lamps) (:requirements :adl) (:types lamp)
+      (:predicates (lit ?l - lamp) (dark))
+      (:action light :parameters (?l - lamp) :precondition (not (lit ?l)) :effect (lit ?l))
+      (:action quench :parameters (?l - lamp) :effect (not (lit ?l))))";
+
+    #[test]
+    fn plans_are_found_whatever_shares_a_step() {
+        check(small::SHUTTLE, small::ROW, u32::MAX, Some(4));
+        check(small::SHUTTLE, small::ROW, 5, Some(4));
+        check(small::SHUTTLE, small::ROW, 4, None);
+        // Nothing to be done, and many things at once.
+        let lamps = "(define (problem p) (:domain lamps) (:objects a b c - lamp) (:init (lit a)) (:goal ";
+        check(LAMPS, &format!("{lamps} (lit a)))"), u32::MAX, Some(0));
+        check(LAMPS, &format!("{lamps} (and (not (lit a)) (lit b) (lit c))))"), u32::MAX, Some(3));
+    }
+
+    #[test]
+    fn tasks_of_other_kinds_are_left_alone() {
+        let when = "(when (dark) (not (lit ?l))))\n (:action draw :effect (not (dark)))";
+        let problem = "(define (problem p) (:domain lamps) (:objects a - lamp) (:init (lit a) (dark))
+          (:goal (not (lit a))))";
+        check(LAMPS, problem, u32::MAX, Some(1));
+        check(&LAMPS.replace("(not (lit ?l))))", &format!("{when})")), problem, u32::MAX, None);
+    }
+}

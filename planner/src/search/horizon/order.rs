@@ -1,0 +1,120 @@
+//! An order of operators in which few take away what a later one needs: those that do not can be applied in one step.
+
+use crate::classical::compiled::Compiled;
+
+/// What an operator does to a fact at the time when it is applied together with others.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Use {
+    pub fact: u32,
+    pub needs: bool,
+    /// Takes it away, and not only where the operator could not be applied beside one that needs it.
+    pub takes: bool,
+}
+
+/// By operator: the facts that it needs, and those that it takes away from others.
+pub(super) fn uses(task: &Compiled) -> Vec<Vec<Use>> {
+    let used = |operator: usize| {
+        let needs = task.preconditions.get(operator);
+        let mut uses: Vec<Use> =
+            needs.iter().map(|&f| Use { fact: task.id(f), needs: true, takes: false }).collect();
+        for effect in task.effects.get(operator) {
+            let (variable, value) = (effect.fact.variable, effect.fact.value);
+            match needs.iter().position(|f| f.variable == variable) {
+                Some(place) => uses[place].takes |= needs[place].value != value,
+                None => {
+                    let offset = task.offsets[variable as usize];
+                    let others = (0..task.domains[variable as usize]).filter(|&other| other != value);
+                    uses.extend(others.map(|v| Use { fact: offset + v, needs: false, takes: true }));
+                }
+            }
+        }
+        uses
+    };
+    (0..task.operators()).map(used).collect()
+}
+
+/// Operators in order, each with the number of its circle: operators of different circles take nothing away from those
+/// that come later (Rintanen, Heljanko and Niemelä 2006: the strong components of the disabling graph).
+pub(super) fn order(task: &Compiled, uses: &[Vec<Use>]) -> Vec<(u32, u32)> {
+    // Nodes: operators, then facts. From an operator to what it takes, from a fact to who needs it.
+    let operators = uses.len();
+    let mut edges: Vec<Vec<u32>> = vec![Vec::new(); operators + task.facts];
+    for (operator, list) in uses.iter().enumerate() {
+        for used in list {
+            let fact = operators + used.fact as usize;
+            if used.takes {
+                edges[operator].push(fact as u32);
+            }
+            if used.needs {
+                edges[fact].push(operator as u32);
+            }
+        }
+    }
+    let circles = components(&edges);
+    let mut order: Vec<(u32, u32)> = (0..operators as u32).map(|op| (op, circles[op as usize])).collect();
+    order.sort_by_key(|&(operator, circle)| (circle, operator));
+    order
+}
+
+/// By node: the number of its strong component; those that it leads to have lower ones (Tarjan 1972).
+fn components(edges: &[Vec<u32>]) -> Vec<u32> {
+    const OPEN: u32 = u32::MAX;
+    let mut found = vec![OPEN; edges.len()];
+    let (mut index, mut low) = (vec![OPEN; edges.len()], vec![0u32; edges.len()]);
+    let (mut next, mut count) = (0, 0);
+    let mut stack = Vec::new();
+    for root in 0..edges.len() {
+        if index[root] != OPEN {
+            continue;
+        }
+        let mut calls = vec![(root, 0usize)];
+        while let Some((node, edge)) = calls.pop() {
+            if edge == 0 {
+                (index[node], low[node]) = (next, next);
+                next += 1;
+                stack.push(node);
+            }
+            if let Some(&to) = edges[node].get(edge) {
+                let to = to as usize;
+                calls.push((node, edge + 1));
+                if index[to] == OPEN {
+                    calls.push((to, 0));
+                } else if found[to] == OPEN {
+                    low[node] = low[node].min(index[to]);
+                }
+                continue;
+            }
+            if low[node] == index[node] {
+                while let Some(member) = stack.pop() {
+                    found[member] = count;
+                    if member == node {
+                        break;
+                    }
+                }
+                count += 1;
+            }
+            if let Some(&(parent, _)) = calls.last() {
+                low[parent] = low[parent].min(low[node]);
+            }
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::components;
+
+    #[test]
+    fn circles_are_found_and_what_they_lead_to_comes_first() {
+        for (edges, expected) in [
+            (vec![vec![], vec![]], vec![0, 1]),
+            (vec![vec![1], vec![]], vec![1, 0]),
+            (vec![vec![1], vec![0]], vec![0, 0]),
+            (vec![vec![1], vec![2], vec![1, 3], vec![]], vec![2, 1, 1, 0]),
+            (vec![vec![1, 2], vec![3], vec![3], vec![0, 4], vec![4]], vec![1, 1, 1, 1, 0]),
+        ] {
+            assert_eq!(components(&edges), expected, "{edges:?}");
+        }
+    }
+}

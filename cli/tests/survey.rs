@@ -152,11 +152,11 @@ fn a_later_run_extends_the_map() {
     let scene = folder.join("two-small.toml");
     std::fs::write(&scene, TWO_SMALL).unwrap();
     let scene = scene.display().to_string();
-    let (report, first) = run("map the room within 12 seconds", &scene, 5, folder, Some(&store));
+    let (report, first) = run("map the room within 12 seconds", &scene, 10, folder, Some(&store));
     assert_eq!(report["verdict"], "cannot_tell", "{}", report["why"]);
     let before = last_map(&first);
     let known = feet_of(&before);
-    let (report, second) = run("map the room", &scene, 5, folder, Some(&store));
+    let (report, second) = run("map the room", &scene, 10, folder, Some(&store));
     assert_eq!(report["verdict"], "achieved", "{}", report["why"]);
     let after = last_map(&second);
     let feet = feet_of(&after);

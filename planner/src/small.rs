@@ -1,7 +1,7 @@
 //! Small tasks that unit tests look into.
 
 use crate::diagnostic::Source;
-use crate::ground::{Fact, GroundTask, Meaning, ground};
+use crate::ground::{Fact, GroundTask, Meaning, Origin, ground};
 use crate::task::Task;
 
 /// Places in a row, boxes, and someone who carries one box at a time.
@@ -59,4 +59,11 @@ pub(crate) fn action(task: &Task, grounded: &GroundTask, index: usize) -> String
     let origin = &grounded.actions[index].origin;
     let names = origin.arguments.iter().map(|&object| format!(" {}", task.objects[object as usize].name));
     format!("({}{})", task.actions[origin.schema as usize].name, names.collect::<String>())
+}
+
+/// An action as it is called: its name and its objects.
+pub(crate) fn called(task: &Task, origin: &Origin) -> String {
+    let name = &task.actions[origin.schema as usize].name;
+    let objects = origin.arguments.iter().map(|&o| format!(" {}", task.objects[o as usize].name));
+    format!("{name}{}", objects.collect::<String>())
 }

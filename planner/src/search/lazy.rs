@@ -74,6 +74,22 @@ pub(crate) struct Shared<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
+#[cfg(test)]
+impl Shared<'_> {
+    /// Lends what searches of a small task share, without limits.
+    pub(crate) fn lend(ground: &crate::ground::GroundTask, to: impl FnOnce(&Shared<'_>)) {
+        let task = &Compiled::new(ground);
+        to(&Shared {
+            task,
+            successors: &Successors::new(task),
+            landmarks: &Landmarks::new(task, &ground.mutex_groups, &|| false),
+            mutex_groups: &ground.mutex_groups,
+            memory: MemoryLimit::new(None, None),
+            stop: &|| false,
+        });
+    }
+}
+
 /// How far a search may go, all its runs together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Allowed<'c> {

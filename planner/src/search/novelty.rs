@@ -329,24 +329,17 @@ mod tests {
     use rustc_hash::FxHashMap;
 
     use super::*;
-    use crate::classical::compiled::Compiled;
-    use crate::classical::successor::Successors;
-    use crate::heuristics::landmarks::Landmarks;
     use crate::small;
 
     /// How a search ends, and whether with a plan.
     fn check(problem: &str, narrow: bool, solvable: bool) {
         let (_, ground) = small::read(small::SHUTTLE, problem);
-        let task = &Compiled::new(&ground);
-        let shared = Shared {
-            task,
-            successors: &Successors::new(task),
-            landmarks: &Landmarks::new(task, &ground.mutex_groups, &|| false),
-            mutex_groups: &ground.mutex_groups,
-            memory: MemoryLimit::new(None, None),
-            stop: &|| false,
-        };
-        let mut search = Search::new(&shared, u32::MAX, narrow);
+        Shared::lend(&ground, |shared| check_shared(shared, problem, narrow, solvable));
+    }
+
+    fn check_shared(shared: &Shared<'_>, problem: &str, narrow: bool, solvable: bool) {
+        let task = shared.task;
+        let mut search = Search::new(shared, u32::MAX, narrow);
         let cancelled = &AtomicBool::new(false);
         let all = Allowed { work: u64::MAX, evaluations: u64::MAX, memory: shared.memory, cancelled };
         let End::Plan(plan) = search.run(all) else {

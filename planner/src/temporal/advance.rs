@@ -76,6 +76,13 @@ pub(crate) struct Step {
     pub span: Span,
 }
 
+impl Step {
+    /// An action from its start to its end, without a proposal.
+    pub fn whole(act: u32) -> Step {
+        Step { act, part: Part::Whole, proposal: None, span: Span { least_s: 0.0, most_s: 0.0 } }
+    }
+}
+
 impl World<'_> {
     /// The situation after a step, or `None` if it cannot be taken. Fills in the step's span.
     pub fn advance(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {

@@ -95,7 +95,6 @@ mod tests {
     use crate::small;
     use crate::temporal::envelope::envelopes;
     use crate::temporal::space::Measure;
-    use crate::temporal::world::Span;
 
     const DRIVES: &str =
         "(define (domain drives) (:requirements :durative-actions :typing :numeric-fluents) (:types place)
@@ -119,14 +118,10 @@ mod tests {
         let calls = Calls::bind(&task, &grounded, &nobody).expect("nothing to bind");
         let world = World::new(&task, &grounded, calls);
         let space = Space::new(&world, envelopes(&world), Measure::Makespan);
-        let called = |act: &Act| {
-            let name = &task.actions[act.origin.schema as usize].name;
-            let names = act.origin.arguments.iter().map(|&o| format!(" {}", task.objects[o as usize].name));
-            format!("{name}{}", names.collect::<String>())
-        };
+        let called = |act: &Act| small::called(&task, act.origin);
         let step = |call: &&str| {
             let act = world.acts.iter().position(|act| called(act) == *call).expect("an action") as u32;
-            Step { act, part: Part::Whole, proposal: None, span: Span { least_s: 0.0, most_s: 0.0 } }
+            Step::whole(act)
         };
         let mut steps: Vec<Step> = plan.iter().map(step).collect();
         let (measured, base) = space.replay_to_goal(&mut steps).expect("no call").expect("a plan");

@@ -10,7 +10,7 @@ use super::advance::Step;
 use super::relaxed::Part;
 use super::schedule::Replayed;
 use super::space::Space;
-use super::world::{Span, World};
+use super::world::World;
 
 /// Steps that are replayed at most for one plan.
 const MOST_REPLAYED: usize = 20_000;
@@ -134,7 +134,7 @@ impl<'w, 'a> Tours<'w, 'a> {
             if stop.place != at {
                 let mut arguments = tour.arguments.clone();
                 (arguments[tour.from], arguments[tour.to]) = (at, stop.place);
-                steps.push(whole(*self.acts.get(&(tour.schema, arguments.as_slice()))?));
+                steps.push(Step::whole(*self.acts.get(&(tour.schema, arguments.as_slice()))?));
                 at = stop.place;
             }
             steps.extend(stop.steps.iter().cloned());
@@ -187,10 +187,6 @@ fn follows(first: &[u32], second: &[u32], from: usize, to: usize) -> bool {
     first[to] == second[from] && (0..first.len()).all(is_same)
 }
 
-fn whole(act: u32) -> Step {
-    Step { act, part: Part::Whole, proposal: None, span: Span { least_s: 0.0, most_s: 0.0 } }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -227,13 +223,9 @@ mod tests {
         let calls = Calls::bind(&task, &grounded, &nobody).expect("nothing to bind");
         let world = World::new(&task, &grounded, calls);
         let space = Space::new(&world, envelopes(&world), Measure::Makespan);
-        let called = |act: &Act| {
-            let name = &task.actions[act.origin.schema as usize].name;
-            let names = act.origin.arguments.iter().map(|&o| format!(" {}", task.objects[o as usize].name));
-            format!("{name}{}", names.collect::<String>())
-        };
+        let called = |act: &Act| small::called(&task, act.origin);
         let step = |call: &str| {
-            whole(world.acts.iter().position(|act| called(act) == call).expect("an action") as u32)
+            Step::whole(world.acts.iter().position(|act| called(act) == call).expect("an action") as u32)
         };
         let mut steps: Vec<Step> = plan.split(", ").map(step).collect();
         let (measured, base) = space.replay_to_goal(&mut steps).expect("no call").expect("a plan");

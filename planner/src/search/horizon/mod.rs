@@ -149,24 +149,17 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
-    use crate::classical::compiled::Compiled;
-    use crate::classical::successor::Successors;
-    use crate::heuristics::landmarks::Landmarks;
     use crate::small;
 
     /// What comes of a search for plans cheaper than a bound: how many operators, if there is a plan.
     fn check(domain: &str, problem: &str, bound: u32, expected: Option<usize>) {
         let (_, ground) = small::read(domain, problem);
-        let task = &Compiled::new(&ground);
-        let shared = Shared {
-            task,
-            successors: &Successors::new(task),
-            landmarks: &Landmarks::new(task, &ground.mutex_groups, &|| false),
-            mutex_groups: &ground.mutex_groups,
-            memory: MemoryLimit::new(None, None),
-            stop: &|| false,
-        };
-        let mut search = Search::new(&shared, bound);
+        Shared::lend(&ground, |shared| check_shared(shared, bound, expected));
+    }
+
+    fn check_shared(shared: &Shared<'_>, bound: u32, expected: Option<usize>) {
+        let task = shared.task;
+        let mut search = Search::new(shared, bound);
         let end = loop {
             // In pieces: going on must make no difference.
             let work = search.counts().work + 200_000;

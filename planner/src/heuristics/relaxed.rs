@@ -262,6 +262,7 @@ impl Relaxed {
                 continue;
             };
             let times = (missing / gain).ceil().clamp(1.0, MOST_REFILLS) as u32;
+            let times = times + self.known(node).map_or(0, |known| known.times);
             self.take(node, (times, REFILL), total);
             self.follow_back(total);
         }
@@ -281,11 +282,19 @@ impl Relaxed {
                     self.take(node, (times, fact), total);
                     let mut movers = std::mem::take(&mut self.intervals.movers);
                     self.intervals.collect_movers(fact, &mut movers);
+                    self.intervals.collect_levers(fact, node, &mut movers);
                     movers.drain(..).for_each(|mover| self.take(mover, (1, NONE), total));
                     self.intervals.movers = movers;
                 }
             }
         }
+    }
+
+    /// What the relaxed plan at hand has of a node's operator.
+    fn known(&self, node: u32) -> Option<&Relevant> {
+        let place = self.operators[node as usize] as usize;
+        let marked = self.marked.get(self.fact_costs.len() + place)? == &self.mark;
+        marked.then(|| &self.plan[self.slots[place] as usize])
     }
 
     /// Takes a node into the relaxed plan, repeated so often until a fact holds, and asks for what it needs.

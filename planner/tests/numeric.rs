@@ -12,6 +12,8 @@ enum Expect {
     Plan,
     /// With time to improve, a plan whose metric is at most this.
     MetricAtMost(f64),
+    /// Without further time, a plan of at most so many steps.
+    StepsAtMost(usize),
     /// Proven to have no plan.
     Unsolvable,
 }
@@ -23,6 +25,10 @@ fn check(domain: &str, problem: &str, expect: Expect) {
     match (expect, verdict) {
         (Expect::Unsolvable, None) => assert!(matches!(outcome, Outcome::Unsolvable { .. }), "{outcome:?}"),
         (Expect::Plan, Some(_)) => {}
+        (Expect::StepsAtMost(most), Some(_)) => {
+            let steps = outcome.plan().map_or(0, |plan| plan.steps.len());
+            assert!(steps <= most, "{steps} steps, more than {most}: {outcome:?}");
+        }
         (Expect::MetricAtMost(most), Some(verdict)) => {
             let metric = verdict.metric.or(verdict.cost).expect("the problem has a metric");
             assert!(metric <= most + 1e-9, "metric {metric} above {most}: {outcome:?}");
@@ -193,4 +199,24 @@ fn what_steps_undo_of_one_another_goes() {
         let (outcome, _) = solve_twice(LADDER, &ladder(rungs), &Options::default());
         assert_eq!(outcome.plan().map(|plan| plan.steps.len()), Some(away), "{rungs} rungs");
     }
+}
+
+#[test]
+fn a_long_way_is_worth_going_faster() {
+    let domain = "(define (domain boat) (:requirements :fluents) (:predicates (met)) (:functions (x) (y) (v))
+      (:action east :parameters () :effect (increase (x) (* 2 (v))))
+      (:action west :parameters () :effect (decrease (x) (* 2 (v))))
+      (:action north :parameters () :effect (increase (y) (v)))
+      (:action south :parameters () :effect (decrease (y) (v)))
+      (:action faster :parameters () :precondition (<= (v) 9) :effect (increase (v) 1))
+      (:action slower :parameters () :precondition (>= (v) 2) :effect (decrease (v) 1))
+      (:action meet :parameters () :effect (met)
+        :precondition (and (>= (+ (x) (y)) 700) (<= (- (x) (y)) 40) (<= (v) 1))))";
+    let problem = |from: i32| {
+        format!(
+            "(define (problem p) (:domain boat) (:init (= (x) {from}) (= (y) 0) (= (v) 1)) (:goal (met)))"
+        )
+    };
+    check(domain, &problem(0), Expect::StepsAtMost(90));
+    check(domain, &problem(2000), Expect::StepsAtMost(250));
 }

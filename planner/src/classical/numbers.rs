@@ -188,6 +188,22 @@ impl Numbers {
         gains.filter(|(weight, _)| *weight != 0.0).map(|(weight, gain)| weight * gain).sum()
     }
 
+    /// What changes add to left minus right of a comparison in a state; NaN where they do more than add.
+    pub(crate) fn gain_in(&self, comparison: u32, changes: &[NumberChange], state: &[u32]) -> f64 {
+        let Some(linear) = &self.linear[comparison as usize] else { return f64::NAN };
+        let added = |c: &NumberChange| {
+            let weight = linear.weights.iter().find(|(number, _)| *number == c.number).map_or(0.0, |w| w.1);
+            let amount = || c.amount.as_ref().map_or(f64::NAN, |amount| self.value(amount, state));
+            match c.change {
+                _ if weight == 0.0 => 0.0,
+                Some(Change::Increase) => weight * amount(),
+                Some(Change::Decrease) => -weight * amount(),
+                _ => f64::NAN,
+            }
+        };
+        changes.iter().map(added).sum()
+    }
+
     /// The least value of a number with which a comparison that reads nothing else holds.
     pub(crate) fn least(&self, comparison: usize, number: u32) -> Option<f64> {
         let linear = self.linear[comparison].as_ref()?;

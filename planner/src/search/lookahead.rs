@@ -11,10 +11,12 @@ pub(crate) struct Lookahead {
     /// By fact: operators that bring it about.
     achievers: Lists<u32>,
     /// By fact: how many operators of the rest (and goals) need it.
-    needed: Vec<i32>,
+    pub(super) needed: Vec<i32>,
     pub(super) rest: Vec<Relevant>,
+    /// Operators of the relaxed plan that are there to move a number.
+    pub(super) moves: Vec<Relevant>,
     /// Operators of the relaxed plan that give back what others use up.
-    refills: Vec<Relevant>,
+    pub(super) refills: Vec<Relevant>,
     pub(super) state: Vec<u32>,
     next: Vec<u32>,
     /// By comparison: what each operator adds to left minus right.
@@ -37,6 +39,7 @@ impl Lookahead {
             achievers: Lists::group(task.facts, pairs),
             needed,
             rest: Vec::new(),
+            moves: Vec::new(),
             refills: Vec::new(),
             state: Vec::new(),
             next: Vec::new(),
@@ -49,51 +52,45 @@ impl Lookahead {
     pub(crate) fn run(&mut self, task: &Compiled, from: &[u32], relaxed: &[Relevant]) {
         self.plan.clear();
         self.rest.clear();
+        self.moves.clear();
         self.refills.clear();
         for entry in relaxed {
-            let list = if entry.until == REFILL { &mut self.refills } else { &mut self.rest };
+            let list = match entry.until {
+                REFILL => &mut self.refills,
+                u32::MAX => &mut self.rest,
+                _ => &mut self.moves,
+            };
             list.push(*entry);
         }
         self.state.clear();
         self.state.extend_from_slice(from);
-        for r in relaxed {
-            self.need(task, r.operator, 1);
-        }
+        relaxed.iter().for_each(|r| count(&mut self.needed, task, r.operator, 1));
         loop {
             while self.pass(task) {}
             if self.rest.is_empty() || !(self.mend(task) || self.steer(task)) {
                 break;
             }
         }
-        let (rest, refills) = (std::mem::take(&mut self.rest), std::mem::take(&mut self.refills));
-        for left in rest.iter().chain(&refills) {
-            self.need(task, left.operator, -1);
+        for list in [&self.rest, &self.moves, &self.refills] {
+            list.iter().for_each(|left| count(&mut self.needed, task, left.operator, -1));
         }
-        (self.rest, self.refills) = (rest, refills);
-        self.rest.clear();
         self.steer_to_goal(task);
     }
 
-    /// Counts an operator's preconditions among those that the rest of the plan needs.
-    pub(super) fn need(&mut self, task: &Compiled, operator: u32, by: i32) {
-        for &fact in task.preconditions.get(operator as usize) {
-            self.needed[task.id(fact) as usize] += by;
-        }
-    }
-
-    /// Applies every operator that can be applied, in order, but those that are there to move a number; tells whether
-    /// there was one.
+    /// Applies every operator that can be applied, in order, but those that are there to move a number; these come before
+    /// one that takes away what they need. Tells whether there was one.
     fn pass(&mut self, task: &Compiled) -> bool {
         let before = self.plan.len();
         let mut rest = std::mem::take(&mut self.rest);
         rest.retain(|entry| {
-            if entry.until != u32::MAX || !task.applicable(entry.operator, &self.state) {
+            if !task.applicable(entry.operator, &self.state) {
                 return true;
             }
-            if self.fill(task) && !task.applicable(entry.operator, &self.state) {
+            let more = self.fill(task) | self.hurry(task, entry.operator);
+            if more && !task.applicable(entry.operator, &self.state) {
                 return true;
             }
-            self.need(task, entry.operator, -1);
+            count(&mut self.needed, task, entry.operator, -1);
             self.step(task, entry.operator);
             false
         });
@@ -102,7 +99,7 @@ impl Lookahead {
     }
 
     /// Applies what gives back numbers that the rest uses up, wherever that is possible; tells whether there was any.
-    fn fill(&mut self, task: &Compiled) -> bool {
+    pub(super) fn fill(&mut self, task: &Compiled) -> bool {
         let before = self.plan.len();
         for place in 0..self.refills.len() {
             while self.refills[place].times > 0 && task.applicable(self.refills[place].operator, &self.state)
@@ -112,6 +109,32 @@ impl Lookahead {
             }
         }
         self.plan.len() > before
+    }
+
+    /// Moves numbers with what can be applied now, but no longer once an operator has been; tells whether there was any.
+    fn hurry(&mut self, task: &Compiled, operator: u32) -> bool {
+        let before = self.plan.len();
+        for place in 0..self.moves.len() {
+            let entry = self.moves[place];
+            if takes_from(task, operator, entry.operator) {
+                self.moves[place].times -= self.repeat(task, entry);
+            }
+        }
+        self.plan.len() > before
+    }
+
+    /// Applies an operator as often as the relaxed plan says, but no longer than it can be applied and is needed; how
+    /// often that was.
+    pub(super) fn repeat(&mut self, task: &Compiled, entry: Relevant) -> u32 {
+        let mut times = 0;
+        while times < entry.times
+            && !task.holds(entry.until, &self.state)
+            && task.applicable(entry.operator, &self.state)
+        {
+            self.step(task, entry.operator);
+            times += 1;
+        }
+        times
     }
 
     pub(super) fn step(&mut self, task: &Compiled, operator: u32) {
@@ -132,13 +155,86 @@ impl Lookahead {
                 let fits = |&&op: &&u32| op != self.rest[i].operator && task.applicable(op, &self.state);
                 let achievers = self.achievers.get(fact as usize).iter();
                 if let Some(&operator) = achievers.filter(fits).min_by_key(|&&op| task.costs[op as usize]) {
+                    if self.hurry(task, operator) {
+                        return true;
+                    }
                     let gone = self.rest.remove(i);
-                    self.need(task, gone.operator, -1);
+                    count(&mut self.needed, task, gone.operator, -1);
                     self.step(task, operator);
                     return true;
                 }
             }
         }
         false
+    }
+}
+
+/// Counts an operator's preconditions among those that the rest of the plan needs.
+pub(super) fn count(needed: &mut [i32], task: &Compiled, operator: u32, by: i32) {
+    for &fact in task.preconditions.get(operator as usize) {
+        needed[task.id(fact) as usize] += by;
+    }
+}
+
+/// Whether an operator takes away a fact that another one needs.
+fn takes_from(task: &Compiled, operator: u32, other: u32) -> bool {
+    let effects = task.effects.get(operator as usize).iter().filter(|e| e.from == e.to);
+    let mut effects = effects.map(|effect| effect.fact);
+    let needs = task.preconditions.get(other as usize);
+    effects.any(|fact| needs.iter().any(|n| n.variable == fact.variable && n.value != fact.value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Lookahead;
+    use crate::classical::compiled::Compiled;
+    use crate::heuristics::relaxed::{Counting, Relaxed};
+    use crate::small;
+
+    /// Follows the relaxed plan from the first state to the goal, in at most so many steps.
+    fn check(domain: &str, problem: &str, most: usize) {
+        let (_, grounded) = small::read(domain, problem);
+        let task = Compiled::new(&grounded);
+        let mut relaxed = Relaxed::new(&task, Counting::Steps);
+        relaxed.evaluate(&task, &task.initial).expect("the goal is in reach");
+        let mut lookahead = Lookahead::new(&task);
+        lookahead.run(&task, &task.initial, &relaxed.plan);
+        let mut state = task.initial.clone();
+        for &operator in &lookahead.plan {
+            assert!(task.applicable(operator, &state), "{:?}", lookahead.plan);
+            task.advance(operator, &mut state);
+        }
+        assert!(task.is_goal(&state), "{:?}", lookahead.plan);
+        assert!(lookahead.plan.len() <= most, "{} steps, more than {most}", lookahead.plan.len());
+    }
+
+    #[test]
+    fn what_is_needed_is_taken_before_leaving() {
+        let domain = "(define (domain round) (:requirements :typing :fluents) (:types market good)
+          (:predicates (at ?m - market)) (:functions (had ?g - good) (sold ?g - good ?m - market))
+          (:action drive :parameters (?a ?b - market) :precondition (at ?a) :effect (and (not (at ?a)) (at ?b)))
+          (:action buy :parameters (?g - good ?m - market) :precondition (and (at ?m) (> (sold ?g ?m) 0))
+            :effect (and (increase (had ?g) (sold ?g ?m)) (assign (sold ?g ?m) 0))))";
+        let problem = "(define (problem p) (:domain round) (:objects a b c - market x y z - good)
+          (:init (at a) (= (had x) 0) (= (had y) 0) (= (had z) 0) (= (sold x a) 3) (= (sold y b) 4) (= (sold z c) 5)
+            (= (sold x b) 0) (= (sold x c) 0) (= (sold y a) 0) (= (sold y c) 0) (= (sold z a) 0) (= (sold z b) 0))
+          (:goal (and (>= (had x) 3) (>= (had y) 4) (>= (had z) 5))))";
+        check(domain, problem, 5);
+    }
+
+    #[test]
+    fn as_much_is_carried_as_will_be_needed() {
+        let domain = "(define (domain garden) (:requirements :typing :fluents) (:types plant)
+          (:functions (x) (carried) (place ?p - plant) (poured ?p - plant))
+          (:action right :parameters () :precondition (<= (x) 20) :effect (increase (x) 1))
+          (:action left :parameters () :precondition (>= (x) 1) :effect (decrease (x) 1))
+          (:action load :parameters () :precondition (and (= (x) 0) (<= (carried) 4)) :effect (increase (carried) 1))
+          (:action pour :parameters (?p - plant) :precondition (and (= (x) (place ?p)) (>= (carried) 1))
+            :effect (and (decrease (carried) 1) (increase (poured ?p) 1))))";
+        let problem = "(define (problem p) (:domain garden) (:objects a b - plant)
+          (:init (= (x) 0) (= (carried) 0) (= (place a) 7) (= (place b) 12) (= (poured a) 0) (= (poured b) 0))
+          (:goal (and (= (poured a) 10) (= (poured b) 5))))";
+        // Fifteen units in and out, on four ways to the tap.
+        check(domain, problem, 30 + 2 * 4 * 12);
     }
 }

@@ -2,16 +2,18 @@
 //! in whatever direction they lie by then.
 
 use crate::classical::compiled::{Compiled, Lists};
-use crate::classical::numbers::repetitions;
+use crate::classical::numbers::{NumberChange, repetitions};
+use crate::ground::Change;
+use crate::heuristics::relaxed::Relevant;
 
-use super::lookahead::{Lookahead, MOST_STEPS};
+use super::lookahead::{Lookahead, MOST_STEPS, count};
 
 /// How many operators may be made applicable one for another.
 const DEPTH: u32 = 4;
 /// How often all conditions of an operator are looked at again.
 const ROUNDS: usize = 4;
 
-/// By comparison: the operators that always add the same to left minus right, with what they add.
+/// By comparison: the operators that add to left minus right, with what they add; NaN where that depends on the state.
 pub(super) fn movers(task: &Compiled) -> Lists<(u32, f64)> {
     let numbers = &task.numbers;
     let mut pairs = Vec::new();
@@ -19,7 +21,9 @@ pub(super) fn movers(task: &Compiled) -> Lists<(u32, f64)> {
         if changes.iter().all(|c| c.conditions.is_empty()) {
             for &comparison in numbers.turned(operator as u32) {
                 let gain = numbers.gain(comparison, changes);
-                if gain != 0.0 && !gain.is_nan() {
+                let adds = |c: &NumberChange| matches!(c.change, Some(Change::Increase | Change::Decrease));
+                let linear = numbers.linear[comparison as usize].is_some();
+                if gain != 0.0 && (!gain.is_nan() || linear && changes.iter().all(adds)) {
                     pairs.push((comparison, (operator as u32, gain)));
                 }
             }
@@ -36,9 +40,9 @@ impl Lookahead {
         }
         for place in 0..self.rest.len() {
             let entry = self.rest[place];
-            if entry.until == u32::MAX && self.enable(task, entry.operator, DEPTH) {
+            if self.enable(task, entry.operator, DEPTH) {
                 self.rest.remove(place);
-                self.need(task, entry.operator, -1);
+                count(&mut self.needed, task, entry.operator, -1);
                 self.step(task, entry.operator);
                 return true;
             }
@@ -97,7 +101,14 @@ impl Lookahead {
         }
         let before = self.plan.len();
         let comparison = (variable - task.numbers.first) as u32;
+        let mut last = f64::INFINITY;
         while !task.holds(fact, &self.state) && self.plan.len() < MOST_STEPS {
+            let gap = task.numbers.gap(comparison as usize, &self.state).abs();
+            // What an operator adds may depend on what it moves.
+            if gap >= last {
+                break;
+            }
+            last = gap;
             let Some((operator, times)) = self.best_mover(task, comparison, keep) else { break };
             for _ in 0..times {
                 if !task.applicable(operator, &self.state) {
@@ -119,6 +130,7 @@ impl Lookahead {
         let relation = task.numbers.comparisons[comparison as usize].relation;
         let mut best: Option<((bool, u64), (u32, u32))> = None;
         for &(operator, gain) in self.movers.get(comparison as usize) {
+            let gain = if gain.is_nan() { self.gain(task, operator, comparison) } else { gain };
             let Some(times) = repetitions(gap, relation, gain) else { continue };
             let after = gap + f64::from(times) * gain;
             if !relation.holds(after, 0.0) || !task.applicable(operator, &self.state) {
@@ -136,6 +148,11 @@ impl Lookahead {
         best.map(|(_, mover)| mover)
     }
 
+    /// What an operator adds to left minus right of a comparison in the state at hand.
+    fn gain(&self, task: &Compiled, operator: u32, comparison: u32) -> f64 {
+        task.numbers.gain_in(comparison, &task.numbers.changes[operator as usize], &self.state)
+    }
+
     /// Whether so many applications of an operator turn a condition that holds.
     fn breaks(&self, task: &Compiled, operator: u32, times: u32, fact: u32) -> bool {
         let variable = task.variables[fact as usize] as usize;
@@ -143,21 +160,31 @@ impl Lookahead {
             return false;
         }
         let comparison = variable - task.numbers.first;
-        let gain = task.numbers.gain(comparison as u32, &task.numbers.changes[operator as usize]);
+        let gain = self.gain(task, operator, comparison as u32);
         let gap = task.numbers.gap(comparison, &self.state) + f64::from(times) * gain;
         !task.numbers.comparisons[comparison].relation.holds(gap, 0.0)
     }
 
-    /// Applies what the relaxed plan brings a condition about with, made applicable first.
+    /// Applies what the relaxed plan brings a condition about with, made applicable first: as much of it as all that
+    /// uses the number up will need.
     fn support(&mut self, task: &Compiled, fact: u32, depth: u32) {
-        let Some(entry) = self.rest.iter().find(|r| r.until == fact).copied() else { return };
-        if self.enable(task, entry.operator, depth - 1) {
-            for _ in 0..entry.times {
-                if task.holds(fact, &self.state) || !task.applicable(entry.operator, &self.state) {
-                    break;
-                }
-                self.step(task, entry.operator);
+        if let Some(entry) = self.moves.iter().find(|r| r.until == fact).copied() {
+            if self.enable(task, entry.operator, depth - 1) {
+                self.repeat(task, entry);
             }
+            return;
+        }
+        let comparison = (task.variables[fact as usize] as usize - task.numbers.first) as u32;
+        let gap = task.numbers.gap(comparison as usize, &self.state);
+        let relation = task.numbers.comparisons[comparison as usize].relation;
+        let helps = |refill: &&Relevant| {
+            refill.times > 0
+                && repetitions(gap, relation, self.gain(task, refill.operator, comparison)).is_some()
+        };
+        if let Some(refill) = self.refills.iter().find(helps).copied()
+            && self.enable(task, refill.operator, depth - 1)
+        {
+            self.fill(task);
         }
     }
 }

@@ -136,7 +136,14 @@ impl<'a> Improve<'a> {
         let task = self.task;
         let mut state = task.initial.clone();
         let mut i = 0;
+        // Without the next of equal steps in a row, the plan is the same as without the one before.
+        let mut tried = None;
         while i < plan.len() && !self.over() {
+            if tried == Some(plan[i]) {
+                task.advance(plan[i], &mut state);
+                i += 1;
+                continue;
+            }
             self.next.clear();
             self.next.extend_from_slice(&state);
             let mut kept = Vec::with_capacity(plan.len());
@@ -154,6 +161,7 @@ impl<'a> Improve<'a> {
                 plan.truncate(i);
                 plan.extend(kept);
             } else {
+                tried = Some(plan[i]);
                 task.advance(plan[i], &mut state);
                 i += 1;
             }

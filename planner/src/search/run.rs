@@ -237,7 +237,9 @@ impl<'a, 's> Run<'a, 's> {
         let mut plan = plan;
         if plain_too {
             let bound = self.bound.min(self.task.search_cost(&plan));
-            let strategy = Strategy { lookahead: false, bound, work_limit: budget / 2, ..GREEDY };
+            // Lookahead over numbers goes the longer ways.
+            let work_limit = if self.task.numbers.is_empty() { budget / 2 } else { budget };
+            let strategy = Strategy { lookahead: false, bound, work_limit, ..GREEDY };
             if let End::Plan(other) = self.search(strategy) {
                 plan = other;
             }

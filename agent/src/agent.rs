@@ -22,6 +22,8 @@ use crate::{standing, weigh};
 /// A planning call ends after so many evaluated states; then the best plan so far, or one good look, has to do.
 const MOST_EVALUATED: u64 = 2_500;
 
+/// What is said behind the cause of a plan that will not do, since none would in the time that is left.
+pub(crate) const TOO_LATE: &str = "; no plan would do in the time that is left";
 /// Before what is said of the goal where steps of the plan are left that were to reach it.
 pub(crate) const AT_THE_END: &str = "at the end of the plan ";
 
@@ -163,7 +165,13 @@ impl<'a> Agent<'a> {
             Taken::LeftToPlanner => {}
         }
         match self.plan(&round.task, round)? {
-            Planned::Unsolvable { why, .. } => return Ok(Some(Ended::NoPlan(why.to_string()))),
+            Planned::Unsolvable { why, statistics } => {
+                let because = format!("{because}{TOO_LATE}");
+                match self.take_up(world, round, &because, asked_of(&statistics), World::in_time)? {
+                    Taken::Up => {}
+                    _ => return Ok(Some(Ended::NoPlan(why.to_string()))),
+                }
+            }
             Planned::Solved { plan, statistics } => self.adopt(round, plan, &statistics, because)?,
             Planned::OutOfTime { best, statistics } | Planned::OutOfMemory { best, statistics } => {
                 let ended = format!("the search ended after {MOST_EVALUATED} states");

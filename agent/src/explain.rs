@@ -85,7 +85,9 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let counts = |action: &str| domain.as_ref().and_then(|domain| counts(domain, action, briefly));
     let name = |symbol: &str| saying.name_of(symbol);
     let goal = header.pddl_goal.clone();
-    let in_vain = domain.as_ref().and_then(|domain| seconds(domain, &saying, &chapters));
+    let in_vain = domain
+        .as_ref()
+        .and_then(|domain| besides_time(domain, &saying).or_else(|| seconds(domain, &saying, &chapters)));
     let counts_in_vain = in_vain.is_some();
     let asked =
         Asked { goal, policy, counts: &counts, name: &name, has_ended: report.is_some(), counts_in_vain };
@@ -104,7 +106,8 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     }
     let not_there = domain.as_ref().map(|domain| domain.config.thresholds.not_there);
     let negligible = domain.as_ref().map(|domain| domain.config.thresholds.remaining);
-    let words = verdict::Words { meanings: &meanings, name: &name, not_there, negligible };
+    let is_used = |call: &str| domain.as_ref().is_none_or(|domain| is_used(domain, &chapters, call));
+    let words = verdict::Words { meanings: &meanings, is_used: &is_used, name: &name, not_there, negligible };
     let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
     let verdict = verdict.iter().map(|line| saying.say(line)).collect();
     Ok(Explanation { summary, asked: said, reading, plans, verdict, lost })
@@ -152,6 +155,25 @@ fn counts(domain: &Domain, action: &str, told: impl Fn(String) -> String) -> Opt
     (!all.is_empty()).then(|| listed(&all, all.len()))
 }
 
+/// What counts beside the time that a plan takes, where plans are to make that small, too.
+fn besides_time(domain: &Domain, saying: &Saying) -> Option<String> {
+    let minimise = &domain.config.minimise;
+    let numbers = domain.vocabulary.words().into_iter().map(|word| format!("({})", word.name));
+    let numbers: Vec<String> = numbers.filter(|number| minimise.contains(number)).collect();
+    let grows_by = |number: &String| {
+        let grows = format!("(increase {number} [");
+        let calls = domain.pddl.text.split(&grows).skip(1).filter_map(|rest| rest.split([' ', ']']).next());
+        let calls: Vec<String> = calls.filter_map(|call| meaning(domain, call)).collect();
+        let by = listed(&calls, calls.len()).replace(';', ":");
+        let said = saying.say(number);
+        if by.is_empty() { said } else { format!("{said} (the {by})") }
+    };
+    let said: Vec<String> = numbers.iter().map(grows_by).collect();
+    (!said.is_empty()).then(|| {
+        format!("What counts is {minimise}. (total-time) is the seconds that pass; {}.", said.join("; "))
+    })
+}
+
 /// Which actions count for more than they take, and do so in this run.
 fn seconds(domain: &Domain, saying: &Saying, chapters: &[chapters::Chapter]) -> Option<String> {
     let is_more = |name: &str| {
@@ -174,6 +196,24 @@ fn seconds(domain: &Domain, saying: &Saying, chapters: &[chapters::Chapter]) -> 
     })
 }
 
+/// Whether an action of which a plan had a step asks a call.
+fn is_used(domain: &Domain, chapters: &[chapters::Chapter], call: &str) -> bool {
+    let steps = chapters.iter().flat_map(|chapter| &chapter.steps);
+    let actions =
+        steps.filter_map(|step| chapters::bare(step).trim_start_matches('(').split([' ', ')']).next());
+    let actions: std::collections::BTreeSet<&str> = actions.collect();
+    actions.into_iter().filter_map(|action| declared(domain, action)).any(|text| {
+        let asked = text.split('[').skip(1).filter_map(|rest| rest.split([' ', ']']).next());
+        asked.into_iter().any(|asked| asked == call)
+    })
+}
+
+/// What the domain's file says of an action.
+fn declared<'d>(domain: &'d Domain, action: &str) -> Option<&'d str> {
+    let from = domain.pddl.text.split_once(&format!("action {action}\n"))?.1;
+    Some(from.split("\n  (:").next().unwrap_or(from))
+}
+
 /// The seconds that are fixed where an action's duration adds to them.
 fn fixed_s(domain: &Domain, action: &str) -> Option<f64> {
     duration(domain, action)?.split_once("(+ ")?.1.split_whitespace().next()?.parse().ok()
@@ -181,8 +221,7 @@ fn fixed_s(domain: &Domain, action: &str) -> Option<f64> {
 
 /// What stands for the duration of an action.
 fn duration<'d>(domain: &'d Domain, action: &str) -> Option<&'d str> {
-    let declared = domain.pddl.text.split_once(&format!("action {action}\n"))?.1;
-    declared.split_once(":duration")?.1.split(":condition").next()?.split(":effect").next()
+    declared(domain, action)?.split_once(":duration")?.1.split(":condition").next()?.split(":effect").next()
 }
 
 /// How poses are called, where they are called after what is looked at.

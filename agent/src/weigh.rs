@@ -69,10 +69,10 @@ pub struct Expected {
 pub struct Way {
     /// The calls.
     pub steps: Vec<String>,
-    /// What each counts for, seconds; records of earlier versions do not say.
+    /// What each takes, seconds; records of earlier versions do not say.
     #[serde(default)]
     pub each_s: Vec<f64>,
-    /// What they count for, one after the other, seconds.
+    /// What they take, one after the other, seconds.
     pub takes_s: f64,
     /// By how much they bring the numbers that count nearer to what is wanted, together.
     pub gains: f64,
@@ -91,7 +91,7 @@ pub struct Way {
 /// A way to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Whole {
-    /// What its steps count for, one after the other, seconds.
+    /// What its steps count for, one after the other, seconds: by what plans are to make small.
     pub takes_s: f64,
     /// How many they are.
     pub steps: usize,
@@ -195,14 +195,14 @@ impl<'r> Scale<'r> {
         (if less { now - then } else { then - now }).max(0.0)
     }
 
-    /// Steps, one after the other: what each counts for, seconds, and the state then; none where they cannot be taken.
+    /// Steps, one after the other: what each takes, seconds, and the state then; none where they cannot be taken.
     fn after(&self, steps: &[Step]) -> Option<(Vec<f64>, State)> {
         let mut state = self.state.clone();
         let each = steps.iter().map(|step| self.apply(&mut state, step)).collect::<Option<_>>()?;
         Some((each, state))
     }
 
-    /// What a step counts for in a state, seconds.
+    /// What a step takes in a state, seconds.
     fn takes_s(&self, state: &State, step: &Step) -> Option<f64> {
         let (id, binding) = self.semantics.bind(step).ok()?;
         let Some(bounds) = &self.semantics.task.action(id).duration else { return Some(0.0) };
@@ -210,7 +210,7 @@ impl<'r> Scale<'r> {
         self.semantics.number(state, &bound.value, &binding).ok()?.filter(|s| s.is_finite())
     }
 
-    /// Applies a step; returns what it counts for, seconds.
+    /// Applies a step; returns the seconds that it takes.
     fn apply(&self, state: &mut State, step: &Step) -> Option<f64> {
         let semantics = &self.semantics;
         let (id, mut binding) = semantics.bind(step).ok()?;
@@ -264,7 +264,11 @@ impl<'r> Scale<'r> {
     /// What steps come to, one after the other.
     fn whole(&self, steps: &[Step]) -> Option<Whole> {
         let (each_s, state) = self.after(steps)?;
-        Some(Whole { takes_s: each_s.iter().sum(), steps: steps.len(), reaches: self.reaches(&state)? })
+        let takes_s = each_s.iter().sum();
+        let counted = |state: &State, end_s: f64| self.semantics.measured(state, end_s, &[]).ok()?;
+        let counted = counted(&self.state, 0.0).zip(counted(&state, takes_s)).map(|(now, then)| then - now);
+        let reaches = self.reaches(&state)?;
+        Some(Whole { takes_s: counted.unwrap_or(takes_s), steps: steps.len(), reaches })
     }
 
     /// What other steps come to with the rest of a plan behind them, or with so much of it as is needed then: with objects

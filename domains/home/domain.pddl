@@ -2,7 +2,7 @@
 ;
 ; Looking is as on the tabletop. What is new: a drive leads through doors, which may turn out to be shut; the body carries one
 ; thing at a time, and looks while it carries nothing; and where a thing is expected, and what it costs to have looked in vain,
-; decides where it is looked for first: [search-cost] is a part of how long the first look at a surface counts.
+; decides where it is looked for first: what [search-cost] says of the first look at a surface counts beside the time that a plan takes.
 
 (define (domain home)
   (:requirements :typing :equality :negative-preconditions :disjunctive-preconditions :universal-preconditions
@@ -55,6 +55,7 @@
     (completeness-in ?of - kind ?where - room)  ; the same of those in a room
     (clarity ?on - surface)                     ; how sure we are what each object on it is, the least sure one, 0 to 1
     (hours-since ?what - thing)                 ; how long ago an earlier run saw it
+    (in-vain)                                   ; seconds that count for looks that may turn out to have been in vain
     (sure))                                     ; the confidence that was asked for
 
   (:durative-action move
@@ -84,7 +85,7 @@
   ; While it looks, the robot stands nowhere in particular: it neither looks elsewhere nor leaves.
   (:durative-action observe
     :parameters (?from - pose ?on - surface)
-    :duration (= ?duration (+ 2 [search-cost ?on]))
+    :duration (= ?duration 2)
     :condition (and
       (over all (time-left))
       (at start (at ?from))
@@ -96,6 +97,7 @@
       (at start (not (at ?from)))
       (at end (at ?from))
       (at end (observed ?from ?on))
+      (at end (increase (in-vain) [search-cost ?on]))
       (at end (increase (clarity ?on) [expected-clarity ?from ?on]))
       (forall (?what - thing)
         (and (at end (increase (confidence ?what) [expected-gain ?from ?on ?what]))

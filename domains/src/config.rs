@@ -36,6 +36,9 @@ pub struct Config {
     /// What is expected where before anything has been seen.
     #[serde(default)]
     pub expect: Vec<Expectation>,
+    /// What plans are to make small: an expression of PDDL over the time that they take, `(total-time)`, and the domain's numbers.
+    #[serde(default = "total_time")]
+    pub minimise: String,
     /// Limits of a run.
     #[serde(default)]
     pub limits: Limits,
@@ -65,6 +68,10 @@ pub struct Config {
 
 fn searching_alone() -> Vec<String> {
     vec!["searching".into()]
+}
+
+fn total_time() -> String {
+    "(total-time)".into()
 }
 
 /// A phrase and its meaning.
@@ -221,7 +228,7 @@ pub enum Source {
     Remembered,
     /// It never changes.
     Fixed,
-    /// It changes within a plan alone: every round begins without it.
+    /// It changes within a plan alone: every round begins as `init` says, else without it.
     Planned,
 }
 

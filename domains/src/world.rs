@@ -270,9 +270,9 @@ impl<'a> World<'a> {
             text += &format!("    {line}\n");
         }
         let metric = if vocabulary.task.actions.iter().any(|a| a.is_durative()) {
-            "\n  (:metric minimize (total-time))"
+            format!("\n  (:metric minimize {})", domain.config.minimise)
         } else {
-            ""
+            String::new()
         };
         text += &format!("  )\n  (:goal {}){metric})\n", goal.pddl);
         Ok(Source::new(format!("{name}.pddl"), text))
@@ -357,6 +357,20 @@ impl<'a> World<'a> {
         }
         let look = policies::behind(s, &self.barred).filter(|_| s.held.is_none());
         look.map_or_else(|| Ok(Choice::Nothing(NOTHING_LEFT.into())), |look| self.head_for(round, look))
+    }
+
+    /// What may still help where the time that was given is too short for any plan: the look that settles most a second, if it ends in
+    /// time.
+    ///
+    /// # Errors
+    /// Never: it is chosen as [`World::fallback`] is.
+    pub fn in_time(&mut self, round: &Round) -> Result<Choice, WorldError> {
+        let s = &round.situation;
+        self.heading_for = None;
+        let is_searching = self.setting.domain.config.uses.iter().any(|ability| ability == "searching");
+        let may_look = s.time_left_s.is_some() && s.held.is_none() && is_searching;
+        let look = reasons::one_look(s).filter(|_| may_look);
+        Ok(look.map_or_else(|| Choice::Nothing(NOTHING_LEFT.into()), Choice::Steps))
     }
 
     /// A plan was made.

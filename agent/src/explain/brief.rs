@@ -9,6 +9,9 @@ use crate::weigh::{Way, Weighed};
 
 /// Why this plan and not another, as far as the record says; where the planner did not count to the end, with all figures.
 pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
+    if chapter.is_late {
+        return vec![rivals::IN_TIME.into()];
+    }
     let known = chapter.weighed.as_ref().and_then(|weighed| {
         let chosen = weighed.chosen.as_ref()?;
         let whole_s = whole_s(chosen).filter(|_| asked.policy.is_none() && !weighed.others.is_empty())?;
@@ -16,17 +19,22 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     });
     let Some((weighed, chosen, whole_s)) = known else { return rivals::why(chapter, asked) };
     let of = format!("of {} ways to begin", weighed.open);
+    let is_more = asked.counts_in_vain && whole_s > chapter.makespan_s + LONGER_S;
+    let (best, comes_to) = match is_more {
+        true => {
+            let takes_s = chapter.makespan_s;
+            ("cheapest", format!("it takes {takes_s:.1} s, and the planner counts {whole_s:.1} s"))
+        }
+        false => ("quickest", format!("{whole_s:.1} s as the planner counts")),
+    };
     let first = match &chapter.cut {
         Some(cut) => format!(
-            "{of}, this is the best whole plan that the planner had when its search was ended after {cut}: {whole_s:.1} s \
-             as it counts."
+            "{of}, this is the best whole plan that the planner had when its search was ended after {cut}: {comes_to}."
         ),
-        None => format!(
-            "{of}, this makes the quickest whole plan that was found: {whole_s:.1} s as the planner counts."
-        ),
+        None => format!("{of}, this makes the {best} whole plan that was found: {comes_to}."),
     };
     let mut said = vec![first];
-    said.extend(instead(weighed, chosen, whole_s, asked));
+    said.extend(instead(weighed, chosen, (whole_s, is_more), asked));
     said.extend(rivals::left(chapter, weighed, chosen, asked));
     said.extend(rivals::longer(weighed, chosen));
     said.extend(unseen(chapter));
@@ -34,13 +42,13 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
 }
 
 /// What the others that stand out would have come to.
-fn instead(weighed: &Weighed, chosen: &Way, whole_s: f64, asked: &Asked<'_>) -> Option<String> {
+fn instead(weighed: &Weighed, chosen: &Way, counted: (f64, bool), asked: &Asked<'_>) -> Option<String> {
     let through = weighed.through.iter().map(|way| (way, Vec::new()));
     let rivals: Vec<&Way> =
         rivals::rivals(weighed, chosen).into_iter().chain(through).map(|(way, _)| way).collect();
     let all: Vec<String> = rivals
         .iter()
-        .map(|way| format!("{} {}", called(way, chosen, &rivals), comes_to(way, whole_s, asked)))
+        .map(|way| format!("{} {}", called(way, chosen, &rivals), comes_to(way, counted, asked)))
         .collect();
     (!all.is_empty()).then(|| format!("begun otherwise: {}.", all.join("; ")))
 }
@@ -54,14 +62,16 @@ fn called(way: &Way, chosen: &Way, rivals: &[&Way]) -> String {
     }
 }
 
-/// What a way comes to with the rest of the plan behind it.
-fn comes_to(way: &Way, whole_s: f64, asked: &Asked<'_>) -> String {
+/// What a way comes to with the rest of the plan behind it, beside what the plan counts for, which may be more than it takes.
+fn comes_to(way: &Way, (whole_s, is_more): (f64, bool), asked: &Asked<'_>) -> String {
+    let take = if is_more { "count" } else { "take" };
     let stuck = way.stuck.as_deref().unwrap_or_default();
     match way.whole {
         Some(whole) if whole.reaches => match whole.takes_s - whole_s {
+            more_s if more_s.abs() <= LONGER_S && is_more => "would count as much".into(),
             more_s if more_s.abs() <= LONGER_S => "would take as long".into(),
-            more_s if more_s > 0.0 => format!("would take {more_s:.1} s more"),
-            more_s => format!("would take {:.1} s less: the planner did not come upon that", -more_s),
+            more_s if more_s > 0.0 => format!("would {take} {more_s:.1} s more"),
+            more_s => format!("would {take} {:.1} s less: the planner did not come upon that", -more_s),
         },
         Some(_) => "would not be enough".into(),
         None if stuck.starts_with("the goal ") => {

@@ -5,6 +5,7 @@ use descry_memory::{Document, Query, Record, RecordId};
 
 use super::standings::{Standing, Standings};
 use super::states::{Difference, States};
+use crate::agent::TOO_LATE;
 use crate::exit::CommandError;
 use crate::report::Event;
 use crate::run::Resumed;
@@ -21,6 +22,8 @@ pub struct Chapter {
     pub because: String,
     /// After how much the planner's search was ended without a proof; none: it ended by itself.
     pub cut: Option<String>,
+    /// No plan would have done in the time that was left.
+    pub is_late: bool,
     /// The greatest of the numbers of which one would do, and none does.
     pub most: Option<(String, f64)>,
     /// Its steps, as they were said.
@@ -85,8 +88,9 @@ pub fn of(
             Event::Planned { round, because, steps, makespan_s, .. } => {
                 let weighed = weighed(record, document, &mut lost);
                 let cut = because.split_once("; the search ended after ").map(|(_, cut)| cut.to_string());
-                let because =
-                    because.split("; the search ended after ").next().unwrap_or_default().to_string();
+                let is_late = because.ends_with(TOO_LATE);
+                let because = because.trim_end_matches(TOO_LATE).split("; the search ended after ").next();
+                let because = because.unwrap_or_default().to_string();
                 let most = one_of(&because).and_then(|begins| states.most(document.id, &begins));
                 let before = standings.at(document);
                 if let (Some(chapter), Some(standing)) = (chapters.last_mut(), &before) {
@@ -97,6 +101,7 @@ pub fn of(
                     at_s,
                     because,
                     cut,
+                    is_late,
                     most,
                     steps,
                     makespan_s,

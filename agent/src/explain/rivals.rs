@@ -21,6 +21,9 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
         return vec!["what else could have been done, and at what cost, is not in the record.".into()];
     };
     let Some(chosen) = &weighed.chosen else {
+        if chapter.is_late {
+            return vec![IN_TIME.into()];
+        }
         if let Some(cut) = &chapter.cut {
             return vec![format!(
                 "the planner's search was ended after {cut}, without a plan that it expected to reach the goal. What \
@@ -44,8 +47,13 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     };
     let left = left(chapter, weighed, chosen, asked);
     let first = first_looks(chapter).filter(|_| asked.counts_in_vain);
-    said.into_iter().chain(left).chain(longer).chain(through).chain(first).collect()
+    let late = chapter.is_late.then(|| IN_TIME.to_string());
+    late.into_iter().chain(said).chain(left).chain(longer).chain(through).chain(first).collect()
 }
+
+/// What is done where no plan ends in time.
+pub const IN_TIME: &str = "No plan would bring it about in the time that is left: the look that settles most a second, of those \
+                           that end in time, is taken all the same.";
 
 /// What the planner has missed: several of its steps could be one.
 pub fn longer(weighed: &Weighed, chosen: &Way) -> Option<String> {
@@ -273,22 +281,26 @@ fn compared(
         n => format!("{more}{n} gain more a second, most of all"),
     };
     let first = named.once(better[0]);
+    let plan_s = whole_s(chosen).unwrap_or(chapter.makespan_s);
     let rule = match (&asked.policy, &chapter.cut) {
         (Some(policy), _) => format!("The policy {policy} goes by its own rule."),
         (None, Some(cut)) => {
             format!("The planner's search was ended after {cut}: this is the best that it had by then.")
         }
+        (None, None) if chapter.is_late => {
+            "It goes by all that is in doubt, not by these numbers alone.".into()
+        }
         (None, None) => {
             let alone = match enough(chapter, weighed, better[0], asked) {
-                Some(false) if chosen.reaches == Some(true) || better[0].takes_s < chapter.makespan_s => {
+                Some(false) if chosen.reaches == Some(true) || better[0].takes_s < plan_s => {
                     " By what is hoped of it, that one would not be enough by itself."
                 }
-                Some(true) if better[0].takes_s < chapter.makespan_s => {
+                Some(true) if better[0].takes_s < plan_s => {
                     " By what is hoped of it, that one would be enough, and sooner: the planner did not come upon it."
                 }
                 _ => "",
             };
-            let whole = match chapter.makespan_s {
+            let whole = match plan_s {
                 // Nothing in the domain takes time.
                 s if s <= 0.0 => "a whole plan".to_string(),
                 s => format!("the quickest whole plan that it finds, here {s:.1} s"),

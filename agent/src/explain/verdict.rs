@@ -23,6 +23,8 @@ const MOST_NAMED: usize = 12;
 pub struct Words<'a> {
     /// What a call asks.
     pub meanings: Meanings<'a>,
+    /// Whether an action of the run's plans asks a call.
+    pub is_used: &'a dyn Fn(&str) -> bool,
     /// What a surface is called.
     pub name: &'a dyn Fn(&str) -> String,
     /// A thing that is there with less is said not to be there.
@@ -57,7 +59,7 @@ pub fn rests_on(
         Some(answer) => format!("the answer is {answer}"),
         None => verdict.to_string(),
     };
-    let mut said = vec![format!("{verdict}: {}.", reasons::no_plan(why, words.meanings))];
+    let mut said = vec![format!("{verdict}: {}.", reasons::no_plan(why, words.meanings, words.is_used))];
     let (beliefs, faults) = record.find_whole(&Query::of_kind("belief")).map_err(CommandError::broken)?;
     lost.extend(faults.iter().map(ToString::to_string));
     let mut newest = beliefs.last().and_then(|d| serde_json::from_value::<Belief>(d.body.clone()).ok());
@@ -202,7 +204,7 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) 
         let open = rests.in_doubt.iter().filter(|doubt| doubt.of == Of::Thing && doubt.left > HARDLY);
         said.extend(open.map(|d| format!("about {}, {} is still open in all.", d.about, share(d.left))));
     }
-    let because = reasons::no_plan(&rests.said, words.meanings);
+    let because = reasons::no_plan(&rests.said, words.meanings, words.is_used);
     said.push(match (rests.ended.as_str(), left_s) {
         ("reached", _) if report.verdict == Verdict::CannotTell => {
             let least = words.not_there.map(|least| format!(", which is said only below {}", share(least)));

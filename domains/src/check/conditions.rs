@@ -6,6 +6,12 @@ use super::Check;
 use crate::asked::mentions;
 
 impl Check<'_> {
+    /// What is wrong with what plans are to make small.
+    pub(super) fn minimise(&self) -> Option<Diagnostic> {
+        let expression = &self.domain.config.minimise;
+        self.aim(&["minimise"], "", &format!("(:goal (and)) (:metric minimize {expression})"))
+    }
+
     /// What is wrong with a condition over the domain's words, its objects and a few more (name and type).
     pub(super) fn condition(
         &self,
@@ -35,10 +41,13 @@ impl Check<'_> {
             let named = mention[1..].iter().zip(&word.types).filter(|(name, _)| !name.starts_with('?'));
             named.filter(|(_, of)| *of == "pose").for_each(|(name, of)| declare(name, of));
         }
-        let problem = format!(
-            "(define (problem p) (:domain {}) (:objects{objects}) (:init) (:goal {condition}))",
-            vocabulary.task.domain
-        );
+        self.aim(path, &objects, &format!("(:goal {condition})"))
+    }
+
+    /// What is wrong with what a problem with these objects is to bring about.
+    fn aim(&self, path: &[&str], objects: &str, aim: &str) -> Option<Diagnostic> {
+        let domain = &self.domain.vocabulary.task.domain;
+        let problem = format!("(define (problem p) (:domain {domain}) (:objects{objects}) (:init) {aim})");
         let source = Source::new("condition", problem);
         let findings = descry_planner::check(&self.domain.pddl, Some(&source));
         // Nothing holds in this problem: what could never come about in it says nothing.

@@ -36,6 +36,7 @@ pub fn findings(domain: &Domain) -> Findings {
     list.extend(check.calls());
     list.extend(check.words());
     list.extend(check.objects());
+    list.extend(check.minimise());
     list.extend(check.phrases());
     list.extend(check.scenes());
     let sources = [domain.pddl.clone(), domain.toml.clone()].into_iter().chain(scenes::scenes(domain));

@@ -133,6 +133,16 @@ fn faults_of_programs_are_found_at_their_place() {
 }
 
 #[test]
+fn faults_of_what_plans_make_small_are_found_at_their_place() {
+    let top = "scene = \"default\"\n";
+    let toml = |expression: &str, code, place, words: &[&str]| {
+        check("domain.toml", (top, &format!("{top}minimise = \"{expression}\"\n")), code, place, words);
+    };
+    toml("(+ (total-time) (wasted))", "undeclared-function", "wasted", &["total-time"]);
+    toml("(total-time", "unbalanced", "(", &["the last `)` is missing"]);
+}
+
+#[test]
 fn faults_of_words_and_objects_are_found_at_their_place() {
     let pddl =
         |change: (&str, &str), code, place, words: &[&str]| check("domain.pddl", change, code, place, words);

@@ -4,6 +4,7 @@ use super::{Binding, CallFailure, Semantics};
 use crate::attachment::Answer;
 use crate::diagnostic::Span;
 use crate::model::relation::{Relation, quotient};
+use crate::model::walk;
 use crate::state::State;
 use crate::task::{Condition, Expression, Fluent, ObjectId, Quantified, Term};
 
@@ -124,8 +125,23 @@ impl Semantics<'_> {
         state.number(fluent.function, &arguments)
     }
 
+    /// The metric's value in a last state, of a plan that ends at this time and violates each preference so often; `None` without a
+    /// metric, or where a part of it is undefined.
+    ///
+    /// # Errors
+    /// [`CallFailure`] where an attachment gives no answer.
+    pub fn measured(&self, state: &State, end: f64, violations: &[f64]) -> Result<Option<f64>, CallFailure> {
+        let Some(metric) = &self.task.metric else { return Ok(None) };
+        let known = walk::replaced(&metric.value, &|part| match part {
+            Expression::TotalTime => Some(Expression::Number(end)),
+            Expression::Violated(id) => violations.get(id.index()).copied().map(Expression::Number),
+            _ => None,
+        });
+        self.number(state, &known, &Binding::new(0))
+    }
+
     /// The value of an expression; `None` where a part of it is undefined. `total-time` and `is-violated` have values
-    /// in metrics alone, which the validator evaluates.
+    /// in metrics alone: see [`Semantics::measured`].
     pub fn number(
         &self,
         state: &State,

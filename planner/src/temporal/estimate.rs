@@ -264,7 +264,7 @@ impl Relaxed {
         if seconds.is_infinite() {
             return Ok(());
         }
-        let cost = seconds + hot.step;
+        let cost = seconds + hot.step + self.counted_s(world, from.state, index)?;
         self.work.fired[index as usize] = (base, cost);
         let label = base + if timed { seconds } else { cost };
         for &proposition in &self.given[hot.gives as usize..hot.moves as usize] {
@@ -317,6 +317,17 @@ impl Relaxed {
         }
         // No duration now does not mean that there will be none once other numbers have changed.
         Ok(seconds.or(Some(0.0)))
+    }
+
+    /// What an operator adds to an additive metric, in seconds of a makespan that count as much.
+    fn counted_s(&self, world: &World, state: &Values, index: u32) -> Result<f64, Failure> {
+        let operator = &self.operators[index as usize];
+        if self.seconds_a_cost == 0.0 || !matches!(operator.part, Part::Whole | Part::End) {
+            return Ok(0.0);
+        }
+        let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Relaxed };
+        let cost = world.evaluate(world.acts[operator.act as usize].cost, &moment)?;
+        Ok((self.seconds_a_cost * cost).max(0.0))
     }
 
     /// How often the operator must be repeated from the state to make a test true, from what it does alone; `None` if it

@@ -110,7 +110,7 @@ pub(crate) fn search_plans(
     for (split, exact) in passes {
         let every_apart = split == all;
         let space = Space::new(world, split, measure.clone());
-        let relaxed = Relaxed::new(world, &space.open_act);
+        let relaxed = Relaxed::new(&space);
         let begin = Situation { state: world.initial()?, open: Vec::new(), timed: 0 };
         let base = Base { situation: begin, costs: 0.0, track: space.begin(), clock: space.clock(&[]) };
         let mut run = Run {
@@ -204,7 +204,7 @@ impl Run<'_, '_, '_> {
         let short =
             (FIRST_WORK / (self.space.world.acts.len() as u64).max(1)).clamp(FIRST_TRY.0, FIRST_TRY.1);
         for eager in [false, true] {
-            let manner = Manner { eager, ..self.manner(None, self.space.is_makespan(), short) };
+            let manner = Manner { eager, ..self.manner(None, self.space.counts_time(), short) };
             let end = self.search(None, manner)?;
             if self.took(end)? {
                 return Ok(());
@@ -303,7 +303,7 @@ impl Run<'_, '_, '_> {
             self.work = self.progress.counts.work + self.progress.counts.work.max(LEAST_WORK);
         }
         self.progress.reason = Reason::Enough;
-        let timed = self.space.is_makespan();
+        let timed = self.space.counts_time();
         // A greedy plan that watches the time, then restarts with falling weights, each with a share of the budget.
         let share = (least / 3).clamp(50, 3000);
         let mut proven = false;
@@ -368,7 +368,7 @@ impl Run<'_, '_, '_> {
                 }
                 continue;
             };
-            let timed = self.space.is_makespan() && !tries.is_multiple_of(3);
+            let timed = self.space.counts_time() && !tries.is_multiple_of(3);
             let left = budget - self.progress.counts.evaluated;
             let mut manner = self.manner(None, timed, REPAIR.max(4 * steps.len() as u64).min(left));
             manner.shuffle = tries;

@@ -14,6 +14,7 @@ use crate::grouped::Grouped;
 use super::direction::may_help;
 use super::envelope::settled;
 use super::estimate::Work;
+use super::space::Space;
 use super::touch::Touched;
 use super::world::{Act, World};
 
@@ -137,6 +138,8 @@ pub(crate) struct Relaxed {
     pub(super) goal_gates: Vec<(CallId, bool)>,
     /// Mean duration: what being a step at all counts.
     pub(super) unit: f64,
+    /// Seconds that count as much as one of what actions add to the metric; nothing where it does not count both.
+    pub(super) seconds_a_cost: f64,
     /// Operators that need nothing.
     pub(super) free: Vec<u32>,
     pub(super) work: Work,
@@ -147,9 +150,10 @@ pub(crate) struct Relaxed {
 pub(super) const NOBODY: u32 = u32::MAX;
 
 impl Relaxed {
-    /// The relaxed task; `open_act` says of each action whether its start and end are apart in the search.
-    pub fn new(world: &World, open_act: &[bool]) -> Relaxed {
-        let mut relaxed = Relaxed::empty(world);
+    /// The relaxed task of a space.
+    pub fn new(space: &Space) -> Relaxed {
+        let (world, open_act) = (space.world, &space.open_act);
+        let mut relaxed = Relaxed { seconds_a_cost: space.measure.seconds_a_cost(), ..Relaxed::empty(world) };
         let apart = (0..world.acts.len() as u32).filter(|&act| open_act[act as usize]);
         let base = relaxed.token_base;
         relaxed.tokens =
@@ -238,6 +242,7 @@ impl Relaxed {
             goal: Vec::new(),
             goal_gates: Vec::new(),
             unit: 1.0,
+            seconds_a_cost: 0.0,
             free: Vec::new(),
             work: Work::default(),
             touched: Touched::default(),

@@ -491,7 +491,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             }
         };
         let cost = self.nodes[node as usize].cost;
-        let reachable = if self.space.is_makespan() { cost.max(estimate.finish_s) } else { cost };
+        let in_time = self.costs[node as usize] + self.space.time_weight() * estimate.finish_s;
+        let reachable = if self.space.counts_time() { cost.max(in_time) } else { cost };
         if self.space.only_grows && reachable >= self.manner.bound {
             return Ok(());
         }

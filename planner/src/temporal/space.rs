@@ -41,6 +41,14 @@ impl Measure {
         };
         *time_weight >= 0.0 && world.acts.iter().all(|act| grows(act.cost))
     }
+
+    /// Seconds that count as much as one of what actions add; nothing where not both count.
+    pub fn seconds_a_cost(&self) -> f64 {
+        match self {
+            Measure::Additive { sign, time_weight } if *time_weight > 0.0 => sign / time_weight,
+            _ => 0.0,
+        }
+    }
 }
 
 /// A search space with everything that several searches on it share.
@@ -106,9 +114,18 @@ impl<'w, 'a> Space<'w, 'a> {
         found
     }
 
-    /// Whether plans are measured by their makespan alone, up to a factor.
-    pub fn is_makespan(&self) -> bool {
-        matches!(self.measure, Measure::Makespan)
+    /// Whether a shorter makespan makes a plan better, whatever else counts.
+    pub fn counts_time(&self) -> bool {
+        self.time_weight() > 0.0
+    }
+
+    /// What a second of the makespan adds to the measure; nothing where that is not known.
+    pub fn time_weight(&self) -> f64 {
+        match self.measure {
+            Measure::Makespan => 1.0,
+            Measure::Additive { time_weight, .. } => time_weight,
+            Measure::Expression(_) => 0.0,
+        }
     }
 
     /// The clock after steps that are all done in one go.

@@ -14,11 +14,10 @@ use serde::Serialize;
 
 use crate::attachment::Attachments;
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::model::walk;
 use crate::plan::Plan;
 use crate::semantics::{Binding, CallFailure, Semantics};
 use crate::state::State;
-use crate::task::{Expression, Task};
+use crate::task::Task;
 
 pub use after::after;
 pub use monitor::{Broken, monitor};
@@ -125,12 +124,9 @@ fn whole(semantics: &Semantics<'_>, plan: &Plan) -> Result<Result<Replayed, Box<
 
 /// The metric's value at the end.
 fn metric(semantics: &Semantics<'_>, replayed: &Replayed) -> Result<Option<f64>, CallFailure> {
-    let Some(metric) = &semantics.task.metric else { return Ok(None) };
+    if semantics.task.metric.is_none() {
+        return Ok(None);
+    }
     let violations = trajectory::violations(semantics, replayed)?;
-    let known = walk::replaced(&metric.value, &|part| match part {
-        Expression::TotalTime => Some(Expression::Number(replayed.end)),
-        Expression::Violated(id) => Some(Expression::Number(violations[id.index()])),
-        _ => None,
-    });
-    semantics.number(&replayed.state, &known, &Binding::new(0))
+    semantics.measured(&replayed.state, replayed.end, &violations)
 }

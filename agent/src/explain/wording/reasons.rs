@@ -155,12 +155,26 @@ fn short(text: &str) -> String {
 }
 
 /// What the planner said of a task without a plan. Calls that were refused are told by what they ask, and counted: which of them
-/// comes first says nothing.
-pub fn no_plan(said: &str, meanings: Meanings<'_>) -> String {
-    let parts = said.split('\n').filter(|part| !part.trim().is_empty());
-    let parts: Vec<String> =
-        parts.map(|part| refused(part, meanings).unwrap_or_else(|| plain(part))).collect();
-    parts.join("; ")
+/// comes first says nothing. Those that `is_used` says no plan of the run has asked are left out, where there are others.
+pub fn no_plan(said: &str, meanings: Meanings<'_>, is_used: &dyn Fn(&str) -> bool) -> String {
+    let all: Vec<&str> = said.split('\n').filter(|part| !part.trim().is_empty()).collect();
+    let counts = |part: &&&str| refused_call(part).is_none_or(is_used);
+    let used: Vec<&str> = all.iter().filter(counts).copied().collect();
+    let is_any = used.iter().any(|part| refused_call(part).is_some());
+    let parts = if is_any { used } else { all };
+    let told = parts.iter().map(|part| refused(part, meanings).unwrap_or_else(|| plain(part)));
+    told.collect::<Vec<_>>().join("; ")
+}
+
+/// Before which words it is said that an attachment gave the wrong answer, its name, and how it answered.
+fn refusal(part: &str) -> Option<(&str, &str, &str)> {
+    let (before, rest) = part.split_once("the attachment of `")?;
+    let (name, rest) = rest.split_once("` ")?;
+    Some((before, name, rest))
+}
+
+fn refused_call(part: &str) -> Option<&str> {
+    refusal(part).map(|(_, name, _)| name)
 }
 
 /// What the planner says when it has looked at everything.
@@ -177,8 +191,7 @@ fn plain(part: &str) -> String {
 
 /// ``the attachment of `NAME` said no to: LIST``, or how else it answered, at the end of a text.
 fn refused(part: &str, meanings: Meanings<'_>) -> Option<String> {
-    let (before, rest) = part.split_once("the attachment of `")?;
-    let (name, rest) = rest.split_once("` ")?;
+    let (before, name, rest) = refusal(part)?;
     let (answer, list) = rest.split_once(": ")?;
     let answer = match answer {
         "said no to" => "no",
@@ -310,6 +323,11 @@ mod tests {
                 "whatever is done next, and in whatever order, the goal is not reached: what it needs excludes each other, or would end too late",
             ),
         ];
-        cases.iter().for_each(|(said, plain)| assert_eq!(no_plan(said, &about), *plain));
+        cases.iter().for_each(|(said, plain)| assert_eq!(no_plan(said, &about, &|_| true), *plain));
+        // What no plan has asked says nothing of why there is none, but where that is all that is known.
+        let (of_hand, both) = (cases[2].0, format!("{}\n{}", cases[1].0, cases[2].0));
+        let told = |said: &str| no_plan(said, &about, &|call| call == "w");
+        assert_eq!(told(&both), cases[1].1);
+        assert_eq!(told(of_hand), cases[2].1);
     }
 }

@@ -1,8 +1,7 @@
 //! `[search-cost ?on]`: seconds that a look at a surface may turn out to have been in vain for, counted at the first look of a plan
 //! there: (1 - p) / p of what going there for a look takes, where p is the probability that this look finds what is asked for.
 //! With the way and the look itself that is their time by p, and surfaces are looked at in the order of that, as is best when each
-//! is looked at once. Nothing where all surfaces must be looked at, and nothing where the time is limited: then only real seconds
-//! count.
+//! is looked at once. Nothing where all surfaces must be looked at.
 
 use descry_planner::{Answer, Call, CallError};
 use serde::{Deserialize, Serialize};
@@ -31,7 +30,7 @@ impl Situation {
         if open.is_empty() {
             open = (0..self.things.len()).collect();
         }
-        if open.is_empty() || !self.kinds.is_empty() || self.time_left_s.is_some() {
+        if open.is_empty() || !self.kinds.is_empty() {
             return None;
         }
         let finds = |&n: &usize| self.doubt_about(n).most_settled_on(self, on) + self.presence(n, on);

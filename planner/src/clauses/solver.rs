@@ -124,6 +124,11 @@ impl Solver {
         self.activity[variable as usize]
     }
 
+    /// Clauses that did not hold so far: until there are more, nothing that was set is taken back.
+    pub(crate) fn conflicts(&self) -> u64 {
+        self.conflicts
+    }
+
     /// Adds a clause, before the search begins.
     pub(crate) fn add(&mut self, clause: &[Literal]) {
         let mut open = Vec::with_capacity(clause.len());
@@ -321,23 +326,22 @@ impl Solver {
     fn try_next(&mut self, decide: &mut dyn Decide) -> bool {
         let next = loop {
             match self.plan.pop() {
-                Some(literal) if self.value(literal).is_none() => break Some(literal),
-                Some(_) => {}
-                None => {
-                    let mut plan = std::mem::take(&mut self.plan);
-                    self.work += decide.next(self, &mut plan);
-                    plan.retain(|&literal| self.value(literal).is_none());
-                    plan.reverse();
-                    self.plan = plan;
-                    if self.plan.is_empty() {
-                        break None;
-                    }
-                }
+                Some(literal) if self.value(literal).is_none() => break literal,
+                Some(_) => continue,
+                None => {}
             }
-        };
-        let first_open = || (0..self.levels.len() as u32).map(|v| Literal::new(v, false));
-        let Some(next) = next.or_else(|| first_open().find(|&l| self.value(l).is_none())) else {
-            return false;
+            let mut plan = std::mem::take(&mut self.plan);
+            self.work += decide.next(self, &mut plan);
+            plan.retain(|&literal| self.value(literal).is_none());
+            if plan.is_empty() {
+                let all = (0..self.levels.len() as u32).map(|variable| Literal::new(variable, false));
+                plan.extend(all.filter(|&literal| self.value(literal).is_none()));
+            }
+            if plan.is_empty() {
+                return false;
+            }
+            plan.reverse();
+            self.plan = plan;
         };
         self.starts.push(self.trail.len());
         self.set(next, NONE);
@@ -461,6 +465,23 @@ mod tests {
                 (0..1 << 9).any(|values| clauses.iter().all(|c| c.iter().any(|&l| holds(values, l))));
             check(9, &clauses, satisfiable);
         }
+    }
+
+    /// Counts how often it is asked.
+    struct Asked(u32);
+    impl Decide for Asked {
+        fn next(&mut self, _: &Solver, _: &mut Vec<Literal>) -> u64 {
+            self.0 += 1;
+            0
+        }
+    }
+
+    #[test]
+    fn what_is_left_open_is_set_in_one_go() {
+        let (mut solver, mut asked) = (Solver::new(1_000), Asked(0));
+        solver.add(&[Literal::new(3, true), Literal::new(7, true)]);
+        assert_eq!(solver.run(&mut asked, u64::MAX, &|| false), Answer::Satisfied);
+        assert_eq!(asked.0, 2, "once more at the end");
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod invariants;
 mod metric;
 mod normal;
 mod obstacles;
+mod pairs;
 mod pddl3;
 mod raw;
 mod reach;
@@ -21,5 +22,6 @@ mod variables;
 
 pub use build::{GroundError, ground};
 pub use obstacles::{MissingAtom, Obstacle};
+pub(crate) use pairs::exclusive;
 pub(crate) use pddl3::compile;
 pub use task::*;

@@ -136,14 +136,16 @@ const GREEDY: Strategy = Strategy {
     evaluation_limit: u64::MAX,
 };
 
-/// The searches for a first plan in the order of their turns, two rounds: with lookahead, by novelty (narrow, then in full),
-/// plainly, and by clauses; every other round those that order states by estimates take the newest of equally good ones first.
-const ORDER: [usize; 2 * TURNS] =
-    [0, NARROW, NOVELTY, PLAIN, HORIZON, 1, NARROW, NOVELTY, PLAIN + 1, HORIZON];
-/// Turns of a round, each of another search.
-const TURNS: usize = 5;
+/// The searches for a first plan in the order of their turns. In a first round with less work those that are quick where they fit:
+/// with lookahead and by clauses. Then, in turn, two rounds: with lookahead, by novelty (narrow, then in full), plainly, and by
+/// clauses; in the second those that order states by estimates take the newest of equally good ones first.
+const QUICK: [usize; 2] = [0, HORIZON];
+const ROUNDS: [[usize; 5]; 2] =
+    [[0, NARROW, NOVELTY, PLAIN, HORIZON], [1, NARROW, NOVELTY, PLAIN + 1, HORIZON]];
+/// How much less work a search of the first round may do.
+const QUICK_SHARE: u64 = 6;
 /// From this turn on, a search that runs out of memory is the last one: others may do with less before.
-const LAST_RESORT: usize = 3;
+const LAST_RESORT: usize = QUICK.len() + 3;
 /// Place of the search by novelty; before it, those with lookahead.
 const NOVELTY: usize = 2;
 /// Places of the two searches without lookahead begin here.
@@ -264,33 +266,35 @@ impl<'a, 's> Run<'a, 's> {
     /// Several searches take turns, each going on where it stopped, with more and more work each round.
     fn first(&mut self) -> Result<(Vec<u32>, bool), ClassicalEnd> {
         let mut kept: [Option<Kept<'a, 's>>; PLACES] = Default::default();
-        let mut work_limit = self.options.first_work;
-        let mut turn = 0usize;
+        let (mut round, mut turn) = (0, 0);
+        let mut work_limit = self.options.first_work / QUICK_SHARE;
         loop {
-            let places: Vec<usize> =
-                self.side_by_side(turn, TURNS).map(|turn| ORDER[turn % ORDER.len()]).collect();
-            for (place, taken) in places.iter().copied().zip(self.take_turns(&mut kept, &places, work_limit))
-            {
-                self.counts.add(taken.took);
-                tracing::debug!(turn, self.counts.evaluated, self.counts.work);
-                kept[place] = match taken.end {
-                    End::Memory => None,
-                    End::Exhausted => Some(Kept::Spent),
-                    _ => Some(taken.search),
-                };
-                match taken.end {
-                    End::Plan(plan) => return Ok((plan, turn == 0)),
-                    End::Exhausted if self.proves(place) => return Err(ClassicalEnd::Exhausted),
-                    End::Stopped => return Err(ClassicalEnd::Stopped),
-                    End::Memory if turn >= LAST_RESORT => return Err(ClassicalEnd::Memory),
-                    End::Limit if self.limited() => return Err(ClassicalEnd::Stopped),
-                    End::Memory | End::Limit | End::Exhausted => {}
+            let order: &[usize] = if round == 0 { &QUICK } else { &ROUNDS[(round - 1) % ROUNDS.len()] };
+            let mut next = 0;
+            while next < order.len() {
+                let places = &order[self.side_by_side(next, order.len())];
+                for (&place, taken) in places.iter().zip(self.take_turns(&mut kept, places, work_limit)) {
+                    self.counts.add(taken.took);
+                    tracing::debug!(turn, place, self.counts.evaluated, self.counts.work);
+                    kept[place] = match taken.end {
+                        End::Memory => None,
+                        End::Exhausted => Some(Kept::Spent),
+                        _ => Some(taken.search),
+                    };
+                    match taken.end {
+                        End::Plan(plan) => return Ok((plan, turn <= QUICK.len() && place == 0)),
+                        End::Exhausted if self.proves(place) => return Err(ClassicalEnd::Exhausted),
+                        End::Stopped => return Err(ClassicalEnd::Stopped),
+                        End::Memory if turn >= LAST_RESORT => return Err(ClassicalEnd::Memory),
+                        End::Limit if self.limited() => return Err(ClassicalEnd::Stopped),
+                        End::Memory | End::Limit | End::Exhausted => {}
+                    }
+                    (turn, next) = (turn + 1, next + 1);
                 }
-                turn += 1;
             }
-            if turn.is_multiple_of(TURNS) {
-                work_limit = work_limit.saturating_mul(ROUND_FACTOR);
-            }
+            let more = if round == 0 { QUICK_SHARE } else { ROUND_FACTOR };
+            work_limit = work_limit.saturating_mul(more);
+            round += 1;
         }
     }
 
@@ -325,7 +329,8 @@ impl<'a, 's> Run<'a, 's> {
             let mut search = kept[place].take().unwrap_or_else(|| Kept::new(self.shared, place, self.bound));
             let memory = self.shared.memory.beside(kept.iter().flatten().map(Kept::bytes).sum());
             // What these do not find soon they hardly find at all: later rounds are for the others.
-            let work = if matches!(place, NARROW | HORIZON) { self.options.first_work } else { work };
+            let most = if matches!(place, NARROW | HORIZON) { self.options.first_work } else { u64::MAX };
+            let work = work.min(most);
             jobs.push(move |cancelled: &AtomicBool| {
                 let before = search.counts();
                 let work = before.work.saturating_add(work);

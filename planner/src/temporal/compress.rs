@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 
 use crate::classical::compiled::is_classical;
 use crate::ground::{
-    Action, Conjunction, Effect, Expression, Fact, GroundTask, Meaning, Metric, Outcome, Variable,
+    Action, Conjunction, Effect, Expression, Fact, GroundTask, Meaning, Metric, Outcome, Variable, exclusive,
 };
 use crate::memory::MemoryLimit;
 use crate::search::run::{ClassicalOptions, FIRST_WORK, solve};
@@ -87,6 +87,7 @@ fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
         parts.extend([(index, Part::Start), (index, Part::End)]);
     }
     guard(world, &mut task, &parts)?;
+    task.mutex_groups.extend(exclusive(&task));
     let expression = Expression::Constant(0.0);
     task.metric = Some(Metric { minimise: true, expression, additive: true, time_weight: 0.0 });
     Some((task, parts))
@@ -196,27 +197,56 @@ fn in_one_go(act: &Act, seconds: f64) -> Option<Action> {
 
 #[cfg(test)]
 mod tests {
-    use super::classical_plan;
+    use super::{classical_plan, compressed};
     use crate::attachment::Attachments;
     use crate::calls::Calls;
+    use crate::ground::Fact;
     use crate::memory::MemoryLimit;
     use crate::small;
+    use crate::task::Task;
     use crate::temporal::envelope::envelopes;
     use crate::temporal::relaxed::Part;
     use crate::temporal::space::{Measure, Space};
     use crate::temporal::world::World;
 
-    #[test]
-    fn a_start_and_its_end_enclose_what_needs_them() {
-        let (task, grounded) = small::read(small::CELLAR, small::FUSES);
+    fn in_space<R>(domain: &str, problem: &str, look: impl FnOnce(&Task, &Space) -> R) -> R {
+        let (task, grounded) = small::read(domain, problem);
         let nobody = Attachments::default();
         let calls = Calls::bind(&task, &grounded, &nobody).expect("nothing to bind");
         let world = World::new(&task, &grounded, calls);
-        let space = Space::new(&world, envelopes(&world), Measure::Makespan);
-        let found = classical_plan(&space, MemoryLimit::new(None, None), 1000, &|| false);
+        look(&task, &Space::new(&world, envelopes(&world), Measure::Makespan))
+    }
+
+    #[test]
+    fn a_start_and_its_end_enclose_what_needs_them() {
+        let found = in_space(small::CELLAR, small::FUSES, |_, space| {
+            classical_plan(space, MemoryLimit::new(None, None), 1000, &|| false)
+        });
         let (steps, _, _) = found.expect("the classical search finds a plan");
         let parts: Vec<Part> = steps.iter().map(|step| step.part).collect();
         assert_eq!(parts, [Part::Start, Part::Whole, Part::Whole, Part::End]);
         assert_eq!(steps[0].act, steps[3].act);
+    }
+
+    #[test]
+    fn what_excludes_what_is_known_of_actions_in_one_go() {
+        // While somebody is on the way, a place is neither clear nor somebody's: no transition alone says that it is one of both.
+        let domain = "(define (domain tiles) (:requirements :typing :durative-actions) (:types robot tile)
+          (:predicates (at ?r - robot ?t - tile) (clear ?t - tile))
+          (:durative-action go :parameters (?r - robot ?a ?b - tile) :duration (= ?duration 1)
+            :condition (and (at start (at ?r ?a)) (at start (clear ?b)))
+            :effect (and (at start (not (at ?r ?a))) (at start (not (clear ?b)))
+                         (at end (at ?r ?b)) (at end (clear ?a)))))";
+        let problem = "(define (problem p) (:domain tiles) (:objects r s - robot a b c - tile)
+          (:init (at r a) (at s b) (clear c)) (:goal (at r b)))";
+        let together = in_space(domain, problem, |task, space| {
+            let (compressed, _) = compressed(space)?;
+            let said = |fact: &Fact| small::fact(task, &compressed, *fact);
+            let groups = compressed.mutex_groups.iter();
+            let groups = groups.map(|group| group.iter().map(said).collect::<Vec<_>>().join(" "));
+            Some(groups.collect::<Vec<_>>())
+        });
+        let expected = ["a", "c", "b"].map(|tile| format!("(at r {tile}) (at s {tile}) (clear {tile})"));
+        assert_eq!(together.expect("nothing forbids it"), expected);
     }
 }

@@ -9,10 +9,8 @@ mod support;
 use crate::clauses::Literal;
 use crate::clauses::solver::{Answer, Solver};
 
-use crate::memory::MemoryLimit;
-
 use self::form::Form;
-use self::support::Support;
+use self::support::{Agenda, Support};
 
 use super::lazy::{Allowed, Counts, End, Shared};
 
@@ -32,6 +30,7 @@ const LITERAL_BYTES: usize = 16;
 struct Horizon {
     steps: usize,
     solver: Solver,
+    agenda: Agenda,
 }
 
 /// The search, which can be gone on with after it ended with [`End::Limit`].
@@ -76,9 +75,9 @@ impl<'a, 's> Search<'a, 's> {
             if allowed.has_ended(self.shared) {
                 return End::Stopped;
             }
-            while self.open.len() < ABREAST && self.lengthen(&allowed.memory) {}
+            while self.open.len() < ABREAST && self.lengthen(&allowed) {}
             if self.open.is_empty() {
-                return End::Exhausted;
+                return if self.next_literals().is_some() { End::Limit } else { End::Exhausted };
             }
             if let Some(end) = self.turn(&allowed) {
                 return end;
@@ -86,17 +85,23 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Adds a longer horizon, if there may be one.
-    fn lengthen(&mut self, memory: &MemoryLimit) -> bool {
-        let Some(form) = &self.form else { return false };
+    /// Literals of the next horizon, if there may be one.
+    fn next_literals(&self) -> Option<usize> {
+        let literals = self.next.saturating_mul(self.form.as_ref()?.size());
+        (self.next <= MOST_STEPS && literals <= MOST_LITERALS).then_some(literals)
+    }
+
+    /// Adds a longer horizon, if there may be one and it can be made within what is allowed.
+    fn lengthen(&mut self, allowed: &Allowed) -> bool {
+        let (Some(form), Some(literals)) = (&self.form, self.next_literals()) else { return false };
         let steps = self.next;
-        let literals = steps.saturating_mul(form.size());
-        let fits = steps <= MOST_STEPS && literals <= MOST_LITERALS;
-        if !fits || !memory.has_room(|| self.bytes(), literals * LITERAL_BYTES) {
+        let work = self.counts.work + literals as u64 * LITERAL_WORK;
+        if work > allowed.work || !allowed.memory.has_room(|| self.bytes(), literals * LITERAL_BYTES) {
             return false;
         }
-        self.open.push(Horizon { steps, solver: form.solver(self.shared.task, steps) });
-        self.counts.work += literals as u64 * LITERAL_WORK;
+        let solver = form.solver(self.shared.task, steps);
+        self.open.push(Horizon { steps, solver, agenda: Agenda::default() });
+        self.counts.work = work;
         self.next = steps + (steps / 4).max(2);
         true
     }
@@ -108,8 +113,8 @@ impl<'a, 's> Search<'a, 's> {
                 return Some(End::Limit);
             }
             let form = self.form.as_ref()?;
-            let Horizon { steps, solver } = &mut self.open[place];
-            let mut support = Support { task: self.shared.task, form, horizon: *steps };
+            let Horizon { steps, solver, agenda } = &mut self.open[place];
+            let mut support = Support { task: self.shared.task, form, horizon: *steps, agenda };
             let before = solver.work;
             let answer = solver.run(&mut support, before + TURN_WORK, &|| allowed.has_ended(self.shared));
             self.counts.work += solver.work - before;
@@ -128,7 +133,7 @@ impl<'a, 's> Search<'a, 's> {
 
     /// The plan of a horizon that was satisfied.
     fn found(&self, place: usize) -> End {
-        let (Some(form), Horizon { steps, solver }) = (&self.form, &self.open[place]) else {
+        let (Some(form), Horizon { steps, solver, .. }) = (&self.form, &self.open[place]) else {
             return End::Exhausted;
         };
         let applied = |step: usize, operator: u32| {

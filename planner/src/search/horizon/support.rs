@@ -10,11 +10,31 @@ use crate::clauses::solver::{Decide, Solver};
 
 use super::form::Form;
 
+/// What was found to be supported since the last conflict: decisions add to what is set, so that it need not be looked at again.
+#[derive(Default)]
+pub(super) struct Agenda {
+    /// By moment and fact, whether it is or was a subgoal.
+    seen: Vec<bool>,
+    /// Subgoals to be looked at, by moment and rank.
+    subgoals: BinaryHeap<Reverse<(usize, u32, u32)>>,
+    /// Conflicts up to when it was begun.
+    conflicts: u64,
+}
+
+impl Agenda {
+    fn want(&mut self, facts: usize, moment: usize, fact: u32, rank: u32) {
+        if moment > 0 && !std::mem::replace(&mut self.seen[moment * facts + fact as usize], true) {
+            self.subgoals.push(Reverse((moment, rank, fact)));
+        }
+    }
+}
+
 /// For plans of so many steps.
 pub(super) struct Support<'a> {
     pub task: &'a Compiled,
     pub form: &'a Form,
     pub horizon: usize,
+    pub agenda: &'a mut Agenda,
 }
 
 impl Support<'_> {
@@ -26,19 +46,22 @@ impl Support<'_> {
         solver.value(Literal::new(self.form.operator(operator, step), true))
     }
 
-    /// The operator to be tried for the earliest subgoal that nothing supports yet, with its step; adds to the work.
-    fn open(&self, solver: &Solver, work: &mut u64) -> Option<(u32, usize)> {
-        let mut seen = vec![false; (self.horizon + 1) * self.task.facts];
-        let mut subgoals = BinaryHeap::new();
-        let mut want = |moment: usize, fact: u32, rank: u32, subgoals: &mut BinaryHeap<_>| {
-            if moment > 0 && !std::mem::replace(&mut seen[moment * self.task.facts + fact as usize], true) {
-                subgoals.push(Reverse((moment, rank, fact)));
-            }
-        };
+    /// Begins again with the goals.
+    fn begin(&mut self, solver: &Solver) -> u64 {
+        let (facts, agenda) = (self.task.facts, &mut *self.agenda);
+        agenda.conflicts = solver.conflicts();
+        agenda.seen.clear();
+        agenda.seen.resize((self.horizon + 1) * facts, false);
+        agenda.subgoals.clear();
         for (place, &fact) in self.form.goals.iter().enumerate() {
-            want(self.horizon, fact, place as u32, &mut subgoals);
+            agenda.want(facts, self.horizon, fact, place as u32);
         }
-        while let Some(Reverse((moment, _, fact))) = subgoals.pop() {
+        (self.horizon * facts / 16) as u64
+    }
+
+    /// The operator to be tried for the earliest subgoal that nothing supports yet, with its step; adds to the work.
+    fn open(&mut self, solver: &Solver, work: &mut u64) -> Option<(u32, usize)> {
+        while let Some(Reverse((moment, rank, fact))) = self.agenda.subgoals.pop() {
             let adders = self.form.adders.get(fact as usize);
             for step in (0..moment).rev() {
                 *work += 1;
@@ -49,9 +72,9 @@ impl Support<'_> {
                 *work += adders.len() as u64;
                 let applied = |&&operator: &&u32| self.does(solver, operator, step) == Some(true);
                 if let Some(&operator) = adders.iter().find(applied) {
-                    let needs = self.task.preconditions.get(operator as usize);
-                    for fact in needs.iter().map(|&need| self.task.id(need)) {
-                        want(step, fact, fact, &mut subgoals);
+                    for &need in self.task.preconditions.get(operator as usize) {
+                        let fact = self.task.id(need);
+                        self.agenda.want(self.task.facts, step, fact, fact);
                     }
                     break;
                 }
@@ -62,6 +85,7 @@ impl Support<'_> {
                         activity(one).total_cmp(&activity(other)).then(other.cmp(&one))
                     });
                     if let Some(operator) = best {
+                        self.agenda.subgoals.push(Reverse((moment, rank, fact)));
                         return Some((operator, step));
                     }
                     break;
@@ -92,8 +116,17 @@ impl Support<'_> {
 
 impl Decide for Support<'_> {
     fn next(&mut self, solver: &Solver, out: &mut Vec<Literal>) -> u64 {
-        let mut work = (self.horizon * self.task.facts / 16) as u64;
-        match self.open(solver, &mut work) {
+        let mut work = 1;
+        let mut open = None;
+        if !self.agenda.seen.is_empty() && self.agenda.conflicts == solver.conflicts() {
+            open = self.open(solver, &mut work);
+        }
+        // What had support may have lost it to what was set later: only all of it, looked at once more, tells.
+        if open.is_none() {
+            work += self.begin(solver);
+            open = self.open(solver, &mut work);
+        }
+        match open {
             Some((operator, step)) => out.push(Literal::new(self.form.operator(operator, step), true)),
             None => self.rest(solver, out),
         }

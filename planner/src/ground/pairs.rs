@@ -1,0 +1,188 @@
+//! Groups of facts of which at most one holds, by which pairs of facts can be reached together (the graph of h², Haslum and
+//! Geffner 2000). Says more than the synthesis of invariants where actions are no longer those of the lifted task.
+
+use super::task::{Action, Fact, GroundTask, Outcome};
+
+/// Facts, and words of pairs looked at, beyond which this is not tried.
+const MOST_FACTS: usize = 4_000;
+const MOST_WORK: usize = 50_000_000;
+/// Members of all groups at most.
+const MOST_MEMBERS: usize = 50_000;
+
+/// Groups of facts that exclude each other, such that every pair of different variables found to do so is in one. None for
+/// tasks with axioms, conditional effects or too many facts.
+pub(crate) fn exclusive(task: &GroundTask) -> Vec<Vec<Fact>> {
+    let conditional = task.actions.iter().flat_map(|action| &action.effects).any(|e| e.when.is_some());
+    let facts: Vec<Fact> = (0..task.variables.len() as u32)
+        .flat_map(|variable| {
+            (0..task.variables[variable as usize].domain_size()).map(move |value| Fact { variable, value })
+        })
+        .collect();
+    if conditional || !task.axioms.is_empty() || facts.len() > MOST_FACTS {
+        return Vec::new();
+    }
+    Pairs::reached(task, &facts).map_or_else(Vec::new, |pairs| pairs.groups(&facts))
+}
+
+/// By fact: the facts that may hold together with it, itself among them if it can be reached.
+struct Pairs {
+    words: usize,
+    rows: Vec<u64>,
+}
+
+impl Pairs {
+    fn reached(task: &GroundTask, facts: &[Fact]) -> Option<Pairs> {
+        let words = facts.len().div_ceil(64);
+        let mut pairs = Pairs { words, rows: vec![0; words * facts.len()] };
+        let mut offsets = Vec::with_capacity(task.variables.len() + 1);
+        let mut next = 0;
+        for variable in &task.variables {
+            offsets.push(next);
+            next += variable.domain_size() as usize;
+        }
+        offsets.push(next);
+        let initial: Vec<usize> =
+            offsets.iter().zip(&task.initial.values).map(|(o, &v)| o + v as usize).collect();
+        for &one in &initial {
+            initial.iter().for_each(|&other| pairs.set(one, other));
+        }
+        let mut work = 0;
+        loop {
+            let mut changed = false;
+            for action in &task.actions {
+                work += words * (action.condition.facts.len() + action.effects.len());
+                changed |= pairs.apply(action, &offsets);
+            }
+            if !changed {
+                return Some(pairs);
+            }
+            if work > MOST_WORK {
+                return None;
+            }
+        }
+    }
+
+    fn row(&self, fact: usize) -> &[u64] {
+        &self.rows[fact * self.words..(fact + 1) * self.words]
+    }
+
+    fn set(&mut self, one: usize, other: usize) {
+        self.rows[one * self.words + other / 64] |= 1 << (other % 64);
+    }
+
+    fn may(&self, one: usize, other: usize) -> bool {
+        self.row(one)[other / 64] >> (other % 64) & 1 == 1
+    }
+
+    /// Lets an action happen wherever it may; whether that reaches new pairs.
+    fn apply(&mut self, action: &Action, offsets: &[usize]) -> bool {
+        let id = |fact: Fact| offsets[fact.variable as usize] + fact.value as usize;
+        let needs: Vec<usize> = action.condition.facts.iter().map(|&fact| id(fact)).collect();
+        if needs.iter().any(|&one| needs.iter().any(|&other| !self.may(one, other))) {
+            return false;
+        }
+        // What may hold beside: all that goes with what is needed, but for the variables that change.
+        let mut beside = vec![0u64; self.words];
+        match needs.split_first() {
+            Some((&first, rest)) => {
+                beside.copy_from_slice(self.row(first));
+                for &fact in rest {
+                    beside.iter_mut().zip(self.row(fact)).for_each(|(word, other)| *word &= other);
+                }
+            }
+            None => {
+                let reached = (0..self.rows.len() / self.words.max(1)).filter(|&fact| self.may(fact, fact));
+                reached.for_each(|fact| beside[fact / 64] |= 1 << (fact % 64));
+            }
+        }
+        let set = action.effects.iter().filter_map(|effect| match effect.outcome {
+            Outcome::Set(fact) => Some(fact),
+            _ => None,
+        });
+        let set: Vec<Fact> = set.collect();
+        for fact in &set {
+            let variable = fact.variable as usize;
+            (offsets[variable]..offsets[variable + 1])
+                .for_each(|other| beside[other / 64] &= !(1 << (other % 64)));
+        }
+        set.iter().for_each(|&fact| beside[id(fact) / 64] |= 1 << (id(fact) % 64));
+        let mut changed = false;
+        for fact in set.into_iter().map(id) {
+            for (word, &beside) in beside.iter().enumerate() {
+                let mut new = beside & !self.row(fact)[word];
+                changed |= new != 0;
+                self.rows[fact * self.words + word] |= new;
+                while new != 0 {
+                    self.set(64 * word + new.trailing_zeros() as usize, fact);
+                    new &= new - 1;
+                }
+            }
+        }
+        changed
+    }
+
+    /// Every pair of different variables that was not reached is in a group, each made as large as it can be.
+    fn groups(&self, facts: &[Fact]) -> Vec<Vec<Fact>> {
+        let reached: Vec<usize> = (0..facts.len()).filter(|&fact| self.may(fact, fact)).collect();
+        let mut all = vec![0; self.words];
+        reached.iter().for_each(|&fact| all[fact / 64] |= 1 << (fact % 64));
+        let mut covered = Pairs { words: self.words, rows: vec![0; self.rows.len()] };
+        let (mut groups, mut members) = (Vec::new(), 0);
+        for (place, &one) in reached.iter().enumerate() {
+            for &other in &reached[place + 1..] {
+                let same = facts[one].variable == facts[other].variable;
+                if same || self.may(one, other) || covered.may(one, other) {
+                    continue;
+                }
+                let group = self.enlarged(&[one, other], &all);
+                group.iter().for_each(|&a| group.iter().for_each(|&b| covered.set(a, b)));
+                members += group.len();
+                if members > MOST_MEMBERS {
+                    return groups;
+                }
+                groups.push(group.into_iter().map(|fact| facts[fact]).collect());
+            }
+        }
+        groups
+    }
+
+    /// Facts with further ones of `all` that exclude them and each other, the first that there are.
+    fn enlarged(&self, facts: &[usize], all: &[u64]) -> Vec<usize> {
+        let mut open = all.to_vec();
+        let without = |open: &mut Vec<u64>, fact: usize| {
+            open.iter_mut().zip(self.row(fact)).for_each(|(word, beside)| *word &= !beside);
+        };
+        facts.iter().for_each(|&fact| without(&mut open, fact));
+        let mut group = facts.to_vec();
+        while let Some(word) = open.iter().position(|&word| word != 0) {
+            let fact = 64 * word + open[word].trailing_zeros() as usize;
+            without(&mut open, fact);
+            group.push(fact);
+        }
+        group
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::small;
+
+    fn check(domain: &str, problem: &str, expected: &[&str]) {
+        let (task, grounded) = small::read(domain, problem);
+        let said = |group: &Vec<Fact>| {
+            let facts = group.iter().map(|&fact| small::fact(&task, &grounded, fact));
+            facts.collect::<Vec<_>>().join(" ")
+        };
+        let groups: Vec<String> = exclusive(&grounded).iter().map(said).collect();
+        assert_eq!(groups, expected, "{domain}");
+    }
+
+    #[test]
+    fn what_is_never_reached_together_is_grouped() {
+        check(small::SHUTTLE, small::ROW, &["(lies x a) NoneOfThose (lies x b) (lies x c)", "(in x) (free)"]);
+        // Conditional effects are not followed.
+        let slips = small::SHUTTLE.replace("(free) (lies ?b ?p)", "(when (at ?p) (free)) (lies ?b ?p)");
+        check(&slips, small::ROW, &[]);
+    }
+}

@@ -107,7 +107,9 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let not_there = domain.as_ref().map(|domain| domain.config.thresholds.not_there);
     let negligible = domain.as_ref().map(|domain| domain.config.thresholds.remaining);
     let is_used = |call: &str| domain.as_ref().is_none_or(|domain| is_used(domain, &chapters, call));
-    let words = verdict::Words { meanings: &meanings, is_used: &is_used, name: &name, not_there, negligible };
+    let last = chapters.iter().rev().find_map(|chapter| chapter.stood().last());
+    let words =
+        verdict::Words { meanings: &meanings, is_used: &is_used, name: &name, last, not_there, negligible };
     let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
     let verdict = verdict.iter().map(|line| saying.say(line)).collect();
     Ok(Explanation { summary, asked: said, reading, plans, verdict, lost })

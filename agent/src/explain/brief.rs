@@ -12,6 +12,13 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     if chapter.is_late {
         return vec![rivals::IN_TIME.into()];
     }
+    let chosen = chapter.weighed.as_ref().and_then(|weighed| weighed.chosen.as_ref());
+    if let Some(cut) = &chapter.cut
+        && chosen.is_some_and(|chosen| !chosen.steps.is_empty() && self::whole_s(chosen).is_none())
+        && asked.policy.is_none()
+    {
+        return vec![rivals::cut_short(cut)];
+    }
     let known = chapter.weighed.as_ref().and_then(|weighed| {
         let chosen = weighed.chosen.as_ref()?;
         let whole_s = whole_s(chosen).filter(|_| asked.policy.is_none() && !weighed.others.is_empty())?;

@@ -112,8 +112,8 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
                     let open = before.steps_done().1;
                     match chapter.steps.iter().map(|step| bare(step)).eq(open.iter().copied()) {
                         true => format!(
-                            "what was left of plan {} would not do: {now}. No plan that would is known: it promises most, \
-                             and is gone on with.",
+                            "what was left of plan {} would not do: {now}. No plan that would is known: it is gone on \
+                             with.",
                             before.round
                         ),
                         false => format!("with what was learned, {rest} would not do: {now}."),
@@ -162,7 +162,11 @@ fn enough_now(chapter: &Chapter, before: &Chapter) -> String {
 
 /// Where less counts as seen than after the last look of the plan before.
 fn seen_less(chapter: &Chapter, before: &Chapter) -> String {
-    let (Some(now), Some(then)) = (&chapter.before, before.stood().last()) else { return String::new() };
+    let Some(now) = &chapter.before else { return String::new() };
+    // How things stood before what made them so as they are now.
+    let Some(then) = before.stood().filter(|then| then.stamp_ns < now.stamp_ns).last() else {
+        return String::new();
+    };
     let percent = |share: f64| (share * 100.0).floor();
     let mut all: Vec<String> = Vec::new();
     for (now, then) in now.doubts.iter().filter_map(|now| Some((now, then.same(now)?))) {

@@ -25,10 +25,7 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
             return vec![IN_TIME.into()];
         }
         if let Some(cut) = &chapter.cut {
-            return vec![format!(
-                "the planner's search was ended after {cut}, without a plan that it expected to reach the goal. What \
-                 promises most by itself is done."
-            )];
+            return vec![cut_short(cut)];
         }
         return vec![
             "it does what the goal asks next. Nothing was compared: no step of it is there to learn more, or only after many others."
@@ -49,6 +46,14 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     let first = first_looks(chapter).filter(|_| asked.counts_in_vain);
     let late = chapter.is_late.then(|| IN_TIME.to_string());
     late.into_iter().chain(said).chain(left).chain(longer).chain(through).chain(first).collect()
+}
+
+/// What is done where the planner's search was ended before it had a plan.
+pub fn cut_short(cut: &str) -> String {
+    format!(
+        "the planner's search was ended after {cut}, without a plan that it expected to reach the goal: what settles most a \
+         second of what is in doubt is done."
+    )
 }
 
 /// What is done where no plan ends in time.

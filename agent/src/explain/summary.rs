@@ -6,7 +6,7 @@ use descry_domains::note::Note;
 use super::chapters::{Chapter, Deed};
 use super::looks::{self, Names};
 use super::standings::Standing;
-use super::wording::{count, listed, place, reasons, share};
+use super::wording::{count, listed, place, reasons, share, share_of};
 use crate::report::{self, Report};
 use crate::run::Header;
 use crate::standing::{InDoubt, Of};
@@ -91,13 +91,13 @@ fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
         (Of::Thing, _) => looks::may_be(doubt, last, name).unwrap_or_else(|| looks::none_may_be(doubt, last)),
         (Of::Kind, _) => format!(
             "{objects}, and it is certain with {} which of them are {}s and that there are no more",
-            share(doubt.sure?),
+            share_of(doubt.sure?, doubt.wanted),
             doubt.about
         ),
         (Of::Surface, _) => {
             format!(
                 "{objects}, and of what kind the least sure one is, and that there are no more, is certain with {}",
-                share(doubt.sure?)
+                share_of(doubt.sure?, doubt.wanted)
             )
         }
     };
@@ -173,7 +173,8 @@ fn trouble(chapters: &[Chapter], short_s: Option<f64>, is_absent: bool) -> Optio
     let vain = in_vain(chapters).filter(|_| !is_absent);
     Some(match (all.split_first(), vain) {
         (None, None) if is_absent => return None,
-        (None, None) => "Everything went as it was planned.".into(),
+        (None, None) if chapters.len() == 1 => "Everything went as it was planned.".into(),
+        (None, None) => "Nothing failed.".into(),
         (None, Some(vain)) => format!("The greatest trouble: {vain}."),
         (Some((first, more)), vain) => {
             let more: Vec<String> = more.iter().cloned().chain(vain).collect();
@@ -202,11 +203,12 @@ fn in_vain(chapters: &[Chapter]) -> Option<String> {
     let short = chapters.iter().filter(is_short).count();
     let misled = chapters.iter().flat_map(misled).max_by(|a, b| a.0.total_cmp(&b.0));
     let misled = misled.map(|(_, what)| format!("; {what}")).unwrap_or_default();
-    let plans = match chapters.len() {
-        1 => "the plan".into(),
-        all => format!("{short} of {all} plans"),
+    let (plans, their) = match chapters.len() {
+        1 => ("the plan".into(), "its"),
+        all => (format!("{short} of {all} plans"), if short == 1 { "its" } else { "their" }),
     };
-    (short > 0).then(|| format!("{plans} brought less to their ends than was hoped{misled}"))
+    (short > 0)
+        .then(|| format!("{plans} came to {their} end without the certainty that was hoped for{misled}"))
 }
 
 /// What was taken for a thing that was asked for in a plan, and was not it, with how much it was.

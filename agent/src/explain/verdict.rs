@@ -9,6 +9,7 @@ use descry_memory::belief::{Belief, Track};
 use descry_memory::{Document, Query, Record};
 
 use super::looks::HARDLY;
+use super::standings::Standing;
 use super::states::{Difference, States};
 use super::wording::reasons::{self, Meanings};
 use super::wording::{count, listed, place, share};
@@ -27,6 +28,8 @@ pub struct Words<'a> {
     pub is_used: &'a dyn Fn(&str) -> bool,
     /// What a surface is called.
     pub name: &'a dyn Fn(&str) -> String,
+    /// How things stood after the last look.
+    pub last: Option<&'a Standing>,
     /// A thing that is there with less is said not to be there.
     pub not_there: Option<f64>,
     /// What may settle less is not worth a look.
@@ -81,7 +84,7 @@ pub fn rests_on(
     let looks = Looks::of(record)?;
     match rests {
         Some(rests) => {
-            said.extend(rests.in_doubt.iter().map(|doubt| seen(doubt, &looks)));
+            said.extend(rests.in_doubt.iter().map(|doubt| seen(doubt, words.last, &looks)));
             said.extend(left(&rests, report, states.left_s(), words));
         }
         None => said
@@ -232,15 +235,23 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) 
 }
 
 /// What was seen of where something may be.
-fn seen(doubt: &InDoubt, looks: &Looks) -> String {
+fn seen(doubt: &InDoubt, last: Option<&Standing>, looks: &Looks) -> String {
+    let percent = |part: f64| (part * 100.0).floor();
+    let was = |seen: &Seen| {
+        let then = last?.same(doubt)?.seen.iter().find(|then| then.on == seen.on)?;
+        then.share.filter(|was| percent(*was) > percent(seen.share.unwrap_or(1.0)))
+    };
     let one = |seen: &Seen| {
+        let was = was(seen).map_or(String::new(), |was| {
+            format!(" ({:.0} % before something was touched there, which counts as not seen)", percent(was))
+        });
         let from = match seen.places {
             0 => "of which no look holds any more".to_string(),
             places => format!("from {}", count(places, "place")),
         };
         match seen.share {
             None => format!("the {} {from}", seen.on),
-            Some(part) => format!("{:.0} % of the {} {from}", (part * 100.0).floor(), seen.on),
+            Some(part) => format!("{:.0} % of the {} {from}{was}", percent(part), seen.on),
         }
     };
     let is_seen = |seen: &&Seen| seen.places > 0 || looks.places(&seen.on) > 0;

@@ -89,7 +89,9 @@ fn no_longer(because: &str) -> Option<String> {
         // What is wanted may be a number that has a name of its own.
         let named = values.split(", ").find_map(|v| v.strip_prefix(name)?.strip_prefix(" is "));
         let wanted = named.map_or(wanted.clone(), |value| wanted.replace(name, &short(value)));
-        let is = unlike(&format!("it is {}", short(is)), is, &wanted);
+        // Of a step that others come before, it is what they are hoped to lead to.
+        let verb = if because.starts_with("step 1 ") { "is" } else { "would be" };
+        let is = unlike(&format!("it {verb} {}", short(is)), is, &wanted);
         return Some(format!("{call} needs {number} to be {wanted}, and {is}"));
     }
     let values = after.split_once(": ").map(|(_, values)| format!(", {}", short(values))).unwrap_or_default();
@@ -267,7 +269,7 @@ mod tests {
             ),
             (
                 "step 2 (merge a) at 5.1: (< (open a) 1) does not hold at its start: (open a) is 1",
-                "(merge a) needs (open a) to be less than 1, and it is 1",
+                "(merge a) needs (open a) to be less than 1, and it would be 1",
             ),
             (
                 "the goal (<= (unseen) 0.1) is not reached: (unseen) is 0.25",

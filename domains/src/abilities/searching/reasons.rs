@@ -12,6 +12,10 @@ pub(crate) const LOOK_S: f64 = 2.0;
 
 /// The single look that settles most a second; none if no look settles anything in the time that is left.
 pub fn one_look(s: &Situation) -> Option<Plan> {
+    // Where all of a kind are wanted, what else is in doubt of each of them is not asked about.
+    let is_open = |&of: &usize| s.completeness(of) < s.threshold;
+    let kinds: Vec<&Doubt> = (0..s.kinds.len()).filter(is_open).map(|of| s.doubt_of(of)).collect();
+    let doubts = if kinds.is_empty() { s.doubts() } else { kinds };
     let looks = (0..s.candidates.len()).flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));
     let takes_s = |from: usize| s.travel_s(s.at, from) + LOOK_S;
     let is_in_time = |from: usize| s.time_left_s.is_none_or(|left_s| takes_s(from) <= left_s);
@@ -19,7 +23,7 @@ pub fn one_look(s: &Situation) -> Option<Plan> {
         !s.observed.contains(&(from, on)) && s.can_drive_to(from) && is_in_time(from) && s.sees(from, on)
     });
     let rate = |&look: &(usize, usize)| {
-        let share: f64 = s.doubts().iter().map(|d| d.share_settled(s, look, Taken::default())).sum();
+        let share: f64 = doubts.iter().map(|d| d.share_settled(s, look, Taken::default())).sum();
         share / takes_s(look.0)
     };
     let (from, on) = open.filter(|look| rate(look) > 0.0).max_by(|a, b| rate(a).total_cmp(&rate(b)))?;

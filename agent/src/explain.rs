@@ -272,8 +272,9 @@ const WAYS: &str = "A way to get further is what may be done next, up to the fir
 const OTHERWISE: &str = "What a plan would come to that begins otherwise is told with the rest of the plan behind it, as far as it \
                          can follow and is needed.";
 /// What seconds mean where more are counted than pass.
-const COUNTED: &str = "Where it is unlikely that a look finds something, the planner counts more seconds for it than it takes, so that \
-                       what is likely comes first (--figures says how).";
+const COUNTED: &str = "Beside the time that a plan takes, the planner counts for a first look at a surface what it costs on average to \
+                       look there in vain: the more, the less likely it finds something and the farther it is, so that what is \
+                       likely and near comes first (--figures says how).";
 
 /// What a run was asked, as far as plans depend on it.
 struct Asked<'a> {

@@ -3,7 +3,7 @@
 use super::Asked;
 use super::chapters::Chapter;
 use super::rivals::{self, LONGER_S, whole_s};
-use super::wording::by_share;
+use super::wording::{by_share, share};
 use crate::standing::{Of, Seen};
 use crate::weigh::{Way, Weighed};
 
@@ -26,7 +26,7 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     });
     let Some((weighed, chosen, whole_s)) = known else { return rivals::why(chapter, asked) };
     let of = format!("of {} ways to begin", weighed.open);
-    let is_more = asked.counts_in_vain && whole_s > chapter.makespan_s + LONGER_S;
+    let is_more = asked.counts_in_vain;
     let (best, comes_to) = match is_more {
         true => {
             let takes_s = chapter.makespan_s;
@@ -80,19 +80,29 @@ fn comes_to(way: &Way, (whole_s, is_more): (f64, bool), asked: &Asked<'_>) -> St
             more_s if more_s > 0.0 => format!("would {take} {more_s:.1} s more"),
             more_s => format!("would {take} {:.1} s less: the planner did not come upon that", -more_s),
         },
-        Some(_) => "would not be enough".into(),
+        Some(_) => not_enough(way),
         None if stuck.starts_with("the goal ") => {
             let why = rivals::would_be(stuck, asked);
             // What is wanted stands above; of a number how much it would be.
             match why.split_once(", and ") {
                 Some((number, _)) => format!("would not be enough ({number})"),
-                None => "would not be enough".into(),
+                // Of one of several surfaces it says only that there is none.
+                None if why.starts_with("there ") => not_enough(way),
+                None => format!("would not be enough ({why})"),
             }
         }
         None if stuck.is_empty() => "could not be followed by the rest of the plan".into(),
         None => {
             format!("could not be followed by the rest of the plan: {}", rivals::would_be(stuck, asked))
         }
+    }
+}
+
+/// That a way would not be enough, with what is hoped of it.
+fn not_enough(way: &Way) -> String {
+    match way.gains > 0.0 {
+        true => format!("would not be enough (+{} is hoped for)", share(way.gains)),
+        false => "would not be enough".into(),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::situation::{KnownSurface, Situation, Thing};
 /// What a look takes, as in the domain.
 pub(crate) const LOOK_S: f64 = 2.0;
 
-/// The single look that settles most a second; none if no look settles anything in the time that is left.
+/// The single look that settles most a second; none if no look settles what matters in the time that is left.
 pub fn one_look(s: &Situation) -> Option<Plan> {
     // Where all of a kind are wanted, what else is in doubt of each of them is not asked about.
     let is_open = |&of: &usize| s.completeness(of) < s.threshold;
@@ -22,11 +22,13 @@ pub fn one_look(s: &Situation) -> Option<Plan> {
     let open = looks.filter(|&(from, on)| {
         !s.observed.contains(&(from, on)) && s.can_drive_to(from) && is_in_time(from) && s.sees(from, on)
     });
-    let rate = |&look: &(usize, usize)| {
-        let share: f64 = doubts.iter().map(|d| d.share_settled(s, look, Taken::default())).sum();
-        share / takes_s(look.0)
+    let settles = |look: (usize, usize)| -> f64 {
+        doubts.iter().map(|doubt| doubt.settled(s, look, Taken::default())).sum()
     };
-    let (from, on) = open.filter(|look| rate(look) > 0.0).max_by(|a, b| rate(a).total_cmp(&rate(b)))?;
+    let rated = open.map(|look| (look, settles(look)));
+    let worth = rated.filter(|(_, settles)| *settles >= s.thresholds.remaining);
+    let rate = |(look, settles): &((usize, usize), f64)| settles / takes_s(look.0);
+    let ((from, on), _) = worth.max_by(|a, b| rate(a).total_cmp(&rate(b)))?;
     Some(look(s, from, on))
 }
 

@@ -85,9 +85,11 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let counts = |action: &str| domain.as_ref().and_then(|domain| counts(domain, action, briefly));
     let name = |symbol: &str| saying.name_of(symbol);
     let goal = header.pddl_goal.clone();
-    let in_vain = domain
-        .as_ref()
-        .and_then(|domain| besides_time(domain, &saying).or_else(|| seconds(domain, &saying, &chapters)));
+    let is_more = chapters.iter().any(brief::counts_more);
+    let in_vain = domain.as_ref().and_then(|domain| {
+        let besides = besides_time(domain, &saying).filter(|_| is_more);
+        besides.or_else(|| seconds(domain, &saying, &chapters))
+    });
     let counts_in_vain = in_vain.is_some();
     let asked =
         Asked { goal, policy, counts: &counts, name: &name, has_ended: report.is_some(), counts_in_vain };
@@ -107,9 +109,16 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let not_there = domain.as_ref().map(|domain| domain.config.thresholds.not_there);
     let negligible = domain.as_ref().map(|domain| domain.config.thresholds.remaining);
     let is_used = |call: &str| domain.as_ref().is_none_or(|domain| is_used(domain, &chapters, call));
-    let last = chapters.iter().rev().find_map(|chapter| chapter.stood().last());
-    let words =
-        verdict::Words { meanings: &meanings, is_used: &is_used, name: &name, last, not_there, negligible };
+    let last: Vec<&standings::Standing> =
+        chapters.last().map(|last| last.stood().collect()).unwrap_or_default();
+    let words = verdict::Words {
+        meanings: &meanings,
+        is_used: &is_used,
+        name: &name,
+        last: &last,
+        not_there,
+        negligible,
+    };
     let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
     let verdict = verdict.iter().map(|line| saying.say(line)).collect();
     Ok(Explanation { summary, asked: said, reading, plans, verdict, lost })
@@ -272,7 +281,7 @@ const WAYS: &str = "A way to get further is what may be done next, up to the fir
 const OTHERWISE: &str = "What a plan would come to that begins otherwise is told with the rest of the plan behind it, as far as it \
                          can follow and is needed.";
 /// What seconds mean where more are counted than pass.
-const COUNTED: &str = "Beside the time that a plan takes, the planner counts for a first look at a surface what it costs on average to \
+const COUNTED: &str = "Beside the time that a plan takes, the planner counts for its first look at a surface what it costs on average to \
                        look there in vain: the more, the less likely it finds something and the farther it is, so that what is \
                        likely and near comes first (--figures says how).";
 

@@ -288,6 +288,8 @@ fn a_look_that_would_come_too_late_is_not_gone_for() {
         assert!(plan["at_s"].as_f64().expect("a time") + takes_s <= 45.0, "{plan}");
     }
     assert!(late > 0, "{told}");
+    // What plans make small is said with what it rests on.
+    assert!(told.to_string().contains("What counts is (+ (total-time) (in-vain))"), "{told}");
 }
 
 #[test]

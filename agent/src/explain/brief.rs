@@ -27,7 +27,7 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     let Some((weighed, chosen, whole_s)) = known else { return rivals::why(chapter, asked) };
     let of = format!("of {} ways to begin", weighed.open);
     let is_more = asked.counts_in_vain;
-    let (best, comes_to) = match is_more {
+    let (best, comes_to) = match counts_more(chapter) {
         true => {
             let takes_s = chapter.makespan_s;
             ("cheapest", format!("it takes {takes_s:.1} s, and the planner counts {whole_s:.1} s"))
@@ -46,6 +46,12 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     said.extend(rivals::longer(weighed, chosen));
     said.extend(unseen(chapter));
     said
+}
+
+/// Whether a plan counts for more than the seconds that it takes.
+pub fn counts_more(chapter: &Chapter) -> bool {
+    let chosen = chapter.weighed.as_ref().and_then(|weighed| weighed.chosen.as_ref());
+    chosen.and_then(whole_s).is_some_and(|whole_s| whole_s > chapter.makespan_s + LONGER_S)
 }
 
 /// What the others that stand out would have come to.

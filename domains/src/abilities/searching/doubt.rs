@@ -19,9 +19,6 @@ use crate::situation::{Situation, Thing};
 const MEASURED_WEIGHT: f64 = 50.0;
 /// Sides from which an object is looked at.
 const SECTORS: usize = 8;
-/// What stays in doubt at best of an object that has been seen from nearly all sides; in the median, runs in the flat end with three
-/// times that.
-const STAYS: f64 = 0.01;
 /// An object that is believed less than this to be the thing is no longer asked about.
 const NEGLIGIBLE: f64 = 0.02;
 /// Size of an object of which nothing is known: a small cup, height and diameter.
@@ -129,10 +126,7 @@ impl Doubt {
         let mut doubt = Self::hidden(situation, kind, &situation.expected[situation.things.len() + of]);
         for track in &situation.belief.tracks {
             let p = kind.probability(track, &situation.surfaces);
-            let settles = p.min(1.0 - p) - STAYS;
-            if settles > 0.0 {
-                doubt.hypotheses.extend(unseen_sides(situation, track, settles));
-            }
+            doubt.hypotheses.extend(unseen_sides(situation, track, p.min(1.0 - p)));
         }
         doubt
     }

@@ -5,17 +5,10 @@ use descry_planner::{Answer, Call, CallError};
 
 use super::settled;
 use crate::abilities::argument;
-use crate::abilities::searching::doubt::Doubt;
 use crate::situation::Situation;
 
 pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
     let what = situation.thing(argument(call, call.arguments.len() - 1)?)?;
-    let settled = settled(
-        situation,
-        call,
-        situation.doubt_about(what),
-        call.arguments.len() > 2,
-        Doubt::share_settled,
-    )?;
+    let settled = settled(situation, call, situation.doubt_about(what), call.arguments.len() > 2)?;
     Ok(Answer::Number((1.0 - situation.confidence(what)) * settled))
 }

@@ -5,7 +5,6 @@ use descry_planner::{Answer, Call, CallError};
 
 use super::settled;
 use crate::abilities::argument;
-use crate::abilities::searching::doubt::Doubt;
 use crate::situation::Situation;
 
 pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
@@ -14,6 +13,6 @@ pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallE
     if !situation.things[what].may_be_on(on) {
         return Ok(Answer::Number(0.0));
     }
-    let settled = settled(situation, call, situation.doubt_about_on(what, on), true, Doubt::share_settled)?;
+    let settled = settled(situation, call, situation.doubt_about_on(what, on), true)?;
     Ok(Answer::Number((1.0 - situation.presence(what, on)) * settled))
 }

@@ -81,18 +81,9 @@ pub(super) const ALL: &[Meaning] = &[
     },
 ];
 
-/// What counts of a doubt for a look after what the plan does before it.
-type Settles = fn(&Doubt, &Situation, (usize, usize), Taken<'_>) -> f64;
-
-/// What a call's look settles of a doubt beyond what the plan does before it. The look is the call's first argument at
+/// The share of a doubt that a call's look settles beyond what the plan does before it. The look is the call's first argument at
 /// its second; without a surface, `is_whole` saying so, at every surface.
-fn settled(
-    situation: &Situation,
-    call: &Call,
-    doubt: &Doubt,
-    names_surface: bool,
-    settles: Settles,
-) -> Result<f64, CallError> {
+fn settled(situation: &Situation, call: &Call, doubt: &Doubt, names_surface: bool) -> Result<f64, CallError> {
     let from = situation.candidate(argument(call, 0)?)?;
     let surfaces = match names_surface {
         true => {
@@ -103,5 +94,5 @@ fn settled(
     };
     let looks = situation.planned_looks(call);
     let before = Taken { looks: &looks, moved: situation.planned_push(call) };
-    Ok(surfaces.map(|on| settles(doubt, situation, (from, on), before)).sum())
+    Ok(surfaces.map(|on| doubt.share_settled(situation, (from, on), before)).sum())
 }

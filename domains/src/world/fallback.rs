@@ -1,0 +1,36 @@
+//! What is done where the planner has no plan.
+
+use super::{Choice, NOTHING_LEFT, Round, World, WorldError};
+use crate::abilities;
+use crate::abilities::searching::{policies, reasons};
+
+impl World<'_> {
+    /// What is surely no waste, for when the planner has run out of states: a step, or else a look behind what is shut.
+    ///
+    /// # Errors
+    /// [`WorldError::Domain`] if the domain has no word for being at a pose.
+    pub fn fallback(&mut self, round: &Round) -> Result<Choice, WorldError> {
+        let s = &round.situation;
+        self.heading_for = None;
+        let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.fallback);
+        if let Some(plan) = own.map_or_else(|| reasons::one_look(s), |fallback| fallback(s)) {
+            return Ok(Choice::Steps(plan));
+        }
+        let look = policies::behind(s, &self.barred).filter(|_| s.held.is_none());
+        look.map_or_else(|| Ok(Choice::Nothing(NOTHING_LEFT.into())), |look| self.head_for(round, look))
+    }
+
+    /// What may still help where the time that was given is too short for any plan: the look that settles most a second, if it ends in
+    /// time.
+    ///
+    /// # Errors
+    /// Never: it is chosen as [`World::fallback`] is.
+    pub fn in_time(&mut self, round: &Round) -> Result<Choice, WorldError> {
+        let s = &round.situation;
+        self.heading_for = None;
+        let is_searching = self.setting.domain.config.uses.iter().any(|ability| ability == "searching");
+        let may_look = s.time_left_s.is_some() && s.held.is_none() && is_searching;
+        let look = reasons::one_look(s).filter(|_| may_look);
+        Ok(look.map_or_else(|| Choice::Nothing(NOTHING_LEFT.into()), Choice::Steps))
+    }
+}

@@ -91,13 +91,16 @@ fn comes_to(way: &Way, (whole_s, is_more): (f64, bool), asked: &Asked<'_>) -> St
             let why = rivals::would_be(stuck, asked);
             // What is wanted stands above; of a number how much it would be.
             match why.split_once(", and ") {
-                Some((number, _)) => format!("would not be enough ({number})"),
                 // Of one of several surfaces it says only that there is none.
-                None if why.starts_with("there ") => not_enough(way),
+                _ if why.starts_with("(exists ") => not_enough(way),
+                Some((number, _)) => format!("would not be enough ({number})"),
                 None => format!("would not be enough ({why})"),
             }
         }
         None if stuck.is_empty() => "could not be followed by the rest of the plan".into(),
+        None if way.steps.iter().any(|step| stuck.contains(step.as_str())) => {
+            format!("would not do: {}", rivals::would_be(stuck, asked))
+        }
         None => {
             format!("could not be followed by the rest of the plan: {}", rivals::would_be(stuck, asked))
         }

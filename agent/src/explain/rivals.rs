@@ -102,7 +102,16 @@ pub fn rivals<'w>(weighed: &'w Weighed, chosen: &Way) -> Vec<(&'w Way, Vec<Strin
         Some(ratio) if ratio > 1.0 - ALIKE => "gains about as much a second",
         _ => "gains most a second of the others",
     };
+    let cheapest = |is_same: bool| {
+        let alike = others().filter(move |o| (o.about() == chosen.about()) == is_same);
+        let known = alike.clone().filter(|o| whole_s(o).is_some());
+        let cheapest =
+            known.min_by(|a, b| whole_s(a).unwrap_or(f64::MAX).total_cmp(&whole_s(b).unwrap_or(f64::MAX)));
+        cheapest.or_else(|| alike.max_by(|a, b| a.gains.total_cmp(&b.gains)))
+    };
     let roles = [
+        (cheapest(true), "is the best of the others that end with the same object"),
+        (cheapest(false), "is the best of those that end with another object"),
         (rate, rate_role),
         (quickest.filter(|o| o.takes_s < chosen.takes_s - LONGER_S), "is the quickest"),
         (most.filter(|o| is_more(o, |way| way.gains)), "gains most in all"),

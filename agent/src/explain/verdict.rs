@@ -122,6 +122,7 @@ fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> 
             tracks.into_iter().partition(|track| track.unknown > 1.0 - HARDLY);
         tracks.sort_by(|a, b| a.certainty().total_cmp(&b.certainty()));
         let mut said: Vec<String> = tracks.iter().take(MOST_NAMED).map(|t| object(t, None, words)).collect();
+        said.extend(several(&tracks));
         if tracks.len() > MOST_NAMED {
             said.push(format!("{} of which it is surer.", count(tracks.len() - MOST_NAMED, "more object")));
         }
@@ -145,6 +146,21 @@ fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> 
         (_, rest) => format!("{rest} other objects are surely not {name}."),
     });
     said
+}
+
+/// That a known object may stand in several places: what is known is how it looks, and each that looks so is one.
+fn several(tracks: &[&Track]) -> Option<String> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    let taken = tracks.iter().flat_map(|track| track.probabilities.iter().filter(|(_, p)| *p > 0.5));
+    taken.for_each(|(name, _)| *counts.entry(name).or_default() += 1);
+    let all: Vec<String> =
+        counts.iter().filter(|(_, n)| **n > 1).map(|(name, n)| format!("{n} are {name}")).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "{}: objects are told by what they look like, and each that looks so counts.",
+            listed(&all, all.len())
+        )
+    })
 }
 
 /// Objects of which it is sure that they are none of the known ones, by where they are.

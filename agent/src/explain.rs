@@ -108,13 +108,12 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let not_there = domain.as_ref().map(|domain| domain.config.thresholds.not_there);
     let negligible = domain.as_ref().map(|domain| domain.config.thresholds.remaining);
     let is_used = |call: &str| words.as_ref().is_none_or(|words| words.is_used(call));
-    let last: Vec<&standings::Standing> =
-        chapters.last().map(|last| last.stood().collect()).unwrap_or_default();
+    let stood: Vec<&standings::Standing> = chapters.iter().flat_map(chapters::Chapter::stood).collect();
     let known = verdict::Words {
         meanings: &meanings,
         is_used: &is_used,
         name: &name,
-        last: &last,
+        stood: &stood,
         not_there,
         negligible,
     };
@@ -158,8 +157,8 @@ const WAYS: &str = "A way to get further is what may be done next, up to the fir
                     is reckoned with if what is looked for is there: a look may show more, or less.";
 
 /// What other ways are told with.
-const OTHERWISE: &str = "What a plan would come to that begins otherwise is told with the rest of the plan behind it, as far as it \
-                         can follow and is needed.";
+const OTHERWISE: &str = "What is hoped for is reckoned as if what is looked for were there. What a plan would come to that begins \
+                         otherwise is told with the rest of the plan behind it, as far as it can follow and is needed.";
 /// What seconds mean where more are counted than pass.
 const COUNTED: &str = "Beside the time that a plan takes, the planner counts for the first look of each plan at a surface, also where \
                        earlier plans have looked, what it costs on average to look there in vain: the more, the less likely it finds \

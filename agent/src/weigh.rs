@@ -25,7 +25,7 @@ const MOST_TRIED: usize = 600;
 /// So many others are kept.
 pub const MOST_KEPT: usize = 12;
 /// Plans with more steps than this until something is gained are not compared.
-const MOST_STEPS: usize = 6;
+pub const MOST_STEPS: usize = 6;
 /// What is shorter by less than this, seconds, is as long.
 const SHORTER_S: f64 = 0.05;
 /// A way this many times as long is none.

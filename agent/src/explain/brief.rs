@@ -41,7 +41,7 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
         None => format!("{of}, this makes the {best} whole plan that was found: {comes_to}."),
     };
     let mut said = vec![first];
-    said.extend(instead(weighed, chosen, (whole_s, is_more), asked));
+    said.extend(instead(chapter, (weighed, chosen), (whole_s, is_more), asked));
     said.extend(rivals::left(chapter, weighed, chosen, asked));
     said.extend(rivals::longer(weighed, chosen));
     said.extend(unseen(chapter));
@@ -55,10 +55,15 @@ pub fn counts_more(chapter: &Chapter) -> bool {
 }
 
 /// What the others that stand out would have come to.
-fn instead(weighed: &Weighed, chosen: &Way, counted: (f64, bool), asked: &Asked<'_>) -> Option<String> {
+fn instead(
+    chapter: &Chapter,
+    (weighed, chosen): (&Weighed, &Way),
+    counted: (f64, bool),
+    asked: &Asked<'_>,
+) -> Option<String> {
     let through = weighed.through.iter().map(|way| (way, Vec::new()));
     let rivals: Vec<&Way> =
-        rivals::rivals(weighed, chosen).into_iter().chain(through).map(|(way, _)| way).collect();
+        rivals::rivals(chapter, weighed, chosen).into_iter().chain(through).map(|(way, _)| way).collect();
     let all: Vec<String> = rivals
         .iter()
         .map(|way| format!("{} {}", called(way, chosen, &rivals), comes_to(way, counted, asked)))

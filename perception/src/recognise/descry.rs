@@ -256,8 +256,8 @@ pub(super) fn kinds(models: &[ObjectModel], probabilities: &[(String, f64)]) -> 
     kinds
 }
 
-/// Weight of flat tails: as tempered, a measurement goes wrong altogether about three times in a thousand.
-const ASTRAY: f64 = 0.0002;
+/// How often a measurement goes wrong altogether: flat tails.
+const ASTRAY: f64 = 0.002;
 
 /// Density of a measure under a range: a uniform, blurred by the measurement.
 fn within_density(value: f64, sigma: f64, r: Range) -> f64 {

@@ -32,19 +32,19 @@ def dear_edge(call):
 
 @pytest.fixture(scope="session")
 def slow():
-    """A task whose search takes long."""
-    return queens(14)
+    """A task whose search takes long: there is a row more than there are columns."""
+    return queens(14, columns=13)
 
 
-def queens(n):
-    """A task whose search takes long: n queens, one a row, put in any order."""
+def queens(n, columns):
+    """Queens, one in each of n rows, put in any order into so many columns."""
     names = " ".join(f"q{i}" for i in range(n))
     apart = " ".join(f"(apart q{r} q{c} q{s} q{d})" for r in range(n) for c in range(n) for s in range(n) for d in range(n) if r != s and c != d and abs(r - s) != abs(c - d))
     domain = """(define (domain queens) (:requirements :adl)
-      (:predicates (put ?r) (stands ?r ?c) (apart ?r ?c ?s ?d) (square ?x))
-      (:action place :parameters (?r ?c) :precondition (and (square ?r) (square ?c) (not (put ?r))
+      (:predicates (put ?r) (stands ?r ?c) (apart ?r ?c ?s ?d) (row ?r) (column ?c))
+      (:action place :parameters (?r ?c) :precondition (and (row ?r) (column ?c) (not (put ?r))
         (forall (?s ?d) (imply (stands ?s ?d) (apart ?r ?c ?s ?d)))) :effect (and (put ?r) (stands ?r ?c))))"""
-    squares = " ".join(f"(square q{i})" for i in range(n))
+    squares = " ".join([*(f"(row q{i})" for i in range(n)), *(f"(column q{i})" for i in range(columns))])
     goal = " ".join(f"(put q{i})" for i in range(n))
     return descry.Task(domain, f"(define (problem q) (:domain queens) (:objects {names}) (:init {squares} {apart}) (:goal (and {goal})))")
 

@@ -1,8 +1,8 @@
 //! Pictures of models and plots of recognition against coverage.
 
-use descry_perception::{Cloud, View};
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::picture::{PictureOptions, png};
+use descry_perception::{Cloud, View};
 use std::fmt::Write;
 use std::path::Path;
 

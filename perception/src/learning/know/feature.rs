@@ -128,8 +128,8 @@ impl Features {
             bounds.extend((0..others.all.len()).map(|m| least_distance(others.sums_of(m), sums)));
             let off = |m: usize| (distance(others.descriptor(m), own), m);
             let mut best = off((0..bounds.len()).min_by_key(|&m| bounds[m])?);
-            for m in 0..bounds.len() {
-                if bounds[m] <= best.0 {
+            for (m, bound) in bounds.iter().enumerate() {
+                if *bound <= best.0 {
                     best = best.min(off(m));
                 }
             }

@@ -3,6 +3,7 @@
 
 mod brief;
 mod chapters;
+mod domains;
 mod looks;
 mod numbers;
 mod outcomes;
@@ -14,10 +15,7 @@ mod summary;
 mod verdict;
 pub mod wording;
 
-use descry_domains::abilities;
 use descry_domains::abilities::searching::policies;
-use descry_domains::load::Domain;
-use descry_domains::vocabulary::Ground;
 use descry_memory::Record;
 use serde::Serialize;
 
@@ -26,8 +24,9 @@ use crate::exit::CommandError;
 use crate::report::Report;
 use crate::run::{Beginning, Header};
 use crate::saying::Saying;
+use domains::Words;
 use states::States;
-use wording::{listed, wrapped};
+use wording::wrapped;
 
 /// What a run is explained by.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -78,17 +77,17 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let beginning = Beginning::of(record).ok().flatten();
     let domain = beginning.as_ref().and_then(|beginning| beginning.domain().ok());
     let saying = beginning.as_ref().map(Saying::of_run).unwrap_or_default();
-    let planner = descry_domains::abilities::searching::policies::PLAN;
-    let policy = Some(&header.settings.policy).filter(|policy| *policy != planner).cloned();
-    let meanings = |call: &str| domain.as_ref().and_then(|domain| meaning(domain, call));
+    let words = domain.as_ref().map(|domain| Words { domain, saying: &saying, chapters: &chapters });
+    let policy = Some(&header.settings.policy).filter(|policy| *policy != policies::PLAN).cloned();
+    let meanings = |call: &str| words.as_ref().and_then(|words| words.meaning(call));
     let briefly = |about: String| about.split(';').next().unwrap_or_default().to_string();
-    let counts = |action: &str| domain.as_ref().and_then(|domain| counts(domain, action, briefly));
+    let counts = |action: &str| words.as_ref().and_then(|words| words.counts(action, briefly));
     let name = |symbol: &str| saying.name_of(symbol);
     let goal = header.pddl_goal.clone();
     let is_more = chapters.iter().any(brief::counts_more);
-    let in_vain = domain.as_ref().and_then(|domain| {
-        let besides = besides_time(domain, &saying).filter(|_| is_more);
-        besides.or_else(|| seconds(domain, &saying, &chapters))
+    let in_vain = words.as_ref().and_then(|words| {
+        let besides = words.besides_time().filter(|_| is_more);
+        besides.or_else(|| words.seconds())
     });
     let counts_in_vain = in_vain.is_some();
     let asked =
@@ -99,8 +98,8 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let mut said = said(header, &asked, states.given_s(), &saying);
     let mut reading = Vec::new();
     if chapters.iter().any(|c| c.weighed.as_ref().is_some_and(|w| w.chosen.is_some())) {
-        said.extend(domain.as_ref().and_then(|domain| numbers(domain, &chapters, &saying)));
-        said.extend(domain.as_ref().and_then(|domain| poses(domain, &header.settings.robot)));
+        said.extend(words.as_ref().and_then(Words::numbers));
+        said.extend(words.as_ref().and_then(|words| words.poses(&header.settings.robot)));
         said.push(OTHERWISE.into());
         said.extend(in_vain.as_ref().map(|_| COUNTED.to_string()));
         reading.push(WAYS.into());
@@ -108,18 +107,17 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     }
     let not_there = domain.as_ref().map(|domain| domain.config.thresholds.not_there);
     let negligible = domain.as_ref().map(|domain| domain.config.thresholds.remaining);
-    let is_used = |call: &str| domain.as_ref().is_none_or(|domain| is_used(domain, &chapters, call));
-    let last: Vec<&standings::Standing> =
-        chapters.last().map(|last| last.stood().collect()).unwrap_or_default();
-    let words = verdict::Words {
+    let is_used = |call: &str| words.as_ref().is_none_or(|words| words.is_used(call));
+    let stood: Vec<&standings::Standing> = chapters.iter().flat_map(chapters::Chapter::stood).collect();
+    let known = verdict::Words {
         meanings: &meanings,
         is_used: &is_used,
         name: &name,
-        last: &last,
+        stood: &stood,
         not_there,
         negligible,
     };
-    let verdict = verdict::rests_on(record, report, &states, &words, &mut lost)?;
+    let verdict = verdict::rests_on(record, report, &states, &known, &mut lost)?;
     let verdict = verdict.iter().map(|line| saying.say(line)).collect();
     Ok(Explanation { summary, asked: said, reading, plans, verdict, lost })
 }
@@ -152,125 +150,6 @@ impl Told {
     }
 }
 
-/// What a call of the domain asks, if descry itself answers it.
-fn meaning(domain: &Domain, call: &str) -> Option<String> {
-    let own = domain.config.attachments.contains_key(call);
-    let mut calls = abilities::used(&domain.config.uses).flat_map(|ability| ability.calls);
-    calls.find(|c| c.name == call && !own).map(|c| c.about.to_string())
-}
-
-/// The calls that an action's duration asks, by what they ask, as it is told; none if it asks none that is known.
-fn counts(domain: &Domain, action: &str, told: impl Fn(String) -> String) -> Option<String> {
-    let calls = duration(domain, action)?.split('[').skip(1).filter_map(|call| call.split([' ', ']']).next());
-    let all: Vec<String> = calls.filter_map(|call| meaning(domain, call)).map(told).collect();
-    (!all.is_empty()).then(|| listed(&all, all.len()))
-}
-
-/// What counts beside the time that a plan takes, where plans are to make that small, too.
-fn besides_time(domain: &Domain, saying: &Saying) -> Option<String> {
-    let minimise = &domain.config.minimise;
-    let numbers = domain.vocabulary.words().into_iter().map(|word| format!("({})", word.name));
-    let numbers: Vec<String> = numbers.filter(|number| minimise.contains(number)).collect();
-    let grows_by = |number: &String| {
-        let grows = format!("(increase {number} [");
-        let calls = domain.pddl.text.split(&grows).skip(1).filter_map(|rest| rest.split([' ', ']']).next());
-        let calls: Vec<String> = calls.filter_map(|call| meaning(domain, call)).collect();
-        let by = listed(&calls, calls.len()).replace(';', ":");
-        let said = saying.say(number);
-        if by.is_empty() { said } else { format!("{said} (the {by})") }
-    };
-    let said: Vec<String> = numbers.iter().map(grows_by).collect();
-    (!said.is_empty()).then(|| {
-        format!("What counts is {minimise}. (total-time) is the seconds that pass; {}.", said.join("; "))
-    })
-}
-
-/// Which actions count for more than they take, and do so in this run.
-fn seconds(domain: &Domain, saying: &Saying, chapters: &[chapters::Chapter]) -> Option<String> {
-    let is_more = |name: &str| {
-        fixed_s(domain, name)
-            .is_some_and(|takes_s| chapters.iter().any(|chapter| chapter.counts_more(name, takes_s)))
-    };
-    let actions = domain.vocabulary.task.actions.iter().filter(|a| is_more(&a.name));
-    let all: Vec<String> = actions
-        .filter_map(|a| {
-            let counts = counts(domain, &a.name, |about| about.replace(';', ":"))?;
-            let takes_s = fixed_s(domain, &a.name)?;
-            Some(format!("{}, besides its {takes_s:.1} s, the {counts}", saying.in_general(&a.name)))
-        })
-        .collect();
-    (!all.is_empty()).then(|| {
-        format!(
-            "More seconds are counted than pass, so that what is likely comes first: for {}.",
-            all.join("; for ")
-        )
-    })
-}
-
-/// Whether an action of which a plan had a step asks a call.
-fn is_used(domain: &Domain, chapters: &[chapters::Chapter], call: &str) -> bool {
-    let steps = chapters.iter().flat_map(|chapter| &chapter.steps);
-    let actions =
-        steps.filter_map(|step| chapters::bare(step).trim_start_matches('(').split([' ', ')']).next());
-    let actions: std::collections::BTreeSet<&str> = actions.collect();
-    actions.into_iter().filter_map(|action| declared(domain, action)).any(|text| {
-        let asked = text.split('[').skip(1).filter_map(|rest| rest.split([' ', ']']).next());
-        asked.into_iter().any(|asked| asked == call)
-    })
-}
-
-/// What the domain's file says of an action.
-fn declared<'d>(domain: &'d Domain, action: &str) -> Option<&'d str> {
-    let from = domain.pddl.text.split_once(&format!("action {action}\n"))?.1;
-    Some(from.split("\n  (:").next().unwrap_or(from))
-}
-
-/// The seconds that are fixed where an action's duration adds to them.
-fn fixed_s(domain: &Domain, action: &str) -> Option<f64> {
-    duration(domain, action)?.split_once("(+ ")?.1.split_whitespace().next()?.parse().ok()
-}
-
-/// What stands for the duration of an action.
-fn duration<'d>(domain: &'d Domain, action: &str) -> Option<&'d str> {
-    declared(domain, action)?.split_once(":duration")?.1.split(":condition").next()?.split(":effect").next()
-}
-
-/// How poses are called, where they are called after what is looked at.
-fn poses(domain: &Domain, robot: &str) -> Option<String> {
-    let text = match robot.starts_with("recorded:") {
-        true => {
-            "Poses are those from which the record was taken, each called after its frame: driving to frame-7 and looking from \
-             there is reading that frame."
-        }
-        false => {
-            "Poses are called after what is looked at from them, as desk-1 and desk-2 after a desk, or after a door; here-N is \
-             where the body stopped on its way."
-        }
-    };
-    let is_searching = domain.config.uses.iter().any(|ability| ability == "searching");
-    is_searching.then(|| format!("{text} Places are x, y and height in the map, in metres."))
-}
-
-/// What the numbers say that plans are to change.
-fn numbers(domain: &Domain, chapters: &[chapters::Chapter], saying: &Saying) -> Option<String> {
-    let expected = chapters.iter().filter_map(|c| c.weighed.as_ref()).flat_map(|w| &w.numbers);
-    let names = expected.filter_map(|n| n.name.trim_matches(['(', ')']).split(' ').next());
-    let names: std::collections::BTreeSet<&str> = names.collect();
-    let sensed = |name: &&str| match domain.vocabulary.ground(&domain.vocabulary.word(name)?, &domain.config)
-    {
-        Ground::Sensed(fact) => Some((name.to_string(), fact.about)),
-        _ => None,
-    };
-    let all: Vec<(String, &str)> = names.iter().filter_map(sensed).collect();
-    let (said, raw): (Vec<_>, Vec<_>) = all.into_iter().partition(|(name, _)| saying.has(name));
-    let raw: Vec<String> = raw.iter().map(|(name, about)| format!("({name} …) is {about}")).collect();
-    let raw = (!raw.is_empty()).then(|| format!("Numbers: {}.", raw.join("; ")));
-    let is_share = said.iter().any(|(_, about)| about.ends_with("0 to 1"));
-    let said = is_share.then(|| "A certainty is a number between 0 and 1.".to_string());
-    let all: Vec<String> = said.into_iter().chain(raw).collect();
-    (!all.is_empty()).then(|| all.join(" "))
-}
-
 /// What ways and their figures mean.
 const WAYS: &str = "A way to get further is what may be done next, up to the first step that may bring the numbers nearer to \
                     what is wanted. In brackets behind it: by how much it is, of all numbers together, in how many \
@@ -278,12 +157,12 @@ const WAYS: &str = "A way to get further is what may be done next, up to the fir
                     is reckoned with if what is looked for is there: a look may show more, or less.";
 
 /// What other ways are told with.
-const OTHERWISE: &str = "What a plan would come to that begins otherwise is told with the rest of the plan behind it, as far as it \
-                         can follow and is needed.";
+const OTHERWISE: &str = "What is hoped for is reckoned as if what is looked for were there. What a plan would come to that begins \
+                         otherwise is told with the rest of the plan behind it, as far as it can follow and is needed.";
 /// What seconds mean where more are counted than pass.
-const COUNTED: &str = "Beside the time that a plan takes, the planner counts for its first look at a surface what it costs on average to \
-                       look there in vain: the more, the less likely it finds something and the farther it is, so that what is \
-                       likely and near comes first (--figures says how).";
+const COUNTED: &str = "Beside the time that a plan takes, the planner counts for the first look of each plan at a surface, also where \
+                       earlier plans have looked, what it costs on average to look there in vain: the more, the less likely it finds \
+                       something and the farther it is, so that what is likely and near comes first (--figures says how).";
 
 /// What a run was asked, as far as plans depend on it.
 struct Asked<'a> {

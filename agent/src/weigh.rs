@@ -16,7 +16,7 @@ use serde_json::Value;
 
 use crate::compared::{self, Compared};
 use crate::exit::CommandError;
-use steps::{Instead, call, joined, words};
+use steps::{Instead, brought, call, joined, leads, words};
 
 /// The blob under which it is kept beside the event of a plan.
 pub const BLOB: &str = "weighed";
@@ -25,7 +25,7 @@ const MOST_TRIED: usize = 600;
 /// So many others are kept.
 pub const MOST_KEPT: usize = 12;
 /// Plans with more steps than this until something is gained are not compared.
-const MOST_STEPS: usize = 6;
+pub const MOST_STEPS: usize = 6;
 /// What is shorter by less than this, seconds, is as long.
 const SHORTER_S: f64 = 0.05;
 /// A way this many times as long is none.
@@ -51,6 +51,8 @@ pub struct Weighed {
     pub through: Option<Way>,
     /// What was left of the plan before, where that is another.
     pub left: Option<Way>,
+    /// What that would bring the numbers that count to, if all goes as expected.
+    pub left_numbers: Vec<Expected>,
 }
 
 /// A number of the domain.
@@ -104,6 +106,11 @@ impl Way {
     pub fn rate(&self) -> f64 {
         self.gains / self.takes_s.max(1e-9)
     }
+
+    /// What its last step is about: its last object.
+    pub fn about(&self) -> Option<&str> {
+        self.steps.last()?.trim_end_matches(')').rsplit(' ').next()
+    }
 }
 
 /// What was weighed, as it is kept beside the event.
@@ -119,7 +126,9 @@ pub fn blob(weighed: &Weighed) -> Result<Blob<'static>, CommandError> {
 pub fn weigh(round: &Round, plan: &Plan, left: &Plan, goal: &str) -> Weighed {
     let Some(scale) = Scale::new(round, plan, goal) else { return Weighed::default() };
     let weighed = scale.weigh(plan).unwrap_or_default();
-    Weighed { left: scale.left(plan, left), ..weighed }
+    let left_way = scale.left(plan, left);
+    let left_numbers = left_way.as_ref().map(|_| scale.at_most(&left.steps)).unwrap_or_default();
+    Weighed { left: left_way, left_numbers, ..weighed }
 }
 
 /// The numbers that count in a round, and their values now.
@@ -130,8 +139,8 @@ struct Scale<'r> {
     counting: Vec<(FunctionId, bool)>,
     /// What says so.
     asked: String,
-    /// The goal, where it does not say so itself.
-    goal: Option<String>,
+    /// Where the goal does not say so itself: the objects that it names and that the steps bring it nearer to.
+    aims: Option<Vec<String>>,
 }
 
 impl<'r> Scale<'r> {
@@ -148,6 +157,7 @@ impl<'r> Scale<'r> {
                 .collect()
         };
         let (mut counting, mut by) = (named(goal), goal.to_string());
+        let mut aims = None;
         if counting.is_empty() {
             let asked = |step: &Step| {
                 let (action, binding) = semantics.bind(step).ok()?;
@@ -155,9 +165,12 @@ impl<'r> Scale<'r> {
             };
             by = plan.steps.iter().filter_map(asked).collect::<Vec<_>>().join(" ");
             counting = named(&by);
+            let asking =
+                plan.steps.iter().filter(|step| asked(step).is_some_and(|by| !named(&by).is_empty()));
+            let brought = asking.flat_map(|step| brought(&semantics, step));
+            aims = Some(brought.filter(|object| words(goal).contains(&object.as_str())).collect());
         }
-        let goal = (by != goal).then(|| goal.to_string());
-        Some(Scale { semantics, state, counting, asked: by, goal })
+        Some(Scale { semantics, state, counting, asked: by, aims })
     }
 
     /// The numbers that count in a state, by name, each with whether less of it is wanted.
@@ -182,12 +195,12 @@ impl<'r> Scale<'r> {
         self.counting.iter().flat_map(of).collect()
     }
 
-    /// The objects of a number that a step asks about: those of which the goal says nothing may be others in another plan.
+    /// The objects of a number that a step asks about: those that are not what it is done for may be others in another plan.
     fn any<'o>(&self, of: Vec<&'o str>) -> Vec<&'o str> {
-        let Some(goal) = &self.goal else { return of };
-        let named = words(goal);
-        let is_named = of.iter().any(|object| named.contains(object));
-        of.into_iter().map(|object| if !is_named || named.contains(&object) { object } else { "?" }).collect()
+        let Some(aims) = &self.aims else { return of };
+        let is_aim = |object: &&str| aims.iter().any(|aim| aim == object);
+        let any_is = of.iter().any(is_aim);
+        of.into_iter().map(|object| if !any_is || is_aim(&object) { object } else { "?" }).collect()
     }
 
     /// By how much a number comes nearer to what is wanted.
@@ -274,34 +287,19 @@ impl<'r> Scale<'r> {
     /// What other steps come to with the rest of a plan behind them, or with so much of it as is needed then: with objects
     /// exchanged, or once a step has led to where it begins. Where that cannot be done, why.
     fn led_on(&self, other: &Other, rest: &[Step]) -> (Option<Whole>, Option<String>) {
-        let Some((_, there)) = self.after(&other.steps) else { return (None, None) };
-        let exchanged: Vec<Step> = rest.iter().map(|step| other.instead.exchanged(step)).collect();
-        let put: Vec<Step> = rest.iter().map(|step| other.instead.in_step(step)).collect();
-        let mut ends = vec![Vec::new(), exchanged.clone(), put];
-        if let Some(last) = other.steps.last() {
-            // What only looks again need not be done where one look is enough.
-            let begins = (0..rest.len()).filter(|&n| n == 0 || rest[n - 1].action == last.action);
-            for (steps, n) in begins.flat_map(|n| [(&exchanged[n..], n), (&rest[n..], n)]) {
-                if n > 0 {
-                    // What is done from where the plan looks last is done from where the other does.
-                    let there = Instead::of(&rest[n - 1], last);
-                    ends.push(rest[n..].iter().map(|step| there.in_step(step)).collect());
-                    ends.push(steps.to_vec());
-                }
-                let pairs = last
-                    .arguments
-                    .iter()
-                    .flat_map(|from| steps[0].arguments.iter().map(move |to| (from, to)));
-                let bridges = pairs.flat_map(|(from, to)| self.bridges(from, to, last));
-                let led = bridges.filter(|bridge| self.apply(&mut there.clone(), bridge).is_some());
-                ends.extend(led.map(|bridge| [std::slice::from_ref(&bridge), steps].concat()));
-            }
-        }
+        let ends = self.ends(other, rest);
         let all = ends.iter().map(|end| [&other.steps, end.as_slice()].concat());
         let all: Vec<_> = all.filter_map(|steps| Some((self.whole(&steps)?, steps))).collect();
-        let quickest = all.iter().map(|(whole, _)| *whole).filter(|whole| whole.reaches);
-        if let Some(whole) = quickest.min_by(|a, b| a.takes_s.total_cmp(&b.takes_s)) {
-            return (Some(whole), None);
+        let mut reaching: Vec<_> = all.iter().filter(|(whole, _)| whole.reaches).collect();
+        reaching.sort_by(|a, b| a.0.takes_s.total_cmp(&b.0.takes_s));
+        // What ends too late is seen by who watches the clock.
+        let late = |steps: &[Step]| if self.is_timed() { self.stuck(steps) } else { None };
+        let ends: Vec<_> = reaching.into_iter().map(|(whole, steps)| (*whole, late(steps))).collect();
+        if let Some((whole, _)) = ends.iter().find(|(_, late)| late.is_none()) {
+            return (Some(*whole), None);
+        }
+        if let Some((_, late)) = ends.into_iter().next() {
+            return (None, late);
         }
         let longer = all.iter().map(|(_, steps)| steps).filter(|steps| steps.len() > other.steps.len());
         let farthest = longer.filter_map(|steps| Some((self.way(steps)?.gains, steps)));
@@ -309,6 +307,47 @@ impl<'r> Scale<'r> {
             Some((_, steps)) => (None, self.stuck(steps)),
             None => (None, self.short_of(other, rest)),
         }
+    }
+
+    /// What may be done behind other steps to bring the rest of a plan about.
+    fn ends(&self, other: &Other, rest: &[Step]) -> Vec<Vec<Step>> {
+        let exchanged: Vec<Step> = rest.iter().map(|step| other.instead.exchanged(step)).collect();
+        let put: Vec<Step> = rest.iter().map(|step| other.instead.in_step(step)).collect();
+        let mut ends = vec![Vec::new(), exchanged.clone(), put.clone()];
+        let Some((last, (_, there))) = other.steps.last().zip(self.after(&other.steps)) else {
+            return ends;
+        };
+        // What only looks again need not be done where one look is enough.
+        let begins = (0..rest.len()).filter(|&n| n == 0 || rest[n - 1].action == last.action);
+        for (steps, n) in begins.flat_map(|n| [(&exchanged[n..], n), (&rest[n..], n)]) {
+            if n > 0 {
+                // What is done from where the plan looks last is done from where the other does.
+                let there = Instead::of(&rest[n - 1], last);
+                ends.push(rest[n..].iter().map(|step| there.in_step(step)).collect());
+                ends.push(steps.to_vec());
+            }
+            let led = self.led(&there, last, &steps[0], last);
+            ends.extend(led.map(|bridge| [std::slice::from_ref(&bridge), steps].concat()));
+        }
+        // What has begun with other objects may go on with those of the plan.
+        for n in 1..rest.len().min(MOST_STEPS) {
+            let begun: Vec<Step> = put[..n].iter().filter(|step| leads(step)).cloned().collect();
+            let Some((_, there)) = self.after(&[&other.steps, begun.as_slice()].concat()) else { break };
+            let led = self.led(&there, &put[n - 1], &rest[n], last);
+            ends.extend(led.map(|bridge| [&begun, std::slice::from_ref(&bridge), &rest[n..]].concat()));
+        }
+        // Who is there already does not go there.
+        ends.iter_mut().for_each(|end| end.retain(leads));
+        ends
+    }
+
+    /// Steps that can be taken in a state, and lead from an object of a step to one of another.
+    fn led(&self, there: &State, from: &Step, to: &Step, about: &Step) -> impl Iterator<Item = Step> {
+        let pairs = from.arguments.iter().flat_map(|from| to.arguments.iter().map(move |to| (from, to)));
+        let bridges = pairs.flat_map(|(from, to)| self.bridges(from, to, about));
+        let led: Vec<Step> =
+            bridges.filter(|bridge| self.apply(&mut there.clone(), bridge).is_some()).collect();
+        led.into_iter()
     }
 
     /// Why the rest of a plan cannot be done behind other steps: that a number is too small then for what is left to do but looking, or
@@ -324,6 +363,11 @@ impl<'r> Scale<'r> {
         let stuck = |end: &Vec<Step>| self.stuck(&[&other.steps, end.as_slice()].concat());
         let by_number = stuck(&needed).filter(|why| why.contains("(>= "));
         by_number.or_else(|| stuck(&exchanged))
+    }
+
+    /// Whether something changes by itself: a deadline passes.
+    fn is_timed(&self) -> bool {
+        !self.semantics.task.init.timed.is_empty()
     }
 
     /// Why steps cannot be taken one after the other, as the monitor says it.
@@ -384,7 +428,7 @@ impl<'r> Scale<'r> {
             let whole = self.whole(&[&steps, rest].concat())?;
             Some(Way { whole: Some(whole), ..through })
         });
-        Some(Weighed { numbers, chosen: Some(chosen), others, open, shorter, through, left: None })
+        Some(Weighed { numbers, chosen: Some(chosen), others, open, shorter, through, ..Weighed::default() })
     }
 
     /// What is left of the plan before, and what it comes to, or why it would not do.
@@ -513,7 +557,7 @@ struct Other {
     way: Way,
 }
 
-/// Those that gain most a second, and of the others the quickest and the one that gains most.
+/// Those that gain most a second, and of the others the quickest, the one that gains most, and the best about each object.
 fn kept(mut all: Vec<Other>) -> Vec<Other> {
     let rate = |a: &Other, b: &Other| b.way.rate().total_cmp(&a.way.rate());
     all.sort_by(|a, b| rate(a, b).then_with(|| a.way.steps.cmp(&b.way.steps)));
@@ -523,6 +567,11 @@ fn kept(mut all: Vec<Other>) -> Vec<Other> {
     };
     for of in [(|way| way.takes_s) as fn(&Way) -> f64, |way| -way.gains] {
         all.extend(by(&rest, of).map(|n| rest.remove(n)));
+    }
+    for other in rest {
+        if all.iter().all(|known| known.way.about() != other.way.about()) {
+            all.push(other);
+        }
     }
     all
 }

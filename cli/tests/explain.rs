@@ -193,6 +193,21 @@ fn what_is_lost_with_a_damaged_header_is_said() {
 }
 
 #[test]
+fn what_is_to_be_brought_may_stand_elsewhere_than_where_it_is_to_stand() {
+    let told = check(
+        &["do", "bring cup A to the kitchen table", "--domain", "home", "--seed", "110108"],
+        0,
+        &[
+            "looking at the desk from desk-1 would count 3",
+            "looking at the lower board from lower-board-6 would count 6",
+        ],
+    );
+    // Nothing that would be enough, or could be followed, is said not to be.
+    let why = told["plans"][0]["why"].to_string();
+    assert!(why.contains("of 52 ways to begin") && !why.contains("would not be enough"), "{why}");
+}
+
+#[test]
 fn an_answer_is_explained_as_one() {
     check(
         &["do", "is cup A on the table", "--seed", "4"],

@@ -72,9 +72,7 @@ pub enum SurfaceError {
         needed: usize,
     },
     /// No plane fits what was asked for.
-    #[error(
-        "no plane {wanted} among the {tried} largest: widen the height band, give `up`, or look at the table"
-    )]
+    #[error("{}: widen the height band, give `up`, or look at the table", no_plane(wanted, *tried))]
     NotFound {
         /// Planes that were looked at.
         tried: usize,
@@ -105,6 +103,13 @@ pub enum SurfaceError {
         /// What tells so.
         because: Sign,
     },
+}
+
+fn no_plane(wanted: &str, tried: usize) -> String {
+    match tried {
+        0 => format!("no plane {wanted}, and no other that is level"),
+        _ => format!("no plane {wanted} among the {tried} largest"),
+    }
 }
 
 /// A horizontal-enough face with its outline.

@@ -73,6 +73,20 @@ fn one_thing_from_one_view() {
             0.05,
         ),
         (
+            "a glass of its size that narrows towards its foot",
+            Thing::Turned {
+                x: 0.05,
+                y: 0.02,
+                knots: &[[0.0, 0.025], [0.104, 0.035]],
+                scale: 1.0,
+                open: true,
+                handle_rad: None,
+                spout: false,
+            },
+            0.0,
+            0.6,
+        ),
+        (
             "the far side of such a cup and nothing before it",
             Thing::Sherd { x: 0.05, y: 0.02, radius: 0.035, height: 0.104, towards_rad: 2.8, half_rad: 0.9 },
             0.0,

@@ -41,7 +41,7 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
         None => format!("{of}, this makes the {best} whole plan that was found: {comes_to}."),
     };
     let mut said = vec![first];
-    said.extend(instead(weighed, chosen, (whole_s, is_more), asked));
+    said.extend(instead(chapter, (weighed, chosen), (whole_s, is_more), asked));
     said.extend(rivals::left(chapter, weighed, chosen, asked));
     said.extend(rivals::longer(weighed, chosen));
     said.extend(unseen(chapter));
@@ -55,10 +55,15 @@ pub fn counts_more(chapter: &Chapter) -> bool {
 }
 
 /// What the others that stand out would have come to.
-fn instead(weighed: &Weighed, chosen: &Way, counted: (f64, bool), asked: &Asked<'_>) -> Option<String> {
+fn instead(
+    chapter: &Chapter,
+    (weighed, chosen): (&Weighed, &Way),
+    counted: (f64, bool),
+    asked: &Asked<'_>,
+) -> Option<String> {
     let through = weighed.through.iter().map(|way| (way, Vec::new()));
     let rivals: Vec<&Way> =
-        rivals::rivals(weighed, chosen).into_iter().chain(through).map(|(way, _)| way).collect();
+        rivals::rivals(chapter, weighed, chosen).into_iter().chain(through).map(|(way, _)| way).collect();
     let all: Vec<String> = rivals
         .iter()
         .map(|way| format!("{} {}", called(way, chosen, &rivals), comes_to(way, counted, asked)))
@@ -91,13 +96,16 @@ fn comes_to(way: &Way, (whole_s, is_more): (f64, bool), asked: &Asked<'_>) -> St
             let why = rivals::would_be(stuck, asked);
             // What is wanted stands above; of a number how much it would be.
             match why.split_once(", and ") {
-                Some((number, _)) => format!("would not be enough ({number})"),
                 // Of one of several surfaces it says only that there is none.
-                None if why.starts_with("there ") => not_enough(way),
+                _ if why.starts_with("(exists ") => not_enough(way),
+                Some((number, _)) => format!("would not be enough ({number})"),
                 None => format!("would not be enough ({why})"),
             }
         }
         None if stuck.is_empty() => "could not be followed by the rest of the plan".into(),
+        None if way.steps.iter().any(|step| stuck.contains(step.as_str())) => {
+            format!("would not do: {}", rivals::would_be(stuck, asked))
+        }
         None => {
             format!("could not be followed by the rest of the plan: {}", rivals::would_be(stuck, asked))
         }

@@ -86,7 +86,9 @@ fn outcome(deed: &Deed, doing: Option<&str>, has_standings: bool) -> Option<Stri
         // What to set otherwise is for who programs it.
         Deed::Noted(Note::Nothing { because }) => {
             let why = because.split(": ").next().and_then(|why| why.split(" among the ").next()).unwrap_or(because);
-            format!("{by}the look showed nothing that things could stand on: {why}.")
+            // A view that does not fit is left out, and says so.
+            let kept = if why.contains("this view") { "" } else { " It is kept, to be merged with further views." };
+            format!("{by}the look showed nothing that things could stand on: {why}.{kept}")
         }
         Deed::Noted(Note::Swept { things }) => swept(things),
         Deed::Noted(note) => {

@@ -5,6 +5,8 @@ use descry_domains::note::Note;
 use super::chapters::{Chapter, Deed, bare};
 use super::wording::{capital, listed, reasons, share, share_of};
 use super::{Asked, Told, brief, outcomes, rivals};
+use crate::agent::AT_THE_END;
+use crate::saying::WOULD_NOT_HOLD;
 use crate::standing::{InDoubt, Of};
 use crate::weigh::Expected;
 
@@ -109,6 +111,10 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
                 }
                 None => {
                     let now = reasons::missed(&chapter.because, "would be only", asked.counts);
+                    let now = match chapter.because.starts_with(AT_THE_END) {
+                        true => now.replacen(" does not hold", WOULD_NOT_HOLD, 1),
+                        false => now,
+                    };
                     let open = before.steps_done().1;
                     match chapter.steps.iter().map(|step| bare(step)).eq(open.iter().copied()) {
                         true => format!(
@@ -126,8 +132,20 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
     // None of many that are all nothing is the greatest.
     let most = chapter.most.as_ref().filter(|(_, most)| share(*most) != share(0.0));
     let least = |name: &str| asked.wanted(name).unwrap_or(0.0);
-    let most = most.map(|(name, most)| format!(" The greatest: {name}, {}.", share_of(*most, least(name))));
+    let most = most.map(|(name, most)| match hoped_of_left(chapter, name) {
+        Some(hoped) => format!(" Hoped of that: {hoped}."),
+        None => format!(" The greatest by now: {name}, {}.", share_of(*most, least(name))),
+    });
     format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
+}
+
+/// What was hoped of what was left of a plan before, of the numbers that are alike but for what comes last in them.
+fn hoped_of_left(chapter: &Chapter, number: &str) -> Option<String> {
+    let (begins, _) = number.rsplit_once(' ')?;
+    let all = chapter.weighed.iter().flat_map(|weighed| &weighed.left_numbers);
+    let alike = all.filter(|expected| expected.name.rsplit_once(' ').is_some_and(|(own, _)| own == begins));
+    let most = alike.max_by(|a, b| a.then.total_cmp(&b.then))?;
+    Some(format!("{} from {} to {}", most.name, share(most.now), share(most.then)))
 }
 
 /// The action of a step as the monitor names it.
@@ -201,8 +219,9 @@ fn intent(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
         // What looks promise is added up: of what ends at 1 it may be more.
         let is_share = wanted.is_some_and(|wanted| wanted <= 1.0) && (0.0..=1.0).contains(&n.now);
         let then = if is_share { n.then.min(1.0) } else { n.then };
+        let least = wanted.unwrap_or(0.0);
         let wanted = wanted.map(|w| format!(" ({} is wanted)", share(w))).unwrap_or_default();
-        format!("{} from {} to {}{wanted}", n.name, share(n.now), share(then))
+        format!("{} from {} to {}{wanted}", n.name, share_of(n.now, least), share_of(then, least))
     };
     let named: Vec<String> = numbers.iter().take(MOST_NAMED).map(one).collect();
     if !named.is_empty() {

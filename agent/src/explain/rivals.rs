@@ -1,12 +1,14 @@
 //! Why a plan was this one and not another: what each rival would have brought, what it would have taken to the end, or why the rest of
 //! the plan could not follow it.
 
+use descry_domains::lexicon::symbol;
+
 use super::Asked;
 use super::chapters::{Chapter, bare};
 use super::wording::{listed, reasons, share};
 use crate::saying::WOULD_NOT_HOLD;
 use crate::standing::{FirstLook, Seen};
-use crate::weigh::{Way, Weighed};
+use crate::weigh::{MOST_STEPS, Way, Weighed};
 
 /// Rates nearer to each other than this share are alike.
 const ALIKE: f64 = 0.02;
@@ -27,10 +29,11 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
         if let Some(cut) = &chapter.cut {
             return vec![cut_short(cut)];
         }
-        return vec![
-            "it does what the goal asks next. Nothing was compared: no step of it is there to learn more, or only after many others."
-                .into(),
-        ];
+        let why = match chapter.steps.len() <= MOST_STEPS {
+            true => "no step of it is there to learn more",
+            false => "none of its first steps is there to learn more",
+        };
+        return vec![format!("it does what the goal asks next. Nothing was compared: {why}.")];
     };
     let longer = longer(weighed, chosen);
     let through = weighed.through.as_ref().map(|way| {
@@ -83,7 +86,7 @@ fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<
         figures(chosen),
         weighed.open
     );
-    let rivals = rivals(weighed, chosen).into_iter().map(|(way, roles)| {
+    let rivals = rivals(chapter, weighed, chosen).into_iter().map(|(way, roles)| {
         let against = against(way, chosen, asked).map(|against| format!("; {against}")).unwrap_or_default();
         format!("{} {}{against}.", figures(way), listed(&roles, roles.len()))
     });
@@ -91,8 +94,9 @@ fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<
 }
 
 /// The others that stand out, each with what it stands out by.
-pub fn rivals<'w>(weighed: &'w Weighed, chosen: &Way) -> Vec<(&'w Way, Vec<String>)> {
+pub fn rivals<'w>(chapter: &Chapter, weighed: &'w Weighed, chosen: &Way) -> Vec<(&'w Way, Vec<String>)> {
     let others = || weighed.others.iter();
+    let likeliest = likeliest_besides(chapter, chosen);
     let rate = others().max_by(|a, b| a.rate().total_cmp(&b.rate()));
     let quickest = others().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s));
     let most = others().max_by(|a, b| a.gains.total_cmp(&b.gains));
@@ -102,7 +106,23 @@ pub fn rivals<'w>(weighed: &'w Weighed, chosen: &Way) -> Vec<(&'w Way, Vec<Strin
         Some(ratio) if ratio > 1.0 - ALIKE => "gains about as much a second",
         _ => "gains most a second of the others",
     };
+    let cheapest = |of: &dyn Fn(Option<&str>) -> bool| {
+        let alike = others().filter(|o| of(o.about()));
+        let known = alike.clone().filter(|o| whole_s(o).is_some());
+        let cheapest =
+            known.min_by(|a, b| whole_s(a).unwrap_or(f64::MAX).total_cmp(&whole_s(b).unwrap_or(f64::MAX)));
+        cheapest.or_else(|| alike.max_by(|a, b| a.gains.total_cmp(&b.gains)))
+    };
     let roles = [
+        (
+            cheapest(&|about| about == chosen.about()),
+            "is the best of the others that end with the same object",
+        ),
+        (cheapest(&|about| about != chosen.about()), "is the best of those that end with another object"),
+        (
+            likeliest.and_then(|on| cheapest(&|about| about == Some(&on))),
+            "is the best of those where it most likely stands else",
+        ),
         (rate, rate_role),
         (quickest.filter(|o| o.takes_s < chosen.takes_s - LONGER_S), "is the quickest"),
         (most.filter(|o| is_more(o, |way| way.gains)), "gains most in all"),
@@ -115,6 +135,15 @@ pub fn rivals<'w>(weighed: &'w Weighed, chosen: &Way) -> Vec<(&'w Way, Vec<Strin
         }
     }
     rivals
+}
+
+/// Where it most likely stands unseen, besides where a way looks.
+fn likeliest_besides(chapter: &Chapter, chosen: &Way) -> Option<String> {
+    let doubts = chapter.before.iter().flat_map(|standing| &standing.doubts);
+    let seen = doubts.flat_map(|doubt| &doubt.seen).filter(|seen| seen.hidden > 0.0);
+    let besides =
+        seen.map(|seen| (symbol(&seen.on), seen.hidden)).filter(|(on, _)| chosen.about() != Some(on));
+    besides.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(on, _)| on)
 }
 
 /// Why what was left of the plan before was not gone on with, where all that ended it was that it counts differently.

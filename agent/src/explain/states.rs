@@ -10,6 +10,8 @@ use crate::exit::CommandError;
 
 /// Changes of a kind that are named; the rest are counted.
 const MOST_NAMED: usize = 4;
+/// Facts that are named; the rest are counted. That they hold no more of a surface is one for each look at it.
+const MOST_FACTS: usize = 8;
 /// Numbers nearer to each other than this are the same.
 const SAME: f64 = 5e-3;
 
@@ -88,7 +90,7 @@ impl Difference {
 
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let facts = |all: &[String]| listed(all, MOST_NAMED);
+        let facts = |all: &[String]| listed(all, MOST_FACTS);
         let number = |(name, was, now): &(String, f64, f64)| {
             format!("{name} is {} instead of {}", share(*now), share(*was))
         };
@@ -173,8 +175,8 @@ mod tests {
         // That time passes is no change.
         check("(:init (at start) (hand-free) (at 5.5 (not (time-left))) (= (presence cup-a desk) 0.85))", "");
         check(
-            "(:init (a) (b) (c) (d) (e) (f) (at start) (hand-free) (= (sure) 0.8))",
-            "(a), (b), (c), (d) and 2 more",
+            "(:init (a) (b) (c) (d) (e) (f) (g) (h) (i) (j) (at start) (hand-free) (= (sure) 0.8))",
+            "(a), (b), (c), (d), (e), (f), (g), (h) and 2 more",
         );
         assert!(State::read("nothing").facts.is_empty());
         let timed = State::read("(:init (at start) (at 60.5 (not (a))) (at 9.25 (b)))");

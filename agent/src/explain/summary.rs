@@ -81,8 +81,10 @@ fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
                 "" => "is in the hand".into(),
                 on => format!("stands on the {} at {}", name(on), place(track)),
             };
+            // It may have been taken since.
+            let then = if report.why.contains(" in the hand") { "by the last look, " } else { "" };
             format!(
-                "what {on} is {} with a probability of {}; {:.0} % of its outside was seen",
+                "{then}what {on} is {} with a probability of {}; {:.0} % of its outside was seen",
                 doubt.about,
                 share(p),
                 track.seen_fraction * 100.0

@@ -28,8 +28,8 @@ pub struct Words<'a> {
     pub is_used: &'a dyn Fn(&str) -> bool,
     /// What a surface is called.
     pub name: &'a dyn Fn(&str) -> String,
-    /// How things stood after each step of the last plan.
-    pub last: &'a [&'a Standing],
+    /// How things stood after each step.
+    pub stood: &'a [&'a Standing],
     /// A thing that is there with less is said not to be there.
     pub not_there: Option<f64>,
     /// What may settle less is not worth a look.
@@ -84,7 +84,7 @@ pub fn rests_on(
     let looks = Looks::of(record)?;
     match rests {
         Some(rests) => {
-            said.extend(rests.in_doubt.iter().map(|doubt| seen(doubt, words.last, &looks)));
+            said.extend(rests.in_doubt.iter().map(|doubt| seen(doubt, words.stood, &looks)));
             said.extend(left(&rests, report, states.left_s(), words));
         }
         None => said
@@ -122,6 +122,7 @@ fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> 
             tracks.into_iter().partition(|track| track.unknown > 1.0 - HARDLY);
         tracks.sort_by(|a, b| a.certainty().total_cmp(&b.certainty()));
         let mut said: Vec<String> = tracks.iter().take(MOST_NAMED).map(|t| object(t, None, words)).collect();
+        said.extend(several(&tracks));
         if tracks.len() > MOST_NAMED {
             said.push(format!("{} of which it is surer.", count(tracks.len() - MOST_NAMED, "more object")));
         }
@@ -145,6 +146,21 @@ fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> 
         (_, rest) => format!("{rest} other objects are surely not {name}."),
     });
     said
+}
+
+/// That a known object may stand in several places: what is known is how it looks, and each that looks so is one.
+fn several(tracks: &[&Track]) -> Option<String> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    let taken = tracks.iter().flat_map(|track| track.probabilities.iter().filter(|(_, p)| *p > 0.5));
+    taken.for_each(|(name, _)| *counts.entry(name).or_default() += 1);
+    let all: Vec<String> =
+        counts.iter().filter(|(_, n)| **n > 1).map(|(name, n)| format!("{n} are {name}")).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "{}: objects are told by what they look like, and each that looks so counts.",
+            listed(&all, all.len())
+        )
+    })
 }
 
 /// Objects of which it is sure that they are none of the known ones, by where they are.
@@ -235,16 +251,16 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) 
 }
 
 /// What was seen of where something may be.
-fn seen(doubt: &InDoubt, last: &[&Standing], looks: &Looks) -> String {
+fn seen(doubt: &InDoubt, stood: &[&Standing], looks: &Looks) -> String {
     let percent = |part: f64| (part * 100.0).floor();
     let was = |seen: &Seen| {
-        let then = last.iter().filter_map(|then| then.same(doubt)).flat_map(|then| &then.seen);
+        let then = stood.iter().filter_map(|then| then.same(doubt)).flat_map(|then| &then.seen);
         let shares = then.filter(|then| then.on == seen.on).filter_map(|then| then.share);
         shares.filter(|was| percent(*was) > percent(seen.share.unwrap_or(1.0))).max_by(f64::total_cmp)
     };
     let one = |seen: &Seen| {
         let was = was(seen).map_or(String::new(), |was| {
-            format!(" ({:.0} % before something was touched there, which counts as not seen)", percent(was))
+            format!(" (once {:.0} %: what was touched there since, or turned out to lie otherwise, counts as not seen)", percent(was))
         });
         let from = match seen.places {
             0 => "of which no look holds any more".to_string(),

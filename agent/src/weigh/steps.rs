@@ -1,6 +1,7 @@
 //! Steps with other objects in them, and steps that could be one.
 
-use descry_planner::Step;
+use descry_planner::task::{Change, Term};
+use descry_planner::{Semantics, Step};
 
 /// Objects, each with the one in its place.
 pub struct Instead(pub Vec<(String, String)>);
@@ -44,8 +45,29 @@ pub fn joined(steps: &[Step]) -> Option<Vec<Step>> {
             _ => all.push(step.clone()),
         }
     }
-    all.retain(|step| !matches!(step.arguments.as_slice(), [from, to] if from == to));
+    all.retain(leads);
     (all.len() < steps.len()).then_some(all)
+}
+
+/// Whether a step leads from an object to another one, if it leads at all.
+pub fn leads(step: &Step) -> bool {
+    !matches!(step.arguments.as_slice(), [from, to] if from == to)
+}
+
+/// The objects about which a step makes facts true.
+pub fn brought(semantics: &Semantics<'_>, step: &Step) -> Vec<String> {
+    let Ok((action, _)) = semantics.bind(step) else { return Vec::new() };
+    let effects = &semantics.task.action(action).effects;
+    let added = effects.start.iter().chain(&effects.end).filter_map(|effect| match &effect.change {
+        Change::Add(atom) => Some(&atom.arguments),
+        _ => None,
+    });
+    let object = |term: &Term| match term {
+        Term::Variable(slot) => step.arguments.get(slot.index()).cloned(),
+        Term::Object(object) => Some(semantics.task.object(*object).name.clone()),
+        Term::Function(_) => None,
+    };
+    added.flatten().filter_map(object).collect()
 }
 
 /// The words of a text in PDDL.

@@ -1,9 +1,10 @@
 //! Segmentation, merging and recognition against what is known, and how long single views take, as tables:
-//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
+//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
 mod frames;
 mod further;
 mod kitchen;
+mod mismatched;
 mod mosd;
 mod surfaces;
 mod table;
@@ -25,6 +26,13 @@ fn main() -> ExitCode {
             Ok(count) => table::run(count, out.first().map(Path::new)),
             Err(_) => Err(format!("`{count}` is no number of arrangements")),
         },
+        ["mismatched", count, seed, further @ ..] => match (count.parse(), seed.parse()) {
+            (Ok(count), Ok(seed)) => {
+                let only = further.first().copied().unwrap_or_default();
+                mismatched::run(count, seed, only, further.get(1).map(Path::new))
+            }
+            _ => Err(format!("`{count}` and `{seed}` are no number of arrangements and first seed")),
+        },
         ["times", repetitions, views @ ..] => match repetitions.parse() {
             Ok(repetitions) => times::run(repetitions, views),
             Err(_) => Err(format!("`{repetitions}` is no number of repetitions")),
@@ -35,7 +43,7 @@ fn main() -> ExitCode {
         },
         ["variants", dirs @ ..] => variants::run(dirs),
         _ => Err(
-            "usage: evaluate mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
+            "usage: evaluate mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
                 .to_owned(),
         ),
     };

@@ -57,25 +57,13 @@ pub fn arrangement(draws: &mut Draws) -> Vec<Known> {
                 4 => (Thing::Block { x, y, half: [0.035, 0.035], height: 0.1, turn_rad: turn }, None),
                 _ => (Thing::Tin { x, y, radius: 0.036, height: 0.11 }, None),
             };
-            if placed.iter().all(|(other, _)| gap(&thing, other) > 0.02) {
+            if placed.iter().all(|(other, _)| thing.gap_m(other) > 0.02) {
                 placed.push((thing, name));
                 break;
             }
         }
     }
     placed
-}
-
-fn gap(a: &Thing, b: &Thing) -> f64 {
-    let round = |t: &Thing| match *t {
-        Thing::Cup { x, y, radius, handle_rad, .. } => {
-            (x, y, radius + if handle_rad.is_some() { 0.03 } else { 0.0 })
-        }
-        Thing::Tin { x, y, radius, .. } | Thing::Sherd { x, y, radius, .. } => (x, y, radius),
-        Thing::Block { x, y, half, .. } => (x, y, half[0].hypot(half[1])),
-    };
-    let ((ax, ay, ar), (bx, by, br)) = (round(a), round(b));
-    (ax - bx).hypot(ay - by) - ar - br
 }
 
 #[derive(Clone, Default)]
@@ -181,16 +169,10 @@ pub fn judge(merged: &Merged, recogniser: &dyn Recogniser) -> Result<Vec<Percept
 }
 
 fn score(things: &[Known], percepts: &[Percept], tally: &mut Tally, seed: Option<u64>) {
-    let place = |t: &Thing| match *t {
-        Thing::Cup { x, y, .. }
-        | Thing::Tin { x, y, .. }
-        | Thing::Sherd { x, y, .. }
-        | Thing::Block { x, y, .. } => (x, y),
-    };
     tally.cups += things.iter().filter(|t| t.1.is_some()).count();
     let mut found = vec![false; things.len()];
     for p in percepts {
-        let off = |t: &Thing| (place(t).0 - p.position_m.x).hypot(place(t).1 - p.position_m.y);
+        let off = |t: &Thing| (t.place().0 - p.position_m.x).hypot(t.place().1 - p.position_m.y);
         let near = (0..things.len()).min_by(|&a, &b| off(&things[a].0).total_cmp(&off(&things[b].0)));
         // Localisation of a single view errs by several centimetres.
         let owner = near.filter(|&i| off(&things[i].0) < 0.15);
@@ -264,7 +246,8 @@ fn report(recognisers: &[&dyn Recogniser], tallies: &[Vec<Vec<Tally>>]) {
     }
 }
 
-fn picture(path: &Path, cloud: &descry_perception::Cloud, percepts: &[Percept]) -> Result<(), String> {
+/// A picture of a cloud, colours by percept.
+pub fn picture(path: &Path, cloud: &descry_perception::Cloud, percepts: &[Percept]) -> Result<(), String> {
     let mut labels = vec![0_u32; cloud.len()];
     for (number, p) in percepts.iter().enumerate() {
         let label = 1 + number as u32;

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 pub struct Descry {
     /// Probability before looking that an object on a table is one of the models.
     pub known: f64,
-    /// How many things made like a known object but for one feature (a handle, a lid, flat sides) there are for each of it:
+    /// How many things made like a known object but for one feature (a handle, a lid, flat sides, a taper) there are for each of it:
     /// what has not been seen of that feature stays in doubt.
     pub look_alikes: f64,
     /// Probability that a known object stands upside down.
@@ -167,6 +167,9 @@ impl Descry {
         }
         if model.shape == Shape::Round {
             logs.push(family(0.2, Shape::Box, Top::Closed, Handle::None));
+            logs.push(
+                family(0.3, Shape::Round, model.top, model.handle) + other_taper_log(model.taper, ALIKE, m),
+            );
         }
         log_sum(&logs)
     }
@@ -198,15 +201,13 @@ fn covers(model: &ObjectModel, family: &Family, m: &Measured) -> f64 {
     let Some(width) = model.diameter_m.filter(|_| same_make && m.round.is_some() && !m.top_hidden) else {
         return 0.0;
     };
-    let inside = |value: f64, sigma: f64, r: Range| {
-        if r.high > r.low {
-            normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma)
-        } else {
-            0.0
-        }
-    };
     inside(m.height_m, m.height_sigma_m, model.height_m)
         * inside(2.0 * m.evidence.radius_m, diameter_sigma_m(m), width)
+}
+
+/// The chance that what was measured lies within a range; none for a single value.
+fn inside(value: f64, sigma: f64, r: Range) -> f64 {
+    normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -255,15 +256,17 @@ pub(super) fn kinds(models: &[ObjectModel], probabilities: &[(String, f64)]) -> 
     kinds
 }
 
-/// How often a measurement goes wrong altogether: flat tails.
-const ASTRAY: f64 = 0.002;
+/// Weight of flat tails: as tempered, a measurement goes wrong altogether about three times in a thousand.
+const ASTRAY: f64 = 0.0002;
 
 /// Density of a measure under a range: a uniform, blurred by the measurement.
 fn within_density(value: f64, sigma: f64, r: Range) -> f64 {
     let width = (r.high - r.low).max(1e-6);
-    // Difference of two normal distribution functions over the width.
-    let inside = normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma);
-    if width > 0.2 * sigma { inside / width } else { normal_density(value - r.middle(), sigma) }
+    if width > 0.2 * sigma {
+        inside(value, sigma, r) / width
+    } else {
+        normal_density(value - r.middle(), sigma)
+    }
 }
 
 /// Log density of a measure under a range (uniform, blurred by the measurement) or, without one, under everyday sizes (log-normal).
@@ -316,9 +319,22 @@ fn diameter_sigma_m(m: &Measured) -> f64 {
 }
 
 fn taper_log(range: Option<Range>, m: &Measured) -> f64 {
-    let Some(round) = m.round else { return measure_log(1.0, 0.2, range, (0.95, 0.25)) };
-    let sigma = (m.height_m * round.slope_sigma / round.radius_m.max(0.005)).hypot(0.05);
-    measure_log(m.evidence.taper, sigma, range, (0.95, 0.25))
+    let (taper, sigma) = taper(m);
+    measure_log(taper, sigma, range, (0.95, 0.25))
+}
+
+/// Log of the chance that the taper lies outside a range by more than a margin: a thing that is alike but for its side.
+fn other_taper_log(range: Range, margin: f64, m: &Measured) -> f64 {
+    let (taper, sigma) = taper(m);
+    (1.0 - inside(taper, sigma, Range { low: range.low - margin, high: range.high + margin }))
+        .max(STRANGER)
+        .ln()
+}
+
+/// The taper and its standard deviation.
+fn taper(m: &Measured) -> (f64, f64) {
+    let Some(round) = m.round else { return (1.0, 0.2) };
+    (m.evidence.taper, (m.height_m * round.slope_sigma / round.radius_m.max(0.005)).hypot(0.05))
 }
 
 /// A footprint is measured only as far as it was seen: a side may be longer than it looks.

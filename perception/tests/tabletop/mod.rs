@@ -2,14 +2,14 @@
 
 #![allow(dead_code)]
 
+pub mod device;
+
+use descry_perception::View;
 use descry_perception::nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use descry_perception::{Intrinsics, View};
+use device::KINECT;
 
 /// Height of the table's top, metres.
 pub const TABLE_M: f64 = 0.72;
-/// The camera of paper 004.
-pub const CAMERA: Intrinsics =
-    Intrinsics { width: 640, height: 480, fx: 589.0, fy: 609.0, cx: 319.5, cy: 239.5 };
 
 /// Something on the table. Places are of the middle of the base, metres on the table.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +22,49 @@ pub enum Thing {
     Sherd { x: f64, y: f64, radius: f64, height: f64, towards_rad: f64, half_rad: f64 },
     /// Half sides along its own axes, turned.
     Block { x: f64, y: f64, half: [f64; 2], height: f64, turn_rad: f64 },
+    /// Turned on a wheel: height and radius from its foot up, times a scale; open ones have a wall of 3 mm. With a handle towards an
+    /// angle, and a spout across from it.
+    Turned {
+        x: f64,
+        y: f64,
+        knots: &'static [[f64; 2]],
+        scale: f64,
+        open: bool,
+        handle_rad: Option<f64>,
+        spout: bool,
+    },
+}
+
+impl Thing {
+    /// The middle of its base, metres on the table.
+    pub fn place(&self) -> (f64, f64) {
+        match *self {
+            Thing::Cup { x, y, .. }
+            | Thing::Tin { x, y, .. }
+            | Thing::Sherd { x, y, .. }
+            | Thing::Block { x, y, .. }
+            | Thing::Turned { x, y, .. } => (x, y),
+        }
+    }
+
+    /// How far it reaches from there, metres.
+    pub fn reach_m(&self) -> f64 {
+        let grip = |handle_rad: Option<f64>| if handle_rad.is_some() { 0.03 } else { 0.0 };
+        match *self {
+            Thing::Cup { radius, handle_rad, .. } => radius + grip(handle_rad),
+            Thing::Tin { radius, .. } | Thing::Sherd { radius, .. } => radius,
+            Thing::Block { half, .. } => half[0].hypot(half[1]),
+            Thing::Turned { knots, scale, handle_rad, .. } => {
+                scale * knots.iter().map(|k| k[1]).fold(0.0, f64::max) + grip(handle_rad)
+            }
+        }
+    }
+
+    /// Free space between two things, metres; less than nothing where they may overlap.
+    pub fn gap_m(&self, other: &Thing) -> f64 {
+        let ((ax, ay), (bx, by)) = (self.place(), other.place());
+        (ax - bx).hypot(ay - by) - self.reach_m() - other.reach_m()
+    }
 }
 
 /// Repeatable draws.
@@ -63,31 +106,9 @@ pub fn disturbed(pose: &Isometry3<f64>, sigma_m: f64, sigma_rad: f64, draws: &mu
     )
 }
 
-/// What the camera sees from its true pose, with the noise of Nguyen et al., told with the stated pose.
+/// What the camera of paper 004 sees from its true pose, with the noise of Nguyen et al., told with the stated pose.
 pub fn look(things: &[Thing], truth: &Isometry3<f64>, stated: &Isometry3<f64>, draws: &mut Draws) -> View {
-    let eye = Point3::from(truth.translation.vector);
-    let mut depths = vec![f32::NAN; CAMERA.width * CAMERA.height];
-    for (i, depth) in depths.iter_mut().enumerate() {
-        let (u, v) = ((i % CAMERA.width) as f64, (i / CAMERA.width) as f64);
-        // The ray wanders by less than a pixel: noise across it, and frayed edges.
-        let (du, dv) = (0.4 * draws.normal(), 0.4 * draws.normal());
-        let ray = truth.rotation * CAMERA.unproject(u + du, v + dv, 1.0).coords;
-        if let Some(z) = nearest(things, &eye, &ray) {
-            let sigma = 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4);
-            let noisy = z + sigma * draws.normal();
-            // Disparity in eighths of a pixel, base 7.5 cm.
-            let disparity = (8.0 * CAMERA.fx * 0.075 / noisy).round() / 8.0;
-            *depth = (CAMERA.fx * 0.075 / disparity) as f32;
-        }
-    }
-    View {
-        stamp_ns: 0,
-        cloud: CAMERA.cloud_from_depth(&depths).expect("the camera is sound"),
-        intrinsics: Some(CAMERA),
-        world_from_camera: *stated,
-        pose_sigma_m: 0.03,
-        pose_sigma_rad: 0.035,
-    }
+    KINECT.look(things, truth, stated, draws)
 }
 
 /// Ray parameter of the nearest surface (the ray has depth 1 along the optical axis).
@@ -105,7 +126,13 @@ fn nearest(things: &[Thing], eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f6
             offer(t);
         }
     }
-    for thing in things {
+    // What a ray passes by, seen from above, it does not meet.
+    let across = (ray.x * ray.x + ray.y * ray.y).sqrt();
+    let passes_by = |thing: &&Thing| {
+        let (x, y) = thing.place();
+        ((x - eye.x) * ray.y - (y - eye.y) * ray.x).abs() > across * (thing.reach_m() + 0.001)
+    };
+    for thing in things.iter().filter(|thing| !passes_by(thing)) {
         match *thing {
             Thing::Cup { x, y, radius, height, handle_rad } => {
                 tube(eye, ray, x, y, radius, height).for_each(&mut offer);
@@ -132,6 +159,25 @@ fn nearest(things: &[Thing], eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f6
                 let high = Point3::new(half[0], half[1], TABLE_M + height);
                 cuboid(eye, ray, x, y, turn_rad, &low, &high).for_each(&mut offer);
             }
+            Thing::Turned { x, y, knots, scale, open, handle_rad, spout } => {
+                let here = Point3::new(eye.x - x, eye.y - y, eye.z - TABLE_M);
+                turned(&here, ray, knots, scale, 0.0).for_each(&mut offer);
+                let [foot, rim] = [0, knots.len() - 1].map(|k| knots[k].map(|m| m * scale));
+                if open {
+                    turned(&here, ray, knots, scale, 0.003).for_each(&mut offer);
+                    disc(eye, ray, x, y, foot[1], TABLE_M + 0.004).for_each(&mut offer);
+                } else {
+                    disc(eye, ray, x, y, rim[1], TABLE_M + rim[0]).for_each(&mut offer);
+                }
+                if let Some(angle) = handle_rad {
+                    handle(eye, ray, x, y, foot[1], rim[0], angle).for_each(&mut offer);
+                    if spout {
+                        let low = Point3::new(-rim[1] - 0.025, -0.012, TABLE_M + 0.85 * rim[0]);
+                        let high = Point3::new(-rim[1], 0.012, TABLE_M + rim[0]);
+                        cuboid(eye, ray, x, y, angle, &low, &high).for_each(&mut offer);
+                    }
+                }
+            }
         }
     }
     best.is_finite().then_some(best)
@@ -154,6 +200,30 @@ fn tube(
     times.into_iter().flatten().filter(move |t| {
         let z = eye_z + ray_z * t;
         (TABLE_M..TABLE_M + height).contains(&z)
+    })
+}
+
+/// The side of a turned body about the origin, a wall within: frusta between its knots.
+fn turned<'a>(
+    eye: &'a Point3<f64>,
+    ray: &'a Vector3<f64>,
+    knots: &'static [[f64; 2]],
+    scale: f64,
+    wall: f64,
+) -> impl Iterator<Item = f64> + 'a {
+    knots.windows(2).flat_map(move |pair| {
+        let [[low, at_low], [high, at_high]] =
+            [0, 1].map(|k| [pair[k][0] * scale, pair[k][1] * scale - wall]);
+        let slope = (at_high - at_low) / (high - low);
+        let (radius, widens) = (at_low + slope * (eye.z - low), slope * ray.z);
+        let a = ray.x * ray.x + ray.y * ray.y - widens * widens;
+        let b = eye.x * ray.x + eye.y * ray.y - radius * widens;
+        let root = b * b - a * (eye.x * eye.x + eye.y * eye.y - radius * radius);
+        let times = (root > 0.0).then(|| [(-b - root.sqrt()) / a, (-b + root.sqrt()) / a]);
+        times
+            .into_iter()
+            .flatten()
+            .filter(move |t| (low..high).contains(&(eye.z + ray.z * t)) && radius + widens * t > 0.0)
     })
 }
 

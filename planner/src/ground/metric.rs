@@ -14,6 +14,12 @@ pub(super) struct Costs {
     pub read: Vec<u32>,
 }
 
+/// The weights of numeric fluents, of which there are so many, and of the time in an expression that is linear in them.
+pub(crate) fn weights(expression: &Expression, count: usize) -> Option<(Vec<f64>, f64)> {
+    let (mut weights, mut time) = (vec![0.0; count], 0.0);
+    linear(expression, 1.0, &mut weights, &mut time).then_some((weights, time))
+}
+
 /// Splits a linear expression into weights; `false` if it is not linear.
 fn linear(expression: &Expression, factor: f64, weights: &mut [f64], time: &mut f64) -> bool {
     match expression {

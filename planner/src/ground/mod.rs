@@ -21,6 +21,7 @@ mod task;
 mod variables;
 
 pub use build::{GroundError, ground};
+pub(crate) use metric::weights;
 pub use obstacles::{MissingAtom, Obstacle};
 pub(crate) use pairs::exclusive;
 pub(crate) use pddl3::compile;

@@ -100,6 +100,31 @@ pub(crate) fn action<'t>(own: &'t Action, visit: &mut dyn FnMut(Part<'t>)) {
     own.preferences.iter().for_each(|(_, preferred)| timed(preferred, visit));
 }
 
+/// The calls among the parts that a walk visits.
+fn calls<'t>(walk: impl FnOnce(&mut dyn FnMut(Part<'t>))) -> Vec<&'t Call> {
+    let mut calls = Vec::new();
+    walk(&mut |part| {
+        if let Part::Call(call) = part {
+            calls.push(call);
+        }
+    });
+    calls
+}
+
+impl Action {
+    /// All that it asks of modules: for its parameters, duration, conditions, effects, rates and preferences.
+    pub fn calls(&self) -> Vec<&Call> {
+        calls(|visit| action(self, visit))
+    }
+}
+
+impl Expression {
+    /// All that it asks of modules.
+    pub fn calls(&self) -> Vec<&Call> {
+        calls(|visit| expression(self, visit))
+    }
+}
+
 /// Visits all that a task says of its goal, and of the way there.
 pub(crate) fn aims<'t>(task: &'t Task, visit: &mut dyn FnMut(Part<'t>)) {
     condition(&task.goal.body, visit);

@@ -319,15 +319,16 @@ impl Relaxed {
         Ok(seconds.or(Some(0.0)))
     }
 
-    /// What an operator adds to an additive metric, in seconds of a makespan that count as much.
+    /// What an operator adds to the measure of plans beside time, in seconds that count as much.
     fn counted_s(&self, world: &World, state: &Values, index: u32) -> Result<f64, Failure> {
         let operator = &self.operators[index as usize];
-        if self.seconds_a_cost == 0.0 || !matches!(operator.part, Part::Whole | Part::End) {
-            return Ok(0.0);
+        match self.counted.get(operator.act as usize) {
+            Some(Some(counted)) if matches!(operator.part, Part::Whole | Part::End) => {
+                let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Relaxed };
+                Ok(world.evaluate(counted, &moment)?.max(0.0))
+            }
+            _ => Ok(0.0),
         }
-        let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Relaxed };
-        let cost = world.evaluate(world.acts[operator.act as usize].cost, &moment)?;
-        Ok((self.seconds_a_cost * cost).max(0.0))
     }
 
     /// How often the operator must be repeated from the state to make a test true, from what it does alone; `None` if it

@@ -138,8 +138,8 @@ pub(crate) struct Relaxed {
     pub(super) goal_gates: Vec<(CallId, bool)>,
     /// Mean duration: what being a step at all counts.
     pub(super) unit: f64,
-    /// Seconds that count as much as one of what actions add to the metric; nothing where it does not count both.
-    pub(super) seconds_a_cost: f64,
+    /// By action, what it adds to the measure beside time, in seconds that count as much.
+    pub(super) counted: Vec<Option<Expression>>,
     /// Operators that need nothing.
     pub(super) free: Vec<u32>,
     pub(super) work: Work,
@@ -153,7 +153,7 @@ impl Relaxed {
     /// The relaxed task of a space.
     pub fn new(space: &Space) -> Relaxed {
         let (world, open_act) = (space.world, &space.open_act);
-        let mut relaxed = Relaxed { seconds_a_cost: space.measure.seconds_a_cost(), ..Relaxed::empty(world) };
+        let mut relaxed = Relaxed { counted: space.measure.counted(world), ..Relaxed::empty(world) };
         let apart = (0..world.acts.len() as u32).filter(|&act| open_act[act as usize]);
         let base = relaxed.token_base;
         relaxed.tokens =
@@ -242,7 +242,7 @@ impl Relaxed {
             goal: Vec::new(),
             goal_gates: Vec::new(),
             unit: 1.0,
-            seconds_a_cost: 0.0,
+            counted: Vec::new(),
             free: Vec::new(),
             work: Work::default(),
             touched: Touched::default(),

@@ -7,13 +7,13 @@ use rustc_hash::FxHasher;
 
 use crate::attachment::Level;
 use crate::calls::Failure;
-use crate::ground::{Expression, Values};
+use crate::ground::{Change, Expression, Outcome, Values, weights};
 use crate::validate::SEPARATION_S;
 
 use super::advance::{Accesses, Situation, Step};
 use super::order::{Clock, Inconsistent, Order};
 use super::relaxed::Part;
-use super::world::{Moment, Span, World};
+use super::world::{Act, Moment, Span, World};
 
 /// What plans are measured by.
 #[derive(Debug, Clone)]
@@ -42,12 +42,40 @@ impl Measure {
         *time_weight >= 0.0 && world.acts.iter().all(|act| grows(act.cost))
     }
 
-    /// Seconds that count as much as one of what actions add; nothing where not both count.
-    pub fn seconds_a_cost(&self) -> f64 {
-        match self {
-            Measure::Additive { sign, time_weight } if *time_weight > 0.0 => sign / time_weight,
-            _ => 0.0,
-        }
+    /// By action: what it adds to the measure beside time, in seconds that count as much. Nothing where not both count, or where
+    /// the measure is not linear in them.
+    pub fn counted(&self, world: &World) -> Vec<Option<Expression>> {
+        let times = |factor: f64, of: &Expression| {
+            Expression::Product(vec![Expression::Constant(factor), of.clone()])
+        };
+        let (weights, time) = match self {
+            Measure::Additive { sign, time_weight } if *time_weight > 0.0 => {
+                return world.acts.iter().map(|act| Some(times(sign / time_weight, act.cost))).collect();
+            }
+            Measure::Expression(expression) => {
+                let linear = weights(expression, world.ground.numerics.len());
+                linear.filter(|(_, time)| *time > 0.0).unwrap_or_default()
+            }
+            _ => Default::default(),
+        };
+        let counted = |act: &Act| {
+            let changes =
+                act.start_effects.iter().chain(act.end_effects).filter(|effect| effect.when.is_none());
+            let terms = changes.filter_map(|effect| match &effect.outcome {
+                Outcome::Change { fluent, change, amount } => {
+                    let weight = weights.get(*fluent as usize).filter(|weight| **weight != 0.0)?;
+                    match change {
+                        Change::Increase => Some(times(weight / time, amount)),
+                        Change::Decrease => Some(times(-weight / time, amount)),
+                        _ => None,
+                    }
+                }
+                _ => None,
+            });
+            let terms: Vec<Expression> = terms.collect();
+            (!terms.is_empty()).then_some(Expression::Sum(terms))
+        };
+        world.acts.iter().map(counted).collect()
     }
 }
 

@@ -143,7 +143,8 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     let (merged, surface, others) = match seen {
         Ok(seen) => seen,
         Err(because) => {
-            mind.regions[on].nothing = Some(because.clone());
+            // What to set otherwise is for who programs it.
+            mind.regions[on].nothing = because.split(": ").next().map(str::to_string);
             notes.push(Note::Nothing { because });
             return Ok(());
         }

@@ -19,6 +19,8 @@ pub use pairs::{Pair, pairs};
 pub struct Prepared {
     pub(crate) points: Vec<Point3<f32>>,
     pub(crate) normals: Option<Vec<Vector3<f32>>>,
+    /// Normals by slot of the tree; empty if there are none.
+    by_slot: Vec<[f64; 3]>,
     pub(crate) tree: Neighbours,
 }
 
@@ -30,7 +32,7 @@ impl Prepared {
     pub fn new(points: &[Point3<f32>]) -> Result<Prepared, CloudError> {
         let points: Vec<Point3<f32>> = points.iter().copied().filter(crate::cloud::is_finite).collect();
         let tree = Neighbours::new(&points)?;
-        Ok(Prepared { points, normals: None, tree })
+        Ok(Prepared { points, normals: None, by_slot: Vec::new(), tree })
     }
 
     /// Makes points ready for every method, with normals by the `k` nearest points.
@@ -39,7 +41,10 @@ impl Prepared {
     /// As [`Prepared::new`].
     pub fn with_normals(points: &[Point3<f32>], k: usize) -> Result<Prepared, CloudError> {
         let mut prepared = Prepared::new(points)?;
-        prepared.normals = Some(normals::estimate(&prepared.tree, k, &Point3::origin()).normals);
+        let normals = normals::estimate(&prepared.tree, k, &Point3::origin()).normals;
+        let by_slot = prepared.tree.indices().iter().map(|&i| normals[i as usize].cast::<f64>().into());
+        prepared.by_slot = by_slot.collect();
+        prepared.normals = Some(normals);
         Ok(prepared)
     }
 

@@ -1,7 +1,7 @@
 //! What evidence is worth: logistic regression on scenes of other objects than those that are evaluated.
 
 use crate::household::{Body, Room, made::made};
-use crate::knowing::{Model, is_right, learned_steps, library, offline, scene, some};
+use crate::knowing::{Model, is_right, learned_steps, library, offline, scene_among, some};
 use crate::page::{Page, Table};
 use crate::plot::{BLUE, Line, ORANGE, Panel, panels};
 use crate::runs::RunOptions;
@@ -17,6 +17,11 @@ const RIDGE: f64 = 0.02;
 /// Objects that are learned, and as many that nobody knows.
 const KNOWN: usize = 16;
 
+/// Looks of models: what little is known of is taken for something else most easily.
+const LOOKS: [usize; 4] = [1, usize::MAX, 2, usize::MAX];
+/// Leaflets in a scene: what is flat and printed fits what is known of one side alone.
+const LEAFLETS: usize = 4;
+
 /// Models as the robot and as a turntable makes them, one after the other.
 fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
     let mut models = Vec::new();
@@ -29,9 +34,10 @@ fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
             step_rad: 15_f64.to_radians(),
             seed: own,
         };
+        let looks = LOOKS[i / 2 % LOOKS.len()];
         let made = match i % 2 {
-            0 => offline(body, i, usize::MAX, own),
-            _ => learned_steps(std::slice::from_ref(body), 0, options, &[usize::MAX])
+            0 => offline(body, i, looks, own),
+            _ => learned_steps(std::slice::from_ref(body), 0, options, &[looks])
                 .and_then(|mut m| m.pop().ok_or_else(String::new)),
         };
         models.extend(made.into_iter().map(|model| Model { body: i, ..model }));
@@ -42,7 +48,7 @@ fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
 /// A claim as a line of a file.
 pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
     format!(
-        "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{}",
+        "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{:.4},{}",
         u8::from(right),
         e.facing,
         e.explained,
@@ -51,6 +57,7 @@ pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
         e.colour.unwrap_or(-1.0),
         e.off_sigmas,
         e.beyond,
+        e.bent,
         e.votes
     )
 }
@@ -64,14 +71,17 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
     let mut claims: Vec<(Evidence, bool)> = Vec::new();
     let mut lines = Vec::new();
     let path = page.file("claims.csv");
+    // What is hopeless has to be known as such.
+    let options = KnowOptions { hopeless: 0.0, ..KnowOptions::default() };
     let mut draws = Draws(seed);
     for k in 0..scenes {
-        let mut scene = scene(&bodies, &some(&mut draws, bodies.len(), 5), seed * 9000 + k as u64);
+        let things = some(&mut draws, bodies.len(), 5);
+        let mut scene = scene_among(&bodies, &things, LEAFLETS * (k % 2), seed * 9000 + k as u64);
         if k % 4 == 3 {
             // What is known without colours has to be judged as well.
             scene.view.cloud.colours = None;
         }
-        for found in library.judged(&scene.view, &KnowOptions::default()).map_err(|e| e.to_string())? {
+        for found in library.judged(&scene.view, &options).map_err(|e| e.to_string())? {
             let found = found.recognised;
             let right = is_right(&scene, &surfaces, models[found.model].body, &found);
             claims.push((found.evidence, right));

@@ -20,6 +20,11 @@ pub struct Scene {
 /// A scene of some of the bodies: those asked for, if there is room. Behind the table stands furniture, on it a box that nobody learned; every fourth
 /// is a desk with chairs.
 pub fn scene(bodies: &[Body], which: &[usize], seed: u64) -> Scene {
+    scene_among(bodies, which, 0, seed)
+}
+
+/// The same among so many leaflets that stand or hang behind the things.
+pub fn scene_among(bodies: &[Body], which: &[usize], leaflets: usize, seed: u64) -> Scene {
     let mut draws = Draws(seed ^ 0x5ce);
     let mut room = Room::new(RoomOptions { controlled: seed % 4 != 3, seed });
     let mut things: Vec<(usize, Isometry3<f64>, f64)> = Vec::new();
@@ -39,7 +44,7 @@ pub fn scene(bodies: &[Body], which: &[usize], seed: u64) -> Scene {
         }
     }
     let (turn, far) = (TAU * draws.next(), 0.95 + 0.4 * draws.next());
-    furnish(&mut room, turn + 0.5 * TAU, &mut draws);
+    furnish(&mut room, turn + 0.5 * TAU, leaflets, &mut draws);
     let eye = Point3::new(far * turn.cos(), far * turn.sin(), TABLE_M + 0.55 + 0.35 * draws.next());
     let pose = looking(eye, Point3::new(0.0, 0.0, TABLE_M + 0.05));
     let mut view = room.look(&CAMERA, &pose, &pose, (0.0, 0.0), seed ^ 0x77);
@@ -47,8 +52,8 @@ pub fn scene(bodies: &[Body], which: &[usize], seed: u64) -> Scene {
     Scene { view, things: things.into_iter().map(|(i, p, _)| (i, p)).collect() }
 }
 
-/// Puts two pieces of furniture on the floor in a direction from the table's middle, and a box on the table's border.
-fn furnish(room: &mut Room, towards: f64, draws: &mut Draws) {
+/// Puts two pieces of furniture on the floor in a direction from the table's middle, and a box and leaflets from the table's border on.
+fn furnish(room: &mut Room, towards: f64, leaflets: usize, draws: &mut Draws) {
     let mut put = |low, high, far_m: f64, up_m: f64, wide: f64| {
         let body = furniture(low, high, (draws.next() * 1e12) as u64);
         let at = towards + wide * (2.0 * draws.next() - 1.0);
@@ -58,6 +63,9 @@ fn furnish(room: &mut Room, towards: f64, draws: &mut Draws) {
     put([0.15, 0.2, 0.35], [0.3, 0.5, 0.65], 0.95, 0.0, 0.4);
     put([0.15, 0.2, 0.35], [0.3, 0.5, 0.65], 1.25, 0.0, 1.0);
     put([0.02, 0.1, 0.08], [0.06, 0.18, 0.2], 0.44, TABLE_M, 0.9);
+    for k in 0..leaflets {
+        put([0.0005, 0.06, 0.08], [0.002, 0.15, 0.16], 0.42 + 0.1 * k as f64, TABLE_M + 0.08 * k as f64, 1.0);
+    }
 }
 
 /// Light is another than when things were learned, and the camera of colours does not see quite what that of depth sees.

@@ -1,8 +1,8 @@
 //! Pictures of models and plots of recognition against coverage.
 
-use descry_perception::Cloud;
-use descry_perception::nalgebra::{Point3, Vector3};
+use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::picture::{PictureOptions, png};
+use descry_perception::{Cloud, View};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -24,6 +24,27 @@ pub fn picture(
     };
     let bytes = png(cloud, labels, &options).map_err(|e| e.to_string())?;
     std::fs::write(path, bytes).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// A frame as its camera took it, with models where they were said to be: in green where that is right, in red where it is not.
+pub fn said(view: &View, answers: &[(&Cloud, Isometry3<f64>, bool)], path: &Path) -> Result<(), String> {
+    let (Some(grid), Some(camera)) = (view.cloud.grid, view.intrinsics) else { return Ok(()) };
+    let colours = view.cloud.colours.as_deref().unwrap_or_default();
+    let mut image = image::RgbImage::from_fn(grid.width as u32, grid.height as u32, |u, v| {
+        let i = v as usize * grid.width + u as usize;
+        let known = view.cloud.points[i].z.is_finite().then(|| colours.get(i)).flatten();
+        image::Rgb(known.copied().unwrap_or([18, 20, 26]))
+    });
+    for (model, world_from_model, right) in answers {
+        let camera_from_model = view.world_from_camera.inverse() * world_from_model;
+        let channel = usize::from(*right);
+        for p in model.points.iter().step_by(3) {
+            let q = camera_from_model * p.cast::<f64>();
+            let Some(i) = camera.project(&q).and_then(|(u, v)| camera.pixel(u, v)) else { continue };
+            image.get_pixel_mut((i % grid.width) as u32, (i / grid.width) as u32).0[channel] = 255;
+        }
+    }
+    image.save(path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
 /// Models beside each other in their own colours, seen from the front and from behind, as a PNG.

@@ -4,7 +4,7 @@
 use crate::frames::frames;
 use crate::judge::line;
 use crate::page::{Page, Table};
-use crate::plot::picture;
+use crate::plot::{picture, said};
 use descry_perception::files::read_cloud;
 use descry_perception::learning::{
     KnowOptions, LearnOptions, LearnedModel, Library, Recognised, choose, learn, outward, register,
@@ -240,6 +240,15 @@ fn found_again(
         }
         let there =
             known.iter().filter(|k| inside(k.0)).map(|k| k.0.name.as_str()).collect::<Vec<_>>().join(", ");
+        if !found.is_empty() {
+            let answers: Vec<_> = found
+                .iter()
+                .map(|f| (&known[f.model].1.cloud, f.world_from_model, off_m(f) < THERE_M))
+                .collect();
+            let name = format!("kitchen-frame-{}.png", 2 * k + begin);
+            said(view, &answers, &page.file(&name))?;
+            page.figure(&name, &format!("Frame {}: what was said, green where it is right", 2 * k + begin));
+        }
         let told = found.iter().map(|f| {
             format!("{} ({:.2}, {:.1} cm off)", known[f.model].0.name, f.confidence, 100.0 * off_m(f))
         });

@@ -14,8 +14,8 @@ use crate::cloud::{Cloud, CloudError};
 use crate::register::{Method, Prepared, RegisterError, RegisterOptions, align};
 use crate::view::View;
 use crate::voxel::VoxelError;
-use evidence::{Evidence, Judge, Verified, first_sight, verify};
-use feature::{Feature, Kind, features};
+use evidence::{Evidence, Judge, Verified, first_sight, unbounded, verify};
+use feature::{Features, Kind};
 use group::{Vote, matches, votes};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
@@ -34,13 +34,21 @@ pub struct KnowOptions {
     pub keypoint_m: f32,
     /// Less confidence is not told.
     pub least_confidence: f64,
+    /// What is less sure at best, by a few points of the model, is not looked at closer: far less than anything told, so that nothing is lost but time.
+    pub hopeless: f64,
     /// What evidence is worth.
     pub judge: Judge,
 }
 
 impl Default for KnowOptions {
     fn default() -> Self {
-        KnowOptions { range_m: 2.5, keypoint_m: 0.015, least_confidence: 0.8, judge: Judge::default() }
+        KnowOptions {
+            range_m: 2.5,
+            keypoint_m: 0.015,
+            least_confidence: 0.8,
+            hopeless: 0.005,
+            judge: Judge::default(),
+        }
     }
 }
 
@@ -92,7 +100,7 @@ struct Known {
     skin: Skin,
     /// Every so many of its points: for a first sight.
     coarse: Skin,
-    features: [Vec<Feature>; 2],
+    features: [Features; 2],
     /// Largest extent, metres.
     size_m: f64,
 }
@@ -130,12 +138,12 @@ impl Library {
         if skin.points.len() < LEAST_POINTS {
             return Err(KnowError::Model { points: skin.points.len() });
         }
-        let mut all = [Vec::new(), Vec::new()];
+        let mut all = KINDS.map(Features::none);
         for away in directions() {
             let part = skin.part(&skin.seen_from(&away))?;
             let keypoints = part.keypoints(options.keypoint_m, |_| true);
             for (features_of, kind) in all.iter_mut().zip(KINDS) {
-                features_of.extend(features(&part, &keypoints, kind));
+                features_of.add_new(&Features::of(&part, &keypoints, kind));
             }
         }
         let few: Vec<u32> = skin.keypoints(COARSE_M, |_| true);
@@ -163,7 +171,7 @@ impl Library {
         Ok(choose(self.judged(view, options)?, options.least_confidence))
     }
 
-    /// All that was judged by itself, whatever the confidence and whatever shares its place: for [`choose`], and for fitting a [`Judge`].
+    /// All that was judged by itself and was not hopeless, whatever shares its place: for [`choose`], and for fitting a [`Judge`].
     ///
     /// # Errors
     /// As [`Library::recognise`].
@@ -185,7 +193,7 @@ impl Library {
         options: &KnowOptions,
     ) -> Result<Vec<Candidate>, KnowError> {
         let keypoints = scene.skin.keypoints(options.keypoint_m, |i| !scene.wide[i]);
-        let described = KINDS.map(|kind| features(&scene.skin, &keypoints, kind));
+        let described = KINDS.map(|kind| Features::of(&scene.skin, &keypoints, kind));
         let of_model = |(number, model): (usize, &Known)| {
             model.find(number, &described, scene, world_from_camera, options)
         };
@@ -226,7 +234,7 @@ impl Known {
     fn find(
         &self,
         number: usize,
-        described: &[Vec<Feature>; 2],
+        described: &[Features; 2],
         scene: &Seen,
         world_from_camera: &Isometry3<f64>,
         options: &KnowOptions,
@@ -244,45 +252,63 @@ impl Known {
                 kept.push(vote);
             }
         }
-        let judged = |vote: Vote| {
-            let pose = self.refined(&vote.scene_from_model, scene)?;
+        let mut judged = Vec::new();
+        for vote in kept {
+            if self.at_most(&vote, scene, &options.judge)? < options.hopeless {
+                continue;
+            }
+            let pose = refined(&self.skin, &vote.scene_from_model, scene)?;
             let Verified { evidence, claims } = verify(&self.skin, &pose, scene, vote.matches);
             let confidence = options.judge.confidence(&evidence);
             let world_from_model = world_from_camera * pose;
             let recognised = Recognised { model: number, world_from_model, confidence, evidence };
-            Ok(Candidate { recognised, explained: claims })
-        };
-        kept.into_iter().map(judged).collect()
+            judged.push(Candidate { recognised, explained: claims });
+        }
+        Ok(judged)
     }
 
-    /// The pose after its visible side was brought onto the scene's surface, from far to near.
-    fn refined(&self, start: &Isometry3<f64>, scene: &Seen) -> Result<Isometry3<f64>, KnowError> {
-        let mut pose = *start;
-        for within_m in [0.025, 0.01] {
-            let eye = pose.inverse() * Point3::origin();
-            let seen = self.skin.seen_from(&eye.coords.cast().normalize());
-            let points: Vec<Point3<f32>> = seen.iter().map(|&i| self.skin.points[i as usize]).collect();
-            if points.len() < LEAST_POINTS / 2 {
-                return Ok(pose);
+    /// The confidence that a vote may come to by a few of the model's points, as it is or brought onto the scene; one if too few of them can be seen.
+    fn at_most(&self, vote: &Vote, scene: &Seen, judge: &Judge) -> Result<f64, KnowError> {
+        let by_points = self.skin.points.len() as f64 / self.coarse.points.len().max(1) as f64;
+        let mut most = 0.0_f64;
+        for pose in [vote.scene_from_model, refined(&self.coarse, &vote.scene_from_model, scene)?] {
+            let few = unbounded(&self.coarse, &pose, scene, vote.matches);
+            if few.facing < LEAST_POINTS / 2 {
+                return Ok(1.0);
             }
-            let options = RegisterOptions {
-                method: Method::PointToPlane,
-                start_target_from_source: pose,
-                within_m,
-                rounds: 15,
-                settle_m: 2e-4,
-                settle_rad: 1e-3,
-                robust_m: Some(0.004),
-                ..RegisterOptions::default()
-            };
-            let fit = align(&Prepared::new(&points)?, &scene.target, &options)?;
-            // What slips away along a plane or around an axis was held by features, not by the surface.
-            if fit.moved_m < 0.04 && fit.moved_rad < 0.5 {
-                pose = fit.target_from_source;
-            }
+            most = most.max(judge.confidence(&few.times(by_points)));
         }
-        Ok(pose)
+        Ok(most)
     }
+}
+
+/// The pose of a skin after its visible side was brought onto the scene's surface, from far to near.
+fn refined(skin: &Skin, start: &Isometry3<f64>, scene: &Seen) -> Result<Isometry3<f64>, KnowError> {
+    let mut pose = *start;
+    for within_m in [0.025, 0.01] {
+        let eye = pose.inverse() * Point3::origin();
+        let seen = skin.seen_from(&eye.coords.cast().normalize());
+        let points: Vec<Point3<f32>> = seen.iter().map(|&i| skin.points[i as usize]).collect();
+        if points.len() < LEAST_POINTS / 2 {
+            return Ok(pose);
+        }
+        let options = RegisterOptions {
+            method: Method::PointToPlane,
+            start_target_from_source: pose,
+            within_m,
+            rounds: 15,
+            settle_m: 2e-4,
+            settle_rad: 1e-3,
+            robust_m: Some(0.004),
+            ..RegisterOptions::default()
+        };
+        let fit = align(&Prepared::new(&points)?, &scene.target, &options)?;
+        // What slips away along a plane or around an axis was held by features, not by the surface.
+        if fit.moved_m < 0.04 && fit.moved_rad < 0.5 {
+            pose = fit.target_from_source;
+        }
+    }
+    Ok(pose)
 }
 
 fn same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {

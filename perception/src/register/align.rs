@@ -99,9 +99,7 @@ struct Run<'a> {
     options: &'a RegisterOptions,
     /// The source in the order of its tree, so that neighbours are searched for one after another.
     points: Vec<Point3<f32>>,
-    source_normals: Vec<[f64; 3]>,
-    /// Target normals by slot.
-    target_normals: Vec<[f64; 3]>,
+    source: &'a Prepared,
     /// Every so many points are looked at.
     stride: usize,
     /// One for each of those.
@@ -111,13 +109,7 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(source: &Prepared, target: &'a Prepared, options: &'a RegisterOptions) -> Run<'a> {
-        let by_slot = |cloud: &Prepared| -> Vec<[f64; 3]> {
-            let Some(normals) = &cloud.normals else { return Vec::new() };
-            cloud.tree.indices().iter().map(|&i| normals[i as usize].cast::<f64>().into()).collect()
-        };
-        let generalised = options.method == Method::Generalised;
-        let to_point = options.method == Method::PointToPoint;
+    fn new(source: &'a Prepared, target: &'a Prepared, options: &'a RegisterOptions) -> Run<'a> {
         let points: Vec<Point3<f32>> =
             source.tree.indices().iter().map(|&i| source.points[i as usize]).collect();
         Run {
@@ -126,8 +118,7 @@ impl<'a> Run<'a> {
             stride: 1,
             partners: vec![Partner::UNKNOWN; points.len()],
             points,
-            source_normals: if generalised { by_slot(source) } else { Vec::new() },
-            target_normals: if to_point { Vec::new() } else { by_slot(target) },
+            source,
             matched: 0,
             square: 0.0,
         }
@@ -206,10 +197,10 @@ impl<'a> Run<'a> {
                 Method::PointToPoint => {
                     sums.add_points(p, t, self.weight(f64::from(partner.distance_sq)));
                 }
-                Method::PointToPlane => self.to_plane(&mut sums, p, t, self.target_normals[slot]),
+                Method::PointToPlane => self.to_plane(&mut sums, p, t, self.target.by_slot[slot]),
                 Method::Generalised => {
-                    let turned = place.turn(self.source_normals[i]);
-                    self.generalised(&mut sums, p, t, turned, self.target_normals[slot]);
+                    let turned = place.turn(self.source.by_slot[i]);
+                    self.generalised(&mut sums, p, t, turned, self.target.by_slot[slot]);
                 }
             }
         }

@@ -5,12 +5,24 @@ use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
 /// A described place.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Feature {
     pub at: Point3<f32>,
     pub normal: Vector3<f32>,
-    /// Bytes, so that distances are quick.
-    pub descriptor: Box<[u8]>,
+}
+
+/// Bytes that are compared in one go, and sums of bytes.
+const BLOCK: usize = 32;
+const SUMS: usize = 16;
+
+/// Features of one kind with their descriptors one after the other, in bytes, so that distances are quick.
+#[derive(Clone, Debug)]
+pub(super) struct Features {
+    pub all: Vec<Feature>,
+    kind: Kind,
+    blocks: Vec<[u8; BLOCK]>,
+    /// Sums of groups of bytes: descriptors are at least as far apart as these.
+    sums: Vec<[u16; SUMS]>,
 }
 
 /// What is described.
@@ -22,22 +34,139 @@ pub(super) enum Kind {
     Pattern,
 }
 
-/// The features of one kind at some points of a skin; where there is nothing to describe there is none.
-pub(super) fn features(skin: &Skin, keypoints: &[u32], kind: Kind) -> Vec<Feature> {
-    let describe = |&i: &u32| {
-        let descriptor = match kind {
-            Kind::Shape => shape(skin, i as usize),
-            Kind::Pattern => pattern(skin, i as usize),
-        }?;
-        Some(Feature { at: skin.points[i as usize], normal: skin.normals[i as usize], descriptor })
-    };
-    keypoints.par_iter().filter_map(describe).collect()
+impl Kind {
+    /// Bytes of a descriptor, and sums of it.
+    const fn lengths(self) -> (usize, usize) {
+        match self {
+            Kind::Shape => (SECTORS[0] * SECTORS[1] * SECTORS[2] * SECTORS[3], 32),
+            Kind::Pattern => (3 * CELLS * CELLS, 48),
+        }
+    }
+
+    /// The sum that a byte goes into: shapes' by sector, whatever the angle between normals, patterns' by squares of four cells.
+    const fn sum_of(self, byte: usize) -> usize {
+        match self {
+            Kind::Shape => byte / SECTORS[3],
+            Kind::Pattern => {
+                let (channel, row, column) = (byte / (CELLS * CELLS), byte / CELLS % CELLS, byte % CELLS);
+                (channel * CELLS / 2 + row / 2) * (CELLS / 2) + column / 2
+            }
+        }
+    }
 }
 
-/// Sum of absolute differences.
-pub(super) fn distance(a: &[u8], b: &[u8]) -> u32 {
-    a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b))).sum()
+impl Features {
+    /// No features of a kind.
+    pub fn none(kind: Kind) -> Features {
+        Features { all: Vec::new(), kind, blocks: Vec::new(), sums: Vec::new() }
+    }
+
+    /// The features at some points of a skin; where there is nothing to describe there is none.
+    pub fn of(skin: &Skin, keypoints: &[u32], kind: Kind) -> Features {
+        let describe = |&i: &u32| {
+            let descriptor = match kind {
+                Kind::Shape => shape(skin, i as usize),
+                Kind::Pattern => pattern(skin, i as usize),
+            }?;
+            Some((Feature { at: skin.points[i as usize], normal: skin.normals[i as usize] }, descriptor))
+        };
+        let described: Vec<(Feature, Box<[u8]>)> = keypoints.par_iter().filter_map(describe).collect();
+        let mut features = Features::none(kind);
+        described.iter().for_each(|(feature, descriptor)| features.push(*feature, descriptor));
+        features
+    }
+
+    fn push(&mut self, feature: Feature, descriptor: &[u8]) {
+        self.all.push(feature);
+        let block = |bytes: &[u8]| {
+            let mut block = [0; BLOCK];
+            block[..bytes.len()].copy_from_slice(bytes);
+            block
+        };
+        self.blocks.extend(descriptor.chunks(BLOCK).map(block));
+        let from = self.sums.len();
+        self.sums.resize(from + self.kind.lengths().1 / SUMS, [0; SUMS]);
+        let sums = self.sums[from..].as_flattened_mut();
+        for (k, &byte) in descriptor.iter().enumerate() {
+            sums[self.kind.sum_of(k)] += u16::from(byte);
+        }
+    }
+
+    /// The descriptor of a feature.
+    fn descriptor(&self, k: usize) -> &[[u8; BLOCK]] {
+        let each = self.kind.lengths().0.div_ceil(BLOCK);
+        &self.blocks[k * each..(k + 1) * each]
+    }
+
+    fn sums_of(&self, k: usize) -> &[[u16; SUMS]] {
+        let each = self.kind.lengths().1 / SUMS;
+        &self.sums[k * each..(k + 1) * each]
+    }
+
+    /// Adds those of another view of the same thing that are not here yet: at another place, or described otherwise.
+    pub fn add_new(&mut self, more: &Features) {
+        let before = self.all.len();
+        for (k, feature) in more.all.iter().enumerate() {
+            let descriptor = more.descriptor(k);
+            let known = (0..before).any(|i| {
+                (self.all[i].at - feature.at).norm() <= SAME_PLACE_M
+                    && distance(self.descriptor(i), descriptor) <= SAME_OFF
+            });
+            if !known {
+                self.all.push(*feature);
+                self.blocks.extend_from_slice(descriptor);
+                self.sums.extend_from_slice(more.sums_of(k));
+            }
+        }
+    }
+
+    /// For each feature of these the most alike of others of the same kind, the first of several: its number and how far the descriptors are apart.
+    pub fn most_alike(&self, others: &Features) -> Vec<Option<(usize, u32)>> {
+        let best = |bounds: &mut Vec<u32>, k: usize| {
+            let (own, sums) = (self.descriptor(k), self.sums_of(k));
+            bounds.clear();
+            bounds.extend((0..others.all.len()).map(|m| least_distance(others.sums_of(m), sums)));
+            let off = |m: usize| (distance(others.descriptor(m), own), m);
+            let mut best = off((0..bounds.len()).min_by_key(|&m| bounds[m])?);
+            for (m, bound) in bounds.iter().enumerate() {
+                if *bound <= best.0 {
+                    best = best.min(off(m));
+                }
+            }
+            Some((best.1, best.0))
+        };
+        (0..self.all.len()).into_par_iter().map_init(Vec::new, best).collect()
+    }
 }
+
+/// Sum of absolute differences of two descriptors.
+#[inline(always)]
+fn distance(a: &[[u8; BLOCK]], b: &[[u8; BLOCK]]) -> u32 {
+    let of = |(a, b): (&[u8; BLOCK], &[u8; BLOCK])| -> u32 {
+        let mut sum = 0;
+        for i in 0..BLOCK {
+            sum += u32::from(a[i].abs_diff(b[i]));
+        }
+        sum
+    };
+    a.iter().zip(b).map(of).sum()
+}
+
+/// The same of their sums, which is no more.
+#[inline(always)]
+fn least_distance(a: &[[u16; SUMS]], b: &[[u16; SUMS]]) -> u32 {
+    let mut sums = [0_u16; SUMS];
+    for (a, b) in a.iter().zip(b) {
+        for i in 0..SUMS {
+            sums[i] += a[i].abs_diff(b[i]);
+        }
+    }
+    sums.iter().map(|s| u32::from(*s)).sum()
+}
+
+/// Features of a model nearer to each other than this, metres, whose descriptors differ by no more in all (a unit a byte) are one.
+const SAME_PLACE_M: f32 = 0.004;
+const SAME_OFF: u32 = 256;
 
 /// Radius that a shape is described in, metres.
 const SHAPE_M: f32 = 0.04;
@@ -189,4 +318,47 @@ fn described(cells: &[([f32; 3], f32)]) -> Option<Box<[u8]>> {
     let colour =
         |k: usize| cells.iter().map(move |c| byte(SCALES[1] * if c.1 > 0.0 { value(c, k) } else { mean[k] }));
     Some(lightness.chain(colour(1)).chain(colour(2)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::Draws;
+
+    /// Features that are drawn, every third near to the one before.
+    fn drawn(kind: Kind, count: usize, seed: u64) -> Features {
+        let mut draws = Draws::new(seed);
+        let mut features = Features::none(kind);
+        let mut bytes = vec![0_u8; kind.lengths().0];
+        for k in 0..count {
+            for byte in &mut bytes {
+                let drawn = (draws.next() >> 32) as u8;
+                *byte = if k % 3 == 2 { byte.saturating_add(drawn % 5) } else { drawn / (1 + k as u8 % 4) };
+            }
+            features.push(Feature { at: Point3::origin(), normal: Vector3::z() }, &bytes);
+        }
+        features
+    }
+
+    #[test]
+    fn the_most_alike_is_that_of_all_compared() {
+        for kind in [Kind::Shape, Kind::Pattern] {
+            let (own, others) = (drawn(kind, 60, 1), drawn(kind, 200, 2));
+            let off = |k: usize, m: usize| distance(others.descriptor(m), own.descriptor(k));
+            for (k, found) in own.most_alike(&others).into_iter().enumerate() {
+                let best = (0..200).map(|m| (off(k, m), m)).min().map(|(off, m)| (m, off));
+                assert_eq!(found, best, "{kind:?} {k}");
+                assert!((0..200).all(|m| least_distance(others.sums_of(m), own.sums_of(k)) <= off(k, m)));
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_described_alike_at_the_same_place_is_one() {
+        let (mut all, more) = (drawn(Kind::Pattern, 9, 1), drawn(Kind::Pattern, 9, 2));
+        all.add_new(&all.clone());
+        assert_eq!(all.all.len(), 9);
+        all.add_new(&more);
+        assert_eq!((all.all.len(), all.descriptor(17)), (18, more.descriptor(8)));
+    }
 }

@@ -1,9 +1,8 @@
 //! Correspondences that one pose explains (geometric consistency: Chen and Bhanu 2007), and that pose.
 
-use super::feature::{Feature, distance};
+use super::feature::{Feature, Features};
 use crate::register::rigid;
 use nalgebra::{Isometry3, Point3};
-use rayon::prelude::*;
 
 /// A place of the model and one of the scene that look alike.
 #[derive(Clone, Copy, Debug)]
@@ -28,13 +27,14 @@ const FEWEST: usize = 3;
 const OUT_M: f64 = 0.02;
 
 /// For each feature of the scene the most alike of the model's, best first.
-pub(super) fn matches<'a>(scene: &'a [Feature], model: &'a [Feature]) -> Vec<Match<'a>> {
-    let best = |feature: &'a Feature| {
-        let off = |m: &&'a Feature| distance(&m.descriptor, &feature.descriptor);
-        let model = model.iter().min_by_key(off)?;
-        Some(Match { model, scene: feature, off: off(&model) as f32 })
-    };
-    let mut found: Vec<Match<'a>> = scene.par_iter().filter_map(best).collect();
+pub(super) fn matches<'a>(scene: &'a Features, model: &'a Features) -> Vec<Match<'a>> {
+    let alike = scene.most_alike(model).into_iter().zip(&scene.all);
+    let mut found: Vec<Match<'a>> = alike
+        .filter_map(|(best, feature)| {
+            let (m, off) = best?;
+            Some(Match { model: &model.all[m], scene: feature, off: off as f32 })
+        })
+        .collect();
     found.sort_by(|a, b| a.off.total_cmp(&b.off));
     let median = found.get(found.len() / 2).map_or(1.0, |m| m.off.max(1.0));
     found.truncate(MATCHES);
@@ -53,13 +53,6 @@ pub(super) struct Vote {
 pub(super) fn votes(mut matches: Vec<Match>) -> Vec<Vote> {
     matches.sort_by(|a, b| a.off.total_cmp(&b.off));
     let n = matches.len();
-    let agree: Vec<bool> = (0..n)
-        .into_par_iter()
-        .flat_map_iter(|i| {
-            let matches = &matches;
-            (0..n).map(move |j| agree(&matches[i], &matches[j]))
-        })
-        .collect();
     let mut used = vec![0_u8; n];
     let mut votes = Vec::new();
     for seed in 0..n.min(SEEDS) {
@@ -67,8 +60,8 @@ pub(super) fn votes(mut matches: Vec<Match>) -> Vec<Vote> {
             continue;
         }
         let mut group = vec![seed];
-        for other in (0..n).filter(|&j| agree[seed * n + j]) {
-            if group.iter().all(|&g| agree[g * n + other]) {
+        for other in 0..n {
+            if group.iter().all(|&g| agree(&matches[g], &matches[other])) {
                 group.push(other);
             }
         }

@@ -2,7 +2,7 @@
 
 use super::evidence::{Evidence, verify};
 use super::scene::Seen;
-use super::{KnowError, KnowOptions, Library, Recognised};
+use super::{KnowError, KnowOptions, Library, Recognised, refined};
 use crate::view::View;
 use nalgebra::Isometry3;
 
@@ -81,7 +81,7 @@ impl Library {
         for (glance, world_from_camera) in looks {
             let stated = world_from_camera.inverse() * world_from_model;
             let of = |pose: &Isometry3<f64>| verify(&known.skin, pose, &glance.scene, guess.votes).evidence;
-            let refined = known.refined(&stated, &glance.scene)?;
+            let refined = refined(&known.skin, &stated, &glance.scene)?;
             let best = [stated, refined]
                 .map(|pose| (of(&pose), pose))
                 .into_iter()
@@ -121,6 +121,7 @@ impl Evidence {
             colour: all.iter().all(|e| e.colour.is_some()).then(|| mean(&|e| e.colour.unwrap_or_default())),
             off_sigmas: mean(&|e| e.off_sigmas),
             beyond: mean(&|e| e.beyond),
+            bent: mean(&|e| e.bent),
             votes: all.iter().map(|e| e.votes).max().unwrap_or_default(),
         }
     }

@@ -67,21 +67,11 @@ fn run(count: u64, first_seed: u64, holes: f64, plot: Option<&String>) -> Result
     for seed in first_seed..first_seed + count {
         for present in [true, false] {
             match runtime.block_on(one(&domain, &spec, seed, present, holes)) {
-                Ok(each) => said.push((present, each)),
-                Err(why) => eprintln!("seed {seed}, {present}: {why}"),
-            }
-            if let Some((_, each)) = said.last() {
-                for (n, s) in each.iter().enumerate() {
-                    let false_no = s.not_there && present;
-                    if false_no || (s.yes && !s.yes_is_right) {
-                        eprintln!(
-                            "seed {seed}, there {present}, look {}: there {:.3}, yes {}",
-                            n + 1,
-                            s.there,
-                            s.yes
-                        );
-                    }
+                Ok(each) => {
+                    tell_wrong(seed, present, &each);
+                    said.push((present, each));
                 }
+                Err(why) => eprintln!("seed {seed}, there {present}: {why}"),
             }
         }
     }
@@ -94,16 +84,37 @@ fn run(count: u64, first_seed: u64, holes: f64, plot: Option<&String>) -> Result
     }
     let all: Vec<(bool, Said)> =
         said.iter().flat_map(|(present, each)| each.iter().map(|s| (*present, *s))).collect();
-    let told = row("all", all);
-    for bin in told.bins.iter().filter(|b| b.count > 0) {
-        println!(
-            "  {:.2}-{:.2}: {:5} said, {:.3} stated, {:.3} came true",
-            bin.low, bin.high, bin.count, bin.stated, bin.came_true
-        );
+    let half = row("half", all.clone());
+    let expected = row("prior", as_often_as(domain.config.thresholds.prior, &all));
+    for (name, told) in [("half", &half), ("prior", &expected)] {
+        for bin in told.bins.iter().filter(|b| b.count > 0) {
+            println!(
+                "  {name:>5} {:.2}-{:.2}: {:5} said, {:.3} stated, {:.3} came true",
+                bin.low, bin.high, bin.count, bin.stated, bin.came_true
+            );
+        }
     }
     match plot {
-        Some(path) => std::fs::write(path, drawn(&told)).map_err(|e| format!("{path}: {e}")),
+        Some(path) => std::fs::write(path, drawn(&half, &expected)).map_err(|e| format!("{path}: {e}")),
         None => Ok(()),
+    }
+}
+
+/// What is there counted so often that it is as often there as is expected before the first look.
+fn as_often_as(prior: f64, said: &[(bool, Said)]) -> Vec<(bool, Said)> {
+    let times = (prior / (1.0 - prior)).round() as usize;
+    said.iter().flat_map(|s| std::iter::repeat_n(*s, if s.0 { times } else { 1 })).collect()
+}
+
+/// What was said wrongly of an arrangement.
+fn tell_wrong(seed: u64, present: bool, each: &[Said]) {
+    for (n, s) in each.iter().enumerate() {
+        let what = match (s.not_there && present, s.yes && !s.yes_is_right) {
+            (true, _) => "false not there",
+            (_, true) => "false yes",
+            _ => continue,
+        };
+        eprintln!("seed {seed}, there {present}, look {}: {what}, {:.3}", n + 1, s.there);
     }
 }
 
@@ -211,23 +222,31 @@ fn heard(s: &Situation, true_m: Option<[f64; 2]>) -> Said {
     }
 }
 
-/// Stated against true shares.
-fn drawn(told: &Reliability) -> String {
-    let bins: Vec<_> = told.bins.iter().filter(|b| b.count > 0).collect();
-    let point = |b: &&Bin| {
-        let spread = 2.0 * (b.came_true * (1.0 - b.came_true) / b.count as f64).sqrt();
-        let interval = Some([b.came_true - spread, b.came_true + spread]);
-        Point { at: b.stated, value: b.came_true, interval }
+/// Stated against true shares, where half have it and where as many have it as the prior says.
+fn drawn(half: &Reliability, expected: &Reliability) -> String {
+    let filled = |told: &Reliability| told.bins.iter().filter(|b| b.count > 0).copied().collect::<Vec<Bin>>();
+    let spread = |b: &Bin| 2.0 * (b.came_true * (1.0 - b.came_true) / b.count as f64).sqrt();
+    // What is counted several times would seem surer than it is.
+    let interval = |b: &Bin, counted_once: bool| {
+        counted_once.then(|| [b.came_true - spread(b), b.came_true + spread(b)])
     };
-    let said = Series { name: "said".into(), points: bins.iter().map(point).collect(), broken: false };
+    let series = |name: &str, told: &Reliability, counted_once: bool| Series {
+        name: name.into(),
+        points: filled(told)
+            .iter()
+            .map(|b| Point { at: b.stated, value: b.came_true, interval: interval(b, counted_once) })
+            .collect(),
+        broken: !counted_once,
+    };
+    let counts = filled(half).iter().map(|b| (0.5 * (b.low + b.high), b.count)).collect();
     let plot = Plot::Lines {
         name: "absence".into(),
         title: "Reliability of \"it is there\"".into(),
         x: Axis::fixed("stated probability", 0.0, 1.0),
         y: Axis::fixed("share that was there", 0.0, 1.0),
-        series: vec![said],
+        series: vec![series("there in half", half, true), series("as often as expected", expected, false)],
         diagonal: true,
-        counts: bins.iter().map(|b| (0.5 * (b.low + b.high), b.count)).collect(),
+        counts,
     };
     plot.svg()
 }

@@ -244,7 +244,7 @@ fn drawn(half: &Reliability, expected: &Reliability) -> String {
         title: "Reliability of \"it is there\"".into(),
         x: Axis::fixed("stated probability", 0.0, 1.0),
         y: Axis::fixed("share that was there", 0.0, 1.0),
-        series: vec![series("there in half", half, true), series("as often as expected", expected, false)],
+        series: vec![series("half have it", half, true), series("as expected", expected, false)],
         diagonal: true,
         counts,
     };

@@ -258,6 +258,23 @@ fn step_edge() -> Frame {
 }
 
 #[test]
+fn holes_come_in_patches_and_as_many_as_asked_for() {
+    let frame = flat(1.5, 1.0);
+    let lost = |holes: f64| {
+        let seen = observe(&frame, &DepthNoise { holes, ..DepthNoise::default() }, (0.4, 5.0), 1, 1);
+        seen.iter().map(|z| z.is_nan()).collect::<Vec<bool>>()
+    };
+    assert!(lost(0.0).iter().all(|lost| !lost));
+    let holed = lost(0.1);
+    let share = holed.iter().filter(|lost| **lost).count() as f64 / holed.len() as f64;
+    assert!((share - 0.1).abs() < 0.001, "{share}");
+    // White noise would lose one in ten of the neighbours of what is lost.
+    let pairs = holed.windows(2).filter(|pair| pair[0]);
+    let (both, all) = pairs.fold((0, 0), |(both, all), pair| (both + usize::from(pair[1]), all + 1));
+    assert!(10 * both > 7 * all, "{both} of {all}");
+}
+
+#[test]
 fn edges_waver_by_the_lateral_noise_and_cast_a_shadow() {
     let frame = step_edge();
     let width = frame.intrinsics.width;

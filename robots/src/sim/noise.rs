@@ -17,12 +17,14 @@ pub struct DepthNoise {
     pub edge_loss: f64,
     /// Factor on both standard deviations; 0 leaves quantisation and lost pixels.
     pub scale: f64,
+    /// Share of the returns that are lost besides, in patches: at steep faces and depth edges first.
+    pub holes: f64,
 }
 
 impl Default for DepthNoise {
     /// A Kinect of the first kind.
     fn default() -> Self {
-        DepthNoise { baseline_m: 0.075, disparity_steps: 8.0, edge_loss: 0.5, scale: 1.0 }
+        DepthNoise { baseline_m: 0.075, disparity_steps: 8.0, edge_loss: 0.5, scale: 1.0, holes: 0.0 }
     }
 }
 
@@ -30,6 +32,8 @@ impl Default for DepthNoise {
 const STEEPEST_DEG: f64 = 85.0;
 /// Depths of neighbouring pixels that differ by more than this share of the depth are an edge.
 const EDGE_SHARE: f32 = 0.02;
+/// Across the patches in which returns are lost, pixels.
+const PATCH_PX: usize = 10;
 
 /// θ/(90° − θ) by cosine of θ; infinite beyond [`STEEPEST_DEG`].
 fn steepness(cosine: f32) -> f32 {
@@ -116,7 +120,33 @@ pub fn observe(
             }
         },
     );
+    if noise.holes > 0.0 {
+        lose_patches(frame, noise.holes, key, &mut out);
+    }
     out
+}
+
+/// Takes a share of the returns away: those with the greatest sum of a field that is smooth over [`PATCH_PX`], of steepness, and of
+/// being at a depth edge.
+fn lose_patches(frame: &Frame, holes: f64, key: u64, depths_m: &mut [f32]) {
+    let width = frame.intrinsics.width.max(1);
+    let corner = |column: usize, row: usize| normal(mix(mix(key ^ (column as u64) << 32) ^ row as u64));
+    let score = |here: usize| {
+        let (column, row) = (here % width, here / width);
+        let (i, j) = (column / PATCH_PX, row / PATCH_PX);
+        let [a, b] = [column, row].map(|at| (at % PATCH_PX) as f32 / PATCH_PX as f32);
+        let patch = (1.0 - b) * ((1.0 - a) * corner(i, j) + a * corner(i + 1, j))
+            + b * ((1.0 - a) * corner(i, j + 1) + a * corner(i + 1, j + 1));
+        let at_edge = if is_edge(frame, column, row) { 1.5 } else { 0.0 };
+        patch + 2.0 * (1.0 - frame.cosine[here]).powi(2) + at_edge
+    };
+    let mut scores: Vec<(f32, usize)> = (0..depths_m.len())
+        .filter(|&here| depths_m[here].is_finite())
+        .map(|here| (score(here), here))
+        .collect();
+    let lost = ((scores.len() as f64 * holes) as usize).min(scores.len());
+    scores.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    scores[..lost].iter().for_each(|&(_, here)| depths_m[here] = f32::NAN);
 }
 
 #[inline]

@@ -327,14 +327,16 @@ impl<'r> Scale<'r> {
                 ends.push(steps.to_vec());
             }
             let led = self.led(&there, last, &steps[0], last);
-            ends.extend(led.map(|bridge| [std::slice::from_ref(&bridge), steps].concat()));
+            ends.extend(led.into_iter().map(|bridge| [std::slice::from_ref(&bridge), steps].concat()));
         }
         // What has begun with other objects may go on with those of the plan.
         for n in 1..rest.len().min(MOST_STEPS) {
             let begun: Vec<Step> = put[..n].iter().filter(|step| leads(step)).cloned().collect();
             let Some((_, there)) = self.after(&[&other.steps, begun.as_slice()].concat()) else { break };
             let led = self.led(&there, &put[n - 1], &rest[n], last);
-            ends.extend(led.map(|bridge| [&begun, std::slice::from_ref(&bridge), &rest[n..]].concat()));
+            ends.extend(
+                led.into_iter().map(|bridge| [&begun, std::slice::from_ref(&bridge), &rest[n..]].concat()),
+            );
         }
         // Who is there already does not go there.
         ends.iter_mut().for_each(|end| end.retain(leads));
@@ -342,12 +344,10 @@ impl<'r> Scale<'r> {
     }
 
     /// Steps that can be taken in a state, and lead from an object of a step to one of another.
-    fn led(&self, there: &State, from: &Step, to: &Step, about: &Step) -> impl Iterator<Item = Step> {
+    fn led(&self, there: &State, from: &Step, to: &Step, about: &Step) -> Vec<Step> {
         let pairs = from.arguments.iter().flat_map(|from| to.arguments.iter().map(move |to| (from, to)));
         let bridges = pairs.flat_map(|(from, to)| self.bridges(from, to, about));
-        let led: Vec<Step> =
-            bridges.filter(|bridge| self.apply(&mut there.clone(), bridge).is_some()).collect();
-        led.into_iter()
+        bridges.filter(|bridge| self.apply(&mut there.clone(), bridge).is_some()).collect()
     }
 
     /// Why the rest of a plan cannot be done behind other steps: that a number is too small then for what is left to do but looking, or

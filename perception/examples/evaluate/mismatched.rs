@@ -1,7 +1,7 @@
 //! Worlds that are not the assumed one: other cameras, holes, and vessels that no model describes.
 
 use super::mosd::words;
-use super::table::{Known, arrangement, judge, options, picture};
+use super::table::{Known, arrangement, judge, options, picture, strewn};
 use super::tabletop::device::{Device, KINECT};
 use super::tabletop::{Draws, Thing, disturbed, on_ring};
 use descry_perception::calibration::{Claim, reliability};
@@ -53,39 +53,24 @@ const GLASS: &[[f64; 2]] = &[[0.0, 0.026], [0.11, 0.037]];
 
 /// Two cups of each kind among vessels, each of a size of its own.
 fn vessels(draws: &mut Draws) -> Vec<Known> {
-    let mut placed: Vec<Known> = Vec::new();
-    for kind in 0..10 {
-        for _ in 0..200 {
-            let (x, y) = (1.2 * (draws.next() - 0.5), 0.6 * (draws.next() - 0.5));
-            let scale = 0.85 + 0.3 * draws.next();
-            let turn = std::f64::consts::TAU * draws.next();
-            let vessel = |knots, open, handle_rad, spout| Thing::Turned {
-                x,
-                y,
-                knots,
-                scale,
-                open,
-                handle_rad,
-                spout,
-            };
-            let cup = |radius, height| Thing::Cup { x, y, radius, height, handle_rad: None };
-            let (thing, name) = match kind {
-                0 | 1 => (cup(0.035, 0.104), Some("cup A")),
-                2 | 3 => (cup(0.044, 0.155), Some("cup B")),
-                4 => (vessel(BOWL, true, None, false), None),
-                5 => (vessel(BOTTLE, false, None, false), None),
-                6 => (vessel(JUG, true, Some(turn), true), None),
-                7 => (vessel(VASE, true, None, false), None),
-                8 => (vessel(BARREL, true, Some(turn), false), None),
-                _ => (vessel(GLASS, true, None, false), None),
-            };
-            if placed.iter().all(|(other, _)| thing.gap_m(other) > 0.02) {
-                placed.push((thing, name));
-                break;
-            }
+    strewn(draws, [1.2, 0.6], 0..10, |kind, x, y, draws| {
+        let scale = 0.85 + 0.3 * draws.next();
+        let turn = std::f64::consts::TAU * draws.next();
+        let vessel = |knots, open, handle_rad, spout| {
+            (Thing::Turned { x, y, knots, scale, open, handle_rad, spout }, None)
+        };
+        let cup = |radius, height| Thing::Cup { x, y, radius, height, handle_rad: None };
+        match kind {
+            0 | 1 => (cup(0.035, 0.104), Some("cup A")),
+            2 | 3 => (cup(0.044, 0.155), Some("cup B")),
+            4 => vessel(BOWL, true, None, false),
+            5 => vessel(BOTTLE, false, None, false),
+            6 => vessel(JUG, true, Some(turn), true),
+            7 => vessel(VASE, true, None, false),
+            8 => vessel(BARREL, true, Some(turn), false),
+            _ => vessel(GLASS, true, None, false),
         }
-    }
-    placed
+    })
 }
 
 /// What was said of the things after a number of views.

@@ -42,28 +42,39 @@ pub fn models() -> Vec<ObjectModel> {
 /// A thing and the name of the cup that it is.
 pub type Known = (Thing, Option<&'static str>);
 
-pub fn arrangement(draws: &mut Draws) -> Vec<Known> {
+/// Things that are drawn kind by kind at places within a part of the table, metres, with two centimetres between them; what finds no room is left out.
+pub fn strewn<K: Copy>(
+    draws: &mut Draws,
+    [length_m, width_m]: [f64; 2],
+    kinds: impl IntoIterator<Item = K>,
+    thing: impl Fn(K, f64, f64, &mut Draws) -> Known,
+) -> Vec<Known> {
     let mut placed: Vec<Known> = Vec::new();
-    let kinds: [u8; 8] = [0, 0, 1, 1, 2, 3, 4, 5];
     for kind in kinds {
         for _ in 0..200 {
-            let (x, y) = (1.1 * (draws.next() - 0.5), 0.5 * (draws.next() - 0.5));
-            let turn = std::f64::consts::TAU * draws.next();
-            let (thing, name) = match kind {
-                0 => (Thing::Cup { x, y, radius: 0.035, height: 0.104, handle_rad: None }, Some("cup A")),
-                1 => (Thing::Cup { x, y, radius: 0.044, height: 0.155, handle_rad: None }, Some("cup B")),
-                2 => (Thing::Cup { x, y, radius: 0.04, height: 0.095, handle_rad: Some(turn) }, None),
-                3 => (Thing::Block { x, y, half: [0.1, 0.06], height: 0.25, turn_rad: turn }, None),
-                4 => (Thing::Block { x, y, half: [0.035, 0.035], height: 0.1, turn_rad: turn }, None),
-                _ => (Thing::Tin { x, y, radius: 0.036, height: 0.11 }, None),
-            };
-            if placed.iter().all(|(other, _)| thing.gap_m(other) > 0.02) {
-                placed.push((thing, name));
+            let (x, y) = (length_m * (draws.next() - 0.5), width_m * (draws.next() - 0.5));
+            let drawn = thing(kind, x, y, draws);
+            if placed.iter().all(|(other, _)| drawn.0.gap_m(other) > 0.02) {
+                placed.push(drawn);
                 break;
             }
         }
     }
     placed
+}
+
+pub fn arrangement(draws: &mut Draws) -> Vec<Known> {
+    strewn(draws, [1.1, 0.5], [0, 0, 1, 1, 2, 3, 4, 5], |kind, x, y, draws| {
+        let turn = std::f64::consts::TAU * draws.next();
+        match kind {
+            0 => (Thing::Cup { x, y, radius: 0.035, height: 0.104, handle_rad: None }, Some("cup A")),
+            1 => (Thing::Cup { x, y, radius: 0.044, height: 0.155, handle_rad: None }, Some("cup B")),
+            2 => (Thing::Cup { x, y, radius: 0.04, height: 0.095, handle_rad: Some(turn) }, None),
+            3 => (Thing::Block { x, y, half: [0.1, 0.06], height: 0.25, turn_rad: turn }, None),
+            4 => (Thing::Block { x, y, half: [0.035, 0.035], height: 0.1, turn_rad: turn }, None),
+            _ => (Thing::Tin { x, y, radius: 0.036, height: 0.11 }, None),
+        }
+    })
 }
 
 #[derive(Clone, Default)]

@@ -1,6 +1,7 @@
 //! Segmentation, merging and recognition against what is known, and how long single views take, as tables:
-//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
+//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
+mod clutter;
 mod frames;
 mod further;
 mod kitchen;
@@ -26,6 +27,10 @@ fn main() -> ExitCode {
             Ok(count) => table::run(count, out.first().map(Path::new)),
             Err(_) => Err(format!("`{count}` is no number of arrangements")),
         },
+        ["clutter", count, first, out @ ..] => match (count.parse(), first.parse()) {
+            (Ok(count), Ok(first)) => clutter::run(count, first, out.first().map(Path::new)),
+            _ => Err(format!("`{count}` and `{first}` are no number of piles and first seed")),
+        },
         ["mismatched", count, seed, further @ ..] => match (count.parse(), seed.parse()) {
             (Ok(count), Ok(seed)) => {
                 let only = further.first().copied().unwrap_or_default();
@@ -43,7 +48,7 @@ fn main() -> ExitCode {
         },
         ["variants", dirs @ ..] => variants::run(dirs),
         _ => Err(
-            "usage: evaluate mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
+            "usage: evaluate mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
                 .to_owned(),
         ),
     };

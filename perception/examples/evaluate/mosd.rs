@@ -27,12 +27,12 @@ pub fn cup() -> ObjectModel {
 }
 
 #[derive(Default)]
-struct Tally {
-    found: usize,
-    objects: usize,
-    split: usize,
-    merged: usize,
-    extra: usize,
+pub struct Tally {
+    pub found: usize,
+    pub objects: usize,
+    pub split: usize,
+    pub merged: usize,
+    pub extra: usize,
 }
 
 /// Scores every scene of the folder.
@@ -107,7 +107,7 @@ fn labelled(path: &Path, name: &str) -> Result<(View, Vec<u32>), String> {
 }
 
 /// What the labels call objects, where no table lists them.
-fn labelled_objects(labels: &[u32]) -> Vec<u32> {
+pub fn labelled_objects(labels: &[u32]) -> Vec<u32> {
     const FEWEST: usize = 60;
     let mut sizes: BTreeMap<u32, usize> = BTreeMap::new();
     labels.iter().filter(|label| **label >= 20).for_each(|label| *sizes.entry(label / 10).or_default() += 1);
@@ -176,7 +176,7 @@ pub fn words(p: &Percept) -> String {
 }
 
 /// The object that most of each segment belongs to; counts what was found, split and merged.
-fn overlap(
+pub fn overlap(
     scene: &Scene,
     cloud: &descry_perception::Cloud,
     labels: &[u32],

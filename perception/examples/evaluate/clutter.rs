@@ -72,8 +72,8 @@ pub fn run(count: u64, first: u64, out: Option<&Path>) -> Result<(), String> {
     Ok(())
 }
 
-/// The pile as the camera sees it, a colour a segment.
-fn picture(path: &Path, view: &View, cloud: &Cloud, scene: &Scene) -> Result<(), String> {
+/// A view as the camera sees it, its cloud in the frame of its pose, a colour a segment.
+pub fn picture(path: &Path, view: &View, cloud: &Cloud, scene: &Scene) -> Result<(), String> {
     let mut labels = vec![0_u32; cloud.len()];
     for (label, segment) in (1..).zip(&scene.segments) {
         segment.indices.iter().for_each(|&i| labels[i as usize] = label);

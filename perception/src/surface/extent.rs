@@ -107,7 +107,7 @@ impl Surface {
         if high.is_empty() {
             return self;
         }
-        let border = covered(&self, &turn);
+        let border = along_edges(&self, &turn);
         let mut owners: Owners = border.iter().map(|cell| (*cell, 0)).collect();
         Hiding::of(&plane, seen).spread(&mut owners, border, true);
         let is_beside =
@@ -134,19 +134,17 @@ impl Surface {
     }
 }
 
-/// The cells whose middles a surface covers, in order.
-fn covered(surface: &Surface, turn: &UnitQuaternion<f64>) -> Vec<[i32; 2]> {
-    let outline = surface.outline();
-    let corners: Vec<[i32; 2]> = surface.hull.iter().map(|p| cell_of(turn, p)).collect();
-    let ends = |k: usize| {
-        let of = || corners.iter().map(move |c| c[k]);
-        of().min().unwrap_or(0)..=of().max().unwrap_or(-1)
+/// The cells along the edges of a surface, in order around it.
+fn along_edges(surface: &Surface, turn: &UnitQuaternion<f64>) -> Vec<[i32; 2]> {
+    /// Of a longer edge not every cell is named.
+    const MOST: f64 = 2000.0;
+    let ends = surface.hull.iter().zip(surface.hull.iter().cycle().skip(1));
+    let edge = |(a, b): (&Point3<f64>, &Point3<f64>)| {
+        let (a, way) = (*a, b - a);
+        let steps = (way.norm() / CELL_M).ceil().clamp(1.0, MOST) as usize;
+        (0..steps).map(move |k| a + way * (k as f64 / steps as f64))
     };
-    let lift = turn.inverse();
-    let middle = |[x, y]: [i32; 2]| {
-        let [x, y] = [x, y].map(|k| (f64::from(k) + 0.5) * CELL_M);
-        lift * Point3::new(x, y, surface.offset_m)
-    };
-    let cells = ends(0).flat_map(|x| ends(1).map(move |y| [x, y]));
-    cells.filter(|cell| outline.covers(&middle(*cell), 0.0)).collect()
+    let mut cells: Vec<[i32; 2]> = ends.flat_map(edge).map(|p| cell_of(turn, &p)).collect();
+    cells.dedup();
+    cells
 }

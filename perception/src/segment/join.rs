@@ -10,11 +10,8 @@ use rustc_hash::FxHashMap;
 const PATCH_REACH_M: f64 = 0.02;
 /// Greatest angle between a voxel's normal and its patch's, as a cosine (25°).
 const PATCH_COS: f64 = 0.906;
-/// A joint is still smooth up to this angle, radians (as in locally convex connected patches), and a concave one up to the second: voxels
-/// round the crease between two things, and what is gentler than a third of it would lead across in steps. Fitted on piles of things.
+/// A concave joint is still smooth up to this angle, radians (as in locally convex connected patches).
 const SMOOTH_RAD: f64 = 0.35;
-const SMOOTH_CONCAVE_RAD: f64 = 0.25;
-
 /// For each voxel the number of its part. Numbers are voxel indices, the same in every run.
 pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
     if !options.part_touching {
@@ -167,11 +164,10 @@ fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
     let angle = a.normal.dot(&b.normal).clamp(-1.0, 1.0).acos();
     // A step sideways between parallel patches (a box before another) is no smooth surface.
     let step = between.dot(&(a.normal + b.normal)).abs() / 2.0;
-    let is_level = step < 0.012;
+    let smooth = angle < SMOOTH_RAD && step < 0.012;
     if bend < 0.0 {
-        return angle < SMOOTH_CONCAVE_RAD && is_level;
+        return smooth;
     }
-    let smooth = angle < SMOOTH_RAD && is_level;
     // Patches that only touch at a corner: the crease must run across the line between their centres.
     let crease = a.normal.cross(&b.normal);
     let along = crease.try_normalize(1e-3).map_or(0.0, |c| c.dot(&between.normalize()).abs());

@@ -120,11 +120,19 @@ impl Cut {
         members: &BTreeMap<u32, Vec<usize>>,
     ) -> Option<Cut> {
         let touched: BTreeSet<u32> = body.iter().map(|&v| part_of_voxel[v]).collect();
-        let pieces = touched.iter().filter_map(|part| members.get(part)).flat_map(|of| {
-            let rest: Vec<usize> = of.iter().copied().filter(|v| body.binary_search(v).is_err()).collect();
-            together(voxels, &rest)
-        });
-        let (left, own): (Vec<_>, Vec<_>) = pieces.partition(|piece| is_apart(voxels, piece, &body, axis));
+        let rest = touched.iter().filter_map(|part| members.get(part)).flatten().copied();
+        let rest: Vec<usize> = rest.filter(|v| body.binary_search(v).is_err()).collect();
+        let (left, own): (Vec<_>, Vec<_>) =
+            together(voxels, &rest).into_iter().partition(|piece| is_apart(voxels, piece, &body, axis));
+        // What two parts leave stays two.
+        let left: Vec<Vec<usize>> = left
+            .iter()
+            .flat_map(|piece| touched.iter().map(move |part| (piece, *part)))
+            .map(|(piece, part)| {
+                piece.iter().copied().filter(|v| part_of_voxel[*v] == part).collect::<Vec<_>>()
+            })
+            .flat_map(|piece| together(voxels, &piece))
+            .collect();
         if touched.len() == 1 && left.is_empty() {
             return None;
         }

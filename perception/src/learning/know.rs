@@ -254,10 +254,8 @@ impl Known {
         }
         let mut judged = Vec::new();
         for vote in kept {
-            if self.at_most(&vote, scene, &options.judge)? < options.hopeless {
-                continue;
-            }
-            let pose = refined(&self.skin, &vote.scene_from_model, scene)?;
+            let Some(near) = self.worth_a_look(&vote, scene, options)? else { continue };
+            let pose = refined(&self.skin, &near, scene, &NEAR_M[1..])?;
             let Verified { evidence, claims } = verify(&self.skin, &pose, scene, vote.matches);
             let confidence = options.judge.confidence(&evidence);
             let world_from_model = world_from_camera * pose;
@@ -267,25 +265,37 @@ impl Known {
         Ok(judged)
     }
 
-    /// The confidence that a vote may come to by a few of the model's points, as it is or brought onto the scene; one if too few of them can be seen.
-    fn at_most(&self, vote: &Vote, scene: &Seen, judge: &Judge) -> Result<f64, KnowError> {
+    /// The pose of a vote, or a nearer one that few of the model's points bring onto the scene; none if by these the confidence comes to nothing at either. Where
+    /// too few of them can be seen nothing is known of that.
+    fn worth_a_look(
+        &self,
+        vote: &Vote,
+        scene: &Seen,
+        options: &KnowOptions,
+    ) -> Result<Option<Isometry3<f64>>, KnowError> {
         let by_points = self.skin.points.len() as f64 / self.coarse.points.len().max(1) as f64;
-        let mut most = 0.0_f64;
-        for pose in [vote.scene_from_model, refined(&self.coarse, &vote.scene_from_model, scene)?] {
-            let few = unbounded(&self.coarse, &pose, scene, vote.matches);
-            if few.facing < LEAST_POINTS / 2 {
-                return Ok(1.0);
-            }
-            most = most.max(judge.confidence(&few.times(by_points)));
+        let poses = [vote.scene_from_model, refined(&self.coarse, &vote.scene_from_model, scene, &NEAR_M)?];
+        let few = poses.map(|pose| unbounded(&self.coarse, &pose, scene, vote.matches));
+        if few.iter().any(|few| few.facing < LEAST_POINTS / 2) {
+            return Ok(Some(vote.scene_from_model));
         }
-        Ok(most)
+        let sure = few.map(|few| options.judge.confidence(&few.times(by_points)));
+        Ok((sure[0].max(sure[1]) >= options.hopeless).then(|| poses[usize::from(sure[1] > sure[0])]))
     }
 }
 
-/// The pose of a skin after its visible side was brought onto the scene's surface, from far to near.
-fn refined(skin: &Skin, start: &Isometry3<f64>, scene: &Seen) -> Result<Isometry3<f64>, KnowError> {
+/// Distances within which points are brought onto the scene, from far to near, metres.
+const NEAR_M: [f32; 2] = [0.025, 0.01];
+
+/// The pose of a skin after its visible side was brought onto the scene's surface, by points that are nearer to it than some distances one after the other.
+fn refined(
+    skin: &Skin,
+    start: &Isometry3<f64>,
+    scene: &Seen,
+    near_m: &[f32],
+) -> Result<Isometry3<f64>, KnowError> {
     let mut pose = *start;
-    for within_m in [0.025, 0.01] {
+    for &within_m in near_m {
         let eye = pose.inverse() * Point3::origin();
         let seen = skin.seen_from(&eye.coords.cast().normalize());
         let points: Vec<Point3<f32>> = seen.iter().map(|&i| skin.points[i as usize]).collect();

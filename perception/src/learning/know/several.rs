@@ -2,7 +2,7 @@
 
 use super::evidence::{Evidence, verify};
 use super::scene::Seen;
-use super::{KnowError, KnowOptions, Library, Recognised, refined};
+use super::{KnowError, KnowOptions, Library, NEAR_M, Recognised, refined};
 use crate::view::View;
 use nalgebra::Isometry3;
 
@@ -81,7 +81,7 @@ impl Library {
         for (glance, world_from_camera) in looks {
             let stated = world_from_camera.inverse() * world_from_model;
             let of = |pose: &Isometry3<f64>| verify(&known.skin, pose, &glance.scene, guess.votes).evidence;
-            let refined = refined(&known.skin, &stated, &glance.scene)?;
+            let refined = refined(&known.skin, &stated, &glance.scene, &NEAR_M)?;
             let best = [stated, refined]
                 .map(|pose| (of(&pose), pose))
                 .into_iter()

@@ -35,7 +35,7 @@ impl<'a> Hiding<'a> {
         }
     }
 
-    /// True if no camera saw anything lower than the plane at a cell, and, unless that may be unseen, one saw the plane or something above it.
+    /// True if no camera saw anything lower than the plane at a cell, and, unless that may be unseen, one saw something above it.
     fn allows(&self, [x, y]: [i32; 2], unseen: bool) -> bool {
         const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]];
         let mut any = unseen;
@@ -46,10 +46,12 @@ impl<'a> Hiding<'a> {
                 let q = map.camera_from_world * place;
                 let pixel = map.intrinsics.project(&q).and_then(|(u, v)| map.intrinsics.pixel(u, v));
                 let share = pixel.map_or(f64::NAN, |pixel| f64::from(map.depths_m[pixel]) / q.z);
-                if high_m * (share - 1.0) > Plane::band_of(range_sigma_m(share * q.coords.norm())) {
+                let band_m = Plane::band_of(range_sigma_m(share * q.coords.norm()));
+                let above_m = high_m * (1.0 - share);
+                if above_m < -band_m {
                     return false;
                 }
-                any |= share.is_finite();
+                any |= above_m > band_m;
             }
         }
         any

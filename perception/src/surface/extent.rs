@@ -6,7 +6,7 @@ use super::planes::{Plane, Sample};
 use super::{Surface, range_sigma_m};
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// So far a plane is taken to reach on behind and beneath what hides it, metres: few things are twice as wide.
 const HIDDEN_M: f64 = 0.3;
@@ -61,6 +61,7 @@ impl<'a> Hiding<'a> {
     /// tells which owners meet.
     pub fn spread(&self, owners: &mut Owners, mut border: Vec<[i32; 2]>, unseen: bool) -> Vec<[usize; 2]> {
         let mut meeting = Vec::new();
+        let mut refused: FxHashSet<[i32; 2]> = FxHashSet::default();
         for _ in 0..(HIDDEN_M / CELL_M) as usize {
             let mut next = Vec::new();
             for cell in border {
@@ -69,11 +70,14 @@ impl<'a> Hiding<'a> {
                     match owners.get(&around) {
                         Some(&other) if other != owner => meeting.push([owner.min(other), owner.max(other)]),
                         Some(_) => {}
+                        None if refused.contains(&around) => {}
                         None if self.allows(around, unseen) => {
                             owners.insert(around, owner);
                             next.push(around);
                         }
-                        None => {}
+                        None => {
+                            refused.insert(around);
+                        }
                     }
                 }
             }

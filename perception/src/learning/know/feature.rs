@@ -11,9 +11,11 @@ pub(super) struct Feature {
     pub normal: Vector3<f32>,
 }
 
-/// Bytes that are compared in one go, and sums of bytes.
+/// Bytes that are compared in one go: of descriptors, and of codes.
 const BLOCK: usize = 32;
-const SUMS: usize = 16;
+const CODE: usize = 16;
+/// So many units of the sums that codes are made of are one of a code.
+const COARSE: u16 = 4;
 
 /// Features of one kind with their descriptors one after the other, in bytes, so that distances are quick.
 #[derive(Clone, Debug)]
@@ -21,8 +23,16 @@ pub(super) struct Features {
     pub all: Vec<Feature>,
     kind: Kind,
     blocks: Vec<[u8; BLOCK]>,
-    /// Sums of groups of bytes: descriptors are at least as far apart as these.
-    sums: Vec<[u16; SUMS]>,
+    /// Sums of groups of bytes, coarsely: what is alike has codes that are, and they are compared in a tenth of the time.
+    codes: Vec<[u8; CODE]>,
+}
+
+/// A feature of one set, the most alike of another's, and how far their descriptors are apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Alike {
+    pub own: usize,
+    pub other: usize,
+    pub off: u32,
 }
 
 /// What is described.
@@ -35,7 +45,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Bytes of a descriptor, and sums of it.
+    /// Bytes of a descriptor, and of its code.
     const fn lengths(self) -> (usize, usize) {
         match self {
             Kind::Shape => (SECTORS[0] * SECTORS[1] * SECTORS[2] * SECTORS[3], 32),
@@ -43,7 +53,7 @@ impl Kind {
         }
     }
 
-    /// The sum that a byte goes into: shapes' by sector, whatever the angle between normals, patterns' by squares of four cells.
+    /// The byte of the code that a byte goes into: shapes' by sector, whatever the angle between normals, patterns' by squares of four cells.
     const fn sum_of(self, byte: usize) -> usize {
         match self {
             Kind::Shape => byte / SECTORS[3],
@@ -58,7 +68,7 @@ impl Kind {
 impl Features {
     /// No features of a kind.
     pub fn none(kind: Kind) -> Features {
-        Features { all: Vec::new(), kind, blocks: Vec::new(), sums: Vec::new() }
+        Features { all: Vec::new(), kind, blocks: Vec::new(), codes: Vec::new() }
     }
 
     /// The features at some points of a skin; where there is nothing to describe there is none.
@@ -84,12 +94,12 @@ impl Features {
             block
         };
         self.blocks.extend(descriptor.chunks(BLOCK).map(block));
-        let from = self.sums.len();
-        self.sums.resize(from + self.kind.lengths().1 / SUMS, [0; SUMS]);
-        let sums = self.sums[from..].as_flattened_mut();
+        let mut sums = vec![0_u16; self.kind.lengths().1];
         for (k, &byte) in descriptor.iter().enumerate() {
             sums[self.kind.sum_of(k)] += u16::from(byte);
         }
+        let byte = |k: usize| (sums[k] / COARSE).min(255) as u8;
+        self.codes.extend((0..sums.len() / CODE).map(|n| std::array::from_fn(|k| byte(n * CODE + k))));
     }
 
     /// The descriptor of a feature.
@@ -98,9 +108,9 @@ impl Features {
         &self.blocks[k * each..(k + 1) * each]
     }
 
-    fn sums_of(&self, k: usize) -> &[[u16; SUMS]] {
-        let each = self.kind.lengths().1 / SUMS;
-        &self.sums[k * each..(k + 1) * each]
+    fn code(&self, k: usize) -> &[[u8; CODE]] {
+        let each = self.kind.lengths().1 / CODE;
+        &self.codes[k * each..(k + 1) * each]
     }
 
     /// Adds those of another view of the same thing that are not here yet: at another place, or described otherwise.
@@ -115,53 +125,63 @@ impl Features {
             if !known {
                 self.all.push(*feature);
                 self.blocks.extend_from_slice(descriptor);
-                self.sums.extend_from_slice(more.sums_of(k));
+                self.codes.extend_from_slice(more.code(k));
             }
         }
     }
 
-    /// For each feature of these the most alike of others of the same kind, the first of several: its number and how far the descriptors are apart.
-    pub fn most_alike(&self, others: &Features) -> Vec<Option<(usize, u32)>> {
-        let best = |bounds: &mut Vec<u32>, k: usize| {
-            let (own, sums) = (self.descriptor(k), self.sums_of(k));
-            bounds.clear();
-            bounds.extend((0..others.all.len()).map(|m| least_distance(others.sums_of(m), sums)));
-            let off = |m: usize| (distance(others.descriptor(m), own), m);
-            let mut best = off((0..bounds.len()).min_by_key(|&m| bounds[m])?);
-            for (m, bound) in bounds.iter().enumerate() {
-                if *bound <= best.0 {
-                    best = best.min(off(m));
-                }
-            }
-            Some((best.1, best.0))
+    /// Which features of these are the most alike to others of the same kind, so many of them, the most alike first, and the median distance of all these to
+    /// those most alike to them. Codes tell which are compared.
+    pub fn most_alike(&self, others: &Features, most: usize) -> (Vec<Alike>, u32) {
+        /// Of so many times as many as are wanted, each with so many of the others, descriptors are compared.
+        const LIKELY: usize = 6;
+        const CLOSE: usize = 24;
+        /// So many in the middle by their codes tell the median.
+        const MIDDLE: usize = 15;
+        let codes = |own: usize| {
+            let code = self.code(own);
+            others.codes.chunks_exact(code.len()).map(|other| distance(other, code)).zip(0..)
         };
-        (0..self.all.len()).into_par_iter().map_init(Vec::new, best).collect()
+        let nearest = |own: usize| Some((codes(own).min()?.0, own));
+        let mut order: Vec<(u32, usize)> = (0..self.all.len()).into_par_iter().filter_map(nearest).collect();
+        order.sort_unstable();
+        let compared = |close: &mut Vec<(u32, u32)>, &(_, own): &(u32, usize)| {
+            close.clear();
+            close.extend(codes(own));
+            if close.len() > CLOSE {
+                close.select_nth_unstable(CLOSE);
+                close.truncate(CLOSE);
+            }
+            let off = |&(_, other): &(u32, u32)| {
+                (distance(others.descriptor(other as usize), self.descriptor(own)), other as usize)
+            };
+            close.iter().map(off).min().map(|(off, other)| Alike { own, other, off })
+        };
+        let all = |of: &[(u32, usize)]| {
+            let each = of.par_iter().map_init(Vec::new, compared);
+            let mut all: Vec<Alike> = each.flatten().collect();
+            all.sort_by_key(|alike| alike.off);
+            all
+        };
+        let from = order.len().saturating_sub(MIDDLE) / 2;
+        let middle = all(&order[from..order.len().min(from + MIDDLE)]);
+        let mut best = all(&order[..order.len().min(LIKELY * most)]);
+        best.truncate(most);
+        (best, middle.get(middle.len() / 2).map_or(0, |alike| alike.off))
     }
 }
 
-/// Sum of absolute differences of two descriptors.
+/// Sum of absolute differences of the bytes of two descriptors, or of two codes.
 #[inline(always)]
-fn distance(a: &[[u8; BLOCK]], b: &[[u8; BLOCK]]) -> u32 {
-    let of = |(a, b): (&[u8; BLOCK], &[u8; BLOCK])| -> u32 {
+fn distance<const N: usize>(a: &[[u8; N]], b: &[[u8; N]]) -> u32 {
+    let of = |(a, b): (&[u8; N], &[u8; N])| -> u32 {
         let mut sum = 0;
-        for i in 0..BLOCK {
+        for i in 0..N {
             sum += u32::from(a[i].abs_diff(b[i]));
         }
         sum
     };
     a.iter().zip(b).map(of).sum()
-}
-
-/// The same of their sums, which is no more.
-#[inline(always)]
-fn least_distance(a: &[[u16; SUMS]], b: &[[u16; SUMS]]) -> u32 {
-    let mut sums = [0_u16; SUMS];
-    for (a, b) in a.iter().zip(b) {
-        for i in 0..SUMS {
-            sums[i] += a[i].abs_diff(b[i]);
-        }
-    }
-    sums.iter().map(|s| u32::from(*s)).sum()
 }
 
 /// Features of a model nearer to each other than this, metres, whose descriptors differ by no more in all (a unit a byte) are one.
@@ -341,15 +361,38 @@ mod tests {
     }
 
     #[test]
-    fn the_most_alike_is_that_of_all_compared() {
+    fn what_is_most_alike_is_found() {
         for kind in [Kind::Shape, Kind::Pattern] {
-            let (own, others) = (drawn(kind, 60, 1), drawn(kind, 200, 2));
-            let off = |k: usize, m: usize| distance(others.descriptor(m), own.descriptor(k));
-            for (k, found) in own.most_alike(&others).into_iter().enumerate() {
-                let best = (0..200).map(|m| (off(k, m), m)).min().map(|(off, m)| (m, off));
-                assert_eq!(found, best, "{kind:?} {k}");
-                assert!((0..200).all(|m| least_distance(others.sums_of(m), own.sums_of(k)) <= off(k, m)));
+            let (own, mut others) = (drawn(kind, 60, 1), drawn(kind, 200, 2));
+            // Of all others those are alike that were made of one of the others.
+            for (k, from) in [(7, 3), (41, 20), (120, 59)] {
+                let near: Vec<u8> =
+                    own.descriptor(from).as_flattened().iter().map(|b| b.saturating_add(3)).collect();
+                let mut made = Features::none(kind);
+                made.push(own.all[from], &near[..kind.lengths().0]);
+                others.replace(k, &made);
             }
+            let off = |k: usize, m: usize| distance(others.descriptor(m), own.descriptor(k));
+            let nearest = |k: usize| (0..200).map(|m| (off(k, m), m)).min().expect("there are others");
+            let (found, median) = own.most_alike(&others, 5);
+            assert_eq!(
+                found.iter().take(3).map(|a| a.own).collect::<std::collections::BTreeSet<_>>(),
+                [3, 20, 59].into()
+            );
+            assert!(found.iter().all(|a| nearest(a.own) == (a.off, a.other)), "{kind:?} {found:?}");
+            let mut all: Vec<u32> = (0..60).map(|k| nearest(k).0).collect();
+            all.sort_unstable();
+            assert!((all[15]..=all[45]).contains(&median), "{kind:?} {median} {all:?}");
+        }
+    }
+
+    impl Features {
+        /// Puts the only feature of others in the place of one.
+        fn replace(&mut self, k: usize, by: &Features) {
+            let (each, code) = (by.blocks.len(), by.codes.len());
+            self.all[k] = by.all[0];
+            self.blocks[k * each..(k + 1) * each].copy_from_slice(&by.blocks);
+            self.codes[k * code..(k + 1) * code].copy_from_slice(&by.codes);
         }
     }
 

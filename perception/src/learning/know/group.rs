@@ -26,20 +26,16 @@ const FEWEST: usize = 3;
 /// How far out along its normal a second point of each match lies when the pose is found, metres.
 const OUT_M: f64 = 0.02;
 
-/// For each feature of the scene the most alike of the model's, best first.
+/// Features of the scene with the most alike of the model's, best first.
 pub(super) fn matches<'a>(scene: &'a Features, model: &'a Features) -> Vec<Match<'a>> {
-    let alike = scene.most_alike(model).into_iter().zip(&scene.all);
-    let mut found: Vec<Match<'a>> = alike
-        .filter_map(|(best, feature)| {
-            let (m, off) = best?;
-            Some(Match { model: &model.all[m], scene: feature, off: off as f32 })
-        })
-        .collect();
-    found.sort_by(|a, b| a.off.total_cmp(&b.off));
-    let median = found.get(found.len() / 2).map_or(1.0, |m| m.off.max(1.0));
-    found.truncate(MATCHES);
-    found.iter_mut().for_each(|m| m.off /= median);
-    found
+    let (alike, median) = scene.most_alike(model, MATCHES);
+    let median = median.max(1) as f32;
+    let found = alike.into_iter().map(|alike| Match {
+        model: &model.all[alike.other],
+        scene: &scene.all[alike.own],
+        off: alike.off as f32 / median,
+    });
+    found.collect()
 }
 
 /// A pose and the number of matches that speak for it.

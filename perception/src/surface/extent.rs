@@ -20,19 +20,17 @@ pub(super) type Owners = FxHashMap<[i32; 2], usize>;
 
 /// What hides a plane from the cameras.
 pub(super) struct Hiding<'a> {
-    /// Each camera, and how high it is above the plane, metres.
-    maps: Vec<(&'a DepthMap, f64)>,
-    world_from_flat: Isometry3<f64>,
+    /// Each camera, how high it is above the plane, metres, and places on the plane as seen from it.
+    maps: Vec<(&'a DepthMap, f64, Isometry3<f64>)>,
 }
 
 impl<'a> Hiding<'a> {
     pub fn of(plane: &Plane, seen: &'a Visibility) -> Hiding<'a> {
-        let high = |map: &'a DepthMap| (map, plane.distance(&map.viewpoint()));
-        let lift = Translation3::new(0.0, 0.0, plane.offset);
-        Hiding {
-            maps: seen.maps.iter().map(high).filter(|(_, high_m)| *high_m > 0.0).collect(),
-            world_from_flat: level(plane).inverse() * lift,
-        }
+        let world_from_flat = level(plane).inverse() * Translation3::new(0.0, 0.0, plane.offset);
+        let maps = seen.maps.iter().map(|map| {
+            (map, plane.distance(&map.viewpoint()), map.camera_from_world * world_from_flat)
+        });
+        Hiding { maps: maps.filter(|(_, high_m, _)| *high_m > 0.0).collect() }
     }
 
     /// True if no camera saw anything lower than the plane at a cell, and, unless that may be unseen, one saw something above it.
@@ -41,9 +39,8 @@ impl<'a> Hiding<'a> {
         let mut any = unseen;
         for [dx, dy] in PLACES {
             let place = Point3::new(f64::from(x) + dx, f64::from(y) + dy, 0.0) * CELL_M;
-            let place = self.world_from_flat * place;
-            for (map, high_m) in &self.maps {
-                let q = map.camera_from_world * place;
+            for (map, high_m, camera_from_flat) in &self.maps {
+                let q = camera_from_flat * place;
                 let pixel = map.intrinsics.project(&q).and_then(|(u, v)| map.intrinsics.pixel(u, v));
                 let share = pixel.map_or(f64::NAN, |pixel| f64::from(map.depths_m[pixel]) / q.z);
                 let band_m = Plane::band_of(range_sigma_m(share * q.coords.norm()));

@@ -258,7 +258,9 @@ fn supports(
         let by_m = other.height_m(&surface.middle());
         (by_m > THING_M.0 && by_m < tall_m && surface.stands_on(other, rays)).then_some(by_m)
     };
-    let under = surfaces.iter().filter_map(lies_on).fold(f64::INFINITY, f64::min);
+    // What reaches as far as a floor is no thing on another.
+    let others = surfaces.iter().filter(|_| surface.reach_m() < REACH_M);
+    let under = others.filter_map(lies_on).fold(f64::INFINITY, f64::min);
     let width_m = surface.width_m();
     match () {
         () if under.is_finite() => (Role::Other, Sign::OnTop { by_m: under }),

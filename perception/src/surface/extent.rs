@@ -5,8 +5,9 @@ use super::hull::{area, convex_hull, parts};
 use super::planes::{Plane, Sample};
 use super::{Surface, range_sigma_m};
 use crate::visibility::{DepthMap, Visibility};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::hash_map::Entry;
 
 /// So far a plane is taken to reach on behind and beneath what hides it, metres: few things are twice as wide.
 const HIDDEN_M: f64 = 0.3;
@@ -15,40 +16,50 @@ const TALLEST_M: f64 = 0.6;
 /// What is this much lower at the edge of a plane stands beside it, metres.
 const BESIDE_M: f64 = 0.3;
 
-/// Which cells of a plane belong to which of its parts.
-pub(super) type Owners = FxHashMap<[i32; 2], usize>;
+/// Where a cell is asked about, from its corner, cells.
+const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]];
+
+/// Which part of a plane a cell belongs to; none where a camera saw that there is nothing of it.
+pub(super) type Owners = FxHashMap<[i32; 2], Option<usize>>;
 
 /// What hides a plane from the cameras.
-pub(super) struct Hiding<'a> {
-    /// Each camera, how high it is above the plane, metres, and places on the plane as seen from it.
-    maps: Vec<(&'a DepthMap, f64, Isometry3<f64>)>,
+pub(super) struct Hiding<'a>(Vec<Above<'a>>);
+
+/// A camera above a plane.
+struct Above<'a> {
+    map: &'a DepthMap,
+    high_m: f64,
+    /// The corner of the cell at zero, and one cell on in x and in y, as seen from the camera, metres.
+    origin: Vector3<f64>,
+    steps: [Vector3<f64>; 2],
 }
 
 impl<'a> Hiding<'a> {
     pub fn of(plane: &Plane, seen: &'a Visibility) -> Hiding<'a> {
         let world_from_flat = level(plane).inverse() * Translation3::new(0.0, 0.0, plane.offset);
-        let maps = seen.maps.iter().map(|map| {
-            (map, plane.distance(&map.viewpoint()), map.camera_from_world * world_from_flat)
+        let above = seen.maps.iter().map(|map| {
+            let camera_from_flat = map.camera_from_world * world_from_flat;
+            let step = |axis: Vector3<f64>| camera_from_flat * axis * CELL_M;
+            Above {
+                map,
+                high_m: plane.distance(&map.viewpoint()),
+                origin: camera_from_flat.translation.vector,
+                steps: [step(Vector3::x()), step(Vector3::y())],
+            }
         });
-        Hiding { maps: maps.filter(|(_, high_m, _)| *high_m > 0.0).collect() }
+        Hiding(above.filter(|camera| camera.high_m > 0.0).collect())
     }
 
     /// True if no camera saw anything lower than the plane at a cell, and, unless that may be unseen, one saw something above it.
     fn allows(&self, [x, y]: [i32; 2], unseen: bool) -> bool {
-        const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]];
         let mut any = unseen;
         for [dx, dy] in PLACES {
-            let place = Point3::new(f64::from(x) + dx, f64::from(y) + dy, 0.0) * CELL_M;
-            for (map, high_m, camera_from_flat) in &self.maps {
-                let q = camera_from_flat * place;
-                let pixel = map.intrinsics.project(&q).and_then(|(u, v)| map.intrinsics.pixel(u, v));
-                let share = pixel.map_or(f64::NAN, |pixel| f64::from(map.depths_m[pixel]) / q.z);
-                let band_m = Plane::band_of(range_sigma_m(share * q.coords.norm()));
-                let above_m = high_m * (1.0 - share);
-                if above_m < -band_m {
+            for camera in &self.0 {
+                let above = camera.above([f64::from(x) + dx, f64::from(y) + dy]);
+                if above == Some(false) {
                     return false;
                 }
-                any |= above_m > band_m;
+                any |= above == Some(true);
             }
         }
         any
@@ -58,22 +69,19 @@ impl<'a> Hiding<'a> {
     /// tells which owners meet.
     pub fn spread(&self, owners: &mut Owners, mut border: Vec<[i32; 2]>, unseen: bool) -> Vec<[usize; 2]> {
         let mut meeting = Vec::new();
-        let mut refused: FxHashSet<[i32; 2]> = FxHashSet::default();
         for _ in 0..(HIDDEN_M / CELL_M) as usize {
             let mut next = Vec::new();
             for cell in border {
-                let owner = owners[&cell];
+                let Some(owner) = owners[&cell] else { continue };
                 for around in (0..9).map(|k| [cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]) {
-                    match owners.get(&around) {
-                        Some(&other) if other != owner => meeting.push([owner.min(other), owner.max(other)]),
-                        Some(_) => {}
-                        None if refused.contains(&around) => {}
-                        None if self.allows(around, unseen) => {
-                            owners.insert(around, owner);
+                    match owners.entry(around) {
+                        Entry::Vacant(free) if self.allows(around, unseen) => {
+                            free.insert(Some(owner));
                             next.push(around);
                         }
-                        None => {
-                            refused.insert(around);
+                        Entry::Vacant(free) => drop(free.insert(None)),
+                        Entry::Occupied(other) => {
+                            meeting.extend(other.get().filter(|other| *other != owner).map(|other| [owner, other]));
                         }
                     }
                 }
@@ -86,6 +94,19 @@ impl<'a> Hiding<'a> {
     }
 }
 
+impl Above<'_> {
+    /// Whether what is seen at a place of the plane, in cells, lies above it (true) or lower (false); none where it lies on it or nothing returns.
+    fn above(&self, [x, y]: [f64; 2]) -> Option<bool> {
+        let q = self.origin + self.steps[0] * x + self.steps[1] * y;
+        let (u, v) = self.map.intrinsics.project(&q.into())?;
+        let share = f64::from(self.map.depths_m[self.map.intrinsics.pixel(u, v)?]) / q.z;
+        let above_m = self.high_m * (1.0 - share);
+        // Where nothing returns it is not a number.
+        let is_off = above_m.abs() > Plane::band_of(range_sigma_m(share * q.norm()));
+        is_off.then_some(above_m > 0.0)
+    }
+}
+
 impl Surface {
     /// With the places on which things stand that hide its edge.
     pub(super) fn with_hidden(self, samples: &[Sample], seen: &Visibility) -> Surface {
@@ -93,7 +114,7 @@ impl Surface {
         let turn = level(&plane);
         let (outline, over) = (self.outline(), self.overhung());
         // What stands beside the outline, and what lies lower there.
-        let (mut high, mut low) = (Vec::new(), Owners::default());
+        let (mut high, mut low) = (Vec::new(), FxHashSet::default());
         for s in samples {
             let height_m = plane.distance(&s.point);
             let near = height_m > -BESIDE_M && height_m < TALLEST_M && height_m.abs() > Plane::band_m(s);
@@ -102,7 +123,7 @@ impl Surface {
             }
             let cell = cell_of(&turn, &s.point);
             if height_m < 0.0 {
-                low.insert(cell, 0);
+                low.insert(cell);
             } else if !over(height_m, &s.point) {
                 high.push((cell, s.point));
             }
@@ -111,14 +132,15 @@ impl Surface {
             return self;
         }
         let border = along_edges(&self, &turn);
-        let mut owners: Owners = border.iter().map(|cell| (*cell, 0)).collect();
+        let mut owners: Owners = border.iter().map(|cell| (*cell, Some(0))).collect();
         Hiding::of(&plane, seen).spread(&mut owners, border, true);
         let is_beside =
-            |cell: &[i32; 2]| (0..9).any(|k| low.contains_key(&[cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]));
+            |cell: &[i32; 2]| (0..9).any(|k| low.contains(&[cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]));
         let mut things = parts(&high.iter().map(|(cell, _)| (*cell, 1)).collect());
         things.retain(|cells| !cells.iter().any(is_beside));
-        let standing: Owners = things.into_iter().flatten().map(|cell| (cell, 0)).collect();
-        high.retain(|(cell, _)| standing.contains_key(cell) && owners.contains_key(cell));
+        let standing: FxHashSet<[i32; 2]> = things.into_iter().flatten().collect();
+        let is_reached = |cell: &[i32; 2]| owners.get(cell).is_some_and(Option::is_some);
+        high.retain(|(cell, _)| standing.contains(cell) && is_reached(cell));
         self.widened(&turn, high.iter().map(|(_, p)| p))
     }
 

@@ -11,6 +11,8 @@ use rustc_hash::FxHashMap;
 
 /// Side of the cells that tell which points of a plane hang together, metres.
 pub(super) const CELL_M: f64 = 0.03;
+/// Fewer samples are no piece of a plane.
+const FEWEST_OF_PIECE: u32 = 5;
 /// A part whose points lie on average so far off the common plane has one of its own, metres.
 const OWN_PLANE_M: f64 = 0.002;
 
@@ -49,14 +51,14 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
     let residual_m = (squares / held.len().max(1) as f64).sqrt();
     let all = |cells: &[[i32; 2]]| cells.iter().fold(Counts::default(), |all, cell| all.with(&counts[cell]));
     let mut pieces = parts(&cells);
-    pieces.retain(|cells| !all(cells).is_slice());
+    pieces.retain(|cells| all(cells).near >= FEWEST_OF_PIECE && !all(cells).is_slice());
     let mut parts = joined(pieces, &Hiding::of(plane, seen));
     parts.sort_by_cached_key(|cells| std::cmp::Reverse(all(cells).near));
     let part_of = owners(&parts);
     let mut members: Vec<Vec<&Sample>> = vec![Vec::new(); parts.len()];
     for (cell, s) in held {
-        if let Some(part) = part_of.get(&cell) {
-            members[*part].push(s);
+        if let Some(&Some(part)) = part_of.get(&cell) {
+            members[part].push(s);
         }
     }
     let scale = (cloud.len() as f64 / samples.len().max(1) as f64).max(1.0);
@@ -80,7 +82,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
 
 /// Which part each cell belongs to.
 fn owners(parts: &[Vec<[i32; 2]>]) -> Owners {
-    parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, n))).collect()
+    parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, Some(n)))).collect()
 }
 
 /// The parts of a plane that hang together behind and beneath what hides it.

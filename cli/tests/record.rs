@@ -57,7 +57,7 @@ fn a_simulated_run_is_played_again_and_goes_on_after_kills() {
 fn a_run_on_real_views_is_played_again_and_goes_on_after_kills() {
     let Some(kitchen) = shared("data/kitchen") else { return };
     let robot = format!("recorded:{}", kitchen.display());
-    check_goal(&["find", "mug", "--robot", &robot], &[&[1], &[12, 10]]);
+    check_goal(&["do", "find mug with confidence 0.96", "--robot", &robot], &[&[1], &[12, 10]]);
 }
 
 /// A run whose body is the record of another finds what that one found, where that one found it.

@@ -68,8 +68,8 @@ shape.mug = { diameter_m = 0.080, height_m = 0.095 }
 /// Writes what the simulated camera sees from some places, each turned to a point, as a recording.
 fn record(folder: &Path, scene: &str, looks: &[([f64; 2], [f64; 3])]) {
     let spec = SceneSpec::parse("scene.toml", scene).expect("the scene is right");
-    let options = SimOptions { seed: 1, ..SimOptions::default() };
-    let robot = SimRobot::new(arrange(&spec, 1).expect("it can be laid out"), options);
+    let options = SimOptions { seed: 7, ..SimOptions::default() };
+    let robot = SimRobot::new(arrange(&spec, 7).expect("it can be laid out"), options);
     let watch = Watch::default();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
     fs::create_dir(folder).expect("a folder can be made");

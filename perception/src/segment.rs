@@ -130,10 +130,6 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
     parts
 }
 
-/// How thick a board above is with what hides its edge, and how far beyond its hull things on it reach, metres.
-const BOARD_M: f64 = 0.05;
-const BOARD_MARGIN_M: f64 = 0.03;
-
 /// Indices and positions (surface frame) of the points that stand above the surface, inside its outline.
 fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>, Vec<Point3<f64>>) {
     let clearance_m = options.clearance_m.max(2.5 * surface.residual_m);
@@ -141,14 +137,7 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>,
     let offset = surface.offset_m as f32;
     let band = clearance_m as f32..options.tallest_m as f32;
     let rows = Rows::of(surface);
-    let boards: Vec<_> = surface.over.iter().map(|over| over.outline(&surface.up)).collect();
-    // What lies on a board above, and the board itself, does not stand on this surface.
-    let is_over = |height: f32, p: &Point3<f64>| {
-        let boards = surface.over.iter().zip(&boards);
-        boards.into_iter().any(|(over, outline)| {
-            f64::from(height) > over.above_m - BOARD_M && outline.covers(p, BOARD_MARGIN_M)
-        })
-    };
+    let is_over = surface.overhung();
     let (mut indices, mut points) =
         (Vec::with_capacity(cloud.len() / 2), Vec::with_capacity(cloud.len() / 2));
     for (i, p) in (0u32..).zip(&cloud.points) {
@@ -157,7 +146,7 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>,
         if band.contains(&height) {
             let world = p.cast::<f64>();
             let flat = surface.surface_from_world * world;
-            if rows.covers(&flat, &world) && !is_over(height, &world) {
+            if rows.covers(&flat, &world) && !is_over(f64::from(height), &world) {
                 indices.push(i);
                 points.push(flat);
             }

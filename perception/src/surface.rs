@@ -1,5 +1,6 @@
 //! The level surfaces in view, the floor told from what things stand on: plane and convex hull of each (paper 004, section V).
 
+mod extent;
 mod face;
 mod hull;
 mod outline;
@@ -163,6 +164,20 @@ impl Surface {
         self.up.dot(&p.coords) - self.offset_m
     }
 
+    /// Tells what lies on a board above, or is the board itself, of a height above the surface: it does not stand on this one.
+    pub(crate) fn overhung(&self) -> impl Fn(f64, &Point3<f64>) -> bool + use<> {
+        /// How thick a board is with what hides its edge, and how far beyond its hull things on it reach, metres.
+        const BOARD_M: f64 = 0.05;
+        const MARGIN_M: f64 = 0.03;
+        let boards: Vec<(f64, Outline)> =
+            self.over.iter().map(|over| (over.above_m, over.outline(&self.up))).collect();
+        move |height_m, p| {
+            boards
+                .iter()
+                .any(|(above_m, outline)| height_m > above_m - BOARD_M && outline.covers(p, MARGIN_M))
+        }
+    }
+
     /// Places of the world as seen from above, in the surface's frame.
     fn flat(&self, places: &[Point3<f64>]) -> Vec<[f64; 2]> {
         places.iter().map(|p| (self.surface_from_world * p).xy().coords.into()).collect()
@@ -258,7 +273,7 @@ pub fn find_surfaces(
     // What a plane was proposed as, its points may not bear out.
     let planes = large_planes(&samples, options.seed, is_level).into_iter().filter(is_level);
     let planes: Vec<Plane> = planes.map(|plane| face_up(&plane, up.as_deref(), &viewpoints)).collect();
-    let faces = planes.iter().flat_map(|plane| face::faces(plane, &samples, cloud, &viewpoints));
+    let faces = planes.iter().flat_map(|plane| face::faces(plane, &samples, cloud, seen));
     let surfaces: Vec<Surface> = faces.filter(|s| s.area_m2 >= options.least_area_m2).collect();
     if surfaces.is_empty() {
         return Err(SurfaceError::NotFound { tried: planes.len(), wanted: wanted(options) });
@@ -266,7 +281,11 @@ pub fn find_surfaces(
     let mut surfaces = distinct(surfaces, &samples);
     role::tell(&mut surfaces, &samples, seen, up.as_ref(), options);
     surfaces.sort_by_key(|surface| (!options.wants(surface), surface.role));
-    Ok(surfaces.into_iter().map(|surface| options.within_region(surface)).collect())
+    let whole = |surface: Surface| match surface.role {
+        Role::Support | Role::Untold => surface.with_hidden(&samples, seen),
+        Role::Floor | Role::Other => surface,
+    };
+    Ok(surfaces.into_iter().map(|surface| options.within_region(whole(surface))).collect())
 }
 
 /// The surfaces by how much speaks for them, without those that are made of what is left over of a better one and of things on it.

@@ -11,7 +11,8 @@ use descry_perception::surface::{
     Region, Role, Sign, Surface, SurfaceError, SurfaceOptions, find_surface, find_surfaces,
 };
 use descry_perception::{Cloud, Intrinsics, Scene, View, Visibility};
-use tabletop::Draws;
+use tabletop::pile::Pile;
+use tabletop::{Draws, TABLE_M};
 
 const CAMERA: Intrinsics = Intrinsics { width: 320, height: 240, fx: 270.0, fy: 270.0, cx: 159.5, cy: 119.5 };
 /// Share of the pixels without a return.
@@ -279,6 +280,24 @@ fn what_lies_on_a_shelf_above_is_not_on_the_table() {
                 .expect("a table");
         assert!((scene.surface.offset_m - height_m).abs() < 0.01);
         assert_eq!(things(&scene), 1, "at {height_m} m: {:?}", bounds(&scene));
+    }
+}
+
+#[test]
+fn what_hides_a_table_stands_on_it() {
+    for seed in 10_001..=10_012 {
+        let mut draws = Draws(seed);
+        let view = Pile::drawn(&mut draws).look(&mut draws);
+        let cloud = view.cloud.transformed(&view.world_from_camera);
+        let seen = Visibility::from_views(std::slice::from_ref(&view));
+        let scene = segment(&cloud, &seen, &SceneOptions::default()).expect("a table");
+        let off_m = scene.surface.middle().z - TABLE_M;
+        assert!(off_m.abs() < 0.01, "seed {seed}: {off_m} m off the table");
+        let is_thing = |label: &u32| *label >= 20;
+        let labels = view.cloud.labels.unwrap_or_default();
+        let held = scene.segments.iter().flat_map(|s| &s.indices).filter(|i| is_thing(&labels[**i as usize]));
+        let share = held.count() as f64 / labels.iter().filter(|label| is_thing(label)).count() as f64;
+        assert!(share > 0.9, "seed {seed}: {share} of the returns of things");
     }
 }
 

@@ -1,6 +1,7 @@
 //! Segmentation, merging and recognition against what is known, and how long single views take, as tables:
-//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
+//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
+mod clutter;
 mod frames;
 mod further;
 mod kitchen;
@@ -19,12 +20,16 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
-        ["mosd", dir] => mosd::run(Path::new(dir)),
+        ["mosd", dir, out @ ..] => mosd::run(Path::new(dir), out.first().map(Path::new)),
         ["kitchen", dir, ..] => kitchen::run(Path::new(dir)),
         ["surfaces", dirs @ ..] => surfaces::run(dirs),
         ["table", count, out @ ..] => match count.parse() {
             Ok(count) => table::run(count, out.first().map(Path::new)),
             Err(_) => Err(format!("`{count}` is no number of arrangements")),
+        },
+        ["clutter", count, first, out @ ..] => match (count.parse(), first.parse()) {
+            (Ok(count), Ok(first)) => clutter::run(count, first, out.first().map(Path::new)),
+            _ => Err(format!("`{count}` and `{first}` are no number of piles and first seed")),
         },
         ["mismatched", count, seed, further @ ..] => match (count.parse(), seed.parse()) {
             (Ok(count), Ok(seed)) => {
@@ -43,7 +48,7 @@ fn main() -> ExitCode {
         },
         ["variants", dirs @ ..] => variants::run(dirs),
         _ => Err(
-            "usage: evaluate mosd DIR | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
+            "usage: evaluate mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
                 .to_owned(),
         ),
     };

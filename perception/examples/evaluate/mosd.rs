@@ -1,5 +1,6 @@
 //! Kinect scenes of the Object Segmentation Database with a label a point.
 
+use super::clutter::picture;
 use descry_perception::cloud::is_finite;
 use descry_perception::files::read_cloud;
 use descry_perception::nalgebra::Point3;
@@ -27,16 +28,19 @@ pub fn cup() -> ObjectModel {
 }
 
 #[derive(Default)]
-struct Tally {
-    found: usize,
-    objects: usize,
-    split: usize,
-    merged: usize,
-    extra: usize,
+pub struct Tally {
+    pub found: usize,
+    pub objects: usize,
+    pub split: usize,
+    pub merged: usize,
+    pub extra: usize,
 }
 
-/// Scores every scene of the folder.
-pub fn run(dir: &Path) -> Result<(), String> {
+/// Scores every scene of the folder; pictures of them go to `out`.
+pub fn run(dir: &Path, out: Option<&Path>) -> Result<(), String> {
+    if let Some(out) = out {
+        std::fs::create_dir_all(out).map_err(|e| format!("{}: {e}", out.display()))?;
+    }
     let (cups, objects) = (dir.join("cups.csv"), dir.join("objects.csv"));
     let cups = if cups.exists() { table(&cups)? } else { Vec::new() };
     let objects = if objects.exists() { Some(table(&objects)?) } else { None };
@@ -71,6 +75,9 @@ pub fn run(dir: &Path) -> Result<(), String> {
             scene.surface.residual_m * 1e3,
             scene.segments.len()
         );
+        if let Some(out) = out {
+            picture(&out.join(format!("{name}.png")), &view, &view.cloud, &scene)?;
+        }
         let of_scene = |rows: &[Vec<String>]| -> Vec<u32> {
             rows.iter().filter(|r| r[0] == name).filter_map(|r| r[1].parse().ok()).collect()
         };
@@ -107,7 +114,7 @@ fn labelled(path: &Path, name: &str) -> Result<(View, Vec<u32>), String> {
 }
 
 /// What the labels call objects, where no table lists them.
-fn labelled_objects(labels: &[u32]) -> Vec<u32> {
+pub fn labelled_objects(labels: &[u32]) -> Vec<u32> {
     const FEWEST: usize = 60;
     let mut sizes: BTreeMap<u32, usize> = BTreeMap::new();
     labels.iter().filter(|label| **label >= 20).for_each(|label| *sizes.entry(label / 10).or_default() += 1);
@@ -176,7 +183,7 @@ pub fn words(p: &Percept) -> String {
 }
 
 /// The object that most of each segment belongs to; counts what was found, split and merged.
-fn overlap(
+pub fn overlap(
     scene: &Scene,
     cloud: &descry_perception::Cloud,
     labels: &[u32],

@@ -124,6 +124,15 @@ impl Cut {
         let rest: Vec<usize> = rest.filter(|v| body.binary_search(v).is_err()).collect();
         let (left, own): (Vec<_>, Vec<_>) =
             together(voxels, &rest).into_iter().partition(|piece| is_apart(voxels, piece, &body, axis));
+        // What two parts leave stays two.
+        let left: Vec<Vec<usize>> = left
+            .iter()
+            .flat_map(|piece| touched.iter().map(move |part| (piece, *part)))
+            .map(|(piece, part)| {
+                piece.iter().copied().filter(|v| part_of_voxel[*v] == part).collect::<Vec<_>>()
+            })
+            .flat_map(|piece| together(voxels, &piece))
+            .collect();
         if touched.len() == 1 && left.is_empty() {
             return None;
         }

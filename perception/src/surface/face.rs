@@ -1,28 +1,28 @@
 //! The connected parts of a plane, each with its convex hull.
 
+use super::extent::{Hiding, Owners};
 use super::hull::{area, convex_hull, parts};
 use super::planes::{FEWEST, Plane, Sample, least_squares};
 use super::{Role, Sign, Surface, floor};
 use crate::cloud::Cloud;
+use crate::visibility::Visibility;
 use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use rustc_hash::FxHashMap;
 
 /// Side of the cells that tell which points of a plane hang together, metres.
-const CELL_M: f64 = 0.03;
+pub(super) const CELL_M: f64 = 0.03;
+/// Fewer samples are no piece of a plane.
+const FEWEST_OF_PIECE: u32 = 5;
 /// A part whose points lie on average so far off the common plane has one of its own, metres.
 const OWN_PLANE_M: f64 = 0.002;
 
 /// The connected parts of a plane, most returns first. None if no camera is above it.
-pub(super) fn faces(
-    plane: &Plane,
-    samples: &[Sample],
-    cloud: &Cloud,
-    viewpoints: &[Point3<f64>],
-) -> Vec<Surface> {
+pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Visibility) -> Vec<Surface> {
+    let viewpoints = seen.viewpoints();
     if !viewpoints.is_empty() && viewpoints.iter().all(|v| plane.distance(v) < 0.02) {
         return Vec::new();
     }
-    let turn = level(plane).to_rotation_matrix();
+    let turn = level(plane);
     let mut counts: FxHashMap<[i32; 2], Counts> = FxHashMap::default();
     let mut held: Vec<([i32; 2], &Sample)> = Vec::new();
     for s in samples {
@@ -30,8 +30,7 @@ pub(super) fn faces(
         if distance.abs() > 2.0 * band {
             continue;
         }
-        let flat = turn * s.point;
-        let cell = [floor(flat.x / CELL_M), floor(flat.y / CELL_M)];
+        let cell = cell_of(&turn, &s.point);
         let counts = counts.entry(cell).or_default();
         if distance.abs() <= band {
             counts.near += 1;
@@ -43,22 +42,28 @@ pub(super) fn faces(
     let is_face = |cell: &[i32; 2]| {
         let around = (0..9).map(|k| [cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]);
         let around = around.filter_map(|cell| counts.get(&cell));
-        !around.fold(Counts::default(), |all, counts| all.with(counts)).is_slice()
+        let around = around.fold(Counts::default(), |all, counts| all.with(counts));
+        !around.is_slice() && !around.is_foot()
     };
     let near = counts.iter().filter(|(cell, counts)| counts.near > 0 && is_face(cell));
     let cells: FxHashMap<[i32; 2], u32> = near.map(|(cell, counts)| (*cell, counts.near)).collect();
     let squares: f64 = held.iter().map(|(_, s)| plane.distance(&s.point).powi(2)).sum();
     let residual_m = (squares / held.len().max(1) as f64).sqrt();
-    held.retain(|(cell, _)| cells.contains_key(cell));
-    let parts = parts(&cells);
-    let part_of: FxHashMap<[i32; 2], usize> =
-        parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, n))).collect();
+    let all = |cells: &[[i32; 2]]| cells.iter().fold(Counts::default(), |all, cell| all.with(&counts[cell]));
+    let mut pieces = parts(&cells);
+    pieces.retain(|cells| all(cells).near >= FEWEST_OF_PIECE && !all(cells).is_slice());
+    let mut parts = joined(pieces, &Hiding::of(plane, seen));
+    parts.sort_by_cached_key(|cells| std::cmp::Reverse(all(cells).near));
+    let part_of = owners(&parts);
     let mut members: Vec<Vec<&Sample>> = vec![Vec::new(); parts.len()];
-    held.iter().for_each(|(cell, s)| members[part_of[cell]].push(s));
+    for (cell, s) in held {
+        if let Some(&Some(part)) = part_of.get(&cell) {
+            members[part].push(s);
+        }
+    }
     let scale = (cloud.len() as f64 / samples.len().max(1) as f64).max(1.0);
     let surface = |(n, (cells, members)): (usize, (&Vec<[i32; 2]>, &Vec<&Sample>))| {
-        let all = cells.iter().fold(Counts::default(), |all, cell| all.with(&counts[cell]));
-        if n > 0 && members.len() < FEWEST || all.is_slice() {
+        if n > 0 && members.len() < FEWEST {
             return None;
         }
         // The plane is the largest part's; another may lie a little off it.
@@ -73,6 +78,28 @@ pub(super) fn faces(
         (hull.len() >= 3).then(surface)
     };
     parts.iter().zip(&members).enumerate().filter_map(surface).collect()
+}
+
+/// Which part each cell belongs to.
+fn owners(parts: &[Vec<[i32; 2]>]) -> Owners {
+    parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, Some(n)))).collect()
+}
+
+/// The parts of a plane that hang together behind and beneath what hides it.
+fn joined(parts: Vec<Vec<[i32; 2]>>, hiding: &Hiding) -> Vec<Vec<[i32; 2]>> {
+    let meeting = match parts.len() {
+        0 | 1 => return parts,
+        _ => hiding.spread(&mut owners(&parts), parts.concat(), false),
+    };
+    let mut of: Vec<usize> = (0..parts.len()).collect();
+    for [a, b] in meeting {
+        let (a, b) = (of[a], of[b]);
+        of.iter_mut().filter(|part| **part == a.max(b)).for_each(|part| *part = a.min(b));
+    }
+    let mut whole = vec![Vec::new(); parts.len()];
+    parts.into_iter().zip(of).for_each(|(part, n)| whole[n].extend(part));
+    whole.retain(|part| !part.is_empty());
+    whole
 }
 
 /// Samples near a plane, and as far again below and above it.
@@ -94,6 +121,12 @@ impl Counts {
         const SHARE: f64 = 0.2;
         f64::from(self.beside[0].min(self.beside[1])) > SHARE * f64::from(self.near)
     }
+
+    /// True if it is hardly more than where something upright begins: of a wall, half as much lies above as near it.
+    fn is_foot(&self) -> bool {
+        const SHARE: f64 = 0.35;
+        f64::from(self.beside[1]) > SHARE * f64::from(self.near)
+    }
 }
 
 /// Corners of the hull around cells, metres.
@@ -102,8 +135,14 @@ fn hull_of(cells: &[[i32; 2]]) -> Vec<[f64; 2]> {
     convex_hull(corners.map(|[x, y]| [f64::from(x) * CELL_M, f64::from(y) * CELL_M]).collect())
 }
 
+/// The cell that a place lies in, once turned.
+pub(super) fn cell_of(turn: &UnitQuaternion<f64>, p: &Point3<f64>) -> [i32; 2] {
+    let flat = turn * p;
+    [floor(flat.x / CELL_M), floor(flat.y / CELL_M)]
+}
+
 /// Turns the normal of a plane into z.
-fn level(plane: &Plane) -> UnitQuaternion<f64> {
+pub(super) fn level(plane: &Plane) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(&plane.normal, &Vector3::z()).unwrap_or_else(|| {
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(
             &Vector3::x_axis(),

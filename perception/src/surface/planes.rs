@@ -35,7 +35,12 @@ impl Plane {
 
     /// How far from a plane a measurement of it may lie, metres.
     pub fn band_m(sample: &Sample) -> f64 {
-        3.0 * sample.sigma_m + 0.004
+        Plane::band_of(sample.sigma_m)
+    }
+
+    /// How far from a plane a measurement with a spread may lie, metres.
+    pub fn band_of(sigma_m: f64) -> f64 {
+        3.0 * sigma_m + 0.004
     }
 }
 
@@ -146,33 +151,37 @@ impl Cubes {
 /// The points that proposals are judged by, each coordinate by itself.
 struct Judges {
     coordinates: [Vec<f64>; 3],
-    /// How far each may be off a plane that it speaks for, metres.
-    bands_m: Vec<f64>,
+    /// One over how far each may be off a plane that it speaks for, per metre.
+    per_band: Vec<f64>,
 }
 
 impl Judges {
     fn of(samples: &[Sample]) -> Judges {
         let judges = || samples.iter().step_by((samples.len() / JUDGES).max(1));
         let axis = |k: usize| judges().map(|s| s.point[k]).collect();
-        let bands_m = judges().map(|s| 2.0 * s.sigma_m + 0.004).collect();
-        Judges { coordinates: [axis(0), axis(1), axis(2)], bands_m }
+        let per_band = judges().map(|s| 1.0 / (2.0 * s.sigma_m + 0.004)).collect();
+        Judges { coordinates: [axis(0), axis(1), axis(2)], per_band }
     }
 
-    /// How many speak for the plane; `None` as soon as it cannot be more than `beaten`.
-    fn near(&self, plane: &Plane, beaten: usize) -> Option<usize> {
+    /// How much speaks for the plane: of each judge the more the nearer it is (Torr and Zisserman 2000), so that a plane that leans through
+    /// two steps has less than that of one. `None` as soon as it cannot be more than `beaten`.
+    fn near(&self, plane: &Plane, beaten: f64) -> Option<f64> {
         const BLOCK: usize = 128;
         let [x, y, z] = self.coordinates.each_ref().map(|axis| axis.chunks(BLOCK));
-        let (mut found, mut left) = (0, self.bands_m.len());
-        for (((x, y), z), bands_m) in x.zip(y).zip(z).zip(self.bands_m.chunks(BLOCK)) {
-            if found + left <= beaten {
+        let (mut found, mut left) = (0.0, self.per_band.len());
+        for (((x, y), z), per_band) in x.zip(y).zip(z).zip(self.per_band.chunks(BLOCK)) {
+            if found + left as f64 <= beaten {
                 return None;
             }
-            let near = x.iter().zip(y).zip(z).zip(bands_m).map(|(((x, y), z), band_m)| {
+            let mut near = [0.0; 8];
+            let places = x.iter().zip(y).zip(z).zip(per_band).enumerate();
+            for (k, (((x, y), z), per_band)) in places {
                 let along = plane.normal.x * x + plane.normal.y * y + plane.normal.z * z;
-                u64::from((along - plane.offset).abs() < *band_m)
-            });
-            found += near.sum::<u64>() as usize;
-            left -= bands_m.len();
+                let off = (along - plane.offset) * per_band;
+                near[k % 8] += (1.0 - off * off).max(0.0);
+            }
+            found += near.iter().sum::<f64>();
+            left -= per_band.len();
         }
         (found > beaten).then_some(found)
     }
@@ -186,7 +195,7 @@ fn propose(
     plausible: &impl Fn(&Plane) -> bool,
 ) -> Option<Plane> {
     let judges = Judges::of(left);
-    let mut best: Option<(usize, Plane)> = None;
+    let mut best: Option<(f64, Plane)> = None;
     for _ in 0..PROPOSALS {
         let first = rng.below(left.len());
         let near = cubes.around(first);
@@ -199,7 +208,7 @@ fn propose(
         }
         let count = match best {
             Some((beaten, _)) => judges.near(&plane, beaten),
-            None => judges.near(&plane, 0).or(Some(0)),
+            None => judges.near(&plane, 0.0).or(Some(0.0)),
         };
         best = count.map(|count| (count, plane)).or(best);
     }

@@ -107,6 +107,10 @@ const PAST_RAYS: usize = 15;
 const PAST_SHARE: f64 = 0.005;
 /// Surfaces are parallel if their normals differ by no more, cosine of 8 degrees.
 const PARALLEL: f64 = 0.99;
+/// What a thing stands on is seen around it within so far, by so many rays, and as level as this, metres.
+const AROUND_M: f64 = 0.1;
+const AROUND_RAYS: usize = 5;
+const LEVEL_M: f64 = 0.012;
 /// What is lower than this on another surface is a thing, or on the floor a step, metres.
 const THING_M: (f64, f64) = (0.015, 0.3);
 /// What is lower than this on a table is a thing unless something was seen beneath it, metres.
@@ -145,7 +149,7 @@ pub(super) fn tell(
     let rays = rays(samples, seen);
     let past: Vec<Option<f64>> = surfaces.iter().map(|s| past(s, &rays)).collect();
     let told: Vec<(Role, Sign)> =
-        (0..surfaces.len()).map(|n| supports(n, surfaces, &level, &past, samples)).collect();
+        (0..surfaces.len()).map(|n| supports(n, surfaces, &level, &past, samples, &rays)).collect();
     assign(surfaces, told);
     let eyes = seen.viewpoints();
     let mirrored: Vec<bool> = (0..surfaces.len()).map(|n| is_mirrored(n, surfaces, &eyes)).collect();
@@ -241,6 +245,7 @@ fn supports(
     level: &Unit<Vector3<f64>>,
     past: &[Option<f64>],
     samples: &[Sample],
+    rays: &[Ray],
 ) -> (Role, Sign) {
     let surface = &surfaces[n];
     let by_rad = surface.up.angle(level);
@@ -248,11 +253,14 @@ fn supports(
         return (Role::Other, Sign::Slanted { by_rad });
     }
     let is_solid = !surface.is_open_beneath(samples);
-    let lies_on = |(other, past): (&Surface, &Option<f64>)| {
-        let tall_m = if past.is_some() && is_solid { TALL_THING_M } else { THING_M.1 };
-        surface.lies_on(other).filter(|by_m| *by_m < tall_m)
+    let lies_on = |other: &Surface| {
+        let tall_m = if past[n].is_some() && is_solid { TALL_THING_M } else { THING_M.1 };
+        let by_m = other.height_m(&surface.middle());
+        (by_m > THING_M.0 && by_m < tall_m && surface.stands_on(other, rays)).then_some(by_m)
     };
-    let under = surfaces.iter().zip(past).filter_map(lies_on).fold(f64::INFINITY, f64::min);
+    // What reaches as far as a floor is no thing on another.
+    let others = surfaces.iter().filter(|_| surface.reach_m() < REACH_M);
+    let under = others.filter_map(lies_on).fold(f64::INFINITY, f64::min);
     let width_m = surface.width_m();
     match () {
         () if under.is_finite() => (Role::Other, Sign::OnTop { by_m: under }),
@@ -354,14 +362,25 @@ impl Surface {
         samples.iter().filter(is_beneath).take(BENEATH).count() == BENEATH
     }
 
-    /// How low the other lies if it reaches on all around beneath this, metres.
-    fn lies_on(&self, other: &Surface) -> Option<f64> {
-        let by_m = other.height_m(&self.middle());
-        if by_m < THING_M.0 || !self.is_parallel(other) || other.area_m2 < 1.5 * self.area_m2 {
-            return None;
+    /// True if the other, which lies lower, goes on around this: it is seen beside it, and hardly anything lower still.
+    fn stands_on(&self, other: &Surface, rays: &[Ray]) -> bool {
+        if !self.is_parallel(other) {
+            return false;
         }
-        let outline = other.outline();
-        let within = self.hull.iter().filter(|p| outline.covers(p, 0.02)).count();
-        (within * 10 >= self.hull.len() * 7).then_some(by_m)
+        let outline = self.outline();
+        let (mut on, mut past) = (0, 0);
+        for ray in rays {
+            let low = other.height_m(&ray.end);
+            if low.abs() < LEVEL_M {
+                on += usize::from(outline.covers(&ray.end, AROUND_M));
+            } else if low < -LOWER_M {
+                let crossing = ray.eye.map_or(ray.end, |eye| {
+                    let high = other.height_m(&eye);
+                    eye + (ray.end - eye) * (high / (high - low))
+                });
+                past += usize::from(outline.covers(&crossing, AROUND_M));
+            }
+        }
+        on >= AROUND_RAYS && on * 10 >= (on + past) * 7
     }
 }

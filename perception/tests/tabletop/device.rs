@@ -1,7 +1,7 @@
 //! Depth cameras that look at the table: the one that is assumed, and others.
 
 use super::{Draws, Thing, nearest};
-use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::{Intrinsics, View};
 
 /// How a depth camera falls short.
@@ -37,19 +37,33 @@ impl Device {
         stated: &Isometry3<f64>,
         draws: &mut Draws,
     ) -> View {
+        let hit = |eye: &Point3<f64>, ray: &Vector3<f64>| nearest(things, eye, ray).map(|z| (z, 0));
+        self.see(hit, truth, stated, draws).0
+    }
+
+    /// What it sees where a ray from an eye ends as told, and what is said of each end.
+    pub(super) fn see(
+        &self,
+        hit: impl Fn(&Point3<f64>, &Vector3<f64>) -> Option<(f64, u32)>,
+        truth: &Isometry3<f64>,
+        stated: &Isometry3<f64>,
+        draws: &mut Draws,
+    ) -> (View, Vec<u32>) {
         let eye = Point3::from(truth.translation.vector);
         let camera = self.camera;
         let mut depths = vec![f32::NAN; camera.width * camera.height];
-        for (i, depth) in depths.iter_mut().enumerate() {
+        let mut said = vec![0; depths.len()];
+        for (i, (depth, said)) in depths.iter_mut().zip(&mut said).enumerate() {
             let (u, v) = ((i % camera.width) as f64, (i / camera.width) as f64);
             let mut ray = || {
                 // The ray wanders by less than a pixel: noise across it, and frayed edges.
                 let (du, dv) = (self.lateral_px * draws.normal(), self.lateral_px * draws.normal());
                 truth.rotation * camera.unproject(u + du, v + dv, 1.0).coords
             };
-            let Some(mut z) = nearest(things, &eye, &ray()) else { continue };
+            let Some((mut z, what)) = hit(&eye, &ray()) else { continue };
+            *said = what;
             if self.base_m.is_none() {
-                let beside = nearest(things, &eye, &ray()).unwrap_or(z);
+                let beside = hit(&eye, &ray()).map_or(z, |(z, _)| z);
                 z = 0.5 * (z + beside);
                 // A few millimetres in waves of decimetres, as cameras of this kind have them after calibration.
                 z += 0.004 * (std::f64::consts::TAU * z / 0.3).sin();
@@ -67,14 +81,15 @@ impl Device {
         if self.holes > 0.0 {
             self.lose(&mut depths, truth, draws);
         }
-        View {
+        let view = View {
             stamp_ns: 0,
             cloud: camera.cloud_from_depth(&depths).expect("the camera is sound"),
             intrinsics: Some(camera),
             world_from_camera: *stated,
             pose_sigma_m: 0.03,
             pose_sigma_rad: 0.035,
-        }
+        };
+        (view, said)
     }
 
     /// Takes the returns away that are likeliest to be lost: in patches, where faces are steep, at depth edges, and in spots that are

@@ -3,6 +3,7 @@
 #![allow(dead_code)]
 
 pub mod device;
+pub mod pile;
 
 use descry_perception::View;
 use descry_perception::nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -111,71 +112,82 @@ pub fn look(things: &[Thing], truth: &Isometry3<f64>, stated: &Isometry3<f64>, d
     KINECT.look(things, truth, stated, draws)
 }
 
+/// Half sides of the table's top, metres.
+pub const HALF_M: [f64; 2] = [0.8, 0.4];
+
 /// Ray parameter of the nearest surface (the ray has depth 1 along the optical axis).
 fn nearest(things: &[Thing], eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
+    let hits = things.iter().filter_map(|thing| meets(thing, eye, ray));
+    let best = hits.fold(bare(HALF_M, eye, ray), f64::min);
+    best.is_finite().then_some(best)
+}
+
+/// Where a ray meets the table's top or the floor; infinite if nowhere.
+fn bare(half_m: [f64; 2], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
+    let level = |(z, half): (f64, Option<[f64; 2]>)| {
+        let t = (z - eye.z) / ray.z;
+        let p = eye + ray * t;
+        (t > 0.1 && half.is_none_or(|h| p.x.abs() < h[0] && p.y.abs() < h[1])).then_some(t)
+    };
+    [(TABLE_M, Some(half_m)), (0.0, None)].into_iter().filter_map(level).fold(f64::INFINITY, f64::min)
+}
+
+/// Where a ray meets a thing first.
+fn meets(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
+    // What a ray passes by, seen from above, it does not meet.
+    let across = (ray.x * ray.x + ray.y * ray.y).sqrt();
+    let (x, y) = thing.place();
+    if ((x - eye.x) * ray.y - (y - eye.y) * ray.x).abs() > across * (thing.reach_m() + 0.001) {
+        return None;
+    }
     let mut best = f64::INFINITY;
     let mut offer = |t: f64| {
         if t > 0.1 && t < best {
             best = t;
         }
     };
-    for (z, half) in [(TABLE_M, Some([0.8, 0.4])), (0.0, None)] {
-        let t = (z - eye.z) / ray.z;
-        let p = eye + ray * t;
-        if half.is_none_or(|h| p.x.abs() < h[0] && p.y.abs() < h[1]) {
-            offer(t);
+    match *thing {
+        Thing::Cup { x, y, radius, height, handle_rad } => {
+            tube(eye, ray, x, y, radius, height).for_each(&mut offer);
+            tube(eye, ray, x, y, radius - 0.003, height).for_each(&mut offer);
+            disc(eye, ray, x, y, radius, TABLE_M + 0.004).for_each(&mut offer);
+            if let Some(angle) = handle_rad {
+                handle(eye, ray, x, y, radius, height, angle).for_each(&mut offer);
+            }
         }
-    }
-    // What a ray passes by, seen from above, it does not meet.
-    let across = (ray.x * ray.x + ray.y * ray.y).sqrt();
-    let passes_by = |thing: &&Thing| {
-        let (x, y) = thing.place();
-        ((x - eye.x) * ray.y - (y - eye.y) * ray.x).abs() > across * (thing.reach_m() + 0.001)
-    };
-    for thing in things.iter().filter(|thing| !passes_by(thing)) {
-        match *thing {
-            Thing::Cup { x, y, radius, height, handle_rad } => {
-                tube(eye, ray, x, y, radius, height).for_each(&mut offer);
-                tube(eye, ray, x, y, radius - 0.003, height).for_each(&mut offer);
-                disc(eye, ray, x, y, radius, TABLE_M + 0.004).for_each(&mut offer);
-                if let Some(angle) = handle_rad {
-                    handle(eye, ray, x, y, radius, height, angle).for_each(&mut offer);
-                }
+        Thing::Tin { x, y, radius, height } => {
+            tube(eye, ray, x, y, radius, height).for_each(&mut offer);
+            disc(eye, ray, x, y, radius, TABLE_M + height).for_each(&mut offer);
+        }
+        Thing::Sherd { x, y, radius, height, towards_rad, half_rad } => {
+            let is_left = |t: &f64| {
+                let p = eye + ray * *t;
+                let (sin, cos) = towards_rad.sin_cos();
+                (p.x - x) * cos + (p.y - y) * sin > radius * half_rad.cos()
+            };
+            tube(eye, ray, x, y, radius, height).filter(is_left).for_each(&mut offer);
+        }
+        Thing::Block { x, y, half, height, turn_rad } => {
+            let low = Point3::new(-half[0], -half[1], TABLE_M);
+            let high = Point3::new(half[0], half[1], TABLE_M + height);
+            cuboid(eye, ray, x, y, turn_rad, &low, &high).for_each(&mut offer);
+        }
+        Thing::Turned { x, y, knots, scale, open, handle_rad, spout } => {
+            let here = Point3::new(eye.x - x, eye.y - y, eye.z - TABLE_M);
+            turned(&here, ray, knots, scale, 0.0).for_each(&mut offer);
+            let [foot, rim] = [0, knots.len() - 1].map(|k| knots[k].map(|m| m * scale));
+            if open {
+                turned(&here, ray, knots, scale, 0.003).for_each(&mut offer);
+                disc(eye, ray, x, y, foot[1], TABLE_M + 0.004).for_each(&mut offer);
+            } else {
+                disc(eye, ray, x, y, rim[1], TABLE_M + rim[0]).for_each(&mut offer);
             }
-            Thing::Tin { x, y, radius, height } => {
-                tube(eye, ray, x, y, radius, height).for_each(&mut offer);
-                disc(eye, ray, x, y, radius, TABLE_M + height).for_each(&mut offer);
-            }
-            Thing::Sherd { x, y, radius, height, towards_rad, half_rad } => {
-                let is_left = |t: &f64| {
-                    let p = eye + ray * *t;
-                    let (sin, cos) = towards_rad.sin_cos();
-                    (p.x - x) * cos + (p.y - y) * sin > radius * half_rad.cos()
-                };
-                tube(eye, ray, x, y, radius, height).filter(is_left).for_each(&mut offer);
-            }
-            Thing::Block { x, y, half, height, turn_rad } => {
-                let low = Point3::new(-half[0], -half[1], TABLE_M);
-                let high = Point3::new(half[0], half[1], TABLE_M + height);
-                cuboid(eye, ray, x, y, turn_rad, &low, &high).for_each(&mut offer);
-            }
-            Thing::Turned { x, y, knots, scale, open, handle_rad, spout } => {
-                let here = Point3::new(eye.x - x, eye.y - y, eye.z - TABLE_M);
-                turned(&here, ray, knots, scale, 0.0).for_each(&mut offer);
-                let [foot, rim] = [0, knots.len() - 1].map(|k| knots[k].map(|m| m * scale));
-                if open {
-                    turned(&here, ray, knots, scale, 0.003).for_each(&mut offer);
-                    disc(eye, ray, x, y, foot[1], TABLE_M + 0.004).for_each(&mut offer);
-                } else {
-                    disc(eye, ray, x, y, rim[1], TABLE_M + rim[0]).for_each(&mut offer);
-                }
-                if let Some(angle) = handle_rad {
-                    handle(eye, ray, x, y, foot[1], rim[0], angle).for_each(&mut offer);
-                    if spout {
-                        let low = Point3::new(-rim[1] - 0.025, -0.012, TABLE_M + 0.85 * rim[0]);
-                        let high = Point3::new(-rim[1], 0.012, TABLE_M + rim[0]);
-                        cuboid(eye, ray, x, y, angle, &low, &high).for_each(&mut offer);
-                    }
+            if let Some(angle) = handle_rad {
+                handle(eye, ray, x, y, foot[1], rim[0], angle).for_each(&mut offer);
+                if spout {
+                    let low = Point3::new(-rim[1] - 0.025, -0.012, TABLE_M + 0.85 * rim[0]);
+                    let high = Point3::new(-rim[1], 0.012, TABLE_M + rim[0]);
+                    cuboid(eye, ray, x, y, angle, &low, &high).for_each(&mut offer);
                 }
             }
         }

@@ -1,0 +1,175 @@
+//! How far a plane reaches where what stands on it hides it: on from where it was seen, as long as no camera saw it to be absent.
+
+use super::face::{CELL_M, cell_of, level};
+use super::hull::{area, convex_hull, parts};
+use super::planes::{Plane, Sample};
+use super::{Surface, range_sigma_m};
+use crate::visibility::{DepthMap, Visibility};
+use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::hash_map::Entry;
+
+/// So far a plane is taken to reach on behind and beneath what hides it, metres: few things are twice as wide.
+const HIDDEN_M: f64 = 0.3;
+/// What stands on a plane is no taller, metres.
+const TALLEST_M: f64 = 0.6;
+/// What is this much lower at the edge of a plane stands beside it, metres.
+const BESIDE_M: f64 = 0.3;
+
+/// Where a cell is asked about, from its corner, cells.
+const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]];
+
+/// Which part of a plane a cell belongs to; none where a camera saw that there is nothing of it.
+pub(super) type Owners = FxHashMap<[i32; 2], Option<usize>>;
+
+/// What hides a plane from the cameras.
+pub(super) struct Hiding<'a>(Vec<Above<'a>>);
+
+/// A camera above a plane.
+struct Above<'a> {
+    map: &'a DepthMap,
+    high_m: f64,
+    /// The corner of the cell at zero, and one cell on in x and in y, as seen from the camera, metres.
+    origin: Vector3<f64>,
+    steps: [Vector3<f64>; 2],
+}
+
+impl<'a> Hiding<'a> {
+    pub fn of(plane: &Plane, seen: &'a Visibility) -> Hiding<'a> {
+        let world_from_flat = level(plane).inverse() * Translation3::new(0.0, 0.0, plane.offset);
+        let above = seen.maps.iter().map(|map| {
+            let camera_from_flat = map.camera_from_world * world_from_flat;
+            let step = |axis: Vector3<f64>| camera_from_flat * axis * CELL_M;
+            Above {
+                map,
+                high_m: plane.distance(&map.viewpoint()),
+                origin: camera_from_flat.translation.vector,
+                steps: [step(Vector3::x()), step(Vector3::y())],
+            }
+        });
+        Hiding(above.filter(|camera| camera.high_m > 0.0).collect())
+    }
+
+    /// True if no camera saw anything lower than the plane at a cell, and, unless that may be unseen, one saw something above it.
+    fn allows(&self, [x, y]: [i32; 2], unseen: bool) -> bool {
+        let mut any = unseen;
+        for [dx, dy] in PLACES {
+            for camera in &self.0 {
+                let above = camera.above([f64::from(x) + dx, f64::from(y) + dy]);
+                if above == Some(false) {
+                    return false;
+                }
+                any |= above == Some(true);
+            }
+        }
+        any
+    }
+
+    /// Gives the hidden cells around those that are owned to their owners, ring by ring, those that no camera had in view as well if told so;
+    /// tells which owners meet.
+    pub fn spread(&self, owners: &mut Owners, mut border: Vec<[i32; 2]>, unseen: bool) -> Vec<[usize; 2]> {
+        let mut meeting = Vec::new();
+        for _ in 0..(HIDDEN_M / CELL_M) as usize {
+            let mut next = Vec::new();
+            for cell in border {
+                let Some(owner) = owners[&cell] else { continue };
+                for around in (0..9).map(|k| [cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]) {
+                    match owners.entry(around) {
+                        Entry::Vacant(free) if self.allows(around, unseen) => {
+                            free.insert(Some(owner));
+                            next.push(around);
+                        }
+                        Entry::Vacant(free) => drop(free.insert(None)),
+                        Entry::Occupied(other) => {
+                            meeting.extend(other.get().filter(|other| *other != owner).map(|other| [owner, other]));
+                        }
+                    }
+                }
+            }
+            border = next;
+        }
+        meeting.sort_unstable();
+        meeting.dedup();
+        meeting
+    }
+}
+
+impl Above<'_> {
+    /// Whether what is seen at a place of the plane, in cells, lies above it (true) or lower (false); none where it lies on it or nothing returns.
+    fn above(&self, [x, y]: [f64; 2]) -> Option<bool> {
+        let q = self.origin + self.steps[0] * x + self.steps[1] * y;
+        let (u, v) = self.map.intrinsics.project(&q.into())?;
+        let share = f64::from(self.map.depths_m[self.map.intrinsics.pixel(u, v)?]) / q.z;
+        let above_m = self.high_m * (1.0 - share);
+        // Where nothing returns it is not a number.
+        let is_off = above_m.abs() > Plane::band_of(range_sigma_m(share * q.norm()));
+        is_off.then_some(above_m > 0.0)
+    }
+}
+
+impl Surface {
+    /// With the places on which things stand that hide its edge.
+    pub(super) fn with_hidden(self, samples: &[Sample], seen: &Visibility) -> Surface {
+        let plane = Plane { normal: self.up.into_inner(), offset: self.offset_m };
+        let turn = level(&plane);
+        let (outline, over) = (self.outline(), self.overhung());
+        // What stands beside the outline, and what lies lower there.
+        let (mut high, mut low) = (Vec::new(), FxHashSet::default());
+        for s in samples {
+            let height_m = plane.distance(&s.point);
+            let near = height_m > -BESIDE_M && height_m < TALLEST_M && height_m.abs() > Plane::band_m(s);
+            if !near || outline.covers(&s.point, 0.0) || !outline.covers(&s.point, 2.0 * HIDDEN_M) {
+                continue;
+            }
+            let cell = cell_of(&turn, &s.point);
+            if height_m < 0.0 {
+                low.insert(cell);
+            } else if !over(height_m, &s.point) {
+                high.push((cell, s.point));
+            }
+        }
+        if high.is_empty() {
+            return self;
+        }
+        let border = along_edges(&self, &turn);
+        let mut owners: Owners = border.iter().map(|cell| (*cell, Some(0))).collect();
+        Hiding::of(&plane, seen).spread(&mut owners, border, true);
+        let is_beside =
+            |cell: &[i32; 2]| (0..9).any(|k| low.contains(&[cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]));
+        let mut things = parts(&high.iter().map(|(cell, _)| (*cell, 1)).collect());
+        things.retain(|cells| !cells.iter().any(is_beside));
+        let standing: FxHashSet<[i32; 2]> = things.into_iter().flatten().collect();
+        let is_reached = |cell: &[i32; 2]| owners.get(cell).is_some_and(Option::is_some);
+        high.retain(|(cell, _)| standing.contains(cell) && is_reached(cell));
+        self.widened(&turn, high.iter().map(|(_, p)| p))
+    }
+
+    /// With the hull around its own and some places.
+    fn widened<'a>(
+        self,
+        turn: &UnitQuaternion<f64>,
+        places: impl Iterator<Item = &'a Point3<f64>>,
+    ) -> Surface {
+        let flat = |p: &Point3<f64>| (turn * p).xy().coords.into();
+        let corners = self.hull.iter().map(flat).chain(places.map(flat));
+        let hull = convex_hull(corners.collect());
+        let lift = turn.inverse();
+        let onto = |[x, y]: [f64; 2]| lift * Point3::new(x, y, self.offset_m);
+        Surface { hull: hull.iter().map(|c| onto(*c)).collect(), area_m2: area(&hull), ..self }
+    }
+}
+
+/// The cells along the edges of a surface, in order around it.
+fn along_edges(surface: &Surface, turn: &UnitQuaternion<f64>) -> Vec<[i32; 2]> {
+    /// Of a longer edge not every cell is named.
+    const MOST: f64 = 2000.0;
+    let ends = surface.hull.iter().zip(surface.hull.iter().cycle().skip(1));
+    let edge = |(a, b): (&Point3<f64>, &Point3<f64>)| {
+        let (a, way) = (*a, b - a);
+        let steps = (way.norm() / CELL_M).ceil().clamp(1.0, MOST) as usize;
+        (0..steps).map(move |k| a + way * (k as f64 / steps as f64))
+    };
+    let mut cells: Vec<[i32; 2]> = ends.flat_map(edge).map(|p| cell_of(turn, &p)).collect();
+    cells.dedup();
+    cells
+}

@@ -19,7 +19,7 @@ const BESIDE_M: f64 = 0.3;
 /// Where a cell is asked about, from its corner, cells.
 const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]];
 
-/// Which part of a plane a cell belongs to; none where a camera saw that there is nothing of it.
+/// Which part of a plane a cell belongs to; none where the plane is not taken to reach on.
 pub(super) type Owners = FxHashMap<[i32; 2], Option<usize>>;
 
 /// What hides a plane from the cameras.
@@ -80,9 +80,10 @@ impl<'a> Hiding<'a> {
                             next.push(around);
                         }
                         Entry::Vacant(free) => drop(free.insert(None)),
-                        Entry::Occupied(other) => {
-                            meeting.extend(other.get().filter(|other| *other != owner).map(|other| [owner, other]));
-                        }
+                        Entry::Occupied(found) => match *found.get() {
+                            Some(other) if other != owner => meeting.push([owner, other]),
+                            _ => {}
+                        },
                     }
                 }
             }

@@ -4,7 +4,7 @@ mod tabletop;
 
 use descry_perception::merge::{MergeOptions, merge};
 use descry_perception::nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
-use descry_perception::recognise::{Descry, Handle, Published, Range, Top, check_models};
+use descry_perception::recognise::{Descry, Handle, Published, Range, Shape, Top, check_models};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::surface::{SurfaceError, SurfaceOptions};
 use descry_perception::{Cloud, ObjectModel, Percept, Recogniser, Sighting, View, Visibility};
@@ -100,6 +100,35 @@ fn one_thing_from_one_view() {
         assert!((least..=most).contains(&p), "{name}: {p} {:?}", found[0].evidence);
         let sum: f64 = found[0].probabilities.iter().map(|p| p.1).sum::<f64>() + found[0].unknown;
         assert!((sum - 1.0).abs() < 1e-9, "{name}: probabilities sum to {sum}");
+    }
+}
+
+/// Of a low box most of what is seen is its top: that says nothing against its sides.
+#[test]
+fn a_known_box_is_known_however_low() {
+    let exactly = |x: f64| Range { low: x, high: x };
+    for [width_m, depth_m, height_m] in [[0.12, 0.08, 0.16], [0.25, 0.18, 0.06], [0.18, 0.11, 0.045]] {
+        let model = ObjectModel {
+            name: "box".into(),
+            kind: "box".into(),
+            shape: Shape::Box,
+            height_m: exactly(height_m),
+            diameter_m: None,
+            width_m: Some(exactly(width_m)),
+            depth_m: Some(exactly(depth_m)),
+            top: Top::Closed,
+            ..cup_a()
+        };
+        for turn_rad in [0.1, 0.6, 1.2] {
+            let half = [0.5 * width_m, 0.5 * depth_m];
+            let (cloud, seen) =
+                seen_from(&[Thing::Block { x: 0.05, y: 0.02, half, height: height_m, turn_rad }], 0.3);
+            let scene = segment(&cloud, &seen, &options()).expect("there is a table");
+            let found = Descry::default().recognise(&scene, &seen, &[model.clone()]);
+            assert_eq!(found.len(), 1, "in one piece");
+            let p = found[0].probability_of("box");
+            assert!(p > 0.7, "{width_m} x {depth_m} x {height_m} turned by {turn_rad}: {p} {:?}", found[0]);
+        }
     }
 }
 

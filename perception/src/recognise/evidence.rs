@@ -36,6 +36,8 @@ const HANDLE_WIDTH_M: f64 = 0.035;
 const ROOT: f64 = 0.35;
 /// What is left of the error of a height however good the camera, metres.
 const HEIGHT_M: f64 = 0.002;
+/// The side ends this far, and three spreads of a measurement, below the top, metres.
+const BELOW_M: f64 = 0.004;
 /// How far the top of a sliver may be from that of the object, metres.
 const SLIVER_M: f64 = 0.01;
 /// How far below the rim a look must reach to be a look inside, metres.
@@ -91,12 +93,10 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
         None => (segment, &asker, first),
     };
     let (footprint_m, middle) = outline::bounding(&segment.points).unwrap_or_default();
-    let side: Vec<Point3<f64>> = segment
-        .points
-        .iter()
-        .filter(|p| p.z > base_m + 0.15 * height_m && p.z < top - 0.1 * height_m)
-        .copied()
-        .collect();
+    // What is measured of a low thing's top reaches far down its side.
+    let rim_m = (BELOW_M + 3.0 * sigma_m).clamp(0.1 * height_m, 0.45 * height_m);
+    let side_m = base_m + 0.15 * height_m..top - rim_m;
+    let side: Vec<Point3<f64>> = segment.points.iter().filter(|p| side_m.contains(&p.z)).copied().collect();
     let mut measured = Measured {
         blur_m: scene.surface.residual_m,
         evidence: Evidence { taper: 1.0, ..Evidence::default() },

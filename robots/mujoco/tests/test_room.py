@@ -106,15 +106,12 @@ class Household(unittest.TestCase):
         points, _ = surface.in_map(placed, *surface.sampled(placed.thing, 6_000, np.random.default_rng(2)))
         eye = np.array([0.0, 0.0, 1.2])
         looks = [(eye, np.full(3, -10.0), np.full(3, 10.0))]
-        # What one look shows of it, 2 cm from where it is: all of that is explained, and the other side is not.
+        # What one look shows of it, 2 cm from where it is, and a fifth that is none of it.
         half = points[surface.seen(scene, points, looks)] + [0.015, -0.01, 0.005]
-        said = surface.judged(scene, name, half, looks)
+        said = surface.judged(scene, name, np.concatenate([half, half[: len(half) // 4] + [0.0, 0.0, 0.4]]), looks)
         self.assertGreater(said["recall_of_shown"], 0.98)
         self.assertLess(said["recall"], 0.85)
-        self.assertGreater(said["precision"], 0.99)
-        self.assertLess(said["distance_m"], 0.003)
-        beside = np.concatenate([half, half[: len(half) // 4] + [0.0, 0.0, 0.4]])
-        self.assertAlmostEqual(surface.judged(scene, name, beside, looks)["precision"], 0.8, delta=0.02)
+        self.assertAlmostEqual(said["precision"], 0.8, delta=0.02)
 
 
 @needs_mujoco

@@ -95,7 +95,7 @@ class Mujoco:
         points = self.folder / f"points-{self.seed}.ply"
         run(DESCRY, "name", str(store), learned["name"], "--points", str(points))
         out, _ = run(DESCRY, "memory", "query", str(run_folder), "--kind", "cloud", "--json")
-        looks = [(r["seen_from_m"], r["covers_m"]["low"], r["covers_m"]["high"]) for r in json.loads(out)["records"]]
+        looks = [(r["seen_from_m"], r["covers_m"]["min_m"], r["covers_m"]["max_m"]) for r in json.loads(out)["records"]]
         scene = household.of_visit(stage.arrange(self.scene_name, self.seed), visit)
         return surface.judged(scene, self.thing, surface.read_ply(points) + learned["seen"]["position_m"], looks)
 

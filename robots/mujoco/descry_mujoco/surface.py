@@ -20,8 +20,8 @@ EXPLAINED_M = 0.02
 SAMPLES, ASKED = 30_000, 4_000
 # The outer surface is what is seen from some of these: turns around the thing, heights above its foot (degrees), and how far off, metres.
 TURNS, HEIGHTS_DEG, AWAY_M = 16, (2.0, 20.0, 40.0, 60.0, 85.0), 1.5
-# A straight line from an eye that ends this near to a point has reached it, metres.
-REACHED_M = 0.003
+# A straight line from an eye that ends this near to a point has reached it; nothing is learned from a look farther away, metres.
+REACHED_M, LOOKED_M = 0.003, 2.5
 # Alignment: points used of the model and of the mesh, what is matched at most, beyond what a match counts for less, metres, and how often.
 ALIGNED, ONTO, WITHIN_M, ROBUST_M, ROUNDS = 1_000, 10_000, 0.03, 0.005, 30
 PLY_TYPES = {"float": "<f4", "uchar": "u1", "uint": "<u4"}
@@ -95,7 +95,7 @@ def seen(scene: Scene, points: np.ndarray, looks: Looks) -> np.ndarray:
         for k in np.flatnonzero(~reached & np.all((points >= low) & (points <= high), axis=1)):
             way = points[k] - eye
             far = np.linalg.norm(way)
-            reached[k] = mujoco.mj_ray(model, data, eye, way / far, groups, True, -1, geom) > far - REACHED_M
+            reached[k] = far < LOOKED_M and mujoco.mj_ray(model, data, eye, way / far, groups, True, -1, geom) > far - REACHED_M
     return reached
 
 

@@ -39,11 +39,6 @@ def descry(*arguments):
     return json.loads(out) if out.strip() else {"verdict": "error", "why": err[-300:]}
 
 
-def truth(scene, seed, visit):
-    out, _ = run(str(ROOT / "target/release/examples/arrangement"), str(scene), str(seed), str(visit))
-    return {o["name"]: o for o in map(json.loads, out.splitlines())}
-
-
 def off_m(a, b):
     return math.dist(a[:2], b[:2])
 
@@ -65,7 +60,8 @@ class Simulated:
         return "--scene", str(self.of_visit[visit]), "--seed", str(self.seed)
 
     def truth(self, visit):
-        return truth(self.of_visit[visit], self.seed, visit)
+        out, _ = run(str(ROOT / "target/release/examples/arrangement"), str(self.of_visit[visit]), str(self.seed))
+        return {o["name"]: o for o in map(json.loads, out.splitlines())}
 
 
 class Mujoco:
@@ -119,7 +115,7 @@ PLACES = {
 }
 
 
-def seed_of(seed, place, folder):
+def seed_of(seed, place, folder, visits):
     thing, other = place.thing, place.other
     store = folder / f"store-{seed}"
 
@@ -145,7 +141,7 @@ def seed_of(seed, place, folder):
     if isinstance(place, Mujoco):
         row["model"] = place.judged(2, store, right[0], run_of("learn what is new", 2))
     run(DESCRY, "name", str(store), right[0]["name"], thing)
-    for visit, key in ((3, "moved"), (4, "gone")):
+    for visit, key in ((3, "moved"), (4, "gone"))[: visits - 2]:
         found = pursue(f"find {thing}", visit)
         row[key] = {"verdict": found["verdict"], "confidence": found.get("confidence"), "views": found.get("views")}
         true = place.truth(visit)
@@ -164,16 +160,17 @@ def main():
     parser.add_argument("scene", nargs="?", default="household", choices=PLACES)
     parser.add_argument("folder", nargs="?", type=pathlib.Path)
     parser.add_argument("--pose-error", default="0.03,2", metavar="METRES,DEGREES", help="of the body on MuJoCo")
+    parser.add_argument("--visits", type=int, default=4, choices=(2, 4), help="2: nothing is searched for")
     given = parser.parse_args()
     low, high, folder = given.low, given.high, given.folder or pathlib.Path(tempfile.mkdtemp())
     folder.mkdir(parents=True, exist_ok=True)
     make, scene_name = PLACES[given.scene]
     rows = []
     for seed in range(low, high + 1):
-        row = seed_of(seed, make(seed, scene_name, folder, given.pose_error), folder)
+        row = seed_of(seed, make(seed, scene_name, folder, given.pose_error), folder, given.visits)
         print(json.dumps(row), flush=True)
         rows.append(row)
-    named = [r for r in rows if "moved" in r]
+    named = [r for r in rows if "gone" in r]
     is_right = lambda r: r["moved"]["verdict"] == "achieved" and (r["moved"]["off_m"] or 9) < NEAR_M
     offs = sorted(r["moved"]["off_m"] for r in named if is_right(r))
     count = lambda condition: sum(1 for r in named if condition(r))

@@ -41,6 +41,7 @@ pub(super) fn make(
     let places: Vec<Vec<Place>> = found.iter().map(|line| line.iter().map(place).collect()).collect();
     let here = &mind.known.candidates[mind.known.at].place;
     let mut ways = mind.known.chart.travel(robot, here, &places.concat(), &[]).into_iter();
+    // Of each line all ways are taken off, also those behind the first that leads there.
     let mut reached = |line: Vec<Place>| -> Vec<Place> {
         line.into_iter().filter(|_| ways.next().is_some_and(|way| way.is_ok())).collect()
     };

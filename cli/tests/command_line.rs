@@ -6,6 +6,12 @@ use std::path::Path;
 use std::process::Output;
 
 use assert_cmd::Command;
+use descry_memory::learned::LearnedThing;
+use descry_memory::remember::Remembered;
+use descry_memory::{Options, Record};
+use descry_perception::Cloud;
+use descry_perception::files::read_cloud;
+use descry_perception::nalgebra::Point3;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -333,6 +339,33 @@ fn a_cloud_that_is_none_points_at_the_place() {
     .expect("writable");
     check(&["recognise", &path.display().to_string()], 2, &["cut.pcd", "byte 87", "9 points"]);
     check(&["recognise", "nowhere.pcd"], 2, &["nowhere.pcd"]);
+}
+
+#[test]
+fn the_points_of_what_was_learned_are_written() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let (store, file) = (folder.path().join("seen"), folder.path().join("thing.ply"));
+    let points = vec![Point3::new(0.1, 0.2, 0.3), Point3::origin()];
+    let thing = LearnedThing {
+        name: "thing 1".into(),
+        learned_unix_s: 1.0,
+        cloud: Cloud { points: points.clone(), ..Cloud::default() },
+        sides: 1.0,
+        directions: 0,
+        meetings: 1,
+        seen: descry_memory::learned::Place { unix_s: 1.0, at_m: Point3::origin(), on: "desk".into() },
+    };
+    let remembered = Remembered { things: vec![thing], ..Remembered::default() };
+    let record = Record::create(&store, Options::default()).expect("a store can be made");
+    remembered.keep(&record, 1.0).expect("it is kept");
+    drop(record);
+    let (store, written) = (store.display().to_string(), file.display().to_string());
+    check(&["name", &store, "Thing 1", "--points", &written], 0, &["thing 1"]);
+    let read = read_cloud(&std::fs::read(&file).expect("it was written")).expect("it is a cloud");
+    assert_eq!(read.cloud.points, points);
+    check(&["name", &store, "thing 2", "--points", &written], 2, &["nothing that was learned is called"]);
+    check(&["name", &store, "thing 1"], 2, &["--points <FILE>"]);
+    check(&["name", &store, "--points", &written], 2, &["OLD"]);
 }
 
 #[test]

@@ -121,14 +121,17 @@ fn stands_are_found_around_obstacles_and_strung_together() {
     let seen: Vec<Point3<f32>> = table.chain(post(0.9, 0.0)).chain(wall).chain(high).collect();
     let options = AroundOptions { lines: 8, most_m: 1.2, ..AroundOptions::default() };
     let found = stands(&object, &seen, &options).expect("sound options");
-    let free: Vec<usize> = (0..8).filter(|&k| found[k].is_some()).collect();
+    let free: Vec<usize> = (0..8).filter(|&k| !found[k].is_empty()).collect();
     assert_eq!(free, [1, 4, 5, 6, 7], "{found:?}");
+    let away = |p: &Point2<f64>| p.coords.norm();
+    assert!(found.iter().all(|line| line.is_sorted_by_key(away)));
     for stand in found.iter().flatten() {
         let off = seen.iter().map(|p| f64::from(p.x - stand.x as f32).hypot(f64::from(p.y) - stand.y));
         assert!(off.fold(f64::INFINITY, f64::min) > options.footprint_m - 1e-6);
     }
     let straight = |a: &Point2<f64>, b: &Point2<f64>| Some((b - a).norm());
     let lengths = |strings: &[Vec<Point2<f64>>]| strings.iter().map(Vec::len).collect::<Vec<_>>();
+    let found: Vec<Option<Point2<f64>>> = found.iter().map(|line| line.first().copied()).collect();
     let strings = trajectories(&found, options.detour, straight);
     assert_eq!(lengths(&strings), [1, 4]);
     let ring: Vec<Option<Point2<f64>>> =

@@ -88,7 +88,14 @@ const EXAMPLES: [(&str, &[&str]); 22] = [
             "descry memory verify runs/mug",
         ],
     ),
-    ("name", &["descry name seen", "descry name seen \"thing 1\" \"the thing from Tuesday\""]),
+    (
+        "name",
+        &[
+            "descry name seen",
+            "descry name seen \"thing 1\" \"the thing from Tuesday\"",
+            "descry name seen \"the thing from Tuesday\" --points thing.ply",
+        ],
+    ),
     ("export", &["descry export runs/mug mug.mcap"]),
     ("completions", &["descry completions bash > ~/.local/share/bash-completion/completions/descry"]),
     ("man", &["descry man | man -l -", "descry man --out ~/.local/share/man/man1"]),

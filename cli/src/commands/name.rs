@@ -6,6 +6,7 @@ use descry_domains::abilities::learning::news::called;
 use descry_memory::learned::LearnedThing;
 use descry_memory::remember::Remembered;
 use descry_memory::{Options, Record};
+use descry_perception::files::ply;
 use serde_json::{Value, json};
 
 use crate::commands::input;
@@ -18,10 +19,14 @@ pub struct Arguments {
     /// Where runs keep what they remember: a folder, or mongodb://HOST/DATABASE
     store: PathBuf,
     /// What it is called, such as "thing 1"; left out: all that was learned is listed
-    #[arg(requires = "new")]
+    #[arg(requires = "deed")]
     old: Option<String>,
     /// What it is to be called, such as "the thing from Tuesday"
+    #[arg(group = "deed")]
     new: Option<String>,
+    /// Write the points of its model, metres about its middle, to a PLY file
+    #[arg(long, value_name = "FILE", group = "deed", requires = "old")]
+    points: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -38,6 +43,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         check_free(&remembered, &known, new)?;
         remembered.rename(&known, new.trim());
         remembered.keep(&store, now_unix_s).map_err(CommandError::broken)?;
+    }
+    if let (Some(old), Some(file)) = (&arguments.old, &arguments.points) {
+        let points = ply::write(&find(&remembered, old)?.cloud, ply::Encoding::Binary);
+        std::fs::write(file, points)
+            .map_err(|e| CommandError::BadInput(format!("--points {}: {e}", file.display())))?;
     }
     let all: Vec<Value> = remembered.things.iter().map(|t| described(t, now_unix_s)).collect();
     if arguments.json {

@@ -40,10 +40,10 @@ impl Default for AroundOptions {
 /// Steps along a line, metres.
 const STEP_M: f64 = 0.05;
 
-/// On each line from the object the nearest place where the body fits, in the order of the lines; `None` where it fits nowhere.
+/// On each line from the object the places where the body fits, the nearest first, in the order of the lines.
 ///
-/// `obstacles` is what was seen (world, z up, metres). A place counts as free if nothing seen is within the footprint; whether it can be reached is
-/// asked of the ways ([`trajectories`]).
+/// `obstacles` is what was seen (world, z up, metres). A place counts as free if nothing seen is within the footprint; which of them can be reached
+/// is asked of the ways: a body may keep farther away from what its map shows than it must.
 ///
 /// # Errors
 /// If an option is no positive number, or there are more points than can be indexed.
@@ -51,7 +51,7 @@ pub fn stands(
     object: &Point3<f64>,
     obstacles: &[Point3<f32>],
     options: &AroundOptions,
-) -> Result<Vec<Option<Point2<f64>>>, LearningError> {
+) -> Result<Vec<Vec<Point2<f64>>>, LearningError> {
     for (field, value) in [
         ("lines", options.lines as f64),
         ("most_m", options.most_m),
@@ -75,7 +75,7 @@ pub fn stands(
         let along = |k: usize| {
             object.xy() + Vector2::new(turn.cos(), turn.sin()) * (options.least_m + STEP_M * k as f64)
         };
-        (0..=steps).map(along).find(|p| fits(p))
+        (0..=steps).map(along).filter(|p| fits(p)).collect()
     };
     Ok((0..options.lines).map(on_line).collect())
 }

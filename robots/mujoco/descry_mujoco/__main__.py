@@ -39,11 +39,11 @@ def arguments() -> argparse.Namespace:
     serve.add_argument("--pose-error", type=pose_error, default=(0.03, 2.0), metavar="METRES,DEGREES", help="standard deviations of localisation")
     serve.add_argument("--truth", type=Path, help="write there how everything really stands, for reports")
     serve.add_argument("--listen", metavar="HOST:PORT", help="wait for who connects, instead of standard input and output")
-    serve.add_argument("--visit", type=int, choices=range(1, 5), default=1, help="of the scene household: what has come by then")
+    serve.add_argument("--visit", type=int, choices=range(1, 5), default=1, help="of the households: what has come by then")
     serve.add_argument("--without", default="", metavar="KINDS", help="kinds of things that are taken away first, with commas between")
     for command in (record, serve):
         # A recording goes round tables that stand together.
-        known = sorted(name for name in SCENES if command is serve or name not in ("home", "household"))
+        known = sorted(name for name in SCENES if command is serve or name not in ("home", "household", "shared-household"))
         command.add_argument("--scene", choices=known, default="search")
         command.add_argument("--seed", type=int, default=1)
         command.add_argument("--holes", type=share, default=0.002, help="share of pixels without a return, 0 to 0.1; more on steep sides")
@@ -67,11 +67,10 @@ def serve(given: argparse.Namespace) -> None:
 
     from . import body, household, stage
 
-    scene = stage.arrange(given.scene, given.seed)
+    # Where nothing comes or goes every visit is the same.
+    scene = household.of_visit(stage.arrange(given.scene, given.seed), given.visit)
     # Nobody errs in the same way at every visit.
     seed = given.seed + 1_000_003 * (given.visit - 1)
-    if given.scene == "household":
-        scene = household.of_visit(scene, given.visit)
     scene.start = stage.start_pose(scene)
     scene = scene.without(given.without.split(","))
     metres, degrees = given.pose_error

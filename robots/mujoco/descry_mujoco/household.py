@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Callable
 
 import numpy as np
 
-from . import meshes
+from . import composed, meshes
 from .meshes import Mesh
 from .scenes import Arranger, Scene, Table, wood
-from .things import Colour, Thing
+from .things import Part, Thing
 
 # Between two things, metres: what stands apart is noticed apart.
 APART_M = 0.08
 VISITS = 4
-
-Part = tuple[Mesh, Colour]
 
 
 def at(mesh: Mesh, x: float, y: float, z: float) -> Mesh:
@@ -102,44 +101,55 @@ def _radio() -> list[Part]:
     return [(meshes.box(0.23, 0.07, 0.14), (0.45, 0.25, 0.12)), (front, (0.85, 0.8, 0.65)), *[(knob, (0.1, 0.1, 0.1)) for knob in knobs]]
 
 
-# What comes, goes and is moved; and what always stands there.
-THINGS = {
+@dataclass(frozen=True)
+class Household:
+    """What comes, goes and is moved, in the order of seeds; and what always stands there, on either table."""
+
+    scene: str
+    parts: Callable[[str], list[Part]]
+    names: list[str]
+    always: tuple[str, str]
+    # What comes at the third visit is so many further on than what comes at the second.
+    further: int
+
+    def thing(self, name: str, called: str | None = None) -> Thing:
+        parts = self.parts(name)
+        vertices = np.concatenate([mesh[0] for mesh, _ in parts])
+        reach = 2.0 * np.abs(vertices[:, :2]).max(axis=0)
+        size = {"x": float(reach[0]), "y": float(reach[1]), "z": float(vertices[:, 2].max())}
+        solids, colours = zip(*parts)
+        return Thing(called or name, name, "parts", size, mass_kg=0.5, parts=solids, colours=colours)
+
+    def coming(self, seed: int) -> tuple[str, str]:
+        """What comes at the second visit, and what at the third."""
+        coming = [name for name in self.names if name not in self.always]
+        return coming[seed % len(coming)], coming[(seed + self.further) % len(coming)]
+
+    def __call__(self, seed: int, rng: np.random.Generator) -> Scene:
+        """Two tables as `of_visit` knows them: everything of all visits, each where it will stand."""
+        def table(name: str, x: float, y: float, height: float) -> Table:
+            return Table(name, (1.2, 0.8), height + float(rng.uniform(-0.02, 0.02)), (x, y), 0.5 * math.pi, leg_m=0.05, colour=wood(rng))
+
+        tables = [table("table", -1.7, 0.3, 0.72), table("desk", 1.7, -0.3, 0.76)]
+        scene = Scene(self.scene, seed, (7.0, 6.0), tables, floor_colour=wood(rng), wall_colour=wood(rng))
+        put = Arranger(scene, rng)
+        for name, on in zip(self.always, tables):
+            put.put(self.thing(name), on, (1.0, 0.6), gap=APART_M)
+        first, second = self.coming(seed)
+        here = int(rng.integers(2))
+        # The first comes, and is moved to the other table when the second comes, which stays.
+        for name, on in ((f"{first}@2", here), (f"{first}@3", 1 - here), (f"{second}@3,4", int(rng.integers(2)))):
+            put.put(self.thing(name.split("@")[0], name), tables[on], (1.0, 0.6), gap=APART_M)
+        return scene
+
+
+FORMS = {
     "cereal": _cereal, "milk": _milk, "kettle": _kettle, "truck": _truck, "drill": _drill, "lamp": _lamp, "watering can": _can, "iron": _iron,
     "toaster": _toaster, "radio": _radio,
 }
-ALWAYS = ("toaster", "radio")
-COMING = [name for name in THINGS if name not in ALWAYS]
-
-
-def thing(name: str, called: str | None = None) -> Thing:
-    parts = THINGS[name]()
-    vertices = np.concatenate([mesh[0] for mesh, _ in parts])
-    reach = 2.0 * np.abs(vertices[:, :2]).max(axis=0)
-    size = {"x": float(reach[0]), "y": float(reach[1]), "z": float(vertices[:, 2].max())}
-    return Thing(called or name, name, "parts", size, mass_kg=0.5, parts=tuple(mesh for mesh, _ in parts), colours=tuple(colour for _, colour in parts))
-
-
-def coming(seed: int) -> tuple[str, str]:
-    """What comes at the second visit, and what at the third."""
-    return COMING[seed % len(COMING)], COMING[(seed + 3) % len(COMING)]
-
-
-def household(seed: int, rng: np.random.Generator) -> Scene:
-    """Two tables as `of_visit` knows them: everything of all visits, each where it will stand."""
-    def table(name: str, x: float, y: float, height: float) -> Table:
-        return Table(name, (1.2, 0.8), height + float(rng.uniform(-0.02, 0.02)), (x, y), 0.5 * math.pi, leg_m=0.05, colour=wood(rng))
-
-    tables = [table("table", -1.7, 0.3, 0.72), table("desk", 1.7, -0.3, 0.76)]
-    scene = Scene("household", seed, (7.0, 6.0), tables, floor_colour=wood(rng), wall_colour=wood(rng))
-    put = Arranger(scene, rng)
-    for name, on in zip(ALWAYS, tables):
-        put.put(thing(name), on, (1.0, 0.6), gap=APART_M)
-    first, second = coming(seed)
-    here = int(rng.integers(2))
-    # The first comes, and is moved to the other table when the second comes, which stays.
-    for name, on in ((f"{first}@2", here), (f"{first}@3", 1 - here), (f"{second}@3,4", int(rng.integers(2)))):
-        put.put(thing(name.split("@")[0], name), tables[on], (1.0, 0.6), gap=APART_M)
-    return scene
+OWN = Household("household", lambda name: FORMS[name](), list(FORMS), ("toaster", "radio"), 3)
+# The things of descry's own simulator, as its learning domain has them.
+SHARED = Household("shared-household", composed.parts, list(composed.read()), ("tissues", "radio"), 5)
 
 
 def of_visit(scene: Scene, visit: int) -> Scene:

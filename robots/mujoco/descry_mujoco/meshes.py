@@ -153,6 +153,21 @@ def tube(path: np.ndarray, along: float, across: float) -> Mesh:
     return outwards(vertices, np.array(faces))
 
 
+def cut(mesh: Mesh, edge_m: float) -> Mesh:
+    """The same surface in triangles without an edge longer than this: each longer one is halved."""
+    vertices, faces = mesh
+    while True:
+        sides = np.linalg.norm(vertices[faces[:, [1, 2, 0]]] - vertices[faces], axis=2)
+        longest, long = sides.argmax(axis=1), sides.max(axis=1) > edge_m
+        if not long.any():
+            return vertices, faces
+        # a and b are the ends of the longest side.
+        a, b, c = (faces[long, (longest[long] + k) % 3] for k in range(3))
+        middle = len(vertices) + np.arange(len(a))
+        vertices = np.concatenate([vertices, 0.5 * (vertices[a] + vertices[b])])
+        faces = np.concatenate([faces[~long], np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
 def outwards(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
     """The mesh with its faces turned so that it holds a volume above zero."""
     return (vertices, faces) if volume((vertices, faces)) > 0.0 else (vertices, faces[:, ::-1])

@@ -275,7 +275,7 @@ def arrange(make: Callable[[int, np.random.Generator], Scene], seed: int, suits=
             continue
         if suits(scene):
             return scene
-    raise SystemExit(f"seed {seed}: none of {ROUNDS} arrangements of {make.__name__} suits; take another seed")
+    raise SystemExit(f"seed {seed}: none of {ROUNDS} arrangements suits; take another seed")
 
 
 def ring(scene: Scene, count: int, rng: np.random.Generator) -> list[tuple[np.ndarray, np.ndarray]]:

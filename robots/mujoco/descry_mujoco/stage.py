@@ -11,7 +11,8 @@ from .scenes import Scene
 
 SCENES = {
     "floor": scenes.floor, "two-tables": scenes.two_tables, "absent": scenes.absent, "present": scenes.present,
-    "search": scenes.search, "four-cups": scenes.four_cups, "home": home.home, "household": household.household,
+    "search": scenes.search, "four-cups": scenes.four_cups, "home": home.home,
+    household.OWN.scene: household.OWN, household.SHARED.scene: household.SHARED,
 }
 # Visibility is measured on small images.
 SHARE_SCALE = 4

@@ -10,7 +10,9 @@ import numpy as np
 from . import meshes
 
 HANDLED = "mug"
-Colour = tuple[float, float, float]
+# One for all of a part, or a row for each of its faces.
+Colour = tuple[float, float, float] | np.ndarray
+Part = tuple[meshes.Mesh, Colour]
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,7 @@ class Thing:
     kind: str
     shape: str
     size: dict[str, float]
-    colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
+    colour: Colour = (0.7, 0.7, 0.7)
     # 0 is matt; 1 loses most of its steep sides to the depth camera.
     shine: float = 0.0
     mass_kg: float = 0.15

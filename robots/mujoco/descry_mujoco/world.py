@@ -120,9 +120,10 @@ def _add_thing(spec: mujoco.MjSpec, placed: Placed) -> None:
     for k, (vertices, faces) in enumerate(thing.meshes()):
         mesh = spec.add_mesh(name=f"{thing.name} {k}", uservert=vertices.ravel(), userface=faces.ravel().astype(int))
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        colour = thing.colour_of(k)
+        looks = {"rgba": [*colour, 1]} if isinstance(colour, tuple) else {"material": _paint(spec, mesh, colour)}
         body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, rgba=[*thing.colour_of(k), 1], mass=0.0,
-            contype=0, conaffinity=0, group=SEEN,
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, **looks, mass=0.0, contype=0, conaffinity=0, group=SEEN,
         )
     half = 0.5 * thing.height_m
     felt = dict(pos=[0, 0, half], group=FELT, friction=[0.6, 0.005, 0.0001], condim=4)
@@ -140,6 +141,21 @@ def _add_thing(spec: mujoco.MjSpec, placed: Placed) -> None:
             type=mujoco.mjtGeom.mjGEOM_BOX, size=half_grip, mass=0.02,
             **{**felt, "pos": [0.25 * (s["diameter"] + s["base"]) + half_grip[0], 0, middle]},
         )
+
+
+def _paint(spec: mujoco.MjSpec, mesh, colours: np.ndarray) -> str:
+    """Gives each face of a mesh a colour of its own, as one pixel of a texture; the name of the material."""
+    count, side = len(colours), math.ceil(math.sqrt(len(colours)))
+    pixels = np.zeros((side * side, 3), np.uint8)
+    pixels[:count] = np.rint(255.0 * colours)
+    texture = spec.add_texture(name=mesh.name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=side, height=side, nchannel=3)
+    texture.data = pixels.tobytes()
+    row, column = np.divmod(np.arange(count), side)
+    mesh.usertexcoord = ((np.stack([column, row], axis=1) + 0.5) / side).ravel()
+    mesh.userfacetexcoord = np.repeat(np.arange(count), 3)
+    material = spec.add_material(name=mesh.name)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = texture.name
+    return material.name
 
 
 def looking(eye: np.ndarray, target: np.ndarray) -> np.ndarray:

@@ -41,26 +41,77 @@ class Household(unittest.TestCase):
     def test_parts_are_closed_and_stand_on_their_foot(self):
         from descry_mujoco import household, meshes
 
-        for name in household.THINGS:
-            thing = household.thing(name)
-            self.assertEqual(len(thing.parts), len(thing.colours))
-            low = min(part[0][:, 2].min() for part in thing.parts)
-            self.assertAlmostEqual(low, 0.0, delta=1e-6, msg=name)
-            for part in thing.parts:
-                self.assertGreater(meshes.volume(part), 1e-7, name)
+        for of in (household.OWN, household.SHARED):
+            for name in of.names:
+                thing = of.thing(name)
+                self.assertEqual(len(thing.parts), len(thing.colours))
+                low = min(part[0][:, 2].min() for part in thing.parts)
+                self.assertAlmostEqual(low, 0.0, delta=1e-6, msg=name)
+                for part in thing.parts:
+                    self.assertGreater(meshes.volume(part), 1e-7, name)
+
+    def test_what_is_cut_is_the_same_surface(self):
+        from descry_mujoco import meshes
+
+        box = meshes.box(0.2, 0.1, 0.05)
+        vertices, faces = meshes.cut(box, 0.02)
+        self.assertAlmostEqual(meshes.volume((vertices, faces)), 0.001, places=9)
+        sides = np.linalg.norm(vertices[faces] - vertices[np.roll(faces, 1, axis=1)], axis=2)
+        self.assertLessEqual(sides.max(), 0.02)
+
+    def test_prints_are_those_of_descrys_own_simulator(self):
+        from descry_mujoco import composed
+
+        # As `Paint::at` of robots/src/sim/composed.rs says them.
+        places = np.array([[0.0, 0.0, 0.0], [0.05, -0.12, 0.2], [-0.31, 0.07, 0.11]])
+        said = 255.0 * composed._printed(np.array([120.0] * 3), {"size_m": 0.03, "spread": 100.0, "seed": 7}, places)
+        np.testing.assert_array_equal(said.astype(int), [[152, 196, 184], [150, 178, 112], [107, 160, 65]])
+
+    def test_each_face_shows_its_colour(self):
+        from descry_mujoco import meshes, stage, things, world
+        from descry_mujoco.scenes import Placed, Scene
+
+        # Each side of a cube has its own mix of primary colours.
+        cube = meshes.cut(meshes.box(0.2, 0.2, 0.2), 0.05)
+        middles = cube[0][cube[1]].mean(axis=1) - [0.0, 0.0, 0.1]
+        sides = np.abs(middles).argmax(axis=1)
+        colours = np.eye(3)[sides] * np.where(np.take_along_axis(middles, sides[:, None], 1) > 0.0, 0.8, 0.4)
+        painted = things.Thing("cube", "cube", "parts", {"x": 0.2, "y": 0.2, "z": 0.2}, parts=(cube,), colours=(colours,))
+        scene = Scene("one", 1, (6.0, 6.0), [], [Placed(painted, "floor", 0.0, 0.0, 0.7, 0.0)])
+        with stage.Stage(scene, 64, 48, 90.0) as staged:
+            for eye, axis in (((1.0, 0.01, 0.8), 0), ((0.01, -1.0, 0.8), 1), ((0.01, 0.01, 1.8), 2)):
+                frame = staged.look(world.looking(np.array(eye), np.array([0.0, 0.0, 0.8])))
+                of_cube = frame.colour[frame.body > 0].astype(float)
+                self.assertGreater(len(of_cube), 100)
+                self.assertLess(np.delete(of_cube, axis, axis=1).mean(), 0.1 * of_cube[:, axis].mean(), f"axis {axis}")
 
     def test_a_thing_comes_is_moved_and_goes_and_the_others_stay(self):
         from descry_mujoco import household, stage
 
-        for seed in range(1, 9):
-            scene = stage.arrange("household", seed)
+        for of, seed in ((of, seed) for of in (household.OWN, household.SHARED) for seed in range(1, 9)):
+            scene = stage.arrange(of.scene, seed)
             visits = [{p.thing.name: (p.x_m, p.y_m, p.surface) for p in household.of_visit(scene, n).placed} for n in range(1, 5)]
-            first, second = household.coming(seed)
-            self.assertEqual([sorted(v) for v in visits], [sorted([*household.ALWAYS, *more]) for more in ([], [first], [first, second], [second])])
+            first, second = of.coming(seed)
+            self.assertEqual([sorted(v) for v in visits], [sorted([*of.always, *more]) for more in ([], [first], [first, second], [second])])
             self.assertNotEqual(visits[1][first][2], visits[2][first][2])
-            self.assertEqual(visits[2][second], visits[3][second])
-            for name in household.ALWAYS:
+            for name in of.always:
                 self.assertEqual(len({v[name] for v in visits}), 1)
+
+    def test_a_model_is_held_against_its_mesh(self):
+        from descry_mujoco import household, stage, surface
+
+        scene = household.of_visit(stage.arrange("household", 3), 2)
+        name, _ = household.OWN.coming(3)
+        placed = next(p for p in scene.placed if p.thing.name == name)
+        points, _ = surface.in_map(placed, *surface.sampled(placed.thing, 6_000, np.random.default_rng(2)))
+        eye = np.array([0.0, 0.0, 1.2])
+        looks = [(eye, np.full(3, -10.0), np.full(3, 10.0))]
+        # What one look shows of it, 2 cm from where it is, and a fifth that is none of it.
+        half = points[surface.seen(scene, points, looks)] + [0.015, -0.01, 0.005]
+        said = surface.judged(scene, name, np.concatenate([half, half[: len(half) // 4] + [0.0, 0.0, 0.4]]), looks)
+        self.assertGreater(said["recall_of_shown"], 0.98)
+        self.assertLess(said["recall"], 0.85)
+        self.assertAlmostEqual(said["precision"], 0.8, delta=0.02)
 
 
 @needs_mujoco

@@ -38,15 +38,21 @@ pub(super) fn make(
     };
     let found = stands(centre, &obstacles(robot, centre, seen, options.most_m), &options).unwrap_or_default();
     let place = |p: &Point2<f64>| Place::Pose(Pose2::facing(p.x, p.y, &centre.xy()));
-    let places: Vec<Place> = found.iter().flatten().map(place).collect();
+    let places: Vec<Vec<Place>> = found.iter().map(|line| line.iter().map(place).collect()).collect();
     let here = &mind.known.candidates[mind.known.at].place;
-    let mut reached = mind.known.chart.travel(robot, here, &places, &[]).into_iter();
-    let poses = found.iter().enumerate().map(|(line, stand)| {
-        let place = place(stand.as_ref()?);
-        reached.next()?.ok()?;
-        Some(Candidate { symbol: format!("{name}-{}", line + 1), place })
-    });
-    let poses: Vec<Option<Candidate>> = poses.collect();
+    let mut ways = mind.known.chart.travel(robot, here, &places.concat(), &[]).into_iter();
+    // Of each line all ways are taken off, also those behind the first that leads there.
+    let mut reached = |line: Vec<Place>| -> Vec<Place> {
+        line.into_iter().filter(|_| ways.next().is_some_and(|way| way.is_ok())).collect()
+    };
+    let poses: Vec<Option<Candidate>> = places
+        .into_iter()
+        .enumerate()
+        .map(|(line, places)| {
+            let place = reached(places).into_iter().next()?;
+            Some(Candidate { symbol: format!("{name}-{}", line + 1), place })
+        })
+        .collect();
     let joined = |line: usize| {
         let (a, b) = (poses[line].as_ref()?, poses[(line + 1) % poses.len()].as_ref()?);
         let straight_m = (at(&a.place)? - at(&b.place)?).norm();

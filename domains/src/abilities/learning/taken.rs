@@ -36,6 +36,8 @@ const EDGE_M: f64 = 0.08;
 const LONG: f64 = 6.0;
 /// What came so near to something new, beside how far that reaches, is of it, metres.
 const OF_IT_M: f64 = 0.1;
+/// A piece that hangs over something new by no more than this is of it, metres: what is between them is hidden from above.
+const OVER_IT_M: f32 = 0.1;
 /// Things nearer to each other than this are one, metres.
 const SAME_M: f64 = 0.12;
 /// So sure must it be that something is what was learned before, and as great a share of it must be explained.
@@ -157,7 +159,7 @@ fn take_in(
     let mut found =
         again::find(&mind.known.news.clone(), &mut mind.glances, &[(&view, pose)], Vec::new(), |_| true);
     found.retain(|f| f.judged.confidence >= SURE);
-    for appeared in visit.appeared.iter().filter(|a| !is_sliver(&a.cloud)) {
+    for appeared in &whole(&mind.known.surfaces, visit.appeared) {
         let surface = mind.known.surfaces.iter().find(|s| is_on(s, &appeared.cloud)).cloned();
         let Some(surface) = surface else {
             let (at, size_m) = extent(&appeared.cloud);
@@ -202,6 +204,36 @@ fn take_in(
     if let Some(map) = DepthMap::from_view(&view, &pose) {
         told.gone.extend(left(mind, on, &map));
     }
+}
+
+/// What came, things that stand before those that do not. A thing whose top hides its middle, as the shade of a lamp does, comes in pieces: what stands
+/// on no surface belongs to what stands beneath it.
+fn whole(surfaces: &[KnownSurface], appeared: Vec<Appeared>) -> Vec<Appeared> {
+    let came = appeared.into_iter().filter(|a| !is_sliver(&a.cloud));
+    let (mut all, aloft): (Vec<Appeared>, Vec<Appeared>) =
+        came.partition(|a| surfaces.iter().any(|s| is_on(s, &a.cloud)));
+    let standing = all.len();
+    for piece in aloft {
+        let is_under = |a: &&mut Appeared| a.view == piece.view && is_over(&piece.cloud, &a.cloud);
+        match all[..standing].iter_mut().find(is_under) {
+            Some(below) => {
+                below.cloud.append(&piece.cloud);
+                below.mask.iter_mut().zip(&piece.mask).for_each(|(pixel, of_piece)| *pixel |= of_piece);
+            }
+            None => all.push(piece),
+        }
+    }
+    all
+}
+
+/// Whether a piece hangs over another one: the middle of either is above or below the other, and the gap between them is small.
+fn is_over(piece: &Cloud, below: &Cloud) -> bool {
+    let (Some(above), Some(under)) = (piece.bounds(), below.bounds()) else { return false };
+    let holds = |(low, high): (Point3<f32>, Point3<f32>), (l, h): (Point3<f32>, Point3<f32>)| {
+        let middle = center(&l, &h);
+        (0..2).all(|k| (low[k]..=high[k]).contains(&middle[k]))
+    };
+    (holds(above, under) || holds(under, above)) && above.0.z > under.0.z && above.0.z - under.1.z < OVER_IT_M
 }
 
 fn extent(cloud: &Cloud) -> (Point3<f64>, [f64; 3]) {
@@ -493,4 +525,22 @@ fn keep(
         size(&size_m, &at_m),
         1e2 * sides
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shade_of_a_lamp_is_over_its_foot_and_what_stands_beside_is_not() {
+        let block = |x: f32, half: f32, low: f32, high: f32| {
+            Cloud::from_points(vec![Point3::new(x - half, -half, low), Point3::new(x + half, half, high)])
+        };
+        let foot = block(0.0, 0.07, 0.72, 0.86);
+        assert!(is_over(&block(0.02, 0.09, 0.9, 1.01), &foot));
+        assert!(is_over(&block(-0.05, 0.02, 0.84, 0.9), &foot));
+        for (x, low, high) in [(0.2, 0.9, 1.01), (0.0, 1.2, 1.3), (0.0, 0.3, 0.6)] {
+            assert!(!is_over(&block(x, 0.09, low, high), &foot), "{x} {low} {high}");
+        }
+    }
 }

@@ -171,6 +171,15 @@ impl Descry {
                 family(0.3, Shape::Round, model.top, model.handle) + other_taper_log(model.taper, ALIKE, m),
             );
         }
+        if let Some(sides) = model.width_m.zip(model.depth_m).filter(|_| model.shape == Shape::Box) {
+            // Cartons come in all sizes: one that is a little longer or lower is another.
+            let metric = height_log(None, height, m)
+                + alike_sides_log([near(sides.0), near(sides.1)], m)
+                + form_log(Some(Shape::Box), m);
+            logs.push(
+                0.5_f64.ln() + self.temper * metric + top_log(model.top, m) + handle_log(model.handle, m),
+            );
+        }
         log_sum(&logs)
     }
 
@@ -337,9 +346,14 @@ fn taper(m: &Measured) -> (f64, f64) {
     (m.evidence.taper, (m.height_m * round.slope_sigma / round.radius_m.max(0.005)).hypot(0.05))
 }
 
+/// Spread of a measured side of a footprint, metres.
+fn side_sigma_m(m: &Measured) -> f64 {
+    0.005_f64.hypot(2.0 * m.sigma_m)
+}
+
 /// A footprint is measured only as far as it was seen: a side may be longer than it looks.
 fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
-    let sigma = 0.005_f64.hypot(2.0 * m.sigma_m);
+    let sigma = side_sigma_m(m);
     match ranges {
         Some((width, depth)) => {
             measure_log(m.footprint_m[0], sigma, Some(width), WIDTHS)
@@ -350,6 +364,16 @@ fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
             measure_log(m.footprint_m[0], sigma, None, WIDTHS) + measure_log(1.0, 0.05, None, (0.95, 0.25))
         }
     }
+}
+
+/// The same for sides that are alike some others: median and log-normal spread of the longer and the shorter.
+fn alike_sides_log(near: [(f64, f64); 2], m: &Measured) -> f64 {
+    let sides = m.footprint_m.iter().zip(near);
+    sides
+        .map(|(side, (median, spread))| {
+            measure_log(*side, side_sigma_m(m), None, (median, spread.hypot(side_sigma_m(m) / median)))
+        })
+        .sum()
 }
 
 /// However many points: what the forms leave out (rounded boxes, bulging cups) bounds what they tell.

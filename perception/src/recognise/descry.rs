@@ -177,7 +177,7 @@ impl Descry {
                 + alike_sides_log([near(sides.0), near(sides.1)], m)
                 + form_log(Some(Shape::Box), m);
             logs.push(
-                0.5_f64.ln() + self.temper * metric + top_log(model.top, m) + handle_log(model.handle, m),
+                0.3_f64.ln() + self.temper * metric + top_log(model.top, m) + handle_log(model.handle, m),
             );
         }
         log_sum(&logs)

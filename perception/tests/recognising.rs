@@ -36,15 +36,15 @@ fn options() -> SceneOptions {
     SceneOptions { surface, ..SceneOptions::default() }
 }
 
-/// One view from true poses, as a cloud in the world.
-fn seen_from(things: &[Thing], angle_rad: f64) -> (Cloud, Visibility) {
-    let pose = on_ring(angle_rad, 1.2, 1.4);
+/// One view from its true pose, as a cloud in the world.
+fn seen_from(things: &[Thing], angle_rad: f64, away_m: f64) -> (Cloud, Visibility) {
+    let pose = on_ring(angle_rad, away_m, 1.4);
     let view: View = look(things, &pose, &pose, &mut Draws(11));
     (view.cloud.transformed(&pose), Visibility::from_views(&[view]))
 }
 
 fn percepts(things: &[Thing], angle_rad: f64, recogniser: &dyn Recogniser) -> Vec<Percept> {
-    let (cloud, seen) = seen_from(things, angle_rad);
+    let (cloud, seen) = seen_from(things, angle_rad, 1.2);
     let scene = segment(&cloud, &seen, &options()).expect("there is a table");
     recogniser.recognise(&scene, &seen, &[cup_a()])
 }
@@ -122,10 +122,8 @@ fn known_box([width_m, depth_m, height_m]: [f64; 3]) -> ObjectModel {
 fn taken_for(known_m: [f64; 3], [width_m, depth_m, height_m]: [f64; 3], turn_rad: f64, away_m: f64) -> f64 {
     let half = [0.5 * width_m, 0.5 * depth_m];
     let thing = Thing::Block { x: 0.05, y: 0.02, half, height: height_m, turn_rad };
-    let pose = on_ring(0.3, away_m, 1.4);
-    let view: View = look(&[thing], &pose, &pose, &mut Draws(11));
-    let seen = Visibility::from_views(std::slice::from_ref(&view));
-    let scene = segment(&view.cloud.transformed(&pose), &seen, &options()).expect("there is a table");
+    let (cloud, seen) = seen_from(&[thing], 0.3, away_m);
+    let scene = segment(&cloud, &seen, &options()).expect("there is a table");
     let found = Descry::default().recognise(&scene, &seen, &[known_box(known_m)]);
     let case = format!("{width_m} x {depth_m} x {height_m} turned by {turn_rad} from {away_m} m");
     assert_eq!(found.len(), 1, "{case}: in one piece");

@@ -366,7 +366,7 @@ fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
     }
 }
 
-/// The same for sides that are alike some others: median and log-normal spread of the longer and the shorter.
+/// The same for the sides of things alike: median and log-normal spread of the longer and of the shorter, blurred by the measurement.
 fn alike_sides_log(near: [(f64, f64); 2], m: &Measured) -> f64 {
     let sides = m.footprint_m.iter().zip(near);
     sides

@@ -28,6 +28,7 @@ pub(super) struct Hiding<'a>(Vec<Above<'a>>);
 /// A camera above a plane.
 struct Above<'a> {
     map: &'a DepthMap,
+    /// How high it is above the plane, metres.
     high_m: f64,
     /// The corner of the cell at zero, and one cell on in x and in y, as seen from the camera, metres.
     origin: Vector3<f64>,

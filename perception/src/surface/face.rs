@@ -51,7 +51,10 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
     let residual_m = (squares / held.len().max(1) as f64).sqrt();
     let all = |cells: &[[i32; 2]]| cells.iter().fold(Counts::default(), |all, cell| all.with(&counts[cell]));
     let mut pieces = parts(&cells);
-    pieces.retain(|cells| all(cells).near >= FEWEST_OF_PIECE && !all(cells).is_slice());
+    pieces.retain(|cells| {
+        let all = all(cells);
+        all.near >= FEWEST_OF_PIECE && !all.is_slice()
+    });
     let mut parts = joined(pieces, &Hiding::of(plane, seen));
     parts.sort_by_cached_key(|cells| std::cmp::Reverse(all(cells).near));
     let part_of = owners(&parts);

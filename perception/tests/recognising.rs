@@ -141,6 +141,33 @@ fn a_known_box_is_known_however_low() {
     }
 }
 
+/// A circle fits to the side of a low box that is seen from far off, and must not be cut out of its top.
+#[test]
+fn a_low_box_far_off_is_in_one_piece() {
+    let mut pieces = Vec::new();
+    for (half, height) in [([0.125, 0.09], 0.06), ([0.09, 0.055], 0.045)] {
+        for seed in 1..=12 {
+            let mut draws = Draws(seed);
+            let turn_rad = std::f64::consts::TAU * draws.next();
+            let thing = Thing::Block { x: 0.3, y: -0.19, half, height, turn_rad };
+            let first_rad = std::f64::consts::TAU * draws.next();
+            let views: Vec<View> = [first_rad, first_rad + 1.6]
+                .iter()
+                .map(|&angle_rad| {
+                    let truth = on_ring(angle_rad, 1.6, 1.3);
+                    let stated = tabletop::disturbed(&truth, 0.02, 0.012, &mut draws);
+                    look(&[thing], &truth, &stated, &mut draws)
+                })
+                .collect();
+            let merged = merge(&views, &MergeOptions::default()).expect("views of one table");
+            let scene = segment(&merged.cloud, &merged.visibility, &options()).expect("there is a table");
+            pieces.push((height, seed, scene.segments.len()));
+        }
+    }
+    let broken: Vec<_> = pieces.iter().filter(|(.., count)| *count != 1).collect();
+    assert!(broken.is_empty(), "height, seed, pieces: {broken:?}");
+}
+
 /// From far off sides are measured to centimetres: a box that is a little shorter may be another, and is not sure to be the known one.
 #[test]
 fn a_box_of_nearly_the_size_is_not_surely_the_known_one() {

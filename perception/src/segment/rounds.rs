@@ -30,6 +30,8 @@ const ROUND_SHARE: f64 = 0.75;
 /// Directions around an axis, and how many of them must show the side: a third.
 const SECTORS: usize = 36;
 const LEAST_SECTORS: usize = 12;
+/// Cosine of the greatest slope of a level face.
+const LEVEL: f64 = 0.8;
 /// How well the normals of a box stand at right angles (1: all of them), and how well a rectangle fits it, metres.
 const SQUARE: f64 = 0.55;
 const BOX_M: f64 = 0.008;
@@ -49,7 +51,7 @@ pub(super) fn part(
     let all: Vec<usize> = members.values().flatten().copied().collect();
     for mut pool in together(voxels, &all) {
         while let Some(cut) = Axis::sought(voxels, &pool).iter().find_map(|axis| {
-            let body = axis.body(voxels, &pool)?;
+            let body = axis.body(voxels, &pool).filter(|body| !axis.parts_a_top(voxels, body))?;
             let is_round = is_round(voxels, &body, points, viewpoints);
             is_round.then(|| Cut::around(voxels, body, axis, part_of_voxel, &members))?
         }) {
@@ -245,6 +247,27 @@ impl Axis {
             self.distance_m(place) < self.radius_m + CLEAR_M && place.z < top_m + CLEAR_M
         };
         wide.then(|| of.iter().copied().filter(belongs).collect())
+    }
+
+    /// Whether a level face runs on across the body's outline, in as many directions as a side must be seen from: what a circle cuts out of
+    /// the top of a low box is no body.
+    fn parts_a_top(&self, voxels: &Voxels, body: &[usize]) -> bool {
+        let is_level = |&v: &usize| voxels.normals[v].z.abs() > LEVEL;
+        let beside = |v: usize| voxels.neighbours(v).iter().map(|&n| n as usize).filter(is_level);
+        let runs_on = |&v: &usize| {
+            beside(v).any(|n| {
+                body.binary_search(&n).is_err()
+                    && (voxels.centres[n].z - voxels.centres[v].z).abs() < CLEAR_M / 2.0
+            })
+        };
+        let sectors: BTreeSet<usize> = body
+            .iter()
+            .copied()
+            .filter(is_level)
+            .filter(runs_on)
+            .map(|v| sector(voxels.centres[v].x - self.x, voxels.centres[v].y - self.y, SECTORS))
+            .collect();
+        sectors.len() >= LEAST_SECTORS
     }
 }
 

@@ -4,6 +4,7 @@
 //! smoothly; where two objects touch, the surface has a concave crease. Vessels are the exception that is mended afterwards: what lies inside
 //! the outline of a body and below its top is the body's own inside.
 
+mod hidden;
 mod join;
 mod mend;
 mod patches;
@@ -15,7 +16,7 @@ mod votes;
 use crate::cloud::Cloud;
 use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, convex_hull, find_surface};
 use crate::visibility::Visibility;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use patches::Voxels;
 pub(crate) use quantile::{end, quantile};
 use serde::{Deserialize, Serialize};
@@ -94,6 +95,7 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
     let mut part_of_voxel = join::parts(&voxels, options);
     if options.part_touching {
         rounds::part(&voxels, &points, &mut part_of_voxel, &viewpoints);
+        hidden::join(&voxels, &mut part_of_voxel, seen, &surface);
     }
     let mut parts = gather(&indices, &points, &voxels, &part_of_voxel);
     if options.part_touching {
@@ -191,6 +193,11 @@ fn stand(parts: &mut [Segment]) -> Vec<f64> {
         part.base_m = base;
     }
     tops
+}
+
+/// True of the normal of something upright.
+fn is_upright(normal: &Vector3<f64>) -> bool {
+    normal.z.abs() < 0.5 && normal.xy().norm() > 0.5
 }
 
 fn middle(points: &[Point3<f64>]) -> [f64; 2] {

@@ -4,9 +4,9 @@
 //! agree, a body is fitted, and parted off if what is left is more than a handle.
 
 use super::patches::Voxels;
-use super::quantile;
 use super::vessels::round_body;
 use super::votes::{RADII, Votes};
+use super::{is_upright, quantile};
 use crate::outline;
 use crate::round::{distance, sector};
 use crate::surface::floor;
@@ -51,7 +51,7 @@ pub(super) fn part(
     let all: Vec<usize> = members.values().flatten().copied().collect();
     for mut pool in together(voxels, &all) {
         while let Some(cut) = Axis::sought(voxels, &pool).iter().find_map(|axis| {
-            let body = axis.body(voxels, &pool).filter(|body| !axis.parts_a_top(voxels, body))?;
+            let body = axis.body(voxels, &pool)?;
             let is_round = is_round(voxels, &body, points, viewpoints);
             is_round.then(|| Cut::around(voxels, body, axis, part_of_voxel, &members))?
         }) {
@@ -70,7 +70,7 @@ pub(super) fn part(
 
 /// True if the side of a part is that of a box: its normals stand at right angles, and a rectangle fits it.
 fn is_box(voxels: &Voxels, of: &[usize], points: &[Point3<f64>]) -> bool {
-    let side: Vec<usize> = of.iter().copied().filter(|&v| is_side(voxels, v)).collect();
+    let side: Vec<usize> = of.iter().copied().filter(|&v| is_upright(&voxels.normals[v])).collect();
     let turned = side.iter().map(|&v| {
         let quarter = 4.0 * voxels.normals[v].y.atan2(voxels.normals[v].x);
         Vector2::new(quarter.cos(), quarter.sin())
@@ -113,7 +113,7 @@ struct Cut {
 }
 
 impl Cut {
-    /// None if the body is just one of the parts.
+    /// None if the body is just one of the parts, or no body.
     fn around(
         voxels: &Voxels,
         body: Vec<usize>,
@@ -141,7 +141,7 @@ impl Cut {
         let mut body = body;
         body.extend(own.into_iter().flatten());
         body.sort_unstable();
-        Some(Cut { body, left })
+        (!axis.parts_a_top(voxels, &body, &left)).then_some(Cut { body, left })
     }
 }
 
@@ -162,7 +162,7 @@ fn is_apart(voxels: &Voxels, rest: &[usize], body: &[usize], axis: &Axis) -> boo
 /// Whether the side of the voxels is that of an upright round body.
 fn is_round(voxels: &Voxels, body: &[usize], points: &[Point3<f64>], viewpoints: &[Point3<f64>]) -> bool {
     // A face on top would speak against a box as well as against a cup.
-    let side: Vec<usize> = body.iter().copied().filter(|&v| is_side(voxels, v)).collect();
+    let side: Vec<usize> = body.iter().copied().filter(|&v| is_upright(&voxels.normals[v])).collect();
     let points = voxels.points_of(&side, points);
     let heights = points.iter().map(|p| p.z).fold((f64::INFINITY, 0.0_f64), |(l, h), z| (l.min(z), h.max(z)));
     round_body(&points, heights.0, heights.1, viewpoints).is_some()
@@ -181,7 +181,7 @@ impl Axis {
     fn sought(voxels: &Voxels, of: &[usize]) -> Vec<Axis> {
         const MOST: usize = 8;
         let cell = |m: f64| floor(m * (1.0 / STEP_M) + 0.5);
-        let side: Vec<usize> = of.iter().copied().filter(|&v| is_side(voxels, v)).collect();
+        let side: Vec<usize> = of.iter().copied().filter(|&v| is_upright(&voxels.normals[v])).collect();
         let (low, high) = bounds(side.iter().map(|&v| voxels.centres[v].xy()));
         let mut votes = Votes::over(
             [low.x, low.y].map(|c| cell(c - RADII_M.1) - 1),
@@ -221,7 +221,8 @@ impl Axis {
     /// The voxels, ascending, of the body about the axis: its side, from enough directions, and what is within.
     fn body(&self, voxels: &Voxels, of: &[usize]) -> Option<Vec<usize>> {
         let near = |v: &usize| {
-            is_side(voxels, *v) && (self.distance_m(&voxels.centres[*v]) - self.radius_m).abs() < CLEAR_M
+            is_upright(&voxels.normals[*v])
+                && (self.distance_m(&voxels.centres[*v]) - self.radius_m).abs() < CLEAR_M
         };
         let faces = |v: &usize| {
             let (place, normal) = (&voxels.centres[*v], &voxels.normals[*v]);
@@ -249,24 +250,22 @@ impl Axis {
         wide.then(|| of.iter().copied().filter(belongs).collect())
     }
 
-    /// Whether a level face runs on across the body's outline, in as many directions as a side must be seen from: what a circle cuts out of
-    /// the top of a low box is no body.
-    fn parts_a_top(&self, voxels: &Voxels, body: &[usize]) -> bool {
-        let is_level = |&v: &usize| voxels.normals[v].z.abs() > LEVEL;
-        let beside = |v: usize| voxels.neighbours(v).iter().map(|&n| n as usize).filter(is_level);
-        let runs_on = |&v: &usize| {
-            beside(v).any(|n| {
-                body.binary_search(&n).is_err()
-                    && (voxels.centres[n].z - voxels.centres[v].z).abs() < CLEAR_M / 2.0
-            })
+    /// Whether the top of a body runs on into what is left beside it, in as many directions as a side must be seen from: what a circle cuts
+    /// out of the top of a low box is no body.
+    fn parts_a_top(&self, voxels: &Voxels, body: &[usize], left: &[Vec<usize>]) -> bool {
+        let mut heights: Vec<f64> = body.iter().map(|&v| voxels.centres[v].z).collect();
+        let top_m = quantile(&mut heights, 0.97);
+        let is_top = |v: usize| {
+            voxels.normals[v].z.abs() > LEVEL && (voxels.centres[v].z - top_m).abs() < CLEAR_M / 2.0
         };
-        let sectors: BTreeSet<usize> = body
-            .iter()
-            .copied()
-            .filter(is_level)
-            .filter(runs_on)
-            .map(|v| sector(voxels.centres[v].x - self.x, voxels.centres[v].y - self.y, SECTORS))
-            .collect();
+        let runs_on = |v: usize| {
+            let mut beside = voxels.neighbours(v).iter().map(|&n| n as usize);
+            beside.any(|n| is_top(n) && body.binary_search(&n).is_ok())
+        };
+        let outline = left.iter().flatten().copied().filter(|&v| is_top(v) && runs_on(v));
+        let direction =
+            |v: usize| sector(voxels.centres[v].x - self.x, voxels.centres[v].y - self.y, SECTORS);
+        let sectors: BTreeSet<usize> = outline.map(direction).collect();
         sectors.len() >= LEAST_SECTORS
     }
 }
@@ -275,10 +274,4 @@ impl Axis {
 fn bounds(places: impl Iterator<Item = Point2<f64>> + Clone) -> (Point2<f64>, Point2<f64>) {
     let first = places.clone().next().unwrap_or_else(Point2::origin);
     places.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)))
-}
-
-/// True if the voxel lies on something upright.
-fn is_side(voxels: &Voxels, voxel: usize) -> bool {
-    let normal = &voxels.normals[voxel];
-    normal.z.abs() < 0.5 && normal.xy().norm() > 0.5
 }

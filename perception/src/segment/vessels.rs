@@ -2,10 +2,11 @@
 
 use super::{Segment, bounds, hull_from_above, middle, most_within, top_m};
 use crate::outline;
-use crate::round::{self, Round};
+use crate::round::{self, Round, distance, sector};
 use crate::surface::range_sigma_m;
 use nalgebra::Point3;
 use std::cell::OnceCell;
+use std::collections::BTreeSet;
 
 /// Parts this far apart can be one vessel, metres.
 const APART_M: f64 = 0.015;
@@ -15,6 +16,13 @@ const LEVEL_M: f64 = 0.015;
 const WIDEST_M: f64 = 0.14;
 /// Share of the points of both that lie on the common round body.
 const ON_BODY: f64 = 0.85;
+/// What is nearer to a body than this lies on it, metres.
+const NEAR_BODY_M: f64 = 0.008;
+/// How far down from the top the rim of a vessel is looked for, metres.
+const RIM_M: f64 = 0.02;
+/// Share of a rim that lies on a circle: its handles do not. In how many directions it is looked for: half of them must show it.
+const ON_RIM: f64 = 0.7;
+const SECTORS: usize = 36;
 /// Share of the side of each of two parts that must lie on its own round body for both to be images of one.
 const ON_MOST: f64 = 0.55;
 /// Bodies are in one place if their axes are nearer than this share of the smaller radius.
@@ -92,16 +100,19 @@ fn union(a: &Segment, b: &Segment) -> Segment {
 }
 
 fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
-    let (n, m) = (large.segment.indices.len(), small.segment.indices.len());
-    if m < 12 || !near(large, small) {
+    let m = small.segment.indices.len();
+    if m < 12 {
         return false;
+    }
+    if !near(large, small) {
+        return is_level(large, small) && one_rim([large, small], viewpoints);
     }
     let inside = small.top_m < large.top_m + 0.005 && footprint_inside(large, small);
     let fitted = large.fitted(viewpoints).filter(|f| f.is_tight(&large.segment.points));
     if inside && fitted.is_some() || fitted.is_some_and(|f| is_handle(&f.body, large, small)) {
         return true;
     }
-    if (large.top_m - small.top_m).abs() > LEVEL_M || (m as f64) < LEAST_SHARE * n as f64 {
+    if !is_level(large, small) {
         return false;
     }
     if in_one_place(large, small, viewpoints) {
@@ -112,7 +123,39 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
     round_body(&both.points, large.low.z.min(small.low.z), top, viewpoints).is_some_and(|body| {
         // Each part on its own must keep to the common body: one alone may carry the fit.
         [large, small].iter().all(|part| share_on(&body, &part.segment) >= ON_BODY - 0.1)
-    })
+    }) || one_rim([large, small], viewpoints)
+}
+
+/// Whether the upper ends of two parts lie on one circle that holds both: near outside and far inside of a bowl, whose side is no cone's.
+fn one_rim(parts: [&Candidate; 2], viewpoints: &[Point3<f64>]) -> bool {
+    let top_m = parts[0].top_m.max(parts[1].top_m);
+    let rims = parts.map(|part| {
+        let points = part.segment.points.iter().copied();
+        points.filter(|p| p.z > top_m - RIM_M).collect::<Vec<_>>()
+    });
+    let both = rims.concat();
+    let Some(fitted) = Fitted::to(&both, top_m - RIM_M, top_m, viewpoints) else { return false };
+    let body = &fitted.body;
+    let is_on = |p: &&Point3<f64>| body.outside_m(p).abs() < NEAR_BODY_M;
+    let on = |of: &[Point3<f64>]| of.iter().filter(is_on).count() as f64 / of.len().max(1) as f64;
+    let seen: BTreeSet<usize> =
+        both.iter().filter(is_on).map(|p| sector(p.x - body.x, p.y - body.y, SECTORS)).collect();
+    let is_within =
+        |p: &&Point3<f64>| distance(p.x - body.x, p.y - body.y) < body.radius_at(top_m) + TOUCHES_M;
+    let holds = |part: &Candidate| {
+        let points = &part.segment.points;
+        points.iter().filter(is_within).count() as f64 >= ON_BODY * points.len() as f64
+    };
+    fitted.is_near(&both, ON_RIM)
+        && seen.len() * 2 >= SECTORS
+        && rims.iter().all(|rim| on(rim) >= ON_MOST)
+        && parts.into_iter().all(holds)
+}
+
+/// Whether two parts are as high, and neither is a crumb of the other.
+fn is_level(large: &Candidate, small: &Candidate) -> bool {
+    let (n, m) = (large.segment.indices.len() as f64, small.segment.indices.len() as f64);
+    (large.top_m - small.top_m).abs() <= LEVEL_M && m >= LEAST_SHARE * n
 }
 
 /// The round body that nearly all of the side of the points lies on, if it is one rather than a box.
@@ -148,8 +191,13 @@ impl Fitted {
 
     /// Judged by what lies on it: a handle does not.
     fn is_tight(&self, points: &[Point3<f64>]) -> bool {
+        self.is_near(points, ON_BODY)
+    }
+
+    /// Whether so large a share of its points lies on it, as near as they are measured, and much nearer than to a box.
+    fn is_near(&self, points: &[Point3<f64>], share: f64) -> bool {
         self.body.residual_m < 2.0 * self.sigma_m + 0.0015
-            && self.body.inliers >= ON_BODY
+            && self.body.inliers >= share
             && self.beats_box(points, 0.6)
     }
 
@@ -190,7 +238,7 @@ fn is_handle(body: &Round, large: &Candidate, small: &Candidate) -> bool {
 }
 
 fn share_on(body: &Round, part: &Segment) -> f64 {
-    let on = part.points.iter().filter(|p| body.outside_m(p) < 0.008).count();
+    let on = part.points.iter().filter(|p| body.outside_m(p) < NEAR_BODY_M).count();
     on as f64 / part.points.len().max(1) as f64
 }
 
@@ -249,5 +297,35 @@ mod tests {
         check(bar(0.044, 0.03, 0.07, 0.08), 2);
         check(bar(0.044, 0.09, 0.012, 0.08), 2);
         check(bar(0.044, 0.03, 0.012, 0.16), 2);
+    }
+
+    /// Points of a bowl's wall, 9 cm high and as wide as 9.5 cm of radius at the top, between two angles in degrees.
+    fn wall(from: usize, to: usize, shift_m: f64) -> Vec<Point3<f64>> {
+        let at = |k: usize| {
+            let angle = (from as f64 + (to - from) as f64 * (k % 120) as f64 / 119.0).to_radians();
+            let share = (k / 120) as f64 / 39.0;
+            let radius = 0.03 + 0.065 * share.sqrt();
+            Point3::new(radius * angle.cos() + shift_m, radius * angle.sin(), 0.01 + 0.08 * share)
+        };
+        (0..4800).map(at).collect()
+    }
+
+    #[test]
+    fn the_inside_and_the_outside_of_a_bowl_are_one() {
+        let eyes = [Point3::new(1.0, 0.0, 0.8)];
+        let count = |walls: [Vec<Point3<f64>>; 2]| {
+            let mut from = 0;
+            let parts = walls.map(|points| {
+                let indices = (from..from + points.len() as u32).collect();
+                from += points.len() as u32;
+                Segment { indices, points, base_m: 0.0 }
+            });
+            whole(parts.into(), &eyes).len()
+        };
+        // The near outside and the far inside, which do not touch.
+        assert_eq!(count([wall(290, 430, 0.0), wall(105, 255, 0.0)]), 1);
+        // Two halves that are farther apart, and two that show too little of a rim.
+        assert_eq!(count([wall(290, 430, 0.1), wall(105, 255, 0.0)]), 2);
+        assert_eq!(count([wall(330, 390, 0.0), wall(150, 210, 0.0)]), 2);
     }
 }

@@ -1,0 +1,163 @@
+//! Bodies that something before them parts: two ends of one face, and what lies between them hidden from all views.
+
+use super::patches::Voxels;
+use super::{is_upright, quantile};
+use crate::surface::Surface;
+use crate::visibility::{Seen, Visibility};
+use nalgebra::{Point3, Vector2, Vector3};
+use std::collections::BTreeMap;
+
+/// Fewest voxels of a face that tell where it lies.
+const FEWEST: usize = 12;
+/// Normals of one upright face turn by no more about it (15°), as a cosine; those of two ends of one by no more (10°).
+const FLAT: f64 = 0.966;
+const PARALLEL: f64 = 0.985;
+/// How far an end of a face may lie before or behind the plane of the other, and how far apart their tops may be, metres.
+const FLUSH_M: f64 = 0.008;
+/// Widest part of a face that is taken to be hidden, metres.
+const WIDEST_M: f64 = 0.25;
+/// Steps in which what is between is looked at, metres, and at which shares of its height.
+const STEP_M: f64 = 0.01;
+const SHARES: [f64; 3] = [0.3, 0.5, 0.7];
+/// Share of these places that all views must miss. None may be looked through.
+const HIDDEN: f64 = 0.8;
+
+/// An upright face of a part, surface frame.
+struct Face {
+    /// Unit, horizontal.
+    normal: Vector2<f64>,
+    /// Distance of its plane from the origin along the normal, metres.
+    offset_m: f64,
+    /// Where it begins and ends along the horizontal direction in it, metres.
+    span_m: (f64, f64),
+}
+
+/// A part with its faces.
+struct Body {
+    name: u32,
+    top_m: f64,
+    faces: Vec<Face>,
+}
+
+/// Gives the ends of one body that a thing before it parts the same name, the lower one.
+pub(super) fn join(voxels: &Voxels, part_of_voxel: &mut [u32], seen: &Visibility, surface: &Surface) {
+    let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (voxel, part) in part_of_voxel.iter().enumerate() {
+        members.entry(*part).or_default().push(voxel);
+    }
+    let bodies: Vec<Body> = members.iter().map(|(name, of)| Body::of(*name, voxels, of)).collect();
+    let mut names: BTreeMap<u32, u32> = members.keys().map(|name| (*name, *name)).collect();
+    for (i, one) in bodies.iter().enumerate() {
+        for other in &bodies[i + 1..] {
+            if one.goes_on_in(other, seen, surface) {
+                let (kept, gone) = (names[&one.name], names[&other.name]);
+                let (kept, gone) = (kept.min(gone), kept.max(gone));
+                names.values_mut().filter(|name| **name == gone).for_each(|name| *name = kept);
+            }
+        }
+    }
+    part_of_voxel.iter_mut().for_each(|part| *part = names[part]);
+}
+
+impl Body {
+    fn of(name: u32, voxels: &Voxels, of: &[usize]) -> Body {
+        let mut heights: Vec<f64> = of.iter().map(|&v| voxels.centres[v].z).collect();
+        Body { name, top_m: quantile(&mut heights, 0.97), faces: faces(voxels, of) }
+    }
+
+    /// Whether a face of both lies in one plane, is as high on both sides, and is hidden between them.
+    fn goes_on_in(&self, other: &Body, seen: &Visibility, surface: &Surface) -> bool {
+        (self.top_m - other.top_m).abs() < FLUSH_M
+            && self.faces.iter().any(|a| {
+                let top_m = self.top_m.min(other.top_m);
+                other.faces.iter().any(|b| a.gap_to(b).is_some_and(|gap| gap.is_hidden(top_m, seen, surface)))
+            })
+    }
+}
+
+/// The upright faces that a part shows, widest first: the direction that most of what is left of its side agrees with, again and again.
+fn faces(voxels: &Voxels, of: &[usize]) -> Vec<Face> {
+    let mut side: Vec<(Point3<f64>, Vector2<f64>)> = of
+        .iter()
+        .filter(|&&v| is_upright(&voxels.normals[v]))
+        .map(|&v| (voxels.centres[v], voxels.normals[v].xy().normalize()))
+        .collect();
+    let mut faces = Vec::new();
+    while side.len() >= FEWEST && faces.len() < 2 {
+        let like = |to: &Vector2<f64>| side.iter().filter(|(_, n)| n.dot(to) > FLAT).count();
+        // Every few are enough to try.
+        let tried = side.iter().step_by(side.len().div_ceil(40));
+        let Some((_, first)) = tried.max_by_key(|(_, n)| like(n)).copied() else { break };
+        let (face, rest): (Vec<_>, Vec<_>) = side.into_iter().partition(|(_, n)| n.dot(&first) > FLAT);
+        faces.extend(Face::through(&face));
+        side = rest;
+    }
+    faces
+}
+
+impl Face {
+    /// None if what faces so is too little or lies in no plane.
+    fn through(of: &[(Point3<f64>, Vector2<f64>)]) -> Option<Face> {
+        let normal = of.iter().map(|(_, n)| n).sum::<Vector2<f64>>().try_normalize(0.0)?;
+        let mut offsets: Vec<f64> = of.iter().map(|(p, _)| normal.dot(&p.xy().coords)).collect();
+        let offset_m = quantile(&mut offsets, 0.5);
+        let on: Vec<&Point3<f64>> = of
+            .iter()
+            .map(|(p, _)| p)
+            .filter(|p| (normal.dot(&p.xy().coords) - offset_m).abs() < FLUSH_M)
+            .collect();
+        let mut along: Vec<f64> = on.iter().map(|p| p.x * -normal.y + p.y * normal.x).collect();
+        let span_m = (quantile(&mut along, 0.02), quantile(&mut along, 0.98));
+        (on.len() >= FEWEST && on.len() * 10 >= of.len() * 7).then_some(Face { normal, offset_m, span_m })
+    }
+
+    /// A place in its plane so far along it.
+    fn at(&self, along_m: f64, height_m: f64) -> Point3<f64> {
+        let flat = self.normal * self.offset_m + Vector2::new(-self.normal.y, self.normal.x) * along_m;
+        Point3::new(flat.x, flat.y, height_m)
+    }
+
+    /// What lies between it and another that may be the same face.
+    fn gap_to<'a>(&'a self, other: &'a Face) -> Option<Gap<'a>> {
+        if self.normal.dot(&other.normal) < PARALLEL {
+            return None;
+        }
+        let (left, right) = if self.span_m.0 < other.span_m.0 { (self, other) } else { (other, self) };
+        let (from, to) = (left.at(left.span_m.1, 0.0), right.at(right.span_m.0, 0.0));
+        let wide_m = (to - from).dot(&Vector3::new(-left.normal.y, left.normal.x, 0.0));
+        let off = |face: &Face, p: &Point3<f64>| (face.normal.dot(&p.xy().coords) - face.offset_m).abs();
+        let middle = from + (to - from) / 2.0;
+        ((STEP_M..WIDEST_M).contains(&wide_m)
+            && off(left, &middle) < FLUSH_M
+            && off(right, &middle) < FLUSH_M)
+            .then_some(Gap { face: left, from_m: left.span_m.1, wide_m })
+    }
+}
+
+/// What is not seen of a face between two ends of it.
+struct Gap<'a> {
+    face: &'a Face,
+    from_m: f64,
+    wide_m: f64,
+}
+
+impl Gap<'_> {
+    fn is_hidden(&self, top_m: f64, seen: &Visibility, surface: &Surface) -> bool {
+        let world_from_surface = surface.surface_from_world.inverse();
+        let steps = (self.wide_m / STEP_M).ceil().max(2.0) as usize;
+        let (mut hidden, mut all) = (0, 0);
+        for k in 1..steps {
+            let along_m = self.from_m + self.wide_m * k as f64 / steps as f64;
+            for share in SHARES {
+                let place = world_from_surface * self.face.at(along_m, share * top_m);
+                match seen.look(&place, FLUSH_M) {
+                    Seen::Free => return false,
+                    Seen::Hidden => hidden += 1,
+                    Seen::Surface | Seen::Never => {}
+                }
+                all += 1;
+            }
+        }
+        f64::from(hidden) >= HIDDEN * f64::from(all)
+    }
+}

@@ -7,7 +7,8 @@ use super::Recogniser;
 use super::evidence::{Measured, measure};
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
 use super::percept::{Percept, Sighting, Stance};
-use crate::noise::normal_cdf;
+use super::verify::Rivals;
+use crate::noise::{KINECT, Residuals, Sensor, normal_cdf};
 use crate::segment::{Scene, Segment};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -28,11 +29,15 @@ pub struct Descry {
     pub least: f64,
     /// Exponent on the likelihoods of sizes and form: below 1 softens them for what the model of the measurements leaves out.
     pub temper: f64,
+    /// X
+    pub fitted: bool,
+    /// X
+    pub verified: f64,
 }
 
 impl Default for Descry {
     fn default() -> Self {
-        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.02, least: 0.5, temper: 0.7 }
+        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.02, least: 0.5, temper: 0.7, fitted: true, verified: 1.0 }
     }
 }
 
@@ -92,45 +97,90 @@ impl Recogniser for Descry {
 
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
         let _span = tracing::debug_span!("recognise", segments = scene.segments.len()).entered();
-        scene.segments.iter().map(|segment| self.judge(scene, segment, seen, models)).collect()
+        let sensor = if self.fitted { fitted(scene, seen) } else { KINECT };
+        scene.segments.iter().map(|segment| self.judge(scene, segment, seen, &sensor, models)).collect()
     }
 }
 
+/// The sensor that errs as what the cameras show of the surface.
+fn fitted(scene: &Scene, seen: &Visibility) -> Sensor {
+    let mut residuals = Residuals::default();
+    seen.maps.iter().for_each(|map| residuals.add(map, &scene.surface));
+    residuals.fit(&KINECT)
+}
+
+/// How probable each model is, and its likelier stance.
+struct Weighed {
+    probabilities: Vec<f64>,
+    stances: Vec<Stance>,
+}
+
+/// A model that is less probable than this by cheap measures is not worth asking rays about (set by hand).
+const DOUBT: f64 = 0.02;
+
 impl Descry {
-    fn judge(&self, scene: &Scene, segment: &Segment, seen: &Visibility, models: &[ObjectModel]) -> Percept {
-        let measured = measure(scene, segment, seen);
+    fn judge(
+        &self,
+        scene: &Scene,
+        segment: &Segment,
+        seen: &Visibility,
+        sensor: &Sensor,
+        models: &[ObjectModel],
+    ) -> Percept {
+        let looked = measure(scene, segment, seen, sensor);
+        let mut weighed = self.weigh(models, &looked.measured, |_, _| 0.0);
+        let doubt = weighed.probabilities.iter().any(|p| *p > DOUBT);
+        if doubt && self.verified > 0.0 {
+            let rays = looked.rays(scene, segment, sensor);
+            let rivals = Rivals::of(&rays, &looked.measured, segment.base_m);
+            let against = |model: &ObjectModel, stance| self.verified * rivals.log_against(model, stance);
+            weighed = self.weigh(models, &looked.measured, against);
+        }
+        let Weighed { probabilities, stances } = weighed;
+        let unknown = 1.0 - probabilities.iter().sum::<f64>();
+        let best = (0..models.len())
+            .max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
+        let named = best.filter(|&b| probabilities[b] >= self.least);
+        let probabilities = models.iter().zip(probabilities).map(|(m, p)| (m.name.clone(), p)).collect();
+        percept(scene, segment, looked.measured, models, named, stances, probabilities, unknown)
+    }
+
+    /// How probable each model is, and how it stands; `against` tells the log of what else speaks against a model in a stance.
+    fn weigh(
+        &self,
+        models: &[ObjectModel],
+        measured: &Measured,
+        against: impl Fn(&ObjectModel, Stance) -> f64,
+    ) -> Weighed {
         let each = self.known / models.len().max(1) as f64;
         let mut stances = vec![Stance::Upright; models.len()];
+        let log = |model: &ObjectModel, stance: Stance| {
+            self.model_log(model, stance, measured) + against(model, stance)
+        };
         let logs: Vec<f64> = models
             .iter()
-            .enumerate()
-            .map(|(i, model)| {
-                let up = (1.0 - self.upside_down).ln() + self.model_log(model, Stance::Upright, &measured);
-                let down = self.upside_down.ln() + self.model_log(model, Stance::UpsideDown, &measured);
+            .zip(&mut stances)
+            .map(|(model, stance)| {
+                let up = (1.0 - self.upside_down).ln() + log(model, Stance::Upright);
+                let down = self.upside_down.ln() + log(model, Stance::UpsideDown);
                 if down > up {
-                    stances[i] = Stance::UpsideDown;
+                    *stance = Stance::UpsideDown;
                 }
                 each.ln() + log_sum(&[up, down])
             })
             .collect();
         let families = FAMILIES.iter().map(|f| {
             ((1.0 - self.known) * f.share).ln()
-                + stranger_log(f, models, &measured)
-                + self.family_log(f, &measured)
+                + stranger_log(f, models, measured)
+                + self.family_log(f, measured)
         });
         let alike =
-            |m: &ObjectModel| (each * self.look_alikes).ln() + self.look_alike_log(m, models, &measured);
+            |m: &ObjectModel| (each * self.look_alikes).ln() + self.look_alike_log(m, models, measured);
         let alike = models.iter().map(alike);
         let rest: Vec<f64> = families.chain(alike).collect();
-        let unknown_log = log_sum(&rest);
-        let total = log_sum(&[logs.as_slice(), &[unknown_log]].concat());
-        let share = |log: f64| if total.is_finite() { (log - total).exp() } else { 0.0 };
-        let probabilities: Vec<(String, f64)> =
-            models.iter().zip(&logs).map(|(m, &log)| (m.name.clone(), share(log))).collect();
-        let unknown = 1.0 - probabilities.iter().map(|p| p.1).sum::<f64>();
-        let best = (0..models.len()).max_by(|&a, &b| logs[a].total_cmp(&logs[b]).then(b.cmp(&a)));
-        let named = best.filter(|&b| probabilities[b].1 >= self.least);
-        percept(scene, segment, measured, models, named, stances, probabilities, unknown)
+        let total = log_sum(&[logs.as_slice(), &rest].concat());
+        let share = |log: &f64| if total.is_finite() { (log - total).exp() } else { 0.0 };
+        Weighed { probabilities: logs.iter().map(share).collect(), stances }
     }
 
     fn model_log(&self, model: &ObjectModel, stance: Stance, m: &Measured) -> f64 {

@@ -2,11 +2,12 @@
 
 use super::asker::Asker;
 use super::percept::{Evidence, Sighting};
+use super::rays::{Around, Rays};
 use super::settle::settle;
+use crate::noise::Sensor;
 use crate::outline::{self, Rectangle};
 use crate::round::{self, Edge, Round};
 use crate::segment::{Scene, Segment, end, quantile, top_m};
-use crate::surface::range_sigma_m;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::Point3;
 
@@ -45,6 +46,9 @@ const INSIDE_M: f64 = 0.014;
 /// deep; and a few of them that stick out together are no handle, metres.
 const FAR_M: f64 = 0.006;
 
+/// Pixels so far beside and above a thing may tell of it, metres.
+const BESIDE_M: f64 = 0.012;
+
 /// All that was measured on one segment.
 #[derive(Clone, Debug)]
 pub(super) struct Measured {
@@ -72,8 +76,38 @@ pub(super) struct Measured {
     pub seen_fraction: f64,
 }
 
+/// What was measured, and whom to ask for more.
+pub(super) struct Looked<'a> {
+    pub measured: Measured,
+    asker: Asker<'a>,
+    points: Vec<Point3<f64>>,
+}
+
+impl Looked<'_> {
+    /// The pixels around the thing.
+    pub fn rays(&self, scene: &Scene, segment: &Segment, sensor: &Sensor) -> Rays {
+        let m = &self.measured;
+        let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
+        let half_m = m.round.map_or(0.5 * m.footprint_m[0], |r| r.radius_at(segment.base_m).max(m.evidence.radius_m));
+        let around = Around {
+            x,
+            y,
+            reach_m: half_m + BESIDE_M,
+            base_m: segment.base_m,
+            top_m: segment.base_m + m.height_m + BESIDE_M,
+        };
+        let others = scene.segments.iter().filter(|other| !std::ptr::eq(*other, segment));
+        Rays::of(&self.asker, sensor, &around, &self.points, others.flat_map(|other| &other.points))
+    }
+}
+
 /// Measures one segment of a scene.
-pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Measured {
+pub(super) fn measure<'a>(
+    scene: &Scene,
+    segment: &Segment,
+    seen: &'a Visibility,
+    sensor: &Sensor,
+) -> Looked<'a> {
     let base_m = segment.base_m;
     let top = top_m(segment);
     let height_m = (top - base_m).max(0.001);
@@ -81,14 +115,14 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
     let world_from_surface = scene.surface.surface_from_world.inverse();
     let place = world_from_surface * Point3::new(middle[0], middle[1], 0.5 * (base_m + top));
     let near = seen.viewpoints().iter().map(|v| (place - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
-    let sigma_m = range_sigma_m(near).min(0.012);
+    let sigma_m = if std::env::var("RULES").is_ok() { sensor } else { &crate::noise::KINECT }.frontal_sigma_m(near).min(0.012);
     let tolerance_m = (3.0 * sigma_m).clamp(0.006, 0.015);
     let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m);
     let first = round::fit(&segment.points, base_m, top, sigma_m, 7);
     let settled = first.and_then(|round| settle(&round, segment, &asker, (base_m, top), sigma_m));
     let (segment, asker, first) = match &settled {
-        Some(settled) => (&settled.segment, &settled.asker, Some(settled.round)),
-        None => (segment, &asker, first),
+        Some(settled) => (&settled.segment, settled.asker.clone(), Some(settled.round)),
+        None => (segment, asker, first),
     };
     let (footprint_m, middle) = outline::bounding(&segment.points).unwrap_or_default();
     let side: Vec<Point3<f64>> = segment
@@ -104,7 +138,7 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
         rectangle: outline::fit(&side),
         height_m,
         height_sigma_m: HEIGHT_M.hypot(0.5 * sigma_m).hypot(0.5 * scene.surface.residual_m.min(0.008)),
-        top_hidden: top_hidden(asker, middle, footprint_m, top),
+        top_hidden: top_hidden(&asker, middle, footprint_m, top),
         footprint_m,
         middle,
         looked_through: 0.0,
@@ -112,12 +146,12 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
         sigma_m,
         seen_fraction: 0.0,
     };
-    measured.evidence.views = views_of(asker, &place);
+    measured.evidence.views = views_of(&asker, &place);
     if let Some(rectangle) = &measured.rectangle {
         measured.evidence.box_residual_m = rectangle.residual_m;
     }
     if let Some(first) = first {
-        let edges = silhouettes(&first, segment, asker, base_m, height_m);
+        let edges = silhouettes(&first, segment, &asker, base_m, height_m);
         let round = round::refit(&first, &segment.points, &edges, base_m, top, sigma_m);
         let eye = (sigma_m > FAR_M).then(|| asker.only_from(&first)).flatten();
         let round =
@@ -125,9 +159,9 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
         measured.round = round.filter(|round| round.inliers >= MOST);
     }
     if let Some(round) = measured.round {
-        measure_round(&mut measured, &round, segment, asker, (base_m, top));
+        measure_round(&mut measured, &round, segment, &asker, (base_m, top));
     }
-    measured
+    Looked { measured, asker, points: segment.points.clone() }
 }
 
 /// Heights at which silhouettes are looked at, as shares of the body's height.

@@ -5,6 +5,7 @@ use super::descry::kinds;
 use super::evidence::measure;
 use super::model::{ObjectModel, Range, Shape};
 use super::percept::{Percept, Stance};
+use crate::noise::KINECT;
 use crate::segment::Scene;
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -36,7 +37,7 @@ impl Recogniser for Published {
             .segments
             .iter()
             .map(|segment| {
-                let measured = measure(scene, segment, seen);
+                let measured = measure(scene, segment, seen, &KINECT).measured;
                 let size = [measured.footprint_m[0], measured.footprint_m[1], measured.height_m];
                 let shape = measured.evidence.round_inliers;
                 let probabilities: Vec<(String, f64)> = models

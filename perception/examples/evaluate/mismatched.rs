@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// After so many views each is judged.
-const VIEWS: [usize; 5] = [1, 2, 3, 5, 8];
+const VIEWS: [usize; 4] = [1, 2, 3, 5];
 /// What the agent asks for before it says yes.
 const SURE: f64 = 0.8;
 
@@ -76,10 +76,11 @@ fn vessels(draws: &mut Draws) -> Vec<Known> {
 fn variants() -> Vec<Descry> {
     let d = Descry::default;
     vec![
-        Descry { fitted: false, verified: 0.0, ..d() },
-        Descry { fitted: false, verified: 0.5, ..d() },
-        Descry { fitted: true, verified: 0.5, ..d() },
-        Descry { fitted: true, verified: 1.0, ..d() },
+        Descry { fitted: false, grip: false, upper: false, ..d() },
+        Descry { grip: false, upper: false, ..d() },
+        Descry { upper: false, ..d() },
+        Descry { grip: false, ..d() },
+        d(),
     ]
 }
 

@@ -1,5 +1,7 @@
 //! Bodies that a ray may meet: upright frusta, open or closed, and boxes.
 
+use crate::round::Round;
+
 /// An upright frustum; metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Frustum {
@@ -43,6 +45,12 @@ pub(super) trait Body {
 }
 
 impl Frustum {
+    /// The closed frustum whose side was fitted, between two heights.
+    pub fn around(round: &Round, base_m: f64, top_m: f64) -> Frustum {
+        let [foot_m, rim_m] = [base_m, top_m].map(|z| round.radius_at(z));
+        Frustum { x: round.x, y: round.y, base_m, top_m, foot_m, rim_m, wall_m: None }
+    }
+
     /// The depths at which a ray enters and leaves the infinite cone about its side, drawn in by `wall_m`.
     #[inline(always)]
     fn cone(&self, from: [f64; 3], [dx, dy, dz]: [f64; 3], wall_m: f64) -> Option<[f64; 2]> {

@@ -33,11 +33,15 @@ pub struct Descry {
     pub fitted: bool,
     /// X
     pub verified: f64,
+    /// X
+    pub grip: bool,
+    /// X
+    pub upper: bool,
 }
 
 impl Default for Descry {
     fn default() -> Self {
-        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.02, least: 0.5, temper: 0.7, fitted: true, verified: 1.0 }
+        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.02, least: 0.5, temper: 0.7, fitted: true, verified: 0.7, grip: true, upper: true }
     }
 }
 
@@ -131,8 +135,7 @@ impl Descry {
         let mut weighed = self.weigh(models, &looked.measured, |_, _| 0.0);
         let doubt = weighed.probabilities.iter().any(|p| *p > DOUBT);
         if doubt && self.verified > 0.0 {
-            let rays = looked.rays(scene, segment, sensor);
-            let rivals = Rivals::of(&rays, &looked.measured, segment.base_m);
+            let rivals = Rivals::of(&looked.rays, &looked.measured, segment.base_m);
             let against = |model: &ObjectModel, stance| self.verified * rivals.log_against(model, stance);
             weighed = self.weigh(models, &looked.measured, against);
         }
@@ -183,6 +186,14 @@ impl Descry {
         Weighed { probabilities: logs.iter().map(share).collect(), stances }
     }
 
+    fn top_log(&self, top: Top, m: &Measured) -> f64 {
+        if self.upper { upper_log(top, m) } else { top_log(top, m) }
+    }
+
+    fn handle_log(&self, handle: Handle, m: &Measured) -> f64 {
+        if self.grip { grip_log(handle, m) } else { handle_log(handle, m) }
+    }
+
     fn model_log(&self, model: &ObjectModel, stance: Stance, m: &Measured) -> f64 {
         let size = height_log(Some(model.height_m), HEIGHTS, m);
         let (top, taper) = match (stance, model.top) {
@@ -195,7 +206,7 @@ impl Descry {
             Shape::Round => round_log(model.diameter_m, m) + taper_log(Some(taper), m),
             Shape::Box => sides_log(model.width_m.zip(model.depth_m), m) + form_log(Some(Shape::Box), m),
         };
-        self.temper * (size + wide) + top_log(top, m) + handle_log(model.handle, m)
+        self.temper * (size + wide) + self.top_log(top, m) + self.handle_log(model.handle, m)
     }
 
     /// The things made like a model but for one feature; sizes are like the model's within a tenth.
@@ -230,7 +241,7 @@ impl Descry {
             _ => sides_log(None, m),
         };
         let metric = height_log(None, family.height, m) + wide + form_log(family.shape, m);
-        self.temper * metric + top_log(family.top, m) + handle_log(family.handle, m)
+        self.temper * metric + self.top_log(family.top, m) + self.handle_log(family.handle, m)
     }
 }
 
@@ -458,6 +469,33 @@ fn top_log(top: Top, m: &Measured) -> f64 {
         Top::Closed => lid.ln(),
         Top::Any => (0.5 * (open + lid)).ln(),
     }
+}
+
+fn upper_log(top: Top, m: &Measured) -> f64 {
+    /// A lid or an inside is missed, or seen where there is none, about this often (set by hand).
+    const ASTRAY_TOP: f64 = 0.01;
+    let open = ASTRAY_TOP + (1.0 - 2.0 * ASTRAY_TOP) / (1.0 + (-m.upper.open_log).exp());
+    match top {
+        Top::Open => open.ln(),
+        Top::Closed => (1.0 - open).ln(),
+        Top::Any => 0.5_f64.ln(),
+    }
+}
+
+fn grip_log(handle: Handle, m: &Measured) -> f64 {
+    /// A handle that is there is missed in view now and then; something like one is none; and views blur a side (set by hand).
+    const MISSED: f64 = 0.04;
+    const LIKE_ONE: f64 = 0.01;
+    const BLUR: f64 = 0.1;
+    let handle_there = m.grip.handle.exp();
+    let with = MISSED + (1.0 - MISSED) * handle_there;
+    let without = (1.0 - LIKE_ONE - BLUR) + LIKE_ONE * handle_there + BLUR * m.grip.blur.exp();
+    let log = match handle {
+        Handle::One => with.ln(),
+        Handle::None => without.ln(),
+        Handle::Any => (0.5 * (with + without)).ln(),
+    };
+    log - with.max(without).ln()
 }
 
 fn handle_log(handle: Handle, m: &Measured) -> f64 {

@@ -1,6 +1,8 @@
 //! Measuring on one segment what tells objects apart, and what could have been measured at all.
 
 use super::asker::Asker;
+use super::body::Frustum;
+use super::features::{Grip, Upper};
 use super::percept::{Evidence, Sighting};
 use super::rays::{Around, Rays};
 use super::settle::settle;
@@ -47,7 +49,8 @@ const INSIDE_M: f64 = 0.014;
 const FAR_M: f64 = 0.006;
 
 /// Pixels so far beside and above a thing may tell of it, metres.
-const BESIDE_M: f64 = 0.012;
+const BESIDE_M: f64 = 0.035;
+const ABOVE_M: f64 = 0.012;
 
 /// All that was measured on one segment.
 #[derive(Clone, Debug)]
@@ -74,40 +77,40 @@ pub(super) struct Measured {
     pub sigma_m: f64,
     /// Share of sides and top that was seen or looked past.
     pub seen_fraction: f64,
+    pub grip: Grip,
+    pub upper: Upper,
 }
 
-/// What was measured, and whom to ask for more.
-pub(super) struct Looked<'a> {
+/// What was measured, and the pixels around the thing.
+pub(super) struct Looked {
     pub measured: Measured,
-    asker: Asker<'a>,
-    points: Vec<Point3<f64>>,
+    pub rays: Rays,
 }
 
-impl Looked<'_> {
-    /// The pixels around the thing.
-    pub fn rays(&self, scene: &Scene, segment: &Segment, sensor: &Sensor) -> Rays {
-        let m = &self.measured;
-        let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
-        let half_m = m.round.map_or(0.5 * m.footprint_m[0], |r| r.radius_at(segment.base_m).max(m.evidence.radius_m));
-        let around = Around {
-            x,
-            y,
-            reach_m: half_m + BESIDE_M,
-            base_m: segment.base_m,
-            top_m: segment.base_m + m.height_m + BESIDE_M,
-        };
-        let others = scene.segments.iter().filter(|other| !std::ptr::eq(*other, segment));
-        Rays::of(&self.asker, sensor, &around, &self.points, others.flat_map(|other| &other.points))
-    }
+/// The pixels around a thing.
+fn rays(
+    scene: &Scene,
+    segment: &Segment,
+    (own, m): (&[Point3<f64>], &Measured),
+    asker: &Asker,
+    sensor: &Sensor,
+) -> Rays {
+    let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
+    let half_m = if m.round.is_some() { m.evidence.radius_m } else { 0.5 * m.footprint_m[0] };
+    let around = Around {
+        x,
+        y,
+        reach_m: half_m + BESIDE_M,
+        base_m: segment.base_m,
+        top_m: segment.base_m + m.height_m + ABOVE_M,
+    };
+    let others = scene.segments.iter().filter(|other| !std::ptr::eq(*other, segment));
+    Rays::of(asker, sensor, &around, own, others.flat_map(|other| &other.points))
 }
 
 /// Measures one segment of a scene.
-pub(super) fn measure<'a>(
-    scene: &Scene,
-    segment: &Segment,
-    seen: &'a Visibility,
-    sensor: &Sensor,
-) -> Looked<'a> {
+pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility, sensor: &Sensor) -> Looked {
+    let this = segment;
     let base_m = segment.base_m;
     let top = top_m(segment);
     let height_m = (top - base_m).max(0.001);
@@ -145,6 +148,8 @@ pub(super) fn measure<'a>(
         independent: (side.len() as f64 / 12.0).clamp(1.0, 60.0),
         sigma_m,
         seen_fraction: 0.0,
+        grip: Grip::default(),
+        upper: Upper::default(),
     };
     measured.evidence.views = views_of(&asker, &place);
     if let Some(rectangle) = &measured.rectangle {
@@ -161,7 +166,12 @@ pub(super) fn measure<'a>(
     if let Some(round) = measured.round {
         measure_round(&mut measured, &round, segment, &asker, (base_m, top));
     }
-    Looked { measured, asker, points: segment.points.clone() }
+    let rays = rays(scene, this, (&segment.points, &measured), &asker, sensor);
+    if let Some(round) = measured.round.filter(|_| measured.evidence.radius_sigma_m <= VAGUE_M) {
+        let body = Frustum::around(&round, base_m, top);
+        (measured.grip, measured.upper) = (Grip::of(&rays, &body), Upper::of(&rays, &body));
+    }
+    Looked { measured, rays }
 }
 
 /// Heights at which silhouettes are looked at, as shares of the body's height.

@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
 /// Pixels of a view that are asked, about.
-const PIXELS: f64 = 500.0;
+const PIXELS: f64 = 900.0;
 /// Chance of something nearer, of what is behind being the surface, and of its being something else (set by hand).
 const NEARER: f64 = 0.1;
 const SURFACE: f64 = 0.6;
@@ -19,7 +19,7 @@ const ELSE: f64 = 0.3;
 /// Depth over which something else may be anywhere, metres (set by hand).
 const ANYWHERE_M: f64 = 1.0;
 /// No pixel says more than this for or against (set by hand).
-const MOST: f64 = 10.0;
+pub(super) const MOST: f64 = 10.0;
 /// Chance that a view says nothing of a body (set by hand).
 const BAD_VIEW: f64 = 0.05;
 /// How far a thing differs from a body of straight sides, metres (set by hand).
@@ -28,7 +28,7 @@ const ROUGH_M: f64 = 0.0015;
 const SHARED_M: f64 = 0.004;
 /// A block of pixels says no more than so many looks, however little neighbours err together: what is left of errors of pose is theirs
 /// in common (set by hand).
-const MOST_LOOKS: f64 = 4.0;
+const MOST_LOOKS: f64 = 2.3;
 /// Side of the cells in which other things are told from a body, metres.
 const CELL_M: f64 = 0.01;
 
@@ -91,10 +91,6 @@ impl Rays {
         Rays { views: asker.views.iter().filter_map(view).collect() }
     }
 
-    /// Log of how much likelier the views are with a body than without.
-    pub fn log_likelihood(&self, body: &impl Body) -> f64 {
-        self.views.iter().map(|view| bounded(view.log_likelihood(body))).sum()
-    }
 }
 
 /// Log of the likelihood of a view that is a bad one now and then.
@@ -121,7 +117,7 @@ impl ViewRays {
                 * lying.map.camera_from_world.inverse();
         let [columns, rows] = window(lying, &surface_from_camera.inverse(), around)?;
         let step = ((columns.len() * rows.len()) as f64 / PIXELS).sqrt().ceil().max(1.0) as usize;
-        let from = surface_from_camera.translation.vector.into();
+        let from: [f64; 3] = surface_from_camera.translation.vector.into();
         let turn = surface_from_camera.rotation.to_rotation_matrix();
         let ray = |u: f64, v: f64| turn * Vector3::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
         let mut pixels = Vec::with_capacity(columns.len() * rows.len() / (step * step) + 1);
@@ -133,8 +129,8 @@ impl ViewRays {
                 }
                 let along: [f64; 3] = ray(u as f64, v as f64).into();
                 let sigma_m = sensor.frontal_sigma_m(depth_m).hypot(ROUGH_M);
-                let p = Point3::from([0, 1, 2].map(|k: usize| from_of(&from, k) + depth_m * along[k]));
-                let behind_m = (around.base_m - from_of(&from, 2)) / along[2];
+                let p = Point3::from([0, 1, 2].map(|k: usize| from[k] + depth_m * along[k]));
+                let behind_m = (around.base_m - from[2]) / along[2];
                 let density = SURFACE * normal(depth_m - behind_m, sigma_m) + ELSE / ANYWHERE_M;
                 let other = !other.is_empty() && other.contains(&cell(&p));
                 pixels.push(Pixel { along, depth_m, sigma_m, without: density, other });
@@ -168,10 +164,6 @@ impl ViewRays {
         let logs = self.pixels.iter().zip(&met).map(|(pixel, depths)| pixel.log_ratio(depths, shared_m));
         self.looks * logs.sum::<f64>() - 0.5 * (shared_m / SHARED_M).powi(2)
     }
-}
-
-fn from_of(from: &[f64; 3], k: usize) -> f64 {
-    from[k]
 }
 
 impl Pixel {

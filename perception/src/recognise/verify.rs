@@ -19,33 +19,24 @@ pub(super) struct Rivals<'a> {
     rays: &'a Rays,
     measured: &'a Measured,
     base_m: f64,
-    /// Log likelihood of the best body of its own measures.
-    own: f64,
+    /// Log likelihood, in each view, of the best body of its own measures.
+    own: Vec<f64>,
 }
 
 impl<'a> Rivals<'a> {
     pub fn of(rays: &'a Rays, measured: &'a Measured, base_m: f64) -> Rivals<'a> {
-        let mut rivals = Rivals { rays, measured, base_m, own: f64::NEG_INFINITY };
-        let tops = [Some(WALL_M), None];
-        let own = measured.round.map_or(f64::NEG_INFINITY, |round| {
-            let top_m = base_m + measured.height_m;
-            let frustum = Frustum {
-                x: round.x,
-                y: round.y,
-                base_m,
-                top_m,
-                foot_m: round.radius_at(base_m),
-                rim_m: round.radius_at(top_m),
-                wall_m: None,
-            };
-            rivals.best(tops.map(|wall_m| Frustum { wall_m, ..frustum }))
+        let mut rivals = Rivals { rays, measured, base_m, own: Vec::new() };
+        let round = measured.round.map(|round| {
+            let closed = Frustum::around(&round, base_m, base_m + measured.height_m);
+            rivals.best([closed, Frustum { wall_m: Some(WALL_M), ..closed }])
         });
-        rivals.own = own.max(rivals.cuboid());
+        let own = [round, rivals.cuboid()].into_iter().flatten();
+        rivals.own = own.max_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_default();
         rivals
     }
 
-    fn cuboid(&self) -> f64 {
-        let Some(rectangle) = &self.measured.rectangle else { return f64::NEG_INFINITY };
+    fn cuboid(&self) -> Option<Vec<f64>> {
+        let rectangle = self.measured.rectangle.as_ref()?;
         let [half_x, half_y] = rectangle.along_m.map(|side| 0.5 * side);
         let cuboid = Cuboid {
             x: rectangle.x,
@@ -54,7 +45,7 @@ impl<'a> Rivals<'a> {
             low: [-half_x, -half_y, self.base_m],
             high: [half_x, half_y, self.base_m + self.measured.height_m],
         };
-        self.rays.log_likelihood(&cuboid)
+        Some(self.rays.views.iter().map(|view| view.log_likelihood(&cuboid)).collect())
     }
 
     /// Log of how much less likely a model makes the views than the best body of its own measures: 0 or less.
@@ -78,33 +69,31 @@ impl<'a> Rivals<'a> {
         };
         let each = [tapers.middle(), within(m.evidence.taper, tapers.low, tapers.high)];
         let of_top = |wall_m: Option<f64>| self.best(each.map(|taper| frustum(taper, wall_m)));
-        let log = match (stance, model.top) {
+        let logs = match (stance, model.top) {
             (Stance::UpsideDown, _) | (_, Top::Closed) => of_top(None),
             (_, Top::Open) => of_top(Some(WALL_M)),
-            (_, Top::Any) => of_top(None).max(of_top(Some(WALL_M))),
+            (_, Top::Any) => better(of_top(None), of_top(Some(WALL_M))),
         };
-        if std::env::var("DBG").is_ok() {
-            let per: Vec<String> = self.rays.views.iter().map(|v| {
-                let f = frustum(tapers.middle(), Some(WALL_M));
-                format!("{:.0}", placed_in(v, &f))
-            }).collect();
-            eprintln!("DBG {} at {x:.3} {y:.3} own {:.1} model {log:.1} diff {:.1} views {} {:?} looks {:.2}", model.name, self.own, log - self.own, self.rays.views.len(), per, self.rays.views[0].looks);
-        }
-        (log - self.own).min(0.0)
+        logs.iter().zip(&self.own).map(|(log, own)| bounded(log - own)).sum::<f64>().min(0.0)
     }
 
-    /// The best of some bodies where each suits best.
-    fn best<const N: usize>(&self, frusta: [Frustum; N]) -> f64 {
-        frusta.into_iter().map(|f| placed(self.rays, &f)).fold(f64::NEG_INFINITY, f64::max)
+    /// Of some bodies the best, each in each view where it suits that view best.
+    fn best<const N: usize>(&self, frusta: [Frustum; N]) -> Vec<f64> {
+        let each = frusta.iter().map(|f| self.rays.views.iter().map(|view| placed_in(view, f)).collect());
+        each.reduce(better).unwrap_or_default()
     }
 }
 
-/// The log likelihood of a frustum, in each view where it suits that view best.
-fn placed(rays: &Rays, frustum: &Frustum) -> f64 {
-    rays.views.iter().map(|view| bounded(placed_in(view, frustum))).sum()
+fn better(a: Vec<f64>, b: Vec<f64>) -> Vec<f64> {
+    if total(&b) > total(&a) { b } else { a }
 }
 
-/// The same in one view, were it a good one.
+/// The log likelihood of all views together, each of which is a bad one now and then.
+fn total(logs: &[f64]) -> f64 {
+    logs.iter().map(|log| bounded(*log)).sum()
+}
+
+/// The log likelihood of a frustum in one view, were it a good one, where it suits it best.
 fn placed_in(view: &ViewRays, frustum: &Frustum) -> f64 {
     let log = |dx: f64, dy: f64| {
         let moved = Frustum { x: frustum.x + dx, y: frustum.y + dy, ..*frustum };

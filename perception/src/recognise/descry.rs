@@ -7,7 +7,7 @@ use super::Recogniser;
 use super::evidence::{Measured, measure};
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
 use super::percept::{Percept, Sighting, Stance};
-use super::verify::Rivals;
+use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor, normal_cdf};
 use crate::segment::{Scene, Segment};
 use crate::visibility::Visibility;
@@ -120,7 +120,7 @@ struct Weighed {
 }
 
 /// A model that is less probable than this by cheap measures is not worth asking rays about (set by hand).
-const DOUBT: f64 = 0.02;
+const DOUBT: f64 = 0.1;
 
 impl Descry {
     fn judge(
@@ -132,12 +132,16 @@ impl Descry {
         models: &[ObjectModel],
     ) -> Percept {
         let looked = measure(scene, segment, seen, sensor);
-        let mut weighed = self.weigh(models, &looked.measured, |_, _| 0.0);
-        let doubt = weighed.probabilities.iter().any(|p| *p > DOUBT);
-        if doubt && self.verified > 0.0 {
-            let rivals = Rivals::of(&looked.rays, &looked.measured, segment.base_m);
-            let against = |model: &ObjectModel, stance| self.verified * rivals.log_against(model, stance);
-            weighed = self.weigh(models, &looked.measured, against);
+        let env = |n: &str, d: f64| std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+        let mut weighed = self.weigh(models, &looked.measured, &vec![0.0; models.len()]);
+        let doubted: Vec<bool> = weighed.probabilities.iter().map(|p| *p > DOUBT).collect();
+        if self.verified > 0.0 && doubted.contains(&true) {
+            let own = Own::of(&looked.rays, &looked.measured, segment.base_m);
+            let each = models.iter().zip(&weighed.stances).zip(doubted);
+            let against: Vec<f64> = each
+                .map(|((m, stance), doubted)| if doubted { self.verified * env("VW", 1.0) * own.log_against(m, *stance) } else { 0.0 })
+                .collect();
+            weighed = self.weigh(models, &looked.measured, &against);
         }
         let Weighed { probabilities, stances } = weighed;
         let unknown = 1.0 - probabilities.iter().sum::<f64>();
@@ -148,28 +152,27 @@ impl Descry {
         percept(scene, segment, looked.measured, models, named, stances, probabilities, unknown)
     }
 
-    /// How probable each model is, and how it stands; `against` tells the log of what else speaks against a model in a stance.
+    /// How probable each model is, and how it stands; `against` is the log of what else speaks against each.
     fn weigh(
         &self,
         models: &[ObjectModel],
         measured: &Measured,
-        against: impl Fn(&ObjectModel, Stance) -> f64,
+        against: &[f64],
     ) -> Weighed {
         let each = self.known / models.len().max(1) as f64;
         let mut stances = vec![Stance::Upright; models.len()];
-        let log = |model: &ObjectModel, stance: Stance| {
-            self.model_log(model, stance, measured) + against(model, stance)
-        };
+        let log = |model: &ObjectModel, stance: Stance| self.model_log(model, stance, measured);
         let logs: Vec<f64> = models
             .iter()
             .zip(&mut stances)
-            .map(|(model, stance)| {
+            .zip(against)
+            .map(|((model, stance), against)| {
                 let up = (1.0 - self.upside_down).ln() + log(model, Stance::Upright);
                 let down = self.upside_down.ln() + log(model, Stance::UpsideDown);
                 if down > up {
                     *stance = Stance::UpsideDown;
                 }
-                each.ln() + log_sum(&[up, down])
+                each.ln() + log_sum(&[up, down]) + against
             })
             .collect();
         let families = FAMILIES.iter().map(|f| {
@@ -483,19 +486,12 @@ fn upper_log(top: Top, m: &Measured) -> f64 {
 }
 
 fn grip_log(handle: Handle, m: &Measured) -> f64 {
-    /// A handle that is there is missed in view now and then; something like one is none; and views blur a side (set by hand).
-    const MISSED: f64 = 0.04;
-    const LIKE_ONE: f64 = 0.01;
-    const BLUR: f64 = 0.1;
-    let handle_there = m.grip.handle.exp();
-    let with = MISSED + (1.0 - MISSED) * handle_there;
-    let without = (1.0 - LIKE_ONE - BLUR) + LIKE_ONE * handle_there + BLUR * m.grip.blur.exp();
-    let log = match handle {
-        Handle::One => with.ln(),
-        Handle::None => without.ln(),
-        Handle::Any => (0.5 * (with + without)).ln(),
-    };
-    log - with.max(without).ln()
+    let [with, without] = m.grip.logs();
+    match handle {
+        Handle::One => with,
+        Handle::None => without,
+        Handle::Any => (0.5 * (with.exp() + without.exp())).ln(),
+    }
 }
 
 fn handle_log(handle: Handle, m: &Measured) -> f64 {

@@ -4,17 +4,20 @@ use super::body::{Body, Cuboid, Frustum, Ray};
 use super::rays::{Pixel, Rays, ViewRays, bounded, normal};
 
 /// Headings at which a handle is looked for.
-const HEADINGS: usize = 24;
+pub(super) const HEADINGS: usize = 24;
 /// Where a handle is: how far out of the body, and between which shares of its height; half its width (set by hand, after mugs), metres.
 const HANDLE_M: (f64, f64) = (0.006, 0.032);
 const HANDLE_HEIGHTS: (f64, f64) = (0.2, 0.85);
 const HALF_WIDTH_M: f64 = 0.007;
 /// What views that lie beside each other leave of a side reaches from foot to rim, so far out, metres.
 const BLUR_M: (f64, f64) = (0.006, 0.024);
+const BLUR_HEIGHTS: (f64, f64) = (0.02, 0.98);
 /// Share of such a place that a ray meets: a handle is a loop (set by hand).
 const LOOP: f64 = 0.4;
 /// Spread of where a ray meets it, metres.
 const LOOP_M: f64 = 0.006;
+/// Chance that what a view shows where a handle may be is neither for nor against one (set by hand).
+const BAD_VIEW: f64 = 0.002;
 /// All views together say no more than this of a handle at one heading.
 const MOST: f64 = 20.0;
 /// A heading at which less than this was said against a handle may hide one.
@@ -22,12 +25,14 @@ const HIDES: f64 = 1.0;
 
 /// What is known of a handle: logs of how much likelier the views are with one, at any heading, and with what blurred views leave of a
 /// side, than with neither.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Grip {
     pub handle: f64,
     pub blur: f64,
-    /// Share of the headings at which one may hide.
-    pub unseen: f64,
+    /// Headings at which one may hide.
+    pub hides: [bool; HEADINGS],
+    /// Number of the likeliest heading.
+    pub heading: usize,
 }
 
 /// What is known of the upper end.
@@ -40,22 +45,66 @@ pub(super) struct Upper {
     pub lid: f64,
 }
 
+impl Default for Grip {
+    fn default() -> Grip {
+        Grip { handle: 0.0, blur: 0.0, hides: [true; HEADINGS], heading: 0 }
+    }
+}
+
 impl Grip {
     pub fn of(rays: &Rays, body: &Frustum) -> Grip {
         let bodies: Vec<Vec<f64>> = rays.views.iter().map(|view| view.met(body)).collect();
-        let logs = |reach_m: (f64, f64), heights: (f64, f64)| -> Vec<f64> {
-            let heading = |k: usize| {
-                let plate = plate(body, std::f64::consts::TAU * k as f64 / HEADINGS as f64, reach_m, heights);
+        let logs = |reach_m: (f64, f64), heights: (f64, f64)| -> [f64; HEADINGS] {
+            std::array::from_fn(|k| {
+                let plate = plate(body, heading_rad(k), reach_m, heights);
                 let each = rays.views.iter().zip(&bodies);
-                each.map(|(view, met)| bounded(view.plate_log(&plate, met))).sum::<f64>().clamp(-MOST, MOST)
-            };
-            (0..HEADINGS).map(heading).collect()
+                each.map(|(view, met)| bounded(view.plate_log(&plate, met), BAD_VIEW)).sum::<f64>().clamp(-MOST, MOST)
+            })
         };
-        let handle = logs(HANDLE_M, HANDLE_HEIGHTS);
-        let blur = logs(BLUR_M, (0.02, 0.98));
-        let hides = handle.iter().filter(|log| **log > -HIDES).count();
-        Grip { handle: mean(&handle), blur: mean(&blur), unseen: hides as f64 / HEADINGS as f64 }
+        let each = logs(HANDLE_M, HANDLE_HEIGHTS);
+        let handle = mean(&each);
+        let blur = if handle > 0.0 { mean(&logs(BLUR_M, BLUR_HEIGHTS)) } else { 0.0 };
+        let heading = (0..HEADINGS).max_by(|&a, &b| each[a].total_cmp(&each[b])).unwrap_or_default();
+        Grip { handle, blur, hides: each.map(|log| log > -HIDES), heading }
     }
+
+    /// Share of the headings at which one may hide.
+    pub fn unseen(&self) -> f64 {
+        self.hides.iter().filter(|hides| **hides).count() as f64 / HEADINGS as f64
+    }
+
+    /// Log of how much likelier a handle is than none.
+    pub fn log(&self) -> f64 {
+        let [with, without] = self.logs();
+        with - without
+    }
+
+    /// Logs of the likelihoods of what was seen with a handle and without.
+    pub fn logs(&self) -> [f64; 2] {
+        /// A handle that is there is missed in view now and then; something like one is none; views blur a side (set by hand).
+        const MISSED: f64 = 0.04;
+        const LIKE_ONE: f64 = 0.02;
+        const BLURRED: f64 = 0.1;
+        let handle = self.handle.exp();
+        let with = MISSED + (1.0 - MISSED) * handle;
+        let without = (1.0 - LIKE_ONE - BLURRED) + LIKE_ONE * handle + BLURRED * self.blur.exp();
+        [with.ln(), without.ln()]
+    }
+
+    /// Whether a place lies at the likeliest heading of a body, outside of it.
+    pub fn has(&self, body: &Frustum, x: f64, y: f64) -> bool {
+        const CLEAR_M: f64 = 0.007;
+        const HALF_M: f64 = 0.02;
+        let (sin, cos) = heading_rad(self.heading).sin_cos();
+        let (dx, dy) = (x - body.x, y - body.y);
+        dx * cos + dy * sin > body.foot_m.min(body.rim_m)
+            && (dy * cos - dx * sin).abs() < HALF_M
+            && dx.hypot(dy) > body.foot_m.max(body.rim_m) + CLEAR_M
+    }
+}
+
+fn heading_rad(k: usize) -> f64 {
+    std::f64::consts::TAU * k as f64 / HEADINGS as f64
 }
 
 /// Log of the mean of what some logs are of.
@@ -153,7 +202,7 @@ impl Upper {
                 lid += if off_m * fall < 0.75 * INSIDE_M { view.looks } else { 0.0 };
             }
             let log = view.looks * sum;
-            open_log += if log < 0.0 { bounded(log) } else { -bounded(-log) };
+            open_log += bounded(log, super::rays::BAD_VIEW);
         }
         let share = |looks: f64| looks / f64::max(all, 1e-9);
         Upper { open_log, open: share(open), lid: share(lid) }

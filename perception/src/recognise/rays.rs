@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
 /// Pixels of a view that are asked, about.
-const PIXELS: f64 = 900.0;
+const PIXELS: f64 = 600.0;
 /// Chance of something nearer, of what is behind being the surface, and of its being something else (set by hand).
 const NEARER: f64 = 0.1;
 const SURFACE: f64 = 0.6;
@@ -21,7 +21,7 @@ const ANYWHERE_M: f64 = 1.0;
 /// No pixel says more than this for or against (set by hand).
 pub(super) const MOST: f64 = 10.0;
 /// Chance that a view says nothing of a body (set by hand).
-const BAD_VIEW: f64 = 0.05;
+pub(super) const BAD_VIEW: f64 = 0.05;
 /// How far a thing differs from a body of straight sides, metres (set by hand).
 const ROUGH_M: f64 = 0.0015;
 /// Spread of what all depths of a view of one body err by together, metres (set by hand).
@@ -29,6 +29,8 @@ const SHARED_M: f64 = 0.004;
 /// A block of pixels says no more than so many looks, however little neighbours err together: what is left of errors of pose is theirs
 /// in common (set by hand).
 const MOST_LOOKS: f64 = 2.3;
+/// Where rays wander to, in spreads across them: columns and rows.
+const WANDER: [[f64; 2]; 3] = [[0.0, 1.0], [0.87, -0.5], [-0.87, -0.5]];
 /// Side of the cells in which other things are told from a body, metres.
 const CELL_M: f64 = 0.01;
 
@@ -40,7 +42,7 @@ pub(super) struct Rays {
 /// The pixels of one view.
 pub(super) struct ViewRays {
     pub from: [f64; 3],
-    /// Where a ray goes that wanders by the noise across it, in three directions: what is added to where it goes.
+    /// What is added to where a ray goes that wanders by the noise across it, to either side and up.
     wander: [[f64; 3]; 3],
     pub pixels: Vec<Pixel>,
     /// Looks that each of them counts for.
@@ -93,9 +95,10 @@ impl Rays {
 
 }
 
-/// Log of the likelihood of a view that is a bad one now and then.
-pub(super) fn bounded(log: f64) -> f64 {
-    if log > 50.0 { log + (1.0 - BAD_VIEW).ln() } else { ((1.0 - BAD_VIEW) * log.exp() + BAD_VIEW).ln() }
+/// Log of the likelihood ratio of a view that says nothing with a chance, whatever it seems to say for or against.
+pub(super) fn bounded(log: f64, bad: f64) -> f64 {
+    let against = |log: f64| ((1.0 - bad) * log.exp() + bad).ln();
+    if log < 0.0 { against(log) } else { -against(-log) }
 }
 
 fn cell(p: &Point3<f64>) -> [i32; 2] {
@@ -136,50 +139,53 @@ impl ViewRays {
                 pixels.push(Pixel { along, depth_m, sigma_m, without: density, other });
             }
         }
-        let turned = |du: f64, dv: f64| -> [f64; 3] {
-            let (du, dv) = (du * sensor.lateral_px / camera.fx, dv * sensor.lateral_px / camera.fy);
+        let wander = WANDER.map(|[du, dv]| {
+            let [du, dv] = [du / camera.fx, dv / camera.fy].map(|by| by * sensor.lateral_px);
             (turn * Vector3::new(du, dv, 0.0)).into()
-        };
-        let wander = [turned(0.0, 1.0), turned(0.87, -0.5), turned(-0.87, -0.5)];
+        });
         let looks = (sensor.looks.min(MOST_LOOKS) * (step * step) as f64 / 64.0).min(1.0);
         (!pixels.is_empty()).then_some(ViewRays { from, wander, pixels, looks })
     }
 
     /// As [`Rays::log_likelihood`], of this view if it is a good one; what its depths err by together is what suits best.
     pub fn log_likelihood(&self, body: &impl Body) -> f64 {
-        let mut met: Vec<[f64; 3]> = Vec::with_capacity(self.pixels.len());
+        let mut met: Vec<f64> = Vec::with_capacity(self.pixels.len());
         let (mut sum, mut weight) = (0.0, 0.0);
         for pixel in &self.pixels {
-            let depths = self.wander.map(|by| {
-                body.depth_m(&Ray { from: self.from, along: [0, 1, 2].map(|k| pixel.along[k] + by[k]) })
-            });
-            let off_m = pixel.depth_m - depths[0];
+            let at_m = body.depth_m(&Ray { from: self.from, along: pixel.along });
+            let off_m = pixel.depth_m - at_m;
             if off_m.abs() < 3.0 * (pixel.sigma_m + SHARED_M) && !pixel.other {
                 let w = self.looks / (pixel.sigma_m * pixel.sigma_m);
                 (sum, weight) = (sum + w * off_m, weight + w);
             }
-            met.push(depths);
+            met.push(at_m);
         }
         let shared_m = sum / (weight + SHARED_M.powi(-2));
-        let logs = self.pixels.iter().zip(&met).map(|(pixel, depths)| pixel.log_ratio(depths, shared_m));
+        let bodies = self.pixels.iter().zip(met).filter(|(_, at_m)| at_m.is_finite());
+        let logs = bodies.map(|(pixel, at_m)| self.log_ratio(pixel, body, at_m, shared_m));
         self.looks * logs.sum::<f64>() - 0.5 * (shared_m / SHARED_M).powi(2)
+    }
+
+    /// Log of how much likelier a pixel's depth is where it meets a body at a depth than without the body. What speaks against it may
+    /// have passed by the body's edge.
+    #[inline(always)]
+    fn log_ratio(&self, pixel: &Pixel, body: &impl Body, at_m: f64, shared_m: f64) -> f64 {
+        let mut with = pixel.with_body(at_m + shared_m);
+        if with < pixel.without {
+            let aside = self.wander.map(|by| {
+                let along = [0, 1, 2].map(|k| pixel.along[k] + by[k]);
+                match body.depth_m(&Ray { from: self.from, along }) {
+                    at_m if at_m.is_finite() => pixel.with_body(at_m + shared_m),
+                    _ => pixel.without,
+                }
+            });
+            with = (with + aside.iter().sum::<f64>()) / (1.0 + aside.len() as f64);
+        }
+        (with / pixel.without).ln().clamp(-MOST, MOST)
     }
 }
 
 impl Pixel {
-    /// Log of how much likelier its depth is where it meets a body at one of some depths, all as likely, than without the body.
-    #[inline(always)]
-    fn log_ratio(&self, depths_m: &[f64; 3], shared_m: f64) -> f64 {
-        if depths_m.iter().all(|d| d.is_infinite()) {
-            return 0.0;
-        }
-        let with: f64 = depths_m
-            .iter()
-            .map(|d| if d.is_infinite() { self.without } else { self.with_body(d + shared_m) })
-            .sum();
-        (with / (3.0 * self.without)).ln().clamp(-MOST, MOST)
-    }
-
     /// Density of its depth where it meets a body at a depth.
     #[inline(always)]
     pub fn with_body(&self, at_m: f64) -> f64 {

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// After so many views each is judged.
-const VIEWS: [usize; 4] = [1, 2, 3, 5];
+const VIEWS: [usize; 5] = [1, 2, 3, 5, 8];
 /// What the agent asks for before it says yes.
 const SURE: f64 = 0.8;
 
@@ -71,26 +71,6 @@ fn vessels(draws: &mut Draws) -> Vec<Known> {
             _ => vessel(GLASS, true, None, false),
         }
     })
-}
-
-fn variants() -> Vec<Descry> {
-    let d = Descry::default;
-    vec![
-        Descry { fitted: false, grip: false, upper: false, ..d() },
-        Descry { grip: false, upper: false, ..d() },
-        Descry { upper: false, ..d() },
-        Descry { grip: false, ..d() },
-        d(),
-    ]
-}
-
-fn judge_all(merged: &descry_perception::Merged, all: &[Descry]) -> Result<Vec<Vec<Percept>>, String> {
-    use descry_perception::Recogniser;
-    let scene_options = descry_perception::segment::SceneOptions { surface: super::table::surface(), ..Default::default() };
-    match descry_perception::segment::segment(&merged.cloud, &merged.visibility, &scene_options) {
-        Ok(scene) => Ok(all.iter().map(|r| r.recognise(&scene, &merged.visibility, &super::table::models())).collect()),
-        Err(_) => Ok(vec![Vec::new(); all.len()]),
-    }
 }
 
 /// What was said of the things after a number of views.
@@ -154,21 +134,16 @@ pub fn run(count: u64, first_seed: u64, only: &str, out: Option<&Path>) -> Resul
         "world", "views", "precision", "recall", "false", "false, .8", "Brier", "ECE", "claims"
     );
     for world in worlds().into_iter().filter(|w| w.0.starts_with(only)) {
-        let each: Vec<Vec<Vec<Tally>>> = (first_seed..first_seed + count)
+        let each: Vec<Vec<Tally>> = (first_seed..first_seed + count)
             .into_par_iter()
             .map(|seed| one(&world, seed, out))
             .collect::<Result<_, String>>()?;
-        let mut tallies = vec![vec![Tally::default(); variants().len()]; VIEWS.len()];
-        for of in each {
-            for (sums, ts) in tallies.iter_mut().zip(of) {
-                sums.iter_mut().zip(ts).for_each(|(s, t)| s.add(t));
-            }
-        }
-        for (views, ts) in VIEWS.iter().zip(&tallies) {
-            for (k, t) in ts.iter().enumerate() {
+        let mut tallies = vec![Tally::default(); VIEWS.len()];
+        each.into_iter().for_each(|of| tallies.iter_mut().zip(of).for_each(|(sum, t)| sum.add(t)));
+        for (views, t) in VIEWS.iter().zip(&tallies) {
             let told = reliability(&t.claims, 10);
             println!(
-                "{:22} {views:>5} [{k}] {:>9.3} {:>7.3} {:>5} {:>9} {:>6.4} {:>6.4} {:>6}",
+                "{:22} {views:>5} {:>9.3} {:>7.3} {:>5} {:>9} {:>6.4} {:>6.4} {:>6}",
                 world.0,
                 t.right as f64 / (t.right + t.wrong).max(1) as f64,
                 t.right as f64 / t.cups.max(1) as f64,
@@ -178,13 +153,12 @@ pub fn run(count: u64, first_seed: u64, only: &str, out: Option<&Path>) -> Resul
                 told.expected_error,
                 told.count
             );
-            }
         }
     }
     Ok(())
 }
 
-fn one((name, device, strange): &World, seed: u64, _out: Option<&Path>) -> Result<Vec<Vec<Tally>>, String> {
+fn one((name, device, strange): &World, seed: u64, out: Option<&Path>) -> Result<Vec<Tally>, String> {
     let mut draws = Draws(seed);
     let things = if *strange { vessels(&mut draws) } else { arrangement(&mut draws) };
     let bare: Vec<Thing> = things.iter().map(|t| t.0).collect();
@@ -206,17 +180,10 @@ fn one((name, device, strange): &World, seed: u64, _out: Option<&Path>) -> Resul
         let kept = merged.fits.iter().position(|fit| fit.used).unwrap_or_default();
         let truth_from_merged = truths[kept] * merged.fits[kept].world_from_camera.inverse();
         let merged = merged.moved(&truth_from_merged);
-        let all = judge_all(&merged, &variants())?;
-        let mut tallies = vec![Tally::default(); all.len()];
-        for (k, (percepts, tally)) in all.iter().zip(&mut tallies).enumerate() {
-            let wrongs = tally.score(&things, percepts);
-            wrongs.iter().for_each(|wrong| eprintln!("[{k}] {name}, seed {seed}, {n} views: {wrong}"));
-        }
-        Ok(tallies)
-    };
-    VIEWS.iter().map(after).collect()
-}
-/*
+        let percepts = judge(&merged, &Descry::default())?;
+        let mut tally = Tally::default();
+        let wrongs = tally.score(&things, &percepts);
+        wrongs.iter().for_each(|wrong| eprintln!("{name}, seed {seed}, {n} views: {wrong}"));
         if let Some(dir) = out.filter(|_| !wrongs.is_empty()) {
             let name = name.replace([' ', ',', '%'], "-");
             picture(&dir.join(format!("{name}-{seed}-{n}.png")), &merged.cloud, &percepts)?;
@@ -225,4 +192,3 @@ fn one((name, device, strange): &World, seed: u64, _out: Option<&Path>) -> Resul
     };
     VIEWS.iter().map(after).collect()
 }
-*/

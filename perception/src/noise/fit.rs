@@ -96,7 +96,9 @@ fn is_on(
 ) -> bool {
     let z = f64::from(map.depths_m[v * map.intrinsics.width + u]);
     let p = map.intrinsics.unproject(u as f64, v as f64, z);
-    z.is_finite() && (normal.dot(&p.coords) - offset_m).abs() < NEAR_SHARE * z && surface.covers(&map.camera_from_world.inverse_transform_point(&p), -INSIDE_M)
+    z.is_finite()
+        && (normal.dot(&p.coords) - offset_m).abs() < NEAR_SHARE * z
+        && surface.covers(&map.camera_from_world.inverse_transform_point(&p), -INSIDE_M)
 }
 
 /// A block of pixels, if it is of the face: residuals of inverse depth, of which the face's is linear.
@@ -120,7 +122,8 @@ fn block(map: &DepthMap, (left, top): (usize, usize), normal: &Vector3<f64>, off
     let (mut sigma, mut residuals) = (f64::INFINITY, Vec::new());
     let mut gate = vec![true; seen.len()];
     for _ in 0..2 {
-        let line = line(seen.iter().zip(&gate).filter(|(_, within)| **within).map(|((_, row, q), _)| (*row, *q)))?;
+        let line =
+            line(seen.iter().zip(&gate).filter(|(_, within)| **within).map(|((_, row, q), _)| (*row, *q)))?;
         residuals = seen.iter().map(|(_, row, q)| q - row.dot(&line)).collect();
         let within = residuals.iter().zip(&gate).filter(|(_, within)| **within);
         let (n, squares) = within.fold((0.0, 0.0), |(n, s), (r, _)| (n + 1.0, s + r * r));
@@ -142,7 +145,9 @@ fn line(rows: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Vector3<f64>>
 fn looks(seen: &[(usize, Vector3<f64>, f64)], residuals: &[f64], gate: &[bool], sigma: f64) -> f64 {
     const CELLS: usize = (BLOCK_PX / CELL_PX) * (BLOCK_PX / CELL_PX);
     let mut sums = [(0.0, 0.0); CELLS];
-    for ((cell, ..), (r, _)) in seen.iter().map(|s| (s.0, s.1)).zip(residuals.iter().zip(gate).filter(|g| *g.1)) {
+    for ((cell, ..), (r, _)) in
+        seen.iter().map(|s| (s.0, s.1)).zip(residuals.iter().zip(gate).filter(|g| *g.1))
+    {
         sums[cell].0 += r;
         sums[cell].1 += 1.0;
     }

@@ -6,7 +6,7 @@
 use super::Recogniser;
 use super::evidence::{Measured, measure};
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
-use super::percept::{Percept, Sighting, Stance};
+use super::percept::{Percept, Stance};
 use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor, normal_cdf};
 use crate::segment::{Scene, Segment};
@@ -29,19 +29,13 @@ pub struct Descry {
     pub least: f64,
     /// Exponent on the likelihoods of sizes and form: below 1 softens them for what the model of the measurements leaves out.
     pub temper: f64,
-    /// X
-    pub fitted: bool,
-    /// X
+    /// Exponent on how much less likely rays find a known object than what was measured: real things differ from their models.
     pub verified: f64,
-    /// X
-    pub grip: bool,
-    /// X
-    pub upper: bool,
 }
 
 impl Default for Descry {
     fn default() -> Self {
-        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.02, least: 0.5, temper: 0.7, fitted: true, verified: 0.7, grip: true, upper: true }
+        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.02, least: 0.5, temper: 0.7, verified: 0.3 }
     }
 }
 
@@ -101,7 +95,7 @@ impl Recogniser for Descry {
 
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
         let _span = tracing::debug_span!("recognise", segments = scene.segments.len()).entered();
-        let sensor = if self.fitted { fitted(scene, seen) } else { KINECT };
+        let sensor = fitted(scene, seen);
         scene.segments.iter().map(|segment| self.judge(scene, segment, seen, &sensor, models)).collect()
     }
 }
@@ -132,33 +126,31 @@ impl Descry {
         models: &[ObjectModel],
     ) -> Percept {
         let looked = measure(scene, segment, seen, sensor);
-        let env = |n: &str, d: f64| std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
         let mut weighed = self.weigh(models, &looked.measured, &vec![0.0; models.len()]);
         let doubted: Vec<bool> = weighed.probabilities.iter().map(|p| *p > DOUBT).collect();
         if self.verified > 0.0 && doubted.contains(&true) {
             let own = Own::of(&looked.rays, &looked.measured, segment.base_m);
             let each = models.iter().zip(&weighed.stances).zip(doubted);
             let against: Vec<f64> = each
-                .map(|((m, stance), doubted)| if doubted { self.verified * env("VW", 1.0) * own.log_against(m, *stance) } else { 0.0 })
+                .map(
+                    |((m, stance), doubted)| {
+                        if doubted { self.verified * own.log_against(m, *stance) } else { 0.0 }
+                    },
+                )
                 .collect();
             weighed = self.weigh(models, &looked.measured, &against);
         }
         let Weighed { probabilities, stances } = weighed;
         let unknown = 1.0 - probabilities.iter().sum::<f64>();
-        let best = (0..models.len())
-            .max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
+        let best =
+            (0..models.len()).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
         let named = best.filter(|&b| probabilities[b] >= self.least);
         let probabilities = models.iter().zip(probabilities).map(|(m, p)| (m.name.clone(), p)).collect();
         percept(scene, segment, looked.measured, models, named, stances, probabilities, unknown)
     }
 
     /// How probable each model is, and how it stands; `against` is the log of what else speaks against each.
-    fn weigh(
-        &self,
-        models: &[ObjectModel],
-        measured: &Measured,
-        against: &[f64],
-    ) -> Weighed {
+    fn weigh(&self, models: &[ObjectModel], measured: &Measured, against: &[f64]) -> Weighed {
         let each = self.known / models.len().max(1) as f64;
         let mut stances = vec![Stance::Upright; models.len()];
         let log = |model: &ObjectModel, stance: Stance| self.model_log(model, stance, measured);
@@ -189,14 +181,6 @@ impl Descry {
         Weighed { probabilities: logs.iter().map(share).collect(), stances }
     }
 
-    fn top_log(&self, top: Top, m: &Measured) -> f64 {
-        if self.upper { upper_log(top, m) } else { top_log(top, m) }
-    }
-
-    fn handle_log(&self, handle: Handle, m: &Measured) -> f64 {
-        if self.grip { grip_log(handle, m) } else { handle_log(handle, m) }
-    }
-
     fn model_log(&self, model: &ObjectModel, stance: Stance, m: &Measured) -> f64 {
         let size = height_log(Some(model.height_m), HEIGHTS, m);
         let (top, taper) = match (stance, model.top) {
@@ -209,7 +193,7 @@ impl Descry {
             Shape::Round => round_log(model.diameter_m, m) + taper_log(Some(taper), m),
             Shape::Box => sides_log(model.width_m.zip(model.depth_m), m) + form_log(Some(Shape::Box), m),
         };
-        self.temper * (size + wide) + self.top_log(top, m) + self.handle_log(model.handle, m)
+        self.temper * (size + wide) + top_log(top, m) + handle_log(model.handle, m)
     }
 
     /// The things made like a model but for one feature; sizes are like the model's within a tenth.
@@ -244,7 +228,7 @@ impl Descry {
             _ => sides_log(None, m),
         };
         let metric = height_log(None, family.height, m) + wide + form_log(family.shape, m);
-        self.temper * metric + self.top_log(family.top, m) + self.handle_log(family.handle, m)
+        self.temper * metric + top_log(family.top, m) + handle_log(family.handle, m)
     }
 }
 
@@ -462,19 +446,6 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
 }
 
 fn top_log(top: Top, m: &Measured) -> f64 {
-    let (open, lid) = match m.evidence.inside {
-        Sighting::Seen => (0.95_f64, 0.01_f64),
-        Sighting::Absent => (0.01, 0.95),
-        Sighting::Unseen => (0.5, 0.5),
-    };
-    match top {
-        Top::Open => open.ln(),
-        Top::Closed => lid.ln(),
-        Top::Any => (0.5 * (open + lid)).ln(),
-    }
-}
-
-fn upper_log(top: Top, m: &Measured) -> f64 {
     /// A lid or an inside is missed, or seen where there is none, about this often (set by hand).
     const ASTRAY_TOP: f64 = 0.01;
     let open = ASTRAY_TOP + (1.0 - 2.0 * ASTRAY_TOP) / (1.0 + (-m.upper.open_log).exp());
@@ -485,32 +456,12 @@ fn upper_log(top: Top, m: &Measured) -> f64 {
     }
 }
 
-fn grip_log(handle: Handle, m: &Measured) -> f64 {
+fn handle_log(handle: Handle, m: &Measured) -> f64 {
     let [with, without] = m.grip.logs();
     match handle {
         Handle::One => with,
         Handle::None => without,
         Handle::Any => (0.5 * (with.exp() + without.exp())).ln(),
-    }
-}
-
-fn handle_log(handle: Handle, m: &Measured) -> f64 {
-    /// What sticks out no farther than the first is what views that lie beside each other leave of a side; as far as the second it is a
-    /// handle, metres.
-    const REACHES_M: (f64, f64) = (0.014, 0.022);
-    let unseen = m.evidence.handle_unseen.clamp(0.0, 1.0);
-    let sure = match m.evidence.handle {
-        Sighting::Seen => (m.evidence.protrusion_m - REACHES_M.0) / (REACHES_M.1 - REACHES_M.0),
-        _ => 0.0,
-    };
-    let between = |no: f64, yes: f64| no * (yes / no).powf(sure.clamp(0.0, 1.0));
-    // A handle that is there is missed in view now and then; out of view always.
-    let with = between(unseen + (1.0 - unseen) * 0.04, 0.9 * (1.0 - unseen) + 0.02);
-    let without = between(0.99, 0.01);
-    match handle {
-        Handle::One => with.ln(),
-        Handle::None => without.ln(),
-        Handle::Any => (0.5 * (with + without)).ln(),
     }
 }
 

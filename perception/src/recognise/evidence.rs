@@ -2,7 +2,7 @@
 
 use super::asker::Asker;
 use super::body::Frustum;
-use super::features::{Grip, Upper};
+use super::features::{Grip, HEADINGS, Upper};
 use super::percept::{Evidence, Sighting};
 use super::rays::{Around, Rays};
 use super::settle::settle;
@@ -10,39 +10,28 @@ use crate::noise::Sensor;
 use crate::outline::{self, Rectangle};
 use crate::round::{self, Edge, Round};
 use crate::segment::{Scene, Segment, end, quantile, top_m};
+use crate::surface::range_sigma_m;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::Point3;
 
 /// Directions around the body that are looked at one by one.
 const SECTORS: usize = 36;
-/// Distances from the body at which a handle has some of itself, metres.
-const HANDLE_REACHES_M: [f64; 3] = [0.010, 0.018, 0.026];
-/// Heights at which it has, as shares of the body's height.
-const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
 /// Heights at which a camera that looks through the side is asked for, as shares of the body's height, and at how many it must: the
 /// foot of a far side is often hidden by the near one.
 const SIDE_HEIGHTS: [f64; 4] = [0.35, 0.5, 0.65, 0.8];
 const THROUGH: usize = 3;
-/// Least and greatest reach of a handle out of the body, metres.
-const HANDLE_M: (f64, f64) = (0.014, 0.06);
-/// A handle reaches out by at least so many spreads of the body's side.
-const HANDLE_SPREADS: f64 = 4.0;
 /// A circle whose radius is known no better than this is no circle to go by, metres.
 const VAGUE_M: f64 = 0.015;
 /// A circle on which no more than this share of the side lies is no circle of it: any face has some that fits a third of it.
 const MOST: f64 = 0.34;
-/// What is this far out of the body is no longer the body itself, metres.
-const CLEAR_M: f64 = 0.007;
-/// Greatest width of a handle across, metres.
-const HANDLE_WIDTH_M: f64 = 0.035;
-/// Share of its reach up to which what sticks out may be the body's own blurred side.
-const ROOT: f64 = 0.35;
+/// A handle or an inside is said to be seen where it is so much likelier, log (set by hand).
+const SAID: f64 = 1.5;
+/// A handle is absent if it may hide at no more than this share of the headings (set by hand).
+const NOWHERE: f64 = 0.08;
 /// What is left of the error of a height however good the camera, metres.
 const HEIGHT_M: f64 = 0.002;
 /// How far the top of a sliver may be from that of the object, metres.
 const SLIVER_M: f64 = 0.01;
-/// How far below the rim a look must reach to be a look inside, metres.
-const INSIDE_M: f64 = 0.014;
 
 /// Measured worse than this, depth does not tell where the middle of a cup is: it spreads points along the view as far as the side is
 /// deep; and a few of them that stick out together are no handle, metres.
@@ -77,6 +66,7 @@ pub(super) struct Measured {
     pub sigma_m: f64,
     /// Share of sides and top that was seen or looked past.
     pub seen_fraction: f64,
+    /// What rays tell of a handle and of the upper end.
     pub grip: Grip,
     pub upper: Upper,
 }
@@ -96,7 +86,9 @@ fn rays(
     sensor: &Sensor,
 ) -> Rays {
     let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
-    let half_m = if m.round.is_some() { m.evidence.radius_m } else { 0.5 * m.footprint_m[0] };
+    let half_m = m.round.map_or(0.5 * m.footprint_m[0], |r| {
+        r.radius_at(segment.base_m).max(r.radius_at(segment.base_m + m.height_m))
+    });
     let around = Around {
         x,
         y,
@@ -118,7 +110,7 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility, senso
     let world_from_surface = scene.surface.surface_from_world.inverse();
     let place = world_from_surface * Point3::new(middle[0], middle[1], 0.5 * (base_m + top));
     let near = seen.viewpoints().iter().map(|v| (place - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
-    let sigma_m = if std::env::var("RULES").is_ok() { sensor } else { &crate::noise::KINECT }.frontal_sigma_m(near).min(0.012);
+    let sigma_m = range_sigma_m(near).min(0.012);
     let tolerance_m = (3.0 * sigma_m).clamp(0.006, 0.015);
     let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m);
     let first = round::fit(&segment.points, base_m, top, sigma_m, 7);
@@ -163,13 +155,9 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility, senso
             round.map(|r| eye.and_then(|eye| r.behind(&segment.points, (base_m, top), eye)).unwrap_or(r));
         measured.round = round.filter(|round| round.inliers >= MOST);
     }
-    if let Some(round) = measured.round {
-        measure_round(&mut measured, &round, segment, &asker, (base_m, top));
-    }
     let rays = rays(scene, this, (&segment.points, &measured), &asker, sensor);
-    if let Some(round) = measured.round.filter(|_| measured.evidence.radius_sigma_m <= VAGUE_M) {
-        let body = Frustum::around(&round, base_m, top);
-        (measured.grip, measured.upper) = (Grip::of(&rays, &body), Upper::of(&rays, &body));
+    if let Some(round) = measured.round {
+        measure_round(&mut measured, &round, (segment, &asker, &rays), (base_m, top));
     }
     Looked { measured, rays }
 }
@@ -233,8 +221,7 @@ fn top_hidden(asker: &Asker, middle: [f64; 2], footprint_m: [f64; 2], top: f64) 
 fn measure_round(
     measured: &mut Measured,
     round: &Round,
-    segment: &Segment,
-    asker: &Asker,
+    (segment, asker, rays): (&Segment, &Asker, &Rays),
     (base_m, top): (f64, f64),
 ) {
     let height = top - base_m;
@@ -247,99 +234,74 @@ fn measure_round(
     evidence.round_inliers = round.inliers;
 
     let sectors = Sectors::measure(round, segment, asker, base_m, height);
-    evidence.arc = sectors.measured_share();
-    measured.looked_through = sectors.looked_through_share();
-    evidence.handle_unseen = sectors.unseen_share();
-    let mut spread_m = round.spread_m;
-    let protrusion = Protrusion::find(round, segment, asker, (base_m, height), measured.sigma_m > FAR_M);
-    if let Some(protrusion) = &protrusion {
-        evidence.protrusion_m = protrusion.reach_m;
-        // What may be a handle says nothing against the roundness of what it is the handle of.
-        let body = |p: &Point3<f64>| !protrusion.has(round, p);
-        spread_m = round.spread_of(&segment.points, (base_m, top), measured.sigma_m, body);
-    }
-    evidence.handle = match protrusion.filter(|p| p.is_handle(spread_m)) {
-        Some(_) => {
-            evidence.round_residual_m = spread_m;
-            measured.round = Some(Round { spread_m, ..*round });
-            Sighting::Seen
-        }
-        None if evidence.handle_unseen < 0.08 => Sighting::Absent,
-        None => Sighting::Unseen,
-    };
-
-    let top_face = TopFace::measure(round, segment, asker, top);
-    (evidence.open, evidence.lid) = (top_face.open, top_face.lid);
-    evidence.inside = match (top_face.open, top_face.lid) {
-        (open, lid) if open > 0.08 && open > lid => Sighting::Seen,
-        (open, lid) if lid > 0.3 && lid > 2.0 * open => Sighting::Absent,
-        _ => Sighting::Unseen,
-    };
-    measured.seen_fraction = 0.75 * sectors.covered_share() + 0.25 * (top_face.open + top_face.lid).min(1.0);
+    evidence.arc = share(&sectors.measured);
+    measured.looked_through = share(&sectors.looked_through);
+    let body = Frustum::around(round, base_m, top);
+    let (grip, upper) = (Grip::of(rays, &body), Upper::of(rays, &body));
+    measured.seen_fraction = 0.75 * sectors.covered_share(&grip) + 0.25 * (upper.open + upper.lid).min(1.0);
+    (evidence.open, evidence.lid) = (upper.open, upper.lid);
     if evidence.radius_sigma_m > VAGUE_M {
         // Beside and above a circle that may as well be another, nothing was looked at.
-        (evidence.handle, evidence.handle_unseen, evidence.inside) =
-            (Sighting::Unseen, 1.0, Sighting::Unseen);
         measured.looked_through = 0.0;
         // A sliver may be cut off above, too.
         measured.height_sigma_m = measured.height_sigma_m.hypot(SLIVER_M);
+    } else {
+        (measured.grip, measured.upper) = (grip, upper);
+    }
+    let (grip, upper) = (&measured.grip, &measured.upper);
+    evidence.handle_unseen = grip.unseen();
+    evidence.handle = sighting(grip.log(), evidence.handle_unseen < NOWHERE);
+    evidence.inside = sighting(upper.open_log, upper.open_log < -SAID);
+    if evidence.handle == Sighting::Seen {
+        // What may be a handle says nothing against the roundness of what it is the handle of.
+        let (beside, rest): (Vec<&Point3<f64>>, Vec<&Point3<f64>>) =
+            segment.points.iter().partition(|p| grip.has(&body, p.x, p.y));
+        let mut reaches: Vec<f64> = beside.iter().map(|p| round.outside_m(p)).collect();
+        evidence.protrusion_m = if reaches.is_empty() { 0.0 } else { quantile(&mut reaches, 0.95) };
+        let spread_m = round.spread_of(rest.into_iter(), (base_m, top), measured.sigma_m);
+        evidence.round_residual_m = spread_m;
+        measured.round = Some(Round { spread_m, ..*round });
     }
 }
 
-/// What is known around the body, direction by direction.
+/// Whether something is there, from the log of how much likelier it is than not, and whether it is not.
+fn sighting(log: f64, absent: bool) -> Sighting {
+    match (log > SAID, absent) {
+        (true, _) => Sighting::Seen,
+        (_, true) => Sighting::Absent,
+        _ => Sighting::Unseen,
+    }
+}
+
+/// What is known of the side, direction by direction.
 struct Sectors {
     measured: [bool; SECTORS],
     looked_through: [bool; SECTORS],
-    /// Share of the places of a handle through which a camera looked.
-    handle_free: [f64; SECTORS],
 }
 
 impl Sectors {
     fn measure(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Sectors {
-        let mut sectors = Sectors {
-            measured: measured_sectors(round, segment, base_m, height),
-            looked_through: [false; SECTORS],
-            handle_free: [0.0; SECTORS],
-        };
-        for i in 0..SECTORS {
+        /// So far within the side a camera has to look, metres.
+        const WITHIN_M: f64 = 0.004;
+        let measured = measured_sectors(round, segment, base_m, height);
+        let mut looked_through = [false; SECTORS];
+        for (i, through) in looked_through.iter_mut().enumerate().filter(|(i, _)| !measured[*i]) {
             let (sin, cos) = (std::f64::consts::TAU * (i as f64 + 0.5) / SECTORS as f64).sin_cos();
-            let look = |reach: f64, share: f64| {
-                let z = base_m + share * height;
-                let d = round.radius_at(z) + reach;
-                asker.look(round.x + d * cos, round.y + d * sin, z)
+            let looked = |share: &&f64| {
+                let z = base_m + **share * height;
+                let d = round.radius_at(z) - WITHIN_M;
+                asker.look(round.x + d * cos, round.y + d * sin, z) >= Seen::Surface
             };
             // Free, or another thing's surface: either way the body's own side is not there.
-            sectors.looked_through[i] = !sectors.measured[i]
-                && SIDE_HEIGHTS.iter().filter(|&&share| look(-0.004, share) >= Seen::Surface).count()
-                    >= THROUGH;
-            let free = HANDLE_REACHES_M
-                .iter()
-                .flat_map(|&reach| HANDLE_HEIGHTS.map(|share| look(reach, share)))
-                .filter(|&s| s == Seen::Free)
-                .count();
-            sectors.handle_free[i] = free as f64 / (HANDLE_REACHES_M.len() * HANDLE_HEIGHTS.len()) as f64;
+            *through = SIDE_HEIGHTS.iter().filter(looked).count() >= THROUGH;
         }
-        sectors
-    }
-
-    fn measured_share(&self) -> f64 {
-        share(&self.measured)
-    }
-
-    fn looked_through_share(&self) -> f64 {
-        share(&self.looked_through)
+        Sectors { measured, looked_through }
     }
 
     /// Share of the circumference that was measured or beside which a camera looked past.
-    fn covered_share(&self) -> f64 {
-        let covered = |i: usize| self.measured[i] || self.handle_free[i] > 0.5;
+    fn covered_share(&self, grip: &Grip) -> f64 {
+        let covered = |i: usize| self.measured[i] || !grip.hides[i * HEADINGS / SECTORS];
         (0..SECTORS).filter(|&i| covered(i)).count() as f64 / SECTORS as f64
-    }
-
-    /// Share of the directions in which a handle, about two sectors wide, could hide.
-    fn unseen_share(&self) -> f64 {
-        let hides = |i: usize| self.handle_free[i] < 0.6 && self.handle_free[(i + 1) % SECTORS] < 0.6;
-        (0..SECTORS).filter(|&i| hides(i)).count() as f64 / SECTORS as f64
     }
 }
 
@@ -373,153 +335,4 @@ fn within_sector(sector: usize) -> [[f64; 2]; 2] {
 
 fn share(flags: &[bool; SECTORS]) -> f64 {
     flags.iter().filter(|f| **f).count() as f64 / SECTORS as f64
-}
-
-fn sector_of(round: &Round, p: &Point3<f64>) -> usize {
-    round::sector(p.x - round.x, p.y - round.y, SECTORS)
-}
-
-/// The largest thing that sticks out of the body in one direction.
-pub(super) struct Protrusion {
-    pub reach_m: f64,
-    /// Where it sticks out to: sine and cosine.
-    direction: (f64, f64),
-    width_m: f64,
-    points: usize,
-    least: usize,
-    inside_height: bool,
-}
-
-impl Protrusion {
-    fn find(
-        round: &Round,
-        segment: &Segment,
-        asker: &Asker,
-        (base_m, height): (f64, f64),
-        far: bool,
-    ) -> Option<Protrusion> {
-        let beside = |p: &&Point3<f64>| {
-            let outside_m = round.outside_m(p);
-            let clear = |sigma_m: f64| outside_m > 3.0 * sigma_m;
-            outside_m > CLEAR_M && asker.support(p).is_some_and(clear)
-        };
-        let out: Vec<&Point3<f64>> = segment
-            .points
-            .iter()
-            .filter(|p| p.z > base_m + 0.08 * height && p.z < base_m + 1.02 * height)
-            .filter(beside)
-            .collect();
-        let mut counts = [0_usize; SECTORS];
-        out.iter().for_each(|p| counts[sector_of(round, p)] += 1);
-        let window = |i: usize| (0..3).map(|k| counts[(i + k) % SECTORS]).sum::<usize>();
-        let start = (0..SECTORS).max_by_key(|&i| (window(i), SECTORS - i))?;
-        let middle = std::f64::consts::TAU * (start as f64 + 1.5) / SECTORS as f64;
-        let (sin, cos) = middle.sin_cos();
-        // Along and across the direction of the protrusion, in the half plane on its side.
-        let local: Vec<(f64, f64, f64)> = out
-            .iter()
-            .map(|p| {
-                let (along, across) = along_and_across(round, p, (sin, cos));
-                (along, across, p.z)
-            })
-            .filter(|&(along, across, _)| along > 0.6 * round.radius_m && across.abs() < 0.06)
-            .collect();
-        if local.len() < 3 {
-            return None;
-        }
-        let reach_of = |&(along, across, z): &(f64, f64, f64)| along.hypot(across) - round.radius_at(z);
-        let mut reaches: Vec<f64> = local.iter().map(reach_of).collect();
-        let reach_m = quantile(&mut reaches, 0.95);
-        // What hardly leaves the body is its blurred side, beside the handle or not.
-        let (mut across, mut heights): (Vec<f64>, Vec<f64>) =
-            local.iter().filter(|l| reach_of(l) > ROOT * reach_m).map(|l| (l.1, l.2)).unzip();
-        let ends = |v: &mut Vec<f64>| (quantile(v, 0.1), quantile(v, 0.9));
-        let (left, right) = ends(&mut across);
-        let (low, high) = ends(&mut heights);
-        Some(Protrusion {
-            reach_m,
-            direction: (sin, cos),
-            width_m: right - left,
-            points: local.len(),
-            least: if far { segment.points.len() / 30 } else { segment.points.len() / 150 }.clamp(6, 60),
-            inside_height: high - low > 0.012 && low > base_m + 0.05 * height,
-        })
-    }
-
-    /// Whether a point lies where it sticks out.
-    fn has(&self, round: &Round, p: &Point3<f64>) -> bool {
-        let (along, across) = along_and_across(round, p, self.direction);
-        round.outside_m(p) > CLEAR_M && along > 0.0 && across.abs() < HANDLE_WIDTH_M
-    }
-
-    /// Whether it is a handle, and not what is left of misaligned views of a side that spreads so much about its form, metres.
-    fn is_handle(&self, spread_m: f64) -> bool {
-        self.points >= self.least
-            && (HANDLE_M.0.max(HANDLE_SPREADS * spread_m)..HANDLE_M.1).contains(&self.reach_m)
-            && self.width_m < HANDLE_WIDTH_M
-            && self.inside_height
-    }
-}
-
-/// A point's place from the axis, along a direction (sine and cosine) and across it, metres.
-fn along_and_across(round: &Round, p: &Point3<f64>, (sin, cos): (f64, f64)) -> (f64, f64) {
-    let (x, y) = (p.x - round.x, p.y - round.y);
-    (x * cos + y * sin, y * cos - x * sin)
-}
-
-/// [`f64::round`] but for halves, without the call that it is on some processors.
-fn nearest_step(steps: f64) -> i32 {
-    (steps + 0.5_f64.copysign(steps)) as i32
-}
-
-/// What was seen of the upper end: the share of it that was looked into, and the share that is a face.
-struct TopFace {
-    open: f64,
-    lid: f64,
-}
-
-impl TopFace {
-    fn measure(round: &Round, segment: &Segment, asker: &Asker, top: f64) -> TopFace {
-        const STEP_M: f64 = 0.005;
-        /// What is said of a cell of the top by the points over it.
-        const LEVEL: u8 = 1;
-        const DEEP: u8 = 2;
-        let radius = round.radius_at(top) - 0.008;
-        let cells = (radius / STEP_M).floor().max(0.0) as i32;
-        let side = 2 * cells + 1;
-        let mut points = vec![0_u8; (side * side) as usize];
-        for p in &segment.points {
-            let kind = if p.z > top - 0.009 {
-                LEVEL
-            } else if p.z < top - INSIDE_M {
-                DEEP
-            } else {
-                continue;
-            };
-            let [i, j] = [p.x - round.x, p.y - round.y].map(|m| nearest_step(m / STEP_M));
-            if i.abs() <= cells && j.abs() <= cells {
-                points[((i + cells) * side + j + cells) as usize] |= kind;
-            }
-        }
-        let (mut all, mut open, mut lid) = (0_u32, 0_u32, 0_u32);
-        for i in -cells..=cells {
-            for j in -cells..=cells {
-                let (dx, dy) = (f64::from(i) * STEP_M, f64::from(j) * STEP_M);
-                if dx.hypot(dy) > radius {
-                    continue;
-                }
-                all += 1;
-                let kind = points[((i + cells) * side + j + cells) as usize];
-                if kind & LEVEL != 0 {
-                    lid += 1;
-                } else if kind & DEEP != 0
-                    || asker.look(round.x + dx, round.y + dy, top - INSIDE_M) == Seen::Free
-                {
-                    open += 1;
-                }
-            }
-        }
-        let share = |n: u32| f64::from(n) / f64::from(all.max(1));
-        TopFace { open: share(open), lid: share(lid) }
-    }
 }

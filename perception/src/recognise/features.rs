@@ -1,7 +1,7 @@
 //! What rays tell of a round body's handle and of its upper end.
 
 use super::body::{Body, Cuboid, Frustum, Ray};
-use super::rays::{Pixel, Rays, ViewRays, bounded, normal};
+use super::rays::{self, Pixel, Rays, ViewRays, bounded, normal};
 
 /// Headings at which a handle is looked for.
 pub(super) const HEADINGS: usize = 24;
@@ -58,7 +58,9 @@ impl Grip {
             std::array::from_fn(|k| {
                 let plate = plate(body, heading_rad(k), reach_m, heights);
                 let each = rays.views.iter().zip(&bodies);
-                each.map(|(view, met)| bounded(view.plate_log(&plate, met), BAD_VIEW)).sum::<f64>().clamp(-MOST, MOST)
+                each.map(|(view, met)| bounded(view.plate_log(&plate, met), BAD_VIEW))
+                    .sum::<f64>()
+                    .clamp(-MOST, MOST)
             })
         };
         let each = logs(HANDLE_M, HANDLE_HEIGHTS);
@@ -164,7 +166,7 @@ impl Pixel {
         }
         let without = if body_m.is_finite() { self.with_body(body_m) } else { self.without };
         let with = LOOP * normal(off_m, sigma_m) + (1.0 - LOOP) * without;
-        (with / without).ln().clamp(-super::rays::MOST, super::rays::MOST)
+        (with / without).ln().clamp(-rays::MOST, rays::MOST)
     }
 }
 
@@ -202,7 +204,7 @@ impl Upper {
                 lid += if off_m * fall < 0.75 * INSIDE_M { view.looks } else { 0.0 };
             }
             let log = view.looks * sum;
-            open_log += bounded(log, super::rays::BAD_VIEW);
+            open_log += bounded(log, rays::BAD_VIEW);
         }
         let share = |looks: f64| looks / f64::max(all, 1e-9);
         Upper { open_log, open: share(open), lid: share(lid) }

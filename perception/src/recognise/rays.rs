@@ -92,7 +92,6 @@ impl Rays {
         let view = |lying: &Lying| ViewRays::of(lying, asker, sensor, around, &other);
         Rays { views: asker.views.iter().filter_map(view).collect() }
     }
-
 }
 
 /// Log of the likelihood ratio of a view that says nothing with a chance, whatever it seems to say for or against.
@@ -115,14 +114,16 @@ impl ViewRays {
     ) -> Option<ViewRays> {
         let camera = &lying.map.intrinsics;
         let surface_from_world = asker.world_from_surface.inverse();
-        let surface_from_camera =
-            surface_from_world * Isometry3::translation(-lying.offset_m.x, -lying.offset_m.y, -lying.offset_m.z)
-                * lying.map.camera_from_world.inverse();
+        let surface_from_camera = surface_from_world
+            * Isometry3::translation(-lying.offset_m.x, -lying.offset_m.y, -lying.offset_m.z)
+            * lying.map.camera_from_world.inverse();
         let [columns, rows] = window(lying, &surface_from_camera.inverse(), around)?;
         let step = ((columns.len() * rows.len()) as f64 / PIXELS).sqrt().ceil().max(1.0) as usize;
         let from: [f64; 3] = surface_from_camera.translation.vector.into();
         let turn = surface_from_camera.rotation.to_rotation_matrix();
-        let ray = |u: f64, v: f64| turn * Vector3::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
+        let ray = |u: f64, v: f64| {
+            turn * Vector3::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0)
+        };
         let mut pixels = Vec::with_capacity(columns.len() * rows.len() / (step * step) + 1);
         for v in rows.step_by(step) {
             for u in columns.clone().step_by(step) {
@@ -218,8 +219,8 @@ fn window(
     for corner in 0..8 {
         let side = |bit: usize| if corner >> bit & 1 == 0 { -around.reach_m } else { around.reach_m };
         let z = if corner >> 2 & 1 == 0 { around.base_m } else { around.top_m };
-        let (u, v) =
-            camera.project(&(camera_from_surface * Point3::new(around.x + side(0), around.y + side(1), z)))?;
+        let (u, v) = camera
+            .project(&(camera_from_surface * Point3::new(around.x + side(0), around.y + side(1), z)))?;
         for (reach, at) in reach.iter_mut().zip([u, v]) {
             *reach = [reach[0].min(at), reach[1].max(at)];
         }

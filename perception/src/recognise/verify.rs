@@ -80,9 +80,7 @@ impl<'a> Own<'a> {
                 wall_m: wall_m(m),
             };
             let views = self.rays.views.iter().zip(&self.placed).zip(&self.logs);
-            views
-                .map(|((view, own), log)| against(placed(view, &body, own.shift_m).log - log))
-                .sum::<f64>()
+            views.map(|((view, own), log)| against(placed(view, &body, own.shift_m).log - log)).sum::<f64>()
         };
         of_taper(tapers.middle()).max(of_taper(within(m.evidence.taper, tapers))).min(0.0)
     }

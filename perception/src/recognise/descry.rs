@@ -4,7 +4,7 @@
 //! upper end and handle. A feature that was not in view has the same likelihood under all of them, so that doubt stays.
 
 use super::Recogniser;
-use super::evidence::{Measured, measure};
+use super::evidence::{Measured, Setting, measure};
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
 use super::percept::{Percept, Stance};
 use super::verify::Own;
@@ -95,8 +95,8 @@ impl Recogniser for Descry {
 
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
         let _span = tracing::debug_span!("recognise", segments = scene.segments.len()).entered();
-        let sensor = fitted(scene, seen);
-        scene.segments.iter().map(|segment| self.judge(scene, segment, seen, &sensor, models)).collect()
+        let setting = Setting::of(scene, fitted(scene, seen));
+        scene.segments.iter().map(|segment| self.judge(&setting, segment, seen, models)).collect()
     }
 }
 
@@ -119,13 +119,12 @@ const DOUBT: f64 = 0.1;
 impl Descry {
     fn judge(
         &self,
-        scene: &Scene,
+        setting: &Setting,
         segment: &Segment,
         seen: &Visibility,
-        sensor: &Sensor,
         models: &[ObjectModel],
     ) -> Percept {
-        let looked = measure(scene, segment, seen, sensor);
+        let looked = measure(setting, segment, seen);
         let mut weighed = self.weigh(models, &looked.measured, &vec![0.0; models.len()]);
         let doubted: Vec<bool> = weighed.probabilities.iter().map(|p| *p > DOUBT).collect();
         if self.verified > 0.0 && doubted.contains(&true) {
@@ -146,7 +145,7 @@ impl Descry {
             (0..models.len()).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
         let named = best.filter(|&b| probabilities[b] >= self.least);
         let probabilities = models.iter().zip(probabilities).map(|(m, p)| (m.name.clone(), p)).collect();
-        percept(scene, segment, looked.measured, models, named, stances, probabilities, unknown)
+        percept(setting.scene, segment, looked.measured, models, named, stances, probabilities, unknown)
     }
 
     /// How probable each model is, and how it stands; `against` is the log of what else speaks against each.

@@ -77,13 +77,47 @@ pub(super) struct Looked {
     pub rays: Rays,
 }
 
+/// A scene with what is asked of it for each of its things.
+pub(super) struct Setting<'a> {
+    pub scene: &'a Scene,
+    pub sensor: Sensor,
+    /// Of each segment.
+    reaches: Vec<Reach>,
+}
+
+impl<'a> Setting<'a> {
+    pub fn of(scene: &'a Scene, sensor: Sensor) -> Setting<'a> {
+        Setting { scene, sensor, reaches: scene.segments.iter().map(Reach::of).collect() }
+    }
+}
+
+/// Least and greatest place of a segment along both axes of the surface, metres.
+struct Reach {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Reach {
+    fn of(segment: &Segment) -> Reach {
+        let none = Reach { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
+        segment.points.iter().fold(none, |r, p| Reach {
+            low: [r.low[0].min(p.x), r.low[1].min(p.y)],
+            high: [r.high[0].max(p.x), r.high[1].max(p.y)],
+        })
+    }
+
+    fn is_within(&self, reach_m: f64, x: f64, y: f64) -> bool {
+        let near = |k: usize, at: f64| self.low[k] < at + reach_m && self.high[k] > at - reach_m;
+        near(0, x) && near(1, y)
+    }
+}
+
 /// The pixels around a thing.
 fn rays(
-    scene: &Scene,
     segment: &Segment,
     (own, m): (&[Point3<f64>], &Measured),
     asker: &Asker,
-    sensor: &Sensor,
+    Setting { scene, sensor, reaches }: &Setting,
 ) -> Rays {
     let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
     let half_m = m.round.map_or(0.5 * m.footprint_m[0], |r| {
@@ -96,13 +130,17 @@ fn rays(
         base_m: segment.base_m,
         top_m: segment.base_m + m.height_m + ABOVE_M,
     };
-    let others = scene.segments.iter().filter(|other| !std::ptr::eq(*other, segment));
-    Rays::of(asker, sensor, &around, own, others.flat_map(|other| &other.points))
+    let others = scene
+        .segments
+        .iter()
+        .zip(reaches)
+        .filter(|(other, reach)| !std::ptr::eq(*other, segment) && reach.is_within(around.reach_m, x, y));
+    Rays::of(asker, sensor, &around, own, others.flat_map(|(other, _)| &other.points))
 }
 
 /// Measures one segment of a scene.
-pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility, sensor: &Sensor) -> Looked {
-    let this = segment;
+pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -> Looked {
+    let (scene, this) = (setting.scene, segment);
     let base_m = segment.base_m;
     let top = top_m(segment);
     let height_m = (top - base_m).max(0.001);
@@ -155,7 +193,7 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility, senso
             round.map(|r| eye.and_then(|eye| r.behind(&segment.points, (base_m, top), eye)).unwrap_or(r));
         measured.round = round.filter(|round| round.inliers >= MOST);
     }
-    let rays = rays(scene, this, (&segment.points, &measured), &asker, sensor);
+    let rays = rays(this, (&segment.points, &measured), &asker, setting);
     if let Some(round) = measured.round {
         measure_round(&mut measured, &round, (segment, &asker, &rays), (base_m, top));
     }
@@ -252,7 +290,7 @@ fn measure_round(
     evidence.handle_unseen = grip.unseen();
     evidence.handle = sighting(grip.log(), evidence.handle_unseen < NOWHERE);
     evidence.inside = sighting(upper.open_log, upper.open_log < -SAID);
-    if evidence.handle == Sighting::Seen {
+    if grip.log() > 0.0 {
         // What may be a handle says nothing against the roundness of what it is the handle of.
         let (beside, rest): (Vec<&Point3<f64>>, Vec<&Point3<f64>>) =
             segment.points.iter().partition(|p| grip.has(&body, p.x, p.y));

@@ -96,7 +96,7 @@ impl Grip {
     /// Whether a place lies at the likeliest heading of a body, outside of it.
     pub fn has(&self, body: &Frustum, x: f64, y: f64) -> bool {
         const CLEAR_M: f64 = 0.007;
-        const HALF_M: f64 = 0.02;
+        const HALF_M: f64 = 0.035;
         let (sin, cos) = heading_rad(self.heading).sin_cos();
         let (dx, dy) = (x - body.x, y - body.y);
         dx * cos + dy * sin > body.foot_m.min(body.rim_m)

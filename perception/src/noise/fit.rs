@@ -1,7 +1,7 @@
 //! The noise of a camera from what it shows of a level face: the inverse of its depth is linear in the pixels.
 
 use super::Sensor;
-use crate::surface::Surface;
+use crate::surface::{Outline, Surface};
 use crate::visibility::DepthMap;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
@@ -47,9 +47,10 @@ impl Residuals {
         let camera_from_surface = map.camera_from_world * surface.surface_from_world.inverse();
         let normal = camera_from_surface.rotation * Vector3::z();
         let offset_m = normal.dot(&camera_from_surface.translation.vector);
+        let outline = surface.outline();
         let corners: Vec<(usize, usize)> = (0..height / BLOCK_PX)
             .flat_map(|j| (0..width / BLOCK_PX).map(move |i| (i * BLOCK_PX, j * BLOCK_PX)))
-            .filter(|&(u, v)| is_on(map, surface, (u + BLOCK_PX / 2, v + BLOCK_PX / 2), &normal, offset_m))
+            .filter(|&(u, v)| is_on(map, &outline, (u + BLOCK_PX / 2, v + BLOCK_PX / 2), &normal, offset_m))
             .collect();
         let step = corners.len().div_ceil(BLOCKS).max(1);
         let blocks = corners.into_iter().step_by(step);
@@ -89,7 +90,7 @@ impl Residuals {
 /// Whether a pixel shows a place of the surface, camera frame.
 fn is_on(
     map: &DepthMap,
-    surface: &Surface,
+    outline: &Outline,
     (u, v): (usize, usize),
     normal: &Vector3<f64>,
     offset_m: f64,
@@ -98,7 +99,7 @@ fn is_on(
     let p = map.intrinsics.unproject(u as f64, v as f64, z);
     z.is_finite()
         && (normal.dot(&p.coords) - offset_m).abs() < NEAR_SHARE * z
-        && surface.covers(&map.camera_from_world.inverse_transform_point(&p), -INSIDE_M)
+        && outline.covers(&map.camera_from_world.inverse_transform_point(&p), -INSIDE_M)
 }
 
 /// A block of pixels, if it is of the face: residuals of inverse depth, of which the face's is linear.

@@ -4,12 +4,12 @@ mod asker;
 mod body;
 mod descry;
 mod evidence;
-mod features;
 mod model;
 mod percept;
 mod published;
 mod rays;
 mod settle;
+mod upper;
 mod verify;
 
 use crate::segment::Scene;

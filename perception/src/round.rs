@@ -168,16 +168,17 @@ impl Round {
         Some(Round { x: self.x + shift_m * to_x, y: self.y + shift_m * to_y, ..*self })
     }
 
-    /// [`Round::spread_m`] of some points.
-    pub fn spread_of<'p>(
+    /// [`Round::spread_m`] of the side points that count.
+    pub fn spread_of(
         &self,
-        points: impl Iterator<Item = &'p Point3<f64>>,
+        points: &[Point3<f64>],
         (base_m, top_m): (f64, f64),
         sigma_m: f64,
+        counts: impl Fn(&Point3<f64>) -> bool,
     ) -> f64 {
         let gate = LAST_GATE * tolerance(sigma_m);
         let band = side_band(base_m, top_m);
-        let side = points.filter(|p| band.contains(&p.z));
+        let side = points.iter().filter(|p| band.contains(&p.z) && counts(p));
         let misses = side.map(|p| self.outside_m(p)).filter(|&d| d > -gate);
         let (n, squares) = misses.fold((0.0, 0.0), |(n, s), d| (n + 1.0, s + d.min(OUTSIDE_M).powi(2)));
         (squares / f64::max(n, 1.0)).sqrt()

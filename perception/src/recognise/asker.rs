@@ -83,6 +83,27 @@ impl<'a> Asker<'a> {
         let mean = each.iter().sum::<Vector2<f64>>().try_normalize(1e-9)?;
         each.iter().all(|eye| eye.dot(&mean) > SAME_SIDE).then_some(mean.into())
     }
+
+    /// Standard deviation of the best measurement of a point of the surface, metres; `None` if cameras that measure better look
+    /// through it: it is noise, or a mixed pixel of a depth edge.
+    pub fn support(&self, p: &Point3<f64>) -> Option<f64> {
+        let place = self.world_from_surface * p;
+        let (mut through, mut here) = (0.0, 0.0);
+        let mut best_m = f64::INFINITY;
+        for view in &self.views {
+            let seen = view.look(&place, self.tolerance_m);
+            let sigma_m = range_sigma_m((place - view.viewpoint()).norm());
+            match seen {
+                Seen::Free => through += sigma_m.powi(-2),
+                Seen::Surface => {
+                    here += sigma_m.powi(-2);
+                    best_m = best_m.min(sigma_m);
+                }
+                Seen::Hidden | Seen::Never => {}
+            }
+        }
+        (through <= here).then_some(if here > 0.0 { best_m } else { 0.0 })
+    }
 }
 
 /// Those of the cameras that do not look through a body which others see.

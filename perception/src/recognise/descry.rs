@@ -6,7 +6,7 @@
 use super::Recogniser;
 use super::evidence::{Measured, Setting, measure};
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
-use super::percept::{Percept, Stance};
+use super::percept::{Percept, Sighting, Stance};
 use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor, normal_cdf};
 use crate::segment::{Scene, Segment};
@@ -456,11 +456,22 @@ fn top_log(top: Top, m: &Measured) -> f64 {
 }
 
 fn handle_log(handle: Handle, m: &Measured) -> f64 {
-    let [with, without] = m.grip.logs();
+    /// What sticks out no farther than the first is what views that lie beside each other leave of a side; as far as the second it is a
+    /// handle, metres.
+    const REACHES_M: (f64, f64) = (0.014, 0.022);
+    let unseen = m.evidence.handle_unseen.clamp(0.0, 1.0);
+    let sure = match m.evidence.handle {
+        Sighting::Seen => (m.evidence.protrusion_m - REACHES_M.0) / (REACHES_M.1 - REACHES_M.0),
+        _ => 0.0,
+    };
+    let between = |no: f64, yes: f64| no * (yes / no).powf(sure.clamp(0.0, 1.0));
+    // A handle that is there is missed in view now and then; out of view always.
+    let with = between(unseen + (1.0 - unseen) * 0.04, 0.9 * (1.0 - unseen) + 0.02);
+    let without = between(0.99, 0.01);
     match handle {
-        Handle::One => with,
-        Handle::None => without,
-        Handle::Any => (0.5 * (with.exp() + without.exp())).ln(),
+        Handle::One => with.ln(),
+        Handle::None => without.ln(),
+        Handle::Any => (0.5 * (with + without)).ln(),
     }
 }
 

@@ -2,10 +2,10 @@
 
 use super::asker::Asker;
 use super::body::Frustum;
-use super::features::{Grip, HEADINGS, Upper};
 use super::percept::{Evidence, Sighting};
 use super::rays::{Around, Rays};
 use super::settle::settle;
+use super::upper::Upper;
 use crate::noise::Sensor;
 use crate::outline::{self, Rectangle};
 use crate::round::{self, Edge, Round};
@@ -16,18 +16,30 @@ use nalgebra::Point3;
 
 /// Directions around the body that are looked at one by one.
 const SECTORS: usize = 36;
+/// Distances from the body at which a handle has some of itself, metres.
+const HANDLE_REACHES_M: [f64; 3] = [0.010, 0.018, 0.026];
+/// Heights at which it has, as shares of the body's height.
+const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
 /// Heights at which a camera that looks through the side is asked for, as shares of the body's height, and at how many it must: the
 /// foot of a far side is often hidden by the near one.
 const SIDE_HEIGHTS: [f64; 4] = [0.35, 0.5, 0.65, 0.8];
 const THROUGH: usize = 3;
+/// Least and greatest reach of a handle out of the body, metres.
+const HANDLE_M: (f64, f64) = (0.014, 0.06);
+/// A handle reaches out by at least so many spreads of the body's side.
+const HANDLE_SPREADS: f64 = 4.0;
 /// A circle whose radius is known no better than this is no circle to go by, metres.
 const VAGUE_M: f64 = 0.015;
 /// A circle on which no more than this share of the side lies is no circle of it: any face has some that fits a third of it.
 const MOST: f64 = 0.34;
-/// A handle or an inside is said to be seen where it is so much likelier, log (set by hand).
+/// What is this far out of the body is no longer the body itself, metres.
+const CLEAR_M: f64 = 0.007;
+/// Greatest width of a handle across, metres.
+const HANDLE_WIDTH_M: f64 = 0.035;
+/// Share of its reach up to which what sticks out may be the body's own blurred side.
+const ROOT: f64 = 0.35;
+/// An inside is said to be seen, or not to be there, where it is so much likelier, log (set by hand).
 const SAID: f64 = 1.5;
-/// A handle is absent if it may hide at no more than this share of the headings (set by hand).
-const NOWHERE: f64 = 0.08;
 /// What is left of the error of a height however good the camera, metres.
 const HEIGHT_M: f64 = 0.002;
 /// How far the top of a sliver may be from that of the object, metres.
@@ -38,7 +50,7 @@ const SLIVER_M: f64 = 0.01;
 const FAR_M: f64 = 0.006;
 
 /// Pixels so far beside and above a thing may tell of it, metres.
-const BESIDE_M: f64 = 0.035;
+const BESIDE_M: f64 = 0.012;
 const ABOVE_M: f64 = 0.012;
 
 /// All that was measured on one segment.
@@ -66,8 +78,7 @@ pub(super) struct Measured {
     pub sigma_m: f64,
     /// Share of sides and top that was seen or looked past.
     pub seen_fraction: f64,
-    /// What rays tell of a handle and of the upper end.
-    pub grip: Grip,
+    /// What rays tell of the upper end.
     pub upper: Upper,
 }
 
@@ -178,7 +189,6 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         independent: (side.len() as f64 / 12.0).clamp(1.0, 60.0),
         sigma_m,
         seen_fraction: 0.0,
-        grip: Grip::default(),
         upper: Upper::default(),
     };
     measured.evidence.views = views_of(&asker, &place);
@@ -272,74 +282,101 @@ fn measure_round(
     evidence.round_inliers = round.inliers;
 
     let sectors = Sectors::measure(round, segment, asker, base_m, height);
-    evidence.arc = share(&sectors.measured);
-    measured.looked_through = share(&sectors.looked_through);
-    let body = Frustum::around(round, base_m, top);
-    let (grip, upper) = (Grip::of(rays, &body), Upper::of(rays, &body));
-    measured.seen_fraction = 0.75 * sectors.covered_share(&grip) + 0.25 * (upper.open + upper.lid).min(1.0);
+    evidence.arc = sectors.measured_share();
+    measured.looked_through = sectors.looked_through_share();
+    evidence.handle_unseen = sectors.unseen_share();
+    let mut spread_m = round.spread_m;
+    let protrusion = Protrusion::find(round, segment, asker, (base_m, height), measured.sigma_m > FAR_M);
+    if let Some(protrusion) = &protrusion {
+        evidence.protrusion_m = protrusion.reach_m;
+        // What may be a handle says nothing against the roundness of what it is the handle of.
+        let body = |p: &Point3<f64>| !protrusion.has(round, p);
+        spread_m = round.spread_of(&segment.points, (base_m, top), measured.sigma_m, body);
+    }
+    evidence.handle = match protrusion.filter(|p| p.is_handle(spread_m)) {
+        Some(_) => {
+            evidence.round_residual_m = spread_m;
+            measured.round = Some(Round { spread_m, ..*round });
+            Sighting::Seen
+        }
+        None if evidence.handle_unseen < 0.08 => Sighting::Absent,
+        None => Sighting::Unseen,
+    };
+
+    let upper = Upper::of(rays, &Frustum::around(round, base_m, top));
     (evidence.open, evidence.lid) = (upper.open, upper.lid);
+    evidence.inside = match upper.open_log {
+        log if log > SAID => Sighting::Seen,
+        log if log < -SAID => Sighting::Absent,
+        _ => Sighting::Unseen,
+    };
+    measured.seen_fraction = 0.75 * sectors.covered_share() + 0.25 * (upper.open + upper.lid).min(1.0);
     if evidence.radius_sigma_m > VAGUE_M {
         // Beside and above a circle that may as well be another, nothing was looked at.
+        (evidence.handle, evidence.handle_unseen, evidence.inside) =
+            (Sighting::Unseen, 1.0, Sighting::Unseen);
         measured.looked_through = 0.0;
         // A sliver may be cut off above, too.
         measured.height_sigma_m = measured.height_sigma_m.hypot(SLIVER_M);
     } else {
-        (measured.grip, measured.upper) = (grip, upper);
-    }
-    let (grip, upper) = (&measured.grip, &measured.upper);
-    evidence.handle_unseen = grip.unseen();
-    evidence.handle = sighting(grip.log(), evidence.handle_unseen < NOWHERE);
-    evidence.inside = sighting(upper.open_log, upper.open_log < -SAID);
-    if grip.log() > 0.0 {
-        // What may be a handle says nothing against the roundness of what it is the handle of.
-        let (beside, rest): (Vec<&Point3<f64>>, Vec<&Point3<f64>>) =
-            segment.points.iter().partition(|p| grip.has(&body, p.x, p.y));
-        let mut reaches: Vec<f64> = beside.iter().map(|p| round.outside_m(p)).collect();
-        evidence.protrusion_m = if reaches.is_empty() { 0.0 } else { quantile(&mut reaches, 0.95) };
-        let spread_m = round.spread_of(rest.into_iter(), (base_m, top), measured.sigma_m);
-        evidence.round_residual_m = spread_m;
-        measured.round = Some(Round { spread_m, ..*round });
+        measured.upper = upper;
     }
 }
 
-/// Whether something is there, from the log of how much likelier it is than not, and whether it is not.
-fn sighting(log: f64, absent: bool) -> Sighting {
-    match (log > SAID, absent) {
-        (true, _) => Sighting::Seen,
-        (_, true) => Sighting::Absent,
-        _ => Sighting::Unseen,
-    }
-}
-
-/// What is known of the side, direction by direction.
+/// What is known around the body, direction by direction.
 struct Sectors {
     measured: [bool; SECTORS],
     looked_through: [bool; SECTORS],
+    /// Share of the places of a handle through which a camera looked.
+    handle_free: [f64; SECTORS],
 }
 
 impl Sectors {
     fn measure(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Sectors {
-        /// So far within the side a camera has to look, metres.
-        const WITHIN_M: f64 = 0.004;
-        let measured = measured_sectors(round, segment, base_m, height);
-        let mut looked_through = [false; SECTORS];
-        for (i, through) in looked_through.iter_mut().enumerate().filter(|(i, _)| !measured[*i]) {
+        let mut sectors = Sectors {
+            measured: measured_sectors(round, segment, base_m, height),
+            looked_through: [false; SECTORS],
+            handle_free: [0.0; SECTORS],
+        };
+        for i in 0..SECTORS {
             let (sin, cos) = (std::f64::consts::TAU * (i as f64 + 0.5) / SECTORS as f64).sin_cos();
-            let looked = |share: &&f64| {
-                let z = base_m + **share * height;
-                let d = round.radius_at(z) - WITHIN_M;
-                asker.look(round.x + d * cos, round.y + d * sin, z) >= Seen::Surface
+            let look = |reach: f64, share: f64| {
+                let z = base_m + share * height;
+                let d = round.radius_at(z) + reach;
+                asker.look(round.x + d * cos, round.y + d * sin, z)
             };
             // Free, or another thing's surface: either way the body's own side is not there.
-            *through = SIDE_HEIGHTS.iter().filter(looked).count() >= THROUGH;
+            sectors.looked_through[i] = !sectors.measured[i]
+                && SIDE_HEIGHTS.iter().filter(|&&share| look(-0.004, share) >= Seen::Surface).count()
+                    >= THROUGH;
+            let free = HANDLE_REACHES_M
+                .iter()
+                .flat_map(|&reach| HANDLE_HEIGHTS.map(|share| look(reach, share)))
+                .filter(|&s| s == Seen::Free)
+                .count();
+            sectors.handle_free[i] = free as f64 / (HANDLE_REACHES_M.len() * HANDLE_HEIGHTS.len()) as f64;
         }
-        Sectors { measured, looked_through }
+        sectors
+    }
+
+    fn measured_share(&self) -> f64 {
+        share(&self.measured)
+    }
+
+    fn looked_through_share(&self) -> f64 {
+        share(&self.looked_through)
     }
 
     /// Share of the circumference that was measured or beside which a camera looked past.
-    fn covered_share(&self, grip: &Grip) -> f64 {
-        let covered = |i: usize| self.measured[i] || !grip.hides[i * HEADINGS / SECTORS];
+    fn covered_share(&self) -> f64 {
+        let covered = |i: usize| self.measured[i] || self.handle_free[i] > 0.5;
         (0..SECTORS).filter(|&i| covered(i)).count() as f64 / SECTORS as f64
+    }
+
+    /// Share of the directions in which a handle, about two sectors wide, could hide.
+    fn unseen_share(&self) -> f64 {
+        let hides = |i: usize| self.handle_free[i] < 0.6 && self.handle_free[(i + 1) % SECTORS] < 0.6;
+        (0..SECTORS).filter(|&i| hides(i)).count() as f64 / SECTORS as f64
     }
 }
 
@@ -373,4 +410,96 @@ fn within_sector(sector: usize) -> [[f64; 2]; 2] {
 
 fn share(flags: &[bool; SECTORS]) -> f64 {
     flags.iter().filter(|f| **f).count() as f64 / SECTORS as f64
+}
+
+fn sector_of(round: &Round, p: &Point3<f64>) -> usize {
+    round::sector(p.x - round.x, p.y - round.y, SECTORS)
+}
+
+/// The largest thing that sticks out of the body in one direction.
+pub(super) struct Protrusion {
+    pub reach_m: f64,
+    /// Where it sticks out to: sine and cosine.
+    direction: (f64, f64),
+    width_m: f64,
+    points: usize,
+    least: usize,
+    inside_height: bool,
+}
+
+impl Protrusion {
+    fn find(
+        round: &Round,
+        segment: &Segment,
+        asker: &Asker,
+        (base_m, height): (f64, f64),
+        far: bool,
+    ) -> Option<Protrusion> {
+        let beside = |p: &&Point3<f64>| {
+            let outside_m = round.outside_m(p);
+            let clear = |sigma_m: f64| outside_m > 3.0 * sigma_m;
+            outside_m > CLEAR_M && asker.support(p).is_some_and(clear)
+        };
+        let out: Vec<&Point3<f64>> = segment
+            .points
+            .iter()
+            .filter(|p| p.z > base_m + 0.08 * height && p.z < base_m + 1.02 * height)
+            .filter(beside)
+            .collect();
+        let mut counts = [0_usize; SECTORS];
+        out.iter().for_each(|p| counts[sector_of(round, p)] += 1);
+        let window = |i: usize| (0..3).map(|k| counts[(i + k) % SECTORS]).sum::<usize>();
+        let start = (0..SECTORS).max_by_key(|&i| (window(i), SECTORS - i))?;
+        let middle = std::f64::consts::TAU * (start as f64 + 1.5) / SECTORS as f64;
+        let (sin, cos) = middle.sin_cos();
+        // Along and across the direction of the protrusion, in the half plane on its side.
+        let local: Vec<(f64, f64, f64)> = out
+            .iter()
+            .map(|p| {
+                let (along, across) = along_and_across(round, p, (sin, cos));
+                (along, across, p.z)
+            })
+            .filter(|&(along, across, _)| along > 0.6 * round.radius_m && across.abs() < 0.06)
+            .collect();
+        if local.len() < 3 {
+            return None;
+        }
+        let reach_of = |&(along, across, z): &(f64, f64, f64)| along.hypot(across) - round.radius_at(z);
+        let mut reaches: Vec<f64> = local.iter().map(reach_of).collect();
+        let reach_m = quantile(&mut reaches, 0.95);
+        // What hardly leaves the body is its blurred side, beside the handle or not.
+        let (mut across, mut heights): (Vec<f64>, Vec<f64>) =
+            local.iter().filter(|l| reach_of(l) > ROOT * reach_m).map(|l| (l.1, l.2)).unzip();
+        let ends = |v: &mut Vec<f64>| (quantile(v, 0.1), quantile(v, 0.9));
+        let (left, right) = ends(&mut across);
+        let (low, high) = ends(&mut heights);
+        Some(Protrusion {
+            reach_m,
+            direction: (sin, cos),
+            width_m: right - left,
+            points: local.len(),
+            least: if far { segment.points.len() / 30 } else { segment.points.len() / 150 }.clamp(6, 60),
+            inside_height: high - low > 0.012 && low > base_m + 0.05 * height,
+        })
+    }
+
+    /// Whether a point lies where it sticks out.
+    fn has(&self, round: &Round, p: &Point3<f64>) -> bool {
+        let (along, across) = along_and_across(round, p, self.direction);
+        round.outside_m(p) > CLEAR_M && along > 0.0 && across.abs() < HANDLE_WIDTH_M
+    }
+
+    /// Whether it is a handle, and not what is left of misaligned views of a side that spreads so much about its form, metres.
+    fn is_handle(&self, spread_m: f64) -> bool {
+        self.points >= self.least
+            && (HANDLE_M.0.max(HANDLE_SPREADS * spread_m)..HANDLE_M.1).contains(&self.reach_m)
+            && self.width_m < HANDLE_WIDTH_M
+            && self.inside_height
+    }
+}
+
+/// A point's place from the axis, along a direction (sine and cosine) and across it, metres.
+fn along_and_across(round: &Round, p: &Point3<f64>, (sin, cos): (f64, f64)) -> (f64, f64) {
+    let (x, y) = (p.x - round.x, p.y - round.y);
+    (x * cos + y * sin, y * cos - x * sin)
 }

@@ -148,7 +148,7 @@ impl ViewRays {
         (!pixels.is_empty()).then_some(ViewRays { from, wander, pixels, looks })
     }
 
-    /// As [`Rays::log_likelihood`], of this view if it is a good one; what its depths err by together is what suits best.
+    /// Log of how much likelier this view is with a body than without; what its depths err by together is what suits best.
     pub fn log_likelihood(&self, body: &impl Body) -> f64 {
         let mut met: Vec<f64> = Vec::with_capacity(self.pixels.len());
         let (mut sum, mut weight) = (0.0, 0.0);

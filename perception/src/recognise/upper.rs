@@ -1,7 +1,10 @@
 //! What rays tell of a round body's upper end.
 
 use super::body::Frustum;
-use super::rays::{BAD_VIEW, Rays, bounded, normal};
+use super::rays::{Rays, bounded, normal};
+
+/// Chance that a view says nothing of an upper end, whatever it seems to show (set by hand).
+const BAD_VIEW: f64 = 0.002;
 
 /// What is known of the upper end.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,35 +1,86 @@
-//! How a structured-light depth camera errs (Nguyen, Izadi, Lovell: Modeling Kinect Sensor Noise, 2012).
+//! How a depth camera errs: what is said of one, and fitted to what one showed.
+
+mod fit;
+
+use serde::{Deserialize, Serialize};
+
+pub use fit::Residuals;
 
 /// Steepest angle between ray and normal that still returns, degrees.
 pub const STEEPEST_DEG: f64 = 85.0;
 
-/// Standard deviation along the ray at the nearest depth, metres, and what it grows by with the square of the depth beyond it.
-const LEAST_AXIAL_M: f64 = 0.0012;
-const AXIAL_GROWTH_PER_M: f64 = 0.0019;
-const NEAREST_M: f64 = 0.4;
-
-/// Standard deviation along the ray, metres, of a return at depth `z_m` from a surface whose normal makes `angle_rad` with the ray (eq. 2 and the
-/// steep-angle term); `None` beyond the steepest angle, where there is no return.
-pub fn axial_sigma_m(z_m: f64, angle_rad: f64) -> Option<f64> {
-    let degrees = angle_rad.abs().to_degrees();
-    (degrees <= STEEPEST_DEG && z_m > 0.0).then(|| {
-        let steep = 0.0001 * degrees * degrees / (z_m.sqrt() * (90.0 - degrees).powi(2));
-        LEAST_AXIAL_M + AXIAL_GROWTH_PER_M * (z_m - NEAREST_M).powi(2) + steep
-    })
+/// What a depth camera measures, and how well.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sensor {
+    /// Standard deviation along the ray of a return from a face that looks at the camera, at the nearest depth, metres.
+    pub axial_m: f64,
+    /// What that grows by with the square of the depth beyond the nearest, metres a square metre.
+    pub growth_per_m: f64,
+    /// Nearest and farthest depth that is measured, metres.
+    pub range_m: (f64, f64),
+    /// Standard deviation across the ray, pixels.
+    pub lateral_px: f64,
+    /// Steepest angle between ray and normal that still returns, degrees.
+    pub steepest_deg: f64,
+    /// Share of returns that have to do with nothing on their ray.
+    pub stray: f64,
+    /// Neighbouring pixels err together: a block of 8 by 8 tells as much as so many that err by themselves.
+    pub looks: f64,
 }
 
-/// The same of a surface that faces the camera, without a branch.
+/// A structured-light camera (Nguyen, Izadi, Lovell: Modeling Kinect Sensor Noise, 2012, eq. 1 and 2); looks are those of the table in eleven
+/// frames of such a camera.
+pub const KINECT: Sensor = Sensor {
+    axial_m: 0.0012,
+    growth_per_m: 0.0019,
+    range_m: (0.4, 6.0),
+    lateral_px: 0.8,
+    steepest_deg: STEEPEST_DEG,
+    stray: 0.01,
+    looks: 2.3,
+};
+
+impl Sensor {
+    /// Standard deviation along the ray, metres, of a return at depth `z_m` from a surface that faces the camera.
+    #[inline(always)]
+    pub fn frontal_sigma_m(&self, z_m: f64) -> f64 {
+        let beyond_m = z_m - self.range_m.0;
+        self.axial_m + self.growth_per_m * (beyond_m * beyond_m)
+    }
+
+    /// The same from a surface whose normal makes `angle_rad` with the ray (eq. 2 and the steep-angle term); `None` beyond the steepest
+    /// angle, where there is no return.
+    pub fn axial_sigma_m(&self, z_m: f64, angle_rad: f64) -> Option<f64> {
+        let degrees = angle_rad.abs().to_degrees();
+        (degrees <= self.steepest_deg && z_m > 0.0).then(|| {
+            let steep = 0.0001 * degrees * degrees / (z_m.sqrt() * (90.0 - degrees).powi(2));
+            self.frontal_sigma_m(z_m) + steep
+        })
+    }
+
+    /// Standard deviation across the ray, metres, at depth `z_m` for focal length `focal_px` (eq. 1: pixels times depth over focal length).
+    pub fn lateral_sigma_m(&self, z_m: f64, angle_rad: f64, focal_px: f64) -> Option<f64> {
+        let degrees = angle_rad.abs().to_degrees();
+        (degrees <= self.steepest_deg && z_m > 0.0)
+            .then(|| (self.lateral_px + 0.034 * degrees / (90.0 - degrees)) * z_m / focal_px)
+    }
+}
+
+/// [`Sensor::axial_sigma_m`] of the [`KINECT`], for those who do not know the camera.
+pub fn axial_sigma_m(z_m: f64, angle_rad: f64) -> Option<f64> {
+    KINECT.axial_sigma_m(z_m, angle_rad)
+}
+
+/// [`Sensor::lateral_sigma_m`] of the [`KINECT`].
+pub fn lateral_sigma_m(z_m: f64, angle_rad: f64, focal_px: f64) -> Option<f64> {
+    KINECT.lateral_sigma_m(z_m, angle_rad, focal_px)
+}
+
+/// [`Sensor::frontal_sigma_m`] of the [`KINECT`].
 #[inline(always)]
 pub(crate) fn frontal_sigma_m(z_m: f32) -> f32 {
-    let beyond_m = z_m - NEAREST_M as f32;
-    LEAST_AXIAL_M as f32 + AXIAL_GROWTH_PER_M as f32 * (beyond_m * beyond_m)
-}
-
-/// Standard deviation across the ray, metres, at depth `z_m` for focal length `focal_px` (eq. 1: pixels times depth over focal length).
-pub fn lateral_sigma_m(z_m: f64, angle_rad: f64, focal_px: f64) -> Option<f64> {
-    let degrees = angle_rad.abs().to_degrees();
-    (degrees <= STEEPEST_DEG && z_m > 0.0)
-        .then(|| (0.8 + 0.034 * degrees / (90.0 - degrees)) * z_m / focal_px)
+    let beyond_m = z_m - KINECT.range_m.0 as f32;
+    KINECT.axial_m as f32 + KINECT.growth_per_m as f32 * (beyond_m * beyond_m)
 }
 
 /// Standard normal distribution function.
@@ -44,10 +95,11 @@ mod tests {
     #[test]
     fn grows_with_depth_and_angle_and_ends() {
         let axial = |z, degrees: f64| axial_sigma_m(z, degrees.to_radians());
+        let lateral_m = |z, angle| KINECT.lateral_sigma_m(z, angle, 525.0);
         assert!((axial(0.4, 0.0).unwrap() - 0.0012).abs() < 1e-12);
         assert!(axial(2.0, 0.0) > axial(1.0, 0.0) && axial(1.0, 80.0) > axial(1.0, 20.0));
-        assert_eq!((axial(1.0, 86.0), lateral_sigma_m(1.0, 1.5, 525.0)), (None, None));
+        assert_eq!((axial(1.0, 86.0), lateral_m(1.0, 1.5)), (None, None));
         assert!((f64::from(frontal_sigma_m(1.7)) - axial(1.7, 0.0).unwrap()).abs() < 1e-8);
-        assert!((lateral_sigma_m(1.0, 0.0, 525.0).unwrap() - 0.8 / 525.0).abs() < 1e-12);
+        assert!((lateral_m(1.0, 0.0).unwrap() - 0.8 / 525.0).abs() < 1e-12);
     }
 }

@@ -11,6 +11,9 @@ pub(crate) struct Rectangle {
     pub y: f64,
     /// Longer and shorter side, metres.
     pub sides_m: [f64; 2],
+    /// Sine and cosine of the angle by which it is turned, and its sides along the axes that are turned so, metres.
+    pub turn: (f64, f64),
+    pub along_m: [f64; 2],
     /// Root mean square distance of the side points from the nearest edge, metres.
     pub residual_m: f64,
 }
@@ -203,6 +206,8 @@ impl Turned {
             x: self.cos * u - self.sin * v,
             y: self.sin * u + self.cos * v,
             sides_m: [a.max(b), a.min(b)],
+            turn: (self.sin, self.cos),
+            along_m: [a, b],
             residual_m,
         }
     }

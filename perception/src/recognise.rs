@@ -1,12 +1,16 @@
 //! From the objects on a surface to percepts (paper 004, section V, "Tabletop Scene Perception").
 
 mod asker;
+mod body;
 mod descry;
 mod evidence;
 mod model;
 mod percept;
 mod published;
+mod rays;
 mod settle;
+mod upper;
+mod verify;
 
 use crate::segment::Scene;
 use crate::visibility::Visibility;

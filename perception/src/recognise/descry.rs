@@ -4,10 +4,11 @@
 //! upper end and handle. A feature that was not in view has the same likelihood under all of them, so that doubt stays.
 
 use super::Recogniser;
-use super::evidence::{Measured, measure};
+use super::evidence::{Measured, Setting, measure};
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
 use super::percept::{Percept, Sighting, Stance};
-use crate::noise::normal_cdf;
+use super::verify::Own;
+use crate::noise::{KINECT, Residuals, Sensor, normal_cdf};
 use crate::segment::{Scene, Segment};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -28,11 +29,13 @@ pub struct Descry {
     pub least: f64,
     /// Exponent on the likelihoods of sizes and form: below 1 softens them for what the model of the measurements leaves out.
     pub temper: f64,
+    /// Exponent on how much less likely rays find a known object than what was measured: real things differ from their models.
+    pub verified: f64,
 }
 
 impl Default for Descry {
     fn default() -> Self {
-        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.02, least: 0.5, temper: 0.7 }
+        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.02, least: 0.5, temper: 0.7, verified: 0.3 }
     }
 }
 
@@ -92,45 +95,89 @@ impl Recogniser for Descry {
 
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
         let _span = tracing::debug_span!("recognise", segments = scene.segments.len()).entered();
-        scene.segments.iter().map(|segment| self.judge(scene, segment, seen, models)).collect()
+        let setting = Setting::of(scene, fitted(scene, seen));
+        scene.segments.iter().map(|segment| self.judge(&setting, segment, seen, models)).collect()
     }
 }
 
+/// The sensor that errs as what the cameras show of the surface.
+fn fitted(scene: &Scene, seen: &Visibility) -> Sensor {
+    let mut residuals = Residuals::default();
+    seen.maps.iter().for_each(|map| residuals.add(map, &scene.surface));
+    residuals.fit(&KINECT)
+}
+
+/// How probable each model is, and its likelier stance.
+struct Weighed {
+    probabilities: Vec<f64>,
+    stances: Vec<Stance>,
+}
+
+/// A model that is less probable than this by cheap measures is not worth asking rays about (set by hand).
+const DOUBT: f64 = 0.1;
+
 impl Descry {
-    fn judge(&self, scene: &Scene, segment: &Segment, seen: &Visibility, models: &[ObjectModel]) -> Percept {
-        let measured = measure(scene, segment, seen);
+    fn judge(
+        &self,
+        setting: &Setting,
+        segment: &Segment,
+        seen: &Visibility,
+        models: &[ObjectModel],
+    ) -> Percept {
+        let looked = measure(setting, segment, seen);
+        let mut weighed = self.weigh(models, &looked.measured, &vec![0.0; models.len()]);
+        let doubted: Vec<bool> = weighed.probabilities.iter().map(|p| *p > DOUBT).collect();
+        if self.verified > 0.0 && doubted.contains(&true) {
+            let own = Own::of(&looked.rays, &looked.measured, segment.base_m);
+            let each = models.iter().zip(&weighed.stances).zip(doubted);
+            let against: Vec<f64> = each
+                .map(
+                    |((m, stance), doubted)| {
+                        if doubted { self.verified * own.log_against(m, *stance) } else { 0.0 }
+                    },
+                )
+                .collect();
+            weighed = self.weigh(models, &looked.measured, &against);
+        }
+        let Weighed { probabilities, stances } = weighed;
+        let unknown = 1.0 - probabilities.iter().sum::<f64>();
+        let best =
+            (0..models.len()).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
+        let named = best.filter(|&b| probabilities[b] >= self.least);
+        let probabilities = models.iter().zip(probabilities).map(|(m, p)| (m.name.clone(), p)).collect();
+        percept(setting.scene, segment, looked.measured, models, named, stances, probabilities, unknown)
+    }
+
+    /// How probable each model is, and how it stands; `against` is the log of what else speaks against each.
+    fn weigh(&self, models: &[ObjectModel], measured: &Measured, against: &[f64]) -> Weighed {
         let each = self.known / models.len().max(1) as f64;
         let mut stances = vec![Stance::Upright; models.len()];
+        let log = |model: &ObjectModel, stance: Stance| self.model_log(model, stance, measured);
         let logs: Vec<f64> = models
             .iter()
-            .enumerate()
-            .map(|(i, model)| {
-                let up = (1.0 - self.upside_down).ln() + self.model_log(model, Stance::Upright, &measured);
-                let down = self.upside_down.ln() + self.model_log(model, Stance::UpsideDown, &measured);
+            .zip(&mut stances)
+            .zip(against)
+            .map(|((model, stance), against)| {
+                let up = (1.0 - self.upside_down).ln() + log(model, Stance::Upright);
+                let down = self.upside_down.ln() + log(model, Stance::UpsideDown);
                 if down > up {
-                    stances[i] = Stance::UpsideDown;
+                    *stance = Stance::UpsideDown;
                 }
-                each.ln() + log_sum(&[up, down])
+                each.ln() + log_sum(&[up, down]) + against
             })
             .collect();
         let families = FAMILIES.iter().map(|f| {
             ((1.0 - self.known) * f.share).ln()
-                + stranger_log(f, models, &measured)
-                + self.family_log(f, &measured)
+                + stranger_log(f, models, measured)
+                + self.family_log(f, measured)
         });
         let alike =
-            |m: &ObjectModel| (each * self.look_alikes).ln() + self.look_alike_log(m, models, &measured);
+            |m: &ObjectModel| (each * self.look_alikes).ln() + self.look_alike_log(m, models, measured);
         let alike = models.iter().map(alike);
         let rest: Vec<f64> = families.chain(alike).collect();
-        let unknown_log = log_sum(&rest);
-        let total = log_sum(&[logs.as_slice(), &[unknown_log]].concat());
-        let share = |log: f64| if total.is_finite() { (log - total).exp() } else { 0.0 };
-        let probabilities: Vec<(String, f64)> =
-            models.iter().zip(&logs).map(|(m, &log)| (m.name.clone(), share(log))).collect();
-        let unknown = 1.0 - probabilities.iter().map(|p| p.1).sum::<f64>();
-        let best = (0..models.len()).max_by(|&a, &b| logs[a].total_cmp(&logs[b]).then(b.cmp(&a)));
-        let named = best.filter(|&b| probabilities[b].1 >= self.least);
-        percept(scene, segment, measured, models, named, stances, probabilities, unknown)
+        let total = log_sum(&[logs.as_slice(), &rest].concat());
+        let share = |log: &f64| if total.is_finite() { (log - total).exp() } else { 0.0 };
+        Weighed { probabilities: logs.iter().map(share).collect(), stances }
     }
 
     fn model_log(&self, model: &ObjectModel, stance: Stance, m: &Measured) -> f64 {
@@ -422,15 +469,13 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
 }
 
 fn top_log(top: Top, m: &Measured) -> f64 {
-    let (open, lid) = match m.evidence.inside {
-        Sighting::Seen => (0.95_f64, 0.01_f64),
-        Sighting::Absent => (0.01, 0.95),
-        Sighting::Unseen => (0.5, 0.5),
-    };
+    /// A lid or an inside is missed, or seen where there is none, about this often (set by hand).
+    const ASTRAY_TOP: f64 = 0.01;
+    let open = ASTRAY_TOP + (1.0 - 2.0 * ASTRAY_TOP) / (1.0 + (-m.upper.open_log).exp());
     match top {
         Top::Open => open.ln(),
-        Top::Closed => lid.ln(),
-        Top::Any => (0.5 * (open + lid)).ln(),
+        Top::Closed => (1.0 - open).ln(),
+        Top::Any => 0.5_f64.ln(),
     }
 }
 

@@ -1,8 +1,12 @@
 //! Measuring on one segment what tells objects apart, and what could have been measured at all.
 
 use super::asker::Asker;
+use super::body::Frustum;
 use super::percept::{Evidence, Sighting};
+use super::rays::{Around, Rays};
 use super::settle::settle;
+use super::upper::Upper;
+use crate::noise::Sensor;
 use crate::outline::{self, Rectangle};
 use crate::round::{self, Edge, Round};
 use crate::segment::{Scene, Segment, end, quantile, top_m};
@@ -34,18 +38,22 @@ const CLEAR_M: f64 = 0.007;
 const HANDLE_WIDTH_M: f64 = 0.035;
 /// Share of its reach up to which what sticks out may be the body's own blurred side.
 const ROOT: f64 = 0.35;
+/// An inside is said to be seen, or not to be there, where it is so much likelier, log (set by hand).
+const SAID: f64 = 1.5;
 /// What is left of the error of a height however good the camera, metres.
 const HEIGHT_M: f64 = 0.002;
 /// The side ends this far, and three spreads of a measurement, below the top, metres.
 const BELOW_M: f64 = 0.004;
 /// How far the top of a sliver may be from that of the object, metres.
 const SLIVER_M: f64 = 0.01;
-/// How far below the rim a look must reach to be a look inside, metres.
-const INSIDE_M: f64 = 0.014;
 
 /// Measured worse than this, depth does not tell where the middle of a cup is: it spreads points along the view as far as the side is
 /// deep; and a few of them that stick out together are no handle, metres.
 const FAR_M: f64 = 0.006;
+
+/// Pixels so far beside and above a thing may tell of it, metres.
+const BESIDE_M: f64 = 0.012;
+const ABOVE_M: f64 = 0.012;
 
 /// All that was measured on one segment.
 #[derive(Clone, Debug)]
@@ -72,10 +80,80 @@ pub(super) struct Measured {
     pub sigma_m: f64,
     /// Share of sides and top that was seen or looked past.
     pub seen_fraction: f64,
+    /// What rays tell of the upper end.
+    pub upper: Upper,
+}
+
+/// What was measured, and the pixels around the thing.
+pub(super) struct Looked {
+    pub measured: Measured,
+    pub rays: Rays,
+}
+
+/// A scene with what is asked of it for each of its things.
+pub(super) struct Setting<'a> {
+    pub scene: &'a Scene,
+    pub sensor: Sensor,
+    /// Of each segment.
+    reaches: Vec<Reach>,
+}
+
+impl<'a> Setting<'a> {
+    pub fn of(scene: &'a Scene, sensor: Sensor) -> Setting<'a> {
+        Setting { scene, sensor, reaches: scene.segments.iter().map(Reach::of).collect() }
+    }
+}
+
+/// Least and greatest place of a segment along both axes of the surface, metres.
+struct Reach {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Reach {
+    fn of(segment: &Segment) -> Reach {
+        let none = Reach { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
+        segment.points.iter().fold(none, |r, p| Reach {
+            low: [r.low[0].min(p.x), r.low[1].min(p.y)],
+            high: [r.high[0].max(p.x), r.high[1].max(p.y)],
+        })
+    }
+
+    fn is_within(&self, reach_m: f64, x: f64, y: f64) -> bool {
+        let near = |k: usize, at: f64| self.low[k] < at + reach_m && self.high[k] > at - reach_m;
+        near(0, x) && near(1, y)
+    }
+}
+
+/// The pixels around a thing.
+fn rays(
+    segment: &Segment,
+    (own, m): (&[Point3<f64>], &Measured),
+    asker: &Asker,
+    Setting { scene, sensor, reaches }: &Setting,
+) -> Rays {
+    let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
+    let half_m = m.round.map_or(0.5 * m.footprint_m[0], |r| {
+        r.radius_at(segment.base_m).max(r.radius_at(segment.base_m + m.height_m))
+    });
+    let around = Around {
+        x,
+        y,
+        reach_m: half_m + BESIDE_M,
+        base_m: segment.base_m,
+        top_m: segment.base_m + m.height_m + ABOVE_M,
+    };
+    let others = scene
+        .segments
+        .iter()
+        .zip(reaches)
+        .filter(|(other, reach)| !std::ptr::eq(*other, segment) && reach.is_within(around.reach_m, x, y));
+    Rays::of(asker, sensor, &around, own, others.flat_map(|(other, _)| &other.points))
 }
 
 /// Measures one segment of a scene.
-pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Measured {
+pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -> Looked {
+    let (scene, this) = (setting.scene, segment);
     let base_m = segment.base_m;
     let top = top_m(segment);
     let height_m = (top - base_m).max(0.001);
@@ -89,8 +167,8 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
     let first = round::fit(&segment.points, base_m, top, sigma_m, 7);
     let settled = first.and_then(|round| settle(&round, segment, &asker, (base_m, top), sigma_m));
     let (segment, asker, first) = match &settled {
-        Some(settled) => (&settled.segment, &settled.asker, Some(settled.round)),
-        None => (segment, &asker, first),
+        Some(settled) => (&settled.segment, settled.asker.clone(), Some(settled.round)),
+        None => (segment, asker, first),
     };
     let (footprint_m, middle) = outline::bounding(&segment.points).unwrap_or_default();
     // What is measured of a low thing's top reaches far down its side.
@@ -104,30 +182,32 @@ pub(super) fn measure(scene: &Scene, segment: &Segment, seen: &Visibility) -> Me
         rectangle: outline::fit(&side),
         height_m,
         height_sigma_m: HEIGHT_M.hypot(0.5 * sigma_m).hypot(0.5 * scene.surface.residual_m.min(0.008)),
-        top_hidden: top_hidden(asker, middle, footprint_m, top),
+        top_hidden: top_hidden(&asker, middle, footprint_m, top),
         footprint_m,
         middle,
         looked_through: 0.0,
         independent: (side.len() as f64 / 12.0).clamp(1.0, 60.0),
         sigma_m,
         seen_fraction: 0.0,
+        upper: Upper::default(),
     };
-    measured.evidence.views = views_of(asker, &place);
+    measured.evidence.views = views_of(&asker, &place);
     if let Some(rectangle) = &measured.rectangle {
         measured.evidence.box_residual_m = rectangle.residual_m;
     }
     if let Some(first) = first {
-        let edges = silhouettes(&first, segment, asker, base_m, height_m);
+        let edges = silhouettes(&first, segment, &asker, base_m, height_m);
         let round = round::refit(&first, &segment.points, &edges, base_m, top, sigma_m);
         let eye = (sigma_m > FAR_M).then(|| asker.only_from(&first)).flatten();
         let round =
             round.map(|r| eye.and_then(|eye| r.behind(&segment.points, (base_m, top), eye)).unwrap_or(r));
         measured.round = round.filter(|round| round.inliers >= MOST);
     }
+    let rays = rays(this, (&segment.points, &measured), &asker, setting);
     if let Some(round) = measured.round {
-        measure_round(&mut measured, &round, segment, asker, (base_m, top));
+        measure_round(&mut measured, &round, (segment, &asker, &rays), (base_m, top));
     }
-    measured
+    Looked { measured, rays }
 }
 
 /// Heights at which silhouettes are looked at, as shares of the body's height.
@@ -189,8 +269,7 @@ fn top_hidden(asker: &Asker, middle: [f64; 2], footprint_m: [f64; 2], top: f64) 
 fn measure_round(
     measured: &mut Measured,
     round: &Round,
-    segment: &Segment,
-    asker: &Asker,
+    (segment, asker, rays): (&Segment, &Asker, &Rays),
     (base_m, top): (f64, f64),
 ) {
     let height = top - base_m;
@@ -224,14 +303,14 @@ fn measure_round(
         None => Sighting::Unseen,
     };
 
-    let top_face = TopFace::measure(round, segment, asker, top);
-    (evidence.open, evidence.lid) = (top_face.open, top_face.lid);
-    evidence.inside = match (top_face.open, top_face.lid) {
-        (open, lid) if open > 0.08 && open > lid => Sighting::Seen,
-        (open, lid) if lid > 0.3 && lid > 2.0 * open => Sighting::Absent,
+    let upper = Upper::of(rays, &Frustum::around(round, base_m, top));
+    (evidence.open, evidence.lid) = (upper.open, upper.lid);
+    evidence.inside = match upper.open_log {
+        log if log > SAID => Sighting::Seen,
+        log if log < -SAID => Sighting::Absent,
         _ => Sighting::Unseen,
     };
-    measured.seen_fraction = 0.75 * sectors.covered_share() + 0.25 * (top_face.open + top_face.lid).min(1.0);
+    measured.seen_fraction = 0.75 * sectors.covered_share() + 0.25 * (upper.open + upper.lid).min(1.0);
     if evidence.radius_sigma_m > VAGUE_M {
         // Beside and above a circle that may as well be another, nothing was looked at.
         (evidence.handle, evidence.handle_unseen, evidence.inside) =
@@ -239,6 +318,8 @@ fn measure_round(
         measured.looked_through = 0.0;
         // A sliver may be cut off above, too.
         measured.height_sigma_m = measured.height_sigma_m.hypot(SLIVER_M);
+    } else {
+        measured.upper = upper;
     }
 }
 
@@ -421,61 +502,4 @@ impl Protrusion {
 fn along_and_across(round: &Round, p: &Point3<f64>, (sin, cos): (f64, f64)) -> (f64, f64) {
     let (x, y) = (p.x - round.x, p.y - round.y);
     (x * cos + y * sin, y * cos - x * sin)
-}
-
-/// [`f64::round`] but for halves, without the call that it is on some processors.
-fn nearest_step(steps: f64) -> i32 {
-    (steps + 0.5_f64.copysign(steps)) as i32
-}
-
-/// What was seen of the upper end: the share of it that was looked into, and the share that is a face.
-struct TopFace {
-    open: f64,
-    lid: f64,
-}
-
-impl TopFace {
-    fn measure(round: &Round, segment: &Segment, asker: &Asker, top: f64) -> TopFace {
-        const STEP_M: f64 = 0.005;
-        /// What is said of a cell of the top by the points over it.
-        const LEVEL: u8 = 1;
-        const DEEP: u8 = 2;
-        let radius = round.radius_at(top) - 0.008;
-        let cells = (radius / STEP_M).floor().max(0.0) as i32;
-        let side = 2 * cells + 1;
-        let mut points = vec![0_u8; (side * side) as usize];
-        for p in &segment.points {
-            let kind = if p.z > top - 0.009 {
-                LEVEL
-            } else if p.z < top - INSIDE_M {
-                DEEP
-            } else {
-                continue;
-            };
-            let [i, j] = [p.x - round.x, p.y - round.y].map(|m| nearest_step(m / STEP_M));
-            if i.abs() <= cells && j.abs() <= cells {
-                points[((i + cells) * side + j + cells) as usize] |= kind;
-            }
-        }
-        let (mut all, mut open, mut lid) = (0_u32, 0_u32, 0_u32);
-        for i in -cells..=cells {
-            for j in -cells..=cells {
-                let (dx, dy) = (f64::from(i) * STEP_M, f64::from(j) * STEP_M);
-                if dx.hypot(dy) > radius {
-                    continue;
-                }
-                all += 1;
-                let kind = points[((i + cells) * side + j + cells) as usize];
-                if kind & LEVEL != 0 {
-                    lid += 1;
-                } else if kind & DEEP != 0
-                    || asker.look(round.x + dx, round.y + dy, top - INSIDE_M) == Seen::Free
-                {
-                    open += 1;
-                }
-            }
-        }
-        let share = |n: u32| f64::from(n) / f64::from(all.max(1));
-        TopFace { open: share(open), lid: share(lid) }
-    }
 }

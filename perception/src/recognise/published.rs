@@ -2,9 +2,10 @@
 
 use super::Recogniser;
 use super::descry::kinds;
-use super::evidence::measure;
+use super::evidence::{Setting, measure};
 use super::model::{ObjectModel, Range, Shape};
 use super::percept::{Percept, Stance};
+use crate::noise::KINECT;
 use crate::segment::Scene;
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -32,11 +33,12 @@ impl Recogniser for Published {
     }
 
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
+        let setting = Setting::of(scene, KINECT);
         scene
             .segments
             .iter()
             .map(|segment| {
-                let measured = measure(scene, segment, seen);
+                let measured = measure(&setting, segment, seen).measured;
                 let size = [measured.footprint_m[0], measured.footprint_m[1], measured.height_m];
                 let shape = measured.evidence.round_inliers;
                 let probabilities: Vec<(String, f64)> = models

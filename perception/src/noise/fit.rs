@@ -1,0 +1,163 @@
+//! The noise of a camera from what it shows of a level face: the inverse of its depth is linear in the pixels.
+
+use super::Sensor;
+use crate::surface::{Outline, Surface};
+use crate::visibility::DepthMap;
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+
+/// Pixels a side of the blocks whose residuals count, and of the smaller ones within them whose means tell how much neighbours err together.
+const BLOCK_PX: usize = 24;
+const CELL_PX: usize = 8;
+/// Blocks of a view that are enough to go by.
+const BLOCKS: usize = 24;
+/// A block counts if this share of its pixels lies on the face.
+const COVERED: f64 = 0.8;
+/// What lies this near to the face may be of it, as a share of the depth, metres a metre.
+const NEAR_SHARE: f64 = 0.012;
+/// A block is so far within the face, metres.
+const INSIDE_M: f64 = 0.02;
+/// Residuals beyond so many spreads of their block are not of the face.
+const OUTLIER: f64 = 4.0;
+/// Fewest blocks to go by, and the weight of what was assumed before, in blocks.
+const FEWEST: usize = 4;
+const ASSUMED: f64 = 4.0;
+/// Noise is told to be no less and no more than these multiples of what was assumed.
+const BETWEEN: (f64, f64) = (0.5, 6.0);
+
+/// How far the returns of views lie from the level faces that they show.
+#[derive(Clone, Debug, Default)]
+pub struct Residuals {
+    blocks: Vec<Block>,
+}
+
+/// A part of a face in one view.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    depth_m: f64,
+    /// Spread of a return along its ray, metres.
+    sigma_m: f64,
+    /// Independent returns in a cell of 8 by 8.
+    looks: f64,
+}
+
+impl Residuals {
+    /// Adds what a view shows of a surface.
+    pub fn add(&mut self, map: &DepthMap, surface: &Surface) {
+        let (width, height) = (map.intrinsics.width, map.intrinsics.height);
+        let camera_from_surface = map.camera_from_world * surface.surface_from_world.inverse();
+        let normal = camera_from_surface.rotation * Vector3::z();
+        let offset_m = normal.dot(&camera_from_surface.translation.vector);
+        let outline = surface.outline();
+        let corners: Vec<(usize, usize)> = (0..height / BLOCK_PX)
+            .flat_map(|j| (0..width / BLOCK_PX).map(move |i| (i * BLOCK_PX, j * BLOCK_PX)))
+            .filter(|&(u, v)| is_on(map, &outline, (u + BLOCK_PX / 2, v + BLOCK_PX / 2), &normal, offset_m))
+            .collect();
+        let step = corners.len().div_ceil(BLOCKS).max(1);
+        let blocks = corners.into_iter().step_by(step);
+        self.blocks.extend(blocks.filter_map(|corner| block(map, corner, &normal, offset_m)));
+    }
+
+    /// The sensor that errs like that; what does not show stays as assumed.
+    pub fn fit(&self, assumed: &Sensor) -> Sensor {
+        if self.blocks.len() < FEWEST {
+            return *assumed;
+        }
+        let mut times: Vec<f64> =
+            self.blocks.iter().map(|b| b.sigma_m / assumed.frontal_sigma_m(b.depth_m)).collect();
+        let times = middle(&mut times).clamp(BETWEEN.0, BETWEEN.1);
+        // Both terms at once; where all lies at one depth their proportion stays.
+        let prior = Vector2::new(assumed.axial_m, assumed.growth_per_m) * times;
+        let scale = Vector2::new(1.0 / prior.x, 1.0 / prior.y);
+        let mut normal = Matrix2::from_diagonal(&scale.component_mul(&scale)) * ASSUMED;
+        let mut right = normal * prior;
+        for block in &self.blocks {
+            let row = Vector2::new(1.0, (block.depth_m - assumed.range_m.0).powi(2));
+            let weight = (times * assumed.frontal_sigma_m(block.depth_m)).powi(-2);
+            normal += row * row.transpose() * weight;
+            right += row * (block.sigma_m * weight);
+        }
+        let found = normal.cholesky().map_or(prior, |c| c.solve(&right));
+        let mut looks: Vec<f64> = self.blocks.iter().map(|b| b.looks).collect();
+        Sensor {
+            axial_m: found.x.max(0.2 * prior.x),
+            growth_per_m: found.y.max(0.2 * prior.y),
+            looks: middle(&mut looks).clamp(1.0, (CELL_PX * CELL_PX) as f64),
+            ..*assumed
+        }
+    }
+}
+
+/// Whether a pixel shows a place of the surface, camera frame.
+fn is_on(
+    map: &DepthMap,
+    outline: &Outline,
+    (u, v): (usize, usize),
+    normal: &Vector3<f64>,
+    offset_m: f64,
+) -> bool {
+    let z = f64::from(map.depths_m[v * map.intrinsics.width + u]);
+    let p = map.intrinsics.unproject(u as f64, v as f64, z);
+    z.is_finite()
+        && (normal.dot(&p.coords) - offset_m).abs() < NEAR_SHARE * z
+        && outline.covers(&map.camera_from_world.inverse_transform_point(&p), -INSIDE_M)
+}
+
+/// A block of pixels, if it is of the face: residuals of inverse depth, of which the face's is linear.
+fn block(map: &DepthMap, (left, top): (usize, usize), normal: &Vector3<f64>, offset_m: f64) -> Option<Block> {
+    let mut seen: Vec<(usize, Vector3<f64>, f64)> = Vec::with_capacity(BLOCK_PX * BLOCK_PX);
+    let mut depth_m = 0.0;
+    for (j, i) in (0..BLOCK_PX).flat_map(|j| (0..BLOCK_PX).map(move |i| (j, i))) {
+        let (u, v) = (left + i, top + j);
+        let z = f64::from(map.depths_m[v * map.intrinsics.width + u]);
+        let p = map.intrinsics.unproject(u as f64, v as f64, z);
+        if z.is_finite() && (normal.dot(&p.coords) - offset_m).abs() < NEAR_SHARE * z {
+            let [x, y] = [i, j].map(|k| k as f64 / BLOCK_PX as f64 - 0.5);
+            seen.push((i / CELL_PX + BLOCK_PX / CELL_PX * (j / CELL_PX), Vector3::new(1.0, x, y), 1.0 / z));
+            depth_m += z;
+        }
+    }
+    if (seen.len() as f64) < COVERED * (BLOCK_PX * BLOCK_PX) as f64 {
+        return None;
+    }
+    depth_m /= seen.len() as f64;
+    let (mut sigma, mut residuals) = (f64::INFINITY, Vec::new());
+    let mut gate = vec![true; seen.len()];
+    for _ in 0..2 {
+        let line =
+            line(seen.iter().zip(&gate).filter(|(_, within)| **within).map(|((_, row, q), _)| (*row, *q)))?;
+        residuals = seen.iter().map(|(_, row, q)| q - row.dot(&line)).collect();
+        let within = residuals.iter().zip(&gate).filter(|(_, within)| **within);
+        let (n, squares) = within.fold((0.0, 0.0), |(n, s), (r, _)| (n + 1.0, s + r * r));
+        sigma = (squares / (n - 3.0_f64).max(1.0)).sqrt();
+        gate = residuals.iter().map(|r| r.abs() <= OUTLIER * sigma).collect();
+    }
+    Some(Block { depth_m, sigma_m: sigma * depth_m * depth_m, looks: looks(&seen, &residuals, &gate, sigma) })
+}
+
+/// Least squares of inverse depths over rows.
+fn line(rows: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Vector3<f64>> {
+    let (normal, right) = rows.fold((Matrix3::zeros(), Vector3::zeros()), |(n, r), (row, q)| {
+        (n + row * row.transpose(), r + row * q)
+    });
+    normal.cholesky().map(|c| c.solve(&right))
+}
+
+/// How many returns of a cell err by themselves: the variance of one over that of the mean of a cell.
+fn looks(seen: &[(usize, Vector3<f64>, f64)], residuals: &[f64], gate: &[bool], sigma: f64) -> f64 {
+    const CELLS: usize = (BLOCK_PX / CELL_PX) * (BLOCK_PX / CELL_PX);
+    let mut sums = [(0.0, 0.0); CELLS];
+    for ((cell, ..), (r, _)) in
+        seen.iter().map(|s| (s.0, s.1)).zip(residuals.iter().zip(gate).filter(|g| *g.1))
+    {
+        sums[cell].0 += r;
+        sums[cell].1 += 1.0;
+    }
+    // A plane was fitted to as few cells: three of them are not free.
+    let squares: f64 = sums.iter().filter(|s| s.1 > 0.0).map(|(sum, n)| (sum / n).powi(2)).sum();
+    sigma * sigma / (squares / (CELLS as f64 - 3.0)).max(1e-18)
+}
+
+fn middle(values: &mut [f64]) -> f64 {
+    let half = values.len() / 2;
+    *values.select_nth_unstable_by(half, f64::total_cmp).1
+}

@@ -1,0 +1,234 @@
+//! How likely a body makes the depths that cameras measured around it.
+//!
+//! Each pixel met the body, something nearer, what lies behind it, or nothing that is there; a body is as likely as all pixels together
+//! make it, against there being none. Neighbouring pixels err together, so that each counts for a part of a look only, and no view says
+//! more against a body than that it may be a bad one.
+
+use super::asker::{Asker, Lying};
+use super::body::{Body, Ray};
+use crate::noise::Sensor;
+use nalgebra::{Isometry3, Point3, Vector3};
+use rustc_hash::FxHashSet;
+
+/// Pixels of a view that are asked, about.
+const PIXELS: f64 = 600.0;
+/// Chance of something nearer, of what is behind being the surface, and of its being something else (set by hand).
+const NEARER: f64 = 0.1;
+const SURFACE: f64 = 0.6;
+const ELSE: f64 = 0.3;
+/// Depth over which something else may be anywhere, metres (set by hand).
+const ANYWHERE_M: f64 = 1.0;
+/// No pixel says more than this for or against (set by hand).
+pub(super) const MOST: f64 = 10.0;
+/// Chance that a view says nothing of a body (set by hand).
+pub(super) const BAD_VIEW: f64 = 0.05;
+/// How far a thing differs from a body of straight sides, metres (set by hand).
+const ROUGH_M: f64 = 0.0015;
+/// Spread of what all depths of a view of one body err by together, metres (set by hand).
+const SHARED_M: f64 = 0.004;
+/// A block of pixels says no more than so many looks, however little neighbours err together: what is left of errors of pose is theirs
+/// in common (set by hand).
+const MOST_LOOKS: f64 = 2.3;
+/// Where rays wander to, in spreads across them: columns and rows.
+const WANDER: [[f64; 2]; 3] = [[0.0, 1.0], [0.87, -0.5], [-0.87, -0.5]];
+/// Side of the cells in which other things are told from a body, metres.
+const CELL_M: f64 = 0.01;
+
+/// The pixels of all views that may tell of one body.
+pub(super) struct Rays {
+    pub views: Vec<ViewRays>,
+}
+
+/// The pixels of one view.
+pub(super) struct ViewRays {
+    pub from: [f64; 3],
+    /// What is added to where a ray goes that wanders by the noise across it, to either side and up.
+    wander: [[f64; 3]; 3],
+    pub pixels: Vec<Pixel>,
+    /// Looks that each of them counts for.
+    pub looks: f64,
+}
+
+/// A pixel with a return.
+pub(super) struct Pixel {
+    pub along: [f64; 3],
+    pub depth_m: f64,
+    /// Spread of the depth, metres.
+    pub sigma_m: f64,
+    /// Density of the depth without a body, one by a metre.
+    pub without: f64,
+    /// True if it shows another thing.
+    pub other: bool,
+}
+
+/// What stands around the body that is asked about.
+pub(super) struct Around {
+    pub x: f64,
+    pub y: f64,
+    /// How far pixels tell of it.
+    pub reach_m: f64,
+    pub base_m: f64,
+    pub top_m: f64,
+}
+
+impl Rays {
+    /// The pixels of the views around a place; `others` are points of other things, `own` those of the body, surface frame.
+    pub fn of<'p>(
+        asker: &Asker,
+        sensor: &Sensor,
+        around: &Around,
+        own: &[Point3<f64>],
+        others: impl Iterator<Item = &'p Point3<f64>>,
+    ) -> Rays {
+        let near = |p: &&Point3<f64>| {
+            (p.x - around.x).abs() < around.reach_m && (p.y - around.y).abs() < around.reach_m
+        };
+        let mut other: FxHashSet<[i32; 2]> = others.filter(near).map(cell).collect();
+        if !other.is_empty() {
+            own.iter().for_each(|p| {
+                other.remove(&cell(p));
+            });
+        }
+        let view = |lying: &Lying| ViewRays::of(lying, asker, sensor, around, &other);
+        Rays { views: asker.views.iter().filter_map(view).collect() }
+    }
+}
+
+/// Log of the likelihood ratio of a view that says nothing with a chance, whatever it seems to say for or against.
+pub(super) fn bounded(log: f64, bad: f64) -> f64 {
+    let against = |log: f64| ((1.0 - bad) * log.exp() + bad).ln();
+    if log < 0.0 { against(log) } else { -against(-log) }
+}
+
+fn cell(p: &Point3<f64>) -> [i32; 2] {
+    [p.x, p.y].map(|m| (m / CELL_M).floor() as i32)
+}
+
+impl ViewRays {
+    fn of(
+        lying: &Lying,
+        asker: &Asker,
+        sensor: &Sensor,
+        around: &Around,
+        other: &FxHashSet<[i32; 2]>,
+    ) -> Option<ViewRays> {
+        let camera = &lying.map.intrinsics;
+        let surface_from_world = asker.world_from_surface.inverse();
+        let surface_from_camera = surface_from_world
+            * Isometry3::translation(-lying.offset_m.x, -lying.offset_m.y, -lying.offset_m.z)
+            * lying.map.camera_from_world.inverse();
+        let [columns, rows] = window(lying, &surface_from_camera.inverse(), around)?;
+        let step = ((columns.len() * rows.len()) as f64 / PIXELS).sqrt().ceil().max(1.0) as usize;
+        let from: [f64; 3] = surface_from_camera.translation.vector.into();
+        let turn = surface_from_camera.rotation.to_rotation_matrix();
+        let ray = |u: f64, v: f64| {
+            turn * Vector3::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0)
+        };
+        let mut pixels = Vec::with_capacity(columns.len() * rows.len() / (step * step) + 1);
+        for v in rows.step_by(step) {
+            for u in columns.clone().step_by(step) {
+                let depth_m = f64::from(lying.map.depths_m[v * camera.width + u]);
+                if !depth_m.is_finite() {
+                    continue;
+                }
+                let along: [f64; 3] = ray(u as f64, v as f64).into();
+                let sigma_m = sensor.frontal_sigma_m(depth_m).hypot(ROUGH_M);
+                let p = Point3::from([0, 1, 2].map(|k: usize| from[k] + depth_m * along[k]));
+                let behind_m = (around.base_m - from[2]) / along[2];
+                let density = SURFACE * normal(depth_m - behind_m, sigma_m) + ELSE / ANYWHERE_M;
+                let other = !other.is_empty() && other.contains(&cell(&p));
+                pixels.push(Pixel { along, depth_m, sigma_m, without: density, other });
+            }
+        }
+        let wander = WANDER.map(|[du, dv]| {
+            let [du, dv] = [du / camera.fx, dv / camera.fy].map(|by| by * sensor.lateral_px);
+            (turn * Vector3::new(du, dv, 0.0)).into()
+        });
+        let looks = (sensor.looks.min(MOST_LOOKS) * (step * step) as f64 / 64.0).min(1.0);
+        (!pixels.is_empty()).then_some(ViewRays { from, wander, pixels, looks })
+    }
+
+    /// Log of how much likelier this view is with a body than without; what its depths err by together is what suits best.
+    pub fn log_likelihood(&self, body: &impl Body) -> f64 {
+        let mut met: Vec<f64> = Vec::with_capacity(self.pixels.len());
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for pixel in &self.pixels {
+            let at_m = body.depth_m(&Ray { from: self.from, along: pixel.along });
+            let off_m = pixel.depth_m - at_m;
+            if off_m.abs() < 3.0 * (pixel.sigma_m + SHARED_M) && !pixel.other {
+                let w = self.looks / (pixel.sigma_m * pixel.sigma_m);
+                (sum, weight) = (sum + w * off_m, weight + w);
+            }
+            met.push(at_m);
+        }
+        let shared_m = sum / (weight + SHARED_M.powi(-2));
+        let bodies = self.pixels.iter().zip(met).filter(|(_, at_m)| at_m.is_finite());
+        let logs = bodies.map(|(pixel, at_m)| self.log_ratio(pixel, body, at_m, shared_m));
+        self.looks * logs.sum::<f64>() - 0.5 * (shared_m / SHARED_M).powi(2)
+    }
+
+    /// Log of how much likelier a pixel's depth is where it meets a body at a depth than without the body. What speaks against it may
+    /// have passed by the body's edge.
+    #[inline(always)]
+    fn log_ratio(&self, pixel: &Pixel, body: &impl Body, at_m: f64, shared_m: f64) -> f64 {
+        let mut with = pixel.with_body(at_m + shared_m);
+        if with < pixel.without {
+            let aside = self.wander.map(|by| {
+                let along = [0, 1, 2].map(|k| pixel.along[k] + by[k]);
+                match body.depth_m(&Ray { from: self.from, along }) {
+                    at_m if at_m.is_finite() => pixel.with_body(at_m + shared_m),
+                    _ => pixel.without,
+                }
+            });
+            with = (with + aside.iter().sum::<f64>()) / (1.0 + aside.len() as f64);
+        }
+        (with / pixel.without).ln().clamp(-MOST, MOST)
+    }
+}
+
+impl Pixel {
+    /// Density of its depth where it meets a body at a depth.
+    #[inline(always)]
+    pub fn with_body(&self, at_m: f64) -> f64 {
+        const STRAY: f64 = 0.01;
+        const RANGE_M: f64 = 5.0;
+        let off_m = self.depth_m - at_m;
+        let nearer = if off_m < 0.0 { NEARER / ANYWHERE_M } else { 0.0 };
+        if self.other && off_m < 3.0 * self.sigma_m {
+            return self.without;
+        }
+        (1.0 - NEARER - STRAY) * normal(off_m, self.sigma_m) + nearer + STRAY / RANGE_M
+    }
+}
+
+#[inline(always)]
+pub(super) fn normal(off: f64, sigma: f64) -> f64 {
+    const ROOT: f64 = 2.506_628_274_631_000_2;
+    let spreads = off / sigma;
+    if spreads.abs() > 6.0 { 0.0 } else { (-0.5 * spreads * spreads).exp() / (sigma * ROOT) }
+}
+
+/// The pixels that a place may fall on: columns and rows. None if it is not in view, or reaches behind the camera.
+fn window(
+    lying: &Lying,
+    camera_from_surface: &Isometry3<f64>,
+    around: &Around,
+) -> Option<[std::ops::Range<usize>; 2]> {
+    let camera = &lying.map.intrinsics;
+    let mut reach = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+    for corner in 0..8 {
+        let side = |bit: usize| if corner >> bit & 1 == 0 { -around.reach_m } else { around.reach_m };
+        let z = if corner >> 2 & 1 == 0 { around.base_m } else { around.top_m };
+        let (u, v) = camera
+            .project(&(camera_from_surface * Point3::new(around.x + side(0), around.y + side(1), z)))?;
+        for (reach, at) in reach.iter_mut().zip([u, v]) {
+            *reach = [reach[0].min(at), reach[1].max(at)];
+        }
+    }
+    let sizes = [camera.width, camera.height];
+    let mut ranges = reach.into_iter().zip(sizes).map(|([low, high], size)| {
+        let within = |at: f64| at.clamp(0.0, size as f64) as usize;
+        within(low.floor())..within(high.ceil() + 1.0)
+    });
+    Some([ranges.next()?, ranges.next()?])
+}

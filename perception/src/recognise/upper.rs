@@ -1,0 +1,58 @@
+//! What rays tell of a round body's upper end.
+
+use super::body::Frustum;
+use super::rays::{Rays, bounded, normal};
+
+/// Chance that a view says nothing of an upper end, whatever it seems to show (set by hand).
+const BAD_VIEW: f64 = 0.002;
+
+/// What is known of the upper end.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Upper {
+    /// Log of how much likelier the views are if it is open.
+    pub open_log: f64,
+    /// Shares of the rays into it that met something below, and something at the rim's height.
+    pub open: f64,
+    pub lid: f64,
+}
+
+impl Upper {
+    pub fn of(rays: &Rays, body: &Frustum) -> Upper {
+        /// So near to the rim a ray does not tell, and what is no lower than the first is a lid, than the second no inside, metres.
+        const RIM_M: f64 = 0.006;
+        const INSIDE_M: f64 = 0.012;
+        /// Spread of how high a lid is, metres.
+        const LID_M: f64 = 0.004;
+        let height_m = body.top_m - body.base_m;
+        let (mut all, mut open, mut lid, mut open_log) = (0.0, 0.0, 0.0, 0.0);
+        for view in &rays.views {
+            let mut sum = 0.0;
+            for pixel in view.pixels.iter().filter(|p| !p.other && p.along[2] < -1e-3) {
+                let at_m = (body.top_m - view.from[2]) / pixel.along[2];
+                let [x, y] = [body.x, body.y];
+                let (dx, dy) =
+                    (view.from[0] + at_m * pixel.along[0] - x, view.from[1] + at_m * pixel.along[1] - y);
+                if dx.hypot(dy) > body.rim_m - RIM_M {
+                    continue;
+                }
+                let (fall, sigma_m) = (-pixel.along[2], pixel.sigma_m.hypot(LID_M));
+                let off_m = pixel.depth_m - at_m;
+                if off_m < -3.0 * sigma_m {
+                    continue;
+                }
+                let within = off_m * fall > INSIDE_M - 2.0 * pixel.sigma_m && off_m * fall < height_m + 0.02;
+                let below = if within { fall / height_m } else { 0.0 };
+                let rest = 0.02;
+                let level = normal(off_m, sigma_m);
+                sum += ((0.9 * below + rest) / (0.9 * level + rest)).ln();
+                all += view.looks;
+                open += if off_m * fall > INSIDE_M { view.looks } else { 0.0 };
+                lid += if off_m * fall < 0.75 * INSIDE_M { view.looks } else { 0.0 };
+            }
+            let log = view.looks * sum;
+            open_log += bounded(log, BAD_VIEW);
+        }
+        let share = |looks: f64| looks / f64::max(all, 1e-9);
+        Upper { open_log, open: share(open), lid: share(lid) }
+    }
+}

@@ -1,0 +1,123 @@
+//! How much worse a known model explains what the cameras saw around a thing than the thing's own measures do.
+
+use super::body::{Cuboid, Frustum};
+use super::evidence::Measured;
+use super::model::{ObjectModel, Range, Shape};
+use super::percept::Stance;
+use super::rays::{BAD_VIEW, Rays, ViewRays, bounded};
+
+/// Thickness of the walls of vessels (set by hand), metres.
+const WALL_M: f64 = 0.003;
+/// Steps by which a body is moved to where it suits a view best, one after the other, and how often each is tried at most, metres.
+const STEPS_M: [f64; 2] = [0.003, 0.0015];
+const TRIES: usize = 2;
+/// Spread of how far a view shows a body beside where all show it, metres (set by hand).
+const SHIFT_M: f64 = 0.005;
+
+/// How well a body suits a view, and how far it was moved for that along both axes of the surface, metres.
+#[derive(Clone, Copy)]
+struct Placed {
+    log: f64,
+    shift_m: [f64; 2],
+}
+
+/// What a known model is compared with: the best body of a thing's own measures.
+pub(super) struct Own<'a> {
+    rays: &'a Rays,
+    measured: &'a Measured,
+    base_m: f64,
+    /// In each view: where its frustum suits best, and the log likelihood of the better of frustum and box.
+    placed: Vec<Placed>,
+    logs: Vec<f64>,
+}
+
+impl<'a> Own<'a> {
+    pub fn of(rays: &'a Rays, measured: &'a Measured, base_m: f64) -> Own<'a> {
+        let frustum = measured.round.map(|round| {
+            let body = Frustum::around(&round, base_m, base_m + measured.height_m);
+            let body = Frustum { wall_m: wall_m(measured), ..body };
+            rays.views.iter().map(|view| placed(view, &body, [0.0; 2])).collect::<Vec<_>>()
+        });
+        let cuboid = measured.rectangle.map(|rectangle| {
+            let [half_x, half_y] = rectangle.along_m.map(|side| 0.5 * side);
+            let body = Cuboid {
+                x: rectangle.x,
+                y: rectangle.y,
+                turn: rectangle.turn,
+                low: [-half_x, -half_y, base_m],
+                high: [half_x, half_y, base_m + measured.height_m],
+            };
+            rays.views.iter().map(|view| view.log_likelihood(&body)).collect::<Vec<f64>>()
+        });
+        let round = frustum.as_ref().map(|placed| placed.iter().map(|p| p.log).collect());
+        let own = [round, cuboid].into_iter().flatten();
+        let logs = own.max_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_default();
+        let unmoved = || vec![Placed { log: 0.0, shift_m: [0.0; 2] }; rays.views.len()];
+        Own { rays, measured, base_m, placed: frustum.unwrap_or_else(unmoved), logs }
+    }
+
+    /// Log of how much less likely a model makes the views than the best body of the thing's own measures: 0 or less.
+    pub fn log_against(&self, model: &ObjectModel, stance: Stance) -> f64 {
+        let (m, Shape::Round, Some(diameter_m)) = (self.measured, model.shape, model.diameter_m) else {
+            return 0.0;
+        };
+        let within = |value: f64, range: Range| value.clamp(range.low, range.high);
+        let tapers = match stance {
+            Stance::UpsideDown => Range { low: 1.0 / model.taper.high, high: 1.0 / model.taper.low },
+            _ => model.taper,
+        };
+        let wide_m = if m.round.is_some() { 2.0 * m.evidence.radius_m } else { m.footprint_m[0] };
+        let widest_m = 0.5 * within(wide_m, diameter_m);
+        let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
+        let of_taper = |taper: f64| {
+            let body = Frustum {
+                x,
+                y,
+                base_m: self.base_m,
+                top_m: self.base_m + within(m.height_m, model.height_m),
+                foot_m: widest_m * taper.min(1.0),
+                rim_m: widest_m / taper.max(1.0),
+                wall_m: wall_m(m),
+            };
+            let views = self.rays.views.iter().zip(&self.placed).zip(&self.logs);
+            views.map(|((view, own), log)| against(placed(view, &body, own.shift_m).log - log)).sum::<f64>()
+        };
+        of_taper(tapers.middle()).max(of_taper(within(m.evidence.taper, tapers))).min(0.0)
+    }
+}
+
+/// The upper end is told by itself: all bodies have the likelier one.
+fn wall_m(measured: &Measured) -> Option<f64> {
+    (measured.upper.open_log > 0.0).then_some(WALL_M)
+}
+
+/// What a view says against a model, that may be a bad one; for it, it says what it says.
+fn against(log: f64) -> f64 {
+    if log < 0.0 { bounded(log, BAD_VIEW) } else { log }
+}
+
+/// The log likelihood of all views together.
+fn total(logs: &[f64]) -> f64 {
+    logs.iter().sum()
+}
+
+/// A frustum where it suits a view best, were it a good one, near where it lies moved already.
+fn placed(view: &ViewRays, frustum: &Frustum, from: [f64; 2]) -> Placed {
+    let at = |[dx, dy]: [f64; 2]| {
+        let moved = Frustum { x: frustum.x + dx, y: frustum.y + dy, ..*frustum };
+        let log = view.log_likelihood(&moved) - 0.5 * (dx * dx + dy * dy) / (SHIFT_M * SHIFT_M);
+        Placed { log, shift_m: [dx, dy] }
+    };
+    let mut best = at(from);
+    for step_m in STEPS_M {
+        for _ in 0..TRIES {
+            let [x, y] = best.shift_m;
+            let around = [[x + step_m, y], [x - step_m, y], [x, y + step_m], [x, y - step_m]].map(at);
+            match around.into_iter().max_by(|a, b| a.log.total_cmp(&b.log)).filter(|to| to.log > best.log) {
+                Some(better) => best = better,
+                None => break,
+            }
+        }
+    }
+    best
+}

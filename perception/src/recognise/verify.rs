@@ -61,20 +61,22 @@ impl<'a> Own<'a> {
         let (m, Shape::Round, Some(diameter_m)) = (self.measured, model.shape, model.diameter_m) else {
             return 0.0;
         };
-        let within = |value: f64, range: Range| value.clamp(range.low, range.high);
+        let within = |value: f64, range: Range, slack: f64| value.clamp(range.low - slack, range.high + slack);
+        // Nothing is measured more sharply than merged views of one surface lie apart.
+        let apart_m = if m.evidence.views > 1 { m.blur_m } else { 0.0 };
         let tapers = match stance {
             Stance::UpsideDown => Range { low: 1.0 / model.taper.high, high: 1.0 / model.taper.low },
             _ => model.taper,
         };
         let wide_m = if m.round.is_some() { 2.0 * m.evidence.radius_m } else { m.footprint_m[0] };
-        let widest_m = 0.5 * within(wide_m, diameter_m);
+        let widest_m = 0.5 * within(wide_m, diameter_m, apart_m);
         let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
         let of_taper = |taper: f64| {
             let body = Frustum {
                 x,
                 y,
                 base_m: self.base_m,
-                top_m: self.base_m + within(m.height_m, model.height_m),
+                top_m: self.base_m + within(m.height_m, model.height_m, apart_m),
                 foot_m: widest_m * taper.min(1.0),
                 rim_m: widest_m / taper.max(1.0),
                 wall_m: wall_m(m),
@@ -82,7 +84,7 @@ impl<'a> Own<'a> {
             let views = self.rays.views.iter().zip(&self.placed).zip(&self.logs);
             views.map(|((view, own), log)| against(placed(view, &body, own.shift_m).log - log)).sum::<f64>()
         };
-        of_taper(tapers.middle()).max(of_taper(within(m.evidence.taper, tapers))).min(0.0)
+        of_taper(tapers.middle()).max(of_taper(within(m.evidence.taper, tapers, apart_m / widest_m.max(0.01)))).min(0.0)
     }
 }
 

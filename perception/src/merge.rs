@@ -38,13 +38,13 @@ pub struct MergeOptions {
     pub height_band_m: Option<(f64, f64)>,
     /// Seen along `up`, what is merged, if not all of it; views are aligned by all that they show.
     pub region: Option<Region>,
-    /// Returns farther from their camera than this are dropped, metres.
+    /// Returns farther from their camera than this are dropped, metres. From: chosen.
     pub range_m: f64,
-    /// Side of the voxels in which clouds are aligned, metres (paper: 1 cm).
+    /// Side of the voxels in which clouds are aligned, metres. From: paper, 004, section V, step 2.
     pub align_voxel_m: f64,
-    /// Side of the voxels in which points are fused, metres: the resolution of the merged cloud.
+    /// Side of the voxels in which points are fused, metres: the resolution of the merged cloud. From: chosen.
     pub fuse_voxel_m: f64,
-    /// Most points of the merged cloud; beyond it the fusing voxels grow.
+    /// Most points of the merged cloud; beyond it the fusing voxels grow. From: chosen.
     pub most_points: usize,
 }
 
@@ -160,14 +160,15 @@ pub enum MergeError {
     },
 }
 
-/// First alignment: everything, from far to near (the table weighs most; paper step 3).
+/// First alignment: everything, from far to near (the table weighs most; paper step 3). From: chosen.
 const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 800, rest_weight: 1.0 };
-/// The same where a view was left out: localisation may have been worse than it said, or what is seen far off.
+/// The same where a view was left out: localisation may have been worse than it said, or what is seen far off. From: chosen.
 const WIDE: Round = Round { from_m: 0.3, passes: 12, asked: 900, ..FIRST };
-/// Second alignment: planes and what is far weigh little, the objects decide (paper step 4).
+/// Second alignment: planes and what is far weigh little, the objects decide (paper step 4). From: chosen.
 const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 1200, rest_weight: 0.2 };
-/// After a view was left out, the rest settles again.
+/// After a view was left out, the rest settles again. From: chosen.
 const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 1200, rest_weight: 0.2 };
+
 /// Merges views into one cloud in the world frame. One view is filtered and fused only.
 ///
 /// # Errors
@@ -411,10 +412,12 @@ fn only_levelled(view: &Prepared, pose: &Isometry3<f64>, up: &Unit<Vector3<f64>>
     let middle = view.points.iter().fold(Vector3::zeros(), |s, p| s + p.at().coords) / n;
     let (before, after) = (view.prior * Point3::from(middle), pose * Point3::from(middle));
     let turn = pose.rotation * view.prior.rotation.inverse();
+    /// A turn with less of it is taken for none. From: rounding.
+    const NO_TURN: f64 = 1e-9;
     // Swing and twist: the twist is the part of the turn about the vertical.
     let along = up.dot(&turn.imag());
     let twist = nalgebra::Quaternion::from_parts(turn.scalar(), up.into_inner() * along);
-    let twist = UnitQuaternion::try_new(twist, 1e-9).unwrap_or_else(UnitQuaternion::identity);
+    let twist = UnitQuaternion::try_new(twist, NO_TURN).unwrap_or_else(UnitQuaternion::identity);
     let swing = turn * twist.inverse();
     let rise = up.scale(up.dot(&(after - before)));
     let rotation = swing * view.prior.rotation;
@@ -464,11 +467,13 @@ fn place_on(
     poses: &mut [Isometry3<f64>],
     view: usize,
 ) {
+    /// What stays as it lies fits by so much more of the points than what is searched for. From: chosen.
+    const STAYS: f64 = 0.05;
     let from = |pose: &Isometry3<f64>| objects(&prepared[view], &parts[view], pose);
     let own = from(&levelled[view]);
     let window = window(&prepared[view], &own, &levelled[view]);
     let Some(found) = search::place(&own, placed, up, window) else { return };
-    let stays = search::fits(&from(&poses[view]), placed, up) > found.share + 0.05;
+    let stays = search::fits(&from(&poses[view]), placed, up) > found.share + STAYS;
     if !stays {
         poses[view] = found.correction * levelled[view];
     }
@@ -482,11 +487,21 @@ fn objects(view: &Prepared, parts: &[Part], pose: &Isometry3<f64>) -> Vec<Orient
 
 /// How far off two views may be from each other at the distance of the objects: three spreads, at least the 10 cm and 6° of a poor localisation.
 fn window(view: &Prepared, objects: &[Oriented], pose: &Isometry3<f64>) -> search::Window {
+    /// Spreads of localisation. From: chosen.
+    const SPREADS: f64 = 3.0;
+    /// Least and greatest turn, radians, and shift, metres; the greatest shift with what a turn adds. From: chosen, 6° to 8°.
+    const TURNS_RAD: (f64, f64) = (0.105, 0.14);
+    const SHIFTS_M: (f64, f64) = (0.10, 0.14);
+    const WIDEST_M: f64 = 0.3;
+    /// Objects are taken to be no farther, metres. From: chosen.
+    const FARTHEST_M: f64 = 3.0;
+    /// The turn is searched for in so much more. From: chosen.
+    const WIDER: f64 = 1.2;
     let sum = objects.iter().fold(Vector3::zeros(), |s, (p, _)| s + p.coords);
-    let distance = (sum / objects.len().max(1) as f64 - pose.translation.vector).norm().min(3.0);
-    let turn_rad = (3.0 * view.sigma_rad).clamp(0.105, 0.14);
-    let shift_m = (3.0 * view.sigma_m).clamp(0.10, 0.14) + distance * turn_rad;
-    search::Window { shift_m: shift_m.min(0.3), turn_rad: 1.2 * turn_rad }
+    let distance = (sum / objects.len().max(1) as f64 - pose.translation.vector).norm().min(FARTHEST_M);
+    let turn_rad = (SPREADS * view.sigma_rad).clamp(TURNS_RAD.0, TURNS_RAD.1);
+    let shift_m = (SPREADS * view.sigma_m).clamp(SHIFTS_M.0, SHIFTS_M.1) + distance * turn_rad;
+    search::Window { shift_m: shift_m.min(WIDEST_M), turn_rad: WIDER * turn_rad }
 }
 
 /// What the used views saw from their corrected poses.

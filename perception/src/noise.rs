@@ -6,8 +6,16 @@ use serde::{Deserialize, Serialize};
 
 pub use fit::Residuals;
 
-/// Steepest angle between ray and normal that still returns, degrees.
+/// Steepest angle between ray and normal that still returns, degrees. From: chosen.
 pub const STEEPEST_DEG: f64 = 85.0;
+
+/// What is added as a surface steepens, metres at a depth of one. From: sensor, Nguyen et al. 2012, the term for
+/// steep angles.
+const STEEP_M: f64 = 0.0001;
+/// What is added across the ray as it steepens, pixels. From: sensor, Nguyen et al. 2012, eq. 1.
+const STEEP_PX: f64 = 0.034;
+/// A quarter turn, degrees. From: derived, a surface seen edge on.
+const EDGE_ON_DEG: f64 = 90.0;
 
 /// What a depth camera measures, and how well.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,7 +37,7 @@ pub struct Sensor {
 }
 
 /// A structured-light camera (Nguyen, Izadi, Lovell: Modeling Kinect Sensor Noise, 2012, eq. 1 and 2); looks are those of the table in eleven
-/// frames of such a camera.
+/// frames of such a camera, the share of strays is set by hand. From: sensor, as said.
 pub const KINECT: Sensor = Sensor {
     axial_m: 0.0012,
     growth_per_m: 0.0019,
@@ -53,7 +61,7 @@ impl Sensor {
     pub fn axial_sigma_m(&self, z_m: f64, angle_rad: f64) -> Option<f64> {
         let degrees = angle_rad.abs().to_degrees();
         (degrees <= self.steepest_deg && z_m > 0.0).then(|| {
-            let steep = 0.0001 * degrees * degrees / (z_m.sqrt() * (90.0 - degrees).powi(2));
+            let steep = STEEP_M * degrees * degrees / (z_m.sqrt() * (EDGE_ON_DEG - degrees).powi(2));
             self.frontal_sigma_m(z_m) + steep
         })
     }
@@ -62,7 +70,7 @@ impl Sensor {
     pub fn lateral_sigma_m(&self, z_m: f64, angle_rad: f64, focal_px: f64) -> Option<f64> {
         let degrees = angle_rad.abs().to_degrees();
         (degrees <= self.steepest_deg && z_m > 0.0)
-            .then(|| (self.lateral_px + 0.034 * degrees / (90.0 - degrees)) * z_m / focal_px)
+            .then(|| (self.lateral_px + STEEP_PX * degrees / (EDGE_ON_DEG - degrees)) * z_m / focal_px)
     }
 }
 

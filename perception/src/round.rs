@@ -3,19 +3,40 @@
 mod side;
 
 use crate::draw::Draws;
+use crate::surface::range_sigma_m;
 use nalgebra::{Point3, Vector4};
 use side::{Side, Sums};
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Radii that are tried, metres.
+/// Radii that are tried, metres. From: chosen.
 const RADII_M: (f64, f64) = (0.012, 0.20);
-/// Circles proposed.
+/// Circles proposed. From: chosen.
 const PROPOSALS: usize = 120;
-/// Points that judge a proposal.
+/// Points that judge a proposal. From: chosen.
 const JUDGES: usize = 160;
-/// Points that all steps of a fit but the last go by, at the least.
+/// Points that all steps of a fit but the last go by, at the least. From: chosen.
 const SCOUTS: usize = 800;
+/// Fewest points of a side that a fit begins with, and fewest near the side that it goes on with. From: chosen.
+const FEWEST: (usize, usize) = (20, 12);
+/// A fit may end so many times as wide as the widest circle that is proposed. From: chosen.
+const WIDER: f64 = 1.2;
+/// Gates of the first steps of a fit, in tolerances. From: chosen.
+const FIRST_GATES: [f64; 2] = [3.0, 2.0];
+/// Directions around an axis that are looked at one by one. From: chosen.
+pub(crate) const SECTORS: usize = 36;
+/// So near to the side, or inside, a point is taken for one of it, metres. From: chosen.
+pub(crate) const ON_SIDE_M: f64 = 0.008;
+/// The side is not looked for in these shares of the height, at the foot and below the top. From: chosen.
+pub(crate) const ENDS: (f64, f64) = (0.15, 0.1);
+/// Spreads of radius, metres, and slope of things that stand on tables, and the steepest slope that a fit takes. From: chosen.
+pub(crate) const RADIUS_SPREAD_M: f64 = 0.05;
+pub(crate) const SLOPE_SPREAD: f64 = 0.1;
+pub(crate) const STEEPEST: f64 = 0.6;
+/// Seed of the circles proposed where a segment is measured. From: mark.
+pub(crate) const SEED: u64 = 7;
+/// No point of a body is taken to be measured worse than this, metres. From: chosen.
+const WORST_SIGMA_M: f64 = 0.012;
 
 /// An upright cone frustum in the surface's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,20 +76,23 @@ pub(crate) struct Edge {
     pub height_m: f64,
 }
 
-/// Spread of where a silhouette ends, metres: about a pixel and a half at arm's length.
+/// Spread of where a silhouette ends, metres: about a pixel and a half at arm's length. From: chosen.
 const EDGE_SIGMA_M: f64 = 0.0025;
-/// Depths of one body share systematic errors (a structured-light camera flattens what is round): however many points, they weigh no more than so many.
-const MOST_INDEPENDENT: f64 = 25.0;
+/// Depths of one body share systematic errors (a structured-light camera flattens what is round): however many points, they weigh no
+/// more than so many; where views are laid on each other, those of each view. From: chosen.
+pub(crate) const MOST_INDEPENDENT: f64 = 25.0;
 
-/// A point is taken for one of the side up to so many tolerances from it, once the fit is near.
+/// A point is taken for one of the side up to so many tolerances from it, once the fit is near. From: chosen.
 const LAST_GATE: f64 = 1.5;
-/// A point farther out than this tells no more by being still farther, metres.
+/// A point farther out than this tells no more by being still farther, metres. From: chosen.
 const OUTSIDE_M: f64 = 0.02;
 
 impl Round {
     /// Radius at a height above the surface, metres.
     pub fn radius_at(&self, z: f64) -> f64 {
-        (self.radius_m + self.slope * (z - self.middle_m)).max(0.003)
+        /// However steep the side: a tip, metres. From: chosen.
+        const LEAST_M: f64 = 0.003;
+        (self.radius_m + self.slope * (z - self.middle_m)).max(LEAST_M)
     }
 
     /// Distance of a point from the side, positive outside, metres.
@@ -95,7 +119,7 @@ pub(crate) fn distance(x: f64, y: f64) -> f64 {
 pub(crate) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64, seed: u64) -> Option<Round> {
     let height = top_m - base_m;
     let side = Side::between(points, base_m, top_m);
-    if side.len() < 20 {
+    if side.len() < FEWEST.0 {
         return None;
     }
     let tolerance = tolerance(sigma_m);
@@ -115,11 +139,11 @@ pub(crate) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64,
         inliers: 0.0,
     };
     let few = side.thinned(SCOUTS);
-    for gate in [3.0, 2.0, LAST_GATE, LAST_GATE] {
+    for gate in [FIRST_GATES[0], FIRST_GATES[1], LAST_GATE, LAST_GATE] {
         round = improve(&round, &few, &[], gate * tolerance, sigma_m)?;
     }
     let round = improve(&round, &side, &[], LAST_GATE * tolerance, sigma_m)?;
-    (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * 1.2).then_some(round)
+    (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * WIDER).then_some(round)
 }
 
 /// The fit again with what silhouettes say, which depth alone measures badly: how wide the body is.
@@ -139,7 +163,7 @@ pub(crate) fn refit(
         round = improve(&round, &few, edges, LAST_GATE * tolerance, sigma_m)?;
     }
     let round = improve(&round, &side, edges, LAST_GATE * tolerance, sigma_m)?;
-    (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * 1.2).then_some(round)
+    (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * WIDER).then_some(round)
 }
 
 impl Round {
@@ -151,7 +175,7 @@ impl Round {
         (base_m, top_m): (f64, f64),
         [to_x, to_y]: [f64; 2],
     ) -> Option<Round> {
-        /// Beside this share of the radius the side falls away too steeply to be placed.
+        /// Beside this share of the radius the side falls away too steeply to be placed. From: chosen.
         const STEEP: f64 = 0.9;
         let band = side_band(base_m, top_m);
         let side = points.iter().filter(|p| band.contains(&p.z)).filter_map(|p| {
@@ -161,7 +185,7 @@ impl Round {
         });
         let mut shifts: Vec<f64> = side.collect();
         let half = shifts.len() / 2;
-        if shifts.len() < 12 {
+        if shifts.len() < FEWEST.1 {
             return None;
         }
         let shift_m = *shifts.select_nth_unstable_by(half, f64::total_cmp).1;
@@ -185,15 +209,22 @@ impl Round {
     }
 }
 
+/// Spread of a measurement of a body so far from the camera, metres.
+pub(crate) fn sigma_m(distance_m: f64) -> f64 {
+    range_sigma_m(distance_m).min(WORST_SIGMA_M)
+}
+
 /// How far from the side a point of it may be measured, metres.
 fn tolerance(sigma_m: f64) -> f64 {
-    (2.0 * sigma_m).clamp(0.004, 0.008)
+    /// However good the camera, metres. From: chosen.
+    const LEAST_M: f64 = 0.004;
+    (2.0 * sigma_m).clamp(LEAST_M, ON_SIDE_M)
 }
 
 /// Heights between base and top at which what is seen can be the side.
 pub(crate) fn side_band(base_m: f64, top_m: f64) -> Range<f64> {
     let height = top_m - base_m;
-    base_m + 0.15 * height..top_m - 0.1 * height
+    base_m + ENDS.0 * height..top_m - ENDS.1 * height
 }
 
 /// The circle through three points that most points lie on and fewest outside of, seen from above.
@@ -215,8 +246,10 @@ fn propose(side: &Side, tolerance: f64, seed: u64) -> Option<[f64; 3]> {
 
 fn circumcircle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<[f64; 3]> {
     let (bx, by, cx, cy) = (b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
+    /// Four times the area of three points that are taken to lie on a line, square metres. From: rounding.
+    const FLAT_M2: f64 = 1e-7;
     let twice = 2.0 * (bx * cy - by * cx);
-    if twice.abs() < 1e-7 {
+    if twice.abs() < FLAT_M2 {
         return None;
     }
     let (b2, c2) = (bx * bx + by * by, cx * cx + cy * cy);
@@ -226,11 +259,15 @@ fn circumcircle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<[f64; 3]> {
 
 /// One Gauss-Newton step on axis, radius and slope over the points within `gate` of the side.
 fn improve(round: &Round, side: &Side, edges: &[Edge], gate: f64, sigma_m: f64) -> Option<Round> {
+    /// What one point weighs at the most. From: chosen.
+    const MOST_EACH: f64 = 0.125;
+    /// An edge that is missed by this has half of its say, metres. From: chosen.
+    const EDGE_FAR_M: f64 = 0.008;
     let Sums { normal, right, squares, count, outside, spread } = side.sums(round, gate);
-    if count < 12.0 {
+    if count < FEWEST.1 as f64 {
         return None;
     }
-    let weight = (MOST_INDEPENDENT / count).min(0.125) / sigma_m.powi(2);
+    let weight = (MOST_INDEPENDENT / count).min(MOST_EACH) / sigma_m.powi(2);
     let (mut normal, mut right) = (normal * weight, right * weight);
     for edge in edges {
         let [a, b] = edge.direction;
@@ -238,14 +275,14 @@ fn improve(round: &Round, side: &Side, edges: &[Edge], gate: f64, sigma_m: f64) 
         let missing = edge.reach_m - (a * round.x + b * round.y + round.radius_m + round.slope * rise);
         let row = Vector4::new(a, b, 1.0, rise);
         // An edge far off is another thing's edge: its pull stays bounded.
-        let w = 1.0 / (EDGE_SIGMA_M.powi(2) * (1.0 + (missing / 0.008).powi(2)));
+        let w = 1.0 / (EDGE_SIGMA_M.powi(2) * (1.0 + (missing / EDGE_FAR_M).powi(2)));
         normal += row * row.transpose() * w;
         right += row * (missing * w);
     }
-    // Weak priors keep what the points do not tell near a cylinder: radius within decimetres, slope about 0.1.
-    normal[(2, 2)] += 1.0 / (0.05_f64 * 0.05);
-    normal[(3, 3)] += 1.0 / (0.1_f64 * 0.1);
-    right[3] -= round.slope / (0.1 * 0.1);
+    // Weak priors keep what the points do not tell near a cylinder.
+    normal[(2, 2)] += 1.0 / (RADIUS_SPREAD_M * RADIUS_SPREAD_M);
+    normal[(3, 3)] += 1.0 / (SLOPE_SPREAD * SLOPE_SPREAD);
+    right[3] -= round.slope / (SLOPE_SPREAD * SLOPE_SPREAD);
     let inverse = normal.try_inverse()?;
     let step = inverse * right;
     let sd = |i: usize| inverse[(i, i)].max(0.0).sqrt();
@@ -253,7 +290,7 @@ fn improve(round: &Round, side: &Side, edges: &[Edge], gate: f64, sigma_m: f64) 
         x: round.x + step[0],
         y: round.y + step[1],
         radius_m: round.radius_m + step[2],
-        slope: (round.slope + step[3]).clamp(-0.6, 0.6),
+        slope: (round.slope + step[3]).clamp(-STEEPEST, STEEPEST),
         middle_m: round.middle_m,
         place_sigma_m: sd(0).hypot(sd(1)) / std::f64::consts::SQRT_2,
         radius_sigma_m: sd(2),

@@ -14,7 +14,7 @@ mod vessels;
 mod votes;
 
 use crate::cloud::Cloud;
-use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, convex_hull, find_surface};
+use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, TALLEST_M, convex_hull, find_surface};
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Vector3};
 use patches::Voxels;
@@ -28,15 +28,15 @@ use std::cell::OnceCell;
 pub struct SceneOptions {
     /// How to find the surface.
     pub surface: SurfaceOptions,
-    /// Least height above the surface of a point that belongs to an object, metres. The surface's own roughness may raise it.
+    /// Least height above the surface of a point that belongs to an object, metres. The surface's own roughness may raise it. From: chosen.
     pub clearance_m: f64,
     /// Greatest height above the surface of a point that belongs to an object, metres.
     pub tallest_m: f64,
-    /// Side of the voxels, metres. Objects that stand twice as far apart are always separate.
+    /// Side of the voxels, metres. Objects that stand twice as far apart are always separate. From: chosen.
     pub voxel_m: f64,
-    /// Fewest points of an object.
+    /// Fewest points of an object. From: chosen.
     pub fewest_points: usize,
-    /// Least height of an object's top above what it stands on, metres.
+    /// Least height of an object's top above what it stands on, metres. From: chosen.
     pub least_height_m: f64,
     /// Whether touching objects are parted at concave creases.
     pub part_touching: bool,
@@ -47,7 +47,7 @@ impl Default for SceneOptions {
         SceneOptions {
             surface: SurfaceOptions::default(),
             clearance_m: 0.008,
-            tallest_m: 0.6,
+            tallest_m: TALLEST_M,
             voxel_m: 0.008,
             fewest_points: 60,
             least_height_m: 0.025,
@@ -108,6 +108,13 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
     Scene { surface, segments: parts }
 }
 
+/// Shares of a segment's points that lie below its lower edge and below its top: beyond are the few that may be noise. From: chosen.
+const POINT_ENDS: (f64, f64) = (0.01, 0.99);
+/// The same of the voxels of a part. From: chosen.
+const VOXEL_ENDS: (f64, f64) = (0.03, 0.97);
+/// Of the second number of places, the first may lie outside of what holds most of them. From: chosen.
+const OUTSIDE: (usize, usize) = (3, 10);
+
 /// The points of each part, in order of its first point.
 fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxel: &[u32]) -> Vec<Segment> {
     let mut counts = vec![0; voxels.len()];
@@ -134,7 +141,9 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
 
 /// Indices and positions (surface frame) of the points that stand above the surface, inside its outline.
 fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>, Vec<Point3<f64>>) {
-    let clearance_m = options.clearance_m.max(2.5 * surface.residual_m);
+    /// Up to so many spreads of the surface is the surface itself. From: chosen.
+    const ROUGH: f64 = 2.5;
+    let clearance_m = options.clearance_m.max(ROUGH * surface.residual_m);
     let up = surface.up.cast::<f32>();
     let offset = surface.offset_m as f32;
     let band = clearance_m as f32..options.tallest_m as f32;
@@ -160,13 +169,15 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>,
 /// Height of a segment's top above the surface, metres: its highest points but for a few that may be noise.
 pub(crate) fn top_m(segment: &Segment) -> f64 {
     let heights: Vec<f64> = segment.points.iter().map(|p| p.z).collect();
-    end(&heights, 0.99)
+    end(&heights, POINT_ENDS.1)
 }
 
 /// Tells for each segment what it stands on: the surface, or the top of another segment under its footprint. Gives all tops.
 fn stand(parts: &mut [Segment]) -> Vec<f64> {
-    /// A lower edge this high has been cut or hidden rather than set on something, unless something is below it.
+    /// A lower edge this high has been cut or hidden rather than set on something, unless something is below it. From: chosen.
     const LIFTED_M: f64 = 0.02;
+    /// How far from its lower edge the top of what it stands on may be measured, metres. From: chosen.
+    const MEETS_M: f64 = 0.03;
     let tops: Vec<f64> = parts.iter().map(top_m).collect();
     let hulls: Vec<OnceCell<_>> = parts.iter().map(|_| OnceCell::new()).collect();
     let is_below = |other: usize, place: [f64; 2]| {
@@ -178,13 +189,13 @@ fn stand(parts: &mut [Segment]) -> Vec<f64> {
         .enumerate()
         .map(|(i, part)| {
             let heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
-            let low = end(&heights, 0.01);
+            let low = end(&heights, POINT_ENDS.0);
             if low < LIFTED_M {
                 return 0.0;
             }
             let place = middle(&part.points);
             let below = tops.iter().enumerate().filter(|&(other, &top)| {
-                other != i && top < low + 0.03 && top > low - 0.03 && is_below(other, place)
+                other != i && top < low + MEETS_M && top > low - MEETS_M && is_below(other, place)
             });
             below.map(|(_, &top)| top).max_by(f64::total_cmp).unwrap_or(0.0)
         })
@@ -224,11 +235,11 @@ fn hull_from_above(points: &[Point3<f64>]) -> Vec<[f64; 2]> {
     convex_hull(points.iter().map(|p| [p.x, p.y]).collect())
 }
 
-/// True if a convex anticlockwise outline holds most of the places: seven in ten or more.
+/// True if a convex anticlockwise outline holds most of the places: all but [`OUTSIDE`].
 fn most_within<T>(hull: &[[f64; 2]], of: &[T], place: impl Fn(&T) -> [f64; 2]) -> bool {
     let outside = of.iter().filter(|p| !holds(hull, place(p)));
     // The first that is too many settles it.
-    outside.take(of.len() * 3 / 10 + 1).count() * 10 <= of.len() * 3
+    outside.take(of.len() * OUTSIDE.0 / OUTSIDE.1 + 1).count() * OUTSIDE.1 <= of.len() * OUTSIDE.0
 }
 
 /// True if a convex anticlockwise outline holds the place.

@@ -8,15 +8,16 @@ mod planes;
 mod role;
 
 use crate::cloud::{Cloud, is_finite};
-use crate::noise::axial_sigma_m;
+use crate::noise::{KINECT, axial_sigma_m};
 use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
+pub(crate) use extent::TALLEST_M;
 pub(crate) use hull::{convex_hull, largest_part};
 pub use outline::Outline;
 pub(crate) use outline::Rows;
-pub(crate) use planes::dominant_planes;
+pub(crate) use planes::{BAND, dominant_planes};
 use planes::{FEWEST, Plane, SAMPLE, Sample, large_planes};
 pub use role::{Role, Sign};
 
@@ -26,15 +27,15 @@ pub use role::{Role, Sign};
 pub struct SurfaceOptions {
     /// Up in the world, if known. Otherwise up is taken from how the cameras are held.
     pub up: Option<Unit<Vector3<f64>>>,
-    /// Most angle between the surface's normal and `up`, radians.
+    /// Most angle between the surface's normal and `up`, radians. From: chosen, 15°.
     pub tilt_rad: f64,
     /// Least and greatest height of the surface along `up`, metres, if known.
     pub height_band_m: Option<(f64, f64)>,
     /// Where the surface is as seen from above, if known: of what lies outside nothing is wanted.
     pub region: Option<Region>,
-    /// Least area of the surface, square metres.
+    /// Least area of the surface, square metres. From: chosen.
     pub least_area_m2: f64,
-    /// Seed of the sampling.
+    /// Seed of the sampling. From: mark.
     pub seed: u64,
 }
 
@@ -166,7 +167,7 @@ impl Surface {
 
     /// Tells what lies on a board above, or is the board itself, of a height above the surface: it does not stand on this one.
     pub(crate) fn overhung(&self) -> impl Fn(f64, &Point3<f64>) -> bool + use<> {
-        /// How thick a board is with what hides its edge, and how far beyond its hull things on it reach, metres.
+        /// How thick a board is with what hides its edge, and how far beyond its hull things on it reach, metres. From: chosen.
         const BOARD_M: f64 = 0.05;
         const MARGIN_M: f64 = 0.03;
         let boards: Vec<(f64, Outline)> =
@@ -213,11 +214,17 @@ impl Surface {
     }
 }
 
-/// Heights above a surface at which things stand on it, metres.
+/// Heights above a surface at which things stand on it, metres. From: chosen.
 const THINGS_M: (f64, f64) = (0.025, 0.35);
-/// Surfaces that share so much of the lesser one, seen from above, lie at least so far apart, metres.
+/// Surfaces that share so much of the lesser one, seen from above, lie at least so far apart, metres. From: chosen.
 const COMMON: f64 = 0.2;
 const APART_M: f64 = 0.015;
+
+/// So many returns of things, so far within the outline, metres, are no accident. From: chosen.
+const THINGS: usize = 20;
+const WITHIN_M: f64 = 0.02;
+/// What is seven of ten or more is most of it: the first number of the second. From: chosen.
+const MOST: (usize, usize) = (7, 10);
 
 /// Finds the surface to stand things on: the best of [`find_surfaces`] that is as wanted.
 ///
@@ -262,13 +269,14 @@ pub fn find_surfaces(
 ) -> Result<Vec<Surface>, SurfaceError> {
     let _span = tracing::debug_span!("find_surfaces", points = cloud.len()).entered();
     let viewpoints = seen.viewpoints();
+    /// What cameras are held like is a weaker hint than a known direction: most angle to that, radians. From: chosen, about 70°.
+    const HELD_RAD: f64 = 1.2;
     let samples = sample(cloud, &viewpoints);
     if samples.len() < FEWEST {
         return Err(SurfaceError::TooFew { found: cloud.count_finite(), needed: FEWEST });
     }
     let up = options.up.or_else(|| held_up(seen));
-    // What cameras are held like is a weaker hint than a known direction.
-    let tilt_rad = if options.up.is_some() { options.tilt_rad } else { 1.2 };
+    let tilt_rad = if options.up.is_some() { options.tilt_rad } else { HELD_RAD };
     let is_level = |plane: &Plane| up.is_none_or(|up| plane.normal.dot(&up).abs() >= tilt_rad.cos());
     // What a plane was proposed as, its points may not bear out.
     let planes = large_planes(&samples, options.seed, is_level).into_iter().filter(is_level);
@@ -361,10 +369,10 @@ fn claim(surface: &Surface, samples: &[Sample]) -> f64 {
     let hull = surface.outline();
     let is_on = |s: &&Sample| {
         let height = surface.height_m(&s.point);
-        height > THINGS_M.0 && height < THINGS_M.1 && hull.covers(&s.point, -0.02)
+        height > THINGS_M.0 && height < THINGS_M.1 && hull.covers(&s.point, -WITHIN_M)
     };
-    let things = samples.iter().filter(is_on).take(20).count();
-    surface.points as f64 * if things >= 20 { 2.0 } else { 1.0 }
+    let things = samples.iter().filter(is_on).take(THINGS).count();
+    surface.points as f64 * if things >= THINGS { 2.0 } else { 1.0 }
 }
 
 fn wanted(options: &SurfaceOptions) -> String {
@@ -379,10 +387,12 @@ fn wanted(options: &SurfaceOptions) -> String {
 
 /// Spread of a depth camera's range at a distance (Nguyen et al.), metres.
 pub(crate) fn range_sigma_m(distance_m: f64) -> f64 {
-    axial_sigma_m(distance_m, 0.0).unwrap_or(0.0012)
+    axial_sigma_m(distance_m, 0.0).unwrap_or(KINECT.axial_m)
 }
 
 fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
+    /// However far off a point is measured, metres. From: chosen.
+    const WORST_SIGMA_M: f64 = 0.02;
     let stride = (cloud.len() / SAMPLE).max(1);
     // A stride that shares a factor with the rows would sample columns only.
     let stride = match cloud.grid {
@@ -398,7 +408,7 @@ fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
         .filter(|p| is_finite(p))
         .map(|p| {
             let point = p.cast::<f64>();
-            let sigma_m = range_sigma_m(near(&point)).min(0.02);
+            let sigma_m = range_sigma_m(near(&point)).min(WORST_SIGMA_M);
             Sample { point, sigma_m }
         })
         .collect()
@@ -406,12 +416,14 @@ fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
 
 /// Up as people and robots hold cameras: against the images' downward axis.
 fn held_up(seen: &Visibility) -> Option<Unit<Vector3<f64>>> {
+    /// Ways up that add up to less cancel out. From: rounding.
+    const CANCELLED: f64 = 1e-6;
     if !seen.held {
         return None;
     }
     let sum: Vector3<f64> =
         seen.maps.iter().map(|m| m.camera_from_world.rotation.inverse() * -Vector3::y()).sum();
-    Unit::try_new(sum, 1e-6)
+    Unit::try_new(sum, CANCELLED)
 }
 
 /// [`f64::floor`], which is a call on some processors.

@@ -1,7 +1,10 @@
-//! Segmentation, merging and recognition against what is known, and how long single views take, as tables:
-//! `cargo run --release -p descry-perception --example evaluate -- mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
+//! Segmentation, merging and recognition against what is known, how long single views take, and where the values of all constants are
+//! from, as tables:
+//! `cargo run --release -p descry-perception --example evaluate -- constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
 mod clutter;
+#[path = "../../tests/constants/mod.rs"]
+mod constants;
 mod frames;
 mod further;
 mod kitchen;
@@ -20,6 +23,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+        ["constants"] => constants(),
         ["mosd", dir, out @ ..] => mosd::run(Path::new(dir), out.first().map(Path::new)),
         ["kitchen", dir, ..] => kitchen::run(Path::new(dir)),
         ["surfaces", dirs @ ..] => surfaces::run(dirs),
@@ -48,7 +52,7 @@ fn main() -> ExitCode {
         },
         ["variants", dirs @ ..] => variants::run(dirs),
         _ => Err(
-            "usage: evaluate mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
+            "usage: evaluate constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
                 .to_owned(),
         ),
     };
@@ -58,5 +62,15 @@ fn main() -> ExitCode {
             eprintln!("{why}");
             ExitCode::from(2)
         }
+    }
+}
+
+/// The constants of this copy of the sources and where their values are from, in Markdown.
+fn constants() -> Result<(), String> {
+    let found = constants::all(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
+    print!("{}", constants::table(&found));
+    match constants::faults(&found).as_slice() {
+        [] => Ok(()),
+        faults => Err(faults.join("\n")),
     }
 }

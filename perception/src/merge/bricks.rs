@@ -3,12 +3,12 @@
 use nalgebra::{Point3, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Voxels along a side of a brick, and along that of a brick with a layer of its neighbours' voxels around.
+/// Voxels along a side of a brick, and along that of a brick with a layer of its neighbours' voxels around. From: work.
 pub(super) const SIDE: usize = 8;
 pub(super) const WIDE: usize = SIDE + 2;
-/// No cell, or no brick.
+/// No cell, or no brick. From: mark.
 pub(super) const NONE: u32 = u32::MAX;
-/// Most voxels along an axis: positions in single precision tell a sixteenth of a voxel then.
+/// Most voxels along an axis: positions in single precision tell a sixteenth of a voxel then. From: derived, single precision has 24 bits.
 const MOST: f64 = (1 << 20) as f64;
 
 /// Voxels over a box, fixed to the world's origin.
@@ -23,7 +23,9 @@ pub(super) struct Grid {
 impl Grid {
     /// The grid over a box. The voxels are at least `voxel_m` wide, wider if they could not be told apart.
     pub fn over(low: &Point3<f64>, high: &Point3<f64>, voxel_m: f64) -> Grid {
-        let voxel_m = voxel_m.max((high - low).amax() / (MOST - 4.0));
+        /// Voxels of the grid's border, and of where it begins. From: chosen.
+        const BORDER: f64 = 4.0;
+        let voxel_m = voxel_m.max((high - low).amax() / (MOST - BORDER));
         let origin_m = low.coords.map(|c| ((c / voxel_m).floor() - 1.0) * voxel_m);
         Grid { voxel_m, origin_m }
     }
@@ -31,6 +33,7 @@ impl Grid {
 
 /// Where a brick lies, in bricks: by axis, 20 bits each.
 type Place = u64;
+/// Bits of a place along an axis. From: derived, three axes in 64 bits.
 const PLACE_BITS: u32 = 20;
 
 /// Cells of occupied voxels.
@@ -46,7 +49,7 @@ pub(super) struct Bricks<C> {
     recent: [(Place, u32); RECENT * RECENT * RECENT],
 }
 
-/// Bricks along each axis of which one may be in `recent`.
+/// Bricks along each axis of which one may be in `recent`. From: work.
 const RECENT: usize = 4;
 
 impl<C> Bricks<C> {

@@ -22,10 +22,8 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::fmt;
 
-/// Up to so many views all are merged together.
+/// Up to so many views all are merged together. From: chosen.
 const FEW: usize = 6;
-/// So many views beside a further one hold it where it belongs.
-const BESIDE: usize = 5;
 
 /// Merges the views of one place again and again, as they become more.
 #[derive(Default)]
@@ -183,7 +181,7 @@ fn beside(poses: &[Isometry3<f64>]) -> Vec<bool> {
     let mut others: Vec<usize> = (0..last).collect();
     others.sort_by(|&a, &b| apart(a).total_cmp(&apart(b)).then(a.cmp(&b)));
     let mut beside = vec![false; poses.len()];
-    others.iter().take(BESIDE).chain([&last]).for_each(|&i| beside[i] = true);
+    others.iter().take(joint::PARTNERS).chain([&last]).for_each(|&i| beside[i] = true);
     beside
 }
 
@@ -211,6 +209,7 @@ fn digest(view: &View) -> u64 {
 /// Numbers that words are mixed into, side by side: none waits for another.
 struct Digest([u64; LANES]);
 
+/// How many words are mixed in at once. From: work.
 const LANES: usize = 3;
 
 impl Digest {

@@ -27,6 +27,7 @@ pub(super) struct Cell {
 }
 
 impl Cell {
+    /// Measured by no view. From: mark.
     const EMPTY: Cell = Cell {
         weight: 0.0,
         at: Vector3::new(0.0, 0.0, 0.0),
@@ -45,7 +46,9 @@ impl Cell {
     }
 
     pub fn mean(&self) -> Cell {
-        let normal = self.normal.try_normalize(1e-6).unwrap_or_else(Vector3::zeros);
+        /// Normals that add up to less cancel out. From: rounding.
+        const CANCELLED: f32 = 1e-6;
+        let normal = self.normal.try_normalize(CANCELLED).unwrap_or_else(Vector3::zeros);
         Cell { at: self.at / self.weight, normal, ..*self }
     }
 }
@@ -91,6 +94,8 @@ pub(super) fn gather(
     planes: &[Plane],
     options: &MergeOptions,
 ) -> Vec<Gathered> {
+    /// If there are too many voxels, they grow at least by this. From: chosen.
+    const GROWTH: f64 = 1.2;
     let _span = tracing::debug_span!("fuse", views = views.len()).entered();
     let used: Vec<usize> = (0..views.len()).filter(|&i| used[i]).collect();
     let of = |&i: &usize| Returns::of(&views[i], &prepared[i], &poses[i], planes, options);
@@ -105,7 +110,7 @@ pub(super) fn gather(
         let cells: usize = all.iter().map(|gathered| gathered.bricks.cells.len()).sum();
         if cells > options.most_points {
             // Surfaces: points fall with the square of the side.
-            voxel_m = all[0].grid.voxel_m * (cells as f64 / options.most_points as f64).sqrt().max(1.2);
+            voxel_m = all[0].grid.voxel_m * (cells as f64 / options.most_points as f64).sqrt().max(GROWTH);
             continue;
         }
         all.iter_mut().for_each(Gathered::sort);
@@ -137,7 +142,7 @@ pub(super) fn gather_further(
 
 /// Sorts the returns of a view into voxels and sheets.
 fn take(all: &mut [Gathered], of: &Returns, view: u16, coloured: bool) {
-    /// Returns that are added together.
+    /// Returns that are added together. From: work.
     const SOME: usize = 512;
     let colours = of.view.cloud.colours.as_deref().filter(|_| coloured);
     let list = || Vec::with_capacity(SOME);

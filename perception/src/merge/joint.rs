@@ -44,14 +44,20 @@ struct Link {
     squares: f64,
 }
 
-/// Spread that all partners have at least: they are seldom the same place, metres.
+/// Spread that all partners have at least: they are seldom the same place, metres. From: chosen.
 const LEAST_SIGMA_M: f32 = 0.002;
-/// Smallest cosine between the normals of partners.
+/// So many views, the nearest, hold one where it belongs. From: chosen.
+pub(super) const PARTNERS: usize = 5;
+/// Smallest cosine between the normals of partners. From: chosen, about 41°.
 const SAME_SIDE: f32 = 0.75;
-/// Another point may be nearer than the partner by this part of how far a partner may be: the surface is much the same there.
+/// Another point may be nearer than the partner by this part of how far a partner may be: the surface is much the same there. From: chosen.
 const SLACK: f32 = 0.1;
-/// A pass that moves no camera farther than this, metres and radians, ends the round.
+/// A pass that moves no camera farther than this, metres and radians, ends the round. From: chosen.
 const SETTLED: (f64, f64) = (2e-4, 2e-4);
+/// Views whose last pass moved no camera by so many times as much have settled all the same. From: chosen.
+const NEARLY: f64 = 5.0;
+/// A round ends early once partners lie within so many times what they do at its last pass. From: chosen.
+const LATE: f64 = 1.5;
 
 /// Aligns the views that are `used` among each other; those of them that do not `move` stay where they are. `parts` tells for each view
 /// what its points belong to.
@@ -85,10 +91,10 @@ pub(super) fn align(
             *f = Found {
                 matched: n,
                 residual_m: (squares / n.max(1) as f64).sqrt(),
-                converged: moved.0 < 5.0 * SETTLED.0 && moved.1 < 5.0 * SETTLED.1,
+                converged: moved.0 < NEARLY * SETTLED.0 && moved.1 < NEARLY * SETTLED.1,
             };
         }
-        if share >= 0.5 && moved.0 < SETTLED.0 && moved.1 < SETTLED.1 && radius <= 1.5 * round.to_m {
+        if share >= 0.5 && moved.0 < SETTLED.0 && moved.1 < SETTLED.1 && radius <= LATE * round.to_m {
             break;
         }
     }
@@ -142,8 +148,8 @@ impl Asked {
 
 /// Pairs of views to match: all if they are few, else each with those whose cameras are nearest.
 fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
+    /// So many views and more are not all matched with all. From: chosen.
     const ALL_BELOW: usize = 7;
-    const PARTNERS: usize = 5;
     let active: Vec<usize> = (0..views.len()).filter(|&i| used[i] && !views[i].points.is_empty()).collect();
     let mut pairs = Vec::new();
     for &i in &active {
@@ -167,6 +173,9 @@ fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(us
 
 /// Partners of the points that one view asks for in the other, and what they ask of both poses.
 fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius: f64) -> Link {
+    /// What is missed by half of the radius, or by two spreads, has a quarter of its say: their squares. From: chosen.
+    const HALF_SQ: f32 = 0.25;
+    const SPREADS_SQ: f32 = 4.0;
     let (i, j) = (asked.from, asked.to);
     let mut sums = Sums::ZERO;
     let Some(tree) = &views[j].tree else { return Link::of(i, j, &sums, poses) };
@@ -192,7 +201,7 @@ fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius:
         let residual = normal.dot(&(in_j - at.coords));
         let variance = point.sigma_m * point.sigma_m + sigma_m * sigma_m + LEAST_SIGMA_M * LEAST_SIGMA_M;
         // Geman-McClure: what does not fit within the radius loses its say smoothly.
-        let scale_sq = (0.25 * radius * radius).max(4.0 * variance);
+        let scale_sq = (HALF_SQ * radius * radius).max(SPREADS_SQ * variance);
         let robust = scale_sq / (scale_sq + residual * residual);
         let along = arm.cross(normal);
         let derivative = [along.x, along.y, along.z, normal.x, normal.y, normal.z].map(f64::from);
@@ -233,6 +242,8 @@ fn step(
     poses: &mut [Isometry3<f64>],
     links: &[Link],
 ) -> (f64, f64) {
+    /// Neighbouring points share their errors: the matched surface counts for no more than so many independent looks. From: chosen.
+    const INDEPENDENT: f64 = 150.0;
     let mut slots = vec![None; views.len()];
     let active: Vec<usize> = (0..views.len()).filter(|&i| used[i] && moves[i]).collect();
     active.iter().enumerate().for_each(|(slot, &i)| slots[i] = Some(6 * slot));
@@ -242,8 +253,7 @@ fn step(
     for link in links {
         // What does not move has no rows.
         let (i, j) = (slots[link.from], slots[link.to]);
-        // Neighbouring points share their errors; the matched surface counts as this many independent looks.
-        let shared = (150.0 / link.matched.max(1) as f64).min(1.0);
+        let shared = (INDEPENDENT / link.matched.max(1) as f64).min(1.0);
         let mut add = |r: Option<usize>, c: Option<usize>, m: &Matrix6<f64>| {
             if let Some((r, c)) = r.zip(c) {
                 let mut view = normal.fixed_view_mut::<6, 6>(r, c);
@@ -293,7 +303,9 @@ fn step(
 
 /// A camera far from where localisation had it loses its say on the common frame: one lost view must not drag the others.
 fn prior_weight(sigmas: f64) -> f64 {
-    1.0 / (1.0 + (sigmas / 4.0).powi(2))
+    /// Spreads at which half of it is left. From: chosen.
+    const HALVED: f64 = 4.0;
+    1.0 / (1.0 + (sigmas / HALVED).powi(2))
 }
 
 /// Turn (scaled axis) and shift of the camera from where localisation had it.

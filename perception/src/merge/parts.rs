@@ -8,16 +8,20 @@ use crate::surface::{self, Outline};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use rustc_hash::FxHashMap;
 
-/// A plane is dominant from this share of all points.
+/// A plane is dominant from this share of all points. From: chosen.
 const DOMINANT: f64 = 0.06;
-/// A plane is level if its normal is this near to up: the cosine of the angle between them.
+/// A plane is level if its normal is this near to up: the cosine of the angle between them. From: chosen, about 18°.
 const LEVEL: f64 = 0.95;
-/// Between these heights above a surface lies what stands on it, metres.
+/// Between these heights above a surface lies what stands on it, metres. From: chosen.
 const STANDING_M: (f64, f64) = (0.01, 0.5);
-/// Side of the cells in which the outline of the surface is sought, metres.
+/// Side of the cells in which the outline of the surface is sought, metres. From: chosen.
 const CELL_M: f64 = 0.05;
-/// Fewest points of what stands on the surface in a view for these to decide where it belongs.
-const FEWEST: usize = 60;
+/// A point lies on a dominant plane within this many spreads of its own and this distance, metres ... From: chosen.
+const PLANE: (f64, f64) = (3.0, 0.006);
+/// ... if it faces nearly the same way: the cosine of the angle between. From: chosen, about 37°.
+pub(super) const PLANE_FACING: f64 = 0.8;
+/// Fewest points of what stands on the surface in a view, or else off the planes, that tell where it belongs. From: chosen.
+pub(super) const FEWEST: usize = 60;
 
 /// What a point of a view belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +72,8 @@ pub(super) fn find(
     up: Option<Unit<Vector3<f64>>>,
     steps: &mut Vec<Step>,
 ) -> Parts {
+    /// Ways up that add up to less cancel out. From: rounding.
+    const CANCELLED: f64 = 1e-6;
     let places: Vec<Vec<Point3<f64>>> = (0..prepared.len())
         .map(|i| if used[i] { in_world(&prepared[i], &poses[i]) } else { Vec::new() })
         .collect();
@@ -77,7 +83,7 @@ pub(super) fn find(
     let planes = surface::dominant_planes(of_views, total, DOMINANT);
     let held: Vector3<f64> =
         poses.iter().zip(used).filter(|(_, u)| **u).map(|(p, _)| p.rotation * -Vector3::y()).sum();
-    let held = up.or_else(|| Unit::try_new(held, 1e-6));
+    let held = up.or_else(|| Unit::try_new(held, CANCELLED));
     let upright = planes.iter().find(|n| held.is_none_or(|up| n.0.dot(&up).abs() > 0.5));
     let up = upright.map(|(normal, _)| match held {
         Some(held) if held.dot(normal) < 0.0 => Unit::new_normalize(-normal),
@@ -148,9 +154,9 @@ impl PlaneOfView {
     /// True if a point of the view lies on the plane and faces as it does.
     #[inline(always)]
     fn holds(&self, view: &Prepared, k: usize) -> bool {
-        let near = 3.0 * f64::from(view.points[k].sigma_m) + 0.006;
+        let near = PLANE.0 * f64::from(view.points[k].sigma_m) + PLANE.1;
         (self.normal.dot(&view.points[k].at().coords) - self.offset_m).abs() < near
-            && self.normal.dot(&view.points[k].normal()).abs() > 0.8
+            && self.normal.dot(&view.points[k].normal()).abs() > PLANE_FACING
     }
 }
 

@@ -11,10 +11,10 @@ use crate::voxel;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
-/// Columns of the image in which points for the alignment are sought; more tells no more at a voxel of 1 cm.
+/// Columns of the image in which points for the alignment are sought; more tells no more at a voxel of 1 cm. From: chosen.
 const COLUMNS: usize = 216;
 
-/// Normals for the alignment: of many pixels, since one measurement is vague.
+/// Normals for the alignment: of many pixels, since one measurement is vague. From: chosen.
 const WIDE: normals::OrganisedOptions =
     normals::OrganisedOptions { reach: 2, depth_step_share: 0.025, base_m: 0.008, least: 8 };
 
@@ -106,10 +106,16 @@ impl Within {
 
 /// Filters and thins one view. A view without usable points gives an empty one.
 pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
-    // What localisation does not state is taken as the paper's robot: a few centimetres and degrees.
-    let sigma_m = if view.pose_sigma_m > 0.0 { view.pose_sigma_m } else { 0.03 };
-    let sigma_rad = if view.pose_sigma_rad > 0.0 { view.pose_sigma_rad } else { 0.035 };
-    let slack_m = 3.0 * sigma_m + 0.05;
+    /// What localisation does not state: a few centimetres and degrees. From: chosen, as for the paper's robot.
+    const SIGMA_M: f64 = 0.03;
+    const SIGMA_RAD: f64 = 0.035;
+    /// Beyond the height band, spreads of localisation and a distance, metres. From: chosen.
+    const SLACK: (f64, f64) = (3.0, 0.05);
+    /// However far off, metres. From: chosen.
+    const WORST_SIGMA_M: f32 = 0.03;
+    let sigma_m = if view.pose_sigma_m > 0.0 { view.pose_sigma_m } else { SIGMA_M };
+    let sigma_rad = if view.pose_sigma_rad > 0.0 { view.pose_sigma_rad } else { SIGMA_RAD };
+    let slack_m = SLACK.0 * sigma_m + SLACK.1;
     let within = Within::of(&view.world_from_camera, options, slack_m);
     let coarse = coarser(view, &within, COLUMNS).and_then(|coarse| {
         let normals = Some(normals::organised(&coarse, &WIDE)?.normals);
@@ -124,7 +130,7 @@ pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
     let surfel = |(&at, &normal): (&Point3<f32>, &Vector3<f32>)| Surfel {
         at,
         normal,
-        sigma_m: frontal_sigma_m(at.coords.norm()).min(0.03),
+        sigma_m: frontal_sigma_m(at.coords.norm()).min(WORST_SIGMA_M),
     };
     let points = facing.map(surfel).collect();
     let coarse = cloud.grid.is_some().then_some(cloud);
@@ -150,11 +156,13 @@ fn firsts(cloud: &Cloud, voxel_m: f64) -> Cloud {
 
 /// What is to be merged of a cloud, thinned, with normals from the nearest points.
 fn thinned(view: &View, within: &Within, options: &MergeOptions) -> Cloud {
+    /// Points that a normal is taken from. From: chosen.
+    const NEAREST: usize = 15;
     let kept = view.cloud.filter(|p| within.holds([p.x, p.y, p.z]));
     let thin = voxel::downsample(&kept, options.align_voxel_m as f32).unwrap_or(kept);
     match Neighbours::new(&thin.points) {
         Ok(tree) => {
-            let normals = normals::estimate(&tree, 15, &Point3::origin()).normals;
+            let normals = normals::estimate(&tree, NEAREST, &Point3::origin()).normals;
             Cloud { normals: Some(normals), ..thin }
         }
         Err(_) => Cloud::default(),
@@ -163,6 +171,7 @@ fn thinned(view: &View, within: &Within, options: &MergeOptions) -> Cloud {
 
 /// Every nth row and column of an organised cloud, so that about as many columns are left; what is not to be merged is no return.
 pub(super) fn coarser(view: &View, within: &Within, about: usize) -> Option<Cloud> {
+    /// No return. From: mark.
     const NONE: Point3<f32> = Point3::new(f32::NAN, f32::NAN, f32::NAN);
     let Grid { width, height } = view.cloud.grid?;
     let stride = (width / about).max(1);

@@ -1,33 +1,36 @@
 //! Which returns of a view are fused, how they face, and which of them lie on a level plane.
 
 use super::MergeOptions;
-use super::parts::Plane;
+use super::parts::{self, Plane};
 use super::prepare::{Prepared, Within, coarser};
 use crate::cloud::{Cloud, Grid};
 use crate::noise::frontal_sigma_m;
 use crate::normals::{OrganisedOptions, organised_where};
+use crate::surface::BAND;
 use crate::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::borrow::Cow;
 
-/// A return between two neighbours this far before and behind it belongs to neither, as a share of its depth.
+/// A return between two neighbours this far before and behind it belongs to neither, as a share of its depth. From: chosen.
 const FLYING_SHARE: f32 = 0.02;
 /// A return lies on a plane within this many spreads of its own and this distance, metres ...
-const PLANE_SPREADS: f32 = 3.0;
-const PLANE_M: f32 = 0.004;
+/// From: derived, as far as a plane is taken to be measured where it is sought.
+const PLANE_SPREADS: f32 = BAND.0 as f32;
+const PLANE_M: f32 = BAND.1 as f32;
 /// ... if it faces nearly the same way: the cosine of the angle between.
-const PLANE_FACING: f32 = 0.8;
-/// Columns of the image in which normals of things are sought.
+/// From: derived, as where the planes are told from what stands on them.
+const PLANE_FACING: f32 = parts::PLANE_FACING as f32;
+/// Columns of the image in which normals of things are sought. From: chosen.
 const COLUMNS: usize = 320;
-/// Things are finer than planes: their normals are those of few pixels.
+/// Things are finer than planes: their normals are those of few pixels. From: chosen.
 const FINE: OrganisedOptions = OrganisedOptions { reach: 1, depth_step_share: 0.02, base_m: 0.006, least: 5 };
 
-/// Returns that are taken together of a cloud without rows.
+/// Returns that are taken together of a cloud without rows. From: work.
 const ROW: usize = 512;
-/// Pixels that are judged together.
+/// Pixels that are judged together. From: work.
 const LANES: usize = 16;
 
-/// What a return is instead of the number of the plane that it lies on: not fused, or off the planes.
+/// What a return is instead of the number of the plane that it lies on: not fused, or off the planes. From: mark.
 const DROPPED: u32 = u32::MAX;
 const THING: u32 = u32::MAX - 1;
 
@@ -99,6 +102,7 @@ impl<'a> Facing<'a> {
 
     #[inline(always)]
     fn normal(&self, row: usize, column: usize) -> Vector3<f32> {
+        /// No normal. From: mark.
         const NONE: Vector3<f32> = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
         self.normals.get(self.rows[row] + self.columns[column]).copied().unwrap_or(NONE)
     }
@@ -243,8 +247,10 @@ fn some(line: &[f32], from: usize) -> &[f32; LANES] {
 /// Spread of a return, metres.
 #[inline(always)]
 fn sigma_m(depth: f32, range_sq: f32) -> f32 {
+    /// Square of the share of the range that depth is taken to be of at the least: no ray is farther aside than 60°. From: chosen.
+    const HALF_SQ: f32 = 0.25;
     // Depth, but for what is seen far aside.
-    let (depth_sq, half_sq) = (depth * depth, 0.25 * range_sq);
+    let (depth_sq, half_sq) = (depth * depth, HALF_SQ * range_sq);
     frontal_sigma_m(if depth_sq > half_sq { depth_sq } else { half_sq }.sqrt())
 }
 

@@ -3,27 +3,26 @@
 //! With the table level, what localisation leaves open is a shift along the table and a turn about the vertical. Small objects far apart
 //! give many wrong valleys to a local method; so the few degrees of freedom are searched on a grid, coarse to fine.
 
+use super::parts::FEWEST;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use rustc_hash::FxHashSet;
 
 /// A place on a surface with its unit normal.
 pub(super) type Oriented = (Point3<f64>, Vector3<f64>);
 
-/// Fewest points off the planes for a search to mean something.
-const FEWEST: usize = 60;
-/// Points of the view that are tried against the others.
+/// Points of the view that are tried against the others. From: chosen.
 const TRIED: usize = 220;
-/// Surfaces farther than this from the middle of a view, along the table and in height, are nothing to fall onto, metres.
+/// Surfaces farther than this from the middle of a view, along the table and in height, are nothing to fall onto, metres. From: chosen.
 const FARTHEST_M: [f64; 2] = [3.0, 1.5];
-/// Side of the coarse and fine cells, metres.
+/// Side of the coarse and fine cells, metres. From: chosen.
 const CELLS_M: [f64; 2] = [0.03, 0.012];
-/// Smallest share of points that must fall on the others' surfaces.
+/// Smallest share of points that must fall on the others' surfaces. From: chosen.
 const LEAST_SHARE: f64 = 0.25;
 
-/// What a correction at the edge of the window (three spreads of localisation) costs, as a share of the points.
+/// What a correction at the edge of the window (three spreads of localisation) costs, as a share of the points. From: chosen.
 const PRIOR: f64 = 0.15;
 
-/// What a point in a cell of a surface that faces its way is worth, and what one beside such a cell is: units of the score.
+/// What a point in a cell of a surface that faces its way is worth, and what one beside such a cell is: units of the score. From: chosen.
 const HIT: u8 = 20;
 const BESIDE: u8 = 7;
 
@@ -45,6 +44,8 @@ fn sides(normal: &Vector3<f64>, least: f64) -> impl Iterator<Item = usize> {
 impl Cells {
     /// Cells around points, with room for `reach` cells to each side.
     fn new(points: &[Oriented], side_m: f64, reach: i32) -> Cells {
+        /// A surface faces each side along which its normal is longer than this. From: chosen.
+        const FACES: f64 = 0.3;
         let key = |p: &Point3<f64>| [p.x, p.y, p.z].map(|c| (c / side_m).floor() as i32);
         let keys: Vec<[i32; 3]> = points.iter().map(|(p, _)| key(p)).collect();
         let (low, high) = keys.iter().fold(([i32::MAX; 3], [i32::MIN; 3]), |(low, high), k| {
@@ -56,7 +57,7 @@ impl Cells {
         let mut cells = Cells { side_m, low, size, worth: vec![0; 6 * size.iter().product::<usize>()] };
         for ((_, normal), key) in points.iter().zip(&keys) {
             let Some(at) = cells.index(*key) else { continue };
-            for side in sides(normal, 0.3) {
+            for side in sides(normal, FACES) {
                 cells.mark(side, at);
             }
         }
@@ -89,7 +90,7 @@ impl Cells {
 
     /// Mean worth (1 for a hit) of points over all shifts of up to `reach` cells along x and y, row by row of x.
     fn scores(&self, points: &[(Point3<f64>, usize)], reach: i32) -> Vec<f64> {
-        /// Shifts along y are summed up by as many at once.
+        /// Shifts along y are summed up by as many at once. From: work.
         const LANES: usize = 8;
         let across = (2 * reach + 1) as usize;
         let wide = across.next_multiple_of(LANES);
@@ -185,6 +186,11 @@ pub(super) fn place(
     up: &Unit<Vector3<f64>>,
     window: Window,
 ) -> Option<Placed> {
+    /// Steps of the turn, coarse and fine, radians. From: chosen.
+    const TURN_STEPS_RAD: [f64; 2] = [0.03, 0.009];
+    /// Around the best coarse places, how far the fine search goes in shift, metres, and turn, radians. From: derived, a coarse cell and
+    /// three fine steps.
+    const FINE: (f64, f64) = (CELLS_M[0], 0.027);
     if view.len() < FEWEST || placed.len() < FEWEST {
         return None;
     }
@@ -193,8 +199,8 @@ pub(super) fn place(
         levelled(&within_reach(view, placed, window.shift_m), placed, &level)?;
     let mut best = [Candidate { x: 0.0, y: 0.0, turn: 0.0, score: 0.0 }; 3];
     for (stage, side_m) in CELLS_M.into_iter().enumerate() {
-        let (shift, turn) = if stage == 0 { (window.shift_m, window.turn_rad) } else { (0.03, 0.027) };
-        let turn_step = if stage == 0 { 0.03 } else { 0.009 };
+        let (shift, turn) = if stage == 0 { (window.shift_m, window.turn_rad) } else { FINE };
+        let turn_step = TURN_STEPS_RAD[stage];
         let (turns, shifts) = ((turn / turn_step).ceil() as i32, (shift / side_m).ceil() as i32);
         let cells = Cells::new(&placed, side_m, shifts);
         let mut found: Vec<Candidate> = Vec::new();
@@ -253,8 +259,10 @@ fn distinct(found: &[Candidate], apart: f64) -> [Candidate; 3] {
 
 /// The points turned about the vertical, each with the side that it faces most.
 fn turned(points: &[Oriented], angle: f64) -> Vec<(Point3<f64>, usize)> {
+    /// Components of a normal that differ by no more are equally long. From: rounding.
+    const ALIKE: f64 = 1e-9;
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), angle);
-    let most = |n: Vector3<f64>| sides(&n, n.amax() - 1e-9).next().unwrap_or(0);
+    let most = |n: Vector3<f64>| sides(&n, n.amax() - ALIKE).next().unwrap_or(0);
     points.iter().map(|(p, n)| (turn * p, most(turn * n))).collect()
 }
 

@@ -5,24 +5,28 @@ use crate::surface::{Outline, Surface};
 use crate::visibility::DepthMap;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-/// Pixels a side of the blocks whose residuals count, and of the smaller ones within them whose means tell how much neighbours err together.
+/// Pixels a side of the blocks whose residuals count, and of the smaller ones within them whose means tell how much neighbours err together. From: chosen.
 const BLOCK_PX: usize = 24;
 const CELL_PX: usize = 8;
-/// Blocks of a view that are enough to go by.
+/// Blocks of a view that are enough to go by. From: work.
 const BLOCKS: usize = 24;
-/// A block counts if this share of its pixels lies on the face.
+/// A block counts if this share of its pixels lies on the face. From: chosen.
 const COVERED: f64 = 0.8;
-/// What lies this near to the face may be of it, as a share of the depth, metres a metre.
+/// What lies this near to the face may be of it, as a share of the depth, metres a metre. From: chosen.
 const NEAR_SHARE: f64 = 0.012;
-/// A block is so far within the face, metres.
+/// A block is so far within the face, metres. From: chosen.
 const INSIDE_M: f64 = 0.02;
-/// Residuals beyond so many spreads of their block are not of the face.
+/// Residuals beyond so many spreads of their block are not of the face. From: chosen.
 const OUTLIER: f64 = 4.0;
-/// Fewest blocks to go by, and the weight of what was assumed before, in blocks.
+/// Fewest blocks to go by, and the weight of what was assumed before, in blocks. From: chosen.
 const FEWEST: usize = 4;
 const ASSUMED: f64 = 4.0;
-/// Noise is told to be no less and no more than these multiples of what was assumed.
+/// Noise is told to be no less and no more than these multiples of what was assumed. From: chosen.
 const BETWEEN: (f64, f64) = (0.5, 6.0);
+/// Neither term of the noise falls below this share of what it would be if both had grown alike. From: chosen.
+const LEAST: f64 = 0.2;
+/// Numbers that a plane takes. From: derived, two slopes and a height.
+const PLANE: f64 = 3.0;
 
 /// How far the returns of views lie from the level faces that they show.
 #[derive(Clone, Debug, Default)]
@@ -79,8 +83,8 @@ impl Residuals {
         let found = normal.cholesky().map_or(prior, |c| c.solve(&right));
         let mut looks: Vec<f64> = self.blocks.iter().map(|b| b.looks).collect();
         Sensor {
-            axial_m: found.x.max(0.2 * prior.x),
-            growth_per_m: found.y.max(0.2 * prior.y),
+            axial_m: found.x.max(LEAST * prior.x),
+            growth_per_m: found.y.max(LEAST * prior.y),
             looks: middle(&mut looks).clamp(1.0, (CELL_PX * CELL_PX) as f64),
             ..*assumed
         }
@@ -128,7 +132,7 @@ fn block(map: &DepthMap, (left, top): (usize, usize), normal: &Vector3<f64>, off
         residuals = seen.iter().map(|(_, row, q)| q - row.dot(&line)).collect();
         let within = residuals.iter().zip(&gate).filter(|(_, within)| **within);
         let (n, squares) = within.fold((0.0, 0.0), |(n, s), (r, _)| (n + 1.0, s + r * r));
-        sigma = (squares / (n - 3.0_f64).max(1.0)).sqrt();
+        sigma = (squares / (n - PLANE).max(1.0)).sqrt();
         gate = residuals.iter().map(|r| r.abs() <= OUTLIER * sigma).collect();
     }
     Some(Block { depth_m, sigma_m: sigma * depth_m * depth_m, looks: looks(&seen, &residuals, &gate, sigma) })
@@ -144,6 +148,7 @@ fn line(rows: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Vector3<f64>>
 
 /// How many returns of a cell err by themselves: the variance of one over that of the mean of a cell.
 fn looks(seen: &[(usize, Vector3<f64>, f64)], residuals: &[f64], gate: &[bool], sigma: f64) -> f64 {
+    /// Cells of a block. From: derived, its side has so many.
     const CELLS: usize = (BLOCK_PX / CELL_PX) * (BLOCK_PX / CELL_PX);
     let mut sums = [(0.0, 0.0); CELLS];
     for ((cell, ..), (r, _)) in
@@ -154,7 +159,7 @@ fn looks(seen: &[(usize, Vector3<f64>, f64)], residuals: &[f64], gate: &[bool], 
     }
     // A plane was fitted to as few cells: three of them are not free.
     let squares: f64 = sums.iter().filter(|s| s.1 > 0.0).map(|(sum, n)| (sum / n).powi(2)).sum();
-    sigma * sigma / (squares / (CELLS as f64 - 3.0)).max(1e-18)
+    sigma * sigma / (squares / (CELLS as f64 - PLANE)).max(f64::MIN_POSITIVE)
 }
 
 fn middle(values: &mut [f64]) -> f64 {

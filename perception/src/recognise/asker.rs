@@ -5,14 +5,19 @@ use crate::surface::range_sigma_m;
 use crate::visibility::{DepthMap, Seen, Visibility};
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 
-/// Cosine of the angle within which cameras see the same side of a thing.
+/// Cosine of the angle within which cameras see the same side of a thing. From: chosen.
 const SAME_SIDE: f64 = 0.9;
-/// Of so many of a body's points the cameras are asked whether it stands where they have it.
+/// Of so many of a body's points the cameras are asked whether it stands where they have it. From: chosen.
 const WITNESSES: usize = 160;
 /// A camera that looks through this share of what others see of a body, of what it has in view, is placed wrongly there.
+/// From: chosen.
 const ASTRAY: f64 = 0.5;
-/// How near to a point of a body what a camera measured still counts as the body: places that lie beside each other, metres.
+/// How near to a point of a body what a camera measured still counts as the body: places that lie beside each other, metres. From: chosen.
 const BESIDE_M: f64 = 0.02;
+
+/// How far from where a camera measured a place may be and still be what it saw, if only whether it has a body in view is asked, metres.
+/// From: chosen.
+pub(super) const IN_VIEW_M: f64 = 0.06;
 
 /// A place above the surface, asked of the cameras.
 #[derive(Clone)]
@@ -74,13 +79,17 @@ impl<'a> Asker<'a> {
 
     /// Horizontal direction from a body to the cameras that had it in view, if they saw the same side of it.
     pub fn only_from(&self, round: &Round) -> Option<[f64; 2]> {
+        /// A camera that is nearer to the axis, seen from above, looks from no side, metres. From: chosen.
+        const ABOVE_M: f64 = 0.1;
+        /// Directions that add up to less cancel out. From: rounding.
+        const CANCELLED: f64 = 1e-9;
         let place = self.world_from_surface * Point3::new(round.x, round.y, round.middle_m);
-        let saw = self.views.iter().filter(|view| view.look(&place, 0.06) > Seen::Never);
+        let saw = self.views.iter().filter(|view| view.look(&place, IN_VIEW_M) > Seen::Never);
         let eyes = saw.map(|view| self.world_from_surface.inverse() * view.viewpoint());
         let each: Vec<Vector2<f64>> = eyes
-            .filter_map(|eye| Vector2::new(eye.x - round.x, eye.y - round.y).try_normalize(0.1))
+            .filter_map(|eye| Vector2::new(eye.x - round.x, eye.y - round.y).try_normalize(ABOVE_M))
             .collect();
-        let mean = each.iter().sum::<Vector2<f64>>().try_normalize(1e-9)?;
+        let mean = each.iter().sum::<Vector2<f64>>().try_normalize(CANCELLED)?;
         each.iter().all(|eye| eye.dot(&mean) > SAME_SIDE).then_some(mean.into())
     }
 
@@ -112,6 +121,8 @@ fn without_astray<'a>(
     world_from_surface: &Isometry3<f64>,
     points: &[Point3<f64>],
 ) -> Vec<Lying<'a>> {
+    /// A camera has a body in view if it is asked with success about more than one in so many points. From: chosen.
+    const EDGE: usize = 8;
     let step = points.len().div_ceil(WITNESSES).max(1);
     let witnesses: Vec<Point3<f64>> = points.iter().step_by(step).map(|p| world_from_surface * p).collect();
     let through = |view: &Lying<'_>| {
@@ -122,7 +133,7 @@ fn without_astray<'a>(
             Seen::Hidden | Seen::Never => (free, here),
         });
         // A few points of its edge are no view of it.
-        (8 * (free + here) > witnesses.len()).then(|| free as f64 / (free + here) as f64)
+        (EDGE * (free + here) > witnesses.len()).then(|| free as f64 / (free + here) as f64)
     };
     let shares: Vec<Option<f64>> = all.iter().map(through).collect();
     let weight = |view: &Lying<'_>| {

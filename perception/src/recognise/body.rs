@@ -54,7 +54,9 @@ impl Frustum {
     /// The depths at which a ray enters and leaves the infinite cone about its side, drawn in by `wall_m`.
     #[inline(always)]
     fn cone(&self, from: [f64; 3], [dx, dy, dz]: [f64; 3], wall_m: f64) -> Option<[f64; 2]> {
-        let slope = (self.rim_m - self.foot_m) / (self.top_m - self.base_m).max(1e-3);
+        /// Nothing is lower, metres. From: rounding.
+        const LEAST_M: f64 = 1e-3;
+        let slope = (self.rim_m - self.foot_m) / (self.top_m - self.base_m).max(LEAST_M);
         let (radius, widens) = (self.foot_m - wall_m + slope * from[2], slope * dz);
         let a = dx * dx + dy * dy - widens * widens;
         let b = from[0] * dx + from[1] * dy - radius * widens;

@@ -1,6 +1,6 @@
 //! Measuring on one segment what tells objects apart, and what could have been measured at all.
 
-use super::asker::Asker;
+use super::asker::{Asker, IN_VIEW_M};
 use super::body::Frustum;
 use super::percept::{Evidence, Sighting};
 use super::rays::{Around, Rays};
@@ -8,52 +8,70 @@ use super::settle::settle;
 use super::upper::Upper;
 use crate::noise::Sensor;
 use crate::outline::{self, Rectangle};
-use crate::round::{self, Edge, Round};
+use crate::round::{self, ENDS, Edge, Round, SECTORS};
 use crate::segment::{Scene, Segment, end, quantile, top_m};
-use crate::surface::range_sigma_m;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::Point3;
 
-/// Directions around the body that are looked at one by one.
-const SECTORS: usize = 36;
-/// Distances from the body at which a handle has some of itself, metres.
+/// Distances from the body at which a handle has some of itself, metres. From: chosen.
 const HANDLE_REACHES_M: [f64; 3] = [0.010, 0.018, 0.026];
-/// Heights at which it has, as shares of the body's height.
+/// Heights at which it has, as shares of the body's height. From: chosen.
 const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
 /// Heights at which a camera that looks through the side is asked for, as shares of the body's height, and at how many it must: the
-/// foot of a far side is often hidden by the near one.
+/// foot of a far side is often hidden by the near one. From: chosen.
 const SIDE_HEIGHTS: [f64; 4] = [0.35, 0.5, 0.65, 0.8];
 const THROUGH: usize = 3;
-/// Least and greatest reach of a handle out of the body, metres.
-const HANDLE_M: (f64, f64) = (0.014, 0.06);
-/// A handle reaches out by at least so many spreads of the body's side.
+/// Least and greatest reach of a handle out of the body, metres. From: chosen.
+pub(super) const HANDLE_M: (f64, f64) = (0.014, 0.06);
+/// A handle reaches out by at least so many spreads of the body's side. From: chosen.
 const HANDLE_SPREADS: f64 = 4.0;
-/// A circle whose radius is known no better than this is no circle to go by, metres.
+/// A circle whose radius is known no better than this is no circle to go by, metres. From: chosen.
 const VAGUE_M: f64 = 0.015;
 /// A circle on which no more than this share of the side lies is no circle of it: any face has some that fits a third of it.
+/// From: chosen, just above that third; real mugs have a circle that half of the side keeps to.
 const MOST: f64 = 0.34;
-/// What is this far out of the body is no longer the body itself, metres.
+/// What is this far out of the body is no longer the body itself, metres. From: chosen.
 const CLEAR_M: f64 = 0.007;
-/// Greatest width of a handle across, metres.
+/// So many spreads of a measurement are more than noise. From: chosen.
+const CLEAR_SPREADS: f64 = 3.0;
+/// Greatest width of a handle across, metres. From: chosen.
 const HANDLE_WIDTH_M: f64 = 0.035;
-/// Share of its reach up to which what sticks out may be the body's own blurred side.
+/// Share of its reach up to which what sticks out may be the body's own blurred side. From: chosen.
 const ROOT: f64 = 0.35;
-/// An inside is said to be seen, or not to be there, where it is so much likelier, log (set by hand).
+/// An inside is said to be seen, or not to be there, where it is so much likelier, log. From: chosen.
 const SAID: f64 = 1.5;
+/// A handle has one in so many points of the body, far off and near, but at least and at most so many. From: chosen.
+const HANDLE_POINTS: (usize, usize) = (30, 150);
+const HANDLE_FEWEST: (usize, usize) = (6, 60);
+/// It is higher than this, metres, and begins above this share of the height. From: chosen.
+const HANDLE_HIGH_M: f64 = 0.012;
+const HANDLE_FOOT: f64 = 0.05;
 /// What is left of the error of a height however good the camera, metres.
+/// From: chosen, after spreads of heights in simulated scenes, a third to a fifth of what was stated before.
 const HEIGHT_M: f64 = 0.002;
-/// The side ends this far, and three spreads of a measurement, below the top, metres.
+/// The side ends this far, and three spreads of a measurement, below the top, metres. From: chosen.
 const BELOW_M: f64 = 0.004;
-/// How far the top of a sliver may be from that of the object, metres.
+/// How far the top of a sliver may be from that of the object, metres. From: chosen.
 const SLIVER_M: f64 = 0.01;
 
 /// Measured worse than this, depth does not tell where the middle of a cup is: it spreads points along the view as far as the side is
-/// deep; and a few of them that stick out together are no handle, metres.
+/// deep; and a few of them that stick out together are no handle, metres. From: chosen.
 const FAR_M: f64 = 0.006;
 
-/// Pixels so far beside and above a thing may tell of it, metres.
+/// Pixels so far beside and above a thing may tell of it, metres. From: chosen.
 const BESIDE_M: f64 = 0.012;
 const ABOVE_M: f64 = 0.012;
+/// Nothing is lower, metres. From: rounding.
+const LEAST_HEIGHT_M: f64 = 0.001;
+/// How far from what a camera measured a place may be and still be what it saw: three spreads, but between these, metres. From: chosen.
+const TOLERANCES_M: (f64, f64) = (0.006, 0.015);
+/// The rim takes at least and at most these shares of the height. From: chosen.
+const RIMS: (f64, f64) = (0.1, 0.45);
+/// No surface is taken to be rougher where the height above it is measured, metres. From: chosen.
+const ROUGHEST_M: f64 = 0.008;
+/// Points of a side that share their error, and how many groups of them count at the most. From: chosen.
+const SHARING: f64 = 12.0;
+const MOST_GROUPS: f64 = 60.0;
 
 /// All that was measured on one segment.
 #[derive(Clone, Debug)]
@@ -156,15 +174,15 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     let (scene, this) = (setting.scene, segment);
     let base_m = segment.base_m;
     let top = top_m(segment);
-    let height_m = (top - base_m).max(0.001);
+    let height_m = (top - base_m).max(LEAST_HEIGHT_M);
     let (_, middle) = outline::bounding(&segment.points).unwrap_or_default();
     let world_from_surface = scene.surface.surface_from_world.inverse();
     let place = world_from_surface * Point3::new(middle[0], middle[1], 0.5 * (base_m + top));
     let near = seen.viewpoints().iter().map(|v| (place - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
-    let sigma_m = range_sigma_m(near).min(0.012);
-    let tolerance_m = (3.0 * sigma_m).clamp(0.006, 0.015);
+    let sigma_m = round::sigma_m(near);
+    let tolerance_m = (CLEAR_SPREADS * sigma_m).clamp(TOLERANCES_M.0, TOLERANCES_M.1);
     let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m);
-    let first = round::fit(&segment.points, base_m, top, sigma_m, 7);
+    let first = round::fit(&segment.points, base_m, top, sigma_m, round::SEED);
     let settled = first.and_then(|round| settle(&round, segment, &asker, (base_m, top), sigma_m));
     let (segment, asker, first) = match &settled {
         Some(settled) => (&settled.segment, settled.asker.clone(), Some(settled.round)),
@@ -172,8 +190,8 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     };
     let (footprint_m, middle) = outline::bounding(&segment.points).unwrap_or_default();
     // What is measured of a low thing's top reaches far down its side.
-    let rim_m = (BELOW_M + 3.0 * sigma_m).clamp(0.1 * height_m, 0.45 * height_m);
-    let side_m = base_m + 0.15 * height_m..top - rim_m;
+    let rim_m = (BELOW_M + CLEAR_SPREADS * sigma_m).clamp(RIMS.0 * height_m, RIMS.1 * height_m);
+    let side_m = base_m + ENDS.0 * height_m..top - rim_m;
     let side: Vec<Point3<f64>> = segment.points.iter().filter(|p| side_m.contains(&p.z)).copied().collect();
     let mut measured = Measured {
         blur_m: scene.surface.residual_m,
@@ -181,12 +199,12 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         round: first,
         rectangle: outline::fit(&side),
         height_m,
-        height_sigma_m: HEIGHT_M.hypot(0.5 * sigma_m).hypot(0.5 * scene.surface.residual_m.min(0.008)),
+        height_sigma_m: HEIGHT_M.hypot(0.5 * sigma_m).hypot(0.5 * scene.surface.residual_m.min(ROUGHEST_M)),
         top_hidden: top_hidden(&asker, middle, footprint_m, top),
         footprint_m,
         middle,
         looked_through: 0.0,
-        independent: (side.len() as f64 / 12.0).clamp(1.0, 60.0),
+        independent: (side.len() as f64 / SHARING).clamp(1.0, MOST_GROUPS),
         sigma_m,
         seen_fraction: 0.0,
         upper: Upper::default(),
@@ -210,16 +228,22 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     Looked { measured, rays }
 }
 
-/// Heights at which silhouettes are looked at, as shares of the body's height.
+/// Heights at which silhouettes are looked at, as shares of the body's height. From: chosen.
 const SILHOUETTES: [(f64, f64); 3] = [(0.15, 0.4), (0.4, 0.65), (0.65, 0.92)];
 
 /// Where the outline of the body, seen from each camera, ends against free space: left and right, at three heights.
 fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Vec<Edge> {
-    /// Lost pixels at depth edges make what is seen narrower by about this on each side, metres.
+    /// Lost pixels at depth edges make what is seen narrower by about this on each side, metres. From: chosen.
     const LOST_M: f64 = 0.001;
+    /// What is no farther out belongs to the body, and so far beyond its edge free space is asked for, metres. From: chosen.
+    const BESIDE_M: f64 = 0.012;
+    /// Fewest points of a band. From: chosen.
+    const FEWEST: usize = 25;
+    /// Share of the points of a band that reach less far than its edge. From: chosen.
+    const END: f64 = 0.985;
     let bands = SILHOUETTES.map(|(low, high)| (base_m + low * height, base_m + high * height));
     let in_band = |&(low, high): &(f64, f64)| {
-        let near = |p: &&Point3<f64>| p.z >= low && p.z < high && round.outside_m(p) < 0.012;
+        let near = |p: &&Point3<f64>| p.z >= low && p.z < high && round.outside_m(p) < BESIDE_M;
         segment.points.iter().filter(near).map(|p| [p.x, p.y]).collect::<Vec<[f64; 2]>>()
     };
     let near = bands.each_ref().map(in_band);
@@ -234,11 +258,11 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
         for side in [-1.0, 1.0] {
             // The tangent point leans a little towards the camera: across the ray, not across the table.
             let across = [side * -ey / distance, side * ex / distance];
-            for ((low, high), near) in bands.iter().zip(&near).filter(|(_, near)| near.len() >= 25) {
+            for ((low, high), near) in bands.iter().zip(&near).filter(|(_, near)| near.len() >= FEWEST) {
                 let z = 0.5 * (low + high);
                 let reaches: Vec<f64> = near.iter().map(|p| across[0] * p[0] + across[1] * p[1]).collect();
-                let reach_m = end(&reaches, 0.985) + LOST_M;
-                let beyond = reach_m + 0.012 - (across[0] * round.x + across[1] * round.y);
+                let reach_m = end(&reaches, END) + LOST_M;
+                let beyond = reach_m + BESIDE_M - (across[0] * round.x + across[1] * round.y);
                 let place = Point3::new(round.x + across[0] * beyond, round.y + across[1] * beyond, z);
                 if view.look(&(asker.world_from_surface * place), asker.tolerance_m) == Seen::Free {
                     edges.push(Edge { direction: across, reach_m, height_m: z });
@@ -251,19 +275,24 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
 
 /// Number of looks with the place inside the image and not behind something else.
 fn views_of(asker: &Asker, place: &Point3<f64>) -> usize {
-    asker.views.iter().filter(|view| !matches!(view.look(place, 0.06), Seen::Never)).count()
+    asker.views.iter().filter(|view| !matches!(view.look(place, IN_VIEW_M), Seen::Never)).count()
 }
 
 /// True if most places just above the object are hidden by something nearer to the cameras.
 fn top_hidden(asker: &Asker, middle: [f64; 2], footprint_m: [f64; 2], top: f64) -> bool {
-    let reach = 0.25 * footprint_m[1];
+    /// Places above are asked about so far from the middle, as a share of the shorter side, and so high over the top, metres; so many of
+    /// the five must be hidden. From: chosen.
+    const REACH: f64 = 0.25;
+    const ABOVE_M: f64 = 0.02;
+    const MOST: usize = 3;
+    let reach = REACH * footprint_m[1];
     let places = [(0.0, 0.0), (reach, 0.0), (-reach, 0.0), (0.0, reach), (0.0, -reach)];
-    let above = top + 0.02;
+    let above = top + ABOVE_M;
     let hidden = places
         .iter()
         .filter(|(dx, dy)| asker.look(middle[0] + dx, middle[1] + dy, above) < Seen::Surface)
         .count();
-    !asker.views.is_empty() && hidden >= 3
+    !asker.views.is_empty() && hidden >= MOST
 }
 
 fn measure_round(
@@ -272,6 +301,10 @@ fn measure_round(
     (segment, asker, rays): (&Segment, &Asker, &Rays),
     (base_m, top): (f64, f64),
 ) {
+    /// Where a handle could hide in no more than this share of the directions there is none. From: chosen.
+    const UNSEEN: f64 = 0.08;
+    /// What the sides count for in what was seen of a body; the top has the rest. From: chosen.
+    const SIDES: f64 = 0.75;
     let height = top - base_m;
     let evidence = &mut measured.evidence;
     let (at_base, at_top) = (round.radius_at(base_m), round.radius_at(top));
@@ -299,7 +332,7 @@ fn measure_round(
             measured.round = Some(Round { spread_m, ..*round });
             Sighting::Seen
         }
-        None if evidence.handle_unseen < 0.08 => Sighting::Absent,
+        None if evidence.handle_unseen < UNSEEN => Sighting::Absent,
         None => Sighting::Unseen,
     };
 
@@ -310,7 +343,8 @@ fn measure_round(
         log if log < -SAID => Sighting::Absent,
         _ => Sighting::Unseen,
     };
-    measured.seen_fraction = 0.75 * sectors.covered_share() + 0.25 * (upper.open + upper.lid).min(1.0);
+    measured.seen_fraction =
+        SIDES * sectors.covered_share() + (1.0 - SIDES) * (upper.open + upper.lid).min(1.0);
     if evidence.radius_sigma_m > VAGUE_M {
         // Beside and above a circle that may as well be another, nothing was looked at.
         (evidence.handle, evidence.handle_unseen, evidence.inside) =
@@ -333,6 +367,8 @@ struct Sectors {
 
 impl Sectors {
     fn measure(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Sectors {
+        /// How far within the side a look goes that finds it missing, metres. From: chosen.
+        const WITHIN_M: f64 = 0.004;
         let mut sectors = Sectors {
             measured: measured_sectors(round, segment, base_m, height),
             looked_through: [false; SECTORS],
@@ -347,7 +383,7 @@ impl Sectors {
             };
             // Free, or another thing's surface: either way the body's own side is not there.
             sectors.looked_through[i] = !sectors.measured[i]
-                && SIDE_HEIGHTS.iter().filter(|&&share| look(-0.004, share) >= Seen::Surface).count()
+                && SIDE_HEIGHTS.iter().filter(|&&share| look(-WITHIN_M, share) >= Seen::Surface).count()
                     >= THROUGH;
             let free = HANDLE_REACHES_M
                 .iter()
@@ -375,15 +411,19 @@ impl Sectors {
 
     /// Share of the directions in which a handle, about two sectors wide, could hide.
     fn unseen_share(&self) -> f64 {
-        let hides = |i: usize| self.handle_free[i] < 0.6 && self.handle_free[(i + 1) % SECTORS] < 0.6;
+        /// Share of the places of a handle that were looked through from which there is none. From: chosen.
+        const FREE: f64 = 0.6;
+        let hides = |i: usize| self.handle_free[i] < FREE && self.handle_free[(i + 1) % SECTORS] < FREE;
         (0..SECTORS).filter(|&i| hides(i)).count() as f64 / SECTORS as f64
     }
 }
 
 /// In which directions two or more points lie on the side.
 fn measured_sectors(round: &Round, segment: &Segment, base_m: f64, height: f64) -> [bool; SECTORS] {
-    let (low, high) = (base_m + 0.15 * height, base_m + 0.9 * height);
-    let on_side = |p: &&Point3<f64>| p.z > low && p.z < high && round.outside_m(p).abs() < 0.009;
+    /// So near to the side a point shows it in its direction, metres. From: chosen.
+    const NEAR_M: f64 = 0.009;
+    let (low, high) = (base_m + ENDS.0 * height, base_m + (1.0 - ENDS.1) * height);
+    let on_side = |p: &&Point3<f64>| p.z > low && p.z < high && round.outside_m(p).abs() < NEAR_M;
     let mut counts = [0_u32; SECTORS];
     // What follows lies in the same direction, most often: this much of the circle needs no angle to be told.
     let mut settled: Option<[[f64; 2]; 2]> = None;
@@ -401,6 +441,7 @@ fn measured_sectors(round: &Round, segment: &Segment, base_m: f64, height: f64) 
 
 /// Directions just inside both ends of a sector.
 fn within_sector(sector: usize) -> [[f64; 2]; 2] {
+    /// Of a sector's width, so near to an end a direction may be of the next. From: rounding.
     const ROUNDING: f64 = 1e-9;
     [ROUNDING, 1.0 - ROUNDING].map(|share| {
         let (sin, cos) = (std::f64::consts::TAU * (sector as f64 + share) / SECTORS as f64).sin_cos();
@@ -435,22 +476,34 @@ impl Protrusion {
         (base_m, height): (f64, f64),
         far: bool,
     ) -> Option<Protrusion> {
+        /// Heights at which something may stick out, as shares of the body's height. From: chosen.
+        const HEIGHTS: (f64, f64) = (0.08, 1.02);
+        /// Sectors that are taken together. From: chosen.
+        const WINDOW: usize = 3;
+        /// It lies farther from the axis than this share of the radius, and no farther aside than the second, metres. From: chosen.
+        const ALONG: f64 = 0.6;
+        const ASIDE_M: f64 = 0.06;
+        /// Fewest points. From: chosen.
+        const FEWEST: usize = 3;
+        /// Share of its points that reach less far, and shares that lie beyond its ends across and in height. From: chosen.
+        const REACH: f64 = 0.95;
+        const SPAN: (f64, f64) = (0.1, 0.9);
         let beside = |p: &&Point3<f64>| {
             let outside_m = round.outside_m(p);
-            let clear = |sigma_m: f64| outside_m > 3.0 * sigma_m;
+            let clear = |sigma_m: f64| outside_m > CLEAR_SPREADS * sigma_m;
             outside_m > CLEAR_M && asker.support(p).is_some_and(clear)
         };
         let out: Vec<&Point3<f64>> = segment
             .points
             .iter()
-            .filter(|p| p.z > base_m + 0.08 * height && p.z < base_m + 1.02 * height)
+            .filter(|p| p.z > base_m + HEIGHTS.0 * height && p.z < base_m + HEIGHTS.1 * height)
             .filter(beside)
             .collect();
         let mut counts = [0_usize; SECTORS];
         out.iter().for_each(|p| counts[sector_of(round, p)] += 1);
-        let window = |i: usize| (0..3).map(|k| counts[(i + k) % SECTORS]).sum::<usize>();
+        let window = |i: usize| (0..WINDOW).map(|k| counts[(i + k) % SECTORS]).sum::<usize>();
         let start = (0..SECTORS).max_by_key(|&i| (window(i), SECTORS - i))?;
-        let middle = std::f64::consts::TAU * (start as f64 + 1.5) / SECTORS as f64;
+        let middle = std::f64::consts::TAU * (start as f64 + 0.5 * WINDOW as f64) / SECTORS as f64;
         let (sin, cos) = middle.sin_cos();
         // Along and across the direction of the protrusion, in the half plane on its side.
         let local: Vec<(f64, f64, f64)> = out
@@ -459,18 +512,18 @@ impl Protrusion {
                 let (along, across) = along_and_across(round, p, (sin, cos));
                 (along, across, p.z)
             })
-            .filter(|&(along, across, _)| along > 0.6 * round.radius_m && across.abs() < 0.06)
+            .filter(|&(along, across, _)| along > ALONG * round.radius_m && across.abs() < ASIDE_M)
             .collect();
-        if local.len() < 3 {
+        if local.len() < FEWEST {
             return None;
         }
         let reach_of = |&(along, across, z): &(f64, f64, f64)| along.hypot(across) - round.radius_at(z);
         let mut reaches: Vec<f64> = local.iter().map(reach_of).collect();
-        let reach_m = quantile(&mut reaches, 0.95);
+        let reach_m = quantile(&mut reaches, REACH);
         // What hardly leaves the body is its blurred side, beside the handle or not.
         let (mut across, mut heights): (Vec<f64>, Vec<f64>) =
             local.iter().filter(|l| reach_of(l) > ROOT * reach_m).map(|l| (l.1, l.2)).unzip();
-        let ends = |v: &mut Vec<f64>| (quantile(v, 0.1), quantile(v, 0.9));
+        let ends = |v: &mut Vec<f64>| (quantile(v, SPAN.0), quantile(v, SPAN.1));
         let (left, right) = ends(&mut across);
         let (low, high) = ends(&mut heights);
         Some(Protrusion {
@@ -478,8 +531,9 @@ impl Protrusion {
             direction: (sin, cos),
             width_m: right - left,
             points: local.len(),
-            least: if far { segment.points.len() / 30 } else { segment.points.len() / 150 }.clamp(6, 60),
-            inside_height: high - low > 0.012 && low > base_m + 0.05 * height,
+            least: (segment.points.len() / if far { HANDLE_POINTS.0 } else { HANDLE_POINTS.1 })
+                .clamp(HANDLE_FEWEST.0, HANDLE_FEWEST.1),
+            inside_height: high - low > HANDLE_HIGH_M && low > base_m + HANDLE_FOOT * height,
         })
     }
 

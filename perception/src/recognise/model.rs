@@ -108,6 +108,11 @@ pub struct ObjectModel {
     pub handle: Handle,
 }
 
+/// Greatest length, metres, and taper that is not a mistake. From: chosen.
+const LONGEST_M: f64 = 5.0;
+const WIDEST_TAPER: f64 = 10.0;
+
+/// Tapers of which one is meant if none is given. From: chosen.
 fn any_taper() -> Range {
     Range { low: 0.7, high: 1.05 }
 }
@@ -162,15 +167,15 @@ impl ObjectModel {
             let Some(range) = given else {
                 return Err(ModelError::Missing { object: self.name.clone(), shape, field });
             };
-            self.check_range(field, range, 5.0, "length in metres between 0 and 5 (not millimetres)")?;
+            self.check_range(field, range, LONGEST_M, "length in metres between 0 and 5 (not millimetres)")?;
         }
         self.check_range(
             "height_m",
             self.height_m,
-            5.0,
+            LONGEST_M,
             "length in metres between 0 and 5 (not millimetres)",
         )?;
-        self.check_range("taper", self.taper, 10.0, "ratio of base to top diameter between 0 and 10")
+        self.check_range("taper", self.taper, WIDEST_TAPER, "ratio of base to top diameter between 0 and 10")
     }
 
     fn check_range(

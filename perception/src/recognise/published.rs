@@ -1,7 +1,7 @@
 //! The recogniser of paper 004: similarity of size and share of cylinder inliers, averaged.
 
 use super::Recogniser;
-use super::descry::kinds;
+use super::descry::{UNPLACED_SIGMA_M, kinds};
 use super::evidence::{Setting, measure};
 use super::model::{ObjectModel, Range, Shape};
 use super::percept::{Percept, Stance};
@@ -15,9 +15,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Published {
-    /// Scale of differences in size, metres (α).
+    /// Scale of differences in size, metres (α). From: chosen, paper 004 does not state it.
     pub alpha_m: f64,
-    /// Least score of a known object (θ).
+    /// Least score of a known object (θ). From: paper, 004 names it; its value is that of the code that its authors published (fawkes).
     pub theta: f64,
 }
 
@@ -57,7 +57,7 @@ impl Recogniser for Published {
                     probabilities,
                     unknown: 1.0 - score,
                     position_m: scene.surface.surface_from_world.inverse() * place,
-                    position_sigma_m: 0.02,
+                    position_sigma_m: UNPLACED_SIGMA_M,
                     size_m: size,
                     stance: if best.is_some() { Stance::Upright } else { Stance::Unknown },
                     points: segment.indices.len(),

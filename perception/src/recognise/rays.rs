@@ -10,29 +10,35 @@ use crate::noise::Sensor;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
-/// Pixels of a view that are asked, about.
+/// Pixels of a view that are asked, about. From: work.
 const PIXELS: f64 = 600.0;
-/// Chance of something nearer, of what is behind being the surface, and of its being something else (set by hand).
+/// Chance of something nearer, of what is behind being the surface, and of its being something else. From: chosen.
 const NEARER: f64 = 0.1;
 const SURFACE: f64 = 0.6;
 const ELSE: f64 = 0.3;
-/// Depth over which something else may be anywhere, metres (set by hand).
+/// Depth over which something else may be anywhere, metres. From: chosen.
 const ANYWHERE_M: f64 = 1.0;
-/// No pixel says more than this for or against (set by hand).
+/// No pixel says more than this for or against. From: chosen.
 pub(super) const MOST: f64 = 10.0;
-/// Chance that a view says nothing of a body (set by hand).
+/// Chance that a view says nothing of a body. From: chosen.
 pub(super) const BAD_VIEW: f64 = 0.05;
-/// How far a thing differs from a body of straight sides, metres (set by hand).
+/// How far a thing differs from a body of straight sides, metres. From: chosen.
 const ROUGH_M: f64 = 0.0015;
-/// Spread of what all depths of a view of one body err by together, metres (set by hand).
+/// Spread of what all depths of a view of one body err by together, metres. From: chosen.
 const SHARED_M: f64 = 0.004;
 /// A block of pixels says no more than so many looks, however little neighbours err together: what is left of errors of pose is theirs
-/// in common (set by hand).
+/// in common. From: chosen.
 const MOST_LOOKS: f64 = 2.3;
-/// Where rays wander to, in spreads across them: columns and rows.
+/// Where rays wander to, in spreads across them: columns and rows. From: derived, three
+/// directions that balance each other.
 const WANDER: [[f64; 2]; 3] = [[0.0, 1.0], [0.87, -0.5], [-0.87, -0.5]];
-/// Side of the cells in which other things are told from a body, metres.
+/// Side of the cells in which other things are told from a body, metres. From: chosen.
 const CELL_M: f64 = 0.01;
+
+/// Pixels a side of the blocks whose looks a sensor tells. From: derived, as it is said.
+const BLOCK_PX: usize = 8;
+/// So many spreads off, a depth is of something else. From: chosen.
+pub(super) const BEYOND: f64 = 3.0;
 
 /// The pixels of all views that may tell of one body.
 pub(super) struct Rays {
@@ -144,7 +150,8 @@ impl ViewRays {
             let [du, dv] = [du / camera.fx, dv / camera.fy].map(|by| by * sensor.lateral_px);
             (turn * Vector3::new(du, dv, 0.0)).into()
         });
-        let looks = (sensor.looks.min(MOST_LOOKS) * (step * step) as f64 / 64.0).min(1.0);
+        let looks =
+            (sensor.looks.min(MOST_LOOKS) * (step * step) as f64 / (BLOCK_PX * BLOCK_PX) as f64).min(1.0);
         (!pixels.is_empty()).then_some(ViewRays { from, wander, pixels, looks })
     }
 
@@ -155,7 +162,7 @@ impl ViewRays {
         for pixel in &self.pixels {
             let at_m = body.depth_m(&Ray { from: self.from, along: pixel.along });
             let off_m = pixel.depth_m - at_m;
-            if off_m.abs() < 3.0 * (pixel.sigma_m + SHARED_M) && !pixel.other {
+            if off_m.abs() < BEYOND * (pixel.sigma_m + SHARED_M) && !pixel.other {
                 let w = self.looks / (pixel.sigma_m * pixel.sigma_m);
                 (sum, weight) = (sum + w * off_m, weight + w);
             }
@@ -190,11 +197,12 @@ impl Pixel {
     /// Density of its depth where it meets a body at a depth.
     #[inline(always)]
     pub fn with_body(&self, at_m: f64) -> f64 {
+        /// Chance of a return that has to do with nothing there, and how far off it may be, metres. From: chosen.
         const STRAY: f64 = 0.01;
         const RANGE_M: f64 = 5.0;
         let off_m = self.depth_m - at_m;
         let nearer = if off_m < 0.0 { NEARER / ANYWHERE_M } else { 0.0 };
-        if self.other && off_m < 3.0 * self.sigma_m {
+        if self.other && off_m < BEYOND * self.sigma_m {
             return self.without;
         }
         (1.0 - NEARER - STRAY) * normal(off_m, self.sigma_m) + nearer + STRAY / RANGE_M
@@ -203,9 +211,12 @@ impl Pixel {
 
 #[inline(always)]
 pub(super) fn normal(off: f64, sigma: f64) -> f64 {
+    /// Root of two pi. From: derived, the integral of a bell.
     const ROOT: f64 = 2.506_628_274_631_000_2;
+    /// So many spreads off there is nothing left. From: rounding.
+    const NONE: f64 = 6.0;
     let spreads = off / sigma;
-    if spreads.abs() > 6.0 { 0.0 } else { (-0.5 * spreads * spreads).exp() / (sigma * ROOT) }
+    if spreads.abs() > NONE { 0.0 } else { (-0.5 * spreads * spreads).exp() / (sigma * ROOT) }
 }
 
 /// The pixels that a place may fall on: columns and rows. None if it is not in view, or reaches behind the camera.

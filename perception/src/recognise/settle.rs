@@ -6,7 +6,9 @@
 //! shifts are found together.
 
 use super::asker::{Asker, Lying};
-use crate::round::{self, Round, side_band};
+use crate::round::{
+    self, MOST_INDEPENDENT, ON_SIDE_M, RADIUS_SPREAD_M, Round, SLOPE_SPREAD, STEEPEST, side_band,
+};
 use crate::segment::Segment;
 use crate::surface::range_sigma_m;
 use crate::visibility::DepthMap;
@@ -14,30 +16,29 @@ use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Standard deviation of how far a view lies beside the others at one body, metres.
+/// From: chosen, views lie within a centimetre or so of each other at one body.
 const SHIFT_M: f64 = 0.008;
-/// Views that lie nearer to each other than this are left as they are, metres.
+/// Views that lie nearer to each other than this are left as they are, metres. From: chosen.
 const LEAST_M: f64 = 0.004;
-/// The views of a side that spreads by less than this, or than a measurement, lie where they belong, metres.
+/// The views of a side that spreads by less than this, or than a measurement, lie where they belong, metres. From: chosen.
 const TIGHT_M: f64 = 0.002;
-/// The side has to spread by no more than this share of what it did.
+/// The side has to spread by no more than this share of what it did. From: chosen.
 const ROUNDER: f64 = 0.85;
-/// So near to the side a point is taken for one of it, metres.
-const SIDE_M: f64 = 0.008;
-/// No view is moved farther than this: it shows something else, metres.
+/// No view is moved farther than this: it shows something else, metres. From: chosen.
 const MOST_M: f64 = 0.03;
-/// Points farther from the side than this tell nothing of it, metres: at first, and once it is near.
+/// Points farther from the side than this tell nothing of it, metres: at first, and once it is near. From: chosen, one a step.
 const GATES_M: [f64; 8] = [0.02, 0.02, 0.016, 0.016, 0.012, 0.012, 0.01, 0.01];
-/// Points of a view that are enough to go by, and those that it needs.
+/// Points of a view that are enough to go by, and those that it needs. From: chosen.
 const ENOUGH: usize = 400;
 const FEWEST: usize = 40;
-/// Depths of one view of a body count for no more than so many.
-const INDEPENDENT: f64 = 25.0;
 /// Share of what a view shows of the body that has to lie on it, and how well, in spreads of a measurement, when the view is settled.
+/// From: chosen.
 const ON_IT: f64 = 0.7;
 const SPREADS: f64 = 1.3;
-/// However good the camera, a side is no smoother than this, metres.
+/// However good the camera, a side is no smoother than this, metres. From: chosen.
 const SMOOTH_M: f64 = 0.0025;
 /// Side of the cells in which the points of a body are looked for in the views, and of those that they are thinned to, metres.
+/// From: chosen.
 const CELL_M: f64 = 0.01;
 const FUSE_M: f64 = 0.003;
 
@@ -74,9 +75,9 @@ pub(super) fn settle<'a>(
         .zip(&shifts)
         .flat_map(|(points, &[x, y])| points.into_iter().map(move |p| Point3::new(p.x - x, p.y - y, p.z)));
     // What lay beside the body before and does so still is another thing, or the edge of one.
-    let of_it = |p: &Point3<f64>| body.outside_m(p) < SIDE_M || cells.holds(p);
+    let of_it = |p: &Point3<f64>| body.outside_m(p) < ON_SIDE_M || cells.holds(p);
     let segment = Segment { points: thinned(moved.filter(of_it)), ..segment.clone() };
-    let settled = round::fit(&segment.points, base_m, top_m, sigma_m, 7)?;
+    let settled = round::fit(&segment.points, base_m, top_m, sigma_m, round::SEED)?;
     if settled.spread_m > ROUNDER * round.spread_m {
         return None;
     }
@@ -116,8 +117,10 @@ impl Side {
 /// The body, and by how much each view lies beside it, surface frame, metres: axis, radius, slope and shifts by Gauss-Newton. None if
 /// there is nothing to move, or if what a view shows does not lie on the body even then.
 fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
-    /// Columns before those of the shifts: axis, radius and slope.
+    /// Columns before those of the shifts: axis, radius and slope. From: derived, two for the axis and one each for radius and slope.
     const BODY: usize = 4;
+    /// Nearer to the axis there is no direction away from it, metres. From: rounding.
+    const AT_AXIS_M: f64 = 1e-6;
     if sides.iter().filter(|side| !side.points.is_empty()).count() < 2 {
         return None;
     }
@@ -127,11 +130,11 @@ fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
         let size = BODY + 2 * sides.len();
         let (mut normal, mut right) = (DMatrix::<f64>::zeros(size, size), DVector::<f64>::zeros(size));
         for (v, side) in sides.iter().enumerate() {
-            let weight = (INDEPENDENT / side.points.len().max(1) as f64).min(1.0) / side.sigma_m.powi(2);
+            let weight = (MOST_INDEPENDENT / side.points.len().max(1) as f64).min(1.0) / side.sigma_m.powi(2);
             let at = BODY + 2 * v;
             for p in &side.points {
                 let (x, y) = (p.x - body.x - shifts[v][0], p.y - body.y - shifts[v][1]);
-                let from_axis = x.hypot(y).max(1e-6);
+                let from_axis = x.hypot(y).max(AT_AXIS_M);
                 let miss = from_axis - body.radius_at(p.z);
                 if miss.abs() > gate_m {
                     continue;
@@ -149,15 +152,15 @@ fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
                 right[at + k] -= shifts[v][k] * SHIFT_M.powi(-2);
             }
         }
-        for (k, spread) in [(2, 0.05_f64), (3, 0.1)] {
+        for (k, spread) in [(2, RADIUS_SPREAD_M), (3, SLOPE_SPREAD)] {
             normal[(k, k)] += spread.powi(-2);
         }
-        right[3] -= body.slope * 0.1_f64.powi(-2);
+        right[3] -= body.slope * SLOPE_SPREAD.powi(-2);
         let step = normal.cholesky()?.solve(&right);
         body.x += step[0];
         body.y += step[1];
         body.radius_m += step[2];
-        body.slope = (body.slope + step[3]).clamp(-0.6, 0.6);
+        body.slope = (body.slope + step[3]).clamp(-STEEPEST, STEEPEST);
         shifts.iter_mut().enumerate().for_each(|(v, s)| {
             s[0] += step[BODY + 2 * v];
             s[1] += step[BODY + 2 * v + 1];
@@ -172,7 +175,9 @@ fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
 impl Side {
     /// Whether what is shown, moved back by a shift, is the side of a body, as smooth as the camera measures.
     fn lies_on(&self, body: &Round, [x, y]: [f64; 2]) -> bool {
-        const GATE_M: f64 = 0.01;
+        /// Farther from the side than this, and than two spreads, a point is not asked whether it lies on it, metres.
+        /// From: derived, the last of the gates.
+        const GATE_M: f64 = GATES_M[GATES_M.len() - 1];
         let misses = self.points.iter().map(|p| body.outside_m(&Point3::new(p.x - x, p.y - y, p.z)));
         let near: Vec<f64> = misses.filter(|m| m.abs() < GATE_M.max(2.0 * self.sigma_m)).collect();
         let spread_m = (near.iter().map(|m| m * m).sum::<f64>() / near.len().max(1) as f64).sqrt();

@@ -1,9 +1,9 @@
 //! What rays tell of a round body's upper end.
 
 use super::body::Frustum;
-use super::rays::{Rays, bounded, normal};
+use super::rays::{BEYOND, Rays, bounded, normal};
 
-/// Chance that a view says nothing of an upper end, whatever it seems to show (set by hand).
+/// Chance that a view says nothing of an upper end, whatever it seems to show. From: chosen.
 const BAD_VIEW: f64 = 0.002;
 
 /// What is known of the upper end.
@@ -18,16 +18,25 @@ pub(super) struct Upper {
 
 impl Upper {
     pub fn of(rays: &Rays, body: &Frustum) -> Upper {
-        /// So near to the rim a ray does not tell, and what is no lower than the first is a lid, than the second no inside, metres.
+        /// So near to the rim a ray does not tell, and what is no lower than the first is a lid, than the second no inside, metres. From: chosen.
         const RIM_M: f64 = 0.006;
         const INSIDE_M: f64 = 0.012;
-        /// Spread of how high a lid is, metres.
+        /// Spread of how high a lid is, metres. From: chosen.
         const LID_M: f64 = 0.004;
+        /// A ray that falls less tells of no end. From: rounding.
+        const LEVEL: f64 = 1e-3;
+        /// What lies deeper than the body by this is not of it, metres. From: chosen.
+        const BELOW_M: f64 = 0.02;
+        /// Share of the rays into it that tell, and the density of what the others say. From: chosen.
+        const TELL: f64 = 0.9;
+        const REST: f64 = 0.02;
+        /// No lid is deeper than this share of the least inside. From: chosen.
+        const LID: f64 = 0.75;
         let height_m = body.top_m - body.base_m;
         let (mut all, mut open, mut lid, mut open_log) = (0.0, 0.0, 0.0, 0.0);
         for view in &rays.views {
             let mut sum = 0.0;
-            for pixel in view.pixels.iter().filter(|p| !p.other && p.along[2] < -1e-3) {
+            for pixel in view.pixels.iter().filter(|p| !p.other && p.along[2] < -LEVEL) {
                 let at_m = (body.top_m - view.from[2]) / pixel.along[2];
                 let [x, y] = [body.x, body.y];
                 let (dx, dy) =
@@ -37,22 +46,22 @@ impl Upper {
                 }
                 let (fall, sigma_m) = (-pixel.along[2], pixel.sigma_m.hypot(LID_M));
                 let off_m = pixel.depth_m - at_m;
-                if off_m < -3.0 * sigma_m {
+                if off_m < -BEYOND * sigma_m {
                     continue;
                 }
-                let within = off_m * fall > INSIDE_M - 2.0 * pixel.sigma_m && off_m * fall < height_m + 0.02;
+                let within =
+                    off_m * fall > INSIDE_M - 2.0 * pixel.sigma_m && off_m * fall < height_m + BELOW_M;
                 let below = if within { fall / height_m } else { 0.0 };
-                let rest = 0.02;
                 let level = normal(off_m, sigma_m);
-                sum += ((0.9 * below + rest) / (0.9 * level + rest)).ln();
+                sum += ((TELL * below + REST) / (TELL * level + REST)).ln();
                 all += view.looks;
                 open += if off_m * fall > INSIDE_M { view.looks } else { 0.0 };
-                lid += if off_m * fall < 0.75 * INSIDE_M { view.looks } else { 0.0 };
+                lid += if off_m * fall < LID * INSIDE_M { view.looks } else { 0.0 };
             }
             let log = view.looks * sum;
             open_log += bounded(log, BAD_VIEW);
         }
-        let share = |looks: f64| looks / f64::max(all, 1e-9);
+        let share = |looks: f64| looks / f64::max(all, f64::MIN_POSITIVE);
         Upper { open_log, open: share(open), lid: share(lid) }
     }
 }

@@ -6,13 +6,16 @@ use super::model::{ObjectModel, Range, Shape};
 use super::percept::Stance;
 use super::rays::{BAD_VIEW, Rays, ViewRays, bounded};
 
-/// Thickness of the walls of vessels (set by hand), metres.
+/// Thickness of the walls of vessels, metres. From: chosen.
 const WALL_M: f64 = 0.003;
-/// Steps by which a body is moved to where it suits a view best, one after the other, and how often each is tried at most, metres.
+/// Steps by which a body is moved to where it suits a view best, one after the other, and how often each is tried at most, metres. From: work.
 const STEPS_M: [f64; 2] = [0.003, 0.0015];
 const TRIES: usize = 2;
-/// Spread of how far a view shows a body beside where all show it, metres (set by hand).
+/// Spread of how far a view shows a body beside where all show it, metres. From: chosen.
 const SHIFT_M: f64 = 0.005;
+
+/// No round body is narrower, metres of radius. From: rounding.
+const LEAST_M: f64 = 0.01;
 
 /// How well a body suits a view, and how far it was moved for that along both axes of the surface, metres.
 #[derive(Clone, Copy)]
@@ -61,7 +64,8 @@ impl<'a> Own<'a> {
         let (m, Shape::Round, Some(diameter_m)) = (self.measured, model.shape, model.diameter_m) else {
             return 0.0;
         };
-        let within = |value: f64, range: Range, slack: f64| value.clamp(range.low - slack, range.high + slack);
+        let within =
+            |value: f64, range: Range, slack: f64| value.clamp(range.low - slack, range.high + slack);
         // Nothing is measured more sharply than merged views of one surface lie apart.
         let apart_m = if m.evidence.views > 1 { m.blur_m } else { 0.0 };
         let tapers = match stance {
@@ -84,7 +88,9 @@ impl<'a> Own<'a> {
             let views = self.rays.views.iter().zip(&self.placed).zip(&self.logs);
             views.map(|((view, own), log)| against(placed(view, &body, own.shift_m).log - log)).sum::<f64>()
         };
-        of_taper(tapers.middle()).max(of_taper(within(m.evidence.taper, tapers, apart_m / widest_m.max(0.01)))).min(0.0)
+        of_taper(tapers.middle())
+            .max(of_taper(within(m.evidence.taper, tapers, apart_m / widest_m.max(LEAST_M))))
+            .min(0.0)
     }
 }
 

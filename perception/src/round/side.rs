@@ -3,7 +3,7 @@
 use super::{OUTSIDE_M, Round, distance, side_band};
 use nalgebra::{Matrix4, Point3, Vector4};
 
-/// Points that are summed up side by side.
+/// Points that are summed up side by side. From: work.
 const LANES: usize = 4;
 
 type Lanes = [f64; LANES];
@@ -73,7 +73,11 @@ impl Side {
 
     /// How well a circle explains the points, seen from above; `None` if not better than `best`.
     pub fn score(&self, [x, y, r]: [f64; 3], tolerance: f64, best: f64) -> Option<f64> {
+        /// What a point inside of the circle says against it: less than one outside, a half. From: chosen.
+        const INSIDE: f64 = 0.15;
+        /// Points after which a circle may be left. From: work.
         const BLOCK: usize = 16;
+        /// A score that is no more than this below the best may be it. From: rounding.
         const ROUNDING: f64 = 1e-6;
         let mut score = 0.0;
         let mut left = self.len;
@@ -85,7 +89,7 @@ impl Side {
             for ((claim, px), py) in claims.iter_mut().zip(xs).zip(ys) {
                 let d = distance(px - x, py - y) - r;
                 // Inside may be the inside of a vessel; outside can only be a handle or another body.
-                let off = if d > 0.0 { -0.5 } else { -0.15 };
+                let off = if d > 0.0 { -0.5 } else { -INSIDE };
                 *claim = if d.abs() < tolerance { 1.0 - (d / tolerance).powi(2) } else { off };
             }
             claims.iter().for_each(|claim| score += claim);
@@ -125,9 +129,11 @@ fn lanes(of: impl Fn(usize) -> f64) -> Lanes {
 /// near, and its square if it is not inside.
 #[inline(always)]
 fn terms(round: &Round, gate: f64, [x, y, z]: [&Lanes; 3]) -> [Lanes; 17] {
+    /// Nearer to the axis there is no direction away from it, metres. From: rounding.
+    const AT_AXIS_M: f64 = 1e-9;
     let (dx, dy) = (lanes(|i| x[i] - round.x), lanes(|i| y[i] - round.y));
     let d = lanes(|i| distance(dx[i], dy[i]));
-    let d = lanes(|i| if d[i] > 1e-9 { d[i] } else { 1e-9 });
+    let d = lanes(|i| if d[i] > AT_AXIS_M { d[i] } else { AT_AXIS_M });
     let rise = lanes(|i| z[i] - round.middle_m);
     let residual = lanes(|i| d[i] - round.radius_m - round.slope * rise[i]);
     let near = |value: Lanes| lanes(|i| if residual[i].abs() <= gate { value[i] } else { 0.0 });

@@ -1,25 +1,28 @@
 //! Bodies that something before them parts: two ends of one face, and what lies between them hidden from all views.
 
 use super::patches::Voxels;
-use super::{is_upright, quantile};
+use super::{VOXEL_ENDS, is_upright, quantile};
 use crate::surface::Surface;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::{Point3, Vector2, Vector3};
 use std::collections::BTreeMap;
 
-/// Fewest voxels of a face that tell where it lies.
+/// Fewest voxels of a face that tell where it lies. From: chosen.
 const FEWEST: usize = 12;
+/// Upright faces that a view shows of a box. From: derived, one of two that are across from each other is turned away.
+const FACES: usize = 2;
 /// Normals of one upright face turn by no more about it (15°), as a cosine; those of two ends of one by no more (10°).
+/// From: chosen.
 const FLAT: f64 = 0.966;
 const PARALLEL: f64 = 0.985;
-/// How far an end of a face may lie before or behind the plane of the other, and how far apart their tops may be, metres.
+/// How far an end of a face may lie before or behind the plane of the other, and how far apart their tops may be, metres. From: chosen.
 const FLUSH_M: f64 = 0.008;
-/// Widest part of a face that is taken to be hidden, metres.
+/// Widest part of a face that is taken to be hidden, metres. From: chosen.
 const WIDEST_M: f64 = 0.25;
-/// Steps in which what is between is looked at, metres, and at which shares of its height.
+/// Steps in which what is between is looked at, metres, and at which shares of its height. From: work.
 const STEP_M: f64 = 0.01;
 const SHARES: [f64; 3] = [0.3, 0.5, 0.7];
-/// Share of these places that all views must miss. None may be looked through.
+/// Share of these places that all views must miss. None may be looked through. From: chosen.
 const HIDDEN: f64 = 0.8;
 
 /// An upright face of a part, surface frame.
@@ -62,7 +65,7 @@ pub(super) fn join(voxels: &Voxels, part_of_voxel: &mut [u32], seen: &Visibility
 impl Body {
     fn of(name: u32, voxels: &Voxels, of: &[usize]) -> Body {
         let mut heights: Vec<f64> = of.iter().map(|&v| voxels.centres[v].z).collect();
-        Body { name, top_m: quantile(&mut heights, 0.97), faces: faces(voxels, of) }
+        Body { name, top_m: quantile(&mut heights, VOXEL_ENDS.1), faces: faces(voxels, of) }
     }
 
     /// Whether a face of both lies in one plane, is as high on both sides, and is hidden between them.
@@ -82,11 +85,13 @@ fn faces(voxels: &Voxels, of: &[usize]) -> Vec<Face> {
         .filter(|&&v| is_upright(&voxels.normals[v]))
         .map(|&v| (voxels.centres[v], voxels.normals[v].xy().normalize()))
         .collect();
+    /// Directions that are tried. From: work.
+    const TRIED: usize = 40;
     let mut faces = Vec::new();
-    while side.len() >= FEWEST && faces.len() < 2 {
+    while side.len() >= FEWEST && faces.len() < FACES {
         let like = |to: &Vector2<f64>| side.iter().filter(|(_, n)| n.dot(to) > FLAT).count();
         // Every few are enough to try.
-        let tried = side.iter().step_by(side.len().div_ceil(40));
+        let tried = side.iter().step_by(side.len().div_ceil(TRIED));
         let Some((_, first)) = tried.max_by_key(|(_, n)| like(n)).copied() else { break };
         let (face, rest): (Vec<_>, Vec<_>) = side.into_iter().partition(|(_, n)| n.dot(&first) > FLAT);
         faces.extend(Face::through(&face));
@@ -107,7 +112,7 @@ impl Face {
             .filter(|p| (normal.dot(&p.xy().coords) - offset_m).abs() < FLUSH_M)
             .collect();
         let mut along: Vec<f64> = on.iter().map(|p| p.x * -normal.y + p.y * normal.x).collect();
-        let span_m = (quantile(&mut along, 0.02), quantile(&mut along, 0.98));
+        let span_m = (quantile(&mut along, VOXEL_ENDS.0), quantile(&mut along, VOXEL_ENDS.1));
         (on.len() >= FEWEST && on.len() * 10 >= of.len() * 7).then_some(Face { normal, offset_m, span_m })
     }
 

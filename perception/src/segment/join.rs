@@ -6,12 +6,14 @@ use super::patches::Voxels;
 use nalgebra::{Point3, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Greatest distance of a patch's voxels from its seed, metres.
+/// Greatest distance of a patch's voxels from its seed, metres. From: chosen.
 const PATCH_REACH_M: f64 = 0.02;
-/// Greatest angle between a voxel's normal and its patch's, as a cosine (25°).
+/// Greatest angle between a voxel's normal and its patch's, as a cosine (25°). From: chosen.
 const PATCH_COS: f64 = 0.906;
 /// A concave joint is still smooth up to this angle, radians (as in locally convex connected patches).
+/// From: chosen, .25 was tried on piles of things and not kept.
 const SMOOTH_RAD: f64 = 0.35;
+
 /// For each voxel the number of its part. Numbers are voxel indices, the same in every run.
 pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
     if !options.part_touching {
@@ -45,13 +47,15 @@ pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
 
 /// Voxels with far fewer points than those around them: frayed edges, which hang between objects and connect nothing.
 fn thin(voxels: &Voxels) -> Vec<bool> {
-    /// Of the points of the voxel that three quarters of those around have no more than.
+    /// Of the points of the voxel that three quarters of those around have no more than. From: chosen.
     const SHARE: f64 = 0.25;
+    /// Share of those around that must be so much fuller. From: chosen.
+    const MOST: f64 = 0.75;
     let is_thin = |i: usize| {
         let own = f64::from(voxels.counts[i]);
         let near = voxels.neighbours(i);
         let fuller = near.iter().filter(|&&j| own < SHARE * f64::from(voxels.counts[j as usize])).count();
-        near.is_empty() || fuller >= near.len() - ((near.len() - 1) as f64 * 0.75).round() as usize
+        near.is_empty() || fuller >= near.len() - ((near.len() - 1) as f64 * MOST).round() as usize
     };
     (0..voxels.len()).map(is_thin).collect()
 }
@@ -71,6 +75,7 @@ fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
 
 /// Patches: voxels around a flat seed with like normals. Flattest seeds first.
 fn grow_patches(voxels: &Voxels, thin: &[bool]) -> Vec<u32> {
+    /// No patch. From: mark.
     const NONE: u32 = u32::MAX;
     // Curvatures are not negative: their bits are in the order of their values.
     let key = |(curvature, voxel): (&f64, u32)| u128::from(curvature.to_bits()) << 32 | u128::from(voxel);
@@ -112,6 +117,12 @@ struct Patch {
 }
 
 fn describe(voxels: &Voxels, patch_of: &[u32]) -> Vec<Patch> {
+    /// One over the curvature of a ball, whose normals tell nothing. From: derived, equal moments along three axes.
+    const PER_BALL: f64 = 3.0;
+    /// What a normal counts for at the least. From: chosen.
+    const LEAST_WEIGHT: f64 = 0.05;
+    /// Normals that add up to less cancel out. From: rounding.
+    const CANCELLED: f64 = 1e-9;
     let count = patch_of.iter().max().map_or(0, |&m| m as usize + 1);
     let mut patches: Vec<Patch> = (0..count)
         .map(|_| Patch { centre: Point3::origin(), normal: Vector3::zeros(), points: 0, voxels: 0 })
@@ -119,13 +130,13 @@ fn describe(voxels: &Voxels, patch_of: &[u32]) -> Vec<Patch> {
     for (i, &p) in patch_of.iter().enumerate() {
         let patch = &mut patches[p as usize];
         patch.centre.coords += voxels.centres[i].coords;
-        patch.normal += voxels.normals[i] * (1.0 - 3.0 * voxels.curvatures[i]).max(0.05);
+        patch.normal += voxels.normals[i] * (1.0 - PER_BALL * voxels.curvatures[i]).max(LEAST_WEIGHT);
         patch.points += voxels.counts[i];
         patch.voxels += 1;
     }
     for patch in &mut patches {
         patch.centre.coords /= f64::from(patch.voxels.max(1));
-        patch.normal = patch.normal.try_normalize(1e-9).unwrap_or_else(Vector3::zeros);
+        patch.normal = patch.normal.try_normalize(CANCELLED).unwrap_or_else(Vector3::zeros);
     }
     patches
 }
@@ -156,6 +167,12 @@ fn borders(voxels: &Voxels, patch_of: &[u32], thin: &[bool]) -> Vec<Border> {
 
 /// True if the surface bends outwards from one patch to the other, or hardly bends.
 fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
+    /// Patches farther aside of each other than this are steps, metres. From: chosen.
+    const STEP_M: f64 = 0.012;
+    /// Normals that differ by less (sine) have no crease. From: rounding.
+    const NO_CREASE: f64 = 1e-3;
+    /// Cosine of the least angle between the crease and the line between the centres. From: chosen.
+    const ALONG: f64 = 0.85;
     if a.normal == Vector3::zeros() || b.normal == Vector3::zeros() || border.length < 2 {
         return false;
     }
@@ -164,14 +181,14 @@ fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
     let angle = a.normal.dot(&b.normal).clamp(-1.0, 1.0).acos();
     // A step sideways between parallel patches (a box before another) is no smooth surface.
     let step = between.dot(&(a.normal + b.normal)).abs() / 2.0;
-    let smooth = angle < SMOOTH_RAD && step < 0.012;
+    let smooth = angle < SMOOTH_RAD && step < STEP_M;
     if bend < 0.0 {
         return smooth;
     }
     // Patches that only touch at a corner: the crease must run across the line between their centres.
     let crease = a.normal.cross(&b.normal);
-    let along = crease.try_normalize(1e-3).map_or(0.0, |c| c.dot(&between.normalize()).abs());
-    smooth || along < 0.85
+    let along = crease.try_normalize(NO_CREASE).map_or(0.0, |c| c.dot(&between.normalize()).abs());
+    smooth || along < ALONG
 }
 
 /// A voxel of each root patch, to name parts by.

@@ -1,16 +1,18 @@
 //! The mends for vessels and handles: what creases wrongly parted.
 
 use super::join::{Border, Union};
-use super::most_within;
 use super::patches::Voxels;
+use super::{VOXEL_ENDS, most_within};
 use crate::surface::convex_hull;
 use std::cell::OnceCell;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// A part smaller than this share of its neighbour is no object of its own.
+/// A part smaller than this share of its neighbour is no object of its own. From: chosen.
 const CRUMB_SHARE: f64 = 0.12;
-/// A part whose base is lifted and which is smaller than this share of what it hangs on belongs to it (a handle, a spout).
+/// A part of so many voxels is no crumb. From: chosen.
+const CRUMB_VOXELS: usize = 40;
+/// A part whose base is lifted and which is smaller than this share of what it hangs on belongs to it (a handle, a spout). From: chosen.
 const HANGING_SHARE: f64 = 0.25;
 
 /// Joins what the creases wrongly parted: insides of vessels, handles, crumbs.
@@ -106,11 +108,11 @@ impl Part {
     }
 
     fn low_m(&self) -> f64 {
-        self.height_m(0.03)
+        self.height_m(VOXEL_ENDS.0)
     }
 
     fn top_m(&self) -> f64 {
-        self.height_m(0.97)
+        self.height_m(VOXEL_ENDS.1)
     }
 
     fn hull(&self) -> &[[f64; 2]] {
@@ -198,17 +200,22 @@ fn link(parts: &mut [Option<Part>], joined: &mut Union, borders: &[Border]) {
 }
 
 fn is_crumb(small: &Part, large: &Part) -> bool {
-    f64::from(small.points) < CRUMB_SHARE * f64::from(large.points) && small.places.len() < 40
+    f64::from(small.points) < CRUMB_SHARE * f64::from(large.points) && small.places.len() < CRUMB_VOXELS
 }
 
 /// The inside of a vessel: within the outline of the body and no higher than its rim.
 fn is_inside(small: &Part, large: &Part) -> bool {
-    small.top_m() < large.top_m() + 0.01 && most_within(large.hull(), &small.places, |p| *p)
+    /// So much above the rim is still measured as no higher, metres. From: chosen.
+    const RIM_M: f64 = 0.01;
+    small.top_m() < large.top_m() + RIM_M && most_within(large.hull(), &small.places, |p| *p)
 }
 
 /// A handle: small, lifted off the surface, not above the body.
 fn hangs_on(small: &Part, large: &Part) -> bool {
+    /// It begins so far above the foot of the body, and ends no farther above its rim than the second, metres. From: chosen.
+    const LIFTED_M: f64 = 0.01;
+    const RIM_M: f64 = 0.005;
     f64::from(small.points) < HANGING_SHARE * f64::from(large.points)
-        && small.low_m() > large.low_m() + 0.01
-        && small.top_m() < large.top_m() + 0.005
+        && small.low_m() > large.low_m() + LIFTED_M
+        && small.top_m() < large.top_m() + RIM_M
 }

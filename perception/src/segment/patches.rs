@@ -59,6 +59,7 @@ struct Moments {
 }
 
 impl Moments {
+    /// Of no points. From: mark.
     const NONE: Moments = Moments { count: 0.0, sum: Vector3::new(0.0, 0.0, 0.0), products: [0.0; 6] };
 
     fn add(&mut self, p: &Point3<f64>) {
@@ -158,10 +159,12 @@ fn surface(
     voxel: usize,
     viewpoints: &[Point3<f64>],
 ) -> (Vector3<f64>, f64) {
+    /// Fewest points that tell a normal. From: chosen.
+    const FEWEST: f64 = 5.0;
     let mut total = moments[voxel];
     voxels.neighbours(voxel).iter().for_each(|&n| total.join(&moments[n as usize]));
     let covariance = spread::covariance(total.count, total.sum.into(), total.products);
-    let Some(least) = spread::least(&covariance).filter(|_| total.count >= 5.0) else {
+    let Some(least) = spread::least(&covariance).filter(|_| total.count >= FEWEST) else {
         return (Vector3::zeros(), 1.0);
     };
     let nearest = viewpoints

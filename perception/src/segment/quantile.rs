@@ -12,7 +12,7 @@ fn rank(count: usize, share: f64) -> usize {
     ((count - 1) as f64 * share).round() as usize
 }
 
-/// Values among which a limit is chosen, and how many values there must be to make that worthwhile.
+/// Values among which a limit is chosen, and how many values there must be to make that worthwhile. From: work.
 const SAMPLE: usize = 64;
 const WORTH_IT: usize = 4 * SAMPLE;
 
@@ -27,6 +27,7 @@ pub(crate) fn end(values: &[f64], share: f64) -> f64 {
 
 /// The value of a rank (0 the least) among the values, each taken in a way. Only those up to a limit that a sample suggests are sorted.
 fn lowest(values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
+    /// Values that are passed over together. From: work.
     const BLOCK: usize = 16;
     let mut kept: Vec<f64> = Vec::new();
     if values.len() >= WORTH_IT {
@@ -47,10 +48,12 @@ fn lowest(values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
 
 /// What hardly fewer than `rank` of the values are below.
 fn limit(values: &[f64], rank: usize, way: &impl Fn(f64) -> f64) -> f64 {
+    /// Spreads of how many of the sample fall below a value that more are let through by. From: work.
+    const SAFE: f64 = 3.0;
     let stride = values.len() / SAMPLE;
     let mut sample: [f64; SAMPLE] = std::array::from_fn(|i| way(values[i * stride]));
     let expected = (rank + 1) as f64 * SAMPLE as f64 / values.len() as f64;
-    let safe = expected + 3.0 * expected.sqrt() + 1.0;
+    let safe = expected + SAFE * expected.sqrt() + 1.0;
     *sample.select_nth_unstable_by((safe as usize).min(SAMPLE - 1), f64::total_cmp).1
 }
 

@@ -6,33 +6,33 @@
 use super::patches::Voxels;
 use super::vessels::round_body;
 use super::votes::{RADII, Votes};
-use super::{is_upright, quantile};
+use super::{VOXEL_ENDS, is_upright, quantile};
 use crate::outline;
-use crate::round::{distance, sector};
+use crate::round::{SECTORS, distance, sector};
 use crate::surface::floor;
 use nalgebra::{Point2, Point3, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Radii that are sought, metres.
+/// Radii that are sought, metres. From: chosen.
 const RADII_M: (f64, f64) = (0.025, 0.085);
-/// Their step and that of places, metres.
+/// Their step and that of places, metres. From: derived, so many radii in that range.
 const STEP_M: f64 = (RADII_M.1 - RADII_M.0) / (RADII - 1) as f64;
-/// Fewest voxels of a side.
+/// Fewest voxels of a side. From: chosen.
 const FEWEST: usize = 25;
-/// What is this far out of the body is no longer the body itself, metres.
+/// What is this far out of the body is no longer the body itself, metres. From: chosen.
 const CLEAR_M: f64 = 0.009;
-/// What is this far out is no image of the body itself in a view that is misplaced, metres.
+/// What is this far out is no image of the body itself in a view that is misplaced, metres. From: chosen.
 const BESIDE_M: f64 = 0.035;
 /// Cosine of the greatest angle between a normal of the side and the direction away from the axis: the faces of a box turn by 45° about theirs.
+/// From: chosen, between 1 and the cosine of 45°.
 const FACING: f64 = 0.9;
-/// Share of what stands at the radius that must face so.
+/// Share of what stands at the radius that must face so. From: chosen.
 const ROUND_SHARE: f64 = 0.75;
-/// Directions around an axis, and how many of them must show the side: a third.
-const SECTORS: usize = 36;
+/// How many directions around an axis must show the side: a third. From: chosen.
 const LEAST_SECTORS: usize = 12;
-/// Cosine of the greatest slope of a level face.
+/// Cosine of the greatest slope of a level face. From: chosen.
 const LEVEL: f64 = 0.8;
-/// How well the normals of a box stand at right angles (1: all of them), and how well a rectangle fits it, metres.
+/// How well the normals of a box stand at right angles (1: all of them), and how well a rectangle fits it, metres. From: chosen.
 const SQUARE: f64 = 0.55;
 const BOX_M: f64 = 0.008;
 
@@ -71,8 +71,10 @@ pub(super) fn part(
 /// True if the side of a part is that of a box: its normals stand at right angles, and a rectangle fits it.
 fn is_box(voxels: &Voxels, of: &[usize], points: &[Point3<f64>]) -> bool {
     let side: Vec<usize> = of.iter().copied().filter(|&v| is_upright(&voxels.normals[v])).collect();
+    /// Sides of a rectangle: turned by so many times their angle all of its normals are one. From: derived, a quarter is one turn.
+    const SIDES: f64 = 4.0;
     let turned = side.iter().map(|&v| {
-        let quarter = 4.0 * voxels.normals[v].y.atan2(voxels.normals[v].x);
+        let quarter = SIDES * voxels.normals[v].y.atan2(voxels.normals[v].x);
         Vector2::new(quarter.cos(), quarter.sin())
     });
     let square = turned.sum::<Vector2<f64>>().norm() / side.len().max(1) as f64;
@@ -148,15 +150,18 @@ impl Cut {
 /// Whether what is left beside a body is more than its handle, its frayed edge or its image in a view that lies beside the others, or
 /// rises above it.
 fn is_apart(voxels: &Voxels, rest: &[usize], body: &[usize], axis: &Axis) -> bool {
+    /// What hangs begins so far above the foot, metres; what rises above the body does so by more than the second. From: chosen.
+    const LIFTED_M: f64 = 0.015;
+    const RISES_M: f64 = 0.02;
     let heights = |of: &[usize]| {
         let mut heights: Vec<f64> = of.iter().map(|&v| voxels.centres[v].z).collect();
-        (quantile(&mut heights, 0.03), quantile(&mut heights, 0.97))
+        (quantile(&mut heights, VOXEL_ENDS.0), quantile(&mut heights, VOXEL_ENDS.1))
     };
     let ((low_m, top_m), (base_m, rim_m)) = (heights(rest), heights(body));
-    let hangs = low_m > base_m + 0.015 && top_m < rim_m;
+    let hangs = low_m > base_m + LIFTED_M && top_m < rim_m;
     let beyond = |v: &&usize| axis.distance_m(&voxels.centres[**v]) > axis.radius_m + BESIDE_M;
     let is_object = !hangs && rest.iter().filter(beyond).count() >= FEWEST;
-    is_object || top_m > rim_m + 0.02
+    is_object || top_m > rim_m + RISES_M
 }
 
 /// Whether the side of the voxels is that of an upright round body.
@@ -179,7 +184,12 @@ struct Axis {
 impl Axis {
     /// The axes on which most normals of a part agree, best first.
     fn sought(voxels: &Voxels, of: &[usize]) -> Vec<Axis> {
+        /// Axes that are tried. From: chosen.
         const MOST: usize = 8;
+        /// A place and radius has more votes of its own than this. From: chosen.
+        const FEW: u16 = 3;
+        /// Axes are apart by more than so many steps. From: chosen.
+        const APART: f64 = 3.0;
         let cell = |m: f64| floor(m * (1.0 / STEP_M) + 0.5);
         let side: Vec<usize> = of.iter().copied().filter(|&v| is_upright(&voxels.normals[v])).collect();
         let (low, high) = bounds(side.iter().map(|&v| voxels.centres[v].xy()));
@@ -194,7 +204,7 @@ impl Axis {
                 votes.add(cell(place.x - across.x * r), cell(place.y - across.y * r), k);
             }
         }
-        let mut cells = votes.peaks(3, FEWEST as u32);
+        let mut cells = votes.peaks(FEW, FEWEST as u32);
         cells.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut axes: Vec<Axis> = Vec::new();
         for (_, [i, j, k]) in cells {
@@ -203,7 +213,7 @@ impl Axis {
                 y: f64::from(j) * STEP_M,
                 radius_m: RADII_M.0 + f64::from(k) * STEP_M,
             };
-            let is_new = axes.iter().all(|a| (a.x - axis.x).hypot(a.y - axis.y) > 3.0 * STEP_M);
+            let is_new = axes.iter().all(|a| (a.x - axis.x).hypot(a.y - axis.y) > APART * STEP_M);
             if axes.len() == MOST {
                 break;
             }
@@ -254,7 +264,7 @@ impl Axis {
     /// out of the top of a low box is no body.
     fn parts_a_top(&self, voxels: &Voxels, body: &[usize], left: &[Vec<usize>]) -> bool {
         let mut heights: Vec<f64> = body.iter().map(|&v| voxels.centres[v].z).collect();
-        let top_m = quantile(&mut heights, 0.97);
+        let top_m = quantile(&mut heights, VOXEL_ENDS.1);
         let is_top = |v: usize| {
             voxels.normals[v].z.abs() > LEVEL && (voxels.centres[v].z - top_m).abs() < CLEAR_M / 2.0
         };

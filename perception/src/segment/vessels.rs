@@ -1,39 +1,40 @@
 //! Vessels in one piece: their near outside and far inside meet only in a thin rim, which no camera resolves.
 
-use super::{Segment, bounds, hull_from_above, middle, most_within, top_m};
+use super::{OUTSIDE, Segment, bounds, hull_from_above, middle, most_within, top_m};
 use crate::outline;
-use crate::round::{self, Round, distance, sector};
-use crate::surface::range_sigma_m;
+use crate::round::{self, ON_SIDE_M, Round, SECTORS, distance, sector};
 use nalgebra::Point3;
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
-/// Parts this far apart can be one vessel, metres.
+/// Parts this far apart can be one vessel, metres. From: chosen.
 const APART_M: f64 = 0.015;
-/// Their tops are this level, metres.
+/// Their tops are this level, metres. From: chosen.
 const LEVEL_M: f64 = 0.015;
-/// Widest vessel, metres of radius.
+/// Widest vessel, metres of radius. From: chosen.
 const WIDEST_M: f64 = 0.14;
-/// Share of the points of both that lie on the common round body.
+/// Share of the points of both that lie on the common round body. From: chosen.
 const ON_BODY: f64 = 0.85;
-/// What is nearer to a body than this lies on it, metres.
-const NEAR_BODY_M: f64 = 0.008;
-/// How far down from the top the rim of a vessel is looked for, metres.
-const RIM_M: f64 = 0.02;
-/// Share of a rim that lies on a circle: its handles do not. In how many directions it is looked for: half of them must show it.
+/// Share of a rim that lies on a circle: its handles do not. From: chosen.
 const ON_RIM: f64 = 0.7;
-const SECTORS: usize = 36;
-/// Share of the side of each of two parts that must lie on its own round body for both to be images of one.
+/// How far down from the top the rim of a vessel is looked for, metres. From: chosen.
+const RIM_DEEP_M: f64 = 0.02;
+/// Share of the side of each of two parts that must lie on its own round body for both to be images of one. From: chosen, more than half.
 const ON_MOST: f64 = 0.55;
 /// Bodies are in one place if their axes are nearer than this share of the smaller radius.
+/// From: chosen, two bodies cannot stand so near to each other.
 const ONE_PLACE: f64 = 0.5;
 /// Widest vessel that has a handle, metres of radius; how wide a handle with its noise is and how far it reaches, and how far from the
-/// wall its nearest part is measured, metres.
+/// wall its nearest part is measured, metres. From: chosen.
 const GRASPED_M: f64 = 0.06;
 const HANDLE_M: (f64, f64) = (0.045, 0.055);
 const TOUCHES_M: f64 = 0.015;
-/// The smaller part has at least this share of the points.
+/// The smaller part has at least this share of the points. From: chosen.
 const LEAST_SHARE: f64 = 0.08;
+/// And at least so many. From: chosen.
+const FEWEST: usize = 12;
+/// What is inside ends no farther above the rim, metres. From: chosen.
+const RIM_M: f64 = 0.005;
 
 /// A part with what the pairs ask of it again and again.
 struct Candidate {
@@ -100,14 +101,15 @@ fn union(a: &Segment, b: &Segment) -> Segment {
 }
 
 fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
-    let m = small.segment.indices.len();
-    if m < 12 {
+    /// By so much the share of one part may be smaller that lies on a body of both. From: chosen.
+    const LESS: f64 = 0.1;
+    if small.segment.indices.len() < FEWEST {
         return false;
     }
     if !near(large, small) {
         return is_level(large, small) && one_rim([large, small], viewpoints);
     }
-    let inside = small.top_m < large.top_m + 0.005 && footprint_inside(large, small);
+    let inside = small.top_m < large.top_m + RIM_M && footprint_inside(large, small);
     let fitted = large.fitted(viewpoints).filter(|f| f.is_tight(&large.segment.points));
     if inside && fitted.is_some() || fitted.is_some_and(|f| is_handle(&f.body, large, small)) {
         return true;
@@ -122,7 +124,7 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
     let top = large.top_m.max(small.top_m);
     round_body(&both.points, large.low.z.min(small.low.z), top, viewpoints).is_some_and(|body| {
         // Each part on its own must keep to the common body: one alone may carry the fit.
-        [large, small].iter().all(|part| share_on(&body, &part.segment) >= ON_BODY - 0.1)
+        [large, small].iter().all(|part| share_on(&body, &part.segment) >= ON_BODY - LESS)
     }) || one_rim([large, small], viewpoints)
 }
 
@@ -131,12 +133,12 @@ fn one_rim(parts: [&Candidate; 2], viewpoints: &[Point3<f64>]) -> bool {
     let top_m = parts[0].top_m.max(parts[1].top_m);
     let rims = parts.map(|part| {
         let points = part.segment.points.iter().copied();
-        points.filter(|p| p.z > top_m - RIM_M).collect::<Vec<_>>()
+        points.filter(|p| p.z > top_m - RIM_DEEP_M).collect::<Vec<_>>()
     });
     let both = rims.concat();
-    let Some(fitted) = Fitted::to(&both, top_m - RIM_M, top_m, viewpoints) else { return false };
+    let Some(fitted) = Fitted::to(&both, top_m - RIM_DEEP_M, top_m, viewpoints) else { return false };
     let body = &fitted.body;
-    let is_on = |p: &&Point3<f64>| body.outside_m(p).abs() < NEAR_BODY_M;
+    let is_on = |p: &&Point3<f64>| body.outside_m(p).abs() < ON_SIDE_M;
     let on = |of: &[Point3<f64>]| of.iter().filter(is_on).count() as f64 / of.len().max(1) as f64;
     let seen: BTreeSet<usize> =
         both.iter().filter(is_on).map(|p| sector(p.x - body.x, p.y - body.y, SECTORS)).collect();
@@ -177,10 +179,12 @@ struct Fitted {
 
 impl Fitted {
     fn to(points: &[Point3<f64>], low_m: f64, top_m: f64, viewpoints: &[Point3<f64>]) -> Option<Fitted> {
+        /// Of the circles proposed. From: mark.
+        const SEED: u64 = 3;
         let first = points.first()?;
         let near = viewpoints.iter().map(|v| (first - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
-        let sigma_m = range_sigma_m(near).min(0.012);
-        let body = round::fit(points, low_m, top_m, sigma_m, 3)?;
+        let sigma_m = round::sigma_m(near);
+        let body = round::fit(points, low_m, top_m, sigma_m, SEED)?;
         (body.radius_m < WIDEST_M).then_some(Fitted { body, sigma_m })
     }
 
@@ -196,16 +200,22 @@ impl Fitted {
 
     /// Whether so large a share of its points lies on it, as near as they are measured, and much nearer than to a box.
     fn is_near(&self, points: &[Point3<f64>], share: f64) -> bool {
-        self.body.residual_m < 2.0 * self.sigma_m + 0.0015
+        /// Beyond two spreads of a measurement, what a good fit may miss by, metres. From: chosen.
+        const MISS_M: f64 = 0.0015;
+        /// Share of the miss of a box. From: chosen.
+        const OF_BOX: f64 = 0.6;
+        self.body.residual_m < 2.0 * self.sigma_m + MISS_M
             && self.body.inliers >= share
-            && self.beats_box(points, 0.6)
+            && self.beats_box(points, OF_BOX)
     }
 
     /// Whether most of its points lie on it, nearer than to a box, and tell where it stands.
     fn is_placed(&self, points: &[Point3<f64>]) -> bool {
+        /// Share of the miss of a box. From: chosen.
+        const OF_BOX: f64 = 0.8;
         self.body.inliers >= ON_MOST
             && self.body.place_sigma_m < ONE_PLACE * self.body.radius_m
-            && self.beats_box(points, 0.8)
+            && self.beats_box(points, OF_BOX)
     }
 }
 
@@ -221,6 +231,10 @@ fn in_one_place(a: &Candidate, b: &Candidate, viewpoints: &[Point3<f64>]) -> boo
 /// Whether a part is what sticks out of a vessel's side: it begins at the wall, is no wider than a handle, reaches no further, and ends
 /// below the rim.
 fn is_handle(body: &Round, large: &Candidate, small: &Candidate) -> bool {
+    /// One in so many points may lie nearer than where it begins, and one farther than where it ends. From: chosen.
+    const STRAY: usize = 20;
+    /// Of the second number of points, the first are no wider than a handle. From: chosen.
+    const NARROW: (usize, usize) = (9, 10);
     let points = &small.segment.points;
     let [x, y] = middle(points);
     let (dx, dy) = (x - body.x, y - body.y);
@@ -232,13 +246,13 @@ fn is_handle(body: &Round, large: &Candidate, small: &Candidate) -> bool {
     let aside = |p: &Point3<f64>| ((p.x - body.x) * dy - (p.y - body.y) * dx) / far_m;
     let mut outs: Vec<f64> = points.iter().map(out).collect();
     outs.sort_by(f64::total_cmp);
-    let (first, last) = (outs[outs.len() / 20], outs[outs.len() - 1 - outs.len() / 20]);
+    let (first, last) = (outs[outs.len() / STRAY], outs[outs.len() - 1 - outs.len() / STRAY]);
     let within = points.iter().filter(|p| aside(p).abs() < HANDLE_M.0 / 2.0).count();
-    first < TOUCHES_M && last < HANDLE_M.1 && within * 10 >= points.len() * 9
+    first < TOUCHES_M && last < HANDLE_M.1 && within * NARROW.1 >= points.len() * NARROW.0
 }
 
 fn share_on(body: &Round, part: &Segment) -> f64 {
-    let on = part.points.iter().filter(|p| body.outside_m(p) < NEAR_BODY_M).count();
+    let on = part.points.iter().filter(|p| body.outside_m(p) < ON_SIDE_M).count();
     on as f64 / part.points.len().max(1) as f64
 }
 
@@ -252,7 +266,7 @@ fn footprint_inside(large: &Candidate, small: &Candidate) -> bool {
         |p: &&Point3<f64>| p.x < large.low.x || p.x > large.high.x || p.y < large.low.y || p.y > large.high.y;
     let points = &small.segment.points;
     // The outline is drawn only where the box around it does not settle it.
-    points.iter().filter(beside).count() * 10 <= points.len() * 3
+    points.iter().filter(beside).count() * OUTSIDE.1 <= points.len() * OUTSIDE.0
         && most_within(large.hull(), points, |p| [p.x, p.y])
 }
 

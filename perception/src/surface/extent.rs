@@ -9,14 +9,14 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::hash_map::Entry;
 
-/// So far a plane is taken to reach on behind and beneath what hides it, metres: few things are twice as wide.
+/// So far a plane is taken to reach on behind and beneath what hides it, metres: few things are twice as wide. From: chosen.
 const HIDDEN_M: f64 = 0.3;
-/// What stands on a plane is no taller, metres.
-const TALLEST_M: f64 = 0.6;
-/// What is this much lower at the edge of a plane stands beside it, metres.
+/// What stands on a plane is no taller, metres. From: chosen.
+pub(crate) const TALLEST_M: f64 = 0.6;
+/// What is this much lower at the edge of a plane stands beside it, metres. From: chosen.
 const BESIDE_M: f64 = 0.3;
 
-/// Where a cell is asked about, from its corner, cells.
+/// Where a cell is asked about, from its corner, cells. From: chosen, the middle and near the corners.
 const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]];
 
 /// Which part of a plane a cell belongs to; none where the plane is not taken to reach on.
@@ -163,7 +163,7 @@ impl Surface {
 
 /// The cells along the edges of a surface, in order around it.
 fn along_edges(surface: &Surface, turn: &UnitQuaternion<f64>) -> Vec<[i32; 2]> {
-    /// Of a longer edge not every cell is named.
+    /// Of an edge of more cells not every one is named. From: chosen.
     const MOST: f64 = 2000.0;
     let ends = surface.hull.iter().zip(surface.hull.iter().cycle().skip(1));
     let edge = |(a, b): (&Point3<f64>, &Point3<f64>)| {

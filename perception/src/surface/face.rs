@@ -9,17 +9,19 @@ use crate::visibility::Visibility;
 use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Side of the cells that tell which points of a plane hang together, metres.
+/// Side of the cells that tell which points of a plane hang together, metres. From: chosen.
 pub(super) const CELL_M: f64 = 0.03;
-/// Fewer samples are no piece of a plane.
+/// Fewer samples are no piece of a plane. From: chosen.
 const FEWEST_OF_PIECE: u32 = 5;
-/// A part whose points lie on average so far off the common plane has one of its own, metres.
+/// A part whose points lie on average so far off the common plane has one of its own, metres. From: chosen.
 const OWN_PLANE_M: f64 = 0.002;
 
 /// The connected parts of a plane, most returns first. None if no camera is above it.
 pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Visibility) -> Vec<Surface> {
+    /// A camera no higher than this sees nothing of a plane, metres. From: chosen.
+    const LEAST_EYE_M: f64 = 0.02;
     let viewpoints = seen.viewpoints();
-    if !viewpoints.is_empty() && viewpoints.iter().all(|v| plane.distance(v) < 0.02) {
+    if !viewpoints.is_empty() && viewpoints.iter().all(|v| plane.distance(v) < LEAST_EYE_M) {
         return Vec::new();
     }
     let turn = level(plane);
@@ -120,13 +122,14 @@ impl Counts {
 
     /// True if the plane goes through a wall or clutter here: about as much lies on either side of it as near it.
     fn is_slice(&self) -> bool {
-        /// Of a body that goes through, it is a half.
+        /// Of a body that goes through, it is a half. From: chosen, less than that half.
         const SHARE: f64 = 0.2;
         f64::from(self.beside[0].min(self.beside[1])) > SHARE * f64::from(self.near)
     }
 
     /// True if it is hardly more than where something upright begins: of a wall, half as much lies above as near it.
     fn is_foot(&self) -> bool {
+        /// What may lie above, for each that lies near. From: chosen, less than that half.
         const SHARE: f64 = 0.35;
         f64::from(self.beside[1]) > SHARE * f64::from(self.near)
     }

@@ -55,6 +55,7 @@ pub(crate) fn clip(polygon: Vec<[f64; 2]>, by: &[[f64; 2]], margin: f64) -> Vec<
 
 /// For each of some cells in order the first that it hangs together with.
 fn first_of_part(order: &[([i32; 2], u32)]) -> Vec<usize> {
+    /// Over so many empty cells two hang together: shadows of objects. From: chosen.
     const GAP: i32 = 2;
     let mut first: Vec<usize> = (0..order.len()).collect();
     // The cells that follow within reach: in the same column, and in the next ones.
@@ -127,8 +128,12 @@ fn farthest<const N: usize>(points: &[[f64; 2]], ways: [[f64; 2]; N]) -> [[f64; 
 
 /// Drops what lies well inside the octagon of the extreme points, which is no corner of the hull (Akl and Toussaint 1978).
 fn drop_inner(points: &mut Vec<[f64; 2]>) {
+    /// Fewer points are sorted as they are. From: work.
     const WORTH_IT: usize = 64;
+    /// Directions of the corners of a box. From: derived, the four diagonals.
     const SLANTS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
+    /// Twice the area by which a point is inside of an edge, square metres. From: rounding.
+    const CLEAR_M2: f64 = 1e-12;
     if points.len() < WORTH_IT {
         return;
     }
@@ -146,8 +151,9 @@ fn drop_inner(points: &mut Vec<[f64; 2]>) {
     let ends = octagon.iter().zip(octagon.iter().cycle().skip(1)).filter(|(a, b)| a != b);
     let edges: Vec<([f64; 2], [f64; 2])> = ends.map(|(a, b)| (*a, [b[0] - a[0], b[1] - a[1]])).collect();
     points.retain(|p| {
-        let left_of =
-            |(a, along): &([f64; 2], [f64; 2])| along[0] * (p[1] - a[1]) - along[1] * (p[0] - a[0]) > 1e-12;
+        let left_of = |(a, along): &([f64; 2], [f64; 2])| {
+            along[0] * (p[1] - a[1]) - along[1] * (p[0] - a[0]) > CLEAR_M2
+        };
         !edges.iter().all(left_of)
     });
 }

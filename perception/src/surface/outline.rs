@@ -41,9 +41,9 @@ struct Row {
     around: (f64, f64),
 }
 
-/// Width of a row, metres.
+/// Width of a row, metres. From: work.
 const ROW_M: f64 = 0.01;
-/// Nearer to an edge than this the edge itself is asked, metres.
+/// Nearer to an edge than this the edge itself is asked, metres. From: rounding.
 const ROUNDING_M: f64 = 1e-6;
 
 impl Rows {
@@ -74,12 +74,14 @@ impl Rows {
 
 impl Row {
     fn of(flat: &Outline, ends_m: [f64; 2]) -> Row {
+        /// An edge whose normal leans no more along the row is taken to run along it. From: rounding.
+        const ALONG: f64 = 1e-9;
         let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
         let mut row = Row { inside: everywhere, around: everywhere };
         for (normal, edge) in &flat.edges {
             let [one, other] = ends_m.map(|y| (edge - normal.y * y) / normal.x);
             let (less, more) = (one.min(other), one.max(other));
-            if normal.x.abs() < 1e-9 {
+            if normal.x.abs() < ALONG {
                 // Along the row: what is nearer than the row's width is left to the edge itself.
                 let clear = ends_m.iter().all(|y| normal.y * y - edge > ROUNDING_M);
                 row.inside = if clear { row.inside } else { (0.0, 0.0) };

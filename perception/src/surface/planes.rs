@@ -4,18 +4,21 @@ use crate::draw::Draws;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Points looked at when a plane is sought; more do not change it.
+/// Points looked at when a plane is sought; more do not change it. From: chosen.
 pub(super) const SAMPLE: usize = 16_000;
-/// Fewest points that make a surface.
+/// Fewest points that make a surface. From: chosen.
 pub(super) const FEWEST: usize = 50;
-/// Planes proposed in each round.
+/// Planes proposed in each round. From: chosen.
 const PROPOSALS: usize = 240;
-/// Planes taken away one after another at most.
+/// Planes taken away one after another at most. From: chosen.
 const ROUNDS: usize = 6;
-/// Proposals go through points of one cube of this side, metres.
+/// Proposals go through points of one cube of this side, metres. From: chosen.
 const REACH_M: f64 = 0.3;
-/// Points that judge a proposal, at the least.
+/// Points that judge a proposal, at the least. From: chosen.
 const JUDGES: usize = 1500;
+
+/// A measurement of a plane lies within this many spreads of its own and this distance of it, metres. From: chosen.
+pub(crate) const BAND: (f64, f64) = (3.0, 0.004);
 
 #[derive(Clone, Copy)]
 pub(super) struct Plane {
@@ -40,7 +43,7 @@ impl Plane {
 
     /// How far from a plane a measurement with a spread may lie, metres.
     pub fn band_of(sigma_m: f64) -> f64 {
-        3.0 * sigma_m + 0.004
+        BAND.0 * sigma_m + BAND.1
     }
 }
 
@@ -157,28 +160,33 @@ struct Judges {
 
 impl Judges {
     fn of(samples: &[Sample]) -> Judges {
+        /// Spreads of a judge, beside the distance that a measurement may have, up to which it speaks for a plane. From: chosen.
+        const SPREADS: f64 = 2.0;
         let judges = || samples.iter().step_by((samples.len() / JUDGES).max(1));
         let axis = |k: usize| judges().map(|s| s.point[k]).collect();
-        let per_band = judges().map(|s| 1.0 / (2.0 * s.sigma_m + 0.004)).collect();
+        let per_band = judges().map(|s| 1.0 / (SPREADS * s.sigma_m + BAND.1)).collect();
         Judges { coordinates: [axis(0), axis(1), axis(2)], per_band }
     }
 
     /// How much speaks for the plane: of each judge the more the nearer it is (Torr and Zisserman 2000), so that a plane that leans through
     /// two steps has less than that of one. `None` as soon as it cannot be more than `beaten`.
     fn near(&self, plane: &Plane, beaten: f64) -> Option<f64> {
+        /// Judges after which a plane may be left. From: work.
         const BLOCK: usize = 128;
+        /// Sums side by side. From: work.
+        const LANES: usize = 8;
         let [x, y, z] = self.coordinates.each_ref().map(|axis| axis.chunks(BLOCK));
         let (mut found, mut left) = (0.0, self.per_band.len());
         for (((x, y), z), per_band) in x.zip(y).zip(z).zip(self.per_band.chunks(BLOCK)) {
             if found + left as f64 <= beaten {
                 return None;
             }
-            let mut near = [0.0; 8];
+            let mut near = [0.0; LANES];
             let places = x.iter().zip(y).zip(z).zip(per_band).enumerate();
             for (k, (((x, y), z), per_band)) in places {
                 let along = plane.normal.x * x + plane.normal.y * y + plane.normal.z * z;
                 let off = (along - plane.offset) * per_band;
-                near[k % 8] += (1.0 - off * off).max(0.0);
+                near[k % LANES] += (1.0 - off * off).max(0.0);
             }
             found += near.iter().sum::<f64>();
             left -= per_band.len();
@@ -194,6 +202,8 @@ fn propose(
     rng: &mut Draws,
     plausible: &impl Fn(&Plane) -> bool,
 ) -> Option<Plane> {
+    /// Points tell no plane if twice the area between them is less, square metres. From: chosen.
+    const FLAT_M2: f64 = 1e-4;
     let judges = Judges::of(left);
     let mut best: Option<(f64, Plane)> = None;
     for _ in 0..PROPOSALS {
@@ -201,7 +211,7 @@ fn propose(
         let near = cubes.around(first);
         let mut pick = || left[near[rng.below(near.len())] as usize].point;
         let (a, b, c) = (left[first].point, pick(), pick());
-        let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-4) else { continue };
+        let Some(normal) = (b - a).cross(&(c - a)).try_normalize(FLAT_M2) else { continue };
         let plane = Plane { normal, offset: normal.dot(&a.coords) };
         if !plausible(&plane) {
             continue;
@@ -217,8 +227,11 @@ fn propose(
 
 /// Weighted least squares on the points near the plane, repeated with a narrowing band.
 fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
-    for band in [4.0, 3.0, 2.5, 2.5] {
-        let near = samples.iter().filter(|s| plane.distance(&s.point).abs() < band * s.sigma_m + 0.003);
+    /// Spreads of a measurement, one a step, and a distance, metres. From: chosen.
+    const BANDS: [f64; 4] = [4.0, 3.0, 2.5, 2.5];
+    const BESIDE_M: f64 = 0.003;
+    for band in BANDS {
+        let near = samples.iter().filter(|s| plane.distance(&s.point).abs() < band * s.sigma_m + BESIDE_M);
         plane = least_squares(near, &plane.normal)?;
     }
     Some(plane)

@@ -4,7 +4,7 @@
 //! ends, something stands before it or a wall rises from it.
 
 use super::planes::Sample;
-use super::{Level, Surface, SurfaceOptions};
+use super::{Level, MOST, Surface, SurfaceOptions, TALLEST_M};
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
@@ -97,38 +97,37 @@ impl fmt::Display for Sign {
     }
 }
 
-/// Rays that are looked at for each camera.
+/// Rays that are looked at for each camera. From: chosen.
 const RAYS: usize = 5000;
 /// Returns lie lower than a surface if they do by so much, metres, and by so much more per metre from its middle: sensors bend what is far.
+/// From: chosen.
 const LOWER_M: f64 = 0.06;
 const LOWER_PER_M: f64 = 0.03;
-/// So many rays and such a share of all that return, past the edge, are no accident.
+/// So many rays and such a share of all that return, past the edge, are no accident. From: chosen.
 const PAST_RAYS: usize = 15;
 const PAST_SHARE: f64 = 0.005;
-/// Surfaces are parallel if their normals differ by no more, cosine of 8 degrees.
+/// Surfaces are parallel if their normals differ by no more, cosine of 8 degrees. From: chosen.
 const PARALLEL: f64 = 0.99;
-/// What a thing stands on is seen around it within so far, by so many rays, and as level as this, metres.
+/// What a thing stands on is seen around it within so far, by so many rays, and as level as this, metres. From: chosen.
 const AROUND_M: f64 = 0.1;
 const AROUND_RAYS: usize = 5;
 const LEVEL_M: f64 = 0.012;
-/// What is lower than this on another surface is a thing, or on the floor a step, metres.
+/// What is lower than this on another surface is a thing, or on the floor a step, metres. From: chosen.
 const THING_M: (f64, f64) = (0.015, 0.3);
-/// What is lower than this on a table is a thing unless something was seen beneath it, metres.
-const TALL_THING_M: f64 = 0.6;
-/// Boards that keep what is on them are measured as well as this, root mean square, metres.
+/// Boards that keep what is on them are measured as well as this, root mean square, metres. From: chosen.
 const BOARD_RESIDUAL_M: f64 = 0.015;
-/// So many samples so far within an outline and below it were seen beneath it, metres.
+/// So many samples so far within an outline and below it were seen beneath it, metres. From: chosen.
 const BENEATH: usize = 15;
 const BENEATH_M: (f64, f64) = (0.05, 0.08);
-/// What is narrower is a rail or the top of a wall, metres.
+/// What is narrower is a rail or the top of a wall, metres. From: chosen.
 const NARROW_M: f64 = 0.12;
-/// The floor is looked down on from at least so high, and lies at least so far below a surface to stand things on, metres.
+/// The floor is looked down on from at least so high, and lies at least so far below a surface to stand things on, metres. From: chosen.
 const EYE_M: f64 = 0.8;
 const UNDER_M: f64 = 0.25;
-/// How far the floor reaches in view if something stands on it, metres, and its area if nothing does, square metres.
+/// How far the floor reaches in view if something stands on it, metres, and its area if nothing does, square metres. From: chosen.
 const REACH_M: f64 = 1.2;
 const WIDE_M2: f64 = 2.5;
-/// A height band no wider than this speaks of tables alone, metres.
+/// A height band no wider than this speaks of tables alone, metres. From: chosen.
 const TELLING_M: f64 = 1.0;
 
 /// Where a return was seen from, if that is known, and where it lies.
@@ -254,7 +253,8 @@ fn supports(
     }
     let is_solid = !surface.is_open_beneath(samples);
     let lies_on = |other: &Surface| {
-        let tall_m = if past[n].is_some() && is_solid { TALL_THING_M } else { THING_M.1 };
+        // What is no taller than things are, on a table, is one unless something was seen beneath it.
+        let tall_m = if past[n].is_some() && is_solid { TALLEST_M } else { THING_M.1 };
         let by_m = other.height_m(&surface.middle());
         (by_m > THING_M.0 && by_m < tall_m && surface.stands_on(other, rays)).then_some(by_m)
     };
@@ -281,7 +281,7 @@ fn is_mirrored(n: usize, surfaces: &[Surface], eyes: &[Point3<f64>]) -> bool {
             high > 0.0 && low < -LOWER_M && outline.covers(&(eye + (*p - eye) * (high / (high - low))), 0.0)
         };
         let most = |eye: &Point3<f64>| {
-            surface.hull.iter().filter(|p| crosses(eye, p)).count() * 10 >= surface.hull.len() * 7
+            surface.hull.iter().filter(|p| crosses(eye, p)).count() * MOST.1 >= surface.hull.len() * MOST.0
         };
         !eyes.is_empty() && eyes.iter().all(most)
     };
@@ -381,6 +381,6 @@ impl Surface {
                 past += usize::from(outline.covers(&crossing, AROUND_M));
             }
         }
-        on >= AROUND_RAYS && on * 10 >= (on + past) * 7
+        on >= AROUND_RAYS && on * MOST.1 >= (on + past) * MOST.0
     }
 }

@@ -51,7 +51,7 @@ impl Frustum {
         Frustum { x: round.x, y: round.y, base_m, top_m, foot_m, rim_m, wall_m: None }
     }
 
-    /// The depths at which a ray enters and leaves the infinite cone about its side, drawn in by `wall_m`.
+    /// The depths at which a ray crosses the infinite cone about its side, drawn in by `wall_m`, the lesser first.
     #[inline(always)]
     fn cone(&self, from: [f64; 3], [dx, dy, dz]: [f64; 3], wall_m: f64) -> Option<[f64; 2]> {
         /// Nothing is lower, metres. From: rounding.
@@ -60,26 +60,30 @@ impl Frustum {
         let (radius, widens) = (self.foot_m - wall_m + slope * from[2], slope * dz);
         let a = dx * dx + dy * dy - widens * widens;
         let b = from[0] * dx + from[1] * dy - radius * widens;
-        let root = b * b - a * (from[0] * from[0] + from[1] * from[1] - radius * radius);
-        (root > 0.0 && a > 0.0).then(|| [(-b - root.sqrt()) / a, (-b + root.sqrt()) / a])
+        let c = from[0] * from[0] + from[1] * from[1] - radius * radius;
+        let root = b * b - a * c;
+        if root <= 0.0 || a == 0.0 {
+            return None;
+        }
+        let ends = [(-b - root.sqrt()) / a, (-b + root.sqrt()) / a];
+        Some(if a > 0.0 { ends } else { [ends[1], ends[0]] })
     }
 }
 
 impl Body for Frustum {
     fn depth_m(&self, ray: &Ray) -> f64 {
         let from = [ray.from[0] - self.x, ray.from[1] - self.y, ray.from[2] - self.base_m];
-        let (height, fall) = (self.top_m - self.base_m, ray.along[2]);
-        let Some([enters, leaves]) = self.cone(from, ray.along, 0.0) else { return f64::INFINITY };
-        let at = from[2] + enters * fall;
-        if (0.0..=height).contains(&at) {
-            return enters;
-        }
+        let (height, [dx, dy, fall]) = (self.top_m - self.base_m, ray.along);
+        let is_side = |at: &f64| *at > 0.0 && (0.0..=height).contains(&(from[2] + at * fall));
         let over = (height - from[2]) / fall;
-        if at < height || fall >= 0.0 || over > leaves {
-            return f64::INFINITY;
+        let (x, y) = (from[0] + over * dx, from[1] + over * dy);
+        if fall >= 0.0 || over < 0.0 || x * x + y * y > self.rim_m * self.rim_m {
+            let ends = self.cone(from, ray.along, 0.0);
+            return ends.and_then(|ends| ends.into_iter().find(is_side)).unwrap_or(f64::INFINITY);
         }
         let Some(wall_m) = self.wall_m else { return over };
-        let back = self.cone(from, ray.along, wall_m).map_or(leaves, |[_, leaves]| leaves);
+        let ends = self.cone(from, ray.along, wall_m).unwrap_or([f64::INFINITY; 2]);
+        let back = ends.into_iter().filter(|at| *at > over).fold(f64::INFINITY, f64::min);
         back.min((wall_m - from[2]) / fall).max(over)
     }
 }
@@ -97,5 +101,42 @@ impl Body for Cuboid {
             leaves = leaves.min(a.max(b));
         }
         if enters < leaves { enters } else { f64::INFINITY }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CUP: Frustum =
+        Frustum { x: 0.2, y: -0.1, base_m: 0.0, top_m: 0.1, foot_m: 0.03, rim_m: 0.04, wall_m: Some(0.003) };
+
+    /// Checks how far a ray comes that begins somewhere and goes to somewhere else, as a share of that way.
+    fn check(body: &impl Body, from: [f64; 3], to: [f64; 3], share: f64) {
+        let ray = Ray { from, along: [0, 1, 2].map(|k| to[k] - from[k]) };
+        let met = body.depth_m(&ray);
+        assert!((met - share).abs() < 1e-9 || met == share, "from {from:?} to {to:?}: {met}, not {share}");
+    }
+
+    #[test]
+    fn rays_meet_a_cup_outside_inside_and_at_its_floor() {
+        // Its side at half its height, from +x; past it; over its rim onto the far wall, and straight down onto its floor.
+        check(&CUP, [1.235, -0.1, 0.05], [0.2, -0.1, 0.05], 1.0 / 1.035);
+        check(&CUP, [1.0, 0.0, 0.05], [0.2, 0.0, 0.05], f64::INFINITY);
+        check(&CUP, [0.2 + 0.0365, -0.1, 0.2], [0.2 - 0.0365, -0.1, 0.05 + 0.045], 1.0);
+        check(&CUP, [0.2, -0.1, 1.0], [0.2, -0.1, 0.0], 0.997);
+        let tin = Frustum { wall_m: None, ..CUP };
+        check(&tin, [0.2, -0.1, 1.0], [0.2, -0.1, 0.0], 0.9);
+    }
+
+    #[test]
+    fn rays_meet_a_turned_box() {
+        let (sin, cos) = 0.5_f64.sin_cos();
+        let cuboid =
+            Cuboid { x: 0.3, y: 0.1, turn: (sin, cos), low: [-0.1, -0.05, 0.0], high: [0.1, 0.05, 0.2] };
+        let place = |u: f64, v: f64, z: f64| [0.3 + cos * u - sin * v, 0.1 + sin * u + cos * v, z];
+        check(&cuboid, place(1.1, 0.02, 0.1), place(0.0, 0.02, 0.1), 1.0 / 1.1);
+        check(&cuboid, place(0.03, 0.02, 1.0), place(0.03, 0.02, 0.0), 0.8);
+        check(&cuboid, place(1.1, 0.06, 0.1), place(0.0, 0.06, 0.1), f64::INFINITY);
     }
 }

@@ -49,7 +49,7 @@ pub(super) struct Rays {
 pub(super) struct ViewRays {
     pub from: [f64; 3],
     /// What is added to where a ray goes that wanders by the noise across it, to either side and up.
-    wander: [[f64; 3]; 3],
+    pub wander: [[f64; 3]; 3],
     pub pixels: Vec<Pixel>,
     /// Looks that each of them counts for.
     pub looks: f64,

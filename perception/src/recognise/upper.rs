@@ -65,3 +65,48 @@ impl Upper {
         Upper { open_log, open: share(open), lid: share(lid) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::body::{Body, Ray};
+    use super::super::rays::{Pixel, ViewRays};
+    use super::*;
+
+    /// A view of a body from above and aside, a pixel a step of a hundredth, as if every ray met just that; some share of them another thing.
+    fn view(body: &Frustum, other: usize) -> Rays {
+        let from = [0.8, 0.0, 0.7];
+        let steps = (-12..=12).flat_map(|i| (-12..=12).map(move |j| (f64::from(i), f64::from(j))));
+        let pixels = steps.enumerate().filter_map(|(k, (i, j))| {
+            let along = [-1.0, 0.01 * i, -0.75 + 0.01 * j];
+            let depth_m = body.depth_m(&Ray { from, along });
+            depth_m.is_finite().then_some(Pixel {
+                along,
+                depth_m,
+                sigma_m: 0.002,
+                without: 1.0,
+                other: k % 10 < other,
+            })
+        });
+        let pixels = pixels.collect();
+        Rays { views: vec![ViewRays { from, wander: [[0.0; 3]; 3], pixels, looks: 0.04 }] }
+    }
+
+    #[test]
+    fn an_open_cup_a_tin_and_a_hidden_end_are_told_apart() {
+        let cup = Frustum {
+            x: 0.0,
+            y: 0.0,
+            base_m: 0.0,
+            top_m: 0.1,
+            foot_m: 0.035,
+            rim_m: 0.04,
+            wall_m: Some(0.003),
+        };
+        let tin = Frustum { wall_m: None, ..cup };
+        let [open, closed] = [cup, tin].map(|body| Upper::of(&view(&body, 0), &body));
+        assert!(open.open_log > 2.0 && open.open > 0.7 && open.lid < 0.2, "{open:?}");
+        assert!(closed.open_log < -2.0 && closed.lid > 0.9 && closed.open == 0.0, "{closed:?}");
+        let hidden = Upper::of(&view(&cup, 10), &cup);
+        assert_eq!((hidden.open_log, hidden.open, hidden.lid), (0.0, 0.0, 0.0));
+    }
+}

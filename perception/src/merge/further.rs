@@ -197,36 +197,40 @@ fn digest(view: &View) -> u64 {
     let has = [normals.is_some(), colours.is_some()].map(u64::from);
     let counts = [*stamp_ns as u64, grid.map_or(0, |grid| grid.width as u64), points.len() as u64];
     let words: Vec<u64> = numbers.map(|number| number.to_bits()).chain(counts).chain(has).collect();
-    let mut digest = Digest([0; LANES]);
-    digest.take(bytemuck::cast_slice(&words));
-    digest.take(bytemuck::cast_slice(points));
-    digest.take(bytemuck::cast_slice(normals.as_deref().unwrap_or_default()));
-    digest.take(bytemuck::cast_slice(colours.as_deref().unwrap_or_default()));
-    digest.0.into_iter().fold(0, mixed)
+    let parts: [&[u8]; 4] = [
+        bytemuck::cast_slice(&words),
+        bytemuck::cast_slice(points),
+        bytemuck::cast_slice(normals.as_deref().unwrap_or_default()),
+        bytemuck::cast_slice(colours.as_deref().unwrap_or_default()),
+    ];
+    parts.into_iter().fold(0, |digest, bytes| mixed(digest, digest_of(bytes)))
 }
 
-/// Numbers that words are mixed into, side by side: none waits for another.
-struct Digest([u64; LANES]);
-
-const LANES: usize = 8;
-
-impl Digest {
-    fn take(&mut self, bytes: &[u8]) {
-        let (words, last) = bytes.as_chunks::<8>();
-        let (rows, rest) = words.as_chunks::<LANES>();
-        let mut mix = |row: &[[u8; 8]]| {
-            self.0.iter_mut().zip(row).for_each(|(lane, word)| *lane = mixed(*lane, u64::from_ne_bytes(*word)));
-        };
-        rows.iter().for_each(|row| mix(row));
-        let mut end = [0; 8];
-        end[..last.len()].copy_from_slice(last);
-        mix(rest);
-        mix(&[end]);
+/// Bytes in one number. Four parts of them are read side by side, and their words mixed in lanes: no memory and no product is waited for.
+fn digest_of(bytes: &[u8]) -> u64 {
+    const LANES: usize = 4;
+    let (words, last) = bytes.as_chunks::<8>();
+    let (rows, rest) = words.as_chunks::<LANES>();
+    let quarter = rows.len() / 4;
+    let mut lanes = [[0_u64; LANES]; 4];
+    let mut mix = |part: usize, row: &[[u8; 8]]| {
+        let lanes = lanes[part].iter_mut().zip(row);
+        lanes.for_each(|(lane, word)| *lane = mixed(*lane, u64::from_ne_bytes(*word)));
+    };
+    let parts: [&[_]; 4] = std::array::from_fn(|part| &rows[part * quarter..(part + 1) * quarter]);
+    for at in 0..quarter {
+        parts.iter().enumerate().for_each(|(part, rows)| mix(part, &rows[at]));
     }
+    rows[4 * quarter..].iter().for_each(|row| mix(0, row));
+    let mut end = [0; 8];
+    end[..last.len()].copy_from_slice(last);
+    mix(1, rest);
+    mix(2, &[end]);
+    lanes.into_iter().flatten().fold(0, mixed)
 }
 
 #[inline(always)]
-fn mixed(lane: u64, word: u64) -> u64 {
+fn mixed(digest: u64, word: u64) -> u64 {
     // Turned, so that the highest bits count as much as all others.
-    (lane.rotate_left(26) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+    (digest.rotate_left(26) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }

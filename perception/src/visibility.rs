@@ -8,6 +8,7 @@ use crate::segment::quantile;
 use crate::spread::tangents;
 use crate::view::View;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use std::sync::Arc;
 
 /// What one camera, or the best of several, knows of a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -30,7 +31,7 @@ pub struct DepthMap {
     /// World to optical frame.
     pub camera_from_world: Isometry3<f64>,
     /// Depth along z in metres, row by row; NaN where there was no return.
-    pub depths_m: Vec<f32>,
+    pub depths_m: Arc<[f32]>,
 }
 
 /// All that the cameras of a scene saw.
@@ -77,7 +78,7 @@ impl DepthMap {
                 *depth = q.z as f32;
             }
         }
-        DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m }
+        DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m: depths_m.into() }
     }
 
     /// Position of the camera in the world, metres.

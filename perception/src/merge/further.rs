@@ -72,9 +72,9 @@ impl Merger {
             let further = base.ok().and_then(|base| self.further(base, &views[..n], options));
             base = further.map_or_else(|| self.anew(&views[..n], options), Ok);
         }
-        let base = base?;
+        let mut base = base?;
         let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
-        let merged = merged(&base.gathered, seen, base.fits.clone(), base.steps.clone());
+        let merged = merged(&mut base.gathered, seen, base.fits.clone(), base.steps.clone());
         // With one more all are merged anew: then nothing of this is wanted.
         self.base = (together(views.len() + 1) <= views.len()).then_some(base);
         Ok(merged)
@@ -187,37 +187,49 @@ fn beside(poses: &[Isometry3<f64>]) -> Vec<bool> {
 
 /// All that merging takes of a view, in one number.
 fn digest(view: &View) -> u64 {
-    let mut digest = Digest([0; LANES]);
-    let pose = &view.world_from_camera;
-    let camera = view.intrinsics.map(|c| [c.width as f64, c.height as f64, c.fx, c.fy, c.cx, c.cy]);
+    let View { cloud, intrinsics, world_from_camera: pose, pose_sigma_m, pose_sigma_rad, stamp_ns } = view;
+    let Cloud { points, grid, colours, normals, .. } = cloud;
+    let camera = intrinsics.map(|c| [c.width as f64, c.height as f64, c.fx, c.fy, c.cx, c.cy]);
     let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
-    let numbers = numbers.chain([&view.pose_sigma_m, &view.pose_sigma_rad]).chain(camera.iter().flatten());
-    numbers.for_each(|number| digest.take([number.to_bits(); LANES]));
-    let Cloud { points, grid, colours, normals, .. } = &view.cloud;
-    digest.take([view.stamp_ns as u64, grid.map_or(0, |grid| grid.width as u64), points.len() as u64]);
-    let (pairs, last) = points.as_chunks::<2>();
-    for [p, q] in pairs {
-        digest.take([0, 1, 2].map(|k| u64::from(p[k].to_bits()) << 32 | u64::from(q[k].to_bits())));
-    }
-    last.iter().for_each(|p| digest.take([p.x, p.y, p.z].map(|c| u64::from(c.to_bits()))));
-    normals.iter().flatten().for_each(|n| digest.take([n.x, n.y, n.z].map(|c| u64::from(c.to_bits()))));
-    colours.iter().flatten().for_each(|colour| digest.take(colour.map(u64::from)));
-    let [one, other, third] = digest.0;
-    one ^ other.rotate_left(21) ^ third.rotate_left(42)
+    let numbers = numbers.chain([pose_sigma_m, pose_sigma_rad]).chain(camera.iter().flatten());
+    let has = [normals.is_some(), colours.is_some()].map(u64::from);
+    let counts = [*stamp_ns as u64, grid.map_or(0, |grid| grid.width as u64), points.len() as u64];
+    let words: Vec<u64> = numbers.map(|number| number.to_bits()).chain(counts).chain(has).collect();
+    let parts: [&[u8]; 4] = [
+        bytemuck::cast_slice(&words),
+        bytemuck::cast_slice(points),
+        bytemuck::cast_slice(normals.as_deref().unwrap_or_default()),
+        bytemuck::cast_slice(colours.as_deref().unwrap_or_default()),
+    ];
+    parts.into_iter().fold(0, |digest, bytes| mixed(digest, digest_of(bytes)))
 }
 
-/// Numbers that words are mixed into, side by side: none waits for another.
-struct Digest([u64; LANES]);
-
-/// How many words are mixed in at once. From: work.
-const LANES: usize = 3;
-
-impl Digest {
-    #[inline(always)]
-    fn take(&mut self, words: [u64; LANES]) {
-        for (lane, word) in self.0.iter_mut().zip(words) {
-            // Turned, so that the highest bits count as much as all others.
-            *lane = (lane.rotate_left(26) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        }
+/// Bytes in one number. Four parts of them are read side by side, and their words mixed in lanes: no memory and no product is waited for.
+fn digest_of(bytes: &[u8]) -> u64 {
+    /// Words that are mixed in side by side. From: work.
+    const LANES: usize = 4;
+    let (words, last) = bytes.as_chunks::<8>();
+    let (rows, rest) = words.as_chunks::<LANES>();
+    let quarter = rows.len() / 4;
+    let mut lanes = [[0_u64; LANES]; 4];
+    let mut mix = |part: usize, row: &[[u8; 8]]| {
+        let lanes = lanes[part].iter_mut().zip(row);
+        lanes.for_each(|(lane, word)| *lane = mixed(*lane, u64::from_ne_bytes(*word)));
+    };
+    let parts: [&[_]; 4] = std::array::from_fn(|part| &rows[part * quarter..(part + 1) * quarter]);
+    for at in 0..quarter {
+        parts.iter().enumerate().for_each(|(part, rows)| mix(part, &rows[at]));
     }
+    rows[4 * quarter..].iter().for_each(|row| mix(0, row));
+    let mut end = [0; 8];
+    end[..last.len()].copy_from_slice(last);
+    mix(1, rest);
+    mix(2, &[end]);
+    lanes.into_iter().flatten().fold(0, mixed)
+}
+
+#[inline(always)]
+fn mixed(digest: u64, word: u64) -> u64 {
+    // Turned, so that the highest bits count as much as all others.
+    (digest.rotate_left(26) ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }

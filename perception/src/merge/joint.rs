@@ -72,13 +72,13 @@ pub(super) fn align(
     let _span = tracing::debug_span!("align", views = views.len(), passes = round.passes).entered();
     let asks = |(parts, used): (&Vec<Part>, &bool)| Askers::of(if *used { parts } else { &[] });
     let askers: Vec<Askers> = parts.iter().zip(used).map(asks).collect();
-    let mut pairs = pairs(views, used, poses);
-    pairs.retain(|&(i, j)| moves[i] || moves[j]);
+    let pairs = pairs(views, used, poses);
     let of_view = |i: usize| pairs.iter().filter(|pair| pair.0 == i).count();
     let ask = |&(i, j): &(usize, usize)| {
         Asked::of(&views[i].points, &askers[i], (i, j), round.asked / of_view(i), round)
     };
-    let mut asked: Vec<Asked> = pairs.iter().map(ask).collect();
+    let of_moving = pairs.iter().filter(|&&(i, j)| moves[i] || moves[j]);
+    let mut asked: Vec<Asked> = of_moving.map(ask).collect();
     let mut found = vec![Found::default(); views.len()];
     for pass in 0..round.passes {
         let share = pass as f64 / (round.passes.max(2) - 1) as f64;

@@ -96,7 +96,7 @@ mod tests {
         let intrinsics = Intrinsics { width: 64, height: 48, fx: 100.0, fy: 100.0, cx: 32.0, cy: 24.0 };
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         let world_from_camera = Isometry3::from_parts(Translation3::new(0.0, 0.0, 2.0), down);
-        let depths_m = vec![(2.0 - height_m) as f32; 64 * 48];
+        let depths_m = vec![(2.0 - height_m) as f32; 64 * 48].into();
         DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m }
     }
 

@@ -42,10 +42,6 @@ pub(super) struct Bricks<C> {
     places: Vec<Place>,
     /// Number of the cell of each voxel, brick by brick, x fastest.
     slots: Vec<u32>,
-    /// Of each brick those around it, itself in the middle: x fastest.
-    beside: Vec<[u32; 27]>,
-    /// Which bricks were asked for since [`Bricks::rest`].
-    touched: Vec<bool>,
     /// Layers of voxels in a brick, along z.
     layers: usize,
     pub cells: Vec<C>,
@@ -63,8 +59,6 @@ impl<C> Bricks<C> {
             numbers: FxHashMap::default(),
             places: Vec::new(),
             slots: Vec::new(),
-            beside: Vec::new(),
-            touched: Vec::new(),
             layers: if columns { 1 } else { SIDE },
             cells: Vec::new(),
             recent: [(Place::MAX, NONE); RECENT * RECENT * RECENT],
@@ -117,46 +111,9 @@ impl<C> Bricks<C> {
         if brick == next {
             self.places.push(place);
             self.slots.resize(self.slots.len() + self.voxels(), NONE);
-            self.touched.push(true);
-            self.meet(place, next);
         }
-        self.touched[brick] = true;
         self.recent[recent] = (place, brick as u32);
         brick
-    }
-
-    /// A new brick and those around it come to know each other.
-    fn meet(&mut self, place: Place, brick: usize) {
-        let step = |by: usize, bits: u32| (by as Place).wrapping_sub(1) << bits;
-        let mut beside = [NONE; 27];
-        // Columns have nothing above and below them.
-        for part in if self.layers == 1 { 9..18 } else { 0..27 } {
-            // Beyond the lowest lies a place that is beyond the highest as well: no brick.
-            let next = place
-                .wrapping_add(step(part % 3, 0))
-                .wrapping_add(step(part / 3 % 3, PLACE_BITS))
-                .wrapping_add(step(part / 9, 2 * PLACE_BITS));
-            if let Some(&other) = self.numbers.get(&next) {
-                beside[part] = other;
-                if let Some(others) = self.beside.get_mut(other as usize) {
-                    others[26 - part] = brick as u32;
-                }
-            }
-        }
-        self.beside.push(beside);
-    }
-
-    /// From here on bricks count as touched when they are asked for again.
-    pub fn rest(&mut self) {
-        self.touched.fill(false);
-        self.recent.fill((Place::MAX, NONE));
-    }
-
-    /// True if the brick or one around it was touched.
-    pub fn is_near_touched(&self, brick: usize) -> bool {
-        self.beside[brick]
-            .iter()
-            .any(|&other| self.touched.get(other as usize).is_some_and(|touched| *touched))
     }
 
     /// Number of bricks that hold a cell.
@@ -164,19 +121,13 @@ impl<C> Bricks<C> {
         self.places.len()
     }
 
-    /// Numbers of the cells of a brick, in the order of its voxels.
-    pub fn of(&self, brick: usize) -> impl Iterator<Item = usize> {
-        let slots = &self.slots[brick * self.voxels()..(brick + 1) * self.voxels()];
-        slots.iter().filter(|slot| **slot != NONE).map(|&slot| slot as usize)
-    }
-
     /// Calls `found` for each cell of a brick with its number and those of the cells in the 27 voxels around it, itself among them.
     pub fn visit(&self, brick: usize, mut found: impl FnMut(usize, &[u32])) {
-        let wide: [Layer; WIDE] = std::array::from_fn(|z| self.layer(brick, z));
+        let wide = self.wide(brick);
         let mut around = [0_u32; 27];
-        for z in 1..=SIDE {
+        for z in 1..=self.layers {
             for y in 1..=SIDE {
-                if wide[z][y].iter().fold(NONE, |all, own| all & own) == NONE {
+                if wide[z][y] == [NONE; WIDE] {
                     continue;
                 }
                 let rows: [&[u32; WIDE]; 9] =
@@ -200,27 +151,36 @@ impl<C> Bricks<C> {
         }
     }
 
-    /// Numbers of the cells of a layer of a brick and of those around, by y and x: the first and the last layer are of the bricks below and
-    /// above. Columns have but the second.
-    pub fn layer(&self, brick: usize, z: usize) -> Layer {
+    /// Numbers of the cells of a brick and of a layer of those around: by z, y, x. Of columns, those of the layer in the middle.
+    pub fn wide(&self, brick: usize) -> [[[u32; WIDE]; WIDE]; WIDE] {
+        let place = self.places[brick];
+        // Columns have nothing above and below them.
+        let columns = self.layers == 1;
+        let mut beside = [None; 27];
+        for part in if columns { 9..18 } else { 0..27 } {
+            let step = |by: usize, bits: u32| (by as Place).wrapping_sub(1) << bits;
+            // Beyond the lowest lies a place that is beyond the highest as well: no brick.
+            let next = place
+                .wrapping_add(step(part % 3, 0))
+                .wrapping_add(step(part / 3 % 3, PLACE_BITS))
+                .wrapping_add(step(part / 9, 2 * PLACE_BITS));
+            beside[part] = if next == place { Some(brick as u32) } else { self.numbers.get(&next).copied() };
+        }
         // Of a voxel of the wide brick: which of the three bricks along an axis holds it, and where.
         let at = |w: usize| (w.div_ceil(SIDE), (w + SIDE - 1) % SIDE);
-        let (above, z) = at(z);
-        let mut layer = [[NONE; WIDE]; WIDE];
-        for (y, row) in layer.iter_mut().enumerate() {
-            let (behind, y) = at(y);
-            let of = |aside: usize| {
-                let brick = self.beside[brick][(above * 3 + behind) * 3 + aside];
-                let first = (brick != NONE).then_some(brick as usize * self.voxels())?;
-                self.slots[first + (z * SIDE + y) * SIDE..].first_chunk::<SIDE>()
-            };
-            row[0] = of(0).map_or(NONE, |slots| slots[SIDE - 1]);
-            row[SIDE + 1] = of(2).map_or(NONE, |slots| slots[0]);
-            row[1..=SIDE].copy_from_slice(of(1).unwrap_or(&[NONE; SIDE]));
+        let mut wide = [[[NONE; WIDE]; WIDE]; WIDE];
+        for (z, layer) in wide.iter_mut().enumerate().filter(|(z, _)| !columns || *z == 1) {
+            for (y, row) in layer.iter_mut().enumerate() {
+                let ((above, z), (behind, y)) = (at(z), at(y));
+                let of = |aside: usize| {
+                    let first = beside[(above * 3 + behind) * 3 + aside]? as usize * self.voxels();
+                    self.slots[first + (z * SIDE + y) * SIDE..].first_chunk::<SIDE>()
+                };
+                row[0] = of(0).map_or(NONE, |slots| slots[SIDE - 1]);
+                row[SIDE + 1] = of(2).map_or(NONE, |slots| slots[0]);
+                row[1..=SIDE].copy_from_slice(of(1).unwrap_or(&[NONE; SIDE]));
+            }
         }
-        layer
+        wide
     }
 }
-
-/// Numbers of cells by y and x.
-pub(super) type Layer = [[u32; WIDE]; WIDE];

@@ -72,9 +72,9 @@ impl Merger {
             let further = base.ok().and_then(|base| self.further(base, &views[..n], options));
             base = further.map_or_else(|| self.anew(&views[..n], options), Ok);
         }
-        let mut base = base?;
+        let base = base?;
         let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
-        let merged = merged(&mut base.gathered, seen, base.fits.clone(), base.steps.clone());
+        let merged = merged(&base.gathered, seen, base.fits.clone(), base.steps.clone());
         // With one more all are merged anew: then nothing of this is wanted.
         self.base = (together(views.len() + 1) <= views.len()).then_some(base);
         Ok(merged)

@@ -8,7 +8,6 @@ use super::bricks::{Bricks, Grid};
 use super::parts::Plane;
 use super::prepare::Prepared;
 use super::returns::{Return, Returns};
-use super::settle::Settled;
 use crate::cloud::Cloud;
 use crate::view::View;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
@@ -29,7 +28,7 @@ pub(super) struct Cell {
 
 impl Cell {
     /// Measured by no view. From: mark.
-    pub const EMPTY: Cell = Cell {
+    const EMPTY: Cell = Cell {
         weight: 0.0,
         at: Vector3::new(0.0, 0.0, 0.0),
         normal: Vector3::new(0.0, 0.0, 0.0),
@@ -77,7 +76,6 @@ pub(super) struct Gathered {
     /// Weighted sums of the colours of each cell, if there are any.
     pub colours: Vec<Vector3<f32>>,
     pub returns: usize,
-    pub settled: Settled,
 }
 
 pub(super) struct Fused {
@@ -228,15 +226,7 @@ impl Gathered {
         let reach = Vector3::repeat(options.range_m + voxel_m);
         let grid = Grid::over(&(low - reach), &(high + reach), voxel_m);
         let flat = on.is_some();
-        Gathered {
-            grid,
-            axes_from_world,
-            flat,
-            bricks: Bricks::new(flat),
-            colours: Vec::new(),
-            returns: 0,
-            settled: Settled::default(),
-        }
+        Gathered { grid, axes_from_world, flat, bricks: Bricks::new(flat), colours: Vec::new(), returns: 0 }
     }
 
     /// Adds returns, and takes them out of the list. A pass for each thing that is waited for: what comes from far memory is asked for many

@@ -1,8 +1,7 @@
 //! Step 5, second half: the voxels moved onto their common surface.
 //!
 //! Every voxel is moved along its normal onto the weighted mean of the like-facing voxels beside it, every column of a sheet along the sheet's
-//! normal onto that of the columns beside it. What a single view claims and another looked through is left out. What no view has touched
-//! since it was settled stays as it is.
+//! normal onto that of the columns beside it. What a single view claims and another looked through is left out.
 
 use super::bricks::{Bricks, NONE, SIDE, WIDE};
 use super::check;
@@ -21,23 +20,17 @@ const VOXEL_SPREAD_M: f32 = 0.003;
 /// From: derived, as where views are held against each other.
 const CARVE_M: f64 = check::CLEAR_M;
 
-/// What is known of gathered cells since they were settled last, by their numbers.
-#[derive(Default)]
-pub(super) struct Settled {
-    means: Vec<Cell>,
-    /// Where they belong, world frame, metres.
-    at: Vec<Point3<f32>>,
-    /// Which of them a camera looked through while a single view claimed them ...
-    through: Vec<bool>,
-    /// ... and which none did, of the first so many.
-    alone: Vec<u32>,
-    asked: usize,
+/// A fused point, world frame.
+#[derive(Clone)]
+struct Settled {
+    at: Point3<f32>,
+    normal: Vector3<f32>,
+    colour: [u8; 3],
+    views: u16,
 }
 
 /// One cloud of what was gathered.
-pub(super) fn settle(all: &mut [Gathered], seen: &Visibility) -> Fused {
-    let gazes = seen.gazes();
-    all.iter_mut().for_each(|gathered| gathered.settle(&gazes));
+pub(super) fn settle(all: &[Gathered], seen: &Visibility) -> Fused {
     let most = all.iter().map(|gathered| gathered.bricks.cells.len()).sum();
     let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
     let mut fused = Fused {
@@ -47,113 +40,80 @@ pub(super) fn settle(all: &mut [Gathered], seen: &Visibility) -> Fused {
         voxel_m: all[0].grid.voxel_m,
     };
     let mut normals = Vec::with_capacity(most);
-    let mut colours = Vec::with_capacity(if coloured { most } else { 0 });
-    for gathered in all.iter() {
-        let turn = gathered.axes_from_world.inverse().to_rotation_matrix().cast::<f32>();
-        let Settled { means, at, through, .. } = &gathered.settled;
-        for number in (0..gathered.bricks.len()).flat_map(|brick| gathered.bricks.of(brick)) {
-            let (cell, at) = (&means[number], at[number]);
-            if (cell.views < 2 && through[number]) || !is_finite(&at) {
-                continue;
+    let mut colours = coloured.then(|| Vec::with_capacity(most));
+    for gathered in all {
+        gathered.settle(seen, |kept| {
+            fused.cloud.points.extend(kept.iter().map(|settled| settled.at));
+            normals.extend(kept.iter().map(|settled| settled.normal));
+            fused.views_per_point.extend(kept.iter().map(|settled| settled.views));
+            if let Some(colours) = &mut colours {
+                colours.extend(kept.iter().map(|settled| settled.colour));
             }
-            fused.cloud.points.push(at);
-            let none = cell.normal == Vector3::zeros();
-            normals.push(if none { Vector3::repeat(f32::NAN) } else { turn * cell.normal });
-            fused.views_per_point.push(cell.views);
-            if coloured {
-                // Half up by cutting off: rounding is a call on some processors.
-                let mean = (gathered.colours[number] / cell.weight).map(|c| (c + 0.5) as u8);
-                colours.push(<[u8; 3]>::from(mean));
-            }
-        }
+        });
     }
     fused.cloud.normals = Some(normals);
-    fused.cloud.colours = coloured.then_some(colours);
+    fused.cloud.colours = colours;
     fused
 }
 
 impl Gathered {
-    /// Settles what was touched since the last time.
-    fn settle(&mut self, gazes: &[Gaze]) {
+    /// Gives what is left of the cells, some at a time.
+    fn settle(&self, seen: &Visibility, mut give: impl FnMut(&[Settled])) {
         /// Bricks that one thread settles in a row, and such rows at a time: what they fill is used again. From: work.
         const TOGETHER: usize = 64;
         const ROWS: usize = 32;
-        let first_new = self.settled.means.len();
-        let changed = self.take_means();
-        self.look_through(gazes, first_new);
-        let Gathered { grid, axes_from_world, flat, bricks, settled, .. } = self;
-        let Settled { means, at, .. } = settled;
+        let Gathered { grid, axes_from_world, flat, bricks, colours: sums, .. } = self;
         let world_from_axes = axes_from_world.inverse().to_rotation_matrix();
-        let stale: Vec<usize> = (0..bricks.len()).filter(|&brick| bricks.is_near_touched(brick)).collect();
-        let mut rows: Vec<Vec<(usize, Point3<f32>)>> = vec![Vec::new(); ROWS];
-        for some in stale.chunks(TOGETHER * ROWS) {
-            rows.par_iter_mut().zip(some.par_chunks(TOGETHER)).for_each(|(row, some)| {
-                row.clear();
-                let mut keep = |number: usize, at: Vector3<f32>| {
-                    let at = world_from_axes * Point3::from(grid.origin_m + at.cast::<f64>() * grid.voxel_m);
-                    row.push((number, at.cast()));
-                };
-                for &brick in some {
-                    match *flat {
-                        true => level(bricks, means, brick, &mut keep),
-                        false => bricks.visit(brick, |number, around| {
-                            if around.iter().any(|&near| changed[near as usize]) {
-                                keep(number, smoothed(&means[number], around, means, grid.voxel_m as f32));
-                            }
-                        }),
-                    }
+        let turn = world_from_axes.cast::<f32>();
+        let cells: Vec<Cell> = bricks.cells.iter().map(Cell::mean).collect();
+        let colour = |number: usize| {
+            // Half up by cutting off: rounding is a call on some processors.
+            let mean = sums.get(number).map(|sum| (sum / cells[number].weight).map(|c| (c + 0.5) as u8));
+            mean.map(<[u8; 3]>::from).unwrap_or_default()
+        };
+        let gazes = seen.gazes();
+        let settle_row = |row: usize, kept: &mut Vec<Settled>| {
+            kept.clear();
+            let mut keep = |number: usize, at: Vector3<f32>| {
+                let cell = &cells[number];
+                let at = world_from_axes * Point3::from(grid.origin_m + at.cast::<f64>() * grid.voxel_m);
+                let none = cell.normal == Vector3::zeros();
+                let normal = if none { Vector3::repeat(f32::NAN) } else { turn * cell.normal };
+                kept.push(Settled { at: at.cast(), normal, colour: colour(number), views: cell.views });
+            };
+            for brick in (row * TOGETHER..bricks.len()).take(TOGETHER) {
+                match flat {
+                    true => level(bricks, &cells, brick, &mut keep),
+                    false => bricks.visit(brick, |number, around| {
+                        keep(number, smoothed(&cells[number], around, &cells, grid.voxel_m as f32));
+                    }),
                 }
-            });
-            let rows = &rows[..some.len().div_ceil(TOGETHER)];
-            rows.iter().flatten().for_each(|&(number, settled)| at[number] = settled);
-        }
-        bricks.rest();
-    }
-
-    /// The means of the cells that views have been added to; tells which these are.
-    fn take_means(&mut self) -> Vec<bool> {
-        let Gathered { bricks, settled: Settled { means, at, through, .. }, .. } = self;
-        let cells = &bricks.cells;
-        means.resize(cells.len(), Cell::EMPTY);
-        at.resize(cells.len(), Point3::origin());
-        through.resize(cells.len(), false);
-        let renew = |(mean, cell): (&mut Cell, &Cell)| {
-            let changed = mean.views != cell.views;
-            if changed {
-                *mean = cell.mean();
             }
-            changed
+            drop_looked_through(kept, &gazes);
         };
-        means.iter_mut().zip(cells).map(renew).collect()
-    }
-
-    /// One view's word against another's look through the place: of each place each look is asked once.
-    fn look_through(&mut self, gazes: &[Gaze], first_new: usize) {
-        /// Places that one thread asks about at a time. From: work.
-        const SOME: usize = 1024;
-        let Gathered { grid, axes_from_world, settled, .. } = self;
-        let Settled { means, through, alone, asked, .. } = settled;
-        let world_from_axes = axes_from_world.inverse().to_rotation_matrix();
-        let place = |&number: &u32| -> Point3<f32> {
-            let at = means[number as usize].at.cast::<f64>();
-            (world_from_axes * Point3::from(grid.origin_m + at * grid.voxel_m)).cast()
-        };
-        let is_alone = |number: &u32| means[*number as usize].views < 2;
-        alone.retain(is_alone);
-        let new: Vec<u32> = (first_new as u32..means.len() as u32).filter(is_alone).collect();
-        // A look is not asked about itself alone.
-        let gazes = if gazes.len() > 1 { gazes } else { &[] };
-        for (numbers, gazes) in [(std::mem::take(alone), &gazes[*asked..]), (new, gazes)] {
-            let mut found = vec![false; numbers.len()];
-            numbers.par_chunks(SOME).zip(found.par_chunks_mut(SOME)).for_each(|(some, found)| {
-                let places: Vec<Point3<f32>> = some.iter().map(place).collect();
-                gazes.iter().for_each(|gaze| gaze.pass(&places, CARVE_M, found));
-            });
-            numbers.iter().zip(&found).for_each(|(number, found)| through[*number as usize] = *found);
-            alone.extend(numbers.iter().zip(found).filter(|(_, found)| !found).map(|(number, _)| number));
+        let mut rows: Vec<Vec<Settled>> = vec![Vec::new(); ROWS];
+        let all = bricks.len().div_ceil(TOGETHER);
+        for first in (0..all).step_by(ROWS) {
+            let rows = &mut rows[..ROWS.min(all - first)];
+            rows.par_iter_mut().enumerate().for_each(|(row, kept)| settle_row(first + row, kept));
+            rows.iter().for_each(|kept| give(kept));
         }
-        *asked = gazes.len();
     }
+}
+
+/// One view's word against another's look through the place.
+fn drop_looked_through(kept: &mut Vec<Settled>, gazes: &[Gaze]) {
+    let mut alone: Vec<Point3<f32>> = Vec::new();
+    if gazes.len() > 1 {
+        alone.extend(kept.iter().filter(|settled| settled.views < 2).map(|settled| settled.at));
+    }
+    let mut through = vec![false; alone.len()];
+    gazes.iter().for_each(|gaze| gaze.pass(&alone, CARVE_M, &mut through));
+    let mut through = through.into_iter();
+    kept.retain(|settled| {
+        let through = settled.views < 2 && through.next().unwrap_or(false);
+        !through && is_finite(&settled.at)
+    });
 }
 
 /// The voxel's mean, moved along its normal onto the mean of the like-facing voxels around it.
@@ -176,7 +136,7 @@ fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3
 
 /// Calls `found` for each column of a brick with its number and its mean, moved along z onto the mean of the columns around it.
 fn level(bricks: &Bricks<Cell>, cells: &[Cell], brick: usize, mut found: impl FnMut(usize, Vector3<f32>)) {
-    let numbers = bricks.layer(brick, 1);
+    let numbers = &bricks.wide(brick)[1];
     // Weight and weighted height: of the columns, then of three beside each other.
     let mut sums = [[[0.0_f32; WIDE]; WIDE]; 2];
     for (y, row) in numbers.iter().enumerate() {

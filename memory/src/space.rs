@@ -575,8 +575,11 @@ mod tests {
     fn later_looks_outweigh_earlier_ones() {
         let mut space = seen();
         let intrinsics = Intrinsics { width: 160, height: 120, fx: 130.0, fy: 130.0, cx: 80.0, cy: 60.0 };
-        let away =
-            DepthMap { intrinsics, camera_from_world: Isometry3::identity(), depths_m: vec![3.0; 160 * 120].into() };
+        let away = DepthMap {
+            intrinsics,
+            camera_from_world: Isometry3::identity(),
+            depths_m: vec![3.0; 160 * 120].into(),
+        };
         (0..4).for_each(|_| space.integrate(&away));
         assert_eq!(space.cell(&Point3::new(-0.2, 0.0, 1.0)), Cell::Free, "it was taken away");
     }

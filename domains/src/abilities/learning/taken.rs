@@ -163,8 +163,10 @@ fn take_in(
     let pose = visit.poses.first().copied().unwrap_or(view.world_from_camera);
     let view = Arc::new(View { world_from_camera: pose, ..view.clone() });
     let seen = view.cloud.finite().transformed(&pose);
+    let up = eyes.robot.description().up;
+    let shown = [(&*view, pose)];
     let mut found =
-        again::find(&mind.known.news.clone(), &mut mind.glances, &[(&view, pose)], Vec::new(), |_| true);
+        again::find(&mind.known.news.clone(), &mut mind.glances, (&shown[..], up), Vec::new(), |_| true);
     found.retain(|f| f.judged.confidence >= SURE);
     for appeared in &whole(&mind.known.surfaces, visit.appeared) {
         let surface = mind.known.surfaces.iter().find(|s| is_on(s, &appeared.cloud)).cloned();
@@ -463,8 +465,9 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
     let views: Vec<(&View, Isometry3<f64>)> =
         used.iter().filter_map(|&n| Some((&*of.looks[n].view, poses(n)?))).collect();
     let near = |p: &Point3<f64>| (p - of.centre).norm() < SAME_M.max(of.radius_m());
-    let before = again::find(&mind.known.news.clone(), &mut mind.glances, &views, Vec::new(), near);
     let surface = mind.known.surfaces.iter().find(|s| s.symbol == of.on).cloned();
+    let up = surface.as_ref().map(|s| s.up);
+    let before = again::find(&mind.known.news.clone(), &mut mind.glances, (&views[..], up), Vec::new(), near);
     if let Some((f, surface)) = before.iter().find(|f| f.judged.confidence >= SURE).zip(surface) {
         let (name, confidence) = (mind.known.news.things[f.thing].name.clone(), f.judged.confidence);
         let said = known_again(mind, &surface, f);

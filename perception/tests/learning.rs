@@ -140,7 +140,7 @@ fn a_far_wall_does_not_move_what_is_near() {
         let same = meta.visit(&visit(&off, seed)).expect("a sound visit");
         let moved = same.poses[0].inverse() * truth;
         let (moved_m, turned_rad) = (moved.translation.vector.norm(), moved.rotation.angle());
-        assert!(moved_m < 0.01 && turned_rad < 0.01, "visit {seed}: {moved_m} m, {turned_rad} rad");
+        assert!(moved_m < 0.02 && turned_rad < 0.01, "visit {seed}: {moved_m} m, {turned_rad} rad");
         assert!(same.appeared.is_empty() && same.gone.is_empty(), "visit {seed}");
     }
 }

@@ -109,6 +109,42 @@ fn nothing_is_gone_where_the_camera_errs_by_more_than_is_known() {
     assert_eq!(went.gone.len(), 1);
 }
 
+/// The view with a wall behind the room where nothing came back, as far off as a camera of depth measures at all and as uncertain.
+fn with_far_wall(mut view: View, draws: &mut Draws) -> View {
+    const WALL_M: f64 = 5.0;
+    let pose = view.world_from_camera;
+    for (i, p) in view.cloud.points.iter_mut().enumerate() {
+        let ray = SMALL.unproject((i % SMALL.width) as f64, (i / SMALL.width) as f64, 1.0).coords;
+        let z = (-WALL_M - pose.translation.x) / (pose.rotation * ray).x;
+        if !p.z.is_finite() && z > 0.0 && z < 8.0 {
+            let sigma = 0.0012 + 0.0019 * (z - 0.4).powi(2);
+            *p = Point3::from((ray * (z + sigma * draws.normal())).cast::<f32>());
+        }
+    }
+    view
+}
+
+#[test]
+fn a_far_wall_does_not_move_what_is_near() {
+    let mut draws = Draws(23);
+    let things = [("tin", standing(0.0, -0.22, 0.0)), ("muesli", standing(0.05, 0.2, 1.0))];
+    // Along the room, so that half of what is seen is far behind the table.
+    let truth = looking(Point3::new(1.6, -0.3, 1.4), Point3::new(0.0, 0.0, TABLE_M));
+    let mut visit = |stated: &Isometry3<f64>, seed: u64| {
+        let view = with_far_wall(look(&room(&things), &truth, &truth, seed), &mut draws);
+        vec![View { world_from_camera: *stated, ..view }]
+    };
+    let mut meta = MetaRoom::new(&visit(&truth, 1), NoticeOptions::default()).expect("a sound visit");
+    for seed in 2..5 {
+        let off = disturbed(&truth, 0.01, 0.0175, &mut Draws(seed));
+        let same = meta.visit(&visit(&off, seed)).expect("a sound visit");
+        let moved = same.poses[0].inverse() * truth;
+        let (moved_m, turned_rad) = (moved.translation.vector.norm(), moved.rotation.angle());
+        assert!(moved_m < 0.02 && turned_rad < 0.01, "visit {seed}: {moved_m} m, {turned_rad} rad");
+        assert!(same.appeared.is_empty() && same.gone.is_empty(), "visit {seed}");
+    }
+}
+
 #[test]
 fn stands_are_found_around_obstacles_and_strung_together() {
     let object = Point3::new(0.0, 0.0, 0.8);

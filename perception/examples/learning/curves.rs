@@ -1,7 +1,7 @@
 //! Recognition against coverage (Fig. 5): models learned by the robot beside models made from perfect poses.
 
 use crate::household::{Room, bodies};
-use crate::knowing::{Model, Scene, Tally, is_right, learned_steps, library, offline, scene, some};
+use crate::knowing::{Model, Scene, Tally, is_right, learned_steps, library, offline, options, scene, some};
 use crate::measure::{median, spread};
 use crate::page::{Page, Table};
 use crate::plot::{BLUE, GREEN, Line, ORANGE, Panel, panels, sheet};
@@ -9,7 +9,7 @@ use crate::runs::RunOptions;
 use crate::tabletop::Draws;
 use descry_perception::Cloud;
 use descry_perception::calibration::{Claim, reliability};
-use descry_perception::learning::{Candidate, KnowOptions, choose};
+use descry_perception::learning::{Candidate, choose};
 use descry_perception::voxel;
 use std::time::Instant;
 
@@ -111,7 +111,7 @@ pub fn print(seed: u64, objects: usize, scenes: usize, page: &mut Page) -> Resul
     let mut claims = Vec::new();
     for k in 0..scenes {
         let scene = scene(&bodies, &some(&mut draws, bodies.len(), 4), seed * 90_000 + k as u64);
-        let found = everything.judged(&scene.view, &KnowOptions::default()).map_err(|e| e.to_string())?;
+        let found = everything.judged(&scene.view, &options()).map_err(|e| e.to_string())?;
         for (i, tally) in tallies.iter_mut().enumerate() {
             look_for(i, &variants, &found, &scene, &surfaces, tally, &mut claims);
         }
@@ -149,7 +149,7 @@ fn look_for(
     let rival = |v: &Variant| v.whole && v.kind == Kind::Perfect && v.model.body != body;
     let known =
         found.iter().filter(|c| c.recognised.model == variant || rival(&variants[c.recognised.model]));
-    let told = choose(known.cloned().collect(), KnowOptions::default().least_confidence);
+    let told = choose(known.cloned().collect(), options().least_confidence);
     let own: Vec<(f64, bool)> = told
         .iter()
         .filter(|f| f.model == variant)
@@ -167,7 +167,7 @@ fn seconds(models: &[&Model], seed: u64) -> Result<f64, String> {
     for k in 0..5 {
         let scene = scene(&bodies, &some(&mut draws, bodies.len(), 4), seed * 91_000 + k);
         let start = Instant::now();
-        library.recognise(&scene.view, &KnowOptions::default()).map_err(|e| e.to_string())?;
+        library.recognise(&scene.view, &options()).map_err(|e| e.to_string())?;
         seconds.push(start.elapsed().as_secs_f64());
     }
     Ok(median(&mut seconds))

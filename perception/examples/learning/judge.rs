@@ -1,7 +1,7 @@
 //! What evidence is worth: logistic regression on scenes of other objects than those that are evaluated.
 
 use crate::household::{Body, Room, made::made};
-use crate::knowing::{Model, is_right, learned_steps, library, offline, scene_among, some};
+use crate::knowing::{Model, is_right, learned_steps, library, offline, options, scene_among, some};
 use crate::page::{Page, Table};
 use crate::plot::{BLUE, Line, ORANGE, Panel, panels};
 use crate::runs::RunOptions;
@@ -72,7 +72,7 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
     let mut lines = Vec::new();
     let path = page.file("claims.csv");
     // What is hopeless has to be known as such.
-    let options = KnowOptions { hopeless: 0.0, ..KnowOptions::default() };
+    let options = KnowOptions { hopeless: 0.0, ..options() };
     let mut draws = Draws(seed);
     for k in 0..scenes {
         let things = some(&mut draws, bodies.len(), 5);

@@ -6,7 +6,7 @@ use crate::measure::onto;
 use crate::runs::{RunOptions, radius_m, run, truth};
 use crate::tabletop::Draws;
 use descry_perception::learning::{KnowOptions, LearnOptions, Library, Recognised, learn};
-use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::{Cloud, Neighbours, View};
 use std::f64::consts::TAU;
 
@@ -86,6 +86,11 @@ fn recolour(view: &mut View, draws: &mut Draws) {
 pub struct Model {
     pub body: usize,
     pub cloud: Cloud,
+}
+
+/// How things are recognised where up is z, in models and in scenes.
+pub fn options() -> KnowOptions {
+    KnowOptions { up: Some(Vector3::z_axis()), ..KnowOptions::default() }
 }
 
 /// How many looks a turntable gives, from two heights.
@@ -182,7 +187,7 @@ impl Tally {
 pub fn library(models: &[&Model]) -> Library {
     let mut library = Library::default();
     for model in models {
-        library.add(&model.cloud, &KnowOptions::default()).expect("a learned model has points");
+        library.add(&model.cloud, &options()).expect("a learned model has points");
     }
     library
 }

@@ -1,7 +1,7 @@
 //! Many learned models known at once: time of a recognition, and what is taken for what.
 
 use crate::household::{Body, Room, bodies, made::made};
-use crate::knowing::{Model, Scene, is_right, learned_steps, library, scene, some};
+use crate::knowing::{Model, Scene, is_right, learned_steps, library, options, scene, some};
 use crate::measure::median;
 use crate::page::{Page, Table};
 use crate::plot::{heat, sheet};
@@ -9,7 +9,7 @@ use crate::runs::{RunOptions, radius_m};
 use crate::tabletop::Draws;
 use descry_perception::Cloud;
 use descry_perception::calibration::Claim;
-use descry_perception::learning::{KnowOptions, Recognised, choose};
+use descry_perception::learning::{Recognised, choose};
 use std::time::Instant;
 
 /// How many models are known.
@@ -55,10 +55,10 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
         })
         .collect();
     for scene in &scenes {
-        let found = everything.judged(&scene.view, &KnowOptions::default()).map_err(|e| e.to_string())?;
+        let found = everything.judged(&scene.view, &options()).map_err(|e| e.to_string())?;
         for (count, said) in KNOWN.iter().zip(&mut sums) {
             let of_these = found.iter().filter(|c| c.recognised.model < *count).cloned().collect();
-            let told = choose(of_these, KnowOptions::default().least_confidence);
+            let told = choose(of_these, options().least_confidence);
             said.add(scene, &told, &all, &surfaces, *count);
             if *count >= most {
                 confuse(scene, &told, &all, &mut confusion);
@@ -83,7 +83,7 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
         let mut seconds = Vec::new();
         for scene in scenes.iter().take(TIMED) {
             let start = Instant::now();
-            known.recognise(&scene.view, &KnowOptions::default()).map_err(|e| e.to_string())?;
+            known.recognise(&scene.view, &options()).map_err(|e| e.to_string())?;
             seconds.push(start.elapsed().as_secs_f64());
         }
         let counts = [

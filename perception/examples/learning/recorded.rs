@@ -164,7 +164,7 @@ fn kitchen(dir: &Path, page: &mut Page) -> Result<(), String> {
             learned_from.len(),
             found_in.len()
         ));
-        let options = KnowOptions::default();
+        let options = KnowOptions { up: Some(up), ..KnowOptions::default() };
         let mut library = Library::default();
         let mut known = Vec::new();
         for thing in &things {

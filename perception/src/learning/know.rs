@@ -1,7 +1,7 @@
 //! Learned objects known again (section VI; Aldoma et al. 2013).
 //!
-//! Local features of shape and of pattern are matched by nearest neighbour, matches grouped by the pose that they share, poses refined on the scene's
-//! surface, and what is left is judged by rays and chosen together: no part of the scene is explained twice.
+//! Local features of shape and of pattern are matched by nearest neighbour, matches grouped by the pose that they share, where up is known also by how a
+//! thing stands; poses are refined on the scene's surface, and what is left is judged by rays and chosen together: no part of the scene is explained twice.
 
 pub mod evidence;
 mod feature;
@@ -9,6 +9,7 @@ mod group;
 mod scene;
 pub mod several;
 mod skin;
+mod stood;
 
 use crate::cloud::{Cloud, CloudError};
 use crate::register::{Method, Prepared, RegisterError, RegisterOptions, align};
@@ -16,8 +17,8 @@ use crate::view::View;
 use crate::voxel::VoxelError;
 use evidence::{Evidence, Judge, Verified, first_sight, unbounded, verify};
 use feature::{Features, Kind};
-use group::{Vote, matches, votes};
-use nalgebra::{Isometry3, Point3, Vector3};
+use group::{Vote, matches, standing, votes};
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use rayon::prelude::*;
 use scene::Seen;
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,9 @@ pub struct KnowOptions {
     pub hopeless: f64,
     /// What evidence is worth.
     pub judge: Judge,
+    /// Up in the frames of the models and in the world of the views, if it is the same in all of them: things mostly stand as they stood when they were
+    /// learned.
+    pub up: Option<Unit<Vector3<f64>>>,
 }
 
 impl Default for KnowOptions {
@@ -48,6 +52,7 @@ impl Default for KnowOptions {
             least_confidence: 0.8,
             hopeless: 0.005,
             judge: Judge::default(),
+            up: None,
         }
     }
 }
@@ -113,8 +118,14 @@ const LEAST_POINTS: usize = 60;
 /// Votes of a model that are looked at, refined, and judged.
 const LOOKED_AT: usize = 60;
 const REFINED: usize = 6;
-/// Poses nearer to each other than this are one, metres and radians.
+/// Poses nearer to each other than this are one, metres and radians; and poses that were brought onto the scene by a few points.
 const SAME: (f64, f64) = (0.02, 0.26);
+const SETTLED: (f64, f64) = (0.005, 0.07);
+/// How near the scene is looked for when a pose is brought onto it, from far to near, metres; and where a few points have brought it there.
+const WITHIN_M: [f32; 2] = [0.025, 0.01];
+const SETTLED_WITHIN_M: [f32; 1] = [0.01];
+/// Odds that a thing lies or hangs, to standing as it stood when it was learned. An assumption: nine in ten stand.
+const LYING: f64 = 0.1;
 /// Two answers may share at most this part of the smaller one's explained points.
 const SHARED: f64 = 0.2;
 
@@ -239,27 +250,13 @@ impl Known {
         world_from_camera: &Isometry3<f64>,
         options: &KnowOptions,
     ) -> Result<Vec<Candidate>, KnowError> {
-        let all = described.iter().zip(&self.features).flat_map(|(s, m)| matches(s, m)).collect();
-        let mut votes = votes(all);
-        votes.truncate(LOOKED_AT);
-        let at = |vote: &Vote| first_sight(&self.coarse, &vote.scene_from_model, scene);
-        let mut ranked: Vec<(f64, Vote)> = votes.iter().map(|v| (at(v), *v)).collect();
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut kept: Vec<Vote> = Vec::new();
-        for (_, vote) in ranked {
-            if kept.len() < REFINED && kept.iter().all(|k| !same(&k.scene_from_model, &vote.scene_from_model))
-            {
-                kept.push(vote);
-            }
-        }
+        let up = options.up.map(|up| [*up, world_from_camera.rotation.inverse() * *up]);
         let mut judged = Vec::new();
-        for vote in kept {
-            if self.at_most(&vote, scene, &options.judge)? < options.hopeless {
-                continue;
-            }
-            let pose = refined(&self.skin, &vote.scene_from_model, scene)?;
+        for vote in self.promising(described, scene, up.as_ref(), options)? {
+            let pose = refined(&self.skin, &vote.scene_from_model, scene, &SETTLED_WITHIN_M)?;
             let Verified { evidence, claims } = verify(&self.skin, &pose, scene, vote.matches);
-            let confidence = options.judge.confidence(&evidence);
+            let stands = up.is_none_or(|up| stood::stands(&self.skin, &pose, scene, &up));
+            let confidence = options.confidence(&evidence, stands);
             let world_from_model = world_from_camera * pose;
             let recognised = Recognised { model: number, world_from_model, confidence, evidence };
             judged.push(Candidate { recognised, explained: claims });
@@ -267,25 +264,77 @@ impl Known {
         Ok(judged)
     }
 
-    /// The confidence that a vote may come to by a few of the model's points, as it is or brought onto the scene; one if too few of them can be seen.
-    fn at_most(&self, vote: &Vote, scene: &Seen, judge: &Judge) -> Result<f64, KnowError> {
+    /// Poses that matches vote for, brought onto the scene by a few of the model's points, if they are not hopeless by these. Votes that come to one pose are
+    /// one. `up` is up in the model and in the scene.
+    fn promising(
+        &self,
+        described: &[Features; 2],
+        scene: &Seen,
+        up: Option<&[Vector3<f64>; 2]>,
+        options: &KnowOptions,
+    ) -> Result<Vec<Vote>, KnowError> {
+        let mut all: Vec<_> = described.iter().zip(&self.features).flat_map(|(s, m)| matches(s, m)).collect();
+        let mut votes = votes(&mut all);
+        votes.truncate(LOOKED_AT);
+        votes.extend(up.iter().flat_map(|up| standing(&all, up, LOOKED_AT)));
+        let at = |vote: &Vote| first_sight(&self.coarse, &vote.scene_from_model, scene);
+        let mut ranked: Vec<(f64, Vote)> = votes.iter().map(|v| (at(v), *v)).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut kept: Vec<Vote> = Vec::new();
+        for (_, vote) in ranked {
+            let is_known = |k: &Vote| same(&k.scene_from_model, &vote.scene_from_model, SAME);
+            if kept.len() < REFINED && !kept.iter().any(is_known) {
+                kept.push(vote);
+            }
+        }
+        let mut promising: Vec<Vote> = Vec::new();
+        for vote in kept {
+            let settled = refined(&self.coarse, &vote.scene_from_model, scene, &WITHIN_M)?;
+            let is_one = |p: &&mut Vote| same(&p.scene_from_model, &settled, SETTLED);
+            if let Some(known) = promising.iter_mut().find(is_one) {
+                known.matches = known.matches.max(vote.matches);
+                continue;
+            }
+            let poses = [vote.scene_from_model, settled];
+            if self.at_most(&poses, vote.matches, scene, &options.judge) >= options.hopeless {
+                promising.push(Vote { scene_from_model: settled, ..vote });
+            }
+        }
+        Ok(promising)
+    }
+
+    /// The most confidence that one of some poses may come to by a few of the model's points; one if too few of them can be seen.
+    fn at_most(&self, poses: &[Isometry3<f64>], votes: usize, scene: &Seen, judge: &Judge) -> f64 {
         let by_points = self.skin.points.len() as f64 / self.coarse.points.len().max(1) as f64;
         let mut most = 0.0_f64;
-        for pose in [vote.scene_from_model, refined(&self.coarse, &vote.scene_from_model, scene)?] {
-            let few = unbounded(&self.coarse, &pose, scene, vote.matches);
-            if few.facing < LEAST_POINTS / 2 {
-                return Ok(1.0);
+        for pose in poses {
+            let few = unbounded(&self.coarse, pose, scene, votes);
+            if few.open() < LEAST_POINTS / 2 {
+                return 1.0;
             }
             most = most.max(judge.confidence(&few.times(by_points)));
         }
-        Ok(most)
+        most
     }
 }
 
-/// The pose of a skin after its visible side was brought onto the scene's surface, from far to near.
-fn refined(skin: &Skin, start: &Isometry3<f64>, scene: &Seen) -> Result<Isometry3<f64>, KnowError> {
+impl KnowOptions {
+    /// Probability that a model with this evidence is where it is said to be, if it stands there as it stood when it was learned, or not.
+    fn confidence(&self, evidence: &Evidence, stands: bool) -> f64 {
+        let p = self.judge.confidence(evidence);
+        if stands { p } else { LYING * p / (1.0 - p + LYING * p) }
+    }
+}
+
+/// The pose of a skin after its visible side was brought onto the scene's surface, looked for within these distances (metres) one after the other.
+fn refined(
+    skin: &Skin,
+    start: &Isometry3<f64>,
+    scene: &Seen,
+    within_m: &[f32],
+) -> Result<Isometry3<f64>, KnowError> {
     let mut pose = *start;
-    for within_m in [0.025, 0.01] {
+    for &within_m in within_m {
         let eye = pose.inverse() * Point3::origin();
         let seen = skin.seen_from(&eye.coords.cast().normalize());
         let points: Vec<Point3<f32>> = seen.iter().map(|&i| skin.points[i as usize]).collect();
@@ -311,8 +360,9 @@ fn refined(skin: &Skin, start: &Isometry3<f64>, scene: &Seen) -> Result<Isometry
     Ok(pose)
 }
 
-fn same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
-    (a.translation.vector - b.translation.vector).norm() < SAME.0 && a.rotation.angle_to(&b.rotation) < SAME.1
+fn same(a: &Isometry3<f64>, b: &Isometry3<f64>, (within_m, within_rad): (f64, f64)) -> bool {
+    (a.translation.vector - b.translation.vector).norm() < within_m
+        && a.rotation.angle_to(&b.rotation) < within_rad
 }
 
 /// Those that together explain the scene best without explaining any part of it twice, the surest first: from the best of each alone, changed one at

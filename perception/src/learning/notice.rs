@@ -137,7 +137,9 @@ impl MetaRoom {
         Ok(Visit { appeared, gone, poses, added, removed })
     }
 
-    /// The poses of the views after all were moved together onto the static structure, where they fit it.
+    /// The poses of the views after all were moved together onto the static structure, where they fit it. What is farther than `range_m` has no say:
+    /// of a wall behind the room, which the camera measures to decimetres, two looks are two clouds that fit each other anywhere, and so many of its
+    /// points outvote those that are known to millimetres.
     fn localised(&self, views: &[View]) -> Result<Vec<Isometry3<f64>>, LearningError> {
         /// What is seen is thinned by pixels: points of a grid of voxels are drawn onto those of another grid, and centimetres off the truth where only
         /// edges hold what is seen along a plane.
@@ -145,8 +147,10 @@ impl MetaRoom {
         const ROOM_M: f32 = 0.01;
         const NEIGHBOURS: usize = 12;
         let stated: Vec<Isometry3<f64>> = views.iter().map(|v| v.world_from_camera).collect();
-        let thinned: Vec<View> =
-            views.iter().map(|v| View { cloud: every(&v.cloud, EVERY), ..v.clone() }).collect();
+        let thinned: Vec<View> = views
+            .iter()
+            .map(|v| View { cloud: near(&every(&v.cloud, EVERY), self.options.range_m), ..v.clone() })
+            .collect();
         let source = Prepared::with_normals(&together(&thinned, &stated).points, NEIGHBOURS)?;
         let target = Prepared::with_normals(&voxel::downsample(&self.cloud, ROOM_M)?.points, NEIGHBOURS)?;
         let (far_m, delta_m) = (self.options.search_m, self.options.delta_m);
@@ -344,6 +348,11 @@ fn every(cloud: &Cloud, step: usize) -> Cloud {
     cloud.select(&kept.map(|i| i as u32).collect::<Vec<_>>())
 }
 
+/// What is no farther from the camera than `range_m`.
+fn near(cloud: &Cloud, range_m: f64) -> Cloud {
+    cloud.filter(|p| is_finite(p) && f64::from(p.z) <= range_m)
+}
+
 /// Points alone: what is static is kept without colours and labels.
 fn bare(cloud: &Cloud) -> Cloud {
     Cloud::from_points(cloud.points.clone())
@@ -353,8 +362,7 @@ fn bare(cloud: &Cloud) -> Cloud {
 fn together(views: &[View], poses: &[Isometry3<f64>]) -> Cloud {
     let mut all = Cloud::default();
     for (view, pose) in views.iter().zip(poses) {
-        let near = view.cloud.filter(|p| is_finite(p) && p.z <= BACKGROUND_M);
-        all.append(&bare(&near).transformed(pose));
+        all.append(&bare(&near(&view.cloud, f64::from(BACKGROUND_M))).transformed(pose));
     }
     all
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use descry_memory::learned::LearnedThing;
 use descry_perception::learning::{Glance, Guess, Judged, KnowOptions};
-use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::recognise::Percept;
 use descry_perception::{Cloud, Neighbours, View};
 
@@ -73,12 +73,12 @@ type Placed = (Guess, Isometry3<f64>);
 pub(super) fn find(
     news: &News,
     glances: &mut Glances,
-    views: &[(&View, Isometry3<f64>)],
+    (views, up): (&[(&View, Isometry3<f64>)], Option<Vector3<f64>>),
     suggested: Vec<Placed>,
     holds: impl Fn(&Point3<f64>) -> bool,
 ) -> Vec<Found> {
     let Some(models) = news.models.clone() else { return Vec::new() };
-    let options = options();
+    let options = options(up);
     let looks: Vec<(Arc<Glance>, Isometry3<f64>)> = views
         .iter()
         .filter_map(|(view, pose)| {
@@ -118,8 +118,12 @@ pub(super) fn find(
     apart
 }
 
-fn options() -> KnowOptions {
-    KnowOptions { range_m: RANGE_M, ..KnowOptions::default() }
+/// How things are known again where up is so in the world. They were learned with z up: in a world with another up they may stand any way.
+fn options(up: Option<Vector3<f64>>) -> KnowOptions {
+    /// Farther from z is another up, radians.
+    const LEVEL_RAD: f64 = 0.1;
+    let up = up.filter(|up| up.angle(&Vector3::z()) < LEVEL_RAD).map(|_| Vector3::z_axis());
+    KnowOptions { range_m: RANGE_M, up, ..KnowOptions::default() }
 }
 
 fn placed(glance: &Glance, world_from_camera: &Isometry3<f64>) -> Vec<Placed> {
@@ -148,7 +152,10 @@ fn together(
         let facing: Vec<u32> = (0..merged.len() as u32).filter(faces).collect();
         let cloud = merged.select(&facing).transformed(&pose.inverse());
         let together = View { cloud, world_from_camera: *pose, ..View::clone(view) };
-        models.known.glance(&together, &options()).map_or_else(|_| Vec::new(), |g| placed(&g, pose))
+        models
+            .known
+            .glance(&together, &options(Some(surface.up)))
+            .map_or_else(|_| Vec::new(), |g| placed(&g, pose))
     };
     views.iter().rev().take(TOGETHER).flat_map(seen).collect()
 }
@@ -182,7 +189,8 @@ pub(crate) fn explain(
 ) -> Vec<Percept> {
     let Some(models) = &news.models else { return percepts };
     let suggested = together(models, surface, views, merged);
-    let found = find(news, glances, views, suggested, |middle| stands_on(surface, middle));
+    let found =
+        find(news, glances, (views, Some(surface.up)), suggested, |middle| stands_on(surface, middle));
     let shares: Vec<Vec<f64>> = percepts
         .iter()
         .map(|p| {

@@ -10,7 +10,7 @@ use descry_perception::learning::{
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3, center};
 use descry_perception::visibility::{DepthMap, Seen as Sight};
 use descry_perception::{Cloud, View};
-use descry_robots::Sensed;
+use descry_robots::{Description, Sensed};
 use descry_skills::Modelled;
 
 use super::again::{self, Found};
@@ -94,13 +94,8 @@ pub(super) fn visit(
             let mut room = MetaRoom { options, ..MetaRoom::clone(before) };
             let visit = room.visit(&views).map_err(strange)?;
             told.pose = visit.poses.first().copied();
-            let off = differing(&visit, &views[0]);
-            let fits = off < STRANGE;
-            if !fits {
-                told.strange =
-                    Some(format!("{:.0} % of what is seen differs from what was there", 1e2 * off));
-            }
-            fits.then_some((room, Some(visit)))
+            told.strange = misfit(eyes.robot.description(), &localised, &visit, &views[0]);
+            told.strange.is_none().then_some((room, Some(visit)))
         }
     };
     let place = &mut Arc::make_mut(&mut mind.known.news).places[at];
@@ -116,6 +111,18 @@ pub(super) fn visit(
     }
     let off = told.pose.unwrap_or(views_pose).inverse() * localised;
     Ok(told.note(&off))
+}
+
+/// Why a visit cannot be compared with those before it, if it cannot. One that was laid onto what was there farther off than localisation errs lies wrong,
+/// or the body is not where it believes to be: either way all that always stood there would be new a few centimetres beside, and where localisation alone
+/// has the visit it is not known to what is compared.
+fn misfit(body: &Description, localised: &Isometry3<f64>, visit: &Visit, view: &View) -> Option<String> {
+    let astray = visit.poses.first().filter(|laid| perceive::is_astray(body, localised, laid));
+    if astray.is_some() {
+        return Some("it would fit what was there only farther off than localisation errs".into());
+    }
+    let off = differing(visit, view);
+    (off >= STRANGE).then(|| format!("{:.0} % of what is seen differs from what was there", 1e2 * off))
 }
 
 /// The share of what is seen that came.
@@ -156,8 +163,10 @@ fn take_in(
     let pose = visit.poses.first().copied().unwrap_or(view.world_from_camera);
     let view = Arc::new(View { world_from_camera: pose, ..view.clone() });
     let seen = view.cloud.finite().transformed(&pose);
+    let up = eyes.robot.description().up;
+    let shown = [(&*view, pose)];
     let mut found =
-        again::find(&mind.known.news.clone(), &mut mind.glances, &[(&view, pose)], Vec::new(), |_| true);
+        again::find(&mind.known.news.clone(), &mut mind.glances, (&shown[..], up), Vec::new(), |_| true);
     found.retain(|f| f.judged.confidence >= SURE);
     for appeared in &whole(&mind.known.surfaces, visit.appeared) {
         let surface = mind.known.surfaces.iter().find(|s| is_on(s, &appeared.cloud)).cloned();
@@ -456,8 +465,9 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
     let views: Vec<(&View, Isometry3<f64>)> =
         used.iter().filter_map(|&n| Some((&*of.looks[n].view, poses(n)?))).collect();
     let near = |p: &Point3<f64>| (p - of.centre).norm() < SAME_M.max(of.radius_m());
-    let before = again::find(&mind.known.news.clone(), &mut mind.glances, &views, Vec::new(), near);
     let surface = mind.known.surfaces.iter().find(|s| s.symbol == of.on).cloned();
+    let up = surface.as_ref().map(|s| s.up);
+    let before = again::find(&mind.known.news.clone(), &mut mind.glances, (&views[..], up), Vec::new(), near);
     if let Some((f, surface)) = before.iter().find(|f| f.judged.confidence >= SURE).zip(surface) {
         let (name, confidence) = (mind.known.news.things[f.thing].name.clone(), f.judged.confidence);
         let said = known_again(mind, &surface, f);
@@ -530,6 +540,22 @@ fn keep(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_visit_that_is_laid_farther_off_than_localisation_errs_is_not_compared() {
+        let body = descry_robots::sim::body::description();
+        let view = View::alone(Cloud::from_points(vec![Point3::new(0.0, 0.0, 1.0)]));
+        let laid = |times: f64| Visit {
+            appeared: Vec::new(),
+            gone: Vec::new(),
+            poses: vec![Isometry3::translation(times * body.pose_sigma_m, 0.0, 0.0)],
+            added: 0,
+            removed: 0,
+        };
+        let why = |times: f64| misfit(&body, &Isometry3::identity(), &laid(times), &view);
+        assert_eq!(why(1.0), None);
+        assert!(why(8.0).is_some_and(|why| why.contains("farther off than localisation errs")));
+    }
 
     #[test]
     fn the_shade_of_a_lamp_is_over_its_foot_and_what_stands_beside_is_not() {

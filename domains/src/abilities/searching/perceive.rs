@@ -280,7 +280,7 @@ pub(crate) fn laid(eyes: Eyes<'_>, surface: &KnownSurface, view: View) -> View {
 }
 
 /// Whether a camera is moved farther from where localisation has it than that errs.
-pub(super) fn is_astray(body: &Description, localised: &Isometry3<f64>, moved: &Isometry3<f64>) -> bool {
+pub(crate) fn is_astray(body: &Description, localised: &Isometry3<f64>, moved: &Isometry3<f64>) -> bool {
     let shift = moved.translation.vector - localised.translation.vector;
     let turn = moved.rotation.rotation_to(&localised.rotation);
     shift.norm() > ASTRAY * body.pose_sigma_m || turn.angle() > ASTRAY * body.pose_sigma_rad

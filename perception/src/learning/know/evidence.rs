@@ -10,13 +10,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Evidence {
-    /// Points of the model that face the camera and are in its image.
+    /// Points of the model that face the camera.
     pub facing: usize,
     /// Of those, points where the camera measured a surface that is turned as the model's …
     pub explained: usize,
     /// … points that it saw through …
     pub through: usize,
-    /// … and points that something nearer hides.
+    /// … and points of which nothing is known: something nearer hides them, nothing came back from there, or they lie beyond the image.
     pub hidden: usize,
     /// How alike colours are where it is explained: 1 the same, 0 altogether different; `None` if model or scene has none.
     pub colour: Option<f64>,
@@ -73,7 +73,7 @@ impl Evidence {
     }
 
     /// Points that nothing hides.
-    fn open(&self) -> usize {
+    pub(super) fn open(&self) -> usize {
         self.facing.saturating_sub(self.hidden)
     }
 
@@ -101,7 +101,7 @@ impl Judge {
 /// Least cosine between the normals of model and scene where a point is explained.
 const TURNED_AS: f32 = 0.6;
 /// Farthest scene point that a point of the model explains, metres.
-const NEAR_M: f32 = 0.012;
+pub(super) const NEAR_M: f32 = 0.012;
 /// Colours that differ by so much (CIE 1976, lightness counts half) are as unlike as not, and points told apart by colour.
 const UNLIKE: f32 = 14.0;
 /// How far beyond what is explained the scene is asked whether it carries on, metres, where no point of the model lies within this; and the least cosine
@@ -158,7 +158,7 @@ struct Rays {
 }
 
 /// How far a measurement may lie from a surface at a depth and be of it, metres.
-fn tolerance_m(z_m: f32) -> f32 {
+pub(super) fn tolerance_m(z_m: f32) -> f32 {
     (3.0 * frontal_sigma_m(z_m)).max(0.006)
 }
 
@@ -169,8 +169,11 @@ fn rays(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen) -> Rays 
     let (mut pairs, mut off) = (Vec::new(), 0.0);
     for i in model.seen_from(&away) {
         let p = camera_from_model * model.points[i as usize].cast::<f64>();
-        let Some((depth, nearest)) = scene.around(&p) else { continue };
         e.facing += 1;
+        let Some((depth, nearest)) = scene.around(&p) else {
+            e.hidden += 1;
+            continue;
+        };
         let sigma = frontal_sigma_m(p.z as f32);
         let tolerance = tolerance_m(p.z as f32);
         if nearest > p.z as f32 + tolerance.max(0.01) {
@@ -297,6 +300,16 @@ mod tests {
         let (inside, before) = (judged(0.0), judged(0.1));
         assert!(inside.0 > 0.8 && inside.1 < 0.2, "{inside:?}");
         assert!(before.0 < 0.05 && before.1 > 0.8, "{before:?}");
+    }
+
+    #[test]
+    fn what_lies_beyond_the_image_is_not_known() {
+        let at = |x: f64| verify(&plate(), &Isometry3::translation(x, 0.0, 1.0), &wall(0.0), 10).evidence;
+        // The image ends .61 m beside its middle.
+        let (whole, cut) = (at(0.0), at(0.6));
+        assert_eq!((whole.facing, whole.hidden), (cut.facing, 0));
+        assert!(cut.hidden * 3 > cut.facing && cut.explained_share() > 0.9, "{cut:?}");
+        assert!(Judge::default().confidence(&cut) < Judge::default().confidence(&whole));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::feature::{Feature, Features};
 use crate::register::rigid;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// A place of the model and one of the scene that look alike.
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +46,7 @@ pub(super) struct Vote {
 }
 
 /// Poses by groups of matches that agree with each other, those of most matches first.
-pub(super) fn votes(mut matches: Vec<Match>) -> Vec<Vote> {
+pub(super) fn votes(matches: &mut [Match]) -> Vec<Vote> {
     matches.sort_by(|a, b| a.off.total_cmp(&b.off));
     let n = matches.len();
     let mut used = vec![0_u8; n];
@@ -72,6 +72,50 @@ pub(super) fn votes(mut matches: Vec<Match>) -> Vec<Vote> {
     votes
 }
 
+/// Least part of a normal that is level, for it to say how a thing that stands is turned.
+const LEVEL: f64 = 0.4;
+/// Matches by which a thing stands so near to the same place, metres and radians, speak for one pose.
+const ONE: (f64, f64) = (0.02, 0.26);
+
+/// Poses of a thing that stands as it stood when it was learned, those that most matches speak for first: where up is known, the place and the normal of one
+/// match say the rest, so that what is small and smooth has a pose by matches that would not agree in groups. `up` is up in the model and in the scene.
+pub(super) fn standing(matches: &[Match], up: &[Vector3<f64>; 2], most: usize) -> Vec<Vote> {
+    let poses: Vec<Isometry3<f64>> = matches.iter().filter_map(|m| stood(m, up)).collect();
+    let is_one = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
+        (a.translation.vector - b.translation.vector).norm_squared() < ONE.0 * ONE.0
+            && a.rotation.angle_to(&b.rotation) < ONE.1
+    };
+    let count = |pose: &Isometry3<f64>| poses.iter().filter(|other| is_one(pose, other)).count();
+    let mut votes: Vec<Vote> =
+        poses.iter().map(|pose| Vote { scene_from_model: *pose, matches: count(pose) }).collect();
+    votes.retain(|v| v.matches >= FEWEST);
+    votes.sort_by_key(|v| std::cmp::Reverse(v.matches));
+    let mut apart: Vec<Vote> = Vec::new();
+    for vote in votes {
+        let is_known = apart.iter().any(|a| is_one(&a.scene_from_model, &vote.scene_from_model));
+        if !is_known && apart.len() < most {
+            apart.push(vote);
+        }
+    }
+    apart
+}
+
+/// The pose of a thing that stands, by one match; none if its normal is steep, or rises otherwise.
+fn stood(m: &Match, up: &[Vector3<f64>; 2]) -> Option<Isometry3<f64>> {
+    let (of_model, of_scene) = (m.model.normal.cast::<f64>(), m.scene.normal.cast::<f64>());
+    let rises = (of_model.dot(&up[0]), of_scene.dot(&up[1]));
+    if (rises.0 - rises.1).abs() >= f64::from(AGREE_COS) {
+        return None;
+    }
+    let axes = |normal: &Vector3<f64>, rise: f64, up: &Vector3<f64>| {
+        let ahead = (normal - up * rise).try_normalize(LEVEL)?;
+        Some(Rotation3::from_basis_unchecked(&[ahead, up.cross(&ahead), *up]))
+    };
+    let turn = axes(&of_scene, rises.1, &up[1])? * axes(&of_model, rises.0, &up[0])?.inverse();
+    let shift = m.scene.at.cast::<f64>().coords - turn * m.model.at.cast::<f64>().coords;
+    Some(Isometry3::from_parts(shift.into(), UnitQuaternion::from_rotation_matrix(&turn)))
+}
+
 fn agree(a: &Match, b: &Match) -> bool {
     let (m, s) = (b.model.at - a.model.at, b.scene.at - a.scene.at);
     let (in_model, in_scene) = (m.norm(), s.norm());
@@ -93,4 +137,49 @@ fn pose(group: &[Match]) -> Option<Isometry3<f64>> {
         [(model[0], scene[0]), (model[1], scene[1])]
     };
     rigid(&group.iter().flat_map(both).collect::<Vec<_>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thing_stands_where_single_matches_say() {
+        let feature = |at: [f32; 3], normal: [f32; 3]| Feature {
+            at: Point3::from(at),
+            normal: Vector3::from(normal).normalize(),
+        };
+        let model = [
+            feature([0.04, 0.0, 0.02], [1.0, 0.0, 0.1]),
+            feature([0.0, 0.04, 0.05], [0.0, 1.0, 0.0]),
+            feature([-0.02, 0.03, 0.09], [-0.4, 0.8, 0.0]),
+            // What faces up does not say how it is turned.
+            feature([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]),
+        ];
+        // In the scene, y is down.
+        let up = [Vector3::z(), -Vector3::y()];
+        let upright = Isometry3::rotation(Vector3::x() * std::f64::consts::FRAC_PI_2);
+        let truth = Isometry3::translation(0.3, 0.1, 1.2) * upright * Isometry3::rotation(Vector3::z() * 0.7);
+        // Places are a centimetre off, more than groups allow to differ.
+        let off = [[0.008, 0.0, -0.004], [-0.008, 0.004, 0.0], [0.0, -0.006, 0.008], [0.0; 3]];
+        let scene: Vec<Feature> = model
+            .iter()
+            .zip(off)
+            .map(|(f, off)| Feature {
+                at: (truth * f.at.cast::<f64>()).cast() + Vector3::from(off),
+                normal: (truth.rotation * f.normal.cast::<f64>()).cast(),
+            })
+            .collect();
+        let matches: Vec<Match> =
+            model.iter().zip(&scene).map(|(model, scene)| Match { model, scene, off: 1.0 }).collect();
+        let found = standing(&matches, &up, 9);
+        assert_eq!(found.len(), 1);
+        let pose = found[0].scene_from_model;
+        assert_eq!(found[0].matches, 3);
+        assert!((pose.translation.vector - truth.translation.vector).norm() < 0.015, "{pose}");
+        assert!(pose.rotation.angle_to(&truth.rotation) < 0.1, "{pose}");
+        assert!((pose.rotation * up[0]).angle(&up[1]) < 1e-6);
+        // Two are too few.
+        assert!(standing(&matches[..2], &up, 9).is_empty());
+    }
 }

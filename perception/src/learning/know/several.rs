@@ -2,7 +2,8 @@
 
 use super::evidence::{Evidence, verify};
 use super::scene::Seen;
-use super::{KnowError, KnowOptions, Library, Recognised, refined};
+use super::stood::stands;
+use super::{KnowError, KnowOptions, Library, Recognised, WITHIN_M, refined};
 use crate::view::View;
 use nalgebra::Isometry3;
 
@@ -51,13 +52,14 @@ impl Library {
     /// If the view is no depth image.
     pub fn glance(&self, view: &View, options: &KnowOptions) -> Result<Glance, KnowError> {
         let scene = self.scene(view, options)?;
-        let found = self.candidates_in(&scene, &Isometry3::identity(), options)?;
+        let found = self.candidates_in(&scene, &view.world_from_camera, options)?;
+        let camera_from_world = view.world_from_camera.inverse();
         let mut found: Vec<Recognised> = found.into_iter().map(|c| c.recognised).collect();
         found.retain(|c| c.confidence >= LEAST);
         found.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
         let guess = |c: &Recognised| Guess {
             model: c.model,
-            camera_from_model: c.world_from_model,
+            camera_from_model: camera_from_world * c.world_from_model,
             confidence: c.confidence,
             votes: c.evidence.votes,
         };
@@ -77,25 +79,27 @@ impl Library {
         options: &KnowOptions,
     ) -> Result<Option<Judged>, KnowError> {
         let Some(known) = self.models.get(guess.model) else { return Ok(None) };
-        let mut told: Vec<(Evidence, Isometry3<f64>)> = Vec::new();
+        let mut told: Vec<(Evidence, Isometry3<f64>, bool)> = Vec::new();
         for (glance, world_from_camera) in looks {
             let stated = world_from_camera.inverse() * world_from_model;
             let of = |pose: &Isometry3<f64>| verify(&known.skin, pose, &glance.scene, guess.votes).evidence;
-            let refined = refined(&known.skin, &stated, &glance.scene)?;
+            let refined = refined(&known.skin, &stated, &glance.scene, &WITHIN_M)?;
             let best = [stated, refined]
                 .map(|pose| (of(&pose), pose))
                 .into_iter()
                 .max_by(|a, b| a.0.explained_share().total_cmp(&b.0.explained_share()));
-            told.extend(
-                best.filter(|(e, _)| e.facing.saturating_sub(e.hidden) >= FEWEST)
-                    .map(|(e, pose)| (e, world_from_camera * pose)),
-            );
+            let Some((evidence, pose)) = best.filter(|(e, _)| e.open() >= FEWEST) else { continue };
+            let stands = options.up.is_none_or(|up| {
+                let up = [*up, world_from_camera.rotation.inverse() * *up];
+                stands(&known.skin, &pose, &glance.scene, &up)
+            });
+            told.push((evidence, world_from_camera * pose, stands));
         }
-        let Some(most) = told.iter().max_by_key(|(e, _)| e.explained) else { return Ok(None) };
-        let evidence = Evidence::of_several(&told.iter().map(|(e, _)| *e).collect::<Vec<_>>());
+        let Some(most) = told.iter().max_by_key(|(e, ..)| e.explained) else { return Ok(None) };
+        let evidence = Evidence::of_several(&told.iter().map(|(e, ..)| *e).collect::<Vec<_>>());
         Ok(Some(Judged {
             world_from_model: most.1,
-            confidence: options.judge.confidence(&evidence),
+            confidence: options.confidence(&evidence, most.2),
             evidence,
             looks: told.len(),
         }))

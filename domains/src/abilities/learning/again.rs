@@ -65,6 +65,9 @@ impl Found {
     }
 }
 
+/// Views, each with where its camera stood, and which way is up there if that is known.
+type Shown<'a> = (&'a [(&'a View, Isometry3<f64>)], Option<Vector3<f64>>);
+
 /// A guess, and where in the world that is.
 type Placed = (Guess, Isometry3<f64>);
 
@@ -73,7 +76,7 @@ type Placed = (Guess, Isometry3<f64>);
 pub(super) fn find(
     news: &News,
     glances: &mut Glances,
-    (views, up): (&[(&View, Isometry3<f64>)], Option<Vector3<f64>>),
+    (views, up): Shown<'_>,
     suggested: Vec<Placed>,
     holds: impl Fn(&Point3<f64>) -> bool,
 ) -> Vec<Found> {

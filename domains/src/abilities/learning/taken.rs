@@ -117,6 +117,10 @@ pub(super) fn visit(
 /// or the body is not where it believes to be: either way all that always stood there would be new a few centimetres beside, and where localisation alone
 /// has the visit it is not known to what is compared.
 fn misfit(body: &Description, localised: &Isometry3<f64>, visit: &Visit, view: &View) -> Option<String> {
+    /// However exact a body is, no visit is laid more exactly than this, metres and radians: half of what is compared.
+    const LAID: (f64, f64) = (0.005, 0.005);
+    let [sigma_m, sigma_rad] = [body.pose_sigma_m.max(LAID.0), body.pose_sigma_rad.max(LAID.1)];
+    let body = &Description { pose_sigma_m: sigma_m, pose_sigma_rad: sigma_rad, ..body.clone() };
     let astray = visit.poses.first().filter(|laid| perceive::is_astray(body, localised, laid));
     if astray.is_some() {
         return Some("it would fit what was there only farther off than localisation errs".into());
@@ -554,6 +558,10 @@ mod tests {
         };
         let why = |times: f64| misfit(&body, &Isometry3::identity(), &laid(times), &view);
         assert_eq!(why(1.0), None);
+        let exact = Description { pose_sigma_m: 0.0, pose_sigma_rad: 0.0, ..body.clone() };
+        let off_m = |x: f64| Visit { poses: vec![Isometry3::translation(x, 0.0, 0.0)], ..laid(0.0) };
+        let why_exact = |x: f64| misfit(&exact, &Isometry3::identity(), &off_m(x), &view);
+        assert!(why_exact(0.003).is_none() && why_exact(0.05).is_some());
         assert!(why(8.0).is_some_and(|why| why.contains("farther off than localisation errs")));
     }
 

@@ -1,7 +1,9 @@
 //! What rays tell of a round body's upper end.
 
-use super::body::Frustum;
+use super::body::{Body, Frustum, Ray};
 use super::rays::{BEYOND, Rays, bounded, normal};
+use super::verify::WALL_M;
+use crate::noise::normal_cdf;
 
 /// Chance that a view says nothing of an upper end, whatever it seems to show. From: chosen.
 const BAD_VIEW: f64 = 0.002;
@@ -18,21 +20,22 @@ pub(super) struct Upper {
 
 impl Upper {
     pub fn of(rays: &Rays, body: &Frustum) -> Upper {
-        /// So near to the rim a ray does not tell, and what is no lower than the first is a lid, than the second no inside, metres. From: chosen.
+        /// So near to the rim a ray does not tell, nor one that would meet the inside no deeper than the second, metres; what is deeper is an
+        /// inside. From: chosen.
         const RIM_M: f64 = 0.006;
         const INSIDE_M: f64 = 0.012;
-        /// Spread of how high a lid is, metres. From: chosen.
+        /// Spread of how high a lid is, and of where an inside is, metres. From: chosen.
         const LID_M: f64 = 0.004;
         /// A ray that falls less tells of no end. From: rounding.
         const LEVEL: f64 = 1e-3;
-        /// What lies deeper than the body by this is not of it, metres. From: chosen.
-        const BELOW_M: f64 = 0.02;
         /// Share of the rays into it that tell, and the density of what the others say. From: chosen.
         const TELL: f64 = 0.9;
         const REST: f64 = 0.02;
+        /// Of what is in an open body a ray meets the wall or floor with this chance, else something on the way there. From: chosen.
+        const EMPTY: f64 = 0.5;
         /// No lid is deeper than this share of the least inside. From: chosen.
         const LID: f64 = 0.75;
-        let height_m = body.top_m - body.base_m;
+        let hollow = Frustum { wall_m: Some(WALL_M), ..*body };
         let (mut all, mut open, mut lid, mut open_log) = (0.0, 0.0, 0.0, 0.0);
         for view in &rays.views {
             let mut sum = 0.0;
@@ -46,14 +49,15 @@ impl Upper {
                 }
                 let (fall, sigma_m) = (-pixel.along[2], pixel.sigma_m.hypot(LID_M));
                 let off_m = pixel.depth_m - at_m;
-                if off_m < -BEYOND * sigma_m {
+                let deep_m = hollow.depth_m(&Ray { from: view.from, along: pixel.along }) - at_m;
+                if off_m < -BEYOND * sigma_m || !(INSIDE_M / fall..f64::INFINITY).contains(&deep_m) {
                     continue;
                 }
-                let within =
-                    off_m * fall > INSIDE_M - 2.0 * pixel.sigma_m && off_m * fall < height_m + BELOW_M;
-                let below = if within { fall / height_m } else { 0.0 };
+                let on_the_way =
+                    (normal_cdf(off_m / sigma_m) - normal_cdf((off_m - deep_m) / sigma_m)) / deep_m;
+                let within = EMPTY * normal(off_m - deep_m, sigma_m) + (1.0 - EMPTY) * on_the_way;
                 let level = normal(off_m, sigma_m);
-                sum += ((TELL * below + REST) / (TELL * level + REST)).ln();
+                sum += ((TELL * within + REST) / (TELL * level + REST)).ln();
                 all += view.looks;
                 open += if off_m * fall > INSIDE_M { view.looks } else { 0.0 };
                 lid += if off_m * fall < LID * INSIDE_M { view.looks } else { 0.0 };
@@ -68,16 +72,16 @@ impl Upper {
 
 #[cfg(test)]
 mod tests {
-    use super::super::body::{Body, Ray};
     use super::super::rays::{Pixel, ViewRays};
     use super::*;
 
-    /// A view of a body from above and aside, a pixel a step of a hundredth, as if every ray met just that; some share of them another thing.
-    fn view(body: &Frustum, other: usize) -> Rays {
-        let from = [0.8, 0.0, 0.7];
+    /// A view of a body from so high and aside, a pixel a step of a hundredth, as if every ray met just that; some share of them another thing.
+    fn view(body: &Frustum, high_m: f64, other: usize) -> Rays {
+        let from = [0.8, 0.0, high_m];
+        let falls = (0.1 - high_m) / 0.8;
         let steps = (-12..=12).flat_map(|i| (-12..=12).map(move |j| (f64::from(i), f64::from(j))));
         let pixels = steps.enumerate().filter_map(|(k, (i, j))| {
-            let along = [-1.0, 0.01 * i, -0.75 + 0.01 * j];
+            let along = [-1.0, 0.01 * i, falls + 0.01 * j];
             let depth_m = body.depth_m(&Ray { from, along });
             depth_m.is_finite().then_some(Pixel {
                 along,
@@ -103,10 +107,13 @@ mod tests {
             wall_m: Some(0.003),
         };
         let tin = Frustum { wall_m: None, ..cup };
-        let [open, closed] = [cup, tin].map(|body| Upper::of(&view(&body, 0), &body));
+        let [open, closed] = [cup, tin].map(|body| Upper::of(&view(&body, 0.7, 0), &body));
         assert!(open.open_log > 2.0 && open.open > 0.7 && open.lid < 0.2, "{open:?}");
         assert!(closed.open_log < -2.0 && closed.lid > 0.9 && closed.open == 0.0, "{closed:?}");
-        let hidden = Upper::of(&view(&cup, 10), &cup);
+        let hidden = Upper::of(&view(&cup, 0.7, 10), &cup);
         assert_eq!((hidden.open_log, hidden.open, hidden.lid), (0.0, 0.0, 0.0));
+        // What looks in so flatly that it meets the far wall just below the rim tells nothing.
+        let flat = Upper::of(&view(&cup, 0.22, 0), &cup);
+        assert!(flat.open_log >= 0.0 && flat.lid < 0.1, "{flat:?}");
     }
 }

@@ -7,7 +7,7 @@ use super::percept::Stance;
 use super::rays::{BAD_VIEW, Rays, ViewRays, bounded};
 
 /// Thickness of the walls of vessels, metres. From: chosen.
-const WALL_M: f64 = 0.003;
+pub(super) const WALL_M: f64 = 0.003;
 /// Steps by which a body is moved to where it suits a view best, one after the other, and how often each is tried at most, metres. From: work.
 const STEPS_M: [f64; 2] = [0.003, 0.0015];
 const TRIES: usize = 2;

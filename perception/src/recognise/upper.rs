@@ -20,8 +20,8 @@ pub(super) struct Upper {
 
 impl Upper {
     pub fn of(rays: &Rays, body: &Frustum) -> Upper {
-        /// So near to the rim a ray does not tell, nor one that would meet the inside no deeper than the second, metres; what is deeper is an
-        /// inside. From: chosen.
+        /// So near to the rim a ray does not tell; what is deeper than the second is an inside, and seen by rays that may come as deep, metres.
+        /// From: chosen.
         const RIM_M: f64 = 0.006;
         const INSIDE_M: f64 = 0.012;
         /// Spread of how high a lid is, and of where an inside is, metres. From: chosen.
@@ -50,7 +50,7 @@ impl Upper {
                 let (fall, sigma_m) = (-pixel.along[2], pixel.sigma_m.hypot(LID_M));
                 let off_m = pixel.depth_m - at_m;
                 let deep_m = hollow.depth_m(&Ray { from: view.from, along: pixel.along }) - at_m;
-                if off_m < -BEYOND * sigma_m || !(INSIDE_M / fall..f64::INFINITY).contains(&deep_m) {
+                if off_m < -BEYOND * sigma_m || !(deep_m > 0.0 && deep_m.is_finite()) {
                     continue;
                 }
                 let on_the_way =
@@ -58,6 +58,9 @@ impl Upper {
                 let within = EMPTY * normal(off_m - deep_m, sigma_m) + (1.0 - EMPTY) * on_the_way;
                 let level = normal(off_m, sigma_m);
                 sum += ((TELL * within + REST) / (TELL * level + REST)).ln();
+                if deep_m * fall < INSIDE_M {
+                    continue;
+                }
                 all += view.looks;
                 open += if off_m * fall > INSIDE_M { view.looks } else { 0.0 };
                 lid += if off_m * fall < LID * INSIDE_M { view.looks } else { 0.0 };
@@ -112,8 +115,8 @@ mod tests {
         assert!(closed.open_log < -2.0 && closed.lid > 0.9 && closed.open == 0.0, "{closed:?}");
         let hidden = Upper::of(&view(&cup, 0.7, 10), &cup);
         assert_eq!((hidden.open_log, hidden.open, hidden.lid), (0.0, 0.0, 0.0));
-        // What looks in so flatly that it meets the far wall just below the rim tells nothing.
+        // What looks in so flatly that it meets the far wall just below the rim has seen neither inside nor lid.
         let flat = Upper::of(&view(&cup, 0.22, 0), &cup);
-        assert!(flat.open_log >= 0.0 && flat.lid < 0.1, "{flat:?}");
+        assert!(flat.open_log >= 0.0 && (flat.open, flat.lid) == (0.0, 0.0), "{flat:?}");
     }
 }

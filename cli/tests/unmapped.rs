@@ -100,21 +100,23 @@ fn record(folder: &Path, scene: &str, looks: &[([f64; 2], [f64; 3])]) {
     fs::write(folder.join("recording.toml"), "up = [0.0, 0.0, 1.0]\n").expect("it is written");
 }
 
-fn both_tables() -> Vec<([f64; 2], [f64; 3])> {
-    let places = [[0.0, -1.9], [1.9, -1.2], [2.0, 1.0], [0.0, 1.9], [-1.9, 1.2], [-1.9, -1.1]];
-    places.map(|from| (from, [0.0, 0.0, 0.75])).to_vec()
+/// Places around both tables, each turned to their middle.
+fn both_tables(from: [[f64; 2]; 6]) -> Vec<([f64; 2], [f64; 3])> {
+    from.map(|from| (from, [0.0, 0.0, 0.75])).to_vec()
 }
 
 #[test]
 fn every_surface_in_view_is_looked_at() {
     let folder = TempDir::new().expect("a folder can be made");
-    record(&folder.path().join("with"), &format!("{TABLES}{CUP}"), &both_tables());
+    let near = [[0.0, -1.9], [1.9, -1.2], [2.0, 1.0], [0.0, 1.9], [-1.9, 1.2], [-1.9, -1.1]];
+    record(&folder.path().join("with"), &format!("{TABLES}{CUP}"), &both_tables(near));
     let said = check(folder.path(), &["find", "cup A", "--robot", "recorded:with", "--json"], 0);
     let height_m = said["position_m"][2].as_f64().expect("a position");
     assert!((height_m - 0.952).abs() < 0.02, "it stands on the higher one: {said}");
     assert!(said["on"].as_str().is_some_and(|on| on.contains("table")), "{said}");
 
-    record(&folder.path().join("without"), TABLES, &both_tables());
+    let far = [[0.0, -2.2], [2.2, -1.4], [2.3, 1.2], [0.0, 2.2], [-2.2, 1.4], [-2.2, -1.3]];
+    record(&folder.path().join("without"), TABLES, &both_tables(far));
     let said = check(folder.path(), &["find", "cup A", "--robot", "recorded:without", "--json"], 1);
     let why = said["why"].as_str().unwrap_or_default();
     assert!(

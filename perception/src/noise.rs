@@ -4,6 +4,7 @@ mod fit;
 
 use serde::{Deserialize, Serialize};
 
+pub(crate) use fit::CELL_PX;
 pub use fit::Residuals;
 
 /// Steepest angle between ray and normal that still returns, degrees. From: chosen.

@@ -7,7 +7,7 @@ use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
 /// Pixels a side of the blocks whose residuals count, and of the smaller ones within them whose means tell how much neighbours err together. From: chosen.
 const BLOCK_PX: usize = 24;
-const CELL_PX: usize = 8;
+pub(crate) const CELL_PX: usize = 8;
 /// Blocks of a view that are enough to go by. From: work.
 const BLOCKS: usize = 24;
 /// A block counts if this share of its pixels lies on the face. From: chosen.

@@ -504,8 +504,7 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     /// No form is measured more sharply than this, metres, and this share of the spread of a measurement. From: chosen.
     const SHARPEST_M: f64 = 0.0015;
     const OF_SIGMA: f64 = 0.7;
-    // No form is measured more sharply than merged views of one surface lie apart.
-    let apart = if m.evidence.views > 1 { m.blur_m } else { 0.0 };
+    let apart = m.apart_m();
     let floor = SHARPEST_M.hypot(OF_SIGMA * m.sigma_m).hypot(apart);
     let miss = match shape {
         Some(Shape::Round) => m.round.map_or(NONE_M, |r| r.spread_m),

@@ -102,6 +102,13 @@ pub(super) struct Measured {
     pub upper: Upper,
 }
 
+impl Measured {
+    /// How far merged views of one surface lie apart, metres: nothing is measured more sharply.
+    pub fn apart_m(&self) -> f64 {
+        if self.evidence.views > 1 { self.blur_m } else { 0.0 }
+    }
+}
+
 /// What was measured, and the pixels around the thing.
 pub(super) struct Looked {
     pub measured: Measured,

@@ -6,7 +6,7 @@
 
 use super::asker::{Asker, Lying};
 use super::body::{Body, Ray};
-use crate::noise::Sensor;
+use crate::noise::{CELL_PX, KINECT, Sensor};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
@@ -35,8 +35,6 @@ const WANDER: [[f64; 2]; 3] = [[0.0, 1.0], [0.87, -0.5], [-0.87, -0.5]];
 /// Side of the cells in which other things are told from a body, metres. From: chosen.
 const CELL_M: f64 = 0.01;
 
-/// Pixels a side of the blocks whose looks a sensor tells. From: derived, as it is said.
-const BLOCK_PX: usize = 8;
 /// So many spreads off, a depth is of something else. From: chosen.
 pub(super) const BEYOND: f64 = 3.0;
 
@@ -151,7 +149,7 @@ impl ViewRays {
             (turn * Vector3::new(du, dv, 0.0)).into()
         });
         let looks =
-            (sensor.looks.min(MOST_LOOKS) * (step * step) as f64 / (BLOCK_PX * BLOCK_PX) as f64).min(1.0);
+            (sensor.looks.min(MOST_LOOKS) * (step * step) as f64 / (CELL_PX * CELL_PX) as f64).min(1.0);
         (!pixels.is_empty()).then_some(ViewRays { from, wander, pixels, looks })
     }
 
@@ -197,8 +195,9 @@ impl Pixel {
     /// Density of its depth where it meets a body at a depth.
     #[inline(always)]
     pub fn with_body(&self, at_m: f64) -> f64 {
-        /// Chance of a return that has to do with nothing there, and how far off it may be, metres. From: chosen.
-        const STRAY: f64 = 0.01;
+        /// Chance of a return that has to do with nothing there. From: derived, the sensor's.
+        const STRAY: f64 = KINECT.stray;
+        /// How far off it may be, metres. From: chosen.
         const RANGE_M: f64 = 5.0;
         let off_m = self.depth_m - at_m;
         let nearer = if off_m < 0.0 { NEARER / ANYWHERE_M } else { 0.0 };

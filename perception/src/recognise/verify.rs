@@ -66,8 +66,7 @@ impl<'a> Own<'a> {
         };
         let within =
             |value: f64, range: Range, slack: f64| value.clamp(range.low - slack, range.high + slack);
-        // Nothing is measured more sharply than merged views of one surface lie apart.
-        let apart_m = if m.evidence.views > 1 { m.blur_m } else { 0.0 };
+        let apart_m = m.apart_m();
         let tapers = match stance {
             Stance::UpsideDown => Range { low: 1.0 / model.taper.high, high: 1.0 / model.taper.low },
             _ => model.taper,

@@ -2,10 +2,9 @@
 //!
 //! Voxel 1 cm centroids; plane: 1,000 rounds at 1 cm on the voxelled cloud; normals and statistical outliers (2 sigma) by 20 neighbours, the tree counted in;
 //! clusters: steps of 2 cm, 30 points or more, on the voxelled cloud without its plane; registration from CLOUD2 (or CLOUD, moved by 2 cm and 2 degrees) to CLOUD,
-//! both voxelled, from the identity, 5 cm, at most 50 rounds, trees and normals counted in; cylinder: 500 rounds on the cluster that holds the largest one.
+//! both voxelled, from the identity, 5 cm, at most 50 rounds, trees and normals counted in.
 
 use descry_perception::cloud::Cloud;
-use descry_perception::cylinder::{self, CylinderOptions};
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::plane::{self, PlaneOptions};
 use descry_perception::register::{Method, Prepared, RegisterOptions, align};
@@ -99,41 +98,18 @@ fn surfaces(cloud: &Cloud) -> Result<Vec<String>, Failure> {
     fit.inliers.iter().for_each(|&i| in_plane[i as usize] = true);
     let rest: Vec<u32> = (0..small.len() as u32).filter(|&i| !in_plane[i as usize]).collect();
     let rest = small.select(&rest).points;
-    let (row, clusters) = time(
+    let (row, _) = time(
         "clusters_2cm",
         rest.len(),
         || Ok(cluster::euclidean(&rest, 0.02, 30)?),
         |c| format!("{} of {} points", c.len(), rest.len()),
     )?;
     rows.push(row);
-    rows.extend(cylinders(&rest, &clusters)?);
     Ok(rows)
 }
 
 fn counted(normals: &[Vector3<f32>]) -> String {
     normals.iter().filter(|n| !n.x.is_nan()).count().to_string()
-}
-
-/// Inliers of the best cylinder, points and normals of a cluster.
-type Candidate = (usize, Vec<Point3<f32>>, Vec<Vector3<f32>>);
-
-fn cylinders(rest: &[Point3<f32>], clusters: &[Vec<u32>]) -> Result<Option<String>, Failure> {
-    let options = CylinderOptions { tolerance_m: 0.01, ..CylinderOptions::default() };
-    let mut best: Option<Candidate> = None;
-    for cluster in clusters {
-        let points: Vec<Point3<f32>> = cluster.iter().map(|&i| rest[i as usize]).collect();
-        let found = normals::estimate(&Neighbours::new(&points)?, NEIGHBOURS, &Point3::origin()).normals;
-        let Ok(fit) = cylinder::find(&points, &found, &options) else { continue };
-        if best.as_ref().is_none_or(|(most, ..)| fit.inliers.len() > *most) {
-            best = Some((fit.inliers.len(), points, found));
-        }
-    }
-    let Some((_, points, found)) = best else { return Ok(None) };
-    let run = || Ok(cylinder::find(&points, &found, &options)?);
-    let tell = |f: &cylinder::CylinderFit| {
-        format!("{} inliers, radius {:.1} mm", f.inliers.len(), 1e3 * f.cylinder.radius_m)
-    };
-    Ok(Some(time("cylinder", points.len(), run, tell)?.0))
 }
 
 fn registrations(target: &Cloud, source: &Cloud) -> Result<Vec<String>, Failure> {

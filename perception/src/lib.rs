@@ -29,7 +29,6 @@ pub mod calibration;
 pub mod camera;
 pub mod cloud;
 pub mod cluster;
-pub mod cylinder;
 mod draw;
 pub mod files;
 pub mod hull;

@@ -8,9 +8,10 @@ mod planes;
 mod role;
 
 use crate::cloud::{Cloud, is_finite};
-use crate::noise::{KINECT, axial_sigma_m};
+use crate::noise::KINECT;
 use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use extent::TALLEST_M;
@@ -281,7 +282,7 @@ pub fn find_surfaces(
     // What a plane was proposed as, its points may not bear out.
     let planes = large_planes(&samples, options.seed, is_level).into_iter().filter(is_level);
     let planes: Vec<Plane> = planes.map(|plane| face_up(&plane, up.as_deref(), &viewpoints)).collect();
-    let faces = planes.iter().flat_map(|plane| face::faces(plane, &samples, cloud, seen));
+    let faces = planes.par_iter().flat_map_iter(|plane| face::faces(plane, &samples, cloud, seen));
     let surfaces: Vec<Surface> = faces.filter(|s| s.area_m2 >= options.least_area_m2).collect();
     if surfaces.is_empty() {
         return Err(SurfaceError::NotFound { tried: planes.len(), wanted: wanted(options) });
@@ -293,7 +294,7 @@ pub fn find_surfaces(
         Role::Support | Role::Untold => surface.with_hidden(&samples, seen),
         Role::Floor | Role::Other => surface,
     };
-    Ok(surfaces.into_iter().map(|surface| options.within_region(whole(surface))).collect())
+    Ok(surfaces.into_par_iter().map(|surface| options.within_region(whole(surface))).collect())
 }
 
 /// The surfaces by how much speaks for them, without those that are made of what is left over of a better one and of things on it.
@@ -387,7 +388,7 @@ fn wanted(options: &SurfaceOptions) -> String {
 
 /// Spread of a depth camera's range at a distance (Nguyen et al.), metres.
 pub(crate) fn range_sigma_m(distance_m: f64) -> f64 {
-    axial_sigma_m(distance_m, 0.0).unwrap_or(KINECT.axial_m)
+    if distance_m > 0.0 { KINECT.frontal_sigma_m(distance_m) } else { KINECT.axial_m }
 }
 
 fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {

@@ -1,7 +1,6 @@
 //! Odd clouds: a clear error or a sane answer, and the same one for every number of threads.
 
 use descry_perception::cluster::{self, ClusterError};
-use descry_perception::cylinder::{self, CylinderError, CylinderOptions};
 use descry_perception::merge::{MergeOptions, merge};
 use descry_perception::nalgebra::{Isometry3, Point3, Unit, Vector3};
 use descry_perception::normals::{self, OrganisedOptions};
@@ -76,7 +75,6 @@ fn every_kernel_takes_every_cloud() {
             Ok(fit) => assert!(fit.inliers.len() >= 3 && fit.plane.offset_m.is_finite(), "{name}"),
             Err(e) => assert!(!matches!(e, PlaneError::Tolerance { .. }), "{name}: {e}"),
         }
-        let _ = cylinder::find(&points, &found.normals, &CylinderOptions::default());
         let level = plane::Plane { normal: Vector3::z(), offset_m: 0.0 };
         assert_eq!(Hull::around(level, &points).is_some(), finite > 0, "{name}");
     }
@@ -91,15 +89,13 @@ fn wrong_wishes_are_refused() {
         let options = PlaneOptions { tolerance_m: bad, ..PlaneOptions::default() };
         assert!(matches!(plane::find(&cloud.points, &options), Err(PlaneError::Tolerance { .. })));
     }
-    let short = cylinder::find(&cloud.points, &[], &CylinderOptions::default());
-    assert!(matches!(short, Err(CylinderError::Normals { .. })));
     let thousandfold = cloud.finite().scaled(1e9);
     let message = voxel::downsample(&thousandfold, 0.01).unwrap_err().to_string();
     assert!(message.contains("millimetres"), "{message}");
 }
 
 #[test]
-fn the_table_and_the_can() {
+fn the_table_and_what_stands_on_it() {
     let points = table();
     let up = Unit::new_normalize(Vector3::z());
     let tilt = Some((up, 0.1));
@@ -113,24 +109,6 @@ fn the_table_and_the_can() {
 
     let clusters = cluster::euclidean(&points[20_000..], 0.01, 10).unwrap();
     assert_eq!(clusters.len(), 1);
-    let can = &points[20_000..];
-    let found = normals::estimate(&Neighbours::new(can).unwrap(), 20, &Point3::origin()).normals;
-    for axis in [None, Some((up, 0.2)), Some((up, 0.0))] {
-        let options = CylinderOptions { axis, ..CylinderOptions::default() };
-        let fit = cylinder::find(can, &found, &options).unwrap();
-        assert!((fit.cylinder.radius_m - 0.035).abs() < 3e-4, "{:?}", fit.cylinder);
-        assert!(fit.cylinder.axis.z.abs() > 0.999 && fit.inliers.len() > 2900 && fit.rms_m < 0.0005);
-        assert!((fit.extent_m.1 - fit.extent_m.0 - 0.1).abs() < 0.002 && fit.arc_rad > 6.2);
-    }
-    let slim = CylinderOptions { radius_m: 0.005..=0.02, ..CylinderOptions::default() };
-    assert!(cylinder::find(can, &found, &slim).is_ok_and(|f| f.inliers.len() < 600), "a can is not slim");
-    let wide = CylinderOptions {
-        radius_m: 5.0..=6.0,
-        axis: Some((up, 0.0)),
-        rounds: 50,
-        ..CylinderOptions::default()
-    };
-    assert_eq!(cylinder::find(can, &found, &wide), Err(CylinderError::None { rounds: 50 }));
 }
 
 #[test]

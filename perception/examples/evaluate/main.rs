@@ -1,6 +1,6 @@
 //! Segmentation, merging and recognition against what is known, how long single views take, and where the values of all constants are
 //! from, as tables:
-//! `cargo run --release -p descry-perception --example evaluate -- constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
+//! `cargo run --release -p descry-perception --example evaluate -- constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
 mod clutter;
 #[path = "../../tests/constants/mod.rs"]
@@ -52,7 +52,7 @@ fn main() -> ExitCode {
         },
         ["variants", dirs @ ..] => variants::run(dirs),
         _ => Err(
-            "usage: evaluate constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
+            "usage: evaluate constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
                 .to_owned(),
         ),
     };

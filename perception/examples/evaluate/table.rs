@@ -99,16 +99,7 @@ pub fn run(count: u64, out: Option<&Path>) -> Result<(), String> {
     for seed in 1..=count {
         let mut draws = Draws(seed);
         let things = arrangement(&mut draws);
-        let bare: Vec<Thing> = things.iter().map(|t| t.0).collect();
-        let start = std::f64::consts::TAU * draws.next();
-        let views: Vec<View> = (0..POSES)
-            .map(|i| {
-                let angle = start + std::f64::consts::TAU * (i as f64 + 0.3 * draws.next()) / POSES as f64;
-                let truth = on_ring(angle, 1.2 + 0.4 * draws.next(), 1.3 + 0.2 * draws.next());
-                let stated = disturbed(&truth, 0.03, 0.035, &mut draws);
-                look(&bare, &truth, &stated, &mut draws)
-            })
-            .collect();
+        let views = around(&things, &mut draws);
         for n in 1..=POSES {
             for (mode, set) in [&views[..n], &views[n - 1..n]].into_iter().enumerate() {
                 let clock = std::time::Instant::now();
@@ -152,6 +143,26 @@ pub fn options() -> MergeOptions {
         height_band_m: Some((0.5, 1.2)),
         ..MergeOptions::default()
     }
+}
+
+/// Views of things from poses around their table, each stated a little wrongly.
+fn around(things: &[Known], draws: &mut Draws) -> Vec<View> {
+    let bare: Vec<Thing> = things.iter().map(|t| t.0).collect();
+    let start = std::f64::consts::TAU * draws.next();
+    let view = |i: usize| {
+        let angle = start + std::f64::consts::TAU * (i as f64 + 0.3 * draws.next()) / POSES as f64;
+        let truth = on_ring(angle, 1.2 + 0.4 * draws.next(), 1.3 + 0.2 * draws.next());
+        let stated = disturbed(&truth, 0.03, 0.035, draws);
+        look(&bare, &truth, &stated, draws)
+    };
+    (0..POSES).map(view).collect()
+}
+
+/// Views of an arrangement.
+pub fn views(seed: u64) -> Vec<View> {
+    let mut draws = Draws(seed);
+    let things = arrangement(&mut draws);
+    around(&things, &mut draws)
 }
 
 /// One view of an arrangement.

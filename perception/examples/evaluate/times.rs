@@ -2,11 +2,14 @@
 
 use super::kitchen::{self, Table};
 use super::{mosd, table};
-use descry_perception::files::read_cloud;
+use descry_perception::files::pcd::{Encoding, write};
+use descry_perception::files::{FileError, Loaded, read_cloud};
+use descry_perception::merge::merge;
 use descry_perception::recognise::{Descry, Recogniser};
 use descry_perception::segment::{SceneOptions, segment_on};
 use descry_perception::surface::find_surface;
 use descry_perception::{Cloud, ObjectModel, Percept, Scene, View, Visibility};
+use rayon::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -19,8 +22,11 @@ struct Case {
     models: Vec<ObjectModel>,
 }
 
-/// Times single views: made ones (`made`), and those of folders of point clouds or of frames of a kitchen.
+/// Times single views: made ones (`made`), and those of folders of point clouds or of frames of a kitchen; and five of them in one (`merged`).
 pub fn run(repetitions: usize, views: &[&str]) -> Result<(), String> {
+    if views == ["merged"] {
+        return merged(repetitions);
+    }
     let mut cases = Vec::new();
     for &name in views {
         let dir = Path::new(name);
@@ -48,6 +54,39 @@ pub fn run(repetitions: usize, views: &[&str]) -> Result<(), String> {
     all.sort_by(f64::total_cmp);
     if let (Some(middle), Some(most)) = (all.get(all.len() / 2), all.last()) {
         println!("median {middle:.2} ms, most {most:.2} ms of {} views", all.len());
+    }
+    Ok(())
+}
+
+/// Times five views of a table from their files to what stands on it.
+fn merged(repetitions: usize) -> Result<(), String> {
+    println!("{:>6} {:>8} {:>8} {:>9}   ms, least of {repetitions}", "table", "read", "merge", "recognise");
+    for seed in 1..=4 {
+        let views = table::views(seed);
+        let files: Vec<Vec<u8>> = views.iter().map(|view| write(&view.cloud, Encoding::Binary)).collect();
+        let mut least_ms = [f64::INFINITY; 3];
+        let mut digest = 0;
+        for _ in 0..repetitions.max(1) {
+            let start = Instant::now();
+            let clouds: Vec<_> = files.par_iter().map(|file| read_cloud(file)).collect();
+            let read = Instant::now();
+            let anew = |(view, loaded): (&View, Result<Loaded, FileError>)| {
+                Ok(View { cloud: loaded?.cloud, ..view.clone() })
+            };
+            let again: Result<Vec<View>, FileError> = views.iter().zip(clouds).map(anew).collect();
+            let again = again.map_err(|e| e.to_string())?;
+            let begun = Instant::now();
+            let merged = merge(&again, &table::options()).map_err(|e| e.to_string())?;
+            let done = Instant::now();
+            let percepts = table::judge(&merged, &Descry::default())?;
+            let ms = [read - start, done - begun, done.elapsed()].map(|d| d.as_secs_f64() * 1e3);
+            least_ms.iter_mut().zip(ms).for_each(|(least, ms)| *least = least.min(ms));
+            let mut hasher = DefaultHasher::new();
+            format!("{percepts:.5?}").hash(&mut hasher);
+            digest = hasher.finish();
+        }
+        let [read, merge, recognise] = least_ms;
+        println!("{seed:6} {read:8.1} {merge:8.1} {recognise:9.1}   {digest:016x}");
     }
     Ok(())
 }

@@ -193,6 +193,16 @@ impl<'a> Table<'a> {
     fn triples<T>(&self, header: &Header, fields: [usize; 3], make: impl Fn([f32; 3]) -> T) -> Vec<T> {
         let single = |f: usize| header.fields[f].kind == b'F' && header.fields[f].size == 4;
         if fields.into_iter().all(single) {
+            let [a, b, c] = fields.map(|f| self.layout[f]);
+            if (a.1, b, c) == (a.1, (a.0 + 4, a.1), (a.0 + 8, a.1)) {
+                // Beside each other in each row, as nearly always.
+                let rows = self.bytes.get(a.0..).unwrap_or_default().chunks(a.1).take(header.points);
+                let row = |row: &[u8]| {
+                    let (words, _) = row.as_chunks::<4>();
+                    make(words.first_chunk().map_or([f32::NAN; 3], |words| words.map(f32::from_le_bytes)))
+                };
+                return rows.map(row).collect();
+            }
             let [a, b, c] = fields.map(|f| self.words(header, f).map(f32::from_le_bytes));
             return a.zip(b).zip(c).map(|((a, b), c)| make([a, b, c])).collect();
         }

@@ -140,24 +140,31 @@ pub(super) fn gather_further(
     true
 }
 
-/// Sorts the returns of a view into voxels and sheets.
+/// Sorts the returns of a view into voxels and sheets: some rows are looked through while those before them are added.
 fn take(all: &mut [Gathered], of: &Returns, view: u16, coloured: bool) {
-    /// Returns that are added together. From: work.
-    const SOME: usize = 512;
+    /// Rows that are looked through together. From: work.
+    const ROWS: usize = 8;
     let colours = of.view.cloud.colours.as_deref().filter(|_| coloured);
-    let list = || Vec::with_capacity(SOME);
-    let mut kept: Vec<(Scale, Vec<Measured>)> =
-        all.iter().map(|gathered| (Scale::of(&of.world_from_camera, gathered), list())).collect();
-    of.visit(|found| {
-        let number = found.plane.map_or(0, |plane| plane + 1);
-        let (scale, kept) = &mut kept[number];
-        kept.push(scale.measured(&found));
-        if kept.len() == SOME {
-            all[number].add(kept, view, colours);
+    let scales: Vec<Scale> = all.iter().map(|gathered| Scale::of(&of.world_from_camera, gathered)).collect();
+    let look = |first: usize, kept: &mut [Vec<Measured>]| {
+        of.visit(first..(first + ROWS).min(of.rows()), |found| {
+            let number = found.plane.map_or(0, |plane| plane + 1);
+            kept[number].push(scales[number].measured(&found));
+        });
+    };
+    let lists = || -> Vec<Vec<Measured>> { all.iter().map(|_| Vec::new()).collect() };
+    let (mut kept, mut next) = (lists(), lists());
+    for first in (0..of.rows() + ROWS).step_by(ROWS) {
+        let mut add = || {
+            for (gathered, kept) in all.iter_mut().zip(&mut kept) {
+                gathered.add(kept, view, colours);
+            }
+        };
+        match first < of.rows() {
+            true => drop(rayon::join(add, || look(first, &mut next))),
+            false => add(),
         }
-    });
-    for (gathered, (_, kept)) in all.iter_mut().zip(&mut kept) {
-        gathered.add(kept, view, colours);
+        std::mem::swap(&mut kept, &mut next);
     }
 }
 
@@ -232,17 +239,21 @@ impl Gathered {
     /// Adds returns, and takes them out of the list. A pass for each thing that is waited for: what comes from far memory is asked for many
     /// times at once.
     fn add(&mut self, kept: &mut Vec<Measured>, view: u16, colours: Option<&[[u8; 3]]>) {
-        for r in kept.iter_mut() {
-            r.cell = self.bricks.cell(r.at.as_ref(), Cell::EMPTY);
-        }
-        for r in kept.iter() {
-            self.bricks.cells[r.cell as usize].add(r, view);
-        }
-        if let Some(colours) = colours {
-            self.colours.resize(self.bricks.cells.len(), Vector3::zeros());
+        /// Returns that are added together. From: work.
+        const SOME: usize = 512;
+        for kept in kept.chunks_mut(SOME) {
+            for r in kept.iter_mut() {
+                r.cell = self.bricks.cell(r.at.as_ref(), Cell::EMPTY);
+            }
             for r in kept.iter() {
-                if let Some(colour) = colours.get(r.pixel as usize) {
-                    self.colours[r.cell as usize] += Vector3::from(colour.map(f32::from)) * r.weight;
+                self.bricks.cells[r.cell as usize].add(r, view);
+            }
+            if let Some(colours) = colours {
+                self.colours.resize(self.bricks.cells.len(), Vector3::zeros());
+                for r in kept.iter() {
+                    if let Some(colour) = colours.get(r.pixel as usize) {
+                        self.colours[r.cell as usize] += Vector3::from(colour.map(f32::from)) * r.weight;
+                    }
                 }
             }
         }

@@ -10,6 +10,7 @@ use crate::surface::BAND;
 use crate::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// A return between two neighbours this far before and behind it belongs to neither, as a share of its depth. From: chosen.
 const FLYING_SHARE: f32 = 0.02;
@@ -146,12 +147,20 @@ impl<'a> Returns<'a> {
         &points[points.len().min(row * self.width)..points.len().min((row + 1) * self.width)]
     }
 
-    /// Calls `found` for those that are in range, band and region and do not fly.
-    pub fn visit(&self, mut found: impl FnMut(Return)) {
+    /// How many rows there are.
+    pub fn rows(&self) -> usize {
+        self.view.cloud.len().div_ceil(self.width)
+    }
+
+    /// Calls `found` for those of some rows that are in range, band and region and do not fly.
+    pub fn visit(&self, rows: Range<usize>, mut found: impl FnMut(Return)) {
         let mut lines: [Line; 3] = std::array::from_fn(|_| Line::of(self.width));
-        lines[2].fill(self.line(0));
+        if let Some(before) = rows.start.checked_sub(1) {
+            lines[1].fill(self.line(before));
+        }
+        lines[2].fill(self.line(rows.start));
         let mut around = vec![THING; self.width.next_multiple_of(LANES)];
-        for row in 0..self.view.cloud.len().div_ceil(self.width) {
+        for row in rows {
             lines.rotate_left(1);
             lines[2].fill(self.line(row + 1));
             for (on, column) in around.iter_mut().zip(&self.coarse.columns) {

@@ -12,6 +12,7 @@ use crate::noise::{KINECT, Residuals, Sensor, normal_cdf};
 use crate::segment::{Scene, Segment};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Our recogniser with its few numbers.
@@ -99,7 +100,9 @@ impl Recogniser for Descry {
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
         let _span = tracing::debug_span!("recognise", segments = scene.segments.len()).entered();
         let setting = Setting::of(scene, fitted(scene, seen));
-        scene.segments.iter().map(|segment| self.judge(&setting, segment, seen, models)).collect()
+        let judge = |segment| self.judge(&setting, segment, seen, models);
+        // Some take far longer than others.
+        scene.segments.par_iter().with_max_len(1).map(judge).collect()
     }
 }
 

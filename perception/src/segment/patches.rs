@@ -4,6 +4,7 @@ use super::bounds;
 use crate::lattice::{Around, Lattice};
 use crate::spread;
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 
 /// Occupied voxels of a set of points, in order of their place.
 pub(super) struct Voxels {
@@ -76,6 +77,9 @@ impl Moments {
     }
 }
 
+/// Voxels that one thread takes in a row. From: work.
+const SOME: usize = 256;
+
 /// Gathers points into voxels of a side and estimates a normal for each from its surroundings.
 pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f64>]) -> Voxels {
     let (low, high) = bounds(points);
@@ -110,11 +114,9 @@ pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f
         runs,
         run_ends,
     };
-    for i in 0..keys.len() {
-        let (normal, curvature) = surface(&voxels, &moments, i, viewpoints);
-        voxels.normals.push(normal);
-        voxels.curvatures.push(curvature);
-    }
+    let facing =
+        (0..keys.len()).into_par_iter().with_min_len(SOME).map(|i| surface(&voxels, &moments, i, viewpoints));
+    (voxels.normals, voxels.curvatures) = facing.unzip();
     voxels
 }
 

@@ -11,6 +11,7 @@ use crate::outline;
 use crate::round::{SECTORS, distance, sector};
 use crate::surface::floor;
 use nalgebra::{Point2, Point3, Vector2};
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Radii that are sought, metres. From: chosen.
@@ -47,7 +48,10 @@ pub(super) fn part(
     for (voxel, part) in part_of_voxel.iter().enumerate() {
         members.entry(*part).or_default().push(voxel);
     }
-    members.retain(|_, of| !is_box(voxels, of, points) && !is_round(voxels, of, points, viewpoints));
+    let is_one = |of: &Vec<usize>| is_box(voxels, of, points) || is_round(voxels, of, points, viewpoints);
+    let all: Vec<&Vec<usize>> = members.values().collect();
+    let mut is_one = all.into_par_iter().with_max_len(1).map(is_one).collect::<Vec<_>>().into_iter();
+    members.retain(|_, _| !is_one.next().unwrap_or(false));
     let all: Vec<usize> = members.values().flatten().copied().collect();
     for mut pool in together(voxels, &all) {
         while let Some(cut) = Axis::sought(voxels, &pool).iter().find_map(|axis| {

@@ -132,7 +132,7 @@ pub async fn pursue(
     Ok(report)
 }
 
-/// A goal in the words of a domain, of the places that a body knows and of the things that were learned.
+/// A goal in the words of a domain, of the places that a body knows and of what is remembered of earlier runs.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] that says what could have been said.

@@ -5,6 +5,7 @@ use crate::neighbours::Neighbours;
 use crate::normals;
 use crate::voxel;
 use nalgebra::{Point3, Vector3};
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Distance of its points, metres.
 pub(super) const STEP_M: f32 = 0.004;
@@ -50,23 +51,24 @@ impl Skin {
 
     /// Indices of the points that can be seen from far away in a direction (unit length, from the object).
     pub fn seen_from(&self, away: &Vector3<f32>) -> Vec<u32> {
-        let right = across(away);
-        let up = away.cross(&right);
-        let cell = |p: &Point3<f32>| {
-            let at = |axis: &Vector3<f32>| (axis.dot(&p.coords) / CELL_M).floor() as i32;
-            (at(&right), at(&up))
-        };
-        let mut nearest = rustc_hash::FxHashMap::default();
-        for p in &self.points {
-            let height = away.dot(&p.coords);
-            let best = nearest.entry(cell(p)).or_insert(height);
-            *best = height.max(*best);
-        }
+        let front = Front::of(self, away);
         let seen = |&i: &u32| {
             let (p, n) = (&self.points[i as usize], &self.normals[i as usize]);
-            n.dot(away) > FACING && away.dot(&p.coords) > nearest[&cell(p)] - BEHIND_M
+            n.dot(away) > FACING && front.has(p)
         };
         (0..self.points.len() as u32).filter(seen).collect()
+    }
+
+    /// Of the points before which nothing lies in a direction, those that face away where none of what is seen is: a body that is no shell has a side
+    /// there that hides them, of which nothing is known.
+    pub fn backs_from(&self, away: &Vector3<f32>, seen: &[u32]) -> Vec<u32> {
+        let front = Front::of(self, away);
+        let shown: FxHashSet<_> = seen.iter().map(|&i| front.cell(&self.points[i as usize])).collect();
+        let back = |&i: &u32| {
+            let (p, n) = (&self.points[i as usize], &self.normals[i as usize]);
+            n.dot(away) < -FACING && front.has(p) && !shown.contains(&front.cell(p))
+        };
+        (0..self.points.len() as u32).filter(back).collect()
     }
 
     /// The skin of some of the points.
@@ -99,6 +101,37 @@ impl Skin {
             }
         }
         best.into_iter().map(|(_, i)| i).collect()
+    }
+}
+
+/// What lies foremost in a direction, in cells across it.
+struct Front {
+    away: Vector3<f32>,
+    axes: [Vector3<f32>; 2],
+    heights: FxHashMap<(i32, i32), f32>,
+}
+
+impl Front {
+    fn of(skin: &Skin, away: &Vector3<f32>) -> Front {
+        let right = across(away);
+        let mut front =
+            Front { away: *away, axes: [right, away.cross(&right)], heights: FxHashMap::default() };
+        for p in &skin.points {
+            let height = away.dot(&p.coords);
+            let best = front.heights.entry(front.cell(p)).or_insert(height);
+            *best = height.max(*best);
+        }
+        front
+    }
+
+    fn cell(&self, p: &Point3<f32>) -> (i32, i32) {
+        let at = |axis: &Vector3<f32>| (axis.dot(&p.coords) / CELL_M).floor() as i32;
+        (at(&self.axes[0]), at(&self.axes[1]))
+    }
+
+    /// True if nothing lies before a point of the skin.
+    fn has(&self, p: &Point3<f32>) -> bool {
+        self.away.dot(&p.coords) > self.heights[&self.cell(p)] - BEHIND_M
     }
 }
 

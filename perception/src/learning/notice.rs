@@ -10,7 +10,7 @@ use crate::register::{Method, Prepared, RegisterOptions, align};
 use crate::view::View;
 use crate::visibility::{DepthMap, Seen};
 use crate::voxel;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -131,7 +131,7 @@ impl MetaRoom {
         let changes: Vec<Change> =
             views.par_iter().zip(&maps).map(|(view, map)| self.compare(view, map, &tree)).collect();
         let appeared = self.clusters(views, &poses, &changes)?;
-        let (gone, removed) = self.remove(&maps)?;
+        let (gone, removed) = self.remove(views, &maps)?;
         let added = self.add(views, &poses, &changes, &appeared)?;
         self.visits += 1;
         Ok(Visit { appeared, gone, poses, added, removed })
@@ -267,21 +267,25 @@ impl MetaRoom {
     }
 
     /// Drops what the visit looked through (D_2 without what is hidden): what went, by clusters, and how many points. A cluster went if most of
-    /// it was looked through by far: of a wall or a floor whose two measurements err, neither does.
-    fn remove(&mut self, maps: &[DepthMap]) -> Result<(Vec<Cloud>, usize), LearningError> {
-        let through = |p: &Point3<f32>, times: f64| {
-            maps.iter().any(|map| {
+    /// it was looked through by far: of a wall or a floor whose two measurements err, neither does. By far is also to either side, as far as a camera
+    /// may be turned: past the edge of what still stands.
+    fn remove(&mut self, views: &[View], maps: &[DepthMap]) -> Result<(Vec<Cloud>, usize), LearningError> {
+        let through = |p: &Point3<f32>, times: f64, turned: f64| {
+            maps.iter().zip(views).any(|(map, view)| {
                 let q = map.camera_from_world * p.cast::<f64>();
                 let near = q.z > 0.0 && q.z <= self.options.range_m;
-                near && map.look_from(&q, times * f64::from(self.tolerance_m(q.z as f32))) == Seen::Free
+                let tolerance_m = times * f64::from(self.tolerance_m(q.z as f32));
+                let aside = Vector3::x() * (turned * view.pose_sigma_rad * q.z);
+                let is_free = |way: f64| map.look_from(&(q + aside * way), tolerance_m) == Seen::Free;
+                near && [0.0, -1.0, 1.0].into_iter().all(is_free)
             })
         };
-        let gone: Vec<bool> = self.cloud.points.par_iter().map(|p| through(p, 1.0)).collect();
+        let gone: Vec<bool> = self.cloud.points.par_iter().map(|p| through(p, 1.0, 0.0)).collect();
         let pick = |wanted: bool| -> Vec<u32> {
             (0u32..).zip(&gone).filter(|(_, g)| **g == wanted).map(|(i, _)| i).collect()
         };
         let lost = self.cloud.select(&pick(true));
-        let by_far: Vec<bool> = lost.points.par_iter().map(|p| through(p, FAR)).collect();
+        let by_far: Vec<bool> = lost.points.par_iter().map(|p| through(p, FAR, 1.0)).collect();
         self.cloud = self.cloud.select(&pick(false));
         // Thinned to voxels, a cluster of so many pixels is about so many points.
         let least = self.options.least_pixels / 4;

@@ -194,7 +194,7 @@ impl<'a> Table<'a> {
         let single = |f: usize| header.fields[f].kind == b'F' && header.fields[f].size == 4;
         if fields.into_iter().all(single) {
             let [a, b, c] = fields.map(|f| self.layout[f]);
-            if (a.1, b, c) == (a.1, (a.0 + 4, a.1), (a.0 + 8, a.1)) {
+            if [b, c] == [(a.0 + 4, a.1), (a.0 + 8, a.1)] && a.1 >= 12 {
                 // Beside each other in each row, as nearly always.
                 let rows = self.bytes.get(a.0..).unwrap_or_default().chunks(a.1).take(header.points);
                 let row = |row: &[u8]| {

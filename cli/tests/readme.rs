@@ -56,12 +56,12 @@ fn every_command_that_is_shown_is_one_with_these_options() {
 fn the_explanation_that_is_shown_is_what_is_said() {
     let text = std::fs::read_to_string(root().join("README.md")).expect("it is there");
     let all = blocks(&text);
-    let at = all.iter().position(|block| block.contains(&"descry explain runs/one")).expect("it is shown");
+    let at = all.iter().position(|block| block.contains(&"descry explain runs/ten")).expect("it is shown");
     let shown = all[at + 1].join("\n");
     let folder = tempfile::tempdir().expect("a folder");
-    let run = binary::outcome(folder.path(), &["find", "cup A", "--seed", "28", "--run", "runs/one"]);
+    let run = binary::outcome(folder.path(), &["find", "cup A", "--seed", "10", "--run", "runs/ten"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    let said = binary::outcome(folder.path(), &["explain", "runs/one"]);
+    let said = binary::outcome(folder.path(), &["explain", "runs/ten"]);
     let said = String::from_utf8_lossy(&said.stdout);
     assert!(said.contains(&shown), "README shows\n{shown}\nbut this is said:\n{said}");
 }

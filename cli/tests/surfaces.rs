@@ -179,7 +179,7 @@ fn cups_in_two_rooms_are_all_found_and_where_they_are() {
         (12020, "cup A"),
         (12056, "cup A"),
     ] {
-        let all = report(seed, "find all cups with confidence 0.92");
+        let all = report(seed, "find all cups with confidence 0.96");
         let found = all["objects"].as_array().into_iter().flatten().find(|o| o["label"] == cup);
         let found = found.unwrap_or_else(|| panic!("seed {seed}: no {cup} in {all}"));
         assert!(found["confidence"].as_f64() > Some(0.8), "seed {seed}: {found}");

@@ -95,6 +95,8 @@ const COVER: f64 = 0.75;
 /// What is looked through by so many times what is tolerated is so by far: two measurements of one surface are not, nor if the camera errs by
 /// twice as much as is known of it.
 const FAR: f64 = 2.5;
+/// A camera may be turned by so many times as much as localisation errs by.
+const TURNED: f64 = 2.0;
 /// Background is kept up to this, metres: to have seen it is to have seen past what stands before it now.
 const BACKGROUND_M: f32 = 8.0;
 
@@ -285,7 +287,7 @@ impl MetaRoom {
             (0u32..).zip(&gone).filter(|(_, g)| **g == wanted).map(|(i, _)| i).collect()
         };
         let lost = self.cloud.select(&pick(true));
-        let by_far: Vec<bool> = lost.points.par_iter().map(|p| through(p, FAR, 1.0)).collect();
+        let by_far: Vec<bool> = lost.points.par_iter().map(|p| through(p, FAR, TURNED)).collect();
         self.cloud = self.cloud.select(&pick(false));
         // Thinned to voxels, a cluster of so many pixels is about so many points.
         let least = self.options.least_pixels / 4;

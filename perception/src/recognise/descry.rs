@@ -516,8 +516,6 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     };
     // What lies beside each other by an error that whole views share tells the same again and again.
     let independent = m.independent / (1.0 + (apart / SHARED_M).powi(2));
-    // What lies nearer to a form than noise scatters what is of that form has been drawn into the noise.
-    let miss = miss.max(OF_SIGMA * m.scatter_m);
     -independent * miss.hypot(floor).ln()
 }
 

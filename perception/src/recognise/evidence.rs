@@ -96,8 +96,6 @@ pub(super) struct Measured {
     pub independent: f64,
     /// Spread of one measurement, metres.
     pub sigma_m: f64,
-    /// The same by the noise that the surface shows, metres.
-    pub scatter_m: f64,
     /// Share of sides and top that was seen or looked past.
     pub seen_fraction: f64,
     /// What rays tell of the upper end.
@@ -215,7 +213,6 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         looked_through: 0.0,
         independent: (side.len() as f64 / SHARING).clamp(1.0, MOST_GROUPS),
         sigma_m,
-        scatter_m: setting.sensor.frontal_sigma_m(near),
         seen_fraction: 0.0,
         upper: Upper::default(),
     };

@@ -105,8 +105,8 @@ pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f
     let (starts, near) = neighbours(&lattice, &keys);
     let mut voxels = Voxels {
         centres: moments.iter().map(|m| Point3::from(m.sum / m.count)).collect(),
-        normals: Vec::with_capacity(keys.len()),
-        curvatures: Vec::with_capacity(keys.len()),
+        normals: Vec::new(),
+        curvatures: Vec::new(),
         counts: moments.iter().map(|m| m.count as u32).collect(),
         starts,
         near,

@@ -153,8 +153,7 @@ fn a_cup_is_found_where_it_is() {
 
 /// The cups that are found in two rooms, against where they truly stand, which a search for each by itself reports. It may not be sure
 /// that there are no others, but none is missed.
-#[test]
-fn cups_in_two_rooms_are_all_found_and_where_they_are() {
+fn check_all_cups(arrangements: &[(u64, &str)]) {
     const TOLERANCE_M: f64 = 0.02;
     let folder = TempDir::new().expect("a folder can be made");
     let report = |seed: u64, goal: &str| {
@@ -167,18 +166,7 @@ fn cups_in_two_rooms_are_all_found_and_where_they_are() {
     let at = |value: &Value| -> Vec<f64> {
         value.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
     };
-    // A plane that cuts through the wall behind a board; something measured that no object explains; views that slide along a counter;
-    // views of a board from afar that blur what stands on it; a cup at three metres of which too little is left to be an object, or through whose few points a circle
-    // was drawn that is too near.
-    for (seed, cup) in [
-        (5123, "cup A"),
-        (5103, "cup B"),
-        (7034, "cup B"),
-        (11035, "cup A"),
-        (8169, "cup A"),
-        (12020, "cup A"),
-        (12056, "cup A"),
-    ] {
+    for &(seed, cup) in arrangements {
         let all = report(seed, "find all cups with confidence 0.96");
         let found = all["objects"].as_array().into_iter().flatten().find(|o| o["label"] == cup);
         let found = found.unwrap_or_else(|| panic!("seed {seed}: no {cup} in {all}"));
@@ -188,4 +176,18 @@ fn cups_in_two_rooms_are_all_found_and_where_they_are() {
         let off_m = found.iter().zip(&truly).map(|(f, t)| (f - t).powi(2)).sum::<f64>().sqrt();
         assert!(off_m < TOLERANCE_M, "seed {seed}: {cup} is {off_m:.3} m from where it stands, {truly:?}");
     }
+}
+
+/// Views of a board from afar that blur what stands on it; through the few points of a cup at three metres a circle was drawn that is too near.
+#[test]
+fn cups_in_two_rooms_are_all_found_and_where_they_are() {
+    check_all_cups(&[(11035, "cup A"), (12056, "cup A")]);
+}
+
+/// A plane that cuts through the wall behind a board; something measured that no object explains; views that slide along a counter; a cup at three
+/// metres of which too little is left to be an object.
+#[test]
+#[ignore = "a minute: more arrangements in which a cup was missed"]
+fn cups_in_more_rooms_are_all_found_and_where_they_are() {
+    check_all_cups(&[(5123, "cup A"), (5103, "cup B"), (7034, "cup B"), (8169, "cup A"), (12020, "cup A")]);
 }

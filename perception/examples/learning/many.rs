@@ -47,6 +47,8 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
     let mut sums: [Said; KNOWN.len()] = Default::default();
     let mut confusion = vec![vec![0; most + 1]; most + 1];
     let mut claims = Vec::new();
+    let mut wrong =
+        Table::new(&["scene", "said", "confidence", "stands there", "off its place", "what speaks for it"]);
     let scenes: Vec<Scene> = (0..scenes)
         .map(|k| {
             let mut things = some(&mut draws, most, THINGS - 1);
@@ -54,7 +56,7 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
             scene(&all, &things, seed * 70_000 + k as u64)
         })
         .collect();
-    for scene in &scenes {
+    for (number, scene) in scenes.iter().enumerate() {
         let found = everything.judged(&scene.view, &options()).map_err(|e| e.to_string())?;
         for (count, said) in KNOWN.iter().zip(&mut sums) {
             let of_these = found.iter().filter(|c| c.recognised.model < *count).cloned().collect();
@@ -62,7 +64,13 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
             said.add(scene, &told, &all, &surfaces, *count);
             if *count >= most {
                 confuse(scene, &told, &all, &mut confusion);
-                claims.extend(told.iter().map(|f| (f.confidence, is_right(scene, &surfaces, f.model, f))));
+                for answer in &told {
+                    let right = is_right(scene, &surfaces, answer.model, answer);
+                    claims.push((answer.confidence, right));
+                    if !right {
+                        wrong.row(told_wrongly(number, scene, &all, answer));
+                    }
+                }
             }
         }
     }
@@ -101,6 +109,8 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
         table.row(row);
     }
     page.table(&table);
+    page.say("Wrong answers with all models known:");
+    page.table(&wrong);
     heat(
         &confusion,
         ("said (the last: nothing)", "truly (the last: strangers)"),
@@ -168,6 +178,32 @@ fn thing_at(scene: &Scene, all: &[Body], found: &Recognised) -> Option<usize> {
     };
     let nearest = (0..scene.things.len()).min_by(|a, b| away(*a).total_cmp(&away(*b)))?;
     (away(nearest) < radius_m(&all[scene.things[nearest].0]).max(0.08)).then_some(nearest)
+}
+
+/// A row about a wrong answer: what it says, and what is there.
+fn told_wrongly(number: usize, scene: &Scene, all: &[Body], found: &Recognised) -> Vec<String> {
+    let there = thing_at(scene, all, found).map_or("nothing", |k| all[scene.things[k].0].name);
+    let said = found.world_from_model;
+    let place = scene.things.iter().find(|thing| thing.0 == found.model).map(|thing| thing.1);
+    let off = place.map_or("not in the scene".to_owned(), |truly| {
+        let off_m = (truly.translation.vector - said.translation.vector).norm();
+        format!("{:.1} cm, {:.0}°", 100.0 * off_m, truly.rotation.angle_to(&said.rotation).to_degrees())
+    });
+    let evidence = &found.evidence;
+    let share = |count: usize| 100 * count / evidence.facing.max(1);
+    let speaks = format!(
+        "of {} points {} % explained, {} % looked through, {} % hidden; colours {:.2}, beyond {:.2}, bent {:.2}, {} votes",
+        evidence.facing,
+        share(evidence.explained),
+        share(evidence.through),
+        share(evidence.hidden),
+        evidence.colour.unwrap_or(f64::NAN),
+        evidence.beyond,
+        evidence.bent,
+        evidence.votes
+    );
+    let confidence = format!("{:.3}", found.confidence);
+    vec![number.to_string(), all[found.model].name.to_owned(), confidence, there.to_owned(), off, speaks]
 }
 
 impl Said {

@@ -14,8 +14,9 @@ use descry_perception::nalgebra::{SMatrix, SVector};
 const ROUNDS: usize = 30;
 /// Pull of the weights towards nothing.
 const RIDGE: f64 = 0.02;
-/// Objects that are learned, and as many that nobody knows.
+/// Objects that are learned, and as many that nobody knows; others after so many scenes.
 const KNOWN: usize = 16;
+const SCENES: usize = 20;
 
 /// Looks of models: what little is known of is taken for something else most easily.
 const LOOKS: [usize; 4] = [1, usize::MAX, 2, usize::MAX];
@@ -48,7 +49,7 @@ fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
 /// A claim as a line of a file.
 pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
     format!(
-        "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{:.4},{}",
+        "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{:.4},{:.4},{}",
         u8::from(right),
         e.facing,
         e.explained,
@@ -56,6 +57,7 @@ pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
         e.hidden,
         e.colour.unwrap_or(-1.0),
         e.off_sigmas,
+        e.turned_rad,
         e.beyond,
         e.bent,
         e.votes
@@ -64,28 +66,14 @@ pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
 
 /// Fits a judge and prints it; what it was fitted to is written to the page's folder.
 pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
-    let bodies: Vec<Body> = (0..2 * KNOWN as u64).map(|k| made(seed * 1000 + k)).collect();
-    let surfaces: Vec<Cloud> = bodies.iter().map(|b| Room::surface(b, 0.004)).collect();
-    let models = models(&bodies, seed);
-    let library = library(&models.iter().collect::<Vec<_>>());
     let mut claims: Vec<(Evidence, bool)> = Vec::new();
     let mut lines = Vec::new();
     let path = page.file("claims.csv");
-    // What is hopeless has to be known as such.
-    let options = KnowOptions { hopeless: 0.0, ..options() };
-    let mut draws = Draws(seed);
-    for k in 0..scenes {
-        let things = some(&mut draws, bodies.len(), 5);
-        let mut scene = scene_among(&bodies, &things, LEAFLETS * (k % 2), seed * 9000 + k as u64);
-        if k % 4 == 3 {
-            // What is known without colours has to be judged as well.
-            scene.view.cloud.colours = None;
-        }
-        for found in library.judged(&scene.view, &options).map_err(|e| e.to_string())? {
-            let found = found.recognised;
-            let right = is_right(&scene, &surfaces, models[found.model].body, &found);
-            claims.push((found.evidence, right));
-            lines.push(line(k, found.model, right, &found.evidence));
+    for first in (0..scenes).step_by(SCENES) {
+        let set = seed + (first / SCENES) as u64;
+        for (scene, model, evidence, right) in judged(set, first..scenes.min(first + SCENES))? {
+            claims.push((evidence, right));
+            lines.push(line(scene, model, right, &evidence));
         }
         std::fs::write(&path, lines.join("\n")).map_err(|e| format!("{}: {e}", path.display()))?;
     }
@@ -100,6 +88,32 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
     let stated: Vec<Claim> = claims.iter().map(|(e, r)| (judge.confidence(e), *r)).collect();
     page.say(&format!("on what it was fitted to: {:?}", reliability(&stated, 5)));
     Ok(())
+}
+
+/// What is said in scenes of a set of objects of which half are known: scene, model, what speaks for it and whether it is so.
+fn judged(set: u64, scenes: std::ops::Range<usize>) -> Result<Vec<(usize, usize, Evidence, bool)>, String> {
+    let bodies: Vec<Body> = (0..2 * KNOWN as u64).map(|k| made(set * 1000 + k)).collect();
+    let surfaces: Vec<Cloud> = bodies.iter().map(|b| Room::surface(b, 0.004)).collect();
+    let models = models(&bodies, set);
+    let library = library(&models.iter().collect::<Vec<_>>());
+    // What is hopeless has to be known as such.
+    let options = KnowOptions { hopeless: 0.0, ..options() };
+    let mut draws = Draws(set);
+    let mut judged = Vec::new();
+    for k in scenes {
+        let things = some(&mut draws, bodies.len(), 5);
+        let mut scene = scene_among(&bodies, &things, LEAFLETS * (k % 2), set * 9000 + k as u64);
+        if k % 4 == 3 {
+            // What is known without colours has to be judged as well.
+            scene.view.cloud.colours = None;
+        }
+        for found in library.judged(&scene.view, &options).map_err(|e| e.to_string())? {
+            let found = found.recognised;
+            let right = is_right(&scene, &surfaces, models[found.model].body, &found);
+            judged.push((k, found.model, found.evidence, right));
+        }
+    }
+    Ok(judged)
 }
 
 /// Stated against true shares of answers.

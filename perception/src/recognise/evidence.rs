@@ -182,7 +182,8 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     let base_m = segment.base_m;
     let top = top_m(segment);
     let height_m = (top - base_m).max(LEAST_HEIGHT_M);
-    let (_, middle) = outline::bounding(&segment.points).unwrap_or_default();
+    let bounding = |segment: &Segment| outline::bounding(&segment.points).unwrap_or_default();
+    let (footprint_m, middle) = bounding(segment);
     let world_from_surface = scene.surface.surface_from_world.inverse();
     let place = world_from_surface * Point3::new(middle[0], middle[1], 0.5 * (base_m + top));
     let near = seen.viewpoints().iter().map(|v| (place - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
@@ -191,11 +192,12 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m);
     let first = round::fit(&segment.points, base_m, top, sigma_m, round::SEED);
     let settled = first.and_then(|round| settle(&round, segment, &asker, (base_m, top), sigma_m));
-    let (segment, asker, first) = match &settled {
-        Some(settled) => (&settled.segment, settled.asker.clone(), Some(settled.round)),
-        None => (segment, asker, first),
+    let (segment, asker, first, (footprint_m, middle)) = match &settled {
+        Some(settled) => {
+            (&settled.segment, settled.asker.clone(), Some(settled.round), bounding(&settled.segment))
+        }
+        None => (segment, asker, first, (footprint_m, middle)),
     };
-    let (footprint_m, middle) = outline::bounding(&segment.points).unwrap_or_default();
     // What is measured of a low thing's top reaches far down its side.
     let rim_m = (BELOW_M + CLEAR_SPREADS * sigma_m).clamp(RIMS.0 * height_m, RIMS.1 * height_m);
     let side_m = base_m + ENDS.0 * height_m..top - rim_m;

@@ -124,6 +124,7 @@ impl Evidence {
             hidden: sum(|e| e.hidden),
             colour: all.iter().all(|e| e.colour.is_some()).then(|| mean(&|e| e.colour.unwrap_or_default())),
             off_sigmas: mean(&|e| e.off_sigmas),
+            turned_rad: mean(&|e| e.turned_rad),
             beyond: mean(&|e| e.beyond),
             bent: mean(&|e| e.bent),
             votes: all.iter().map(|e| e.votes).max().unwrap_or_default(),

@@ -49,7 +49,7 @@ fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
 /// A claim as a line of a file.
 pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
     format!(
-        "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{:.4},{:.4},{}",
+        "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{:.4},{}",
         u8::from(right),
         e.facing,
         e.explained,
@@ -59,7 +59,6 @@ pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
         e.off_sigmas,
         e.turned_rad,
         e.beyond,
-        e.bent,
         e.votes
     )
 }

@@ -182,7 +182,11 @@ fn thing_at(scene: &Scene, all: &[Body], found: &Recognised) -> Option<usize> {
 
 /// A row about a wrong answer: what it says, and what is there.
 fn told_wrongly(number: usize, scene: &Scene, all: &[Body], found: &Recognised) -> Vec<String> {
-    let there = thing_at(scene, all, found).map_or("nothing", |k| all[scene.things[k].0].name);
+    let at = found.world_from_model.translation.vector;
+    let there = thing_at(scene, all, found).map_or_else(
+        || format!("nothing, ({:.2}, {:.2}, {:.2}) m", at.x, at.y, at.z),
+        |k| all[scene.things[k].0].name.to_owned(),
+    );
     let said = found.world_from_model;
     let place = scene.things.iter().find(|thing| thing.0 == found.model).map(|thing| thing.1);
     let off = place.map_or("not in the scene".to_owned(), |truly| {
@@ -192,18 +196,18 @@ fn told_wrongly(number: usize, scene: &Scene, all: &[Body], found: &Recognised) 
     let evidence = &found.evidence;
     let share = |count: usize| 100 * count / evidence.facing.max(1);
     let speaks = format!(
-        "of {} points {} % explained, {} % looked through, {} % hidden; colours {:.2}, beyond {:.2}, bent {:.2}, {} votes",
+        "of {} points {} % explained, {} % looked through, {} % hidden; colours {:.2}, beyond {:.2}, normals {:.2} rad off, {} votes",
         evidence.facing,
         share(evidence.explained),
         share(evidence.through),
         share(evidence.hidden),
         evidence.colour.unwrap_or(f64::NAN),
         evidence.beyond,
-        evidence.bent,
+        evidence.turned_rad,
         evidence.votes
     );
     let confidence = format!("{:.3}", found.confidence);
-    vec![number.to_string(), all[found.model].name.to_owned(), confidence, there.to_owned(), off, speaks]
+    vec![number.to_string(), all[found.model].name.to_owned(), confidence, there, off, speaks]
 }
 
 impl Said {

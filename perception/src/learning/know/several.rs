@@ -126,7 +126,6 @@ impl Evidence {
             off_sigmas: mean(&|e| e.off_sigmas),
             turned_rad: mean(&|e| e.turned_rad),
             beyond: mean(&|e| e.beyond),
-            bent: mean(&|e| e.bent),
             votes: all.iter().map(|e| e.votes).max().unwrap_or_default(),
         }
     }

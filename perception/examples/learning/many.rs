@@ -74,6 +74,20 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
             }
         }
     }
+    page.table(&counted(&learned, &sums, &scenes)?);
+    page.say("Wrong answers with all models known:");
+    page.table(&wrong);
+    heat(
+        &confusion,
+        ("said (the last: nothing)", "truly (the last: strangers)"),
+        &page.file("confusion.svg"),
+    )?;
+    page.figure("confusion.svg", "What is taken for what, with all models known");
+    Ok(claims)
+}
+
+/// What was said with so many models known, and how long a recognition takes then.
+fn counted(learned: &[Model], sums: &[Said], scenes: &[Scene]) -> Result<Table, String> {
     let mut table = Table::new(&[
         "models known",
         "named rightly",
@@ -85,7 +99,7 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
         "said where nothing stands",
         "s a recognition",
     ]);
-    for (count, said) in KNOWN.iter().zip(&sums) {
+    for (count, said) in KNOWN.iter().zip(sums) {
         let few: Vec<&Model> = learned.iter().take(*count).collect();
         let known = library(&few);
         let mut seconds = Vec::new();
@@ -108,16 +122,7 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
         row.push(format!("{:.2}", median(&mut seconds)));
         table.row(row);
     }
-    page.table(&table);
-    page.say("Wrong answers with all models known:");
-    page.table(&wrong);
-    heat(
-        &confusion,
-        ("said (the last: nothing)", "truly (the last: strangers)"),
-        &page.file("confusion.svg"),
-    )?;
-    page.figure("confusion.svg", "What is taken for what, with all models known");
-    Ok(claims)
+    Ok(table)
 }
 
 /// Learns so many objects by the robot, in a mixed order; returns models that go by the numbers of the bodies, and the bodies, strangers last.

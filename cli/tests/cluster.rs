@@ -1,11 +1,9 @@
 //! An experiment's shards as a scheduler runs them: with the number of each where the scheduler puts it, in one folder that all share.
 
-mod binary;
-
 use std::path::Path;
 use std::process::Command;
 
-use binary::{check_refused, outcome};
+use crate::binary::{check_refused, outcome};
 
 const BATCH: &str = r#"
 name = "A few runs"

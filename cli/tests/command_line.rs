@@ -1,7 +1,5 @@
 //! The command line as scripts see it: output, exit codes, messages.
 
-mod beside;
-
 use std::path::Path;
 use std::process::Output;
 
@@ -15,7 +13,7 @@ use descry_perception::nalgebra::Point3;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use beside::shared;
+use crate::beside::shared;
 
 fn descry(arguments: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_descry"))
@@ -376,10 +374,32 @@ fn the_mugs_are_found_on_real_views() {
     assert_eq!(said["verdict"], "achieved", "{said}");
 }
 
-/// The views were taken by a tracker that drifts: merged as they are stated, the white mug is in three places.
 #[test]
 fn everything_on_a_real_table_is_identified_where_it_stands() {
-    let Some(folder) = shared("data/kitchen") else { return };
+    check_real_table(2);
+}
+
+#[test]
+#[ignore = "16 looks at a whole kitchen: a minute"]
+fn everything_on_a_real_table_is_identified_where_it_stands_from_all_its_views() {
+    check_real_table(1);
+}
+
+/// Of the frames of a kitchen every so manieth. They were taken by a tracker that drifts: merged as they are stated, the white mug is in
+/// three places.
+fn check_real_table(every: usize) {
+    let Some(all) = shared("data/kitchen") else { return };
+    let folder = TempDir::new().expect("a folder can be made");
+    let mut files: Vec<_> = std::fs::read_dir(&all).expect("a folder").flatten().map(|f| f.path()).collect();
+    files.sort();
+    let (frames, others): (Vec<_>, Vec<_>) =
+        files.into_iter().partition(|f| f.to_string_lossy().contains("frame-"));
+    // A depth image, its colours and its pose.
+    let frames = frames.chunks(3).step_by(every).flatten();
+    for file in frames.chain(&others).filter(|f| f.is_file()) {
+        std::fs::copy(file, folder.path().join(file.file_name().expect("a name"))).expect("it can be copied");
+    }
+    let folder = folder.path();
     let robot = format!("recorded:{}", folder.display());
     let goal = "identify all objects on the table";
     let (out, _) = check(&["do", goal, "--robot", &robot, "--json"], 1, &[]);

@@ -1,12 +1,10 @@
 //! Damaged records: a flipped bit, a cut or missing file. Every command shows what it shows of the whole record, or says what is
 //! lost and shows nothing that was not in it.
 
-mod binary;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use binary::{check, kill_after, outcome};
+use crate::binary::{check, kill_after, outcome};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;

@@ -1,7 +1,6 @@
 //! `descry explain RUN`: why a run went as it did, from its record alone.
 
-mod binary;
-
+use crate::binary;
 use std::path::Path;
 
 use descry_agent::body::{scene_spec, simulate};

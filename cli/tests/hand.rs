@@ -1,7 +1,6 @@
 //! What a hand is for, in a flat where not everything goes well.
 
-mod binary;
-
+use crate::binary;
 use std::fs;
 
 use descry_domains::load::Domain;

@@ -1,13 +1,10 @@
 //! Kills at any moment: the run goes on to the same end, and nothing that was done is asked for again.
 
-mod binary;
-mod body;
-
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use binary::{check, start};
-use body::{body_in, check_nothing_twice, has_python};
+use crate::binary::{check, start};
+use crate::body::{body_in, check_nothing_twice, has_python};
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -1,8 +1,5 @@
 //! `--live`: the page of what goes on, as a browser on this machine asks for it, and as others do who are refused.
 
-mod binary;
-mod body;
-
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
@@ -10,8 +7,8 @@ use std::process::Child;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use binary::{check, check_refused, documents, outcome, start};
-use body::has_python;
+use crate::binary::{check, check_refused, documents, outcome, start};
+use crate::body::has_python;
 use serde_json::Value;
 
 /// An answer: its status, its head and its text.
@@ -199,7 +196,7 @@ kind = "tasks"
 about = "A few runs"
 domain = "tabletop"
 scene = "default"
-runs = 4
+runs = 2
 first_seed = 1
 policies = ["plan", "nearest"]
 
@@ -218,10 +215,10 @@ fn a_batch_is_shown_while_it_goes_on() {
         shown(folder, &["experiment", "batch.toml", "--out", "seen", "--jobs", "1", "--live"]);
     check_status(&address, "GET /", &[&format!("Host: {address}"), "Origin: http://evil.example"], 403);
     let first = got(&address, "/").expect("it is there");
-    assert!(first.text.contains("<progress max=\"8\"") && first.text.contains("follow("), "{}", first.text);
+    assert!(first.text.contains("<progress max=\"4\"") && first.text.contains("follow("), "{}", first.text);
     let (news, last) = followed(&address, "/");
     assert!(news >= 2, "{news} news of a batch");
-    for part in ["<progress max=\"8\" value=\"8\">", "<h3>All runs</h3>", "8 of 8 (0 failed)"] {
+    for part in ["<progress max=\"4\" value=\"4\">", "<h3>All runs</h3>", "4 of 4 (0 failed)"] {
         assert!(last.text.contains(part), "{part} is not in\n{}", last.text);
     }
     assert!(!last.text.contains("so far"), "{}", last.text);

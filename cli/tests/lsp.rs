@@ -1,7 +1,6 @@
 //! `descry lsp`: an editor speaks to it over its standard input and output.
 
-mod binary;
-
+use crate::binary;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};

@@ -1,7 +1,6 @@
 //! `descry show RUN --html FILE`: one page that holds everything, and that a browser draws.
 
-mod binary;
-
+use crate::binary;
 use std::path::Path;
 use std::process::Command;
 

@@ -1,7 +1,6 @@
 //! The commands of README and of the book are commands, and what README shows of an explanation is what is said.
 
-mod binary;
-
+use crate::binary;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

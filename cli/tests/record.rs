@@ -1,12 +1,11 @@
 //! What the record of a run is good for: it is played again, serves as a body, and lets a run that was killed go on.
 
-mod beside;
-mod binary;
-
 use std::path::Path;
 
-use beside::shared;
-use binary::{check, check_refused, documents, first_line, kill_after, outcome, start, without_readers};
+use crate::beside::shared;
+use crate::binary::{
+    check, check_refused, documents, first_line, kill_after, outcome, start, without_readers,
+};
 use serde_json::Value;
 use tempfile::TempDir;
 

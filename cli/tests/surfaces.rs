@@ -1,11 +1,9 @@
 //! Several surfaces in one room: every answer is about what was asked, and names where.
 
-mod binary;
-
 use std::fs;
 use std::path::Path;
 
-use binary::{check, check_refused, outcome};
+use crate::binary::{check, check_refused, outcome};
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -1,12 +1,10 @@
 //! Recordings that say nothing of surfaces: every surface in view is one to stand things on, and none that may be the floor proves
 //! anything.
 
-mod binary;
-
 use std::fs;
 use std::path::Path;
 
-use binary::check;
+use crate::binary::check;
 use descry_robots::image::{ImageBuffer, Luma};
 use descry_robots::nalgebra::Point3;
 use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};

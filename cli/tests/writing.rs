@@ -1,7 +1,6 @@
 //! What helps to write and to plan: layout, why an action is not in a plan, completions, man pages.
 
-mod binary;
-
+use crate::binary;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};

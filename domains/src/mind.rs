@@ -8,6 +8,7 @@ use descry_perception::nalgebra::Isometry3;
 
 use crate::abilities::learning::again::Glances;
 use crate::abilities::searching::change::Change;
+use crate::abilities::searching::merging::LastMerged;
 use crate::situation::Known;
 use crate::words::Words;
 
@@ -19,6 +20,8 @@ pub struct Mind {
     pub words: Words,
     /// Looks at each surface, and what was changed there.
     pub regions: Vec<Region>,
+    /// What was merged last, if other surfaces may be in the same views.
+    pub merged: Option<LastMerged>,
     /// Views taken so far.
     pub views: usize,
     /// Pushes tried so far.

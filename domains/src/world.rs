@@ -169,10 +169,10 @@ impl<'a> World<'a> {
         };
         let regions = known.surfaces.iter().map(|_| Region::default()).collect();
         let words = Words::begin(domain).map_err(|e| WorldError::Domain(format!("domain.toml: {e}")))?;
-        let glances = Default::default();
+        let (merged, glances) = Default::default();
         let readings = Default::default();
         let mut mind =
-            Mind { known, words, regions, views: 0, pushes: 0, distance_m: 0.0, glances, readings };
+            Mind { known, words, regions, merged, views: 0, pushes: 0, distance_m: 0.0, glances, readings };
         mind.attend();
         abilities::used(&domain.config.uses)
             .filter_map(|a| a.begins)

@@ -119,7 +119,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_walk_finds_what_a_search_of_all_finds(
-            places in prop::collection::vec((-1.0..0.7_f64, -0.5..0.5_f64, 0.2..0.9_f64), 1..4000)
+            places in prop::collection::vec((-1.0..0.7_f64, -0.5..0.5_f64, 0.2..0.9_f64), 1..1000)
         ) {
             let lattice = lattice();
             let voxel = |p: &(f64, f64, f64)| [p.0, p.1, p.2].map(|c| (c / 0.05).floor() as i64);

@@ -1,19 +1,17 @@
 //! Learning objects, each step by itself, in a simulated room: what is new, how looks lie to each other, the model grown, known again.
 
-mod household;
-mod tabletop;
-
+use crate::household;
 use std::f64::consts::PI;
 
+use crate::household::{Body, Room, RoomOptions, TABLE_M, bodies, looking, standing};
+use crate::tabletop::{Draws, disturbed};
 use descry_perception::learning::{
     AroundOptions, Keyframe, KnowError, KnowOptions, LearnOptions, LearningError, Library, MetaRoom,
     NoticeOptions, keyframes, learn, nearest, outward, register, stands, trajectories, united,
 };
 use descry_perception::nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3, center};
 use descry_perception::{Cloud, Intrinsics, Neighbours, View};
-use household::{Body, Room, RoomOptions, TABLE_M, bodies, looking, standing};
 use std::f64::consts::TAU;
-use tabletop::{Draws, disturbed};
 
 /// A quarter of the pixels of an Xtion.
 const SMALL: Intrinsics = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5 };
@@ -127,7 +125,12 @@ fn nothing_is_gone_at_the_edge_of_what_stands_where_views_are_turned() {
         let same = first.clone().visit(&visit(&things, TURNED_RAD, seed)).expect("a sound visit");
         let gone: Vec<usize> = same.gone.iter().map(Cloud::len).collect();
         assert!(gone.is_empty(), "visit {seed}: {gone:?}");
+        let came: Vec<Point3<f64>> = same.appeared.iter().filter(|a| a.apart).map(|a| a.centre()).collect();
+        assert!(came.is_empty(), "visit {seed}: {came:?}");
     }
+    let more = [things[0], things[1], ("mug", standing(0.1, 0.15, 0.0))];
+    let came = first.clone().visit(&visit(&more, TURNED_RAD, 9)).expect("a sound visit");
+    assert!(came.appeared.iter().any(|a| a.apart && near(&a.centre(), 0.1, 0.15)), "{}", came.appeared.len());
     let went = first.clone().visit(&visit(&things[..1], TURNED_RAD, 9)).expect("a sound visit");
     let places: Vec<Point3<f32>> =
         went.gone.iter().filter_map(Cloud::bounds).map(|(l, h)| center(&l, &h)).collect();

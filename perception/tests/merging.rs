@@ -1,12 +1,10 @@
 //! Views of a known table with wrong poses, merged, against the truth.
 
-mod tabletop;
-
+use crate::tabletop::{Draws, TABLE_M, Thing, disturbed, look, on_ring};
 use descry_perception::merge::{MergeError, MergeOptions, Merger, merge};
 use descry_perception::nalgebra::{Isometry3, Point3, Unit, Vector3};
 use descry_perception::surface::Region;
 use descry_perception::{Merged, View};
-use tabletop::{Draws, TABLE_M, Thing, disturbed, look, on_ring};
 
 fn things() -> Vec<Thing> {
     vec![
@@ -212,6 +210,8 @@ fn what_was_kept_of_other_views_changes_nothing() {
 
 #[test]
 fn a_further_view_is_laid_on_those_before_it() {
+    /// Before and after all are merged anew.
+    const AT_ONCE: [usize; 2] = [8, 11];
     let angles: Vec<f64> = (0..11).map(|i| 2.4 * f64::from(i)).collect();
     for (seed, sigma_m, sigma_rad) in [(1, 0.03, 0.035), (7, 0.03, 0.035), (4, 0.045, 0.04)] {
         let (mut views, mut truths) = views(&angles, sigma_m, sigma_rad, seed);
@@ -224,8 +224,10 @@ fn a_further_view_is_laid_on_those_before_it() {
             let (apart, off) = (disagreement_m(&merged, &truths[..n]), offset_m(&merged, &truths[..n]));
             assert!(n < 5 || apart < 0.012, "seed {seed}, {n} views: {apart} m apart");
             assert!(n < 5 || off < 0.04, "seed {seed}, {n} views: {off} m off");
-            let at_once = Merger::default().merge(&views[..n], &options()).expect("the views are sound");
-            assert!(same(&merged, &at_once), "seed {seed}: {n} views at once give something else");
+            if AT_ONCE.contains(&n) {
+                let at_once = Merger::default().merge(&views[..n], &options()).expect("the views are sound");
+                assert!(same(&merged, &at_once), "seed {seed}: {n} views at once give something else");
+            }
         }
         assert!(laid >= 4, "seed {seed}: only {laid} views were laid on those before");
         // A view that cannot be placed is left out as it is by merging anew.

@@ -1,12 +1,10 @@
 //! How many pieces things on a table are seen in, from one view.
 
-mod tabletop;
-
+use crate::tabletop::{Draws, Thing, look, on_ring};
 use descry_perception::Visibility;
 use descry_perception::nalgebra::{Unit, Vector3};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::surface::SurfaceOptions;
-use tabletop::{Draws, Thing, look, on_ring};
 
 /// Seen from +x, so far off and so high.
 fn pieces(things: &[Thing], (away_m, high_m): (f64, f64), seed: u64) -> usize {

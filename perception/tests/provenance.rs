@@ -1,7 +1,6 @@
 //! Every constant of segmenting, recognising, fitting round bodies, surfaces and merging says where its value is from.
 
-mod constants;
-
+use crate::constants;
 use constants::{PARTS, all, faults, read, table};
 use std::path::Path;
 

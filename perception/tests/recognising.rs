@@ -1,14 +1,13 @@
 //! Single things on a table: what they are, and what must stay in doubt.
 
-mod tabletop;
-
+use crate::tabletop;
+use crate::tabletop::{Draws, TABLE_M, Thing, look, on_ring};
 use descry_perception::merge::{MergeOptions, merge};
 use descry_perception::nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use descry_perception::recognise::{Descry, Handle, Published, Range, Shape, Top, check_models};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::surface::{SurfaceError, SurfaceOptions};
 use descry_perception::{Cloud, ObjectModel, Percept, Recogniser, Sighting, View, Visibility};
-use tabletop::{Draws, TABLE_M, Thing, look, on_ring};
 
 fn cup_a() -> ObjectModel {
     let exactly = |x: f64| Range { low: x, high: x };
@@ -318,6 +317,17 @@ fn a_carton_in_one_piece_is_no_cylinder_however_its_views_lie() {
 /// In one view a wide circle fits the edge of a carton that faces the camera.
 #[test]
 fn a_circle_that_is_too_wide_is_no_side_of_a_cylinder() {
+    check_cartons(4);
+}
+
+#[test]
+#[ignore = "216 views: half a minute"]
+fn a_circle_that_is_too_wide_is_no_side_of_a_cylinder_however_it_is_turned() {
+    check_cartons(1);
+}
+
+/// Of 24 turns of cartons every so manieth.
+fn check_cartons(every: usize) {
     let exactly = |x: f64| Range { low: x, high: x };
     let cylinder = ObjectModel {
         name: "white cylinder".into(),
@@ -328,8 +338,9 @@ fn a_circle_that_is_too_wide_is_no_side_of_a_cylinder() {
         ..cup_a()
     };
     let mut taken_for_it = Vec::new();
-    for (turn, half) in
-        (0..24).flat_map(|turn| [[0.035, 0.095], [0.05, 0.07], [0.06, 0.06]].map(|half| (turn, half)))
+    for (turn, half) in (0..24)
+        .step_by(every)
+        .flat_map(|turn| [[0.035, 0.095], [0.05, 0.07], [0.06, 0.06]].map(|half| (turn, half)))
     {
         for away_m in [1.2, 1.6, 2.0] {
             let turn_rad = std::f64::consts::PI * f64::from(turn) / 24.0;
@@ -358,6 +369,17 @@ fn a_circle_that_is_too_wide_is_no_side_of_a_cylinder() {
 
 #[test]
 fn what_stands_level_with_a_box_is_parted_from_it() {
+    check_beside_a_box(2, 6);
+}
+
+#[test]
+#[ignore = "200 views: half a minute"]
+fn what_stands_level_with_a_box_is_parted_from_it_whatever_the_noise() {
+    check_beside_a_box(8, 28);
+}
+
+/// Of so many draws of each of five cases at least so many go well.
+fn check_beside_a_box(draws: u64, least: usize) {
     // The side of the box that faces -y lies at y = 0.07; what is beside it has a side there, too.
     let carton = |gap_m: f64| Thing::Block {
         x: 0.05 + 0.035 + gap_m + 0.08,
@@ -378,7 +400,7 @@ fn what_stands_level_with_a_box_is_parted_from_it() {
     // How near the noise lets a cup come to a carton and be told from it is a matter of chance: most draws go well.
     let mut well = Vec::new();
     for (what, things, cup) in &cases {
-        for seed in 1..=8 {
+        for seed in 1..=draws {
             let mut draws = Draws(seed);
             let views: Vec<View> = [-2.4, -1.6, -0.8, 0.8, 2.0]
                 .iter()
@@ -395,7 +417,7 @@ fn what_stands_level_with_a_box_is_parted_from_it() {
         }
     }
     let of = |what: &str| well.iter().filter(|(case, _)| *case == what).count();
-    assert!(well.len() >= 28 && cases.iter().all(|(what, ..)| of(what) >= 1), "{well:?}");
+    assert!(well.len() >= least && (draws < 8 || cases.iter().all(|(what, ..)| of(what) >= 1)), "{well:?}");
 }
 
 #[test]

@@ -1,10 +1,9 @@
 //! The map of a building: poses, planes and what is open, held to a simulated truth.
 
-mod corridor;
-mod tabletop;
-
+use crate::corridor;
+use crate::corridor::{Building, CAMERA_HEIGHT_M, Rig, along, around, field_of_view, with_people};
+use crate::tabletop::Draws;
 use corridor::measure::{BODY_M, MAP_FAR_M, score, score_pillars, survey};
-use corridor::{Building, CAMERA_HEIGHT_M, Rig, along, around, field_of_view, with_people};
 use descry_perception::mapping::{
     Cells, CellsError, ClosureOptions, ExploreOptions, FieldOfView, Fit, MapOptions, MappingError, Matcher,
     NormalOptions, PairFit, RectifyOptions, RoomMap, Station, Survey, Unseen, by_regions, chained, closures,
@@ -14,7 +13,6 @@ use descry_perception::nalgebra::{Isometry2, Point2, Point3, Vector2, Vector3};
 use descry_perception::occupancy::Space;
 use std::f64::consts::{FRAC_PI_4, TAU};
 use std::sync::OnceLock;
-use tabletop::Draws;
 
 const LONG_M: f64 = 16.0;
 const SHORT_M: f64 = 10.0;

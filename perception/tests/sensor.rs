@@ -1,13 +1,11 @@
 //! What a few views of a table tell of the camera that took them.
 
-mod tabletop;
-
+use crate::tabletop::device::{Device, KINECT};
+use crate::tabletop::{Draws, Thing, on_ring};
 use descry_perception::nalgebra::{Unit, Vector3};
 use descry_perception::noise::{KINECT as ASSUMED, Residuals, Sensor};
 use descry_perception::surface::{SurfaceOptions, find_surface};
 use descry_perception::{Intrinsics, Visibility};
-use tabletop::device::{Device, KINECT};
-use tabletop::{Draws, Thing, on_ring};
 
 /// The sensor fitted to four views of a table with a box on it.
 fn fitted(device: &Device) -> Sensor {

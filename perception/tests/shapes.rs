@@ -1,8 +1,11 @@
 //! Shape models from laser scans: the cells of the paper's tables, and what must not go wrong.
 
-mod lab;
-mod tabletop;
-
+use crate::lab;
+use crate::lab::{
+    INSTANCES, NAMES, Run, circled, f_c_range, four_legs, map_of_the_lab, models, object, paper, relocalised,
+    seed_of,
+};
+use crate::tabletop::Draws;
 use descry_perception::laser::{
     Alignment, FitOptions, Ignored, KnownShape, NextOptions, ObjectScan, Objective, Observation,
     ObserveError, ObserveOptions, Occupancy, PosedScan, RecogniseOptions, Scan, ScanError, ShapeError,
@@ -10,14 +13,9 @@ use descry_perception::laser::{
     localise, nearest, next_scan, observe, recognise, recognise_scan, undetermined_m2,
 };
 use descry_perception::nalgebra::{Isometry2, Point2};
-use lab::{
-    INSTANCES, NAMES, Run, circled, f_c_range, four_legs, map_of_the_lab, models, object, paper, relocalised,
-    seed_of,
-};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 use std::sync::OnceLock;
-use tabletop::Draws;
 
 const EXPERIMENT: u64 = 7;
 

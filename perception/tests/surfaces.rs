@@ -1,8 +1,8 @@
 //! Rooms with tables: which level surfaces there are, and what tells the floor from a table. A time-of-flight camera sees them: its noise grows
 //! with the depth, some pixels have no return, some at edges lie between near and far.
 
-mod tabletop;
-
+use crate::tabletop::pile::Pile;
+use crate::tabletop::{Draws, TABLE_M};
 use descry_perception::nalgebra::{
     Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
 };
@@ -11,8 +11,6 @@ use descry_perception::surface::{
     Region, Role, Sign, Surface, SurfaceError, SurfaceOptions, find_surface, find_surfaces,
 };
 use descry_perception::{Cloud, Intrinsics, Scene, View, Visibility};
-use tabletop::pile::Pile;
-use tabletop::{Draws, TABLE_M};
 
 const CAMERA: Intrinsics = Intrinsics { width: 320, height: 240, fx: 270.0, fy: 270.0, cx: 159.5, cy: 119.5 };
 /// Share of the pixels without a return.

@@ -1,14 +1,12 @@
 //! What is seen does not depend on how it is told: in rows or as bare points, in any frame and order.
 
-mod tabletop;
-
+use crate::tabletop::{Draws, Thing, look, on_ring};
 use descry_perception::cloud::is_finite;
 use descry_perception::nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use descry_perception::recognise::{Descry, Handle, Range, Top};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::{Cloud, ObjectModel, Percept, Recogniser, View, Visibility};
 use std::sync::LazyLock;
-use tabletop::{Draws, Thing, look, on_ring};
 
 fn models() -> Vec<ObjectModel> {
     let cup = |name: &str, diameter_m, height_m| ObjectModel {

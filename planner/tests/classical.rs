@@ -1,13 +1,11 @@
 //! Classical planning from text to a validated plan: small domains of our own, and (slow) the competition's.
 
-mod solving;
-
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use descry_planner::{Attachments, Options, Outcome, plan};
 
-use solving::{read, solve, solve_twice};
+use crate::solving::{read, solve, solve_twice};
 
 /// What must come out.
 enum Expect {

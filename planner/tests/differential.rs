@@ -1,10 +1,7 @@
 //! Planner, validator and monitor beside a second, plain account of what PDDL means, on random small tasks.
 
-#[path = "differential/generate.rs"]
 mod generate;
-#[path = "differential/oracle.rs"]
 mod oracle;
-#[path = "differential/task.rs"]
 mod task;
 
 use descry_planner::{Attachments, Options, Outcome, Plan, Source, Step, Task, monitor, plan, validate};

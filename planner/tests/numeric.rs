@@ -1,10 +1,8 @@
 //! Planning with numbers and without times, from text to a validated plan.
 
-mod solving;
-
 use descry_planner::{Options, Outcome};
 
-use solving::solve_twice;
+use crate::solving::solve_twice;
 
 /// What must come out.
 enum Expect {

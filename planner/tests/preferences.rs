@@ -1,12 +1,10 @@
 //! Preferences and constraints: what is planned for, beside all short plans of random small tasks.
 
-#[path = "preferences/brute.rs"]
 mod brute;
-mod solving;
 
 use descry_planner::{Attachments, Options, Outcome, PlanError, plan};
 
-use solving::{read, solve, solve_twice};
+use crate::solving::{read, solve, solve_twice};
 
 /// Rooms in a row, a lamp, and a load that wears the carrier.
 const ROOMS: &str = "(define (domain rooms) (:requirements :adl :numeric-fluents :preferences :constraints)

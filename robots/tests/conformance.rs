@@ -1,8 +1,6 @@
 //! Every body of this crate keeps the promises of bodies, and a body that does not is found out.
 
-mod folders;
-mod scenes;
-
+use crate::{folders, scenes};
 use descry_robots::conformance;
 use descry_robots::recorded::RecordedRobot;
 use descry_robots::sim::{SimOptions, SimRobot};

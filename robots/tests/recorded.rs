@@ -1,7 +1,6 @@
 //! Reading recordings: what they hold, and what is said about those that are wrong.
 
-mod folders;
-
+use crate::folders;
 use descry_robots::nalgebra::{Point3, Vector3};
 use descry_robots::recorded::{RecordedRobot, Recording};
 use descry_robots::{Failure, Place, Robot, Watch};

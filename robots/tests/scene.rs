@@ -1,7 +1,6 @@
 //! Scenes: mistakes in them, and what seeds make of them.
 
-mod scenes;
-
+use crate::scenes::on_a_table;
 use descry_robots::Pose2;
 use descry_robots::nalgebra::Point3;
 use descry_robots::sim::shape::Shape;

@@ -1,7 +1,6 @@
 //! The simulated body: driving and its errors, mishaps, pushing, and that a seed fixes it all.
 
-mod scenes;
-
+use crate::scenes::on_a_table;
 use descry_robots::nalgebra::{Isometry3, Point3, Vector2};
 use descry_robots::sim::{DepthNoise, FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::{CancellationToken, Failure, Place, Pose2, Progress, Push, Robot, Watch};

@@ -1,8 +1,6 @@
 //! A body on tape answers again what it answered, goes on where the tape ends, and says where it cannot.
 
-mod folders;
-mod scenes;
-
+use crate::{folders, scenes};
 use descry_robots::Pixels;
 use descry_robots::nalgebra::Point3;
 use descry_robots::program::{Limits, ProgramRobot};

@@ -66,7 +66,17 @@ fn off_m(report: &Report) -> f64 {
 }
 
 #[test]
+fn what_is_new_is_learned_and_found_where_it_was_moved_to() {
+    check_learned(false);
+}
+
+#[test]
+#[ignore = "three more runs: a minute"]
 fn what_is_new_is_learned_known_better_when_met_again_and_found_where_it_was_moved_to() {
+    check_learned(true);
+}
+
+fn check_learned(met_again: bool) {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
 
@@ -74,8 +84,10 @@ fn what_is_new_is_learned_known_better_when_met_again_and_found_where_it_was_mov
     assert_eq!(first.verdict, Verdict::Achieved, "{}", first.why);
     assert!(first.why.contains("nothing can be new yet") && first.objects.is_empty(), "{}", first.why);
 
-    let again = pursue("what has changed", 1, folder, true).unwrap();
-    assert!(again.verdict == Verdict::Achieved && again.objects.is_empty(), "{}", again.why);
+    if met_again {
+        let again = pursue("what has changed", 1, folder, true).unwrap();
+        assert!(again.verdict == Verdict::Achieved && again.objects.is_empty(), "{}", again.why);
+    }
 
     let second = pursue("learn what is new", 2, folder, true).unwrap();
     assert_eq!(second.verdict, Verdict::Achieved, "{}", second.why);
@@ -89,7 +101,16 @@ fn what_is_new_is_learned_known_better_when_met_again_and_found_where_it_was_mov
     assert_eq!(kept.things[0].name, "kettle");
     assert!(kept.things[0].sides > 0.6 && kept.things[0].cloud.len() > 5000, "{}", kept.things[0].sides);
 
-    // As if little more than one half of it had been seen, and not the one that is seen first when it is met again: the rest is added.
+    if met_again {
+        check_known_better(folder);
+    }
+    let third = pursue("find the kettle", 3, folder, true).unwrap();
+    assert_eq!(third.verdict, Verdict::Achieved, "{}", third.why);
+    assert!(off_m(&third) < 0.05, "{} m off", off_m(&third));
+}
+
+/// As if little more than one half of the kettle had been seen, and not the one that is seen first when it is met again: the rest is added.
+fn check_known_better(folder: &Path) {
     let half = change(folder, |remembered| {
         let thing = &mut remembered.things[0];
         thing.cloud = thing.cloud.filter(|p| p.x < 0.01);
@@ -103,10 +124,6 @@ fn what_is_new_is_learned_known_better_when_met_again_and_found_where_it_was_mov
     let (low, high) = thing.cloud.bounds().unwrap();
     assert!(thing.meetings == 2 && thing.sides > 0.6 && (high - low).max() < 0.4, "{thing:?}");
     assert!(thing.cloud.len() > before + before / 4, "{} {before}", thing.cloud.len());
-
-    let third = pursue("find the kettle", 3, folder, true).unwrap();
-    assert_eq!(third.verdict, Verdict::Achieved, "{}", third.why);
-    assert!(off_m(&third) < 0.05, "{} m off", off_m(&third));
 }
 
 #[test]

@@ -66,6 +66,9 @@ pub struct Appeared {
     pub view: usize,
     /// Its pixels in that view, row by row (O_0).
     pub mask: Vec<bool>,
+    /// True if most of it lies before what was there by far, to either side as well, as far as its cameras may be turned. Otherwise it may be an edge
+    /// of what always stood there.
+    pub apart: bool,
 }
 
 impl Appeared {
@@ -227,7 +230,18 @@ impl MetaRoom {
                 before.set[i] = true;
             }
         }
-        Change { before: before.opened(1), revealed, unknown }
+        let before = before.opened(1);
+        let depth_m = |i: usize| view.cloud.points[i].z;
+        let reach = (TURNED * view.pose_sigma_rad * map.intrinsics.fx).ceil() as usize;
+        // Before what is known by far, to either side as well.
+        let is_apart = |i: &usize| {
+            let (first, column) = (i - i % grid.width, i % grid.width);
+            let far_m = FAR as f32 * self.tolerance_m(depth_m(*i));
+            let beside = column.saturating_sub(reach)..(column + reach + 1).min(grid.width);
+            beside.into_iter().all(|column| known[first + column] - depth_m(*i) > far_m)
+        };
+        let apart = Mask::of(grid, before.pixels().filter(is_apart));
+        Change { before, apart, revealed, unknown }
     }
 
     fn tolerance_m(&self, z_m: f32) -> f32 {
@@ -250,6 +264,10 @@ impl MetaRoom {
         }
         let clusters =
             cluster::euclidean(&all.points, self.options.cluster_step_m, self.options.least_pixels)?;
+        let is_apart = |point: &&u32| {
+            let (k, pixel) = origin[**point as usize];
+            changes[k].apart.set[pixel]
+        };
         let of_cluster = |cluster: &Vec<u32>| {
             let mask_in = |k: usize| {
                 let here = cluster.iter().map(|&i| origin[i as usize]).filter(|o| o.0 == k).map(|o| o.1);
@@ -263,6 +281,7 @@ impl MetaRoom {
                 cloud: all.select(cluster),
                 view,
                 mask: mask.set.clone(),
+                apart: 2 * cluster.iter().filter(is_apart).count() > cluster.len(),
             })
         };
         Ok(clusters.iter().filter_map(of_cluster).collect())
@@ -329,6 +348,8 @@ impl MetaRoom {
 struct Change {
     /// Pixels before it.
     before: Mask,
+    /// Those of them that lie before it by far, to either side as well, as far as the camera may be turned.
+    apart: Mask,
     /// Pixels behind it: they may always have been there.
     revealed: Vec<u32>,
     /// Pixels where nothing was known.

@@ -1,6 +1,6 @@
 //! Random small tasks.
 
-use crate::task::{Action, Change, Effect, Formula, Named, Number, Rule, Task, Term};
+use super::task::{Action, Change, Effect, Formula, Named, Number, Rule, Task, Term};
 
 /// Numbers by chance (splitmix64; Steele, Lea and Flood 2014).
 pub struct Chance(pub u64);

@@ -2,8 +2,8 @@
 
 use std::collections::{HashMap, VecDeque};
 
-use crate::generate::tuples;
-use crate::task::{Change, Effect, Formula, Named, Number, Task, Term};
+use super::generate::tuples;
+use super::task::{Change, Effect, Formula, Named, Number, Task, Term};
 
 /// Facts by bit, derived ones included, and numbers; NaN where undefined.
 #[derive(Debug, Clone, PartialEq)]

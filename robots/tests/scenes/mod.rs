@@ -5,12 +5,12 @@
 use descry_robots::sim::{Scene, SceneSpec, arrange};
 
 /// A scene on a table; what is given begins in its sixth line.
-#[macro_export]
 macro_rules! on_a_table {
     ($rest:literal) => {
         concat!("\n[[surface]]\nname = \"table\"\nsize_m = [1.6, 0.8]\nheight_m = 0.72\n", $rest)
     };
 }
+pub(crate) use on_a_table;
 
 const CUP: &str = on_a_table!(
     r#"[start]

@@ -177,7 +177,7 @@ fn take_in(
         let Some(surface) = surface else {
             let (at, size_m) = extent(&appeared.cloud);
             let is_of = |n: &Novelty| (n.centre - at).xy().norm() < n.radius_m() + OF_IT_M;
-            if mind.known.news.novelties.iter().any(is_of) {
+            if !appeared.apart || mind.known.news.novelties.iter().any(is_of) {
                 continue;
             }
             told.came.push(format!("something on no surface, {}", size(&size_m, &at)));

@@ -1,12 +1,14 @@
 //! How views are merged and looked through.
 
-use descry_perception::merge::MergeOptions;
-use descry_perception::nalgebra::Unit;
+use descry_perception::View;
+use descry_perception::merge::{MergeError, MergeOptions, Merged};
+use descry_perception::nalgebra::{Isometry3, Unit};
 use descry_perception::segment::SceneOptions;
 use descry_perception::surface::{Region, SurfaceOptions};
 use descry_robots::Robot;
 
 use crate::lexicon::symbol;
+use crate::mind::Mind;
 use crate::situation::KnownSurface;
 
 /// How far from the height at which the map has a surface points are merged that may be of it.
@@ -44,4 +46,29 @@ pub(super) fn options_at(robot: &dyn Robot, known: &KnownSurface) -> (MergeOptio
     let region = Some(Region { corners: known.outline.clone(), margin_m: BESIDE_M });
     let surface = SurfaceOptions { region: region.clone(), tilt_rad: LEVEL_RAD, ..seeking.surface };
     (MergeOptions { region, ..merging }, SceneOptions { surface, ..seeking })
+}
+
+/// What was merged last of a surface without an outline on the map.
+pub struct LastMerged {
+    options: MergeOptions,
+    /// When its views were taken, and from where.
+    views: Vec<(i64, Isometry3<f64>)>,
+    merged: Merged,
+}
+
+/// The views of a surface in one cloud. Without a map one view is of all surfaces in it: what the last of them was made of is had again.
+pub(super) fn merged(
+    mind: &mut Mind,
+    on: usize,
+    views: &[View],
+    options: &MergeOptions,
+) -> Result<Merged, MergeError> {
+    let taken: Vec<_> = views.iter().map(|view| (view.stamp_ns, view.world_from_camera)).collect();
+    if let Some(last) = mind.merged.as_ref().filter(|last| last.views == taken && last.options == *options) {
+        return Ok(last.merged.clone());
+    }
+    let merged = mind.regions[on].merger.merge(views, options)?;
+    let kept = || LastMerged { options: options.clone(), views: taken, merged: merged.clone() };
+    mind.merged = (!mind.known.surfaces[on].whole).then(kept);
+    Ok(merged)
 }

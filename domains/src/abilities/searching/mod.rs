@@ -7,7 +7,7 @@ pub mod change;
 mod discover;
 pub mod doubt;
 mod facts;
-mod merging;
+pub(crate) mod merging;
 pub mod obstacle;
 pub mod perceive;
 mod placing;

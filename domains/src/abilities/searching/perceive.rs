@@ -22,6 +22,7 @@ use serde_json::json;
 
 use super::change::Change;
 use super::discover;
+use super::merging;
 pub use super::merging::options;
 use super::merging::options_at;
 use super::placing;
@@ -123,15 +124,15 @@ fn views(mind: &Mind) -> Vec<RecordId> {
 /// The multi-view perception of paper 004, section V, on one surface: restore its views by their timestamps, merge, recognise,
 /// believe.
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
-    let (merging, seeking) = options_at(eyes.robot, &mind.known.surfaces[on]);
-    place_looks(mind, eyes, on, (&merging, &seeking.surface))?;
+    let (options, seeking) = options_at(eyes.robot, &mind.known.surfaces[on]);
+    place_looks(mind, eyes, on, (&options, &seeking.surface))?;
     if !keep_placed(&mut mind.regions[on].looks) {
         let because = format!("the {} cannot be made out in this view", mind.known.surfaces[on].name);
         notes.push(Note::Nothing { because });
         return Ok(());
     }
     let views = restore(mind, eyes, on)?;
-    let merged = mind.regions[on].merger.merge(&views, &merging);
+    let merged = merging::merged(mind, on, &views, &options);
     let seen = merged.map_err(|nothing| nothing.to_string()).and_then(|merged| {
         let (surfaces, options) = (&mind.known.surfaces, &seeking.surface);
         let found = match surfaces[on].whole {

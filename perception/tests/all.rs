@@ -1,0 +1,22 @@
+//! What perception promises, from outside: one program, so that what all tests share is built and linked once.
+
+mod constants;
+mod corridor;
+mod dining_room;
+mod files;
+mod household;
+mod lab;
+mod learning;
+mod merging;
+mod neighbours;
+mod pieces;
+mod provenance;
+mod recognising;
+mod registration;
+mod robust;
+mod rooms;
+mod sensor;
+mod shapes;
+mod surfaces;
+mod tabletop;
+mod told;

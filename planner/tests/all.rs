@@ -1,0 +1,16 @@
+//! What the planner promises, from outside: one program, so that what all tests share is built and linked once.
+
+mod attachments;
+mod broken;
+mod classical;
+mod differential;
+mod formatting;
+mod layers;
+mod modules;
+mod numeric;
+mod preferences;
+mod reading;
+mod solving;
+mod temporal;
+mod unsolvable;
+mod validating;

@@ -1,0 +1,16 @@
+//! What bodies promise, from outside: one program, so that what all tests share is built and linked once.
+
+mod camera;
+mod conformance;
+mod flat;
+mod folders;
+mod home;
+mod pinned;
+mod program;
+mod recorded;
+mod route;
+mod scene;
+mod scenes;
+mod sim;
+mod taped;
+mod unmapped;

@@ -138,7 +138,7 @@ pub(crate) fn conclude(
     }
 }
 
-/// In an answer, `{changes <surface>}` stands for what has changed there since an earlier run.
+/// In an answer, `{changes <surface>}` stands for what has changed there since an earlier run, `{changes}` for all surfaces.
 pub(crate) const CHANGES: &str = "changes";
 /// A probability that is said with an answer that holds.
 const WORTH_SAYING: f64 = 0.01;
@@ -399,24 +399,18 @@ impl Asker<'_> {
     /// What has changed on a surface since an earlier run looked at it.
     fn changes(&self, surface: &str) -> String {
         let Some(past) = &self.s.past else { return "nothing is remembered of earlier".into() };
-        let before: Vec<&Track> =
-            past.remembered.present.iter().map(|r| &r.track).filter(|t| t.on == *surface).collect();
-        let now: Vec<&Track> = self.s.belief.tracks.iter().filter(|t| t.on == *surface).collect();
-        let name = |t: &Track| t.label().unwrap_or("something unknown").to_string();
-        let near = |a: &Track, b: &Track| (a.position_m - b.position_m).norm() < SAME_M;
-        let came: Vec<&&Track> = now.iter().filter(|t| !before.iter().any(|b| near(t, b))).collect();
-        let went: Vec<&&Track> = before.iter().filter(|b| !now.iter().any(|t| near(t, b))).collect();
-        let moved = |t: &Track| t.label().is_some() && went.iter().any(|b| b.label() == t.label());
-        let at = |t: &Track| reasons::place(&t.position_m);
-        let came_lines = came.iter().map(|t| match moved(t) {
-            true => format!("{} was moved to {}", name(t), at(t)),
-            false => format!("{} came, at {}", name(t), at(t)),
-        });
-        let stays_gone = |b: &&&&Track| b.label().is_none() || !came.iter().any(|t| t.label() == b.label());
-        let went_lines =
-            went.iter().filter(stays_gone).map(|b| format!("{} is gone from {}", name(b), at(b)));
-        let lines: Vec<String> = came_lines.chain(went_lines).collect();
-        if lines.is_empty() { "nothing has changed".into() } else { lines.join("; ") }
+        changes(&past.remembered, &self.s.belief.tracks, surface, self.lexicon.name_of(surface))
+    }
+
+    /// What has changed on all surfaces at which an earlier run looked, and at which none did.
+    fn all_changes(&self) -> String {
+        let Some(past) = &self.s.past else { return "nothing is remembered of earlier".into() };
+        let (known, new): (Vec<_>, Vec<_>) =
+            self.s.surfaces.iter().partition(|s| past.remembered.has_looked_at(&s.symbol));
+        let told = known.iter().map(|s| format!("on the {}: {}", s.name, self.changes(&s.symbol)));
+        let names: Vec<&str> = new.iter().map(|s| s.name.as_str()).collect();
+        let left_out = (!names.is_empty()).then(|| never_seen(&names.join(" and the ")));
+        told.chain(left_out).collect::<Vec<_>>().join("; ")
     }
 
     /// What holds of an atom now: the names in the place of the question mark, or a number, or yes or no.
@@ -425,7 +419,7 @@ impl Asker<'_> {
             atom.trim_matches(|c| c == '(' || c == ')').split_whitespace().map(str::to_lowercase).collect();
         let Some((word, arguments)) = tokens.split_first() else { return String::new() };
         if word == CHANGES {
-            return arguments.first().map_or_else(String::new, |surface| self.changes(surface));
+            return arguments.first().map_or_else(|| self.all_changes(), |surface| self.changes(surface));
         }
         let readings =
             after(&self.round.task, &self.round.attachments, &Plan::default(), &[word]).unwrap_or_default();
@@ -446,5 +440,51 @@ impl Asker<'_> {
             (true, true) => "nothing".into(),
             (true, false) => "no".into(),
         }
+    }
+}
+
+/// What has changed on a surface since an earlier run looked at it; `name` is what people call it.
+fn changes(past: &Remembered, now: &[Track], surface: &str, name: &str) -> String {
+    if !past.has_looked_at(surface) {
+        return never_seen(name);
+    }
+    let before: Vec<&Track> = past.present.iter().map(|r| &r.track).filter(|t| t.on == *surface).collect();
+    let now: Vec<&Track> = now.iter().filter(|t| t.on == *surface).collect();
+    let name = |t: &Track| t.label().unwrap_or("something unknown").to_string();
+    let near = |a: &Track, b: &Track| (a.position_m - b.position_m).norm() < SAME_M;
+    let came: Vec<&&Track> = now.iter().filter(|t| !before.iter().any(|b| near(t, b))).collect();
+    let went: Vec<&&Track> = before.iter().filter(|b| !now.iter().any(|t| near(t, b))).collect();
+    let moved = |t: &Track| t.label().is_some() && went.iter().any(|b| b.label() == t.label());
+    let at = |t: &Track| reasons::place(&t.position_m);
+    let came_lines = came.iter().map(|t| match moved(t) {
+        true => format!("{} was moved to {}", name(t), at(t)),
+        false => format!("{} came, at {}", name(t), at(t)),
+    });
+    let stays_gone = |b: &&&&Track| b.label().is_none() || !came.iter().any(|t| t.label() == b.label());
+    let went_lines = went.iter().filter(stays_gone).map(|b| format!("{} is gone from {}", name(b), at(b)));
+    let lines: Vec<String> = came_lines.chain(went_lines).collect();
+    if lines.is_empty() { "nothing has changed".into() } else { lines.join("; ") }
+}
+
+fn never_seen(surface: &str) -> String {
+    format!("nothing is remembered of the {surface}: no earlier run looked at it")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use descry_memory::belief::Belief;
+
+    #[test]
+    fn changes_are_told_of_what_was_looked_at() {
+        let check = |looked_at: &[&str], surface: &str, expected: &str| {
+            let looked_at: Vec<String> = looked_at.iter().map(|s| s.to_string()).collect();
+            let past = Remembered::default().after(&Belief::default(), &looked_at, 0.0);
+            assert_eq!(changes(&past, &[], surface, "lower board"), expected, "{looked_at:?}");
+        };
+        let never = "nothing is remembered of the lower board: no earlier run looked at it";
+        check(&[], "lower-board", never);
+        check(&["desk"], "lower-board", never);
+        check(&["desk", "lower-board"], "lower-board", "nothing has changed");
     }
 }

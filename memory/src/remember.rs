@@ -48,6 +48,9 @@ pub struct Remembered {
     pub present: Vec<Recollection>,
     /// What stood somewhere and was not there when it was looked again, the oldest first.
     pub gone: Vec<Recollection>,
+    /// Surfaces that were looked at; of an older store, those since it is kept.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub looked_at: Vec<String>,
     /// Shapes that were learned, the oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<KnownShape>,
@@ -102,7 +105,18 @@ impl Remembered {
         gone.drain(..gone.len().saturating_sub(MOST_GONE));
         let now = belief.tracks.iter().filter(|t| looked_at.contains(&t.on));
         let seen = now.map(|track| Recollection { seen_unix_s: now_unix_s, track: track.clone() });
-        Self { present: elsewhere.into_iter().chain(seen).collect(), gone, ..self }
+        let present = elsewhere.into_iter().chain(seen).collect();
+        let mut all = self.looked_at;
+        all.extend(looked_at.iter().cloned());
+        all.sort_unstable();
+        all.dedup();
+        Self { present, gone, looked_at: all, ..self }
+    }
+
+    /// Whether a surface is known to have been looked at: it is kept, or something was seen there.
+    pub fn has_looked_at(&self, surface: &str) -> bool {
+        let mut seen = self.present.iter().chain(&self.gone);
+        self.looked_at.iter().any(|s| s == surface) || seen.any(|r| r.track.on == surface)
     }
 
     /// Gives a thing that was learned another name, wherever it was seen.
@@ -213,6 +227,24 @@ mod tests {
         let (last, still) = empty.last_seen("cup A").unwrap();
         assert_eq!((last.seen_unix_s, still), (100.0, false));
         assert_eq!(empty.last_seen("mug"), None);
+    }
+
+    #[test]
+    fn a_surface_of_which_nothing_is_known_was_not_looked_at() {
+        let check = |kept: &Remembered, expected: [bool; 3]| {
+            assert_eq!(["desk", "shelf", "table"].map(|on| kept.has_looked_at(on)), expected, "{kept:?}");
+        };
+        let own = |names: &[&str]| names.iter().map(|s| s.to_string()).collect::<Vec<_>>();
+        let seen = believed(&[("desk", 0.0, 0.9)]);
+        let first = Remembered::default().after(&seen, &own(&["desk", "shelf"]), 0.0);
+        check(&Remembered::default(), [false; 3]);
+        check(&first, [true, true, false]);
+        // An older store does not say it: what stood or stands there does.
+        let mut older = serde_json::to_value(&first).unwrap();
+        older.as_object_mut().unwrap().remove("looked_at");
+        let older: Remembered = serde_json::from_value(older).unwrap();
+        check(&older, [true, false, false]);
+        check(&older.after(&believed(&[]), &own(&["desk", "table"]), 1.0), [true, false, true]);
     }
 
     #[test]

@@ -121,7 +121,7 @@ pub struct Report {
     pub threshold: f64,
     /// Probability that what was looked for is there after all.
     pub remaining: Option<f64>,
-    /// Where it is believed to be: the middle of its body, in the map.
+    /// Where it is believed to be: the middle of its body, in the map; none in the hand.
     pub position_m: Option<[f64; 3]>,
     /// Standard deviation of that, in the direction in which it is known worst.
     #[serde(default)]
@@ -218,7 +218,10 @@ impl fmt::Display for Report {
         let verdict = words(self.verdict);
         let answer = self.answer.as_ref().map(|a| format!("{a}; ")).unwrap_or_default();
         writeln!(f, "\n{answer}{verdict}: {}", self.why)?;
-        if let (Some(object), Some([x, y, z])) = (&self.object, self.position_m) {
+        let is_held = self.objects.iter().any(|o| o.asked && o.position_m.is_none());
+        if let Some(object) = self.object.as_ref().filter(|_| is_held) {
+            writeln!(f, "  {object} in the hand, confidence {:.2}", self.confidence)?;
+        } else if let (Some(object), Some([x, y, z])) = (&self.object, self.position_m) {
             let on = self.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
             let give_cm = self.position_sigma_m.map_or(0.0, |sigma_m| 1e2 * sigma_m);
             let give = if give_cm >= 1.0 { format!(" give or take {give_cm:.0} cm") } else { String::new() };
@@ -236,10 +239,13 @@ impl fmt::Display for Report {
             if any_asked && !o.asked && self.objects[..n].last().is_some_and(|before| before.asked) {
                 writeln!(f, "  besides:")?;
             }
-            let [x, y, z] = o.position_m;
             let name = o.label.as_deref().unwrap_or("unknown");
             let on = o.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
-            writeln!(f, "  {name:16} {:.2} at ({x:.3}, {y:.3}, {z:.3}) m{on}", o.confidence)?;
+            let at = match o.position_m {
+                Some([x, y, z]) => format!("at ({x:.3}, {y:.3}, {z:.3}) m{on}"),
+                None => "in the hand".into(),
+            };
+            writeln!(f, "  {name:16} {:.2} {at}", o.confidence)?;
         }
         let counted = |n: usize, of: &str| format!("{n} {of}{}", if n == 1 { "" } else { "s" });
         writeln!(
@@ -262,6 +268,36 @@ impl fmt::Display for Report {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use descry_domains::goal;
+    use descry_domains::lexicon::{Lexicon, Places};
+    use descry_domains::load::Domain;
+
+    #[test]
+    fn what_is_in_the_hand_stands_nowhere() {
+        let domain = Domain::load("home").unwrap();
+        let lexicon = Lexicon::new(&domain, &Places::default());
+        let goal = goal::read("pick up cup A", &domain, &lexicon).unwrap();
+        let check = |object: Option<&str>, position_m: Option<[f64; 3]>, expected: &str| {
+            let seen = serde_json::json!({
+                "label": "the red one", "confidence": 0.97, "position_m": position_m,
+                "size_m": [0.07, 0.07, 0.1], "asked": true,
+            });
+            let report = Report {
+                object: object.map(str::to_string),
+                confidence: 0.97,
+                position_m,
+                objects: vec![serde_json::from_value(seen).unwrap()],
+                ..Report::begin(&goal, "run".into())
+            };
+            let said = report.to_string();
+            assert!(said.contains(expected), "{expected}: {said}");
+            assert_eq!(said.contains(" m, confidence"), said.contains(" at ("), "{said}");
+        };
+        let one = Some("the red one");
+        check(one, None, "  the red one in the hand, confidence 0.97\n");
+        check(one, Some([1.0, 2.0, 0.8]), "  the red one at (1.000, 2.000, 0.800) m, confidence 0.97\n");
+        check(None, None, "  the red one      0.97 in the hand\n");
+    }
 
     #[test]
     fn no_time_is_said_to_be_none() {

@@ -262,7 +262,7 @@ fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) -> Option<R
     report.planning_s = totals.planning_s;
     report.geometry_s = totals.geometry_s;
     report.object = conclusion.object;
-    report.position_m = conclusion.found.as_ref().map(|o| o.position_m);
+    report.position_m = conclusion.found.as_ref().and_then(|o| o.position_m);
     report.position_sigma_m = conclusion.found.as_ref().and_then(|o| o.position_sigma_m);
     report.on = conclusion.found.as_ref().and_then(|o| o.on.clone());
     report.room = conclusion.found.and_then(|o| o.room);

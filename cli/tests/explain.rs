@@ -422,6 +422,7 @@ fn failures_are_named_as_the_causes_of_new_plans() {
         "the certainty of where cup A stands is 0.",
         "Hoped for: the certainty that cup A stands on the ",
         "and by what was done since that look: cup A is in the hand",
+        "It rests on this: what is in the hand is cup A with a probability of ",
         "achieved",
     ] {
         assert!(told.contains(words), "{words}: {told}");

@@ -41,6 +41,17 @@ fn the_hand_reaches_for_what_was_seen_from_where_the_body_stands() {
 }
 
 #[test]
+fn what_is_in_the_hand_is_said_to_be_there_and_nowhere_else() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let run = ["do", "pick up cup A", "--domain", "home", "--seed", "95001", "--run", "run", "--json"];
+    let report = binary::check(folder.path(), &run, 0);
+    assert!(report["position_m"].is_null() && report["on"].is_null(), "{report}");
+    let held = report["objects"].as_array().expect("a list").iter().find(|o| o["asked"] == true);
+    assert!(held.is_some_and(|held| held["position_m"].is_null()), "{report}");
+    assert!(!report["true_position_m"].is_null(), "{report}");
+}
+
+#[test]
 fn what_slid_out_of_the_hand_is_looked_for_where_it_did() {
     let said = achieved("bring cup A to the desk", 93014, "[[fault]]\nkind = \"grasp_slips\"\nat = 1\n");
     let (_, after) = said.split_once("it slid out of the hand").expect("it slips once");

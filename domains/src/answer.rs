@@ -57,8 +57,9 @@ pub struct Believed {
     pub kind: Option<String>,
     /// Probability of that.
     pub confidence: f64,
-    /// The middle of its body, in the map.
-    pub position_m: [f64; 3],
+    /// The middle of its body, in the map; none in the hand.
+    #[serde(default)]
+    pub position_m: Option<[f64; 3]>,
     /// Standard deviation of that, in the direction in which it is known worst; none if nothing is known of it.
     #[serde(default)]
     pub position_sigma_m: Option<f64>,
@@ -364,7 +365,7 @@ impl Asker<'_> {
             label: t.label().map(str::to_string),
             kind: t.kind().map(str::to_string),
             confidence: t.certainty(),
-            position_m: (t.position_m + up * (t.size_m[2] / 2.0)).coords.into(),
+            position_m: (!t.on.is_empty()).then(|| (t.position_m + up * (t.size_m[2] / 2.0)).coords.into()),
             position_sigma_m: on.map(|surface| adrift::worst(surface, t).1),
             size_m: t.size_m,
             on: on.map(|s| s.name.clone()),

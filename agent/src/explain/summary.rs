@@ -77,14 +77,14 @@ fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
     };
     let by = match (doubt.of, looks::best_seen(doubt, last)) {
         (Of::Thing, Some((track, p))) if p >= doubt.wanted => {
+            // It may have been taken since that look.
+            let is_held = report.why.contains(&format!("{} is in the hand", doubt.about));
             let on = match track.on.as_str() {
-                "" => "is in the hand".into(),
+                on if on.is_empty() || is_held => "is in the hand".into(),
                 on => format!("stands on the {} at {}", name(on), place(track)),
             };
-            // It may have been taken since.
-            let then = if report.why.contains(" in the hand") { "by the last look, " } else { "" };
             format!(
-                "{then}what {on} is {} with a probability of {}; {:.0} % of its outside was seen",
+                "what {on} is {} with a probability of {}; {:.0} % of its outside was seen",
                 doubt.about,
                 share(p),
                 track.seen_fraction * 100.0

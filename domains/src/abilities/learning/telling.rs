@@ -160,7 +160,7 @@ fn believed(mind: &Mind, n: &Novelty) -> Believed {
         kind: label.clone(),
         label,
         confidence,
-        position_m: n.centre.coords.into(),
+        position_m: Some(n.centre.coords.into()),
         position_sigma_m: None,
         size_m: n.size_m,
         on: surface.map(|s| s.name.clone()),

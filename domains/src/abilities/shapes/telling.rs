@@ -212,7 +212,7 @@ impl<'a> Teller<'a> {
             kind: label.clone(),
             label,
             confidence: thing.sureness(s.floor.known.len()),
-            position_m: [middle.x, middle.y, 0.0],
+            position_m: Some([middle.x, middle.y, 0.0]),
             position_sigma_m: None,
             size_m: [width_m, width_m, 0.0],
             on: None,

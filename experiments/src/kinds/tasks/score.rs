@@ -116,7 +116,10 @@ type Place = ([f64; 3], Option<String>);
 fn named(report: &Report) -> Vec<Place> {
     match report.object {
         Some(_) => report.position_m.map(|at| (at, report.on.clone())).into_iter().collect(),
-        None => report.objects.iter().filter(|o| o.asked).map(|o| (o.position_m, o.on.clone())).collect(),
+        None => {
+            let asked = report.objects.iter().filter(|o| o.asked);
+            asked.filter_map(|o| Some((o.position_m?, o.on.clone()))).collect()
+        }
     }
 }
 

@@ -141,8 +141,6 @@ pub(crate) fn conclude(
 
 /// In an answer, `{changes <surface>}` stands for what has changed there since an earlier run, `{changes}` for all surfaces.
 pub(crate) const CHANGES: &str = "changes";
-/// A probability that is said with an answer that holds.
-const WORTH_SAYING: f64 = 0.01;
 /// An object nearer than this to where one was is that one, metres.
 const SAME_M: f64 = 0.10;
 
@@ -161,6 +159,9 @@ impl Asker<'_> {
     /// The goal holds: what was asked for, and where.
     fn reached(&self) -> (Verdict, String) {
         let s = self.s;
+        if let Some(unknown) = self.nowhere() {
+            return (Verdict::CannotTell, unknown);
+        }
         let mut said = self.surely();
         for (of, kind) in s.kinds.iter().enumerate() {
             let members = self.members(kind);
@@ -168,12 +169,15 @@ impl Asker<'_> {
                 return self.none_of(kind);
             }
             said.push(match members.len() {
-                0 => format!("there is no {}", kind.name),
-                n => format!("all {}s are found: {n}, {}", kind.name, members.join("; ")),
+                0 => format!("there is no {}{}", kind.name, reasons::in_room(s, kind)),
+                n => {
+                    let place = reasons::in_room(s, kind);
+                    format!("all {}s{place} are found: {n}, {}", kind.name, members.join("; "))
+                }
             });
             // As sure as was asked for is not sure.
             let hidden = s.doubt_of(of).hidden;
-            if hidden >= WORTH_SAYING {
+            if hidden >= reasons::WORTH_SAYING {
                 said.push(format!("where nothing was seen there may be another ({hidden:.2})"));
             }
         }
@@ -195,12 +199,24 @@ impl Asker<'_> {
             .nothing_seen(kind)
             .or_else(|| reasons::may_be_floor(s, kind))
             .or_else(|| (left > s.thresholds.not_there).then(|| format!("none was seen: {seen}")));
+        let about = format!("{}{}", kind.name, reasons::in_room(s, kind));
         match open {
             Some(open) => {
-                (Verdict::CannotTell, format!("it cannot be told whether there is a {}, {open}", kind.name))
+                (Verdict::CannotTell, format!("it cannot be told whether there is a {about}, {open}"))
             }
-            None => (Verdict::NotFound, format!("there is no {}: {seen}", kind.name)),
+            None => (Verdict::NotFound, format!("there is no {about}: {seen}")),
         }
+    }
+
+    /// That nothing is known on which a kind could stand in the room in which it is asked about; none if something is.
+    fn nowhere(&self) -> Option<String> {
+        let mut asked = self.s.kinds.iter().zip(&self.goal.asked.kinds);
+        let (kind, (_, room)) = asked.find(|(kind, _)| kind.on.as_ref().is_some_and(Vec::is_empty))?;
+        let room = self.lexicon.name_of(room.as_ref()?);
+        Some(format!(
+            "it cannot be told whether there is a {} in the {room}: no surface is known there",
+            kind.name
+        ))
     }
 
     /// No plan is left: what is known of what was asked for, and what keeps one from saying more.

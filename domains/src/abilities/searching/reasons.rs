@@ -7,6 +7,8 @@ use descry_planner::{Plan, Step};
 use super::doubt::{Doubt, Taken};
 use crate::situation::{KnownSurface, Situation, Thing};
 
+/// A probability that is said with an answer.
+pub const WORTH_SAYING: f64 = 0.01;
 /// What a look takes, as in the domain.
 pub(crate) const LOOK_S: f64 = 2.0;
 
@@ -159,14 +161,28 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     let is_one =
         |track: &Track| format!(", what stands at {} is one with {:.2}", place(&track.position_m), p(track));
     let hidden = s.doubt_of(open).hidden;
-    let more = format!(", there may be more where nothing was seen ({hidden:.2})");
-    let more = if hidden > 1.0 - s.threshold || least.is_none() { more } else { String::new() };
-    let all = s.completeness(open);
-    Some(format!(
-        "all {}s are found with {all:.2} only{}{more}",
-        kind.name,
-        least.map(is_one).unwrap_or_default()
-    ))
+    let about = about(least.map(is_one), hidden, 1.0 - s.threshold, s.belief.tracks.is_empty());
+    let (all, place) = (s.completeness(open), in_room(s, kind));
+    Some(format!("all {}s{place} are found with {all:.2} only{about}", kind.name))
+}
+
+/// What the doubt about all of a kind is about: the least sure object, and what may stand where nothing was seen, if that alone is
+/// more than is allowed or there is no such object.
+fn about(least: Option<String>, hidden: f64, allowed: f64, is_bare: bool) -> String {
+    let says_hidden = is_bare || hidden >= WORTH_SAYING && (hidden > allowed || least.is_none());
+    let hidden = hidden.max(0.0);
+    let more = says_hidden.then(|| format!(", there may be more where nothing was seen ({hidden:.2})"));
+    match (least, more) {
+        (None, None) => ", the doubt is about the objects that were seen".into(),
+        (least, more) => least.into_iter().chain(more).collect(),
+    }
+}
+
+/// The room in which a kind is asked about, in words; empty if it is asked about wherever it is.
+pub fn in_room(s: &Situation, kind: &Thing) -> String {
+    let first = kind.on.as_ref().and_then(|on| on.first());
+    let room = first.and_then(|&on| s.surfaces[on].room.as_ref());
+    room.map(|room| format!(" in the {room}")).unwrap_or_default()
 }
 
 fn out_of_time(s: &Situation) -> Option<String> {
@@ -211,4 +227,27 @@ fn out_of_sight(s: &Situation, doubt: &Doubt, what: &str) -> Option<String> {
 /// A place in words.
 pub fn place(p: &Point3<f64>) -> String {
     format!("({:.2}, {:.2}) m", p.x, p.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn doubt_about_all_of_a_kind_is_about_something() {
+        let check = |least: Option<&str>, hidden: f64, is_bare: bool, expected: &str| {
+            assert_eq!(
+                about(least.map(str::to_string), hidden, 0.1, is_bare),
+                expected,
+                "{least:?} {hidden}"
+            );
+        };
+        let one = ", what stands at (0.10, 0.20) m is one with 0.60";
+        check(Some(one), 0.05, false, one);
+        check(Some(one), 0.2, false, &format!("{one}, there may be more where nothing was seen (0.20)"));
+        check(None, 0.05, false, ", there may be more where nothing was seen (0.05)");
+        check(None, 0.005, false, ", the doubt is about the objects that were seen");
+        check(None, -1e-9, false, ", the doubt is about the objects that were seen");
+        check(None, -1e-9, true, ", there may be more where nothing was seen (0.00)");
+    }
 }

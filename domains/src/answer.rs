@@ -163,6 +163,11 @@ impl Asker<'_> {
             return (Verdict::CannotTell, unknown);
         }
         let mut said = self.surely();
+        // What was expected before anything was seen tells of no object.
+        let is_of_objects = !(said.is_empty() && s.kinds.is_empty() && s.asked.is_empty());
+        if self.mind.views == 0 && is_of_objects && !self.goal.asked.more {
+            return (Verdict::CannotTell, "it cannot be told: no look was taken".into());
+        }
         for (of, kind) in s.kinds.iter().enumerate() {
             let members = self.members(kind);
             if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {

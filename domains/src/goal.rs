@@ -66,9 +66,17 @@ pub enum GoalError {
     },
     /// The confidence that was asked for is no probability.
     #[error(
-        "\"with confidence {found}\" asks for no probability\n  a number above 0 and below 1 was expected, as in \"with confidence 0.9\""
+        "\"with confidence {found}\" asks for no probability\n  a number above 0.5 and below 1 was expected, as in \"with confidence 0.9\""
     )]
     BadConfidence {
+        /// What followed "with confidence".
+        found: String,
+    },
+    /// With the confidence that was asked for, a yes would be no likelier than a no.
+    #[error(
+        "\"with confidence {found}\" asks for a yes that is no likelier than a no\n  a number above 0.5 and below 1 was expected, as in \"with confidence 0.9\""
+    )]
+    LowConfidence {
         /// What followed "with confidence".
         found: String,
     },
@@ -225,8 +233,7 @@ fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError> {
         match (confidence, within) {
             (Some(at), within) if within.is_none_or(|w| w < at) => {
                 let found = words.split_off(at)[2..].join(" ");
-                let probability = found.parse::<f64>().ok().filter(|c| *c > 0.0 && *c < 1.0);
-                wanted.confidence = Some(probability.ok_or(GoalError::BadConfidence { found })?);
+                wanted.confidence = Some(confidence_of(found)?);
             }
             (_, Some(at)) => {
                 let found = words.split_off(at)[1..].join(" ");
@@ -234,6 +241,15 @@ fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError> {
             }
             _ => return Ok((words, wanted)),
         }
+    }
+}
+
+/// "0.9": a yes must be likelier than a no.
+fn confidence_of(found: String) -> Result<f64, GoalError> {
+    match found.parse::<f64>() {
+        Ok(c) if c > 0.5 && c < 1.0 => Ok(c),
+        Ok(c) if c > 0.0 && c < 1.0 => Err(GoalError::LowConfidence { found }),
+        _ => Err(GoalError::BadConfidence { found }),
     }
 }
 
@@ -384,6 +400,28 @@ mod tests {
         check("(c <thing>)", &[("thing", "a"), ("thing", "b")], Err("<first:thing>"));
         check("(c <cup>)", &[("thing", "a")], Err("no slot <cup>; it has <thing>"));
         check("(< (x) 3) ", &[], Ok("(< (x) 3) "));
+    }
+
+    #[test]
+    fn a_yes_is_likelier_than_a_no() {
+        let domain = Domain::load("tabletop").unwrap();
+        let lexicon = Lexicon::new(&domain, &crate::lexicon::Places::of_scene(&domain));
+        let check = |confidence: &str, expected: Result<f64, &str>| {
+            let said = format!("is cup A on the table with confidence {confidence}");
+            let found = read(&said, &domain, &lexicon).map(|goal| goal.threshold);
+            match expected {
+                Ok(threshold) => assert_eq!(found.ok(), Some(threshold), "{said}"),
+                Err(part) => assert!(found.is_err_and(|e| e.to_string().contains(part)), "{said}"),
+            }
+        };
+        check("0.9", Ok(0.9));
+        check("0.51", Ok(0.51));
+        for low in ["0.5", "0.3", "1e-300"] {
+            check(low, Err("asks for a yes that is no likelier than a no"));
+        }
+        for none in ["0", "1", "2", "-0.7", "nan", "much"] {
+            check(none, Err("asks for no probability"));
+        }
     }
 
     #[test]

@@ -136,7 +136,10 @@ fn in_doubt(round: &Round) -> Vec<InDoubt> {
         InDoubt { lost, ..doubt }
     });
     let kinds = s.kinds.iter().enumerate();
-    let kinds = kinds.map(|(n, t)| told(&t.name, Of::Kind, s.completeness(n), s.doubt_of(n)));
+    let kinds = kinds.map(|(n, t)| InDoubt {
+        wanted: s.wanted_of(n),
+        ..told(&t.name, Of::Kind, s.completeness(n), s.doubt_of(n))
+    });
     let surfaces = s.asked.iter();
     let surfaces = surfaces.map(|&on| told(&s.surfaces[on].name, Of::Surface, s.clarity(on), s.doubt_on(on)));
     things.chain(kinds).chain(surfaces).collect()

@@ -53,6 +53,46 @@ fn scene() -> TempDir {
 }
 
 #[test]
+fn what_is_said_of_a_room_names_it() {
+    let folder = TempDir::new().expect("a folder can be made");
+    for (goal, exit, verdict, words) in [
+        ("which cups are in the kitchen", 0, "achieved", "all cups in the kitchen are found: "),
+        ("which cups are in the hall", 1, "cannot_tell", "a cup in the hall: no surface is known there"),
+    ] {
+        let arguments = ["do", goal, "--domain", "home", "--seed", "95001", "--run", verdict, "--json"];
+        let report = check(folder.path(), &arguments, exit);
+        assert_eq!(report["verdict"], verdict, "{report}");
+        assert!(report["why"].as_str().is_some_and(|why| why.contains(words)), "{report}");
+    }
+}
+
+#[test]
+fn none_of_a_kind_is_looked_for_until_that_can_be_said() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let none = ["--scene", "no-cup-a", "--seed", "95012", "--run", "none", "--json"];
+    let report = check(folder.path(), &[&["do", "find all cup A"], &none[..]].concat(), 1);
+    let why = report["why"].as_str().unwrap_or_default();
+    assert!(why.starts_with("there is no cup A: "), "{report}");
+}
+
+#[test]
+fn changes_are_told_of_surfaces_that_an_earlier_run_looked_at() {
+    let folder = TempDir::new().expect("a folder can be made");
+    for (goal, words) in [
+        ("find cup A", "cup A stands on the "),
+        (
+            "what has changed on the lower board",
+            "nothing is remembered of the lower board: no earlier run looked at it",
+        ),
+    ] {
+        let with = ["--domain", "home", "--seed", "95002", "--remember", "seen", "--json"];
+        let output = outcome(folder.path(), &[&["do", goal], &with[..]].concat());
+        let report: Value = serde_json::from_slice(&output.stdout).expect("it is JSON");
+        assert!(report["why"].as_str().is_some_and(|why| why.contains(words)), "{report}");
+    }
+}
+
+#[test]
 fn a_verdict_is_about_the_surface_that_was_asked_about() {
     let folder = scene();
     for seed in [1, 4] {

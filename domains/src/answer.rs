@@ -256,7 +256,17 @@ impl Asker<'_> {
             let seen = self.seen_of(s.doubt_about(n), s.chance_there(n));
             return (Verdict::NotFound, format!("{} is not {asked}{elsewhere}: {seen}", thing.name));
         }
-        let unclear = s.kinds.iter().enumerate().any(|(n, _)| s.completeness(n) < s.threshold)
+        if let Some(unknown) = self.nowhere() {
+            return (Verdict::CannotTell, unknown);
+        }
+        if let [kind] = s.kinds.as_slice()
+            && s.things.is_empty()
+            && s.completeness(0) >= s.threshold
+            && s.completeness(0) < s.wanted_of(0)
+        {
+            return self.none_of(kind);
+        }
+        let unclear = (0..s.kinds.len()).any(|n| s.completeness(n) < s.wanted_of(n))
             || s.asked.iter().any(|&on| s.clarity(on) < s.threshold);
         if unclear {
             let left = match reasons::left_in_all(s) {

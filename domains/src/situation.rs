@@ -487,6 +487,17 @@ impl Situation {
         self.belief.tracks.iter().map(sure).product::<f64>() * (1.0 - self.doubt_of(of).hidden)
     }
 
+    /// Whether an object that was seen is believed to be of a kind, where it is asked about.
+    pub fn has_member(&self, of: usize) -> bool {
+        self.belief.tracks.iter().any(|t| self.kinds[of].probability(t, &self.surfaces) > 0.5)
+    }
+
+    /// How sure it must be that all of a kind are found. As sure as was asked for that there is none is not sure enough to say so.
+    pub fn wanted_of(&self, of: usize) -> f64 {
+        let is_empty = self.completeness(of) >= self.threshold && !self.has_member(of);
+        if is_empty { self.threshold.max(1.0 - self.thresholds.not_there) } else { self.threshold }
+    }
+
     /// What is in doubt about which objects are of a kind.
     pub fn doubt_of(&self, of: usize) -> &Doubt {
         self.derived.of[of].get_or_init(|| Doubt::of(self, of))

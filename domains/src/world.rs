@@ -238,7 +238,7 @@ impl<'a> World<'a> {
 
     /// The problem of this round in PDDL.
     fn problem(&self, s: &Situation) -> Result<Source, WorldError> {
-        let Setting { domain, goal, .. } = &self.setting;
+        let domain = self.setting.domain;
         let vocabulary = &domain.vocabulary;
         let name = format!("round-{}", self.mind.views + 1);
         let mut text =
@@ -275,8 +275,14 @@ impl<'a> World<'a> {
         } else {
             String::new()
         };
-        text += &format!("  )\n  (:goal {}){metric})\n", goal.pddl);
+        text += &format!("  )\n  (:goal {}){metric})\n", self.goal_now(s));
         Ok(Source::new(format!("{name}.pddl"), text))
+    }
+
+    /// The goal of this round: what was asked for, as sure as it must be by what is believed.
+    fn goal_now(&self, s: &Situation) -> String {
+        let surer = |goal: String, of: usize| words::surer(&goal, &s.kinds[of].symbol, s.wanted_of(of));
+        (0..s.kinds.len()).fold(self.setting.goal.pddl.clone(), surer)
     }
 
     /// Every call, bound to a situation. A program of the domain's own replaces what is built in.
@@ -327,10 +333,9 @@ impl<'a> World<'a> {
         if s.can_drive_to(look.from) {
             return Ok(Choice::Steps(reasons::look(s, look.from, look.on)));
         }
-        let Setting { domain, goal, .. } = &self.setting;
         let there = format!("(at {})", s.candidates[look.from].symbol);
-        let task =
-            words::with_goal(domain, &round.problem, &goal.pddl, &there).map_err(WorldError::Domain)?;
+        let task = words::with_goal(self.setting.domain, &round.problem, &self.goal_now(s), &there)
+            .map_err(WorldError::Domain)?;
         Ok(Choice::Towards { task: Box::new(task), then: reasons::look_there(s, look.from, look.on) })
     }
 
@@ -450,14 +455,15 @@ impl<'a> World<'a> {
     /// Whether a condition holds as things are believed now.
     fn holds_now(&mut self, condition: &str) -> Result<bool, WorldError> {
         self.attend();
-        let Setting { domain, goal, .. } = self.setting.clone();
+        let domain = self.setting.domain;
         let situation = Arc::new(Situation::new(self.mind.known.clone(), domain.config.thresholds));
         let problem = self.problem(&situation)?;
         // What is no longer believed in holds of nothing.
         if !words::are_known(condition, &problem.text, domain) {
             return Ok(false);
         }
-        let task = words::with_goal(domain, &problem, &goal.pddl, condition).map_err(WorldError::Domain)?;
+        let goal = self.goal_now(&situation);
+        let task = words::with_goal(domain, &problem, &goal, condition).map_err(WorldError::Domain)?;
         Ok(monitor(&task, &self.bind(&situation), &Plan::default()).is_ok())
     }
 

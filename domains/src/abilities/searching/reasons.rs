@@ -15,7 +15,7 @@ pub(crate) const LOOK_S: f64 = 2.0;
 /// The single look that settles most a second; none if no look settles what matters in the time that is left.
 pub fn one_look(s: &Situation) -> Option<Plan> {
     // Where all of a kind are wanted, what else is in doubt of each of them is not asked about.
-    let is_open = |&of: &usize| s.completeness(of) < s.threshold;
+    let is_open = |&of: &usize| s.completeness(of) < s.wanted_of(of);
     let kinds: Vec<&Doubt> = (0..s.kinds.len()).filter(is_open).map(|of| s.doubt_of(of)).collect();
     let doubts = if kinds.is_empty() { s.doubts() } else { kinds };
     let looks = (0..s.candidates.len()).flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));
@@ -152,7 +152,7 @@ pub fn left_in_all(s: &Situation) -> Option<String> {
 
 /// What keeps one from saying that all of a kind are found: the least sure object, and what may stand where nothing was seen.
 fn left_of_kinds(s: &Situation) -> Option<String> {
-    let open = (0..s.kinds.len()).find(|&of| s.completeness(of) < s.threshold)?;
+    let open = (0..s.kinds.len()).find(|&of| s.completeness(of) < s.wanted_of(of))?;
     let kind = &s.kinds[open];
     let p = |track: &Track| kind.probability(track, &s.surfaces);
     let sure = |track: &&Track| p(track).max(1.0 - p(track));

@@ -157,7 +157,7 @@ pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Choo
 pub fn is_asked(s: &Situation) -> bool {
     let own: Vec<usize> = (0..s.things.len()).filter(|&n| s.things[n].track.is_none()).collect();
     let unsure = own.iter().any(|&n| s.confidence(n) < s.threshold)
-        || (0..s.kinds.len()).any(|n| s.completeness(n) < s.threshold)
+        || (0..s.kinds.len()).any(|n| s.completeness(n) < s.wanted_of(n))
         || s.asked.iter().any(|&on| s.clarity(on) < s.threshold);
     s.held.is_none() && (unsure || own.is_empty() && s.kinds.is_empty() && s.asked.is_empty())
 }

@@ -47,6 +47,7 @@ pub mod replay;
 pub mod report;
 pub mod run;
 pub mod saying;
+pub mod shell;
 pub mod standing;
 pub mod stop;
 pub mod template;

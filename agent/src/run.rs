@@ -30,6 +30,7 @@ use crate::body::tape::{self, RecordTape};
 use crate::exit::CommandError;
 use crate::keeping::Keeping;
 use crate::report::{Event, Report};
+use crate::shell;
 use crate::stop::Stop;
 pub use beginning::Beginning;
 pub use files::{finish, has_ended, header, keep_header, lost_of_header, report};
@@ -226,9 +227,10 @@ pub async fn live_through(
 /// Says of a run that was stopped how it goes on.
 fn how_to_go_on(error: CommandError, folder: &Path) -> CommandError {
     let CommandError::Stopped { signal, .. } = error else { return error };
-    let folder = folder.display();
+    let folder = folder.display().to_string();
+    let word = shell::word(&folder);
     let said =
-        format!("stopped; everything until here is in {folder}\n  go on with: descry do --resume {folder}");
+        format!("stopped; everything until here is in {folder}\n  go on with: descry do --resume {word}");
     CommandError::Stopped { said, signal }
 }
 
@@ -277,4 +279,20 @@ fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) -> Option<R
 pub fn events(record: &Record) -> Result<(Vec<Value>, Vec<Fault>), CommandError> {
     let (documents, faults) = record.find_whole(&Query::of_kind("event")).map_err(CommandError::broken)?;
     Ok((documents.into_iter().map(|d| d.body).collect(), faults))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_was_stopped_says_how_it_goes_on() {
+        let check = |folder: &str, expected: &str| {
+            let stopped = CommandError::Stopped { said: "stopped".into(), signal: 2 };
+            let said = how_to_go_on(stopped, Path::new(folder)).to_string();
+            assert!(said.ends_with(&format!("go on with: descry do --resume {expected}")), "{said}");
+        };
+        check("runs/mug", "runs/mug");
+        check("my runs/mug", "'my runs/mug'");
+    }
 }

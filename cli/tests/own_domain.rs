@@ -126,6 +126,8 @@ fn a_new_domain_is_written_over_nothing() {
     std::fs::create_dir(folder.path().join("empty")).expect("a folder can be made");
     assert!(descry(folder.path(), &["new", "empty"]).status.success());
     assert!(descry(folder.path(), &["check", "empty"]).status.success());
+    let (out, _) = shown(&descry(folder.path(), &["new", "my domains/own"]));
+    assert!(out.contains("descry find mug --domain 'my domains/own'\n"), "{out}");
 }
 
 #[test]

@@ -8,12 +8,13 @@ use descry_robots::program::{Limits, ProgramRobot};
 
 use super::{Body, Told};
 use crate::exit::CommandError;
+use crate::shell;
 
 /// Stands in a command line for the seed.
 pub const SEED: &str = "{seed}";
 /// Stands there for a file to which the program writes how everything really stands.
 pub const TRUTH: &str = "{truth}";
-/// Stands there for what is not to be in its world: kinds, with commas between, in quotes.
+/// Stands there for what is not to be in its world: kinds, with commas between, as one word of the shell.
 pub const WITHOUT: &str = "{without}";
 
 /// A file that a program writes for reports. It is removed with its body.
@@ -47,8 +48,8 @@ pub fn open(command: &str, seed: u64, without: &[String]) -> Result<Body, Comman
     let file = truth.as_ref().map(|t| t.path().display().to_string()).unwrap_or_default();
     let command = command
         .replace(SEED, &seed.to_string())
-        .replace(TRUTH, &quoted(&file))
-        .replace(WITHOUT, &quoted(&without.join(",")));
+        .replace(TRUTH, &shell::word(&file))
+        .replace(WITHOUT, &shell::word(&without.join(",")));
     let robot = ProgramRobot::start(&command, Limits::default()).map_err(CommandError::broken)?;
     Ok(Body { truth: truth.map(Told::Program), ..Body::new(Arc::new(robot)) })
 }
@@ -61,9 +62,4 @@ pub fn connect(address: &str) -> Result<Body, CommandError> {
     ProgramRobot::connect(address, Limits::default())
         .map(|r| Body::new(Arc::new(r)))
         .map_err(CommandError::broken)
-}
-
-/// As one word of the shell.
-fn quoted(text: &str) -> String {
-    format!("'{}'", text.replace('\'', "'\\''"))
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use descry_agent::shell;
 use descry_agent::template::write_domain;
 use serde_json::json;
 
@@ -24,7 +25,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     if arguments.json {
         input::print_json(&json!({ "folder": folder, "files": written }))?;
     } else {
-        let shown = folder.display();
+        let shown = shell::word(&folder.display().to_string());
         let next = [
             format!("  descry check {shown}"),
             format!("  descry goals --domain {shown}"),

@@ -195,6 +195,14 @@ fn a_later_run_extends_the_map() {
 }
 
 #[test]
+fn a_room_is_mapped_and_all_of_a_kind_are_found_in_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (report, _) = run("map the room and find all cups", "one-room", 1, folder.path(), None);
+    assert_eq!(report["verdict"], "achieved", "{report}");
+    assert!(report["why"].as_str().unwrap().contains("all cups are found: 2, "), "{report}");
+}
+
+#[test]
 #[ignore = "two rooms, half a minute"]
 fn two_rooms_are_mapped_and_the_cup_is_found_in_one_run() {
     let folder = tempfile::tempdir().unwrap();

@@ -17,6 +17,7 @@
     (path-cost ?from ?to - pose                 cost             path_cost@descry)
     (expected-view ?from - pose                 cost             expected_view@descry)
     (expected-discovery ?from - pose ?what - thing cost          expected_discovery@descry)
+    (expected-discoveries ?from - pose ?of - kind cost           expected_discoveries@descry)
     (can-see ?from - pose ?on - surface         conditionchecker can_see@descry)
     (worth-a-look ?from - pose ?on - surface    conditionchecker worth_a_look@descry)
     (expected-gain ?from - pose ?on - surface ?what - thing cost expected_gain@descry)
@@ -47,7 +48,8 @@
       (at start (not (at ?from)))
       (at end (at ?to))))
 
-  ; Something that is sought may stand on what is not known yet: as long as that is so, looking there may raise the confidence in it.
+  ; Something that is sought may stand on what is not known yet: as long as that is so, looking there may raise the confidence in it, and
+  ; in having found all of a kind.
   (:durative-action chart
     :parameters (?from - pose)
     :duration (= ?duration 2)
@@ -62,7 +64,9 @@
       (at end (charted ?from))
       (at end (decrease (unseen) [expected-view ?from]))
       (forall (?what - thing)
-        (at end (increase (confidence ?what) [expected-discovery ?from ?what])))))
+        (at end (increase (confidence ?what) [expected-discovery ?from ?what])))
+      (forall (?of - kind)
+        (at end (increase (completeness ?of) [expected-discoveries ?from ?of])))))
 
   (:durative-action observe
     :parameters (?from - pose ?on - surface)

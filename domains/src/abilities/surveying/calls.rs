@@ -22,6 +22,12 @@ pub(super) const ALL: &[Meaning] = &[
         about: "by how much it would raise the confidence in a thing if that stood on what is not known yet",
         answers: expected_discovery,
     },
+    Meaning {
+        name: "expected-discoveries",
+        reads: &[Reads::all("charted")],
+        about: "by how much it would raise the certainty of having found all of a kind if more stood on what is not known yet",
+        answers: expected_discoveries,
+    },
 ];
 
 fn expected_view(s: &Situation, call: &Call) -> Result<Answer, CallError> {
@@ -31,9 +37,18 @@ fn expected_view(s: &Situation, call: &Call) -> Result<Answer, CallError> {
 /// The share of all that is still unknown and can be seen, of all that confidence lacks: what is known already and left to be searched is worth more.
 fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let what = s.thing(argument(call, 1)?)?;
+    Ok(Answer::Number((1.0 - s.confidence(what)) * share_shown(s, call)?))
+}
+
+/// The same of all of a kind.
+fn expected_discoveries(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+    let of = s.kind(argument(call, 1)?)?;
+    Ok(Answer::Number((1.0 - s.completeness(of)) * share_shown(s, call)?))
+}
+
+fn share_shown(s: &Situation, call: &Call) -> Result<f64, CallError> {
     let all_m2 = s.chart.unseen_m2();
-    let share = if all_m2 > 0.0 { (gain_m2(s, call)? / all_m2).min(1.0) } else { 0.0 };
-    Ok(Answer::Number((1.0 - s.confidence(what)) * share))
+    Ok(if all_m2 > 0.0 { (gain_m2(s, call)? / all_m2).min(1.0) } else { 0.0 })
 }
 
 fn gain_m2(s: &Situation, call: &Call) -> Result<f64, CallError> {

@@ -62,6 +62,16 @@ fn what_is_there_is_found_and_what_is_not_is_not() {
 }
 
 #[test]
+fn nobody_drives_for_a_shape_that_nobody_has_learned() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = run("find chair", "default", 1, folder.path(), None);
+    let moved = (report["verdict"].as_str(), report["distance_m"].as_f64(), report["views"].as_u64());
+    assert_eq!(moved, (Some("cannot_tell"), Some(0.0), Some(0)), "{report}");
+    let why = report["why"].as_str().unwrap();
+    assert!(why.starts_with("nobody has learned what the chair looks like"), "{why}");
+}
+
+#[test]
 fn what_was_learned_is_known_after_a_restart() {
     let folder = tempfile::tempdir().unwrap();
     let (folder, store) = (folder.path(), folder.path().join("store"));

@@ -127,8 +127,12 @@ const WORTH_M: f64 = 0.001;
 
 /// The quickest of the single scans and alignments that promise anything for what is asked.
 pub(super) fn fallback(s: &Situation) -> Option<Plan> {
+    // What nobody has learned is known by no scan.
+    if s.floor.sought.as_ref().is_some_and(|shape| !s.floor.knows(shape)) {
+        return None;
+    }
     let is_open = |t: &&Thing| match &s.floor.sought {
-        Some(shape) => s.floor.knows(shape) && t.may_have(shape, s.floor.known.len(), s.threshold),
+        Some(shape) => t.may_have(shape, s.floor.known.len(), s.threshold),
         None => t.symbol == THIS,
     };
     let open: Vec<&Thing> = s.floor.things.iter().filter(is_open).collect();

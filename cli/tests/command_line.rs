@@ -109,6 +109,14 @@ fn results_are_printed_and_what_happens_is_told() {
     let (out, err) = check(&["find", "cup A"], 0, &[]);
     assert!(out.contains("achieved: cup A stands on the table") && !out.contains("(observe "), "{out}");
     assert!(err.contains("(observe ") && !err.contains("achieved:"), "{err}");
+    for (arguments, goal) in [
+        (&["find", "cup A", "--jsn", "--json"][..], "find cup A"),
+        (&["do", "find mug", "--json", "--seed", "many"], "find mug"),
+    ] {
+        let said = json(arguments, 2);
+        assert_eq!((&said["goal"], &said["exit"]), (&goal.into(), &2.into()), "{said}");
+        assert!(said["why"].as_str().is_some_and(|why| !why.is_empty()), "{said}");
+    }
     let said = json(&["find", "cup Z", "--json"], 2);
     assert_eq!(
         (&said["goal"], &said["verdict"], &said["exit"]),

@@ -134,6 +134,23 @@ impl<'a> Unended<'a> {
     }
 }
 
+/// Prints for `--json` that a command line of `find` or `do` cannot be read; `words` are those behind the program's name.
+pub(super) fn refuse(words: &[String], because: &str) -> Result<(), CommandError> {
+    let (options, verb) = match words.split_first() {
+        Some((command, rest)) if command == "find" => (rest, "find "),
+        Some((command, rest)) if command == "do" => (rest, ""),
+        _ => return Ok(()),
+    };
+    let options = options.split(|word| word == "--").next().unwrap_or_default();
+    if options.iter().all(|word| word != "--json") {
+        return Ok(());
+    }
+    let said: Vec<&str> =
+        options.iter().map(String::as_str).take_while(|word| !word.starts_with('-')).collect();
+    let failed = CommandError::bad_input(because.trim().trim_start_matches("error: "));
+    input::print_json(&Unended::of(format!("{verb}{}", said.join(" ")).trim_end(), &failed))
+}
+
 /// Keeps how a run ended.
 fn end(mut report: Report, folder: &Folder, started: Instant) -> Result<Report, CommandError> {
     report.wall_s = started.elapsed().as_secs_f64();

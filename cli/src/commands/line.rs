@@ -112,8 +112,18 @@ pub fn line() -> clap::Command {
 
 /// The command that was asked for; what cannot be read ends the program with a word about it.
 pub fn asked() -> Command {
-    let line = Line::from_arg_matches(&line().get_matches());
-    line.unwrap_or_else(|error| error.exit()).command
+    let read = line().try_get_matches().and_then(|matches| Line::from_arg_matches(&matches));
+    read.unwrap_or_else(|error| refuse(&error)).command
+}
+
+/// Says why a line cannot be read, or the help that it asks for, and ends.
+fn refuse(error: &clap::Error) -> ! {
+    let words: Vec<String> = std::env::args_os().skip(1).map(|w| w.to_string_lossy().into_owned()).collect();
+    if error.use_stderr() {
+        // Where nobody reads it, the exit code still says it.
+        let _ = super::find::refuse(&words, &error.render().to_string());
+    }
+    error.exit()
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! `descry show RUN`: what happened in a run, from its record.
 
+use std::fs::File;
+use std::io::Write;
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
@@ -33,7 +35,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     };
     if let Some(page) = &arguments.html {
         let text = descry_pages::page::of_run(&record, report.as_ref())?;
-        std::fs::write(page, text).map_err(|e| CommandError::broken(format!("{}: {e}", page.display())))?;
+        let at = |e: std::io::Error| format!("{}: {e}", page.display());
+        let mut file = File::create(page).map_err(|e| CommandError::bad_input(at(e)))?;
+        file.write_all(text.as_bytes()).map_err(|e| CommandError::broken(at(e)))?;
         input::print_text(&page.display().to_string())?;
     } else if arguments.json {
         input::print_json(&json!({

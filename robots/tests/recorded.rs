@@ -103,6 +103,27 @@ fn mistakes_beside_frames_are_named() {
     check(&put("recording.toml", "folder = \"elsewhere\"\n"), 1, &["no folder", "elsewhere"]);
 }
 
+/// A surface in `recording.toml`, and the words that must be said about it.
+fn check_surface(outline: &str, height: &str, line: usize, words: &[&str]) {
+    let text = format!("[[surface]]\nname = \"table\"\noutline_m = {outline}\nheight_m = {height}\n");
+    let spoil = |folder: &Path| fs::write(folder.join("recording.toml"), &text).unwrap();
+    check_mistake(folders::side_by_side, &spoil, line, words);
+}
+
+#[test]
+fn surfaces_that_cannot_be_are_named() {
+    let check = check_surface;
+    let table = "[[-0.6, -0.4], [0.6, -0.4], [0.6, 0.4], [-0.6, 0.4]]";
+    check(&table.replace("0.", "60"), "750", 3, &["\"table\"", "1212 m wide", "30 m", "millimetres"]);
+    check(table, "750", 4, &["found 750", "within 100 m", "millimetres"]);
+    check(table, "nan", 4, &["found NaN", "height"]);
+    let another = format!("0.7\n[[surface]]\nname = \"table\"\noutline_m = {table}\nheight_m = 0.7");
+    check(table, &another, 6, &["surfaces 1 and 2", "\"table\""]);
+    check("[[0, 0], [1, 0]]", "0.7", 3, &["no outline", "three corners"]);
+    check("[[0, 0], [1, 1], [2, 2]]", "0.7", 3, &["area of 0 m2", "one line"]);
+    check("[[0, 0], [1, 1], [1, 0], [0, 1]]", "0.7", 3, &["after corner 1 and corner 3", "order"]);
+}
+
 #[test]
 fn mistakes_in_lists_are_named() {
     let check = |spoil: &dyn Fn(&Path), line, words: &[&str]| {

@@ -73,6 +73,14 @@ pub fn read_cloud(bytes: &[u8]) -> Result<Loaded, FileError> {
     pcd::read(bytes)
 }
 
+/// Most bytes of padding behind the data: a page of memory, up to which the Point Cloud Library fills its files. From: chosen, 64 KiB.
+const MOST_PADDING: usize = 1 << 16;
+
+/// True if what follows the data is nothing: zeros to the end of a page, or the end of a line.
+fn is_padding(rest: &[u8]) -> bool {
+    rest.len() < MOST_PADDING && rest.iter().all(|b| *b == 0 || b.is_ascii_whitespace())
+}
+
 /// Makes raw points sane: infinite becomes "no return", what has no return leaves clouds without a grid; says what it did.
 fn finish(
     mut cloud: Cloud,

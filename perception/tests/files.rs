@@ -151,6 +151,53 @@ fn broken_files_are_explained() {
 }
 
 #[test]
+fn what_the_header_does_not_declare_is_refused() {
+    let head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\n";
+    let cut = ["as the header declares", "POINTS, WIDTH and HEIGHT"];
+    let [declares, mend] = cut;
+    check_error(&format!("{head}DATA ascii\n1 2 3\n4 5 6\n7 8 9\n"), &["1 lines of points", "found 3", mend]);
+    let bytes = "123456789abc".repeat(3);
+    check_error(
+        &format!("{head}DATA binary\n{bytes}"),
+        &["1 points", declares, "24 bytes more, as 2 points"],
+    );
+    let mut packed = pcd::write(&sample(true), pcd::Encoding::BinaryCompressed);
+    packed.extend([7; 100]);
+    let error = files::read_cloud(&packed).unwrap_err().to_string();
+    assert!(cut.iter().all(|part| error.contains(part)) && error.contains("100 bytes more"), "{error}");
+    let ply =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
+    check_error(&format!("{ply}end_header\n1 2 3\n4 5 6\n"), &["1 rows of element vertex", "up to 1 lines"]);
+    check_error(&format!("{ply}end_header\n1 2 3 4\n"), &["line 8", "\"4\"", "every column"]);
+    let binary = ply.replace("ascii", "binary_little_endian");
+    check_error(&format!("{binary}end_header\n{bytes}"), &["1 rows of element vertex", "24 bytes more"]);
+    let face = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    check_error(&format!("{ply}{face}1 2 3\n4 5 6\n7 8 9\n"), &["line 11", "vertex_indices"]);
+    let twice = "POINTS 1\nPOINTS 2\nDATA ascii\n1 2 3\n";
+    check_error(&format!("{head}{twice}"), &["line 7", "one line POINTS", "line 6", "\"2\""]);
+    check_error(&format!("{ply}{ply}"), &["line 7", "ply"]);
+    check_error(&format!("{ply}format ascii 1.0\n"), &["line 7", "one line format"]);
+    check_error(&format!("{ply}element vertex 2\n"), &["line 7", "one element of each name"]);
+    let foo = "VIEWPOINT 0 0 0 foo 1 0 0 0\nDATA ascii\n1 2 3\n";
+    check_error(&format!("{head}{foo}"), &["line 6", "qw qx qy qz", "foo"]);
+}
+
+#[test]
+fn padding_and_empty_lines_are_nothing() {
+    let head = "FIELDS x y z\nPOINTS 1\nPOINTS 1\n";
+    assert_eq!(read(&format!("{head}DATA ascii\n1 2 3\n\n \n# end\n")).unwrap().cloud.len(), 1);
+    assert_eq!(read(&format!("{head}DATA binary\n123456789abc\n")).unwrap().cloud.len(), 1);
+    for encoding in [pcd::Encoding::Binary, pcd::Encoding::BinaryCompressed] {
+        let mut padded = pcd::write(&sample(true), encoding);
+        padded.resize(padded.len().next_multiple_of(4096), 0);
+        assert!(same(&files::read_cloud(&padded).unwrap().cloud, &sample(true)), "{encoding:?}");
+    }
+    let mut ply = ply::write(&sample(false), ply::Encoding::Binary);
+    ply.extend(b"\n");
+    assert_eq!(files::read_cloud(&ply).unwrap().cloud.len(), 12);
+}
+
+#[test]
 fn ply_of_strangers() {
     let text = "ply\nformat ascii 1.0\ncomment made by a scanner\nelement camera 1\nproperty list uchar float k\n\
                 element vertex 2\nproperty double x\nproperty double y\nproperty double z\nproperty float diffuse_red\n\

@@ -110,6 +110,21 @@ fn what_is_left_out_is_said() {
     assert_eq!(loaded.cloud.scaled(0.001).unit_warning(), None);
 }
 
+#[test]
+fn no_return_may_be_written_as_the_place_of_the_sensor() {
+    let rows = "DATA ascii\n0 0 0\n1 2 3\n-0 0 0\n4 5 6\n";
+    let check = |head: &str, finite: usize, notes: &[&str]| {
+        let loaded = read(&format!("FIELDS x y z\n{head}\n{rows}")).unwrap();
+        assert_eq!((loaded.cloud.count_finite(), loaded.cloud.len()), (finite, 4), "{head}");
+        assert_eq!(loaded.notes, notes, "{head}");
+    };
+    let note = "2 points at (0, 0, 0), where the sensor is, are taken as \"no return\"";
+    check("WIDTH 2\nHEIGHT 2", 2, &[note]);
+    check("WIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 0 0 1 0 0", 2, &[note]);
+    check("WIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 1 1 0 0 0", 4, &[]);
+    check("WIDTH 4\nHEIGHT 1", 4, &[]);
+}
+
 /// The error names the place, what was expected and a way out.
 fn check_error(text: &str, parts: &[&str]) {
     let error = read(text).unwrap_err();

@@ -125,6 +125,26 @@ fn no_return_may_be_written_as_the_place_of_the_sensor() {
     check("WIDTH 4\nHEIGHT 1", 4, &[]);
 }
 
+#[test]
+fn what_far_points_look_like_is_said() {
+    let seen: Vec<Point3<f64>> =
+        (0..100).map(|i| Point3::new(f64::from(i % 10) * 0.1, f64::from(i / 10) * 0.1, 1.2)).collect();
+    let check = |scale: f64, offset: Vector3<f64>, words: &[&str]| {
+        let points = seen.iter().map(|p| (p * scale + offset).cast()).collect();
+        let said = Cloud::from_points(points).unit_warning().unwrap_or_default();
+        assert!(words.iter().all(|w| said.contains(w)) && words.is_empty() == said.is_empty(), "{said}");
+    };
+    let here = Vector3::zeros();
+    check(1.0, here, &[]);
+    check(1000.0, here, &["looks like millimetres; scale by 0.001"]);
+    check(100.0, here, &["looks like centimetres; scale by 0.01"]);
+    check(300.0, here, &["centimetres or millimetres"]);
+    check(1.0, Vector3::new(0.0, 400.0, 0.0), &["400 m from the sensor", "at the origin"]);
+    let utm = Vector3::new(691_234.5, 5_334_567.25, 520.0);
+    check(1.0, utm, &["from the origin", "500.0 mm apart", "subtract an offset before writing"]);
+    check(1e30, here, &["damaged", "order of bytes"]);
+}
+
 /// The error names the place, what was expected and a way out.
 fn check_error(text: &str, parts: &[&str]) {
     let error = read(text).unwrap_err();

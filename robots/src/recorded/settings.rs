@@ -174,6 +174,14 @@ impl CameraSettings {
         }
         Ok(())
     }
+
+    /// If the principal point lies outside an image of that many columns and rows: along which axis, and what is wrong.
+    pub(crate) fn off_image(&self, size: (usize, usize)) -> Option<(usize, String)> {
+        let axes = [("cx", self.cx, size.0, "columns"), ("cy", self.cy, size.1, "rows")];
+        let off = axes.into_iter().position(|(_, at, most, _)| !(0.0..=most as f64).contains(&at))?;
+        let (name, at, most, what) = axes[off];
+        Some((off, format!("{name} is {at}, expected a pixel of the image, which has {most} {what}")))
+    }
 }
 
 fn objection(path: Vec<Step>, problem: String, mend: &str) -> Objection {

@@ -12,6 +12,20 @@ pub struct Grid {
     pub height: usize,
 }
 
+/// No depth camera and no scanner of rooms sees farther, metres. From: chosen.
+const FARTHEST_TYPICAL_M: f64 = 100.0;
+/// No coordinates of a map are greater, metres. From: derived, the width of the earth.
+const FARTHEST_ON_EARTH_M: f64 = 1.3e7;
+/// A place whose points lie within this of their middle is in metres if it is far away, metres. From: chosen.
+const WIDEST_PLACE_M: f64 = 20.0;
+/// What is narrower than this share of its distance is far away, and not in other units. From: chosen.
+const NARROW: f64 = 0.01;
+/// Nearer is too near for a depth camera that gives millimetres; farther is too far for one that gives centimetres. From: chosen.
+const LEAST_MILLIMETRES: f64 = 300.0;
+const MOST_CENTIMETRES: f64 = 800.0;
+/// Coordinates that single precision tells less apart than this blur objects, metres. From: chosen.
+const COARSEST_M: f64 = 1e-4;
+
 /// Points with what is known of each. All attributes that are present have one entry a point.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cloud {
@@ -176,23 +190,60 @@ impl Cloud {
         Some(finite.fold((first, first), |(low, high), p| (low.inf(p), high.sup(p))))
     }
 
-    /// A warning if the cloud is likely not in metres: a typical return lies farther away than any depth camera or room scanner sees.
-    ///
-    /// Judged by the median distance of the finite points from the sensor (the origin): beyond 100 it is taken for millimetres.
-    /// Mend with [`Cloud::scaled`]`(0.001)`.
+    /// A warning if a typical return lies farther from the sensor (the origin) than any depth camera or room scanner sees: what that looks
+    /// like. Other units are mended with [`Cloud::scaled`], coordinates of a map by subtracting an offset before they are written.
     pub fn unit_warning(&self) -> Option<String> {
-        const FARTHEST_TYPICAL_M: f32 = 100.0;
-        let ranges = || self.points.iter().filter(|p| is_finite(p)).map(|p| p.coords.norm());
+        let ranges = || self.points.iter().filter(|p| is_finite(p)).map(|p| p.coords.cast::<f64>().norm());
         let (near, all) =
             ranges().fold((0, 0), |(near, all), r| (near + usize::from(r <= FARTHEST_TYPICAL_M), all + 1));
         if near > all / 2 || all == 0 {
             return None;
         }
-        let mut ranges: Vec<f32> = ranges().collect();
-        let (_, median, _) = ranges.select_nth_unstable_by(all / 2, f32::total_cmp);
-        Some(format!(
-            "half of the points lie more than {median:.0} m from the sensor: this looks like millimetres; scale by 0.001"
-        ))
+        let far_m = median(ranges().collect());
+        let half = format!("half of the points lie more than {far_m:.0} m from the sensor");
+        if far_m > FARTHEST_ON_EARTH_M {
+            return Some(
+                "half of the points lie farther away than the earth is wide: no unit makes up for that; the coordinates are damaged, \
+                 or of another type or order of bytes than the file says"
+                    .into(),
+            );
+        }
+        if let Some(within_m) =
+            self.within_of_middle_m().filter(|&m| m <= WIDEST_PLACE_M || m < far_m * NARROW)
+        {
+            return Some(self.far_from_origin(far_m).unwrap_or(format!(
+                "{half}, and {within_m:.1} m from their middle: is the sensor at the origin, and are these metres?"
+            )));
+        }
+        Some(match far_m {
+            m if m < LEAST_MILLIMETRES => format!("{half}: this looks like centimetres; scale by 0.01"),
+            m if m < MOST_CENTIMETRES => {
+                format!("{half}: this looks like centimetres or millimetres; scale by 0.01 or 0.001")
+            }
+            _ => format!("{half}: this looks like millimetres; scale by 0.001"),
+        })
+    }
+
+    /// How far a typical point lies from the middle of all, metres; `None` if none is finite.
+    fn within_of_middle_m(&self) -> Option<f64> {
+        let finite = || self.points.iter().filter(|p| is_finite(p)).map(|p| p.cast::<f64>());
+        finite().next()?;
+        let middle = Point3::from([0, 1, 2].map(|axis| median(finite().map(|p| p[axis]).collect())));
+        Some(median(finite().map(|p| (p - middle).norm()).collect()))
+    }
+
+    /// What to say of coordinates that lie so far from the origin that single precision blurs them.
+    fn far_from_origin(&self, far_m: f64) -> Option<String> {
+        let (low, high) = self.bounds()?;
+        let greatest = low.coords.amax().max(high.coords.amax());
+        let apart_m = f64::from(greatest.next_up()) - f64::from(greatest);
+        (apart_m > COARSEST_M).then(|| {
+            format!(
+                "coordinates lie {far_m:.0} m from the origin, where single precision tells places {:.1} mm apart: subtract an offset \
+                 before writing",
+                apart_m * 1e3
+            )
+        })
     }
 
     /// The cloud with every coordinate multiplied by `factor` (0.001 takes millimetres to metres).
@@ -205,4 +256,13 @@ impl Cloud {
 pub fn is_finite(p: &Point3<f32>) -> bool {
     // What is not finite times nothing is NaN: one comparison in place of three.
     p.x * 0.0 + p.y * 0.0 + p.z * 0.0 == 0.0
+}
+
+/// The value in the middle; not a number of none.
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return f64::NAN;
+    }
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -6,7 +6,7 @@ pub mod pcd;
 pub mod ply;
 
 use crate::cloud::{Cloud, CloudError, Grid};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Where in a file something is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +73,28 @@ pub fn read_cloud(bytes: &[u8]) -> Result<Loaded, FileError> {
     pcd::read(bytes)
 }
 
+/// Most bytes of padding behind the data: a page of memory, up to which the Point Cloud Library fills its files. From: chosen, 64 KiB.
+const MOST_PADDING: usize = 1 << 16;
+
+/// True if what follows the data is nothing: zeros to the end of a page, or the end of a line.
+fn is_padding(rest: &[u8]) -> bool {
+    rest.len() < MOST_PADDING && rest.iter().all(|b| *b == 0 || b.is_ascii_whitespace())
+}
+
+/// Takes pixels at the place of the sensor itself as "no return": how many they were. Where the file says that the sensor stood elsewhere
+/// than at the origin, a point there is one like any other.
+fn void_at_sensor(cloud: &mut Cloud, viewpoint: &Isometry3<f64>) -> usize {
+    if viewpoint.translation.vector != Vector3::zeros() {
+        return 0;
+    }
+    let mut voided = 0;
+    for p in cloud.points.iter_mut().filter(|p| p.coords == Vector3::zeros()) {
+        voided += 1;
+        *p = Point3::new(f32::NAN, f32::NAN, f32::NAN);
+    }
+    voided
+}
+
 /// Makes raw points sane: infinite becomes "no return", what has no return leaves clouds without a grid; says what it did.
 fn finish(
     mut cloud: Cloud,
@@ -84,6 +106,10 @@ fn finish(
         cloud.grid = None;
     }
     let organised = cloud.grid.is_some();
+    let at_lens = if organised { void_at_sensor(&mut cloud, &viewpoint) } else { 0 };
+    if at_lens > 0 {
+        notes.push(format!("{at_lens} points at (0, 0, 0), where the sensor is, are taken as \"no return\""));
+    }
     let mut infinite = 0usize;
     let mut missing = 0usize;
     for p in cloud.points.iter_mut().filter(|p| !crate::cloud::is_finite(p)) {

@@ -110,6 +110,41 @@ fn what_is_left_out_is_said() {
     assert_eq!(loaded.cloud.scaled(0.001).unit_warning(), None);
 }
 
+#[test]
+fn no_return_may_be_written_as_the_place_of_the_sensor() {
+    let rows = "DATA ascii\n0 0 0\n1 2 3\n-0 0 0\n4 5 6\n";
+    let check = |head: &str, finite: usize, notes: &[&str]| {
+        let loaded = read(&format!("FIELDS x y z\n{head}\n{rows}")).unwrap();
+        assert_eq!((loaded.cloud.count_finite(), loaded.cloud.len()), (finite, 4), "{head}");
+        assert_eq!(loaded.notes, notes, "{head}");
+    };
+    let note = "2 points at (0, 0, 0), where the sensor is, are taken as \"no return\"";
+    check("WIDTH 2\nHEIGHT 2", 2, &[note]);
+    check("WIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 0 0 1 0 0", 2, &[note]);
+    check("WIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 1 1 0 0 0", 4, &[]);
+    check("WIDTH 4\nHEIGHT 1", 4, &[]);
+}
+
+#[test]
+fn what_far_points_look_like_is_said() {
+    let seen: Vec<Point3<f64>> =
+        (0..100).map(|i| Point3::new(f64::from(i % 10) * 0.1, f64::from(i / 10) * 0.1, 1.2)).collect();
+    let check = |scale: f64, offset: Vector3<f64>, words: &[&str]| {
+        let points = seen.iter().map(|p| (p * scale + offset).cast()).collect();
+        let said = Cloud::from_points(points).unit_warning().unwrap_or_default();
+        assert!(words.iter().all(|w| said.contains(w)) && words.is_empty() == said.is_empty(), "{said}");
+    };
+    let here = Vector3::zeros();
+    check(1.0, here, &[]);
+    check(1000.0, here, &["looks like millimetres; scale by 0.001"]);
+    check(100.0, here, &["looks like centimetres; scale by 0.01"]);
+    check(300.0, here, &["centimetres or millimetres"]);
+    check(1.0, Vector3::new(0.0, 400.0, 0.0), &["400 m from the sensor", "at the origin"]);
+    let utm = Vector3::new(691_234.5, 5_334_567.25, 520.0);
+    check(1.0, utm, &["from the origin", "500.0 mm apart", "subtract an offset before writing"]);
+    check(1e30, here, &["damaged", "order of bytes"]);
+}
+
 /// The error names the place, what was expected and a way out.
 fn check_error(text: &str, parts: &[&str]) {
     let error = read(text).unwrap_err();
@@ -148,6 +183,53 @@ fn broken_files_are_explained() {
         "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n",
         &["byte", "cut"],
     );
+}
+
+#[test]
+fn what_the_header_does_not_declare_is_refused() {
+    let head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\n";
+    let cut = ["as the header declares", "POINTS, WIDTH and HEIGHT"];
+    let [declares, mend] = cut;
+    check_error(&format!("{head}DATA ascii\n1 2 3\n4 5 6\n7 8 9\n"), &["1 lines of points", "found 3", mend]);
+    let bytes = "123456789abc".repeat(3);
+    check_error(
+        &format!("{head}DATA binary\n{bytes}"),
+        &["1 points", declares, "24 bytes more, as 2 points"],
+    );
+    let mut packed = pcd::write(&sample(true), pcd::Encoding::BinaryCompressed);
+    packed.extend([7; 100]);
+    let error = files::read_cloud(&packed).unwrap_err().to_string();
+    assert!(cut.iter().all(|part| error.contains(part)) && error.contains("100 bytes more"), "{error}");
+    let ply =
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n";
+    check_error(&format!("{ply}end_header\n1 2 3\n4 5 6\n"), &["1 rows of element vertex", "up to 1 lines"]);
+    check_error(&format!("{ply}end_header\n1 2 3 4\n"), &["line 8", "\"4\"", "every column"]);
+    let binary = ply.replace("ascii", "binary_little_endian");
+    check_error(&format!("{binary}end_header\n{bytes}"), &["1 rows of element vertex", "24 bytes more"]);
+    let face = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    check_error(&format!("{ply}{face}1 2 3\n4 5 6\n7 8 9\n"), &["line 11", "vertex_indices"]);
+    let twice = "POINTS 1\nPOINTS 2\nDATA ascii\n1 2 3\n";
+    check_error(&format!("{head}{twice}"), &["line 7", "one line POINTS", "line 6", "\"2\""]);
+    check_error(&format!("{ply}{ply}"), &["line 7", "ply"]);
+    check_error(&format!("{ply}format ascii 1.0\n"), &["line 7", "one line format"]);
+    check_error(&format!("{ply}element vertex 2\n"), &["line 7", "one element of each name"]);
+    let foo = "VIEWPOINT 0 0 0 foo 1 0 0 0\nDATA ascii\n1 2 3\n";
+    check_error(&format!("{head}{foo}"), &["line 6", "qw qx qy qz", "foo"]);
+}
+
+#[test]
+fn padding_and_empty_lines_are_nothing() {
+    let head = "FIELDS x y z\nPOINTS 1\nPOINTS 1\n";
+    assert_eq!(read(&format!("{head}DATA ascii\n1 2 3\n\n \n# end\n")).unwrap().cloud.len(), 1);
+    assert_eq!(read(&format!("{head}DATA binary\n123456789abc\n")).unwrap().cloud.len(), 1);
+    for encoding in [pcd::Encoding::Binary, pcd::Encoding::BinaryCompressed] {
+        let mut padded = pcd::write(&sample(true), encoding);
+        padded.resize(padded.len().next_multiple_of(4096), 0);
+        assert!(same(&files::read_cloud(&padded).unwrap().cloud, &sample(true)), "{encoding:?}");
+    }
+    let mut ply = ply::write(&sample(false), ply::Encoding::Binary);
+    ply.extend(b"\n");
+    assert_eq!(files::read_cloud(&ply).unwrap().cloud.len(), 12);
 }
 
 #[test]

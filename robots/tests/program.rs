@@ -169,6 +169,7 @@ fn what_is_no_robot_is_refused_with_the_reason() {
     check_refused("no focal length", &["camera.fx is 0"]);
     check_refused("laser beyond a turn", &["laser: 1000 readings", "a full turn at most"]);
     check_refused("two tables of one name", &["two surfaces are called \"table\""]);
+    check_refused("a table in millimetres", &["\"table\"", "m wide, expected 30 m", "not in millimetres"]);
     check_refused("short map", &["9999 bytes follow the hello", "10000 cells"]);
     check_refused("two cameras", &["camera.base_from_camera", "there is a head"]);
     check_refused("only a head", &["there is a head, and no camera that it turns"]);

@@ -76,6 +76,11 @@ fn gone(name: &'static str) -> impl Fn(&Path) {
     move |folder: &Path| fs::remove_file(folder.join(name)).unwrap()
 }
 
+fn eight_bits(name: &'static str) -> impl Fn(&Path) {
+    let image = descry_robots::image::GrayImage::new(folders::SIZE.0, folders::SIZE.1);
+    move |folder: &Path| image.save(folder.join(name)).unwrap()
+}
+
 #[test]
 fn mistakes_beside_frames_are_named() {
     let check = |spoil: &dyn Fn(&Path), line, words: &[&str]| {
@@ -83,9 +88,22 @@ fn mistakes_beside_frames_are_named() {
     };
     check(&gone("frame-10.pose.txt"), 0, &["frame-10.depth.png", "frame-10.pose.txt is missing", "4x4"]);
     check(&gone("frame-10.depth.png"), 0, &["frame-10.pose.txt", "without a frame"]);
-    check(&gone("camera-intrinsics.txt"), 0, &["camera", "recording.toml", "fx = 525.0"]);
+    check(&gone("camera-intrinsics.txt"), 0, &["camera", "recording.toml", "fx = ...", "16x12"]);
     check(&put("camera-intrinsics.txt", "20 0 8\n0 21\n0 0 1\n"), 2, &["2 numbers", "expected 3"]);
     check(&put("camera-intrinsics.txt", "20 0 8\n0 -21 6\n0 0 1\n"), 2, &["-21", "above zero"]);
+    let camera = |text| put("camera-intrinsics.txt", text);
+    check(&camera("20 0 8\n0 21 6\n0 0 2\n"), 3, &["2 in column 3", "expected 1"]);
+    check(&camera("20 0.5 8\n0 21 6\n0 0 1\n"), 1, &["0.5 in column 2", "expected 0"]);
+    check(&camera("20 0 17\n0 21 6\n0 0 1\n"), 1, &["cx is 17", "16 columns"]);
+    check(&camera("20 0 8\n0 21 -1\n0 0 1\n"), 2, &["cy is -1", "12 rows"]);
+    check(&eight_bits("frame-10.depth.png"), 0, &["frame-10.depth.png", "L8 pixels", "16 bits"]);
+    let millimetres = |folder: &Path| {
+        for (k, frame) in ["9", "10", "100"].into_iter().enumerate() {
+            let text = format!("0 0 1 {k}500\n-1 0 0 250\n0 -1 0 1200\n0 0 0 1\n");
+            fs::write(folder.join(format!("frame-{frame}.pose.txt")), text).unwrap();
+        }
+    };
+    check(&millimetres, 0, &["2000 m from that of frame frame-9", "in metres?"]);
     let pose = |text| put("frame-100.pose.txt", text);
     check(
         &pose("1 0 0 0\n0 1 0 0\n0 0 l 0\n0 0 0 1\n"),
@@ -99,8 +117,31 @@ fn mistakes_beside_frames_are_named() {
     check(&put("frame-10.depth.png", "no picture"), 0, &["frame-10.depth.png", "is no image"]);
     check(&put("recording.toml", "start = \"frame-11\"\n"), 0, &["frame-11", "frame-9, frame-10"]);
     check(&put("recording.toml", "depth_scale = 0\n"), 1, &["found 0", "above zero"]);
+    check(&put("recording.toml", "\nlinear_m_s = 1e-300\n"), 2, &["found 1e-300", "0.001 or more"]);
+    check(&put("recording.toml", "angular_deg_s = 1e-9\n"), 1, &["found 1e-9", "0.01 or more"]);
     check(&put("recording.toml", "\ndeph_scale = 1\n"), 2, &["unknown field", "depth_scale"]);
     check(&put("recording.toml", "folder = \"elsewhere\"\n"), 1, &["no folder", "elsewhere"]);
+}
+
+/// A surface in `recording.toml`, and the words that must be said about it.
+fn check_surface(outline: &str, height: &str, line: usize, words: &[&str]) {
+    let text = format!("[[surface]]\nname = \"table\"\noutline_m = {outline}\nheight_m = {height}\n");
+    let spoil = |folder: &Path| fs::write(folder.join("recording.toml"), &text).unwrap();
+    check_mistake(folders::side_by_side, &spoil, line, words);
+}
+
+#[test]
+fn surfaces_that_cannot_be_are_named() {
+    let check = check_surface;
+    let table = "[[-0.6, -0.4], [0.6, -0.4], [0.6, 0.4], [-0.6, 0.4]]";
+    check(&table.replace("0.", "60"), "750", 3, &["\"table\"", "1212 m wide", "30 m", "millimetres"]);
+    check(table, "750", 4, &["found 750", "within 100 m", "millimetres"]);
+    check(table, "nan", 4, &["found NaN", "height"]);
+    let another = format!("0.7\n[[surface]]\nname = \"table\"\noutline_m = {table}\nheight_m = 0.7");
+    check(table, &another, 6, &["surfaces 1 and 2", "\"table\""]);
+    check("[[0, 0], [1, 0]]", "0.7", 3, &["no outline", "three corners"]);
+    check("[[0, 0], [1, 1], [2, 2]]", "0.7", 3, &["area of 0 m2", "one line"]);
+    check("[[0, 0], [1, 1], [1, 0], [0, 1]]", "0.7", 3, &["after corner 1 and corner 3", "order"]);
 }
 
 #[test]
@@ -114,6 +155,12 @@ fn mistakes_in_lists_are_named() {
     check(&put("pose.txt", "0 0 0 0 0 0 1\n1 2 3 0 0 1\n2 0 0 0 0 0 1\n"), 2, &["6 numbers", "expected 7"]);
     check(&put("pose.txt", "0 0 0 0 0 0 1\n0 0 0 0 0 0 1\n2 0 0 0 0 0 2\n"), 3, &["length 2.000"]);
     check(&put("recording.toml", "[camera]\nfx = 0\nfy = 1\ncx = 1\ncy = 1\n"), 2, &["found 0", "focal"]);
+    let outside = "[camera]\nfx = 20\nfy = 21\ncx = 8\ncy = 240\n";
+    check(&put("recording.toml", outside), 0, &["[camera]: cy is 240", "12 rows"]);
+    let twice = |folder: &Path| {
+        fs::copy(folder.join("depth/2.pgm"), folder.join("depth/2.png")).unwrap();
+    };
+    check(&twice, 0, &["2.pgm and 2.png", "remove one"]);
     let empty = |folder: &Path| fs::remove_dir_all(folder.join("depth")).unwrap();
     check(&empty, 0, &["no frames", "NAME.depth.png"]);
 }

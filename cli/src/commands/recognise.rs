@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use descry_domains::abilities::searching::perceive;
 use descry_domains::load::{DEFAULT, Domain};
 use descry_perception::files::read_cloud;
-use descry_perception::nalgebra::Point3;
+use descry_perception::nalgebra::{Point3, Unit, Vector3};
 use descry_perception::recognise::{Descry, ObjectModel, Percept, Published, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment};
 use descry_perception::{Cloud, View, Visibility};
@@ -26,6 +26,12 @@ pub struct Arguments {
     /// Recogniser: descry, or published (the score of paper 004)
     #[arg(long, default_value = "descry", value_parser = ["descry", "published"])]
     recogniser: String,
+    /// Where the sensor stood in the frame of the cloud, metres [default: what the file says, or the origin]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
+    viewpoint: Option<[f64; 3]>,
+    /// Direction of up in the frame of the cloud [default: as the camera was held, or any]
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
+    up: Option<[f64; 3]>,
     /// Draw the cloud with each object tinted and named, as SVG; of one cloud
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
@@ -56,8 +62,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         "published" => &Published::default(),
         _ => &Descry::default(),
     };
-    let seen: Vec<Seen> =
-        arguments.clouds.iter().map(|path| look(path, recogniser, &objects)).collect::<Result<_, _>>()?;
+    let seen: Vec<Seen> = arguments
+        .clouds
+        .iter()
+        .map(|path| look(path, arguments, recogniser, &objects))
+        .collect::<Result<_, _>>()?;
     if let Some(path) = &arguments.picture {
         draw(path, &seen)?;
     }
@@ -72,29 +81,69 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     Ok(if seen.iter().all(|s| s.found.is_ok()) { Exit::Done } else { Exit::No })
 }
 
-fn look(path: &Path, recogniser: &dyn Recogniser, objects: &[ObjectModel]) -> Result<Seen, CommandError> {
+fn look(
+    path: &Path,
+    arguments: &Arguments,
+    recogniser: &dyn Recogniser,
+    objects: &[ObjectModel],
+) -> Result<Seen, CommandError> {
     let shown = path.display().to_string();
     let bytes = input::read(path, MOST_CLOUD_BYTES)?;
     let loaded = read_cloud(&bytes).map_err(|e| CommandError::BadInput(format!("{shown}, {e}")))?;
-    let cloud = loaded.cloud;
+    let (cloud, mut notes) = (loaded.cloud, loaded.notes);
     let points = cloud.points.len();
-    // The sensor stands where the file says; an organised cloud tells by its pixels what it looked through.
     let view = View::alone(cloud);
-    let organised = Visibility::from_views(std::slice::from_ref(&view));
-    let visibility = match organised.maps.is_empty() {
-        false => organised,
-        true => {
-            let eye = Point3::from(loaded.viewpoint.translation.vector);
-            Visibility::from_viewpoints(&view.cloud, &[eye])
-        }
-    };
-    let found = segment(&view.cloud, &visibility, &SceneOptions::default())
+    let stated =
+        Some(Point3::from(loaded.viewpoint.translation.vector)).filter(|eye| *eye != Point3::origin());
+    let (visibility, note) = seen_from(&view, arguments.viewpoint.map(Point3::from), stated);
+    notes.extend(note.map(str::to_string));
+    let mut options = SceneOptions::default();
+    options.surface.up = arguments.up.map(|up| Unit::new_normalize(Vector3::from(up)));
+    let found = segment(&view.cloud, &visibility, &options)
         .map(|scene| {
             let percepts = recogniser.recognise(&scene, &visibility, objects);
             (scene, percepts)
         })
         .map_err(|e| e.to_string());
-    Ok(Seen { path: shown, points, notes: loaded.notes, cloud: view.cloud, found })
+    Ok(Seen { path: shown, points, notes, cloud: view.cloud, found })
+}
+
+/// What was seen from where the sensor stood, and what a person should know of that. An organised cloud tells by its pixels what it looked
+/// through; any other was seen from where it is said, by the option or else by the file.
+fn seen_from(
+    view: &View,
+    told: Option<Point3<f64>>,
+    stated: Option<Point3<f64>>,
+) -> (Visibility, Option<&'static str>) {
+    let organised = Visibility::from_views(std::slice::from_ref(view));
+    if !organised.maps.is_empty() {
+        return (
+            organised,
+            told.map(|_| "--viewpoint is left out: an organised cloud tells it by its pixels"),
+        );
+    }
+    let known = told.or(stated);
+    let visibility = Visibility::from_viewpoints(&view.cloud, &[known.unwrap_or(Point3::origin())]);
+    let unknown = "the file does not say where the sensor stood: taken at the origin; give --viewpoint";
+    (visibility, known.is_none().then_some(unknown))
+}
+
+/// Three finite numbers with commas between them.
+fn triple(text: &str) -> Result<[f64; 3], String> {
+    let number = |word: &str| word.trim().parse().ok().filter(|x: &f64| x.is_finite());
+    let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
+    let numbers = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+    numbers.ok_or_else(|| "expected three numbers such as 0,-0.5,1.2".to_string())
+}
+
+/// Three numbers that point somewhere.
+fn direction(text: &str) -> Result<[f64; 3], String> {
+    let up = triple(text)?;
+    let length = Vector3::from(up).norm();
+    match length.is_finite() && length > 0.0 {
+        true => Ok(up),
+        false => Err("expected a direction such as 0,0,1".to_string()),
+    }
 }
 
 fn draw(path: &Path, seen: &[Seen]) -> Result<(), CommandError> {
@@ -140,4 +189,47 @@ fn as_text(seen: &Seen) -> String {
         Err(why) => lines.push(format!("  no table: {why}")),
     }
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use descry_perception::Grid;
+
+    fn view(grid: Option<Grid>) -> View {
+        let at = |i: i32| f32::from(i as i16);
+        let points =
+            (0..100).map(|i| Point3::new(at(i % 10 - 5) * 0.01, at(i / 10 - 5) * 0.01, 1.0)).collect();
+        View::alone(Cloud { grid, ..Cloud::from_points(points) })
+    }
+
+    #[test]
+    fn where_the_sensor_stood_is_told_stated_or_asked_for() {
+        let (told, stated) = (Point3::new(0.0, 0.0, 2.0), Point3::new(0.0, 3.0, 0.0));
+        let check = |told: Option<Point3<f64>>, stated, eye: Point3<f64>, note: Option<&str>| {
+            let (visibility, said) = seen_from(&view(None), told, stated);
+            assert_eq!(visibility.viewpoints(), [eye]);
+            assert!(
+                said.is_some() == note.is_some()
+                    && said.unwrap_or_default().contains(note.unwrap_or_default())
+            );
+        };
+        check(Some(told), Some(stated), told, None);
+        check(None, Some(stated), stated, None);
+        check(None, None, Point3::origin(), Some("taken at the origin; give --viewpoint"));
+        let pixels = Some(Grid { width: 10, height: 10 });
+        assert_eq!(seen_from(&view(pixels), None, None).1, None);
+        assert!(seen_from(&view(pixels), Some(told), None).1.is_some_and(|said| said.contains("left out")));
+    }
+
+    #[test]
+    fn places_and_directions_are_three_numbers() {
+        assert_eq!(triple("0, -0.5,1.2"), Ok([0.0, -0.5, 1.2]));
+        for wrong in ["", "1,2", "1,2,3,4", "1,nan,3", "a,b,c"] {
+            assert!(triple(wrong).is_err(), "{wrong}");
+        }
+        assert!(
+            direction("0,0,0").is_err() && direction("1e-300,0,0").is_err() && direction("0,0,-1").is_ok()
+        );
+    }
 }

@@ -49,6 +49,7 @@ impl<'a> Table<'a> {
         let stride = header.stride();
         let needed = header.points.saturating_mul(stride);
         let bytes = data.get(..needed).ok_or_else(|| header.too_short(data.len(), needed))?;
+        header.ends_with(data, needed)?;
         let layout = header.offsets().map(|offset| (offset, stride)).collect();
         Ok(Table { bytes: bytes.into(), layout })
     }
@@ -71,6 +72,7 @@ impl<'a> Table<'a> {
         }
         let stream =
             data.get(8..8usize.saturating_add(packed)).ok_or_else(|| header.too_short(data.len(), packed))?;
+        header.ends_with(data, 8 + packed)?;
         let bytes = lzf::unpack(stream, needed).map_err(|e| {
             let place = Place::Byte(header.data_at + 8 + e.at());
             FileError::new(place, "an LZF stream", e.to_string(), "the file is damaged: write it again")
@@ -89,20 +91,20 @@ impl<'a> Table<'a> {
         let mut bytes = Vec::with_capacity(header.points.saturating_mul(stride).min(data.len()));
         let mut rows = 0;
         for (number, line) in data.split(|&b| b == b'\n').enumerate() {
-            if rows == header.points {
-                break;
-            }
             let line = std::str::from_utf8(line).unwrap_or("\u{fffd}");
             if line.trim().is_empty() || line.trim_start().starts_with('#') {
                 continue;
             }
-            parse_row(&header.fields, line, Place::Line(header.data_line + number), &mut bytes)?;
             rows += 1;
+            if rows > header.points {
+                continue;
+            }
+            parse_row(&header.fields, line, Place::Line(header.data_line + number), &mut bytes)?;
         }
-        if rows < header.points {
+        if rows != header.points {
             return Err(FileError::new(
                 Place::Byte(header.data_at + data.len()),
-                format!("{} lines of points", header.points),
+                format!("{} lines of points, as the header declares", header.points),
                 format!("{rows}"),
                 "set POINTS, WIDTH and HEIGHT to what is there, or write the file again",
             ));

@@ -1,6 +1,6 @@
 //! PLY: `ascii`, `binary_little_endian`, `binary_big_endian`; any elements and properties, of which the vertices are used.
 
-use super::{FileError, Loaded, Place, finish};
+use super::{FileError, Loaded, Place, finish, is_padding};
 use crate::cloud::Cloud;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -86,27 +86,41 @@ struct Element {
     line: usize,
 }
 
+impl Element {
+    /// Least bytes of a row.
+    fn least_bytes(&self, stored: Stored) -> usize {
+        match stored {
+            Stored::Ascii => 2 * self.properties.len(),
+            _ => self.properties.iter().map(|p| p.list.unwrap_or(p.scalar).size()).sum(),
+        }
+    }
+}
+
 /// Reads the vertices of a PLY file: `x y z`, `red green blue` (or `diffuse_red` …; whole numbers to 255 or floats to 1), `nx ny nz`, `label`.
 ///
 /// # Errors
 /// If the header or the data are broken: with the line or byte, what was expected, and what to do.
 pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     let (stored, elements, mut cursor) = header(bytes)?;
+    let mut vertices = None;
     for element in &elements {
+        let table = cursor.rows(stored, element)?;
         if element.name == "vertex" {
-            let table = cursor.rows(stored, element)?;
-            let mut notes = Vec::new();
-            let cloud = cloud(element, &table, &mut notes)?;
-            return finish(cloud, Isometry3::identity(), notes, Place::Line(element.line));
+            vertices = Some((element, table));
         }
-        cursor.rows(stored, element)?;
     }
-    Err(FileError::new(
-        Place::Line(cursor.line),
-        "an element \"vertex\"",
-        "none",
-        "a cloud is the vertices of a PLY file",
-    ))
+    let (Some((element, table)), Some(last)) = (vertices, elements.last()) else {
+        return Err(FileError::new(
+            Place::Line(cursor.line),
+            "an element \"vertex\"",
+            "none",
+            "a cloud is the vertices of a PLY file",
+        ));
+    };
+    cursor.ends_with(stored, last)?;
+    let mut notes = Vec::new();
+    let cloud = cloud(element, &table, &mut notes)?;
+    finish(cloud, Isometry3::identity(), notes, Place::Line(element.line))
 }
 
 /// Where reading stands.
@@ -125,12 +139,28 @@ impl<'a> Cursor<'a> {
         Some((self.line, std::str::from_utf8(&rest[..end]).unwrap_or("\u{fffd}")))
     }
 
+    /// Refuses rows behind the last element: the header says less than is there.
+    fn ends_with(&self, stored: Stored, last: &Element) -> Result<(), FileError> {
+        let rest = self.bytes.get(self.at..).unwrap_or_default();
+        let more = match stored {
+            Stored::Ascii => rest.split(|&b| b == b'\n').filter(|l| !l.trim_ascii().is_empty()).count(),
+            _ => rest.len() / last.least_bytes(stored).max(1),
+        };
+        if more == 0 || is_padding(rest) {
+            return Ok(());
+        }
+        let what = if stored == Stored::Ascii { "lines" } else { "rows" };
+        Err(FileError::new(
+            Place::Byte(self.at),
+            format!("the end of {} rows of element {}, as the header declares", last.count, last.name),
+            format!("{} bytes more, up to {more} {what}", rest.len()),
+            format!("set the count of element {} to what is there, or write the file again", last.name),
+        ))
+    }
+
     /// All values of an element that are no lists, row after row.
     fn rows(&mut self, stored: Stored, element: &Element) -> Result<Vec<f64>, FileError> {
-        let least: usize = match stored {
-            Stored::Ascii => 2 * element.properties.len(),
-            _ => element.properties.iter().map(|p| p.list.unwrap_or(p.scalar).size()).sum(),
-        };
+        let least = element.least_bytes(stored);
         let left = self.bytes.len() - self.at;
         if element.count.saturating_mul(least.max(1)) > left.saturating_add(1) {
             return Err(FileError::new(
@@ -192,7 +222,15 @@ impl<'a> Cursor<'a> {
                 number()?;
             }
         }
-        Ok(())
+        match words.next() {
+            None => Ok(()),
+            Some(extra) => Err(FileError::new(
+                Place::Line(line),
+                "the end of the line",
+                format!("{extra:?}"),
+                "the properties of the element must name every column",
+            )),
+        }
     }
 
     fn binary_row(
@@ -253,6 +291,12 @@ fn header(bytes: &[u8]) -> Result<(Stored, Vec<Element>, Cursor<'_>), FileError>
             ["ply"] if line == 1 => {}
             _ if line == 1 => return bad("\"ply\"", "is this a PLY file?"),
             [] | ["comment", ..] | ["obj_info", ..] => {}
+            ["format", ..] if stored.is_some() => {
+                return bad("one line format", "leave out the one that is wrong");
+            }
+            ["element", name, ..] if elements.iter().any(|e| e.name == *name) => {
+                return bad("one element of each name", "leave out the one that is wrong");
+            }
             ["format", "ascii", ..] => stored = Some(Stored::Ascii),
             ["format", "binary_little_endian", ..] => stored = Some(Stored::Little),
             ["format", "binary_big_endian", ..] => stored = Some(Stored::Big),

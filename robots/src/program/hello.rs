@@ -4,7 +4,7 @@ use crate::body::{Door, Room, Stamp, Station, SurfaceHint};
 use crate::grid::OccupancyGrid;
 use crate::parts::{self, Description, Footprint, Frames, Gripper, Head, Sense, Speeds};
 use crate::program::message;
-use crate::recorded::Known;
+use crate::recorded::{Known, outline};
 use descry_perception::Intrinsics;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use serde::Deserialize;
@@ -295,18 +295,15 @@ impl Hello {
             message::transform(&station.map_from_base)
                 .map_err(|e| format!("station {}: {e}", station.name))?;
         }
-        let outlines = self.surfaces.iter().map(|s| (&s.name, &s.outline_m));
-        for (name, outline) in outlines.chain(self.rooms.iter().map(|r| (&r.name, &r.outline_m))) {
-            if outline.len() < 3 || outline.iter().any(|p| !(p.x.is_finite() && p.y.is_finite())) {
-                return Err(format!(
-                    "the outline of \"{name}\" is none: expected three corners or more, metres"
-                ));
-            }
+        let told = |name: &str, (problem, mend): outline::Fault| format!("\"{name}\": {problem}; {mend}");
+        for s in &self.surfaces {
+            outline::check(&s.outline_m, outline::WIDEST_SURFACE_M).map_err(|f| told(&s.name, f))?;
+            outline::check_height(s.height_m).map_err(|f| told(&s.name, f))?;
         }
-        match self.surfaces.iter().find(|s| !s.height_m.is_finite()) {
-            Some(s) => Err(format!("surface {}: its height is {}", s.name, s.height_m)),
-            None => Ok(()),
+        for r in &self.rooms {
+            outline::check(&r.outline_m, outline::WIDEST_ROOM_M).map_err(|f| told(&r.name, f))?;
         }
+        Ok(())
     }
 
     fn greeting(self, map: Option<OccupancyGrid>) -> Greeting {

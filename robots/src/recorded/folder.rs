@@ -4,7 +4,7 @@ use crate::input::InputError;
 use crate::recorded::pose::{self, MaybePose};
 use crate::recorded::settings::{CameraSettings, Settings};
 use descry_perception::Intrinsics;
-use image::{ImageReader, RgbImage};
+use image::{ColorType, ImageDecoder, ImageReader, RgbImage};
 use nalgebra::Isometry3;
 use std::ffi::OsStr;
 use std::fs;
@@ -19,6 +19,9 @@ const POSE_SUFFIX: &str = ".pose.txt";
 const COLOUR_SUFFIXES: [&str; 3] = [".color.jpg", ".color.jpeg", ".color.png"];
 const LIST_DEPTH_ENDINGS: [&str; 2] = ["pgm", "png"];
 const LIST_COLOUR_ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// No typical station lies farther from the first, metres.
+const FARTHEST_TYPICAL_M: f64 = 100.0;
 
 /// A frame on disk and where it was taken.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,7 +106,8 @@ impl Recording {
                 ));
             }
         }
-        let camera = camera(&folder, &settings)?;
+        check_distances(&folder, &frames)?;
+        let camera = camera(&folder, &settings, size)?;
         let intrinsics = Intrinsics {
             width: size.0,
             height: size.1,
@@ -125,11 +129,7 @@ impl Recording {
     pub fn depth_m(&self, frame: &StoredFrame) -> Result<Vec<f32>, InputError> {
         let image = decode(&frame.depth)?;
         let image::DynamicImage::ImageLuma16(image) = image else {
-            return Err(InputError::whole(
-                shown(&frame.depth),
-                format!("{:?} pixels, expected one channel of 16 bits", image.color()),
-                "store depth as 16-bit grey",
-            ));
+            return Err(no_depth(&frame.depth, image.color()));
         };
         let scale = self.settings.depth_scale;
         let metres = |&d: &u16| match d {
@@ -269,6 +269,15 @@ fn listed(folder: &Path) -> Result<Vec<Candidate>, InputError> {
             "add it: a line tx ty tz qx qy qz qw for each frame of depth/",
         ));
     }
+    for pair in files.windows(2) {
+        if stem(&pair[0]) == stem(&pair[1]) {
+            return Err(InputError::whole(
+                shown(&depth),
+                format!("{} and {} are both frame {}", pair[0], pair[1], stem(&pair[0])),
+                "remove one of them",
+            ));
+        }
+    }
     let text = read(&pose_file)?;
     let poses = pose::listed_poses(&shown(&pose_file), &text)?;
     if poses.len() != files.len() {
@@ -281,7 +290,7 @@ fn listed(folder: &Path) -> Result<Vec<Candidate>, InputError> {
         ));
     }
     let candidate = |(file, pose): (String, MaybePose)| {
-        let stem = Path::new(&file).file_stem().and_then(OsStr::to_str).unwrap_or(&file).to_string();
+        let stem = stem(&file).to_string();
         let colour = LIST_COLOUR_ENDINGS
             .iter()
             .map(|e| folder.join("color").join(format!("{stem}.{e}")))
@@ -291,20 +300,53 @@ fn listed(folder: &Path) -> Result<Vec<Candidate>, InputError> {
     Ok(files.into_iter().zip(poses).map(candidate).collect())
 }
 
-fn camera(folder: &Path, settings: &Settings) -> Result<CameraSettings, InputError> {
+/// The name of a file without its ending.
+fn stem(file: &str) -> &str {
+    Path::new(file).file_stem().and_then(OsStr::to_str).unwrap_or(file)
+}
+
+/// Refuses poses that are not in metres: most of them lie farther from the first than any building is wide.
+fn check_distances(folder: &Path, frames: &[StoredFrame]) -> Result<(), InputError> {
+    let Some((first, others)) = frames.split_first() else { return Ok(()) };
+    let at = |frame: &StoredFrame| frame.world_from_camera.translation.vector;
+    let mut distances_m: Vec<f64> = others.iter().map(|f| (at(f) - at(first)).norm()).collect();
+    distances_m.sort_unstable_by(f64::total_cmp);
+    match distances_m.get(distances_m.len() / 2) {
+        Some(&median_m) if median_m > FARTHEST_TYPICAL_M => Err(InputError::whole(
+            shown(folder),
+            format!(
+                "the poses lie {median_m:.0} m from that of frame {} (the median), expected {FARTHEST_TYPICAL_M} m at most",
+                first.name
+            ),
+            "are they in metres? write translations in metres, not in millimetres",
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn camera(folder: &Path, settings: &Settings, size: (usize, usize)) -> Result<CameraSettings, InputError> {
     if let Some(camera) = settings.camera {
-        return Ok(camera);
+        let wrong = |(_, problem): (usize, String)| {
+            InputError::whole(
+                shown(folder),
+                format!("[camera]: {problem}"),
+                "give the camera of these frames",
+            )
+        };
+        return camera.off_image(size).map_or(Ok(camera), |off| Err(wrong(off)));
     }
     let file = folder.join(CAMERA_FILE);
     if file.is_file() {
-        return pose::camera_matrix(&shown(&file), &read(&file)?);
+        return pose::camera_matrix(&shown(&file), &read(&file)?, size);
     }
+    let (columns, rows) = size;
     Err(InputError::whole(
         shown(folder),
         "nothing says which camera took the frames",
         format!(
-            "add {CAMERA_FILE} (3x3), or a {SETTINGS_FILE} with the lines\n\n  [camera]\n  fx = 525.0\n  fy = 525.0\n  cx = 319.5\n  cy = 239.5\n\n\
-             in the folder or elsewhere (then with the line folder = \"...\" first, and opened by its own name); these are the usual figures of a Kinect"
+            "add {CAMERA_FILE} (fx 0 cx / 0 fy cy / 0 0 1), or a {SETTINGS_FILE} with the lines\n\n  [camera]\n  fx = ...\n  fy = ...\n  cx = ...\n  cy = ...\n\n\
+             in the folder or elsewhere (then with the line folder = \"...\" first, and opened by its own name). The figures are those of the \
+             camera's calibration for images of {columns}x{rows} pixels, in pixels; its driver or data sheet states them"
         ),
     ))
 }
@@ -320,9 +362,14 @@ fn start_of(frames: &[StoredFrame], settings: &Settings, path: &Path) -> Result<
     })
 }
 
+/// Columns and rows of a depth image, by its head alone.
 fn size_of(path: &Path) -> Result<(usize, usize), InputError> {
-    let size = open(path)?.into_dimensions().map_err(|e| no_image(path, &e))?;
-    Ok((size.0 as usize, size.1 as usize))
+    let head = open(path)?.into_decoder().map_err(|e| no_image(path, &e))?;
+    if head.color_type() != ColorType::L16 {
+        return Err(no_depth(path, head.color_type()));
+    }
+    let (columns, rows) = head.dimensions();
+    Ok((columns as usize, rows as usize))
 }
 
 fn decode(path: &Path) -> Result<image::DynamicImage, InputError> {
@@ -336,4 +383,9 @@ fn open(path: &Path) -> Result<ImageReader<std::io::BufReader<fs::File>>, InputE
 
 fn no_image(path: &Path, e: &image::ImageError) -> InputError {
     InputError::whole(shown(path), format!("is no image: {e}"), "store it again as PNG, JPEG or PGM")
+}
+
+fn no_depth(path: &Path, found: ColorType) -> InputError {
+    let problem = format!("{found:?} pixels, expected one channel of 16 bits");
+    InputError::whole(shown(path), problem, "store depth as 16-bit grey")
 }

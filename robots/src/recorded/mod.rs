@@ -35,6 +35,7 @@
 //! ```
 
 mod folder;
+pub(crate) mod outline;
 mod pose;
 mod robot;
 mod settings;

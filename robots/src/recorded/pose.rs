@@ -7,6 +7,9 @@ use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuat
 /// A rotation may differ from an exact one by this much in any entry: written with few digits it is still one.
 const ROTATION_TOLERANCE: f64 = 0.03;
 
+/// The fixed entries of a camera matrix may differ from 0 and 1 by this much.
+const CAMERA_TOLERANCE: f64 = 1e-6;
+
 /// A pose, or that tracking was lost when the frame was taken (entries that are not finite).
 pub(crate) type MaybePose = Option<Isometry3<f64>>;
 
@@ -107,19 +110,30 @@ pub(crate) fn listed_poses(file: &str, text: &str) -> Result<Vec<MaybePose>, Inp
         .collect()
 }
 
-/// A 3x3 camera matrix.
-pub(crate) fn camera_matrix(file: &str, text: &str) -> Result<CameraSettings, InputError> {
+/// A 3x3 camera matrix, of images with that many columns and rows.
+pub(crate) fn camera_matrix(
+    file: &str,
+    text: &str,
+    size: (usize, usize),
+) -> Result<CameraSettings, InputError> {
     let rows = matrix(file, text, 3, "the 3x3 camera matrix")?;
     let entry = |r: usize, c: usize| rows[r].1[c];
+    let wrong = |row: usize, problem: String| {
+        Err(InputError::at(file, text, rows[row].0, problem, "write fx 0 cx / 0 fy cy / 0 0 1, in pixels"))
+    };
     let camera = CameraSettings { fx: entry(0, 0), fy: entry(1, 1), cx: entry(0, 2), cy: entry(1, 2) };
     let focal = |r: usize| entry(r, r).is_finite() && entry(r, r) > 0.0;
     if let Some(r) = (0..2).find(|&r| !focal(r)) {
-        let problem = format!("a focal length of {}, expected pixels above zero", entry(r, r));
-        return Err(InputError::at(file, text, rows[r].0, problem, "write fx 0 cx / 0 fy cy / 0 0 1"));
+        return wrong(r, format!("a focal length of {}, expected pixels above zero", entry(r, r)));
     }
-    if !(camera.cx.is_finite() && camera.cy.is_finite()) {
-        let problem = "the principal point is no pixel";
-        return Err(InputError::at(file, text, rows[0].0, problem, "write fx 0 cx / 0 fy cy / 0 0 1"));
+    for (r, c, expected) in [(0, 1, 0.0), (1, 0, 0.0), (2, 0, 0.0), (2, 1, 0.0), (2, 2, 1.0)] {
+        let found = entry(r, c);
+        if !(found.is_finite() && (found - expected).abs() <= CAMERA_TOLERANCE) {
+            return wrong(r, format!("{found} in column {}, expected {expected}", c + 1));
+        }
     }
-    Ok(camera)
+    match camera.off_image(size) {
+        Some((row, problem)) => wrong(row, problem),
+        None => Ok(camera),
+    }
 }

@@ -1,7 +1,14 @@
 //! What a folder of frames does not say by itself.
 
 use crate::input::{self, InputError, Objection, Step};
+use crate::recorded::outline;
+use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
+
+/// A body that drives slower never arrives, metres a second.
+const LEAST_LINEAR_M_S: f64 = 0.001;
+/// A body that turns slower never has turned, degrees a second.
+const LEAST_ANGULAR_DEG_S: f64 = 0.01;
 
 /// The contents of `recording.toml`; everything may be left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,18 +102,18 @@ impl Settings {
     }
 
     fn check(&self) -> Result<(), Objection> {
-        let above_zero = [
-            ("depth_scale", self.depth_scale),
-            ("pose_sigma_m", self.pose_sigma_m),
-            ("pose_sigma_deg", self.pose_sigma_deg),
-            ("linear_m_s", self.linear_m_s),
-            ("angular_deg_s", self.angular_deg_s),
+        let least = [
+            ("depth_scale", self.depth_scale, 0.0),
+            ("pose_sigma_m", self.pose_sigma_m, 0.0),
+            ("pose_sigma_deg", self.pose_sigma_deg, 0.0),
+            ("linear_m_s", self.linear_m_s, LEAST_LINEAR_M_S),
+            ("angular_deg_s", self.angular_deg_s, LEAST_ANGULAR_DEG_S),
         ];
-        let objection =
-            |path: Vec<Step>, problem: String, mend: &str| Objection { path, problem, mend: mend.into() };
-        for (key, value) in above_zero {
-            if !(value.is_finite() && value > 0.0) {
-                let problem = format!("found {value}, expected a number above zero");
+        for (key, value, least) in least {
+            if !(value.is_finite() && value > 0.0 && value >= least) {
+                let expected =
+                    if least > 0.0 { format!("{least} or more") } else { "a number above zero".into() };
+                let problem = format!("found {value:?}, expected {expected}");
                 return Err(objection(vec![Step::Key(key)], problem, "leave it out for the usual value"));
             }
         }
@@ -117,41 +124,66 @@ impl Settings {
                 return Err(objection(vec![Step::Key("up")], problem, "such as [0.0, 0.0, 1.0]"));
             }
         }
+        self.check_surfaces()?;
+        let [near, far] = self.range_m;
+        if !(near >= 0.0 && near < far) {
+            let problem = format!("[{near}, {far}] is no range");
+            return Err(objection(vec![Step::Key("range_m")], problem, "least and greatest depth in metres"));
+        }
+        self.camera.map_or(Ok(()), |camera| camera.check())
+    }
+
+    fn check_surfaces(&self) -> Result<(), Objection> {
         for (n, surface) in self.surfaces.iter().enumerate() {
             let at = |key| vec![Step::Key("surface"), Step::Index(n), Step::Key(key)];
-            if surface.outline_m.len() < 3 || surface.outline_m.iter().flatten().any(|x| !x.is_finite()) {
-                let problem = format!("\"{}\" has no outline", surface.name);
-                return Err(objection(at("outline_m"), problem, "at least three corners, [x, y] in metres"));
+            if let Some(before) = self.surfaces[..n].iter().position(|s| s.name == surface.name) {
+                let problem =
+                    format!("surfaces {} and {} are both called \"{}\"", before + 1, n + 1, surface.name);
+                return Err(objection(at("name"), problem, "give each surface a name of its own"));
             }
-            if !surface.height_m.is_finite() {
-                let problem = format!("found {}, expected a height", surface.height_m);
-                return Err(objection(at("height_m"), problem, "metres along the world's z"));
-            }
+            let corners: Vec<Point2<f64>> = surface.outline_m.iter().map(|&c| c.into()).collect();
+            outline::check(&corners, outline::WIDEST_SURFACE_M).map_err(|(problem, mend)| {
+                objection(at("outline_m"), format!("\"{}\": {problem}", surface.name), mend)
+            })?;
+            outline::check_height(surface.height_m)
+                .map_err(|(problem, mend)| objection(at("height_m"), problem, mend))?;
             let is_upright = self.up.is_none_or(|[x, y, z]| z > 0.99 * (x * x + y * y + z * z).sqrt());
             if !is_upright {
                 let problem = "surfaces can be named only where the world's z is up".to_string();
                 return Err(objection(at("name"), problem, "leave the surfaces out, or turn the poses"));
             }
         }
-        let [near, far] = self.range_m;
-        if !(near >= 0.0 && near < far) {
-            let problem = format!("[{near}, {far}] is no range");
-            return Err(objection(vec![Step::Key("range_m")], problem, "least and greatest depth in metres"));
-        }
-        if let Some(camera) = self.camera {
-            for (key, value) in [("fx", camera.fx), ("fy", camera.fy)] {
-                if !(value.is_finite() && value > 0.0) {
-                    let problem = format!("found {value}, expected a focal length above zero");
-                    return Err(objection(vec![Step::Key("camera"), Step::Key(key)], problem, "in pixels"));
-                }
+        Ok(())
+    }
+}
+
+impl CameraSettings {
+    fn check(&self) -> Result<(), Objection> {
+        let at = |key| vec![Step::Key("camera"), Step::Key(key)];
+        for (key, value) in [("fx", self.fx), ("fy", self.fy)] {
+            if !(value.is_finite() && value > 0.0) {
+                let problem = format!("found {value}, expected a focal length above zero");
+                return Err(objection(at(key), problem, "in pixels"));
             }
-            for (key, value) in [("cx", camera.cx), ("cy", camera.cy)] {
-                if !value.is_finite() {
-                    let problem = format!("found {value}, expected a pixel");
-                    return Err(objection(vec![Step::Key("camera"), Step::Key(key)], problem, "a number"));
-                }
+        }
+        for (key, value) in [("cx", self.cx), ("cy", self.cy)] {
+            if !value.is_finite() {
+                let problem = format!("found {value}, expected a pixel");
+                return Err(objection(at(key), problem, "a number"));
             }
         }
         Ok(())
     }
+
+    /// If the principal point lies outside an image of that many columns and rows: along which axis, and what is wrong.
+    pub(crate) fn off_image(&self, size: (usize, usize)) -> Option<(usize, String)> {
+        let axes = [("cx", self.cx, size.0, "columns"), ("cy", self.cy, size.1, "rows")];
+        let off = axes.into_iter().position(|(_, at, most, _)| !(0.0..=most as f64).contains(&at))?;
+        let (name, at, most, what) = axes[off];
+        Some((off, format!("{name} is {at}, expected a pixel of the image, which has {most} {what}")))
+    }
+}
+
+fn objection(path: Vec<Step>, problem: String, mend: &str) -> Objection {
+    Objection { path, problem, mend: mend.into() }
 }

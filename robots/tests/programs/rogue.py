@@ -63,6 +63,9 @@ class Rogue(Template):
             hello["laser"] = dict(hello["laser"], readings=1000)
         if WHAT == "two tables of one name":
             hello["surfaces"] *= 2
+        if WHAT == "a table in millimetres":
+            corners = hello["surfaces"][0]["outline_m"]
+            hello["surfaces"][0]["outline_m"] = [[1000 * x, 1000 * y] for x, y in corners]
         return hello, cells
 
     def drive_to(self, request, to, route_m):

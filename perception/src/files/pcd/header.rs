@@ -1,6 +1,6 @@
 //! The header of a PCD file.
 
-use crate::files::{FileError, Place};
+use crate::files::{FileError, Place, is_padding};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,6 +99,21 @@ impl Header {
             "the file was cut: write it again, or lower POINTS, WIDTH and HEIGHT",
         )
     }
+
+    /// Refuses `data` that go on for a point or more after `needed` bytes: the header says less than is there. Zeros are padding.
+    pub(super) fn ends_with(&self, data: &[u8], needed: usize) -> Result<(), FileError> {
+        let rest = data.get(needed..).unwrap_or_default();
+        let more = rest.len() / self.stride();
+        if more == 0 || is_padding(rest) {
+            return Ok(());
+        }
+        Err(FileError::new(
+            Place::Byte(self.data_at.saturating_add(needed)),
+            format!("the end of {} points, as the header declares", self.points),
+            format!("{} bytes more, as {more} points have", rest.len()),
+            "set POINTS, WIDTH and HEIGHT to what is there, or write the file again",
+        ))
+    }
 }
 
 /// What the lines of a header say, each with its line.
@@ -159,7 +174,17 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, FileError> {
                 ));
             }
         };
-        *slot = Some((number, rest));
+        match slot {
+            Some((first, before)) if *before != rest => {
+                return Err(FileError::new(
+                    place,
+                    format!("one line {word}, and that is line {first}"),
+                    format!("another with {:?}", rest.join(" ")),
+                    "leave out the one that is wrong",
+                ));
+            }
+            _ => *slot = Some((number, rest)),
+        }
     }
     Err(FileError::new(Place::Line(number + 1), "a line DATA", "the end of the file", "the header is cut"))
 }
@@ -290,9 +315,9 @@ impl Said<'_> {
 
     fn viewpoint(&self, notes: &mut Vec<String>) -> Result<Isometry3<f64>, FileError> {
         let Some((line, words)) = &self.viewpoint else { return Ok(Isometry3::identity()) };
-        let numbers: Vec<f64> =
-            words.iter().filter_map(|w| w.parse().ok()).filter(|v: &f64| v.is_finite()).collect();
-        let &[x, y, z, qw, qx, qy, qz] = numbers.as_slice() else {
+        let number = |w: &&str| w.parse().ok().filter(|v: &f64| v.is_finite());
+        let numbers: Option<Vec<f64>> = words.iter().map(number).collect();
+        let Some(&[x, y, z, qw, qx, qy, qz]) = numbers.as_deref() else {
             return Err(FileError::new(
                 Place::Line(*line),
                 "VIEWPOINT tx ty tz qw qx qy qz",

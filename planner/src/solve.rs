@@ -12,7 +12,7 @@ use crate::explain::{Explanation, constrained, explain, is_open, narrowed};
 use crate::ground::{Expression, GroundError, GroundTask, compile, ground};
 use crate::memory::MemoryLimit;
 use crate::outcome::{Options, Outcome, PlanError, Statistics};
-use crate::plan::Plan;
+use crate::plan::{EPSILON_S, Plan};
 use crate::search::classical::plan_classical;
 use crate::task::Task;
 use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans};
@@ -285,6 +285,9 @@ fn to_plan(task: &Task, grounded: &GroundTask, world: &World, timed: &[Timed]) -
 /// a plan that breaks nothing else is refused.
 fn checked(task: &Task, attachments: &Attachments, mut plan: Plan) -> Result<Plan, PlanError> {
     plan.steps.retain(|step| !step.action.contains(' '));
+    if !task.init.timed.is_empty() && plan.makespan_s().is_none() {
+        give_times(task, &mut plan);
+    }
     let verdict = validate(task, attachments, &plan);
     if verdict.valid {
         return Ok(Plan { cost: verdict.cost, ..plan });
@@ -301,6 +304,14 @@ fn checked(task: &Task, attachments: &Attachments, mut plan: Plan) -> Result<Pla
         }
     }
     Err(PlanError::Internal { reason: verdict.reason.unwrap_or_default(), plan })
+}
+
+/// Where nothing that happens at a time matters to a plan, its steps come one after the other, and apart from all of that.
+fn give_times(task: &Task, plan: &mut Plan) {
+    let is_taken =
+        |at_s: f64| task.init.timed.iter().any(|timed| (timed.time_s - at_s).abs() < EPSILON_S / 2.0);
+    let mut times_s = (0..).map(|tick: u32| f64::from(tick) * EPSILON_S).filter(|&at_s| !is_taken(at_s));
+    plan.steps.iter_mut().for_each(|step| step.start_s = times_s.next());
 }
 
 fn since(

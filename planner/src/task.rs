@@ -73,6 +73,8 @@ pub struct Task {
     pub init: Init,
     /// The goal.
     pub goal: Scoped<Condition>,
+    /// Where the goal stands.
+    pub goal_span: Span,
     /// Trajectory constraints; those that a preference stands before carry it.
     pub constraints: Vec<Trajectory>,
     /// Preferences, by name; several preferences may share a name, which then counts their violations.

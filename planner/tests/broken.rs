@@ -42,6 +42,9 @@ fn each_fault_is_drawn_where_it_is() {
         ("goal-about-nothing", "base-domain.pddl", Some("goal-about-nothing.pddl")),
         ("faulty-problem", "base-domain.pddl", Some("faulty-problem.pddl")),
         ("contradiction", "base-domain.pddl", Some("contradiction.pddl")),
+        ("domain-said-twice", "twice-domain.pddl", None),
+        ("problem-said-twice", "base-domain.pddl", Some("twice-problem.pddl")),
+        ("contradicting-effects", "contradicting-effects.pddl", None),
         ("guessed-name", "guessed-name.pddl", None),
     ] {
         let findings = findings(domain, problem);
@@ -54,6 +57,7 @@ fn each_fault_is_drawn_where_it_is() {
 fn what_deserves_a_look_is_drawn_where_it_is() {
     for (name, domain, problem) in [
         ("gaps", "gaps-domain.pddl", Some("gaps-problem.pddl")),
+        ("no-domain", "base-domain.pddl", Some("no-domain.pddl")),
         ("division-by-zero", "division-by-zero.pddl", None),
     ] {
         let findings = findings(domain, problem);

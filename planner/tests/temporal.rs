@@ -267,6 +267,56 @@ fn what_a_condition_mentions_is_kept_apart_even_where_it_never_matters() {
 }
 
 #[test]
+fn what_grounding_leaves_out_is_kept_apart() {
+    // Nobody asks for `(s)`, which the two would change at the same time: grounding knows nothing of it.
+    let domain = "(:requirements :negative-preconditions) (:predicates (p) (q) (s))
+      (:durative-action one :parameters () :duration (= ?duration 3) :condition (over all (not (q)))
+        :effect (and (at start (p)) (at end (s))))
+      (:durative-action two :parameters () :duration (= ?duration 1) :condition (at start (p))
+        :effect (and (at start (q)) (at start (not (s)))))";
+    check(domain, "(:init) (:goal (and (q) (p)))", Some(4.0));
+}
+
+#[test]
+fn what_is_given_at_a_time_and_matters_to_nobody_takes_no_time() {
+    let domain = "(:requirements :timed-initial-literals) (:predicates (p) (q) (r))
+      (:action one :parameters () :effect (and (p) (not (r))))
+      (:action two :parameters () :precondition (p) :effect (q))";
+    check(domain, "(:init (at 0 (r)) (at 5 (r))) (:goal (q))", Some(0.002));
+}
+
+#[test]
+fn a_duration_lies_strictly_between_its_bounds_however_near_they_are() {
+    for (most_s, expected_s) in [("5.001", 5.0), ("5.0005", 5.0), ("6", 5.001)] {
+        let domain = format!(
+            "(:requirements :duration-inequalities) (:predicates (held))
+          (:durative-action hold :parameters () :duration (and (> ?duration 5) (< ?duration {most_s}))
+            :effect (at end (held)))"
+        );
+        check(&domain, "(:init) (:goal (held))", Some(expected_s));
+    }
+    let domain = "(:requirements :duration-inequalities) (:predicates (held))
+      (:durative-action hold :parameters () :duration (and (> ?duration 5) (< ?duration 5)) :effect (at end (held)))";
+    check(domain, "(:init) (:goal (held))", None);
+}
+
+#[test]
+fn only_a_search_that_leaves_nothing_out_proves_a_plan_to_be_the_best() {
+    // Done in one go, one after the other, the two take 6.5 s; started together, 4.
+    let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (r) (s))
+      (:durative-action short :parameters () :duration (= ?duration 2.5) :condition (at start (s)) :effect (at end (r)))
+      (:durative-action long :parameters () :duration (= ?duration 4) :condition (over all (s)) :effect (at start (s))))";
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (r)) (:metric minimize (total-time)))";
+    let task = Task::read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("sound");
+    for anytime in [false, true] {
+        let options = Options { evaluation_limit: Some(4_000), anytime, ..Options::default() };
+        let found = plan(&task, &Attachments::new(), &options, &|| false, &mut |_| {}).expect("a plan");
+        let end_s = found.plan().and_then(|plan| plan.makespan_s()).expect("it has times");
+        assert!(end_s < 4.02 || !(anytime || found.statistics().optimal), "{found:?}");
+    }
+}
+
+#[test]
 fn numbers_limit_what_runs_at_once() {
     let domain = "(:requirements :numeric-fluents) (:types job) (:predicates (done ?j - job)) (:functions (hands))
       (:durative-action work :parameters (?j - job) :duration (= ?duration 10) :condition (at start (>= (hands) 1))

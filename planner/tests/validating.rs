@@ -150,6 +150,24 @@ fn plans_with_times() {
 }
 
 #[test]
+fn what_happens_at_a_time_asks_for_a_plan_with_times() {
+    let domain = "(define (domain d) (:requirements :timed-initial-literals) (:predicates (p) (q))
+      (:action a :parameters () :precondition (p) :effect (q)))";
+    let problem = "(define (problem p) (:domain d) (:init (p) (at 0.5 (not (p)))) (:goal (q)))";
+    check(
+        domain,
+        problem,
+        &[
+            ("(a)", "the task has timed literals, but step 1 (a) has no time"),
+            ("0: (a)", ""),
+            ("0.6: (a)", "(p) does not hold"),
+        ],
+    );
+    let verdict = verdict(domain, problem, "0: (a) [3]");
+    assert_eq!((verdict.valid, verdict.makespan), (true, Some(0.0)), "what takes no time ends at once");
+}
+
+#[test]
 fn effects_at_the_end_remember_the_start() {
     // What `heat-up` leaves behind depends on whether the door was closed when it began.
     let problem = |goal: &str| {

@@ -424,6 +424,8 @@ pub struct Problem {
     pub initial: Vec<Initial>,
     /// The goal.
     pub goal: Option<Formula>,
+    /// Where the goal stands, the whole section.
+    pub goal_span: Span,
     /// Trajectory constraints.
     pub constraints: Vec<Formula>,
     /// The metric.

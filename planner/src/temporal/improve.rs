@@ -95,7 +95,7 @@ const REPAIR: u64 = 200;
 pub(crate) fn search_plans(
     world: &World,
     measure: &Measure,
-    limits: Limits,
+    mut limits: Limits,
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
 ) -> Result<Progress, Failure> {
@@ -107,6 +107,8 @@ pub(crate) fn search_plans(
     }
     let in_one_go = passes[0].0.iter().all(|apart| !apart);
     let mut progress = Progress { reason: Reason::Unproven, counts: Counts::default(), plans: 0 };
+    // Rearranged into actions done in one go, a plan is still a plan, but it may end later.
+    let all_in_one_go = |timed: bool| in_one_go && !timed && in_one_go_suffices(world);
     for (split, exact) in passes {
         let every_apart = split == all;
         let space = Space::new(world, split, measure.clone());
@@ -130,16 +132,25 @@ pub(crate) fn search_plans(
         run.first()?;
         if run.best.is_some() {
             run.improve()?;
-            return Ok(run.progress);
+        }
+        if let Some(best) = &run.best {
+            limits.bound = best.measured - tolerance(best.measured);
         }
         progress = run.progress;
+        let found = progress.plans > 0;
         match progress.reason {
-            Reason::Exhausted if !(every_apart || in_one_go && in_one_go_suffices(world)) => {
+            Reason::Exhausted if !(every_apart || all_in_one_go(found && space.timed_measure())) => {
                 progress.reason = Reason::Unproven;
             }
             Reason::Unproven => {}
             _ => break,
         }
+        if found && !limits.anytime {
+            break;
+        }
+    }
+    if progress.plans > 0 && progress.reason == Reason::Unproven {
+        progress.reason = Reason::Enough;
     }
     Ok(progress)
 }
@@ -266,14 +277,14 @@ impl Run<'_, '_, '_> {
             steps = ordered;
         }
         let better = match &self.best {
-            None => true,
+            None => measured < self.limits.bound,
             Some(best) => measured < best.measured - tolerance(best.measured),
         };
         let nearer = |best: &Best| measured <= best.measured && slowness_s < best.slowness_s - 1e-6;
         if !better && !self.best.as_ref().is_some_and(nearer) {
             return Ok(false);
         }
-        let plan = better.then(|| schedule(self.space, &steps));
+        let plan = better.then(|| schedule(self.space, &steps, self.stop));
         self.best = Some(Best { measured, slowness_s, steps });
         if let Some(plan) = plan {
             self.progress.plans += 1;
@@ -433,11 +444,11 @@ fn in_time_order(space: &Space, steps: &[Step]) -> Vec<Step> {
 }
 
 /// The earliest schedule of a plan.
-fn schedule(space: &Space, steps: &[Step]) -> Vec<Timed> {
+fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Vec<Timed> {
     let Ok(mut track) = space.track(steps) else { return Vec::new() };
     // A schedule that has no room for more distance is as good as the search took it for.
     let mut apart = track.clone();
-    if keep_apart(space, steps, &mut apart).is_ok() {
+    if keep_apart(space, steps, &mut apart, stop).is_ok() {
         track = apart;
     }
     let actions =

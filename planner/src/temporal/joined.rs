@@ -24,7 +24,10 @@ pub(crate) fn shortened(
     let mut left = MOST_REPLAYED;
     let mut looks = MOST_LOOKED_AT / space.world.acts.len().max(1);
     'shorter: loop {
-        for (first, second) in pairs(space.world, &plan.1) {
+        if left <= plan.1.len() {
+            return Ok(plan);
+        }
+        for (first, second) in pairs(space.world, &plan.1, stop) {
             looks = looks.saturating_sub(1);
             if looks == 0 {
                 return Ok(plan);
@@ -53,8 +56,9 @@ pub(crate) fn shortened(
     }
 }
 
-/// Pairs of steps by the same action of which the second asks for what the first has brought about.
-fn pairs(world: &World, steps: &[Step]) -> Vec<(usize, usize)> {
+/// Pairs of steps by the same action of which the second asks for what the first has brought about; once asked to stop,
+/// those found so far.
+fn pairs(world: &World, steps: &[Step], stop: &dyn Fn() -> bool) -> Vec<(usize, usize)> {
     let act = |step: &Step| &world.acts[step.act as usize];
     let is_whole = |step: &Step| step.part == Part::Whole && step.proposal.is_none();
     let follows = |first: &Act, second: &Act| {
@@ -66,6 +70,9 @@ fn pairs(world: &World, steps: &[Step]) -> Vec<(usize, usize)> {
     };
     let mut pairs = Vec::new();
     for (at, second) in steps.iter().enumerate().filter(|(_, step)| is_whole(step)) {
+        if stop() {
+            break;
+        }
         let before = steps[..at].iter().enumerate().rev().filter(|(_, step)| is_whole(step));
         let first = before.into_iter().find(|(_, first)| follows(act(first), act(second)));
         pairs.extend(first.map(|(first, _)| (first, at)));

@@ -4,15 +4,16 @@
 //! out. PDDL 2.1 (section 8.1) takes all that a condition mentions for what it reads, and so do strict validators: what
 //! changes it must not happen at the same time. Before or after makes no difference, so the search knows nothing of
 //! this: in the schedule of a finished plan, such happenings are moved apart. So it is with a derived fact: it reads
-//! every instance of what its rules mention, while grounding keeps those instances that decide it.
+//! every instance of what its rules mention, while grounding keeps those instances that decide it. And so it is with
+//! effects on what nobody asks for, and with conditions that always hold: grounding leaves them out, validators do not.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::plan::EPSILON_S;
 use crate::semantics::reads::depends_on;
 use crate::task::{
-    Action, Assignment, Atom, Change, Condition, Effect, Expression, Fluent, GroundChange, ObjectId,
-    PredicateId, Quantified, Task, Term,
+    Assignment, Atom, Change, Condition, Expression, Fluent, GroundChange, ObjectId, PredicateId, Quantified,
+    Task, Term,
 };
 
 use super::advance::Step;
@@ -55,11 +56,12 @@ struct Touch {
 }
 
 /// Moves apart what happens at the same time where one changes what the other mentions.
-pub(super) fn keep_apart(space: &Space, steps: &[Step], track: &mut Track) -> Result<(), Inconsistent> {
-    let task = space.world.task;
-    if task.rules.is_empty() && !task.actions.iter().any(mentions_more) {
-        return Ok(());
-    }
+pub(super) fn keep_apart(
+    space: &Space,
+    steps: &[Step],
+    track: &mut Track,
+    stop: &dyn Fn() -> bool,
+) -> Result<(), Inconsistent> {
     let mut touches = touches(space, steps, track)?;
     for _ in 0..MOST_ROUNDS {
         let order = &track.order;
@@ -76,7 +78,7 @@ pub(super) fn keep_apart(space: &Space, steps: &[Step], track: &mut Track) -> Re
                 together.extend(others.map(|other| in_order(one, other)));
             }
         }
-        if together.is_empty() {
+        if together.is_empty() || stop() {
             return Ok(());
         }
         together.sort_unstable();
@@ -90,25 +92,6 @@ pub(super) fn keep_apart(space: &Space, steps: &[Step], track: &mut Track) -> Re
 fn in_order(one: &Touch, other: &Touch) -> (u32, u32) {
     let key = |touch: &Touch| (touch.step != GIVEN, touch.happening);
     if key(one) < key(other) { (one.happening, other.happening) } else { (other.happening, one.happening) }
-}
-
-/// Whether an action may mention more than its ground instances hold.
-fn mentions_more(action: &Action) -> bool {
-    let condition = |condition: &Condition| match condition {
-        Condition::And(parts) => parts.iter().any(is_compound),
-        other => is_compound(other),
-    };
-    let effects = action.effects.start.iter().chain(&action.effects.end);
-    let numeric = |effect: &Effect| matches!(effect.change, Change::Number(..));
-    let conditional = |effect: &Effect| {
-        !(effect.when.start.is_true() && effect.when.over_all.is_true() && effect.when.end.is_true())
-    };
-    [&action.condition.start, &action.condition.end].into_iter().any(condition)
-        || effects.into_iter().any(|effect| conditional(effect) || numeric(effect))
-}
-
-fn is_compound(condition: &Condition) -> bool {
-    matches!(condition, Condition::Or(_) | Condition::Forall(..) | Condition::Exists(..))
 }
 
 /// By atom, the happenings that mention or change it, where they do different things with it.

@@ -68,6 +68,23 @@ pub(crate) struct Span {
     pub most_s: f64,
 }
 
+impl Span {
+    /// What is left an [`EPSILON_S`] inside bounds that are not part of it; the middle, where there is less room than that.
+    fn strictly_inside(self, bounds: Span) -> Span {
+        let least_s = self.least_s.max(bounds.least_s + EPSILON_S);
+        let most_s = self.most_s.min(bounds.most_s - EPSILON_S);
+        let middle_s = (self.least_s.max(bounds.least_s) + self.most_s.min(bounds.most_s)) / 2.0;
+        let is_inside = self.least_s <= middle_s
+            && middle_s <= self.most_s
+            && bounds.least_s < middle_s
+            && middle_s < bounds.most_s;
+        match least_s > most_s && is_inside {
+            true => Span { least_s: middle_s, most_s: middle_s },
+            false => Span { least_s, most_s },
+        }
+    }
+}
+
 /// The ground task in the form that the temporal search applies.
 pub(crate) struct World<'a> {
     /// The lifted task.
@@ -212,23 +229,25 @@ impl<'a> World<'a> {
     /// A durative action takes at least [`EPSILON_S`], unless it must take less and its end is free of its start.
     pub fn span(&self, act: &Act, moment: &Moment) -> Result<Option<Span>, Failure> {
         let mut span = Span { least_s: 0.0, most_s: f64::INFINITY };
+        let mut strict = Span { least_s: f64::NEG_INFINITY, most_s: f64::INFINITY };
         for bound in act.bounds.iter().filter(|bound| !bound.at_end) {
             let seconds = self.evaluate(&bound.seconds, moment)?;
             if seconds.is_nan() {
                 return Ok(None);
             }
             match bound.relation {
-                Relation::Less => span.most_s = span.most_s.min(seconds - EPSILON_S),
+                Relation::Less => strict.most_s = strict.most_s.min(seconds),
                 Relation::AtMost => span.most_s = span.most_s.min(seconds),
                 Relation::Equal => {
                     span.least_s = span.least_s.max(seconds);
                     span.most_s = span.most_s.min(seconds);
                 }
                 Relation::AtLeast => span.least_s = span.least_s.max(seconds),
-                Relation::Greater => span.least_s = span.least_s.max(seconds + EPSILON_S),
+                Relation::Greater => strict.least_s = strict.least_s.max(seconds),
                 Relation::Unequal => {}
             }
         }
+        span = span.strictly_inside(strict);
         if span.most_s < EPSILON_S && !self.ends_freely(act) {
             return Ok(None);
         }

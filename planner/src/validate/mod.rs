@@ -14,10 +14,10 @@ use serde::Serialize;
 
 use crate::attachment::Attachments;
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::plan::Plan;
+use crate::plan::{Plan, Step};
 use crate::semantics::{Binding, CallFailure, Semantics};
 use crate::state::State;
-use crate::task::Task;
+use crate::task::{Action, Task};
 
 pub use after::after;
 pub use monitor::{Broken, monitor};
@@ -73,7 +73,13 @@ pub(crate) struct Replayed {
 pub fn validate(task: &Task, attachments: &Attachments, plan: &Plan) -> Verdict {
     let _span = tracing::debug_span!("validate", steps = plan.steps.len()).entered();
     let semantics = Semantics::new(task, attachments);
-    let makespan = plan.makespan_s().filter(|_| !plan.steps.is_empty() || task.is_temporal());
+    let takes_time = |step: &Step| {
+        let mut named = task.actions.iter().filter(|action| action.name.eq_ignore_ascii_case(&step.action));
+        named.next().is_none_or(Action::is_durative)
+    };
+    let is_durative: Vec<bool> = plan.steps.iter().map(takes_time).collect();
+    let makespan =
+        timeline::makespan_s(plan, &is_durative).filter(|_| !plan.steps.is_empty() || task.is_temporal());
     let invalid = |reason: String, step: Option<usize>, finding: Option<Diagnostic>| Verdict {
         valid: false,
         reason: Some(reason),

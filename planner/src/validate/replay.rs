@@ -1,6 +1,6 @@
 //! One happening after the other, from the initial state to the end of a plan.
 
-use super::timeline::{Event, Happening, happenings};
+use super::timeline::{Event, Happening, happenings, makespan_s};
 use super::{Fault, Replayed, SEPARATION_S};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::relation::Relation;
@@ -9,7 +9,7 @@ use crate::plan::Plan;
 use crate::semantics::effects::Clash;
 use crate::semantics::{Binding, CallFailure, Changes, Pending, Semantics, Touched, Why, value_text};
 use crate::state::State;
-use crate::task::{Action, ActionId, Comparison, GroundChange, Timed, When};
+use crate::task::{Action, ActionId, Comparison, GroundChange, Task, Timed, When};
 
 /// A durative action between its start and its end.
 struct Running {
@@ -65,15 +65,8 @@ pub(super) fn replay(semantics: &Semantics<'_>, plan: &Plan) -> Outcome<Replayed
         }
     }
     let is_durative: Vec<bool> = bound.iter().map(|(action, _)| task.action(*action).is_durative()).collect();
-    if let Some(index) =
-        (0..plan.steps.len()).find(|&index| is_durative[index] && plan.steps[index].start_s.is_none())
-    {
-        let reason = format!("{} takes time, but the plan has no times", step_text(plan, index));
-        let span = task.action(bound[index].0).span;
-        let finding = Diagnostic::error("plan", reason.clone(), span, "durative")
-            .with_help("write steps like `0.000: (move a b) [3.200]`");
-        let (step, condition) = (Some(index), String::new());
-        return Ok(Err(Box::new(Fault { reason, step, condition, values: Vec::new(), finding })));
+    if let Some(fault) = without_times(task, plan, &bound, &is_durative) {
+        return Ok(Err(Box::new(fault)));
     }
     let happenings = happenings(task, plan, &is_durative);
     let state = semantics.initial()?;
@@ -83,8 +76,35 @@ pub(super) fn replay(semantics: &Semantics<'_>, plan: &Plan) -> Outcome<Replayed
     for happening in &happenings {
         attempt!(replay.happening(happening));
     }
-    let end = plan.makespan_s().filter(|_| !plan.steps.is_empty()).unwrap_or(plan.steps.len() as f64);
+    let makespan_s = makespan_s(plan, &is_durative).filter(|_| !plan.steps.is_empty());
+    let end = makespan_s.unwrap_or(plan.steps.len() as f64);
     Ok(Ok(Replayed { state: replay.state, trace: replay.trace, violations: replay.violations, end }))
+}
+
+/// A plan without times, where something takes time or happens at one.
+fn without_times(
+    task: &Task,
+    plan: &Plan,
+    bound: &[(ActionId, Binding)],
+    is_durative: &[bool],
+) -> Option<Fault> {
+    let untimed = |&index: &usize| plan.steps[index].start_s.is_none();
+    let durative = (0..plan.steps.len()).filter(untimed).find(|&index| is_durative[index]);
+    let (reason, span, label, step) = match (durative, task.init.timed.first()) {
+        (Some(index), _) => {
+            let reason = format!("{} takes time, but the plan has no times", step_text(plan, index));
+            (reason, task.action(bound[index].0).span, "durative", Some(index))
+        }
+        (None, Some(timed)) => {
+            let step = (0..plan.steps.len()).find(untimed)?;
+            let reason = format!("the task has timed literals, but {} has no time", step_text(plan, step));
+            (reason, timed.span, "before or after this?", Some(step))
+        }
+        (None, None) => return None,
+    };
+    let finding = Diagnostic::error("plan", reason.clone(), span, label)
+        .with_help("write steps like `0.000: (move a b) [3.200]`");
+    Some(Fault { reason, step, condition: String::new(), values: Vec::new(), finding })
 }
 
 /// A step for messages: its number, its text, its time.

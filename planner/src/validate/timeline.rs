@@ -1,7 +1,7 @@
 //! From the steps of a plan to what happens when.
 
 use super::SEPARATION_S;
-use crate::plan::Plan;
+use crate::plan::{Plan, Step};
 use crate::task::Task;
 
 /// Something that happens at one time.
@@ -42,7 +42,7 @@ pub(super) fn happenings(task: &Task, plan: &Plan, is_durative: &[bool]) -> Vec<
             events.push((start_s, Event::Instant(index)));
         }
     }
-    let end = plan.makespan_s().unwrap_or(0.0);
+    let end = makespan_s(plan, is_durative).unwrap_or(0.0);
     for (index, timed) in task.init.timed.iter().enumerate() {
         if timed.time_s < end + SEPARATION_S {
             events.push((timed.time_s, Event::Timed(index)));
@@ -60,6 +60,15 @@ pub(super) fn happenings(task: &Task, plan: &Plan, is_durative: &[bool]) -> Vec<
         }
     }
     all
+}
+
+/// When the last step ends; what takes no time takes none, whatever the plan says. `None` for a plan without times.
+pub(super) fn makespan_s(plan: &Plan, is_durative: &[bool]) -> Option<f64> {
+    let end_s = |(step, is_durative): (&Step, &bool)| {
+        Some(step.start_s? + if *is_durative { step.duration_s } else { 0.0 })
+    };
+    let mut ends_s = plan.steps.iter().zip(is_durative).map(end_s);
+    ends_s.try_fold(0.0, |last: f64, end_s| Some(last.max(end_s?)))
 }
 
 /// Whether `event` ends a step that starts among `events`: a step without duration still starts before it ends.

@@ -51,6 +51,7 @@ impl Checker<'_> {
             let when = (!action.durative).then_some(When::Start);
             self.effect(effect, &Around::default(), when, action.durative, &mut scope, &mut found);
         }
+        [&found.effects.start, &found.effects.end].into_iter().for_each(|effects| self.agree(effects));
         self.task.actions.push(Action {
             name,
             parameters,
@@ -63,6 +64,23 @@ impl Checker<'_> {
             preferences,
             span: action.name.span,
         });
+    }
+
+    /// At once, a number can get one value, or have amounts added and taken away: of other changes PDDL 2.1 gives no result.
+    fn agree(&mut self, effects: &[Effect]) {
+        let always = |effect: &&Effect| effect.forall.is_empty() && effect.when == Timed::default();
+        let mut earlier: Vec<&Effect> = Vec::new();
+        for effect in effects.iter().filter(always) {
+            if let Some(other) = earlier.iter().find(|other| contradict(other, effect)) {
+                let message = "two changes of one number at once contradict each other";
+                self.push(
+                    Diagnostic::error("contradicting-effects", message, effect.span, "which one holds?")
+                        .with_label(other.span, "the number is changed here already")
+                        .with_help("make one change of the two; only `increase` and `decrease` add up"),
+                );
+            }
+            earlier.push(effect);
+        }
     }
 
     fn duration(&mut self, action: &ast::Action, scope: &Scope) -> Vec<DurationBound> {
@@ -469,6 +487,21 @@ impl Checker<'_> {
             if assignment == Assignment::Decrease { Expression::Negative(Box::new(factor)) } else { factor };
         found.rates.push(Rate { fluent, per_second, span });
     }
+}
+
+/// Whether two effects change one number in ways of which the order matters.
+fn contradict(one: &Effect, other: &Effect) -> bool {
+    let (Change::Number(how, fluent, amount), Change::Number(other_how, other_fluent, other_amount)) =
+        (&one.change, &other.change)
+    else {
+        return false;
+    };
+    let adds = |how: &Assignment| matches!(how, Assignment::Increase | Assignment::Decrease);
+    let same = fluent.function == other_fluent.function && fluent.arguments == other_fluent.arguments;
+    let assign_same = (*how, *other_how) == (Assignment::Assign, Assignment::Assign)
+        && constant(amount).is_some()
+        && constant(amount) == constant(other_amount);
+    same && !(adds(how) && adds(other_how)) && !assign_same
 }
 
 fn has_preference(formula: &Formula) -> bool {

@@ -148,6 +148,7 @@ impl<'a> Checker<'a> {
             actions: Vec::new(),
             init: Init::default(),
             goal: Scoped { slots: 0, body: Condition::TRUE },
+            goal_span: Span::default(),
             constraints: Vec::new(),
             preferences: Vec::new(),
             metric: None,
@@ -213,6 +214,7 @@ impl<'a> Checker<'a> {
         self.task.problem = problem.name.map(|name| self.name(name.symbol).to_string()).unwrap_or_default();
         self.same_domain(problem, domain);
         self.initial(&problem.initial);
+        self.task.goal_span = problem.goal_span;
         match &problem.goal {
             Some(goal) => self.goal(goal),
             None if problem.name.is_some() => self.no_goal(problem),
@@ -229,7 +231,8 @@ impl<'a> Checker<'a> {
     }
 
     fn same_domain(&mut self, problem: &ast::Problem, domain: &ast::Domain) {
-        let (Some(said), Some(is)) = (problem.domain, domain.name) else { return };
+        let Some(is) = domain.name else { return };
+        let Some(said) = problem.domain else { return self.no_domain(problem, is) };
         if said.symbol != is.symbol {
             let (said_name, is_name) = (self.name(said.symbol), self.name(is.symbol));
             let message =
@@ -237,6 +240,16 @@ impl<'a> Checker<'a> {
             self.push(
                 Diagnostic::warning("other-domain", message, said.span, "another domain is named here")
                     .with_label(is.span, "this is the domain that was read"),
+            );
+        }
+    }
+
+    fn no_domain(&mut self, problem: &ast::Problem, is: ast::Name) {
+        if let Some(name) = problem.name {
+            let message = "the problem does not say which domain it belongs to";
+            self.push(
+                Diagnostic::warning("no-domain", message, name.span, "this problem")
+                    .with_help(format!("add `(:domain {})`", self.name(is.symbol))),
             );
         }
     }

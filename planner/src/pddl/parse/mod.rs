@@ -197,10 +197,20 @@ impl<'a> Parser<'a> {
         };
         let header = self.children(define).nth(1)?;
         match self.children(header).nth(1) {
-            Some(node) => *name = self.name(node, &format!("the {kind}'s name")),
+            Some(node) => {
+                *name = self.name(node, &format!("the {kind}'s name"));
+                self.nothing_after_name(header, kind);
+            }
             None => self.fault("syntax", format!("the {kind} has no name"), header, "expected a name"),
         }
         Some(self.children(define).skip(2).collect())
+    }
+
+    /// A list like `(domain name)` holds one name.
+    fn nothing_after_name(&mut self, list: usize, kind: &str) {
+        if let Some(extra) = self.children(list).nth(2) {
+            self.expected("`)`", extra, format!("a {kind} has one name; join its words with `-`"));
+        }
     }
 
     fn no_definition(&mut self, kind: &str, other: &str, define: Option<usize>, empty: bool) {
@@ -257,8 +267,12 @@ impl<'a> Parser<'a> {
     fn problem_section(&mut self, section: usize, problem: &mut Problem) {
         let Some(keyword) = self.section_keyword(section) else { return };
         match keyword {
+            ":domain" if problem.domain.is_some() => self.second(section, keyword),
             ":domain" => match self.children(section).nth(1) {
-                Some(node) => problem.domain = self.name(node, "the domain's name"),
+                Some(node) => {
+                    problem.domain = self.name(node, "the domain's name");
+                    self.nothing_after_name(section, "domain");
+                }
                 None => self.fault("syntax", "the domain's name is missing", section, "expected a name"),
             },
             ":requirements" => self.requirements(section, &mut problem.requirements),
@@ -268,8 +282,10 @@ impl<'a> Parser<'a> {
                     self.initial(node, &mut problem.initial);
                 }
             }
+            ":goal" if problem.goal.is_some() => self.second(section, keyword),
             ":goal" => self.goal(section, problem),
             ":constraints" => problem.constraints.extend(self.constraints(section)),
+            ":metric" if problem.metric.is_some() => self.second(section, keyword),
             ":metric" => problem.metric = self.metric(section),
             ":moduleoptions" => self.module_options(section, &mut problem.module_options),
             ":moduleexitoptions" => self.module_options(section, &mut problem.module_exit_options),
@@ -318,19 +334,17 @@ impl<'a> Parser<'a> {
         self.findings.push(diagnostic);
     }
 
+    /// A section that a problem has once.
+    fn second(&mut self, section: usize, keyword: &str) {
+        let (span, message) = (self.head_span(section), format!("a second `{keyword}`"));
+        self.findings.push(
+            Diagnostic::error("duplicate", message, span, "the problem has one already")
+                .with_help("remove one of them"),
+        );
+    }
+
     fn goal(&mut self, section: usize, problem: &mut Problem) {
         let parts: Vec<usize> = self.children(section).skip(1).collect();
-        if let Some(first) = problem.goal.take() {
-            let span = self.head_span(section);
-            self.findings.push(Diagnostic::error(
-                "duplicate",
-                "a second `:goal`",
-                span,
-                "the problem has one already",
-            ));
-            problem.goal = Some(first);
-            return;
-        }
         let formulas: Vec<Formula> = parts.iter().filter_map(|&part| self.formula(part, false)).collect();
         if parts.len() > 1 {
             let span = self.span(parts[1]);
@@ -339,6 +353,7 @@ impl<'a> Parser<'a> {
             self.findings.push(diagnostic.with_help("put them into one `(and …)`"));
         }
         problem.goal = Some(Formula::And(formulas));
+        problem.goal_span = self.span(section);
     }
 
     fn constraints(&mut self, section: usize) -> Vec<Formula> {
@@ -398,7 +413,9 @@ impl<'a> Parser<'a> {
                 self.expected("a part of the action", node, format!("parts: {}", ACTION_PARTS.join(" ")));
                 continue;
             };
-            if seen.contains(&part) {
+            // `:condition` is what `:precondition` is called where actions take time.
+            let key = if part == ":precondition" { ":condition" } else { part };
+            if seen.contains(&key) {
                 self.fault(
                     "duplicate",
                     format!("a second `{part}` in one action"),
@@ -406,7 +423,7 @@ impl<'a> Parser<'a> {
                     "the action has one already",
                 );
             }
-            seen.push(part);
+            seen.push(key);
             let value = nodes.next_if(|&next| self.word(next).is_none_or(|word| !word.starts_with(':')));
             has_duration |= part == ":duration";
             self.action_part(node, part, value, &mut action, &mut variables);

@@ -1,0 +1,6 @@
+(define (domain twice over)
+  (:requirements :strips :durative-actions)
+  (:predicates (p) (q) (r))
+  (:action a :parameters () :condition (p) :precondition (q) :effect (r))
+  (:durative-action b :parameters () :duration (= ?duration 1) :precondition (at start (p))
+    :condition (at start (q)) :effect (at end (r))))

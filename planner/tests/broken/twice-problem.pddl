@@ -1,0 +1,8 @@
+(define (problem said twice)
+  (:domain base kitchen)
+  (:domain kitchen)
+  (:init)
+  (:goal (hand-free))
+  (:goal (hand-free))
+  (:metric minimize (total-time))
+  (:metric maximize (total-time)))

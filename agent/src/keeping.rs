@@ -4,7 +4,7 @@ mod remote;
 
 use std::path::Path;
 
-use descry_memory::{Durability, Options, Record, Retention};
+use descry_memory::{Durability, Options, Record, Retention, free_bytes};
 use serde::{Deserialize, Serialize};
 
 use crate::exit::CommandError;
@@ -64,12 +64,29 @@ impl Keeping {
     /// The same with the name under which a new run is in its store, which must be free there.
     ///
     /// # Errors
-    /// [`CommandError::BadInput`] for an address that cannot be used; [`CommandError::Broken`] if no server answers there.
+    /// [`CommandError::BadInput`] for an address that cannot be used, or where less room is left already than is to be left;
+    /// [`CommandError::Broken`] if no server answers there.
     pub fn of_new_run(&self, run: &Path) -> Result<Self, CommandError> {
-        let Some(address) = self.address()? else { return Ok(self.clone()) };
+        let Some(address) = self.address()? else {
+            self.check_room(run)?;
+            return Ok(self.clone());
+        };
         let address = address.of_run(run);
         address.check_free(self.options())?;
         Ok(Keeping { memory: Some(address.to_string()), ..self.clone() })
+    }
+
+    fn check_room(&self, run: &Path) -> Result<(), CommandError> {
+        match (self.min_free, free_bytes(run)) {
+            (Some(least), Ok(free)) if free < least => Err(CommandError::bad_input(format!(
+                "--min-free: {:.1} GB are to be left on the disk of {}, and {:.1} GB are left before anything is recorded\n  \
+                 make room there, or let less be left",
+                least as f64 / 1e9,
+                run.display(),
+                free as f64 / 1e9,
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// A new record for a run.

@@ -94,6 +94,12 @@ fn what_cannot_be_played_or_go_on_is_said() {
     check_refused(folder, &["replay", "nothing"], 2, &["run.json", "descry runs"]);
     check_refused(folder, &["do", "--resume", "nothing"], 2, &["run.json"]);
     check_refused(folder, &["find", "cup A", "--max-bytes", "much"], 2, &["no size", "500MB"]);
+    check_refused(
+        folder,
+        &["find", "cup A", "--min-free", "900000TB"],
+        2,
+        &["--min-free", "are left before"],
+    );
     check_refused(folder, &["replay", "nothing", "--speed", "0"], 2, &["no speed"]);
     if cfg!(not(feature = "mongodb")) {
         let words = ["built without MongoDB", "cargo build --release --features mongodb"];

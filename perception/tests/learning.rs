@@ -128,7 +128,7 @@ fn nothing_is_gone_at_the_edge_of_what_stands_where_views_are_turned() {
         let came: Vec<Point3<f64>> = same.appeared.iter().filter(|a| a.apart).map(|a| a.centre()).collect();
         assert!(came.is_empty(), "visit {seed}: {came:?}");
     }
-    let more = [things[0], things[1], ("mug", standing(0.1, 0.15, 0.0))];
+    let more = [things[0], things[1], ("kettle", standing(0.1, 0.15, 0.0))];
     let came = first.clone().visit(&visit(&more, TURNED_RAD, 9)).expect("a sound visit");
     assert!(came.appeared.iter().any(|a| a.apart && near(&a.centre(), 0.1, 0.15)), "{}", came.appeared.len());
     let went = first.clone().visit(&visit(&things[..1], TURNED_RAD, 9)).expect("a sound visit");

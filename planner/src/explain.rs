@@ -122,7 +122,10 @@ fn together(task: &Task, parts: &[&Condition], narrowed: bool) -> Diagnostic {
         }
     };
     let mut spans = parts.iter().filter_map(|part| first_span(part));
-    let span = spans.next().unwrap_or_default();
+    let Some(span) = spans.next() else {
+        // A goal of nothing, as that any of no things holds: nobody can bring that about.
+        return Diagnostic::error("unsolvable", message, task.goal_span, "this goal");
+    };
     let label = if parts.len() > 1 { "this and the others exclude each other" } else { "this goal" };
     let mut finding = Diagnostic::error("unsolvable", message, span, label);
     for span in spans.take(SHOWN) {

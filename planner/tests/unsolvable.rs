@@ -130,6 +130,7 @@ fn each_reason_is_drawn_where_it_stands() {
             "  (:init (= (fuel) 3) (= (cap) 5))
   (:goal (and (lit) (> (fuel) 8) (< (fuel) 100)))".to_string(),
         ),
+        ("nothing-will-do", TANK, "  (:init (= (fuel) 3) (= (cap) 5)) (:goal (or))".to_string()),
         ("needed-by-a-rule-of-some", HOUSE, format!("{HOUSE_PROBLEM}  (:goal (exists (?t - thing) (and (clean ?t) (brush ?t))))")),
     ] {
         insta::assert_snapshot!(name, why(domain, &problem));

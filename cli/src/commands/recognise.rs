@@ -208,7 +208,8 @@ mod tests {
         let (told, stated) = (Point3::new(0.0, 0.0, 2.0), Point3::new(0.0, 3.0, 0.0));
         let check = |told: Option<Point3<f64>>, stated, eye: Point3<f64>, note: Option<&str>| {
             let (visibility, said) = seen_from(&view(None), told, stated);
-            assert_eq!(visibility.viewpoints(), [eye]);
+            let eyes = visibility.viewpoints();
+            assert!(eyes.len() == 1 && (eyes[0] - eye).norm() < 1e-9, "{eyes:?}");
             assert!(
                 said.is_some() == note.is_some()
                     && said.unwrap_or_default().contains(note.unwrap_or_default())

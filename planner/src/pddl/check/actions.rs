@@ -66,7 +66,8 @@ impl Checker<'_> {
         });
     }
 
-    /// At once, a number can get one value, or have amounts added and taken away: of other changes PDDL 2.1 gives no result.
+    /// At once, a number can get one value, have amounts added and taken away, or be scaled: of other changes PDDL 2.1 gives no result, and
+    /// here the order of the text decides.
     fn agree(&mut self, effects: &[Effect]) {
         let always = |effect: &&Effect| effect.forall.is_empty() && effect.when == Timed::default();
         let mut earlier: Vec<&Effect> = Vec::new();
@@ -74,9 +75,9 @@ impl Checker<'_> {
             if let Some(other) = earlier.iter().find(|other| contradict(other, effect)) {
                 let message = "two changes of one number at once contradict each other";
                 self.push(
-                    Diagnostic::error("contradicting-effects", message, effect.span, "which one holds?")
+                    Diagnostic::warning("contradicting-effects", message, effect.span, "this comes last here")
                         .with_label(other.span, "the number is changed here already")
-                        .with_help("make one change of the two; only `increase` and `decrease` add up"),
+                        .with_help("PDDL gives no result of both, and other planners may read them otherwise: make one change of the two"),
                 );
             }
             earlier.push(effect);
@@ -497,11 +498,13 @@ fn contradict(one: &Effect, other: &Effect) -> bool {
         return false;
     };
     let adds = |how: &Assignment| matches!(how, Assignment::Increase | Assignment::Decrease);
+    let scales = |how: &Assignment| matches!(how, Assignment::ScaleUp | Assignment::ScaleDown);
     let same = fluent.function == other_fluent.function && fluent.arguments == other_fluent.arguments;
     let assign_same = (*how, *other_how) == (Assignment::Assign, Assignment::Assign)
         && constant(amount).is_some()
         && constant(amount) == constant(other_amount);
-    same && !(adds(how) && adds(other_how)) && !assign_same
+    let commute = adds(how) && adds(other_how) || scales(how) && scales(other_how);
+    same && !commute && !assign_same
 }
 
 fn has_preference(formula: &Formula) -> bool {

@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+use descry_agent::shell;
+
 use super::{ExperimentError, Kind, Source, kinds};
 
 /// What is to be run on a cluster.
@@ -136,7 +138,7 @@ fn name(said: &str) -> String {
 
 /// A path as a word of a shell.
 fn quoted(path: &Path) -> String {
-    format!("'{}'", path.to_string_lossy().replace('\'', r"'\''"))
+    shell::quoted(&path.to_string_lossy())
 }
 
 /// A text as YAML has it within quotation marks, which is how JSON has it.

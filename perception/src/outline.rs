@@ -60,16 +60,15 @@ pub(crate) fn fits(points: &[Point3<f64>], residual_m: f64) -> bool {
     })
 }
 
-/// Sides of the rectangle of least area around nearly all points (longer, shorter), and its middle.
-pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<([f64; 2], [f64; 2])> {
+/// The rectangle of least area around nearly all points; it has no residual.
+pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.is_empty() {
         return None;
     }
     let mut turner = Turner::of(points);
-    let least = (0..TURNS)
+    (0..TURNS)
         .map(|turn| turner.turned(turn).rectangle(0.0))
-        .min_by(|a, b| (a.sides_m[0] * a.sides_m[1]).total_cmp(&(b.sides_m[0] * b.sides_m[1])))?;
-    Some((least.sides_m, [least.x, least.y]))
+        .min_by(|a, b| (a.sides_m[0] * a.sides_m[1]).total_cmp(&(b.sides_m[0] * b.sides_m[1])))
 }
 
 /// Points seen from above, and their coordinates along the sides of the rectangle that was turned last.

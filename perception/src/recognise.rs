@@ -9,6 +9,7 @@ mod percept;
 mod published;
 mod rays;
 mod settle;
+mod toppled;
 mod upper;
 mod verify;
 

@@ -4,6 +4,7 @@ use crate::tabletop;
 use crate::tabletop::{Draws, TABLE_M, Thing, look, on_ring};
 use descry_perception::merge::{MergeOptions, merge};
 use descry_perception::nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
+use descry_perception::recognise::Stance;
 use descry_perception::recognise::{Descry, Handle, Published, Range, Shape, Top, check_models};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::surface::{SurfaceError, SurfaceOptions};
@@ -99,6 +100,54 @@ fn one_thing_from_one_view() {
         assert!((least..=most).contains(&p), "{name}: {p} {:?}", found[0].evidence);
         let sum: f64 = found[0].probabilities.iter().map(|p| p.1).sum::<f64>() + found[0].unknown;
         assert!((sum - 1.0).abs() < 1e-9, "{name}: probabilities sum to {sum}");
+    }
+}
+
+#[test]
+fn what_lies_on_its_side_is_known_and_told_from_what_is_like_it() {
+    let lying = |radius: f64, height: f64, open: bool, handle: bool| Thing::Lying {
+        x: 0.05,
+        y: 0.02,
+        radius,
+        height,
+        towards_rad: 0.7,
+        open,
+        handle,
+    };
+    let range = |low: f64, high: f64| Range { low, high };
+    let mug = ObjectModel {
+        name: "mug".into(),
+        kind: "mug".into(),
+        height_m: range(0.08, 0.12),
+        diameter_m: Some(range(0.07, 0.10)),
+        taper: range(0.8, 1.15),
+        handle: Handle::One,
+        ..cup_a()
+    };
+    let carton = Thing::Block { x: 0.05, y: 0.02, half: [0.052, 0.035], height: 0.07, turn_rad: 0.7 };
+    // (what, thing, model, its probability at least, at most)
+    let cases = [
+        ("the cup on its side", lying(0.035, 0.104, true, false), cup_a(), 0.7, 1.0),
+        ("a tin of its size on its side", lying(0.035, 0.104, false, false), cup_a(), 0.0, 0.3),
+        ("a larger cup on its side", lying(0.044, 0.155, true, false), cup_a(), 0.0, 0.01),
+        ("a carton of its size", carton, cup_a(), 0.0, 0.05),
+        ("the cup as it stands", CUP, cup_a(), 0.7, 1.0),
+        ("a mug on its side", lying(0.042, 0.095, true, true), mug, 0.5, 1.0),
+    ];
+    for (name, thing, model, least, most) in cases {
+        let mut draws = Draws(5);
+        let poses = [0.3, 1.9, 3.5, 5.0].map(|angle| on_ring(angle, 1.2, 1.4));
+        let views = poses.map(|pose| look(&[thing], &pose, &pose, &mut draws));
+        let up = Some(Unit::new_normalize(Vector3::z()));
+        let merged =
+            merge(&views, &MergeOptions { up, ..MergeOptions::default() }).expect("views that merge");
+        let scene = segment(&merged.cloud, &merged.visibility, &options()).expect("there is a table");
+        let found = Descry::default().recognise(&scene, &merged.visibility, std::slice::from_ref(&model));
+        assert_eq!(found.len(), 1, "{name}: in one piece");
+        let p = found[0].probability_of(&model.name);
+        assert!((least..=most).contains(&p), "{name}: {p} {:?}", found[0].evidence);
+        let lies = found[0].stance == Stance::Lying;
+        assert_eq!(lies, p > 0.5 && matches!(thing, Thing::Lying { .. }), "{name}: {:?}", found[0].stance);
     }
 }
 

@@ -1,4 +1,4 @@
-//! Bodies that a ray may meet: upright frusta, open or closed, and boxes.
+//! Bodies that a ray may meet: frusta, open or closed at the top, and boxes.
 
 use crate::round::Round;
 
@@ -78,6 +78,13 @@ impl Body for Frustum {
         let over = (height - from[2]) / fall;
         let (x, y) = (from[0] + over * dx, from[1] + over * dy);
         if fall >= 0.0 || over < 0.0 || x * x + y * y > self.rim_m * self.rim_m {
+            if fall > 0.0 && from[2] < 0.0 {
+                let foot = -from[2] / fall;
+                let (x, y) = (from[0] + foot * dx, from[1] + foot * dy);
+                if x * x + y * y < self.foot_m * self.foot_m {
+                    return foot;
+                }
+            }
             let ends = self.cone(from, ray.along, 0.0);
             return ends.and_then(|ends| ends.into_iter().find(is_side)).unwrap_or(f64::INFINITY);
         }
@@ -127,6 +134,8 @@ mod tests {
         check(&CUP, [0.2, -0.1, 1.0], [0.2, -0.1, 0.0], 0.997);
         let tin = Frustum { wall_m: None, ..CUP };
         check(&tin, [0.2, -0.1, 1.0], [0.2, -0.1, 0.0], 0.9);
+        // From below onto its foot.
+        check(&CUP, [0.2, -0.1, -1.0], [0.2, -0.1, 0.0], 1.0);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use super::Recogniser;
 use super::evidence::{HANDLE_M, Measured, Setting, measure};
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
 use super::percept::{Percept, Sighting, Stance};
+use super::toppled::Toppled;
 use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor, normal_cdf};
 use crate::segment::{Scene, Segment};
@@ -27,6 +28,8 @@ pub struct Descry {
     pub look_alikes: f64,
     /// Probability that a known object stands upside down. From: fitted, with the look-alikes.
     pub upside_down: f64,
+    /// How probable it is that a round thing lies on its side, for each that stands. From: chosen, as upside down.
+    pub lying: f64,
     /// Least probability with which a percept carries a model's name. From: chosen, likelier than not.
     pub least: f64,
     /// Exponent on the likelihoods of sizes and form: below 1 softens them for what the model of the measurements leaves out. From: chosen.
@@ -38,7 +41,15 @@ pub struct Descry {
 
 impl Default for Descry {
     fn default() -> Self {
-        Descry { known: 0.5, look_alikes: 1.0, upside_down: 0.02, least: 0.5, temper: 0.7, verified: 0.3 }
+        Descry {
+            known: 0.5,
+            look_alikes: 1.0,
+            upside_down: 0.02,
+            lying: 0.02,
+            least: 0.5,
+            temper: 0.7,
+            verified: 0.3,
+        }
     }
 }
 
@@ -130,20 +141,27 @@ impl Descry {
         seen: &Visibility,
         models: &[ObjectModel],
     ) -> Percept {
-        let looked = measure(setting, segment, seen);
-        let mut weighed = self.weigh(models, &looked.measured, &vec![0.0; models.len()]);
+        let mut looked = measure(setting, segment, seen);
+        let toppled = Toppled::of(setting, segment, seen, &looked.measured, models);
+        if let Some(toppled) = &toppled {
+            looked.measured.rival_m = toppled.spread_m();
+        }
+        let mut weighed =
+            self.weigh(models, &looked.measured, toppled.as_ref(), &vec![[0.0; 3]; models.len()]);
         let doubted: Vec<bool> = weighed.probabilities.iter().map(|p| *p > DOUBT).collect();
         if self.verified > 0.0 && doubted.contains(&true) {
             let own = Own::of(&looked.rays, &looked.measured, segment.base_m);
+            let lying = toppled.as_ref().map(|toppled| toppled.own(&looked.measured));
+            let against = |(m, stance): (&ObjectModel, &Stance)| {
+                let lies =
+                    lying.as_ref().map(|ways| ways.each_ref().map(|way| way.log_against(m, Stance::Upright)));
+                let [foot, rim] = lies.unwrap_or_default();
+                [own.log_against(m, *stance), foot, rim].map(|log| self.verified * log)
+            };
             let each = models.iter().zip(&weighed.stances).zip(doubted);
-            let against: Vec<f64> = each
-                .map(
-                    |((m, stance), doubted)| {
-                        if doubted { self.verified * own.log_against(m, *stance) } else { 0.0 }
-                    },
-                )
-                .collect();
-            weighed = self.weigh(models, &looked.measured, &against);
+            let against: Vec<[f64; 3]> =
+                each.map(|(asked, doubted)| if doubted { against(asked) } else { [0.0; 3] }).collect();
+            weighed = self.weigh(models, &looked.measured, toppled.as_ref(), &against);
         }
         let Weighed { probabilities, stances } = weighed;
         let unknown = 1.0 - probabilities.iter().sum::<f64>();
@@ -154,8 +172,15 @@ impl Descry {
         percept(setting.scene, segment, looked.measured, models, named, stances, probabilities, unknown)
     }
 
-    /// How probable each model is, and how it stands; `against` is the log of what else speaks against each.
-    fn weigh(&self, models: &[ObjectModel], measured: &Measured, against: &[f64]) -> Weighed {
+    /// How probable each model is, and how it stands; `against` is the log of what else speaks against each as it stands, and as it lies
+    /// either way.
+    fn weigh(
+        &self,
+        models: &[ObjectModel],
+        measured: &Measured,
+        toppled: Option<&Toppled>,
+        against: &[[f64; 3]],
+    ) -> Weighed {
         let each = self.known / models.len().max(1) as f64;
         let mut stances = vec![Stance::Upright; models.len()];
         let log = |model: &ObjectModel, stance: Stance| self.model_log(model, stance, measured);
@@ -163,27 +188,54 @@ impl Descry {
             .iter()
             .zip(&mut stances)
             .zip(against)
-            .map(|((model, stance), against)| {
+            .map(|((model, stance), [against, lying @ ..])| {
                 let up = (1.0 - self.upside_down).ln() + log(model, Stance::Upright);
                 let down = self.upside_down.ln() + log(model, Stance::UpsideDown);
                 if down > up {
                     *stance = Stance::UpsideDown;
                 }
-                each.ln() + log_sum(&[up, down]) + against
+                let stands = each.ln() + log_sum(&[up, down]) + against;
+                let lies = self.lying_logs(toppled, |m| self.model_log(model, Stance::Upright, m));
+                let lies: Vec<f64> =
+                    lies.iter().zip(lying).map(|(log, against)| each.ln() + log + against).collect();
+                if lies.iter().any(|log| *log > stands) {
+                    *stance = Stance::Lying;
+                }
+                log_sum(&[&[stands], lies.as_slice()].concat())
             })
             .collect();
-        let families = FAMILIES.iter().map(|f| {
-            ((1.0 - self.known) * f.share).ln()
-                + stranger_log(f, models, measured)
-                + self.family_log(f, measured)
+        let families = FAMILIES.iter().flat_map(|family| {
+            let share = ((1.0 - self.known) * family.share).ln();
+            let log = |m: &Measured| share + stranger_log(family, models, m) + self.family_log(family, m);
+            // What has no axis is the same however it lies.
+            let lies = match family.shape {
+                Some(Shape::Round) => self.lying_logs(toppled, log),
+                _ => Vec::new(),
+            };
+            std::iter::once(log(measured)).chain(lies)
         });
-        let alike =
-            |m: &ObjectModel| (each * self.look_alikes).ln() + self.look_alike_log(m, models, measured);
-        let alike = models.iter().map(alike);
+        let alike = models.iter().flat_map(|model| {
+            let share = (each * self.look_alikes).ln();
+            let log = |m: &Measured| share + self.look_alike_log(model, models, m);
+            let lies = match model.shape {
+                Shape::Round => self.lying_logs(toppled, log),
+                Shape::Box => Vec::new(),
+            };
+            std::iter::once(log(measured)).chain(lies)
+        });
         let rest: Vec<f64> = families.chain(alike).collect();
         let total = log_sum(&[logs.as_slice(), &rest].concat());
         let share = |log: &f64| if total.is_finite() { (log - total).exp() } else { 0.0 };
         Weighed { probabilities: logs.iter().map(share).collect(), stances }
+    }
+
+    /// Log likelihoods of what may lie, with either end for its foot, which is closed; none if it cannot lie.
+    fn lying_logs(&self, toppled: Option<&Toppled>, log: impl Fn(&Measured) -> f64) -> Vec<f64> {
+        let Some(toppled) = toppled else { return Vec::new() };
+        let ways = toppled.ways.each_ref().map(|way| &way.measured);
+        let way =
+            |rim: &Measured, foot: &Measured| (0.5 * self.lying).ln() + log(rim) + top_log(Top::Closed, foot);
+        vec![way(ways[0], ways[1]), way(ways[1], ways[0])]
     }
 
     fn model_log(&self, model: &ObjectModel, stance: Stance, m: &Measured) -> f64 {
@@ -300,9 +352,10 @@ fn percept(
     unknown: f64,
 ) -> Percept {
     let kinds = kinds(models, &probabilities);
-    let round_fits = measured
-        .round
-        .filter(|_| form_log(Some(Shape::Round), &measured) > form_log(Some(Shape::Box), &measured));
+    let stance = named.map_or(Stance::Unknown, |i| stances[i]);
+    let stands = measured.round.filter(|_| stance != Stance::Lying);
+    let round_fits =
+        stands.filter(|_| form_log(Some(Shape::Round), &measured) > form_log(Some(Shape::Box), &measured));
     let (x, y) = round_fits.map_or((measured.middle[0], measured.middle[1]), |r| (r.x, r.y));
     let sigma = round_fits.map_or(UNPLACED_SIGMA_M, |r| r.place_sigma_m.max(LEAST_PLACE_SIGMA_M));
     Percept {
@@ -314,7 +367,7 @@ fn percept(
         position_m: scene.surface.surface_from_world.inverse() * Point3::new(x, y, segment.base_m),
         position_sigma_m: sigma,
         size_m: [measured.footprint_m[0], measured.footprint_m[1], measured.height_m],
-        stance: named.map_or(Stance::Unknown, |i| stances[i]),
+        stance,
         points: segment.indices.len(),
         seen_fraction: measured.seen_fraction,
         evidence: measured.evidence,
@@ -474,7 +527,7 @@ fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     /// Log by which each share of the side that was looked through, beyond what may be an accident, speaks against it. From: chosen.
     const THROUGH: (f64, f64) = (-60.0, 0.15);
     let all = [Some(Shape::Round), Some(Shape::Box), None].map(|s| raw_form_log(s, m));
-    let best = all.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let best = all.into_iter().fold(miss_log(m.rival_m, m), f64::max);
     // However round what is there: a camera that looked through the rest of the side says that it is not.
     let through = match shape {
         Some(Shape::Round) => THROUGH.0 * (m.looked_through - THROUGH.1).max(0.0),
@@ -500,23 +553,28 @@ fn beside_log(m: &Measured) -> f64 {
 fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     /// Irregular things miss both forms by about this much, metres. From: chosen.
     const IRREGULAR_M: f64 = 0.006;
-    /// Views that lie so far apart tell a form half as sharply as they would if only the noise of each point counted, metres. From: chosen.
-    const SHARED_M: f64 = 0.003;
     /// The miss of what no circle fits at all. From: chosen.
     const NONE_M: f64 = 0.02;
-    /// No form is measured more sharply than this, metres, and this share of the spread of a measurement. From: chosen.
-    const SHARPEST_M: f64 = 0.0015;
-    const OF_SIGMA: f64 = 0.7;
-    let apart = m.apart_m();
-    let floor = SHARPEST_M.hypot(OF_SIGMA * m.sigma_m).hypot(apart);
     let miss = match shape {
         Some(Shape::Round) => m.round.map_or(NONE_M, |r| r.spread_m),
         Some(Shape::Box) => m.rectangle.map_or(NONE_M, |r| r.residual_m),
         None => IRREGULAR_M,
     };
+    miss_log(miss, m)
+}
+
+/// Log likelihood of a side that misses a form by so much, metres.
+fn miss_log(miss_m: f64, m: &Measured) -> f64 {
+    /// Views that lie so far apart tell a form half as sharply as they would if only the noise of each point counted, metres. From: chosen.
+    const SHARED_M: f64 = 0.003;
+    /// No form is measured more sharply than this, metres, and this share of the spread of a measurement. From: chosen.
+    const SHARPEST_M: f64 = 0.0015;
+    const OF_SIGMA: f64 = 0.7;
+    let apart = m.apart_m();
+    let floor = SHARPEST_M.hypot(OF_SIGMA * m.sigma_m).hypot(apart);
     // What lies beside each other by an error that whole views share tells the same again and again.
     let independent = m.independent / (1.0 + (apart / SHARED_M).powi(2));
-    -independent * miss.hypot(floor).ln()
+    -independent * miss_m.hypot(floor).ln()
 }
 
 fn top_log(top: Top, m: &Measured) -> f64 {

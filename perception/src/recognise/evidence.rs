@@ -26,14 +26,16 @@ pub(super) const HANDLE_M: (f64, f64) = (0.014, 0.06);
 /// A handle reaches out by at least so many spreads of the body's side. From: chosen.
 const HANDLE_SPREADS: f64 = 4.0;
 /// A circle whose radius is known no better than this is no circle to go by, metres. From: chosen.
-const VAGUE_M: f64 = 0.015;
+pub(super) const VAGUE_M: f64 = 0.015;
 /// A circle on which no more than this share of the side lies is no circle of it: any face has some that fits a third of it.
 /// From: chosen, just above that third; real mugs have a circle that half of the side keeps to.
-const MOST: f64 = 0.34;
+pub(super) const MOST: f64 = 0.34;
 /// What is this far out of the body is no longer the body itself, metres. From: chosen.
-const CLEAR_M: f64 = 0.007;
+pub(super) const CLEAR_M: f64 = 0.007;
 /// So many spreads of a measurement are more than noise. From: chosen.
 const CLEAR_SPREADS: f64 = 3.0;
+/// Where a handle could hide in no more than this share of the directions there is none. From: chosen.
+pub(super) const UNSEEN: f64 = 0.08;
 /// Greatest width of a handle across, metres. From: chosen.
 const HANDLE_WIDTH_M: f64 = 0.035;
 /// Share of its reach up to which what sticks out may be the body's own blurred side. From: chosen.
@@ -41,8 +43,8 @@ const ROOT: f64 = 0.35;
 /// An inside is said to be seen, or not to be there, where it is so much likelier, log. From: chosen.
 const SAID: f64 = 1.5;
 /// A handle has one in so many points of the body, far off and near, but at least and at most so many. From: chosen.
-const HANDLE_POINTS: (usize, usize) = (30, 150);
-const HANDLE_FEWEST: (usize, usize) = (6, 60);
+pub(super) const HANDLE_POINTS: (usize, usize) = (30, 150);
+pub(super) const HANDLE_FEWEST: (usize, usize) = (6, 60);
 /// It is higher than this, metres, and begins above this share of the height. From: chosen.
 const HANDLE_HIGH_M: f64 = 0.012;
 const HANDLE_FOOT: f64 = 0.05;
@@ -81,6 +83,9 @@ pub(super) struct Measured {
     pub blur_m: f64,
     pub round: Option<Round>,
     pub rectangle: Option<Rectangle>,
+    /// How far the side is off the best round body about an axis that lies, of what stands, and about one that stands, of what lies;
+    /// infinite if there is none, metres.
+    pub rival_m: f64,
     /// Height above what it stands on, metres.
     pub height_m: f64,
     pub height_sigma_m: f64,
@@ -150,17 +155,24 @@ impl Reach {
     }
 }
 
-/// The pixels around a thing.
-fn rays(
+/// The pixels around a thing that stands.
+fn rays(segment: &Segment, own: (&[Point3<f64>], &Measured), asker: &Asker, setting: &Setting) -> Rays {
+    let m = own.1;
+    let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
+    let half_m = m.round.map_or(0.5 * m.footprint_m[0], |r| {
+        r.radius_at(segment.base_m).max(r.radius_at(segment.base_m + m.height_m))
+    });
+    rays_around(([x, y], half_m), segment, own, asker, setting)
+}
+
+/// The pixels around a thing that reaches so far from a place.
+pub(super) fn rays_around(
+    ([x, y], half_m): ([f64; 2], f64),
     segment: &Segment,
     (own, m): (&[Point3<f64>], &Measured),
     asker: &Asker,
     Setting { scene, sensor, reaches }: &Setting,
 ) -> Rays {
-    let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
-    let half_m = m.round.map_or(0.5 * m.footprint_m[0], |r| {
-        r.radius_at(segment.base_m).max(r.radius_at(segment.base_m + m.height_m))
-    });
     let around = Around {
         x,
         y,
@@ -176,20 +188,26 @@ fn rays(
     Rays::of(asker, sensor, &around, own, others.flat_map(|(other, _)| &other.points))
 }
 
+/// How far from what a camera measured a place may be and still be what it saw, metres.
+pub(super) fn tolerance_m(sigma_m: f64) -> f64 {
+    (CLEAR_SPREADS * sigma_m).clamp(TOLERANCES_M.0, TOLERANCES_M.1)
+}
+
 /// Measures one segment of a scene.
 pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -> Looked {
     let (scene, this) = (setting.scene, segment);
     let base_m = segment.base_m;
     let top = top_m(segment);
     let height_m = (top - base_m).max(LEAST_HEIGHT_M);
-    let bounding = |segment: &Segment| outline::bounding(&segment.points).unwrap_or_default();
+    let bounding = |segment: &Segment| {
+        outline::bounding(&segment.points).map_or(([0.0; 2], [0.0; 2]), |r| (r.sides_m, [r.x, r.y]))
+    };
     let (footprint_m, middle) = bounding(segment);
     let world_from_surface = scene.surface.surface_from_world.inverse();
     let place = world_from_surface * Point3::new(middle[0], middle[1], 0.5 * (base_m + top));
     let near = seen.viewpoints().iter().map(|v| (place - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
     let sigma_m = round::sigma_m(near);
-    let tolerance_m = (CLEAR_SPREADS * sigma_m).clamp(TOLERANCES_M.0, TOLERANCES_M.1);
-    let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m);
+    let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m(sigma_m));
     let first = round::fit(&segment.points, base_m, top, sigma_m, round::SEED);
     let settled = first.and_then(|round| settle(&round, segment, &asker, (base_m, top), sigma_m));
     let (segment, asker, first, (footprint_m, middle)) = match &settled {
@@ -207,6 +225,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         evidence: Evidence { taper: 1.0, ..Evidence::default() },
         round: first,
         rectangle: outline::fit(&side),
+        rival_m: f64::INFINITY,
         height_m,
         height_sigma_m: HEIGHT_M.hypot(0.5 * sigma_m).hypot(0.5 * scene.surface.residual_m.min(ROUGHEST_M)),
         top_hidden: top_hidden(&asker, middle, footprint_m, top),
@@ -310,8 +329,6 @@ fn measure_round(
     (segment, asker, rays): (&Segment, &Asker, &Rays),
     (base_m, top): (f64, f64),
 ) {
-    /// Where a handle could hide in no more than this share of the directions there is none. From: chosen.
-    const UNSEEN: f64 = 0.08;
     /// What the sides count for in what was seen of a body; the top has the rest. From: chosen.
     const SIDES: f64 = 0.75;
     let height = top - base_m;
@@ -345,7 +362,7 @@ fn measure_round(
         None => Sighting::Unseen,
     };
 
-    let upper = Upper::of(rays, &Frustum::around(round, base_m, top));
+    let upper = Upper::of(&rays.views, &Frustum::around(round, base_m, top));
     (evidence.open, evidence.lid) = (upper.open, upper.lid);
     evidence.inside = match upper.open_log {
         log if log > SAID => Sighting::Seen,
@@ -379,7 +396,7 @@ impl Sectors {
         /// How far within the side a look goes that finds it missing, metres. From: chosen.
         const WITHIN_M: f64 = 0.004;
         let mut sectors = Sectors {
-            measured: measured_sectors(round, segment, base_m, height),
+            measured: measured_sectors(round, &segment.points, base_m, height),
             looked_through: [false; SECTORS],
             handle_free: [0.0; SECTORS],
         };
@@ -428,7 +445,12 @@ impl Sectors {
 }
 
 /// In which directions two or more points lie on the side.
-fn measured_sectors(round: &Round, segment: &Segment, base_m: f64, height: f64) -> [bool; SECTORS] {
+pub(super) fn measured_sectors(
+    round: &Round,
+    points: &[Point3<f64>],
+    base_m: f64,
+    height: f64,
+) -> [bool; SECTORS] {
     /// So near to the side a point shows it in its direction, metres. From: chosen.
     const NEAR_M: f64 = 0.009;
     let (low, high) = (base_m + ENDS.0 * height, base_m + (1.0 - ENDS.1) * height);
@@ -436,7 +458,7 @@ fn measured_sectors(round: &Round, segment: &Segment, base_m: f64, height: f64) 
     let mut counts = [0_u32; SECTORS];
     // What follows lies in the same direction, most often: this much of the circle needs no angle to be told.
     let mut settled: Option<[[f64; 2]; 2]> = None;
-    for p in segment.points.iter().filter(on_side) {
+    for p in points.iter().filter(on_side) {
         let (x, y) = (p.x - round.x, p.y - round.y);
         if settled.is_some_and(|[from, to]| from[0] * y - from[1] * x > 0.0 && to[0] * y - to[1] * x < 0.0) {
             continue;

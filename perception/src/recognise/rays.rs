@@ -54,6 +54,7 @@ pub(super) struct ViewRays {
 }
 
 /// A pixel with a return.
+#[derive(Clone, Copy)]
 pub(super) struct Pixel {
     pub along: [f64; 3],
     pub depth_m: f64,
@@ -95,6 +96,19 @@ impl Rays {
         }
         let view = |lying: &Lying| ViewRays::of(lying, asker, sensor, around, &other);
         Rays { views: asker.views.iter().filter_map(view).collect() }
+    }
+
+    /// The same in another frame.
+    pub fn moved(&self, there_from_surface: &Isometry3<f64>) -> Rays {
+        let turn = |way: &[f64; 3]| (there_from_surface.rotation * Vector3::from(*way)).into();
+        let pixel = |pixel: &Pixel| Pixel { along: turn(&pixel.along), ..*pixel };
+        let view = |view: &ViewRays| ViewRays {
+            from: (there_from_surface * Point3::from(view.from)).into(),
+            wander: view.wander.each_ref().map(turn),
+            pixels: view.pixels.iter().map(pixel).collect(),
+            looks: view.looks,
+        };
+        Rays { views: self.views.iter().map(view).collect() }
     }
 }
 

@@ -1,7 +1,7 @@
 //! What rays tell of a round body's upper end.
 
 use super::body::{Body, Frustum, Ray};
-use super::rays::{BEYOND, Rays, bounded, normal};
+use super::rays::{BEYOND, ViewRays, bounded, normal};
 use super::verify::WALL_M;
 use crate::noise::normal_cdf;
 
@@ -19,7 +19,8 @@ pub(super) struct Upper {
 }
 
 impl Upper {
-    pub fn of(rays: &Rays, body: &Frustum) -> Upper {
+    /// As views of a body tell it.
+    pub fn of<'v>(views: impl IntoIterator<Item = &'v ViewRays>, body: &Frustum) -> Upper {
         /// So near to the rim a ray does not tell; what is deeper than the second is an inside, and seen by rays that may come as deep, metres.
         /// From: chosen.
         const RIM_M: f64 = 0.006;
@@ -37,14 +38,15 @@ impl Upper {
         const LID: f64 = 0.75;
         let hollow = Frustum { wall_m: Some(WALL_M), ..*body };
         let (mut all, mut open, mut lid, mut open_log) = (0.0, 0.0, 0.0, 0.0);
-        for view in &rays.views {
+        for view in views {
             let mut sum = 0.0;
             for pixel in view.pixels.iter().filter(|p| !p.other && p.along[2] < -LEVEL) {
                 let at_m = (body.top_m - view.from[2]) / pixel.along[2];
                 let [x, y] = [body.x, body.y];
                 let (dx, dy) =
                     (view.from[0] + at_m * pixel.along[0] - x, view.from[1] + at_m * pixel.along[1] - y);
-                if dx.hypot(dy) > body.rim_m - RIM_M {
+                // What lies may be seen from behind its rim.
+                if at_m < 0.0 || dx.hypot(dy) > body.rim_m - RIM_M {
                     continue;
                 }
                 let (fall, sigma_m) = (-pixel.along[2], pixel.sigma_m.hypot(LID_M));
@@ -75,11 +77,11 @@ impl Upper {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rays::{Pixel, ViewRays};
+    use super::super::rays::Pixel;
     use super::*;
 
     /// A view of a body from so high and aside, a pixel a step of a hundredth, as if every ray met just that; some share of them another thing.
-    fn view(body: &Frustum, high_m: f64, other: usize) -> Rays {
+    fn view(body: &Frustum, high_m: f64, other: usize) -> ViewRays {
         let from = [0.8, 0.0, high_m];
         let falls = (0.1 - high_m) / 0.8;
         let steps = (-12..=12).flat_map(|i| (-12..=12).map(move |j| (f64::from(i), f64::from(j))));
@@ -95,7 +97,7 @@ mod tests {
             })
         });
         let pixels = pixels.collect();
-        Rays { views: vec![ViewRays { from, wander: [[0.0; 3]; 3], pixels, looks: 0.04 }] }
+        ViewRays { from, wander: [[0.0; 3]; 3], pixels, looks: 0.04 }
     }
 
     #[test]
@@ -110,13 +112,13 @@ mod tests {
             wall_m: Some(0.003),
         };
         let tin = Frustum { wall_m: None, ..cup };
-        let [open, closed] = [cup, tin].map(|body| Upper::of(&view(&body, 0.7, 0), &body));
+        let [open, closed] = [cup, tin].map(|body| Upper::of([&view(&body, 0.7, 0)], &body));
         assert!(open.open_log > 2.0 && open.open > 0.7 && open.lid < 0.2, "{open:?}");
         assert!(closed.open_log < -2.0 && closed.lid > 0.9 && closed.open == 0.0, "{closed:?}");
-        let hidden = Upper::of(&view(&cup, 0.7, 10), &cup);
+        let hidden = Upper::of([&view(&cup, 0.7, 10)], &cup);
         assert_eq!((hidden.open_log, hidden.open, hidden.lid), (0.0, 0.0, 0.0));
         // What looks in so flatly that it meets the far wall just below the rim has seen neither inside nor lid.
-        let flat = Upper::of(&view(&cup, 0.22, 0), &cup);
+        let flat = Upper::of([&view(&cup, 0.22, 0)], &cup);
         assert!(flat.open_log >= 0.0 && (flat.open, flat.lid) == (0.0, 0.0), "{flat:?}");
     }
 }

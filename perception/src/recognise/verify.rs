@@ -59,6 +59,12 @@ impl<'a> Own<'a> {
         Own { rays, measured, base_m, placed: frustum.unwrap_or_else(unmoved), logs }
     }
 
+    /// The same of the thing turned as if it stood; what explains it best as it lies stays.
+    pub fn turned<'b>(&self, rays: &'b Rays, measured: &'b Measured, base_m: f64) -> Own<'b> {
+        let placed = vec![Placed { log: 0.0, shift_m: [0.0; 2] }; rays.views.len()];
+        Own { rays, measured, base_m, placed, logs: self.logs.clone() }
+    }
+
     /// Log of how much less likely a model makes the views than the best body of the thing's own measures: 0 or less.
     pub fn log_against(&self, model: &ObjectModel, stance: Stance) -> f64 {
         let (m, Shape::Round, Some(diameter_m)) = (self.measured, model.shape, model.diameter_m) else {

@@ -34,6 +34,8 @@ pub enum Thing {
         handle_rad: Option<f64>,
         spout: bool,
     },
+    /// A cup, or closed a tin, on its side: its foot behind the middle, its rim before it along a direction; a handle lies beside it.
+    Lying { x: f64, y: f64, radius: f64, height: f64, towards_rad: f64, open: bool, handle: bool },
 }
 
 impl Thing {
@@ -44,7 +46,8 @@ impl Thing {
             | Thing::Tin { x, y, .. }
             | Thing::Sherd { x, y, .. }
             | Thing::Block { x, y, .. }
-            | Thing::Turned { x, y, .. } => (x, y),
+            | Thing::Turned { x, y, .. }
+            | Thing::Lying { x, y, .. } => (x, y),
         }
     }
 
@@ -55,6 +58,9 @@ impl Thing {
             Thing::Cup { radius, handle_rad, .. } => radius + grip(handle_rad),
             Thing::Tin { radius, .. } | Thing::Sherd { radius, .. } => radius,
             Thing::Block { half, .. } => half[0].hypot(half[1]),
+            Thing::Lying { radius, height, handle, .. } => {
+                (radius + grip(handle.then_some(0.0))).hypot(0.5 * height)
+            }
             Thing::Turned { knots, scale, handle_rad, .. } => {
                 scale * knots.iter().map(|k| k[1]).fold(0.0, f64::max) + grip(handle_rad)
             }
@@ -189,6 +195,24 @@ fn meets(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
                     let high = Point3::new(-rim[1], 0.012, TABLE_M + rim[0]);
                     cuboid(eye, ray, x, y, angle, &low, &high).for_each(&mut offer);
                 }
+            }
+        }
+        Thing::Lying { x, y, radius, height, towards_rad, open, handle: has_handle } => {
+            // Across it, up from its axis, along it from its foot.
+            let (sin, cos) = towards_rad.sin_cos();
+            let own = |v: Vector3<f64>| Vector3::new(cos * v.y - sin * v.x, v.z, cos * v.x + sin * v.y);
+            let axis = Point3::new(x, y, TABLE_M + radius);
+            let eye = Point3::from(own(eye - axis)) + Vector3::new(0.0, 0.0, TABLE_M + 0.5 * height);
+            let ray = own(*ray);
+            tube(&eye, &ray, 0.0, 0.0, radius, height).for_each(&mut offer);
+            disc(&eye, &ray, 0.0, 0.0, radius, TABLE_M).for_each(&mut offer);
+            if open {
+                tube(&eye, &ray, 0.0, 0.0, radius - 0.003, height).for_each(&mut offer);
+            } else {
+                disc(&eye, &ray, 0.0, 0.0, radius, TABLE_M + height).for_each(&mut offer);
+            }
+            if has_handle {
+                handle(&eye, &ray, 0.0, 0.0, radius, height, 0.0).for_each(&mut offer);
             }
         }
     }

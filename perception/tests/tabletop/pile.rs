@@ -37,6 +37,7 @@ impl Placed {
                 | Thing::Sherd { height, .. }
                 | Thing::Block { height, .. } => height,
                 Thing::Turned { knots, scale, .. } => scale * knots[knots.len() - 1][0],
+                Thing::Lying { radius, .. } => 2.0 * radius,
             }
     }
 

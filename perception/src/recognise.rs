@@ -4,6 +4,7 @@ mod asker;
 mod body;
 mod descry;
 mod evidence;
+mod likelihood;
 mod model;
 mod percept;
 mod published;

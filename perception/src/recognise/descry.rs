@@ -4,12 +4,16 @@
 //! upper end and handle. A feature that was not in view has the same likelihood under all of them, so that doubt stays.
 
 use super::Recogniser;
-use super::evidence::{HANDLE_M, Measured, Setting, measure};
+use super::evidence::{Measured, Setting, measure};
+use super::likelihood::{
+    HEIGHTS, STRANGER, WIDTHS, alike_sides_log, diameter_log, diameter_sigma_m, form_log, handle_log,
+    height_log, inside, log_sum, other_taper_log, round_log, sides_log, taper_log, top_log,
+};
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
-use super::percept::{Percept, Sighting, Stance};
+use super::percept::{Percept, Stance};
 use super::toppled::Toppled;
 use super::verify::Own;
-use crate::noise::{KINECT, Residuals, Sensor, normal_cdf};
+use crate::noise::{KINECT, Residuals, Sensor};
 use crate::segment::{Scene, Segment};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -311,12 +315,6 @@ impl Descry {
 /// Standard deviation of where a thing stands that no circle fits, metres, and what it is for others at the least. From: chosen.
 pub(super) const UNPLACED_SIGMA_M: f64 = 0.02;
 const LEAST_PLACE_SIGMA_M: f64 = 0.001;
-/// No density and no chance is taken to be less. From: chosen.
-const LEAST_DENSITY: f64 = 1e-12;
-const LEAST_CHANCE: f64 = 1e-6;
-/// Share of a family's things of the measured size that are of a known kind all the same, at the least. From: chosen.
-const STRANGER: f64 = 0.05;
-
 /// Log of the chance that a thing of a family, as measured, is of none of the known kinds.
 fn stranger_log(family: &Family, models: &[ObjectModel], m: &Measured) -> f64 {
     let known = models.iter().map(|model| covers(model, family, m)).fold(0.0, f64::max);
@@ -333,11 +331,6 @@ fn covers(model: &ObjectModel, family: &Family, m: &Measured) -> f64 {
     };
     inside(m.height_m, m.height_sigma_m, model.height_m)
         * inside(2.0 * m.evidence.radius_m, diameter_sigma_m(m), width)
-}
-
-/// The chance that what was measured lies within a range; none for a single value.
-fn inside(value: f64, sigma: f64, r: Range) -> f64 {
-    normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -385,250 +378,4 @@ pub(super) fn kinds(models: &[ObjectModel], probabilities: &[(String, f64)]) -> 
         }
     }
     kinds
-}
-
-/// How often a measurement goes wrong altogether: flat tails.
-/// From: chosen, a tenth of it was tried, and with it a real mug that narrows was no mug.
-const ASTRAY: f64 = 0.002;
-
-/// Density of a measure under a range: a uniform, blurred by the measurement.
-fn within_density(value: f64, sigma: f64, r: Range) -> f64 {
-    /// Of the spread of a measurement: a range that is no wider is a single value. From: chosen.
-    const NARROW: f64 = 0.2;
-    let width = r.high - r.low;
-    if width > NARROW * sigma {
-        inside(value, sigma, r) / width
-    } else {
-        normal_density(value - r.middle(), sigma)
-    }
-}
-
-/// Log density of a measure under a range (uniform, blurred by the measurement) or, without one, under everyday sizes (log-normal).
-fn measure_log(value: f64, sigma: f64, range: Option<Range>, everyday: (f64, f64)) -> f64 {
-    match range {
-        Some(r) => {
-            let density = within_density(value, sigma, r);
-            ((1.0 - ASTRAY) * density + ASTRAY * everyday_density(value, everyday)).max(LEAST_DENSITY).ln()
-        }
-        None => everyday_density(value, everyday).max(LEAST_DENSITY).ln(),
-    }
-}
-
-/// Median, metres, and log-normal spread of the heights of everyday things. From: chosen, a guess; nothing was measured.
-const HEIGHTS: (f64, f64) = (0.11, 0.6);
-/// The same of their widths. From: chosen, a guess; nothing was measured.
-const WIDTHS: (f64, f64) = (0.10, 0.6);
-/// The same of their tapers, which have no unit. From: chosen, a guess; nothing was measured.
-const TAPERS: (f64, f64) = (0.95, 0.25);
-/// What is left of the error of a taper however well the side is measured. From: chosen.
-const RATIO_SIGMA: f64 = 0.05;
-
-fn height_log(range: Option<Range>, everyday: (f64, f64), m: &Measured) -> f64 {
-    if m.top_hidden {
-        // Only a lower bound: the chance of being at least that high.
-        let chance = match range {
-            Some(r) => 1.0 - normal_cdf((m.height_m - r.high) / m.height_sigma_m),
-            None => 1.0 - normal_cdf((m.height_m / everyday.0).ln() / everyday.1),
-        };
-        return chance.max(LEAST_CHANCE).ln();
-    }
-    measure_log(m.height_m, m.height_sigma_m, range, everyday)
-}
-
-fn diameter_log(range: Option<Range>, everyday: (f64, f64), m: &Measured) -> f64 {
-    if m.round.is_none() {
-        /// How well a footprint tells a diameter, metres. From: chosen.
-        const SIGMA_M: f64 = 0.02;
-        // No circle fits; were it round, its footprint would be its diameter.
-        return measure_log(m.footprint_m[0], SIGMA_M, range, everyday);
-    }
-    measure_log(2.0 * m.evidence.radius_m, diameter_sigma_m(m), range, everyday)
-}
-
-/// Diameter and form of a round body together: a circle that is not as wide as the body is no circle of its side, and then its
-/// roundness says nothing for it.
-fn round_log(range: Option<Range>, m: &Measured) -> f64 {
-    let form = form_log(Some(Shape::Round), m);
-    let Some(r) = range.filter(|_| m.round.is_some()) else { return diameter_log(range, WIDTHS, m) + form };
-    let (value, sigma) = (2.0 * m.evidence.radius_m, diameter_sigma_m(m));
-    let fits = (1.0 - ASTRAY) * within_density(value, sigma, r);
-    let astray = ASTRAY * everyday_density(value, WIDTHS);
-    log_sum(&[fits.max(LEAST_DENSITY).ln() + form, astray.max(LEAST_DENSITY).ln() + form.min(LEAST_FORM)])
-}
-
-fn diameter_sigma_m(m: &Measured) -> f64 {
-    /// What is left of the error however good the camera, metres. From: chosen.
-    const LEAST_M: f64 = 0.003;
-    (2.0 * m.evidence.radius_sigma_m).hypot(LEAST_M)
-}
-
-fn taper_log(range: Option<Range>, m: &Measured) -> f64 {
-    let (taper, sigma) = taper(m);
-    measure_log(taper, sigma, range, TAPERS)
-}
-
-/// Log of the chance that the taper lies outside a range by more than a margin: a thing that is alike but for its side.
-fn other_taper_log(range: Range, margin: f64, m: &Measured) -> f64 {
-    let (taper, sigma) = taper(m);
-    (1.0 - inside(taper, sigma, Range { low: range.low - margin, high: range.high + margin }))
-        .max(STRANGER)
-        .ln()
-}
-
-/// The taper and its standard deviation.
-fn taper(m: &Measured) -> (f64, f64) {
-    /// Of what no circle fits. From: chosen.
-    const UNKNOWN: (f64, f64) = (1.0, 0.2);
-    /// No radius is less, metres. From: chosen.
-    const LEAST_M: f64 = 0.005;
-    let Some(round) = m.round else { return UNKNOWN };
-    let sigma = m.height_m * round.slope_sigma / round.radius_m.max(LEAST_M);
-    (m.evidence.taper, sigma.hypot(RATIO_SIGMA))
-}
-
-/// Spread of a measured side of a footprint, metres.
-fn side_sigma_m(m: &Measured) -> f64 {
-    /// What is left of the error however good the camera, metres. From: chosen.
-    const LEAST_M: f64 = 0.005;
-    LEAST_M.hypot(2.0 * m.sigma_m)
-}
-
-/// A footprint is measured only as far as it was seen: a side may be longer than it looks.
-fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
-    let sigma = side_sigma_m(m);
-    match ranges {
-        Some((width, depth)) => {
-            measure_log(m.footprint_m[0], sigma, Some(width), WIDTHS)
-                + measure_log(m.footprint_m[1], sigma, Some(depth), WIDTHS)
-        }
-        // One side only, as for a round body: densities of as many measures must be compared.
-        None => {
-            measure_log(m.footprint_m[0], sigma, None, WIDTHS) + measure_log(1.0, RATIO_SIGMA, None, TAPERS)
-        }
-    }
-}
-
-/// The same for the sides of things alike: median and log-normal spread of the longer and of the shorter, blurred by the measurement.
-fn alike_sides_log(near: [(f64, f64); 2], m: &Measured) -> f64 {
-    let sides = m.footprint_m.iter().zip(near);
-    sides
-        .map(|(side, (median, spread))| {
-            measure_log(*side, side_sigma_m(m), None, (median, spread.hypot(side_sigma_m(m) / median)))
-        })
-        .sum()
-}
-
-/// However many points: what the forms leave out (rounded boxes, bulging cups) bounds what they tell. From: chosen.
-const LEAST_FORM: f64 = -12.0;
-
-/// How well the side keeps to the form, against the form it keeps to best, and whether it is there at all. `None` is a form that is
-/// neither round nor a box.
-fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
-    /// Log by which each share of the side that was looked through, beyond what may be an accident, speaks against it. From: chosen.
-    const THROUGH: (f64, f64) = (-60.0, 0.15);
-    let all = [Some(Shape::Round), Some(Shape::Box), None].map(|s| raw_form_log(s, m));
-    let best = all.into_iter().fold(miss_log(m.rival_m, m), f64::max);
-    // However round what is there: a camera that looked through the rest of the side says that it is not.
-    let through = match shape {
-        Some(Shape::Round) => THROUGH.0 * (m.looked_through - THROUGH.1).max(0.0),
-        _ => 0.0,
-    };
-    let beside = if shape == Some(Shape::Round) { beside_log(m) } else { 0.0 };
-    (raw_form_log(shape, m) - best).max(LEAST_FORM) + through + beside
-}
-
-/// However well a circle fits a part of the side: a round body has nothing beside it but a handle, and what views blur.
-fn beside_log(m: &Measured) -> f64 {
-    /// So far a handle, or views that lie beside each other, reach out of the body, metres. From: chosen.
-    const REACH_M: f64 = 0.04;
-    /// Spread of how far beyond that what belongs to the body reaches, metres. From: chosen.
-    const SIGMA_M: f64 = 0.01;
-    /// However far something reaches out, it may be a view that lies wrongly: no log is lower. From: chosen.
-    const LEAST: f64 = -20.0;
-    let Some(round) = m.round else { return 0.0 };
-    let beside_m = (m.footprint_m[0] - 2.0 * round.radius_m - REACH_M).max(0.0);
-    (-0.5 * (beside_m / SIGMA_M).powi(2)).max(LEAST)
-}
-
-fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
-    /// Irregular things miss both forms by about this much, metres. From: chosen.
-    const IRREGULAR_M: f64 = 0.006;
-    /// The miss of what no circle fits at all. From: chosen.
-    const NONE_M: f64 = 0.02;
-    let miss = match shape {
-        Some(Shape::Round) => m.round.map_or(NONE_M, |r| r.spread_m),
-        Some(Shape::Box) => m.rectangle.map_or(NONE_M, |r| r.residual_m),
-        None => IRREGULAR_M,
-    };
-    miss_log(miss, m)
-}
-
-/// Log likelihood of a side that misses a form by so much, metres.
-fn miss_log(miss_m: f64, m: &Measured) -> f64 {
-    /// Views that lie so far apart tell a form half as sharply as they would if only the noise of each point counted, metres. From: chosen.
-    const SHARED_M: f64 = 0.003;
-    /// No form is measured more sharply than this, metres, and this share of the spread of a measurement. From: chosen.
-    const SHARPEST_M: f64 = 0.0015;
-    const OF_SIGMA: f64 = 0.7;
-    let apart = m.apart_m();
-    let floor = SHARPEST_M.hypot(OF_SIGMA * m.sigma_m).hypot(apart);
-    // What lies beside each other by an error that whole views share tells the same again and again.
-    let independent = m.independent / (1.0 + (apart / SHARED_M).powi(2));
-    -independent * miss_m.hypot(floor).ln()
-}
-
-fn top_log(top: Top, m: &Measured) -> f64 {
-    /// A lid or an inside is missed, or seen where there is none, about this often. From: chosen.
-    const ASTRAY_TOP: f64 = 0.01;
-    let open = ASTRAY_TOP + (1.0 - 2.0 * ASTRAY_TOP) / (1.0 + (-m.upper.open_log).exp());
-    match top {
-        Top::Open => open.ln(),
-        Top::Closed => (1.0 - open).ln(),
-        Top::Any => 0.5_f64.ln(),
-    }
-}
-
-fn handle_log(handle: Handle, m: &Measured) -> f64 {
-    /// What sticks out no farther than the first is what views that lie beside each other leave of a side; as far as the second it is a
-    /// handle, metres. From: chosen, the first is the least reach of a handle.
-    const REACHES_M: (f64, f64) = (HANDLE_M.0, 0.022);
-    /// How often a handle in view is missed and found, and one out of view is found all the same. From: chosen.
-    const MISSED: f64 = 0.04;
-    const FOUND: f64 = 0.9;
-    const STRAY: f64 = 0.02;
-    /// How often none is found where there is none, and one is. From: chosen.
-    const NEITHER: (f64, f64) = (0.99, 0.01);
-    let unseen = m.evidence.handle_unseen.clamp(0.0, 1.0);
-    let sure = match m.evidence.handle {
-        Sighting::Seen => (m.evidence.protrusion_m - REACHES_M.0) / (REACHES_M.1 - REACHES_M.0),
-        _ => 0.0,
-    };
-    let between = |no: f64, yes: f64| no * (yes / no).powf(sure.clamp(0.0, 1.0));
-    // A handle that is there is missed in view now and then; out of view always.
-    let with = between(unseen + (1.0 - unseen) * MISSED, FOUND * (1.0 - unseen) + STRAY);
-    let without = between(NEITHER.0, NEITHER.1);
-    match handle {
-        Handle::One => with.ln(),
-        Handle::None => without.ln(),
-        Handle::Any => (0.5 * (with + without)).ln(),
-    }
-}
-
-fn everyday_density(value: f64, (median, spread): (f64, f64)) -> f64 {
-    if value <= 0.0 {
-        return 0.0;
-    }
-    normal_density((value / median).ln(), spread) / value
-}
-
-fn normal_density(x: f64, sigma: f64) -> f64 {
-    (-0.5 * (x / sigma).powi(2)).exp() / (sigma * std::f64::consts::TAU.sqrt())
-}
-
-fn log_sum(logs: &[f64]) -> f64 {
-    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if most == f64::NEG_INFINITY {
-        return most;
-    }
-    most + logs.iter().map(|l| (l - most).exp()).sum::<f64>().ln()
 }

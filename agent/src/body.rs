@@ -8,7 +8,7 @@ use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::truth::Truth;
 
 use crate::exit::CommandError;
-use crate::keeping;
+use crate::{keeping, shell};
 
 pub mod program;
 mod recorded;
@@ -106,7 +106,8 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
             let path = std::path::Path::new(folder);
             if keeping::is_address(path) && keeping::Address::read(folder)?.run.is_none() {
                 let text = format!(
-                    "--robot {robot}: one run is one body\n  name it behind a #; `descry memory show {folder}` lists the runs"
+                    "--robot {robot}: one run is one body\n  name it behind a #; `descry memory show {}` lists the runs",
+                    shell::word(folder)
                 );
                 return Err(CommandError::BadInput(text));
             }

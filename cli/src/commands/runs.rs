@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::commands::input;
 use descry_agent::exit::{CommandError, Exit};
 use descry_agent::keeping::{self, RECORD};
-use descry_agent::run;
+use descry_agent::{run, shell};
 
 /// Arguments of `descry runs`.
 #[derive(clap::Args)]
@@ -57,9 +57,10 @@ fn table(runs: &[Value]) -> String {
 fn list(arguments: &Arguments) -> Result<Vec<Value>, CommandError> {
     let folder = &arguments.folder;
     if keeping::is_address(folder) {
+        let folder = folder.display().to_string();
         let text = format!(
-            "{0}: a store, not a folder of runs\n  `descry memory show {0}` names the runs whose records are there",
-            folder.display()
+            "{folder}: a store, not a folder of runs\n  `descry memory show {}` names the runs whose records are there",
+            shell::word(&folder)
         );
         return Err(CommandError::BadInput(text));
     }

@@ -143,6 +143,8 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
 fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>, Vec<Point3<f64>>) {
     /// Up to so many spreads of the surface is the surface itself. From: chosen.
     const ROUGH: f64 = 2.5;
+    /// Points whose heights are told together. From: work.
+    const BLOCK: usize = 16;
     let clearance_m = options.clearance_m.max(ROUGH * surface.residual_m);
     let up = surface.up.cast::<f32>();
     let offset = surface.offset_m as f32;
@@ -151,15 +153,21 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>,
     let is_over = surface.overhung();
     let (mut indices, mut points) =
         (Vec::with_capacity(cloud.len() / 2), Vec::with_capacity(cloud.len() / 2));
-    for (i, p) in (0u32..).zip(&cloud.points) {
+    for (block, first) in cloud.points.chunks(BLOCK).zip((0u32..).step_by(BLOCK)) {
         // What is not finite is in no band.
-        let height = up.dot(&p.coords) - offset;
-        if band.contains(&height) {
-            let world = p.cast::<f64>();
-            let flat = surface.surface_from_world * world;
-            if rows.covers(&flat, &world) && !is_over(f64::from(height), &world) {
-                indices.push(i);
-                points.push(flat);
+        let mut heights = [f32::NAN; BLOCK];
+        heights.iter_mut().zip(block).for_each(|(height, p)| *height = up.dot(&p.coords) - offset);
+        if !heights.iter().fold(false, |any, height| any | band.contains(height)) {
+            continue;
+        }
+        for ((i, p), height) in (first..).zip(block).zip(heights) {
+            if band.contains(&height) {
+                let world = p.cast::<f64>();
+                let flat = surface.surface_from_world * world;
+                if rows.covers(&flat, &world) && !is_over(f64::from(height), &world) {
+                    indices.push(i);
+                    points.push(flat);
+                }
             }
         }
     }

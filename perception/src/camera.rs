@@ -46,6 +46,7 @@ pub enum CameraError {
 
 impl Intrinsics {
     /// Pixel (column, row) of a point in the optical frame, metres; `None` behind the camera. It may lie outside the image.
+    #[inline]
     pub fn project(&self, p: &Point3<f64>) -> Option<(f64, f64)> {
         (p.z > 0.0).then(|| (self.fx * p.x / p.z + self.cx, self.fy * p.y / p.z + self.cy))
     }
@@ -56,10 +57,13 @@ impl Intrinsics {
     }
 
     /// Index of the pixel nearest to (column, row) in row order; `None` outside the image.
+    #[inline]
     pub fn pixel(&self, column: f64, row: f64) -> Option<usize> {
         let (u, v) = (column + 0.5, row + 0.5);
-        let inside = u >= 0.0 && v >= 0.0 && u < self.width as f64 && v < self.height as f64;
-        inside.then(|| v as usize * self.width + u as usize)
+        // Signed, and of 32 bits: single instructions, where other numbers take several.
+        let [width, height] = [self.width, self.height].map(|size| size as i64 as f64);
+        let inside = u >= 0.0 && v >= 0.0 && u < width && v < height;
+        inside.then(|| v as u32 as usize * self.width + u as u32 as usize)
     }
 
     /// An organised cloud in the optical frame from depths along z in metres, row by row; what is not finite or not positive is "no return".

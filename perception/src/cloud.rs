@@ -193,6 +193,9 @@ impl Cloud {
     /// A warning if a typical return lies farther from the sensor (the origin) than any depth camera or room scanner sees: what that looks
     /// like. Other units are mended with [`Cloud::scaled`], coordinates of a map by subtracting an offset before they are written.
     pub fn unit_warning(&self) -> Option<String> {
+        if self.is_surely_near() {
+            return None;
+        }
         let ranges = || self.points.iter().filter(|p| is_finite(p)).map(|p| p.coords.cast::<f64>().norm());
         let (near, all) =
             ranges().fold((0, 0), |(near, all), r| (near + usize::from(r <= FARTHEST_TYPICAL_M), all + 1));
@@ -224,6 +227,20 @@ impl Cloud {
         })
     }
 
+    /// True if more than half of the points lie well within what is typical: told without a root of each.
+    fn is_surely_near(&self) -> bool {
+        /// Share of the square of that range up to which single precision tells it. From: rounding.
+        const SURE: f32 = 0.999;
+        let sure_sq = (FARTHEST_TYPICAL_M * FARTHEST_TYPICAL_M) as f32 * SURE;
+        let count = |(near, finite): (u32, u32), p: &Point3<f32>| {
+            (near + u32::from(p.coords.norm_squared() < sure_sq), finite + u32::from(is_finite(p)))
+        };
+        self.points.len() <= u32::MAX as usize && {
+            let (near, finite) = self.points.iter().fold((0, 0), count);
+            near > finite / 2
+        }
+    }
+
     /// How far a typical point lies from the middle of all, metres; `None` if none is finite.
     fn within_of_middle_m(&self) -> Option<f64> {
         let finite = || self.points.iter().filter(|p| is_finite(p)).map(|p| p.cast::<f64>());
@@ -253,6 +270,7 @@ impl Cloud {
 }
 
 /// True if all three coordinates are finite.
+#[inline]
 pub fn is_finite(p: &Point3<f32>) -> bool {
     // What is not finite times nothing is NaN: one comparison in place of three.
     p.x * 0.0 + p.y * 0.0 + p.z * 0.0 == 0.0

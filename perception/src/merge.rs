@@ -320,7 +320,7 @@ fn filter_and_thin(
     prepared: &[Prepared],
     options: &MergeOptions,
 ) -> Result<Vec<Step>, MergeError> {
-    let given = views.iter().map(|v| v.cloud.count_finite()).sum();
+    let given = views.par_iter().map(|v| v.cloud.count_finite()).sum();
     let points = prepared.iter().map(|p| p.points.len()).sum();
     if points == 0 {
         let band = options

@@ -36,8 +36,8 @@ impl Bounds {
     fn around(items: &[Item]) -> Bounds {
         items.iter().fold(Bounds::EMPTY, |mut b, item| {
             for k in 0..3 {
-                b.low[k] = b.low[k].min(item.at[k]);
-                b.high[k] = b.high[k].max(item.at[k]);
+                b.low[k] = lesser(item.at[k], b.low[k]);
+                b.high[k] = greater(item.at[k], b.high[k]);
             }
             b
         })
@@ -45,7 +45,7 @@ impl Bounds {
 
     #[inline(always)]
     fn distance_sq(&self, q: &[f32; 3]) -> f32 {
-        let beyond = |k: usize| (self.low[k] - q[k]).max(q[k] - self.high[k]).max(0.0);
+        let beyond = |k: usize| greater(greater(self.low[k] - q[k], q[k] - self.high[k]), 0.0);
         let (x, y, z) = (beyond(0), beyond(1), beyond(2));
         x * x + y * y + z * z
     }
@@ -53,7 +53,7 @@ impl Bounds {
     fn distance_sq_to(&self, other: &Bounds) -> f32 {
         let mut sum = 0.0;
         for k in 0..3 {
-            let d = (self.low[k] - other.high[k]).max(other.low[k] - self.high[k]).max(0.0);
+            let d = greater(greater(self.low[k] - other.high[k], other.low[k] - self.high[k]), 0.0);
             sum += d * d;
         }
         sum
@@ -63,6 +63,17 @@ impl Bounds {
         let width = |k: usize| self.high[k] - self.low[k];
         (1..3).fold(0, |best, k| if width(k) > width(best) { k } else { best })
     }
+}
+
+/// [`f32::min`] and [`f32::max`] of what is a number: a single instruction each.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 #[derive(Clone, Copy)]

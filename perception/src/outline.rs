@@ -44,7 +44,7 @@ pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     let turned = turner.turned(best?.1);
     let turned = turner.settled(turned);
     let squares = turner.squares_within(&turned, f64::INFINITY)?;
-    Some(turned.rectangle((squares / turner.xs.len() as f64).sqrt()))
+    Some(turned.rectangle((squares / turner.len as f64).sqrt()))
 }
 
 /// True if some rectangle fits the points, as [`fit`] does, with a lesser residual.
@@ -53,7 +53,7 @@ pub(crate) fn fits(points: &[Point3<f64>], residual_m: f64) -> bool {
         return false;
     }
     let mut turner = Turner::of(points);
-    let bound = residual_m * residual_m * turner.xs.len() as f64;
+    let bound = residual_m * residual_m * turner.len as f64;
     (0..TURNS).any(|turn| {
         let turned = turner.turned(turn);
         turner.squares_within(&turned, bound).is_some()
@@ -73,10 +73,14 @@ pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<Rectangle> {
 
 /// Points seen from above, and their coordinates along the sides of the rectangle that was turned last.
 struct Turner {
+    /// How many points there are. All that follows is filled up to whole blocks with what lies outside of no side.
+    len: usize,
     xs: Vec<f64>,
     ys: Vec<f64>,
     us: Vec<f64>,
     vs: Vec<f64>,
+    /// How far out each block of the points lies across each side: less is farther.
+    reaches: Vec<[f64; 4]>,
     /// Across the ends of `us`, then of `vs`.
     sides: [Side; 4],
 }
@@ -84,25 +88,33 @@ struct Turner {
 impl Turner {
     fn of(points: &[Point3<f64>]) -> Turner {
         let stride = (points.len() / LEAST).max(1);
-        let (xs, ys): (Vec<f64>, Vec<f64>) = points.iter().step_by(stride).map(|p| (p.x, p.y)).unzip();
-        // Filled up to whole blocks with what lies outside of no side.
-        let coordinates = vec![f64::NAN; xs.len().next_multiple_of(BLOCK)];
-        let last = xs.len().saturating_sub(1);
+        let (mut xs, mut ys): (Vec<f64>, Vec<f64>) =
+            points.iter().step_by(stride).map(|p| (p.x, p.y)).unzip();
+        let len = xs.len();
+        for column in [&mut xs, &mut ys] {
+            column.resize(len.next_multiple_of(BLOCK), f64::NAN);
+        }
+        let coordinates = vec![f64::NAN; xs.len()];
+        let reaches = vec![[f64::INFINITY; 4]; xs.len() / BLOCK];
+        let last = len.saturating_sub(1);
         let rank = |share: f64| (last as f64 * share).round() as usize;
         let outside = [rank(0.02), last - rank(0.98)];
         let sides =
             [0, 1, 0, 1].map(|end| Side { outermost: (0..=outside[end]).collect(), found: Vec::new() });
-        Turner { xs, ys, us: coordinates.clone(), vs: coordinates, sides }
+        Turner { len, xs, ys, us: coordinates.clone(), vs: coordinates, reaches, sides }
     }
 
     fn turned(&mut self, turn: usize) -> Turned {
         let (sin, cos) = (std::f64::consts::FRAC_PI_2 * turn as f64 / TURNS as f64).sin_cos();
-        for (((x, y), u), v) in self.xs.iter().zip(&self.ys).zip(&mut self.us).zip(&mut self.vs) {
-            (*u, *v) = (cos * x + sin * y, -sin * x + cos * y);
+        let [xs, ys] = [&self.xs, &self.ys].map(|column| column.as_chunks::<BLOCK>().0);
+        let [us, vs] = [&mut self.us, &mut self.vs].map(|column| column.as_chunks_mut::<BLOCK>().0);
+        for ((((x, y), u), v), reach) in xs.iter().zip(ys).zip(us).zip(vs).zip(&mut self.reaches) {
+            *reach = turn_block([x, y], [u, v], (sin, cos));
         }
+        let reach = |side: usize| self.reaches.iter().map(move |reach| reach[side]);
         let [left, right, front, back] = &mut self.sides;
-        let u = [left.turn(&self.us, |u| u), -right.turn(&self.us, |u| -u)];
-        let v = [front.turn(&self.vs, |v| v), -back.turn(&self.vs, |v| -v)];
+        let u = [left.turn(&self.us, reach(0), |u| u), -right.turn(&self.us, reach(1), |u| -u)];
+        let v = [front.turn(&self.vs, reach(2), |v| v), -back.turn(&self.vs, reach(3), |v| -v)];
         Turned { sin, cos, u, v }
     }
 
@@ -114,13 +126,13 @@ impl Turner {
         for _ in 0..ROUNDS {
             let ([u0, u1], [v0, v1]) = (turned.u, turned.v);
             let mut sums = [(0.0, 0.0); 4];
-            for (u, v) in self.us.iter().zip(&self.vs).take(self.xs.len()) {
+            for (u, v) in self.us.iter().zip(&self.vs).take(self.len) {
                 let away = [u - u0, u - u1, v - v0, v - v1].map(f64::abs);
                 let nearest = (0..4).min_by(|&a, &b| away[a].total_cmp(&away[b])).unwrap_or(0);
                 sums[nearest].0 += if nearest < 2 { u } else { v };
                 sums[nearest].1 += 1.0;
             }
-            let least = LEAST_SHARE * self.xs.len() as f64;
+            let least = LEAST_SHARE * self.len as f64;
             let amid = |n: usize, edge: f64| if sums[n].1 > least { sums[n].0 / sums[n].1 } else { edge };
             (turned.u, turned.v) = ([amid(0, u0), amid(1, u1)], [amid(2, v0), amid(3, v1)]);
         }
@@ -131,7 +143,7 @@ impl Turner {
     fn squares_within(&self, turned: &Turned, bound: f64) -> Option<f64> {
         let ([u0, u1], [v0, v1]) = (turned.u, turned.v);
         let lesser = |a: f64, b: f64| if a < b { a } else { b };
-        let (n, mut sum) = (self.xs.len(), 0.0);
+        let (n, mut sum) = (self.len, 0.0);
         for (us, vs) in self.us[..n].chunks(BLOCK).zip(self.vs[..n].chunks(BLOCK)) {
             let mut squares = [0.0; BLOCK];
             for ((square, u), v) in squares.iter_mut().zip(us).zip(vs) {
@@ -156,15 +168,17 @@ struct Side {
 }
 
 impl Side {
-    /// Where the side lies when turned, from where the points lie across it: less is farther out.
-    fn turn(&mut self, places: &[f64], way: impl Fn(f64) -> f64) -> f64 {
+    /// Where the side lies when turned, from where the points lie across it and how far out each block of them does: less is farther out.
+    fn turn(&mut self, places: &[f64], reaches: impl Iterator<Item = f64>, way: impl Fn(f64) -> f64) -> f64 {
         // The side lies no farther in than the points that were outermost before.
         let before = self.outermost.iter().map(|&i| way(places[i]));
         let limit = before.fold(f64::NEG_INFINITY, f64::max);
         self.found.clear();
-        for (block, first) in places.as_chunks::<BLOCK>().0.iter().zip((0..).step_by(BLOCK)) {
+        for ((block, first), reach) in
+            places.as_chunks::<BLOCK>().0.iter().zip((0..).step_by(BLOCK)).zip(reaches)
+        {
             // Neighbours in an image are near each other: most blocks have none so far out.
-            if least(block, &way) <= limit {
+            if reach <= limit {
                 let places = block.iter().map(|place| way(*place)).zip(first..);
                 self.found.extend(places.filter(|(place, _)| *place <= limit));
             }
@@ -177,15 +191,30 @@ impl Side {
     }
 }
 
-/// The least of some places, each taken in a way.
+/// Turns the points of a block, and tells how far out they lie across each side; those that are no number count for nothing.
 #[inline(always)]
-fn least(places: &[f64; BLOCK], way: &impl Fn(f64) -> f64) -> f64 {
+fn turn_block(
+    [xs, ys]: [&[f64; BLOCK]; 2],
+    [us, vs]: [&mut [f64; BLOCK]; 2],
+    (sin, cos): (f64, f64),
+) -> [f64; 4] {
+    /// Points that are turned side by side. From: work.
     const LANES: usize = 4;
-    let mut least = [f64::INFINITY; LANES];
-    for lanes in places.as_chunks::<LANES>().0 {
-        least = std::array::from_fn(|i| if way(lanes[i]) < least[i] { way(lanes[i]) } else { least[i] });
+    let lesser = |a: f64, b: f64| if a < b { a } else { b };
+    let greater = |a: f64, b: f64| if a > b { a } else { b };
+    let (mut least, mut most) = ([[f64::INFINITY; LANES]; 2], [[f64::NEG_INFINITY; LANES]; 2]);
+    let [xs, ys] = [xs, ys].map(|column| column.as_chunks::<LANES>().0);
+    let [us, vs] = [us, vs].map(|column| column.as_chunks_mut::<LANES>().0);
+    for (((x, y), us), vs) in xs.iter().zip(ys).zip(us).zip(vs) {
+        let u: [f64; LANES] = std::array::from_fn(|i| cos * x[i] + sin * y[i]);
+        let v: [f64; LANES] = std::array::from_fn(|i| -sin * x[i] + cos * y[i]);
+        least = [(u, least[0]), (v, least[1])].map(|(a, b)| std::array::from_fn(|i| lesser(a[i], b[i])));
+        most = [(u, most[0]), (v, most[1])].map(|(a, b)| std::array::from_fn(|i| greater(a[i], b[i])));
+        (*us, *vs) = (u, v);
     }
-    least.into_iter().fold(f64::INFINITY, f64::min)
+    let [left, front] = least.map(|lanes| lanes.into_iter().fold(f64::INFINITY, lesser));
+    let [right, back] = most.map(|lanes| lanes.into_iter().fold(f64::NEG_INFINITY, greater));
+    [left, -right, front, -back]
 }
 
 /// The sides that bound nearly all points, the rectangle turned.

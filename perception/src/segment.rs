@@ -139,27 +139,48 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
     parts
 }
 
-/// Indices and positions (surface frame) of the points that stand above the surface, inside its outline.
-fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> (Vec<u32>, Vec<Point3<f64>>) {
+/// Indices and positions (surface frame) of points.
+type Placed = (Vec<u32>, Vec<Point3<f64>>);
+
+/// The points that stand above the surface, inside its outline.
+fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> Placed {
+    let half = cloud.len() / 2;
+    let rows = Rows::of(surface);
+    let [first, second] = [0..half, half..cloud.len()].map(|range| (range.start, &cloud.points[range]));
+    let of = |(from, points): (usize, &[Point3<f32>])| above_of(from as u32, points, surface, &rows, options);
+    let ((mut indices, mut points), more) = rayon::join(|| of(first), || of(second));
+    indices.extend(more.0);
+    points.extend(more.1);
+    (indices, points)
+}
+
+/// The same of some points that follow each other; the first has a number.
+fn above_of(from: u32, of: &[Point3<f32>], surface: &Surface, rows: &Rows, options: &SceneOptions) -> Placed {
     /// Up to so many spreads of the surface is the surface itself. From: chosen.
     const ROUGH: f64 = 2.5;
+    /// Points whose heights are told together. From: work.
+    const BLOCK: usize = 16;
     let clearance_m = options.clearance_m.max(ROUGH * surface.residual_m);
     let up = surface.up.cast::<f32>();
     let offset = surface.offset_m as f32;
     let band = clearance_m as f32..options.tallest_m as f32;
-    let rows = Rows::of(surface);
     let is_over = surface.overhung();
-    let (mut indices, mut points) =
-        (Vec::with_capacity(cloud.len() / 2), Vec::with_capacity(cloud.len() / 2));
-    for (i, p) in (0u32..).zip(&cloud.points) {
+    let (mut indices, mut points) = (Vec::with_capacity(of.len()), Vec::with_capacity(of.len()));
+    for (block, first) in of.chunks(BLOCK).zip((from..).step_by(BLOCK)) {
         // What is not finite is in no band.
-        let height = up.dot(&p.coords) - offset;
-        if band.contains(&height) {
-            let world = p.cast::<f64>();
-            let flat = surface.surface_from_world * world;
-            if rows.covers(&flat, &world) && !is_over(f64::from(height), &world) {
-                indices.push(i);
-                points.push(flat);
+        let mut heights = [f32::NAN; BLOCK];
+        heights.iter_mut().zip(block).for_each(|(height, p)| *height = up.dot(&p.coords) - offset);
+        if !heights.iter().fold(false, |any, height| any | band.contains(height)) {
+            continue;
+        }
+        for ((i, p), height) in (first..).zip(block).zip(heights) {
+            if band.contains(&height) {
+                let world = p.cast::<f64>();
+                let flat = surface.surface_from_world * world;
+                if rows.covers(&flat, &world) && !is_over(f64::from(height), &world) {
+                    indices.push(i);
+                    points.push(flat);
+                }
             }
         }
     }

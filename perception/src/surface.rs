@@ -6,6 +6,7 @@ mod hull;
 mod outline;
 mod planes;
 mod role;
+mod tiles;
 
 use crate::cloud::{Cloud, is_finite};
 use crate::noise::KINECT;

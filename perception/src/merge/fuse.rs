@@ -12,6 +12,7 @@ use crate::cloud::Cloud;
 use crate::view::View;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// What is known of a voxel: running sums, weighted, while it is gathered; then means.
 #[derive(Clone, Copy)]
@@ -113,7 +114,7 @@ pub(super) fn gather(
             voxel_m = all[0].grid.voxel_m * (cells as f64 / options.most_points as f64).sqrt().max(GROWTH);
             continue;
         }
-        all.iter_mut().for_each(Gathered::sort);
+        all.par_iter_mut().for_each(Gathered::sort);
         return all;
     }
 }
@@ -142,31 +143,37 @@ pub(super) fn gather_further(
 
 /// Sorts the returns of a view into voxels and sheets: some rows are looked through while those before them are added.
 fn take(all: &mut [Gathered], of: &Returns, view: u16, coloured: bool) {
-    /// Rows that are looked through together. From: work.
-    const ROWS: usize = 8;
+    /// Rows that are looked through together, and how many of them beside the adding, which takes less long. From: work.
+    const ROWS: usize = 12;
+    const BESIDE: usize = 4;
     let colours = of.view.cloud.colours.as_deref().filter(|_| coloured);
     let scales: Vec<Scale> = all.iter().map(|gathered| Scale::of(&of.world_from_camera, gathered)).collect();
-    let look = |first: usize, kept: &mut [Vec<Measured>]| {
-        of.visit(first..(first + ROWS).min(of.rows()), |found| {
+    let look = |rows: Range<usize>, kept: &mut Lists| {
+        of.visit(rows.start.min(of.rows())..rows.end.min(of.rows()), |found| {
             let number = found.plane.map_or(0, |plane| plane + 1);
             kept[number].push(scales[number].measured(&found));
         });
     };
-    let lists = || -> Vec<Vec<Measured>> { all.iter().map(|_| Vec::new()).collect() };
+    let lists = || -> [Lists; 2] { [(); 2].map(|()| all.iter().map(|_| Vec::new()).collect()) };
     let (mut kept, mut next) = (lists(), lists());
     for first in (0..of.rows() + ROWS).step_by(ROWS) {
-        let mut add = || {
-            for (gathered, kept) in all.iter_mut().zip(&mut kept) {
-                gathered.add(kept, view, colours);
+        let [early, late] = &mut next;
+        let mut add_and_look = || {
+            for kept in &mut kept {
+                all.iter_mut().zip(kept).for_each(|(gathered, kept)| gathered.add(kept, view, colours));
             }
+            look(first..first + BESIDE, early);
         };
         match first < of.rows() {
-            true => drop(rayon::join(add, || look(first, &mut next))),
-            false => add(),
+            true => drop(rayon::join(add_and_look, || look(first + BESIDE..first + ROWS, late))),
+            false => add_and_look(),
         }
         std::mem::swap(&mut kept, &mut next);
     }
 }
+
+/// Returns for each voxel grid or sheet.
+type Lists = Vec<Vec<Measured>>;
 
 /// Camera to grid.
 struct Scale {

@@ -190,12 +190,12 @@ impl Standing {
         let side = plane.0.dot(up).signum();
         let (up, offset_m) = (plane.0 * side, plane.1 * side);
         let (across, along) = tangents(&up);
-        let mut cells = FxHashMap::default();
+        let mut cells: FxHashMap<[i32; 2], u32> = FxHashMap::default();
         for (i, k) in points {
             let p = &places[i][k].coords;
-            *cells.entry([across, along].map(|axis| (axis.dot(p) / CELL_M).floor() as i32)).or_default() += 1;
+            *cells.entry([across, along].map(|axis| surface::floor(axis.dot(p) / CELL_M))).or_default() += 1;
         }
-        let part = surface::largest_part(&cells);
+        let part = surface::largest_part(cells.into_iter().collect());
         let corners = part.iter().flat_map(|&[x, y]| [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]);
         let hull =
             surface::convex_hull(corners.map(|corner| corner.map(|c| f64::from(c) * CELL_M)).collect());

@@ -177,9 +177,13 @@ pub(super) fn coarser(view: &View, within: &Within, about: usize) -> Option<Clou
     let stride = (width / about).max(1);
     let (columns, rows) = (width / stride, height / stride);
     let mut points = Vec::with_capacity(columns * rows);
-    for row in view.cloud.points.chunks_exact(width.max(1)).step_by(stride).take(rows) {
-        let pixels = row.iter().step_by(stride).take(columns);
-        points.extend(pixels.map(|p| if within.holds([p.x, p.y, p.z]) { *p } else { NONE }));
+    for line in view.cloud.points.chunks_exact(width.max(1)).step_by(stride).take(rows) {
+        let before = points.len();
+        points.resize(before + columns, NONE);
+        // Chunks are not empty: the first of each is there.
+        for (point, p) in points[before..].iter_mut().zip(line.chunks(stride)) {
+            *point = if within.holds([p[0].x, p[0].y, p[0].z]) { p[0] } else { NONE };
+        }
     }
     Some(Cloud { points, grid: Some(Grid { width: columns, height: rows }), ..Cloud::default() })
 }

@@ -4,7 +4,9 @@
 //! give many wrong valleys to a local method; so the few degrees of freedom are searched on a grid, coarse to fine.
 
 use super::parts::FEWEST;
+use crate::surface::floor;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 /// A place on a surface with its unit normal.
@@ -46,7 +48,7 @@ impl Cells {
     fn new(points: &[Oriented], side_m: f64, reach: i32) -> Cells {
         /// A surface faces each side along which its normal is longer than this. From: chosen.
         const FACES: f64 = 0.3;
-        let key = |p: &Point3<f64>| [p.x, p.y, p.z].map(|c| (c / side_m).floor() as i32);
+        let key = |p: &Point3<f64>| [p.x, p.y, p.z].map(|c| floor(c / side_m));
         let keys: Vec<[i32; 3]> = points.iter().map(|(p, _)| key(p)).collect();
         let (low, high) = keys.iter().fold(([i32::MAX; 3], [i32::MIN; 3]), |(low, high), k| {
             (std::array::from_fn(|c| low[c].min(k[c])), std::array::from_fn(|c| high[c].max(k[c])))
@@ -72,15 +74,14 @@ impl Cells {
 
     /// A surface of that side in the cell, which the margin keeps off the edge.
     fn mark(&mut self, side: usize, at: usize) {
-        let table = side * self.size.iter().product::<usize>();
+        let (row, plane) = (self.size[1], self.size[0] * self.size[1]);
+        let table = side * plane * self.size[2];
         if self.worth[table + at] == HIT {
             return;
         }
-        let plane = self.size[0] * self.size[1];
         for z in [at - plane, at, at + plane] {
-            for x in [z - self.size[1], z, z + self.size[1]] {
-                for y in [x - 1, x, x + 1] {
-                    let worth = &mut self.worth[table + y];
+            for x in [z - row, z, z + row] {
+                for worth in &mut self.worth[table + x - 1..table + x + 2] {
                     *worth = (*worth).max(BESIDE);
                 }
             }
@@ -97,7 +98,7 @@ impl Cells {
         let mut sums = vec![0_u32; across * wide];
         let table = self.size.iter().product::<usize>();
         for (p, side) in points {
-            let key = [p.x, p.y, p.z].map(|c| (c / self.side_m).floor() as i32);
+            let key = [p.x, p.y, p.z].map(|c| floor(c / self.side_m));
             let worth = &self.worth[side * table..(side + 1) * table];
             for (i, sums) in (-reach..=reach).zip(sums.chunks_exact_mut(wide)) {
                 // A row that sticks out of the cells on one side is met shift by shift.
@@ -147,7 +148,7 @@ pub(super) fn fits(view: &[Oriented], placed: &[Oriented], up: &Unit<Vector3<f64
 
 /// The points of a view that have something of the placed ones within a shift: the others can fall onto nothing.
 fn within_reach(view: &[Oriented], placed: &[Oriented], shift_m: f64) -> Vec<Oriented> {
-    let cell = |p: &Point3<f64>| [p.x, p.y, p.z].map(|c| (c / shift_m).floor() as i32);
+    let cell = |p: &Point3<f64>| [p.x, p.y, p.z].map(|c| floor(c / shift_m));
     let taken: FxHashSet<[i32; 3]> = placed.iter().map(|(p, _)| cell(p)).collect();
     let near = |(p, _): &&Oriented| {
         let [x, y, z] = cell(p);
@@ -203,25 +204,25 @@ pub(super) fn place(
         let turn_step = TURN_STEPS_RAD[stage];
         let (turns, shifts) = ((turn / turn_step).ceil() as i32, (shift / side_m).ceil() as i32);
         let cells = Cells::new(&placed, side_m, shifts);
-        let mut found: Vec<Candidate> = Vec::new();
         let starts: &[Candidate] = if stage == 0 { &best[..1] } else { &best };
-        for start in starts {
-            for t in -turns..=turns {
-                let angle = start.turn + f64::from(t) * turn_step;
-                let mut turned = turned(&tried, angle);
-                turned.iter_mut().for_each(|(p, _)| *p += Vector3::new(start.x, start.y, 0.0));
-                let mut scores = cells.scores(&turned, shifts).into_iter();
-                for i in -shifts..=shifts {
-                    for (j, score) in (-shifts..=shifts).zip(scores.by_ref()) {
-                        let (x, y) = (start.x + f64::from(i) * side_m, start.y + f64::from(j) * side_m);
-                        let score = score
-                            - PRIOR * (x * x + y * y) / window.shift_m.powi(2)
-                            - PRIOR * (angle / window.turn_rad).powi(2);
-                        found.push(Candidate { x, y, turn: angle, score });
-                    }
-                }
-            }
-        }
+        let tries: Vec<(&Candidate, f64)> = starts
+            .iter()
+            .flat_map(|start| (-turns..=turns).map(move |t| (start, start.turn + f64::from(t) * turn_step)))
+            .collect();
+        let candidates = |&(start, angle): &(&Candidate, f64)| -> Vec<Candidate> {
+            let mut turned = turned(&tried, angle);
+            turned.iter_mut().for_each(|(p, _)| *p += Vector3::new(start.x, start.y, 0.0));
+            let shifted = (-shifts..=shifts).flat_map(|i| (-shifts..=shifts).map(move |j| (i, j)));
+            let of_shift = |((i, j), score): ((i32, i32), f64)| {
+                let (x, y) = (start.x + f64::from(i) * side_m, start.y + f64::from(j) * side_m);
+                let score = score
+                    - PRIOR * (x * x + y * y) / window.shift_m.powi(2)
+                    - PRIOR * (angle / window.turn_rad).powi(2);
+                Candidate { x, y, turn: angle, score }
+            };
+            shifted.zip(cells.scores(&turned, shifts)).map(of_shift).collect()
+        };
+        let found: Vec<Candidate> = tries.par_iter().flat_map_iter(candidates).collect();
         best = distinct(&found, 2.0 * side_m);
     }
     let Candidate { x, y, turn: angle, score } = best[0];

@@ -62,10 +62,12 @@ impl Gathered {
         /// Bricks that one thread settles in a row, and such rows at a time: what they fill is used again. From: work.
         const TOGETHER: usize = 64;
         const ROWS: usize = 32;
+        /// Cells that one thread takes in a row. From: work.
+        const SOME: usize = 4096;
         let Gathered { grid, axes_from_world, flat, bricks, colours: sums, .. } = self;
         let world_from_axes = axes_from_world.inverse().to_rotation_matrix();
         let turn = world_from_axes.cast::<f32>();
-        let cells: Vec<Cell> = bricks.cells.iter().map(Cell::mean).collect();
+        let cells: Vec<Cell> = bricks.cells.par_iter().with_min_len(SOME).map(Cell::mean).collect();
         let colour = |number: usize| {
             // Half up by cutting off: rounding is a call on some processors.
             let mean = sums.get(number).map(|sum| (sum / cells[number].weight).map(|c| (c + 0.5) as u8));

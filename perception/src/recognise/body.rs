@@ -71,6 +71,7 @@ impl Frustum {
 }
 
 impl Body for Frustum {
+    #[inline(always)]
     fn depth_m(&self, ray: &Ray) -> f64 {
         let from = [ray.from[0] - self.x, ray.from[1] - self.y, ray.from[2] - self.base_m];
         let (height, [dx, dy, fall]) = (self.top_m - self.base_m, ray.along);

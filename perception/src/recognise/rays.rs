@@ -7,6 +7,7 @@
 use super::asker::{Asker, Lying};
 use super::body::{Body, Ray};
 use crate::noise::{CELL_PX, KINECT, Sensor};
+use crate::surface::floor;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
@@ -119,7 +120,7 @@ pub(super) fn bounded(log: f64, bad: f64) -> f64 {
 }
 
 fn cell(p: &Point3<f64>) -> [i32; 2] {
-    [p.x, p.y].map(|m| (m / CELL_M).floor() as i32)
+    [p.x, p.y].map(|m| floor(m / CELL_M))
 }
 
 impl ViewRays {

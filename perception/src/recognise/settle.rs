@@ -10,7 +10,7 @@ use crate::round::{
     self, MOST_INDEPENDENT, ON_SIDE_M, RADIUS_SPREAD_M, Round, SLOPE_SPREAD, STEEPEST, side_band,
 };
 use crate::segment::Segment;
-use crate::surface::range_sigma_m;
+use crate::surface::{floor, range_sigma_m};
 use crate::visibility::DepthMap;
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -211,7 +211,7 @@ impl Cells {
     }
 
     fn cell(p: &Point3<f64>) -> [i32; 2] {
-        [p.x, p.y].map(|m| (m / CELL_M).floor() as i32)
+        [p.x, p.y].map(|m| floor(m / CELL_M))
     }
 
     fn holds(&self, p: &Point3<f64>) -> bool {
@@ -275,7 +275,7 @@ fn thinned(points: impl Iterator<Item = Point3<f64>>) -> Vec<Point3<f64>> {
     let mut cubes: FxHashMap<[i32; 3], usize> = FxHashMap::default();
     let mut sums: Vec<(Vector3<f64>, f64)> = Vec::new();
     for p in points {
-        let cube = [p.x, p.y, p.z].map(|m| (m / FUSE_M).floor() as i32);
+        let cube = [p.x, p.y, p.z].map(|m| floor(m / FUSE_M));
         let at = *cubes.entry(cube).or_insert_with(|| {
             sums.push((Vector3::zeros(), 0.0));
             sums.len() - 1

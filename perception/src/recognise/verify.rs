@@ -93,9 +93,10 @@ impl<'a> Own<'a> {
             let views = self.rays.views.iter().zip(&self.placed).zip(&self.logs);
             views.map(|((view, own), log)| against(placed(view, &body, own.shift_m).log - log)).sum::<f64>()
         };
-        of_taper(tapers.middle())
-            .max(of_taper(within(m.evidence.taper, tapers, apart_m / widest_m.max(LEAST_M))))
-            .min(0.0)
+        let (middle, own) =
+            (tapers.middle(), within(m.evidence.taper, tapers, apart_m / widest_m.max(LEAST_M)));
+        let log = of_taper(middle);
+        if own == middle { log.min(0.0) } else { log.max(of_taper(own)).min(0.0) }
     }
 }
 
@@ -116,16 +117,23 @@ fn total(logs: &[f64]) -> f64 {
 
 /// A frustum where it suits a view best, were it a good one, near where it lies moved already.
 fn placed(view: &ViewRays, frustum: &Frustum, from: [f64; 2]) -> Placed {
-    let at = |[dx, dy]: [f64; 2]| {
+    let mut known: Vec<Placed> = Vec::with_capacity(1 + STEPS_M.len() * TRIES * 4);
+    let mut at = |shift_m: [f64; 2]| {
+        // A step back leads to where it was already.
+        if let Some(known) = known.iter().find(|known| known.shift_m == shift_m) {
+            return *known;
+        }
+        let [dx, dy] = shift_m;
         let moved = Frustum { x: frustum.x + dx, y: frustum.y + dy, ..*frustum };
         let log = view.log_likelihood(&moved) - 0.5 * (dx * dx + dy * dy) / (SHIFT_M * SHIFT_M);
-        Placed { log, shift_m: [dx, dy] }
+        known.push(Placed { log, shift_m });
+        Placed { log, shift_m }
     };
     let mut best = at(from);
     for step_m in STEPS_M {
         for _ in 0..TRIES {
             let [x, y] = best.shift_m;
-            let around = [[x + step_m, y], [x - step_m, y], [x, y + step_m], [x, y - step_m]].map(at);
+            let around = [[x + step_m, y], [x - step_m, y], [x, y + step_m], [x, y - step_m]].map(&mut at);
             match around.into_iter().max_by(|a, b| a.log.total_cmp(&b.log)).filter(|to| to.log > best.log) {
                 Some(better) => best = better,
                 None => break,

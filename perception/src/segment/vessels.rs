@@ -5,7 +5,6 @@ use crate::outline;
 use crate::round::{self, ON_SIDE_M, Round, SECTORS, distance, sector};
 use nalgebra::Point3;
 use std::cell::OnceCell;
-use std::collections::BTreeSet;
 
 /// Parts this far apart can be one vessel, metres. From: chosen.
 const APART_M: f64 = 0.015;
@@ -140,18 +139,18 @@ fn one_rim(parts: [&Candidate; 2], viewpoints: &[Point3<f64>]) -> bool {
     let body = &fitted.body;
     let is_on = |p: &&Point3<f64>| body.outside_m(p).abs() < ON_SIDE_M;
     let on = |of: &[Point3<f64>]| of.iter().filter(is_on).count() as f64 / of.len().max(1) as f64;
-    let seen: BTreeSet<usize> =
-        both.iter().filter(is_on).map(|p| sector(p.x - body.x, p.y - body.y, SECTORS)).collect();
+    let mut seen = [false; SECTORS];
+    both.iter().filter(is_on).for_each(|p| seen[sector(p.x - body.x, p.y - body.y, SECTORS)] = true);
     let is_within =
         |p: &&Point3<f64>| distance(p.x - body.x, p.y - body.y) < body.radius_at(top_m) + TOUCHES_M;
     let holds = |part: &Candidate| {
         let points = &part.segment.points;
         points.iter().filter(is_within).count() as f64 >= ON_BODY * points.len() as f64
     };
-    fitted.is_near(&both, ON_RIM)
-        && seen.len() * 2 >= SECTORS
+    seen.iter().filter(|seen| **seen).count() * 2 >= SECTORS
         && rims.iter().all(|rim| on(rim) >= ON_MOST)
         && parts.into_iter().all(holds)
+        && fitted.is_near(&both, ON_RIM)
 }
 
 /// Whether two parts are as high, and neither is a crumb of the other.

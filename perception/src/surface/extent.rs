@@ -3,11 +3,11 @@
 use super::face::{CELL_M, cell_of, level};
 use super::hull::{area, convex_hull, parts};
 use super::planes::{Plane, Sample};
+use super::tiles::Tiles;
 use super::{Surface, range_sigma_m};
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
-use rustc_hash::{FxHashMap, FxHashSet};
-use std::collections::hash_map::Entry;
+use rustc_hash::FxHashSet;
 
 /// So far a plane is taken to reach on behind and beneath what hides it, metres: few things are twice as wide. From: chosen.
 const HIDDEN_M: f64 = 0.3;
@@ -19,8 +19,20 @@ const BESIDE_M: f64 = 0.3;
 /// Where a cell is asked about, from its corner, cells. From: chosen, the middle and near the corners.
 const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]];
 
-/// Which part of a plane a cell belongs to; none where the plane is not taken to reach on.
-pub(super) type Owners = FxHashMap<[i32; 2], Option<usize>>;
+/// Which part of a plane a cell belongs to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Owner {
+    /// It was not asked yet whether the plane reaches on here.
+    #[default]
+    Untold,
+    /// The plane is not taken to reach on here.
+    Nobody,
+    /// The part of this number.
+    Part(usize),
+}
+
+/// The owners of the cells of a plane.
+pub(super) type Owners = Tiles<Owner>;
 
 /// What hides a plane from the cameras.
 pub(super) struct Hiding<'a>(Vec<Above<'a>>);
@@ -73,18 +85,16 @@ impl<'a> Hiding<'a> {
         for _ in 0..(HIDDEN_M / CELL_M) as usize {
             let mut next = Vec::new();
             for cell in border {
-                let Some(owner) = owners[&cell] else { continue };
+                let Owner::Part(owner) = owners.get(cell) else { continue };
                 for around in (0..9).map(|k| [cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]) {
-                    match owners.entry(around) {
-                        Entry::Vacant(free) if self.allows(around, unseen) => {
-                            free.insert(Some(owner));
+                    match owners.get(around) {
+                        Owner::Untold if self.allows(around, unseen) => {
+                            *owners.at(around) = Owner::Part(owner);
                             next.push(around);
                         }
-                        Entry::Vacant(free) => drop(free.insert(None)),
-                        Entry::Occupied(found) => match *found.get() {
-                            Some(other) if other != owner => meeting.push([owner, other]),
-                            _ => {}
-                        },
+                        Owner::Untold => *owners.at(around) = Owner::Nobody,
+                        Owner::Part(other) if other != owner => meeting.push([owner, other]),
+                        Owner::Part(_) | Owner::Nobody => {}
                     }
                 }
             }
@@ -134,14 +144,16 @@ impl Surface {
             return self;
         }
         let border = along_edges(&self, &turn);
-        let mut owners: Owners = border.iter().map(|cell| (*cell, Some(0))).collect();
+        let mut owners = Owners::new();
+        border.iter().for_each(|cell| *owners.at(*cell) = Owner::Part(0));
         Hiding::of(&plane, seen).spread(&mut owners, border, true);
         let is_beside =
             |cell: &[i32; 2]| (0..9).any(|k| low.contains(&[cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]));
-        let mut things = parts(&high.iter().map(|(cell, _)| (*cell, 1)).collect());
+        let cells: FxHashSet<[i32; 2]> = high.iter().map(|(cell, _)| *cell).collect();
+        let mut things = parts(cells.into_iter().map(|cell| (cell, 1)).collect());
         things.retain(|cells| !cells.iter().any(is_beside));
         let standing: FxHashSet<[i32; 2]> = things.into_iter().flatten().collect();
-        let is_reached = |cell: &[i32; 2]| owners.get(cell).is_some_and(Option::is_some);
+        let is_reached = |cell: &[i32; 2]| matches!(owners.get(*cell), Owner::Part(_));
         high.retain(|(cell, _)| standing.contains(cell) && is_reached(cell));
         self.widened(&turn, high.iter().map(|(_, p)| p))
     }

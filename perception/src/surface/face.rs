@@ -1,13 +1,13 @@
 //! The connected parts of a plane, each with its convex hull.
 
-use super::extent::{Hiding, Owners};
+use super::extent::{Hiding, Owner, Owners};
 use super::hull::{area, convex_hull, parts};
 use super::planes::{FEWEST, Plane, Sample, least_squares};
+use super::tiles::Tiles;
 use super::{Role, Sign, Surface, floor};
 use crate::cloud::Cloud;
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
-use rustc_hash::FxHashMap;
 
 /// Side of the cells that tell which points of a plane hang together, metres. From: chosen.
 pub(super) const CELL_M: f64 = 0.03;
@@ -25,7 +25,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
         return Vec::new();
     }
     let turn = level(plane);
-    let mut counts: FxHashMap<[i32; 2], Counts> = FxHashMap::default();
+    let mut counts: Tiles<Counts> = Tiles::new();
     let mut held: Vec<([i32; 2], &Sample)> = Vec::new();
     for s in samples {
         let (distance, band) = (plane.distance(&s.point), Plane::band_m(s));
@@ -33,7 +33,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
             continue;
         }
         let cell = cell_of(&turn, &s.point);
-        let counts = counts.entry(cell).or_default();
+        let counts = counts.at(cell);
         if distance.abs() <= band {
             counts.near += 1;
             held.push((cell, s));
@@ -41,18 +41,17 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
             counts.beside[usize::from(distance > 0.0)] += 1;
         }
     }
-    let is_face = |cell: &[i32; 2]| {
-        let around = (0..9).map(|k| [cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]);
-        let around = around.filter_map(|cell| counts.get(&cell));
-        let around = around.fold(Counts::default(), |all, counts| all.with(counts));
+    let is_face = |cell: [i32; 2]| {
+        let around = (0..9).map(|k| counts.get([cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]));
+        let around = around.fold(Counts::default(), Counts::with);
         !around.is_slice() && !around.is_foot()
     };
-    let near = counts.iter().filter(|(cell, counts)| counts.near > 0 && is_face(cell));
-    let cells: FxHashMap<[i32; 2], u32> = near.map(|(cell, counts)| (*cell, counts.near)).collect();
+    let near = counts.all().filter(|(cell, counts)| counts.near > 0 && is_face(*cell));
+    let mut pieces = parts(near.map(|(cell, counts)| (cell, counts.near)).collect());
     let squares: f64 = held.iter().map(|(_, s)| plane.distance(&s.point).powi(2)).sum();
     let residual_m = (squares / held.len().max(1) as f64).sqrt();
-    let all = |cells: &[[i32; 2]]| cells.iter().fold(Counts::default(), |all, cell| all.with(&counts[cell]));
-    let mut pieces = parts(&cells);
+    let all =
+        |cells: &[[i32; 2]]| cells.iter().map(|cell| counts.get(*cell)).fold(Counts::default(), Counts::with);
     pieces.retain(|cells| {
         let all = all(cells);
         all.near >= FEWEST_OF_PIECE && !all.is_slice()
@@ -62,7 +61,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
     let part_of = owners(&parts);
     let mut members: Vec<Vec<&Sample>> = vec![Vec::new(); parts.len()];
     for (cell, s) in held {
-        if let Some(&Some(part)) = part_of.get(&cell) {
+        if let Owner::Part(part) = part_of.get(cell) {
             members[part].push(s);
         }
     }
@@ -87,7 +86,10 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
 
 /// Which part each cell belongs to.
 fn owners(parts: &[Vec<[i32; 2]>]) -> Owners {
-    parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, Some(n)))).collect()
+    let mut owners = Owners::new();
+    let all = parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, n)));
+    all.for_each(|(cell, n)| *owners.at(cell) = Owner::Part(n));
+    owners
 }
 
 /// The parts of a plane that hang together behind and beneath what hides it.
@@ -115,7 +117,7 @@ struct Counts {
 }
 
 impl Counts {
-    fn with(self, other: &Counts) -> Counts {
+    fn with(self, other: Counts) -> Counts {
         let beside = [0, 1].map(|side| self.beside[side] + other.beside[side]);
         Counts { near: self.near + other.near, beside }
     }
@@ -137,7 +139,10 @@ impl Counts {
 
 /// Corners of the hull around cells, metres.
 fn hull_of(cells: &[[i32; 2]]) -> Vec<[f64; 2]> {
-    let corners = cells.iter().flat_map(|&[x, y]| [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]);
+    // What lies between two of one column is no corner.
+    let columns = cells.chunk_by(|a, b| a[0] == b[0] && a[1] < b[1]);
+    let ends = columns.flat_map(|column| [column[0], [column[0][0], column[column.len() - 1][1] + 1]]);
+    let corners = ends.flat_map(|[x, y]| [[x, y], [x + 1, y]]);
     convex_hull(corners.map(|[x, y]| [f64::from(x) * CELL_M, f64::from(y) * CELL_M]).collect())
 }
 

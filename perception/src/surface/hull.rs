@@ -1,25 +1,34 @@
 //! Sets of cells and of points in a plane: what hangs together, and the hull.
 
-use rustc_hash::FxHashMap;
-
-/// The largest set of cells that hang together over gaps of up to two cells (shadows of objects); ties go to the first in order.
-pub(crate) fn largest_part(cells: &FxHashMap<[i32; 2], u32>) -> Vec<[i32; 2]> {
+/// The largest set of cells that hang together over gaps of up to two cells (shadows of objects); ties go to the first in order. Each cell
+/// is named once.
+pub(crate) fn largest_part(cells: Vec<([i32; 2], u32)>) -> Vec<[i32; 2]> {
     parts(cells).into_iter().next().unwrap_or_default()
 }
 
-/// The sets of cells that hang together so, the one with most returns first; ties go to the first in order.
-pub(crate) fn parts(cells: &FxHashMap<[i32; 2], u32>) -> Vec<Vec<[i32; 2]>> {
-    let mut order: Vec<([i32; 2], u32)> = cells.iter().map(|(cell, count)| (*cell, *count)).collect();
-    order.sort_unstable();
-    let first = first_of_part(&order);
-    let mut parts = vec![(0, Vec::new()); order.len()];
-    for ((cell, count), &first) in order.iter().zip(&first) {
-        parts[first].0 += count;
-        parts[first].1.push(*cell);
+/// The sets of cells that hang together so, the one with most returns first; ties go to the first in order. Each cell is named once.
+pub(crate) fn parts(mut cells: Vec<([i32; 2], u32)>) -> Vec<Vec<[i32; 2]>> {
+    cells.sort_unstable_by_key(|(cell, _)| rank(*cell));
+    let mut parts: Vec<(u32, Vec<[i32; 2]>)> = Vec::new();
+    let mut numbers = vec![0; cells.len()];
+    for (i, ((cell, count), first)) in cells.iter().zip(first_of_part(&cells)).enumerate() {
+        if first == i {
+            numbers[i] = parts.len();
+            parts.push((0, Vec::new()));
+        }
+        let part = &mut parts[numbers[first]];
+        part.0 += count;
+        part.1.push(*cell);
     }
     parts.retain(|(count, _)| *count > 0);
     parts.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
     parts.into_iter().map(|(_, cells)| cells).collect()
+}
+
+/// A number in the order of the cells: by x, then by y.
+fn rank(cell: [i32; 2]) -> u64 {
+    let [x, y] = cell.map(|at| u64::from(at.cast_unsigned() ^ 1 << 31));
+    x << 32 | y
 }
 
 /// Area of a polygon with its corners anticlockwise.
@@ -61,6 +70,7 @@ fn first_of_part(order: &[([i32; 2], u32)]) -> Vec<usize> {
     // The cells that follow within reach: in the same column, and in the next ones.
     let mut ahead = [0; GAP as usize + 1];
     for (i, ([x, y], _)) in order.iter().enumerate() {
+        let mut own = root(&mut first, i);
         for (dx, start) in (0..).zip(&mut ahead) {
             let from = [x + dx, if dx == 0 { y + 1 } else { y - GAP }];
             while order.get(*start).is_some_and(|(cell, _)| *cell < from) {
@@ -68,8 +78,9 @@ fn first_of_part(order: &[([i32; 2], u32)]) -> Vec<usize> {
             }
             let near = order[*start..].iter().take_while(|(cell, _)| *cell <= [x + dx, y + GAP]);
             for j in (*start..).take(near.count()) {
-                let (a, b) = (root(&mut first, i), root(&mut first, j));
-                first[a.max(b)] = a.min(b);
+                let other = root(&mut first, j);
+                first[own.max(other)] = own.min(other);
+                own = own.min(other);
             }
         }
     }

@@ -1,0 +1,111 @@
+//! Cells of a plane in square tiles, which are laid where something is.
+
+use rustc_hash::FxHashMap;
+use std::cell::Cell;
+
+/// Cells along each side of a tile, as a power of two. From: work.
+const BITS: usize = 3;
+const SIDE: usize = 1 << BITS;
+
+/// A value for each cell: the default where none was set. Neighbours lie in one tile, most often, so that few are looked up.
+pub(super) struct Tiles<T> {
+    /// Where in `values` each tile begins.
+    starts: FxHashMap<[i32; 2], usize>,
+    /// The tile that was asked for last, and where it begins.
+    last: Cell<([i32; 2], usize)>,
+    /// The tiles in the order in which they were laid.
+    tiles: Vec<[i32; 2]>,
+    values: Vec<T>,
+}
+
+impl<T: Copy + Default> Tiles<T> {
+    pub fn new() -> Tiles<T> {
+        /// No cell lies in it. From: derived, tiles are numbered from the least cell by eight.
+        const NONE: [i32; 2] = [i32::MIN; 2];
+        Tiles {
+            starts: FxHashMap::default(),
+            last: Cell::new((NONE, 0)),
+            tiles: Vec::new(),
+            values: Vec::new(),
+        }
+    }
+
+    /// Where the tile of a cell begins, if it is laid.
+    #[inline(always)]
+    fn start(&self, tile: [i32; 2]) -> Option<usize> {
+        let (last, start) = self.last.get();
+        if last == tile {
+            return Some(start);
+        }
+        let start = *self.starts.get(&tile)?;
+        self.last.set((tile, start));
+        Some(start)
+    }
+
+    #[inline(always)]
+    pub fn get(&self, cell: [i32; 2]) -> T {
+        self.start(cell.map(|at| at >> BITS))
+            .map_or_else(T::default, |start| self.values[start + place(cell)])
+    }
+
+    #[inline(always)]
+    pub fn at(&mut self, cell: [i32; 2]) -> &mut T {
+        let tile = cell.map(|at| at >> BITS);
+        let start = match self.start(tile) {
+            Some(start) => start,
+            None => self.lay(tile),
+        };
+        &mut self.values[start + place(cell)]
+    }
+
+    fn lay(&mut self, tile: [i32; 2]) -> usize {
+        let start = self.values.len();
+        self.values.resize(start + SIDE * SIDE, T::default());
+        self.starts.insert(tile, start);
+        self.tiles.push(tile);
+        self.last.set((tile, start));
+        start
+    }
+
+    /// The cells of all tiles that are laid, in no order that says anything.
+    pub fn all(&self) -> impl Iterator<Item = ([i32; 2], T)> {
+        self.tiles.iter().zip(self.values.chunks_exact(SIDE * SIDE)).flat_map(|(tile, values)| {
+            let [x, y] = tile.map(|at| at << BITS);
+            (0..).zip(values).map(move |(k, value)| ([x + (k >> BITS), y + (k & (SIDE as i32 - 1))], *value))
+        })
+    }
+}
+
+/// Where in its tile a cell lies.
+#[inline(always)]
+fn place(cell: [i32; 2]) -> usize {
+    let [x, y] = cell.map(|at| at.cast_unsigned() as usize % SIDE);
+    x * SIDE + y
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    proptest! {
+        #[test]
+        fn tiles_hold_what_a_map_holds(
+            near in prop::collection::vec(prop::array::uniform2(-20..20_i32), 0..300),
+            far in prop::collection::vec(prop::array::uniform2(any::<i32>()), 0..9),
+        ) {
+            let (mut tiles, mut map) = (Tiles::new(), BTreeMap::new());
+            for cell in near.into_iter().chain(far).chain([[i32::MIN; 2], [i32::MAX; 2]]) {
+                *tiles.at(cell) += 1;
+                *map.entry(cell).or_default() += 1;
+            }
+            for cell in (-25..25).flat_map(|x| (-25..25).map(move |y| [x, y])) {
+                prop_assert_eq!(tiles.get(cell), map.get(&cell).copied().unwrap_or_default());
+            }
+            let mut all: Vec<([i32; 2], u32)> = tiles.all().filter(|(_, count)| *count > 0).collect();
+            all.sort_unstable();
+            prop_assert_eq!(all, map.into_iter().collect::<Vec<_>>());
+        }
+    }
+}

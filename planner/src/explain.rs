@@ -3,7 +3,7 @@
 mod core;
 mod sites;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use serde::Serialize;
@@ -25,7 +25,38 @@ pub(crate) use self::sites::sites;
 pub struct Explanation {
     /// The reasons, the goal's first.
     pub findings: Findings,
+    /// Actions that could start while they run, which might help, and which no search tries to the end: where there are any, the proof
+    /// holds for plans in which no action overlaps itself. The last finding says so.
+    pub overlapping: BTreeSet<String>,
 }
+
+impl Explanation {
+    fn new(task: &Task, list: Vec<Diagnostic>) -> Explanation {
+        let findings = Findings { sources: task.sources.to_vec(), list };
+        Explanation { findings, overlapping: BTreeSet::new() }
+    }
+
+    /// The same for plans in which these actions do not overlap themselves.
+    pub(crate) fn but_for(mut self, task: &Task, overlapping: &BTreeSet<String>) -> Explanation {
+        let mut actions = task.actions.iter().filter(|action| overlapping.contains(&action.name));
+        if let Some(first) = actions.next() {
+            let message =
+                "the proof holds for plans in which no action overlaps itself: others were not all looked at";
+            let label = |action: &Action| format!("`{}` could start again while it runs", action.name);
+            let mut finding = Diagnostic::warning(OVERLAP, message, first.span, label(first));
+            for action in actions.take(SHOWN) {
+                finding = finding.with_label(action.span, label(action));
+            }
+            let help = "if it cannot, let its start need and take what its end gives back";
+            self.findings.list.push(finding.with_help(help));
+        }
+        self.overlapping.clone_from(overlapping);
+        self
+    }
+}
+
+/// What findings that tell of actions that overlap themselves are called.
+const OVERLAP: &str = "overlap-untried";
 
 impl fmt::Display for Explanation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -82,7 +113,7 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
     if list.is_empty() {
         list.push(together(task, &parts, false));
     }
-    Explanation { findings: Findings { sources: task.sources.to_vec(), list } }
+    Explanation::new(task, list)
 }
 
 /// What is said where no relaxation knows better.
@@ -104,7 +135,7 @@ pub(crate) fn constrained(task: &Task, reachable: bool) -> Explanation {
         finding = finding.with_label(span, "this too");
     }
     let finding = finding.with_help("make it a `(preference …)` to see how much of it can be kept");
-    Explanation { findings: Findings { sources: task.sources.to_vec(), list: vec![finding] } }
+    Explanation::new(task, vec![finding])
 }
 
 /// Each part of the goal can be had if nothing is ever taken away: what may be in the way of all. `narrowed` where these

@@ -1,7 +1,7 @@
 //! The way in: [`plan`] takes a task to a timed plan, or says why there is none.
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::attachment::{Attachments, CallStatistics};
@@ -45,12 +45,16 @@ pub fn plan(
         let limit = statistics.evaluated.max(LEAST_EVALUATIONS);
         let options =
             Options { evaluation_limit: Some(limit), anytime: false, bound: None, ..options.clone() };
-        let mut unsolvable = |task: &Task| {
-            let found = search(task, attachments, &options, stop, &mut |_| {});
-            !stop() && matches!(found, Ok(Outcome::Unsolvable { .. }))
+        let mut overlapping = why.overlapping.clone();
+        let mut unsolvable = |task: &Task| match search(task, attachments, &options, stop, &mut |_| {}) {
+            Ok(Outcome::Unsolvable { why, .. }) if !stop() => {
+                overlapping.extend(why.overlapping);
+                true
+            }
+            _ => false,
         };
         if let Some(narrowed) = narrowed(&freed(task), &mut unsolvable) {
-            *why = narrowed;
+            *why = narrowed.but_for(task, &overlapping);
         }
     }
     Ok(outcome)
@@ -187,7 +191,12 @@ fn search_for(
     };
     let found = match grounded.goal_reachable {
         true => search_plans(&world, &measure(&grounded), limits(options, memory), stop, &mut hear),
-        false => Ok(Progress { reason: Reason::Exhausted, counts: Counts::default(), plans: 0 }),
+        false => Ok(Progress {
+            reason: Reason::Exhausted,
+            counts: Counts::default(),
+            plans: 0,
+            overlapping: Vec::new(),
+        }),
     };
     let progress = found.map_err(|failure| world.calls.report(failure))?;
     if let Some(error) = invalid.filter(|error| best.is_none() || matches!(error, PlanError::Internal { .. }))
@@ -198,8 +207,15 @@ fn search_for(
     statistics.expanded = progress.counts.expanded;
     statistics.plans = progress.plans;
     statistics.attachments = since(&before, attachments.statistics());
-    let why = || explain(task, &grounded, &world.calls.refusals());
-    Ok(ended(best, progress.reason, why, statistics))
+    let schemas = progress.overlapping.iter().map(|&act| world.acts[act as usize].origin.schema);
+    let overlapping: BTreeSet<String> =
+        schemas.map(|schema| task.actions[schema as usize].name.clone()).collect();
+    let why = || explain(task, &grounded, &world.calls.refusals()).but_for(task, &overlapping);
+    let reason = match progress.reason {
+        Reason::Exhausted if best.is_some() && !overlapping.is_empty() => Reason::Enough,
+        reason => reason,
+    };
+    Ok(ended(best, reason, why, statistics))
 }
 
 /// What a search with times has come to.

@@ -142,6 +142,48 @@ fn what_can_only_start_at_one_time_is_not_proven_to_be_impossible() {
     assert!(!matches!(found, Outcome::Unsolvable { .. }), "{found:?}");
 }
 
+const CHARGE: &str = "(define (domain d) (:requirements :durative-actions :numeric-fluents)
+  (:predicates (plug) (track) (fresh) (idle) (full) (two) (three)) (:functions (charge) (running))
+  (:durative-action charge :parameters () :duration (= ?duration 10) :condition (at start (plug))
+    :effect (at end (increase (charge) 1)))
+  (:durative-action run :parameters () :duration (= ?duration 10) :condition (at start (track))
+    :effect (and (at start (increase (running) 1)) (at end (decrease (running) 1))))
+  (:durative-action use :parameters () :duration (= ?duration 10) :condition (at start (fresh))
+    :effect (and (at end (not (fresh))) (at end (increase (charge) 1))))
+  (:durative-action fill :parameters () :duration (= ?duration 10) :condition (at start (idle)) :effect (at end (full)))
+  (:durative-action turn :parameters () :duration (= ?duration 10) :condition (at start (idle))
+    :effect (and (at start (not (idle))) (at start (increase (running) 1)) (at end (idle)) (at end (decrease (running) 1))))
+  (:action count-two :parameters () :precondition (>= (running) 2) :effect (two))
+  (:action count-three :parameters () :precondition (>= (running) 3) :effect (three)))";
+
+#[test]
+fn what_runs_twice_at_once_is_found_or_left_open() {
+    // A plan; or the actions of which a proof takes for granted that they do not overlap themselves.
+    for (init, goal, expected) in [
+        ("(plug)", "(>= (charge) 3)", Ok(())),
+        ("(track)", "(two)", Ok(())),
+        ("(track)", "(three)", Err("run")),
+        ("(fresh)", "(>= (charge) 2)", Ok(())),
+        ("(fresh)", "(>= (charge) 5)", Err("use")),
+        ("(idle)", "(two)", Err("")),
+        ("(idle)", "(and (two) (full))", Err("")),
+    ] {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init {init} (= (charge) 0) (= (running) 0)) (:goal {goal}))"
+        );
+        let found = outcome(Source::new("domain.pddl", CHARGE), Source::new("problem.pddl", problem));
+        match (&found, expected) {
+            (Outcome::Solved { statistics, .. }, Ok(())) => assert!(!statistics.optimal),
+            (Outcome::Unsolvable { why, .. }, Err(names)) => {
+                let overlapping: Vec<&str> = why.overlapping.iter().map(String::as_str).collect();
+                assert_eq!(overlapping.join(" "), names, "{why}");
+                assert_eq!(why.to_string().contains("no action overlaps itself"), !names.is_empty());
+            }
+            _ => panic!("{init} {goal}: {found:?}"),
+        }
+    }
+}
+
 #[test]
 fn durations_depend_on_the_state_and_stretch() {
     let filled = "(:requirements :numeric-fluents) (:predicates (full)) (:functions (missing) (rate))

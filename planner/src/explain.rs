@@ -1,6 +1,7 @@
 //! Why there is no plan.
 
 mod core;
+mod relaxed;
 mod sites;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,6 +19,7 @@ use crate::task::{
 };
 
 pub(crate) use self::core::{is_open, narrowed};
+use self::relaxed::could_be_had;
 pub(crate) use self::sites::sites;
 
 /// Why a task has no plan: findings that point at the goal, at what nobody achieves, and at who said no.
@@ -28,12 +30,15 @@ pub struct Explanation {
     /// Actions that could start while they run, which might help, and which no search tries to the end: where there are any, the proof
     /// holds for plans in which no action overlaps itself. The last finding says so.
     pub overlapping: BTreeSet<String>,
+    /// Whether the goal could surely be had if nothing were ever taken away.
+    #[serde(skip)]
+    pub(crate) only_lost: bool,
 }
 
 impl Explanation {
     fn new(task: &Task, list: Vec<Diagnostic>) -> Explanation {
         let findings = Findings { sources: task.sources.to_vec(), list };
-        Explanation { findings, overlapping: BTreeSet::new() }
+        Explanation { findings, ..Explanation::default() }
     }
 
     /// The same for plans in which these actions do not overlap themselves.
@@ -110,10 +115,11 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
     for (&(module, wanted), calls) in refusals {
         list.extend(refused(task, ModuleId(module), wanted, calls));
     }
+    let only_lost = list.is_empty() && could_be_had(ground);
     if list.is_empty() {
-        list.push(together(task, &parts, false));
+        list.push(together(task, &parts, false, only_lost));
     }
-    Explanation::new(task, list)
+    Explanation { only_lost, ..Explanation::new(task, list) }
 }
 
 /// What is said where no relaxation knows better.
@@ -138,9 +144,9 @@ pub(crate) fn constrained(task: &Task, reachable: bool) -> Explanation {
     Explanation::new(task, vec![finding])
 }
 
-/// Each part of the goal can be had if nothing is ever taken away: what may be in the way of all. `narrowed` where these
-/// parts alone cannot be had.
-fn together(task: &Task, parts: &[&Condition], narrowed: bool) -> Diagnostic {
+/// What may be in the way of all parts of the goal. `narrowed` where these parts alone cannot be had; `only_lost` where they could, if
+/// nothing were ever taken away.
+fn together(task: &Task, parts: &[&Condition], narrowed: bool, only_lost: bool) -> Diagnostic {
     let message = match (narrowed, parts.len()) {
         (false, _) => UNREACHED.to_string(),
         (true, 1) => {
@@ -180,11 +186,14 @@ fn together(task: &Task, parts: &[&Condition], narrowed: bool) -> Diagnostic {
             reasons.push(LASTS);
         }
     }
-    let help = format!(
-        "with nothing ever taken away and all the time in the world it could be had: {}",
-        reasons.join(", or ")
-    );
-    finding.with_help(help)
+    let first = match only_lost {
+        true => "with nothing ever taken away and all the time in the world it could be had: ",
+        false => "perhaps ",
+    };
+    if !only_lost && (task.is_temporal() || !task.functions.is_empty()) {
+        reasons.insert(0, "what it takes of numbers or of durations never comes out right");
+    }
+    finding.with_help(format!("{first}{}", reasons.join(", or ")))
 }
 
 const LASTS: &str = "what an action gives only while it runs does not last long enough";

@@ -343,6 +343,30 @@ fn a_duration_lies_strictly_between_its_bounds_however_near_they_are() {
 }
 
 #[test]
+fn times_that_are_not_told_apart_are_refused_under_the_text() {
+    for (duration, fits) in
+        [("100000000", true), ("100000000000000", false), ("1000000000000000000000", false)]
+    {
+        let domain = format!(
+            "(define (domain d) (:requirements :durative-actions) (:predicates (idle) (waited) (gone))
+          (:durative-action wait :parameters () :duration (= ?duration {duration}) :condition (at start (idle))
+            :effect (and (at start (not (idle))) (at end (waited))))
+          (:durative-action go :parameters () :duration (= ?duration 1) :condition (at start (waited)) :effect (at end (gone))))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (idle)) (:goal (gone)))";
+        let task = Task::read(&Source::new("domain.pddl", domain), &Source::new("problem.pddl", problem));
+        let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
+        match plan(&task, &Attachments::new(), &Options::default(), &|| false, &mut |_| {}) {
+            Ok(Outcome::Solved { .. }) => assert!(fits, "{duration}"),
+            Err(PlanError::Refused(findings)) => {
+                assert!(!fits && findings.render(false).contains("this may take"), "{duration}");
+            }
+            other => panic!("{duration}: {other:?}"),
+        }
+    }
+}
+
+#[test]
 fn only_a_search_that_leaves_nothing_out_proves_a_plan_to_be_the_best() {
     // Done in one go, one after the other, the two take 6.5 s; started together, 4.
     let domain = "(define (domain d) (:requirements :durative-actions) (:predicates (r) (s))

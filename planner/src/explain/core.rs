@@ -14,8 +14,12 @@ pub(crate) fn is_open(why: &Explanation) -> bool {
 }
 
 /// Leaves out what need not be in the goal for it to stay out of reach, as far as `unsolvable` proves; and tells what
-/// is left. Nothing of it can be left out, where every question is answered.
-pub(crate) fn narrowed(task: &Task, unsolvable: &mut dyn FnMut(&Task) -> bool) -> Option<Explanation> {
+/// is left; `only_lost` where all of it could be had if nothing were ever taken away. Nothing of it can be left out, where every question is answered.
+pub(crate) fn narrowed(
+    task: &Task,
+    only_lost: bool,
+    unsolvable: &mut dyn FnMut(&Task) -> bool,
+) -> Option<Explanation> {
     let Condition::And(parts) = &task.goal.body else { return None };
     if parts.len() > MOST_PARTS {
         return None;
@@ -29,6 +33,6 @@ pub(crate) fn narrowed(task: &Task, unsolvable: &mut dyn FnMut(&Task) -> bool) -
             left = others;
         }
     }
-    let list = vec![together(task, &left.iter().collect::<Vec<_>>(), left.len() < parts.len())];
+    let list = vec![together(task, &left.iter().collect::<Vec<_>>(), left.len() < parts.len(), only_lost)];
     Some(Explanation::new(task, list))
 }

@@ -330,10 +330,12 @@ impl Run<'_, '_, '_> {
     /// Keeps a plan if it is better than the best so far, without the steps that it does not need. Between plans that are
     /// equally good, the one whose goals are fulfilled earlier in sum is nearer to a better one.
     fn take(&mut self, mut steps: Vec<Step>) -> Result<bool, Failure> {
-        let Some((mut measured, mut base)) = self.space.replay_to_goal(&mut steps)? else { return Ok(false) };
+        let Some((mut measured, mut base)) = self.space.replay_to_goal(&mut steps, self.stop)? else {
+            return Ok(false);
+        };
         let mut lean = keep_for(self.space.world, &steps, &self.space.world.ground.goal);
         if lean.len() < steps.len()
-            && let Some((leaner, lean_base)) = self.space.replay_to_goal(&mut lean)?
+            && let Some((leaner, lean_base)) = self.space.replay_to_goal(&mut lean, self.stop)?
             && leaner <= measured
         {
             (measured, steps, base) = (leaner, lean, lean_base);
@@ -345,7 +347,7 @@ impl Run<'_, '_, '_> {
         let goal = &self.space.world.ground.goal.facts;
         let slowness_s: f64 = goal.iter().map(|fact| ready_s[fact.variable as usize]).sum();
         let mut ordered = in_time_order(self.space, &steps);
-        if let Some((again, _)) = self.space.replay_to_goal(&mut ordered)?
+        if let Some((again, _)) = self.space.replay_to_goal(&mut ordered, self.stop)?
             && again <= measured
         {
             steps = ordered;
@@ -359,8 +361,11 @@ impl Run<'_, '_, '_> {
             return Ok(false);
         }
         let plan = better.then(|| schedule(self.space, &steps, self.stop));
+        if matches!(plan, Some(None)) {
+            return Ok(false);
+        }
         self.best = Some(Best { measured, slowness_s, steps });
-        if let Some(plan) = plan {
+        if let Some(plan) = plan.flatten() {
             self.progress.plans += 1;
             (self.on_plan)(&plan)?;
         }
@@ -446,7 +451,7 @@ impl Run<'_, '_, '_> {
                 return Ok(());
             }
             let mut kept = taken_apart(self.space, steps, &mut chance);
-            let Some((_, base)) = self.space.replay(&mut kept)? else {
+            let Some((_, base)) = self.space.replay(&mut kept, self.stop)? else {
                 idle += 1;
                 if idle > 1000 {
                     return Ok(());
@@ -519,13 +524,15 @@ fn in_time_order(space: &Space, steps: &[Step]) -> Vec<Step> {
     timed.into_iter().map(|(_, step)| step.clone()).collect()
 }
 
-/// The earliest schedule of a plan.
-fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Vec<Timed> {
-    let Ok(mut track) = space.track(steps) else { return Vec::new() };
-    // A schedule that has no room for more distance is as good as the search took it for.
+/// The earliest schedule of a plan; `None` if it is long and has been asked to stop.
+fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Option<Vec<Timed>> {
+    let mut track = space.track(steps).ok()?;
     let mut apart = track.clone();
-    if keep_apart(space, steps, &mut apart, stop).is_ok() {
-        track = apart;
+    match keep_apart(space, steps, &mut apart, stop) {
+        Ok(true) => track = apart,
+        Ok(false) => return None,
+        // A schedule that has no room for more distance is as good as the search took it for.
+        Err(_) => {}
     }
     let actions =
         track.actions.iter().zip(steps).filter_map(|(action, step)| action.map(|action| (action, step)));
@@ -546,5 +553,5 @@ fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Vec<Timed
         .collect();
     plan.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     debug_assert!(plan.iter().all(|timed| matches!(timed.step.part, Part::Whole | Part::Start)));
-    plan
+    Some(plan)
 }

@@ -199,6 +199,23 @@ fn durations_depend_on_the_state_and_stretch() {
 }
 
 #[test]
+fn a_duration_is_as_long_as_its_effects_need() {
+    let charged = |bounds: &str, effect: &str| {
+        format!(
+            "(:requirements :numeric-fluents :duration-inequalities :continuous-effects) (:predicates (here) (new) (gone)) (:functions (charge))
+          (:durative-action charge :parameters () :duration {bounds} :condition (and (at start (new)) (over all (here)))
+            :effect (and (at start (not (new))) {effect}))
+          (:action go :parameters () :precondition (>= (charge) 60) :effect (and (not (here)) (gone)))"
+        )
+    };
+    let init = "(:init (here) (new) (= (charge) 0)) (:goal (gone))";
+    let at_end = "(at end (increase (charge) ?duration))";
+    check(&charged("(<= ?duration 100)", at_end), init, Some(100.0));
+    check(&charged("(and (>= ?duration 20) (<= ?duration 120))", at_end), init, Some(70.0));
+    check(&charged("(<= ?duration 100)", "(increase (charge) (* #t 2))"), init, Some(50.0));
+}
+
+#[test]
 fn durations_may_be_nothing_at_first_or_at_all() {
     // What there is to load decides how long loading takes: at first there is nothing.
     let domain = "(:requirements :numeric-fluents) (:predicates (chosen)) (:functions (ready) (loaded))
@@ -223,6 +240,17 @@ fn numbers_change_under_conditions_that_come_later() {
       (:durative-action fill :parameters () :duration (= ?duration 5)
         :effect (when (at end (ready)) (at end (increase (level) 1))))";
     check(domain, "(:init (= (level) 0)) (:goal (>= (level) 1))", Some(5.0));
+}
+
+#[test]
+fn what_has_no_result_at_the_end_is_never_done() {
+    let domain = "(:requirements :numeric-fluents :conditional-effects) (:predicates (high) (wet)) (:functions (level) (rain))
+      (:durative-action fill :parameters () :duration (= ?duration 5)
+        :effect (and (when (at end (high)) (at end (assign (level) 5))) (when (at end (wet)) (at end (increase (level) 2)))))
+      (:durative-action dry :parameters () :duration (= ?duration 2) :condition (at start (wet)) :effect (at end (not (wet)))))";
+    let domain = domain.strip_suffix(')').unwrap_or(domain);
+    check(domain, "(:init (high) (wet) (= (level) 0)) (:goal (= (level) 5))", Some(5.0));
+    check(domain, "(:init (high) (wet) (= (level) 0)) (:goal (= (level) 7))", None);
 }
 
 #[test]

@@ -149,6 +149,8 @@ fn with_nothing_taken_away_a_goal_is_to_be_had_only_where_it_surely_is() {
         ("(:action light :parameters () :precondition (key) :effect (and (lit) (increase (fuel) (/ 1 (left)))))", "(and (out) (lit) (in))", false),
         ("(:durative-action light :parameters () :duration (= ?duration (- (left) 5)) :condition (at start (in)) :effect (at end (lit)))", "(lit)", false),
         ("(:action light :parameters () :precondition (and (in) (> (left) 0)) :effect (lit))", "(lit)", false),
+        // Or give a number two values.
+        ("(:action light :parameters () :precondition (in) :effect (and (lit) (assign (fuel) 1) (assign (fuel) 2)))", "(lit)", false),
         // What a start gives is of no use where its end cannot come.
         ("(:durative-action light :parameters () :duration (= ?duration 5) :condition (and (at start (in)) (at end (< (left) -9)))
             :effect (at start (lit)))", "(lit)", false),

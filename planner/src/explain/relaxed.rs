@@ -5,6 +5,7 @@ use crate::ground::{
     Action, Change, Conjunction, DurationBound, DurativeAction, Effect, Expression, Fact, GroundTask,
     Outcome, When,
 };
+use crate::model::agreement::contradictions;
 use crate::model::relation::Relation;
 
 /// Whether it surely could. No where that is not known.
@@ -95,7 +96,17 @@ impl<'g> Had<'g> {
 
     /// Whether effects surely have a result: of numbers, where known amounts are added to known numbers.
     fn can_happen(&self, effects: &[Effect]) -> bool {
-        effects.iter().all(|effect| match &effect.outcome {
+        let kinds = effects.iter().filter_map(|effect| match effect.outcome {
+            Outcome::Change { fluent, change, amount: Expression::Constant(amount) } => {
+                Some((fluent, change, amount))
+            }
+            _ => None,
+        });
+        contradictions(kinds).is_empty() && effects.iter().all(|effect| self.has_result(effect))
+    }
+
+    fn has_result(&self, effect: &Effect) -> bool {
+        match &effect.outcome {
             Outcome::Set(_) => true,
             Outcome::Change { fluent, change, amount: Expression::Constant(amount) } => match change {
                 Change::Assign => amount.is_finite(),
@@ -105,7 +116,7 @@ impl<'g> Had<'g> {
                 Change::ScaleUp | Change::ScaleDown => false,
             },
             _ => false,
-        })
+        }
     }
 
     /// What effects do whose conditions hold.

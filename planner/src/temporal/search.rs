@@ -14,8 +14,10 @@ use crate::ground::Values;
 use crate::memory::{Heap, MemoryLimit, Rows, soon};
 
 use super::advance::{Gates, Open, Situation, Step};
+use super::destroy::shuffled;
 use super::estimate::{Estimate, From};
 use super::order::Inconsistent;
+use super::overlap::starts_again;
 use super::relaxed::{Part, Relaxed};
 use super::space::{Base, Space};
 use super::store::Store;
@@ -531,11 +533,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         if self.overlapping.contains(&act) {
             return Ok(());
         }
-        let world = self.space.world;
-        let nothing = Span { least_s: 0.0, most_s: 0.0 };
-        let mut step = Step { act, part: Part::Start, proposal: None, span: nothing };
-        // What a module would propose is not asked.
-        if !world.acts[act as usize].grounding.is_empty() || world.advance(situation, &mut step)?.is_some() {
+        if starts_again(self.space.world, situation, act)? {
             self.overlapping.insert(act);
         }
         Ok(())
@@ -593,15 +591,4 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             self.proposals.len() - 1
         }) as u32
     }
-}
-
-/// The number itself without a seed, else its place in a permutation (the finaliser of SplitMix64).
-fn shuffled(number: u64, seed: u64) -> u64 {
-    if seed == 0 {
-        return number;
-    }
-    let mut mixed = number.wrapping_add(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    mixed ^ (mixed >> 31)
 }

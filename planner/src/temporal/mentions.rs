@@ -290,7 +290,7 @@ mod tests {
     #[test]
     fn of_a_long_plan_less_is_done_once_asked_to_stop() {
         let domain = "(define (domain d) (:requirements :numeric-fluents) (:predicates (p)) (:functions (n))
-          (:action more :parameters () :effect (and (p) (increase (n) 1))))";
+          (:action more :parameters () :precondition (>= (n) 0) :effect (and (p) (increase (n) 1))))";
         let problem = "(define (problem p) (:domain d) (:init (= (n) 0)) (:goal (and (p) (> (n) 0))))";
         let (task, grounded) = small::read(domain, problem);
         let nobody = Attachments::default();

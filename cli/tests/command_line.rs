@@ -10,7 +10,7 @@ use descry_memory::{Options, Record};
 use descry_perception::Cloud;
 use descry_perception::files::read_cloud;
 use descry_perception::nalgebra::Point3;
-use serde_json::Value;
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use crate::beside::shared;
@@ -264,6 +264,35 @@ fn a_plan_is_validated() {
     std::fs::write(&plan, "0.000: (drive van home market) [9.000]\n").expect("writable");
     let verdict = json(&["validate", &domain, &problem, &plan, "--attach", &attach, "--json"], 1);
     assert_eq!(verdict["valid"], false, "{verdict}");
+    let (said, _) = check(&["validate", &domain, &problem, &plan, "--attach", &attach], 1, &[]);
+    assert!(said.starts_with("not valid: step 1"), "{said}");
+}
+
+#[test]
+fn that_there_is_no_plan_is_a_result_and_says_what_it_takes_for_granted() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("writable");
+        path.display().to_string()
+    };
+    let domain = write(
+        "domain.pddl",
+        "(define (domain d) (:requirements :durative-actions :numeric-fluents) (:predicates (idle) (done)) (:functions (running))
+           (:durative-action run :parameters () :duration (= ?duration 10) :condition (at start (idle))
+             :effect (and (at start (increase (running) 1)) (at end (decrease (running) 1))))
+           (:action go :parameters () :precondition (>= (running) 3) :effect (done)))",
+    );
+    for (init, proven, overlapping) in [
+        ("", "proven unsolvable\n", json!([])),
+        ("(idle)", "proven unsolvable as long as no action overlaps itself\n", json!(["run"])),
+    ] {
+        let text = format!("(define (problem p) (:domain d) (:init {init} (= (running) 0)) (:goal (done)))");
+        let problem = write("problem.pddl", &text);
+        let (said, _) = check(&["plan", &domain, &problem], 3, &[]);
+        assert!(said.starts_with(proven), "{said}");
+        assert_eq!(json(&["plan", &domain, &problem, "--json"], 3)["overlapping"], overlapping);
+    }
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Why there is no plan.
 
 mod core;
+mod relaxed;
 mod sites;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use serde::Serialize;
@@ -18,6 +19,7 @@ use crate::task::{
 };
 
 pub(crate) use self::core::{is_open, narrowed};
+use self::relaxed::could_be_had;
 pub(crate) use self::sites::sites;
 
 /// Why a task has no plan: findings that point at the goal, at what nobody achieves, and at who said no.
@@ -25,7 +27,41 @@ pub(crate) use self::sites::sites;
 pub struct Explanation {
     /// The reasons, the goal's first.
     pub findings: Findings,
+    /// Actions that could start while they run, which might help, and which no search tries to the end: where there are any, the proof
+    /// holds for plans in which no action overlaps itself. The last finding says so.
+    pub overlapping: BTreeSet<String>,
+    /// Whether the goal could surely be had if nothing were ever taken away.
+    #[serde(skip)]
+    pub(crate) only_lost: bool,
 }
+
+impl Explanation {
+    fn new(task: &Task, list: Vec<Diagnostic>) -> Explanation {
+        let findings = Findings { sources: task.sources.to_vec(), list };
+        Explanation { findings, ..Explanation::default() }
+    }
+
+    /// The same for plans in which these actions do not overlap themselves.
+    pub(crate) fn but_for(mut self, task: &Task, overlapping: &BTreeSet<String>) -> Explanation {
+        let mut actions = task.actions.iter().filter(|action| overlapping.contains(&action.name));
+        if let Some(first) = actions.next() {
+            let message =
+                "the proof holds for plans in which no action overlaps itself: others were not all looked at";
+            let label = |action: &Action| format!("`{}` could start again while it runs", action.name);
+            let mut finding = Diagnostic::warning(OVERLAP, message, first.span, label(first));
+            for action in actions.take(SHOWN) {
+                finding = finding.with_label(action.span, label(action));
+            }
+            let help = "if it cannot, let its start need and take what its end gives back";
+            self.findings.list.push(finding.with_help(help));
+        }
+        self.overlapping.clone_from(overlapping);
+        self
+    }
+}
+
+/// What findings that tell of actions that overlap themselves are called.
+const OVERLAP: &str = "overlap-untried";
 
 impl fmt::Display for Explanation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -79,10 +115,11 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
     for (&(module, wanted), calls) in refusals {
         list.extend(refused(task, ModuleId(module), wanted, calls));
     }
+    let only_lost = list.is_empty() && could_be_had(ground);
     if list.is_empty() {
-        list.push(together(task, &parts, false));
+        list.push(together(task, &parts, false, only_lost));
     }
-    Explanation { findings: Findings { sources: task.sources.to_vec(), list } }
+    Explanation { only_lost, ..Explanation::new(task, list) }
 }
 
 /// What is said where no relaxation knows better.
@@ -104,12 +141,12 @@ pub(crate) fn constrained(task: &Task, reachable: bool) -> Explanation {
         finding = finding.with_label(span, "this too");
     }
     let finding = finding.with_help("make it a `(preference …)` to see how much of it can be kept");
-    Explanation { findings: Findings { sources: task.sources.to_vec(), list: vec![finding] } }
+    Explanation::new(task, vec![finding])
 }
 
-/// Each part of the goal can be had if nothing is ever taken away: what may be in the way of all. `narrowed` where these
-/// parts alone cannot be had.
-fn together(task: &Task, parts: &[&Condition], narrowed: bool) -> Diagnostic {
+/// What may be in the way of all parts of the goal. `narrowed` where these parts alone cannot be had; `only_lost` where they could, if
+/// nothing were ever taken away.
+fn together(task: &Task, parts: &[&Condition], narrowed: bool, only_lost: bool) -> Diagnostic {
     let message = match (narrowed, parts.len()) {
         (false, _) => UNREACHED.to_string(),
         (true, 1) => {
@@ -149,11 +186,14 @@ fn together(task: &Task, parts: &[&Condition], narrowed: bool) -> Diagnostic {
             reasons.push(LASTS);
         }
     }
-    let help = format!(
-        "with nothing ever taken away and all the time in the world it could be had: {}",
-        reasons.join(", or ")
-    );
-    finding.with_help(help)
+    let first = match only_lost {
+        true => "with nothing ever taken away and all the time in the world it could be had: ",
+        false => "perhaps ",
+    };
+    if !only_lost && (task.is_temporal() || !task.functions.is_empty()) {
+        reasons.insert(0, "what it takes of numbers or of durations never comes out right");
+    }
+    finding.with_help(format!("{first}{}", reasons.join(", or ")))
 }
 
 const LASTS: &str = "what an action gives only while it runs does not last long enough";

@@ -43,7 +43,7 @@ pub struct Statistics {
     pub plans: u64,
     /// Ground actions.
     pub actions: u64,
-    /// Set where the plan is proven to be best.
+    /// Set where the plan is proven to be best, those in which an action overlaps itself among them.
     pub optimal: bool,
     /// Set where the task has preferences that no search looked for: those that the metric does not count, or that ask for
     /// times or attachments. They only score plans.
@@ -62,7 +62,7 @@ pub enum Outcome {
         /// What it took.
         statistics: Statistics,
     },
-    /// Proven to have no plan.
+    /// Proven to have no plan; where `why` names actions that overlap themselves, none in which no action does.
     Unsolvable {
         /// Why.
         why: Explanation,

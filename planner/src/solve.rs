@@ -1,7 +1,7 @@
 //! The way in: [`plan`] takes a task to a timed plan, or says why there is none.
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::attachment::{Attachments, CallStatistics};
@@ -45,12 +45,16 @@ pub fn plan(
         let limit = statistics.evaluated.max(LEAST_EVALUATIONS);
         let options =
             Options { evaluation_limit: Some(limit), anytime: false, bound: None, ..options.clone() };
-        let mut unsolvable = |task: &Task| {
-            let found = search(task, attachments, &options, stop, &mut |_| {});
-            !stop() && matches!(found, Ok(Outcome::Unsolvable { .. }))
+        let mut overlapping = why.overlapping.clone();
+        let mut unsolvable = |task: &Task| match search(task, attachments, &options, stop, &mut |_| {}) {
+            Ok(Outcome::Unsolvable { why, .. }) if !stop() => {
+                overlapping.extend(why.overlapping);
+                true
+            }
+            _ => false,
         };
-        if let Some(narrowed) = narrowed(&freed(task), &mut unsolvable) {
-            *why = narrowed;
+        if let Some(narrowed) = narrowed(&freed(task), why.only_lost, &mut unsolvable) {
+            *why = narrowed.but_for(task, &overlapping);
         }
     }
     Ok(outcome)
@@ -58,6 +62,9 @@ pub fn plan(
 
 /// Goals of tasks with more ground actions than this are not taken apart to find out which parts are to blame.
 const MOST_ACTIONS_TAKEN_APART: u64 = 5_000;
+/// Times are not told apart where numbers are further from each other than this part of what is kept between happenings.
+/// From: a few times, each rounded by half of that, are added up between two happenings.
+const LEAST_SPACING: f64 = 0.1;
 /// Bytes that a search's own form of the task takes, as a multiple of the grounded task's.
 const FORMS: usize = 2;
 /// Evaluated states that a part of a goal may always take.
@@ -187,7 +194,12 @@ fn search_for(
     };
     let found = match grounded.goal_reachable {
         true => search_plans(&world, &measure(&grounded), limits(options, memory), stop, &mut hear),
-        false => Ok(Progress { reason: Reason::Exhausted, counts: Counts::default(), plans: 0 }),
+        false => Ok(Progress {
+            reason: Reason::Exhausted,
+            counts: Counts::default(),
+            plans: 0,
+            overlapping: Vec::new(),
+        }),
     };
     let progress = found.map_err(|failure| world.calls.report(failure))?;
     if let Some(error) = invalid.filter(|error| best.is_none() || matches!(error, PlanError::Internal { .. }))
@@ -198,8 +210,15 @@ fn search_for(
     statistics.expanded = progress.counts.expanded;
     statistics.plans = progress.plans;
     statistics.attachments = since(&before, attachments.statistics());
-    let why = || explain(task, &grounded, &world.calls.refusals());
-    Ok(ended(best, progress.reason, why, statistics))
+    let schemas = progress.overlapping.iter().map(|&act| world.acts[act as usize].origin.schema);
+    let overlapping: BTreeSet<String> =
+        schemas.map(|schema| task.actions[schema as usize].name.clone()).collect();
+    let why = || explain(task, &grounded, &world.calls.refusals()).but_for(task, &overlapping);
+    let reason = match progress.reason {
+        Reason::Exhausted if best.is_some() && !overlapping.is_empty() => Reason::Enough,
+        reason => reason,
+    };
+    Ok(ended(best, reason, why, statistics))
 }
 
 /// What a search with times has come to.
@@ -303,7 +322,24 @@ fn checked(task: &Task, attachments: &Attachments, mut plan: Plan) -> Result<Pla
             return Err(PlanError::Refused(Findings { list, ..verdict.findings }));
         }
     }
+    if let Some(finding) = too_long(task, &plan) {
+        let findings = Findings { sources: task.sources.to_vec(), list: vec![finding] };
+        return Err(PlanError::Refused(findings));
+    }
     Err(PlanError::Internal { reason: verdict.reason.unwrap_or_default(), plan })
+}
+
+/// Where a plan takes so long that times near its end are not told apart: its longest action.
+fn too_long(task: &Task, plan: &Plan) -> Option<Diagnostic> {
+    let spacing_s = plan.makespan_s()? * f64::EPSILON;
+    let longest = plan.steps.iter().max_by(|one, other| one.duration_s.total_cmp(&other.duration_s))?;
+    let action = task.actions.iter().find(|action| action.name == longest.action)?;
+    let message =
+        format!("plans of {:.0e} s are too long: times have steps of {EPSILON_S} s", plan.makespan_s()?);
+    let label = format!("this may take {:.0e} s", longest.duration_s);
+    let finding = Diagnostic::error("too-long", message, action.span, label);
+    (spacing_s > LEAST_SPACING * EPSILON_S)
+        .then(|| finding.with_help("give durations and times in a larger unit, such as hours"))
 }
 
 /// Where nothing that happens at a time matters to a plan, its steps come one after the other, and apart from all of that.

@@ -200,6 +200,48 @@ fn what_steps_undo_of_one_another_goes() {
 }
 
 #[test]
+fn what_has_no_result_is_never_done() {
+    // What is set and raised at once has no value: one of the two must not happen, or nobody does it.
+    let domain = "(define (domain d) (:requirements :fluents :conditional-effects :negative-preconditions)
+      (:predicates (high) (wet) (done)) (:functions (level) (rain))
+      (:action fill :parameters () :precondition (not (done))
+        :effect (and (done) (when (high) (assign (level) 5)) (when (wet) (increase (level) 2))))
+      (:action dry :parameters () :precondition (wet) :effect (not (wet)))
+      (:action splash :parameters () :effect (and (done) (assign (rain) 1) (assign (rain) 2))))";
+    for (init, goal, expect) in [
+        ("(high)", "(= (level) 5)", Expect::StepsAtMost(1)),
+        ("(wet)", "(= (level) 2)", Expect::StepsAtMost(1)),
+        ("(high) (wet)", "(= (level) 5)", Expect::StepsAtMost(2)),
+        ("(high) (wet)", "(= (level) 7)", Expect::Unsolvable),
+        ("(high) (wet)", "(and (done) (wet))", Expect::Unsolvable),
+    ] {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init {init} (= (level) 0) (= (rain) 0)) (:goal {goal}))"
+        );
+        check(domain, &problem, expect);
+    }
+}
+
+#[test]
+fn what_the_last_state_is_worth_is_made_as_large_as_can_be() {
+    let purse = "(define (domain d) (:requirements :fluents :negative-preconditions) (:predicates (done)) (:functions (gold))
+      (:action get :parameters () :precondition (and (not (done)) (< (gold) 5)) :effect (increase (gold) 1))
+      (:action stop :parameters () :precondition (not (done)) :effect (done)))";
+    let gate = "(define (domain d) (:requirements :fluents :typing :conditional-effects) (:types coin)
+      (:predicates (in) (open)) (:functions (spent) (worth ?c - coin))
+      (:action pay :parameters (?c - coin)
+        :effect (and (in) (when (open) (increase (spent) (worth ?c))) (when (not (open)) (increase (spent) 7)) (increase (spent) 1)))
+      (:action open :parameters () :effect (and (open) (increase (spent) 2))))";
+    let coins = "(:objects a b - coin) (:init (= (spent) 0) (= (worth a) 3) (= (worth b) 1.5)) (:goal (in))";
+    for (domain, problem, most) in [
+        (purse, "(:init (= (gold) 0)) (:goal (done)) (:metric minimize (- 10 (gold)))", 5.0),
+        (gate, &format!("{coins} (:metric minimize (+ 3 (* 2 (spent))))"), 12.0),
+    ] {
+        check(domain, &format!("(define (problem p) (:domain d) {problem})"), Expect::MetricAtMost(most));
+    }
+}
+
+#[test]
 fn a_long_way_is_worth_going_faster() {
     let domain = "(define (domain boat) (:requirements :fluents) (:predicates (met)) (:functions (x) (y) (v))
       (:action east :parameters () :effect (increase (x) (* 2 (v))))

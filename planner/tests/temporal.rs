@@ -142,6 +142,48 @@ fn what_can_only_start_at_one_time_is_not_proven_to_be_impossible() {
     assert!(!matches!(found, Outcome::Unsolvable { .. }), "{found:?}");
 }
 
+const CHARGE: &str = "(define (domain d) (:requirements :durative-actions :numeric-fluents)
+  (:predicates (plug) (track) (fresh) (idle) (full) (two) (three)) (:functions (charge) (running))
+  (:durative-action charge :parameters () :duration (= ?duration 10) :condition (at start (plug))
+    :effect (at end (increase (charge) 1)))
+  (:durative-action run :parameters () :duration (= ?duration 10) :condition (at start (track))
+    :effect (and (at start (increase (running) 1)) (at end (decrease (running) 1))))
+  (:durative-action use :parameters () :duration (= ?duration 10) :condition (at start (fresh))
+    :effect (and (at end (not (fresh))) (at end (increase (charge) 1))))
+  (:durative-action fill :parameters () :duration (= ?duration 10) :condition (at start (idle)) :effect (at end (full)))
+  (:durative-action turn :parameters () :duration (= ?duration 10) :condition (at start (idle))
+    :effect (and (at start (not (idle))) (at start (increase (running) 1)) (at end (idle)) (at end (decrease (running) 1))))
+  (:action count-two :parameters () :precondition (>= (running) 2) :effect (two))
+  (:action count-three :parameters () :precondition (>= (running) 3) :effect (three)))";
+
+#[test]
+fn what_runs_twice_at_once_is_found_or_left_open() {
+    // A plan; or the actions of which a proof takes for granted that they do not overlap themselves.
+    for (init, goal, expected) in [
+        ("(plug)", "(>= (charge) 3)", Ok(())),
+        ("(track)", "(two)", Ok(())),
+        ("(track)", "(three)", Err("run")),
+        ("(fresh)", "(>= (charge) 2)", Ok(())),
+        ("(fresh)", "(>= (charge) 5)", Err("use")),
+        ("(idle)", "(two)", Err("")),
+        ("(idle)", "(and (two) (full))", Err("")),
+    ] {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init {init} (= (charge) 0) (= (running) 0)) (:goal {goal}))"
+        );
+        let found = outcome(Source::new("domain.pddl", CHARGE), Source::new("problem.pddl", problem));
+        match (&found, expected) {
+            (Outcome::Solved { statistics, .. }, Ok(())) => assert!(!statistics.optimal),
+            (Outcome::Unsolvable { why, .. }, Err(names)) => {
+                let overlapping: Vec<&str> = why.overlapping.iter().map(String::as_str).collect();
+                assert_eq!(overlapping.join(" "), names, "{why}");
+                assert_eq!(why.to_string().contains("no action overlaps itself"), !names.is_empty());
+            }
+            _ => panic!("{init} {goal}: {found:?}"),
+        }
+    }
+}
+
 #[test]
 fn durations_depend_on_the_state_and_stretch() {
     let filled = "(:requirements :numeric-fluents) (:predicates (full)) (:functions (missing) (rate))
@@ -154,6 +196,23 @@ fn durations_depend_on_the_state_and_stretch() {
       (:durative-action cook :parameters () :duration (= ?duration 6) :condition (over all (on))
         :effect (at end (cooked)))";
     check(stretched, "(:init (idle)) (:goal (cooked))", Some(6.0));
+}
+
+#[test]
+fn a_duration_is_as_long_as_its_effects_need() {
+    let charged = |bounds: &str, effect: &str| {
+        format!(
+            "(:requirements :numeric-fluents :duration-inequalities :continuous-effects) (:predicates (here) (new) (gone)) (:functions (charge))
+          (:durative-action charge :parameters () :duration {bounds} :condition (and (at start (new)) (over all (here)))
+            :effect (and (at start (not (new))) {effect}))
+          (:action go :parameters () :precondition (>= (charge) 60) :effect (and (not (here)) (gone)))"
+        )
+    };
+    let init = "(:init (here) (new) (= (charge) 0)) (:goal (gone))";
+    let at_end = "(at end (increase (charge) ?duration))";
+    check(&charged("(<= ?duration 100)", at_end), init, Some(100.0));
+    check(&charged("(and (>= ?duration 20) (<= ?duration 120))", at_end), init, Some(70.0));
+    check(&charged("(<= ?duration 100)", "(increase (charge) (* #t 2))"), init, Some(50.0));
 }
 
 #[test]
@@ -181,6 +240,17 @@ fn numbers_change_under_conditions_that_come_later() {
       (:durative-action fill :parameters () :duration (= ?duration 5)
         :effect (when (at end (ready)) (at end (increase (level) 1))))";
     check(domain, "(:init (= (level) 0)) (:goal (>= (level) 1))", Some(5.0));
+}
+
+#[test]
+fn what_has_no_result_at_the_end_is_never_done() {
+    let domain = "(:requirements :numeric-fluents :conditional-effects) (:predicates (high) (wet)) (:functions (level) (rain))
+      (:durative-action fill :parameters () :duration (= ?duration 5)
+        :effect (and (when (at end (high)) (at end (assign (level) 5))) (when (at end (wet)) (at end (increase (level) 2)))))
+      (:durative-action dry :parameters () :duration (= ?duration 2) :condition (at start (wet)) :effect (at end (not (wet)))))";
+    let domain = domain.strip_suffix(')').unwrap_or(domain);
+    check(domain, "(:init (high) (wet) (= (level) 0)) (:goal (= (level) 5))", Some(5.0));
+    check(domain, "(:init (high) (wet) (= (level) 0)) (:goal (= (level) 7))", None);
 }
 
 #[test]
@@ -298,6 +368,30 @@ fn a_duration_lies_strictly_between_its_bounds_however_near_they_are() {
     let domain = "(:requirements :duration-inequalities) (:predicates (held))
       (:durative-action hold :parameters () :duration (and (> ?duration 5) (< ?duration 5)) :effect (at end (held)))";
     check(domain, "(:init) (:goal (held))", None);
+}
+
+#[test]
+fn times_that_are_not_told_apart_are_refused_under_the_text() {
+    for (duration, fits) in
+        [("100000000", true), ("100000000000000", false), ("1000000000000000000000", false)]
+    {
+        let domain = format!(
+            "(define (domain d) (:requirements :durative-actions) (:predicates (idle) (waited) (gone))
+          (:durative-action wait :parameters () :duration (= ?duration {duration}) :condition (at start (idle))
+            :effect (and (at start (not (idle))) (at end (waited))))
+          (:durative-action go :parameters () :duration (= ?duration 1) :condition (at start (waited)) :effect (at end (gone))))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (idle)) (:goal (gone)))";
+        let task = Task::read(&Source::new("domain.pddl", domain), &Source::new("problem.pddl", problem));
+        let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
+        match plan(&task, &Attachments::new(), &Options::default(), &|| false, &mut |_| {}) {
+            Ok(Outcome::Solved { .. }) => assert!(fits, "{duration}"),
+            Err(PlanError::Refused(findings)) => {
+                assert!(!fits && findings.render(false).contains("this may take"), "{duration}");
+            }
+            other => panic!("{duration}: {other:?}"),
+        }
+    }
 }
 
 #[test]

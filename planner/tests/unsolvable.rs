@@ -138,6 +138,29 @@ fn each_reason_is_drawn_where_it_stands() {
 }
 
 #[test]
+fn with_nothing_taken_away_a_goal_is_to_be_had_only_where_it_surely_is() {
+    let both = "(:requirements :durative-actions :numeric-fluents) (:predicates (key) (in) (out) (lit)) (:functions (fuel) (left))
+      (:action enter :parameters () :precondition (key) :effect (and (in) (not (key)) (decrease (left) 1)))
+      (:action leave :parameters () :precondition (key) :effect (and (out) (not (key))))";
+    let start = "(:init (key) (= (fuel) 0) (= (left) 0))";
+    for (more, goal, surely) in [
+        ("", "(and (in) (out))", true),
+        // It would be divided by nothing, take less than no time, or ask for a number.
+        ("(:action light :parameters () :precondition (key) :effect (and (lit) (increase (fuel) (/ 1 (left)))))", "(and (out) (lit) (in))", false),
+        ("(:durative-action light :parameters () :duration (= ?duration (- (left) 5)) :condition (at start (in)) :effect (at end (lit)))", "(lit)", false),
+        ("(:action light :parameters () :precondition (and (in) (> (left) 0)) :effect (lit))", "(lit)", false),
+        // Or give a number two values.
+        ("(:action light :parameters () :precondition (in) :effect (and (lit) (assign (fuel) 1) (assign (fuel) 2)))", "(lit)", false),
+        // What a start gives is of no use where its end cannot come.
+        ("(:durative-action light :parameters () :duration (= ?duration 5) :condition (and (at start (in)) (at end (< (left) -9)))
+            :effect (at start (lit)))", "(lit)", false),
+    ] {
+        let why = why(&format!("{both} {more}"), &format!("{start} (:goal {goal})"));
+        assert_eq!(why.contains("it could be had"), surely, "{why}");
+    }
+}
+
+#[test]
 fn a_failing_attachment_is_drawn_where_it_is_asked() {
     let problem = "  (:objects cup - thing) (:init) (:goal (seen cup))";
     let Err(PlanError::Attachment { findings, .. }) = solve(FAILING, problem) else { panic!("it fails") };

@@ -120,6 +120,24 @@ const WORKSHOP_PROBLEM: &str = "(define (problem p) (:domain workshop)
   (:goal (and (done a))))";
 
 #[test]
+fn changes_of_one_number_at_once_must_have_a_result() {
+    let domain = "(define (domain d) (:requirements :fluents :conditional-effects) (:predicates (high) (wet)) (:functions (level))
+      (:action fill :parameters () :effect (and (when (high) (assign (level) 5)) (when (wet) (increase (level) 2))))
+      (:action rain :parameters () :effect (and (wet) (increase (level) 1) (decrease (level) 3)))
+      (:action rise :parameters () :effect (and (high) (assign (level) 1) (assign (level) 1))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (level) 0)) (:goal (>= (level) 0)))";
+    check(
+        domain,
+        problem,
+        &[
+            ("(rain)\n(fill)", ""),
+            ("(rise)\n(fill)", ""),
+            ("(rain)\n(rise)\n(fill)", "step 3 (fill): two changes of (level) at once contradict each other"),
+        ],
+    );
+}
+
+#[test]
 fn plans_with_times() {
     check(
         WORKSHOP,

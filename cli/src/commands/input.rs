@@ -49,6 +49,11 @@ pub fn drawn(findings: &Findings) -> String {
     findings.render(is_coloured())
 }
 
+/// The same as a result, on standard output.
+pub fn print_findings(findings: &Findings) -> Result<(), CommandError> {
+    print_text(findings.render(shows_colours(&std::io::stdout())).trim_end())
+}
+
 /// Prints one JSON object on standard output. A reader that has gone away is no fault.
 pub fn print_json(value: &impl Serialize) -> Result<(), CommandError> {
     let text = serde_json::to_string(value).map_err(|e| CommandError::Bug(e.to_string()))?;
@@ -86,9 +91,14 @@ pub fn lost(faults: &[Fault]) -> Exit {
     if faults.is_empty() { Exit::Done } else { Exit::No }
 }
 
-/// Whether standard error shows colours: a terminal, and nobody said [`NO_COLOR`](https://no-color.org).
+/// Whether standard error shows colours.
 pub fn is_coloured() -> bool {
-    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty())
+    shows_colours(&std::io::stderr())
+}
+
+/// Whether a stream shows colours: a terminal, and nobody said [`NO_COLOR`](https://no-color.org).
+fn shows_colours(stream: &impl IsTerminal) -> bool {
+    stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty())
 }
 
 /// So much is read of what does not say how long it is: a pipe or a device.

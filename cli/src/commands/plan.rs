@@ -173,6 +173,8 @@ fn print_json(
         "scored_only": scored_only,
         "attachments": attachments,
         "why": why.map(|why| why.to_string()),
+        // A proof holds for plans in which none of these overlaps itself.
+        "overlapping": why.map(|why| &why.overlapping),
         "findings": why.map(|why| &why.findings),
         "plan": plan.map(|p| &p.steps),
     });
@@ -196,7 +198,13 @@ fn show(
     );
     match (outcome, outcome.plan()) {
         (Outcome::Unsolvable { why, .. }, _) => {
-            input::narrate(&format!("proven unsolvable ({time})\n{}", input::drawn(&why.findings)));
+            let but_for = match why.overlapping.is_empty() {
+                true => "",
+                false => " as long as no action overlaps itself",
+            };
+            input::print_text(&format!("proven unsolvable{but_for}"))?;
+            input::print_findings(&why.findings)?;
+            input::narrate(&time);
         }
         (_, Some(plan)) => {
             if !written {

@@ -33,7 +33,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     if arguments.json {
         input::print_json(&verdict)?;
     } else {
-        input::narrate(&told(&verdict));
+        input::print_text(&told(&verdict))?;
     }
     Ok(if verdict.valid { Exit::Done } else { Exit::No })
 }

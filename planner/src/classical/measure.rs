@@ -49,6 +49,14 @@ impl Measure {
         matches!(self.kind, Kind::Sum)
     }
 
+    /// What a plan that ends in a state costs, where that is known from the state alone.
+    pub(crate) fn of_last(&self, numbers: &Numbers, state: &[u32]) -> Option<f64> {
+        match &self.kind {
+            Kind::Last(expression, sign) => Some(sign * numbers.value(expression, state)),
+            Kind::Sum | Kind::Adding(..) => None,
+        }
+    }
+
     /// The cost of a plan from the first state.
     pub(crate) fn of(&self, task: &Compiled, plan: &[u32]) -> f64 {
         let (mut state, mut sum) = (task.initial.clone(), 0.0);

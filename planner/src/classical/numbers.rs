@@ -4,6 +4,7 @@
 //! (value 0 where it holds), looked up after each change, so that all searches treat it like any other fact.
 
 use crate::ground::{Change, Comparison, Conjunction, Expression, Fact, GroundTask, Outcome, Relation};
+use crate::model::agreement::contradictions;
 use crate::model::relation::quotient;
 
 use super::compiled::Lists;
@@ -64,6 +65,8 @@ pub(crate) struct Numbers {
     turned: Lists<u32>,
     /// By operator: whether a number may become undefined or infinite, which forbids the operator.
     risky: Vec<bool>,
+    /// By operator: whether changes of one number may contradict each other, which forbids the operator.
+    contradicting: Vec<bool>,
 }
 
 impl Numbers {
@@ -90,6 +93,7 @@ impl Numbers {
             changes: Vec::with_capacity(task.actions.len()),
             turned: Lists::new(),
             risky: Vec::with_capacity(task.actions.len()),
+            contradicting: Vec::with_capacity(task.actions.len()),
             initial,
         };
         for action in &task.actions {
@@ -115,6 +119,9 @@ impl Numbers {
         let safe =
             |c: &NumberChange| c.constant_gain().is_some() && self.initial[c.number as usize].is_finite();
         self.risky.push(!changes.iter().all(safe));
+        let known = |amount: &Expression| evaluate(amount, &|_| f64::NAN);
+        let kinds = changes.iter().filter_map(|c| Some((c.number, c.change?, known(c.amount.as_ref()?))));
+        self.contradicting.push(!contradictions(kinds).is_empty());
         self.changes.push(changes);
     }
 
@@ -241,10 +248,13 @@ impl Numbers {
         }
     }
 
-    /// Whether all numbers that an operator changes stay defined and finite.
+    /// Whether all numbers that an operator changes stay defined and finite, and no changes contradict each other.
     pub(crate) fn possible(&self, operator: u32, state: &[u32]) -> bool {
         if !self.risky[operator as usize] {
             return true;
+        }
+        if self.contradicting[operator as usize] && self.contradict(operator, state) {
+            return false;
         }
         let mut next = state.to_vec();
         self.apply(operator, state, &mut next);
@@ -252,6 +262,15 @@ impl Numbers {
             let happens = c.conditions.iter().all(|f| state[f.variable as usize] == f.value);
             !happens || self.get(&next, c.number).is_finite()
         })
+    }
+
+    /// Whether changes that happen in a state contradict each other.
+    fn contradict(&self, operator: u32, state: &[u32]) -> bool {
+        let happens = |c: &&NumberChange| c.conditions.iter().all(|f| state[f.variable as usize] == f.value);
+        let happening = self.changes[operator as usize].iter().filter(happens);
+        let kinds =
+            happening.filter_map(|c| Some((c.number, c.change?, self.value(c.amount.as_ref()?, state))));
+        !contradictions(kinds).is_empty()
     }
 
     /// Numbers that an operator writes.

@@ -1,21 +1,25 @@
 //! Which parts of a goal are to blame: a smallest set of them that cannot be had together.
 
-use crate::diagnostic::Findings;
 use crate::task::{Condition, Task};
 
-use super::{Explanation, UNREACHED, together};
+use super::{Explanation, OVERLAP, UNREACHED, together};
 
 /// Goals with more parts than this are not taken apart.
 const MOST_PARTS: usize = 24;
 
 /// Whether every state was seen and nothing more can be said about why none will do.
 pub(crate) fn is_open(why: &Explanation) -> bool {
-    matches!(why.findings.list.as_slice(), [only] if only.message == UNREACHED)
+    let mut reasons = why.findings.list.iter().filter(|finding| finding.code != OVERLAP);
+    reasons.next().is_some_and(|first| first.message == UNREACHED) && reasons.next().is_none()
 }
 
 /// Leaves out what need not be in the goal for it to stay out of reach, as far as `unsolvable` proves; and tells what
-/// is left. Nothing of it can be left out, where every question is answered.
-pub(crate) fn narrowed(task: &Task, unsolvable: &mut dyn FnMut(&Task) -> bool) -> Option<Explanation> {
+/// is left; `only_lost` where all of it could be had if nothing were ever taken away. Nothing of it can be left out, where every question is answered.
+pub(crate) fn narrowed(
+    task: &Task,
+    only_lost: bool,
+    unsolvable: &mut dyn FnMut(&Task) -> bool,
+) -> Option<Explanation> {
     let Condition::And(parts) = &task.goal.body else { return None };
     if parts.len() > MOST_PARTS {
         return None;
@@ -29,6 +33,6 @@ pub(crate) fn narrowed(task: &Task, unsolvable: &mut dyn FnMut(&Task) -> bool) -
             left = others;
         }
     }
-    let list = vec![together(task, &left.iter().collect::<Vec<_>>(), left.len() < parts.len())];
-    Some(Explanation { findings: Findings { sources: task.sources.to_vec(), list } })
+    let list = vec![together(task, &left.iter().collect::<Vec<_>>(), left.len() < parts.len(), only_lost)];
+    Some(Explanation::new(task, list))
 }

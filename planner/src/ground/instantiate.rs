@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::task::{Assignment, ObjectId};
+use crate::task::ObjectId;
 
 use super::atoms::{Atoms, NONE};
 use super::normal::{Change_, Effect_, Formula, Named, Number, Pattern, Target, Term, module_writes};
@@ -373,7 +373,7 @@ impl<'a> Instantiate<'a> {
             }
             Change_::Number(how, fluent, amount) => {
                 let fluent = self.numeric(fluent, binding);
-                push(Deed::Change(fluent, change(*how), Box::new(self.expression(amount, binding))));
+                push(Deed::Change(fluent, *how, Box::new(self.expression(amount, binding))));
             }
             Change_::Call(call) => push(Deed::Call(self.call(call, binding))),
         }
@@ -515,16 +515,6 @@ fn guards_of(formula: &Formula) -> Vec<&Pattern> {
         Formula::And(parts) => parts.iter().flat_map(guards_of).collect(),
         Formula::Literal(pattern, true) => vec![pattern],
         _ => Vec::new(),
-    }
-}
-
-fn change(how: Assignment) -> Change {
-    match how {
-        Assignment::Assign => Change::Assign,
-        Assignment::Increase => Change::Increase,
-        Assignment::Decrease => Change::Decrease,
-        Assignment::ScaleUp => Change::ScaleUp,
-        Assignment::ScaleDown => Change::ScaleDown,
     }
 }
 

@@ -3,6 +3,7 @@
 use super::instantiate::{Clauses, Deed, GroundEffect, RawCall, RawPlace};
 use super::raw::{RawAction, RawTask};
 use super::task::{Change, Comparison, Expression};
+use crate::model::agreement::contradictions;
 
 /// What matters.
 pub(super) struct Relevant {
@@ -46,6 +47,11 @@ pub(super) fn is_risky(change: Change, fluent: u32, amount: &Expression, undefin
     let mut risky = change == Change::ScaleDown || change != Change::Assign && undefined[fluent as usize];
     reads(amount, &mut |id| risky |= undefined[id as usize], &mut |_| {});
     risky || may_fail(amount)
+}
+
+/// The value of an expression that is the same in every state; NaN for others.
+fn known(expression: &Expression) -> f64 {
+    if let Expression::Constant(value) = expression { *value } else { f64::NAN }
 }
 
 /// Whether an expression may be undefined although all that it reads is defined.
@@ -139,7 +145,20 @@ impl Work<'_> {
         }
     }
 
+    /// A number that one action changes in contradicting ways may forbid it, whoever asks for the number.
+    fn contradictions(&mut self, effects: &[GroundEffect]) {
+        let change = |effect: &GroundEffect| match &effect.deed {
+            Deed::Change(id, change, amount) => Some((*id, *change, known(amount))),
+            _ => None,
+        };
+        let changes: Vec<_> = effects.iter().filter_map(change).collect();
+        for (first, _) in contradictions(changes.iter().copied()) {
+            Self::set(&mut self.relevant.numerics, changes[first].0, &mut self.changed);
+        }
+    }
+
     fn effects(&mut self, effects: &[GroundEffect]) {
+        self.contradictions(effects);
         for effect in effects {
             if !self.keeps(&effect.deed) {
                 continue;

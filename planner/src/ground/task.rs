@@ -3,6 +3,7 @@
 //! Ids are plain indices. Those of predicates, fluents, objects, actions and modules are the lifted task's own.
 
 pub use crate::model::relation::Relation;
+pub use crate::task::Assignment as Change;
 
 /// Index of a finite-domain variable in [`GroundTask::variables`].
 pub type VariableId = u32;
@@ -174,34 +175,6 @@ impl Conjunction {
     /// Whether nothing is asked.
     pub fn is_empty(&self) -> bool {
         self.facts.is_empty() && self.comparisons.is_empty() && self.calls.is_empty()
-    }
-}
-
-/// How an effect changes a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Change {
-    /// `assign`
-    Assign,
-    /// `increase`
-    Increase,
-    /// `decrease`
-    Decrease,
-    /// `scale-up`
-    ScaleUp,
-    /// `scale-down`
-    ScaleDown,
-}
-
-impl Change {
-    /// Changes a number.
-    pub fn apply(self, number: &mut f64, amount: f64) {
-        match self {
-            Change::Assign => *number = amount,
-            Change::Increase => *number += amount,
-            Change::Decrease => *number -= amount,
-            Change::ScaleUp => *number *= amount,
-            Change::ScaleDown => *number /= amount,
-        }
     }
 }
 

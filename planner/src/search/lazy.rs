@@ -34,6 +34,8 @@ pub(crate) struct Strategy {
     pub towards_landmarks: bool,
     /// Only plans cheaper than this (in the search's costs) are of interest.
     pub bound: u32,
+    /// Only plans that end in a state of which the metric makes less than this are of interest.
+    pub better_than: Option<f64>,
     /// Give up after this much work (see [`Relaxed::work`]).
     pub work_limit: u64,
     /// Give up after this many evaluations.
@@ -287,7 +289,7 @@ impl<'a, 's> Search<'a, 's> {
         let mut last = u32::MAX;
         self.trail.clear();
         loop {
-            if task.is_goal(&self.state) {
+            if task.is_goal(&self.state) && self.is_better() {
                 return Some(self.store.plan_to(id));
             }
             if (self.shared.stop)() {
@@ -309,6 +311,13 @@ impl<'a, 's> Search<'a, 's> {
             last = estimate;
             id = self.look_ahead(id)?;
         }
+    }
+
+    /// Whether a plan that ends in `self.state` is good enough.
+    fn is_better(&self) -> bool {
+        let task = self.shared.task;
+        let costs = || task.measure.of_last(&task.numbers, &self.state);
+        self.strategy.better_than.is_none_or(|bound| costs().is_none_or(|cost| cost < bound))
     }
 
     /// Moves `self.state` to the middle of the last lookahead; `None` if that was expanded before.

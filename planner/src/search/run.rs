@@ -132,6 +132,7 @@ const GREEDY: Strategy = Strategy {
     landmarks: true,
     towards_landmarks: true,
     bound: u32::MAX,
+    better_than: None,
     work_limit: u64::MAX,
     evaluation_limit: u64::MAX,
 };
@@ -255,7 +256,10 @@ impl<'a, 's> Run<'a, 's> {
             return if self.options.anytime { ClassicalEnd::Stopped } else { ClassicalEnd::Done };
         }
         match (self.options.anytime, self.options.soft) {
-            (true, _) => self.anytime(self.options.first_work * 4, u64::MAX),
+            (true, soft) => match self.anytime(self.options.first_work * 4, u64::MAX) {
+                ClassicalEnd::Done if !soft => self.beyond(),
+                end => end,
+            },
             (false, true) => self.anytime(2 * budget, self.counts.work + SOFT_SHARE * budget),
             (false, false) => ClassicalEnd::Done,
         }
@@ -437,6 +441,29 @@ impl<'a, 's> Run<'a, 's> {
                 }
             }
         }
+    }
+
+    /// Searches for plans that end in states of which the metric makes less, where it looks at nothing else: once every state was
+    /// seen, there is none.
+    fn beyond(&mut self) -> ClassicalEnd {
+        let mut work_limit = self.options.first_work;
+        for turn in 0.. {
+            let cost = self.best.as_ref().map(|best| self.task.plan_cost(best));
+            let known = self.task.measure.of_last(&self.task.numbers, &self.task.initial);
+            let Some(better_than) = cost.filter(|cost| known.is_some() && cost.is_finite()) else {
+                return ClassicalEnd::Done;
+            };
+            let strategy = Strategy { better_than: Some(better_than), work_limit, ..for_better(turn) };
+            match self.search(strategy) {
+                End::Plan(plan) => drop(self.improve(plan, work_limit)),
+                End::Exhausted => return ClassicalEnd::Exhausted,
+                End::Stopped => return ClassicalEnd::Stopped,
+                End::Memory if turn > WEIGHTS.len() => return ClassicalEnd::Memory,
+                End::Limit if self.limited() => return ClassicalEnd::Stopped,
+                End::Memory | End::Limit => work_limit = work_limit.saturating_mul(2),
+            }
+        }
+        ClassicalEnd::Done
     }
 
     /// Searches side by side: what each comes to and takes, up to the first plan.

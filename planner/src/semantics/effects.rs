@@ -3,6 +3,7 @@
 use super::{Binding, CallFailure, Semantics};
 use crate::attachment::{Answer, FactValue};
 use crate::diagnostic::Span;
+use crate::model::agreement::contradictions;
 use crate::state::State;
 use crate::task::{
     ActionId, Assignment, Call, Change, Effect, Fact, Fluent, GroundFluent, ObjectId, Timed, Written,
@@ -247,6 +248,13 @@ impl Semantics<'_> {
         }
         for fluent in &changes.cleared {
             state.set_number(fluent.function, &fluent.arguments, None);
+        }
+        let numbers = changes.numbers.iter();
+        let kinds = numbers.map(|(fluent, assignment, number, _)| (fluent, *assignment, *number));
+        if let Some(&(_, second)) = contradictions(kinds).first() {
+            let (fluent, _, _, span) = &changes.numbers[second];
+            let reason = format!("two changes of {} at once contradict each other", self.ground_text(fluent));
+            return Ok(Err(Clash { reason, span: *span }));
         }
         for (fluent, assignment, number, span) in &changes.numbers {
             let before = state.number(fluent.function, &fluent.arguments);

@@ -21,7 +21,7 @@ use crate::task::{ActionId, ObjectId, Slot, Task};
 pub use conditions::Why;
 pub(crate) use conditions::value_text;
 pub use effects::{Changes, Clash, Pending};
-pub use reads::Touched;
+pub use reads::{Together, Touched};
 
 /// A slot that no object is bound to.
 pub(crate) const UNBOUND: ObjectId = ObjectId(u32::MAX);

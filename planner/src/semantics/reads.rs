@@ -43,9 +43,8 @@ impl Touched {
         let numbers = self.changes.numbers.iter().map(|(fluent, assignment, ..)| (fluent, Some(*assignment)));
         let cleared = self.changes.cleared.iter().map(|fluent| (fluent, None));
         for (fluent, assignment) in numbers.chain(cleared) {
-            let additive = |kind: Assignment| matches!(kind, Assignment::Increase | Assignment::Decrease);
             let both_write = other.changes.numbers.iter().any(|(own, kind, ..)| {
-                own == fluent && !(additive(*kind) && assignment.is_some_and(additive))
+                own == fluent && !(is_additive(*kind) && assignment.is_some_and(is_additive))
             });
             if other.fluents.contains(fluent) || both_write {
                 return Some(semantics.ground_text(fluent));
@@ -58,6 +57,63 @@ impl Touched {
         }
         None
     }
+}
+
+/// What several participants of a happening read and write: whether one more disturbs any of them is seen without looking at each.
+#[derive(Debug, Default)]
+pub struct Together {
+    facts: FxHashSet<Fact>,
+    fluents: FxHashSet<GroundFluent>,
+    predicates: FxHashSet<PredicateId>,
+    added: FxHashSet<Fact>,
+    deleted: FxHashSet<Fact>,
+    written: FxHashSet<PredicateId>,
+    /// Numbers to which something is added, other writing of numbers and objects.
+    moved: FxHashSet<GroundFluent>,
+    set: FxHashSet<GroundFluent>,
+}
+
+impl Together {
+    /// Takes one in.
+    pub fn extend(&mut self, touched: &Touched) {
+        self.facts.extend(touched.facts.iter().cloned());
+        self.fluents.extend(touched.fluents.iter().cloned());
+        self.predicates.extend(touched.predicates.iter().copied());
+        let Changes { added, deleted, numbers, cleared, objects } = &touched.changes;
+        self.added.extend(added.iter().cloned());
+        self.deleted.extend(deleted.iter().cloned());
+        self.written.extend(added.iter().chain(deleted).map(|fact| fact.predicate));
+        for (fluent, kind, ..) in numbers {
+            if is_additive(*kind) { &mut self.moved } else { &mut self.set }.insert(fluent.clone());
+        }
+        self.set.extend(cleared.iter().chain(objects.iter().map(|(fluent, ..)| fluent)).cloned());
+    }
+
+    /// Whether one disturbs, or is disturbed by, any of those taken in ([`Touched::conflict`]); it may say yes too often.
+    pub fn may_conflict(&self, touched: &Touched) -> bool {
+        let Changes { added, deleted, numbers, cleared, objects } = &touched.changes;
+        let mut written = added.iter().chain(deleted);
+        let is_written = |fact: &Fact| self.added.contains(fact) || self.deleted.contains(fact);
+        let touches = |fluent: &GroundFluent| self.fluents.contains(fluent) || self.set.contains(fluent);
+        let changes = |fluent: &GroundFluent| self.moved.contains(fluent) || self.set.contains(fluent);
+        written.any(|fact| self.facts.contains(fact) || self.predicates.contains(&fact.predicate))
+            || touched.facts.iter().any(is_written)
+            || touched.predicates.iter().any(|predicate| self.written.contains(predicate))
+            || added.iter().any(|fact| self.deleted.contains(fact))
+            || deleted.iter().any(|fact| self.added.contains(fact))
+            || touched.fluents.iter().any(changes)
+            || numbers.iter().any(|(fluent, kind, ..)| {
+                touches(fluent) || !is_additive(*kind) && self.moved.contains(fluent)
+            })
+            || cleared
+                .iter()
+                .chain(objects.iter().map(|(fluent, ..)| fluent))
+                .any(|fluent| touches(fluent) || self.moved.contains(fluent))
+    }
+}
+
+fn is_additive(kind: Assignment) -> bool {
+    matches!(kind, Assignment::Increase | Assignment::Decrease)
 }
 
 impl Semantics<'_> {

@@ -28,6 +28,17 @@ impl Chance {
     }
 }
 
+/// The number itself without a seed, else its place in a permutation (the finaliser of SplitMix64).
+pub(super) fn shuffled(number: u64, seed: u64) -> u64 {
+    if seed == 0 {
+        return number;
+    }
+    let mut mixed = number.wrapping_add(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    mixed ^ (mixed >> 31)
+}
+
 /// What is still asked for while a plan is walked backwards.
 struct Asked<'w, 'a> {
     world: &'w World<'a>,

@@ -1,5 +1,7 @@
 //! Which actions must have their start and end apart in the search.
 
+use std::collections::BTreeSet;
+
 use rustc_hash::FxHashSet;
 
 use crate::ground::{Change, Conjunction, Effect, Expression, Fact, NumericId, Outcome};
@@ -26,8 +28,12 @@ pub(crate) fn all_apart(world: &World) -> Vec<bool> {
 
 /// Whether every plan can be rearranged into one whose actions are done in one go, one after the other: with nothing
 /// given from outside, and every action such that its start can wait until its end, or its end follow its start at
-/// once, whatever happens in between (compare the compression-safe actions of Coles et al. 2009).
-pub(crate) fn in_one_go_suffices(world: &World) -> bool {
+/// once, whatever happens in between (compare the compression-safe actions of Coles et al. 2009). If so, the actions that must
+/// not overlap themselves for that.
+pub(crate) fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
+    if !world.ground.timed.is_empty() {
+        return None;
+    }
     let wanted = Wanted::new(world);
     let mut written = vec![Vec::new(); world.ground.variables.len()];
     let mut touched = Touched::default();
@@ -47,16 +53,22 @@ pub(crate) fn in_one_go_suffices(world: &World) -> bool {
         .iter()
         .map(|writers| writers.first().copied().filter(|first| writers.iter().all(|writer| writer == first)))
         .collect();
-    let mut durative = world.acts.iter().enumerate().filter(|(_, act)| act.durative);
-    world.ground.timed.is_empty()
-        && durative.all(|(index, act)| {
-            let kept = |variable: u32| {
-                let writers = &written[variable as usize];
-                let derived = world.ground.variables[variable as usize].stratum.is_some();
-                !derived && (writers.is_empty() || alone[variable as usize] == Some(index as u32))
-            };
-            starts_late(world, kept, act) || ends_early(&locked, act)
-        })
+    let mut alone_with_itself = BTreeSet::new();
+    for (index, act) in (0..).zip(&world.acts).filter(|(_, act)| act.durative) {
+        let derived = |variable: u32| world.ground.variables[variable as usize].stratum.is_some();
+        let never_changes = |variable: u32| !derived(variable) && written[variable as usize].is_empty();
+        if ends_early(&locked, act) || starts_late(world, never_changes, act) {
+            continue;
+        }
+        let kept = |variable: u32| {
+            never_changes(variable) || !derived(variable) && alone[variable as usize] == Some(index)
+        };
+        if !starts_late(world, kept, act) {
+            return None;
+        }
+        alone_with_itself.insert(index);
+    }
+    Some(alone_with_itself)
 }
 
 /// Whether an action that can start can also start right before its end; `kept` says which variables nobody else changes.
@@ -204,7 +216,7 @@ mod tests {
             assert_eq!(own.map(|own| own.1), Some(apart), "{name}");
         }
         assert!(all_apart(&world).iter().all(|apart| *apart));
-        assert_eq!(in_one_go_suffices(&world), suffices);
+        assert_eq!(in_one_go_suffices(&world).is_some(), suffices);
     }
 
     #[test]

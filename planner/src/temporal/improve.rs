@@ -5,6 +5,7 @@
 //! of the plan is taken out, what is left is kept, and the goal is reached again from there within the bound.
 
 use std::cell::OnceCell;
+use std::collections::BTreeSet;
 
 use crate::calls::Failure;
 use crate::memory::MemoryLimit;
@@ -15,6 +16,7 @@ use super::destroy::{Chance, keep_for, taken_apart};
 use super::envelope::{all_apart, envelopes, in_one_go_suffices};
 use super::joined::shortened;
 use super::mentions::keep_apart;
+use super::overlap::helpful;
 use super::relaxed::{Part, Relaxed};
 use super::schedule::{Replayed, tightened};
 use super::search::{Counts, End, Manner, Search};
@@ -57,12 +59,14 @@ pub(crate) struct Progress {
     pub counts: Counts,
     /// How many plans were found.
     pub plans: u64,
+    /// Where every possibility was seen but one: the actions that it might help to start while they run.
+    pub overlapping: Vec<u32>,
 }
 
 /// Why a search for plans ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reason {
-    /// Every possibility was seen: without a plan, there is none.
+    /// Every possibility was seen: without a plan, there is none, unless actions overlap themselves that might.
     Exhausted,
     /// Nothing is left to look at, but not every possibility was seen: nothing is proven.
     Unproven,
@@ -88,6 +92,8 @@ const WEIGHTS: [f64; 2] = [3.0, 1.0];
 /// Evaluations of the first, short search for a plan, at least and at most, and evaluated states times operators.
 const FIRST_TRY: (u64, u64) = (50, 500);
 const FIRST_WORK: u64 = 2_000_000;
+/// Evaluations of a search for plans in which actions overlap themselves, at least.
+const LEAST_OVERLAPPED: u64 = 2_000;
 /// Evaluations of one repair in the large neighbourhood search, at least.
 const REPAIR: u64 = 200;
 
@@ -101,17 +107,72 @@ pub(crate) fn search_plans(
 ) -> Result<Progress, Failure> {
     let (inside, all) = (envelopes(world), all_apart(world));
     // What the searches before leave out, the last one looks at.
-    let mut passes = vec![(all.clone(), false), (all.clone(), true)];
+    let mut passes = vec![Pass::new(&all, false), Pass::new(&all, true)];
     if inside != all {
-        passes.insert(0, (inside, false));
+        passes.insert(0, Pass::new(&inside, false));
     }
-    let in_one_go = passes[0].0.iter().all(|apart| !apart);
-    let mut progress = Progress { reason: Reason::Unproven, counts: Counts::default(), plans: 0 };
-    // Rearranged into actions done in one go, a plan is still a plan, but it may end later.
-    let all_in_one_go = |timed: bool| in_one_go && !timed && in_one_go_suffices(world);
-    for (split, exact) in passes {
-        let every_apart = split == all;
-        let space = Space::new(world, split, measure.clone());
+    let mut progress =
+        Progress { reason: Reason::Unproven, counts: Counts::default(), plans: 0, overlapping: Vec::new() };
+    for pass in passes {
+        let over = pass.run(world, measure, &mut limits, stop, &mut progress, on_plan)?;
+        if over || progress.plans > 0 && !limits.anytime {
+            break;
+        }
+    }
+    if progress.reason == Reason::Exhausted && !progress.overlapping.is_empty() {
+        overlapped(world, measure, limits, stop, &mut progress, on_plan)?;
+    }
+    if progress.plans > 0 && progress.reason == Reason::Unproven {
+        progress.reason = Reason::Enough;
+    }
+    Ok(progress)
+}
+
+/// Looks, for as long again, for a plan in which actions run twice at once, where none without is left to be found.
+fn overlapped(
+    world: &World,
+    measure: &Measure,
+    mut limits: Limits,
+    stop: &(dyn Fn() -> bool + Sync),
+    progress: &mut Progress,
+    on_plan: &mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let known = progress.clone();
+    let evaluated = progress.counts.evaluated;
+    limits.evaluations = limits.evaluations.min(evaluated + evaluated.max(LEAST_OVERLAPPED));
+    let pass = Pass { at_once: 2, ..Pass::new(&all_apart(world), false) };
+    pass.run(world, measure, &mut limits, stop, progress, on_plan)?;
+    progress.overlapping = known.overlapping;
+    progress.reason = if progress.plans > known.plans { Reason::Enough } else { Reason::Exhausted };
+    Ok(())
+}
+
+/// One round of searching for plans and improving them.
+struct Pass {
+    /// By action, whether its start and end are apart.
+    apart: Vec<bool>,
+    /// Whether nothing may be left out.
+    exact: bool,
+    /// How many times one action may run at once.
+    at_once: usize,
+}
+
+impl Pass {
+    fn new(apart: &[bool], exact: bool) -> Pass {
+        Pass { apart: apart.to_vec(), exact, at_once: 1 }
+    }
+
+    /// Goes on from the plans and the bound of the passes before. Whether no further one can do better.
+    fn run(
+        &self,
+        world: &World,
+        measure: &Measure,
+        limits: &mut Limits,
+        stop: &(dyn Fn() -> bool + Sync),
+        progress: &mut Progress,
+        on_plan: &mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
+    ) -> Result<bool, Failure> {
+        let space = Space::new(world, self.apart.clone(), measure.clone());
         let relaxed = Relaxed::new(&space);
         let begin = Situation { state: world.initial()?, open: Vec::new(), timed: 0 };
         let base = Base { situation: begin, costs: 0.0, track: space.begin(), clock: space.clock(&[]) };
@@ -119,12 +180,14 @@ pub(crate) fn search_plans(
             space: &space,
             relaxed,
             base,
-            exact,
+            exact: self.exact,
+            at_once: self.at_once,
             elsewhere: 0,
             work: u64::MAX,
-            limits,
+            limits: *limits,
             stop,
-            progress,
+            progress: progress.clone(),
+            overlapping: BTreeSet::new(),
             on_plan,
             best: None,
             tours: OnceCell::new(),
@@ -136,23 +199,26 @@ pub(crate) fn search_plans(
         if let Some(best) = &run.best {
             limits.bound = best.measured - tolerance(best.measured);
         }
-        progress = run.progress;
-        let found = progress.plans > 0;
-        match progress.reason {
-            Reason::Exhausted if !(every_apart || all_in_one_go(found && space.timed_measure())) => {
+        let mut overlapping = run.overlapping;
+        *progress = run.progress;
+        if progress.reason == Reason::Exhausted {
+            if self.apart != all_apart(world) && !self.all_in_one_go(&space, progress, &mut overlapping) {
                 progress.reason = Reason::Unproven;
             }
-            Reason::Unproven => {}
-            _ => break,
+            progress.overlapping = helpful(world, overlapping, !space.only_grows);
         }
-        if found && !limits.anytime {
-            break;
+        Ok(progress.reason != Reason::Unproven)
+    }
+
+    /// Whether plans of actions done in one go stand for all; rearranged into one, a plan is still a plan, but it may end later.
+    /// Notes the actions of which that is known only where they do not overlap themselves.
+    fn all_in_one_go(&self, space: &Space, progress: &Progress, overlapping: &mut BTreeSet<u32>) -> bool {
+        if self.apart.contains(&true) || progress.plans > 0 && space.timed_measure() {
+            return false;
         }
+        let suffices = in_one_go_suffices(space.world);
+        suffices.map(|alone| overlapping.extend(alone)).is_some()
     }
-    if progress.plans > 0 && progress.reason == Reason::Unproven {
-        progress.reason = Reason::Enough;
-    }
-    Ok(progress)
 }
 
 struct Run<'r, 'w, 'a> {
@@ -160,6 +226,7 @@ struct Run<'r, 'w, 'a> {
     relaxed: Relaxed,
     base: Base,
     exact: bool,
+    at_once: usize,
     /// States that the classical search evaluated.
     elsewhere: u64,
     /// Work that all searches together may do.
@@ -167,6 +234,8 @@ struct Run<'r, 'w, 'a> {
     limits: Limits,
     stop: &'r (dyn Fn() -> bool + Sync),
     progress: Progress,
+    /// Actions that the search that proved something could have started while they ran.
+    overlapping: BTreeSet<u32>,
     on_plan: &'r mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
     best: Option<Best>,
     tours: OnceCell<Option<Tours<'w, 'a>>>,
@@ -196,6 +265,7 @@ impl Run<'_, '_, '_> {
             memory: self.limits.memory,
             shuffle: 0,
             exact: self.exact,
+            at_once: self.at_once,
         }
     }
 
@@ -222,8 +292,9 @@ impl Run<'_, '_, '_> {
             }
         }
         let left = self.limits.evaluations.saturating_sub(self.progress.counts.evaluated);
-        if let Some((steps, evaluated, work)) =
-            classical_plan(self.space, self.limits.memory, left, self.stop)
+        if self.at_once == 1
+            && let Some((steps, evaluated, work)) =
+                classical_plan(self.space, self.limits.memory, left, self.stop)
         {
             self.progress.counts.evaluated += evaluated;
             self.progress.counts.work += work;
@@ -243,8 +314,11 @@ impl Run<'_, '_, '_> {
     fn took(&mut self, end: End) -> Result<bool, Failure> {
         let (reason, over) = match end {
             End::Found(steps) => (Reason::Unproven, self.take(steps)?),
-            End::Exhausted { proven: true } => (Reason::Exhausted, true),
-            End::Exhausted { proven: false } => (Reason::Unproven, false),
+            End::Exhausted { proven: true, overlapping } => {
+                self.overlapping = overlapping;
+                (Reason::Exhausted, true)
+            }
+            End::Exhausted { .. } => (Reason::Unproven, false),
             End::Budget => (Reason::Enough, false),
             End::Stopped => (Reason::Stopped, true),
             End::Memory => (Reason::Memory, true),
@@ -256,10 +330,12 @@ impl Run<'_, '_, '_> {
     /// Keeps a plan if it is better than the best so far, without the steps that it does not need. Between plans that are
     /// equally good, the one whose goals are fulfilled earlier in sum is nearer to a better one.
     fn take(&mut self, mut steps: Vec<Step>) -> Result<bool, Failure> {
-        let Some((mut measured, mut base)) = self.space.replay_to_goal(&mut steps)? else { return Ok(false) };
+        let Some((mut measured, mut base)) = self.space.replay_to_goal(&mut steps, self.stop)? else {
+            return Ok(false);
+        };
         let mut lean = keep_for(self.space.world, &steps, &self.space.world.ground.goal);
         if lean.len() < steps.len()
-            && let Some((leaner, lean_base)) = self.space.replay_to_goal(&mut lean)?
+            && let Some((leaner, lean_base)) = self.space.replay_to_goal(&mut lean, self.stop)?
             && leaner <= measured
         {
             (measured, steps, base) = (leaner, lean, lean_base);
@@ -271,7 +347,7 @@ impl Run<'_, '_, '_> {
         let goal = &self.space.world.ground.goal.facts;
         let slowness_s: f64 = goal.iter().map(|fact| ready_s[fact.variable as usize]).sum();
         let mut ordered = in_time_order(self.space, &steps);
-        if let Some((again, _)) = self.space.replay_to_goal(&mut ordered)?
+        if let Some((again, _)) = self.space.replay_to_goal(&mut ordered, self.stop)?
             && again <= measured
         {
             steps = ordered;
@@ -285,8 +361,11 @@ impl Run<'_, '_, '_> {
             return Ok(false);
         }
         let plan = better.then(|| schedule(self.space, &steps, self.stop));
+        if matches!(plan, Some(None)) {
+            return Ok(false);
+        }
         self.best = Some(Best { measured, slowness_s, steps });
-        if let Some(plan) = plan {
+        if let Some(plan) = plan.flatten() {
             self.progress.plans += 1;
             (self.on_plan)(&plan)?;
         }
@@ -331,8 +410,8 @@ impl Run<'_, '_, '_> {
                         }
                     }
                     End::Budget => break,
-                    End::Exhausted { proven: all } => {
-                        proven = all;
+                    End::Exhausted { proven: all, overlapping } => {
+                        (proven, self.overlapping) = (all, overlapping);
                         break;
                     }
                     End::Stopped => return self.ended(Reason::Stopped),
@@ -372,7 +451,7 @@ impl Run<'_, '_, '_> {
                 return Ok(());
             }
             let mut kept = taken_apart(self.space, steps, &mut chance);
-            let Some((_, base)) = self.space.replay(&mut kept)? else {
+            let Some((_, base)) = self.space.replay(&mut kept, self.stop)? else {
                 idle += 1;
                 if idle > 1000 {
                     return Ok(());
@@ -420,7 +499,7 @@ fn tolerance(measured: f64) -> f64 {
 /// a step that starts first may come to its end before what its end builds on: this order need not be a plan.
 fn in_time_order(space: &Space, steps: &[Step]) -> Vec<Step> {
     let Ok(track) = space.track(steps) else { return steps.to_vec() };
-    let mut starts: Vec<(u32, usize)> = Vec::new();
+    let mut starts: Vec<usize> = Vec::new();
     let mut timed: Vec<(f64, &Step)> = Vec::with_capacity(steps.len());
     let mut given = space.world.ground.timed.iter();
     for (index, step) in steps.iter().enumerate() {
@@ -428,12 +507,14 @@ fn in_time_order(space: &Space, steps: &[Step]) -> Vec<Step> {
         let time_s = match step.part {
             Part::Free => given.next().map_or(0.0, |timed| timed.time_s),
             Part::Whole | Part::Start => {
-                starts.push((step.act, index));
+                starts.extend((step.part == Part::Start).then_some(index));
                 own.map_or(0.0, |(start, _)| track.order.earliest_s(start))
             }
             Part::End => {
-                let start = starts.iter().rev().find(|(act, _)| *act == step.act);
-                let end = start.and_then(|&(_, start)| track.actions[start]).and_then(|(_, end)| end);
+                let same =
+                    |&start: &usize| steps[start].act == step.act && steps[start].proposal == step.proposal;
+                let start = starts.iter().position(same).map(|position| starts.remove(position));
+                let end = start.and_then(|start| track.actions[start]).and_then(|(_, end)| end);
                 end.map_or(0.0, |end| track.order.earliest_s(end))
             }
         };
@@ -443,13 +524,15 @@ fn in_time_order(space: &Space, steps: &[Step]) -> Vec<Step> {
     timed.into_iter().map(|(_, step)| step.clone()).collect()
 }
 
-/// The earliest schedule of a plan.
-fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Vec<Timed> {
-    let Ok(mut track) = space.track(steps) else { return Vec::new() };
-    // A schedule that has no room for more distance is as good as the search took it for.
+/// The earliest schedule of a plan; `None` if it is long and has been asked to stop.
+fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Option<Vec<Timed>> {
+    let mut track = space.track(steps).ok()?;
     let mut apart = track.clone();
-    if keep_apart(space, steps, &mut apart, stop).is_ok() {
-        track = apart;
+    match keep_apart(space, steps, &mut apart, stop) {
+        Ok(true) => track = apart,
+        Ok(false) => return None,
+        // A schedule that has no room for more distance is as good as the search took it for.
+        Err(_) => {}
     }
     let actions =
         track.actions.iter().zip(steps).filter_map(|(action, step)| action.map(|action| (action, step)));
@@ -470,5 +553,5 @@ fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Vec<Timed
         .collect();
     plan.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     debug_assert!(plan.iter().all(|timed| matches!(timed.step.part, Part::Whole | Part::Start)));
-    plan
+    Some(plan)
 }

@@ -44,7 +44,7 @@ pub(crate) fn shortened(
                     None => drop(steps.remove(second)),
                 }
                 steps.remove(first);
-                if let Some((measured, base)) = space.replay_to_goal(&mut steps)?
+                if let Some((measured, base)) = space.replay_to_goal(&mut steps, stop)?
                     && measured <= plan.0
                 {
                     plan = (measured, steps, base);
@@ -131,7 +131,7 @@ mod tests {
             Step::whole(act)
         };
         let mut steps: Vec<Step> = plan.iter().map(step).collect();
-        let (measured, base) = space.replay_to_goal(&mut steps).expect("no call").expect("a plan");
+        let (measured, base) = space.replay_to_goal(&mut steps, &|| false).expect("no call").expect("a plan");
         let (_, shorter, _) = shortened(&space, (measured, steps, base), &|| false).expect("no call");
         let left: Vec<String> = shorter.iter().map(|step| called(&world.acts[step.act as usize])).collect();
         assert_eq!(left, expected, "{roads} {goal}");

@@ -23,6 +23,8 @@ use super::world::World;
 
 /// Rounds of moving happenings apart, each of which may bring others together.
 const MOST_ROUNDS: usize = 100;
+/// After so many happenings that were compared with their neighbours, it asks whether to stop.
+const TOUCHES_A_LOOK: usize = 1024;
 
 /// A ground atom or number by its name: whether it is a number, predicate or function, arguments.
 type Name = (bool, u32, Vec<u32>);
@@ -55,13 +57,15 @@ struct Touch {
     does: Use,
 }
 
-/// Moves apart what happens at the same time where one changes what the other mentions.
+/// Moves apart what happens at the same time where one changes what the other mentions; whether it came to an end with that: of a
+/// long plan it does not once asked to stop.
 pub(super) fn keep_apart(
     space: &Space,
     steps: &[Step],
     track: &mut Track,
     stop: &dyn Fn() -> bool,
-) -> Result<(), Inconsistent> {
+) -> Result<bool, Inconsistent> {
+    let mut looks = 0;
     let mut touches = touches(space, steps, track)?;
     for _ in 0..MOST_ROUNDS {
         let order = &track.order;
@@ -70,6 +74,10 @@ pub(super) fn keep_apart(
             let time_s = |touch: &Touch| order.earliest_s(touch.happening);
             touches.sort_by(|one, other| time_s(one).total_cmp(&time_s(other)));
             for (index, one) in touches.iter().enumerate() {
+                looks += 1;
+                if looks % TOUCHES_A_LOOK == 0 && stop() {
+                    return Ok(false);
+                }
                 let near = |other: &&Touch| time_s(other) - time_s(one) < EPSILON_S / 2.0;
                 let disturbs = |other: &&Touch| {
                     other.step != one.step && (other.does != one.does || one.does == Use::Writes)
@@ -78,14 +86,14 @@ pub(super) fn keep_apart(
                 together.extend(others.map(|other| in_order(one, other)));
             }
         }
-        if together.is_empty() || stop() {
-            return Ok(());
+        if together.is_empty() {
+            return Ok(true);
         }
         together.sort_unstable();
         together.dedup();
         track.order.separate(&together)?;
     }
-    Ok(())
+    Ok(true)
 }
 
 /// Two happenings, the one that shall come first before the other: what is given cannot be moved.
@@ -267,5 +275,38 @@ fn every(variables: &[Quantified], binding: &mut [u32], visit: &mut dyn FnMut(&m
     for object in first.parameter.objects.iter() {
         binding[first.slot.index()] = object.0;
         every(others, binding, visit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attachment::Attachments;
+    use crate::calls::Calls;
+    use crate::small;
+    use crate::temporal::envelope::all_apart;
+    use crate::temporal::space::Measure;
+
+    #[test]
+    fn of_a_long_plan_less_is_done_once_asked_to_stop() {
+        let domain = "(define (domain d) (:requirements :numeric-fluents) (:predicates (p)) (:functions (n))
+          (:action more :parameters () :precondition (>= (n) 0) :effect (and (p) (increase (n) 1))))";
+        let problem = "(define (problem p) (:domain d) (:init (= (n) 0)) (:goal (and (p) (> (n) 0))))";
+        let (task, grounded) = small::read(domain, problem);
+        let nobody = Attachments::default();
+        let calls = Calls::bind(&task, &grounded, &nobody).expect("nothing to bind");
+        let world = World::new(&task, &grounded, calls);
+        let space = Space::new(&world, all_apart(&world), Measure::Makespan);
+        for (count, stopped) in [(1, false), (100, false), (2_000, true)] {
+            let mut steps = vec![Step::whole(0); count];
+            let replayed = space.replay_to_goal(&mut steps, &|| true).expect("no call");
+            assert_eq!(replayed.is_none(), stopped, "{count}");
+            let mut track = space.track(&steps).expect("it fits");
+            assert_eq!(
+                keep_apart(&space, &steps, &mut track, &|| true).is_ok_and(|all| !all),
+                stopped,
+                "{count}"
+            );
+        }
     }
 }

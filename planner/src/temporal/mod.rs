@@ -10,6 +10,7 @@ mod improve;
 mod joined;
 mod mentions;
 mod order;
+mod overlap;
 mod relaxed;
 mod remaining;
 mod schedule;

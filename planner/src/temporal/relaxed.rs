@@ -594,5 +594,5 @@ fn seconds_of(world: &World, act: usize) -> Seconds {
             least_s = least_s.max(seconds);
         }
     }
-    Seconds::Known(least_s)
+    if act.share > 0.0 { Seconds::Settled } else { Seconds::Known(least_s) }
 }

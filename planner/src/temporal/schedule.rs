@@ -46,7 +46,7 @@ pub(crate) fn tightened(
                 let mut steps = plan.1.clone();
                 let moved = steps.remove(from);
                 steps.insert(to, moved);
-                if let Some((measured, base)) = space.replay_to_goal(&mut steps)?
+                if let Some((measured, base)) = space.replay_to_goal(&mut steps, stop)?
                     && measured < plan.0 - 1e-6
                 {
                     plan = (measured, steps, base);

@@ -4,6 +4,7 @@
 //! heuristic evaluated, only when it is taken from the queue. Preferred steps have a queue of their own, which is
 //! served more often after progress.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
@@ -13,8 +14,10 @@ use crate::ground::Values;
 use crate::memory::{Heap, MemoryLimit, Rows, soon};
 
 use super::advance::{Gates, Open, Situation, Step};
+use super::destroy::shuffled;
 use super::estimate::{Estimate, From};
 use super::order::Inconsistent;
+use super::overlap::starts_again;
 use super::relaxed::{Part, Relaxed};
 use super::space::{Base, Space};
 use super::store::Store;
@@ -42,6 +45,8 @@ pub(crate) struct Manner {
     /// Whether equal states are told apart wherever their times leave different possibilities: then nothing is lost,
     /// and a search that comes to its end proves something.
     pub exact: bool,
+    /// How many times one action may be in progress at once.
+    pub at_once: usize,
 }
 
 /// How a search ended.
@@ -51,8 +56,11 @@ pub(crate) enum End {
     Found(Vec<Step>),
     /// Nothing within the bound is left to look at.
     Exhausted {
-        /// Whether that proves that there is no plan within the bound: nothing was left out on the way.
+        /// Whether that proves that there is no plan within the bound: nothing was left out on the way, but the starts of
+        /// actions in progress.
         proven: bool,
+        /// Actions that could have started while they were in progress.
+        overlapping: BTreeSet<u32>,
     },
     /// The budget of evaluations is used up.
     Budget,
@@ -146,6 +154,8 @@ pub(crate) struct Search<'s, 'w, 'a> {
     unseen: usize,
     /// Whether something was left out that might have led to a plan.
     lossy: bool,
+    /// Actions that could have started while they were in progress as often as they may be.
+    overlapping: BTreeSet<u32>,
     /// What the relaxed plan of the state evaluated last leads to, to be looked at next.
     ahead: Option<Ahead>,
 }
@@ -200,6 +210,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             counts: Counts::default(),
             unseen: 0,
             lossy: false,
+            overlapping: BTreeSet::new(),
             ahead: None,
         }
     }
@@ -233,10 +244,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
                 continue;
             }
             let Some(entry) = self.take() else {
-                return Ok((
-                    End::Exhausted { proven: !self.lossy && self.space.world.is_complete() },
-                    self.counts,
-                ));
+                let proven = !self.lossy && self.space.world.is_complete();
+                return Ok((End::Exhausted { proven, overlapping: self.overlapping }, self.counts));
             };
             if let Some(end) = self.follow(entry)? {
                 return Ok((end, self.counts));
@@ -396,7 +405,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
                     continue;
                 }
                 let mut step = Step { act, part, proposal: None, span: nothing };
-                if part == Part::Start && from.open.iter().any(|open| open.act == act) {
+                if part == Part::Start && self.is_full(&from, act) {
                     continue;
                 }
                 if let Some(next) = self.space.world.advance(&from, &mut step)? {
@@ -511,14 +520,29 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             Some(weight) if self.manner.timed => reachable + (weight - 1.0) * estimate.cost,
             Some(weight) => cost + weight * estimate.cost,
         };
-        self.enqueue(node, situation, &open, &estimate, key)
+        self.enqueue(node, situation, &estimate, key)
+    }
+
+    /// Whether an action is in progress as often as it may be.
+    fn is_full(&self, situation: &Situation, act: u32) -> bool {
+        situation.open.iter().filter(|open| open.act == act).count() >= self.manner.at_once
+    }
+
+    /// Notes an action that could have started while it is in progress.
+    fn note_overlap(&mut self, situation: &Situation, act: u32) -> Result<(), Failure> {
+        if self.overlapping.contains(&act) {
+            return Ok(());
+        }
+        if starts_again(self.space.world, situation, act)? {
+            self.overlapping.insert(act);
+        }
+        Ok(())
     }
 
     fn enqueue(
         &mut self,
         node: u32,
         situation: &Situation,
-        open: &[u32],
         estimate: &Estimate,
         key: f64,
     ) -> Result<(), Failure> {
@@ -541,8 +565,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         }
         for act in self.space.candidates(&situation.state) {
             let part = if self.space.open_act[act as usize] { Part::Start } else { Part::Whole };
-            // PDDL 2.1 lets no instance of an action overlap itself.
-            if open.contains(&act) {
+            if part == Part::Start && self.is_full(situation, act) {
+                self.note_overlap(situation, act)?;
                 continue;
             }
             let declared = &self.space.world.acts[act as usize];
@@ -567,15 +591,4 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             self.proposals.len() - 1
         }) as u32
     }
-}
-
-/// The number itself without a seed, else its place in a permutation (the finaliser of SplitMix64).
-fn shuffled(number: u64, seed: u64) -> u64 {
-    if seed == 0 {
-        return number;
-    }
-    let mut mixed = number.wrapping_add(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    mixed ^ (mixed >> 31)
 }

@@ -15,6 +15,9 @@ use super::order::{Clock, Inconsistent, Order};
 use super::relaxed::Part;
 use super::world::{Act, Moment, Span, World};
 
+/// After so many steps of a replay, it asks whether to stop.
+const STEPS_A_LOOK: usize = 256;
+
 /// What plans are measured by.
 #[derive(Debug, Clone)]
 pub(crate) enum Measure {
@@ -218,24 +221,39 @@ impl<'w, 'a> Space<'w, 'a> {
         }
     }
 
-    /// Where a sequence of steps from the first state leads, and its measure; `None` if it does not work out.
-    pub fn replay(&self, steps: &mut [Step]) -> Result<Option<(f64, Base)>, Failure> {
+    /// Where a sequence of steps from the first state leads, and its measure; `None` if it does not work out, or is long and has been
+    /// asked to stop.
+    pub fn replay(
+        &self,
+        steps: &mut [Step],
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Option<(f64, Base)>, Failure> {
         let mut situation = Situation { state: self.world.initial()?, open: Vec::new(), timed: 0 };
         let mut costs = 0.0;
-        for step in steps.iter_mut() {
+        let mut track = self.begin();
+        for (index, step) in steps.iter_mut().enumerate() {
+            if index % STEPS_A_LOOK == STEPS_A_LOOK - 1 && stop() {
+                return Ok(None);
+            }
             let Some(next) = self.world.advance(&situation, step)? else { return Ok(None) };
             costs += self.step_cost(&situation.state, step)?;
             situation = next;
+            if track.push(self, step).is_err() {
+                return Ok(None);
+            }
         }
-        let Ok(track) = self.track(steps) else { return Ok(None) };
         let measured = self.measured(costs, &situation.state, track.order.makespan_s())?;
         let clock = self.clock(steps);
         Ok(Some((measured, Base { situation, costs, track, clock })))
     }
 
     /// The same of a whole plan: `None` also if the goal is not fulfilled after it.
-    pub fn replay_to_goal(&self, steps: &mut [Step]) -> Result<Option<(f64, Base)>, Failure> {
-        let Some((measured, base)) = self.replay(steps)? else { return Ok(None) };
+    pub fn replay_to_goal(
+        &self,
+        steps: &mut [Step],
+        stop: &dyn Fn() -> bool,
+    ) -> Result<Option<(f64, Base)>, Failure> {
+        let Some((measured, base)) = self.replay(steps, stop)? else { return Ok(None) };
         if self.tight && base.track.timed_at_end(self) != (false, false) {
             return Ok(None);
         }

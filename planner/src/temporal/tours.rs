@@ -75,7 +75,7 @@ impl<'w, 'a> Tours<'w, 'a> {
                     if left == 0 || stop() {
                         return Ok(plan);
                     }
-                    if let Some((measured, base)) = space.replay_to_goal(&mut steps)?
+                    if let Some((measured, base)) = space.replay_to_goal(&mut steps, stop)?
                         && measured < plan.0 - BETTER
                     {
                         plan = (measured, steps, base);
@@ -228,7 +228,7 @@ mod tests {
             Step::whole(world.acts.iter().position(|act| called(act) == call).expect("an action") as u32)
         };
         let mut steps: Vec<Step> = plan.split(", ").map(step).collect();
-        let (measured, base) = space.replay_to_goal(&mut steps).expect("no call").expect("a plan");
+        let (measured, base) = space.replay_to_goal(&mut steps, &|| false).expect("no call").expect("a plan");
         let tours = Tours::new(&world).expect("they are few");
         let better = tours.rearranged(&space, (measured, steps, base), &|| false);
         let (better, steps, _) = better.expect("no call");

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use crate::attachment::Level;
 use crate::calls::{Calls, Failure};
 use crate::ground::{
-    Axiom, ComparisonId, Conjunction, DurationBound, Effect, Expression, GroundTask, Origin, Outcome,
-    Relation, Values,
+    Axiom, Change, ComparisonId, Conjunction, DurationBound, Effect, Expression, GroundTask, NumericId,
+    Origin, Outcome, Place, Relation, Values,
 };
+use crate::model::agreement::contradictions;
 use crate::model::relation::quotient;
 use crate::plan::EPSILON_S;
 use crate::task::{Task, Term};
@@ -25,6 +26,9 @@ pub(crate) struct Act<'a> {
     pub durative: bool,
     /// Bounds on the duration.
     pub bounds: &'a [DurationBound],
+    /// How much of what the bounds leave it takes: nothing for the least, and for as long as it has to; more where that alone would
+    /// not give what its effects can do.
+    pub share: f64,
     /// Holds right before the start.
     pub at_start: &'a Conjunction,
     /// Holds strictly between start and end.
@@ -42,6 +46,9 @@ pub(crate) struct Act<'a> {
     /// Grounding calls: module and arguments.
     pub grounding: Vec<(usize, Vec<u32>)>,
 }
+
+/// Of what bounds on a duration leave, what is tried besides the least where effects depend on it: half of it, and all.
+const SHARES: [f64; 2] = [0.5, 1.0];
 
 pub(super) static NOTHING: Conjunction =
     Conjunction { facts: Vec::new(), comparisons: Vec::new(), calls: Vec::new() };
@@ -93,7 +100,7 @@ pub(crate) struct World<'a> {
     pub ground: &'a GroundTask,
     /// Its calls.
     pub calls: Calls<'a>,
-    /// Durative actions first, in the ground task's order, then instantaneous ones.
+    /// Durative actions first, in the ground task's order, then instantaneous ones, then durative ones again that take longer.
     pub acts: Vec<Act<'a>>,
     /// Whether the steps of the search can make every plan, once it was asked for.
     complete: OnceCell<bool>,
@@ -112,6 +119,7 @@ impl<'a> World<'a> {
             origin: &action.origin,
             durative: true,
             bounds: &action.duration,
+            share: 0.0,
             at_start: &action.at_start,
             over_all: &action.over_all,
             at_end: &action.at_end,
@@ -125,6 +133,7 @@ impl<'a> World<'a> {
             origin: &action.origin,
             durative: false,
             bounds: &[],
+            share: 0.0,
             at_start: &action.condition,
             over_all: &NOTHING,
             at_end: &NOTHING,
@@ -134,7 +143,14 @@ impl<'a> World<'a> {
             cost: &action.cost,
             grounding: grounding(task, &action.origin),
         });
-        let acts: Vec<Act> = durative.chain(instantaneous).collect();
+        let mut acts: Vec<Act> = durative.chain(instantaneous).collect();
+        let longer = |act: &&Act| chooses_effects(act);
+        let longer: Vec<Act> = acts
+            .iter()
+            .filter(longer)
+            .flat_map(|act| SHARES.map(|share| Act { share, ..act.clone() }))
+            .collect();
+        acts.extend(longer);
         let proposes = acts.iter().any(|act| !act.grounding.is_empty());
         let stratum_of =
             |axiom: &Axiom| ground.variables[axiom.head.variable as usize].stratum.unwrap_or(0) as usize;
@@ -252,6 +268,11 @@ impl<'a> World<'a> {
             return Ok(None);
         }
         span.least_s = span.least_s.max(EPSILON_S.min(span.most_s));
+        if act.share > 0.0 {
+            let seconds = span.least_s + act.share * (span.most_s - span.least_s);
+            let is_longer = seconds.is_finite() && seconds > span.least_s;
+            return Ok(is_longer.then_some(Span { least_s: seconds, most_s: seconds }));
+        }
         Ok((span.least_s <= span.most_s && span.least_s.is_finite()).then_some(span))
     }
 
@@ -287,7 +308,7 @@ impl<'a> World<'a> {
     /// Lets effects happen: `moment` is the state before them, `into` a copy of it that becomes the state after, with
     /// derived variables up to date. `gate` says whether an effect's conditions on earlier times were met.
     ///
-    /// `Ok(false)` if a number becomes undefined or infinite: then the effects cannot happen.
+    /// `Ok(false)` if a number becomes undefined or infinite, or changes of it contradict each other: then the effects cannot happen.
     pub fn apply(
         &self,
         effects: &[Effect],
@@ -295,6 +316,7 @@ impl<'a> World<'a> {
         gate: &dyn Fn(usize, &Effect) -> bool,
         into: &mut Values,
     ) -> Result<bool, Failure> {
+        let mut changes: Vec<(u32, Change, f64)> = Vec::new();
         for (index, effect) in effects.iter().enumerate() {
             let here = effect.when.as_ref().map(|when| &when.here);
             if !gate(index, effect) || !here.map_or(Ok(true), |here| self.holds(here, moment))? {
@@ -304,6 +326,7 @@ impl<'a> World<'a> {
                 Outcome::Set(fact) => into.values[fact.variable as usize] = fact.value,
                 Outcome::Change { fluent, change, amount } => {
                     let amount = self.evaluate(amount, moment)?;
+                    changes.push((*fluent, *change, amount));
                     change.apply(&mut into.numbers[*fluent as usize], amount);
                     if !into.numbers[*fluent as usize].is_finite() {
                         return Ok(false);
@@ -315,8 +338,14 @@ impl<'a> World<'a> {
                 }
                 Outcome::Call(call) => {
                     self.calls.write(*call, moment.proposal, moment.state, moment.level, into)?;
+                    let written = self.ground.calls[*call as usize].writes.iter().filter_map(number);
+                    let written = written.map(|at| (at, Change::Assign, into.numbers[at as usize]));
+                    changes.extend(written.filter(|(_, _, value)| !value.is_nan()));
                 }
             }
+        }
+        if changes.len() > 1 && !contradictions(changes.into_iter()).is_empty() {
+            return Ok(false);
         }
         self.derive(into)?;
         Ok(true)
@@ -353,6 +382,10 @@ impl<'a> World<'a> {
     }
 }
 
+fn number(place: &Place) -> Option<NumericId> {
+    if let Place::Number(number) = place { Some(*number) } else { None }
+}
+
 /// Whether an action has effects or bounds at its end that depend on how long it is chosen to take.
 fn chooses_effects(act: &Act) -> bool {
     let fixed = act.bounds.iter().any(|bound| bound.relation == Relation::Equal && !bound.at_end);
@@ -362,7 +395,8 @@ fn chooses_effects(act: &Act) -> bool {
         Outcome::Set(_) | Outcome::Call(_) => false,
     };
     let ends = act.bounds.iter().any(|bound| bound.at_end);
-    !fixed && (ends || act.start_effects.iter().chain(act.end_effects).any(timed))
+    let mut effects = act.start_effects.iter().chain(act.flow_effects).chain(act.end_effects);
+    !fixed && (ends || effects.any(timed))
 }
 
 fn mentions_duration(expression: &Expression) -> bool {

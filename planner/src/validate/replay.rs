@@ -7,7 +7,9 @@ use crate::model::relation::Relation;
 use crate::plan::EPSILON_S;
 use crate::plan::Plan;
 use crate::semantics::effects::Clash;
-use crate::semantics::{Binding, CallFailure, Changes, Pending, Semantics, Touched, Why, value_text};
+use crate::semantics::{
+    Binding, CallFailure, Changes, Pending, Semantics, Together, Touched, Why, value_text,
+};
 use crate::state::State;
 use crate::task::{Action, ActionId, Comparison, GroundChange, Task, Timed, When};
 
@@ -327,8 +329,11 @@ impl Replay<'_, '_> {
 
     /// No part of a happening touches what another part reads or writes.
     fn conflicts(&self, parts: &[Part], time_s: f64) -> Outcome<()> {
+        let mut together = Together::default();
         for (index, part) in parts.iter().enumerate() {
-            for other in &parts[..index] {
+            let may_conflict = together.may_conflict(&part.touched);
+            together.extend(&part.touched);
+            for other in parts[..index].iter().filter(|_| may_conflict) {
                 let Some(what) = part.touched.conflict(&other.touched, self.semantics) else { continue };
                 let text = |step: Option<usize>| match step {
                     Some(step) => step_text(self.plan, step),

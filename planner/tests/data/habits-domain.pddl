@@ -12,8 +12,8 @@
  :parameters(?t - truck ?a ?b - place)
  :precondition(and(at ?t ?a)(not(= ?a ?b))(>= (fuel ?t) 1)
    (forall(?p - parcel)(imply(at ?p ?b)(linked ?a ?b))))
- :effect(and(at ?t ?b)(not(at ?t ?a))(decrease (fuel ?t) 1)(increase(total-cost)2)
-   (when(= ?b depot)(and(assign (fuel ?t) 10)(assign (home ?t) ?b)))
+ :effect(and(at ?t ?b)(not(at ?t ?a))(increase(total-cost)2)
+   (when(not(= ?b depot))(decrease (fuel ?t) 1))(when(= ?b depot)(and(assign (fuel ?t) 10)(assign (home ?t) ?b)))
    (forall(?o - truck)(when(and(at ?o ?b)(not(= ?o ?t)))(empty ?o)))))
 (:durative-action rest
  :parameters (?t - truck)

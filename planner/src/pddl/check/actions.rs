@@ -5,6 +5,7 @@ use super::expressions::{Place, Value, span_of};
 use super::{Checker, Scope};
 use crate::attachment::CallKind;
 use crate::diagnostic::{Diagnostic, Span};
+use crate::model::agreement::contradictions;
 use crate::pddl::ast::{self, Arithmetic, Assignment, Comparison, Formula, Name, When};
 use crate::task::{
     Action, Change, Condition, DurationBound, Effect, Expression, Fluent, PreferenceId, Quantified, Rate,
@@ -66,21 +67,23 @@ impl Checker<'_> {
         });
     }
 
-    /// At once, a number can get one value, have amounts added and taken away, or be scaled: of other changes PDDL 2.1 gives no result, and
-    /// here the order of the text decides.
+    /// Changes of one number that happen together, wherever one of them does, and contradict each other.
     fn agree(&mut self, effects: &[Effect]) {
-        let always = |effect: &&Effect| effect.forall.is_empty() && effect.when == Timed::default();
-        let mut earlier: Vec<&Effect> = Vec::new();
-        for effect in effects.iter().filter(always) {
-            if let Some(other) = earlier.iter().find(|other| contradict(other, effect)) {
+        let is_always = |effect: &Effect| effect.when == Timed::default();
+        let together = |one: &Effect, other: &Effect| {
+            (one.when == other.when || is_always(one) || is_always(other))
+                && (one.forall == other.forall || one.forall.is_empty() || other.forall.is_empty())
+        };
+        for (index, effect) in effects.iter().enumerate() {
+            let mut earlier = effects[..index].iter();
+            if let Some(other) = earlier.find(|other| together(other, effect) && contradict(other, effect)) {
                 let message = "two changes of one number at once contradict each other";
                 self.push(
-                    Diagnostic::warning("contradicting-effects", message, effect.span, "this comes last here")
-                        .with_label(other.span, "the number is changed here already")
-                        .with_help("PDDL gives no result of both, and other planners may read them otherwise: make one change of the two"),
+                    Diagnostic::warning("contradicting-effects", message, effect.span, "and here in another way")
+                        .with_label(other.span, "the number is changed here")
+                        .with_help("PDDL gives no result of both: where they happen together, the action cannot be taken; make one change of the two"),
                 );
             }
-            earlier.push(effect);
         }
     }
 
@@ -490,21 +493,17 @@ impl Checker<'_> {
     }
 }
 
-/// Whether two effects change one number in ways of which the order matters.
+/// Whether two effects change one number in ways that contradict each other.
 fn contradict(one: &Effect, other: &Effect) -> bool {
     let (Change::Number(how, fluent, amount), Change::Number(other_how, other_fluent, other_amount)) =
         (&one.change, &other.change)
     else {
         return false;
     };
-    let adds = |how: &Assignment| matches!(how, Assignment::Increase | Assignment::Decrease);
-    let scales = |how: &Assignment| matches!(how, Assignment::ScaleUp | Assignment::ScaleDown);
+    let kinds = [(how, amount), (other_how, other_amount)];
+    let kinds = kinds.map(|(how, amount)| ((), *how, constant(amount).unwrap_or(f64::NAN)));
     let same = fluent.function == other_fluent.function && fluent.arguments == other_fluent.arguments;
-    let assign_same = (*how, *other_how) == (Assignment::Assign, Assignment::Assign)
-        && constant(amount).is_some()
-        && constant(amount) == constant(other_amount);
-    let commute = adds(how) && adds(other_how) || scales(how) && scales(other_how);
-    same && !commute && !assign_same
+    same && !contradictions(kinds.into_iter()).is_empty()
 }
 
 fn has_preference(formula: &Formula) -> bool {

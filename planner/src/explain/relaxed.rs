@@ -1,0 +1,156 @@
+//! Whether the goal could be had if nothing were ever taken away: a plan that ignores what is lost, and of which nothing is
+//! unsure. What it takes of numbers and attachments is not looked into: with those, the answer is no.
+
+use crate::ground::{
+    Action, Change, Conjunction, DurationBound, DurativeAction, Effect, Expression, Fact, GroundTask,
+    Outcome, When,
+};
+use crate::model::agreement::contradictions;
+use crate::model::relation::Relation;
+
+/// Whether it surely could. No where that is not known.
+pub(super) fn could_be_had(ground: &GroundTask) -> bool {
+    let mut had = Had::new(ground);
+    while had.grow() {}
+    ground.goal_reachable && had.holds(&ground.goal)
+}
+
+/// What has held so far.
+struct Had<'g> {
+    ground: &'g GroundTask,
+    /// By variable and value.
+    facts: Vec<Vec<bool>>,
+    /// Actions that have been taken: instantaneous ones, durative ones.
+    taken: [Vec<bool>; 2],
+}
+
+impl<'g> Had<'g> {
+    fn new(ground: &'g GroundTask) -> Had<'g> {
+        let none = ground.variables.iter().map(|variable| vec![false; variable.values.len()]);
+        let taken = [vec![false; ground.actions.len()], vec![false; ground.durative.len()]];
+        let mut had = Had { ground, facts: none.collect(), taken };
+        for (values, &value) in had.facts.iter_mut().zip(&ground.initial.values) {
+            values[value as usize] = true;
+        }
+        ground.timed.iter().flat_map(|timed| &timed.outcomes).for_each(|outcome| had.make(outcome));
+        had
+    }
+
+    /// Takes every action once more; whether that gave anything.
+    fn grow(&mut self) -> bool {
+        let ground = self.ground;
+        let before = self.count();
+        for (index, action) in ground.actions.iter().enumerate() {
+            if self.taken[0][index] || self.can_take(action) {
+                self.taken[0][index] = true;
+                self.happen(&action.effects);
+            }
+        }
+        for (index, action) in ground.durative.iter().enumerate() {
+            if self.taken[1][index] || self.can_run(action) {
+                self.taken[1][index] = true;
+                self.happen(&action.start_effects);
+                self.happen(&action.end_effects);
+            }
+        }
+        for axiom in &ground.axioms {
+            if self.holds(&axiom.body) {
+                self.facts[axiom.head.variable as usize][axiom.head.value as usize] = true;
+            }
+        }
+        self.count() > before
+    }
+
+    fn count(&self) -> usize {
+        let flags = self.facts.iter().chain(&self.taken);
+        flags.map(|flags| flags.iter().filter(|flag| **flag).count()).sum()
+    }
+
+    fn holds(&self, condition: &Conjunction) -> bool {
+        self.holds_after(&[], condition)
+    }
+
+    /// Whether a condition holds once these effects have happened.
+    fn holds_after(&self, effects: &[Effect], condition: &Conjunction) -> bool {
+        let given = |fact: &Fact| {
+            let mut outcomes = self.happening(effects);
+            outcomes.any(|outcome| *outcome == Outcome::Set(*fact))
+        };
+        let has = |fact: &Fact| self.facts[fact.variable as usize][fact.value as usize] || given(fact);
+        condition.comparisons.is_empty() && condition.calls.is_empty() && condition.facts.iter().all(has)
+    }
+
+    fn can_take(&self, action: &Action) -> bool {
+        self.holds(&action.condition) && self.can_happen(&action.effects)
+    }
+
+    /// Whether a durative action can run, with what its own start gives.
+    fn can_run(&self, action: &DurativeAction) -> bool {
+        let lists = [&action.start_effects, &action.flow_effects, &action.end_effects];
+        let inside = [&action.over_all, &action.at_end];
+        self.holds(&action.at_start)
+            && inside.into_iter().all(|condition| self.holds_after(&action.start_effects, condition))
+            && lists.into_iter().all(|effects| self.can_happen(effects))
+            && lasts(&action.duration)
+    }
+
+    /// Whether effects surely have a result: of numbers, where known amounts are added to known numbers.
+    fn can_happen(&self, effects: &[Effect]) -> bool {
+        let kinds = effects.iter().filter_map(|effect| match effect.outcome {
+            Outcome::Change { fluent, change, amount: Expression::Constant(amount) } => {
+                Some((fluent, change, amount))
+            }
+            _ => None,
+        });
+        contradictions(kinds).is_empty() && effects.iter().all(|effect| self.has_result(effect))
+    }
+
+    fn has_result(&self, effect: &Effect) -> bool {
+        match &effect.outcome {
+            Outcome::Set(_) => true,
+            Outcome::Change { fluent, change, amount: Expression::Constant(amount) } => match change {
+                Change::Assign => amount.is_finite(),
+                Change::Increase | Change::Decrease => {
+                    amount.is_finite() && self.ground.initial.numbers[*fluent as usize].is_finite()
+                }
+                Change::ScaleUp | Change::ScaleDown => false,
+            },
+            _ => false,
+        }
+    }
+
+    /// What effects do whose conditions hold.
+    fn happening<'e>(&self, effects: &'e [Effect]) -> impl Iterator<Item = &'e Outcome> {
+        let holds = |when: &When| {
+            [&when.here, &when.at_start, &when.over_all].into_iter().all(|part| self.holds(part))
+        };
+        let happening = effects.iter().filter(move |effect| effect.when.as_deref().is_none_or(holds));
+        happening.map(|effect| &effect.outcome)
+    }
+
+    fn happen(&mut self, effects: &[Effect]) {
+        let outcomes: Vec<&Outcome> = self.happening(effects).collect();
+        outcomes.into_iter().for_each(|outcome| self.make(outcome));
+    }
+
+    fn make(&mut self, outcome: &Outcome) {
+        if let Outcome::Set(fact) = outcome {
+            self.facts[fact.variable as usize][fact.value as usize] = true;
+        }
+    }
+}
+
+/// Whether bounds surely leave a duration: they are the same in every state.
+fn lasts(bounds: &[DurationBound]) -> bool {
+    let (mut least_s, mut most_s) = (0.0_f64, f64::INFINITY);
+    for bound in bounds {
+        let Expression::Constant(seconds) = bound.seconds else { return false };
+        match bound.relation {
+            Relation::AtLeast => least_s = least_s.max(seconds),
+            Relation::AtMost => most_s = most_s.min(seconds),
+            Relation::Equal => (least_s, most_s) = (least_s.max(seconds), most_s.min(seconds)),
+            Relation::Greater | Relation::Less | Relation::Unequal => return false,
+        }
+    }
+    0.0 < most_s && least_s <= most_s && least_s.is_finite()
+}

@@ -1,0 +1,68 @@
+//! Changes of one number at once. PDDL 2.1 (section 8.1) gives them a result only where their order does not matter: where all add
+//! to it, all scale it, or all give it the same value. Where they contradict each other, what makes them cannot happen.
+
+use std::hash::Hash;
+
+use rustc_hash::FxHashMap;
+
+use super::relation::Relation;
+use crate::task::Assignment;
+
+impl Assignment {
+    /// Changes a number.
+    pub(crate) fn apply(self, number: &mut f64, amount: f64) {
+        match self {
+            Assignment::Assign => *number = amount,
+            Assignment::Increase => *number += amount,
+            Assignment::Decrease => *number -= amount,
+            Assignment::ScaleUp => *number *= amount,
+            Assignment::ScaleDown => *number /= amount,
+        }
+    }
+}
+
+/// Whether two changes of one number, each with its amount, have a result together; of amounts that are not known (NaN), no.
+fn agree((one, amount): (Assignment, f64), (other, other_amount): (Assignment, f64)) -> bool {
+    let adds = |change: Assignment| matches!(change, Assignment::Increase | Assignment::Decrease);
+    let scales = |change: Assignment| matches!(change, Assignment::ScaleUp | Assignment::ScaleDown);
+    match (one, other) {
+        (Assignment::Assign, Assignment::Assign) => Relation::Equal.holds(amount, other_amount),
+        _ => adds(one) && adds(other) || scales(one) && scales(other),
+    }
+}
+
+/// Of some changes those that contradict an earlier one, as pairs of places.
+pub(crate) fn contradictions<N: Hash + Eq>(
+    changes: impl Iterator<Item = (N, Assignment, f64)>,
+) -> Vec<(usize, usize)> {
+    let mut first: FxHashMap<N, (usize, Assignment, f64)> = FxHashMap::default();
+    let mut found = Vec::new();
+    for (place, (number, change, amount)) in changes.enumerate() {
+        let &mut (earlier, other, other_amount) = first.entry(number).or_insert((place, change, amount));
+        if earlier != place && !agree((other, other_amount), (change, amount)) {
+            found.push((earlier, place));
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_result_in_either_order_is_a_contradiction() {
+        use Assignment::{Assign, Decrease, Increase, ScaleDown, ScaleUp};
+        for (changes, expected) in [
+            (vec![(0, Increase, 1.0), (0, Decrease, 3.0), (1, Assign, 1.0)], vec![]),
+            (vec![(0, ScaleUp, 2.0), (0, ScaleDown, 3.0)], vec![]),
+            (vec![(0, Assign, 2.0), (1, Assign, 3.0), (0, Assign, 2.0)], vec![]),
+            (vec![(0, Assign, 2.0), (1, Assign, 3.0), (0, Assign, 3.0)], vec![(0, 2)]),
+            (vec![(1, Assign, f64::NAN), (1, Assign, f64::NAN)], vec![(0, 1)]),
+            (vec![(0, Increase, 2.0), (0, Assign, 3.0)], vec![(0, 1)]),
+            (vec![(0, ScaleUp, 2.0), (0, Increase, 3.0)], vec![(0, 1)]),
+        ] {
+            assert_eq!(contradictions(changes.iter().copied()), expected, "{changes:?}");
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Actions that run twice at once.
+//!
+//! PDDL 2.1 does not forbid it, and whether there is a plan is then a question of another kind: without it plans need
+//! polynomial space, with it exponential space where ends are kept apart, and else nobody can decide (Gigante, Micheli,
+//! Montanari and Scala, Decidability and complexity of action-based temporal planning over dense time, 2022). The searches
+//! therefore start no action while it runs, and note where they could have: what they prove then holds for plans in which no action
+//! overlaps itself.
+
+use std::collections::BTreeSet;
+
+use rustc_hash::FxHashMap;
+
+use crate::calls::Failure;
+use crate::ground::{Fact, Outcome};
+
+use super::advance::{Situation, Step};
+use super::relaxed::Part;
+use super::touch::Touched;
+use super::world::{Act, Span, World};
+
+/// Whether an action can start where it is in progress. What a module would propose for it is not asked.
+pub(super) fn starts_again(world: &World, situation: &Situation, act: u32) -> Result<bool, Failure> {
+    let nothing = Span { least_s: 0.0, most_s: 0.0 };
+    let mut step = Step { act, part: Part::Start, proposal: None, span: nothing };
+    Ok(!world.acts[act as usize].grounding.is_empty() || world.advance(situation, &mut step)?.is_some())
+}
+
+/// Which of these actions it might help to run twice at once.
+///
+/// Of one that does nothing but bring about at its end, once and for all, what nobody ever changes again, the run that ends
+/// first is enough: a plan without the others is still a plan. Not where actions `earn` something, or where the goal waits for
+/// what is given at a time, until which one that nobody needs may have to last.
+pub(super) fn helpful(world: &World, acts: BTreeSet<u32>, earn: bool) -> Vec<u32> {
+    if acts.is_empty() || earn || goal_waits(world) {
+        return acts.into_iter().collect();
+    }
+    let kept = kept(world);
+    let once = |act: &Act| {
+        let for_ever = |fact: Fact| kept.get(&fact.variable) == Some(&Some(fact.value));
+        act.start_effects.is_empty()
+            && act.flow_effects.is_empty()
+            && act.end_effects.iter().all(|effect| match effect.outcome {
+                Outcome::Set(fact) => effect.when.is_none() && for_ever(fact),
+                _ => false,
+            })
+    };
+    acts.into_iter().filter(|&act| !once(&world.acts[act as usize])).collect()
+}
+
+/// Whether what is given at a time might fulfil a part of the goal.
+fn goal_waits(world: &World) -> bool {
+    let goal = &world.ground.goal;
+    let plain = goal.comparisons.is_empty() && goal.calls.is_empty() && world.ground.axioms.is_empty();
+    let fulfils = |outcome: &Outcome| !matches!(outcome, Outcome::Set(fact) if !goal.facts.contains(fact));
+    let mut given = world.ground.timed.iter().flat_map(|timed| &timed.outcomes);
+    !world.ground.timed.is_empty() && (!plain || given.any(fulfils))
+}
+
+/// By variable that anything changes, the value that it always gets; none where there are several.
+fn kept(world: &World) -> FxHashMap<u32, Option<u32>> {
+    let acts = world.acts.iter().flat_map(|act| act.start_effects.iter().chain(act.end_effects));
+    let given = world.ground.timed.iter().flat_map(|timed| &timed.outcomes);
+    let mut kept: FxHashMap<u32, Option<u32>> = FxHashMap::default();
+    let mut touched = Touched::default();
+    for outcome in acts.map(|effect| &effect.outcome).chain(given) {
+        if let Outcome::Set(fact) = outcome {
+            let value = kept.entry(fact.variable).or_insert(Some(fact.value));
+            *value = value.filter(|value| *value == fact.value);
+            continue;
+        }
+        touched.clear();
+        touched.outcome(world, outcome);
+        kept.extend(touched.variables.iter().map(|&variable| (variable, None)));
+    }
+    kept
+}

@@ -19,8 +19,8 @@ const SURE: f64 = 0.8;
 /// What is said farther than this from a thing is not said of it, metres.
 const NEAR_M: f64 = 0.06;
 
-/// A world: its name, its camera, and whether vessels stand among the cups.
-type World = (&'static str, Device, bool);
+/// A world: its name, its camera, and what stands there.
+type World = (&'static str, Device, fn(&mut Draws) -> Vec<Known>);
 
 fn worlds() -> Vec<World> {
     let noisy =
@@ -34,13 +34,15 @@ fn worlds() -> Vec<World> {
         ..KINECT
     };
     vec![
-        ("matched", KINECT, false),
-        ("twice the noise", noisy, false),
-        ("holes of 10 %", holed, false),
-        ("320 x 240", Device { camera: coarse, ..KINECT }, false),
-        ("time of flight", flight, false),
-        ("vessels", KINECT, true),
-        ("vessels, noise, holes", Device { holes: 0.1, ..noisy }, true),
+        ("matched", KINECT, arrangement),
+        ("twice the noise", noisy, arrangement),
+        ("holes of 10 %", holed, arrangement),
+        ("320 x 240", Device { camera: coarse, ..KINECT }, arrangement),
+        ("time of flight", flight, arrangement),
+        ("vessels", KINECT, vessels),
+        ("vessels, noise, holes", Device { holes: 0.1, ..noisy }, vessels),
+        ("lying", KINECT, lying),
+        ("lying, noise, holes", Device { holes: 0.1, ..noisy }, lying),
     ]
 }
 
@@ -69,6 +71,37 @@ fn vessels(draws: &mut Draws) -> Vec<Known> {
             7 => vessel(VASE, true, None, false),
             8 => vessel(BARREL, true, Some(turn), false),
             _ => vessel(GLASS, true, None, false),
+        }
+    })
+}
+
+/// Two cups of each kind on their side, among tins and cartons of just their size, a mug and a cup that stands.
+fn lying(draws: &mut Draws) -> Vec<Known> {
+    strewn(draws, [1.2, 0.6], 0..10, |kind, x, y, draws| {
+        let turn_rad = std::f64::consts::TAU * draws.next();
+        let (small, large) = ((0.035, 0.104), (0.044, 0.155));
+        let lies = |(radius, height), open, handle| Thing::Lying {
+            x,
+            y,
+            radius,
+            height,
+            towards_rad: turn_rad,
+            open,
+            handle,
+        };
+        let carton = |(radius, height): (f64, f64)| {
+            let half = [0.5 * height, radius];
+            Thing::Block { x, y, half, height: 2.0 * radius, turn_rad }
+        };
+        match kind {
+            0 | 1 => (lies(small, true, false), Some("cup A")),
+            2 | 3 => (lies(large, true, false), Some("cup B")),
+            4 => (lies(small, false, false), None),
+            5 => (lies(large, false, false), None),
+            6 => (carton(small), None),
+            7 => (carton(large), None),
+            8 => (lies((0.042, 0.095), true, true), None),
+            _ => (Thing::Cup { x, y, radius: small.0, height: small.1, handle_rad: None }, Some("cup A")),
         }
     })
 }
@@ -158,9 +191,9 @@ pub fn run(count: u64, first_seed: u64, only: &str, out: Option<&Path>) -> Resul
     Ok(())
 }
 
-fn one((name, device, strange): &World, seed: u64, out: Option<&Path>) -> Result<Vec<Tally>, String> {
+fn one((name, device, strewn): &World, seed: u64, out: Option<&Path>) -> Result<Vec<Tally>, String> {
     let mut draws = Draws(seed);
-    let things = if *strange { vessels(&mut draws) } else { arrangement(&mut draws) };
+    let things = strewn(&mut draws);
     let bare: Vec<Thing> = things.iter().map(|t| t.0).collect();
     let start = std::f64::consts::TAU * draws.next();
     let most = VIEWS[VIEWS.len() - 1];

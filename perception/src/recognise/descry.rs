@@ -137,6 +137,9 @@ struct Weighed {
 /// A model that is less probable than this by cheap measures is not worth asking rays about. From: chosen.
 const DOUBT: f64 = 0.1;
 
+/// How many times as often tins, jars and rolls lie on their side as what can spill. From: chosen.
+const CLOSED_LIES: f64 = 5.0;
+
 impl Descry {
     fn judge(
         &self,
@@ -212,20 +215,21 @@ impl Descry {
             let share = ((1.0 - self.known) * family.share).ln();
             let log = |m: &Measured| share + stranger_log(family, models, m) + self.family_log(family, m);
             // What has no axis is the same however it lies.
+            let often = if family.top == Top::Closed { CLOSED_LIES.ln() } else { 0.0 };
             let lies = match family.shape {
-                Some(Shape::Round) => self.lying_logs(toppled, log),
+                Some(Shape::Round) => self.lying_logs(toppled, |m| often + log(m)),
                 _ => Vec::new(),
             };
             std::iter::once(log(measured)).chain(lies)
         });
         let alike = models.iter().flat_map(|model| {
             let share = (each * self.look_alikes).ln();
-            let log = |m: &Measured| share + self.look_alike_log(model, models, m);
+            let log = |m: &Measured, lids: f64| share + self.look_alike_log(model, models, m, lids);
             let lies = match model.shape {
-                Shape::Round => self.lying_logs(toppled, log),
+                Shape::Round => self.lying_logs(toppled, |m| log(m, CLOSED_LIES)),
                 Shape::Box => Vec::new(),
             };
-            std::iter::once(log(measured)).chain(lies)
+            std::iter::once(log(measured, 1.0)).chain(lies)
         });
         let rest: Vec<f64> = families.chain(alike).collect();
         let total = log_sum(&[logs.as_slice(), &rest].concat());
@@ -257,8 +261,9 @@ impl Descry {
         self.temper * (size + wide) + top_log(top, m) + handle_log(model.handle, m)
     }
 
-    /// The things made like a model but for one feature; sizes are like the model's within a tenth.
-    fn look_alike_log(&self, model: &ObjectModel, models: &[ObjectModel], m: &Measured) -> f64 {
+    /// The things made like a model but for one feature; sizes are like the model's within a tenth. Those with a lid are so many times as
+    /// many.
+    fn look_alike_log(&self, model: &ObjectModel, models: &[ObjectModel], m: &Measured, lids: f64) -> f64 {
         /// How alike: by so much of a size, or of a taper, things made like a known one differ. From: chosen.
         const ALIKE: f64 = 0.1;
         /// What a range is wider than its standard deviation by. From: derived, the root of 12, as of any uniform distribution.
@@ -281,7 +286,7 @@ impl Descry {
             logs.push(family(HANDLED, model.shape, model.top, Handle::One));
         }
         if model.top != Top::Closed {
-            logs.push(family(LIDDED, model.shape, Top::Closed, Handle::None));
+            logs.push(family(LIDDED * lids, model.shape, Top::Closed, Handle::None));
         }
         if model.shape == Shape::Round {
             logs.push(family(FLAT, Shape::Box, Top::Closed, Handle::None));

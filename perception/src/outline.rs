@@ -18,6 +18,12 @@ pub(crate) struct Rectangle {
     pub residual_m: f64,
 }
 
+impl Rectangle {
+    /// Of no points. From: mark.
+    pub const NONE: Rectangle =
+        Rectangle { x: 0.0, y: 0.0, sides_m: [0.0; 2], turn: (0.0, 1.0), along_m: [0.0; 2], residual_m: 0.0 };
+}
+
 /// Orientations tried over a quarter turn.
 const TURNS: usize = 30;
 /// Points that are looked at, at the least, if there are as many.

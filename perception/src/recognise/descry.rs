@@ -354,7 +354,7 @@ fn percept(
     let stands = measured.round.filter(|_| stance != Stance::Lying);
     let round_fits =
         stands.filter(|_| form_log(Some(Shape::Round), &measured) > form_log(Some(Shape::Box), &measured));
-    let (x, y) = round_fits.map_or((measured.middle[0], measured.middle[1]), |r| (r.x, r.y));
+    let (x, y) = round_fits.map_or((measured.footprint.x, measured.footprint.y), |r| (r.x, r.y));
     let sigma = round_fits.map_or(UNPLACED_SIGMA_M, |r| r.place_sigma_m.max(LEAST_PLACE_SIGMA_M));
     Percept {
         label: named.map(|i| models[i].name.clone()),
@@ -364,7 +364,7 @@ fn percept(
         unknown: unknown.max(0.0),
         position_m: scene.surface.surface_from_world.inverse() * Point3::new(x, y, segment.base_m),
         position_sigma_m: sigma,
-        size_m: [measured.footprint_m[0], measured.footprint_m[1], measured.height_m],
+        size_m: [measured.footprint.sides_m[0], measured.footprint.sides_m[1], measured.height_m],
         stance,
         points: segment.indices.len(),
         seen_fraction: measured.seen_fraction,

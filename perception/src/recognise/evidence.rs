@@ -91,10 +91,8 @@ pub(super) struct Measured {
     pub height_sigma_m: f64,
     /// True if something in front may hide its true top.
     pub top_hidden: bool,
-    /// Footprint: longer and shorter side, metres.
-    pub footprint_m: [f64; 2],
-    /// Middle of the footprint, surface frame.
-    pub middle: [f64; 2],
+    /// What bounds it seen from above, surface frame.
+    pub footprint: Rectangle,
     /// Share of the round body's visible-to-be side through which a camera looked: it is no body of that form.
     pub looked_through: f64,
     /// Points that tell the side's form, counted once for each group that shares its error.
@@ -158,8 +156,8 @@ impl Reach {
 /// The pixels around a thing that stands.
 fn rays(segment: &Segment, own: (&[Point3<f64>], &Measured), asker: &Asker, setting: &Setting) -> Rays {
     let m = own.1;
-    let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
-    let half_m = m.round.map_or(0.5 * m.footprint_m[0], |r| {
+    let (x, y) = m.round.map_or((m.footprint.x, m.footprint.y), |round| (round.x, round.y));
+    let half_m = m.round.map_or(0.5 * m.footprint.sides_m[0], |r| {
         r.radius_at(segment.base_m).max(r.radius_at(segment.base_m + m.height_m))
     });
     rays_around(([x, y], half_m), segment, own, asker, setting)
@@ -199,22 +197,20 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     let base_m = segment.base_m;
     let top = top_m(segment);
     let height_m = (top - base_m).max(LEAST_HEIGHT_M);
-    let bounding = |segment: &Segment| {
-        outline::bounding(&segment.points).map_or(([0.0; 2], [0.0; 2]), |r| (r.sides_m, [r.x, r.y]))
-    };
-    let (footprint_m, middle) = bounding(segment);
+    let bounding = |segment: &Segment| outline::bounding(&segment.points).unwrap_or(Rectangle::NONE);
+    let footprint = bounding(segment);
     let world_from_surface = scene.surface.surface_from_world.inverse();
-    let place = world_from_surface * Point3::new(middle[0], middle[1], 0.5 * (base_m + top));
+    let place = world_from_surface * Point3::new(footprint.x, footprint.y, 0.5 * (base_m + top));
     let near = seen.viewpoints().iter().map(|v| (place - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
     let sigma_m = round::sigma_m(near);
     let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m(sigma_m));
     let first = round::fit(&segment.points, base_m, top, sigma_m, round::SEED);
     let settled = first.and_then(|round| settle(&round, segment, &asker, (base_m, top), sigma_m));
-    let (segment, asker, first, (footprint_m, middle)) = match &settled {
+    let (segment, asker, first, footprint) = match &settled {
         Some(settled) => {
             (&settled.segment, settled.asker.clone(), Some(settled.round), bounding(&settled.segment))
         }
-        None => (segment, asker, first, (footprint_m, middle)),
+        None => (segment, asker, first, footprint),
     };
     // What is measured of a low thing's top reaches far down its side.
     let rim_m = (BELOW_M + CLEAR_SPREADS * sigma_m).clamp(RIMS.0 * height_m, RIMS.1 * height_m);
@@ -228,9 +224,8 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         rival_m: f64::INFINITY,
         height_m,
         height_sigma_m: HEIGHT_M.hypot(0.5 * sigma_m).hypot(0.5 * scene.surface.residual_m.min(ROUGHEST_M)),
-        top_hidden: top_hidden(&asker, middle, footprint_m, top),
-        footprint_m,
-        middle,
+        top_hidden: top_hidden(&asker, &footprint, top),
+        footprint,
         looked_through: 0.0,
         independent: (side.len() as f64 / SHARING).clamp(1.0, MOST_GROUPS),
         sigma_m,
@@ -307,18 +302,18 @@ fn views_of(asker: &Asker, place: &Point3<f64>) -> usize {
 }
 
 /// True if most places just above the object are hidden by something nearer to the cameras.
-fn top_hidden(asker: &Asker, middle: [f64; 2], footprint_m: [f64; 2], top: f64) -> bool {
+fn top_hidden(asker: &Asker, footprint: &Rectangle, top: f64) -> bool {
     /// Places above are asked about so far from the middle, as a share of the shorter side, and so high over the top, metres; so many of
     /// the five must be hidden. From: chosen.
     const REACH: f64 = 0.25;
     const ABOVE_M: f64 = 0.02;
     const MOST: usize = 3;
-    let reach = REACH * footprint_m[1];
+    let reach = REACH * footprint.sides_m[1];
     let places = [(0.0, 0.0), (reach, 0.0), (-reach, 0.0), (0.0, reach), (0.0, -reach)];
     let above = top + ABOVE_M;
     let hidden = places
         .iter()
-        .filter(|(dx, dy)| asker.look(middle[0] + dx, middle[1] + dy, above) < Seen::Surface)
+        .filter(|(dx, dy)| asker.look(footprint.x + dx, footprint.y + dy, above) < Seen::Surface)
         .count();
     !asker.views.is_empty() && hidden >= MOST
 }

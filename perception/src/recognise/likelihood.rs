@@ -69,7 +69,7 @@ pub(super) fn diameter_log(range: Option<Range>, everyday: (f64, f64), m: &Measu
         /// How well a footprint tells a diameter, metres. From: chosen.
         const SIGMA_M: f64 = 0.02;
         // No circle fits; were it round, its footprint would be its diameter.
-        return measure_log(m.footprint_m[0], SIGMA_M, range, everyday);
+        return measure_log(m.footprint.sides_m[0], SIGMA_M, range, everyday);
     }
     measure_log(2.0 * m.evidence.radius_m, diameter_sigma_m(m), range, everyday)
 }
@@ -127,19 +127,20 @@ pub(super) fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
     let sigma = side_sigma_m(m);
     match ranges {
         Some((width, depth)) => {
-            measure_log(m.footprint_m[0], sigma, Some(width), WIDTHS)
-                + measure_log(m.footprint_m[1], sigma, Some(depth), WIDTHS)
+            measure_log(m.footprint.sides_m[0], sigma, Some(width), WIDTHS)
+                + measure_log(m.footprint.sides_m[1], sigma, Some(depth), WIDTHS)
         }
         // One side only, as for a round body: densities of as many measures must be compared.
         None => {
-            measure_log(m.footprint_m[0], sigma, None, WIDTHS) + measure_log(1.0, RATIO_SIGMA, None, TAPERS)
+            measure_log(m.footprint.sides_m[0], sigma, None, WIDTHS)
+                + measure_log(1.0, RATIO_SIGMA, None, TAPERS)
         }
     }
 }
 
 /// The same for the sides of things alike: median and log-normal spread of the longer and of the shorter, blurred by the measurement.
 pub(super) fn alike_sides_log(near: [(f64, f64); 2], m: &Measured) -> f64 {
-    let sides = m.footprint_m.iter().zip(near);
+    let sides = m.footprint.sides_m.iter().zip(near);
     sides
         .map(|(side, (median, spread))| {
             measure_log(*side, side_sigma_m(m), None, (median, spread.hypot(side_sigma_m(m) / median)))
@@ -175,7 +176,7 @@ fn beside_log(m: &Measured) -> f64 {
     /// However far something reaches out, it may be a view that lies wrongly: no log is lower. From: chosen.
     const LEAST: f64 = -20.0;
     let Some(round) = m.round else { return 0.0 };
-    let beside_m = (m.footprint_m[0] - 2.0 * round.radius_m - REACH_M).max(0.0);
+    let beside_m = (m.footprint.sides_m[0] - 2.0 * round.radius_m - REACH_M).max(0.0);
     (-0.5 * (beside_m / SIGMA_M).powi(2)).max(LEAST)
 }
 

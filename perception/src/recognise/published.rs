@@ -39,7 +39,7 @@ impl Recogniser for Published {
             .iter()
             .map(|segment| {
                 let measured = measure(&setting, segment, seen).measured;
-                let size = [measured.footprint_m[0], measured.footprint_m[1], measured.height_m];
+                let size = [measured.footprint.sides_m[0], measured.footprint.sides_m[1], measured.height_m];
                 let shape = measured.evidence.round_inliers;
                 let probabilities: Vec<(String, f64)> = models
                     .iter()
@@ -48,7 +48,7 @@ impl Recogniser for Published {
                 let best = (0..models.len())
                     .max_by(|&a, &b| probabilities[a].1.total_cmp(&probabilities[b].1).then(b.cmp(&a)))
                     .filter(|&b| probabilities[b].1 >= self.theta);
-                let place = Point3::new(measured.middle[0], measured.middle[1], segment.base_m);
+                let place = Point3::new(measured.footprint.x, measured.footprint.y, segment.base_m);
                 let score = best.map_or(0.0, |b| probabilities[b].1);
                 Percept {
                     label: best.map(|b| models[b].name.clone()),

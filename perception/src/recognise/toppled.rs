@@ -13,7 +13,7 @@ use super::percept::{Evidence, Sighting};
 use super::rays::{Rays, ViewRays};
 use super::upper::Upper;
 use super::verify::Own;
-use crate::outline;
+use crate::outline::Rectangle;
 use crate::round::{self, Round, SECTORS, side_band};
 use crate::segment::{Segment, end, quantile};
 use crate::visibility::Visibility;
@@ -23,6 +23,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 const LENGTH_ENDS: (f64, f64) = (0.01, 0.99);
 /// Its axis is sought about the sides of what bounds it from above, turned by so much, radians. From: chosen.
 const TURNS: [f64; 3] = [0.0, 0.1, -0.1];
+/// Points by which the direction of its axis is sought, at the least. From: chosen, as of a fit.
+const SCOUTS: usize = 800;
 /// How far from its radius its axis lies above what it rests on, metres. From: chosen.
 const RESTS_M: f64 = 0.01;
 /// Spread of how long it is however good the camera, metres. From: chosen, twice that of a height: both ends are edges.
@@ -66,14 +68,14 @@ impl Toppled {
         if measured.top_hidden || !models.iter().any(|model| may_lie(model, measured)) {
             return None;
         }
-        let mut found = fit(&segment.points, segment.base_m, measured.sigma_m)?;
+        let mut found = fit(segment, &measured.footprint, measured.sigma_m)?;
         let asker = Asker::of(
             seen,
             setting.scene.surface.surface_from_world.inverse(),
             &segment.points,
             tolerance_m(measured.sigma_m),
         );
-        let place = (measured.middle, 0.5 * measured.footprint_m[0]);
+        let place = ([measured.footprint.x, measured.footprint.y], 0.5 * measured.footprint.sides_m[0]);
         let flat = rays_around(place, segment, (&segment.points, measured), &asker, setting);
         let handle = found.handle();
         if handle.sighting == Sighting::Seen {
@@ -140,7 +142,7 @@ fn may_lie(model: &ObjectModel, m: &Measured) -> bool {
         Range { low: model.height_m.low.max(thick_m.low), high: model.height_m.high.max(thick_m.high) };
     let is_near = |value: f64, low: f64, high: f64| value > low - SLACK_M && value < high + SLACK_M;
     is_near(m.height_m, thick_m.low, thick_m.high)
-        && is_near(m.footprint_m[0], HIDDEN * long_m.low, long_m.high + out_m)
+        && is_near(m.footprint.sides_m[0], HIDDEN * long_m.low, long_m.high + out_m)
 }
 
 /// A round body about an axis along the surface.
@@ -213,15 +215,16 @@ impl Found {
 }
 
 /// The best round body about an axis along the surface.
-fn fit(points: &[Point3<f64>], base_m: f64, sigma_m: f64) -> Option<Found> {
-    let bounds = outline::bounding(points)?;
+fn fit(segment: &Segment, bounds: &Rectangle, sigma_m: f64) -> Option<Found> {
+    let points = &segment.points;
+    let few: Vec<Point3<f64>> = points.iter().step_by((points.len() / SCOUTS).max(1)).copied().collect();
     let sides = [0.0, std::f64::consts::FRAC_PI_2];
     let angle = bounds.turn.0.atan2(bounds.turn.1);
     let angles = sides.into_iter().flat_map(|side| TURNS.map(|by| angle + side + by));
-    let origin = Translation3::new(-bounds.x, -bounds.y, -base_m);
-    let level = angles.filter_map(|angle| about(points, &origin, (angle, 0.0), sigma_m));
+    let origin = Translation3::new(-bounds.x, -bounds.y, -segment.base_m);
     let best = |a: &Found, b: &Found| a.miss_m2.total_cmp(&b.miss_m2);
-    let found = level.min_by(best)?;
+    let scouted = angles.filter_map(|angle| about(&few, &origin, (angle, 0.0), sigma_m)).min_by(best)?;
+    let found = about(points, &origin, (scouted.angle, 0.0), sigma_m)?;
     // What narrows rests on its side: its axis rises towards the wider end.
     let rise = found.body.round.slope.atan();
     let risen = about(points, &origin, (found.angle, rise), sigma_m);

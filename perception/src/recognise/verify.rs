@@ -77,9 +77,9 @@ impl<'a> Own<'a> {
             Stance::UpsideDown => Range { low: 1.0 / model.taper.high, high: 1.0 / model.taper.low },
             _ => model.taper,
         };
-        let wide_m = if m.round.is_some() { 2.0 * m.evidence.radius_m } else { m.footprint_m[0] };
+        let wide_m = if m.round.is_some() { 2.0 * m.evidence.radius_m } else { m.footprint.sides_m[0] };
         let widest_m = 0.5 * within(wide_m, diameter_m, apart_m);
-        let (x, y) = m.round.map_or((m.middle[0], m.middle[1]), |round| (round.x, round.y));
+        let (x, y) = m.round.map_or((m.footprint.x, m.footprint.y), |round| (round.x, round.y));
         let of_taper = |taper: f64| {
             let body = Frustum {
                 x,

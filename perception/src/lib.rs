@@ -46,6 +46,7 @@ pub mod outliers;
 mod outline;
 pub mod picture;
 pub mod plane;
+mod pool;
 pub mod recognise;
 pub mod register;
 mod round;

@@ -15,6 +15,7 @@ mod search;
 mod settle;
 
 use crate::cloud::Cloud;
+use crate::pool;
 use crate::surface::Region;
 use crate::view::View;
 use crate::visibility::{DepthMap, Visibility};
@@ -174,14 +175,16 @@ const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 1200,
 /// # Errors
 /// If there is no view, no usable point, a pose that is not finite, or an option that means nothing.
 pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeError> {
-    let _span = tracing::debug_span!("merge", views = views.len()).entered();
-    check(views, options)?;
-    let Ready { prepared, maps } = Ready::of(views, options);
-    let mut steps = filter_and_thin(views, &prepared, options)?;
-    let mut aligned = place(&prepared, &maps, options, &mut steps);
-    let seen = visibility(maps, &aligned.used, &aligned.poses);
-    let gathered = fuse::gather(views, &prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
-    Ok(merged(&gathered, seen, fits(&prepared, &mut aligned), steps))
+    pool::within(tracing::debug_span!("merge", views = views.len()), || {
+        check(views, options)?;
+        let Ready { prepared, maps } = Ready::of(views, options);
+        let mut steps = filter_and_thin(views, &prepared, options)?;
+        let mut aligned = place(&prepared, &maps, options, &mut steps);
+        let seen = visibility(maps, &aligned.used, &aligned.poses);
+        let gathered =
+            fuse::gather(views, &prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
+        Ok(merged(&gathered, seen, fits(&prepared, &mut aligned), steps))
+    })
 }
 
 /// The merged cloud of what was gathered, with what is said of it.
@@ -223,12 +226,13 @@ impl Ready {
 /// # Errors
 /// As [`merge`].
 pub fn align_views(views: &[View], options: &MergeOptions) -> Result<Vec<ViewFit>, MergeError> {
-    let _span = tracing::debug_span!("align views", views = views.len()).entered();
-    check(views, options)?;
-    let Ready { prepared, maps } = Ready::of(views, options);
-    let mut steps = filter_and_thin(views, &prepared, options)?;
-    let mut aligned = place(&prepared, &maps, options, &mut steps);
-    Ok(fits(&prepared, &mut aligned))
+    pool::within(tracing::debug_span!("align views", views = views.len()), || {
+        check(views, options)?;
+        let Ready { prepared, maps } = Ready::of(views, options);
+        let mut steps = filter_and_thin(views, &prepared, options)?;
+        let mut aligned = place(&prepared, &maps, options, &mut steps);
+        Ok(fits(&prepared, &mut aligned))
+    })
 }
 
 /// Steps 3 and 4; from farther away if a view would be left out else.

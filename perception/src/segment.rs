@@ -14,6 +14,7 @@ mod vessels;
 mod votes;
 
 use crate::cloud::Cloud;
+use crate::pool;
 use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, TALLEST_M, convex_hull, find_surface};
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Vector3};
@@ -88,24 +89,25 @@ pub fn segment(cloud: &Cloud, seen: &Visibility, options: &SceneOptions) -> Resu
 
 /// Parts what stands on a known surface.
 pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &SceneOptions) -> Scene {
-    let _span = tracing::debug_span!("segment", points = cloud.len()).entered();
-    let (indices, points) = above(cloud, &surface, options);
-    let viewpoints: Vec<_> = seen.viewpoints().iter().map(|v| surface.surface_from_world * v).collect();
-    let voxels = patches::voxels(&points, options.voxel_m, &viewpoints);
-    let mut part_of_voxel = join::parts(&voxels, options);
-    if options.part_touching {
-        rounds::part(&voxels, &points, &mut part_of_voxel, &viewpoints);
-        hidden::join(&voxels, &mut part_of_voxel, seen, &surface);
-    }
-    let mut parts = gather(&indices, &points, &voxels, &part_of_voxel);
-    if options.part_touching {
-        parts = vessels::whole(parts, &viewpoints);
-    }
-    parts.retain(|s| s.indices.len() >= options.fewest_points);
-    let mut tops = stand(&mut parts).into_iter();
-    parts.retain(|s| tops.next().is_some_and(|top| top - s.base_m >= options.least_height_m));
-    parts.sort_by(|a, b| b.indices.len().cmp(&a.indices.len()).then(a.indices.cmp(&b.indices)));
-    Scene { surface, segments: parts }
+    pool::within(tracing::debug_span!("segment", points = cloud.len()), || {
+        let (indices, points) = above(cloud, &surface, options);
+        let viewpoints: Vec<_> = seen.viewpoints().iter().map(|v| surface.surface_from_world * v).collect();
+        let voxels = patches::voxels(&points, options.voxel_m, &viewpoints);
+        let mut part_of_voxel = join::parts(&voxels, options);
+        if options.part_touching {
+            rounds::part(&voxels, &points, &mut part_of_voxel, &viewpoints);
+            hidden::join(&voxels, &mut part_of_voxel, seen, &surface);
+        }
+        let mut parts = gather(&indices, &points, &voxels, &part_of_voxel);
+        if options.part_touching {
+            parts = vessels::whole(parts, &viewpoints);
+        }
+        parts.retain(|s| s.indices.len() >= options.fewest_points);
+        let mut tops = stand(&mut parts).into_iter();
+        parts.retain(|s| tops.next().is_some_and(|top| top - s.base_m >= options.least_height_m));
+        parts.sort_by(|a, b| b.indices.len().cmp(&a.indices.len()).then(a.indices.cmp(&b.indices)));
+        Scene { surface, segments: parts }
+    })
 }
 
 /// Shares of a segment's points that lie below its lower edge and below its top: beyond are the few that may be noise. From: chosen.
@@ -123,11 +125,8 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
     }
     let mut parts: Vec<Segment> = Vec::new();
     let mut slots: Vec<Option<usize>> = vec![None; voxels.len()];
-    let mut from = 0;
-    for run in voxels.of_point.chunk_by(|a, b| a == b) {
-        let range = from..from + run.len();
-        from = range.end;
-        let part = part_of_voxel[run[0] as usize] as usize;
+    for (range, voxel) in voxels.runs() {
+        let part = part_of_voxel[voxel] as usize;
         let slot = *slots[part].get_or_insert_with(|| {
             let (indices, points) = (Vec::with_capacity(counts[part]), Vec::with_capacity(counts[part]));
             parts.push(Segment { indices, points, base_m: 0.0 });

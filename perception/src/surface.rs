@@ -10,10 +10,12 @@ mod tiles;
 
 use crate::cloud::{Cloud, is_finite};
 use crate::noise::KINECT;
+use crate::pool;
 use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::mpsc;
 
 pub(crate) use extent::TALLEST_M;
 pub(crate) use hull::{convex_hull, largest_part};
@@ -269,33 +271,52 @@ pub fn find_surfaces(
     seen: &Visibility,
     options: &SurfaceOptions,
 ) -> Result<Vec<Surface>, SurfaceError> {
-    let _span = tracing::debug_span!("find_surfaces", points = cloud.len()).entered();
-    let viewpoints = seen.viewpoints();
-    /// What cameras are held like is a weaker hint than a known direction: most angle to that, radians. From: chosen, about 70°.
-    const HELD_RAD: f64 = 1.2;
-    let samples = sample(cloud, &viewpoints);
-    if samples.len() < FEWEST {
-        return Err(SurfaceError::TooFew { found: cloud.count_finite(), needed: FEWEST });
-    }
-    let up = options.up.or_else(|| held_up(seen));
-    let tilt_rad = if options.up.is_some() { options.tilt_rad } else { HELD_RAD };
-    let is_level = |plane: &Plane| up.is_none_or(|up| plane.normal.dot(&up).abs() >= tilt_rad.cos());
-    // What a plane was proposed as, its points may not bear out.
-    let planes = large_planes(&samples, options.seed, is_level).into_iter().filter(is_level);
-    let planes: Vec<Plane> = planes.map(|plane| face_up(&plane, up.as_deref(), &viewpoints)).collect();
-    let faces = planes.par_iter().flat_map_iter(|plane| face::faces(plane, &samples, cloud, seen));
-    let surfaces: Vec<Surface> = faces.filter(|s| s.area_m2 >= options.least_area_m2).collect();
-    if surfaces.is_empty() {
-        return Err(SurfaceError::NotFound { tried: planes.len(), wanted: wanted(options) });
-    }
-    let mut surfaces = distinct(surfaces, &samples);
-    role::tell(&mut surfaces, &samples, seen, up.as_ref(), options);
-    surfaces.sort_by_key(|surface| (!options.wants(surface), surface.role));
-    let whole = |surface: Surface| match surface.role {
-        Role::Support | Role::Untold => surface.with_hidden(&samples, seen),
-        Role::Floor | Role::Other => surface,
-    };
-    Ok(surfaces.into_par_iter().map(|surface| options.within_region(whole(surface))).collect())
+    pool::within(tracing::debug_span!("find_surfaces", points = cloud.len()), || {
+        let viewpoints = seen.viewpoints();
+        /// What cameras are held like is a weaker hint than a known direction: most angle to that, radians. From: chosen, about 70°.
+        const HELD_RAD: f64 = 1.2;
+        let samples = sample(cloud, &viewpoints);
+        if samples.len() < FEWEST {
+            return Err(SurfaceError::TooFew { found: cloud.count_finite(), needed: FEWEST });
+        }
+        let up = options.up.or_else(|| held_up(seen));
+        let tilt_rad = if options.up.is_some() { options.tilt_rad } else { HELD_RAD };
+        let is_level = |plane: &Plane| up.is_none_or(|up| plane.normal.dot(&up).abs() >= tilt_rad.cos());
+        let faces_of = |plane: &Plane| {
+            let mut faces = face::faces(&face_up(plane, up.as_deref(), &viewpoints), &samples, cloud, seen);
+            faces.retain(|face| face.area_m2 >= options.least_area_m2);
+            faces
+        };
+        let (teller, told) = mpsc::channel();
+        let mut tried = 0;
+        // The faces of one are found while the next planes are sought.
+        rayon::in_place_scope(|scope| {
+            let found = |plane: Plane| {
+                // What a plane was proposed as, its points may not bear out.
+                if is_level(&plane) {
+                    let (n, teller, faces_of) = (tried, teller.clone(), &faces_of);
+                    scope.spawn(move |_| drop(teller.send((n, faces_of(&plane)))));
+                    tried += 1;
+                }
+            };
+            large_planes(&samples, options.seed, is_level, found);
+        });
+        drop(teller);
+        let mut faces: Vec<(usize, Vec<Surface>)> = told.into_iter().collect();
+        faces.sort_unstable_by_key(|(n, _)| *n);
+        let surfaces: Vec<Surface> = faces.into_iter().flat_map(|(_, faces)| faces).collect();
+        if surfaces.is_empty() {
+            return Err(SurfaceError::NotFound { tried, wanted: wanted(options) });
+        }
+        let mut surfaces = distinct(surfaces, &samples);
+        role::tell(&mut surfaces, &samples, seen, up.as_ref(), options);
+        surfaces.sort_by_key(|surface| (!options.wants(surface), surface.role));
+        let whole = |surface: Surface| match surface.role {
+            Role::Support | Role::Untold => surface.with_hidden(&samples, seen),
+            Role::Floor | Role::Other => surface,
+        };
+        Ok(surfaces.into_par_iter().map(|surface| options.within_region(whole(surface))).collect())
+    })
 }
 
 /// The surfaces by how much speaks for them, without those that are made of what is left over of a better one and of things on it.

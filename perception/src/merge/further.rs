@@ -15,6 +15,7 @@ use super::{
     filter_and_thin, fit, fits, joint, merged, objects, only_levelled, place, place_on, visibility,
 };
 use crate::cloud::Cloud;
+use crate::pool;
 use crate::view::View;
 use crate::visibility::DepthMap;
 use nalgebra::Isometry3;
@@ -57,27 +58,29 @@ impl Merger {
     /// # Errors
     /// As [`merge`](super::merge).
     pub fn merge(&mut self, views: &[View], options: &MergeOptions) -> Result<Merged, MergeError> {
-        let _span = tracing::debug_span!("merge further", views = views.len()).entered();
-        check(views, options)?;
-        if self.options.as_ref() != Some(options) {
-            *self = Merger { options: Some(options.clone()), ..Merger::default() };
-        }
-        self.prepare(views, options);
-        let anew = together(views.len());
-        let is_begun = |base: &Base| base.digests.len() >= anew && self.digests.starts_with(&base.digests);
-        let kept = self.base.take().filter(is_begun);
-        let begun = kept.as_ref().map_or(anew, |base| base.digests.len());
-        let mut base = kept.map_or_else(|| self.anew(&views[..anew], options), Ok);
-        for n in begun + 1..=views.len() {
-            let further = base.ok().and_then(|base| self.further(base, &views[..n], options));
-            base = further.map_or_else(|| self.anew(&views[..n], options), Ok);
-        }
-        let base = base?;
-        let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
-        let merged = merged(&base.gathered, seen, base.fits.clone(), base.steps.clone());
-        // With one more all are merged anew: then nothing of this is wanted.
-        self.base = (together(views.len() + 1) <= views.len()).then_some(base);
-        Ok(merged)
+        pool::within(tracing::debug_span!("merge further", views = views.len()), || {
+            check(views, options)?;
+            if self.options.as_ref() != Some(options) {
+                *self = Merger { options: Some(options.clone()), ..Merger::default() };
+            }
+            self.prepare(views, options);
+            let anew = together(views.len());
+            let is_begun =
+                |base: &Base| base.digests.len() >= anew && self.digests.starts_with(&base.digests);
+            let kept = self.base.take().filter(is_begun);
+            let begun = kept.as_ref().map_or(anew, |base| base.digests.len());
+            let mut base = kept.map_or_else(|| self.anew(&views[..anew], options), Ok);
+            for n in begun + 1..=views.len() {
+                let further = base.ok().and_then(|base| self.further(base, &views[..n], options));
+                base = further.map_or_else(|| self.anew(&views[..n], options), Ok);
+            }
+            let base = base?;
+            let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
+            let merged = merged(&base.gathered, seen, base.fits.clone(), base.steps.clone());
+            // With one more all are merged anew: then nothing of this is wanted.
+            self.base = (together(views.len() + 1) <= views.len()).then_some(base);
+            Ok(merged)
+        })
     }
 
     /// What is known of each view by itself: of those that were here before it is kept.

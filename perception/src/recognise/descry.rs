@@ -14,6 +14,7 @@ use super::percept::{Percept, Stance};
 use super::toppled::Toppled;
 use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor};
+use crate::pool;
 use crate::segment::{Scene, Segment};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -113,11 +114,12 @@ impl Recogniser for Descry {
     }
 
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
-        let _span = tracing::debug_span!("recognise", segments = scene.segments.len()).entered();
-        let setting = Setting::of(scene, fitted(scene, seen));
-        let judge = |segment| self.judge(&setting, segment, seen, models);
-        // Some take far longer than others.
-        scene.segments.par_iter().with_max_len(1).map(judge).collect()
+        pool::within(tracing::debug_span!("recognise", segments = scene.segments.len()), || {
+            let setting = Setting::of(scene, fitted(scene, seen));
+            let judge = |segment| self.judge(&setting, segment, seen, models);
+            // Some take far longer than others.
+            scene.segments.par_iter().with_max_len(1).map(judge).collect()
+        })
     }
 }
 

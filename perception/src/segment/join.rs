@@ -2,9 +2,11 @@
 
 use super::SceneOptions;
 use super::mend::mend;
-use super::patches::Voxels;
+use super::patches::{SOME, Voxels};
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
+use std::ops::Range;
 
 /// Greatest distance of a patch's voxels from its seed, metres. From: chosen.
 const PATCH_REACH_M: f64 = 0.02;
@@ -57,7 +59,7 @@ fn thin(voxels: &Voxels) -> Vec<bool> {
         let fuller = near.iter().filter(|&&j| own < SHARE * f64::from(voxels.counts[j as usize])).count();
         near.is_empty() || fuller >= near.len() - ((near.len() - 1) as f64 * MOST).round() as usize
     };
-    (0..voxels.len()).map(is_thin).collect()
+    (0..voxels.len()).into_par_iter().with_min_len(SOME).map(is_thin).collect()
 }
 
 /// Gives each thin voxel to the part of its fullest neighbour that is not thin.
@@ -80,7 +82,7 @@ fn grow_patches(voxels: &Voxels, thin: &[bool]) -> Vec<u32> {
     // Curvatures are not negative: their bits are in the order of their values.
     let key = |(curvature, voxel): (&f64, u32)| u128::from(curvature.to_bits()) << 32 | u128::from(voxel);
     let mut order: Vec<u128> = voxels.curvatures.iter().zip(0..).map(key).collect();
-    order.sort_unstable();
+    order.par_sort_unstable();
     let mut patch_of = vec![NONE; voxels.len()];
     let mut patches = 0;
     for seed in order.into_iter().map(|key| key as u32) {
@@ -150,15 +152,21 @@ pub(super) struct Border {
 
 /// The borders of all patches, in order of the patches.
 fn borders(voxels: &Voxels, patch_of: &[u32], thin: &[bool]) -> Vec<Border> {
-    let mut lengths: FxHashMap<(u32, u32), u32> = FxHashMap::default();
-    for i in (0..voxels.len()).filter(|&i| !thin[i]) {
-        for &j in voxels.neighbours(i).iter().filter(|&&j| j as usize > i) {
-            let (a, b) = (patch_of[i], patch_of[j as usize]);
-            if a != b && !thin[j as usize] {
-                *lengths.entry((a.min(b), a.max(b))).or_default() += 1;
+    let of = |range: Range<usize>| {
+        let mut lengths: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+        for i in range.filter(|&i| !thin[i]) {
+            for &j in voxels.neighbours(i).iter().filter(|&&j| j as usize > i) {
+                let (a, b) = (patch_of[i], patch_of[j as usize]);
+                if a != b && !thin[j as usize] {
+                    *lengths.entry((a.min(b), a.max(b))).or_default() += 1;
+                }
             }
         }
-    }
+        lengths
+    };
+    let half = voxels.len() / 2;
+    let (mut lengths, others) = rayon::join(|| of(0..half), || of(half..voxels.len()));
+    others.into_iter().for_each(|(patches, length)| *lengths.entry(patches).or_default() += length);
     let mut borders: Vec<Border> =
         lengths.into_iter().map(|(patches, length)| Border { patches, length }).collect();
     borders.sort_unstable_by_key(|border| border.patches);

@@ -5,6 +5,7 @@ use crate::lattice::{Around, Lattice};
 use crate::spread;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Occupied voxels of a set of points, in order of their place.
 pub(super) struct Voxels {
@@ -19,9 +20,10 @@ pub(super) struct Voxels {
     /// Where in `near` the neighbours of each voxel begin, and where the last ones end.
     starts: Vec<u32>,
     near: Vec<u32>,
-    /// The voxel of each point.
-    pub of_point: Vec<u32>,
-    /// Ranges of points that follow each other in one voxel, voxel by voxel, and where those of each voxel end.
+    /// Where runs of points begin that follow each other in one voxel, and where the last one ends; and the voxel of each run.
+    run_starts: Vec<u32>,
+    of_run: Vec<u32>,
+    /// The same runs voxel by voxel, and where those of each voxel end.
     runs: Vec<(u32, u32)>,
     run_ends: Vec<u32>,
 }
@@ -34,6 +36,12 @@ impl Voxels {
     /// Occupied voxels among the 26 around, in order.
     pub fn neighbours(&self, voxel: usize) -> &[u32] {
         &self.near[self.starts[voxel] as usize..self.starts[voxel + 1] as usize]
+    }
+
+    /// Ranges of points that follow each other in one voxel, and this voxel, in the order of the points.
+    pub fn runs(&self) -> impl Iterator<Item = (Range<usize>, usize)> {
+        let ends = self.run_starts.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
+        ends.zip(self.of_run.iter().map(|&voxel| voxel as usize))
     }
 
     /// The points of some voxels, voxel by voxel, from those that the voxels were made of.
@@ -78,31 +86,35 @@ impl Moments {
 }
 
 /// Voxels that one thread takes in a row. From: work.
-const SOME: usize = 256;
+pub(super) const SOME: usize = 256;
 
 /// Gathers points into voxels of a side and estimates a normal for each from its surroundings.
 pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f64>]) -> Voxels {
     let (low, high) = bounds(points);
     let lattice = Lattice::over(&low, &high, side_m);
-    let (mut entries, starts) = runs(&lattice, points);
+    let (mut entries, run_starts) = runs(&lattice, points);
     lattice.sort(&mut entries, &mut Vec::new());
-    let mut of_point = vec![0; points.len()];
-    let mut runs = Vec::with_capacity(entries.len());
-    let (mut keys, mut moments, mut run_ends) = (Vec::new(), Vec::new(), Vec::new());
+    let range = |run: usize| (run_starts[run], run_starts[run + 1]);
+    let runs: Vec<(u32, u32)> = entries.iter().map(|(_, run)| range(*run as usize)).collect();
+    let (mut keys, mut run_ends) = (Vec::new(), Vec::new());
+    let mut of_run = vec![0; entries.len()];
     for same in entries.chunk_by(|a, b| a.0 == b.0) {
-        let mut own = Moments::NONE;
-        for &(_, run) in same {
-            let (from, to) = (starts[run as usize], starts[run as usize + 1]);
-            let range = from as usize..to as usize;
-            points[range.clone()].iter().for_each(|p| own.add(p));
-            of_point[range].fill(keys.len() as u32);
-            runs.push((from, to));
-        }
+        same.iter().for_each(|(_, run)| of_run[*run as usize] = keys.len() as u32);
         keys.push(same[0].0);
-        moments.push(own);
-        run_ends.push(runs.len() as u32);
+        run_ends.push(run_ends.last().copied().unwrap_or(0) + same.len() as u32);
     }
-    let (starts, near) = neighbours(&lattice, &keys);
+    let moments_of = |voxel: usize| {
+        let mut own = Moments::NONE;
+        let first = if voxel == 0 { 0 } else { run_ends[voxel - 1] };
+        for &(from, to) in &runs[first as usize..run_ends[voxel] as usize] {
+            points[from as usize..to as usize].iter().for_each(|p| own.add(p));
+        }
+        own
+    };
+    let (moments, (starts, near)) = rayon::join(
+        || (0..keys.len()).into_par_iter().with_min_len(SOME).map(moments_of).collect::<Vec<Moments>>(),
+        || neighbours(&lattice, &keys),
+    );
     let mut voxels = Voxels {
         centres: moments.iter().map(|m| Point3::from(m.sum / m.count)).collect(),
         normals: Vec::new(),
@@ -110,7 +122,8 @@ pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f
         counts: moments.iter().map(|m| m.count as u32).collect(),
         starts,
         near,
-        of_point,
+        run_starts,
+        of_run,
         runs,
         run_ends,
     };
@@ -123,19 +136,22 @@ pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f
 /// Points that follow each other in one voxel, as neighbours in an image do: the voxel and the number of each run, and where the runs begin
 /// and the last one ends.
 fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>) {
-    let mut entries: Vec<(u64, u32)> = Vec::with_capacity(points.len() / 2);
-    let mut starts: Vec<u32> = Vec::with_capacity(points.len() / 2);
-    let mut last = None;
-    for (i, p) in (0..).zip(points) {
-        let key = lattice.key(&p.coords);
-        if last != Some(key) {
-            entries.push((key, starts.len() as u32));
-            starts.push(i);
-            last = Some(key);
+    let of = |range: Range<usize>| {
+        let mut runs: Vec<(u64, u32)> = Vec::with_capacity(range.len() / 2);
+        for (i, p) in (range.start as u32..).zip(&points[range]) {
+            let key = lattice.key(&p.coords);
+            if runs.last().is_none_or(|(last, _)| *last != key) {
+                runs.push((key, i));
+            }
         }
-    }
-    starts.push(points.len() as u32);
-    (entries, starts)
+        runs
+    };
+    let half = points.len() / 2;
+    let (mut all, more) = rayon::join(|| of(0..half), || of(half..points.len()));
+    let goes_on = all.last().zip(more.first()).is_some_and(|(last, first)| last.0 == first.0);
+    all.extend(&more[usize::from(goes_on)..]);
+    let starts = all.iter().map(|(_, first)| *first).chain([points.len() as u32]).collect();
+    (all.iter().zip(0..).map(|((key, _), run)| (*key, run)).collect(), starts)
 }
 
 /// For each voxel where its neighbours begin, and all of them in a row.

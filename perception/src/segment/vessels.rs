@@ -4,7 +4,8 @@ use super::{OUTSIDE, Segment, bounds, hull_from_above, middle, most_within, top_
 use crate::outline;
 use crate::round::{self, ON_SIDE_M, Round, SECTORS, distance, sector};
 use nalgebra::Point3;
-use std::cell::OnceCell;
+use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Parts this far apart can be one vessel, metres. From: chosen.
 const APART_M: f64 = 0.015;
@@ -37,20 +38,22 @@ const RIM_M: f64 = 0.005;
 
 /// A part with what the pairs ask of it again and again.
 struct Candidate {
+    /// Among all; none of what was joined.
+    number: Option<usize>,
     segment: Segment,
     low: Point3<f64>,
     high: Point3<f64>,
     top_m: f64,
     /// Seen from above.
-    hull: OnceCell<Vec<[f64; 2]>>,
-    fitted: OnceCell<Option<Fitted>>,
+    hull: OnceLock<Vec<[f64; 2]>>,
+    fitted: OnceLock<Option<Fitted>>,
 }
 
 impl Candidate {
-    fn new(segment: Segment) -> Candidate {
+    fn new(number: Option<usize>, segment: Segment) -> Candidate {
         let (low, high) = bounds(&segment.points);
         let top_m = top_m(&segment);
-        Candidate { segment, low, high, top_m, hull: OnceCell::new(), fitted: OnceCell::new() }
+        Candidate { number, segment, low, high, top_m, hull: OnceLock::new(), fitted: OnceLock::new() }
     }
 
     fn fitted(&self, viewpoints: &[Point3<f64>]) -> Option<&Fitted> {
@@ -67,15 +70,24 @@ impl Candidate {
 /// Joins parts that lie on one upright round body, and what lies inside it.
 pub(super) fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<Segment> {
     parts.sort_by(|a, b| b.indices.len().cmp(&a.indices.len()).then(a.indices.cmp(&b.indices)));
-    let mut parts: Vec<Candidate> = parts.into_iter().map(Candidate::new).collect();
+    let parts = parts.into_par_iter().enumerate();
+    let mut parts: Vec<Candidate> = parts.map(|(n, part)| Candidate::new(Some(n), part)).collect();
+    // All at once, as if none were joined: most are not.
+    let with_all = |(n, part)| {
+        let others = parts[n + 1..].par_iter().with_max_len(1);
+        others.map(|other| one_vessel(part, other, viewpoints)).collect()
+    };
+    let pairs: Vec<Vec<bool>> = parts.par_iter().with_max_len(1).enumerate().map(with_all).collect();
     let mut first = 0;
     while first < parts.len() {
-        let found =
-            (first + 1..parts.len()).find(|&second| one_vessel(&parts[first], &parts[second], viewpoints));
-        match found {
+        let is_one = |second: &usize| match (parts[first].number, parts[*second].number) {
+            (Some(one), Some(other)) => pairs[one][other - one - 1],
+            _ => one_vessel(&parts[first], &parts[*second], viewpoints),
+        };
+        match (first + 1..parts.len()).find(is_one) {
             Some(second) => {
                 let other = parts.remove(second);
-                parts[first] = Candidate::new(union(&parts[first].segment, &other.segment));
+                parts[first] = Candidate::new(None, union(&parts[first].segment, &other.segment));
             }
             None => first += 1,
         }

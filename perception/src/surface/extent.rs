@@ -7,6 +7,7 @@ use super::tiles::Tiles;
 use super::{Surface, range_sigma_m};
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 /// So far a plane is taken to reach on behind and beneath what hides it, metres: few things are twice as wide. From: chosen.
@@ -25,6 +26,8 @@ pub(super) enum Owner {
     /// It was not asked yet whether the plane reaches on here.
     #[default]
     Untold,
+    /// The plane may reach on here, from whichever part comes first.
+    Open,
     /// The plane is not taken to reach on here.
     Nobody,
     /// The part of this number.
@@ -78,23 +81,40 @@ impl<'a> Hiding<'a> {
         any
     }
 
+    /// Tells of each cell around some whether the plane may reach on there, if that was not told yet.
+    fn ask(&self, owners: &mut Owners, border: &[[i32; 2]], unseen: bool) {
+        /// Cells that one thread takes in a row. From: work.
+        const SOME: usize = 256;
+        let mut asked = Vec::new();
+        for cell in border.iter().flat_map(|cell| around(*cell)) {
+            if owners.get(cell) == Owner::Untold {
+                *owners.at(cell) = Owner::Nobody;
+                asked.push(cell);
+            }
+        }
+        let allows = asked.par_iter().with_min_len(SOME).map(|cell| self.allows(*cell, unseen));
+        let open: Vec<bool> = allows.collect();
+        let open = asked.iter().zip(open).filter(|(_, open)| *open);
+        open.for_each(|(cell, _)| *owners.at(*cell) = Owner::Open);
+    }
+
     /// Gives the hidden cells around those that are owned to their owners, ring by ring, those that no camera had in view as well if told so;
     /// tells which owners meet.
     pub fn spread(&self, owners: &mut Owners, mut border: Vec<[i32; 2]>, unseen: bool) -> Vec<[usize; 2]> {
         let mut meeting = Vec::new();
         for _ in 0..(HIDDEN_M / CELL_M) as usize {
+            self.ask(owners, &border, unseen);
             let mut next = Vec::new();
             for cell in border {
                 let Owner::Part(owner) = owners.get(cell) else { continue };
-                for around in (0..9).map(|k| [cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]) {
+                for around in around(cell) {
                     match owners.get(around) {
-                        Owner::Untold if self.allows(around, unseen) => {
+                        Owner::Open => {
                             *owners.at(around) = Owner::Part(owner);
                             next.push(around);
                         }
-                        Owner::Untold => *owners.at(around) = Owner::Nobody,
                         Owner::Part(other) if other != owner => meeting.push([owner, other]),
-                        Owner::Part(_) | Owner::Nobody => {}
+                        Owner::Part(_) | Owner::Nobody | Owner::Untold => {}
                     }
                 }
             }
@@ -104,6 +124,11 @@ impl<'a> Hiding<'a> {
         meeting.dedup();
         meeting
     }
+}
+
+/// A cell and the eight next to it.
+pub(super) fn around([x, y]: [i32; 2]) -> impl Iterator<Item = [i32; 2]> {
+    (0..9).map(move |k| [x + k % 3 - 1, y + k / 3 - 1])
 }
 
 impl Above<'_> {
@@ -147,8 +172,7 @@ impl Surface {
         let mut owners = Owners::new();
         border.iter().for_each(|cell| *owners.at(*cell) = Owner::Part(0));
         Hiding::of(&plane, seen).spread(&mut owners, border, true);
-        let is_beside =
-            |cell: &[i32; 2]| (0..9).any(|k| low.contains(&[cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]));
+        let is_beside = |cell: &[i32; 2]| around(*cell).any(|beside| low.contains(&beside));
         let cells: FxHashSet<[i32; 2]> = high.iter().map(|(cell, _)| *cell).collect();
         let mut things = parts(cells.into_iter().map(|cell| (cell, 1)).collect());
         things.retain(|cells| !cells.iter().any(is_beside));

@@ -1,6 +1,6 @@
 //! The connected parts of a plane, each with its convex hull.
 
-use super::extent::{Hiding, Owner, Owners};
+use super::extent::{Hiding, Owner, Owners, around};
 use super::hull::{area, convex_hull, parts};
 use super::planes::{FEWEST, Plane, Sample, least_squares};
 use super::tiles::Tiles;
@@ -42,11 +42,10 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
         }
     }
     let is_face = |cell: [i32; 2]| {
-        let around = (0..9).map(|k| counts.get([cell[0] + k % 3 - 1, cell[1] + k / 3 - 1]));
-        let around = around.fold(Counts::default(), Counts::with);
+        let around = around(cell).map(|cell| counts.get(cell)).fold(Counts::default(), Counts::with);
         !around.is_slice() && !around.is_foot()
     };
-    let near = counts.all().filter(|(cell, counts)| counts.near > 0 && is_face(*cell));
+    let near = counts.all().into_iter().filter(|(cell, counts)| counts.near > 0 && is_face(*cell));
     let mut pieces = parts(near.map(|(cell, counts)| (cell, counts.near)).collect());
     let squares: f64 = held.iter().map(|(_, s)| plane.distance(&s.point).powi(2)).sum();
     let residual_m = (squares / held.len().max(1) as f64).sqrt();

@@ -66,16 +66,21 @@ pub(crate) fn dominant_planes(
     let holds = |plane: &Plane| {
         samples.iter().filter(|s| plane.holds(s)).count() as f64 >= share * samples.len() as f64
     };
-    let planes = large_planes(&samples, 1, |_| true);
+    let mut planes = Vec::new();
+    large_planes(&samples, 1, |_| true, |plane| planes.push(plane));
     planes.into_iter().filter(holds).map(|p| (p.normal, p.offset)).collect()
 }
 
-/// Large planes, one after another, each without the points of those before it.
-pub(super) fn large_planes(samples: &[Sample], seed: u64, plausible: impl Fn(&Plane) -> bool) -> Vec<Plane> {
+/// Tells of large planes, one after another, each without the points of those before it.
+pub(super) fn large_planes(
+    samples: &[Sample],
+    seed: u64,
+    plausible: impl Fn(&Plane) -> bool,
+    mut found: impl FnMut(Plane),
+) {
     let mut rng = Draws::new(seed);
     let mut left = samples.to_vec();
     let mut cubes = Cubes::of(samples);
-    let mut planes = Vec::new();
     for _ in 0..ROUNDS {
         if left.len() < FEWEST {
             break;
@@ -88,9 +93,8 @@ pub(super) fn large_planes(samples: &[Sample], seed: u64, plausible: impl Fn(&Pl
         if before - left.len() < FEWEST {
             break;
         }
-        planes.push(plane);
+        found(plane);
     }
-    planes
 }
 
 /// Which points lie in one cube.

@@ -67,12 +67,24 @@ impl<T: Copy + Default> Tiles<T> {
         start
     }
 
-    /// The cells of all tiles that are laid, in no order that says anything.
-    pub fn all(&self) -> impl Iterator<Item = ([i32; 2], T)> {
-        self.tiles.iter().zip(self.values.chunks_exact(SIDE * SIDE)).flat_map(|(tile, values)| {
-            let [x, y] = tile.map(|at| at << BITS);
-            (0..).zip(values).map(move |(k, value)| ([x + (k >> BITS), y + (k & (SIDE as i32 - 1))], *value))
-        })
+    /// The cells of all tiles that are laid, by x, then by y.
+    pub fn all(&self) -> Vec<([i32; 2], T)> {
+        let mut tiles: Vec<(&[i32; 2], &[T])> =
+            self.tiles.iter().zip(self.values.chunks_exact(SIDE * SIDE)).collect();
+        tiles.sort_unstable_by_key(|(tile, _)| **tile);
+        let mut all = Vec::with_capacity(self.values.len());
+        for row in tiles.chunk_by(|a, b| a.0[0] == b.0[0]) {
+            for k in 0..SIDE {
+                for (tile, values) in row {
+                    let [x, y] = tile.map(|at| at << BITS);
+                    let column = values[k * SIDE..(k + 1) * SIDE].iter();
+                    all.extend(
+                        (y..=y | (SIDE as i32 - 1)).zip(column).map(|(y, value)| ([x + k as i32, y], *value)),
+                    );
+                }
+            }
+        }
+        all
     }
 }
 
@@ -103,8 +115,7 @@ mod tests {
             for cell in (-25..25).flat_map(|x| (-25..25).map(move |y| [x, y])) {
                 prop_assert_eq!(tiles.get(cell), map.get(&cell).copied().unwrap_or_default());
             }
-            let mut all: Vec<([i32; 2], u32)> = tiles.all().filter(|(_, count)| *count > 0).collect();
-            all.sort_unstable();
+            let all: Vec<([i32; 2], u32)> = tiles.all().into_iter().filter(|(_, count)| *count > 0).collect();
             prop_assert_eq!(all, map.into_iter().collect::<Vec<_>>());
         }
     }

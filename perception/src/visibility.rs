@@ -151,24 +151,29 @@ impl Gaze<'_> {
     /// return. Quicker than that where most are not.
     pub(crate) fn pass(&self, points: &[Point3<f32>], tolerance_m: f64, through: &mut [bool]) {
         const LANES: usize = 16;
-        const NONE: u32 = u32::MAX;
+        /// The column of what is not in the image. From: mark.
+        const NONE: f32 = -1.0;
         let Intrinsics { width, height, .. } = self.map.intrinsics;
         let (right, bottom) = (width as f32, height as f32);
         for (points, through) in points.chunks(LANES).zip(through.chunks_mut(LANES)) {
-            let mut pixels = [NONE; LANES];
+            let mut places = [[NONE, 0.0]; LANES];
             let mut depths_m = [0.0; LANES];
-            for ((p, pixel), depth_m) in points.iter().zip(&mut pixels).zip(&mut depths_m) {
+            for ((p, place), depth_m) in points.iter().zip(&mut places).zip(&mut depths_m) {
                 let q = self.turn * p.coords + self.shift;
                 let per = 1.0 / q.z;
                 let (u, v) =
                     (self.focal[0] * q.x * per + self.centre[0], self.focal[1] * q.y * per + self.centre[1]);
                 let inside = q.z > 0.0 && u >= 0.0 && v >= 0.0 && u < right && v < bottom;
-                *pixel = if inside { v as u32 * width as u32 + u as u32 } else { NONE };
+                *place = [if inside { u } else { NONE }, v];
                 *depth_m = q.z + tolerance_m as f32;
             }
-            for (((p, through), pixel), depth_m) in points.iter().zip(through).zip(pixels).zip(depths_m) {
+            for (((p, through), [u, v]), depth_m) in points.iter().zip(through).zip(places).zip(depths_m) {
+                if u < 0.0 {
+                    continue;
+                }
+                let pixel = v as u32 as usize * width + u as u32 as usize;
                 // The very pixel that the point falls on may show already that it was not.
-                let beyond = self.map.depths_m.get(pixel as usize).is_some_and(|seen| *seen > depth_m);
+                let beyond = self.map.depths_m.get(pixel).is_some_and(|seen| *seen > depth_m);
                 *through |= beyond && self.map.look(&p.cast(), tolerance_m) == Seen::Free;
             }
         }

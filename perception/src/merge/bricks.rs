@@ -123,7 +123,8 @@ impl<C> Bricks<C> {
 
     /// Calls `found` for each cell of a brick with its number and those of the cells in the 27 voxels around it, itself among them.
     pub fn visit(&self, brick: usize, mut found: impl FnMut(usize, &[u32])) {
-        let wide = self.wide(brick);
+        let mut wide = [[[NONE; WIDE]; WIDE]; WIDE];
+        self.wide(brick, &mut wide);
         let mut around = [0_u32; 27];
         for z in 1..=self.layers {
             for y in 1..=SIDE {
@@ -151,8 +152,24 @@ impl<C> Bricks<C> {
         }
     }
 
-    /// Numbers of the cells of a brick and of a layer of those around: by z, y, x. Of columns, those of the layer in the middle.
-    pub fn wide(&self, brick: usize) -> [[[u32; WIDE]; WIDE]; WIDE] {
+    /// Numbers of the cells of a brick of columns and of a layer of those around: by y, x.
+    pub fn wide_columns(&self, brick: usize) -> [[u32; WIDE]; WIDE] {
+        let beside = self.beside(brick);
+        std::array::from_fn(|y| self.wide_row(&beside, 1, y))
+    }
+
+    /// Numbers of the cells of a brick and of a layer of those around: by z, y, x.
+    fn wide(&self, brick: usize, wide: &mut [[[u32; WIDE]; WIDE]; WIDE]) {
+        let beside = self.beside(brick);
+        for (z, layer) in wide.iter_mut().enumerate() {
+            for (y, row) in layer.iter_mut().enumerate() {
+                *row = self.wide_row(&beside, z, y);
+            }
+        }
+    }
+
+    /// Numbers of the 27 bricks around one, itself in the middle.
+    fn beside(&self, brick: usize) -> [Option<u32>; 27] {
         let place = self.places[brick];
         // Columns have nothing above and below them.
         let columns = self.layers == 1;
@@ -166,21 +183,25 @@ impl<C> Bricks<C> {
                 .wrapping_add(step(part / 9, 2 * PLACE_BITS));
             beside[part] = if next == place { Some(brick as u32) } else { self.numbers.get(&next).copied() };
         }
+        beside
+    }
+
+    /// A row of a wide brick, from the bricks beside the one in its middle.
+    #[inline(always)]
+    fn wide_row(&self, beside: &[Option<u32>; 27], z: usize, y: usize) -> [u32; WIDE] {
         // Of a voxel of the wide brick: which of the three bricks along an axis holds it, and where.
         let at = |w: usize| (w.div_ceil(SIDE), (w + SIDE - 1) % SIDE);
-        let mut wide = [[[NONE; WIDE]; WIDE]; WIDE];
-        for (z, layer) in wide.iter_mut().enumerate().filter(|(z, _)| !columns || *z == 1) {
-            for (y, row) in layer.iter_mut().enumerate() {
-                let ((above, z), (behind, y)) = (at(z), at(y));
-                let of = |aside: usize| {
-                    let first = beside[(above * 3 + behind) * 3 + aside]? as usize * self.voxels();
-                    self.slots[first + (z * SIDE + y) * SIDE..].first_chunk::<SIDE>()
-                };
-                row[0] = of(0).map_or(NONE, |slots| slots[SIDE - 1]);
-                row[SIDE + 1] = of(2).map_or(NONE, |slots| slots[0]);
-                row[1..=SIDE].copy_from_slice(of(1).unwrap_or(&[NONE; SIDE]));
-            }
+        let ((above, z), (behind, y)) = (at(z), at(y));
+        let of = |aside: usize| {
+            let first = beside[(above * 3 + behind) * 3 + aside]? as usize * self.voxels();
+            self.slots[first + (z * SIDE + y) * SIDE..].first_chunk::<SIDE>()
+        };
+        let mut row = [NONE; WIDE];
+        row[0] = of(0).map_or(NONE, |slots| slots[SIDE - 1]);
+        row[SIDE + 1] = of(2).map_or(NONE, |slots| slots[0]);
+        if let Some(slots) = of(1) {
+            row[1..=SIDE].copy_from_slice(slots);
         }
-        wide
+        row
     }
 }

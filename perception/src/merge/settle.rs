@@ -107,6 +107,7 @@ impl Gathered {
 fn drop_looked_through(kept: &mut Vec<Settled>, gazes: &[Gaze]) {
     let mut alone: Vec<Point3<f32>> = Vec::new();
     if gazes.len() > 1 {
+        alone.reserve(kept.len());
         alone.extend(kept.iter().filter(|settled| settled.views < 2).map(|settled| settled.at));
     }
     let mut through = vec![false; alone.len()];
@@ -138,7 +139,7 @@ fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3
 
 /// Calls `found` for each column of a brick with its number and its mean, moved along z onto the mean of the columns around it.
 fn level(bricks: &Bricks<Cell>, cells: &[Cell], brick: usize, mut found: impl FnMut(usize, Vector3<f32>)) {
-    let numbers = &bricks.wide(brick)[1];
+    let numbers = bricks.wide_columns(brick);
     // Weight and weighted height: of the columns, then of three beside each other.
     let mut sums = [[[0.0_f32; WIDE]; WIDE]; 2];
     for (y, row) in numbers.iter().enumerate() {

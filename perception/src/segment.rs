@@ -67,6 +67,9 @@ pub struct Segment {
     pub points: Vec<Point3<f64>>,
     /// Height of what it stands on above the surface, metres: 0 on the surface itself, more on another object.
     pub base_m: f64,
+    /// Spread of that height, metres: of what stands in another thing, whose foot is not seen.
+    #[serde(default)]
+    pub base_sigma_m: f64,
 }
 
 /// A surface with the objects on it.
@@ -129,7 +132,7 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
         let part = part_of_voxel[voxel] as usize;
         let slot = *slots[part].get_or_insert_with(|| {
             let (indices, points) = (Vec::with_capacity(counts[part]), Vec::with_capacity(counts[part]));
-            parts.push(Segment { indices, points, base_m: 0.0 });
+            parts.push(Segment { indices, points, base_m: 0.0, base_sigma_m: 0.0 });
             parts.len() - 1
         });
         parts[slot].indices.extend_from_slice(&indices[range.clone()]);
@@ -192,36 +195,50 @@ pub(crate) fn top_m(segment: &Segment) -> f64 {
     end(&heights, POINT_ENDS.1)
 }
 
-/// Tells for each segment what it stands on: the surface, or the top of another segment under its footprint. Gives all tops.
+/// How high the bottom of a vessel or of an open carton is in which something stands, metres, and its spread. From: chosen.
+const BOTTOM_M: (f64, f64) = (0.005, 0.006);
+
+/// Tells for each segment what it stands on: the surface, the top of another segment under its footprint, or the bottom of one that is
+/// around it. Gives all tops.
 fn stand(parts: &mut [Segment]) -> Vec<f64> {
     /// A lower edge this high has been cut or hidden rather than set on something, unless something is below it. From: chosen.
     const LIFTED_M: f64 = 0.02;
     /// How far from its lower edge the top of what it stands on may be measured, metres. From: chosen.
     const MEETS_M: f64 = 0.03;
+    /// So near to it, metres, so many points of what bears it are seen: at least, and one for so many of its own. From: chosen.
+    const BESIDE_M: f64 = 0.02;
+    const SEEN: (usize, usize) = (5, 20);
     let tops: Vec<f64> = parts.iter().map(top_m).collect();
     let hulls: Vec<OnceCell<_>> = parts.iter().map(|_| OnceCell::new()).collect();
-    let is_below = |other: usize, place: [f64; 2]| {
-        let hull = hulls[other].get_or_init(|| hull_from_above(&parts[other].points));
-        holds(hull, place)
+    let hull = |part: usize| hulls[part].get_or_init(|| hull_from_above(&parts[part].points));
+    // The top of what bears it is seen beside it, or the side below.
+    let bears = |other: usize, part: usize| {
+        let is_beside = |p: &&Point3<f64>| {
+            (p.z - tops[other]).abs() < MEETS_M && holds_within(hull(part), [p.x, p.y], BESIDE_M)
+        };
+        let least = SEEN.0.max(parts[part].points.len() / SEEN.1);
+        parts[other].points.iter().filter(is_beside).take(least).count() == least
     };
-    let bases: Vec<f64> = parts
-        .iter()
-        .enumerate()
-        .map(|(i, part)| {
-            let heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
-            let low = end(&heights, POINT_ENDS.0);
-            if low < LIFTED_M {
-                return 0.0;
-            }
-            let place = middle(&part.points);
-            let below = tops.iter().enumerate().filter(|&(other, &top)| {
-                other != i && top < low + MEETS_M && top > low - MEETS_M && is_below(other, place)
-            });
-            below.map(|(_, &top)| top).max_by(f64::total_cmp).unwrap_or(0.0)
-        })
-        .collect();
+    let base = |(i, part): (usize, &Segment)| {
+        let heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
+        let low = end(&heights, POINT_ENDS.0);
+        if low < LIFTED_M {
+            return (0.0, 0.0);
+        }
+        let place = middle(&part.points);
+        let is_below =
+            |other: &usize| *other != i && tops[*other] > low - MEETS_M && holds(hull(*other), place);
+        let below: Vec<usize> = (0..parts.len()).filter(is_below).collect();
+        let bearing = below.iter().filter(|&&other| tops[other] < low + MEETS_M && bears(other, i));
+        match bearing.map(|&other| tops[other]).max_by(f64::total_cmp) {
+            Some(top) => (top, 0.0),
+            None if below.is_empty() => (0.0, 0.0),
+            None => BOTTOM_M,
+        }
+    };
+    let bases: Vec<(f64, f64)> = parts.iter().enumerate().map(base).collect();
     for (part, base) in parts.iter_mut().zip(bases) {
-        part.base_m = base;
+        (part.base_m, part.base_sigma_m) = base;
     }
     tops
 }
@@ -264,10 +281,16 @@ fn most_within<T>(hull: &[[f64; 2]], of: &[T], place: impl Fn(&T) -> [f64; 2]) -
 
 /// True if a convex anticlockwise outline holds the place.
 fn holds(hull: &[[f64; 2]], p: [f64; 2]) -> bool {
+    holds_within(hull, p, 0.0)
+}
+
+/// True if a convex anticlockwise outline that is widened by a margin holds the place.
+fn holds_within(hull: &[[f64; 2]], p: [f64; 2], margin_m: f64) -> bool {
     let n = hull.len();
     n >= 3
         && (0..n).all(|i| {
             let (a, b) = (hull[i], hull[(i + 1) % n]);
-            (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) >= 0.0
+            let (x, y) = (b[0] - a[0], b[1] - a[1]);
+            x * (p[1] - a[1]) - y * (p[0] - a[0]) >= -margin_m * (x * x + y * y).sqrt()
         })
 }

@@ -244,6 +244,29 @@ fn place_and_size_come_back() {
     assert_eq!(found[0].evidence.inside, Sighting::Seen);
 }
 
+/// A dish, 5 cm high and 15 cm wide at the top.
+const DISH: Thing = Thing::Turned {
+    x: 0.05,
+    y: 0.02,
+    knots: &[[0.0, 0.06], [0.05, 0.075]],
+    scale: 1.0,
+    open: true,
+    handle_rad: None,
+    spout: false,
+};
+
+#[test]
+fn what_stands_in_a_dish_stands_no_higher_than_its_bottom() {
+    for angle in [0.3, 1.9, -2.2] {
+        let found = percepts(&[DISH, CUP], angle, &Descry::default());
+        let said: Vec<_> = found.iter().map(|p| (p.probabilities[0].1, p.size_m)).collect();
+        let is_cup = |(p, [long, _, height]): &(f64, [f64; 3])| {
+            *p > 0.3 && *long < 0.09 && (height - 0.1).abs() < 0.01
+        };
+        assert!(said.iter().any(is_cup), "from {angle}: {said:?}");
+    }
+}
+
 #[test]
 fn neighbours_two_centimetres_apart_are_two() {
     let beside = Thing::Cup { x: 0.05, y: 0.02 + 0.09, radius: 0.035, height: 0.104, handle_rad: None };

@@ -223,7 +223,10 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         rectangle: outline::fit(&side),
         rival_m: f64::INFINITY,
         height_m,
-        height_sigma_m: HEIGHT_M.hypot(0.5 * sigma_m).hypot(0.5 * scene.surface.residual_m.min(ROUGHEST_M)),
+        height_sigma_m: HEIGHT_M
+            .hypot(0.5 * sigma_m)
+            .hypot(0.5 * scene.surface.residual_m.min(ROUGHEST_M))
+            .hypot(this.base_sigma_m),
         top_hidden: top_hidden(&asker, &footprint, top),
         footprint,
         looked_through: 0.0,

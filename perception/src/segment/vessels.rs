@@ -98,8 +98,12 @@ pub(super) fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<
 /// Both in one, in order of the indices.
 fn union(a: &Segment, b: &Segment) -> Segment {
     let count = a.indices.len() + b.indices.len();
-    let mut both =
-        Segment { indices: Vec::with_capacity(count), points: Vec::with_capacity(count), base_m: 0.0 };
+    let mut both = Segment {
+        indices: Vec::with_capacity(count),
+        points: Vec::with_capacity(count),
+        base_m: 0.0,
+        base_sigma_m: 0.0,
+    };
     let (mut i, mut j) = (0, 0);
     while i < a.indices.len() || j < b.indices.len() {
         let from_a = b.indices.get(j).is_none_or(|next| a.indices.get(i).is_some_and(|own| own <= next));
@@ -307,9 +311,14 @@ mod tests {
     fn check(beside: Vec<Point3<f64>>, parts: usize) {
         let body = cup();
         let n = body.len() as u32;
-        let own = Segment { indices: (0..n).collect(), points: body, base_m: 0.0 };
+        let own = Segment { indices: (0..n).collect(), points: body, base_m: 0.0, base_sigma_m: 0.0 };
         let what = format!("{:?} to {:?}", beside.first(), beside.last());
-        let other = Segment { indices: (n..n + beside.len() as u32).collect(), points: beside, base_m: 0.0 };
+        let other = Segment {
+            indices: (n..n + beside.len() as u32).collect(),
+            points: beside,
+            base_m: 0.0,
+            base_sigma_m: 0.0,
+        };
         let eyes = [Point3::new(1.0, 0.3, 0.8), Point3::new(-0.7, 0.8, 0.8)];
         assert_eq!(whole(vec![own, other], &eyes).len(), parts, "{what}");
     }
@@ -343,7 +352,7 @@ mod tests {
             let parts = walls.map(|points| {
                 let indices = (from..from + points.len() as u32).collect();
                 from += points.len() as u32;
-                Segment { indices, points, base_m: 0.0 }
+                Segment { indices, points, base_m: 0.0, base_sigma_m: 0.0 }
             });
             whole(parts.into(), &eyes).len()
         };

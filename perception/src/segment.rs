@@ -15,6 +15,7 @@ mod votes;
 
 use crate::cloud::Cloud;
 use crate::pool;
+use crate::round::sector;
 use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, TALLEST_M, convex_hull, find_surface};
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Vector3};
@@ -211,6 +212,11 @@ fn stand(parts: &mut [Segment]) -> Vec<f64> {
     let tops: Vec<f64> = parts.iter().map(top_m).collect();
     let hulls: Vec<OnceCell<_>> = parts.iter().map(|_| OnceCell::new()).collect();
     let hull = |part: usize| hulls[part].get_or_init(|| hull_from_above(&parts[part].points));
+    let boxes: Vec<_> = parts.iter().map(|part| bounds(&part.points)).collect();
+    let is_over = |other: usize, place: [f64; 2]| {
+        let (low, high) = &boxes[other];
+        (0..2).all(|k| place[k] > low[k] && place[k] < high[k])
+    };
     // The top of what bears it is seen beside it, or the side below.
     let bears = |other: usize, part: usize| {
         let is_beside = |p: &&Point3<f64>| {
@@ -222,18 +228,20 @@ fn stand(parts: &mut [Segment]) -> Vec<f64> {
     let base = |(i, part): (usize, &Segment)| {
         let heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
         let low = end(&heights, POINT_ENDS.0);
-        if low < LIFTED_M {
-            return (0.0, 0.0);
-        }
         let place = middle(&part.points);
-        let is_below =
-            |other: &usize| *other != i && tops[*other] > low - MEETS_M && holds(hull(*other), place);
+        let is_below = |other: &usize| {
+            *other != i
+                && tops[*other] > low - MEETS_M
+                && is_over(*other, place)
+                && holds(hull(*other), place)
+        };
         let below: Vec<usize> = (0..parts.len()).filter(is_below).collect();
-        let bearing = below.iter().filter(|&&other| tops[other] < low + MEETS_M && bears(other, i));
+        let may_bear = |other: usize| low > LIFTED_M && tops[other] < low + MEETS_M;
+        let bearing = below.iter().filter(|&&other| may_bear(other) && bears(other, i));
         match bearing.map(|&other| tops[other]).max_by(f64::total_cmp) {
             Some(top) => (top, 0.0),
-            None if below.is_empty() => (0.0, 0.0),
-            None => BOTTOM_M,
+            None if below.iter().any(|&other| is_around(&parts[other].points, place)) => BOTTOM_M,
+            None => (0.0, 0.0),
         }
     };
     let bases: Vec<(f64, f64)> = parts.iter().enumerate().map(base).collect();
@@ -241,6 +249,15 @@ fn stand(parts: &mut [Segment]) -> Vec<f64> {
         (part.base_m, part.base_sigma_m) = base;
     }
     tops
+}
+
+/// True if points lie in nearly all directions from a place.
+fn is_around(points: &[Point3<f64>], [x, y]: [f64; 2]) -> bool {
+    /// At least in the first of the second number of directions. From: chosen.
+    const MOST: (usize, usize) = (27, 36);
+    let mut seen = [false; MOST.1];
+    points.iter().for_each(|p| seen[sector(p.x - x, p.y - y, MOST.1)] = true);
+    seen.iter().filter(|seen| **seen).count() >= MOST.0
 }
 
 /// True of the normal of something upright.

@@ -189,6 +189,22 @@ fn a_known_box_is_known_however_low() {
     }
 }
 
+#[test]
+fn a_known_box_is_known_whichever_side_is_down() {
+    for (there_m, known) in [
+        ([0.16, 0.12, 0.08], true),
+        ([0.16, 0.08, 0.12], true),
+        ([0.16, 0.12, 0.11], false),
+        ([0.12, 0.12, 0.08], false),
+        ([0.19, 0.08, 0.12], false),
+    ] {
+        for turn_rad in [0.1, 0.6, 1.2] {
+            let p = taken_for([0.12, 0.08, 0.16], there_m, turn_rad, 1.2);
+            assert!(if known { p > 0.5 } else { p < 0.3 }, "{there_m:?} turned by {turn_rad}: {p}");
+        }
+    }
+}
+
 /// A circle fits to the side of a low box that is seen from far off, and must not be cut out of its top.
 #[test]
 fn a_low_box_far_off_is_in_one_piece() {

@@ -108,6 +108,22 @@ pub struct ObjectModel {
     pub handle: Handle,
 }
 
+impl ObjectModel {
+    /// A closed box with each of its other sides down; none of what is open, has a handle or is no box.
+    pub(super) fn on_other_sides(&self) -> Vec<ObjectModel> {
+        let sides = self.width_m.zip(self.depth_m).filter(|_| self.shape == Shape::Box);
+        let Some((width, depth)) = sides.filter(|_| self.top != Top::Open && self.handle != Handle::One)
+        else {
+            return Vec::new();
+        };
+        let turned = |(up, one, other): (Range, Range, Range)| {
+            let (width, depth) = if one.middle() < other.middle() { (other, one) } else { (one, other) };
+            ObjectModel { height_m: up, width_m: Some(width), depth_m: Some(depth), ..self.clone() }
+        };
+        [(width, self.height_m, depth), (depth, self.height_m, width)].map(turned).into()
+    }
+}
+
 /// Greatest length, metres, and taper that is not a mistake. From: chosen.
 const LONGEST_M: f64 = 5.0;
 const WIDEST_TAPER: f64 = 10.0;

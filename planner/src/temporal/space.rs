@@ -255,15 +255,17 @@ impl<'w, 'a> Space<'w, 'a> {
     ) -> Result<Option<(f64, Base)>, Failure> {
         let mut situation = Situation { state: self.world.initial()?, open: Vec::new(), timed: 0 };
         let mut costs = 0.0;
-        let mut track = self.begin();
+        let stops = |index: usize| index % STEPS_A_LOOK == STEPS_A_LOOK - 1 && stop();
         for (index, step) in steps.iter_mut().enumerate() {
-            if index % STEPS_A_LOOK == STEPS_A_LOOK - 1 && stop() {
-                return Ok(None);
-            }
-            let Some(next) = self.world.advance(&situation, step)? else { return Ok(None) };
+            let next = if stops(index) { None } else { self.world.advance(&situation, step)? };
+            let Some(next) = next else { return Ok(None) };
             costs += self.step_cost(&situation.state, step)?;
             situation = next;
-            if track.push(self, step).is_err() {
+        }
+        // Most sequences do not work out: times are looked at in those that do.
+        let mut track = self.begin();
+        for (index, step) in steps.iter().enumerate() {
+            if stops(index) || track.push(self, step).is_err() {
                 return Ok(None);
             }
         }

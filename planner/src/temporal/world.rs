@@ -328,6 +328,9 @@ impl<'a> World<'a> {
         gate: &dyn Fn(usize, &Effect) -> bool,
         into: &mut Values,
     ) -> Result<bool, Failure> {
+        let changes_number =
+            |effect: &&Effect| matches!(effect.outcome, Outcome::Change { .. } | Outcome::Call(_));
+        let several = effects.iter().filter(changes_number).nth(1).is_some();
         let mut changes: Vec<(u32, Change, f64)> = Vec::new();
         for (index, effect) in effects.iter().enumerate() {
             let here = effect.when.as_ref().map(|when| &when.here);
@@ -338,7 +341,7 @@ impl<'a> World<'a> {
                 Outcome::Set(fact) => into.values[fact.variable as usize] = fact.value,
                 Outcome::Change { fluent, change, amount } => {
                     let amount = self.evaluate(amount, moment)?;
-                    changes.push((*fluent, *change, amount));
+                    changes.extend(several.then_some((*fluent, *change, amount)));
                     change.apply(&mut into.numbers[*fluent as usize], amount);
                     if !into.numbers[*fluent as usize].is_finite() {
                         return Ok(false);

@@ -9,7 +9,7 @@ use crate::calls::{Calls, report};
 use crate::classical::compiled::is_classical;
 use crate::diagnostic::{Diagnostic, Findings};
 use crate::explain::{Explanation, constrained, explain, is_open, narrowed};
-use crate::ground::{Expression, GroundError, GroundTask, compile, ground};
+use crate::ground::{Earns, Expression, GroundError, GroundTask, compile, ground_with};
 use crate::memory::MemoryLimit;
 use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::plan::{EPSILON_S, Plan};
@@ -117,9 +117,9 @@ fn search(
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
     let Some(compiled) = compile(task) else {
-        return search_for(task, task, attachments, options, stop, on_plan);
+        return search_on(task, task, attachments, options, stop, on_plan);
     };
-    let mut outcome = search_for(task, &compiled.task, attachments, options, stop, on_plan)?;
+    let mut outcome = search_on(task, &compiled.task, attachments, options, stop, on_plan)?;
     let statistics = outcome.statistics_mut();
     statistics.scored_only = compiled.forgets || compiled.uncounted;
     // Times say more than the compiled task does of what happens at once and when.
@@ -128,7 +128,10 @@ fn search(
 }
 
 /// Searches for plans of `task`, which are valid plans of `original` once its bookkeeping is left out.
-fn search_for(
+///
+/// Where actions earn something, states in which more has been earned are better ones, and there are ever more of them: the
+/// first search looks away from that, for a plan or the proof that there is none, and a second one goes after what is to be earned.
+fn search_on(
     original: &Task,
     task: &Task,
     attachments: &Attachments,
@@ -136,6 +139,47 @@ fn search_for(
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
+    let (outcome, earns) = search_for(original, task, attachments, options, false, stop, on_plan)?;
+    let Outcome::Solved { plan, mut statistics } = outcome else { return Ok(outcome) };
+    statistics.optimal &= earns == Earns::Never;
+    let evaluation_limit = options.evaluation_limit.map(|limit| limit.saturating_sub(statistics.evaluated));
+    if earns != Earns::Surely || !options.anytime || evaluation_limit == Some(0) {
+        return Ok(Outcome::Solved { plan, statistics });
+    }
+    let sign = if original.metric.as_ref().is_none_or(|metric| metric.minimise) { 1.0 } else { -1.0 };
+    let cost = |plan: &Plan| sign * plan.cost.unwrap_or(0.0);
+    let (mut best, mut plans) = (plan, statistics.plans);
+    let mut hear = |plan: &Plan| {
+        if cost(plan) < cost(&best) {
+            best = plan.clone();
+            plans += 1;
+            on_plan(plan);
+        }
+    };
+    let options = Options { evaluation_limit, ..options.clone() };
+    let (outcome, _) = search_for(original, task, attachments, &options, true, stop, &mut hear)?;
+    let more = outcome.statistics();
+    statistics.plans = plans;
+    statistics.evaluated += more.evaluated;
+    statistics.expanded += more.expanded;
+    statistics.optimal = more.optimal;
+    Ok(match outcome {
+        Outcome::OutOfTime { .. } => Outcome::OutOfTime { best: Some(best), statistics },
+        Outcome::OutOfMemory { .. } => Outcome::OutOfMemory { best: Some(best), statistics },
+        Outcome::Solved { .. } | Outcome::Unsolvable { .. } => Outcome::Solved { plan: best, statistics },
+    })
+}
+
+/// One search; `keep_metric` makes what actions add to the metric a part of states. Tells besides whether actions earn something.
+fn search_for(
+    original: &Task,
+    task: &Task,
+    attachments: &Attachments,
+    options: &Options,
+    keep_metric: bool,
+    stop: &(dyn Fn() -> bool + Sync),
+    on_plan: &mut dyn FnMut(&Plan),
+) -> Result<(Outcome, Earns), PlanError> {
     let before = attachments.statistics();
     let memory = MemoryLimit::new(options.memory_limit_bytes, options.memory_used);
     let full = AtomicBool::new(false);
@@ -144,12 +188,16 @@ fn search_for(
         full.fetch_or(!room, Ordering::Relaxed);
         !room || stop()
     };
-    let out_of_memory = || Ok(Outcome::OutOfMemory { best: None, statistics: Statistics::default() });
-    let grounded = match ground(task, memory.counted(), &halt) {
+    let out_of_memory =
+        || Ok((Outcome::OutOfMemory { best: None, statistics: Statistics::default() }, Earns::Never));
+    let grounded = match ground_with(task, memory.counted(), keep_metric, &halt) {
         Ok(grounded) => grounded,
         Err(GroundError::Stopped) if full.load(Ordering::Relaxed) => return out_of_memory(),
-        Err(error) => return grounding_ended(task, error),
+        Err(error) => return Ok((grounding_ended(task, error)?, Earns::Never)),
     };
+    let additive = grounded.metric.as_ref().filter(|metric| metric.additive);
+    let earns = additive.map_or(Earns::Never, |metric| metric.earns);
+    let options = &Options { anytime: options.anytime && earns != Earns::Surely, ..options.clone() };
     // Every search has its own form of the grounded task beside it.
     let compiled = FORMS * grounded.bytes();
     if grounded.goal_reachable && !memory.has_room(|| grounded.bytes(), compiled) {
@@ -169,7 +217,8 @@ fn search_for(
     if grounded.goal_reachable && is_classical(&grounded) {
         // Violations are numbers that the original does not have.
         let soft = !original.preferences.is_empty() && task.functions.len() > original.functions.len();
-        return plan_classical(task, &grounded, options, soft, memory, stop, &check, on_plan);
+        let outcome = plan_classical(task, &grounded, options, soft, memory, stop, &check, on_plan)?;
+        return Ok((outcome, earns));
     }
     let calls = Calls::bind(task, &grounded, attachments)?;
     configure(task, attachments)?;
@@ -215,10 +264,12 @@ fn search_for(
         schemas.map(|schema| task.actions[schema as usize].name.clone()).collect();
     let why = || explain(task, &grounded, &world.calls.refusals()).but_for(task, &overlapping);
     let reason = match progress.reason {
-        Reason::Exhausted if best.is_some() && !overlapping.is_empty() => Reason::Enough,
+        Reason::Exhausted if best.is_some() && (!overlapping.is_empty() || world.chooses_costs()) => {
+            Reason::Enough
+        }
         reason => reason,
     };
-    Ok(ended(best, reason, why, statistics))
+    Ok((ended(best, reason, why, statistics), earns))
 }
 
 /// What a search with times has come to.

@@ -4,6 +4,7 @@ mod attachments;
 mod broken;
 mod classical;
 mod differential;
+mod durations;
 mod formatting;
 mod layers;
 mod modules;

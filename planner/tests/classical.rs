@@ -126,6 +126,61 @@ fn derived_predicates_with_negation() {
 }
 
 #[test]
+fn however_far_a_goal_seems_it_is_not_out_of_reach() {
+    // Every rung asks for both hands on the one below: what they add up to doubles with each.
+    let domain =
+        "(define (domain climb) (:requirements :typing :fluents) (:types rung) (:functions (total-cost))
+      (:predicates (left ?r - rung) (right ?r - rung) (above ?a ?b - rung))
+      (:action left :parameters (?a ?b - rung) :precondition (and (left ?a) (right ?a) (above ?b ?a))
+        :effect (and (left ?b) (increase (total-cost) 3)))
+      (:action right :parameters (?a ?b - rung) :precondition (and (left ?a) (right ?a) (above ?b ?a))
+        :effect (and (right ?b) (increase (total-cost) 3))))";
+    for (metric, cost) in [("", 80.0), ("(:metric minimize (total-cost))", 240.0)] {
+        let names: String = (0..=40).map(|n| format!("r{n} ")).collect();
+        let above: String = (0..40).map(|n| format!("(above r{} r{n}) ", n + 1)).collect();
+        let problem = format!(
+            "(define (problem p) (:domain climb) (:objects {names} - rung)
+               (:init (= (total-cost) 0) (left r0) (right r0) {above}) (:goal (and (left r40) (right r40))) {metric})"
+        );
+        check(domain, &problem, Expect::CostAtMost(cost));
+    }
+}
+
+#[test]
+fn a_plan_may_cost_more_than_the_search_can_count() {
+    let domain = "(define (domain count) (:requirements :fluents) (:functions (x) (total-cost))
+      (:action up :effect (and (increase (x) 1) (increase (total-cost) 1000000))))";
+    for (far, proven) in [(3, true), (4400, false)] {
+        let problem = format!(
+            "(define (problem p) (:domain count) (:init (= (x) 0) (= (total-cost) 0)) (:goal (>= (x) {far}))
+               (:metric minimize (total-cost)))"
+        );
+        let options = Options { anytime: true, evaluation_limit: Some(9_000), ..Options::default() };
+        let (outcome, verdict) = solve(&read(domain, &problem), &options);
+        assert_eq!(verdict.and_then(|verdict| verdict.cost), Some(1e6 * f64::from(far)), "{far}");
+        assert_eq!(outcome.statistics().optimal, proven, "{far}");
+    }
+}
+
+#[test]
+fn small_costs_are_told_apart() {
+    let domain = "(define (domain crumbs) (:requirements :fluents)
+      (:predicates (one) (two) (three) (full)) (:functions (total-cost))
+      (:action first :effect (and (one) (increase (total-cost) 0.0004)))
+      (:action second :precondition (one) :effect (and (two) (increase (total-cost) 0.0004)))
+      (:action third :precondition (two) :effect (and (three) (increase (total-cost) 0.0004)))
+      (:action fourth :precondition (three) :effect (and (full) (increase (total-cost) 0.0004)))
+      (:action loaf :effect (and (full) (increase (total-cost) 0.0014))))";
+    let problem = "(define (problem p) (:domain crumbs) (:init (= (total-cost) 0)) (:goal (full))
+      (:metric minimize (total-cost)))";
+    let options = Options { anytime: true, evaluation_limit: Some(5_000), ..Options::default() };
+    let (outcome, _) = solve(&read(domain, problem), &options);
+    assert!(matches!(outcome, Outcome::Solved { .. }) && !outcome.statistics().optimal, "{outcome:?}");
+    let cost = outcome.plan().and_then(|plan| plan.cost).expect("a plan");
+    assert!((cost - 0.0014).abs() < 1e-9, "{cost}");
+}
+
+#[test]
 fn object_fluents() {
     let domain = "(define (domain tow) (:requirements :typing :object-fluents :negative-preconditions)
       (:types place robot) (:predicates (road ?a ?b - place)) (:functions (where ?r - robot) - place)

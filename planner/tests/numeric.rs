@@ -10,6 +10,10 @@ enum Expect {
     Plan,
     /// With time to improve, a plan whose metric is at most this.
     MetricAtMost(f64),
+    /// With time to improve, a plan that is proven best, of this metric.
+    Best(f64),
+    /// With time to improve, a plan whose metric is at least this, and which is not said to be the best.
+    Unproven(f64),
     /// Without further time, a plan of at most so many steps.
     StepsAtMost(usize),
     /// Proven to have no plan.
@@ -17,7 +21,7 @@ enum Expect {
 }
 
 fn check(domain: &str, problem: &str, expect: Expect) {
-    let anytime = matches!(expect, Expect::MetricAtMost(_));
+    let anytime = matches!(expect, Expect::MetricAtMost(_) | Expect::Best(_) | Expect::Unproven(_));
     let options = Options { anytime, evaluation_limit: Some(20_000), ..Options::default() };
     let (outcome, verdict) = solve_twice(domain, problem, &options);
     match (expect, verdict) {
@@ -26,6 +30,14 @@ fn check(domain: &str, problem: &str, expect: Expect) {
         (Expect::StepsAtMost(most), Some(_)) => {
             let steps = outcome.plan().map_or(0, |plan| plan.steps.len());
             assert!(steps <= most, "{steps} steps, more than {most}: {outcome:?}");
+        }
+        (Expect::Best(metric), Some(verdict)) => {
+            assert!(outcome.statistics().optimal, "{outcome:?}");
+            assert_eq!(verdict.metric, Some(metric), "{outcome:?}");
+        }
+        (Expect::Unproven(least), Some(verdict)) => {
+            assert!(!outcome.statistics().optimal, "{outcome:?}");
+            assert!(verdict.metric.is_some_and(|metric| metric >= least), "{outcome:?}");
         }
         (Expect::MetricAtMost(most), Some(verdict)) => {
             let metric = verdict.metric.or(verdict.cost).expect("the problem has a metric");
@@ -239,6 +251,47 @@ fn what_the_last_state_is_worth_is_made_as_large_as_can_be() {
     ] {
         check(domain, &format!("(define (problem p) (:domain d) {problem})"), Expect::MetricAtMost(most));
     }
+}
+
+#[test]
+fn what_can_be_earned_is_gone_after() {
+    let domain = |gain: &str| {
+        format!(
+            "(define (domain d) (:requirements :fluents :typing :negative-preconditions) (:types coin)
+              (:predicates (done) (taken ?c - coin)) (:functions (gold) (spent) (worth ?c - coin))
+              (:action take :parameters (?c - coin) :precondition (not (taken ?c))
+                :effect (and (taken ?c) (increase (gold) (worth ?c)) (increase (spent) 2)))
+              (:action dig :effect {gain})
+              (:action stop :parameters () :effect (done)))"
+        )
+    };
+    let problem = |goal: &str, metric: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:objects a b c - coin) (:init (= (gold) 0) (= (spent) 0)
+               (= (worth a) 3) (= (worth b) 1) (= (worth c) 5)) (:goal {goal}) (:metric {metric}))"
+        )
+    };
+    let nothing = domain("(done)");
+    check(&nothing, &problem("(done)", "maximize (gold)"), Expect::Best(9.0));
+    check(&nothing, &problem("(done)", "maximize (- (gold) (spent))"), Expect::Best(4.0));
+    check(&nothing, &problem("(done)", "minimize (- (spent) (* 2 (gold)))"), Expect::Best(-12.0));
+    check(&nothing, &problem("(and)", "maximize (gold)"), Expect::Best(9.0));
+    // What grows for ever has no largest value.
+    for gain in ["(increase (gold) 1)", "(and (increase (gold) 1) (done))", "(increase (gold) (- (gold) -1))"]
+    {
+        let domain = domain(gain);
+        check(&domain, &problem("(done)", "maximize (gold)"), Expect::Unproven(12.0));
+        check(
+            &domain,
+            &problem("(and (done) (taken a) (not (taken a)))", "maximize (gold)"),
+            Expect::Unsolvable,
+        );
+    }
+    check(
+        &domain("(decrease (spent) 1)"),
+        &problem("(done)", "maximize (- 0 (spent))"),
+        Expect::Unproven(3.0),
+    );
 }
 
 #[test]

@@ -7,10 +7,15 @@ use crate::ground::{Conjunction, Effect, Fact, GroundTask, Meaning, Outcome};
 use super::measure::Measure;
 use super::numbers::{Numbers, is_plain};
 
-/// Costs that are not whole numbers are multiplied by this and rounded for the search; plans report exact costs.
-const COST_SCALE: f64 = 1000.0;
+/// Costs that are not whole numbers are multiplied by the first of these that makes them so, or else by the very first, and rounded
+/// for the search; plans report exact costs.
+const COST_SCALES: [f64; 4] = [1e3, 1e4, 1e5, 1e6];
+/// What is no farther from a whole number is one.
+const WHOLE: f64 = 1e-6;
 /// Costs above this are scaled down for the search.
 const LARGEST_COST: f64 = 1.0e6;
+/// What the search counts of a plan at most: below a bound that is none.
+pub(crate) const MOST_COUNTED: u32 = u32::MAX - 1;
 
 /// Lists of different lengths in one array.
 #[derive(Clone, Debug, Default)]
@@ -364,7 +369,12 @@ impl Compiled {
 
     /// The cost of a plan as the search counts.
     pub(crate) fn search_cost(&self, plan: &[u32]) -> u32 {
-        plan.iter().fold(0, |sum: u32, &op| sum.saturating_add(self.costs[op as usize]))
+        plan.iter().fold(0, |sum, &op| self.with_cost(sum, op))
+    }
+
+    /// The cost of a beginning of a plan with an operator more, as the search counts.
+    pub(crate) fn with_cost(&self, cost: u32, operator: u32) -> u32 {
+        cost.saturating_add(self.costs[operator as usize]).min(MOST_COUNTED)
     }
 
     /// A bound on costs as the search counts.
@@ -389,7 +399,10 @@ fn symbol(meaning: &Meaning) -> u32 {
 fn costs(exact: &[f64]) -> (Vec<u32>, f64) {
     let largest = exact.iter().copied().fold(0.0, f64::max);
     let whole = exact.iter().all(|c| c.fract() == 0.0);
-    let scale = if whole { 1.0 } else { COST_SCALE }.min(LARGEST_COST / largest.max(1.0));
+    let makes_whole =
+        |scale: &&f64| exact.iter().all(|c| ((c * **scale).round() - c * **scale).abs() < WHOLE);
+    let finest = COST_SCALES.iter().find(makes_whole).copied().unwrap_or(COST_SCALES[0]);
+    let scale = if whole { 1.0 } else { finest }.min(LARGEST_COST / largest.max(1.0));
     let costs = exact.iter().map(|c| (c * scale).round().clamp(0.0, LARGEST_COST) as u32).collect();
     (costs, scale)
 }

@@ -48,6 +48,16 @@ pub fn ground(
     memory_limit_bytes: Option<usize>,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<GroundTask, GroundError> {
+    ground_with(task, memory_limit_bytes, false, stop)
+}
+
+/// The same; `keep_metric` makes what actions add to the metric a part of states.
+pub(crate) fn ground_with(
+    task: &Task,
+    memory_limit_bytes: Option<usize>,
+    keep_metric: bool,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<GroundTask, GroundError> {
     let _span = debug_span!("ground").entered();
     widths(task)?;
     let normal = normal::normalise(task);
@@ -82,7 +92,7 @@ pub fn ground(
     let keep = !task.modules.is_empty() || !task.preferences.is_empty() || !task.constraints.is_empty();
     let signed = expression.map(|e| (task.metric.as_ref().is_none_or(|m| m.minimise), e));
     let undefined: Vec<bool> = initial_numbers(&make).iter().map(|number| number.is_nan()).collect();
-    let costs = metric::costs(&raw, &make.comparisons, &undefined, signed, keep);
+    let costs = metric::costs(&raw, &make.comparisons, &undefined, signed, keep, keep_metric);
     for action in &mut raw.actions {
         action.cost = costs.of(action);
     }

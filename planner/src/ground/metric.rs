@@ -1,9 +1,9 @@
 //! The metric, and the numeric fluents that only add up costs.
 
-use super::instantiate::Deed;
+use super::instantiate::{Deed, GroundEffect};
 use super::raw::{RawAction, RawTask};
 use super::relevant::{is_risky, reads};
-use super::task::{Change, Comparison, Expression, Metric};
+use super::task::{Change, Comparison, Earns, Expression, Metric};
 
 /// How the metric is made up.
 pub(super) struct Costs {
@@ -92,13 +92,62 @@ fn not_just_costs(task: &RawTask, comparisons: &[Comparison], undefined: &[bool]
     read
 }
 
-/// Looks into the metric. `keep` keeps every numeric fluent in the state.
+/// Whether actions make an additive metric better.
+fn earning(task: &RawTask, weights: &[f64], sign: f64) -> Earns {
+    let earns = |effect: &GroundEffect| match &effect.deed {
+        Deed::Change(id, change, amount) => added(*change, amount, sign * weights[*id as usize]),
+        _ => Earns::Never,
+    };
+    let effects = task.actions.iter().flat_map(|action| {
+        let later = action.later.iter().flat_map(|later| &later.end_effects);
+        action.effects.iter().chain(later)
+    });
+    effects.map(earns).max().unwrap_or(Earns::Never)
+}
+
+/// Whether a change of a number makes a sum smaller in which it has a weight.
+pub(crate) fn added(change: Change, amount: &Expression, weight: f64) -> Earns {
+    let weight = match change {
+        _ if weight == 0.0 => return Earns::Never,
+        Change::Increase => weight,
+        Change::Decrease => -weight,
+        _ => return Earns::Perhaps,
+    };
+    match (is_at_least_nothing(amount, weight), is_at_least_nothing(amount, -weight)) {
+        (true, _) => Earns::Never,
+        (false, true) => Earns::Surely,
+        (false, false) => Earns::Perhaps,
+    }
+}
+
+/// Whether an expression times a factor is never below zero, as far as its constants tell.
+fn is_at_least_nothing(expression: &Expression, factor: f64) -> bool {
+    match expression {
+        Expression::Constant(value) => factor * value >= 0.0,
+        Expression::Duration => factor >= 0.0,
+        Expression::Sum(parts) => parts.iter().all(|part| is_at_least_nothing(part, factor)),
+        Expression::Product(parts) => {
+            let rest = parts.iter().filter(|part| !matches!(part, Expression::Constant(_)));
+            let constants = parts.iter().map(|part| match part {
+                Expression::Constant(value) => *value,
+                _ => 1.0,
+            });
+            factor * constants.product::<f64>() >= 0.0
+                && rest.into_iter().all(|part| is_at_least_nothing(part, 1.0))
+        }
+        Expression::Negative(inner) => is_at_least_nothing(inner, -factor),
+        _ => false,
+    }
+}
+
+/// Looks into the metric. `keep` keeps every numeric fluent in the state, `keep_metric` those that the metric is made of.
 pub(super) fn costs(
     task: &RawTask,
     comparisons: &[Comparison],
     undefined: &[bool],
     metric: Option<(bool, Expression)>,
     keep: bool,
+    keep_metric: bool,
 ) -> Costs {
     let count = undefined.len();
     let read = not_just_costs(task, comparisons, undefined);
@@ -108,8 +157,15 @@ pub(super) fn costs(
         let weights = (0..count).map(|id| (!read[id] && !keep).then_some(0.0)).collect();
         return Costs { weights, metric: None, read: Vec::new() };
     };
-    let additive = linear(&expression, 1.0, &mut weights, &mut time_weight)
+    let additive = !keep_metric
+        && linear(&expression, 1.0, &mut weights, &mut time_weight)
         && (0..count).all(|id| weights[id] == 0.0 || !read[id]);
+    let sign = if minimise { 1.0 } else { -1.0 };
+    let earns = match additive {
+        true if sign * time_weight < 0.0 => Earns::Surely,
+        true => earning(task, &weights, sign),
+        false => Earns::Perhaps,
+    };
     let mut used = Vec::new();
     reads(&expression, &mut |id| used.push(id), &mut |_| {});
     let weights = (0..count).map(|id| {
@@ -118,7 +174,7 @@ pub(super) fn costs(
     });
     let weights: Vec<_> = weights.collect();
     let read = if additive { Vec::new() } else { used };
-    Costs { weights, metric: Some(Metric { minimise, expression, additive, time_weight }), read }
+    Costs { weights, metric: Some(Metric { minimise, expression, additive, earns, time_weight }), read }
 }
 
 impl Costs {
@@ -141,11 +197,7 @@ impl Costs {
     }
 }
 
-fn strip(
-    weights: &[Option<f64>],
-    effects: &mut Vec<super::instantiate::GroundEffect>,
-    terms: &mut Vec<Expression>,
-) {
+fn strip(weights: &[Option<f64>], effects: &mut Vec<GroundEffect>, terms: &mut Vec<Expression>) {
     effects.retain(|effect| {
         let Deed::Change(id, change, amount) = &effect.deed else { return true };
         let Some(weight) = weights[*id as usize] else { return true };

@@ -20,8 +20,9 @@ mod statics;
 mod task;
 mod variables;
 
+pub(crate) use build::ground_with;
 pub use build::{GroundError, ground};
-pub(crate) use metric::weights;
+pub(crate) use metric::{added, weights};
 pub use obstacles::{MissingAtom, Obstacle};
 pub(crate) use pairs::exclusive;
 pub(crate) use pddl3::compile;

@@ -329,8 +329,21 @@ pub struct Metric {
     pub expression: Expression,
     /// True where the metric is a constant, plus the costs of the plan's actions, plus `time_weight` × makespan.
     pub additive: bool,
+    /// Whether actions make it better than it was without them: then it may have no best value.
+    pub earns: Earns,
     /// The weight of `total-time` in an additive metric.
     pub time_weight: f64,
+}
+
+/// Whether actions make a metric better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Earns {
+    /// Whatever is done, it gets no better.
+    Never,
+    /// It is not known beforehand.
+    Perhaps,
+    /// Some action makes it better.
+    Surely,
 }
 
 /// A state: a value a variable (derived ones included and up to date), a number a numeric fluent (NaN where undefined).

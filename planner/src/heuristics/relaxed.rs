@@ -36,7 +36,7 @@ impl Counting {
             Counting::CostAndSteps if task.unit_cost => 1,
             Counting::CostAndSteps => task.costs[operator] + 1,
             Counting::CostThenSteps if task.free_operators => {
-                task.costs[operator].saturating_mul(COST_OVER_STEPS).saturating_add(1)
+                reached(task.costs[operator].saturating_mul(COST_OVER_STEPS), 1)
             }
             Counting::CostThenSteps => task.costs[operator],
         }
@@ -55,6 +55,11 @@ pub(crate) struct Relevant {
     /// The fact of the numeric condition that it is repeated for; `u32::MAX` for none, [`REFILL`] for a number that the
     /// relaxed plan uses up.
     pub until: u32,
+}
+
+/// The sum of two estimates; however much it is, what it takes so much to reach can be reached.
+fn reached(cost: u32, more: u32) -> u32 {
+    cost.saturating_add(more).min(NONE - 1)
 }
 
 /// What an operator is there for that gives back what others of the relaxed plan use up.
@@ -188,7 +193,7 @@ impl Relaxed {
             for i in 0..waiting.len() {
                 let node = self.waiting.get(fact as usize)[i] as usize;
                 self.missing[node] -= 1;
-                self.node_costs[node] = self.node_costs[node].saturating_add(cost);
+                self.node_costs[node] = reached(self.node_costs[node], cost);
                 if self.missing[node] == 0 {
                     self.trigger(node);
                 }
@@ -224,7 +229,7 @@ impl Relaxed {
             for i in 0..self.intervals.found.len() {
                 let (fact, times) = self.intervals.found[i];
                 let more = self.base_costs[node as usize].saturating_mul(times - 1);
-                let cost = at.saturating_add(more);
+                let cost = reached(at, more);
                 if cost < self.fact_costs[fact as usize] {
                     self.fact_costs[fact as usize] = cost;
                     self.supporters[fact as usize] = node;

@@ -334,7 +334,8 @@ impl<'a> Improve<'a> {
     fn child(&mut self, parent: u32, operator: u32, bound: u64) -> Option<u32> {
         let task = self.task;
         let cost = self.store.cost(parent).saturating_add(self.costs[operator as usize]);
-        if u64::from(cost) >= bound {
+        // What is more than can be counted might be more than what it would take the place of.
+        if cost == u32::MAX || u64::from(cost) >= bound {
             return None;
         }
         let mut before = std::mem::take(&mut self.next);

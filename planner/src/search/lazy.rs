@@ -255,7 +255,7 @@ impl<'a, 's> Search<'a, 's> {
     /// Makes the state behind an entry and visits it if that is worth while.
     fn follow(&mut self, parent: u32, operator: u32) -> Option<Vec<u32>> {
         let task = self.shared.task;
-        let cost = self.store.cost(parent).saturating_add(task.costs[operator as usize]);
+        let cost = task.with_cost(self.store.cost(parent), operator);
         if cost >= self.strategy.bound {
             return None;
         }
@@ -381,7 +381,7 @@ impl<'a, 's> Search<'a, 's> {
         self.trail.clear();
         if plan.len() > 1 {
             for &operator in &plan {
-                let cost = self.store.cost(id).saturating_add(task.costs[operator as usize]);
+                let cost = task.with_cost(self.store.cost(id), operator);
                 if cost >= self.strategy.bound {
                     fresh = None;
                     break;

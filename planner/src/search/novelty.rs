@@ -214,7 +214,7 @@ impl<'a, 's> Search<'a, 's> {
         self.shared.successors.applicable(task, state, applicable);
         self.unseen += applicable.len();
         for &operator in applicable.iter() {
-            let cost = self.store.cost(id).saturating_add(task.costs[operator as usize]);
+            let cost = task.with_cost(self.store.cost(id), operator);
             if cost >= self.bound {
                 continue;
             }

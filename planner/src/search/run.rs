@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use tracing::debug_span;
 
-use crate::classical::compiled::Compiled;
+use crate::classical::compiled::{Compiled, MOST_COUNTED};
 use crate::classical::successor::Successors;
 use crate::ground::GroundTask;
 use crate::heuristics::landmarks::Landmarks;
@@ -415,9 +415,11 @@ impl<'a, 's> Run<'a, 's> {
                 self.counts.add(took);
                 match end {
                     End::Plan(plan) => {
-                        let plans = self.plans;
+                        let (plans, counted) = (self.plans, self.task.search_cost(&plan));
                         let settled = self.improve(plan, work_limit);
                         if self.task.measure.is_sum() {
+                            // What the search takes for cheaper need not be where it rounds: it must not come to the same again.
+                            self.bound = self.bound.min(counted);
                             continue;
                         }
                         again = if settled && self.plans == plans { again + 1 } else { 0 };
@@ -425,7 +427,7 @@ impl<'a, 's> Run<'a, 's> {
                             return ClassicalEnd::Done;
                         }
                     }
-                    End::Exhausted if !strategy.lookahead && self.task.has_exact_costs() => {
+                    End::Exhausted if !strategy.lookahead && self.counts_exactly() => {
                         return ClassicalEnd::Exhausted;
                     }
                     End::Exhausted if !strategy.lookahead => return ClassicalEnd::Done,
@@ -441,6 +443,11 @@ impl<'a, 's> Run<'a, 's> {
                 }
             }
         }
+    }
+
+    /// Whether what the search counts of plans within the bound is what they cost.
+    fn counts_exactly(&self) -> bool {
+        self.task.has_exact_costs() && self.bound < MOST_COUNTED
     }
 
     /// Searches for plans that end in states of which the metric makes less, where it looks at nothing else: once every state was

@@ -72,6 +72,8 @@ pub(crate) struct Step {
     pub part: Part,
     /// The parameter that its grounding module proposed.
     pub proposal: Option<Arc<str>>,
+    /// How long it is to take, where the schedule stretches it.
+    pub taken_s: Option<f64>,
     /// How long the action may take; filled in by [`World::advance`].
     pub span: Span,
 }
@@ -79,7 +81,13 @@ pub(crate) struct Step {
 impl Step {
     /// An action from its start to its end, without a proposal.
     pub fn whole(act: u32) -> Step {
-        Step { act, part: Part::Whole, proposal: None, span: Span { least_s: 0.0, most_s: 0.0 } }
+        Step {
+            act,
+            part: Part::Whole,
+            proposal: None,
+            taken_s: None,
+            span: Span { least_s: 0.0, most_s: 0.0 },
+        }
     }
 }
 
@@ -165,7 +173,7 @@ impl World<'_> {
             true => self.span(act, &moment)?,
             false => Some(Span { least_s: 0.0, most_s: 0.0 }),
         };
-        let Some(span) = span else { return Ok(None) };
+        let Some(span) = span.and_then(|span| span.taking(step.taken_s)) else { return Ok(None) };
         moment.duration_s = span.least_s;
         let mut after = from.state.clone();
         if !self.apply(act.start_effects, &moment, &|_, _| true, &mut after)? {

@@ -6,7 +6,8 @@ use rustc_hash::FxHashMap;
 
 use crate::classical::compiled::is_classical;
 use crate::ground::{
-    Action, Conjunction, Effect, Expression, Fact, GroundTask, Meaning, Metric, Outcome, Variable, exclusive,
+    Action, Conjunction, Earns, Effect, Expression, Fact, GroundTask, Meaning, Metric, Outcome, Variable,
+    exclusive,
 };
 use crate::memory::MemoryLimit;
 use crate::search::run::{ClassicalOptions, FIRST_WORK, solve};
@@ -50,7 +51,7 @@ pub(crate) fn classical_plan(
     let nothing = Span { least_s: 0.0, most_s: 0.0 };
     let step = |&action: &u32| {
         let (act, part) = parts[action as usize];
-        Step { act, part, proposal: None, span: nothing }
+        Step { act, part, proposal: None, taken_s: None, span: nothing }
     };
     Some((actions.iter().map(step).collect(), outcome.evaluated, outcome.work))
 }
@@ -89,7 +90,8 @@ fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
     guard(world, &mut task, &parts)?;
     task.mutex_groups.extend(exclusive(&task));
     let expression = Expression::Constant(0.0);
-    task.metric = Some(Metric { minimise: true, expression, additive: true, time_weight: 0.0 });
+    task.metric =
+        Some(Metric { minimise: true, expression, additive: true, earns: Earns::Never, time_weight: 0.0 });
     Some((task, parts))
 }
 

@@ -8,6 +8,7 @@ use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
 use crate::calls::Failure;
+use crate::ground::Earns;
 use crate::memory::MemoryLimit;
 
 use super::advance::{Situation, Step};
@@ -205,7 +206,7 @@ impl Pass {
             if self.apart != all_apart(world) && !self.all_in_one_go(&space, progress, &mut overlapping) {
                 progress.reason = Reason::Unproven;
             }
-            progress.overlapping = helpful(world, overlapping, !space.only_grows);
+            progress.overlapping = helpful(world, overlapping, space.earns != Earns::Never);
         }
         Ok(progress.reason != Reason::Unproven)
     }

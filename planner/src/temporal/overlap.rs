@@ -21,7 +21,7 @@ use super::world::{Act, Span, World};
 /// Whether an action can start where it is in progress. What a module would propose for it is not asked.
 pub(super) fn starts_again(world: &World, situation: &Situation, act: u32) -> Result<bool, Failure> {
     let nothing = Span { least_s: 0.0, most_s: 0.0 };
-    let mut step = Step { act, part: Part::Start, proposal: None, span: nothing };
+    let mut step = Step { act, part: Part::Start, proposal: None, taken_s: None, span: nothing };
     Ok(!world.acts[act as usize].grounding.is_empty() || world.advance(situation, &mut step)?.is_some())
 }
 

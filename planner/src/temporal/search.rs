@@ -10,7 +10,7 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::calls::Failure;
-use crate::ground::Values;
+use crate::ground::{Earns, Values};
 use crate::memory::{Heap, MemoryLimit, Rows, soon};
 
 use super::advance::{Gates, Open, Situation, Step};
@@ -217,8 +217,13 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
 
     /// Searches.
     pub fn run(mut self, stop: &dyn Fn() -> bool) -> Result<(End, Counts), Failure> {
-        let nowhere =
-            Step { act: NONE, part: Part::Free, proposal: None, span: Span { least_s: 0.0, most_s: 0.0 } };
+        let nowhere = Step {
+            act: NONE,
+            part: Part::Free,
+            proposal: None,
+            taken_s: None,
+            span: Span { least_s: 0.0, most_s: 0.0 },
+        };
         if let Some(end) = self.visit(NONE, nowhere, self.base.situation.clone(), self.base.costs)? {
             return Ok((end, self.counts));
         }
@@ -303,7 +308,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         let from = self.situation(entry.parent);
         let proposal = self.proposals.get(entry.proposal as usize).cloned();
         let nothing = Span { least_s: 0.0, most_s: 0.0 };
-        let mut step = Step { act: entry.act, part: entry.part, proposal, span: nothing };
+        let mut step = Step { act: entry.act, part: entry.part, proposal, taken_s: None, span: nothing };
         let Some(next) = self.space.world.advance(&from, &mut step)? else { return Ok(None) };
         let costs = self.costs[entry.parent as usize] + self.space.step_cost(&from.state, &step)?;
         self.visit(entry.parent, step, next, costs)
@@ -359,7 +364,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         let Ok(times) = self.times(parent, &step, !situation.open.is_empty()) else { return Ok(None) };
         let measured = self.space.measured(costs, &situation.state, times.makespan_s)?;
         let too_dear = measured >= self.manner.bound;
-        if too_dear && self.space.only_grows {
+        if too_dear && self.space.earns != Earns::Surely {
+            self.lossy |= self.space.earns == Earns::Perhaps;
             return Ok(None);
         }
         self.counts.work += WORK_A_STATE + situation.state.values.len() as u64;
@@ -380,10 +386,11 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             self.costs[node as usize] = costs;
         }
         if !times.due && !too_dear && self.space.world.is_goal(&situation)? {
-            if !times.late {
+            if !times.late && self.works_out(node)? {
                 return Ok(Some(End::Found(self.path(node))));
             }
-            // Something that nobody needs might only have to last until then.
+            // What is stretched may do something else,
+            // or something that nobody needs might only have to last until then.
             self.lossy = true;
         }
         self.expand(node, &situation, times.ready_s.as_deref())?;
@@ -404,7 +411,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
                 if !self.space.world.acts[act as usize].grounding.is_empty() {
                     continue;
                 }
-                let mut step = Step { act, part, proposal: None, span: nothing };
+                let mut step = Step { act, part, proposal: None, taken_s: None, span: nothing };
                 if part == Part::Start && self.is_full(&from, act) {
                     continue;
                 }
@@ -427,6 +434,14 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             Some((step, situation, costs)) => self.visit(node, step, situation, costs),
             None => Ok(None),
         }
+    }
+
+    /// Whether a plan is one still where its actions are stretched. Of what goes on from a base, its beginning is not known here.
+    fn works_out(&self, node: u32) -> Result<bool, Failure> {
+        if !self.space.stretches || !self.base.track.actions.is_empty() {
+            return Ok(true);
+        }
+        Ok(self.space.replay_to_goal(&mut self.path(node), &|| false)?.is_some())
     }
 
     /// A node on the way of a lookahead, which is not evaluated; `None` if it is known already or its times do not fit.
@@ -502,7 +517,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         let cost = self.nodes[node as usize].cost;
         let in_time = self.costs[node as usize] + self.space.time_weight() * estimate.finish_s;
         let reachable = if self.space.counts_time() { cost.max(in_time) } else { cost };
-        if self.space.only_grows && reachable >= self.manner.bound {
+        if self.space.earns != Earns::Surely && reachable >= self.manner.bound {
+            self.lossy |= self.space.earns == Earns::Perhaps;
             return Ok(());
         }
         self.counts.expanded += 1;

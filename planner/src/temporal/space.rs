@@ -7,7 +7,7 @@ use rustc_hash::FxHasher;
 
 use crate::attachment::Level;
 use crate::calls::Failure;
-use crate::ground::{Change, Expression, Outcome, Values, weights};
+use crate::ground::{Change, Earns, Expression, Outcome, Values, added, weights};
 use crate::validate::SEPARATION_S;
 
 use super::advance::{Accesses, Situation, Step};
@@ -15,6 +15,10 @@ use super::order::{Clock, Inconsistent, Order};
 use super::relaxed::Part;
 use super::world::{Act, Moment, Span, World};
 
+/// How often a plan is replayed whose actions are stretched in turn by those that were stretched before.
+const MOST_STRETCHED: usize = 8;
+/// Differences of times that rounding makes are no stretch.
+const LEAST_STRETCH_S: f64 = 1e-7;
 /// After so many steps of a replay, it asks whether to stop.
 const STEPS_A_LOOK: usize = 256;
 
@@ -35,14 +39,31 @@ pub(crate) enum Measure {
 }
 
 impl Measure {
-    /// Whether no action earns a reward. Of an expression over states that is not known; it is taken to be so.
-    fn only_grows(&self, world: &World) -> bool {
-        let Measure::Additive { sign, time_weight } = self else { return true };
-        let grows = |cost: &Expression| match cost {
-            Expression::Constant(cost) => sign * cost >= 0.0,
-            _ => *sign > 0.0,
+    /// Whether actions make it better.
+    fn earns(&self, world: &World) -> Earns {
+        let expression = match self {
+            Measure::Makespan => return Earns::Never,
+            Measure::Additive { .. } => {
+                return world.ground.metric.as_ref().map_or(Earns::Never, |metric| metric.earns);
+            }
+            Measure::Expression(expression) => expression,
         };
-        *time_weight >= 0.0 && world.acts.iter().all(|act| grows(act.cost))
+        let Some((weights, time)) = weights(expression, world.ground.numerics.len()) else {
+            return Earns::Perhaps;
+        };
+        if time < 0.0 {
+            return Earns::Surely;
+        }
+        let acts = world.acts.iter();
+        let effects = acts.flat_map(|act| [act.start_effects, act.flow_effects, act.end_effects]).flatten();
+        let given = world.ground.timed.iter().flat_map(|timed| &timed.outcomes);
+        let earns = |outcome: &Outcome| match outcome {
+            Outcome::Set(_) => Earns::Never,
+            Outcome::Change { fluent, change, amount } => added(*change, amount, weights[*fluent as usize]),
+            Outcome::Flow { fluent, rate } => added(Change::Increase, rate, weights[*fluent as usize]),
+            Outcome::Call(_) => Earns::Perhaps,
+        };
+        effects.map(|effect| &effect.outcome).chain(given).map(earns).max().unwrap_or(Earns::Never)
     }
 
     /// By action: what it adds to the measure beside time, in seconds that count as much. Nothing where not both count, or where
@@ -98,8 +119,11 @@ pub(crate) struct Space<'w, 'a> {
     everywhere: Vec<u32>,
     /// Whether times can make a sequence impossible.
     pub tight: bool,
-    /// Whether a beginning of a plan that is as dear as another plan leads to no better one.
-    pub only_grows: bool,
+    /// Whether actions make what plans are measured by better: unless they surely do, a beginning of a plan that is as dear as
+    /// another plan is taken to lead to no better one.
+    pub earns: Earns,
+    /// Whether effects or costs of some action depend on how long it is stretched.
+    pub stretches: bool,
 }
 
 impl<'w, 'a> Space<'w, 'a> {
@@ -127,8 +151,9 @@ impl<'w, 'a> Space<'w, 'a> {
         }
         let accesses = Accesses::new(world);
         let tight = open_act.contains(&true) || !ground.timed.is_empty();
-        let only_grows = measure.only_grows(world);
-        Space { world, open_act, measure, accesses, pivots, everywhere, tight, only_grows }
+        let earns = measure.earns(world);
+        let stretches = world.acts.iter().any(Act::is_read_off);
+        Space { world, open_act, measure, accesses, pivots, everywhere, tight, earns, stretches }
     }
 
     /// Actions whose facts at start hold, in order.
@@ -230,15 +255,17 @@ impl<'w, 'a> Space<'w, 'a> {
     ) -> Result<Option<(f64, Base)>, Failure> {
         let mut situation = Situation { state: self.world.initial()?, open: Vec::new(), timed: 0 };
         let mut costs = 0.0;
-        let mut track = self.begin();
+        let stops = |index: usize| index % STEPS_A_LOOK == STEPS_A_LOOK - 1 && stop();
         for (index, step) in steps.iter_mut().enumerate() {
-            if index % STEPS_A_LOOK == STEPS_A_LOOK - 1 && stop() {
-                return Ok(None);
-            }
-            let Some(next) = self.world.advance(&situation, step)? else { return Ok(None) };
+            let next = if stops(index) { None } else { self.world.advance(&situation, step)? };
+            let Some(next) = next else { return Ok(None) };
             costs += self.step_cost(&situation.state, step)?;
             situation = next;
-            if track.push(self, step).is_err() {
+        }
+        // Most sequences do not work out: times are looked at in those that do.
+        let mut track = self.begin();
+        for (index, step) in steps.iter().enumerate() {
+            if stops(index) || track.push(self, step).is_err() {
                 return Ok(None);
             }
         }
@@ -247,17 +274,44 @@ impl<'w, 'a> Space<'w, 'a> {
         Ok(Some((measured, Base { situation, costs, track, clock })))
     }
 
-    /// The same of a whole plan: `None` also if the goal is not fulfilled after it.
+    /// The same of a whole plan: `None` also if the goal is not fulfilled after it. What an action does that is stretched goes by
+    /// how long it takes then.
     pub fn replay_to_goal(
         &self,
         steps: &mut [Step],
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<(f64, Base)>, Failure> {
-        let Some((measured, base)) = self.replay(steps, stop)? else { return Ok(None) };
+        steps.iter_mut().for_each(|step| step.taken_s = None);
+        let Some((mut measured, mut base)) = self.replay(steps, stop)? else { return Ok(None) };
+        for _ in 0..MOST_STRETCHED {
+            if !self.stretches || !self.stretch(steps, &base.track) {
+                break;
+            }
+            let Some(replayed) = self.replay(steps, stop)? else { return Ok(None) };
+            (measured, base) = replayed;
+        }
+        if self.stretches && self.stretch(steps, &base.track) {
+            return Ok(None);
+        }
         if self.tight && base.track.timed_at_end(self) != (false, false) {
             return Ok(None);
         }
         Ok(self.world.is_goal(&base.situation)?.then_some((measured, base)))
+    }
+
+    /// Fixes how long those actions take that are stretched on a track, where something depends on it; whether there are any.
+    fn stretch(&self, steps: &mut [Step], track: &Track) -> bool {
+        let mut any = false;
+        for (step, action) in steps.iter_mut().zip(&track.actions) {
+            let Some((start, Some(end))) = *action else { continue };
+            let taken_s = track.order.earliest_s(end) - track.order.earliest_s(start);
+            let is_longer = taken_s > step.span.least_s + LEAST_STRETCH_S;
+            if is_longer && step.taken_s.is_none() && self.world.acts[step.act as usize].is_read_off() {
+                step.taken_s = Some((taken_s * 1e6).round() / 1e6);
+                any = true;
+            }
+        }
+        any
     }
 }
 

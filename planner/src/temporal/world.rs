@@ -76,6 +76,13 @@ pub(crate) struct Span {
 }
 
 impl Span {
+    /// What is left where so much is to be taken; `None` if that is not allowed.
+    pub fn taking(self, taken_s: Option<f64>) -> Option<Span> {
+        let Some(taken_s) = taken_s else { return Some(self) };
+        (self.least_s <= taken_s && taken_s <= self.most_s)
+            .then_some(Span { least_s: taken_s, most_s: taken_s })
+    }
+
     /// What is left an [`EPSILON_S`] inside bounds that are not part of it; the middle, where there is less room than that.
     fn strictly_inside(self, bounds: Span) -> Span {
         let least_s = self.least_s.max(bounds.least_s + EPSILON_S);
@@ -171,6 +178,11 @@ impl<'a> World<'a> {
     pub fn is_complete(&self) -> bool {
         let plain = |act: &Act| act.flow_effects.is_empty() && !chooses_effects(act);
         *self.complete.get_or_init(|| self.acts.iter().all(plain) && !some_only_together(self))
+    }
+
+    /// Whether what an action adds to the metric depends on how long it is chosen to take.
+    pub fn chooses_costs(&self) -> bool {
+        self.acts.iter().any(chooses_cost)
     }
 
     /// The first state, with derived variables up to date.
@@ -316,6 +328,9 @@ impl<'a> World<'a> {
         gate: &dyn Fn(usize, &Effect) -> bool,
         into: &mut Values,
     ) -> Result<bool, Failure> {
+        let changes_number =
+            |effect: &&Effect| matches!(effect.outcome, Outcome::Change { .. } | Outcome::Call(_));
+        let several = effects.iter().filter(changes_number).nth(1).is_some();
         let mut changes: Vec<(u32, Change, f64)> = Vec::new();
         for (index, effect) in effects.iter().enumerate() {
             let here = effect.when.as_ref().map(|when| &when.here);
@@ -326,7 +341,7 @@ impl<'a> World<'a> {
                 Outcome::Set(fact) => into.values[fact.variable as usize] = fact.value,
                 Outcome::Change { fluent, change, amount } => {
                     let amount = self.evaluate(amount, moment)?;
-                    changes.push((*fluent, *change, amount));
+                    changes.extend(several.then_some((*fluent, *change, amount)));
                     change.apply(&mut into.numbers[*fluent as usize], amount);
                     if !into.numbers[*fluent as usize].is_finite() {
                         return Ok(false);
@@ -386,9 +401,24 @@ fn number(place: &Place) -> Option<NumericId> {
     if let Place::Number(number) = place { Some(*number) } else { None }
 }
 
+impl Act<'_> {
+    /// Whether its effects, its bounds or what it costs depend on how long it takes, and the schedule may choose that.
+    pub fn is_read_off(&self) -> bool {
+        self.share == 0.0 && (chooses_effects(self) || chooses_cost(self))
+    }
+}
+
+/// Whether what an action costs depends on how long it is chosen to take.
+fn chooses_cost(act: &Act) -> bool {
+    !is_fixed(act) && mentions_duration(act.cost)
+}
+
+fn is_fixed(act: &Act) -> bool {
+    act.bounds.iter().any(|bound| bound.relation == Relation::Equal && !bound.at_end)
+}
+
 /// Whether an action has effects or bounds at its end that depend on how long it is chosen to take.
 fn chooses_effects(act: &Act) -> bool {
-    let fixed = act.bounds.iter().any(|bound| bound.relation == Relation::Equal && !bound.at_end);
     let timed = |effect: &Effect| match &effect.outcome {
         Outcome::Change { amount, .. } => mentions_duration(amount),
         Outcome::Flow { .. } => true,
@@ -396,7 +426,7 @@ fn chooses_effects(act: &Act) -> bool {
     };
     let ends = act.bounds.iter().any(|bound| bound.at_end);
     let mut effects = act.start_effects.iter().chain(act.flow_effects).chain(act.end_effects);
-    !fixed && (ends || effects.any(timed))
+    !is_fixed(act) && (ends || effects.any(timed))
 }
 
 fn mentions_duration(expression: &Expression) -> bool {

@@ -1,0 +1,90 @@
+//! Durations that are left open: what depends on them, and what may then be said of a plan.
+
+use descry_planner::Options;
+
+use crate::solving::{read, solve};
+
+/// What must come out of a task with times.
+enum Expect {
+    /// A plan of this metric, or of this makespan where there is none; whether it is said to be the best.
+    Plan(f64, bool),
+    /// Neither a plan nor a proof that there is none.
+    Open,
+}
+
+fn check(domain: &str, problem: &str, anytime: bool, expect: Expect) {
+    let task = read(
+        &format!("(define (domain d) (:requirements :durative-actions :numeric-fluents) {domain})"),
+        &format!("(define (problem p) (:domain d) {problem})"),
+    );
+    let options = Options { anytime, evaluation_limit: Some(1_500), ..Options::default() };
+    let (outcome, verdict) = solve(&task, &options);
+    match (expect, outcome.plan(), verdict) {
+        (Expect::Plan(expected, optimal), Some(plan), Some(verdict)) => {
+            let measured = verdict.metric.or(plan.makespan_s()).unwrap_or_default();
+            assert!((measured - expected).abs() < 0.02, "{measured}, not {expected}:\n{plan}");
+            assert_eq!(outcome.statistics().optimal, optimal, "{outcome:?}");
+        }
+        (Expect::Open, None, None) => {
+            assert!(!matches!(outcome, descry_planner::Outcome::Unsolvable { .. }), "{outcome:?}");
+        }
+        _ => panic!("unexpected outcome {outcome:?}"),
+    }
+}
+
+const POUR: &str = "(:predicates (idle) (on) (done) (dry)) (:functions (used))
+  (:durative-action pour :parameters () :duration (and (>= ?duration 2) (<= ?duration 10)) :condition (at start (idle))
+    :effect (and (at start (not (idle))) (at start (on)) (at end (not (on))) (at end (increase (used) (* 2 ?duration)))))
+  (:durative-action work :parameters () :duration (= ?duration 5) :condition (over all (on)) :effect (at end (done)))
+  (:action look :parameters () :precondition (and (done) (<= (used) 4) (> (used) 0)) :effect (dry))";
+
+#[test]
+fn an_action_that_is_stretched_does_what_it_does_in_that_time() {
+    let problem = |goal: &str| format!("(:init (idle) (= (used) 0)) (:goal {goal})");
+    for (goal, expect) in [
+        ("(done)", Expect::Plan(5.0, false)),
+        ("(and (done) (<= (used) 11))", Expect::Plan(5.0, false)),
+        // Work that fits in makes it use at least ten.
+        ("(and (done) (<= (used) 9))", Expect::Open),
+        ("(dry)", Expect::Open),
+        // Half of what may be is as much as this.
+        ("(and (done) (>= (used) 12))", Expect::Plan(6.0, false)),
+    ] {
+        check(POUR, &problem(goal), false, expect);
+    }
+}
+
+#[test]
+fn a_length_that_is_not_tried_is_not_proven_to_be_impossible() {
+    for (used, expect) in [
+        (4, Expect::Plan(2.0, false)),
+        (12, Expect::Plan(6.0, false)),
+        (14, Expect::Open),
+        (20, Expect::Plan(10.0, false)),
+    ] {
+        check(POUR, &format!("(:init (idle) (= (used) 0)) (:goal (= (used) {used}))"), false, expect);
+    }
+}
+
+#[test]
+fn what_a_longer_action_earns_is_gone_after() {
+    let domain = "(:predicates (idle) (done)) (:functions (gold))
+      (:durative-action dig :parameters () :duration (and (>= ?duration 2) (<= ?duration 10)) :condition (at start (idle))
+        :effect (and (at start (not (idle))) (at end (done)) (at end (increase (gold) (* ?duration ?duration)))))";
+    let problem = |metric: &str| format!("(:init (idle) (= (gold) 0)) (:goal (done)) (:metric {metric})");
+    check(domain, &problem("maximize (gold)"), true, Expect::Plan(100.0, false));
+    check(domain, &problem("minimize (gold)"), true, Expect::Plan(4.0, false));
+}
+
+#[test]
+fn what_is_made_better_by_going_on_is_gone_on_with() {
+    // What is bought is dear at first, and a part of it comes back.
+    let domain = "(:predicates (bought ?x) (done)) (:functions (spent))
+      (:durative-action buy :parameters (?x) :duration (= ?duration 1) :condition (at start (>= (spent) 0))
+        :effect (and (at end (bought ?x)) (at end (done)) (at end (increase (spent) 3))))
+      (:durative-action refund :parameters (?x) :duration (= ?duration 1)
+        :condition (and (at start (bought ?x)) (at start (>= (spent) 3)))
+        :effect (and (at start (not (bought ?x))) (at end (decrease (spent) 2))))";
+    let problem = "(:objects a) (:init (= (spent) 0)) (:goal (done)) (:metric minimize (spent))";
+    check(domain, problem, true, Expect::Plan(1.0, false));
+}

@@ -199,48 +199,32 @@ pub(crate) fn top_m(segment: &Segment) -> f64 {
 /// How high the bottom of a vessel or of an open carton is in which something stands, metres, and its spread. From: chosen.
 const BOTTOM_M: (f64, f64) = (0.005, 0.006);
 
-/// Tells for each segment what it stands on: the surface, the top of another segment under its footprint, or the bottom of one that is
+/// Tells for each segment what it stands on: the surface, another segment that is seen around its foot, or the bottom of one that is
 /// around it. Gives all tops.
 fn stand(parts: &mut [Segment]) -> Vec<f64> {
-    /// A lower edge this high has been cut or hidden rather than set on something, unless something is below it. From: chosen.
-    const LIFTED_M: f64 = 0.02;
-    /// How far from its lower edge the top of what it stands on may be measured, metres. From: chosen.
-    const MEETS_M: f64 = 0.03;
-    /// So near to it, metres, so many points of what bears it are seen: at least, and one for so many of its own. From: chosen.
-    const BESIDE_M: f64 = 0.02;
-    const SEEN: (usize, usize) = (5, 20);
+    /// What begins lower stands on the surface, or in something, metres. From: chosen.
+    const LIFTED_M: f64 = 0.01;
     let tops: Vec<f64> = parts.iter().map(top_m).collect();
+    let boxes: Vec<_> = parts.iter().map(|part| bounds(&part.points)).collect();
     let hulls: Vec<OnceCell<_>> = parts.iter().map(|_| OnceCell::new()).collect();
     let hull = |part: usize| hulls[part].get_or_init(|| hull_from_above(&parts[part].points));
-    let boxes: Vec<_> = parts.iter().map(|part| bounds(&part.points)).collect();
     let is_over = |other: usize, place: [f64; 2]| {
         let (low, high) = &boxes[other];
-        (0..2).all(|k| place[k] > low[k] && place[k] < high[k])
-    };
-    // The top of what bears it is seen beside it, or the side below.
-    let bears = |other: usize, part: usize| {
-        let is_beside = |p: &&Point3<f64>| {
-            (p.z - tops[other]).abs() < MEETS_M && holds_within(hull(part), [p.x, p.y], BESIDE_M)
-        };
-        let least = SEEN.0.max(parts[part].points.len() / SEEN.1);
-        parts[other].points.iter().filter(is_beside).take(least).count() == least
+        (0..2).all(|k| place[k] > low[k] && place[k] < high[k]) && holds(hull(other), place)
     };
     let base = |(i, part): (usize, &Segment)| {
         let heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
-        let low = end(&heights, POINT_ENDS.0);
-        let place = middle(&part.points);
-        let is_below = |other: &usize| {
-            *other != i
-                && tops[*other] > low - MEETS_M
-                && is_over(*other, place)
-                && holds(hull(*other), place)
-        };
+        let (low, place) = (end(&heights, POINT_ENDS.0), middle(&part.points));
+        let is_below = |other: &usize| *other != i && tops[*other] > low - MEETS_M && is_over(*other, place);
         let below: Vec<usize> = (0..parts.len()).filter(is_below).collect();
-        let may_bear = |other: usize| low > LIFTED_M && tops[other] < low + MEETS_M;
-        let bearing = below.iter().filter(|&&other| may_bear(other) && bears(other, i));
-        match bearing.map(|&other| tops[other]).max_by(f64::total_cmp) {
-            Some(top) => (top, 0.0),
-            None if below.iter().any(|&other| is_around(&parts[other].points, place)) => BOTTOM_M,
+        let lifted = below.iter().filter(|_| low > LIFTED_M);
+        let borne = lifted.filter_map(|&other| borne_at_m(part, hull(i), (place, low), &parts[other].points));
+        let is_around = |&other: &usize| {
+            is_wider(&boxes[other], &boxes[i]) && directions(parts[other].points.iter(), place) >= AROUND
+        };
+        match borne.max_by(f64::total_cmp) {
+            Some(at) => (at, 0.0),
+            None if below.iter().any(is_around) => BOTTOM_M,
             None => (0.0, 0.0),
         }
     };
@@ -251,13 +235,49 @@ fn stand(parts: &mut [Segment]) -> Vec<f64> {
     tops
 }
 
-/// True if points lie in nearly all directions from a place.
-fn is_around(points: &[Point3<f64>], [x, y]: [f64; 2]) -> bool {
-    /// At least in the first of the second number of directions. From: chosen.
-    const MOST: (usize, usize) = (27, 36);
-    let mut seen = [false; MOST.1];
-    points.iter().for_each(|p| seen[sector(p.x - x, p.y - y, MOST.1)] = true);
-    seen.iter().filter(|seen| **seen).count() >= MOST.0
+/// How far from its lower edge the top of what a thing stands on may be measured, metres. From: chosen.
+const MEETS_M: f64 = 0.03;
+/// Directions from a place that are looked at one by one, how many of them what is around shows at least, and what bears. From: chosen.
+const DIRECTIONS: usize = 36;
+const AROUND: usize = 27;
+const BEARS: usize = 15;
+
+/// How high another thing bears a part, metres: its top is seen around the part's foot, or its side below. None if it does not.
+fn borne_at_m(
+    part: &Segment,
+    hull: &[[f64; 2]],
+    (place, low): ([f64; 2], f64),
+    other: &[Point3<f64>],
+) -> Option<f64> {
+    /// It is seen no farther out of the part's outline, and no farther within, metres. From: chosen.
+    const BESIDE_M: (f64, f64) = (0.015, 0.01);
+    /// In so many points: at least, and one for so many of the part's own. From: chosen.
+    const SEEN: (usize, usize) = (5, 20);
+    /// Share of them that lie lower than the top. From: chosen.
+    const TOP: f64 = 0.8;
+    let is_beside = |p: &&Point3<f64>| {
+        let at = [p.x, p.y];
+        (p.z - low).abs() < MEETS_M
+            && holds_within(hull, at, BESIDE_M.0)
+            && !holds_within(hull, at, -BESIDE_M.1)
+    };
+    let beside: Vec<&Point3<f64>> = other.iter().filter(is_beside).collect();
+    let bears = beside.len() >= SEEN.0.max(part.points.len() / SEEN.1)
+        && directions(beside.iter().copied(), place) >= BEARS;
+    let mut heights: Vec<f64> = beside.iter().map(|p| p.z).collect();
+    bears.then(|| quantile(&mut heights, TOP))
+}
+
+/// True if a box is wider than another both ways.
+fn is_wider((low, high): &(Point3<f64>, Point3<f64>), (from, to): &(Point3<f64>, Point3<f64>)) -> bool {
+    (0..2).all(|k| high[k] - low[k] > to[k] - from[k])
+}
+
+/// In how many directions from a place points lie.
+fn directions<'a>(points: impl Iterator<Item = &'a Point3<f64>>, [x, y]: [f64; 2]) -> usize {
+    let mut seen = [false; DIRECTIONS];
+    points.for_each(|p| seen[sector(p.x - x, p.y - y, DIRECTIONS)] = true);
+    seen.iter().filter(|seen| **seen).count()
 }
 
 /// True of the normal of something upright.

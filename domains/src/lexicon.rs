@@ -27,6 +27,9 @@ pub const SENSE: &str = "sense";
 /// Types whose objects have names in every domain: their symbols are these names.
 pub const NAMED: [&str; 6] = ["surface", "room", "door", "kind", "obstacle", SENSE];
 
+/// How two names must differ.
+pub(crate) const TOLD_APART: &str = "give each a name of its own: letters and digits alone tell names apart";
+
 /// Something that can be named: its PDDL symbol, and what it is called, the usual name first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Named {
@@ -71,6 +74,25 @@ impl Places {
         let name = &domain.config.scene;
         let spec = domain.scenes.get(name).and_then(|text| SceneSpec::parse(name, text).ok());
         spec.map_or_else(Self::default, |spec| Self::of_spec(&spec))
+    }
+
+    /// Two places of one type, or one, that nothing tells apart or names: letters and digits alone do.
+    pub(crate) fn unclear(&self) -> Option<String> {
+        let all = [
+            ("surface", &self.surfaces),
+            ("room", &self.rooms),
+            ("door", &self.doors),
+            (SENSE, &self.senses),
+        ];
+        all.into_iter().find_map(|(of, names)| {
+            let nameless = names.iter().find(|name| symbol(name).is_empty());
+            let same = |(n, name): (usize, &String)| {
+                let other = names[..n].iter().find(|other| symbol(other) == symbol(name))?;
+                Some(format!("nothing tells the {of} \"{name}\" from the {of} \"{other}\""))
+            };
+            let nameless = nameless.map(|name| format!("\"{name}\" is no name of a {of}"));
+            nameless.or_else(|| names.iter().enumerate().find_map(same))
+        })
     }
 
     /// Those of a scene.

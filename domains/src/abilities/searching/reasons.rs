@@ -178,11 +178,15 @@ fn about(least: Option<String>, hidden: f64, allowed: f64, is_bare: bool) -> Str
     }
 }
 
-/// The room in which a kind is asked about, in words; empty if it is asked about wherever it is.
+/// The rooms in which a kind is asked about, in words; empty if it is asked about wherever it is.
 pub fn in_room(s: &Situation, kind: &Thing) -> String {
-    let first = kind.on.as_ref().and_then(|on| on.first());
-    let room = first.and_then(|&on| s.surfaces[on].room.as_ref());
-    room.map(|room| format!(" in the {room}")).unwrap_or_default()
+    let mut rooms: Vec<&str> = Vec::new();
+    for room in kind.on.iter().flatten().filter_map(|&on| s.surfaces[on].room.as_deref()) {
+        if !rooms.contains(&room) {
+            rooms.push(room);
+        }
+    }
+    if rooms.is_empty() { String::new() } else { format!(" in the {}", rooms.join(" or the ")) }
 }
 
 fn out_of_time(s: &Situation) -> Option<String> {

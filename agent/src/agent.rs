@@ -172,7 +172,11 @@ impl<'a> Agent<'a> {
         }
         match self.plan(&round.task, round)? {
             Planned::Unsolvable { why, statistics } => {
-                let because = if world.is_timed(round) { format!("{because}{TOO_LATE}") } else { because };
+                let because = if round.situation.time_left_s.is_some() {
+                    format!("{because}{TOO_LATE}")
+                } else {
+                    because
+                };
                 match self.take_up(world, round, &because, asked_of(&statistics), World::in_time)? {
                     Taken::Up => {}
                     _ => return Ok(Some(Ended::NoPlan(why.to_string()))),

@@ -14,7 +14,7 @@ use crate::abilities::searching::doubt::Doubt;
 use crate::abilities::searching::reasons;
 use crate::config::Answers;
 use crate::goal::{Goal, put_in};
-use crate::lexicon::{Lexicon, symbol};
+use crate::lexicon::{Lexicon, plural, symbol};
 use crate::mind::Mind;
 use crate::situation::{Situation, Thing};
 use crate::world::Round;
@@ -186,7 +186,7 @@ impl Asker<'_> {
                 n => {
                     let place = reasons::in_room(s, kind);
                     let all = if is_known { "all " } else { "" };
-                    format!("{all}{}s{place} are found: {n}, {}", kind.name, members.join("; "))
+                    format!("{all}{}{place} are found: {n}, {}", plural(&kind.name), members.join("; "))
                 }
             });
             // As sure as was asked for is not sure.

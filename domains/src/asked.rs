@@ -111,7 +111,7 @@ fn signed(condition: &str) -> Vec<Mention> {
     let spaced = condition.to_lowercase().replace('(', " ( ").replace(')', " ) ");
     let mut tokens = spaced.split_whitespace();
     let mut found = Vec::new();
-    parts(&mut tokens).iter().for_each(|part| collect(part, false, &[], &mut found));
+    parts(&mut tokens).0.iter().for_each(|part| collect(part, false, &[], &mut found));
     found
 }
 
@@ -121,17 +121,20 @@ enum Part {
     List(Vec<Part>),
 }
 
-/// The parts up to the bracket that closes them.
-fn parts<'a>(tokens: &mut impl Iterator<Item = &'a str>) -> Vec<Part> {
+/// The parts up to the bracket that closes them, and whether it is there: a list that is not closed is none.
+fn parts<'a>(tokens: &mut impl Iterator<Item = &'a str>) -> (Vec<Part>, bool) {
     let mut all = Vec::new();
     while let Some(token) = tokens.next() {
         match token {
-            "(" => all.push(Part::List(parts(tokens))),
-            ")" => break,
+            "(" => match parts(tokens) {
+                (list, true) => all.push(Part::List(list)),
+                (open, false) => all.extend(open.into_iter().filter(|part| matches!(part, Part::List(_)))),
+            },
+            ")" => return (all, true),
             word => all.push(Part::Word(word.to_string())),
         }
     }
-    all
+    (all, false)
 }
 
 impl Part {

@@ -213,8 +213,54 @@ fn things(objects: &[ObjectModel]) -> Vec<Named> {
     things
 }
 
-/// The names of a thing, each with an s too.
+/// Several of something: cups, boxes, berries.
+pub fn plural(name: &str) -> String {
+    const HISSING: [&str; 5] = ["s", "x", "z", "ch", "sh"];
+    let before_y = name.strip_suffix('y').filter(|stem| !stem.ends_with(['a', 'e', 'i', 'o', 'u']));
+    match before_y.filter(|stem| !stem.is_empty()) {
+        Some(stem) => format!("{stem}ies"),
+        None if HISSING.iter().any(|end| name.ends_with(end)) => format!("{name}es"),
+        None => format!("{name}s"),
+    }
+}
+
+/// The names of a thing, each in the plural too.
 fn in_plural(thing: &Named) -> Named {
-    let plural = thing.names.iter().map(|name| format!("{name}s"));
-    Named { symbol: thing.symbol.clone(), names: plural.chain(thing.names.iter().cloned()).collect() }
+    let plurals = thing.names.iter().map(|name| plural(name));
+    Named { symbol: thing.symbol.clone(), names: plurals.chain(thing.names.iter().cloned()).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn several_are_called_as_people_call_them() {
+        let check = |name: &str, expected: &str| assert_eq!(plural(name), expected);
+        check("cup", "cups");
+        check("white cylinder", "white cylinders");
+        check("box", "boxes");
+        check("glass", "glasses");
+        check("brush", "brushes");
+        check("berry", "berries");
+        check("tray", "trays");
+        check("y", "ys");
+    }
+
+    #[test]
+    fn places_have_names_of_their_own() {
+        let check = |surfaces: &[&str], rooms: &[&str], expected: Option<&str>| {
+            let own = |list: &[&str]| list.iter().map(|name| name.to_string()).collect();
+            let places = Places { surfaces: own(surfaces), rooms: own(rooms), ..Places::default() };
+            assert_eq!(places.unclear().as_deref(), expected, "{surfaces:?} {rooms:?}");
+        };
+        check(&["table", "table 2"], &["table"], None);
+        check(
+            &["table", "Table"],
+            &[],
+            Some("nothing tells the surface \"Table\" from the surface \"table\""),
+        );
+        check(&["a b", "c", "a-b"], &[], Some("nothing tells the surface \"a-b\" from the surface \"a b\""));
+        check(&["table"], &["--"], Some("\"--\" is no name of a room"));
+    }
 }

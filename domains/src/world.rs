@@ -205,11 +205,6 @@ impl<'a> World<'a> {
         self.mind.known.candidates.len()
     }
 
-    /// Whether it must be over in some time.
-    pub fn is_timed(&self, round: &Round) -> bool {
-        round.situation.time_left_s.is_some()
-    }
-
     /// Views taken, and metres driven.
     pub fn taken(&self) -> (usize, f64) {
         (self.mind.views, self.mind.distance_m)

@@ -1,6 +1,6 @@
 //! What a look has brought: how sure it is now of what was asked for, why it is no surer, and what of the places has been seen.
 
-use descry_domains::lexicon::symbol;
+use descry_domains::lexicon::{plural, symbol};
 use descry_domains::note::Note;
 use descry_memory::belief::Track;
 
@@ -253,8 +253,9 @@ fn unsure_of(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<Strin
     (all < SURELY).then(|| match unsure.len() {
         1 => one,
         n => format!(
-            "which of {n} objects{} are {kind}s is certain with {} for all together, least of one: {one}",
+            "which of {n} objects{} are {} is certain with {} for all together, least of one: {one}",
             doubt.within,
+            plural(kind),
             share(all)
         ),
     })

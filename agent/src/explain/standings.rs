@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use descry_domains::lexicon::symbol;
+use descry_domains::lexicon::{plural, symbol};
 use descry_memory::belief::{Belief, Track};
 use descry_memory::{Document, Query, Record, RecordId};
 
@@ -93,7 +93,7 @@ impl<'a> Standings<'a> {
 pub fn certainty(doubt: &InDoubt) -> String {
     match doubt.of {
         Of::Thing => format!("the certainty of where {} stands", doubt.about),
-        Of::Kind => format!("the certainty that all {}s{} are found", doubt.about, doubt.within),
+        Of::Kind => format!("the certainty that all {}{} are found", plural(&doubt.about), doubt.within),
         Of::Surface => format!("the certainty of what stands on the {}", doubt.about),
     }
 }

@@ -1,6 +1,7 @@
 //! A run in a few sentences: what was asked, what the answer is, what it rests on, and what was the greatest trouble.
 
 use descry_domains::answer::{Believed, Verdict};
+use descry_domains::lexicon::plural;
 use descry_domains::note::Note;
 
 use super::chapters::{Chapter, Deed};
@@ -94,9 +95,9 @@ fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
         }
         (Of::Thing, _) => looks::may_be(doubt, last, name).unwrap_or_else(|| looks::none_may_be(doubt, last)),
         (Of::Kind, _) => format!(
-            "{objects}, and it is certain with {} which of them are {}s and that there are no more",
+            "{objects}, and it is certain with {} which of them are {} and that there are no more",
             share_of(doubt.sure?, doubt.wanted),
-            doubt.about
+            plural(&doubt.about)
         ),
         (Of::Surface, _) => {
             format!(

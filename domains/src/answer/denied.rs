@@ -5,6 +5,7 @@ use descry_memory::belief::Track;
 use super::Asker;
 use crate::abilities::searching::reasons;
 use crate::asked::Denied;
+use crate::lexicon::plural;
 use crate::situation::{Situation, Thing};
 
 /// Whether something that must not be so may be so, for all that was seen.
@@ -84,8 +85,8 @@ impl Asker<'_> {
             }
             Open::Kind(of) => {
                 let kind = &s.kinds[of];
-                let (name, place) = (&kind.name, reasons::in_room(s, kind));
-                format!("it cannot be told, for not all {name}s{place} are known")
+                let (name, place) = (plural(&kind.name), reasons::in_room(s, kind));
+                format!("it cannot be told, for not all {name}{place} are known")
             }
             Open::Surface(on) => {
                 let surface = &s.surfaces[on].name;

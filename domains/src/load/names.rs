@@ -5,7 +5,7 @@ use descry_planner::{Diagnostic, Findings, Source, Span};
 
 use super::LoadError;
 use crate::check::place::Places;
-use crate::lexicon::symbol;
+use crate::lexicon::{plural, symbol};
 
 /// An object's file and what it says.
 pub(super) type Read<'a> = (&'a (String, String), ObjectModel);
@@ -59,7 +59,8 @@ fn several(objects: &[Read<'_>], own: usize, name: &str) -> Option<(String, Stri
     Some((
         message,
         format!(
-            "give it a name of its own, such as \"first {name}\"; what is asked of all {name}s is asked of the kind"
+            "give it a name of its own, such as \"first {name}\"; what is asked of all {} is asked of the kind",
+            plural(name)
         ),
     ))
 }

@@ -5,6 +5,7 @@ use descry_perception::nalgebra::{self, Point3, Vector3};
 use descry_planner::{Plan, Step};
 
 use super::doubt::{Doubt, Taken};
+use crate::lexicon::plural;
 use crate::situation::{KnownSurface, Situation, Thing};
 
 /// A probability that is said with an answer.
@@ -163,7 +164,7 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     let hidden = s.doubt_of(open).hidden;
     let about = about(least.map(is_one), hidden, 1.0 - s.threshold, s.belief.tracks.is_empty());
     let (all, place) = (s.completeness(open), in_room(s, kind));
-    Some(format!("all {}s{place} are found with {all:.2} only{about}", kind.name))
+    Some(format!("all {}{place} are found with {all:.2} only{about}", plural(&kind.name)))
 }
 
 /// What the doubt about all of a kind is about: the least sure object, and what may stand where nothing was seen, if that alone is

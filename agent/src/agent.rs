@@ -24,6 +24,8 @@ const MOST_EVALUATED: u64 = 2_500;
 
 /// What is said behind the cause of a plan that will not do, since none would in the time that is left.
 pub(crate) const TOO_LATE: &str = "; no plan would do in the time that is left";
+/// Why a look is taken although the goal holds.
+const NOT_DENIED: &str = "nothing that was seen speaks against it, and not enough was seen";
 /// Before what is said of the goal where steps of the plan are left that were to reach it.
 pub(crate) const AT_THE_END: &str = "at the end of the plan ";
 
@@ -114,13 +116,17 @@ impl<'a> Agent<'a> {
     /// One turn of the loop. Returns why the run ends here, if it does.
     async fn step(&mut self, world: &mut World<'_>, round: &Round) -> Result<Option<Ended>, CommandError> {
         if reached(round) {
-            return Ok(Some(Ended::Reached));
-        }
-        match self.monitor(world, round) {
-            Ok(()) => self.keep(round)?,
-            Err(because) => {
-                if let Some(ended) = self.replan(world, round, because)? {
-                    return Ok(Some(ended));
+            match self.take_up(world, round, NOT_DENIED, Vec::new(), World::before_denying)? {
+                Taken::Up => world.planned(),
+                _ => return Ok(Some(Ended::Reached)),
+            }
+        } else {
+            match self.monitor(world, round) {
+                Ok(()) => self.keep(round)?,
+                Err(because) => {
+                    if let Some(ended) = self.replan(world, round, because)? {
+                        return Ok(Some(ended));
+                    }
                 }
             }
         }
@@ -166,7 +172,11 @@ impl<'a> Agent<'a> {
         }
         match self.plan(&round.task, round)? {
             Planned::Unsolvable { why, statistics } => {
-                let because = format!("{because}{TOO_LATE}");
+                let because = if round.situation.time_left_s.is_some() {
+                    format!("{because}{TOO_LATE}")
+                } else {
+                    because
+                };
                 match self.take_up(world, round, &because, asked_of(&statistics), World::in_time)? {
                     Taken::Up => {}
                     _ => return Ok(Some(Ended::NoPlan(why.to_string()))),

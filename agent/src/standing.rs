@@ -3,6 +3,7 @@
 
 pub use descry_domains::abilities::searching::FirstLook;
 use descry_domains::abilities::searching::doubt::Doubt;
+use descry_domains::abilities::searching::reasons;
 use descry_domains::answer::Ended;
 use descry_domains::situation::KnownSurface;
 use descry_domains::world::Round;
@@ -25,6 +26,9 @@ pub struct InDoubt {
     pub about: String,
     /// What that is.
     pub of: Of,
+    /// Of a kind the rooms in which it is asked about, as in " in the kitchen"; empty: wherever it is.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub within: String,
     /// How sure it is of it, 0 to 1; records of earlier versions do not say.
     pub sure: Option<f64>,
     /// How sure it has to be.
@@ -119,6 +123,7 @@ fn in_doubt(round: &Round) -> Vec<InDoubt> {
         InDoubt {
             about: about.into(),
             of,
+            within: String::new(),
             sure: Some(sure),
             wanted: s.threshold,
             left: doubt.remaining().max(0.0),
@@ -138,6 +143,7 @@ fn in_doubt(round: &Round) -> Vec<InDoubt> {
     let kinds = s.kinds.iter().enumerate();
     let kinds = kinds.map(|(n, t)| InDoubt {
         wanted: s.wanted_of(n),
+        within: reasons::in_room(s, t),
         ..told(&t.name, Of::Kind, s.completeness(n), s.doubt_of(n))
     });
     let surfaces = s.asked.iter();

@@ -6,6 +6,7 @@ mod body;
 mod cluster;
 mod command_line;
 mod damage;
+mod denied;
 mod explain;
 mod hand;
 mod household;

@@ -79,6 +79,22 @@ pub(crate) fn grounded(domain: &Domain, call: &Call, step: usize) -> Option<Grou
     Some(Grounded { word, arguments: tokens.collect() })
 }
 
+/// Whether an action puts things elsewhere: what is asked is not made so by it.
+pub(crate) fn carries(domain: &Domain, action: &str) -> bool {
+    let config = domain.config.action.get(action).cloned().unwrap_or_default();
+    let skill = |text: &str| text.split_whitespace().next().map(str::to_string);
+    let texts = config.does.texts();
+    let skills: Vec<String> = match texts.is_empty() {
+        true if config.program.is_some() => Vec::new(),
+        true => vec![action.to_string()],
+        false => texts.iter().filter_map(|text| skill(text)).collect(),
+    };
+    let uses = &domain.config.uses;
+    let carrying = &abilities::carrying::ABILITY;
+    let is_of_hand = |name: &String| carrying.skills.iter().any(|word| word.name == name);
+    uses.iter().any(|name| name == carrying.name) && skills.iter().any(is_of_hand)
+}
+
 /// Of the parts of a call the one that its action is called after, else the first.
 pub(crate) fn foremost(domain: &Domain, call: &Call) -> Option<Grounded> {
     let parts = || (0..).map_while(|step| grounded(domain, call, step));

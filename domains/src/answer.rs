@@ -1,5 +1,7 @@
 //! What is answered in the end: about what was asked, with where it is and what it rests on.
 
+pub(crate) mod denied;
+
 use descry_memory::belief::Track;
 use descry_memory::remember::Remembered;
 use descry_perception::nalgebra::Vector3;
@@ -12,7 +14,7 @@ use crate::abilities::searching::doubt::Doubt;
 use crate::abilities::searching::reasons;
 use crate::config::Answers;
 use crate::goal::{Goal, put_in};
-use crate::lexicon::{Lexicon, symbol};
+use crate::lexicon::{Lexicon, plural, symbol};
 use crate::mind::Mind;
 use crate::situation::{Situation, Thing};
 use crate::world::Round;
@@ -159,7 +161,7 @@ impl Asker<'_> {
     /// The goal holds: what was asked for, and where.
     fn reached(&self) -> (Verdict, String) {
         let s = self.s;
-        if let Some(unknown) = self.nowhere() {
+        if let Some(unknown) = self.nowhere().or_else(|| self.undenied()) {
             return (Verdict::CannotTell, unknown);
         }
         let mut said = self.surely();
@@ -170,6 +172,12 @@ impl Asker<'_> {
         }
         for (of, kind) in s.kinds.iter().enumerate() {
             let members = self.members(kind);
+            let is_known = s.completeness(of) >= s.wanted_of(of);
+            // What is not so of any that stands where was looked is known without all of them.
+            let is_denied = self.goal.asked.denied.iter().any(|d| d.kinds.contains(&kind.symbol));
+            if members.is_empty() && !is_known && is_denied {
+                continue;
+            }
             if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {
                 return self.none_of(kind);
             }
@@ -177,19 +185,20 @@ impl Asker<'_> {
                 0 => format!("there is no {}{}", kind.name, reasons::in_room(s, kind)),
                 n => {
                     let place = reasons::in_room(s, kind);
-                    format!("all {}s{place} are found: {n}, {}", kind.name, members.join("; "))
+                    let all = if is_known { "all " } else { "" };
+                    format!("{all}{}{place} are found: {n}, {}", plural(&kind.name), members.join("; "))
                 }
             });
             // As sure as was asked for is not sure.
             let hidden = s.doubt_of(of).hidden;
-            if hidden >= reasons::WORTH_SAYING {
+            if is_known && hidden >= reasons::WORTH_SAYING {
                 said.push(format!("where nothing was seen there may be another ({hidden:.2})"));
             }
         }
         for &on in &s.asked {
             said.push(format!("everything on the {} is identified", s.surfaces[on].name));
         }
-        if said.is_empty() || self.goal.asked.more {
+        if said.is_empty() || self.goal.asked.more || !self.goal.asked.denied.is_empty() {
             said.insert(0, format!("it holds that {}", self.goal.pddl));
         }
         (Verdict::Achieved, said.join("; "))
@@ -213,11 +222,13 @@ impl Asker<'_> {
         }
     }
 
-    /// That nothing is known on which a kind could stand in the room in which it is asked about; none if something is.
+    /// That nothing is known on which a kind could stand in a room in which it is asked about; none if something is.
     fn nowhere(&self) -> Option<String> {
-        let mut asked = self.s.kinds.iter().zip(&self.goal.asked.kinds);
-        let (kind, (_, room)) = asked.find(|(kind, _)| kind.on.as_ref().is_some_and(Vec::is_empty))?;
-        let room = self.lexicon.name_of(room.as_ref()?);
+        let asked = self.s.kinds.iter().zip(&self.goal.asked.kinds);
+        let mut rooms = asked.flat_map(|(kind, (_, rooms))| rooms.iter().flatten().map(move |r| (kind, r)));
+        let is_bare = |room: &String| !self.s.surfaces.iter().any(|k| k.is_in(std::slice::from_ref(room)));
+        let (kind, room) = rooms.find(|(_, room)| is_bare(room))?;
+        let room = self.lexicon.name_of(room);
         Some(format!(
             "it cannot be told whether there is a {} in the {room}: no surface is known there",
             kind.name
@@ -241,6 +252,9 @@ impl Asker<'_> {
         let is_beyond_the_body = self.goal.asked.more && self.lacks.is_some() && self.mind.views == 0;
         if (is_beyond_looks || is_beyond_the_body) && is_proven {
             return (Verdict::Impossible, self.impossible(&says));
+        }
+        if let Some(so) = self.contradicted().filter(|_| self.goal.question) {
+            return (Verdict::NotFound, so);
         }
         let left = |n: usize| self.nothing_seen(&s.things[n]).or_else(|| reasons::left_about(s, n));
         let open = missing.iter().find_map(|&n| Some((n, left(n)?)));
@@ -275,11 +289,27 @@ impl Asker<'_> {
             };
             return (Verdict::CannotTell, format!("not everything could be identified{left}"));
         }
+        if let Some(no) = self.no_of_kinds().filter(|_| is_proven) {
+            return (Verdict::NotFound, no);
+        }
         if !is_proven {
             let text = format!("no plan was found that brings about {}", self.goal.pddl);
             return (Verdict::CannotTell, format!("{text}{says}"));
         }
         (Verdict::Impossible, self.impossible(&says))
+    }
+
+    /// That a question about kinds has the answer no: all of them are known, and it is not so; none if it is another question.
+    fn no_of_kinds(&self) -> Option<String> {
+        let s = self.s;
+        let is_of_kinds = self.goal.question && !s.kinds.is_empty() && self.own().next().is_none();
+        let said = s.kinds.iter().map(|kind| match self.members(kind) {
+            none if none.is_empty() => format!("there is no {}{}", kind.name, reasons::in_room(s, kind)),
+            members => members.join("; "),
+        });
+        is_of_kinds.then(|| {
+            format!("{}; so it does not hold that {}", said.collect::<Vec<_>>().join("; "), self.goal.pddl)
+        })
     }
 
     /// Why looks for a thing prove nothing: they showed nothing that it could stand on, or too few agree.

@@ -312,6 +312,9 @@ fn default_program_time_s() -> f64 {
     5.0
 }
 
+/// With less a yes would be no likelier than a no.
+const SURE: &str = "a number above 0.5 and below 1";
+
 /// Checks the numbers of a configuration.
 pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
     let value = |key: &str, value: f64, holds: bool, expected: &'static str| {
@@ -327,11 +330,12 @@ pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
     };
     for (n, phrase) in config.goal.iter().enumerate() {
         let p = phrase.confidence.unwrap_or(0.5);
-        value(&format!("goal.{n}.confidence"), p, p > 0.0 && p < 1.0, "a number above 0 and below 1")?;
+        let is_usual = phrase.confidence.is_none();
+        value(&format!("goal.{n}.confidence"), p, is_usual || p > 0.5 && p < 1.0, SURE)?;
     }
     let t = &config.thresholds;
+    value("thresholds.confidence", t.confidence, t.confidence > 0.5 && t.confidence < 1.0, SURE)?;
     for (key, p) in [
-        ("thresholds.confidence", t.confidence),
         ("thresholds.remaining", t.remaining),
         ("thresholds.out_of_sight", t.out_of_sight),
         ("thresholds.not_there", t.not_there),

@@ -27,6 +27,9 @@ pub const SENSE: &str = "sense";
 /// Types whose objects have names in every domain: their symbols are these names.
 pub const NAMED: [&str; 6] = ["surface", "room", "door", "kind", "obstacle", SENSE];
 
+/// How two names must differ.
+pub(crate) const TOLD_APART: &str = "give each a name of its own: letters and digits alone tell names apart";
+
 /// Something that can be named: its PDDL symbol, and what it is called, the usual name first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Named {
@@ -71,6 +74,25 @@ impl Places {
         let name = &domain.config.scene;
         let spec = domain.scenes.get(name).and_then(|text| SceneSpec::parse(name, text).ok());
         spec.map_or_else(Self::default, |spec| Self::of_spec(&spec))
+    }
+
+    /// Two places of one type, or one, that nothing tells apart or names: letters and digits alone do.
+    pub(crate) fn unclear(&self) -> Option<String> {
+        let all = [
+            ("surface", &self.surfaces),
+            ("room", &self.rooms),
+            ("door", &self.doors),
+            (SENSE, &self.senses),
+        ];
+        all.into_iter().find_map(|(of, names)| {
+            let nameless = names.iter().find(|name| symbol(name).is_empty());
+            let same = |(n, name): (usize, &String)| {
+                let other = names[..n].iter().find(|other| symbol(other) == symbol(name))?;
+                Some(format!("nothing tells the {of} \"{name}\" from the {of} \"{other}\""))
+            };
+            let nameless = nameless.map(|name| format!("\"{name}\" is no name of a {of}"));
+            nameless.or_else(|| names.iter().enumerate().find_map(same))
+        })
     }
 
     /// Those of a scene.
@@ -191,8 +213,54 @@ fn things(objects: &[ObjectModel]) -> Vec<Named> {
     things
 }
 
-/// The names of a thing, each with an s too.
+/// Several of something: cups, boxes, berries.
+pub fn plural(name: &str) -> String {
+    const HISSING: [&str; 5] = ["s", "x", "z", "ch", "sh"];
+    let before_y = name.strip_suffix('y').filter(|stem| !stem.ends_with(['a', 'e', 'i', 'o', 'u']));
+    match before_y.filter(|stem| !stem.is_empty()) {
+        Some(stem) => format!("{stem}ies"),
+        None if HISSING.iter().any(|end| name.ends_with(end)) => format!("{name}es"),
+        None => format!("{name}s"),
+    }
+}
+
+/// The names of a thing, each in the plural too.
 fn in_plural(thing: &Named) -> Named {
-    let plural = thing.names.iter().map(|name| format!("{name}s"));
-    Named { symbol: thing.symbol.clone(), names: plural.chain(thing.names.iter().cloned()).collect() }
+    let plurals = thing.names.iter().map(|name| plural(name));
+    Named { symbol: thing.symbol.clone(), names: plurals.chain(thing.names.iter().cloned()).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn several_are_called_as_people_call_them() {
+        let check = |name: &str, expected: &str| assert_eq!(plural(name), expected);
+        check("cup", "cups");
+        check("white cylinder", "white cylinders");
+        check("box", "boxes");
+        check("glass", "glasses");
+        check("brush", "brushes");
+        check("berry", "berries");
+        check("tray", "trays");
+        check("y", "ys");
+    }
+
+    #[test]
+    fn places_have_names_of_their_own() {
+        let check = |surfaces: &[&str], rooms: &[&str], expected: Option<&str>| {
+            let own = |list: &[&str]| list.iter().map(|name| name.to_string()).collect();
+            let places = Places { surfaces: own(surfaces), rooms: own(rooms), ..Places::default() };
+            assert_eq!(places.unclear().as_deref(), expected, "{surfaces:?} {rooms:?}");
+        };
+        check(&["table", "table 2"], &["table"], None);
+        check(
+            &["table", "Table"],
+            &[],
+            Some("nothing tells the surface \"Table\" from the surface \"table\""),
+        );
+        check(&["a b", "c", "a-b"], &[], Some("nothing tells the surface \"a-b\" from the surface \"a b\""));
+        check(&["table"], &["--"], Some("\"--\" is no name of a room"));
+    }
 }

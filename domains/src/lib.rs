@@ -21,6 +21,7 @@ pub mod answer;
 pub mod asked;
 pub mod check;
 pub mod config;
+mod declared;
 pub mod function;
 pub mod goal;
 pub mod lexicon;

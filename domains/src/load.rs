@@ -1,5 +1,7 @@
 //! A domain's folder: the PDDL text, what may be said, the known objects and the scenes.
 
+mod names;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -150,8 +152,11 @@ pub fn objects(folder: &Path) -> Result<Vec<ObjectModel>, LoadError> {
 
 fn parse_objects(files: &Files) -> Result<Vec<ObjectModel>, LoadError> {
     let of_objects = files.iter().filter(|(key, _)| key.starts_with("objects/"));
-    let objects: Vec<ObjectModel> =
-        of_objects.map(|(_, (name, text))| parse::<ObjectModel>(name, text)).collect::<Result<_, _>>()?;
+    let read: Vec<names::Read<'_>> = of_objects
+        .map(|(_, file)| Ok((file, parse::<ObjectModel>(&file.0, &file.1)?)))
+        .collect::<Result<_, LoadError>>()?;
+    names::check(&read)?;
+    let objects: Vec<ObjectModel> = read.into_iter().map(|(_, object)| object).collect();
     check_models(&objects).map_err(|because| LoadError::Objects { because })?;
     Ok(objects)
 }

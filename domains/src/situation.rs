@@ -37,7 +37,7 @@ pub struct Candidate {
 }
 
 /// Something that is looked for: a known object, or a kind of them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Thing {
     /// Its PDDL symbol.
     pub symbol: String,

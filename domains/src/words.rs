@@ -181,42 +181,9 @@ pub(crate) fn with_goal(
     Task::read(&domain.pddl, &Source::new(problem.name.clone(), text)).map_err(|f| f.render(false))
 }
 
-/// A goal in which it is at least so sure that all of a kind are found.
-pub(crate) fn surer(goal: &str, kind: &str, wanted: f64) -> String {
-    let (mut out, mut rest) = (String::new(), goal);
-    while let Some(at) = rest.find("(completeness") {
-        let end = rest[at..].find(')').map_or(rest.len(), |end| at + end + 1);
-        let (before, behind) = rest.split_at(end);
-        let is_it = before[at..].trim_end_matches(')').split_whitespace().nth(1) == Some(kind);
-        let number = behind.split(')').next().unwrap_or_default();
-        let least = number.trim().parse::<f64>().ok().filter(|least| is_it && *least < wanted);
-        out += before;
-        rest = match least {
-            Some(_) => &behind[number.len()..],
-            None => behind,
-        };
-        out.extend(least.map(|_| format!(" {wanted}")));
-    }
-    out + rest
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_goal_asks_to_be_surer_of_one_kind() {
-        let check = |goal: &str, expected: &str| assert_eq!(surer(goal, "cup", 0.95), expected);
-        check("(>= (completeness cup) 0.9)", "(>= (completeness cup) 0.95)");
-        check("(>= (completeness cup) 0.99)", "(>= (completeness cup) 0.99)");
-        check("(>= (completeness mug) 0.9)", "(>= (completeness mug) 0.9)");
-        check("(>= (completeness-in cup kitchen) 0.9)", "(>= (completeness-in cup kitchen) 0.95)");
-        check(
-            "(and (<= (unseen) 0.5) (>= (completeness mug) 0.9) (>= (completeness cup) 0.9))",
-            "(and (<= (unseen) 0.5) (>= (completeness mug) 0.9) (>= (completeness cup) 0.95))",
-        );
-        check("(>= (clarity table) 0.9)", "(>= (clarity table) 0.9)");
-    }
 
     #[test]
     fn atoms_and_values_are_read() {

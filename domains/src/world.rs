@@ -26,6 +26,7 @@ use crate::abilities::searching::policies::{self, By, Look};
 use crate::abilities::searching::reasons;
 use crate::abilities::surveying::chart::Chart;
 use crate::actions::{self, Carried, Grounded};
+use crate::declared;
 use crate::goal::Goal;
 use crate::lexicon::{Lexicon, Places, symbol};
 use crate::load::Domain;
@@ -35,7 +36,9 @@ use crate::programs::Programs;
 use crate::situation::{Candidate, Known, Past, Situation, Thing};
 use crate::words::{self, Words};
 pub use error::WorldError;
-use grounds::{asked_for, doors, expected, kinds, known_by_map, members, no_surface, objects, recalled};
+use grounds::{
+    asked_for, doors, expected, kinds, known_by_map, members, no_surface, objects, places_of, recalled,
+};
 
 /// How the reason begins why a step failed that came to its end, but not as the domain says.
 pub const NOT_AS_SAID: &str = "it has ended, but not as the domain says: ";
@@ -118,6 +121,9 @@ impl<'a> World<'a> {
         let Setting { domain, goal, robot, .. } = &setting;
         crate::check::runnable(domain).map_err(|f| WorldError::Domain(f.render(false)))?;
         let mut surfaces = candidates::surfaces(domain, &**robot);
+        if let Some(unclear) = Places::of_body(&**robot).unclear() {
+            return Err(WorldError::Domain(format!("{unclear}\n  {}", crate::lexicon::TOLD_APART)));
+        }
         known_by_map(domain, &surfaces)?;
         let chart = Chart::begin(domain, setting.past.as_ref(), &**robot);
         surfaces.extend(chart.known_surfaces());
@@ -131,8 +137,8 @@ impl<'a> World<'a> {
             .things
             .iter()
             .map(|(name, on)| {
-                let on =
-                    on.as_ref().map(|on| on.iter().map(index).collect::<Result<Vec<_>, _>>()).transpose()?;
+                let rooms = lexicon.of_type("room");
+                let on = on.as_ref().map(|places| places_of(places, rooms, &surfaces)).transpose()?;
                 Ok(Thing { on, ..asked_for(domain, &news, name)? })
             })
             .collect::<Result<_, WorldError>>()?;
@@ -213,7 +219,10 @@ impl<'a> World<'a> {
         let domain = self.setting.domain;
         let situation = Arc::new(Situation::new(self.mind.known.clone(), domain.config.thresholds));
         let problem = self.problem(&situation)?;
-        let task = Task::read(&domain.pddl, &problem).map_err(|f| WorldError::Domain(f.render(false)))?;
+        let mut task = Task::read(&domain.pddl, &problem).map_err(|f| WorldError::Domain(f.render(false)))?;
+        if self.setting.goal.question {
+            task.actions.retain(|action| !actions::carries(domain, &action.name));
+        }
         let attachments = self.bind(&situation);
         let said = json!({ "name": problem.name, "pddl": problem.text });
         let record = perceive::put(self.setting.record, "problem", self.setting.robot.now_ns(), &said)?;
@@ -243,14 +252,13 @@ impl<'a> World<'a> {
         let name = format!("round-{}", self.mind.views + 1);
         let mut text =
             format!("(define (problem {name})\n  (:domain {})\n  (:objects\n", domain_name(domain));
-        let mut symbols: Vec<String> = vocabulary.task.objects.iter().map(|o| o.name.clone()).collect();
-        for (of, names) in objects(s, &self.lexicon, domain) {
-            let fresh: Vec<String> = names.into_iter().filter(|n| !symbols.contains(n)).collect();
-            if !fresh.is_empty() && vocabulary.has_type(&of) {
-                text += &format!("    {} - {of}\n", fresh.join(" "));
-                symbols.extend(fresh);
-            }
-        }
+        let objects = objects(s, &self.lexicon, domain);
+        let named =
+            objects.iter().flat_map(|(of, names)| names.iter().map(move |n| (n.as_str(), of.as_str())));
+        let (lines, declared) = declared::lines(named, vocabulary);
+        text.extend(lines.iter().map(|line| format!("    {line}\n")));
+        let constants = vocabulary.task.objects.iter().map(|o| o.name.clone());
+        let symbols: Vec<String> = constants.chain(declared).collect();
         text += "  )\n  (:init\n";
         let mut lines: Vec<String> = Vec::new();
         for word in vocabulary.words() {
@@ -279,10 +287,20 @@ impl<'a> World<'a> {
         Ok(Source::new(format!("{name}.pddl"), text))
     }
 
-    /// The goal of this round: what was asked for, as sure as it must be by what is believed.
+    /// The goal of this round: what was asked for, and of kinds of which nothing was seen to be as sure of that as one must be to say so.
     fn goal_now(&self, s: &Situation) -> String {
-        let surer = |goal: String, of: usize| words::surer(&goal, &s.kinds[of].symbol, s.wanted_of(of));
-        (0..s.kinds.len()).fold(self.setting.goal.pddl.clone(), surer)
+        let goal = &self.setting.goal;
+        let surer = |(of, (kind, rooms)): (usize, &(String, Option<Vec<String>>))| {
+            let wanted = s.wanted_of(of);
+            let (word, room) = match rooms.as_ref().and_then(|rooms| rooms.first()) {
+                Some(room) => ("completeness-in", format!(" {room}")),
+                None => ("completeness", String::new()),
+            };
+            let is_said = self.setting.domain.vocabulary.word(word).is_some();
+            (wanted > s.threshold && is_said).then(|| format!(" (>= ({word} {kind}{room}) {wanted})"))
+        };
+        let surer: String = goal.asked.kinds.iter().enumerate().filter_map(surer).collect();
+        if surer.is_empty() { goal.pddl.clone() } else { format!("(and {}{surer})", goal.pddl) }
     }
 
     /// Every call, bound to a situation. A program of the domain's own replaces what is built in.

@@ -159,6 +159,9 @@ pub struct Speeds {
 }
 
 impl Speeds {
+    /// A body that is slower never arrives.
+    pub const LEAST: Speeds = Speeds { linear_m_s: 0.001, angular_rad_s: 0.0001 };
+
     /// What a straight way takes on which the base turns while it drives: max(ds/v, dθ/ω), seconds.
     pub fn duration_s(&self, distance_m: f64, turned_rad: f64) -> f64 {
         (distance_m / self.linear_m_s).max(turned_rad / self.angular_rad_s)

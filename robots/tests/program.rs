@@ -172,6 +172,8 @@ fn what_is_no_robot_is_refused_with_the_reason() {
     check_refused("a table in millimetres", &["\"table\"", "m wide, expected 30 m", "not in millimetres"]);
     check_refused("short map", &["9999 bytes follow the hello", "10000 cells"]);
     check_refused("two cameras", &["camera.base_from_camera", "there is a head"]);
+    check_refused("hardly drives", &["base.linear_m_s is 0.000000001", "expected 0.001 or more"]);
+    check_refused("hardly turns", &["base.angular_rad_s is", "expected 0.0001 or more"]);
     check_refused("only a head", &["there is a head, and no camera that it turns"]);
     check_refused("nowhere", &["it has no base", "expected one station"]);
     check_refused("no map", &["neither a map nor stations"]);

@@ -1,6 +1,6 @@
 //! What a look has brought: how sure it is now of what was asked for, why it is no surer, and what of the places has been seen.
 
-use descry_domains::lexicon::symbol;
+use descry_domains::lexicon::{plural, symbol};
 use descry_domains::note::Note;
 use descry_memory::belief::Track;
 
@@ -245,7 +245,7 @@ pub fn none_may_be(doubt: &InDoubt, after: &Standing) -> String {
 fn unsure_of(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<String> {
     let p = |track: &Track| track.probability_of(&doubt.about);
     let open = |track: &Track| p(track).min(1.0 - p(track));
-    let unsure: Vec<&Track> = after.belief.tracks.iter().filter(|track| open(track) > HARDLY).collect();
+    let unsure: Vec<&Track> = after.asked_about(doubt).filter(|track| open(track) > HARDLY).collect();
     let least = unsure.iter().max_by(|a, b| open(a).total_cmp(&open(b)))?;
     let all: f64 = unsure.iter().map(|track| 1.0 - open(track)).product();
     let kind = &doubt.about;
@@ -253,7 +253,9 @@ fn unsure_of(doubt: &InDoubt, after: &Standing, name: Names<'_>) -> Option<Strin
     (all < SURELY).then(|| match unsure.len() {
         1 => one,
         n => format!(
-            "which of {n} objects are {kind}s is certain with {} for all together, least of one: {one}",
+            "which of {n} objects{} are {} is certain with {} for all together, least of one: {one}",
+            doubt.within,
+            plural(kind),
             share(all)
         ),
     })

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use descry_domains::lexicon::{plural, symbol};
 use descry_memory::belief::{Belief, Track};
 use descry_memory::{Document, Query, Record, RecordId};
 
@@ -26,6 +27,15 @@ impl Standing {
     /// The same doubt as another.
     pub fn same(&self, other: &InDoubt) -> Option<&InDoubt> {
         self.doubts.iter().find(|doubt| doubt.of == other.of && doubt.about == other.about)
+    }
+
+    /// The objects that stand where a kind is asked about.
+    pub fn asked_about<'a>(&'a self, doubt: &'a InDoubt) -> impl Iterator<Item = &'a Track> {
+        let is_there = |track: &Track| {
+            let mut asked = doubt.seen.iter().filter(|seen| seen.share.is_some());
+            doubt.within.is_empty() || asked.any(|seen| symbol(&seen.on) == track.on)
+        };
+        self.belief.tracks.iter().filter(move |track| is_there(track))
     }
 
     /// The object that a thing or one of a kind most likely is, with that probability.
@@ -83,7 +93,7 @@ impl<'a> Standings<'a> {
 pub fn certainty(doubt: &InDoubt) -> String {
     match doubt.of {
         Of::Thing => format!("the certainty of where {} stands", doubt.about),
-        Of::Kind => format!("the certainty that all {}s are found", doubt.about),
+        Of::Kind => format!("the certainty that all {}{} are found", plural(&doubt.about), doubt.within),
         Of::Surface => format!("the certainty of what stands on the {}", doubt.about),
     }
 }

@@ -1,6 +1,7 @@
 //! A run in a few sentences: what was asked, what the answer is, what it rests on, and what was the greatest trouble.
 
-use descry_domains::answer::Verdict;
+use descry_domains::answer::{Believed, Verdict};
+use descry_domains::lexicon::plural;
 use descry_domains::note::Note;
 
 use super::chapters::{Chapter, Deed};
@@ -70,15 +71,17 @@ fn said_of(report: &Report) -> Option<String> {
 fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
     let doubt = last.doubts.first()?;
     let seen = seen(doubt);
-    let objects = match last.belief.tracks.len() {
+    let objects = match last.asked_about(doubt).count() {
         0 => "no object was seen".to_string(),
         1 => "one object was seen".into(),
         n => format!("{n} objects were seen"),
     };
+    let objects = format!("{objects}{}", doubt.within);
     let by = match (doubt.of, looks::best_seen(doubt, last)) {
         (Of::Thing, Some((track, p))) if p >= doubt.wanted => {
-            // It may have been taken since that look.
-            let is_held = report.why.contains(&format!("{} is in the hand", doubt.about));
+            // It may have been taken since that look: what stands nowhere is in the hand.
+            let is_it = |o: &&Believed| [&o.label, &o.kind].contains(&&Some(doubt.about.clone()));
+            let is_held = report.objects.iter().filter(is_it).any(|o| o.asked && o.position_m.is_none());
             let on = match track.on.as_str() {
                 on if on.is_empty() || is_held => "is in the hand".into(),
                 on => format!("stands on the {} at {}", name(on), place(track)),
@@ -92,9 +95,9 @@ fn rests(report: &Report, last: &Standing, name: Names<'_>) -> Option<String> {
         }
         (Of::Thing, _) => looks::may_be(doubt, last, name).unwrap_or_else(|| looks::none_may_be(doubt, last)),
         (Of::Kind, _) => format!(
-            "{objects}, and it is certain with {} which of them are {}s and that there are no more",
+            "{objects}, and it is certain with {} which of them are {} and that there are no more",
             share_of(doubt.sure?, doubt.wanted),
-            doubt.about
+            plural(&doubt.about)
         ),
         (Of::Surface, _) => {
             format!(

@@ -4,6 +4,7 @@ use descry_planner::{Diagnostic, Severity, Source};
 
 use super::Check;
 use crate::asked::mentions;
+use crate::declared;
 
 impl Check<'_> {
     /// What is wrong with what plans are to make small.
@@ -20,34 +21,30 @@ impl Check<'_> {
         more: &[(String, String)],
     ) -> Option<Diagnostic> {
         let vocabulary = &self.domain.vocabulary;
-        let mut known: Vec<String> = vocabulary.task.objects.iter().map(|o| o.name.clone()).collect();
-        let mut objects = String::new();
-        let mut declare = |name: &str, of: &str| {
-            if vocabulary.has_type(of) && !known.iter().any(|k| k == name) {
-                objects.push_str(&format!(" {name} - {of}"));
-                known.push(name.to_string());
-            }
-        };
-        more.iter().for_each(|(name, of)| declare(name, of));
-        // What is of a type is of its supertypes too: the narrowest counts.
-        let mut types: Vec<&descry_planner::task::Type> = vocabulary.task.types.iter().collect();
-        types.sort_by_key(|t| std::cmp::Reverse(t.ancestors.len()));
-        for of in types {
-            self.lexicon.of_type(&of.name).iter().for_each(|n| declare(&n.symbol, &of.name));
-        }
+        let named = vocabulary.task.types.iter().flat_map(|of| {
+            self.lexicon.of_type(&of.name).iter().map(move |n| (n.symbol.as_str(), of.name.as_str()))
+        });
+        let more = more.iter().map(|(name, of)| (name.as_str(), of.as_str()));
+        let mut objects: Vec<(&str, &str)> = more.chain(named).collect();
         // Poses have their names from the body: one that a condition names may be there.
-        for mention in mentions(condition) {
+        let mentions = mentions(condition);
+        for mention in &mentions {
             let Some(word) = mention.first().and_then(|name| vocabulary.word(name)) else { continue };
-            let named = mention[1..].iter().zip(&word.types).filter(|(name, _)| !name.starts_with('?'));
-            named.filter(|(_, of)| *of == "pose").for_each(|(name, of)| declare(name, of));
+            let poses = mention[1..].iter().zip(&word.types).filter(|(_, of)| *of == "pose");
+            for (name, _) in poses.filter(|(name, _)| !name.starts_with('?')) {
+                if objects.iter().all(|(known, _)| known != name) {
+                    objects.push((name.as_str(), "pose"));
+                }
+            }
         }
+        let objects = declared::lines(objects, vocabulary).0.join(" ");
         self.aim(path, &objects, &format!("(:goal {condition})"))
     }
 
     /// What is wrong with what a problem with these objects is to bring about.
     fn aim(&self, path: &[&str], objects: &str, aim: &str) -> Option<Diagnostic> {
         let domain = &self.domain.vocabulary.task.domain;
-        let problem = format!("(define (problem p) (:domain {domain}) (:objects{objects}) (:init) {aim})");
+        let problem = format!("(define (problem p) (:domain {domain}) (:objects {objects}) (:init) {aim})");
         let source = Source::new("condition", problem);
         let findings = descry_planner::check(&self.domain.pddl, Some(&source));
         // Nothing holds in this problem: what could never come about in it says nothing.

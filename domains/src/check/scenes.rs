@@ -4,7 +4,7 @@ use descry_planner::{Diagnostic, Source, Span};
 use descry_robots::sim::SceneSpec;
 
 use super::Check;
-use crate::lexicon::symbol;
+use crate::lexicon::{TOLD_APART, symbol};
 use crate::load::Domain;
 
 /// The number of the first scene among the sources of the findings, behind `domain.pddl` and `domain.toml`.
@@ -44,6 +44,10 @@ impl Check<'_> {
             let at = |byte: usize| u32::try_from(byte).unwrap_or(u32::MAX);
             let span = Span { source: at(FIRST_SCENE + n), start: at(start), end: at(start + rest) };
             list.push(self.error("scene", wrong.problem, span, wrong.mend));
+        }
+        if let Some(unclear) = self.places.unclear() {
+            let message = format!("{unclear} in scenes/{}.toml", config.scene);
+            list.push(self.error("same-name", message, self.toml.at(&["scene"]), TOLD_APART));
         }
         if self.places.surfaces.is_empty() {
             return list;

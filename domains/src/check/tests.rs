@@ -180,6 +180,8 @@ fn faults_of_phrases_are_found_at_their_place() {
     toml((say, "say = \"find <thng>\""), "unknown-slot", "<thng>", &["did you mean `thing`"]);
     toml((say, "say = \"find <thing>s\""), "glued-slot", "<thing>", &["space"]);
     toml((say, "say = \"find it\""), "slots", "<thing>", &["no slot <thing>; it has none"]);
+    toml((say, "say = \"find <thing>\"\nconfidence = 0.4"), "value", "0.4", &["above 0.5"]);
+    toml(("confidence = 0.8", "confidence = 0.5"), "value", "0.5", &["above 0.5"]);
     let means = "(>= (confidence <thing>) <threshold>)";
     toml(
         (means, "(>= (confidnce <thing>) <threshold>)"),
@@ -208,5 +210,15 @@ fn faults_of_scenes_and_places_are_found_at_their_place() {
         |what: &str, at: &str| format!("{scene}[[expect]]\nwhat = \"{what}\"\nat = \"{at}\"\nweight = 2.0\n");
     toml((scene, &expect("mug", "attic")), "no-place", "\"attic\"", &["known: table"]);
     toml((scene, &expect("spoon", "table")), "no-thing", "\"spoon\"", &["known: mug"]);
+    let other =
+        "[[surface]]\nname = \"Table!\"\nposition_m = [9.0, 0.0]\nsize_m = [1.0, 1.0]\nheight_m = 0.7\n";
+    let first = "[[surface]]";
+    check(
+        "scenes/default.toml",
+        (first, &(other.to_string() + first)),
+        "same-name",
+        "\"default\"",
+        &["tells"],
+    );
     check("scenes/default.toml", ("[[surface]]", "[[surfaces]]"), "scene", "surfaces]]", &["surfaces"]);
 }

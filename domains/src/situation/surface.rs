@@ -4,6 +4,8 @@ use descry_memory::belief::Track;
 use descry_perception::locate::Certainty;
 use descry_perception::nalgebra::{Point3, Vector3};
 
+use crate::lexicon::symbol;
+
 /// What lies so near to a wall of the map, or beyond it, is the wall, metres: localisation along a surface errs by two or three
 /// centimetres.
 const WALL_M: f64 = 0.03;
@@ -39,6 +41,11 @@ impl KnownSurface {
         }
         let sum = self.outline.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords);
         Some(Point3::from(sum / self.outline.len() as f64))
+    }
+
+    /// Whether it is in one of some rooms, by their symbols.
+    pub(crate) fn is_in(&self, rooms: &[String]) -> bool {
+        self.room.as_deref().is_some_and(|own| rooms.contains(&symbol(own)))
     }
 
     /// Whether a point lies over the outline widened by a margin in metres.

@@ -3,6 +3,7 @@
 use super::{Choice, NOTHING_LEFT, Round, World, WorldError};
 use crate::abilities;
 use crate::abilities::searching::{policies, reasons};
+use crate::answer::denied;
 
 impl World<'_> {
     /// What is surely no waste, for when the planner has run out of states: a step, or else a look behind what is shut.
@@ -20,8 +21,20 @@ impl World<'_> {
         look.map_or_else(|| Ok(Choice::Nothing(NOTHING_LEFT.into())), |look| self.head_for(round, look))
     }
 
-    /// What may still help where the time that was given is too short for any plan: the look that settles most a second, if it ends in
-    /// time.
+    /// Where the goal holds since nothing speaks against it: the look that settles most of what may do so, if it is not known.
+    ///
+    /// # Errors
+    /// Never: it is chosen as [`World::fallback`] is.
+    pub fn before_denying(&mut self, round: &Round) -> Result<Choice, WorldError> {
+        let s = &round.situation;
+        self.heading_for = None;
+        let may_look = s.held.is_none() && denied::is_open(s, &self.setting.goal.asked.denied);
+        let look = may_look.then(|| reasons::one_look(s)).flatten();
+        Ok(look.map_or_else(|| Choice::Nothing(NOTHING_LEFT.into()), Choice::Steps))
+    }
+
+    /// What may still help where there is no plan since the time that was given is too short for any, or since what is asked is nothing that
+    /// a look promises: the look that settles most a second, if it ends in time.
     ///
     /// # Errors
     /// Never: it is chosen as [`World::fallback`] is.
@@ -29,7 +42,8 @@ impl World<'_> {
         let s = &round.situation;
         self.heading_for = None;
         let is_searching = self.setting.domain.config.uses.iter().any(|ability| ability == "searching");
-        let may_look = s.time_left_s.is_some() && s.held.is_none() && is_searching;
+        let is_short = s.time_left_s.is_some() || self.setting.goal.question;
+        let may_look = is_short && s.held.is_none() && is_searching;
         let look = reasons::one_look(s).filter(|_| may_look);
         Ok(look.map_or_else(|| Choice::Nothing(NOTHING_LEFT.into()), Choice::Steps))
     }

@@ -6,7 +6,7 @@ use descry_robots::{PoseEstimate, Robot};
 use super::WorldError;
 use crate::abilities::learning::news::{self, News};
 use crate::goal::Goal;
-use crate::lexicon::{Lexicon, SENSE, symbol};
+use crate::lexicon::{Lexicon, Named, SENSE, symbol};
 use crate::load::Domain;
 use crate::situation::{self, Candidate, Known, KnownDoor, Past, Situation, Thing};
 
@@ -61,11 +61,31 @@ pub(super) fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[situation::
     belief
 }
 
-/// The kinds of which all are asked for, each on the surfaces of the room in which it is asked about.
+/// The surfaces of places that are named by their symbols: surfaces, or rooms with all that is in them.
+pub(super) fn places_of(
+    places: &[String],
+    rooms: &[Named],
+    surfaces: &[situation::KnownSurface],
+) -> Result<Vec<usize>, WorldError> {
+    let mut on = Vec::new();
+    for place in places {
+        let is_there =
+            |n: &usize| surfaces[*n].symbol == *place || surfaces[*n].is_in(std::slice::from_ref(place));
+        let there: Vec<usize> = (0..surfaces.len()).filter(is_there).collect();
+        if there.is_empty() && rooms.iter().all(|room| room.symbol != *place) {
+            return Err(no_surface(place, surfaces));
+        }
+        on.extend(there.into_iter().filter(|n| !on.contains(n)).collect::<Vec<_>>());
+    }
+    Ok(on)
+}
+
+/// The kinds of which all are asked for, each on the surfaces of the rooms in which it is asked about.
 pub(super) fn kinds(domain: &Domain, goal: &Goal, surfaces: &[situation::KnownSurface]) -> Vec<Thing> {
-    let of = |(kind, room): &(String, Option<String>)| {
-        let is_in = |n: &usize| surfaces[*n].room.as_deref().map(symbol).as_ref() == room.as_ref();
-        let on = room.as_ref().map(|_| (0..surfaces.len()).filter(is_in).collect());
+    let of = |(kind, rooms): &(String, Option<Vec<String>>)| {
+        let of_rooms =
+            |rooms: &Vec<String>| (0..surfaces.len()).filter(|&n| surfaces[n].is_in(rooms)).collect();
+        let on = rooms.as_ref().map(of_rooms);
         Thing { on, ..situation::thing(domain, kind) }
     };
     goal.asked.kinds.iter().map(of).collect()

@@ -348,7 +348,16 @@ impl Hello {
 
 impl Base {
     fn check(&self) -> Result<(), String> {
-        above_zero(&[("base.linear_m_s", self.linear_m_s), ("base.angular_rad_s", self.angular_rad_s)])?;
+        for (name, speed, least) in [
+            ("base.linear_m_s", self.linear_m_s, Speeds::LEAST.linear_m_s),
+            ("base.angular_rad_s", self.angular_rad_s, Speeds::LEAST.angular_rad_s),
+        ] {
+            if !(speed.is_finite() && speed >= least) {
+                return Err(format!(
+                    "{name} is {speed}, expected {least} or more: a slower body never arrives"
+                ));
+            }
+        }
         let radius_m = self.footprint.radius_m();
         if !(radius_m.is_finite() && radius_m >= 0.0) {
             return Err(format!("base.footprint has a radius of {radius_m} m"));

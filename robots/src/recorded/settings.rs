@@ -1,12 +1,11 @@
 //! What a folder of frames does not say by itself.
 
 use crate::input::{self, InputError, Objection, Step};
+use crate::parts::Speeds;
 use crate::recorded::outline;
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-/// A body that drives slower never arrives, metres a second.
-const LEAST_LINEAR_M_S: f64 = 0.001;
 /// A body that turns slower never has turned, degrees a second.
 const LEAST_ANGULAR_DEG_S: f64 = 0.01;
 
@@ -106,7 +105,7 @@ impl Settings {
             ("depth_scale", self.depth_scale, 0.0),
             ("pose_sigma_m", self.pose_sigma_m, 0.0),
             ("pose_sigma_deg", self.pose_sigma_deg, 0.0),
-            ("linear_m_s", self.linear_m_s, LEAST_LINEAR_M_S),
+            ("linear_m_s", self.linear_m_s, Speeds::LEAST.linear_m_s),
             ("angular_deg_s", self.angular_deg_s, LEAST_ANGULAR_DEG_S),
         ];
         for (key, value, least) in least {

@@ -61,6 +61,10 @@ class Rogue(Template):
             hello["senses"] = [{"name": "label reader", "about": "the text of a label, or null"}]
         if WHAT == "laser beyond a turn":
             hello["laser"] = dict(hello["laser"], readings=1000)
+        if WHAT == "hardly drives":
+            hello["base"]["linear_m_s"] = 1e-9
+        if WHAT == "hardly turns":
+            hello["base"]["angular_rad_s"] = 1e-300
         if WHAT == "two tables of one name":
             hello["surfaces"] *= 2
         if WHAT == "a table in millimetres":

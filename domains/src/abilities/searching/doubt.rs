@@ -142,7 +142,9 @@ impl Doubt {
 
     /// Where a thing may be hidden, on the surfaces that it is asked about.
     fn hidden(situation: &Situation, thing: &Thing, expected: &[f64]) -> Self {
-        let size = thing.models.first().map_or(SMALL_M, size_m);
+        // Of a kind the smallest may be where the largest has no room.
+        let sizes = thing.models.iter().map(size_m);
+        let size = sizes.min_by(|a, b| volume_m3(a).total_cmp(&volume_m3(b))).unwrap_or(SMALL_M);
         let surfaces = (0..situation.surfaces.len()).filter(|&on| thing.may_be_on(on));
         let weighted: Vec<(usize, f64)> = surfaces.map(|on| (on, expected[on])).collect();
         let mut doubt = Self::hidden_on(situation, &weighted, size);
@@ -367,6 +369,11 @@ impl Doubt {
 /// since it can be settled in no other way.
 fn negligible(situation: &Situation, moved: Option<usize>) -> f64 {
     if moved.is_some() { situation.thresholds.out_of_sight } else { situation.thresholds.remaining }
+}
+
+/// As of a body as high and as wide.
+fn volume_m3((height_m, diameter_m): &(f64, f64)) -> f64 {
+    height_m * diameter_m * diameter_m
 }
 
 /// Height and diameter of a model, metres.

@@ -5,6 +5,7 @@ use descry_perception::nalgebra::{self, Point3, Vector3};
 use descry_planner::{Plan, Step};
 
 use super::doubt::{Doubt, Taken};
+use crate::lexicon::plural;
 use crate::situation::{KnownSurface, Situation, Thing};
 
 /// A probability that is said with an answer.
@@ -163,7 +164,7 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     let hidden = s.doubt_of(open).hidden;
     let about = about(least.map(is_one), hidden, 1.0 - s.threshold, s.belief.tracks.is_empty());
     let (all, place) = (s.completeness(open), in_room(s, kind));
-    Some(format!("all {}s{place} are found with {all:.2} only{about}", kind.name))
+    Some(format!("all {}{place} are found with {all:.2} only{about}", plural(&kind.name)))
 }
 
 /// What the doubt about all of a kind is about: the least sure object, and what may stand where nothing was seen, if that alone is
@@ -178,11 +179,15 @@ fn about(least: Option<String>, hidden: f64, allowed: f64, is_bare: bool) -> Str
     }
 }
 
-/// The room in which a kind is asked about, in words; empty if it is asked about wherever it is.
+/// The rooms in which a kind is asked about, in words; empty if it is asked about wherever it is.
 pub fn in_room(s: &Situation, kind: &Thing) -> String {
-    let first = kind.on.as_ref().and_then(|on| on.first());
-    let room = first.and_then(|&on| s.surfaces[on].room.as_ref());
-    room.map(|room| format!(" in the {room}")).unwrap_or_default()
+    let mut rooms: Vec<&str> = Vec::new();
+    for room in kind.on.iter().flatten().filter_map(|&on| s.surfaces[on].room.as_deref()) {
+        if !rooms.contains(&room) {
+            rooms.push(room);
+        }
+    }
+    if rooms.is_empty() { String::new() } else { format!(" in the {}", rooms.join(" or the ")) }
 }
 
 fn out_of_time(s: &Situation) -> Option<String> {

@@ -1,5 +1,5 @@
-//! `(completeness-in ?of ?where)`: how sure it is that all of a kind are found that are in a room. Known of the room that is asked
-//! about; of any other no more than nothing.
+//! `(completeness-in ?of ?where)`: how sure it is that all of a kind are found that are in a room. Known of the rooms that
+//! are asked about: of each it is at least as sure as of all of them together. Of any other no more is known than nothing.
 
 use crate::lexicon::symbol;
 use crate::situation::Situation;
@@ -9,9 +9,9 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     let mut lines = Vec::new();
     for (of, kind) in situation.kinds.iter().enumerate() {
         for room in &rooms {
-            let is_asked = kind.on.as_ref().is_some_and(|on| {
-                on.iter().all(|&n| situation.surfaces[n].room.as_deref().map(symbol).as_ref() == Some(room))
-            });
+            let there = (0..situation.surfaces.len())
+                .filter(|&n| situation.surfaces[n].is_in(std::slice::from_ref(room)));
+            let is_asked = kind.on.as_ref().is_none_or(|on| there.clone().all(|n| on.contains(&n)));
             let value = if is_asked { situation.completeness(of) } else { 0.0 };
             lines.push(format!("(= (completeness-in {} {room}) {value:.6})", kind.symbol));
         }

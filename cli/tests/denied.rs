@@ -1,0 +1,144 @@
+//! What is asked with "not", "no", "all" and rooms, in phrases of one's own: it is looked at, nothing is made so by a question, and what
+//! nobody has seen is not denied.
+
+use std::fs;
+
+use descry_domains::load::Domain;
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::binary;
+
+const PHRASES: &str = r#"
+[[goal]]
+say = "make sure that <thing> is not on <surface>"
+means = "(not (on <thing> <surface>))"
+
+[[goal]]
+say = "is <surface> free of <thing>"
+means = "(<= (presence <thing> <surface>) 0.1)"
+question = true
+
+[[goal]]
+say = "are there no <kind> on <surface>"
+means = "(and (>= (clarity <surface>) <threshold>) (not (exists (?t - thing) (and (is ?t <kind>) (on ?t <surface>)))))"
+question = true
+
+[[goal]]
+say = "are all <kind> on <surface>"
+means = "(and (>= (completeness <kind>) <threshold>) (forall (?t - thing) (imply (is ?t <kind>) (on ?t <surface>))))"
+question = true
+
+[[goal]]
+say = "is there <thing> in <room>"
+means = "(exists (?s - surface) (and (in ?s <room>) (>= (presence <thing> ?s) <threshold>)))"
+question = true
+
+[[goal]]
+say = "find <thing> and all <kind>"
+means = "(and (exists (?s - surface) (>= (presence <thing> ?s) <threshold>)) (>= (completeness <kind>) <threshold>))"
+
+[[goal]]
+say = "which <kind> are in <first:room> or <second:room>"
+means = "(and (>= (completeness-in <kind> <first:room>) <threshold>) (>= (completeness-in <kind> <second:room>) <threshold>))"
+"#;
+
+/// The domain *home* with phrases of one's own.
+fn own() -> TempDir {
+    let folder = TempDir::new().expect("a folder can be made");
+    for (path, (_, text)) in &Domain::load("home").expect("a built-in domain").files {
+        let to = folder.path().join("own").join(path);
+        fs::create_dir_all(to.parent().expect("a folder")).expect("a folder can be made");
+        let more = if path == "domain.toml" { PHRASES } else { "" };
+        fs::write(to, format!("{text}{more}")).expect("the domain is written");
+    }
+    folder
+}
+
+/// Asks in two rooms: the answer or verdict, what it says, and what was done or not.
+fn check(folder: &TempDir, goal: &str, seed: u64, expected: &str, words: &str) -> Value {
+    let (seed, run) = (seed.to_string(), format!("run-{seed}-{}", goal.replace(' ', "-")));
+    let asked =
+        ["do", goal, "--domain", "own", "--scene", "two-rooms", "--seed", &seed, "--run", &run, "--json"];
+    let exit = i32::from(!["yes", "achieved"].contains(&expected));
+    let report = binary::check(folder.path(), &asked, exit);
+    let said = report["answer"].as_str().or(report["verdict"].as_str());
+    let why = report["why"].as_str().unwrap_or_default();
+    assert!(said == Some(expected) && why.contains(words), "{goal}: {report}");
+    report
+}
+
+#[test]
+fn what_was_not_looked_at_is_not_denied() {
+    let folder = own();
+    // The mug stands on the desk, the cylinder does not.
+    let no =
+        check(&folder, "is the desk free of the mug", 96501, "no", "mug stands on the desk in the study");
+    let yes = check(&folder, "is the desk free of the white cylinder", 96501, "yes", "it holds that");
+    let sure =
+        check(&folder, "make sure that the white cylinder is not on the desk", 96501, "achieved", "it holds");
+    for report in [no, yes, sure] {
+        assert!(report["views"].as_u64() > Some(0), "{report}");
+    }
+    check(&folder, "are there no mugs on the desk", 96501, "no", "");
+    check(&folder, "are there no cups on the desk", 96501, "yes", "everything on the desk is identified");
+}
+
+#[test]
+fn a_question_is_not_made_true() {
+    let folder = own();
+    let words = "so it does not hold that";
+    check(&folder, "are all mugs on the counter", 96501, "no", words);
+    check(&folder, "are all mugs on the desk", 96501, "yes", "all mugs are found: 1");
+    for run in ["run-96501-are-all-mugs-on-the-counter", "run-96501-are-all-mugs-on-the-desk"] {
+        let done = binary::documents(folder.path(), run);
+        assert!(done.iter().all(|document| !document.contains("(pick-up ")), "{run}");
+    }
+}
+
+#[test]
+fn what_is_asked_of_rooms_is_about_them() {
+    let folder = own();
+    check(
+        &folder,
+        "is there a mug in the kitchen",
+        96501,
+        "no",
+        "mug is not on the kitchen table or the counter",
+    );
+    check(&folder, "is there a mug in the study", 96501, "yes", "mug stands on the desk in the study");
+    let words = "all cups in the kitchen or the study are found: 2";
+    check(&folder, "which cups are in the kitchen or the study", 96501, "achieved", words);
+}
+
+#[test]
+fn a_thing_and_a_kind_of_one_name_are_asked_for_at_once() {
+    let folder = own();
+    let checked = binary::outcome(folder.path(), &["check", "own"]);
+    assert_eq!(checked.status.code(), Some(0), "{}", String::from_utf8_lossy(&checked.stderr));
+    let words = "mug stands on the desk in the study; all mugs are found: 1";
+    check(&folder, "find the mug and all mugs", 96501, "achieved", words);
+}
+
+/// A place and a thing of one table and another, as they are called.
+fn named(surface: &str, other: &str, thing: &str) -> String {
+    format!(
+        "title = \"Two tables\"\n[[surface]]\nname = \"{surface}\"\nsize_m = [1.2, 0.8]\nheight_m = 0.72\n[[surface]]\nname = \
+         \"{other}\"\nposition_m = [3.0, 0.0]\nsize_m = [1.2, 0.8]\nheight_m = 0.72\n[start]\nposition_m = [-2.3, 0.0]\n[[object]]\nname = \
+         \"{thing}\"\nshape.cup = {{ diameter_m = 0.070, height_m = 0.104 }}\non = [\"{other}\"]\n"
+    )
+}
+
+#[test]
+fn names_that_are_symbols_of_something_else_do_no_harm() {
+    let folder = TempDir::new().expect("a folder can be made");
+    fs::write(folder.path().join("two.toml"), named("table", "table 2", "cup A")).expect("a scene");
+    let find = ["find", "cup A", "--scene", "two.toml", "--seed", "96001", "--json"];
+    let report = binary::check(folder.path(), &find, 0);
+    assert_eq!((&report["on"], &report["true_on"]), (&"table 2".into(), &"table 2".into()), "{report}");
+    // Nobody could say which of these is meant.
+    fs::write(folder.path().join("same.toml"), named("table", "Table!", "cup A")).expect("a scene");
+    let ask = ["do", "is cup A on the table", "--scene", "same.toml"];
+    let words = ["nothing tells the surface \"Table!\" from the surface \"table\"", "a name of its own"];
+    binary::check_refused(folder.path(), &ask, 2, &words);
+}

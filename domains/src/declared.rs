@@ -1,0 +1,66 @@
+//! Objects as a problem declares them: what has one symbol is one object, of every type that it is spoken of by. A table, a thing
+//! that is called "table", and a kind of the name of a thing do not exclude each other.
+
+use crate::vocabulary::Vocabulary;
+
+/// The lines that declare objects, each a symbol and a type, and their symbols. Types that the domain does not have declare nothing; what is
+/// of a type is of its supertypes, and the domain's constants are declared already.
+pub(crate) fn lines<'a>(
+    objects: impl IntoIterator<Item = (&'a str, &'a str)>,
+    vocabulary: &Vocabulary,
+) -> (Vec<String>, Vec<String>) {
+    let mut types: Vec<(&str, Vec<&str>)> = Vec::new();
+    let is_constant = |symbol: &str| vocabulary.task.find_object(symbol).is_some();
+    for (symbol, of) in objects {
+        if !vocabulary.has_type(of) || is_constant(symbol) {
+            continue;
+        }
+        match types.iter_mut().find(|(known, _)| *known == symbol) {
+            None => types.push((symbol, vec![of])),
+            Some((_, known)) if known.iter().any(|narrow| vocabulary.is_a(narrow, of)) => {}
+            Some((_, known)) => {
+                known.retain(|wide| !vocabulary.is_a(of, wide));
+                known.push(of);
+            }
+        }
+    }
+    let mut lines: Vec<(Vec<&str>, String)> = Vec::new();
+    for (symbol, of) in &types {
+        match lines.iter_mut().find(|(known, _)| known == of) {
+            Some((_, line)) => *line += &format!(" {symbol}"),
+            None => lines.push((of.clone(), (*symbol).to_string())),
+        }
+    }
+    let declared = |(of, symbols): &(Vec<&str>, String)| match of.as_slice() {
+        [one] => format!("{symbols} - {one}"),
+        several => format!("{symbols} - (either {})", several.join(" ")),
+    };
+    (lines.iter().map(declared).collect(), types.iter().map(|(symbol, _)| (*symbol).to_string()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use descry_planner::Source;
+
+    use super::*;
+
+    #[test]
+    fn what_has_one_symbol_is_one_object() {
+        let pddl = "(define (domain d) (:requirements :typing)
+            (:types pose thing kind - object cup - thing) (:constants sofa - thing) (:predicates (at ?p - pose)))";
+        let vocabulary = Vocabulary::read(&Source::new("d.pddl", pddl)).unwrap();
+        let check = |objects: &[(&str, &str)], expected: &[&str]| {
+            assert_eq!(lines(objects.iter().copied(), &vocabulary).0, expected, "{objects:?}");
+        };
+        check(&[], &[]);
+        check(&[("a", "pose"), ("b", "pose"), ("c", "thing")], &["a b - pose", "c - thing"]);
+        check(
+            &[("mug", "thing"), ("b", "pose"), ("mug", "kind")],
+            &["mug - (either thing kind)", "b - pose"],
+        );
+        check(&[("a", "pose"), ("a", "pose")], &["a - pose"]);
+        check(&[("a", "cup"), ("a", "thing")], &["a - cup"]);
+        check(&[("a", "thing"), ("a", "pose"), ("a", "cup")], &["a - (either pose cup)"]);
+        check(&[("a", "room"), ("sofa", "pose")], &[]);
+    }
+}

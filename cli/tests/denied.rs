@@ -123,7 +123,7 @@ fn a_thing_and_a_kind_of_one_name_are_asked_for_at_once() {
 /// A place and a thing of one table and another, as they are called.
 fn named(surface: &str, other: &str, thing: &str) -> String {
     format!(
-        "title = \"Two tables\"\n[[surface]]\nname = \"{surface}\"\nsize_m = [1.2, 0.8]\nheight_m = 0.72\n[[surface]]\nname = \
+        "title = \"Two tables\"\n[room]\nsize_m = [9.0, 5.0]\n[[surface]]\nname = \"{surface}\"\nsize_m = [1.2, 0.8]\nheight_m = 0.72\n[[surface]]\nname = \
          \"{other}\"\nposition_m = [3.0, 0.0]\nsize_m = [1.2, 0.8]\nheight_m = 0.72\n[start]\nposition_m = [-2.3, 0.0]\n[[object]]\nname = \
          \"{thing}\"\nshape.cup = {{ diameter_m = 0.070, height_m = 0.104 }}\non = [\"{other}\"]\n"
     )

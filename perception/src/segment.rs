@@ -204,6 +204,10 @@ const BOTTOM_M: (f64, f64) = (0.005, 0.006);
 fn stand(parts: &mut [Segment]) -> Vec<f64> {
     /// What begins lower stands on the surface, or in something, metres. From: chosen.
     const LIFTED_M: f64 = 0.01;
+    /// A lower edge this high has been cut or hidden rather than set on something of which nothing is seen around it, metres. From: chosen.
+    const CUT_M: f64 = 0.02;
+    /// What stands in another thing is in its middle rather than along its wall: so far from that, metres. From: chosen.
+    const WALL_M: f64 = 0.02;
     let tops: Vec<f64> = parts.iter().map(top_m).collect();
     let boxes: Vec<_> = parts.iter().map(|part| bounds(&part.points)).collect();
     let hulls: Vec<OnceCell<_>> = parts.iter().map(|_| OnceCell::new()).collect();
@@ -219,14 +223,20 @@ fn stand(parts: &mut [Segment]) -> Vec<f64> {
         let below: Vec<usize> = (0..parts.len()).filter(is_below).collect();
         let lifted = below.iter().filter(|_| low > LIFTED_M);
         let borne = lifted.filter_map(|&other| borne_at_m(part, hull(i), (place, low), &parts[other].points));
-        let is_around = |&other: &usize| {
-            is_wider(&boxes[other], &boxes[i]) && directions(parts[other].points.iter(), place) >= AROUND
-        };
-        match borne.max_by(f64::total_cmp) {
-            Some(at) => (at, 0.0),
-            None if below.iter().any(is_around) => BOTTOM_M,
-            None => (0.0, 0.0),
+        if let Some(at) = borne.max_by(f64::total_cmp) {
+            return (at, 0.0);
         }
+        let is_around = |&other: &usize| {
+            is_wider(&boxes[other], &boxes[i])
+                && holds_within(hull(other), place, -WALL_M)
+                && directions(parts[other].points.iter(), place) >= AROUND
+        };
+        if below.iter().any(is_around) {
+            return BOTTOM_M;
+        }
+        // What lies along the rim of another is most likely a piece of that.
+        let rims = below.iter().map(|&other| tops[other]).filter(|top| low > CUT_M && *top < low + MEETS_M);
+        (rims.max_by(f64::total_cmp).unwrap_or(0.0), 0.0)
     };
     let bases: Vec<(f64, f64)> = parts.iter().enumerate().map(base).collect();
     for (part, base) in parts.iter_mut().zip(bases) {

@@ -44,6 +44,12 @@ fn mistakes_are_drawn_at_their_place() {
         ("name = \"mug\"", "name = \"mug\"\nscale = [0.01, 1.0]", 13, &["no inside"]),
         ("[start]", "[room]\nsize_m = [1e9, 5]\n[start]", 7, &["at most 100"]),
         ("[-2.0, 0.0]", "[-9.0, 0.0]", 7, &["outside the room"]),
+        (
+            "height_m = 0.72",
+            "height_m = 0.72\nposition_m = [2.8, 0.0]",
+            6,
+            &["\"table\" is not within the room", "give [room] a `size_m`"],
+        ),
         ("[-2.0, 0.0]", "[-2.0, nan]", 7, &["expected a number"]),
         ("[target]", "[target", 14, &["no TOML"]),
         ("height_m = 0.72", "", 2, &["missing field `height_m`", "add it"]),

@@ -14,23 +14,34 @@ impl World<'_> {
         let s = &round.situation;
         self.heading_for = None;
         let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.fallback);
-        if let Some(plan) = own.map_or_else(|| reasons::one_look(s), |fallback| fallback(s)) {
-            return Ok(Choice::Steps(plan));
+        match own.map_or_else(|| reasons::one_look(s), |fallback| fallback(s)) {
+            Some(plan) => Ok(Choice::Steps(plan)),
+            None => self.behind(round),
         }
+    }
+
+    /// A look behind what is shut.
+    fn behind(&mut self, round: &Round) -> Result<Choice, WorldError> {
+        let s = &round.situation;
         let look = policies::behind(s, &self.barred).filter(|_| s.held.is_none());
         look.map_or_else(|| Ok(Choice::Nothing(NOTHING_LEFT.into())), |look| self.head_for(round, look))
     }
 
-    /// Where the goal holds since nothing speaks against it: the look that settles most of what may do so, if it is not known.
+    /// Where the goal holds since nothing speaks against it: the look that settles most of what may do so, or else one behind what is shut,
+    /// if it is not known.
     ///
     /// # Errors
-    /// Never: it is chosen as [`World::fallback`] is.
+    /// [`WorldError::Domain`] if the domain has no word for being at a pose.
     pub fn before_denying(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
         self.heading_for = None;
-        let may_look = s.held.is_none() && denied::is_open(s, &self.setting.goal.asked.denied);
-        let look = may_look.then(|| reasons::one_look(s)).flatten();
-        Ok(look.map_or_else(|| Choice::Nothing(NOTHING_LEFT.into()), Choice::Steps))
+        if s.held.is_some() || !denied::is_open(s, &self.setting.goal.asked.denied) {
+            return Ok(Choice::Nothing(NOTHING_LEFT.into()));
+        }
+        match reasons::one_look(s) {
+            Some(plan) => Ok(Choice::Steps(plan)),
+            None => self.behind(round),
+        }
     }
 
     /// What may still help where there is no plan since the time that was given is too short for any, or since what is asked is nothing that

@@ -155,12 +155,13 @@ impl SceneSpec {
             ));
         }
         let inside = |room: &RoomSpec| s.outline_m().iter().all(|c| room.holds(c, IN_WALL_M));
-        if self.rooms.len() > 1 && !self.rooms.iter().any(inside) {
-            return Err(object(
-                &at("position_m"),
-                format!("\"{}\" is not within one room", s.name),
-                "move it, or make it smaller".into(),
-            ));
+        if !self.rooms.iter().any(inside) {
+            let (where_to, mend) = match self.rooms.len() {
+                1 => ("the room", "move it, make it smaller, or give [room] a `size_m` that holds it"),
+                _ => ("one room", "move it, or make it smaller"),
+            };
+            let problem = format!("\"{}\" is not within {where_to}", s.name);
+            return Err(object(&at("position_m"), problem, mend.into()));
         }
         Ok(())
     }

@@ -211,7 +211,7 @@ fn faults_of_scenes_and_places_are_found_at_their_place() {
     toml((scene, &expect("mug", "attic")), "no-place", "\"attic\"", &["known: table"]);
     toml((scene, &expect("spoon", "table")), "no-thing", "\"spoon\"", &["known: mug"]);
     let other =
-        "[[surface]]\nname = \"Table!\"\nposition_m = [9.0, 0.0]\nsize_m = [1.0, 1.0]\nheight_m = 0.7\n";
+        "[[surface]]\nname = \"Table!\"\nposition_m = [2.4, 1.9]\nsize_m = [1.0, 1.0]\nheight_m = 0.7\n";
     let first = "[[surface]]";
     check(
         "scenes/default.toml",

@@ -82,7 +82,7 @@ pub struct GoalPhrase {
     pub say: String,
     /// The goal condition in PDDL, with the same slots.
     pub means: String,
-    /// Whether the answer is yes or no.
+    /// Whether the answer is yes or no. Nothing is carried to make it yes.
     #[serde(default)]
     pub question: bool,
     /// The confidence that is asked for where the goal says none; none: that of the thresholds.

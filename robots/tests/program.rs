@@ -174,6 +174,8 @@ fn what_is_no_robot_is_refused_with_the_reason() {
     check_refused("two cameras", &["camera.base_from_camera", "there is a head"]);
     check_refused("hardly drives", &["base.linear_m_s is 0.000000001", "expected 0.001 or more"]);
     check_refused("hardly turns", &["base.angular_rad_s is", "expected 0.0001 or more"]);
+    check_refused("keeps away from everything", &["base.clearance_m is", "expected 0 to 10"]);
+    check_refused("a map of dust", &["map.resolution_m is", "expected 0.001 to 10"]);
     check_refused("only a head", &["there is a head, and no camera that it turns"]);
     check_refused("nowhere", &["it has no base", "expected one station"]);
     check_refused("no map", &["neither a map nor stations"]);

@@ -358,13 +358,15 @@ impl Base {
                 ));
             }
         }
+        /// A body is no wider, and keeps no farther away from what is around it, metres. From: chosen, more than any door.
+        const MOST_M: f64 = 10.0;
         let radius_m = self.footprint.radius_m();
-        if !(radius_m.is_finite() && radius_m >= 0.0) {
-            return Err(format!("base.footprint has a radius of {radius_m} m"));
-        }
-        let clearance_m = self.clearance_m;
-        if !(clearance_m.is_finite() && clearance_m >= 0.0) {
-            return Err(format!("base.clearance_m is {clearance_m}"));
+        for (name, length_m) in
+            [("the radius of base.footprint", radius_m), ("base.clearance_m", self.clearance_m)]
+        {
+            if !(0.0..=MOST_M).contains(&length_m) {
+                return Err(format!("{name} is {length_m} m, expected 0 to {MOST_M}"));
+            }
         }
         Ok(())
     }
@@ -434,7 +436,12 @@ impl Laser {
 
 impl Map {
     fn grid(&self, cells: &[u8]) -> Result<OccupancyGrid, String> {
-        above_zero(&[("map.resolution_m", self.resolution_m)])?;
+        /// Sides that cells may have, metres. From: chosen.
+        const CELLS_M: (f64, f64) = (0.001, 10.0);
+        if !(CELLS_M.0..=CELLS_M.1).contains(&self.resolution_m) {
+            let (least, most) = CELLS_M;
+            return Err(format!("map.resolution_m is {}, expected {least} to {most}", self.resolution_m));
+        }
         if !(self.origin_m.x.is_finite() && self.origin_m.y.is_finite()) {
             return Err("map.origin_m is no place".into());
         }

@@ -65,6 +65,10 @@ class Rogue(Template):
             hello["base"]["linear_m_s"] = 1e-9
         if WHAT == "hardly turns":
             hello["base"]["angular_rad_s"] = 1e-300
+        if WHAT == "keeps away from everything":
+            hello["base"]["clearance_m"] = 1e300
+        if WHAT == "a map of dust":
+            hello["map"]["resolution_m"] = 1e-300
         if WHAT == "two tables of one name":
             hello["surfaces"] *= 2
         if WHAT == "a table in millimetres":

@@ -10,19 +10,18 @@ mod mend;
 mod patches;
 mod quantile;
 mod rounds;
+mod stand;
 mod vessels;
 mod votes;
 
 use crate::cloud::Cloud;
 use crate::pool;
-use crate::round::sector;
 use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, TALLEST_M, convex_hull, find_surface};
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Vector3};
 use patches::Voxels;
 pub(crate) use quantile::{end, quantile};
 use serde::{Deserialize, Serialize};
-use std::cell::OnceCell;
 
 /// How to part a scene into objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -107,7 +106,7 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
             parts = vessels::whole(parts, &viewpoints);
         }
         parts.retain(|s| s.indices.len() >= options.fewest_points);
-        let mut tops = stand(&mut parts).into_iter();
+        let mut tops = stand::on(&mut parts).into_iter();
         parts.retain(|s| tops.next().is_some_and(|top| top - s.base_m >= options.least_height_m));
         parts.sort_by(|a, b| b.indices.len().cmp(&a.indices.len()).then(a.indices.cmp(&b.indices)));
         Scene { surface, segments: parts }
@@ -194,100 +193,6 @@ fn above_of(from: u32, of: &[Point3<f32>], surface: &Surface, rows: &Rows, optio
 pub(crate) fn top_m(segment: &Segment) -> f64 {
     let heights: Vec<f64> = segment.points.iter().map(|p| p.z).collect();
     end(&heights, POINT_ENDS.1)
-}
-
-/// How high the bottom of a vessel or of an open carton is in which something stands, metres, and its spread. From: chosen.
-const BOTTOM_M: (f64, f64) = (0.005, 0.006);
-
-/// Tells for each segment what it stands on: the surface, another segment that is seen around its foot, or the bottom of one that is
-/// around it. Gives all tops.
-fn stand(parts: &mut [Segment]) -> Vec<f64> {
-    /// What begins lower stands on the surface, or in something, metres. From: chosen.
-    const LIFTED_M: f64 = 0.01;
-    /// A lower edge this high has been cut or hidden rather than set on something of which nothing is seen around it, metres. From: chosen.
-    const CUT_M: f64 = 0.02;
-    /// What stands in another thing is in its middle rather than along its wall: so far from that, metres. From: chosen.
-    const WALL_M: f64 = 0.02;
-    let tops: Vec<f64> = parts.iter().map(top_m).collect();
-    let boxes: Vec<_> = parts.iter().map(|part| bounds(&part.points)).collect();
-    let hulls: Vec<OnceCell<_>> = parts.iter().map(|_| OnceCell::new()).collect();
-    let hull = |part: usize| hulls[part].get_or_init(|| hull_from_above(&parts[part].points));
-    let is_over = |other: usize, place: [f64; 2]| {
-        let (low, high) = &boxes[other];
-        (0..2).all(|k| place[k] > low[k] && place[k] < high[k]) && holds(hull(other), place)
-    };
-    let base = |(i, part): (usize, &Segment)| {
-        let heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
-        let (low, place) = (end(&heights, POINT_ENDS.0), middle(&part.points));
-        let is_below = |other: &usize| *other != i && tops[*other] > low - MEETS_M && is_over(*other, place);
-        let below: Vec<usize> = (0..parts.len()).filter(is_below).collect();
-        let lifted = below.iter().filter(|_| low > LIFTED_M);
-        let borne = lifted.filter_map(|&other| borne_at_m(part, hull(i), (place, low), &parts[other].points));
-        if let Some(at) = borne.max_by(f64::total_cmp) {
-            return (at, 0.0);
-        }
-        let is_around = |&other: &usize| {
-            is_wider(&boxes[other], &boxes[i])
-                && holds_within(hull(other), place, -WALL_M)
-                && directions(parts[other].points.iter(), place) >= AROUND
-        };
-        if below.iter().any(is_around) {
-            return BOTTOM_M;
-        }
-        // What lies along the rim of another is most likely a piece of that.
-        let rims = below.iter().map(|&other| tops[other]).filter(|top| low > CUT_M && *top < low + MEETS_M);
-        (rims.max_by(f64::total_cmp).unwrap_or(0.0), 0.0)
-    };
-    let bases: Vec<(f64, f64)> = parts.iter().enumerate().map(base).collect();
-    for (part, base) in parts.iter_mut().zip(bases) {
-        (part.base_m, part.base_sigma_m) = base;
-    }
-    tops
-}
-
-/// How far from its lower edge the top of what a thing stands on may be measured, metres. From: chosen.
-const MEETS_M: f64 = 0.03;
-/// Directions from a place that are looked at one by one, how many of them what is around shows at least, and what bears. From: chosen.
-const DIRECTIONS: usize = 36;
-const AROUND: usize = 27;
-const BEARS: usize = 15;
-
-/// How high another thing bears a part, metres: its top is seen around the part's foot, or its side below. None if it does not.
-fn borne_at_m(
-    part: &Segment,
-    hull: &[[f64; 2]],
-    (place, low): ([f64; 2], f64),
-    other: &[Point3<f64>],
-) -> Option<f64> {
-    /// It is seen no farther out of the part's outline, and no farther within, metres. From: chosen.
-    const BESIDE_M: (f64, f64) = (0.015, 0.01);
-    /// In so many points: at least, and one for so many of the part's own. From: chosen.
-    const SEEN: (usize, usize) = (5, 20);
-    /// Share of them that lie lower than the top. From: chosen.
-    const TOP: f64 = 0.8;
-    let is_beside = |p: &&Point3<f64>| {
-        let at = [p.x, p.y];
-        (p.z - low).abs() < MEETS_M
-            && holds_within(hull, at, BESIDE_M.0)
-            && !holds_within(hull, at, -BESIDE_M.1)
-    };
-    let beside: Vec<&Point3<f64>> = other.iter().filter(is_beside).collect();
-    let bears = beside.len() >= SEEN.0.max(part.points.len() / SEEN.1)
-        && directions(beside.iter().copied(), place) >= BEARS;
-    let mut heights: Vec<f64> = beside.iter().map(|p| p.z).collect();
-    bears.then(|| quantile(&mut heights, TOP))
-}
-
-/// True if a box is wider than another both ways.
-fn is_wider((low, high): &(Point3<f64>, Point3<f64>), (from, to): &(Point3<f64>, Point3<f64>)) -> bool {
-    (0..2).all(|k| high[k] - low[k] > to[k] - from[k])
-}
-
-/// In how many directions from a place points lie.
-fn directions<'a>(points: impl Iterator<Item = &'a Point3<f64>>, [x, y]: [f64; 2]) -> usize {
-    let mut seen = [false; DIRECTIONS];
-    points.for_each(|p| seen[sector(p.x - x, p.y - y, DIRECTIONS)] = true);
-    seen.iter().filter(|seen| **seen).count()
 }
 
 /// True of the normal of something upright.

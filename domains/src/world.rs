@@ -36,9 +36,7 @@ use crate::programs::Programs;
 use crate::situation::{Candidate, Known, Past, Situation, Thing};
 use crate::words::{self, Words};
 pub use error::WorldError;
-use grounds::{
-    asked_for, doors, expected, kinds, known_by_map, members, no_surface, objects, places_of, recalled,
-};
+use grounds::{doors, expected, kinds, known_by_map, members, no_surface, objects, recalled, things};
 
 /// How the reason begins why a step failed that came to its end, but not as the domain says.
 pub const NOT_AS_SAID: &str = "it has ended, but not as the domain says: ";
@@ -132,16 +130,7 @@ impl<'a> World<'a> {
         };
         let news = News::of_past(setting.past.as_ref());
         let lexicon = Lexicon::new(domain, &Places::of_body(&**robot)).remembering(setting.past.as_ref());
-        let asked: Vec<Thing> = goal
-            .asked
-            .things
-            .iter()
-            .map(|(name, on)| {
-                let rooms = lexicon.of_type("room");
-                let on = on.as_ref().map(|places| places_of(places, rooms, &surfaces)).transpose()?;
-                Ok(Thing { on, ..asked_for(domain, &news, name)? })
-            })
-            .collect::<Result<_, WorldError>>()?;
+        let asked = things(domain, goal, &news, lexicon.of_type("room"), &surfaces)?;
         let ring = &domain.config.candidates;
         let (mut poses, at) = candidates::candidates(&**robot, &chart, &surfaces, ring, here);
         let doors = doors(&**robot, here, &mut poses);

@@ -180,7 +180,6 @@ fn search_for(
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<(Outcome, Earns), PlanError> {
-    let before = attachments.statistics();
     let memory = MemoryLimit::new(options.memory_limit_bytes, options.memory_used);
     let full = AtomicBool::new(false);
     let halt = || {
@@ -220,9 +219,24 @@ fn search_for(
         let outcome = plan_classical(task, &grounded, options, soft, memory, stop, &check, on_plan)?;
         return Ok((outcome, earns));
     }
-    let calls = Calls::bind(task, &grounded, attachments)?;
+    let outcome =
+        plan_in_time((task, &grounded), attachments, limits(options, memory), stop, &check, on_plan)?;
+    Ok((outcome, earns))
+}
+
+/// Plans for a grounded task with times, calls or costs that depend on states.
+fn plan_in_time(
+    (task, grounded): (&Task, &GroundTask),
+    attachments: &Attachments,
+    limits: Limits,
+    stop: &(dyn Fn() -> bool + Sync),
+    check: &dyn Fn(Plan) -> Result<Option<Plan>, PlanError>,
+    on_plan: &mut dyn FnMut(&Plan),
+) -> Result<Outcome, PlanError> {
+    let before = attachments.statistics();
+    let calls = Calls::bind(task, grounded, attachments)?;
     configure(task, attachments)?;
-    let world = World::new(task, &grounded, calls);
+    let world = World::new(task, grounded, calls);
     let mut statistics = Statistics {
         actions: (grounded.actions.len() + grounded.durative.len()) as u64,
         ..Statistics::default()
@@ -230,7 +244,7 @@ fn search_for(
     let mut best: Option<Plan> = None;
     let mut invalid: Option<PlanError> = None;
     let mut hear = |timed: &[Timed]| {
-        let plan = to_plan(task, &grounded, &world, timed);
+        let plan = to_plan(task, grounded, &world, timed);
         match check(plan) {
             Ok(Some(plan)) => {
                 on_plan(&plan);
@@ -242,7 +256,7 @@ fn search_for(
         Ok(())
     };
     let found = match grounded.goal_reachable {
-        true => search_plans(&world, &measure(&grounded), limits(options, memory), stop, &mut hear),
+        true => search_plans(&world, &measure(grounded), limits, stop, &mut hear),
         false => Ok(Progress {
             reason: Reason::Exhausted,
             counts: Counts::default(),
@@ -262,14 +276,14 @@ fn search_for(
     let schemas = progress.overlapping.iter().map(|&act| world.acts[act as usize].origin.schema);
     let overlapping: BTreeSet<String> =
         schemas.map(|schema| task.actions[schema as usize].name.clone()).collect();
-    let why = || explain(task, &grounded, &world.calls.refusals()).but_for(task, &overlapping);
+    let why = || explain(task, grounded, &world.calls.refusals()).but_for(task, &overlapping);
     let reason = match progress.reason {
         Reason::Exhausted if best.is_some() && (!overlapping.is_empty() || world.chooses_costs()) => {
             Reason::Enough
         }
         reason => reason,
     };
-    Ok((ended(best, reason, why, statistics), earns))
+    Ok(ended(best, reason, why, statistics))
 }
 
 /// What a search with times has come to.

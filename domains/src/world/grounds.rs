@@ -36,8 +36,23 @@ pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<
     objects
 }
 
+/// The things that are asked for, each on the surfaces of the places where it is asked about.
+pub(super) fn things(
+    domain: &Domain,
+    goal: &Goal,
+    news: &News,
+    rooms: &[Named],
+    surfaces: &[situation::KnownSurface],
+) -> Result<Vec<Thing>, WorldError> {
+    let of = |(name, on): &(String, Option<Vec<String>>)| {
+        let on = on.as_ref().map(|places| places_of(places, rooms, surfaces)).transpose()?;
+        Ok(Thing { on, ..asked_for(domain, news, name)? })
+    };
+    goal.asked.things.iter().map(of).collect()
+}
+
 /// A thing that is asked for: one of the domain's objects or kinds, or one that was learned.
-pub(super) fn asked_for(domain: &Domain, news: &News, name: &str) -> Result<Thing, WorldError> {
+fn asked_for(domain: &Domain, news: &News, name: &str) -> Result<Thing, WorldError> {
     let known = situation::thing(domain, name);
     match news.thing(name) {
         None => Ok(known),
@@ -62,7 +77,7 @@ pub(super) fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[situation::
 }
 
 /// The surfaces of places that are named by their symbols: surfaces, or rooms with all that is in them.
-pub(super) fn places_of(
+fn places_of(
     places: &[String],
     rooms: &[Named],
     surfaces: &[situation::KnownSurface],

@@ -8,6 +8,7 @@ mod envelope;
 mod estimate;
 mod improve;
 mod joined;
+mod manner;
 mod mentions;
 mod order;
 mod overlap;
@@ -23,6 +24,6 @@ mod tours;
 mod world;
 
 pub(crate) use improve::{Limits, Progress, Reason, Timed, search_plans};
-pub(crate) use search::Counts;
+pub(crate) use manner::Counts;
 pub(crate) use space::Measure;
 pub(crate) use world::World;

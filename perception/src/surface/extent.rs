@@ -1,6 +1,6 @@
 //! How far a plane reaches where what stands on it hides it: on from where it was seen, as long as no camera saw it to be absent.
 
-use super::face::{CELL_M, cell_of, level};
+use super::face::Grid;
 use super::hull::{area, convex_hull, parts};
 use super::planes::{Plane, Sample};
 use super::tiles::Tiles;
@@ -38,7 +38,11 @@ pub(super) enum Owner {
 pub(super) type Owners = Tiles<Owner>;
 
 /// What hides a plane from the cameras.
-pub(super) struct Hiding<'a>(Vec<Above<'a>>);
+pub(super) struct Hiding<'a> {
+    cameras: Vec<Above<'a>>,
+    /// Cells across which a plane reaches on.
+    rings: usize,
+}
 
 /// A camera above a plane.
 struct Above<'a> {
@@ -51,11 +55,11 @@ struct Above<'a> {
 }
 
 impl<'a> Hiding<'a> {
-    pub fn of(plane: &Plane, seen: &'a Visibility) -> Hiding<'a> {
-        let world_from_flat = level(plane).inverse() * Translation3::new(0.0, 0.0, plane.offset);
+    pub fn of(plane: &Plane, grid: &Grid, seen: &'a Visibility) -> Hiding<'a> {
+        let world_from_flat = grid.turn.inverse() * Translation3::new(0.0, 0.0, plane.offset);
         let above = seen.maps.iter().map(|map| {
             let camera_from_flat = map.camera_from_world * world_from_flat;
-            let step = |axis: Vector3<f64>| camera_from_flat * axis * CELL_M;
+            let step = |axis: Vector3<f64>| camera_from_flat * axis * grid.side_m;
             Above {
                 map,
                 high_m: plane.distance(&map.viewpoint()),
@@ -63,14 +67,15 @@ impl<'a> Hiding<'a> {
                 steps: [step(Vector3::x()), step(Vector3::y())],
             }
         });
-        Hiding(above.filter(|camera| camera.high_m > 0.0).collect())
+        let cameras = above.filter(|camera| camera.high_m > 0.0).collect();
+        Hiding { cameras, rings: (HIDDEN_M / grid.side_m) as usize }
     }
 
     /// True if no camera saw anything lower than the plane at a cell, and, unless that may be unseen, one saw something above it.
     fn allows(&self, [x, y]: [i32; 2], unseen: bool) -> bool {
         let mut any = unseen;
         for [dx, dy] in PLACES {
-            for camera in &self.0 {
+            for camera in &self.cameras {
                 let above = camera.above([f64::from(x) + dx, f64::from(y) + dy]);
                 if above == Some(false) {
                     return false;
@@ -102,7 +107,7 @@ impl<'a> Hiding<'a> {
     /// tells which owners meet.
     pub fn spread(&self, owners: &mut Owners, mut border: Vec<[i32; 2]>, unseen: bool) -> Vec<[usize; 2]> {
         let mut meeting = Vec::new();
-        for _ in 0..(HIDDEN_M / CELL_M) as usize {
+        for _ in 0..self.rings {
             self.ask(owners, &border, unseen);
             let mut next = Vec::new();
             for cell in border {
@@ -148,7 +153,7 @@ impl Surface {
     /// With the places on which things stand that hide its edge.
     pub(super) fn with_hidden(self, samples: &[Sample], seen: &Visibility) -> Surface {
         let plane = Plane { normal: self.up.into_inner(), offset: self.offset_m };
-        let turn = level(&plane);
+        let grid = Grid::fine(&plane);
         let (outline, over) = (self.outline(), self.overhung());
         // What stands beside the outline, and what lies lower there.
         let (mut high, mut low) = (Vec::new(), FxHashSet::default());
@@ -158,7 +163,7 @@ impl Surface {
             if !near || outline.covers(&s.point, 0.0) || !outline.covers(&s.point, 2.0 * HIDDEN_M) {
                 continue;
             }
-            let cell = cell_of(&turn, &s.point);
+            let cell = grid.cell_of(&s.point);
             if height_m < 0.0 {
                 low.insert(cell);
             } else if !over(height_m, &s.point) {
@@ -168,10 +173,10 @@ impl Surface {
         if high.is_empty() {
             return self;
         }
-        let border = along_edges(&self, &turn);
+        let border = along_edges(&self, &grid);
         let mut owners = Owners::new();
         border.iter().for_each(|cell| *owners.at(*cell) = Owner::Part(0));
-        Hiding::of(&plane, seen).spread(&mut owners, border, true);
+        Hiding::of(&plane, &grid, seen).spread(&mut owners, border, true);
         let is_beside = |cell: &[i32; 2]| around(*cell).any(|beside| low.contains(&beside));
         let cells: FxHashSet<[i32; 2]> = high.iter().map(|(cell, _)| *cell).collect();
         let mut things = parts(cells.into_iter().map(|cell| (cell, 1)).collect());
@@ -179,7 +184,7 @@ impl Surface {
         let standing: FxHashSet<[i32; 2]> = things.into_iter().flatten().collect();
         let is_reached = |cell: &[i32; 2]| matches!(owners.get(*cell), Owner::Part(_));
         high.retain(|(cell, _)| standing.contains(cell) && is_reached(cell));
-        self.widened(&turn, high.iter().map(|(_, p)| p))
+        self.widened(&grid.turn, high.iter().map(|(_, p)| p))
     }
 
     /// With the hull around its own and some places.
@@ -198,16 +203,16 @@ impl Surface {
 }
 
 /// The cells along the edges of a surface, in order around it.
-fn along_edges(surface: &Surface, turn: &UnitQuaternion<f64>) -> Vec<[i32; 2]> {
+fn along_edges(surface: &Surface, grid: &Grid) -> Vec<[i32; 2]> {
     /// Of an edge of more cells not every one is named. From: chosen.
     const MOST: f64 = 2000.0;
     let ends = surface.hull.iter().zip(surface.hull.iter().cycle().skip(1));
     let edge = |(a, b): (&Point3<f64>, &Point3<f64>)| {
         let (a, way) = (*a, b - a);
-        let steps = (way.norm() / CELL_M).ceil().clamp(1.0, MOST) as usize;
+        let steps = (way.norm() / grid.side_m).ceil().clamp(1.0, MOST) as usize;
         (0..steps).map(move |k| a + way * (k as f64 / steps as f64))
     };
-    let mut cells: Vec<[i32; 2]> = ends.flat_map(edge).map(|p| cell_of(turn, &p)).collect();
+    let mut cells: Vec<[i32; 2]> = ends.flat_map(edge).map(|p| grid.cell_of(&p)).collect();
     cells.dedup();
     cells
 }

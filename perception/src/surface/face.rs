@@ -10,7 +10,10 @@ use crate::visibility::Visibility;
 use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Side of the cells that tell which points of a plane hang together, metres. From: chosen.
-pub(super) const CELL_M: f64 = 0.03;
+const CELL_M: f64 = 0.03;
+/// Where a plane is seen more sparsely than so many samples a cell, they are twice as wide, and twice again at the most. From: chosen.
+const FULL: f64 = 1.0;
+const WIDEST_CELL_M: f64 = 4.0 * CELL_M;
 /// Fewer samples are no piece of a plane. From: chosen.
 const FEWEST_OF_PIECE: u32 = 5;
 /// A part whose points lie on average so far off the common plane has one of its own, metres. From: chosen.
@@ -24,21 +27,15 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
     if !viewpoints.is_empty() && viewpoints.iter().all(|v| plane.distance(v) < LEAST_EYE_M) {
         return Vec::new();
     }
-    let turn = level(plane);
+    let held: Vec<&Sample> = samples.iter().filter(|s| plane.holds(s)).collect();
+    let grid = Grid::filled_by(plane, &held);
+    let held: Vec<([i32; 2], &Sample)> = held.into_iter().map(|s| (grid.cell_of(&s.point), s)).collect();
     let mut counts: Tiles<Counts> = Tiles::new();
-    let mut held: Vec<([i32; 2], &Sample)> = Vec::new();
+    held.iter().for_each(|(cell, _)| counts.at(*cell).near += 1);
     for s in samples {
-        let (distance, band) = (plane.distance(&s.point), Plane::band_m(s));
-        if distance.abs() > 2.0 * band {
-            continue;
-        }
-        let cell = cell_of(&turn, &s.point);
-        let counts = counts.at(cell);
-        if distance.abs() <= band {
-            counts.near += 1;
-            held.push((cell, s));
-        } else {
-            counts.beside[usize::from(distance > 0.0)] += 1;
+        let (distance_m, band_m) = (plane.distance(&s.point), Plane::band_m(s));
+        if distance_m.abs() > band_m && distance_m.abs() <= 2.0 * band_m {
+            counts.at(grid.cell_of(&s.point)).beside[usize::from(distance_m > 0.0)] += 1;
         }
     }
     let is_face = |cell: [i32; 2]| {
@@ -55,7 +52,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
         let all = all(cells);
         all.near >= FEWEST_OF_PIECE && !all.is_slice()
     });
-    let mut parts = joined(pieces, &Hiding::of(plane, seen));
+    let mut parts = joined(pieces, &Hiding::of(plane, &grid, seen));
     parts.sort_by_cached_key(|cells| std::cmp::Reverse(all(cells).near));
     let part_of = owners(&parts);
     let mut members: Vec<Vec<&Sample>> = vec![Vec::new(); parts.len()];
@@ -74,7 +71,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
         let own = (n > 0 && mean.abs() > OWN_PLANE_M)
             .then(|| least_squares(members.iter().copied(), &plane.normal))
             .flatten();
-        let hull = hull_of(cells);
+        let hull = hull_of(cells, grid.side_m);
         let own_plane = own.unwrap_or(*plane);
         let surface =
             || Surface { residual_m, ..face(&own_plane, plane, &hull, members, scale, samples.len()) };
@@ -137,22 +134,55 @@ impl Counts {
 }
 
 /// Corners of the hull around cells, metres.
-fn hull_of(cells: &[[i32; 2]]) -> Vec<[f64; 2]> {
+fn hull_of(cells: &[[i32; 2]], side_m: f64) -> Vec<[f64; 2]> {
     // What lies between two of one column is no corner.
     let columns = cells.chunk_by(|a, b| a[0] == b[0] && a[1] < b[1]);
     let ends = columns.flat_map(|column| [column[0], [column[0][0], column[column.len() - 1][1] + 1]]);
     let corners = ends.flat_map(|[x, y]| [[x, y], [x + 1, y]]);
-    convex_hull(corners.map(|[x, y]| [f64::from(x) * CELL_M, f64::from(y) * CELL_M]).collect())
+    convex_hull(corners.map(|cell| cell.map(|at| f64::from(at) * side_m)).collect())
 }
 
-/// The cell that a place lies in, once turned.
-pub(super) fn cell_of(turn: &UnitQuaternion<f64>, p: &Point3<f64>) -> [i32; 2] {
-    let flat = turn * p;
-    [floor(flat.x / CELL_M), floor(flat.y / CELL_M)]
+/// A plane in square cells.
+pub(super) struct Grid {
+    /// Turns the plane's normal into z.
+    pub turn: UnitQuaternion<f64>,
+    /// Of a cell, metres.
+    pub side_m: f64,
+}
+
+impl Grid {
+    /// The finest.
+    pub fn fine(plane: &Plane) -> Grid {
+        Grid { turn: level(plane), side_m: CELL_M }
+    }
+
+    /// The finest in which samples of the plane lie cell by cell rather than here and there.
+    fn filled_by(plane: &Plane, held: &[&Sample]) -> Grid {
+        /// Of the widest cells, one sample in so many tells enough. From: work.
+        const STRIDE: usize = 4;
+        let mut grid = Grid { side_m: WIDEST_CELL_M, ..Grid::fine(plane) };
+        let (mut seen, mut cells) = (Tiles::new(), 0);
+        for s in held.iter().step_by(STRIDE) {
+            let is_seen: &mut bool = seen.at(grid.cell_of(&s.point));
+            cells += usize::from(!*is_seen);
+            *is_seen = true;
+        }
+        let per_cell = held.len() as f64 / f64::max(cells as f64, 1.0);
+        while grid.side_m > CELL_M && per_cell * (grid.side_m / (2.0 * WIDEST_CELL_M)).powi(2) >= FULL {
+            grid.side_m /= 2.0;
+        }
+        grid
+    }
+
+    /// The cell that a place lies in.
+    pub fn cell_of(&self, p: &Point3<f64>) -> [i32; 2] {
+        let flat = self.turn * p;
+        [floor(flat.x / self.side_m), floor(flat.y / self.side_m)]
+    }
 }
 
 /// Turns the normal of a plane into z.
-pub(super) fn level(plane: &Plane) -> UnitQuaternion<f64> {
+fn level(plane: &Plane) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(&plane.normal, &Vector3::z()).unwrap_or_else(|| {
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(
             &Vector3::x_axis(),

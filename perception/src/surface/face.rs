@@ -11,8 +11,10 @@ use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Side of the cells that tell which points of a plane hang together, metres. From: chosen.
 const CELL_M: f64 = 0.03;
-/// Where a plane is seen more sparsely than so many samples a cell, they are twice as wide, and twice again at the most. From: chosen.
-const FULL: f64 = 1.0;
+/// Where a wide plane is seen more sparsely than so many samples a cell, they are twice as wide, and twice again at the most, as long as
+/// there are so many of them. From: chosen.
+const FULL: f64 = 2.0;
+const MANY: f64 = 1000.0;
 const WIDEST_CELL_M: f64 = 4.0 * CELL_M;
 /// Fewer samples are no piece of a plane. From: chosen.
 const FEWEST_OF_PIECE: u32 = 5;
@@ -161,15 +163,15 @@ impl Grid {
         /// Of the widest cells, one sample in so many tells enough. From: work.
         const STRIDE: usize = 4;
         let mut grid = Grid { side_m: WIDEST_CELL_M, ..Grid::fine(plane) };
-        let (mut seen, mut cells) = (Tiles::new(), 0);
+        let (mut seen, mut cells) = (Tiles::new(), 0.0);
         for s in held.iter().step_by(STRIDE) {
             let is_seen: &mut bool = seen.at(grid.cell_of(&s.point));
-            cells += usize::from(!*is_seen);
+            cells += if *is_seen { 0.0 } else { 1.0 };
             *is_seen = true;
         }
-        let per_cell = held.len() as f64 / f64::max(cells as f64, 1.0);
-        while grid.side_m > CELL_M && per_cell * (grid.side_m / (2.0 * WIDEST_CELL_M)).powi(2) >= FULL {
+        while grid.side_m > CELL_M && (cells < MANY || held.len() as f64 >= 4.0 * cells * FULL) {
             grid.side_m /= 2.0;
+            cells *= 4.0;
         }
         grid
     }

@@ -50,7 +50,7 @@ pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     let turned = turner.turned(best?.1);
     let turned = turner.settled(turned);
     let squares = turner.squares_within(&turned, f64::INFINITY)?;
-    Some(turned.rectangle((squares / turner.len as f64).sqrt()))
+    Some(turned.rectangle(turner.origin, (squares / turner.len as f64).sqrt()))
 }
 
 /// True if some rectangle fits the points, as [`fit`] does, with a lesser residual.
@@ -73,20 +73,22 @@ pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<Rectangle> {
     }
     let mut turner = Turner::of(points);
     (0..TURNS)
-        .map(|turn| turner.turned(turn).rectangle(0.0))
+        .map(|turn| turner.turned(turn).rectangle(turner.origin, 0.0))
         .min_by(|a, b| (a.sides_m[0] * a.sides_m[1]).total_cmp(&(b.sides_m[0] * b.sides_m[1])))
 }
 
 /// Points seen from above, and their coordinates along the sides of the rectangle that was turned last.
 struct Turner {
-    /// How many points there are. All that follows is filled up to whole blocks with what lies outside of no side.
+    /// How many points there are, and the first of them, metres. All that follows is as seen from there, where a tenth of a micrometre is
+    /// more than they know, and filled up to whole blocks with what lies outside of no side.
     len: usize,
-    xs: Vec<f64>,
-    ys: Vec<f64>,
-    us: Vec<f64>,
-    vs: Vec<f64>,
+    origin: [f64; 2],
+    xs: Vec<f32>,
+    ys: Vec<f32>,
+    us: Vec<f32>,
+    vs: Vec<f32>,
     /// How far out each block of the points lies across each side: less is farther.
-    reaches: Vec<[f64; 4]>,
+    reaches: Vec<[f32; 4]>,
     /// Across the ends of `us`, then of `vs`.
     sides: [Side; 4],
 }
@@ -94,20 +96,21 @@ struct Turner {
 impl Turner {
     fn of(points: &[Point3<f64>]) -> Turner {
         let stride = (points.len() / LEAST).max(1);
-        let (mut xs, mut ys): (Vec<f64>, Vec<f64>) =
-            points.iter().step_by(stride).map(|p| (p.x, p.y)).unzip();
+        let origin = points.first().map_or([0.0; 2], |p| [p.x, p.y]);
+        let from_there = |p: &Point3<f64>| ((p.x - origin[0]) as f32, (p.y - origin[1]) as f32);
+        let (mut xs, mut ys): (Vec<f32>, Vec<f32>) = points.iter().step_by(stride).map(from_there).unzip();
         let len = xs.len();
         for column in [&mut xs, &mut ys] {
-            column.resize(len.next_multiple_of(BLOCK), f64::NAN);
+            column.resize(len.next_multiple_of(BLOCK), f32::NAN);
         }
-        let coordinates = vec![f64::NAN; xs.len()];
-        let reaches = vec![[f64::INFINITY; 4]; xs.len() / BLOCK];
+        let coordinates = vec![f32::NAN; xs.len()];
+        let reaches = vec![[f32::INFINITY; 4]; xs.len() / BLOCK];
         let last = len.saturating_sub(1);
         let rank = |share: f64| (last as f64 * share).round() as usize;
         let outside = [rank(0.02), last - rank(0.98)];
         let sides =
             [0, 1, 0, 1].map(|end| Side { outermost: (0..=outside[end]).collect(), found: Vec::new() });
-        Turner { len, xs, ys, us: coordinates.clone(), vs: coordinates, reaches, sides }
+        Turner { len, origin, xs, ys, us: coordinates.clone(), vs: coordinates, reaches, sides }
     }
 
     fn turned(&mut self, turn: usize) -> Turned {
@@ -115,13 +118,13 @@ impl Turner {
         let [xs, ys] = [&self.xs, &self.ys].map(|column| column.as_chunks::<BLOCK>().0);
         let [us, vs] = [&mut self.us, &mut self.vs].map(|column| column.as_chunks_mut::<BLOCK>().0);
         for ((((x, y), u), v), reach) in xs.iter().zip(ys).zip(us).zip(vs).zip(&mut self.reaches) {
-            *reach = turn_block([x, y], [u, v], (sin, cos));
+            *reach = turn_block([x, y], [u, v], (sin as f32, cos as f32));
         }
         let reach = |side: usize| self.reaches.iter().map(move |reach| reach[side]);
         let [left, right, front, back] = &mut self.sides;
         let u = [left.turn(&self.us, reach(0), |u| u), -right.turn(&self.us, reach(1), |u| -u)];
         let v = [front.turn(&self.vs, reach(2), |v| v), -back.turn(&self.vs, reach(3), |v| -v)];
-        Turned { sin, cos, u, v }
+        Turned { sin, cos, u: u.map(f64::from), v: v.map(f64::from) }
     }
 
     /// The same with each edge amid the points that are nearest to it: bounds lie as far out as noise reaches.
@@ -132,7 +135,8 @@ impl Turner {
         for _ in 0..ROUNDS {
             let ([u0, u1], [v0, v1]) = (turned.u, turned.v);
             let mut sums = [(0.0, 0.0); 4];
-            for (u, v) in self.us.iter().zip(&self.vs).take(self.len) {
+            let places = self.us.iter().zip(&self.vs).take(self.len);
+            for (u, v) in places.map(|(u, v)| (f64::from(*u), f64::from(*v))) {
                 let away = [u - u0, u - u1, v - v0, v - v1].map(f64::abs);
                 let nearest = (0..4).min_by(|&a, &b| away[a].total_cmp(&away[b])).unwrap_or(0);
                 sums[nearest].0 += if nearest < 2 { u } else { v };
@@ -147,22 +151,25 @@ impl Turner {
 
     /// Sum of the squared distances of the points from the nearest edge; `None` if it is more than the bound.
     fn squares_within(&self, turned: &Turned, bound: f64) -> Option<f64> {
-        let ([u0, u1], [v0, v1]) = (turned.u, turned.v);
-        let lesser = |a: f64, b: f64| if a < b { a } else { b };
-        let (n, mut sum) = (self.len, 0.0);
-        for (us, vs) in self.us[..n].chunks(BLOCK).zip(self.vs[..n].chunks(BLOCK)) {
-            let mut squares = [0.0; BLOCK];
-            for ((square, u), v) in squares.iter_mut().zip(us).zip(vs) {
-                let across = lesser((u - u0).abs(), (u - u1).abs());
-                let edge = lesser(across, lesser((v - v0).abs(), (v - v1).abs()));
-                *square = edge * edge;
-            }
-            squares.iter().for_each(|square| sum += square);
+        let ([u0, u1], [v0, v1]) = (turned.u.map(|u| u as f32), turned.v.map(|v| v as f32));
+        let lesser = |a: f32, b: f32| if a < b { a } else { b };
+        let square = |u: f32, v: f32| {
+            let across = lesser((u - u0).abs(), (u - u1).abs());
+            let edge = lesser(across, lesser((v - v0).abs(), (v - v1).abs()));
+            edge * edge
+        };
+        let (us, last_us) = self.us[..self.len].as_chunks::<BLOCK>();
+        let (vs, last_vs) = self.vs[..self.len].as_chunks::<BLOCK>();
+        let mut sum = 0.0;
+        for (us, vs) in us.iter().zip(vs) {
+            let squares: [f32; BLOCK] = std::array::from_fn(|i| square(us[i], vs[i]));
+            sum += f64::from(squares.iter().sum::<f32>());
             if sum > bound {
                 return None;
             }
         }
-        Some(sum)
+        sum += last_us.iter().zip(last_vs).map(|(u, v)| f64::from(square(*u, *v))).sum::<f64>();
+        (sum <= bound).then_some(sum)
     }
 }
 
@@ -170,15 +177,15 @@ impl Turner {
 struct Side {
     /// Those and the one on the side: they were the farthest at the last turn.
     outermost: Vec<usize>,
-    found: Vec<(f64, usize)>,
+    found: Vec<(f32, usize)>,
 }
 
 impl Side {
     /// Where the side lies when turned, from where the points lie across it and how far out each block of them does: less is farther out.
-    fn turn(&mut self, places: &[f64], reaches: impl Iterator<Item = f64>, way: impl Fn(f64) -> f64) -> f64 {
+    fn turn(&mut self, places: &[f32], reaches: impl Iterator<Item = f32>, way: impl Fn(f32) -> f32) -> f32 {
         // The side lies no farther in than the points that were outermost before.
         let before = self.outermost.iter().map(|&i| way(places[i]));
-        let limit = before.fold(f64::NEG_INFINITY, f64::max);
+        let limit = before.fold(f32::NEG_INFINITY, f32::max);
         self.found.clear();
         for ((block, first), reach) in
             places.as_chunks::<BLOCK>().0.iter().zip((0..).step_by(BLOCK)).zip(reaches)
@@ -200,26 +207,26 @@ impl Side {
 /// Turns the points of a block, and tells how far out they lie across each side; those that are no number count for nothing.
 #[inline(always)]
 fn turn_block(
-    [xs, ys]: [&[f64; BLOCK]; 2],
-    [us, vs]: [&mut [f64; BLOCK]; 2],
-    (sin, cos): (f64, f64),
-) -> [f64; 4] {
+    [xs, ys]: [&[f32; BLOCK]; 2],
+    [us, vs]: [&mut [f32; BLOCK]; 2],
+    (sin, cos): (f32, f32),
+) -> [f32; 4] {
     /// Points that are turned side by side. From: work.
     const LANES: usize = 4;
-    let lesser = |a: f64, b: f64| if a < b { a } else { b };
-    let greater = |a: f64, b: f64| if a > b { a } else { b };
-    let (mut least, mut most) = ([[f64::INFINITY; LANES]; 2], [[f64::NEG_INFINITY; LANES]; 2]);
+    let lesser = |a: f32, b: f32| if a < b { a } else { b };
+    let greater = |a: f32, b: f32| if a > b { a } else { b };
+    let (mut least, mut most) = ([[f32::INFINITY; LANES]; 2], [[f32::NEG_INFINITY; LANES]; 2]);
     let [xs, ys] = [xs, ys].map(|column| column.as_chunks::<LANES>().0);
     let [us, vs] = [us, vs].map(|column| column.as_chunks_mut::<LANES>().0);
     for (((x, y), us), vs) in xs.iter().zip(ys).zip(us).zip(vs) {
-        let u: [f64; LANES] = std::array::from_fn(|i| cos * x[i] + sin * y[i]);
-        let v: [f64; LANES] = std::array::from_fn(|i| -sin * x[i] + cos * y[i]);
+        let u: [f32; LANES] = std::array::from_fn(|i| cos * x[i] + sin * y[i]);
+        let v: [f32; LANES] = std::array::from_fn(|i| -sin * x[i] + cos * y[i]);
         least = [(u, least[0]), (v, least[1])].map(|(a, b)| std::array::from_fn(|i| lesser(a[i], b[i])));
         most = [(u, most[0]), (v, most[1])].map(|(a, b)| std::array::from_fn(|i| greater(a[i], b[i])));
         (*us, *vs) = (u, v);
     }
-    let [left, front] = least.map(|lanes| lanes.into_iter().fold(f64::INFINITY, lesser));
-    let [right, back] = most.map(|lanes| lanes.into_iter().fold(f64::NEG_INFINITY, greater));
+    let [left, front] = least.map(|lanes| lanes.into_iter().fold(f32::INFINITY, lesser));
+    let [right, back] = most.map(|lanes| lanes.into_iter().fold(f32::NEG_INFINITY, greater));
     [left, -right, front, -back]
 }
 
@@ -232,13 +239,14 @@ struct Turned {
 }
 
 impl Turned {
-    fn rectangle(&self, residual_m: f64) -> Rectangle {
+    /// Of points that were looked at as seen from a place.
+    fn rectangle(&self, origin: [f64; 2], residual_m: f64) -> Rectangle {
         let ([u0, u1], [v0, v1]) = (self.u, self.v);
         let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
         let (a, b) = (u1 - u0, v1 - v0);
         Rectangle {
-            x: self.cos * u - self.sin * v,
-            y: self.sin * u + self.cos * v,
+            x: origin[0] + self.cos * u - self.sin * v,
+            y: origin[1] + self.sin * u + self.cos * v,
             sides_m: [a.max(b), a.min(b)],
             turn: (self.sin, self.cos),
             along_m: [a, b],

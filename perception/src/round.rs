@@ -230,15 +230,15 @@ pub(crate) fn side_band(base_m: f64, top_m: f64) -> Range<f64> {
 /// The circle through three points that most points lie on and fewest outside of, seen from above.
 fn propose(side: &Side, tolerance: f64, seed: u64) -> Option<[f64; 3]> {
     let mut rng = Draws::new(seed);
-    let judges = side.thinned(JUDGES);
-    let mut best: Option<(f64, [f64; 3])> = None;
+    let judges = side.judges(JUDGES);
+    let mut best: Option<(f32, [f64; 3])> = None;
     for _ in 0..PROPOSALS {
         let mut pick = || side.place(rng.below(side.len()));
         let Some(circle) = circumcircle(pick(), pick(), pick()) else { continue };
         if circle[2] < RADII_M.0 || circle[2] > RADII_M.1 {
             continue;
         }
-        let beaten = best.map_or(f64::NEG_INFINITY, |(score, _)| score);
+        let beaten = best.map_or(f32::NEG_INFINITY, |(score, _)| score);
         best = judges.score(circle, tolerance, beaten).map(|score| (score, circle)).or(best);
     }
     best.map(|(_, circle)| circle)
@@ -254,7 +254,7 @@ fn circumcircle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<[f64; 3]> {
     }
     let (b2, c2) = (bx * bx + by * by, cx * cx + cy * cy);
     let (ux, uy) = ((cy * b2 - by * c2) / twice, (bx * c2 - cx * b2) / twice);
-    Some([a[0] + ux, a[1] + uy, ux.hypot(uy)])
+    Some([a[0] + ux, a[1] + uy, distance(ux, uy)])
 }
 
 /// One Gauss-Newton step on axis, radius and slope over the points within `gate` of the side.

@@ -18,6 +18,10 @@ mod times;
 mod variants;
 
 use std::path::Path;
+/// As the program has it.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

@@ -7,6 +7,7 @@
 use super::asker::{Asker, Lying};
 use super::body::{Body, Ray};
 use crate::noise::{CELL_PX, KINECT, Sensor};
+use crate::round::distance;
 use crate::surface::floor;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
@@ -151,7 +152,7 @@ impl ViewRays {
                     continue;
                 }
                 let along: [f64; 3] = ray(u as f64, v as f64).into();
-                let sigma_m = sensor.frontal_sigma_m(depth_m).hypot(ROUGH_M);
+                let sigma_m = distance(sensor.frontal_sigma_m(depth_m), ROUGH_M);
                 let p = Point3::from([0, 1, 2].map(|k: usize| from[k] + depth_m * along[k]));
                 let behind_m = (around.base_m - from[2]) / along[2];
                 let density = SURFACE * normal(depth_m - behind_m, sigma_m) + ELSE / ANYWHERE_M;
@@ -183,14 +184,14 @@ impl ViewRays {
         }
         let shared_m = sum / (weight + SHARED_M.powi(-2));
         let bodies = self.pixels.iter().zip(met).filter(|(_, at_m)| at_m.is_finite());
-        let logs = bodies.map(|(pixel, at_m)| self.log_ratio(pixel, body, at_m, shared_m));
-        self.looks * logs.sum::<f64>() - 0.5 * (shared_m / SHARED_M).powi(2)
+        let ratios = bodies.map(|(pixel, at_m)| self.ratio(pixel, body, at_m, shared_m));
+        self.looks * log_product(ratios) - 0.5 * (shared_m / SHARED_M).powi(2)
     }
 
-    /// Log of how much likelier a pixel's depth is where it meets a body at a depth than without the body. What speaks against it may
+    /// How much likelier a pixel's depth is where it meets a body at a depth than without the body. What speaks against it may
     /// have passed by the body's edge.
     #[inline(always)]
-    fn log_ratio(&self, pixel: &Pixel, body: &impl Body, at_m: f64, shared_m: f64) -> f64 {
+    fn ratio(&self, pixel: &Pixel, body: &impl Body, at_m: f64, shared_m: f64) -> f64 {
         let mut with = pixel.with_body(at_m + shared_m);
         if with < pixel.without {
             let aside = self.wander.map(|by| {
@@ -202,8 +203,25 @@ impl ViewRays {
             });
             with = (with + aside.iter().sum::<f64>()) / (1.0 + aside.len() as f64);
         }
-        (with / pixel.without).ln().clamp(-MOST, MOST)
+        with / pixel.without
     }
+}
+
+/// Log of the product of ratios, each of which says no more than [`MOST`]: the log of a few at once.
+fn log_product(ratios: impl Iterator<Item = f64>) -> f64 {
+    /// A product beyond these could not take one more, e to the power of so many times [`MOST`]. From: rounding.
+    const WITHIN: f64 = 40.0;
+    let (least, most) = ((-MOST).exp(), MOST.exp());
+    let (low, high) = ((-WITHIN * MOST).exp(), (WITHIN * MOST).exp());
+    let (mut log, mut product) = (0.0, 1.0_f64);
+    for ratio in ratios {
+        product *= ratio.clamp(least, most);
+        if product < low || product > high {
+            log += product.ln();
+            product = 1.0;
+        }
+    }
+    log + product.ln()
 }
 
 impl Pixel {

@@ -8,6 +8,12 @@ const LANES: usize = 4;
 
 type Lanes = [f64; LANES];
 
+/// Points that judge circles, seen from above. A tenth of a micrometre is more than they know.
+pub(super) struct Judges {
+    x: Vec<f32>,
+    y: Vec<f32>,
+}
+
 /// Filled up with NaN, which is on no side.
 pub(super) struct Side {
     x: Vec<f64>,
@@ -71,31 +77,11 @@ impl Side {
         Side { x: pick(&self.x), y: pick(&self.y), z: pick(&self.z), len }
     }
 
-    /// How well a circle explains the points, seen from above; `None` if not better than `best`.
-    pub fn score(&self, [x, y, r]: [f64; 3], tolerance: f64, best: f64) -> Option<f64> {
-        /// What a point inside of the circle says against it: less than one outside, a half. From: chosen.
-        const INSIDE: f64 = 0.15;
-        /// Points after which a circle may be left. From: work.
-        const BLOCK: usize = 16;
-        /// A score that is no more than this below the best may be it. From: rounding.
-        const ROUNDING: f64 = 1e-6;
-        let mut score = 0.0;
-        let mut left = self.len;
-        for (xs, ys) in self.x[..self.len].chunks(BLOCK).zip(self.y[..self.len].chunks(BLOCK)) {
-            if score + left as f64 + ROUNDING < best {
-                return None;
-            }
-            let mut claims = [0.0; BLOCK];
-            for ((claim, px), py) in claims.iter_mut().zip(xs).zip(ys) {
-                let d = distance(px - x, py - y) - r;
-                // Inside may be the inside of a vessel; outside can only be a handle or another body.
-                let off = if d > 0.0 { -0.5 } else { -INSIDE };
-                *claim = if d.abs() < tolerance { 1.0 - (d / tolerance).powi(2) } else { off };
-            }
-            claims.iter().for_each(|claim| score += claim);
-            left -= xs.len();
-        }
-        (score > best).then_some(score)
+    /// Every so manieth point: so many, or less than twice as many.
+    pub fn judges(&self, count: usize) -> Judges {
+        let stride = (self.len / count).max(1);
+        let pick = |column: &[f64]| column[..self.len].iter().step_by(stride).map(|c| *c as f32).collect();
+        Judges { x: pick(&self.x), y: pick(&self.y) }
     }
 
     /// Sums over the points within `gate` of the side of a body.
@@ -117,6 +103,39 @@ impl Side {
             xz, yz, z,     zz,
         );
         Sums { normal, right: Vector4::new(xr, yr, r, zr), squares, count, spread, outside }
+    }
+}
+
+impl Judges {
+    /// How well a circle explains the points, seen from above; `None` if not better than `best`.
+    pub fn score(&self, circle: [f64; 3], tolerance: f64, best: f32) -> Option<f32> {
+        /// What a point inside of the circle says against it: less than one outside, a half. From: chosen.
+        const INSIDE: f32 = 0.15;
+        /// Points after which a circle may be left. From: work.
+        const BLOCK: usize = 16;
+        /// A score that is no more than this below the best may be it. From: rounding.
+        const ROUNDING: f32 = 1e-3;
+        let ([x, y, r], per_m) = (circle.map(|c| c as f32), (1.0 / tolerance) as f32);
+        let claim = |x_m: f32, y_m: f32| {
+            let off = ((x_m * x_m + y_m * y_m).sqrt() - r) * per_m;
+            // Inside may be the inside of a vessel; outside can only be a handle or another body.
+            let beyond = if off > 0.0 { -0.5 } else { -INSIDE };
+            if off.abs() < 1.0 { 1.0 - off * off } else { beyond }
+        };
+        let mut score = 0.0;
+        let (xs, last_xs) = self.x.as_chunks::<BLOCK>();
+        let (ys, last_ys) = self.y.as_chunks::<BLOCK>();
+        let mut left = self.x.len();
+        for (xs, ys) in xs.iter().zip(ys) {
+            if score + left as f32 + ROUNDING < best {
+                return None;
+            }
+            let claims: [f32; BLOCK] = std::array::from_fn(|i| claim(xs[i] - x, ys[i] - y));
+            score += claims.iter().sum::<f32>();
+            left -= BLOCK;
+        }
+        score += last_xs.iter().zip(last_ys).map(|(px, py)| claim(px - x, py - y)).sum::<f32>();
+        (score > best).then_some(score)
     }
 }
 

@@ -5,6 +5,7 @@ use super::{VOXEL_ENDS, is_upright, quantile};
 use crate::surface::Surface;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::{Point3, Vector2, Vector3};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Fewest voxels of a face that tell where it lies. From: chosen.
@@ -48,7 +49,9 @@ pub(super) fn join(voxels: &Voxels, part_of_voxel: &mut [u32], seen: &Visibility
     for (voxel, part) in part_of_voxel.iter().enumerate() {
         members.entry(*part).or_default().push(voxel);
     }
-    let bodies: Vec<Body> = members.iter().map(|(name, of)| Body::of(*name, voxels, of)).collect();
+    let all: Vec<(&u32, &Vec<usize>)> = members.iter().collect();
+    let body = |(name, of): (&u32, &Vec<usize>)| Body::of(*name, voxels, of);
+    let bodies: Vec<Body> = all.into_par_iter().with_max_len(1).map(body).collect();
     let mut names: BTreeMap<u32, u32> = members.keys().map(|name| (*name, *name)).collect();
     for (i, one) in bodies.iter().enumerate() {
         for other in &bodies[i + 1..] {

@@ -18,33 +18,54 @@ const SMOOTH_RAD: f64 = 0.35;
 
 /// For each voxel the number of its part. Numbers are voxel indices, the same in every run.
 pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
-    if !options.part_touching {
-        let thin = thin(voxels);
-        let mut whole = Union::new(voxels.len());
-        for i in (0..voxels.len()).filter(|&i| !thin[i]) {
-            let near = voxels.neighbours(i).iter().filter(|&&j| !thin[j as usize]);
-            near.for_each(|&j| whole.join(i as u32, j));
-        }
-        let mut parts: Vec<u32> = (0..voxels.len() as u32).map(|i| whole.root(i)).collect();
-        adopt(voxels, &thin, &mut parts);
-        return parts;
-    }
     let thin = thin(voxels);
-    let patch_of = grow_patches(voxels, &thin);
-    let patches = describe(voxels, &patch_of);
-    let borders = borders(voxels, &patch_of, &thin);
-    let mut joined = Union::new(patches.len());
-    for border in &borders {
-        let (a, b) = border.patches;
-        if meets_convexly(&patches[a as usize], &patches[b as usize], border) {
-            joined.join(a, b);
-        }
-    }
-    mend(&mut joined, &borders, voxels, &patch_of);
-    let root_voxel = first_voxels(&patch_of, &mut joined, patches.len());
-    let mut parts: Vec<u32> = patch_of.iter().map(|&p| root_voxel[joined.root(p) as usize]).collect();
+    let full: Vec<usize> = (0..voxels.len()).filter(|&i| !thin[i]).collect();
+    let sets = voxels.together(&full);
+    let mut place = vec![None; voxels.len()];
+    sets.iter().for_each(|set| (0..).zip(set).for_each(|(local, &voxel)| place[voxel] = Some(local)));
+    let name = |set: &Vec<usize>| match options.part_touching {
+        true => Piece { voxels, of: set, place: &place }.parts(),
+        false => vec![set[0] as u32; set.len()],
+    };
+    let names: Vec<Vec<u32>> = sets.par_iter().with_max_len(1).map(name).collect();
+    let mut parts: Vec<u32> = (0..voxels.len() as u32).collect();
+    let named = sets.iter().flatten().zip(names.iter().flatten());
+    named.for_each(|(&voxel, &name)| parts[voxel] = name);
     adopt(voxels, &thin, &mut parts);
     parts
+}
+
+/// Voxels that hang together, none of them thin. Its functions number them as they come.
+pub(super) struct Piece<'a> {
+    pub voxels: &'a Voxels,
+    /// Their numbers among all, ascending.
+    pub of: &'a [usize],
+    /// The number here of each of all voxels that is in some piece.
+    place: &'a [Option<u32>],
+}
+
+impl Piece<'_> {
+    /// The neighbours of one.
+    fn near(&self, voxel: usize) -> impl Iterator<Item = u32> {
+        self.voxels.neighbours(self.of[voxel]).iter().filter_map(|&j| self.place[j as usize])
+    }
+
+    /// For each the number of its part.
+    fn parts(&self) -> Vec<u32> {
+        let patch_of = grow_patches(self);
+        let patches = describe(self, &patch_of);
+        let borders = borders(self, &patch_of);
+        let mut joined = Union::new(patches.len());
+        for border in &borders {
+            let (a, b) = border.patches;
+            if meets_convexly(&patches[a as usize], &patches[b as usize], border) {
+                joined.join(a, b);
+            }
+        }
+        mend(&mut joined, &borders, self, &patch_of);
+        let root_voxel = first_voxels(&patch_of, &mut joined, patches.len());
+        patch_of.iter().map(|&p| self.of[root_voxel[joined.root(p) as usize] as usize] as u32).collect()
+    }
 }
 
 /// Voxels with far fewer points than those around them: frayed edges, which hang between objects and connect nothing.
@@ -76,32 +97,33 @@ fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
 }
 
 /// Patches: voxels around a flat seed with like normals. Flattest seeds first.
-fn grow_patches(voxels: &Voxels, thin: &[bool]) -> Vec<u32> {
+fn grow_patches(piece: &Piece) -> Vec<u32> {
     /// No patch. From: mark.
     const NONE: u32 = u32::MAX;
+    let Piece { voxels, of, .. } = *piece;
     // Curvatures are not negative: their bits are in the order of their values.
-    let key = |(curvature, voxel): (&f64, u32)| u128::from(curvature.to_bits()) << 32 | u128::from(voxel);
-    let mut order: Vec<u128> = voxels.curvatures.iter().zip(0..).map(key).collect();
+    let key = |(&voxel, local): (&usize, u32)| {
+        u128::from(voxels.curvatures[voxel].to_bits()) << 32 | u128::from(local)
+    };
+    let mut order: Vec<u128> = of.iter().zip(0..).map(key).collect();
     order.par_sort_unstable();
-    let mut patch_of = vec![NONE; voxels.len()];
-    let mut patches = 0;
+    let mut patch_of = vec![NONE; of.len()];
+    let (mut patches, mut open) = (0, Vec::new());
     for seed in order.into_iter().map(|key| key as u32) {
         if patch_of[seed as usize] != NONE {
             continue;
         }
-        let (origin, normal) = (voxels.centres[seed as usize], voxels.normals[seed as usize]);
-        let mut open = vec![seed];
+        let (origin, normal) = (voxels.centres[of[seed as usize]], voxels.normals[of[seed as usize]]);
         patch_of[seed as usize] = patches;
+        open.push(seed);
         while let Some(voxel) = open.pop() {
-            for &next in voxels.neighbours(voxel as usize) {
-                let n = next as usize;
-                if patch_of[n] == NONE
-                    && !thin[n]
-                    && !thin[seed as usize]
-                    && (voxels.centres[n] - origin).norm() < PATCH_REACH_M
+            for next in piece.near(voxel as usize) {
+                let (own, n) = (&mut patch_of[next as usize], of[next as usize]);
+                if *own == NONE
+                    && (voxels.centres[n] - origin).norm_squared() < PATCH_REACH_M * PATCH_REACH_M
                     && voxels.normals[n].dot(&normal) > PATCH_COS
                 {
-                    patch_of[n] = patches;
+                    *own = patches;
                     open.push(next);
                 }
             }
@@ -118,7 +140,7 @@ struct Patch {
     voxels: u32,
 }
 
-fn describe(voxels: &Voxels, patch_of: &[u32]) -> Vec<Patch> {
+fn describe(Piece { voxels, of, .. }: &Piece, patch_of: &[u32]) -> Vec<Patch> {
     /// One over the curvature of a ball, whose normals tell nothing. From: derived, equal moments along three axes.
     const PER_BALL: f64 = 3.0;
     /// What a normal counts for at the least. From: chosen.
@@ -129,7 +151,7 @@ fn describe(voxels: &Voxels, patch_of: &[u32]) -> Vec<Patch> {
     let mut patches: Vec<Patch> = (0..count)
         .map(|_| Patch { centre: Point3::origin(), normal: Vector3::zeros(), points: 0, voxels: 0 })
         .collect();
-    for (i, &p) in patch_of.iter().enumerate() {
+    for (&i, &p) in of.iter().zip(patch_of) {
         let patch = &mut patches[p as usize];
         patch.centre.coords += voxels.centres[i].coords;
         patch.normal += voxels.normals[i] * (1.0 - PER_BALL * voxels.curvatures[i]).max(LEAST_WEIGHT);
@@ -151,21 +173,21 @@ pub(super) struct Border {
 }
 
 /// The borders of all patches, in order of the patches.
-fn borders(voxels: &Voxels, patch_of: &[u32], thin: &[bool]) -> Vec<Border> {
+fn borders(piece: &Piece, patch_of: &[u32]) -> Vec<Border> {
     let of = |range: Range<usize>| {
         let mut lengths: FxHashMap<(u32, u32), u32> = FxHashMap::default();
-        for i in range.filter(|&i| !thin[i]) {
-            for &j in voxels.neighbours(i).iter().filter(|&&j| j as usize > i) {
-                let (a, b) = (patch_of[i], patch_of[j as usize]);
-                if a != b && !thin[j as usize] {
+        for i in range {
+            for j in piece.near(i).map(|j| j as usize).filter(|&j| j > i) {
+                let (a, b) = (patch_of[i], patch_of[j]);
+                if a != b {
                     *lengths.entry((a.min(b), a.max(b))).or_default() += 1;
                 }
             }
         }
         lengths
     };
-    let half = voxels.len() / 2;
-    let (mut lengths, others) = rayon::join(|| of(0..half), || of(half..voxels.len()));
+    let half = patch_of.len() / 2;
+    let (mut lengths, others) = rayon::join(|| of(0..half), || of(half..patch_of.len()));
     others.into_iter().for_each(|(patches, length)| *lengths.entry(patches).or_default() += length);
     let mut borders: Vec<Border> =
         lengths.into_iter().map(|(patches, length)| Border { patches, length }).collect();

@@ -1,12 +1,13 @@
 //! The mends for vessels and handles: what creases wrongly parted.
 
-use super::join::{Border, Union};
-use super::patches::Voxels;
+use super::join::{Border, Piece, Union};
+use super::patches::SOME;
 use super::{VOXEL_ENDS, most_within};
 use crate::surface::convex_hull;
-use std::cell::OnceCell;
+use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::OnceLock;
 
 /// A part smaller than this share of its neighbour is no object of its own. From: chosen.
 const CRUMB_SHARE: f64 = 0.12;
@@ -18,14 +19,16 @@ const HANGING_SHARE: f64 = 0.25;
 /// Joins what the creases wrongly parted: insides of vessels, handles, crumbs.
 ///
 /// The smallest part that belongs to a neighbour goes first; then what touches the joined part is looked at anew.
-pub(super) fn mend(joined: &mut Union, borders: &[Border], voxels: &Voxels, patch_of: &[u32]) {
-    let mut parts = gather(joined, voxels, patch_of);
+pub(super) fn mend(joined: &mut Union, borders: &[Border], piece: &Piece, patch_of: &[u32]) {
+    let mut parts = gather(joined, piece, patch_of);
     link(&mut parts, joined, borders);
-    let mut open: BinaryHeap<Reverse<Belonging>> = BinaryHeap::new();
-    for (root, part) in (0..).zip(&parts) {
+    let of_part = |(root, part): (usize, &Option<Part>)| {
         let others = part.iter().flat_map(|part| &part.links);
-        open.extend(others.filter_map(|link| Belonging::of(&parts, root, link.other)).map(Reverse));
-    }
+        let belongings = others.filter_map(|link| Belonging::of(&parts, root as u32, link.other));
+        belongings.map(Reverse).collect::<Vec<_>>()
+    };
+    let all = parts.par_iter().with_min_len(SOME).enumerate().flat_map_iter(of_part);
+    let mut open: BinaryHeap<Reverse<Belonging>> = all.collect::<Vec<_>>().into();
     let mut joins = 0;
     while let Some(Reverse(next)) = open.pop() {
         let Belonging { small, large, .. } = next;
@@ -94,7 +97,7 @@ struct Part {
     places: Vec<[f64; 2]>,
     /// Places whose hull is that of all.
     outer: Vec<[f64; 2]>,
-    hull: OnceCell<Vec<[f64; 2]>>,
+    hull: OnceLock<Vec<[f64; 2]>>,
     /// One for each other part, in no order.
     links: Vec<Link>,
     /// After how many joins it was made.
@@ -156,16 +159,16 @@ fn merged(long: &[f64], short: &[f64]) -> Vec<f64> {
 }
 
 /// The parts by their roots, not linked yet.
-fn gather(joined: &mut Union, voxels: &Voxels, patch_of: &[u32]) -> Vec<Option<Part>> {
+fn gather(joined: &mut Union, Piece { voxels, of, .. }: &Piece, patch_of: &[u32]) -> Vec<Option<Part>> {
     let patches = patch_of.iter().max().map_or(0, |&p| p as usize + 1);
     let mut parts: Vec<Option<Part>> = (0..patches).map(|_| None).collect();
-    for (voxel, &patch) in patch_of.iter().enumerate() {
+    for (&voxel, &patch) in of.iter().zip(patch_of) {
         let part = parts[joined.root(patch) as usize].get_or_insert_with(|| Part {
             points: 0,
             heights_m: Vec::new(),
             places: Vec::new(),
             outer: Vec::new(),
-            hull: OnceCell::new(),
+            hull: OnceLock::new(),
             links: Vec::new(),
             made: 0,
         });

@@ -38,6 +38,28 @@ impl Voxels {
         &self.near[self.starts[voxel] as usize..self.starts[voxel + 1] as usize]
     }
 
+    /// Some voxels in sets that hang together, each ascending.
+    pub fn together(&self, of: &[usize]) -> Vec<Vec<usize>> {
+        let mut open = vec![false; self.len()];
+        of.iter().for_each(|&v| open[v] = true);
+        let mut sets = Vec::new();
+        for &first in of {
+            if !std::mem::take(&mut open[first]) {
+                continue;
+            }
+            let mut set = vec![first];
+            let mut next = 0;
+            while let Some(&voxel) = set.get(next) {
+                let near = self.neighbours(voxel).iter().map(|&n| n as usize);
+                set.extend(near.filter(|&n| std::mem::take(&mut open[n])));
+                next += 1;
+            }
+            set.sort_unstable();
+            sets.push(set);
+        }
+        sets
+    }
+
     /// Ranges of points that follow each other in one voxel, and this voxel, in the order of the points.
     pub fn runs(&self) -> impl Iterator<Item = (Range<usize>, usize)> {
         let ends = self.run_starts.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
@@ -156,16 +178,23 @@ fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>
 
 /// For each voxel where its neighbours begin, and all of them in a row.
 fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
-    let (mut starts, mut near) = (Vec::with_capacity(keys.len() + 1), Vec::new());
-    let mut around = Around::from(lattice, keys, 0);
-    for (i, key) in keys.iter().enumerate() {
-        starts.push(near.len() as u32);
-        around.visit(*key, |j| {
-            if j != i {
-                near.push(j as u32);
-            }
-        });
-    }
+    let of = |range: Range<usize>| {
+        let (mut starts, mut near) = (Vec::with_capacity(range.len() + 1), Vec::new());
+        let mut around = Around::from(lattice, keys, range.start);
+        for i in range {
+            starts.push(near.len() as u32);
+            around.visit(keys[i], |j| {
+                if j != i {
+                    near.push(j as u32);
+                }
+            });
+        }
+        (starts, near)
+    };
+    let half = keys.len() / 2;
+    let ((mut starts, mut near), more) = rayon::join(|| of(0..half), || of(half..keys.len()));
+    starts.extend(more.0.iter().map(|start| start + near.len() as u32));
+    near.extend(more.1);
     starts.push(near.len() as u32);
     (starts, near)
 }

@@ -53,7 +53,7 @@ pub(super) fn part(
     let mut is_one = all.into_par_iter().with_max_len(1).map(is_one).collect::<Vec<_>>().into_iter();
     members.retain(|_, _| !is_one.next().unwrap_or(false));
     let all: Vec<usize> = members.values().flatten().copied().collect();
-    for mut pool in together(voxels, &all) {
+    for mut pool in voxels.together(&all) {
         while let Some(cut) = Axis::sought(voxels, &pool).iter().find_map(|axis| {
             let body = axis.body(voxels, &pool)?;
             let is_round = is_round(voxels, &body, points, viewpoints);
@@ -75,39 +75,14 @@ pub(super) fn part(
 /// True if the side of a part is that of a box: its normals stand at right angles, and a rectangle fits it.
 fn is_box(voxels: &Voxels, of: &[usize], points: &[Point3<f64>]) -> bool {
     let side: Vec<usize> = of.iter().copied().filter(|&v| is_upright(&voxels.normals[v])).collect();
-    /// Sides of a rectangle: turned by so many times their angle all of its normals are one. From: derived, a quarter is one turn.
-    const SIDES: f64 = 4.0;
-    let turned = side.iter().map(|&v| {
-        let quarter = SIDES * voxels.normals[v].y.atan2(voxels.normals[v].x);
-        Vector2::new(quarter.cos(), quarter.sin())
-    });
+    // Turned by four times their angle, the normals of all sides of a rectangle are one.
+    let twice = |a: Vector2<f64>| Vector2::new(a.x * a.x - a.y * a.y, 2.0 * a.x * a.y);
+    let turned = side.iter().map(|&v| twice(twice(voxels.normals[v].xy().normalize())));
     let square = turned.sum::<Vector2<f64>>().norm() / side.len().max(1) as f64;
     if square <= SQUARE {
         return false;
     }
     outline::fits(&voxels.points_of(&side, points), BOX_M)
-}
-
-/// The voxels in sets that hang together, each ascending.
-fn together(voxels: &Voxels, of: &[usize]) -> Vec<Vec<usize>> {
-    let mut open = vec![false; voxels.len()];
-    of.iter().for_each(|&v| open[v] = true);
-    let mut sets = Vec::new();
-    for &first in of {
-        if !std::mem::take(&mut open[first]) {
-            continue;
-        }
-        let mut set = vec![first];
-        let mut next = 0;
-        while let Some(&voxel) = set.get(next) {
-            let near = voxels.neighbours(voxel).iter().map(|&n| n as usize);
-            set.extend(near.filter(|&n| std::mem::take(&mut open[n])));
-            next += 1;
-        }
-        set.sort_unstable();
-        sets.push(set);
-    }
-    sets
 }
 
 /// A round body, and what is left of the parts that it takes voxels from.
@@ -131,7 +106,7 @@ impl Cut {
         let rest = touched.iter().filter_map(|part| members.get(part)).flatten().copied();
         let rest: Vec<usize> = rest.filter(|v| body.binary_search(v).is_err()).collect();
         let (left, own): (Vec<_>, Vec<_>) =
-            together(voxels, &rest).into_iter().partition(|piece| is_apart(voxels, piece, &body, axis));
+            voxels.together(&rest).into_iter().partition(|piece| is_apart(voxels, piece, &body, axis));
         // What two parts leave stays two.
         let left: Vec<Vec<usize>> = left
             .iter()
@@ -139,7 +114,7 @@ impl Cut {
             .map(|(piece, part)| {
                 piece.iter().copied().filter(|v| part_of_voxel[*v] == part).collect::<Vec<_>>()
             })
-            .flat_map(|piece| together(voxels, &piece))
+            .flat_map(|piece| voxels.together(&piece))
             .collect();
         if touched.len() == 1 && left.is_empty() {
             return None;

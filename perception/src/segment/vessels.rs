@@ -2,7 +2,7 @@
 
 use super::{OUTSIDE, Segment, bounds, hull_from_above, middle, most_within, top_m};
 use crate::outline;
-use crate::round::{self, ON_SIDE_M, Round, SECTORS, distance, sector};
+use crate::round::{self, ON_SIDE_M, Round, SECTORS, STEEPEST, distance, sector};
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -84,7 +84,7 @@ pub(super) fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<
             (Some(one), Some(other)) => pairs[one][other - one - 1],
             _ => one_vessel(&parts[first], &parts[*second], viewpoints),
         };
-        match (first + 1..parts.len()).find(is_one) {
+        match (first + 1..parts.len()).into_par_iter().with_max_len(1).find_first(is_one) {
             Some(second) => {
                 let other = parts.remove(second);
                 parts[first] = Candidate::new(None, union(&parts[first].segment, &other.segment));
@@ -122,7 +122,7 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
         return false;
     }
     if !near(large, small) {
-        return is_level(large, small) && one_rim([large, small], viewpoints);
+        return is_level(large, small) && is_in_reach(large, small) && one_rim([large, small], viewpoints);
     }
     let inside = small.top_m < large.top_m + RIM_M && footprint_inside(large, small);
     let fitted = large.fitted(viewpoints).filter(|f| f.is_tight(&large.segment.points));
@@ -274,6 +274,12 @@ fn share_on(body: &Round, part: &Segment) -> f64 {
 /// True if the boxes around the two come near each other.
 fn near(a: &Candidate, b: &Candidate) -> bool {
     (0..3).all(|k| a.low[k] - APART_M < b.high[k] && b.low[k] - APART_M < a.high[k])
+}
+
+/// True if the widest vessel could reach both.
+fn is_in_reach(a: &Candidate, b: &Candidate) -> bool {
+    let across_m = 2.0 * (WIDEST_M + STEEPEST * RIM_DEEP_M + TOUCHES_M);
+    (0..2).all(|k| a.low[k] - across_m < b.high[k] && b.low[k] - across_m < a.high[k])
 }
 
 fn footprint_inside(large: &Candidate, small: &Candidate) -> bool {

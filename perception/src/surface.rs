@@ -321,7 +321,7 @@ pub fn find_surfaces(
 
 /// The surfaces by how much speaks for them, without those that are made of what is left over of a better one and of things on it.
 fn distinct(surfaces: Vec<Surface>, samples: &[Sample]) -> Vec<Surface> {
-    let mut claims: Vec<(f64, Surface)> = surfaces.into_iter().map(|s| (claim(&s, samples), s)).collect();
+    let mut claims: Vec<(f64, Surface)> = surfaces.into_par_iter().map(|s| (claim(&s, samples), s)).collect();
     claims.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     let mut distinct: Vec<Surface> = Vec::new();
     for (_, surface) in claims {
@@ -424,17 +424,18 @@ fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
     };
     let near =
         |p: &Point3<f64>| viewpoints.iter().map(|v| (p - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
-    cloud
-        .points
-        .iter()
-        .step_by(stride)
-        .filter(|p| is_finite(p))
-        .map(|p| {
-            let point = p.cast::<f64>();
-            let sigma_m = range_sigma_m(near(&point)).min(WORST_SIGMA_M);
-            Sample { point, sigma_m }
-        })
-        .collect()
+    let sample = |p: &Point3<f32>| {
+        let point = p.cast::<f64>();
+        let sigma_m = range_sigma_m(near(&point)).min(WORST_SIGMA_M);
+        Sample { point, sigma_m }
+    };
+    let half = (cloud.len() / 2).next_multiple_of(stride).min(cloud.len());
+    let of = |points: &[Point3<f32>]| -> Vec<Sample> {
+        points.iter().step_by(stride).filter(|p| is_finite(p)).map(sample).collect()
+    };
+    let (mut samples, more) = rayon::join(|| of(&cloud.points[..half]), || of(&cloud.points[half..]));
+    samples.extend(more);
+    samples
 }
 
 /// Up as people and robots hold cameras: against the images' downward axis.

@@ -5,6 +5,7 @@ use super::{
 };
 use crate::round::sector;
 use nalgebra::Point3;
+use rayon::prelude::*;
 use std::cell::OnceCell;
 
 /// How high the bottom of a vessel or of an open carton is in which something stands, metres, and its spread. From: chosen.
@@ -26,8 +27,8 @@ pub(super) fn on(parts: &mut [Segment]) -> Vec<f64> {
     const CUT_M: f64 = 0.02;
     /// What stands in another thing is in its middle rather than along its wall: so far from that, metres. From: chosen.
     const WALL_M: f64 = 0.02;
-    let tops: Vec<f64> = parts.iter().map(top_m).collect();
-    let boxes: Vec<_> = parts.iter().map(|part| bounds(&part.points)).collect();
+    let of = |part: &Segment| (top_m(part), bounds(&part.points));
+    let (tops, boxes): (Vec<f64>, Vec<_>) = parts.par_iter().with_max_len(1).map(of).unzip();
     let hulls: Vec<OnceCell<_>> = parts.iter().map(|_| OnceCell::new()).collect();
     let hull = |part: usize| hulls[part].get_or_init(|| hull_from_above(&parts[part].points));
     let is_over = |other: usize, place: [f64; 2]| {

@@ -40,11 +40,16 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
             counts.at(grid.cell_of(&s.point)).beside[usize::from(distance_m > 0.0)] += 1;
         }
     }
+    let cells = counts.all();
+    let mut beneath: Tiles<bool> = Tiles::new();
+    let rising = cells.iter().filter(|(_, counts)| counts.beside[1] > 0);
+    rising.flat_map(|(cell, _)| around(*cell)).for_each(|cell| *beneath.at(cell) = true);
     let is_face = |cell: [i32; 2]| {
-        let around = around(cell).map(|cell| counts.get(cell)).fold(Counts::default(), Counts::with);
-        !around.is_slice() && !around.is_foot()
+        let all = || around(cell).map(|cell| counts.get(cell)).fold(Counts::default(), Counts::with);
+        // Both need something above the plane.
+        !beneath.get(cell) || (!all().is_slice() && !all().is_foot())
     };
-    let near = counts.all().into_iter().filter(|(cell, counts)| counts.near > 0 && is_face(*cell));
+    let near = cells.into_iter().filter(|(cell, counts)| counts.near > 0 && is_face(*cell));
     let mut pieces = parts(near.map(|(cell, counts)| (cell, counts.near)).collect());
     let squares: f64 = held.iter().map(|(_, s)| plane.distance(&s.point).powi(2)).sum();
     let residual_m = (squares / held.len().max(1) as f64).sqrt();

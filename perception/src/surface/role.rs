@@ -7,6 +7,7 @@ use super::planes::Sample;
 use super::{Level, MOST, Surface, SurfaceOptions, TALLEST_M};
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Unit, Vector3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -146,9 +147,9 @@ pub(super) fn tell(
 ) {
     let level = level(surfaces, up);
     let rays = rays(samples, seen);
-    let past: Vec<Option<f64>> = surfaces.iter().map(|s| past(s, &rays)).collect();
-    let told: Vec<(Role, Sign)> =
-        (0..surfaces.len()).map(|n| supports(n, surfaces, &level, &past, samples, &rays)).collect();
+    let past: Vec<Option<f64>> = surfaces.par_iter().map(|s| past(s, &rays)).collect();
+    let supports = |n| supports(n, surfaces, &level, &past, samples, &rays);
+    let told: Vec<(Role, Sign)> = (0..surfaces.len()).into_par_iter().map(supports).collect();
     assign(surfaces, told);
     let eyes = seen.viewpoints();
     let mirrored: Vec<bool> = (0..surfaces.len()).map(|n| is_mirrored(n, surfaces, &eyes)).collect();

@@ -177,7 +177,8 @@ impl Turner {
 struct Side {
     /// Those and the one on the side: they were the farthest at the last turn.
     outermost: Vec<usize>,
-    found: Vec<(f32, usize)>,
+    /// What lies so far out, [`ranked`].
+    found: Vec<u64>,
 }
 
 impl Side {
@@ -192,16 +193,29 @@ impl Side {
         {
             // Neighbours in an image are near each other: most blocks have none so far out.
             if reach <= limit {
-                let places = block.iter().map(|place| way(*place)).zip(first..);
-                self.found.extend(places.filter(|(place, _)| *place <= limit));
+                let (mut some, mut count) = ([0; BLOCK], 0);
+                for (place, number) in block.iter().map(|place| way(*place)).zip(first..) {
+                    // Written over by the next if it is not so far out.
+                    some[count % BLOCK] = ranked(place, number);
+                    count += usize::from(place <= limit);
+                }
+                self.found.extend_from_slice(&some[..count]);
             }
         }
         let last = self.outermost.len() - 1;
-        let (farther, side, _) = self.found.select_nth_unstable_by(last, |a, b| a.0.total_cmp(&b.0));
+        let (farther, side, _) = self.found.select_nth_unstable(last);
         self.outermost.clear();
-        self.outermost.extend(farther.iter().map(|f| f.1).chain([side.1]));
-        side.0
+        self.outermost.extend(farther.iter().chain([&*side]).map(|ranked| *ranked as u32 as usize));
+        way(places[self.outermost[last]])
     }
+}
+
+/// A place and the number of what lies there, in the order of the places.
+fn ranked(place: f32, number: u32) -> u64 {
+    let bits = place.to_bits();
+    // Of negative numbers the bits fall as they rise.
+    let order = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
+    u64::from(order) << 32 | u64::from(number)
 }
 
 /// Turns the points of a block, and tells how far out they lie across each side; those that are no number count for nothing.

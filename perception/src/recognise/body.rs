@@ -65,7 +65,8 @@ impl Frustum {
         if root <= 0.0 || a == 0.0 {
             return None;
         }
-        let ends = [(-b - root.sqrt()) / a, (-b + root.sqrt()) / a];
+        let (root, per) = (root.sqrt(), 1.0 / a);
+        let ends = [(-b - root) * per, (-b + root) * per];
         Some(if a > 0.0 { ends } else { [ends[1], ends[0]] })
     }
 }

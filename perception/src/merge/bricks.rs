@@ -100,7 +100,10 @@ impl<C> Bricks<C> {
             former.push(*slot);
             *slot = former.len() as u32 - 1;
         }
-        self.cells = former.iter().map(|&number| self.cells[number as usize]).collect();
+        // With room for those of further looks: what outgrows its memory is copied whole.
+        let mut cells = Vec::with_capacity(former.len() + former.len() / 2);
+        cells.extend(former.iter().map(|&number| self.cells[number as usize]));
+        self.cells = cells;
         former
     }
 

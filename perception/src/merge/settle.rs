@@ -20,6 +20,9 @@ const VOXEL_SPREAD_M: f32 = 0.003;
 /// From: derived, as where views are held against each other.
 const CARVE_M: f64 = check::CLEAR_M;
 
+/// Rows of bricks that are settled at a time: what they fill is used again. From: work.
+const ROWS: usize = 16;
+
 /// A fused point, world frame.
 #[derive(Clone)]
 struct Settled {
@@ -41,8 +44,9 @@ pub(super) fn settle(all: &[Gathered], seen: &Visibility) -> Fused {
     };
     let mut normals = Vec::with_capacity(most);
     let mut colours = coloured.then(|| Vec::with_capacity(most));
+    let mut rows: Vec<Vec<Settled>> = vec![Vec::new(); ROWS];
     for gathered in all {
-        gathered.settle(seen, |kept| {
+        gathered.settle(seen, &mut rows, |kept| {
             fused.cloud.points.extend(kept.iter().map(|settled| settled.at));
             normals.extend(kept.iter().map(|settled| settled.normal));
             fused.views_per_point.extend(kept.iter().map(|settled| settled.views));
@@ -57,43 +61,43 @@ pub(super) fn settle(all: &[Gathered], seen: &Visibility) -> Fused {
 }
 
 impl Gathered {
-    /// Gives what is left of the cells, some at a time.
-    fn settle(&self, seen: &Visibility, mut give: impl FnMut(&[Settled])) {
-        /// Bricks that one thread settles in a row, and such rows at a time: what they fill is used again. From: work.
+    /// Gives what is left of the cells, some rows at a time.
+    fn settle(&self, seen: &Visibility, rows: &mut [Vec<Settled>], mut give: impl FnMut(&[Settled])) {
+        /// Bricks that one thread settles in a row. From: work.
         const TOGETHER: usize = 64;
-        const ROWS: usize = 32;
         /// Cells that one thread takes in a row. From: work.
         const SOME: usize = 4096;
         let Gathered { grid, axes_from_world, flat, bricks, colours: sums, .. } = self;
         let world_from_axes = axes_from_world.inverse().to_rotation_matrix();
         let turn = world_from_axes.cast::<f32>();
-        let cells: Vec<Cell> = bricks.cells.par_iter().with_min_len(SOME).map(Cell::mean).collect();
-        let colour = |number: usize| {
+        let colour = |number: usize, cell: &Cell| {
             // Half up by cutting off: rounding is a call on some processors.
-            let mean = sums.get(number).map(|sum| (sum / cells[number].weight).map(|c| (c + 0.5) as u8));
+            let mean = sums.get(number).map(|sum| (sum / cell.weight).map(|c| (c + 0.5) as u8));
             mean.map(<[u8; 3]>::from).unwrap_or_default()
         };
+        // That of a voxel is asked for by all around it, that of a column by few.
+        let voxels = if *flat { &[][..] } else { &bricks.cells };
+        let means: Vec<Cell> = voxels.par_iter().with_min_len(SOME).map(Cell::mean).collect();
         let gazes = seen.gazes();
         let settle_row = |row: usize, kept: &mut Vec<Settled>| {
             kept.clear();
-            let mut keep = |number: usize, at: Vector3<f32>| {
-                let cell = &cells[number];
+            let mut keep = |number: usize, cell: &Cell, at: Vector3<f32>| {
                 let at = world_from_axes * Point3::from(grid.origin_m + at.cast::<f64>() * grid.voxel_m);
                 let none = cell.normal == Vector3::zeros();
                 let normal = if none { Vector3::repeat(f32::NAN) } else { turn * cell.normal };
-                kept.push(Settled { at: at.cast(), normal, colour: colour(number), views: cell.views });
+                kept.push(Settled { at: at.cast(), normal, colour: colour(number, cell), views: cell.views });
             };
             for brick in (row * TOGETHER..bricks.len()).take(TOGETHER) {
                 match flat {
-                    true => level(bricks, &cells, brick, &mut keep),
+                    true => level(bricks, brick, &mut keep),
                     false => bricks.visit(brick, |number, around| {
-                        keep(number, smoothed(&cells[number], around, &cells, grid.voxel_m as f32));
+                        let mean = &means[number];
+                        keep(number, mean, smoothed(mean, around, &means, grid.voxel_m as f32));
                     }),
                 }
             }
             drop_looked_through(kept, &gazes);
         };
-        let mut rows: Vec<Vec<Settled>> = vec![Vec::new(); ROWS];
         let all = bricks.len().div_ceil(TOGETHER);
         for first in (0..all).step_by(ROWS) {
             let rows = &mut rows[..ROWS.min(all - first)];
@@ -137,16 +141,17 @@ fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3
     if weight > 0.0 { own.at + own.normal * (offset / weight) } else { own.at }
 }
 
-/// Calls `found` for each column of a brick with its number and its mean, moved along z onto the mean of the columns around it.
-fn level(bricks: &Bricks<Cell>, cells: &[Cell], brick: usize, mut found: impl FnMut(usize, Vector3<f32>)) {
+/// Calls `found` for each column of a brick with its number, its mean, and where that lies once moved along z onto the mean of the columns
+/// around it.
+fn level(bricks: &Bricks<Cell>, brick: usize, mut found: impl FnMut(usize, &Cell, Vector3<f32>)) {
     let numbers = bricks.wide_columns(brick);
     // Weight and weighted height: of the columns, then of three beside each other.
     let mut sums = [[[0.0_f32; WIDE]; WIDE]; 2];
     for (y, row) in numbers.iter().enumerate() {
         for (x, &number) in row.iter().enumerate().filter(|(_, number)| **number != NONE) {
-            let cell = &cells[number as usize];
+            let cell = &bricks.cells[number as usize];
             sums[0][y][x] = cell.weight;
-            sums[1][y][x] = cell.weight * cell.at.z;
+            sums[1][y][x] = cell.weight * (cell.at.z / cell.weight);
         }
     }
     let across = sums.map(|sums| {
@@ -159,8 +164,8 @@ fn level(bricks: &Bricks<Cell>, cells: &[Cell], brick: usize, mut found: impl Fn
         for x in 0..SIDE {
             let number = numbers[y + 1][x + 1];
             if number != NONE {
-                let own = cells[number as usize].at;
-                found(number as usize, Vector3::new(own.x, own.y, heights[x] / weights[x]));
+                let own = bricks.cells[number as usize].mean();
+                found(number as usize, &own, Vector3::new(own.at.x, own.at.y, heights[x] / weights[x]));
             }
         }
     }

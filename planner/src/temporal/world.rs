@@ -367,7 +367,7 @@ impl<'a> World<'a> {
     }
 
     /// Brings derived variables up to date.
-    fn derive(&self, state: &mut Values) -> Result<(), Failure> {
+    pub(super) fn derive(&self, state: &mut Values) -> Result<(), Failure> {
         if self.derived.is_empty() {
             return Ok(());
         }

@@ -8,7 +8,7 @@
 //!   their order leaves nothing to search.
 //! - An action with preferences of its own becomes several of its name: each preference is a condition, or is paid for.
 
-mod conditions;
+pub(super) mod conditions;
 mod touch;
 
 use rustc_hash::FxHashMap;

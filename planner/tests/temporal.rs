@@ -317,6 +317,20 @@ fn a_plan_that_breaks_a_constraint_on_the_way_is_refused_under_the_text() {
         let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
         let found = plan(&task, &Attachments::new(), &Options::default(), &|| false, &mut |_| {});
         match found {
+#[test]
+fn a_deadline_is_met_up_to_its_very_moment() {
+    let domain = "(:requirements :constraints) (:predicates (idle) (done))
+      (:durative-action work :parameters () :duration (= ?duration 5) :condition (at start (idle))
+        :effect (and (at start (not (idle))) (at end (done))))";
+    for within in ["5", "5.001", "6"] {
+        check(
+            domain,
+            &format!("(:init (idle)) (:goal (done)) (:constraints (within {within} (done)))"),
+            Some(5.0),
+        );
+    }
+}
+
             Ok(Outcome::Solved { .. }) => assert!(kept, "{constraint}"),
             Err(PlanError::Refused(findings)) => {
                 assert!(!kept && findings.render(false).contains("the constraint on (c) is broken"));

@@ -151,6 +151,30 @@ fn derived_predicates_with_negation() {
 }
 
 #[test]
+fn grounding_hears_the_stop_signal_where_it_finds_nothing() {
+    let variables = "?a ?b ?c ?d ?e ?f ?g ?h";
+    let objects: String = (0..40).map(|index| format!(" o{index}")).collect();
+    for body in [
+        // Nothing fits what is asked of the last two.
+        format!(":parameters ({variables}) :precondition (and (= ?g ?h) (not (= ?g ?h))) :effect (done)"),
+        format!(":parameters () :effect (and (done) (forall ({variables}) (met {variables})))"),
+    ] {
+        let domain = format!(
+            "(define (domain d) (:requirements :adl) (:predicates (done) (met {variables})) (:action meet {body}))"
+        );
+        let problem = format!("(define (problem p) (:domain d) (:objects{objects}) (:init) (:goal (done)))");
+        let found = plan(
+            &read(&domain, &problem),
+            &Attachments::default(),
+            &Options::default(),
+            &|| true,
+            &mut |_| {},
+        );
+        assert!(matches!(found, Ok(Outcome::OutOfTime { best: None, .. })), "{found:?}");
+    }
+}
+
+#[test]
 fn however_far_a_goal_seems_it_is_not_out_of_reach() {
     // Every rung asks for both hands on the one below: what they add up to doubles with each.
     let domain =

@@ -74,6 +74,7 @@ pub(crate) fn ground_with(
         instances: vec![Vec::new(); normal.actions.len() + rules.alternatives.len()],
         limit,
         count: 0,
+        tried: 0,
         stop,
     };
     let span = debug_span!("reach").entered();

@@ -224,6 +224,17 @@ fn durations_depend_on_the_state_and_stretch() {
 }
 
 #[test]
+fn a_duration_may_be_asked_for_at_the_end() {
+    let tell = "(:requirements :numeric-fluents :duration-inequalities) (:predicates (told)) (:functions (length) (speed))
+      (:durative-action tell :parameters () :duration (at end (= ?duration (* (length) (speed)))) :effect (at end (told)))";
+    let longer = "(:durative-action lengthen :parameters () :duration (= ?duration 1) :effect (at end (increase (length) 1)))";
+    let init = "(:init (= (length) 3) (= (speed) 2))";
+    check(tell, &format!("{init} (:goal (told))"), Some(6.0));
+    check(&format!("{tell} {longer}"), &format!("{init} (:goal (told))"), Some(6.0));
+    check(&format!("{tell} {longer}"), &format!("{init} (:goal (and (told) (= (length) 4)))"), Some(6.0));
+}
+
+#[test]
 fn a_duration_is_as_long_as_its_effects_need() {
     let charged = |bounds: &str, effect: &str| {
         format!(
@@ -307,17 +318,6 @@ fn effects_at_the_end_remember_what_held_before() {
 }
 
 #[test]
-fn a_plan_that_breaks_a_constraint_on_the_way_is_refused_under_the_text() {
-    let domain = "(define (domain d) (:requirements :constraints) (:predicates (a) (b) (c))
-      (:action one :parameters () :effect (a)) (:action two :parameters () :precondition (a) :effect (b)))";
-    for (constraint, kept) in [("(sometime-before (b) (a))", true), ("(within 1 (c))", false)] {
-        let problem =
-            format!("(define (problem p) (:domain d) (:init) (:goal (b)) (:constraints (and {constraint})))");
-        let task = Task::read(&Source::new("domain.pddl", domain), &Source::new("problem.pddl", problem));
-        let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
-        let found = plan(&task, &Attachments::new(), &Options::default(), &|| false, &mut |_| {});
-        match found {
-#[test]
 fn a_deadline_is_met_up_to_its_very_moment() {
     let domain = "(:requirements :constraints) (:predicates (idle) (done))
       (:durative-action work :parameters () :duration (= ?duration 5) :condition (at start (idle))
@@ -331,6 +331,17 @@ fn a_deadline_is_met_up_to_its_very_moment() {
     }
 }
 
+#[test]
+fn a_plan_that_breaks_a_constraint_on_the_way_is_refused_under_the_text() {
+    let domain = "(define (domain d) (:requirements :constraints) (:predicates (a) (b) (c))
+      (:action one :parameters () :effect (a)) (:action two :parameters () :precondition (a) :effect (b)))";
+    for (constraint, kept) in [("(sometime-before (b) (a))", true), ("(within 1 (c))", false)] {
+        let problem =
+            format!("(define (problem p) (:domain d) (:init) (:goal (b)) (:constraints (and {constraint})))");
+        let task = Task::read(&Source::new("domain.pddl", domain), &Source::new("problem.pddl", problem));
+        let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
+        let found = plan(&task, &Attachments::new(), &Options::default(), &|| false, &mut |_| {});
+        match found {
             Ok(Outcome::Solved { .. }) => assert!(kept, "{constraint}"),
             Err(PlanError::Refused(findings)) => {
                 assert!(!kept && findings.render(false).contains("the constraint on (c) is broken"));

@@ -362,7 +362,8 @@ impl<'w, 'a> Watch<'w, 'a> {
         let (world, read) = (self.world, &mut self.read);
         read.condition(world, act.at_start);
         self.held.condition(world, act.over_all);
-        act.bounds.iter().for_each(|bound| expression_touches(world, &bound.seconds, read));
+        let bounds = act.bounds.iter().filter(|bound| !bound.at_end);
+        bounds.for_each(|bound| expression_touches(world, &bound.seconds, read));
         for when in act.end_effects.iter().filter_map(|effect| effect.when.as_ref()) {
             read.condition(world, &when.at_start);
             read.condition(world, &when.over_all);
@@ -372,8 +373,11 @@ impl<'w, 'a> Watch<'w, 'a> {
     }
 
     fn end(&mut self, act: &Act) -> Access {
-        self.held.condition(self.world, act.over_all);
-        self.read.condition(self.world, act.at_end);
+        let (world, read) = (self.world, &mut self.read);
+        self.held.condition(world, act.over_all);
+        read.condition(world, act.at_end);
+        let bounds = act.bounds.iter().filter(|bound| bound.at_end);
+        bounds.for_each(|bound| expression_touches(world, &bound.seconds, read));
         self.access(act.flow_effects.iter().chain(act.end_effects))
     }
 

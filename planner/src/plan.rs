@@ -37,7 +37,8 @@ impl Plan {
     /// # Errors
     /// Every line that is no step.
     pub fn read(source: &Source) -> Result<Plan, Findings> {
-        let mut reader = Reader { text: &source.text, at: 0, findings: Vec::new() };
+        let at = source.text.len() - source.text.trim_start_matches('\u{feff}').len();
+        let mut reader = Reader { text: &source.text, at, findings: Vec::new() };
         let mut plan = Plan { steps: Vec::new(), cost: cost_comment(&source.text) };
         let mut places: Vec<Span> = Vec::new();
         while let Some((step, place)) = reader.step() {
@@ -208,6 +209,7 @@ mod tests {
         for (text, written) in [
             ("(move a b)\n(move B c)\n; cost = 2 (unit cost)\n", "(move a b)\n(move B c)\n; cost = 2\n"),
             ("0.5: (b) [1]\n0: (A x) [D:2.25; C:1]", "0.000: (a x) [2.250]\n0.500: (b) [1.000]\n"),
+            ("\u{feff}(a)\r\n(b)\r\n", "(a)\n(b)\n"),
             ("; a comment\n0.333333: (a)[0.1](b)", ""),
             ("", ""),
         ] {

@@ -35,6 +35,7 @@ fn each_fault_is_drawn_where_it_is() {
         ("wrong-argument-type", "wrong-argument-type.pddl", None),
         ("duplicate-action", "duplicate-action.pddl", None),
         ("durations", "durations.pddl", None),
+        ("unsteady-rate", "unsteady-rate.pddl", None),
         ("missing-attachment", "missing-attachment.pddl", None),
         ("cyclic-types", "cyclic-types.pddl", None),
         ("wrong-kind", "wrong-kind.pddl", None),

@@ -112,6 +112,31 @@ fn conditional_effects_quantifiers_disjunctions_and_negations() {
 }
 
 #[test]
+fn what_names_an_undefined_object_has_no_result() {
+    let domain = "(define (domain parcels) (:requirements :adl :object-fluents) (:types parcel place)
+      (:predicates (seen ?p - place) (opened ?p - parcel)) (:functions (at ?p - parcel) - place (next ?p - place) - place)
+      (:action send :parameters (?p - parcel) :effect (and (assign (at ?p) (next (at ?p))) (opened ?p)))
+      (:action look :parameters (?p - parcel) :effect (seen (at ?p)))
+      (:action open :parameters (?p - parcel)
+        :effect (and (when (opened ?p) (seen (at ?p))) (opened ?p))))";
+    let problem = |goal: &str| {
+        format!(
+            "(define (problem p) (:domain parcels) (:objects x y - parcel a b c - place)
+               (:init (= (at x) a) (= (next a) b) (= (next b) c)) (:goal {goal}))"
+        )
+    };
+    check(domain, &problem("(and (= (at x) c) (seen b) (opened x))"), Expect::Best(3.0));
+    // Nobody knows where y is, and nothing is behind c.
+    check(domain, &problem("(opened y)"), Expect::Best(1.0));
+    check(
+        &domain.replace("(when (opened ?p) (seen (at ?p)))", "(seen (at ?p))"),
+        &problem("(opened y)"),
+        Expect::Unsolvable,
+    );
+    check(domain, &problem("(exists (?p - place) (= (at y) ?p))"), Expect::Unsolvable);
+}
+
+#[test]
 fn derived_predicates_with_negation() {
     let domain = "(define (domain net) (:requirements :typing :derived-predicates :adl)
       (:types node) (:predicates (link ?a ?b - node) (up ?n - node) (fed ?n - node) (source ?n - node) (dark ?n - node))
@@ -123,6 +148,30 @@ fn derived_predicates_with_negation() {
       (:init (source a) (link a b) (link b c) (link a d) (up c)) (:goal (and (fed c) (not (up c)))))";
     check(domain, problem, Expect::Best(3.0));
     check(domain, &problem.replace("(and (fed c) (not (up c)))", "(and (up b) (dark d))"), Expect::Best(3.0));
+}
+
+#[test]
+fn grounding_hears_the_stop_signal_where_it_finds_nothing() {
+    let variables = "?a ?b ?c ?d ?e ?f ?g ?h";
+    let objects: String = (0..40).map(|index| format!(" o{index}")).collect();
+    for body in [
+        // Nothing fits what is asked of the last two.
+        format!(":parameters ({variables}) :precondition (and (= ?g ?h) (not (= ?g ?h))) :effect (done)"),
+        format!(":parameters () :effect (and (done) (forall ({variables}) (met {variables})))"),
+    ] {
+        let domain = format!(
+            "(define (domain d) (:requirements :adl) (:predicates (done) (met {variables})) (:action meet {body}))"
+        );
+        let problem = format!("(define (problem p) (:domain d) (:objects{objects}) (:init) (:goal (done)))");
+        let found = plan(
+            &read(&domain, &problem),
+            &Attachments::default(),
+            &Options::default(),
+            &|| true,
+            &mut |_| {},
+        );
+        assert!(matches!(found, Ok(Outcome::OutOfTime { best: None, .. })), "{found:?}");
+    }
 }
 
 #[test]

@@ -95,6 +95,31 @@ fn what_flows_is_read_before_it_begins_to_flow_or_after_it_ends() {
     check(domain, &format!("{init} (:goal (= (level) 10))"), Some(8.0));
 }
 
+#[test]
+fn what_flows_keeps_what_holds_over_all_on_the_way() {
+    let domain = |over_all: &str| {
+        format!(
+            "(:requirements :adl :numeric-fluents :continuous-effects) (:predicates (idle) (full)) (:functions (level))
+             (:durative-action fill :parameters () :duration (= ?duration 5)
+               :condition (and (at start (idle)) (over all {over_all}))
+               :effect (and (at start (not (idle))) (at end (idle)) (at end (full)) (increase (level) (* #t 2))))"
+        )
+    };
+    let problem = "(:init (idle) (= (level) 0)) (:goal (full))";
+    for over_all in ["(<= (level) 10)", "(< (level) 10)", "(> (level) 0)", "(not (= (level) 10))"] {
+        check(&domain(over_all), problem, Some(5.0));
+    }
+    // Whoever waits until the level is past it can.
+    let waits = "(:init (idle) (= (level) 6)) (:goal (full))";
+    check(&domain("(not (= (level) 5))"), waits, Some(5.0));
+    for over_all in ["(not (= (level) 5))", "(or (<= (level) 2) (>= (level) 8))"] {
+        let domain = format!("(define (domain d) (:requirements :durative-actions) {})", domain(over_all));
+        let problem = format!("(define (problem p) (:domain d) {problem})");
+        let found = outcome(Source::new("domain.pddl", domain), Source::new("problem.pddl", problem));
+        assert!(found.plan().is_none(), "{over_all}: {found:?}");
+    }
+}
+
 const SHOP: &str = "(:predicates (open) (bought) (there) (home))
   (:durative-action go :parameters () :duration (= ?duration 4) :condition (at start (home))
     :effect (and (at start (not (home))) (at end (there))))
@@ -199,6 +224,17 @@ fn durations_depend_on_the_state_and_stretch() {
 }
 
 #[test]
+fn a_duration_may_be_asked_for_at_the_end() {
+    let tell = "(:requirements :numeric-fluents :duration-inequalities) (:predicates (told)) (:functions (length) (speed))
+      (:durative-action tell :parameters () :duration (at end (= ?duration (* (length) (speed)))) :effect (at end (told)))";
+    let longer = "(:durative-action lengthen :parameters () :duration (= ?duration 1) :effect (at end (increase (length) 1)))";
+    let init = "(:init (= (length) 3) (= (speed) 2))";
+    check(tell, &format!("{init} (:goal (told))"), Some(6.0));
+    check(&format!("{tell} {longer}"), &format!("{init} (:goal (told))"), Some(6.0));
+    check(&format!("{tell} {longer}"), &format!("{init} (:goal (and (told) (= (length) 4)))"), Some(6.0));
+}
+
+#[test]
 fn a_duration_is_as_long_as_its_effects_need() {
     let charged = |bounds: &str, effect: &str| {
         format!(
@@ -279,6 +315,20 @@ fn effects_at_the_end_remember_what_held_before() {
     let domain = domain.strip_suffix(')').unwrap_or(domain);
     // Shaking begins before all is still at first, or after it is set.
     check(domain, "(:init (idle) (still)) (:goal (and (set) (shaken)))", Some(11.0));
+}
+
+#[test]
+fn a_deadline_is_met_up_to_its_very_moment() {
+    let domain = "(:requirements :constraints) (:predicates (idle) (done))
+      (:durative-action work :parameters () :duration (= ?duration 5) :condition (at start (idle))
+        :effect (and (at start (not (idle))) (at end (done))))";
+    for within in ["5", "5.001", "6"] {
+        check(
+            domain,
+            &format!("(:init (idle)) (:goal (done)) (:constraints (within {within} (done)))"),
+            Some(5.0),
+        );
+    }
 }
 
 #[test]

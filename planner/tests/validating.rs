@@ -167,6 +167,42 @@ fn plans_with_times() {
     );
 }
 
+/// A basin that fills up while it is watched, in a condition over all; and what else happens to it.
+fn basin(over_all: &str, more: &str) -> String {
+    format!(
+        "(define (domain basin) (:requirements :adl :durative-actions :numeric-fluents :continuous-effects :derived-predicates)
+          (:predicates (dry) (odd)) (:functions (level) (room))
+          (:derived (odd) (and (> (level) 2) (< (level) 8)))
+          (:durative-action fill :parameters () :duration (= ?duration 10) :condition (over all {over_all})
+            :effect (and (increase (level) (* #t 1)) {more})))"
+    )
+}
+
+#[test]
+fn what_holds_over_all_holds_between_two_happenings() {
+    let problem = "(define (problem p) (:domain basin) (:init (= (level) 0) (= (room) 10)) (:goal (and)))";
+    for (over_all, more, reason) in [
+        ("(<= (level) 10)", "", ""),
+        ("(<= (level) 9)", "", "(<= (level) 9) does not hold all the time"),
+        // It holds at both ends, and not on the way.
+        ("(or (<= (level) 2) (>= (level) 8))", "", "does not hold all the time"),
+        ("(not (= (level) 5))", "", "does not hold all the time"),
+        ("(not (odd))", "", "does not hold all the time"),
+        ("(< (* (level) (room)) 25)", "(decrease (room) (* #t 1))", "does not hold all the time"),
+        ("(<= (* (level) (room)) 25)", "(decrease (room) (* #t 1))", ""),
+        // The ends themselves are not part of it.
+        ("(< (level) 10)", "", ""),
+        ("(> (level) 0)", "", ""),
+        ("(and (> (level) 0) (< (level) 10) (not (= (level) 10)))", "", ""),
+        ("(> (level) 1)", "", "(> (level) 1) does not hold all the time"),
+    ] {
+        check(&basin(over_all, more), problem, &[("0: (fill) [10]", reason)]);
+    }
+    let twice = "0: (fill) [10]\n2: (fill) [10]";
+    check(&basin("(< (level) 18)", ""), problem, &[(twice, "step 2 (fill) at 2: (< (level) 18)")]);
+    check(&basin("(< (level) 20)", ""), problem, &[(twice, "")]);
+}
+
 #[test]
 fn what_happens_at_a_time_asks_for_a_plan_with_times() {
     let domain = "(define (domain d) (:requirements :timed-initial-literals) (:predicates (p) (q))

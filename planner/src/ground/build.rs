@@ -74,6 +74,7 @@ pub(crate) fn ground_with(
         instances: vec![Vec::new(); normal.actions.len() + rules.alternatives.len()],
         limit,
         count: 0,
+        tried: 0,
         stop,
     };
     let span = debug_span!("reach").entered();
@@ -435,10 +436,11 @@ fn later(
         .collect();
     let duration = bounds
         .iter()
-        .map(|(at_end, comparison, number)| DurationBound {
-            at_end: *at_end,
-            relation: Relation::of(*comparison, true),
-            seconds: make.expression(number, binding),
+        .map(|(at_end, comparison, number)| {
+            let seconds = make.expression(number, binding);
+            // What never changes is the same at the start.
+            let at_end = *at_end && !matches!(seconds, Expression::Constant(_));
+            DurationBound { at_end, relation: Relation::of(*comparison, true), seconds }
         })
         .collect();
     let (over_all, end) = (resolve.flat(over_all, top), resolve.flat(end, top));

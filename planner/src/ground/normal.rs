@@ -3,9 +3,10 @@
 
 use std::sync::Arc;
 
+use super::pddl3::conditions::negated;
 use crate::task::{
-    Assignment, Atom, Call, Change, Comparison, Condition, Effect, Expression, Fluent, ObjectId, Quantified,
-    Task, Term as LiftedTerm, Timed, Written,
+    Assignment, Atom, Call, Change, Comparison, Condition, Effect, Expression, Fluent, FunctionId, ObjectId,
+    Quantified, Task, Term as LiftedTerm, Timed, Written,
 };
 
 /// A variable slot or an object.
@@ -294,7 +295,8 @@ impl<'a> Scope<'a> {
         }
     }
 
-    fn effect(&mut self, effect: &Effect, at_end: bool) -> Effect_ {
+    /// An effect. Where an object that it names may be undefined, `needs` gets what the action needs for it to have a result.
+    fn effect(&mut self, effect: &Effect, at_end: bool, needs: &mut Vec<Formula>) -> Effect_ {
         let mut forall = self.quantify(&effect.forall);
         let mut when = self.timed(&effect.when);
         let mut fresh = Fresh::default();
@@ -319,6 +321,7 @@ impl<'a> Scope<'a> {
             Change::Call(call) => Change_::Call(self.call(call, &mut fresh)),
         };
         if !fresh.is_empty() {
+            needs.extend(self.defined(effect, at_end, &fresh));
             let place = if at_end { &mut when.end } else { &mut when.start };
             let mut parts: Vec<_> = fresh.atoms.into_iter().map(|a| Formula::Literal(a, true)).collect();
             parts.push(std::mem::replace(place, Formula::And(Vec::new())));
@@ -327,6 +330,43 @@ impl<'a> Scope<'a> {
         }
         Effect_ { forall, when, change }
     }
+
+    /// That the objects which an effect names are defined where it happens; `None` where they always are. Of an effect at the end
+    /// that depends on earlier times the validator alone tells.
+    fn defined(&mut self, effect: &Effect, at_end: bool, fresh: &Fresh) -> Option<Formula> {
+        let Timed { start, over_all, end } = &effect.when;
+        let earlier = at_end && !(start.is_true() && over_all.is_true());
+        let first = self.task.predicates.len() as u32;
+        let unsure = |atom: &Pattern| may_be_undefined(self.task, FunctionId(atom.predicate - first));
+        if earlier || !fresh.atoms.iter().any(unsure) {
+            return None;
+        }
+        let atoms = fresh.atoms.iter().map(|atom| Formula::Literal(atom.clone(), true)).collect();
+        let defined = Formula::Exists(fresh.slots.clone(), Box::new(Formula::And(atoms)));
+        let now = if at_end { end } else { start };
+        let otherwise = (!now.is_true()).then(|| self.formula(&negated(now)));
+        let needed = match otherwise {
+            Some(otherwise) => Formula::Or(vec![otherwise, defined]),
+            None => defined,
+        };
+        let forall = effect.forall.iter().map(|quantified| quantified.slot.0).collect();
+        Some(if effect.forall.is_empty() { needed } else { Formula::Forall(forall, Box::new(needed)) })
+    }
+}
+
+/// Whether an object function may have no value for some arguments.
+fn may_be_undefined(task: &Task, function: FunctionId) -> bool {
+    let arguments: usize =
+        task.function(function).parameters.iter().map(|parameter| parameter.objects.len()).product();
+    let given = task.init.objects.iter().filter(|(fluent, _)| fluent.function == function).count();
+    let unset =
+        |effect: &Effect| matches!(&effect.change, Change::Object(own, None) if own.function == function);
+    let mut effects =
+        task.actions.iter().flat_map(|action| action.effects.start.iter().chain(&action.effects.end));
+    let mut written = task.modules.iter().flat_map(|module| &module.writes);
+    given < arguments
+        || effects.any(unset)
+        || written.any(|place| matches!(place, Written::Object(own) if own.function == function))
 }
 
 fn action(task: &Task, schema: usize) -> Action_ {
@@ -356,14 +396,25 @@ fn action(task: &Task, schema: usize) -> Action_ {
         parts.push(condition.start);
         condition.start = Formula::And(parts);
     }
+    let mut effects = |effects: &[Effect], at_end: bool, condition: &mut Formula| -> Vec<Effect_> {
+        let mut needs = Vec::new();
+        let effects = effects.iter().map(|effect| scope.effect(effect, at_end, &mut needs)).collect();
+        if !needs.is_empty() {
+            needs.push(std::mem::replace(condition, Formula::And(Vec::new())));
+            *condition = Formula::And(needs);
+        }
+        effects
+    };
+    let start_effects = effects(&lifted.effects.start, false, &mut condition.start);
+    let end_effects = effects(&lifted.effects.end, true, &mut condition.end);
     Action_ {
         schema: schema as u32,
         arity: lifted.parameters.len(),
         extra: fresh.slots,
         duration,
         condition,
-        start_effects: lifted.effects.start.iter().map(|e| scope.effect(e, false)).collect(),
-        end_effects: lifted.effects.end.iter().map(|e| scope.effect(e, true)).collect(),
+        start_effects,
+        end_effects,
         flows,
         domains: scope.domains,
     }

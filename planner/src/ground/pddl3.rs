@@ -8,7 +8,7 @@
 //!   their order leaves nothing to search.
 //! - An action with preferences of its own becomes several of its name: each preference is a condition, or is paid for.
 
-mod conditions;
+pub(super) mod conditions;
 mod touch;
 
 use rustc_hash::FxHashMap;
@@ -16,6 +16,7 @@ use rustc_hash::FxHashMap;
 use crate::diagnostic::Span;
 use crate::model::automaton::{AT_END, Automaton, Cases, Literal};
 use crate::model::walk::{self, Part};
+use crate::plan::EPSILON_S;
 use crate::task::{
     Action, Assignment, Atom, Change, Condition, Effect, Expression, Fact, Fluent, Function, FunctionId,
     GroundChange, GroundFluent, Modal, Object, ObjectId, Parameter, Predicate, PredicateId, PreferenceId,
@@ -281,6 +282,8 @@ impl<'t> Compiler<'t> {
         let early_fact = Fact { predicate: early_atom.predicate, arguments: Box::new([]) };
         let init = &mut self.made.init;
         init.facts.push(early_fact.clone());
+        // Who sees what comes about at the very last moment does so after it, and before it is too late.
+        let time_s = time_s + 2.0 * EPSILON_S;
         let late = TimedInitial { time_s, change: GroundChange::Delete(early_fact), span: Span::default() };
         init.timed.insert(init.timed.partition_point(|timed| timed.time_s <= time_s), late);
         let effects = vec![effect(Change::Add(own.clone()), Condition::TRUE, false)];

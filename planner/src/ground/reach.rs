@@ -61,8 +61,13 @@ pub(super) struct Reach<'a, P: Possible> {
     /// Upper bound on atoms and instances together.
     pub limit: usize,
     pub count: usize,
+    /// Objects tried so far where nothing but their type narrows them down.
+    pub tried: usize,
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
+
+/// The stop signal is asked once for so many objects that are tried.
+const TRIED_AT_ONCE: usize = 1 << 14;
 
 /// Scratch space of one join.
 struct Join<'r> {
@@ -204,6 +209,7 @@ impl<P: Possible> Reach<'_, P> {
         };
         let slot = rule.slots[at] as usize;
         for object in join.domains[slot].iter() {
+            self.go_on()?;
             join.binding[slot] = object.0;
             if join.consistent() {
                 self.enumerate(join, at + 1)?;
@@ -226,7 +232,7 @@ impl<P: Possible> Reach<'_, P> {
             self.count += 1;
         }
         for head in &rule.heads {
-            self.head(join, head, 0);
+            self.head(join, head, 0)?;
         }
         if self.count + self.atoms.len() > self.limit || (self.count % 4096 == 1 && (self.stop)()) {
             return Err(Stopped);
@@ -234,19 +240,31 @@ impl<P: Possible> Reach<'_, P> {
         Ok(())
     }
 
-    fn head(&mut self, join: &mut Join<'_>, head: &Head, at: usize) {
+    fn head(&mut self, join: &mut Join<'_>, head: &Head, at: usize) -> Result<(), Stopped> {
         if at < head.forall.len() {
             let slot = head.forall[at] as usize;
             for object in join.domains[slot].iter() {
+                self.go_on()?;
                 join.binding[slot] = object.0;
-                self.head(join, head, at + 1);
+                self.head(join, head, at + 1)?;
             }
             join.binding[slot] = NONE;
-            return;
+            return Ok(());
         }
         let mut arguments = [NONE; 32];
         let arity = join.pattern(&head.atom.terms, &mut arguments);
         self.atoms.insert(head.atom.predicate, &arguments[..arity]);
+        Ok(())
+    }
+
+    /// Counts one more object that is tried; an error once nothing more is to be tried.
+    fn go_on(&mut self) -> Result<(), Stopped> {
+        self.tried += 1;
+        let asked = self.tried.is_multiple_of(TRIED_AT_ONCE);
+        if asked && (self.count + self.atoms.len() > self.limit || (self.stop)()) {
+            return Err(Stopped);
+        }
+        Ok(())
     }
 }
 

@@ -3,5 +3,6 @@
 
 pub(crate) mod agreement;
 pub(crate) mod automaton;
+pub(crate) mod between;
 pub(crate) mod relation;
 pub(crate) mod walk;

@@ -7,6 +7,7 @@ pub(crate) mod calls;
 mod conditions;
 mod derive;
 mod describe;
+mod differences;
 pub(crate) mod effects;
 pub(crate) mod reads;
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::attachment::Level;
 use crate::calls::Failure;
 use crate::ground::{Change, Effect, Outcome, Values, When};
+use crate::model::between::telling_parts;
 
 use super::order::Access;
 use super::relaxed::Part;
@@ -23,6 +24,14 @@ pub(crate) struct Open {
     pub span: Span,
     /// Which of its end effects can still happen.
     pub gates: Gates,
+}
+
+impl Open {
+    /// A state while it goes on.
+    fn moment<'s>(&'s self, state: &'s Values) -> Moment<'s> {
+        let proposal = self.proposal.as_ref();
+        Moment { state, duration_s: self.span.least_s, proposal, level: Level::Exact }
+    }
 }
 
 /// Of the end effects of an action in progress, a bit for each whose conditions at the start or over all failed; no words
@@ -114,9 +123,8 @@ impl World<'_> {
             return Ok(Some(next));
         }
         let gates = self.start_gates(act, &from.state, step)?;
-        if !self.finish(act, step.proposal.as_ref(), span, &gates, &mut next.state)?
-            || !self.goes_on(&mut next)?
-        {
+        let own = Open { act: step.act, proposal: step.proposal.clone(), span, gates };
+        if !self.finish(&own, &mut next)? || !self.goes_on(&mut next)? {
             return Ok(None);
         }
         Ok(Some(next))
@@ -138,8 +146,7 @@ impl World<'_> {
         let mut next = from.clone();
         let open = next.open.remove(position);
         step.span = open.span;
-        let act = &self.acts[step.act as usize];
-        if !self.finish(act, open.proposal.as_ref(), open.span, &open.gates, &mut next.state)? {
+        if !self.finish(&open, &mut next)? {
             return Ok(None);
         }
         Ok(self.goes_on(&mut next)?.then_some(next))
@@ -180,7 +187,9 @@ impl World<'_> {
             return Ok(None);
         }
         let inside = Moment { state: &after, ..moment };
-        Ok(self.holds(act.over_all, &inside)?.then_some((after, span)))
+        // Where numbers flow, what holds over all is told at the end.
+        let goes_on = !act.flow_effects.is_empty() || self.holds(act.over_all, &inside)?;
+        Ok(goes_on.then_some((after, span)))
     }
 
     fn start_gates(&self, act: &Act, before: &Values, step: &Step) -> Result<Gates, Failure> {
@@ -200,28 +209,16 @@ impl World<'_> {
         Ok(gates)
     }
 
-    /// Lets the action end in a state; `false` if it cannot.
-    fn finish(
-        &self,
-        act: &Act,
-        proposal: Option<&Arc<str>>,
-        span: Span,
-        gates: &Gates,
-        state: &mut Values,
-    ) -> Result<bool, Failure> {
-        let duration_s = span.least_s;
+    /// Lets an action end in a situation that it is no longer open in; `false` if it cannot.
+    fn finish(&self, own: &Open, situation: &mut Situation) -> Result<bool, Failure> {
+        let act = &self.acts[own.act as usize];
         if !act.flow_effects.is_empty() {
-            let before = state.clone();
-            let moment = Moment { state: &before, duration_s, proposal, level: Level::Exact };
-            if !self.apply(act.flow_effects, &moment, &|_, _| true, state)? {
-                return Ok(false);
-            }
-            if !self.holds(act.over_all, &Moment { state, ..moment })? {
-                return Ok(false);
-            }
+            let Some(flowed) = self.flowed(own, situation)? else { return Ok(false) };
+            situation.state = flowed;
         }
+        let state = &mut situation.state;
         let before = state.clone();
-        let moment = Moment { state: &before, duration_s, proposal, level: Level::Exact };
+        let moment = own.moment(&before);
         if !self.holds(act.at_end, &moment)? || !self.end_allows(act, &moment)? {
             return Ok(false);
         }
@@ -229,8 +226,47 @@ impl World<'_> {
         for effect in act.end_effects {
             inside.push(effect.when.as_ref().map_or(Ok(true), |when| self.holds(&when.over_all, &moment))?);
         }
-        let gate = |index: usize, _: &Effect| inside[index] && gates.is_open(index);
+        let gate = |index: usize, _: &Effect| inside[index] && own.gates.is_open(index);
         self.apply(act.end_effects, &moment, &gate, state)
+    }
+
+    /// The state right before the end of an action that changes numbers at a rate; `None` if it, or what else is open, cannot go
+    /// on all the time.
+    fn flowed(&self, own: &Open, situation: &Situation) -> Result<Option<Values>, Failure> {
+        let before = &situation.state;
+        let mut last = before.clone();
+        let flows = self.acts[own.act as usize].flow_effects;
+        if !self.apply(flows, &own.moment(before), &|_, _| true, &mut last)? {
+            return Ok(None);
+        }
+        let on_the_way = |part: f64| -> Result<Values, Failure> {
+            let mut state = before.clone();
+            for (number, last) in state.numbers.iter_mut().zip(&last.numbers) {
+                *number += part * (last - *number);
+            }
+            self.derive(&mut state)?;
+            Ok(state)
+        };
+        let middle = on_the_way(0.5)?;
+        let mut differences = Vec::with_capacity(self.ground.comparisons.len());
+        for comparison in &self.ground.comparisons {
+            let mut points = [0.0; 3];
+            for (point, state) in points.iter_mut().zip([before, &middle, &last]) {
+                let moment = own.moment(state);
+                *point =
+                    self.evaluate(&comparison.left, &moment)? - self.evaluate(&comparison.right, &moment)?;
+            }
+            differences.push(points);
+        }
+        for part in telling_parts(differences) {
+            let state = on_the_way(part)?;
+            for open in situation.open.iter().chain([own]) {
+                if !self.holds(self.acts[open.act as usize].over_all, &open.moment(&state))? {
+                    return Ok(None);
+                }
+            }
+        }
+        Ok(Some(last))
     }
 
     /// Whether all that is in progress can go on in a state; notes which end effects cannot happen any more.
@@ -326,7 +362,8 @@ impl<'w, 'a> Watch<'w, 'a> {
         let (world, read) = (self.world, &mut self.read);
         read.condition(world, act.at_start);
         self.held.condition(world, act.over_all);
-        act.bounds.iter().for_each(|bound| expression_touches(world, &bound.seconds, read));
+        let bounds = act.bounds.iter().filter(|bound| !bound.at_end);
+        bounds.for_each(|bound| expression_touches(world, &bound.seconds, read));
         for when in act.end_effects.iter().filter_map(|effect| effect.when.as_ref()) {
             read.condition(world, &when.at_start);
             read.condition(world, &when.over_all);
@@ -336,8 +373,11 @@ impl<'w, 'a> Watch<'w, 'a> {
     }
 
     fn end(&mut self, act: &Act) -> Access {
-        self.held.condition(self.world, act.over_all);
-        self.read.condition(self.world, act.at_end);
+        let (world, read) = (self.world, &mut self.read);
+        self.held.condition(world, act.over_all);
+        read.condition(world, act.at_end);
+        let bounds = act.bounds.iter().filter(|bound| bound.at_end);
+        bounds.for_each(|bound| expression_touches(world, &bound.seconds, read));
         self.access(act.flow_effects.iter().chain(act.end_effects))
     }
 

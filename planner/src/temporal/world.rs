@@ -280,6 +280,13 @@ impl<'a> World<'a> {
             return Ok(None);
         }
         span.least_s = span.least_s.max(EPSILON_S.min(span.most_s));
+        // What the end asks for is most likely what it would ask for now.
+        for bound in act.bounds.iter().filter(|bound| bound.at_end && bound.relation == Relation::Equal) {
+            let seconds = self.evaluate(&bound.seconds, moment)?;
+            if span.least_s < seconds && seconds <= span.most_s {
+                span.least_s = seconds;
+            }
+        }
         if act.share > 0.0 {
             let seconds = span.least_s + act.share * (span.most_s - span.least_s);
             let is_longer = seconds.is_finite() && seconds > span.least_s;
@@ -367,7 +374,7 @@ impl<'a> World<'a> {
     }
 
     /// Brings derived variables up to date.
-    fn derive(&self, state: &mut Values) -> Result<(), Failure> {
+    pub(super) fn derive(&self, state: &mut Values) -> Result<(), Failure> {
         if self.derived.is_empty() {
             return Ok(());
         }

@@ -3,6 +3,7 @@
 use super::timeline::{Event, Happening, happenings, makespan_s};
 use super::{Fault, Replayed, SEPARATION_S};
 use crate::diagnostic::{Diagnostic, Span};
+use crate::model::between::telling_parts;
 use crate::model::relation::Relation;
 use crate::plan::EPSILON_S;
 use crate::plan::Plan;
@@ -19,6 +20,7 @@ struct Running {
     action: ActionId,
     binding: Binding,
     pending: Pending,
+    since_s: f64,
 }
 
 /// Who takes part in a happening, and what it does there.
@@ -166,7 +168,7 @@ impl Replay<'_, '_> {
         if !self.trace.is_empty() {
             self.trace.push((happening.time_s, self.state.clone()));
         }
-        self.invariants()
+        self.after_happening()
     }
 
     /// What an event does, if it can happen now.
@@ -369,7 +371,8 @@ impl Replay<'_, '_> {
                     let (action, mut binding) = self.bound[step].clone();
                     let effects = &self.semantics.task.action(action).effects.end;
                     let pending = self.semantics.remember(&self.state, effects, &mut binding)?;
-                    self.running.push(Running { step, action, binding, pending });
+                    let since_s = self.now_s;
+                    self.running.push(Running { step, action, binding, pending, since_s });
                 }
                 Event::End(step) => self.running.retain(|running| running.step != step),
                 _ => {}
@@ -378,10 +381,22 @@ impl Replay<'_, '_> {
         Ok(())
     }
 
-    /// Conditions over all of what is running hold in the present state.
-    fn invariants(&mut self) -> Outcome<()> {
+    /// Conditions over all of what is running hold in the present state, right after a happening. What has begun just now has
+    /// to hold from now on alone: where numbers flow, that is told on the way.
+    fn after_happening(&mut self) -> Outcome<()> {
+        let flows = self.running.iter().any(|running| self.flows(running));
+        let begun_s = if flows { self.now_s } else { f64::INFINITY };
+        self.invariants(begun_s)
+    }
+
+    fn flows(&self, running: &Running) -> bool {
+        !self.semantics.task.action(running.action).continuous.is_empty()
+    }
+
+    /// Conditions over all of what is running since before a time hold in the present state.
+    fn invariants(&mut self, begun_s: f64) -> Outcome<()> {
         let mut broken = None;
-        for running in &mut self.running {
+        for running in self.running.iter_mut().filter(|running| running.since_s < begun_s) {
             let action = self.semantics.task.action(running.action);
             if let Some(why) =
                 self.semantics.why_not(&self.state, &action.condition.over_all, &mut running.binding)?
@@ -403,11 +418,31 @@ impl Replay<'_, '_> {
         })
     }
 
-    /// Numbers that change at a rate, up to the next happening. Between happenings they change linearly, so that
-    /// conditions over all that hold at both ends hold between them.
+    /// Numbers that change at a rate, up to the next happening; conditions over all hold on the way.
     fn flow(&mut self, until_s: f64) -> Outcome<()> {
         let elapsed_s = until_s - self.now_s;
         self.now_s = until_s;
+        let changes = attempt!(self.flowing(elapsed_s));
+        if changes.numbers.is_empty() || elapsed_s <= 0.0 {
+            return Ok(Ok(()));
+        }
+        let middle = attempt!(self.moved(&changes, 0.5));
+        let after = attempt!(self.moved(&changes, 1.0));
+        let differences = [&self.state, &middle, &after].map(|state| self.differences(state));
+        let [first, middle, last] = differences;
+        let points = first?.into_iter().zip(middle?).zip(last?);
+        let before = self.state.clone();
+        for part in telling_parts(points.map(|((first, middle), last)| [first, middle, last])) {
+            self.state = attempt!(self.moved(&changes, part));
+            attempt!(self.invariants(f64::INFINITY));
+            self.state.clone_from(&before);
+        }
+        self.state = after;
+        Ok(Ok(()))
+    }
+
+    /// What changes at a rate, and by how much in a time.
+    fn flowing(&self, elapsed_s: f64) -> Outcome<Changes> {
         let mut changes = Changes::default();
         for running in &self.running {
             for rate in &self.semantics.task.action(running.action).continuous {
@@ -417,21 +452,46 @@ impl Replay<'_, '_> {
                     let clash = Clash { reason: "this rate has no value".to_string(), span: rate.span };
                     return Ok(Err(Box::new(self.clash(Some(running.step), clash))));
                 };
-                changes.numbers.push((
-                    fluent,
-                    crate::task::Assignment::Increase,
-                    value * elapsed_s,
-                    rate.span,
-                ));
+                let increase = crate::task::Assignment::Increase;
+                changes.numbers.push((fluent, increase, value * elapsed_s, rate.span));
             }
         }
-        if changes.numbers.is_empty() || elapsed_s <= 0.0 {
-            return Ok(Ok(()));
+        Ok(Ok(changes))
+    }
+
+    /// The state once a part of some changes has come about.
+    fn moved(&self, changes: &Changes, part: f64) -> Outcome<State> {
+        let mut partly = changes.clone();
+        partly.numbers.iter_mut().for_each(|(_, _, amount, _)| *amount *= part);
+        let mut state = self.state.clone();
+        Ok(match self.semantics.apply(&mut state, &partly)? {
+            Ok(()) => Ok(state),
+            Err(clash) => Err(Box::new(self.clash(None, clash))),
+        })
+    }
+
+    /// How far apart the sides of all comparisons are that matter to what is running.
+    fn differences(&self, state: &State) -> Result<Vec<f64>, CallFailure> {
+        let mut found = Vec::new();
+        self.semantics.rule_differences(state, &mut found)?;
+        for running in &self.running {
+            let action = self.semantics.task.action(running.action);
+            let mut binding = running.binding.clone();
+            let mut add = |condition, binding: &mut Binding| {
+                self.semantics.differences(state, condition, binding, &mut found)
+            };
+            add(&action.condition.over_all, &mut binding)?;
+            for (_, preferred) in &action.preferences {
+                add(&preferred.over_all, &mut binding)?;
+            }
+            for effect in &action.effects.end {
+                self.semantics.some_binding(&effect.forall, &mut binding, &mut |binding| {
+                    add(&effect.when.over_all, binding)?;
+                    Ok(false)
+                })?;
+            }
         }
-        if let Err(clash) = self.semantics.apply(&mut self.state, &changes)? {
-            return Ok(Err(Box::new(self.clash(None, clash))));
-        }
-        self.invariants()
+        Ok(found)
     }
 }
 

@@ -8,6 +8,7 @@ mod goals;
 mod initial;
 mod lints;
 mod names;
+mod rates;
 mod requirements;
 mod strata;
 mod usage;
@@ -204,6 +205,7 @@ impl<'a> Checker<'a> {
         for action in &domain.actions {
             self.action(action);
         }
+        self.steady_rates();
         for constraint in &domain.constraints {
             self.constraint(constraint);
         }

@@ -1,0 +1,75 @@
+//! What holds between two happenings, while numbers change steadily: PDDL 2.1 (Fox and Long 2003), section 8.3, asks for
+//! conditions over all in the open interval between them, so that what holds at both ends need not hold on the way.
+
+use super::relation::Relation;
+
+/// Parts of an interval no longer than this are nothing but rounding.
+const EDGE: f64 = 1e-9;
+
+/// Parts of an interval, from 0 to 1 and without these ends, such that a condition on numbers holds all the time inside if it
+/// holds at each of them: where a comparison may change, and once between two such places.
+///
+/// `differences` are those of the sides of each comparison: at the beginning, in the middle and at the end. They are taken to
+/// change at a rate, or as products of two such numbers do.
+pub(crate) fn telling_parts(differences: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64> {
+    let mut turns: Vec<f64> = differences.into_iter().flat_map(turns).collect();
+    turns.sort_by(f64::total_cmp);
+    turns.dedup();
+    let mut parts = Vec::with_capacity(2 * turns.len() + 1);
+    let mut before = 0.0;
+    for turn in turns {
+        parts.extend([(before + turn) / 2.0, turn]);
+        before = turn;
+    }
+    parts.push((before + 1.0) / 2.0);
+    parts
+}
+
+/// Where a difference is nothing or turns back, inside the interval.
+fn turns([first, middle, last]: [f64; 3]) -> Vec<f64> {
+    // The parabola through three points: a·x² + b·x + first.
+    let a = 2.0 * (first - 2.0 * middle + last);
+    let b = last - first - a;
+    let size = first.abs().max(middle.abs()).max(last.abs());
+    let found = if a.abs() <= EDGE * size {
+        vec![first / (first - last)]
+    } else {
+        let root = (b * b - 4.0 * a * first).max(0.0).sqrt();
+        vec![(-b - root) / (2.0 * a), -b / (2.0 * a), (-b + root) / (2.0 * a)]
+    };
+    // Where it is nothing at an end, rounding may let it be so shortly before.
+    let ends = [(first, b), (last, 2.0 * a + b)].map(|(own, slope)| is_nothing(own).then_some(slope));
+    let at_an_end = |part: f64| {
+        let near = |slope: Option<f64>, apart: f64| slope.is_some_and(|slope| is_nothing(slope * apart));
+        near(ends[0], part) || near(ends[1], 1.0 - part)
+    };
+    found.into_iter().filter(|&part| part > EDGE && part < 1.0 - EDGE && !at_an_end(part)).collect()
+}
+
+fn is_nothing(difference: f64) -> bool {
+    Relation::Equal.holds(difference, 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stretch_and_every_turn_is_looked_at() {
+        for (differences, expected) in [
+            (vec![], vec![0.5]),
+            (vec![[1.0, 1.0, 1.0]], vec![0.5]),
+            (vec![[f64::NAN, 1.0, 1.0]], vec![0.5]),
+            // Rising through nothing; from nothing; up to nothing.
+            (vec![[-1.0, 1.0, 3.0]], vec![0.125, 0.25, 0.625]),
+            (vec![[0.0, 1.0, 2.0]], vec![0.5]),
+            (vec![[-2.0, -1.0, -1e-9]], vec![0.5]),
+            // x·(1 - x), less a quarter: it touches nothing in the middle.
+            (vec![[-0.25, 0.0, -0.25]], vec![0.25, 0.5, 0.75]),
+            // Two comparisons.
+            (vec![[-1.0, 0.0, 1.0], [-1.0, 1.0, 3.0]], vec![0.125, 0.25, 0.375, 0.5, 0.75]),
+        ] {
+            assert_eq!(telling_parts(differences.clone()), expected, "{differences:?}");
+        }
+    }
+}

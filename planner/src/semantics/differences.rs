@@ -1,0 +1,59 @@
+//! How far apart both sides of each comparison are.
+
+use super::{Binding, CallFailure, Semantics};
+use crate::model::walk::{self, Part};
+use crate::state::State;
+use crate::task::{Condition, Quantified, Rule, Slot};
+
+impl Semantics<'_> {
+    /// Adds the differences of the sides of every comparison that a condition speaks of, in an order that no state changes; NaN
+    /// where one is undefined. Those of rules are given by [`Semantics::rule_differences`].
+    pub(crate) fn differences(
+        &self,
+        state: &State,
+        condition: &Condition,
+        binding: &mut Binding,
+        found: &mut Vec<f64>,
+    ) -> Result<(), CallFailure> {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                parts.iter().try_for_each(|part| self.differences(state, part, binding, found))?;
+            }
+            Condition::Not(inner) => self.differences(state, inner, binding, found)?,
+            Condition::Forall(variables, inner) | Condition::Exists(variables, inner) => {
+                self.some_binding(variables, binding, &mut |binding| {
+                    self.differences(state, inner, binding, found)?;
+                    Ok(false)
+                })?;
+            }
+            Condition::Compare(_, sides, _) => {
+                let [left, right] = sides.each_ref().map(|side| self.number(state, side, binding));
+                found.push(left?.zip(right?).map_or(f64::NAN, |(left, right)| left - right));
+            }
+            Condition::Atom(_) | Condition::Same(..) | Condition::Call(_) => {}
+        }
+        Ok(())
+    }
+
+    /// The same of all instances of the rules of derived predicates.
+    pub(crate) fn rule_differences(&self, state: &State, found: &mut Vec<f64>) -> Result<(), CallFailure> {
+        for rule in self.task.rules.iter().filter(|rule| compares(rule)) {
+            let slots = (0..).map(Slot).zip(&rule.parameters);
+            let variables: Vec<Quantified> =
+                slots.map(|(slot, parameter)| Quantified { slot, parameter: parameter.clone() }).collect();
+            self.some_binding(&variables, &mut Binding::new(rule.slots), &mut |binding| {
+                self.differences(state, &rule.body, binding, found)?;
+                Ok(false)
+            })?;
+        }
+        Ok(())
+    }
+}
+
+fn compares(rule: &Rule) -> bool {
+    let mut found = false;
+    walk::condition(&rule.body, &mut |part| {
+        found |= matches!(part, Part::Condition(Condition::Compare(..)));
+    });
+    found
+}

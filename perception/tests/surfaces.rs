@@ -320,3 +320,14 @@ fn a_tilted_surface_has_its_height_where_it_is() {
         assert_eq!(found, expected, "tilted by {tilt_rad}, {higher_m} m higher");
     }
 }
+
+#[test]
+fn a_wide_plane_that_is_seen_sparsely_is_one() {
+    // Ten metres by ten, a point every ten centimetres.
+    let at = |k: usize| Point3::new((k % 100) as f32 * 0.1, (k / 100) as f32 * 0.1, 0.0);
+    let cloud = Cloud::from_points((0..10_000).map(at).collect());
+    let options = SurfaceOptions { up: Some(Vector3::z_axis()), ..SurfaceOptions::default() };
+    let found = find_surfaces(&cloud, &Visibility::default(), &options).expect("a surface");
+    let areas_m2: Vec<f64> = found.iter().map(|surface| surface.area_m2).collect();
+    assert!(areas_m2.len() == 1 && (90.0..110.0).contains(&areas_m2[0]), "{areas_m2:?}");
+}

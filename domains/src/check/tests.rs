@@ -218,10 +218,10 @@ fn all_of_a_phrase_is_heard() {
     let sure = and(&format!("say = \"look with confidence\"\n{looks}"));
     toml((say, &sure), "unsayable", "with confidence", &["how sure"]);
     let again = and("say = \"Find <a:thing>!\"\nmeans = \"(>= (confidence <a:thing>) 0.6)\"");
-    toml((say, &again), "same-phrase", "\"find <thing>\"", &["\"find <thing>\" is said above"]);
-    for none in ["", "(and)"] {
+    toml((say, &again), "same-phrase", "\"find <thing>\"", &["\"Find <a:thing>!\" is said above"]);
+    for (none, place) in [("", "\"\""), ("(and)", "\"(and)\"")] {
         let nothing = and(&format!("say = \"rest\"\nmeans = \"{none}\""));
-        toml((say, &nothing), "no-goal", &format!("\"{none}\""), &["asks for nothing"]);
+        toml((say, &nothing), "no-goal", place, &["asks for nothing"]);
     }
     // What a slot holds may be for the answer alone.
     let told = and(&format!("say = \"greet <thing>\"\n{looks}\nanswer.achieved = \"hello, <thing>\""));

@@ -29,7 +29,9 @@ impl Check<'_> {
         let place = self.toml.at(&["goal", &n.to_string(), "means"]);
         let message = "this asks for nothing: it holds before anything is done".to_string();
         let help = "say what is to hold, as in (>= (confidence <thing>) <threshold>)";
-        mentions(&phrase.means).is_empty().then(|| self.error("no-goal", message, place, help))
+        let is_word = |mention: &Vec<String>| self.domain.vocabulary.word(&mention[0]).is_some();
+        let is_empty = !mentions(&phrase.means).iter().any(is_word);
+        is_empty.then(|| self.error("no-goal", message, place, help))
     }
 
     /// That a phrase has words in it that end every goal: how sure, how soon.

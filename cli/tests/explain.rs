@@ -189,7 +189,25 @@ fn what_is_lost_with_a_damaged_header_is_said() {
         "{text}"
     );
     assert!(text.contains("achieved: cup A stands on the table"), "{text}");
+    // So is what the verdict rests on, also in JSON.
+    let segments = std::fs::read_dir(folder.path().join("run/record/segments")).expect("a folder").flatten();
+    let mut spoiled = 0;
+    for segment in segments.map(|entry| entry.path()) {
+        let mut bytes = std::fs::read(&segment).expect("a segment");
+        if let Some(at) = bytes.windows(RESTS.len()).position(|part| part == RESTS) {
+            bytes[at] ^= 1;
+            std::fs::write(&segment, bytes).expect("it is spoiled");
+            spoiled += 1;
+        }
+    }
+    assert_eq!(spoiled, 1);
+    let told = binary::check(folder.path(), &["explain", "run", "--json"], 1);
+    assert_eq!(told["lost"].as_array().map(Vec::len), Some(2), "{told}");
+    assert!(told["verdict"].to_string().contains("achieved: cup A stands on the table"), "{told}");
 }
+
+/// What only the document holds that says what the verdict rests on.
+const RESTS: &[u8] = b"\"in_doubt\"";
 
 #[test]
 fn what_is_to_be_brought_may_stand_elsewhere_than_where_it_is_to_stand() {

@@ -275,6 +275,14 @@ fn what_a_program_could_not_do_is_tried_again_and_given_up() {
     check(&rings(&busy, "retries = 1\ngives_up = [\"(tired)\"]"), "ring", 1, &given_up, &["it rang"]);
     let teaches = "teaches = [{ when = \"program\", says = \"(tired)\" }]";
     check(&rings(&busy, teaches), "ring", 1, &["busy; (tired)", impossible], &["it rang"]);
+    let no = answers("\"value\":false");
+    let given_up = ["it answered false; (ring) is given up: (tired)", impossible];
+    check(&rings(&no, "retries = 0\ngives_up = [\"(tired)\"]"), "ring", 1, &given_up, &["it rang"]);
+    // What is no answer does not say that it is done.
+    for none in ["\"valeu\":\"ding\"", "\"error\":5", "\"error\":{\"code\":5}"] {
+        let expected = ["expected a `value`, or an `error` that is a text"];
+        check(&rings(&answers(none), "retries = 0"), "ring", 5, &expected, &["it rang"]);
+    }
     let crash = "echo no bell here >&2; exit 3";
     check(&rings(crash, "retries = 1"), "ring", 5, &["failed", "no bell here"], &["it rang"]);
     let late = "retries = 0\nlimit_s = 0.2";

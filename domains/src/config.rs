@@ -315,6 +315,9 @@ fn default_program_time_s() -> f64 {
 /// With less a yes would be no likelier than a no.
 const SURE: &str = "a number above 0.5 and below 1";
 
+/// With more left, "not there" would be no likelier than its contrary.
+const LEFT: &str = "a number above 0 and below 0.5";
+
 /// Checks the numbers of a configuration.
 pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
     let value = |key: &str, value: f64, holds: bool, expected: &'static str| {
@@ -335,13 +338,13 @@ pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
     }
     let t = &config.thresholds;
     value("thresholds.confidence", t.confidence, t.confidence > 0.5 && t.confidence < 1.0, SURE)?;
+    value("thresholds.prior", t.prior, t.prior > 0.0 && t.prior < 1.0, "a number above 0 and below 1")?;
     for (key, p) in [
         ("thresholds.remaining", t.remaining),
         ("thresholds.out_of_sight", t.out_of_sight),
         ("thresholds.not_there", t.not_there),
-        ("thresholds.prior", t.prior),
     ] {
-        value(key, p, p > 0.0 && p < 1.0, "a number above 0 and below 1")?;
+        value(key, p, p > 0.0 && p < 0.5, LEFT)?;
     }
     let c = &config.candidates;
     value("candidates.poses", c.poses as f64, (1..=1000).contains(&c.poses), "1 to 1000 poses")?;

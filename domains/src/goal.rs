@@ -88,6 +88,14 @@ pub enum GoalError {
         /// What followed "within".
         found: String,
     },
+    /// How sure, or how soon, is said more than once.
+    #[error("\"{condition}\" is said twice\n  expected it once, as in \"find cup A {condition} {example}\"")]
+    SaidTwice {
+        /// What begins it.
+        condition: &'static str,
+        /// What may follow.
+        example: &'static str,
+    },
     /// The phrase itself cannot be used.
     #[error("the phrase \"{phrase}\" in domain.toml: {because}")]
     BadPhrase {
@@ -222,26 +230,39 @@ struct Wanted {
     deadline_s: Option<f64>,
 }
 
+/// Behind these words a goal says how sure it must be.
+pub(crate) const CONFIDENCE: [&str; 2] = ["with", "confidence"];
+/// Behind this word a goal says how soon it must be.
+pub(crate) const DEADLINE: [&str; 1] = ["within"];
+
 /// Takes "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.
 fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError> {
     let mut words: Vec<String> =
         said.split_whitespace().map(|w| bare(w).to_lowercase()).filter(|w| !w.is_empty()).collect();
     let mut wanted = Wanted { confidence: None, deadline_s: None };
     loop {
-        let confidence = words.windows(2).rposition(|w| w[0] == "with" && w[1] == "confidence");
-        let within = words.iter().rposition(|w| w == "within");
+        let confidence = words.windows(2).rposition(|w| w == CONFIDENCE);
+        let within = words.windows(1).rposition(|w| w == DEADLINE);
         match (confidence, within) {
             (Some(at), within) if within.is_none_or(|w| w < at) => {
                 let found = words.split_off(at)[2..].join(" ");
-                wanted.confidence = Some(confidence_of(found)?);
+                let other = wanted.confidence.replace(confidence_of(found)?);
+                once(other, "with confidence", "0.9")?;
             }
             (_, Some(at)) => {
                 let found = words.split_off(at)[1..].join(" ");
-                wanted.deadline_s = Some(seconds(&found).ok_or(GoalError::BadDeadline { found })?);
+                let other =
+                    wanted.deadline_s.replace(seconds(&found).ok_or(GoalError::BadDeadline { found })?);
+                once(other, "within", "60 seconds")?;
             }
             _ => return Ok((words, wanted)),
         }
     }
+}
+
+/// That nothing was said of a condition before.
+fn once(other: Option<f64>, condition: &'static str, example: &'static str) -> Result<(), GoalError> {
+    other.map_or(Ok(()), |_| Err(GoalError::SaidTwice { condition, example }))
 }
 
 /// "0.9": a yes must be likelier than a no.
@@ -288,8 +309,12 @@ fn fits<'a>(say: &'a str, words: &[String]) -> Vec<Vec<(&'a str, String)>> {
         };
         (1..=words.len()).flat_map(with).collect()
     }
-    let pattern: Vec<&str> = say.split_whitespace().map(bare).filter(|word| !word.is_empty()).collect();
-    step(&pattern, words)
+    step(&pattern(say), words)
+}
+
+/// The words and slots of a phrase, without the signs around them.
+pub(crate) fn pattern(say: &str) -> Vec<&str> {
+    say.split_whitespace().map(bare).filter(|word| !word.is_empty()).collect()
 }
 
 fn fill(lexicon: &Lexicon, open: &[String], slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> {
@@ -422,6 +447,24 @@ mod tests {
         for none in ["0", "1", "2", "-0.7", "nan", "much"] {
             check(none, Err("asks for no probability"));
         }
+    }
+
+    #[test]
+    fn how_sure_and_how_soon_are_said_once() {
+        let domain = Domain::load("tabletop").unwrap();
+        let lexicon = Lexicon::new(&domain, &crate::lexicon::Places::of_scene(&domain));
+        let check = |conditions: &str, expected: Result<(f64, Option<f64>), &str>| {
+            let found = read(&format!("find cup A {conditions}"), &domain, &lexicon);
+            let found = found.map(|goal| (goal.threshold, goal.deadline_s)).map_err(|e| e.to_string());
+            match expected {
+                Ok(expected) => assert_eq!(found, Ok(expected), "{conditions}"),
+                Err(part) => assert!(found.is_err_and(|e| e.contains(part)), "{conditions}"),
+            }
+        };
+        check("within 60 seconds with confidence 0.9", Ok((0.9, Some(60.0))));
+        check("with confidence 0.9 within 60 seconds", Ok((0.9, Some(60.0))));
+        check("with confidence 0.9 with confidence 0.6", Err("\"with confidence\" is said twice"));
+        check("within 9 seconds with confidence 0.9 within 1 minute", Err("\"within\" is said twice"));
     }
 
     #[test]

@@ -188,9 +188,10 @@ impl ProgramAttachment {
         if answer["id"] != id {
             return Err(unreadable(&line, "the `id` that was asked"));
         }
-        match answer["error"].as_str() {
-            Some(error) => Err(CallError::Failed(error.to_string())),
-            None => Ok(answer),
+        match (&answer["error"], answer.get("value")) {
+            (Value::String(error), _) => Err(CallError::Failed(error.clone())),
+            (Value::Null, Some(_)) => Ok(answer),
+            _ => Err(unreadable(&line, "a `value`, or an `error` that is a text")),
         }
     }
 

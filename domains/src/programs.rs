@@ -101,16 +101,17 @@ impl Programs {
 
 impl ProgramAction {
     /// The call as a skill. The program is asked `{"id": 0, "action": "greet", "arguments": ["anna"]}` and answers
-    /// `{"id": 0, "value": "said hello"}`, or `{"id": 0, "error": "why not"}`, which is tried again as the domain says.
+    /// `{"id": 0, "value": "said hello"}`, or `{"id": 0, "error": "why not"}`, which is tried again as the domain says, as is `false`.
     pub fn perform(&self, call: &Call) -> Box<dyn Skill> {
         let program = Arc::clone(&self.program);
         let question = json!({ "action": call.action, "arguments": call.arguments });
         let ask = move || match program.ask_one(question.clone()) {
-            Ok(answer) => Asked::Done(match &answer["value"] {
-                serde_json::Value::String(word) => word.clone(),
-                serde_json::Value::Null | serde_json::Value::Bool(true) => "done".into(),
-                other => other.to_string(),
-            }),
+            Ok(answer) => match &answer["value"] {
+                Value::String(word) => Asked::Done(word.clone()),
+                Value::Null | Value::Bool(true) => Asked::Done("done".into()),
+                Value::Bool(false) => Asked::Failed { because: "it answered false".into(), passing: true },
+                other => Asked::Done(other.to_string()),
+            },
             Err(CallError::Failed(because)) => Asked::Failed { because, passing: true },
             Err(other) => Asked::Failed { because: other.to_string(), passing: false },
         };

@@ -170,6 +170,11 @@ fn what_is_no_robot_is_refused_with_the_reason() {
     check_refused("laser beyond a turn", &["laser: 1000 readings", "a full turn at most"]);
     check_refused("two tables of one name", &["two surfaces are called \"table\""]);
     check_refused("a table in millimetres", &["\"table\"", "m wide, expected 30 m", "not in millimetres"]);
+    check_refused("a door in millimetres", &["the door \"way\"", "is 900", "not millimetres"]);
+    check_refused("a door to nowhere", &["the door \"way\"", "\"yard\"", "[\"hall\"]"]);
+    check_refused("a table nowhere", &["the surface \"table\"", "\"hal\""]);
+    check_refused("a heading in degrees", &["pose_sigma_rad is 2", "not degrees"]);
+    check_refused("a head in millimetres", &["head.base_from_head is 1400", "not millimetres"]);
     check_refused("short map", &["9999 bytes follow the hello", "10000 cells"]);
     check_refused("two cameras", &["camera.base_from_camera", "there is a head"]);
     check_refused("hardly drives", &["base.linear_m_s is 0.000000001", "expected 0.001 or more"]);

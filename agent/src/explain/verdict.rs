@@ -50,8 +50,10 @@ pub fn rests_on(
     let Some(report) = report else {
         return Ok(vec!["there is no verdict: the run was cut off (descry do --resume goes on with it), or its report is lost.".into()]);
     };
-    let rests = record.newest(standing::RESTS).map_err(CommandError::broken)?;
-    let rests = rests.and_then(|d| serde_json::from_value::<Rests>(d.body).ok());
+    let (found, faults) =
+        record.find_whole(&Query::of_kind(standing::RESTS)).map_err(CommandError::broken)?;
+    lost.extend(faults.iter().map(ToString::to_string));
+    let rests = found.last().and_then(|d| serde_json::from_value::<Rests>(d.body.clone()).ok());
     // Why it ended is said last.
     let end = rests.as_ref().map(|rests| rests.said.as_str()).filter(|end| !end.is_empty());
     let why = end.and_then(|end| report.why.strip_suffix(end)).map(|why| why.trim_end_matches(": "));

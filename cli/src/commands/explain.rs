@@ -27,15 +27,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         Err(e) => (None, Some(e)),
     };
     let mut explained = descry_agent::explain::of(&record, &header, report.as_ref())?;
-    explained.lost.extend(descry_agent::run::lost_of_header(folder));
+    let faults = &record.recovery().faults;
+    let otherwise = faults.iter().map(ToString::to_string).chain(damaged.iter().map(ToString::to_string));
+    for lost in otherwise.chain(descry_agent::run::lost_of_header(folder)) {
+        if !explained.lost.contains(&lost) {
+            explained.lost.push(lost);
+        }
+    }
     if arguments.json {
         input::print_json(&explained)?;
+        explained.lost.iter().for_each(|lost| input::narrate(&format!("descry: lost: {lost}")));
     } else {
         input::print_text(explained.text(arguments.figures).trim_end())?;
     }
-    if let Some(damaged) = &damaged {
-        input::narrate(&format!("descry: lost: {damaged}"));
-    }
-    let exit = input::lost(&record.recovery().faults);
-    Ok(if damaged.is_some() || !explained.lost.is_empty() { Exit::No } else { exit })
+    Ok(if explained.lost.is_empty() { Exit::Done } else { Exit::No })
 }

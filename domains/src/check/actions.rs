@@ -142,6 +142,10 @@ impl Check<'_> {
                 list.push(self.error("no-failure", message, place, self.known(&taught.when, FAILURES)));
             }
         }
+        if let Some(because) = &config.because {
+            let parameters = self.domain.vocabulary.action(name).unwrap_or_default();
+            list.extend(self.marks(name, &["action", name, "because"], because, &parameters));
+        }
         if let Some(check) = &config.check {
             let (condition, objects) = self.over(name, check);
             list.extend(self.condition(&["action", name, "check"], &condition, &objects));

@@ -3,6 +3,7 @@
 
 mod actions;
 mod conditions;
+mod heard;
 mod phrases;
 pub(crate) mod place;
 mod scenes;

@@ -14,7 +14,14 @@ impl Check<'_> {
     /// Every phrase.
     pub(super) fn phrases(&self) -> Vec<Diagnostic> {
         let phrases = self.domain.config.goal.iter().enumerate();
-        phrases.flat_map(|(n, phrase)| self.phrase(&n.to_string(), phrase)).collect()
+        let all = phrases.flat_map(|(n, phrase)| {
+            let mut found = self.phrase(&n.to_string(), phrase);
+            if found.is_empty() {
+                found = self.unheard(n, phrase);
+            }
+            found
+        });
+        all.collect()
     }
 
     fn phrase(&self, n: &str, phrase: &GoalPhrase) -> Vec<Diagnostic> {

@@ -118,6 +118,7 @@ fn faults_of_actions_and_calls_are_found_at_their_place() {
         &["did you mean `blocked`"],
     );
     toml(("retries = 2\n", "check = \"(att ?to)\"\n"), "undeclared-predicate", "att", &["`at`"]);
+    toml(("retries = 2\n", "because = \"on to ?too\"\n"), "no-parameter", "?too", &["did you mean `?to`?"]);
     toml(("limit_s = 120.0", "limit_s = -1.0"), "value", "-1.0", &["seconds, above 0"]);
 }
 
@@ -182,6 +183,10 @@ fn faults_of_phrases_are_found_at_their_place() {
     toml((say, "say = \"find it\""), "slots", "<thing>", &["no slot <thing>; it has none"]);
     toml((say, "say = \"find <thing>\"\nconfidence = 0.4"), "value", "0.4", &["above 0.5"]);
     toml(("confidence = 0.8", "confidence = 0.5"), "value", "0.5", &["above 0.5"]);
+    for key in ["remaining", "out_of_sight", "not_there"] {
+        let left = format!("{key} = 0.5");
+        toml(("confidence = 0.8", &left), "value", "0.5", &["above 0 and below 0.5"]);
+    }
     let means = "(>= (confidence <thing>) <threshold>)";
     toml(
         (means, "(>= (confidnce <thing>) <threshold>)"),
@@ -197,6 +202,31 @@ fn faults_of_phrases_are_found_at_their_place() {
     toml((about, &answer("{(on ? <thing>)}")), "wrong-type", "(on ? <thing>)", &["thing"]);
     toml((about, &answer("on {(on <thing> ?)")), "answer", "\"on {(on <thing> ?)\"", &["not closed"]);
     toml((about, &answer("<cup>")), "slots", "<cup>", &["it has <thing>"]);
+}
+
+#[test]
+fn all_of_a_phrase_is_heard() {
+    let toml =
+        |change: (&str, &str), code, place, words: &[&str]| check("domain.toml", change, code, place, words);
+    let say = "say = \"find <thing>\"";
+    let and = |more: &str| format!("{more}\n\n[[goal]]\n{say}");
+    let looks = "means = \"(observed table-1 table)\"";
+    let unused = and(&format!("say = \"is <thing> here\"\n{looks}"));
+    toml((say, &unused), "unused-slot", "<thing>", &["is the same", "in `means`"]);
+    let within = and(&format!("say = \"look within a room\"\n{looks}"));
+    toml((say, &within), "unsayable", "within", &["how soon", "other words"]);
+    let sure = and(&format!("say = \"look with confidence\"\n{looks}"));
+    toml((say, &sure), "unsayable", "with confidence", &["how sure"]);
+    let again = and("say = \"Find <a:thing>!\"\nmeans = \"(>= (confidence <a:thing>) 0.6)\"");
+    toml((say, &again), "same-phrase", "\"find <thing>\"", &["\"Find <a:thing>!\" is said above"]);
+    for (none, place) in [("", "\"\""), ("(and)", "\"(and)\"")] {
+        let nothing = and(&format!("say = \"rest\"\nmeans = \"{none}\""));
+        toml((say, &nothing), "no-goal", place, &["asks for nothing"]);
+    }
+    // What a slot holds may be for the answer alone.
+    let told = and(&format!("say = \"greet <thing>\"\n{looks}\nanswer.achieved = \"hello, <thing>\""));
+    let domain = changed("domain.toml", say, &told).expect("it loads");
+    assert!(findings(&domain).is_empty(), "{}", findings(&domain));
 }
 
 #[test]

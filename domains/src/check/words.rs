@@ -97,18 +97,32 @@ impl Check<'_> {
                 list.push(self.error("no-word", message, self.toml.at(&path), help));
                 continue;
             };
-            let marks = text.split('?').skip(1);
-            let named = marks.map(|mark| {
-                let end = mark.find(|c: char| !c.is_alphanumeric() && c != '-' && c != '_');
-                format!("?{}", &mark[..end.unwrap_or(mark.len())])
-            });
-            for unknown in named.filter(|mark| parameters.iter().all(|(name, _)| name != mark)) {
-                let message = format!("`{name}` has no parameter {unknown}");
-                let help = self.known(&unknown, parameters.iter().map(|(name, _)| name.as_str()));
-                list.push(self.error("no-parameter", message, self.toml.within(&path, &unknown), help));
-            }
+            list.extend(self.marks(name, &path, text, &parameters));
         }
         list
+    }
+
+    /// The variables of a text for people are parameters of what it is about.
+    pub(super) fn marks(
+        &self,
+        name: &str,
+        path: &[&str],
+        text: &str,
+        parameters: &[(String, String)],
+    ) -> Vec<Diagnostic> {
+        let marks = text.split('?').skip(1);
+        let named = marks.map(|mark| {
+            let end = mark.find(|c: char| !c.is_alphanumeric() && c != '-' && c != '_');
+            format!("?{}", &mark[..end.unwrap_or(mark.len())])
+        });
+        // A question mark by itself is a sign.
+        let unknown = named.filter(|mark| mark != "?" && parameters.iter().all(|(name, _)| name != mark));
+        let told = |unknown: String| {
+            let message = format!("`{name}` has no parameter {unknown}");
+            let help = self.known(&unknown, parameters.iter().map(|(name, _)| name.as_str()));
+            self.error("no-parameter", message, self.toml.within(path, &unknown), help)
+        };
+        unknown.map(told).collect()
     }
 
     fn begins(&self, word: &Word) -> bool {
@@ -178,7 +192,11 @@ impl Check<'_> {
                 let is_called =
                     |of: &&&str| self.lexicon.of_type(of).iter().any(|k| k.symbol == symbol(name));
                 let given = GIVEN.iter().find(is_called);
-                if let Some(other) = other.or(given.copied()) {
+                if symbol(name).is_empty() {
+                    let message = format!("\"{name}\" has neither a letter nor a digit");
+                    let place = self.toml.at(&["objects", of, &n.to_string()]);
+                    list.push(self.error("same-name", message, place, "names are told apart by these"));
+                } else if let Some(other) = other.or(given.copied()) {
                     let message = format!("\"{name}\" is the name of a {other} already");
                     let place = self.toml.at(&["objects", of, &n.to_string()]);
                     list.push(self.error("same-name", message, place, "give it another name"));

@@ -5,8 +5,8 @@ use descry_agent::stop::Stop;
 use std::path::Path;
 
 use descry_domains::abilities::searching::policies;
-use descry_domains::goal::{self, Goal};
-use descry_domains::lexicon::{Lexicon, Places};
+use descry_domains::goal::{self, Goal, type_of_slot};
+use descry_domains::lexicon::{Lexicon, Places, symbol};
 use descry_domains::load::Domain;
 use descry_robots::sim::{Fault, FaultPlan, SceneSpec};
 use serde::Deserialize;
@@ -133,8 +133,10 @@ pub(super) fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
     let lexicon = Lexicon::new(&domain, &Places::of_spec(&spec));
     let goals = text.goals.iter().map(|g| {
         check_goal(source, g, &spec)?;
-        goal::read(&g.say, &domain, &lexicon)
-            .map_err(|e| refuse(source, "goal", e.to_string(), "see descry goals"))
+        let goal = goal::read(&g.say, &domain, &lexicon)
+            .map_err(|e| refuse(source, "goal", e.to_string(), "see descry goals"))?;
+        check_words(source, g, &goal, &domain, &spec)?;
+        Ok(goal)
     });
     let goals = goals.collect::<Result<_, _>>()?;
     let head = Head { name: text.name.clone(), kind: text.kind.clone(), about: text.about.clone() };
@@ -178,6 +180,12 @@ fn check_goal(source: &Source, goal: &GoalText, spec: &SceneSpec) -> Result<(), 
     let refused = |problem: String, mend: String| {
         Err(refuse(source, "goal", format!("goal \"{}\": {problem}", goal.say), mend))
     };
+    if goal.targets.is_empty() {
+        return refused(
+            "it has no targets".into(),
+            "name what it is about, such as targets = [\"cup A\"]".into(),
+        );
+    }
     let is_there =
         |t: &&String| spec.objects.iter().any(|o| o.name == **t || o.kind.as_deref() == Some(t.as_str()));
     if let Some(absent) = goal.targets.iter().find(|t| !is_there(t)) {
@@ -202,6 +210,55 @@ fn check_goal(source: &Source, goal: &GoalText, spec: &SceneSpec) -> Result<(), 
         true => Ok(()),
         false => refused("absent_share is no share".into(), "from 0 to below 1, such as 0.25".into()),
     }
+}
+
+/// What a goal is held against is what its words are about.
+fn check_words(
+    source: &Source,
+    text: &GoalText,
+    goal: &Goal,
+    domain: &Domain,
+    spec: &SceneSpec,
+) -> Result<(), ExperimentError> {
+    let refused = |problem: String, mend: &str| {
+        Err(refuse(source, "goal", format!("goal \"{}\": {problem}", text.say), mend))
+    };
+    match (goal.question, text.truly == Truly::Answered) {
+        (true, false) => return refused("it is a question".into(), "truly = \"answered\""),
+        (false, true) => {
+            return refused("it is no question".into(), "ask it as one, or leave \"answered\" to those");
+        }
+        _ => {}
+    }
+    let said = |of: &'static str| goal.slots.iter().filter(move |slot| type_of_slot(&slot.slot) == of);
+    for (of, held) in [("surface", &text.surface), ("room", &text.room)] {
+        let is_held = |name: &String| said(of).any(|slot| slot.symbol == symbol(name));
+        if let Some(slot) = said(of).next().filter(|_| !held.as_ref().is_some_and(is_held)) {
+            return refused(
+                format!("it is about the {of} \"{}\"", slot.name),
+                &format!("{of} = \"{}\"", slot.name),
+            );
+        }
+    }
+    let names: Vec<String> = text.targets.iter().flat_map(|target| names(target, domain, spec)).collect();
+    let mut things = said("thing").chain(said("kind")).peekable();
+    match things.peek().map(|slot| slot.name.clone()) {
+        Some(thing) if !things.any(|slot| names.contains(&slot.symbol)) => {
+            refused(format!("it is about \"{thing}\", which none of its targets is"), "name that in targets")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The symbols by which a goal may speak of a target: its name, what it is, and of which kind that is.
+fn names(target: &str, domain: &Domain, spec: &SceneSpec) -> Vec<String> {
+    let there = spec.objects.iter().filter(|o| o.name == target || o.kind.as_deref() == Some(target));
+    let called = there.flat_map(|o| [Some(&o.name), o.kind.as_ref()]).flatten();
+    let mut all: Vec<String> = called.map(|name| symbol(name)).collect();
+    let kinds = domain.objects.iter().filter(|model| all.contains(&symbol(&model.name)));
+    let kinds: Vec<String> = kinds.map(|model| symbol(&model.kind)).collect();
+    all.extend(kinds);
+    all
 }
 
 impl Tasks {

@@ -126,6 +126,18 @@ fn mistakes_are_drawn_under_the_text() {
     check(bring, "[\"cup A\"]", "[\"cup Q\"]", &["goal \"pick up cup A\"", "\"cup Q\"", "red cup 1"]);
     check(bring, "surface = \"desk\"", "", &["on which surface", "add surface"]);
     check(bring, "surface = \"desk\"", "surface = \"disk\"", &["no surface \"disk\"", "coffee table"]);
+    check(bring, "[\"cup A\"]", "[]", &["goal \"pick up cup A\"", "no targets"]);
+    check(
+        bring,
+        "surface = \"desk\"",
+        "surface = \"counter\"",
+        &["about the surface \"desk\"", "surface = \"desk\""],
+    );
+    check(bring, "[\"cup A\"]", "[\"white cylinder\"]", &["about \"cup A\", which none of its targets is"]);
+    let find = "home/find.toml";
+    check(find, "truly = \"answered\"", "truly = \"stands\"", &["it is a question", "answered"]);
+    check(find, "truly = \"found\"", "truly = \"answered\"\nsurface = \"desk\"", &["it is no question"]);
+    check(find, "room = \"kitchen\"", "", &["about the room \"kitchen\"", "room = \"kitchen\""]);
     check(bring, "truly = \"held\"", "truly = \"hold\"", &["truly = \"hold\"", "all-stand"]);
     let other = |robot: &str| format!("[[case]]\nname = \"other\"\n{robot}\n\n[[goal]]");
     let rooms = "home/two-rooms.toml";

@@ -218,7 +218,10 @@ impl Hello {
         if self.now_ns < 0 {
             return Err(format!("now_ns is {}, expected nanoseconds from 0", self.now_ns));
         }
-        above_zero(&[("pose_sigma_m", self.pose_sigma_m), ("pose_sigma_rad", self.pose_sigma_rad)])?;
+        let sigmas = [("pose_sigma_m", self.pose_sigma_m), ("pose_sigma_rad", self.pose_sigma_rad)];
+        above_zero(&sigmas)?;
+        at_most(&sigmas[..1], MOST_M, "metres, not millimetres")?;
+        at_most(&sigmas[1..], MOST_SIGMA_RAD, "radians, not degrees")?;
         self.check_parts()?;
         self.check_names()?;
         let map = match &self.map {
@@ -255,12 +258,18 @@ impl Hello {
             if !(angles.iter().all(|a| a.is_finite() && *a >= 0.0) && finite3(&h.base_from_head)) {
                 return Err("head: expected base_from_head in metres and three limits from 0".into());
             }
+            at_most(
+                &[("head.base_from_head", h.base_from_head.coords.amax())],
+                MOST_M,
+                "metres, not millimetres",
+            )?;
         }
         if let Some(arm) = &self.arm {
             above_zero(&[
                 ("arm.reach_m", arm.reach_m),
                 ("arm.hand_opening_m", arm.hand_opening_m.unwrap_or(1.0)),
             ])?;
+            at_most(&[("arm.reach_m", arm.reach_m)], MOST_M, "metres, not millimetres")?;
         }
         if let Some(laser) = &self.laser {
             laser.check()?;
@@ -302,6 +311,35 @@ impl Hello {
         }
         for r in &self.rooms {
             outline::check(&r.outline_m, outline::WIDEST_ROOM_M).map_err(|f| told(&r.name, f))?;
+        }
+        self.check_rooms()
+    }
+
+    /// What is said of surfaces and doors is about rooms that there are.
+    fn check_rooms(&self) -> Result<(), String> {
+        let rooms: Vec<&str> = self.rooms.iter().map(|room| room.name.as_str()).collect();
+        let known = |what: &str, name: &str, room: &String| match rooms.contains(&room.as_str()) {
+            true => Ok(()),
+            false => {
+                Err(format!("the {what} \"{name}\" is at the room \"{room}\", expected one of {rooms:?}"))
+            }
+        };
+        for surface in &self.surfaces {
+            surface.room.iter().try_for_each(|room| known("surface", &surface.name, room))?;
+        }
+        for Door { name, centre_m, along_rad, width_m, between } in &self.doors {
+            between.iter().try_for_each(|room| known("door", name, room))?;
+            if between[0] == between[1] {
+                return Err(format!("the door \"{name}\" has the room \"{}\" on both sides", between[0]));
+            }
+            if !(centre_m.x.is_finite() && centre_m.y.is_finite() && along_rad.is_finite()) {
+                return Err(format!(
+                    "the door \"{name}\": expected centre_m in metres and along_rad in radians"
+                ));
+            }
+            let width = format!("the width_m of the door \"{name}\"");
+            above_zero(&[(width.as_str(), *width_m)])?;
+            at_most(&[(width.as_str(), *width_m)], MOST_M, "metres, not millimetres")?;
         }
         Ok(())
     }
@@ -358,8 +396,6 @@ impl Base {
                 ));
             }
         }
-        /// A body is no wider, and keeps no farther away from what is around it, metres. From: chosen, more than any door.
-        const MOST_M: f64 = 10.0;
         let radius_m = self.footprint.radius_m();
         for (name, length_m) in
             [("the radius of base.footprint", radius_m), ("base.clearance_m", self.clearance_m)]
@@ -462,6 +498,19 @@ impl Map {
             height: self.height,
             occupied: cells.iter().map(|&c| c != 0).collect(),
         })
+    }
+}
+
+/// No body is wider or reaches farther, keeps farther away from what is around it, or knows its place less well, and no door is wider,
+/// metres. From: chosen.
+const MOST_M: f64 = 10.0;
+/// A body that knows its heading less well knows none, radians. From: chosen, a third of a half turn.
+const MOST_SIGMA_RAD: f64 = 1.0;
+
+fn at_most(numbers: &[(&str, f64)], most: f64, unit: &str) -> Result<(), String> {
+    match numbers.iter().find(|(_, x)| *x > most) {
+        Some((name, x)) => Err(format!("{name} is {x}, expected {most} at most: {unit}")),
+        None => Ok(()),
     }
 }
 

@@ -74,6 +74,19 @@ class Rogue(Template):
         if WHAT == "a table in millimetres":
             corners = hello["surfaces"][0]["outline_m"]
             hello["surfaces"][0]["outline_m"] = [[1000 * x, 1000 * y] for x, y in corners]
+        corners = [[-2.5, -2.5], [2.5, -2.5], [2.5, 2.5], [-2.5, 2.5]]
+        hall = {"name": "hall", "outline_m": corners}
+        door = {"name": "way", "centre_m": [0, 2.5], "along_rad": 0, "width_m": 0.9, "between": ["hall", "yard"]}
+        if WHAT == "a door in millimetres":
+            hello["rooms"], hello["doors"] = [hall, dict(hall, name="yard")], [dict(door, width_m=900)]
+        if WHAT == "a door to nowhere":
+            hello["rooms"], hello["doors"] = [hall], [door]
+        if WHAT == "a table nowhere":
+            hello["surfaces"][0]["room"] = "hal"
+        if WHAT == "a heading in degrees":
+            hello["pose_sigma_rad"] = 2.0
+        if WHAT == "a head in millimetres":
+            hello["head"] = dict(hello["head"], base_from_head=[0, 0, 1400])
         return hello, cells
 
     def drive_to(self, request, to, route_m):

@@ -1,0 +1,72 @@
+//! Whether all that a phrase says is heard: it can be said, it is no other phrase, and what its slots hold means something.
+
+use descry_planner::Diagnostic;
+
+use super::Check;
+use crate::asked::mentions;
+use crate::config::GoalPhrase;
+use crate::goal::{CONFIDENCE, DEADLINE, pattern, slots_of, type_of_slot};
+
+impl Check<'_> {
+    /// What nobody would hear of the `n`-th phrase.
+    pub(super) fn unheard(&self, n: usize, phrase: &GoalPhrase) -> Vec<Diagnostic> {
+        let unused = slots_of(&phrase.say).into_iter().filter(|slot| !is_used(phrase, slot));
+        let unused = unused.map(|slot| {
+            let tag = format!("<{slot}>");
+            let message = format!(
+                "neither the meaning nor an answer has {tag}: whatever it holds, the goal is the same"
+            );
+            let help = format!("speak of {tag} in `means`, or leave it out of `say`");
+            self.error("unused-slot", message, self.toml.within(&["goal", &n.to_string(), "say"], &tag), help)
+        });
+        let otherwise =
+            [self.asks_for_nothing(n, phrase), self.never_said(n, phrase), self.said_before(n, phrase)];
+        unused.chain(otherwise.into_iter().flatten()).collect()
+    }
+
+    /// That a phrase is true of whatever is so.
+    fn asks_for_nothing(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
+        let place = self.toml.at(&["goal", &n.to_string(), "means"]);
+        let message = "this asks for nothing: it holds before anything is done".to_string();
+        let help = "say what is to hold, as in (>= (confidence <thing>) <threshold>)";
+        let is_word = |mention: &Vec<String>| self.domain.vocabulary.word(&mention[0]).is_some();
+        let is_empty = !mentions(&phrase.means).iter().any(is_word);
+        is_empty.then(|| self.error("no-goal", message, place, help))
+    }
+
+    /// That a phrase has words in it that end every goal: how sure, how soon.
+    fn never_said(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
+        let words = shape(phrase);
+        let is_there = |ending: &&[&str]| words.windows(ending.len()).any(|part| part == *ending);
+        let ending = [&CONFIDENCE[..], &DEADLINE[..]].into_iter().find(is_there)?.join(" ");
+        let message =
+            format!("this phrase cannot be said: behind \"{ending}\" every goal says how sure or how soon");
+        let place = self.toml.within(&["goal", &n.to_string(), "say"], &ending);
+        Some(self.error("unsayable", message, place, "say it in other words"))
+    }
+
+    /// That an earlier phrase has the same words and slots.
+    fn said_before(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
+        let mut earlier = self.domain.config.goal[..n].iter();
+        let other = earlier.find(|other| shape(other) == shape(phrase))?;
+        let message = format!("\"{}\" is said above already, and means that", other.say);
+        let place = self.toml.at(&["goal", &n.to_string(), "say"]);
+        Some(self.error("same-phrase", message, place, "leave one of the two out, or say it in other words"))
+    }
+}
+
+/// The words of a phrase, and the types of what fills its slots.
+fn shape(phrase: &GoalPhrase) -> Vec<String> {
+    let word = |word: &str| match word.strip_prefix('<').and_then(|word| word.strip_suffix('>')) {
+        Some(slot) => format!("<{}>", type_of_slot(slot)),
+        None => word.to_lowercase(),
+    };
+    pattern(&phrase.say).into_iter().map(word).collect()
+}
+
+fn is_used(phrase: &GoalPhrase, slot: &str) -> bool {
+    let answer = &phrase.answer;
+    let answers = [&answer.achieved, &answer.not_found, &answer.cannot_tell];
+    let mut texts = answers.into_iter().flatten().chain([&phrase.means]);
+    texts.any(|text| slots_of(text).contains(&slot))
+}

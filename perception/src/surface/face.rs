@@ -167,6 +167,8 @@ impl Grid {
     fn filled_by(plane: &Plane, held: &[&Sample]) -> Grid {
         /// Of the widest cells, one sample in so many tells enough. From: work.
         const STRIDE: usize = 4;
+        /// Cells in one that is twice as wide. From: derived, two along each side.
+        const QUARTERS: f64 = 4.0;
         let mut grid = Grid { side_m: WIDEST_CELL_M, ..Grid::fine(plane) };
         let (mut seen, mut cells) = (Tiles::new(), 0.0);
         for s in held.iter().step_by(STRIDE) {
@@ -174,9 +176,9 @@ impl Grid {
             cells += if *is_seen { 0.0 } else { 1.0 };
             *is_seen = true;
         }
-        while grid.side_m > CELL_M && (cells < MANY || held.len() as f64 >= 4.0 * cells * FULL) {
+        while grid.side_m > CELL_M && (cells < MANY || held.len() as f64 >= QUARTERS * cells * FULL) {
             grid.side_m /= 2.0;
-            cells *= 4.0;
+            cells *= QUARTERS;
         }
         grid
     }

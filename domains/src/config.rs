@@ -246,7 +246,7 @@ pub struct Thresholds {
     /// An object is called not there where the probability that it is there after all, hidden or as one of the objects that were seen, is
     /// no more than this.
     pub not_there: f64,
-    /// That a sought object is there, before the first look.
+    /// That a sought object is there, before the first look; more than `remaining` and `not_there`, else nobody would look.
     pub prior: f64,
 }
 
@@ -318,6 +318,9 @@ const SURE: &str = "a number above 0.5 and below 1";
 /// With more left, "not there" would be no likelier than its contrary.
 const LEFT: &str = "a number above 0 and below 0.5";
 
+/// With less, no look were worth it, and all were "not there" unseen.
+const WORTH_A_LOOK: &str = "a number above `remaining` and `not_there`, and below 1";
+
 /// Checks the numbers of a configuration.
 pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
     let value = |key: &str, value: f64, holds: bool, expected: &'static str| {
@@ -338,7 +341,6 @@ pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
     }
     let t = &config.thresholds;
     value("thresholds.confidence", t.confidence, t.confidence > 0.5 && t.confidence < 1.0, SURE)?;
-    value("thresholds.prior", t.prior, t.prior > 0.0 && t.prior < 1.0, "a number above 0 and below 1")?;
     for (key, p) in [
         ("thresholds.remaining", t.remaining),
         ("thresholds.out_of_sight", t.out_of_sight),
@@ -346,6 +348,8 @@ pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
     ] {
         value(key, p, p > 0.0 && p < 0.5, LEFT)?;
     }
+    let left = t.remaining.max(t.not_there);
+    value("thresholds.prior", t.prior, t.prior > left && t.prior < 1.0, WORTH_A_LOOK)?;
     let c = &config.candidates;
     value("candidates.poses", c.poses as f64, (1..=1000).contains(&c.poses), "1 to 1000 poses")?;
     let fits = c.distance_m > 0.0 && c.distance_m < 20.0;

@@ -187,6 +187,7 @@ fn faults_of_phrases_are_found_at_their_place() {
         let left = format!("{key} = 0.5");
         toml(("confidence = 0.8", &left), "value", "0.5", &["above 0 and below 0.5"]);
     }
+    toml(("confidence = 0.8", "prior = 0.05"), "value", "0.05", &["above `remaining` and `not_there`"]);
     let means = "(>= (confidence <thing>) <threshold>)";
     toml(
         (means, "(>= (confidnce <thing>) <threshold>)"),

@@ -1,10 +1,12 @@
-//! What one more look at a table costs: CPU time of merging when there are 3, 10 and 30 views, anew and with what was kept of the look before.
+//! What one more look at a table costs: time of merging when there are 3, 10 and 30 views, anew and with what was kept of the look before, and
+//! CPU time of all its threads.
 
 use super::table::{arrangement, judge, options};
 use super::tabletop::{Draws, Thing, disturbed, look, on_ring};
 use descry_perception::merge::{Merger, merge};
 use descry_perception::recognise::Descry;
 use descry_perception::{Merged, View};
+use std::time::Instant;
 
 /// CPU time of all threads so far, milliseconds.
 fn cpu_ms() -> f64 {
@@ -14,10 +16,18 @@ fn cpu_ms() -> f64 {
     tasks.filter_map(of_task).filter_map(first).sum::<f64>() / 1e6
 }
 
+/// What came out, with how long it took and of how much CPU time, milliseconds.
+fn timed<T>(of: impl FnOnce() -> Result<T, String>) -> Result<(T, String), String> {
+    let (start, before) = (Instant::now(), cpu_ms());
+    let found = of()?;
+    let ms = start.elapsed().as_secs_f64() * 1e3;
+    Ok((found, format!("{ms:.0} ({:.0})", cpu_ms() - before)))
+}
+
 /// Merges up to `count` views of some arrangements, look by look.
 pub fn run(count: usize, mode: &str) -> Result<(), String> {
     println!(
-        "{:>5} {:>10} {:>10}   CPU ms; {:>9} {:>9}  cups right, wrong",
+        "{:>5} {:>10} {:>10}   ms (of CPU); {:>9} {:>9}  cups right, wrong",
         "views", "anew", "kept", "anew", "kept"
     );
     for seed in 1..=2 {
@@ -35,21 +45,17 @@ pub fn run(count: usize, mode: &str) -> Result<(), String> {
         let mut merger = Merger::default();
         for n in 1..=count {
             let wanted = [3, 10, count].contains(&n);
-            let before = cpu_ms();
-            let kept = match mode {
-                "anew" => None,
-                _ => Some(merger.merge(&views[..n], &options()).map_err(|e| e.to_string())?),
-            };
-            let kept_ms = cpu_ms() - before;
+            let (kept, kept_ms) = timed(|| match mode {
+                "anew" => Ok(None),
+                _ => merger.merge(&views[..n], &options()).map(Some).map_err(|e| e.to_string()),
+            })?;
             if !wanted {
                 continue;
             }
-            let before = cpu_ms();
-            let anew = match mode {
-                "kept" => None,
-                _ => Some(merge(&views[..n], &options()).map_err(|e| e.to_string())?),
-            };
-            let anew_ms = cpu_ms() - before;
+            let (anew, anew_ms) = timed(|| match mode {
+                "kept" => Ok(None),
+                _ => merge(&views[..n], &options()).map(Some).map_err(|e| e.to_string()),
+            })?;
             let score = |merged: &Option<Merged>| -> Result<String, String> {
                 let Some(merged) = merged else { return Ok("-".to_owned()) };
                 let percepts = judge(merged, &Descry::default())?;
@@ -67,7 +73,7 @@ pub fn run(count: usize, mode: &str) -> Result<(), String> {
                 Ok(format!("{right} {} -{left_out}", named().count() - right))
             };
             println!(
-                "{n:5} {anew_ms:10.0} {kept_ms:10.0}           {:>9} {:>9}",
+                "{n:5} {anew_ms:>10} {kept_ms:>10}                {:>9} {:>9}",
                 score(&anew)?,
                 score(&kept)?
             );

@@ -181,15 +181,21 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
         let mut steps = filter_and_thin(views, &prepared, options)?;
         let mut aligned = place(&prepared, &maps, options, &mut steps);
         let seen = visibility(maps, &aligned.used, &aligned.poses);
-        let gathered =
+        let mut gathered =
             fuse::gather(views, &prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
-        Ok(merged(&gathered, seen, fits(&prepared, &mut aligned), steps))
+        Ok(merged(&mut gathered, seen, fits(&prepared, &mut aligned), steps, false))
     })
 }
 
 /// The merged cloud of what was gathered, with what is said of it.
-fn merged(gathered: &[Gathered], seen: Visibility, fits: Vec<ViewFit>, mut steps: Vec<Step>) -> Merged {
-    let fused = settle::settle(gathered, &seen);
+fn merged(
+    gathered: &mut [Gathered],
+    seen: Visibility,
+    fits: Vec<ViewFit>,
+    mut steps: Vec<Step>,
+    further: bool,
+) -> Merged {
+    let fused = settle::settle(gathered, &seen, further);
     steps.push(Step {
         name: "fuse".to_owned(),
         points: fused.cloud.len(),

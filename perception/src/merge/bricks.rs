@@ -36,6 +36,12 @@ type Place = u64;
 /// Bits of a place along an axis. From: derived, three axes in 64 bits.
 const PLACE_BITS: u32 = 20;
 
+/// Some voxels of a brick: a bit for each of a layer, x fastest.
+pub(super) type Mask = [u64; SIDE];
+
+/// Numbers of the 27 bricks around one, itself in the middle.
+pub(super) type Beside = [Option<u32>; 27];
+
 /// Cells of occupied voxels.
 pub(super) struct Bricks<C> {
     numbers: FxHashMap<Place, u32>,
@@ -45,6 +51,8 @@ pub(super) struct Bricks<C> {
     /// Layers of voxels in a brick, along z.
     layers: usize,
     pub cells: Vec<C>,
+    /// Which voxels of each brick were asked for.
+    pub touched: Vec<Mask>,
     /// Bricks that were asked for of late, by the last bits of their place.
     recent: [(Place, u32); RECENT * RECENT * RECENT],
 }
@@ -61,6 +69,7 @@ impl<C> Bricks<C> {
             slots: Vec::new(),
             layers: if columns { 1 } else { SIDE },
             cells: Vec::new(),
+            touched: Vec::new(),
             recent: [(Place::MAX, NONE); RECENT * RECENT * RECENT],
         }
     }
@@ -82,6 +91,7 @@ impl<C> Bricks<C> {
             _ => self.brick(place, recent),
         };
         let [x, y, z] = voxel.map(|c| c as usize % SIDE);
+        self.touched[brick][z] |= 1 << (y * SIDE + x);
         let slot = &mut self.slots[brick * self.layers * SIDE * SIDE + (z * SIDE + y) * SIDE + x];
         if *slot == NONE {
             *slot = self.cells.len() as u32;
@@ -113,6 +123,7 @@ impl<C> Bricks<C> {
         let brick = *self.numbers.entry(place).or_insert(next as u32) as usize;
         if brick == next {
             self.places.push(place);
+            self.touched.push(Mask::default());
             self.slots.resize(self.slots.len() + self.voxels(), NONE);
         }
         self.recent[recent] = (place, brick as u32);
@@ -124,10 +135,51 @@ impl<C> Bricks<C> {
         self.places.len()
     }
 
-    /// Calls `found` for each cell of a brick with its number and those of the cells in the 27 voxels around it, itself among them.
-    pub fn visit(&self, brick: usize, mut found: impl FnMut(usize, &[u32])) {
+    /// The voxels of a brick that were asked for, with all around them.
+    pub fn touched_around(&self, beside: &Beside) -> Mask {
+        let is_touched = |brick: &u32| self.touched[*brick as usize] != Mask::default();
+        if !beside.iter().flatten().any(is_touched) {
+            return Mask::default();
+        }
+        let layers: [u64; WIDE] = std::array::from_fn(|z| {
+            let (above, z) = in_brick(z);
+            let rows: [u8; WIDE] = std::array::from_fn(|y| {
+                let (behind, y) = in_brick(y);
+                let of = |aside: usize| {
+                    let brick = beside[(above * 3 + behind) * 3 + aside];
+                    brick.map_or(0, |brick| (self.touched[brick as usize][z] >> (y * SIDE)) as u8)
+                };
+                let row = of(1);
+                of(0) >> (SIDE - 1) | row | row << 1 | row >> 1 | of(2) << (SIDE - 1)
+            });
+            u64::from_le_bytes(std::array::from_fn(|y| rows[y] | rows[y + 1] | rows[y + 2]))
+        });
+        std::array::from_fn(|z| layers[z] | layers[z + 1] | layers[z + 2])
+    }
+
+    /// Calls `found` with the number of each cell that was asked for.
+    pub fn visit_touched(&self, mut found: impl FnMut(usize)) {
+        for (slots, touched) in self.slots.chunks(self.voxels()).zip(&self.touched) {
+            for (slots, mut touched) in slots.chunks(SIDE * SIDE).zip(*touched) {
+                while touched != 0 {
+                    found(slots[touched.trailing_zeros() as usize] as usize);
+                    touched &= touched - 1;
+                }
+            }
+        }
+    }
+
+    /// Numbers of the cells of a brick.
+    pub fn cells_of(&self, brick: usize) -> impl Iterator<Item = usize> {
+        let slots = self.slots[brick * self.voxels()..].iter().take(self.voxels());
+        slots.filter(|slot| **slot != NONE).map(|slot| *slot as usize)
+    }
+
+    /// Calls `found` for each cell of the brick in the middle with its number and, if it is of the mask, those of the cells in the 27 voxels
+    /// around it, itself among them.
+    pub fn visit(&self, beside: &Beside, mask: &Mask, mut found: impl FnMut(usize, Option<&[u32]>)) {
         let mut wide = [[[NONE; WIDE]; WIDE]; WIDE];
-        self.wide(brick, &mut wide);
+        self.wide(beside, &mut wide);
         let mut around = [0_u32; 27];
         for z in 1..=self.layers {
             for y in 1..=SIDE {
@@ -141,6 +193,10 @@ impl<C> Bricks<C> {
                     if own == NONE {
                         continue;
                     }
+                    if !is_in(mask, [x, y, z]) {
+                        found(own as usize, None);
+                        continue;
+                    }
                     let mut count = 0;
                     for row in rows {
                         for &cell in &row[x - 1..x + 2] {
@@ -149,30 +205,28 @@ impl<C> Bricks<C> {
                             count += usize::from(cell != NONE);
                         }
                     }
-                    found(own as usize, &around[..count]);
+                    found(own as usize, Some(&around[..count]));
                 }
             }
         }
     }
 
-    /// Numbers of the cells of a brick of columns and of a layer of those around: by y, x.
-    pub fn wide_columns(&self, brick: usize) -> [[u32; WIDE]; WIDE] {
-        let beside = self.beside(brick);
-        std::array::from_fn(|y| self.wide_row(&beside, 1, y))
+    /// Numbers of the cells of the brick of columns in the middle and of a layer of those around: by y, x.
+    pub fn wide_columns(&self, beside: &Beside) -> [[u32; WIDE]; WIDE] {
+        std::array::from_fn(|y| self.wide_row(beside, 1, y))
     }
 
-    /// Numbers of the cells of a brick and of a layer of those around: by z, y, x.
-    fn wide(&self, brick: usize, wide: &mut [[[u32; WIDE]; WIDE]; WIDE]) {
-        let beside = self.beside(brick);
+    /// Numbers of the cells of the brick in the middle and of a layer of those around: by z, y, x.
+    fn wide(&self, beside: &Beside, wide: &mut [[[u32; WIDE]; WIDE]; WIDE]) {
         for (z, layer) in wide.iter_mut().enumerate() {
             for (y, row) in layer.iter_mut().enumerate() {
-                *row = self.wide_row(&beside, z, y);
+                *row = self.wide_row(beside, z, y);
             }
         }
     }
 
     /// Numbers of the 27 bricks around one, itself in the middle.
-    fn beside(&self, brick: usize) -> [Option<u32>; 27] {
+    pub fn beside(&self, brick: usize) -> Beside {
         let place = self.places[brick];
         // Columns have nothing above and below them.
         let columns = self.layers == 1;
@@ -191,10 +245,8 @@ impl<C> Bricks<C> {
 
     /// A row of a wide brick, from the bricks beside the one in its middle.
     #[inline(always)]
-    fn wide_row(&self, beside: &[Option<u32>; 27], z: usize, y: usize) -> [u32; WIDE] {
-        // Of a voxel of the wide brick: which of the three bricks along an axis holds it, and where.
-        let at = |w: usize| (w.div_ceil(SIDE), (w + SIDE - 1) % SIDE);
-        let ((above, z), (behind, y)) = (at(z), at(y));
+    fn wide_row(&self, beside: &Beside, z: usize, y: usize) -> [u32; WIDE] {
+        let ((above, z), (behind, y)) = (in_brick(z), in_brick(y));
         let of = |aside: usize| {
             let first = beside[(above * 3 + behind) * 3 + aside]? as usize * self.voxels();
             self.slots[first + (z * SIDE + y) * SIDE..].first_chunk::<SIDE>()
@@ -207,4 +259,16 @@ impl<C> Bricks<C> {
         }
         row
     }
+}
+
+/// Which of three bricks along an axis holds a voxel of the wide brick, and where.
+#[inline(always)]
+fn in_brick(wide: usize) -> (usize, usize) {
+    (wide.div_ceil(SIDE), (wide + SIDE - 1) % SIDE)
+}
+
+/// True if a voxel of a wide brick is of a mask.
+#[inline(always)]
+pub(super) fn is_in(mask: &Mask, [x, y, z]: [usize; 3]) -> bool {
+    mask[z - 1] >> ((y - 1) * SIDE + x - 1) & 1 == 1
 }

@@ -74,11 +74,12 @@ impl Merger {
                 let further = base.ok().and_then(|base| self.further(base, &views[..n], options));
                 base = further.map_or_else(|| self.anew(&views[..n], options), Ok);
             }
-            let base = base?;
+            let mut base = base?;
             let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
-            let merged = merged(&base.gathered, seen, base.fits.clone(), base.steps.clone());
-            // With one more all are merged anew: then nothing of this is wanted.
-            self.base = (together(views.len() + 1) <= views.len()).then_some(base);
+            // With one more all may be merged anew: then nothing of this is wanted.
+            let further = together(views.len() + 1) <= views.len();
+            let merged = merged(&mut base.gathered, seen, base.fits.clone(), base.steps.clone(), further);
+            self.base = further.then_some(base);
             Ok(merged)
         })
     }

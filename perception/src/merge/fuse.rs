@@ -8,6 +8,7 @@ use super::bricks::{Bricks, Grid};
 use super::parts::Plane;
 use super::prepare::Prepared;
 use super::returns::{Return, Returns};
+use super::settle::Before;
 use crate::cloud::Cloud;
 use crate::view::View;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
@@ -77,6 +78,7 @@ pub(super) struct Gathered {
     /// Weighted sums of the colours of each cell, if there are any.
     pub colours: Vec<Vector3<f32>>,
     pub returns: usize,
+    pub before: Before,
 }
 
 pub(super) struct Fused {
@@ -240,7 +242,8 @@ impl Gathered {
         let reach = Vector3::repeat(options.range_m + voxel_m);
         let grid = Grid::over(&(low - reach), &(high + reach), voxel_m);
         let flat = on.is_some();
-        Gathered { grid, axes_from_world, flat, bricks: Bricks::new(flat), colours: Vec::new(), returns: 0 }
+        let (bricks, before) = (Bricks::new(flat), Before::default());
+        Gathered { grid, axes_from_world, flat, bricks, colours: Vec::new(), returns: 0, before }
     }
 
     /// Adds returns, and takes them out of the list. A pass for each thing that is waited for: what comes from far memory is asked for many

@@ -3,13 +3,15 @@
 //! Every voxel is moved along its normal onto the weighted mean of the like-facing voxels beside it, every column of a sheet along the sheet's
 //! normal onto that of the columns beside it. What a single view claims and another looked through is left out.
 
-use super::bricks::{Bricks, NONE, SIDE, WIDE};
+use super::bricks::{Beside, Bricks, Mask, NONE, SIDE, WIDE, is_in};
 use super::check;
 use super::fuse::{Cell, Fused, Gathered};
 use crate::cloud::{Cloud, is_finite};
 use crate::visibility::{Gaze, Visibility};
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
+use std::iter::Peekable;
+use std::slice::Iter;
 
 /// How far along its normal a voxel may be moved by its neighbours, in spreads of its own. From: chosen.
 const TUBE_SPREADS: f32 = 2.5;
@@ -23,17 +25,35 @@ const CARVE_M: f64 = check::CLEAR_M;
 /// Rows of bricks that are settled at a time: what they fill is used again. From: work.
 const ROWS: usize = 16;
 
+/// Bricks that one thread settles in a row. From: work.
+const TOGETHER: usize = 64;
+
 /// A fused point, world frame.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 struct Settled {
     at: Point3<f32>,
     normal: Vector3<f32>,
     colour: [u8; 3],
     views: u16,
+    /// Number of its cell.
+    cell: u32,
+    /// False if it is as it was settled before.
+    anew: bool,
 }
 
-/// One cloud of what was gathered.
-pub(super) fn settle(all: &[Gathered], seen: &Visibility) -> Fused {
+/// What was settled of voxels or columns: what no view has touched since stays as it is.
+#[derive(Default)]
+pub(super) struct Before {
+    /// Of the voxels; none of columns.
+    means: Vec<Cell>,
+    /// What is settled of some bricks in a row, cell by cell.
+    rows: Vec<Vec<Settled>>,
+    /// Views that it was held against.
+    gazes: usize,
+}
+
+/// One cloud of what was gathered. What is settled is kept for a further look if one is to come.
+pub(super) fn settle(all: &mut [Gathered], seen: &Visibility, further: bool) -> Fused {
     let most = all.iter().map(|gathered| gathered.bricks.cells.len()).sum();
     let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
     let mut fused = Fused {
@@ -44,14 +64,15 @@ pub(super) fn settle(all: &[Gathered], seen: &Visibility) -> Fused {
     };
     let mut normals = Vec::with_capacity(most);
     let mut colours = coloured.then(|| Vec::with_capacity(most));
-    let mut rows: Vec<Vec<Settled>> = vec![Vec::new(); ROWS];
+    let gazes = seen.gazes();
+    let mut scratch: Vec<Vec<Settled>> = vec![Vec::new(); ROWS];
     for gathered in all {
-        gathered.settle(seen, &mut rows, |kept| {
-            fused.cloud.points.extend(kept.iter().map(|settled| settled.at));
-            normals.extend(kept.iter().map(|settled| settled.normal));
-            fused.views_per_point.extend(kept.iter().map(|settled| settled.views));
+        gathered.settle(&gazes, &mut scratch, further, |settled| {
+            fused.cloud.points.extend(settled.iter().map(|settled| settled.at));
+            normals.extend(settled.iter().map(|settled| settled.normal));
+            fused.views_per_point.extend(settled.iter().map(|settled| settled.views));
             if let Some(colours) = &mut colours {
-                colours.extend(kept.iter().map(|settled| settled.colour));
+                colours.extend(settled.iter().map(|settled| settled.colour));
             }
         });
     }
@@ -62,11 +83,73 @@ pub(super) fn settle(all: &[Gathered], seen: &Visibility) -> Fused {
 
 impl Gathered {
     /// Gives what is left of the cells, some rows at a time.
-    fn settle(&self, seen: &Visibility, rows: &mut [Vec<Settled>], mut give: impl FnMut(&[Settled])) {
-        /// Bricks that one thread settles in a row. From: work.
-        const TOGETHER: usize = 64;
+    fn settle(
+        &mut self,
+        gazes: &[Gaze],
+        scratch: &mut [Vec<Settled>],
+        further: bool,
+        mut give: impl FnMut(&[Settled]),
+    ) {
+        let Before { means, mut rows, gazes: known } = std::mem::take(&mut self.before);
+        let is_first = rows.is_empty();
+        let means = self.means(means);
+        let settle_row = |number: usize, row: &mut Vec<Settled>, before: &mut Vec<Settled>| {
+            row.clear();
+            let mut known_cells = before.iter().peekable();
+            for brick in (number * TOGETHER..self.bricks.len()).take(TOGETHER) {
+                let beside = self.bricks.beside(brick);
+                let mask = if is_first { [u64::MAX; SIDE] } else { self.bricks.touched_around(&beside) };
+                if mask == Mask::default() {
+                    row.extend(self.bricks.cells_of(brick).filter_map(|cell| stays(&mut known_cells, cell)));
+                } else {
+                    self.settle_brick(&beside, &mask, &means, &mut known_cells, row);
+                }
+            }
+            drop_looked_through(row, gazes, known);
+            if further {
+                before.clone_from(row);
+            }
+        };
+        let all = self.bricks.len().div_ceil(TOGETHER);
+        rows.resize_with(all, Vec::new);
+        for first in (0..all).step_by(ROWS) {
+            let before = &mut rows[first..all.min(first + ROWS)];
+            let some = scratch.par_iter_mut().zip(before).enumerate();
+            some.for_each(|(row, (settled, before))| settle_row(first + row, settled, before));
+            scratch.iter().take(all - first).for_each(|settled| give(settled));
+        }
+        if further {
+            self.before = Before { means, rows, gazes: gazes.len() };
+            self.bricks.touched.fill(Mask::default());
+        }
+    }
+
+    /// The means of all voxels, from those before. That of a voxel is asked for by all around it, that of a column by few.
+    fn means(&self, before: Vec<Cell>) -> Vec<Cell> {
         /// Cells that one thread takes in a row. From: work.
         const SOME: usize = 4096;
+        let cells = if self.flat { &[][..] } else { &self.bricks.cells };
+        let mut means = before;
+        if means.is_empty() {
+            // With room for those of further looks.
+            means.reserve(cells.len() + cells.len() / 2);
+            means.par_extend(cells.par_iter().with_min_len(SOME).map(Cell::mean));
+        } else {
+            means.extend_from_slice(&cells[means.len()..]);
+            self.bricks.visit_touched(|number| means[number] = cells[number].mean());
+        }
+        means
+    }
+
+    /// Adds what the cells of the brick in the middle are settled to: those of the mask anew, of the others what was settled before.
+    fn settle_brick(
+        &self,
+        beside: &Beside,
+        mask: &Mask,
+        means: &[Cell],
+        before: &mut Peekable<Iter<Settled>>,
+        settled: &mut Vec<Settled>,
+    ) {
         let Gathered { grid, axes_from_world, flat, bricks, colours: sums, .. } = self;
         let world_from_axes = axes_from_world.inverse().to_rotation_matrix();
         let turn = world_from_axes.cast::<f32>();
@@ -75,50 +158,48 @@ impl Gathered {
             let mean = sums.get(number).map(|sum| (sum / cell.weight).map(|c| (c + 0.5) as u8));
             mean.map(<[u8; 3]>::from).unwrap_or_default()
         };
-        // That of a voxel is asked for by all around it, that of a column by few.
-        let voxels = if *flat { &[][..] } else { &bricks.cells };
-        let means: Vec<Cell> = voxels.par_iter().with_min_len(SOME).map(Cell::mean).collect();
-        let gazes = seen.gazes();
-        let settle_row = |row: usize, kept: &mut Vec<Settled>| {
-            kept.clear();
-            let mut keep = |number: usize, cell: &Cell, at: Vector3<f32>| {
-                let at = world_from_axes * Point3::from(grid.origin_m + at.cast::<f64>() * grid.voxel_m);
-                let none = cell.normal == Vector3::zeros();
-                let normal = if none { Vector3::repeat(f32::NAN) } else { turn * cell.normal };
-                kept.push(Settled { at: at.cast(), normal, colour: colour(number, cell), views: cell.views });
-            };
-            for brick in (row * TOGETHER..bricks.len()).take(TOGETHER) {
-                match flat {
-                    true => level(bricks, brick, &mut keep),
-                    false => bricks.visit(brick, |number, around| {
-                        let mean = &means[number];
-                        keep(number, mean, smoothed(mean, around, &means, grid.voxel_m as f32));
-                    }),
-                }
-            }
-            drop_looked_through(kept, &gazes);
+        let mut keep = |number: usize, anew: Option<(&Cell, Vector3<f32>)>| {
+            let stays = stays(before, number);
+            let Some((cell, at)) = anew else { return settled.extend(stays) };
+            let at = world_from_axes * Point3::from(grid.origin_m + at.cast::<f64>() * grid.voxel_m);
+            let none = cell.normal == Vector3::zeros();
+            let normal = if none { Vector3::repeat(f32::NAN) } else { turn * cell.normal };
+            let (colour, views) = (colour(number, cell), cell.views);
+            settled.push(Settled { at: at.cast(), normal, colour, views, cell: number as u32, anew: true });
         };
-        let all = bricks.len().div_ceil(TOGETHER);
-        for first in (0..all).step_by(ROWS) {
-            let rows = &mut rows[..ROWS.min(all - first)];
-            rows.par_iter_mut().enumerate().for_each(|(row, kept)| settle_row(first + row, kept));
-            rows.iter().for_each(|kept| give(kept));
+        match flat {
+            true => level(bricks, beside, mask, |number, anew| {
+                keep(number, anew.as_ref().map(|(cell, at)| (cell, *at)));
+            }),
+            false => bricks.visit(beside, mask, |number, around| {
+                let mean = &means[number];
+                let smoothed = |around: &[u32]| smoothed(mean, around, means, grid.voxel_m as f32);
+                keep(number, around.map(|around| (mean, smoothed(around))));
+            }),
         }
     }
 }
 
-/// One view's word against another's look through the place.
-fn drop_looked_through(kept: &mut Vec<Settled>, gazes: &[Gaze]) {
-    let mut alone: Vec<Point3<f32>> = Vec::new();
-    if gazes.len() > 1 {
-        alone.reserve(kept.len());
-        alone.extend(kept.iter().filter(|settled| settled.views < 2).map(|settled| settled.at));
-    }
-    let mut through = vec![false; alone.len()];
-    gazes.iter().for_each(|gaze| gaze.pass(&alone, CARVE_M, &mut through));
-    let mut through = through.into_iter();
-    kept.retain(|settled| {
-        let through = settled.views < 2 && through.next().unwrap_or(false);
+/// What was settled of a cell before, the cells before it taken already.
+fn stays(before: &mut Peekable<Iter<Settled>>, cell: usize) -> Option<Settled> {
+    before.next_if(|settled| settled.cell as usize == cell).map(|settled| Settled { anew: false, ..*settled })
+}
+
+/// One view's word against another's look through the place. What stays was held against the views that were known.
+fn drop_looked_through(row: &mut Vec<Settled>, gazes: &[Gaze], known: usize) {
+    let mut looked = [(false, known), (true, 0)].map(|(anew, known)| {
+        let mut alone: Vec<Point3<f32>> = Vec::new();
+        if gazes.len() > 1 {
+            alone.reserve(row.len());
+            let of = |settled: &&Settled| settled.views < 2 && settled.anew == anew;
+            alone.extend(row.iter().filter(of).map(|settled| settled.at));
+        }
+        let mut through = vec![false; alone.len()];
+        gazes[known..].iter().for_each(|gaze| gaze.pass(&alone, CARVE_M, &mut through));
+        through.into_iter()
+    });
+    row.retain(|settled| {
+        let through = settled.views < 2 && looked[usize::from(settled.anew)].next().unwrap_or(false);
         !through && is_finite(&settled.at)
     });
 }
@@ -141,10 +222,15 @@ fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3
     if weight > 0.0 { own.at + own.normal * (offset / weight) } else { own.at }
 }
 
-/// Calls `found` for each column of a brick with its number, its mean, and where that lies once moved along z onto the mean of the columns
-/// around it.
-fn level(bricks: &Bricks<Cell>, brick: usize, mut found: impl FnMut(usize, &Cell, Vector3<f32>)) {
-    let numbers = bricks.wide_columns(brick);
+/// Calls `found` for each column of the brick in the middle with its number and, if it is of the mask, its mean, and where that lies once moved
+/// along z onto the mean of the columns around it.
+fn level(
+    bricks: &Bricks<Cell>,
+    beside: &Beside,
+    mask: &Mask,
+    mut found: impl FnMut(usize, Option<(Cell, Vector3<f32>)>),
+) {
+    let numbers = bricks.wide_columns(beside);
     // Weight and weighted height: of the columns, then of three beside each other.
     let mut sums = [[[0.0_f32; WIDE]; WIDE]; 2];
     for (y, row) in numbers.iter().enumerate() {
@@ -164,8 +250,11 @@ fn level(bricks: &Bricks<Cell>, brick: usize, mut found: impl FnMut(usize, &Cell
         for x in 0..SIDE {
             let number = numbers[y + 1][x + 1];
             if number != NONE {
-                let own = bricks.cells[number as usize].mean();
-                found(number as usize, &own, Vector3::new(own.at.x, own.at.y, heights[x] / weights[x]));
+                let anew = is_in(mask, [x + 1, y + 1, 1]).then(|| {
+                    let own = bricks.cells[number as usize].mean();
+                    (own, Vector3::new(own.at.x, own.at.y, heights[x] / weights[x]))
+                });
+                found(number as usize, anew);
             }
         }
     }

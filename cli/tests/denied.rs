@@ -112,6 +112,20 @@ fn what_is_asked_of_rooms_is_about_them() {
 }
 
 #[test]
+fn what_was_seen_is_said_before_what_may_stand_out_of_sight() {
+    let folder = own();
+    let (path, allowed) = (folder.path().join("own/domain.toml"), "out_of_sight = 0.01");
+    let text = fs::read_to_string(&path).expect("the domain was written");
+    assert!(text.contains(allowed), "{text}");
+    fs::write(&path, text.replace(allowed, "out_of_sight = 0.005")).expect("the domain is written");
+    // Of one object it is not sure, and there is little room where nothing was seen.
+    let asked = ["do", "which cups are in the kitchen", "--domain", "own", "--run", "run", "--json"];
+    let report = binary::check(folder.path(), &asked, 1);
+    let why = report["why"].as_str().unwrap_or_default();
+    assert!(why.contains("are found with 0.") && why.contains("is one with 0."), "{report}");
+}
+
+#[test]
 fn a_thing_and_a_kind_of_one_name_are_asked_for_at_once() {
     let folder = own();
     let checked = binary::outcome(folder.path(), &["check", "own"]);

@@ -148,21 +148,36 @@ pub fn left_in_all(s: &Situation) -> Option<String> {
     if s.kinds.is_empty() && !places.is_empty() {
         return Some(format!("what stands at {} looks the same from every side", places.join(" and at ")));
     }
-    s.doubts().into_iter().find_map(|doubt| out_of_sight(s, doubt, "more")).or_else(|| left_of_kinds(s))
+    let more = s.doubts().into_iter().find_map(|doubt| out_of_sight(s, doubt, "more"));
+    // What was seen comes first where it leaves more open than what may stand where nothing was seen.
+    let is_seen = open_kind(s)
+        .is_some_and(|of| least_sure(s, of).is_some_and(|(_, p)| p.min(1.0 - p) > s.doubt_of(of).hidden));
+    more.filter(|_| !is_seen).or_else(|| left_of_kinds(s))
+}
+
+/// The first kind of which not all are found.
+fn open_kind(s: &Situation) -> Option<usize> {
+    (0..s.kinds.len()).find(|&of| s.completeness(of) < s.wanted_of(of))
+}
+
+/// The object of which it is least sure whether it is of a kind, and how likely it is; none if all are sure enough.
+fn least_sure(s: &Situation, of: usize) -> Option<(&Track, f64)> {
+    let sure = |p: f64| p.max(1.0 - p);
+    let tracks = s.belief.tracks.iter().map(|track| (track, s.kinds[of].probability(track, &s.surfaces)));
+    let least = tracks.min_by(|a, b| sure(a.1).total_cmp(&sure(b.1)));
+    least.filter(|(_, p)| sure(*p) < s.threshold)
 }
 
 /// What keeps one from saying that all of a kind are found: the least sure object, and what may stand where nothing was seen.
 fn left_of_kinds(s: &Situation) -> Option<String> {
-    let open = (0..s.kinds.len()).find(|&of| s.completeness(of) < s.wanted_of(of))?;
+    let open = open_kind(s)?;
     let kind = &s.kinds[open];
-    let p = |track: &Track| kind.probability(track, &s.surfaces);
-    let sure = |track: &&Track| p(track).max(1.0 - p(track));
-    let least = s.belief.tracks.iter().min_by(|a, b| sure(a).total_cmp(&sure(b)));
-    let least = least.filter(|track| sure(track) < s.threshold);
-    let is_one =
-        |track: &Track| format!(", what stands at {} is one with {:.2}", place(&track.position_m), p(track));
+    let is_one = |(track, p): (&Track, f64)| {
+        format!(", what stands at {} is one with {p:.2}", place(&track.position_m))
+    };
     let hidden = s.doubt_of(open).hidden;
-    let about = about(least.map(is_one), hidden, 1.0 - s.threshold, s.belief.tracks.is_empty());
+    let least = least_sure(s, open).map(is_one);
+    let about = about(least, hidden, 1.0 - s.threshold, s.belief.tracks.is_empty());
     let (all, place) = (s.completeness(open), in_room(s, kind));
     Some(format!("all {}{place} are found with {all:.2} only{about}", plural(&kind.name)))
 }

@@ -112,7 +112,8 @@ pub(crate) fn conclude(
     let asker = Asker { goal, lexicon, mind, round, lacks, s };
     let (verdict, why) = match ended {
         Ended::Reached => asker.reached(),
-        Ended::NoPlan(why) => asker.gave_up(why, true),
+        // On a map that the body has made itself ways may be missing.
+        Ended::NoPlan(why) => asker.gave_up(why, !s.chart.has_ways()),
         Ended::Undecided(why) => asker.gave_up(why, false),
         Ended::Limit(why) => (Verdict::CannotTell, format!("it cannot be told: {why}")),
         Ended::Failed(why) => (Verdict::Failed, why.clone()),

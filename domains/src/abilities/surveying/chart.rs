@@ -253,6 +253,11 @@ impl Chart {
         Some(way)
     }
 
+    /// Whether ways are taken over the floor of this map.
+    pub(crate) fn has_ways(&self) -> bool {
+        self.router.is_some()
+    }
+
     /// Whether a surface is one of this map.
     pub(crate) fn has(&self, surface: &str) -> bool {
         self.surfaces.iter().any(|(name, _)| symbol(name) == surface)

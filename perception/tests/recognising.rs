@@ -104,6 +104,26 @@ fn one_thing_from_one_view() {
 }
 
 #[test]
+fn what_is_seen_around_a_thing_that_no_body_fits_counts_against_the_cup() {
+    // A flat leaf as high as the cup's rim on a thin stem, seen from above: nothing of a side is in view, and the table all around it.
+    const LEAF: Thing = Thing::Turned {
+        x: 0.0,
+        y: 0.0,
+        knots: &[[0.0, 0.002], [0.098, 0.002], [0.0995, 0.013], [0.104, 0.013]],
+        scale: 1.0,
+        open: false,
+        handle_rad: None,
+        spout: false,
+    };
+    let (cloud, seen) = seen_from(&[LEAF], 0.0, 0.02);
+    let scene = segment(&cloud, &seen, &options()).expect("there is a table");
+    let found = Descry::default().recognise(&scene, &seen, &[cup_a()]);
+    assert_eq!(found.len(), 1, "in one piece");
+    let p = found[0].probability_of("cup A");
+    assert!(p < 0.7, "{p} {:?} {:?}", found[0].size_m, found[0].evidence);
+}
+
+#[test]
 fn what_lies_on_its_side_is_known_and_told_from_what_is_like_it() {
     let lying = |radius: f64, height: f64, open: bool, handle: bool| Thing::Lying {
         x: 0.05,

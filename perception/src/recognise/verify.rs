@@ -29,7 +29,7 @@ pub(super) struct Own<'a> {
     rays: &'a Rays,
     measured: &'a Measured,
     base_m: f64,
-    /// In each view: where its frustum suits best, and the log likelihood of the better of frustum and box.
+    /// In each view: where its frustum suits best, and the log likelihood of the better of frustum and box, against there being none.
     placed: Vec<Placed>,
     logs: Vec<f64>,
 }
@@ -54,7 +54,9 @@ impl<'a> Own<'a> {
         });
         let round = frustum.as_ref().map(|placed| placed.iter().map(|p| p.log).collect());
         let own = [round, cuboid].into_iter().flatten();
-        let logs = own.max_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_default();
+        // What no body was fitted to is compared with none: each view is as likely as without one.
+        let none = || vec![0.0; rays.views.len()];
+        let logs = own.max_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_else(none);
         let unmoved = || vec![Placed { log: 0.0, shift_m: [0.0; 2] }; rays.views.len()];
         Own { rays, measured, base_m, placed: frustum.unwrap_or_else(unmoved), logs }
     }

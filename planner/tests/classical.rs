@@ -137,6 +137,42 @@ fn what_names_an_undefined_object_has_no_result() {
 }
 
 #[test]
+fn an_object_gets_one_value_at_once() {
+    let domain = |effect: &str| {
+        format!(
+            "(define (domain d) (:requirements :adl :object-fluents) (:types thing place) (:constants a b - place x - thing)
+               (:predicates (p) (q) (done)) (:functions (at ?t - thing) - place (next ?p - place) - place)
+               (:action act :parameters (?one ?other - thing) :precondition (not (= ?one ?other)) :effect (and (done) {effect}))
+               (:action same :parameters (?one - thing) :effect (and (done) (assign (at ?one) a) (assign (at x) (next b))))
+               (:action off :effect (not (p))) (:action on :effect (q)))"
+        )
+    };
+    let problem = |goal: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:objects y - thing) (:init (p) (= (at x) b) (= (next b) b)) (:goal {goal}))"
+        )
+    };
+    for (effect, goal, expect) in [
+        ("(assign (at x) a) (assign (at x) b)", "(and (done) (= (at x) a))", Expect::Unsolvable),
+        ("(assign (at x) a) (assign (at x) undefined)", "(not (= (at x) b))", Expect::Unsolvable),
+        ("(assign (at ?one) a) (assign (at ?other) b)", "(and (= (at x) b) (= (at y) a))", Expect::Best(1.0)),
+        ("(assign (at x) a) (when (p) (assign (at x) b))", "(= (at x) a)", Expect::Best(2.0)),
+        (
+            "(when (q) (assign (at x) a)) (when (not (p)) (assign (at x) b))",
+            "(= (at x) a)",
+            Expect::Best(2.0),
+        ),
+        (
+            "(when (not (q)) (assign (at x) b)) (when (not (q)) (assign (at x) (next (at x))))",
+            "(done)",
+            Expect::Best(1.0),
+        ),
+    ] {
+        check(&domain(effect), &problem(goal), expect);
+    }
+}
+
+#[test]
 fn derived_predicates_with_negation() {
     let domain = "(define (domain net) (:requirements :typing :derived-predicates :adl)
       (:types node) (:predicates (link ?a ?b - node) (up ?n - node) (fed ?n - node) (source ?n - node) (dark ?n - node))

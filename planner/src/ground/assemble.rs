@@ -63,6 +63,14 @@ pub(super) fn assemble(
     for action in std::mem::take(&mut raw.actions) {
         encode_action(&encoding, action, &mut actions, &mut durative);
     }
+    let never = |effects: &[Effect]| {
+        let always: Vec<Effect> = effects.iter().filter(|effect| effect.when.is_none()).cloned().collect();
+        Effect::some_contest(&always, &variables)
+    };
+    if variables.iter().any(Variable::is_object) {
+        actions.retain(|action| !never(&action.effects));
+        durative.retain(|action| !never(&action.start_effects) && !never(&action.end_effects));
+    }
     let axioms = raw.axioms.iter().filter_map(|axiom| {
         Some(Axiom { head: encoding.fact(axiom.head)?, body: encoding.conjunction(&axiom.body)? })
     });

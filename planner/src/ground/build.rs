@@ -1,6 +1,6 @@
 //! From the lifted task to the grounded one, step by step.
 
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use tracing::debug_span;
 
 use crate::model::relation::Relation;
@@ -115,9 +115,16 @@ pub(crate) fn ground_with(
         Relevant { wanted: everything(true), unwanted, numerics: vec![true; make.numerics.len()] }
     } else {
         let functions = task.predicates.len()..task.predicates.len() + task.functions.len();
-        let valued: Vec<u32> = (0..make.atoms.len() as u32)
+        let mut objects: FxHashMap<(u32, &[u32]), u32> = FxHashMap::default();
+        let valued = (0..make.atoms.len() as u32)
             .filter(|&atom| functions.contains(&(make.atoms.predicate(atom) as usize)))
-            .collect();
+            .filter_map(|atom| {
+                let (_, arguments) = make.atoms.arguments(atom).split_last()?;
+                let next = objects.len() as u32;
+                let object = *objects.entry((make.atoms.predicate(atom), arguments)).or_insert(next);
+                Some((atom, object))
+            });
+        let valued: FxHashMap<u32, u32> = valued.collect();
         let mut relevant =
             relevant::prune(&mut raw, &make.comparisons, &make.calls, &undefined, &costs.read, &valued);
         // An effect that only harms has its conditions too, though nobody wants it to happen.

@@ -190,20 +190,30 @@ fn derived_predicates_with_negation() {
 fn grounding_hears_the_stop_signal_where_it_finds_nothing() {
     let variables = "?a ?b ?c ?d ?e ?f ?g ?h";
     let objects: String = (0..40).map(|index| format!(" o{index}")).collect();
-    for body in [
+    let simply = ":parameters () :effect (done)".to_string();
+    for (body, goal) in [
         // Nothing fits what is asked of the last two.
-        format!(":parameters ({variables}) :precondition (and (= ?g ?h) (not (= ?g ?h))) :effect (done)"),
-        format!(":parameters () :effect (and (done) (forall ({variables}) (met {variables})))"),
+        (
+            format!(":parameters ({variables}) :precondition (and (= ?g ?h) (not (= ?g ?h))) :effect (done)"),
+            "(done)".to_string(),
+        ),
+        (
+            format!(":parameters () :effect (and (done) (forall ({variables}) (met {variables})))"),
+            "(done)".into(),
+        ),
+        (simply.clone(), format!("(forall ({variables}) (or (done) (met {variables})))")),
+        (simply, format!("(exists ({variables}) (and (done) (not (= ?a ?b))))")),
     ] {
         let domain = format!(
             "(define (domain d) (:requirements :adl) (:predicates (done) (met {variables})) (:action meet {body}))"
         );
-        let problem = format!("(define (problem p) (:domain d) (:objects{objects}) (:init) (:goal (done)))");
+        let problem = format!("(define (problem p) (:domain d) (:objects{objects}) (:init) (:goal {goal}))");
+        let asked = AtomicUsize::new(0);
         let found = plan(
             &read(&domain, &problem),
             &Attachments::default(),
             &Options::default(),
-            &|| true,
+            &|| asked.fetch_add(1, Ordering::Relaxed) >= 20,
             &mut |_| {},
         );
         assert!(matches!(found, Ok(Outcome::OutOfTime { best: None, .. })), "{found:?}");

@@ -84,10 +84,13 @@ pub(crate) fn ground_with(
     }
     drop(span);
     let (atoms, instances) = (reach.atoms, reach.instances);
-    let mut make = Instantiate::new(&statics, atoms);
+    let mut make = Instantiate::new(&statics, atoms, stop);
     let _span = debug_span!("instantiate").entered();
     mark_always(task, &normal, &instances, &mut make, stop)?;
     let (mut raw, goal_possible) = instantiate(task, &normal, &rules, instances, &mut make, stop)?;
+    if make.stopped {
+        return Err(GroundError::Stopped);
+    }
     let expression = normal.metric.as_ref().map(|m| make.expression(m, &[]));
     let reached = relaxed::prune(&mut raw, &make.calls);
     let keep = !task.modules.is_empty() || !task.preferences.is_empty() || !task.constraints.is_empty();
@@ -333,6 +336,9 @@ fn instantiate(
     let mut goal = Clauses::default();
     let mut binding = vec![NONE; normal.goal_domains.len()];
     let possible = make.conjoin(&normal.goal, &mut binding, &normal.goal_domains, &mut goal);
+    if make.stopped {
+        return Err(GroundError::Stopped);
+    }
     let goal = resolve.flat(goal, top);
     axioms.append(&mut resolve.axioms);
     axioms.sort_by_key(|a: &RawAxiom| a.stratum);

@@ -36,6 +36,7 @@ fn each_fault_is_drawn_where_it_is() {
         ("duplicate-action", "duplicate-action.pddl", None),
         ("durations", "durations.pddl", None),
         ("unsteady-rate", "unsteady-rate.pddl", None),
+        ("between-happenings", "between-happenings.pddl", None),
         ("missing-attachment", "missing-attachment.pddl", None),
         ("cyclic-types", "cyclic-types.pddl", None),
         ("wrong-kind", "wrong-kind.pddl", None),

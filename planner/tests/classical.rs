@@ -173,6 +173,16 @@ fn an_object_gets_one_value_at_once() {
 }
 
 #[test]
+fn a_predicate_about_a_function_may_be_called_like_a_connective() {
+    let domain = "(define (domain stack) (:requirements :typing :object-fluents) (:types thing)
+      (:predicates (on ?a ?b - thing) (r ?a - thing)) (:functions (top) - thing (under ?t - thing) - thing)
+      (:action lift :parameters () :precondition (on (top) (under (top))) :effect (r (top))))";
+    let problem = "(define (problem p) (:domain stack) (:objects a b - thing)
+      (:init (on a b) (= (top) a) (= (under a) b)) (:goal (and (r (top)) (on (top) b))))";
+    check(domain, problem, Expect::Best(1.0));
+}
+
+#[test]
 fn derived_predicates_with_negation() {
     let domain = "(define (domain net) (:requirements :typing :derived-predicates :adl)
       (:types node) (:predicates (link ?a ?b - node) (up ?n - node) (fed ?n - node) (source ?n - node) (dark ?n - node))

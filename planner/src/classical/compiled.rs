@@ -160,6 +160,13 @@ pub(crate) fn is_classical(task: &GroundTask) -> bool {
             .all(|a| plain(&a.condition) && is_plain(&a.cost) && a.effects.iter().all(plain_effect))
 }
 
+/// By action, whether it may give an object several values at once; empty where none may.
+fn contested(task: &GroundTask) -> Vec<bool> {
+    let is_contested = |action: &Action| Effect::some_contest(&action.effects, &task.variables);
+    let contested: Vec<bool> = task.actions.iter().map(is_contested).collect();
+    if contested.contains(&true) { contested } else { Vec::new() }
+}
+
 impl Compiled {
     /// The task in flat arrays, for tasks that [`is_classical`].
     pub(crate) fn new(task: &GroundTask) -> Compiled {
@@ -187,11 +194,7 @@ impl Compiled {
             }
             effects.push(list);
         }
-        let is_contested = |action: &Action| Effect::some_contest(&action.effects, &task.variables);
-        let mut contested: Vec<bool> = task.actions.iter().map(is_contested).collect();
-        if !contested.contains(&true) {
-            contested = Vec::new();
-        }
+        let contested = contested(task);
         let measure = Measure::new(task, &numbers);
         let (costs, cost_scale) = costs(&measure.estimates);
         let mut axiom_bodies = Lists::new();

@@ -117,17 +117,7 @@ pub(crate) fn ground_with(
         let unwanted = absences(&raw);
         Relevant { wanted: everything(true), unwanted, numerics: vec![true; make.numerics.len()] }
     } else {
-        let functions = task.predicates.len()..task.predicates.len() + task.functions.len();
-        let mut objects: FxHashMap<(u32, &[u32]), u32> = FxHashMap::default();
-        let valued = (0..make.atoms.len() as u32)
-            .filter(|&atom| functions.contains(&(make.atoms.predicate(atom) as usize)))
-            .filter_map(|atom| {
-                let (_, arguments) = make.atoms.arguments(atom).split_last()?;
-                let next = objects.len() as u32;
-                let object = *objects.entry((make.atoms.predicate(atom), arguments)).or_insert(next);
-                Some((atom, object))
-            });
-        let valued: FxHashMap<u32, u32> = valued.collect();
+        let valued = valued(task, &make.atoms);
         let mut relevant =
             relevant::prune(&mut raw, &make.comparisons, &make.calls, &undefined, &costs.read, &valued);
         // An effect that only harms has its conditions too, though nobody wants it to happen.
@@ -138,6 +128,21 @@ pub(crate) fn ground_with(
     let mut ground = assemble(task, raw, make, reached, relevant, groups, costs.metric, goal_possible);
     ground.obstacles = found;
     Ok(ground)
+}
+
+/// By atom of an object function: a number for the function with its arguments.
+fn valued(task: &Task, atoms: &Atoms) -> FxHashMap<u32, u32> {
+    let functions = task.predicates.len()..task.predicates.len() + task.functions.len();
+    let mut objects: FxHashMap<(u32, &[u32]), u32> = FxHashMap::default();
+    let valued = (0..atoms.len() as u32)
+        .filter(|&atom| functions.contains(&(atoms.predicate(atom) as usize)))
+        .filter_map(|atom| {
+            let (_, arguments) = atoms.arguments(atom).split_last()?;
+            let next = objects.len() as u32;
+            let object = *objects.entry((atoms.predicate(atom), arguments)).or_insert(next);
+            Some((atom, object))
+        });
+    valued.collect()
 }
 
 fn widths(task: &Task) -> Result<(), GroundError> {

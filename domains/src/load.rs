@@ -241,7 +241,7 @@ pub fn from_files(files: Files, folder: Option<PathBuf>) -> Result<Domain, LoadE
         })
         .collect();
     let shapes = under("shapes/").map(|(_, (name, text))| shape(name, text)).collect::<Result<_, _>>()?;
-    let pddl = Source { name: pddl_name.clone(), text: pddl.clone() };
+    let pddl = Source::new(pddl_name.clone(), pddl.clone());
     let vocabulary = Vocabulary::read(&pddl).map_err(|findings| LoadError::Findings { findings })?;
     let functions = Functions::default();
     Ok(Domain {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use descry_planner::task::{Change, Task, TypeId, Written};
+use descry_planner::task::{Assignment, Change, Task, TypeId, Written};
 use descry_planner::{Findings, Source, Span};
 
 use crate::abilities::{self, Fact};
@@ -14,6 +14,7 @@ pub struct Vocabulary {
     /// The domain with an empty problem.
     pub task: Task,
     changed: BTreeSet<String>,
+    given: BTreeSet<String>,
 }
 
 /// A predicate or a function.
@@ -57,8 +58,12 @@ impl Vocabulary {
         let name = domain_name(&pddl.text);
         let nothing = format!("(define (problem nothing) (:domain {name}) (:objects) (:init) (:goal (and)))");
         let task = Task::read(pddl, &Source::new("nothing.pddl", nothing))?;
-        let changed = changed(&task);
-        Ok(Self { task, changed })
+        let rates = task.actions.iter().flat_map(|a| &a.continuous);
+        let rates = rates.map(|r| task.function(r.fluent.function).name.clone());
+        let changed = changed(&task, |_| true).into_iter().chain(rates).collect();
+        let adds = |change: &Change| matches!(change, Change::Number(how, ..) if *how != Assignment::Assign);
+        let given = self::changed(&task, |change| !adds(change));
+        Ok(Self { task, changed, given })
     }
 
     /// Whether a type is declared.
@@ -149,6 +154,11 @@ impl Vocabulary {
         self.changed.contains(word)
     }
 
+    /// Whether an action's effects give a word a value whatever it had before.
+    pub fn is_given(&self, word: &str) -> bool {
+        self.given.contains(word)
+    }
+
     fn type_name(&self, types: &[TypeId]) -> String {
         types.first().map_or_else(|| "object".into(), |id| self.task.type_of(*id).name.clone())
     }
@@ -164,8 +174,8 @@ fn domain_name(text: &str) -> String {
     found.unwrap_or("domain").to_string()
 }
 
-/// The words that effects of actions change.
-fn changed(task: &Task) -> BTreeSet<String> {
+/// The words that such effects of actions change.
+fn changed(task: &Task, is_such: impl Fn(&Change) -> bool) -> BTreeSet<String> {
     let predicate = |id: descry_planner::task::PredicateId| task.predicate(id).name.clone();
     let function = |id: descry_planner::task::FunctionId| task.function(id).name.clone();
     let of = |change: &Change| -> Vec<String> {
@@ -182,8 +192,7 @@ fn changed(task: &Task) -> BTreeSet<String> {
         }
     };
     let effects = task.actions.iter().flat_map(|a| a.effects.start.iter().chain(&a.effects.end));
-    let rates = task.actions.iter().flat_map(|a| &a.continuous).map(|r| function(r.fluent.function));
-    effects.flat_map(|e| of(&e.change)).chain(rates).collect()
+    effects.filter(|effect| is_such(&effect.change)).flat_map(|e| of(&e.change)).collect()
 }
 
 #[cfg(test)]

@@ -14,10 +14,24 @@ pub struct Source {
 }
 
 impl Source {
-    /// A source from its name and its text.
+    /// A source from its name and its text. A carriage return alone ends a line too: it is taken for a line feed.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
-        Self { name: name.into(), text: text.into() }
+        Self { name: name.into(), text: with_line_feeds(text.into()) }
     }
+}
+
+/// The text with line feeds for carriage returns that stand alone; all places stay where they are.
+fn with_line_feeds(text: String) -> String {
+    if !text.contains('\r') {
+        return text;
+    }
+    let mut parts = text.split('\r');
+    let mut mended = parts.next().unwrap_or_default().to_string();
+    for part in parts {
+        mended.push(if part.starts_with('\n') { '\r' } else { '\n' });
+        mended.push_str(part);
+    }
+    mended
 }
 
 /// A place in one of the sources of a task: byte offsets `start..end` of source number `source`

@@ -54,7 +54,7 @@ pub use diagnostic::{Diagnostic, Findings, Label, Severity, Source, Span};
 pub use explain::Explanation;
 pub use outcome::{Options, Outcome, PlanError, Statistics};
 pub use pddl::check;
-pub use plan::{EPSILON_S, Plan, Step};
+pub use plan::{EPSILON_S, Plan, Step, number_text};
 pub use semantics::Semantics;
 pub use solve::plan;
 pub use state::State;

@@ -59,6 +59,17 @@ impl Plan {
         Ok(plan)
     }
 
+    /// The same with times of six digits.
+    pub(crate) fn tidy(&self) -> Plan {
+        let rounded = |seconds: f64| (seconds * 1e6).round() / 1e6;
+        let mut plan = self.clone();
+        for step in &mut plan.steps {
+            step.start_s = step.start_s.map(rounded);
+            step.duration_s = rounded(step.duration_s);
+        }
+        plan
+    }
+
     /// When the last step ends; 0 for an empty plan, `None` for a classical one.
     pub fn makespan_s(&self) -> Option<f64> {
         self.steps.iter().try_fold(0.0, |last: f64, step| Some(last.max(step.start_s? + step.duration_s)))
@@ -82,19 +93,28 @@ impl fmt::Display for Plan {
             f.write_str("\n")?;
         }
         if let Some(cost) = self.cost {
-            writeln!(f, "; cost = {cost}")?;
+            writeln!(f, "; cost = {}", number_text(cost))?;
         }
         Ok(())
     }
 }
 
-/// Three digits, or six where three are not exact.
+/// Three digits, or six where three are not exact, or all that it takes to read the same number.
 fn seconds(value: f64) -> String {
-    if ((value * 1e3).round() / 1e3 - value).abs() < 1e-9 {
-        format!("{value:.3}")
-    } else {
-        format!("{value:.6}")
+    let short = [3, 6].map(|digits| format!("{value:.digits$}"));
+    let exact = |text: &&String| text.parse() == Ok(value);
+    short.iter().find(exact).cloned().unwrap_or_else(|| format!("{value}"))
+}
+
+/// A number as people read it: what is left of rounding in its last digits is not shown.
+pub fn number_text(value: f64) -> String {
+    const DIGITS: f64 = 1e6;
+    let size = value.abs();
+    if size != 0.0 && !(1.0 / DIGITS..1e15).contains(&size) {
+        return if value.is_finite() { format!("{value:e}") } else { format!("{value}") };
     }
+    let rounded = (value * DIGITS).round() / DIGITS;
+    format!("{}", if size < 1e9 { rounded + 0.0 } else { value })
 }
 
 fn cost_comment(text: &str) -> Option<f64> {
@@ -211,6 +231,8 @@ mod tests {
             ("0.5: (b) [1]\n0: (A x) [D:2.25; C:1]", "0.000: (a x) [2.250]\n0.500: (b) [1.000]\n"),
             ("\u{feff}(a)\r\n(b)\r\n", "(a)\n(b)\n"),
             ("; a comment\n0.333333: (a)[0.1](b)", ""),
+            ("1.4285714285714286: (a) [0.1234565]", "1.4285714285714286: (a) [0.1234565]\n"),
+            ("(a)\n; cost = 4.0009999999999994", "(a)\n; cost = 4.001\n"),
             ("", ""),
         ] {
             match read(text) {
@@ -228,6 +250,22 @@ mod tests {
         let findings = read("0: (a) [x]\nmove a b\n1: (b) [2]\n2: (c [1]\nNaN: (d) [1]\n-1: (e) [1]\n");
         let findings = findings.expect_err("five lines are no steps");
         assert_eq!(findings.list.len(), 5, "{findings}");
+    }
+
+    #[test]
+    fn numbers_are_written_as_people_read_them() {
+        for (value, written) in [
+            (4.0009999999999994, "4.001"),
+            (-0.0, "0"),
+            (12.5, "12.5"),
+            (1.0 / 3.0, "0.333333"),
+            (3e-9, "3e-9"),
+            (123_456_789_012.0, "123456789012"),
+            (1e300, "1e300"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(number_text(value), written);
+        }
     }
 
     #[test]

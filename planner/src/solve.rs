@@ -372,6 +372,14 @@ fn checked(task: &Task, attachments: &Attachments, mut plan: Plan) -> Result<Pla
     if !task.init.timed.is_empty() && plan.makespan_s().is_none() {
         give_times(task, &mut plan);
     }
+    // What is left of rounding goes, unless the plan rests on it.
+    let tidy = plan.tidy();
+    if tidy != plan {
+        let verdict = validate(task, attachments, &tidy);
+        if verdict.valid {
+            return Ok(Plan { cost: verdict.cost, ..tidy });
+        }
+    }
     let verdict = validate(task, attachments, &plan);
     if verdict.valid {
         return Ok(Plan { cost: verdict.cost, ..plan });

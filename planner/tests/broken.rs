@@ -36,6 +36,7 @@ fn each_fault_is_drawn_where_it_is() {
         ("duplicate-action", "duplicate-action.pddl", None),
         ("durations", "durations.pddl", None),
         ("unsteady-rate", "unsteady-rate.pddl", None),
+        ("between-happenings", "between-happenings.pddl", None),
         ("missing-attachment", "missing-attachment.pddl", None),
         ("cyclic-types", "cyclic-types.pddl", None),
         ("wrong-kind", "wrong-kind.pddl", None),
@@ -81,4 +82,19 @@ fn of_a_long_line_what_is_near_the_place_is_drawn() {
 fn findings_are_plain_data_too() {
     let findings = findings("predicate-typo.pddl", None);
     insta::assert_json_snapshot!("predicate-typo-data", findings);
+}
+
+#[test]
+fn a_carriage_return_alone_ends_a_line() {
+    let text = source("predicate-typo.pddl").text.replace("(define", "; a comment\n(define");
+    for line_end in ["\r", "\r\n"] {
+        let found = check(&Source::new("domain", text.replace('\n', line_end)), None);
+        let expected = check(&Source::new("domain", text.as_str()), None);
+        let places = |findings: &descry_planner::Findings| -> Vec<(usize, usize)> {
+            let labels = findings.list.iter().flat_map(|finding| &finding.labels);
+            labels.map(|label| findings.place(label.span)).map(|(_, line, column)| (line, column)).collect()
+        };
+        assert_eq!(places(&found), places(&expected), "{line_end:?}");
+        assert_eq!(found.render(false), expected.render(false), "{line_end:?}");
+    }
 }

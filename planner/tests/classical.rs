@@ -137,6 +137,52 @@ fn what_names_an_undefined_object_has_no_result() {
 }
 
 #[test]
+fn an_object_gets_one_value_at_once() {
+    let domain = |effect: &str| {
+        format!(
+            "(define (domain d) (:requirements :adl :object-fluents) (:types thing place) (:constants a b - place x - thing)
+               (:predicates (p) (q) (done)) (:functions (at ?t - thing) - place (next ?p - place) - place)
+               (:action act :parameters (?one ?other - thing) :precondition (not (= ?one ?other)) :effect (and (done) {effect}))
+               (:action same :parameters (?one - thing) :effect (and (done) (assign (at ?one) a) (assign (at x) (next b))))
+               (:action off :effect (not (p))) (:action on :effect (q)))"
+        )
+    };
+    let problem = |goal: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:objects y - thing) (:init (p) (= (at x) b) (= (next b) b)) (:goal {goal}))"
+        )
+    };
+    for (effect, goal, expect) in [
+        ("(assign (at x) a) (assign (at x) b)", "(and (done) (= (at x) a))", Expect::Unsolvable),
+        ("(assign (at x) a) (assign (at x) undefined)", "(not (= (at x) b))", Expect::Unsolvable),
+        ("(assign (at ?one) a) (assign (at ?other) b)", "(and (= (at x) b) (= (at y) a))", Expect::Best(1.0)),
+        ("(assign (at x) a) (when (p) (assign (at x) b))", "(= (at x) a)", Expect::Best(2.0)),
+        (
+            "(when (q) (assign (at x) a)) (when (not (p)) (assign (at x) b))",
+            "(= (at x) a)",
+            Expect::Best(2.0),
+        ),
+        (
+            "(when (not (q)) (assign (at x) b)) (when (not (q)) (assign (at x) (next (at x))))",
+            "(done)",
+            Expect::Best(1.0),
+        ),
+    ] {
+        check(&domain(effect), &problem(goal), expect);
+    }
+}
+
+#[test]
+fn a_predicate_about_a_function_may_be_called_like_a_connective() {
+    let domain = "(define (domain stack) (:requirements :typing :object-fluents) (:types thing)
+      (:predicates (on ?a ?b - thing) (r ?a - thing)) (:functions (top) - thing (under ?t - thing) - thing)
+      (:action lift :parameters () :precondition (on (top) (under (top))) :effect (r (top))))";
+    let problem = "(define (problem p) (:domain stack) (:objects a b - thing)
+      (:init (on a b) (= (top) a) (= (under a) b)) (:goal (and (r (top)) (on (top) b))))";
+    check(domain, problem, Expect::Best(1.0));
+}
+
+#[test]
 fn derived_predicates_with_negation() {
     let domain = "(define (domain net) (:requirements :typing :derived-predicates :adl)
       (:types node) (:predicates (link ?a ?b - node) (up ?n - node) (fed ?n - node) (source ?n - node) (dark ?n - node))
@@ -154,20 +200,30 @@ fn derived_predicates_with_negation() {
 fn grounding_hears_the_stop_signal_where_it_finds_nothing() {
     let variables = "?a ?b ?c ?d ?e ?f ?g ?h";
     let objects: String = (0..40).map(|index| format!(" o{index}")).collect();
-    for body in [
+    let simply = ":parameters () :effect (done)".to_string();
+    for (body, goal) in [
         // Nothing fits what is asked of the last two.
-        format!(":parameters ({variables}) :precondition (and (= ?g ?h) (not (= ?g ?h))) :effect (done)"),
-        format!(":parameters () :effect (and (done) (forall ({variables}) (met {variables})))"),
+        (
+            format!(":parameters ({variables}) :precondition (and (= ?g ?h) (not (= ?g ?h))) :effect (done)"),
+            "(done)".to_string(),
+        ),
+        (
+            format!(":parameters () :effect (and (done) (forall ({variables}) (met {variables})))"),
+            "(done)".into(),
+        ),
+        (simply.clone(), format!("(forall ({variables}) (or (done) (met {variables})))")),
+        (simply, format!("(exists ({variables}) (and (done) (not (= ?a ?b))))")),
     ] {
         let domain = format!(
             "(define (domain d) (:requirements :adl) (:predicates (done) (met {variables})) (:action meet {body}))"
         );
-        let problem = format!("(define (problem p) (:domain d) (:objects{objects}) (:init) (:goal (done)))");
+        let problem = format!("(define (problem p) (:domain d) (:objects{objects}) (:init) (:goal {goal}))");
+        let asked = AtomicUsize::new(0);
         let found = plan(
             &read(&domain, &problem),
             &Attachments::default(),
             &Options::default(),
-            &|| true,
+            &|| asked.fetch_add(1, Ordering::Relaxed) >= 20,
             &mut |_| {},
         );
         assert!(matches!(found, Ok(Outcome::OutOfTime { best: None, .. })), "{found:?}");

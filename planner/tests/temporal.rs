@@ -535,3 +535,55 @@ fn what_actions_earn_is_made_large() {
     check(domain, &format!("{problem} (:metric maximize (reward))"), Some(4.0));
     check(domain, &format!("{problem} (:metric maximize (- (reward) (* 3 (total-time))))"), Some(2.0));
 }
+
+#[test]
+fn an_end_that_names_an_undefined_object_has_no_result() {
+    // What was so at the start decides at the end whether something is done to what is held then.
+    let domain = "(:types thing) (:predicates (armed) (idle) (done) (marked ?t - thing)) (:functions (held) - thing (under ?t - thing) - thing)
+      (:constants x y - thing)
+      (:durative-action act :parameters () :duration (= ?duration 2)
+        :effect (and (at end (done)) (when (at start (armed)) (at end (marked (under (held)))))))
+      (:durative-action keep :parameters () :duration (= ?duration 3)
+        :effect (and (at end (done)) (when (over all (armed)) (at end (assign (held) (under (held)))))))
+      (:durative-action disarm :parameters () :duration (= ?duration 1) :condition (at start (idle)) :effect (at end (not (armed))))";
+    for (init, goal, expected_s) in [
+        ("(armed) (= (held) x) (= (under x) y)", "(marked y)", Some(2.0)),
+        ("(armed) (= (held) x)", "(done)", None),
+        ("(armed)", "(done)", None),
+        ("(= (held) x)", "(done)", Some(2.0)),
+        ("(armed) (idle) (= (held) x)", "(and (done) (not (marked y)))", Some(3.0)),
+        ("(armed) (= (held) x) (= (under x) y)", "(= (held) y)", Some(3.0)),
+    ] {
+        check(domain, &format!("(:init {init}) (:goal {goal})"), expected_s);
+    }
+}
+
+#[test]
+fn an_object_gets_one_value_at_a_time() {
+    let domain =
+        "(:types thing) (:predicates (p) (q) (done)) (:functions (held) - thing) (:constants x y - thing)
+      (:durative-action act :parameters () :duration (= ?duration 2) :condition (at start (p))
+        :effect (and (at start (not (p))) (when (at start (p)) (at end (assign (held) x)))
+          (when (at end (not (p))) (at end (assign (held) y))) (at end (done))))
+      (:durative-action restore :parameters () :duration (= ?duration 1) :condition (at start (q))
+        :effect (and (at start (not (q))) (at start (p)) (at end (done))))";
+    check(domain, "(:init (p) (q) (= (held) x)) (:goal (= (held) y))", None);
+    // What holds again at the end is restored while it goes on.
+    check(domain, "(:init (p) (q) (= (held) y)) (:goal (= (held) x))", Some(2.0));
+}
+
+#[test]
+fn a_plan_that_is_written_and_read_again_is_valid() {
+    let domain = "(define (domain d) (:requirements :durative-actions :fluents :duration-inequalities) (:predicates (p)) (:functions (level))
+      (:durative-action fill :parameters () :duration (and (>= ?duration 0.1) (<= ?duration (/ 10 7))) :condition (at start (p))
+        :effect (and (at start (not (p))) (at end (increase (level) (* 7 ?duration))))))";
+    let problem = "(define (problem p) (:domain d) (:init (p) (= (level) 0)) (:goal (>= (level) 10)))";
+    let task =
+        Task::read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("no findings");
+    let options = Options::default();
+    let outcome = plan(&task, &Attachments::new(), &options, &|| false, &mut |_| {}).expect("no refusal");
+    let written = outcome.plan().expect("a plan").to_string();
+    let again = descry_planner::Plan::read(&Source::new("plan", written.as_str())).expect("it is a plan");
+    let verdict = descry_planner::validate(&task, &Attachments::new(), &again);
+    assert!(verdict.valid, "{written}{verdict:?}");
+}

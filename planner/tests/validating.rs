@@ -138,6 +138,29 @@ fn changes_of_one_number_at_once_must_have_a_result() {
 }
 
 #[test]
+fn an_object_gets_one_value_at_once() {
+    let domain = "(define (domain d) (:requirements :adl :object-fluents) (:types place) (:constants a b - place)
+      (:predicates (high) (wet)) (:functions (at) - place (home) - place)
+      (:action go :parameters () :effect (and (when (high) (assign (at) a)) (when (wet) (assign (at) (home)))))
+      (:action rain :parameters () :effect (wet))
+      (:action lose :parameters () :effect (and (wet) (assign (at) undefined) (assign (at) a)))
+      (:action rise :parameters () :effect (and (high) (assign (at) b) (assign (at) (home)))))";
+    let problem =
+        "(define (problem p) (:domain d) (:init (= (at) a) (= (home) b)) (:goal (or (high) (wet))))";
+    let clash = "two changes of (at) at once contradict each other";
+    check(
+        domain,
+        problem,
+        &[
+            ("(rain)\n(go)", ""),
+            ("(rise)\n(go)", ""),
+            ("(rain)\n(rise)\n(go)", &format!("step 3 (go): {clash}")),
+            ("(rain)\n(lose)", &format!("step 2 (lose): {clash}")),
+        ],
+    );
+}
+
+#[test]
 fn plans_with_times() {
     check(
         WORKSHOP,

@@ -28,7 +28,7 @@ pub fn source(path: &Path) -> Result<Source, CommandError> {
         let at = e.utf8_error().valid_up_to();
         CommandError::BadInput(format!("{name}: byte {at} is not UTF-8 text\n  a PDDL file was expected"))
     })?;
-    Ok(Source { name, text })
+    Ok(Source::new(name, text))
 }
 
 /// Where the commands let bodies move and runs go on.

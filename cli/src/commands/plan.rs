@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use descry_planner::{Outcome, Plan, PlanError, Statistics, Task};
+use descry_planner::{Outcome, Plan, PlanError, Statistics, Task, number_text};
 use serde::Serialize;
 use serde_json::json;
 
@@ -238,7 +238,7 @@ fn show(
 }
 
 fn summary(plan: &Plan) -> String {
-    let cost = plan.cost.map_or(String::new(), |c| format!(", cost {c}"));
+    let cost = plan.cost.map_or(String::new(), |cost| format!(", cost {}", number_text(cost)));
     let makespan = plan.makespan_s().map_or(String::new(), |s| format!(", makespan {s:.3}"));
     format!("{} steps{cost}{makespan}", plan.steps.len())
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use descry_planner::{Plan, Task, Verdict};
+use descry_planner::{Plan, Task, Verdict, number_text};
 
 use crate::commands::input::{self, AttachmentArguments};
 use descry_agent::exit::{CommandError, Exit};
@@ -39,7 +39,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
 }
 
 fn told(verdict: &Verdict) -> String {
-    let number = |name: &str, value: Option<f64>| value.map_or(String::new(), |v| format!(", {name} {v}"));
+    let number = |name: &str, value: Option<f64>| {
+        value.map_or(String::new(), |value| format!(", {name} {}", number_text(value)))
+    };
     let numbers = number("cost", verdict.cost)
         + &number("makespan", verdict.makespan)
         + &number("metric", verdict.metric);

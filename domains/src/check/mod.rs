@@ -37,6 +37,7 @@ pub fn findings(domain: &Domain) -> Findings {
     list.extend(check.calls());
     list.extend(check.words());
     list.extend(check.objects());
+    list.extend(check.open());
     list.extend(check.minimise());
     list.extend(check.phrases());
     list.extend(check.scenes());

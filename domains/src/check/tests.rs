@@ -168,6 +168,16 @@ fn faults_of_words_and_objects_are_found_at_their_place() {
     toml((top, &with("init = [\"(observed table\"]")), "init", "\"(observed table\"", &["expected"]);
     toml((top, &with("init = [\"(at start)\"]")), "init", "\"(at start)\"", &["sensed"]);
     toml((top, &with("init = [\"(observed table-1 shelf)\"]")), "undeclared-object", "shelf", &["table"]);
+    let twice = "\"(not (observed table-1 table))\"";
+    let init = with(&format!("init = [\"(observed table-1 table)\", \"(observed table-1 table)\", {twice}]"));
+    toml((top, &init), "two-values", twice, &["hold and not to hold"]);
+    pddl(
+        ("(confidence ?what - thing))", "(confidence ?what - thing) (tried ?on - surface))"),
+        "no-value",
+        "tried",
+        &["init = [\"(= (tried …) 0)\"]"],
+    );
+    toml((top, &with("open = [\"surfac\"]")), "no-type", "\"surfac\"", &["did you mean `surface`?"]);
     toml((top, &with("[objects]\nperson = [\"Anna\"]")), "no-type", "[\"Anna\"]", &[":types"]);
     toml((top, &with("[objects]\nthing = [\"spoon\"]")), "given-type", "[\"spoon\"]", &["objects/"]);
     toml(("[\"searching\"]", "[\"serching\", \"searching\"]"), "no-ability", "\"serching\"", &["searching"]);

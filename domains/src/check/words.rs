@@ -1,5 +1,7 @@
 //! Every word has its value from somewhere; what is said of words and objects in `domain.toml` makes sense.
 
+use std::collections::BTreeMap;
+
 use descry_planner::Diagnostic;
 
 use super::Check;
@@ -35,6 +37,9 @@ impl Check<'_> {
                             Diagnostic::error("word-types", message, word.span, "this word").with_help(help),
                         );
                     }
+                }
+                Ground::Fixed | Ground::Remembered | Ground::Planned if self.stays_undefined(&word) => {
+                    list.push(never_defined(&word));
                 }
                 Ground::Fixed if !self.begins(&word) => {
                     let name = &word.name;
@@ -125,6 +130,13 @@ impl Check<'_> {
         unknown.map(told).collect()
     }
 
+    /// Whether a word is a number that has no value in the beginning and is given none by any action.
+    fn stays_undefined(&self, word: &Word) -> bool {
+        // Costs begin at 0.
+        let is_cost = word.name == "total-cost" && word.types.is_empty();
+        word.is_number && !is_cost && !self.begins(word) && !self.domain.vocabulary.is_given(&word.name)
+    }
+
     fn begins(&self, word: &Word) -> bool {
         let lines = self.domain.config.init.iter().filter_map(|line| words::read(line).ok());
         lines.flatten().any(|(name, ..)| name == word.name)
@@ -134,6 +146,7 @@ impl Check<'_> {
     fn init(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
+        let mut said: BTreeMap<(String, Vec<String>), Option<f64>> = BTreeMap::new();
         for (n, line) in config.init.iter().enumerate() {
             let n = n.to_string();
             let path = ["init", n.as_str()];
@@ -158,8 +171,35 @@ impl Check<'_> {
                 let help = "only what is remembered or fixed begins as init says";
                 list.push(self.error("init", message, self.toml.at(&path), help));
             }
+            for (name, arguments, value) in instances {
+                let atom = std::iter::once(&name).chain(&arguments).cloned().collect::<Vec<_>>().join(" ");
+                let other = said.insert((name, arguments), value).filter(|other| *other != value);
+                if let Some(other) = other {
+                    let message = format!("`({atom})` begins in two ways");
+                    let help = match other {
+                        Some(first) if value.is_some() => {
+                            format!("it is {first} already; remove one of them")
+                        }
+                        _ => "it is said to hold and not to hold; remove one of them".into(),
+                    };
+                    list.push(self.error("two-values", message, self.toml.at(&path), help));
+                }
+            }
         }
         list
+    }
+
+    /// Types of which a person may name objects as he likes are types.
+    pub(super) fn open(&self) -> Vec<Diagnostic> {
+        let vocabulary = &self.domain.vocabulary;
+        let types = || vocabulary.task.types.iter().map(|t| t.name.as_str());
+        let named = self.domain.config.open.iter().enumerate();
+        let unknown = named.filter(|(_, of)| !vocabulary.has_type(of) && !GIVEN.contains(&of.as_str()));
+        let told = |(n, of): (usize, &String)| {
+            let message = format!("there is no type `{of}` in :types of domain.pddl");
+            self.error("no-type", message, self.toml.at(&["open", &n.to_string()]), self.known(of, types()))
+        };
+        unknown.map(told).collect()
     }
 
     /// The abilities that are used, and the objects of the domain's own types.
@@ -206,4 +246,16 @@ impl Check<'_> {
         }
         list
     }
+}
+
+/// That what reads a number, or adds to it, can never happen.
+fn never_defined(word: &Word) -> Diagnostic {
+    let name = &word.name;
+    let arguments = if word.types.is_empty() { "" } else { " …" };
+    let message = format!("`{name}` has no value in the beginning, and no action assigns it one");
+    let help = format!(
+        "what reads or changes it never happens: say what it is at first, init = [\"(= ({name}{arguments}) 0)\"], or who states it: \
+         [word.{name}] program = […]"
+    );
+    Diagnostic::error("no-value", message, word.span, "this number").with_help(help)
 }

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::ground::{Conjunction, Effect, Fact, GroundTask, Meaning, Outcome};
+use crate::ground::{Action, Conjunction, Effect, Fact, GroundTask, Meaning, Outcome, Variable};
+use crate::model::agreement::reset;
 
 use super::measure::Measure;
 use super::numbers::{Numbers, is_plain};
@@ -102,6 +103,10 @@ pub(crate) struct Compiled {
     pub effects: Lists<Achieve>,
     /// Of effects.
     pub conditions: Vec<Fact>,
+    /// By operator, whether it may give an object several values at once; empty where none may.
+    contested: Vec<bool>,
+    /// By variable that is not derived, whether it is an object.
+    objects: Vec<bool>,
     /// By operator: for the search.
     pub costs: Vec<u32>,
     /// What a plan costs.
@@ -155,6 +160,13 @@ pub(crate) fn is_classical(task: &GroundTask) -> bool {
             .all(|a| plain(&a.condition) && is_plain(&a.cost) && a.effects.iter().all(plain_effect))
 }
 
+/// By action, whether it may give an object several values at once; empty where none may.
+fn contested(task: &GroundTask) -> Vec<bool> {
+    let is_contested = |action: &Action| Effect::some_contest(&action.effects, &task.variables);
+    let contested: Vec<bool> = task.actions.iter().map(is_contested).collect();
+    if contested.contains(&true) { contested } else { Vec::new() }
+}
+
 impl Compiled {
     /// The task in flat arrays, for tasks that [`is_classical`].
     pub(crate) fn new(task: &GroundTask) -> Compiled {
@@ -182,6 +194,7 @@ impl Compiled {
             }
             effects.push(list);
         }
+        let contested = contested(task);
         let measure = Measure::new(task, &numbers);
         let (costs, cost_scale) = costs(&measure.estimates);
         let mut axiom_bodies = Lists::new();
@@ -208,6 +221,8 @@ impl Compiled {
             preconditions,
             effects,
             conditions,
+            contested,
+            objects: task.variables.iter().map(Variable::is_object).collect(),
             unit_cost: measure.estimates.iter().all(|&c| c == 1.0),
             cost_scale,
             free_operators: costs.contains(&0),
@@ -284,10 +299,29 @@ impl Compiled {
             && self.possible(operator, state)
     }
 
-    /// Whether an operator of which the preconditions hold leaves all numbers defined and finite.
+    /// Whether an operator of which the preconditions hold leaves all numbers defined and finite, and gives each object one value.
     #[inline]
     pub(crate) fn possible(&self, operator: u32, state: &[u32]) -> bool {
-        self.numbers.is_empty() || self.numbers.possible(operator, state)
+        (self.numbers.is_empty() || self.numbers.possible(operator, state))
+            && (self.contested.is_empty() || self.agrees(operator, state))
+    }
+
+    /// Whether there are operators that are not possible wherever their preconditions hold.
+    pub(crate) fn some_impossible(&self) -> bool {
+        !self.numbers.is_empty() || !self.contested.is_empty()
+    }
+
+    fn agrees(&self, operator: u32, state: &[u32]) -> bool {
+        if !self.contested[operator as usize] {
+            return true;
+        }
+        let happens = |effect: &&Achieve| {
+            let conditions = &self.conditions[effect.from as usize..effect.to as usize];
+            self.objects[effect.fact.variable as usize]
+                && conditions.iter().all(|f| state[f.variable as usize] == f.value)
+        };
+        let set = self.effects.get(operator as usize).iter().filter(happens);
+        reset(set.map(|effect| (effect.fact.variable, effect.fact.value))).is_none()
     }
 
     /// Whether the goal holds.

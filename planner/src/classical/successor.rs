@@ -69,7 +69,7 @@ impl Successors {
     /// Appends the applicable operators.
     pub(crate) fn applicable(&self, task: &Compiled, state: &[u32], out: &mut Vec<u32>) {
         self.collect(self.root, state, out);
-        if !task.numbers.is_empty() {
+        if task.some_impossible() {
             out.retain(|&operator| task.possible(operator, state));
         }
     }

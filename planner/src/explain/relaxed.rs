@@ -94,7 +94,8 @@ impl<'g> Had<'g> {
             && lasts(&action.duration)
     }
 
-    /// Whether effects surely have a result: of numbers, where known amounts are added to known numbers.
+    /// Whether effects surely have a result: of numbers, where known amounts are added to known numbers; of objects, where each gets
+    /// one value.
     fn can_happen(&self, effects: &[Effect]) -> bool {
         let kinds = effects.iter().filter_map(|effect| match effect.outcome {
             Outcome::Change { fluent, change, amount: Expression::Constant(amount) } => {
@@ -102,7 +103,9 @@ impl<'g> Had<'g> {
             }
             _ => None,
         });
-        contradictions(kinds).is_empty() && effects.iter().all(|effect| self.has_result(effect))
+        contradictions(kinds).is_empty()
+            && !Effect::some_contest(effects, &self.ground.variables)
+            && effects.iter().all(|effect| self.has_result(effect))
     }
 
     fn has_result(&self, effect: &Effect) -> bool {

@@ -63,6 +63,7 @@ pub(super) fn assemble(
     for action in std::mem::take(&mut raw.actions) {
         encode_action(&encoding, action, &mut actions, &mut durative);
     }
+    drop_contested(&variables, &mut actions, &mut durative);
     let axioms = raw.axioms.iter().filter_map(|axiom| {
         Some(Axiom { head: encoding.fact(axiom.head)?, body: encoding.conjunction(&axiom.body)? })
     });
@@ -100,6 +101,18 @@ pub(super) fn assemble(
     compact(&mut ground, !task.modules.is_empty());
     derive_initial(&mut ground);
     ground
+}
+
+/// Drops actions that always give an object fluent several values at once.
+fn drop_contested(variables: &[Variable], actions: &mut Vec<Action>, durative: &mut Vec<DurativeAction>) {
+    let never = |effects: &[Effect]| {
+        let always: Vec<Effect> = effects.iter().filter(|effect| effect.when.is_none()).cloned().collect();
+        Effect::some_contest(&always, variables)
+    };
+    if variables.iter().any(Variable::is_object) {
+        actions.retain(|action| !never(&action.effects));
+        durative.retain(|action| !never(&action.start_effects) && !never(&action.end_effects));
+    }
 }
 
 fn strata(raw: &RawTask) -> Vec<Option<u32>> {

@@ -1,6 +1,6 @@
 //! From the lifted task to the grounded one, step by step.
 
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use tracing::debug_span;
 
 use crate::model::relation::Relation;
@@ -84,10 +84,13 @@ pub(crate) fn ground_with(
     }
     drop(span);
     let (atoms, instances) = (reach.atoms, reach.instances);
-    let mut make = Instantiate::new(&statics, atoms);
+    let mut make = Instantiate::new(&statics, atoms, stop);
     let _span = debug_span!("instantiate").entered();
     mark_always(task, &normal, &instances, &mut make, stop)?;
     let (mut raw, goal_possible) = instantiate(task, &normal, &rules, instances, &mut make, stop)?;
+    if make.stopped {
+        return Err(GroundError::Stopped);
+    }
     let expression = normal.metric.as_ref().map(|m| make.expression(m, &[]));
     let reached = relaxed::prune(&mut raw, &make.calls);
     let keep = !task.modules.is_empty() || !task.preferences.is_empty() || !task.constraints.is_empty();
@@ -114,10 +117,7 @@ pub(crate) fn ground_with(
         let unwanted = absences(&raw);
         Relevant { wanted: everything(true), unwanted, numerics: vec![true; make.numerics.len()] }
     } else {
-        let functions = task.predicates.len()..task.predicates.len() + task.functions.len();
-        let valued: Vec<u32> = (0..make.atoms.len() as u32)
-            .filter(|&atom| functions.contains(&(make.atoms.predicate(atom) as usize)))
-            .collect();
+        let valued = valued(task, &make.atoms);
         let mut relevant =
             relevant::prune(&mut raw, &make.comparisons, &make.calls, &undefined, &costs.read, &valued);
         // An effect that only harms has its conditions too, though nobody wants it to happen.
@@ -128,6 +128,21 @@ pub(crate) fn ground_with(
     let mut ground = assemble(task, raw, make, reached, relevant, groups, costs.metric, goal_possible);
     ground.obstacles = found;
     Ok(ground)
+}
+
+/// By atom of an object function: a number for the function with its arguments.
+fn valued(task: &Task, atoms: &Atoms) -> FxHashMap<u32, u32> {
+    let functions = task.predicates.len()..task.predicates.len() + task.functions.len();
+    let mut objects: FxHashMap<(u32, &[u32]), u32> = FxHashMap::default();
+    let valued = (0..atoms.len() as u32)
+        .filter(|&atom| functions.contains(&(atoms.predicate(atom) as usize)))
+        .filter_map(|atom| {
+            let (_, arguments) = atoms.arguments(atom).split_last()?;
+            let next = objects.len() as u32;
+            let object = *objects.entry((atoms.predicate(atom), arguments)).or_insert(next);
+            Some((atom, object))
+        });
+    valued.collect()
 }
 
 fn widths(task: &Task) -> Result<(), GroundError> {
@@ -326,6 +341,9 @@ fn instantiate(
     let mut goal = Clauses::default();
     let mut binding = vec![NONE; normal.goal_domains.len()];
     let possible = make.conjoin(&normal.goal, &mut binding, &normal.goal_domains, &mut goal);
+    if make.stopped {
+        return Err(GroundError::Stopped);
+    }
     let goal = resolve.flat(goal, top);
     axioms.append(&mut resolve.axioms);
     axioms.sort_by_key(|a: &RawAxiom| a.stratum);

@@ -296,7 +296,7 @@ impl<'a> Scope<'a> {
     }
 
     /// An effect. Where an object that it names may be undefined, `needs` gets what the action needs for it to have a result.
-    fn effect(&mut self, effect: &Effect, at_end: bool, needs: &mut Vec<Formula>) -> Effect_ {
+    fn effect(&mut self, effect: &Effect, at_end: bool, needs: &mut Needs) -> Effect_ {
         let mut forall = self.quantify(&effect.forall);
         let mut when = self.timed(&effect.when);
         let mut fresh = Fresh::default();
@@ -321,7 +321,15 @@ impl<'a> Scope<'a> {
             Change::Call(call) => Change_::Call(self.call(call, &mut fresh)),
         };
         if !fresh.is_empty() {
-            needs.extend(self.defined(effect, at_end, &fresh));
+            if let Some(first) = fresh.atoms.iter().find(|atom| self.unsure(atom)) {
+                if at_end && !(effect.when.start.is_true() && effect.when.over_all.is_true()) {
+                    let function = first.predicate - self.task.predicates.len() as u32;
+                    let forbidden = without_result(function, &forall, &when, &fresh);
+                    needs.forbidden.push(forbidden);
+                } else {
+                    needs.conditions.push(self.defined(effect, at_end, &fresh));
+                }
+            }
             let place = if at_end { &mut when.end } else { &mut when.start };
             let mut parts: Vec<_> = fresh.atoms.into_iter().map(|a| Formula::Literal(a, true)).collect();
             parts.push(std::mem::replace(place, Formula::And(Vec::new())));
@@ -331,27 +339,48 @@ impl<'a> Scope<'a> {
         Effect_ { forall, when, change }
     }
 
-    /// That the objects which an effect names are defined where it happens; `None` where they always are. Of an effect at the end
-    /// that depends on earlier times the validator alone tells.
-    fn defined(&mut self, effect: &Effect, at_end: bool, fresh: &Fresh) -> Option<Formula> {
-        let Timed { start, over_all, end } = &effect.when;
-        let earlier = at_end && !(start.is_true() && over_all.is_true());
-        let first = self.task.predicates.len() as u32;
-        let unsure = |atom: &Pattern| may_be_undefined(self.task, FunctionId(atom.predicate - first));
-        if earlier || !fresh.atoms.iter().any(unsure) {
-            return None;
-        }
+    /// Whether an atom is of an object function that may have no value.
+    fn unsure(&self, atom: &Pattern) -> bool {
+        let function = atom.predicate.checked_sub(self.task.predicates.len() as u32);
+        function.is_some_and(|function| may_be_undefined(self.task, FunctionId(function)))
+    }
+
+    /// That the objects which an effect names are defined where it happens.
+    fn defined(&mut self, effect: &Effect, at_end: bool, fresh: &Fresh) -> Formula {
         let atoms = fresh.atoms.iter().map(|atom| Formula::Literal(atom.clone(), true)).collect();
         let defined = Formula::Exists(fresh.slots.clone(), Box::new(Formula::And(atoms)));
-        let now = if at_end { end } else { start };
+        let now = if at_end { &effect.when.end } else { &effect.when.start };
         let otherwise = (!now.is_true()).then(|| self.formula(&negated(now)));
         let needed = match otherwise {
             Some(otherwise) => Formula::Or(vec![otherwise, defined]),
             None => defined,
         };
         let forall = effect.forall.iter().map(|quantified| quantified.slot.0).collect();
-        Some(if effect.forall.is_empty() { needed } else { Formula::Forall(forall, Box::new(needed)) })
+        if effect.forall.is_empty() { needed } else { Formula::Forall(forall, Box::new(needed)) }
     }
+}
+
+/// What effects need to have a result.
+#[derive(Default)]
+struct Needs {
+    /// Of their action.
+    conditions: Vec<Formula>,
+    /// Effects that must not happen, beside those at its end that depend on earlier times.
+    forbidden: Vec<Effect_>,
+}
+
+/// An effect that cannot happen, where an effect at the end would that names an undefined object: the object function gets a number,
+/// which is none.
+fn without_result(function: u32, forall: &[u32], when: &Timed3<Formula>, fresh: &Fresh) -> Effect_ {
+    let mut absent: Vec<Formula> =
+        fresh.atoms.iter().map(|atom| Formula::Literal(atom.clone(), false)).collect();
+    let absent = if absent.len() == 1 { absent.remove(0) } else { Formula::Or(absent) };
+    let undefined = Formula::Forall(fresh.slots.clone(), Box::new(absent));
+    let mut when = when.clone();
+    when.end = Formula::And(vec![when.end, undefined]);
+    let nowhere = Named { index: function, terms: Vec::new() };
+    let change = Change_::Number(Assignment::Assign, nowhere, Number::Constant(f64::NAN));
+    Effect_ { forall: forall.to_vec(), when, change }
 }
 
 /// Whether an object function may have no value for some arguments.
@@ -397,11 +426,13 @@ fn action(task: &Task, schema: usize) -> Action_ {
         condition.start = Formula::And(parts);
     }
     let mut effects = |effects: &[Effect], at_end: bool, condition: &mut Formula| -> Vec<Effect_> {
-        let mut needs = Vec::new();
-        let effects = effects.iter().map(|effect| scope.effect(effect, at_end, &mut needs)).collect();
-        if !needs.is_empty() {
-            needs.push(std::mem::replace(condition, Formula::And(Vec::new())));
-            *condition = Formula::And(needs);
+        let mut needs = Needs::default();
+        let mut effects: Vec<Effect_> =
+            effects.iter().map(|effect| scope.effect(effect, at_end, &mut needs)).collect();
+        effects.append(&mut needs.forbidden);
+        if !needs.conditions.is_empty() {
+            needs.conditions.push(std::mem::replace(condition, Formula::And(Vec::new())));
+            *condition = Formula::And(needs.conditions);
         }
         effects
     };

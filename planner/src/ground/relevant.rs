@@ -1,5 +1,7 @@
 //! Backward relevance: what no goal, condition or metric asks for goes.
 
+use rustc_hash::FxHashMap;
+
 use super::instantiate::{Clauses, Deed, GroundEffect, RawCall, RawPlace};
 use super::raw::{RawAction, RawTask};
 use super::task::{Change, Comparison, Expression};
@@ -21,6 +23,8 @@ struct Work<'a> {
     calls: &'a [RawCall],
     /// By numeric fluent: without a value at first.
     undefined: &'a [bool],
+    /// By atom of an object function: the function with its arguments.
+    valued: &'a FxHashMap<u32, u32>,
     changed: bool,
 }
 
@@ -155,6 +159,45 @@ impl Work<'_> {
         for (first, _) in contradictions(changes.iter().copied()) {
             Self::set(&mut self.relevant.numerics, changes[first].0, &mut self.changed);
         }
+        if !self.valued.is_empty() {
+            self.contests(effects);
+        }
+    }
+
+    /// An object that one action gives two values forbids it: it may matter that one of them does not happen.
+    fn contests(&mut self, effects: &[GroundEffect]) {
+        // The object, its value (none where it loses that), and how it gets it.
+        let valued = self.valued;
+        let given = effects.iter().filter_map(|effect| match effect.deed {
+            Deed::Add(atom) => Some((*valued.get(&atom)?, Some(atom), effect)),
+            Deed::Delete(atom) => Some((*valued.get(&atom)?, None, effect)),
+            _ => None,
+        });
+        let given: Vec<(u32, Option<u32>, &GroundEffect)> = given.collect();
+        for (place, &(object, value, one)) in given.iter().enumerate() {
+            for &(other_object, other_value, other) in &given[..place] {
+                if object != other_object || value == other_value || self.exclude(one, other) {
+                    continue;
+                }
+                for clauses in
+                    [one, other].into_iter().flat_map(|effect| effect.when.iter().flat_map(|w| w.iter()))
+                {
+                    self.literals(clauses, 1);
+                    self.numbers(clauses);
+                }
+            }
+        }
+    }
+
+    /// Whether one object would have to have two values for both to happen.
+    fn exclude(&self, one: &GroundEffect, other: &GroundEffect) -> bool {
+        let (Some(one), Some(other)) = (&one.when, &other.when) else { return false };
+        let has = |literal: u32| if literal & 1 == 0 { self.valued.get(&(literal >> 1)) } else { None };
+        one[0].literals.iter().any(|&literal| {
+            has(literal).is_some_and(|object| {
+                other[0].literals.iter().any(|&another| another != literal && has(another) == Some(object))
+            })
+        })
     }
 
     fn effects(&mut self, effects: &[GroundEffect]) {
@@ -211,15 +254,15 @@ impl Work<'_> {
 }
 
 /// Removes actions that bring nothing about that matters, and effects that nothing asks about. `undefined` says of the
-/// numeric fluents which have no value at first; `metric` lists those that the metric depends on beyond the actions' costs; `valued` the atoms of object functions, where giving one
-/// value takes the others away.
+/// numeric fluents which have no value at first; `metric` lists those that the metric depends on beyond the actions' costs; `valued`
+/// tells for atoms of object functions, where giving one value takes the others away, the function with its arguments.
 pub(super) fn prune(
     task: &mut RawTask,
     comparisons: &[Comparison],
     calls: &[RawCall],
     undefined: &[bool],
     metric: &[u32],
-    valued: &[u32],
+    valued: &FxHashMap<u32, u32>,
 ) -> Relevant {
     let count = task.init.len();
     let relevant = Relevant {
@@ -227,10 +270,10 @@ pub(super) fn prune(
         unwanted: vec![false; count],
         numerics: vec![false; undefined.len()],
     };
-    let mut work = Work { relevant, comparisons, calls, undefined, changed: true };
+    let mut work = Work { relevant, comparisons, calls, undefined, valued, changed: true };
     work.clauses(&task.goal);
     metric.iter().for_each(|&id| work.relevant.numerics[id as usize] = true);
-    valued.iter().for_each(|&atom| work.relevant.wanted[atom as usize] = true);
+    valued.keys().for_each(|&atom| work.relevant.wanted[atom as usize] = true);
     let mut kept = vec![false; task.actions.len()];
     while std::mem::take(&mut work.changed) {
         for (index, action) in task.actions.iter().enumerate() {

@@ -62,6 +62,11 @@ impl Variable {
     pub fn domain_size(&self) -> u32 {
         self.values.len() as u32
     }
+
+    /// Whether it is an object fluent: of two values that it is given at once, neither is its value.
+    pub fn is_object(&self) -> bool {
+        matches!(self.values[0], Meaning::Object { .. })
+    }
 }
 
 /// A numeric fluent that some effect, timed literal or attachment writes; all others are folded into constants.
@@ -222,6 +227,34 @@ pub struct Effect {
     pub when: Option<Box<When>>,
     /// What happens.
     pub outcome: Outcome,
+}
+
+impl Effect {
+    /// Whether both give one object fluent different values where both happen, which is possible as far as their conditions tell.
+    pub(crate) fn contests(&self, other: &Effect, variables: &[Variable]) -> bool {
+        let (Outcome::Set(one), Outcome::Set(another)) = (&self.outcome, &other.outcome) else {
+            return false;
+        };
+        one.variable == another.variable
+            && one.value != another.value
+            && variables[one.variable as usize].is_object()
+            && !self.excludes(other)
+    }
+
+    /// Whether the conditions of both cannot hold at once.
+    fn excludes(&self, other: &Effect) -> bool {
+        let (Some(one), Some(other)) = (&self.when, &other.when) else { return false };
+        let differs = |fact: &Fact| {
+            other.here.facts.iter().any(|f| f.variable == fact.variable && f.value != fact.value)
+        };
+        one.here.facts.iter().any(differs)
+    }
+
+    /// Whether some of these effects may give an object fluent several values at once.
+    pub(crate) fn some_contest(effects: &[Effect], variables: &[Variable]) -> bool {
+        let mut later = effects.iter().enumerate();
+        later.any(|(place, one)| effects[..place].iter().any(|other| one.contests(other, variables)))
+    }
 }
 
 /// Where a ground thing comes from: an action, axiom or module of the lifted task with its arguments.

@@ -22,6 +22,8 @@ pub(super) struct Encoding {
     always: Vec<bool>,
     /// By variable: its atoms, by value.
     pub atoms: Vec<Vec<u32>>,
+    /// So many first variables are object functions.
+    objects: usize,
 }
 
 /// What decides about the grouping.
@@ -55,6 +57,7 @@ pub(super) fn encode(choice: Choice<'_>) -> Encoding {
             chosen.push(atoms);
         }
     };
+    let objects = choice.fixed.iter().filter(|group| group.iter().any(|&a| !covered[a as usize])).count();
     choice.fixed.iter().for_each(|group| take(group, &mut covered));
     let left = |group: &[u32], covered: &[bool]| group.iter().filter(|&&a| !covered[a as usize]).count();
     let mut heap: std::collections::BinaryHeap<(usize, std::cmp::Reverse<usize>)> = choice
@@ -83,10 +86,10 @@ pub(super) fn encode(choice: Choice<'_>) -> Encoding {
     order.sort_by_key(|&a| (choice.derived[a as usize], a));
     let plain = chosen.len();
     chosen.extend(order.into_iter().map(|a| vec![a]));
-    place(choice, chosen, plain)
+    place(choice, chosen, objects, plain)
 }
 
-fn place(choice: Choice<'_>, mut chosen: Vec<Vec<u32>>, plain: usize) -> Encoding {
+fn place(choice: Choice<'_>, mut chosen: Vec<Vec<u32>>, objects: usize, plain: usize) -> Encoding {
     let count = choice.carried.len();
     let wants_double = |group: &[u32], a: u32| group.len() > 1 && choice.unwanted[a as usize];
     let doubled: Vec<u32> =
@@ -99,6 +102,7 @@ fn place(choice: Choice<'_>, mut chosen: Vec<Vec<u32>>, plain: usize) -> Encodin
         none: Vec::new(),
         always: choice.always,
         atoms: Vec::new(),
+        objects,
     };
     let derived: Vec<Vec<u32>> = chosen.split_off(plain);
     for group in chosen {
@@ -213,6 +217,9 @@ impl Encoding {
         before: &[&Conjunction],
         out: &mut Vec<Effect>,
     ) {
+        if let Some(fact) = self.fact(atom).filter(|fact| (fact.variable as usize) < self.objects) {
+            return self.unset(atom, fact, effect, out);
+        }
         let added_again = all.iter().any(|other| {
             matches!(other.deed, Deed::Add(a) if a == atom)
                 && (other.when.is_none() || other.when == effect.when)
@@ -236,6 +243,17 @@ impl Encoding {
         let alone = self.atoms[fact.variable as usize].len() == 1;
         let extra = if known || alone { None } else { Some(fact) };
         self.push(effect, extra, Outcome::Set(Fact { variable: fact.variable, value: none }), out);
+    }
+
+    /// An object function loses its value, of which this is one: that contradicts what gives it another.
+    fn unset(&self, atom: u32, fact: Fact, effect: &GroundEffect, out: &mut Vec<Effect>) {
+        if let Some(variable) = self.doubles[atom as usize] {
+            self.push(effect, None, Outcome::Set(Fact { variable, value: 1 }), out);
+        }
+        let none = self.none[fact.variable as usize].filter(|_| fact.value == 0);
+        if let Some(value) = none {
+            self.push(effect, None, Outcome::Set(Fact { variable: fact.variable, value }), out);
+        }
     }
 
     fn push(&self, effect: &GroundEffect, extra: Option<Fact>, outcome: Outcome, out: &mut Vec<Effect>) {

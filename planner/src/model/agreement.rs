@@ -1,5 +1,5 @@
-//! Changes of one number at once. PDDL 2.1 (section 8.1) gives them a result only where their order does not matter: where all add
-//! to it, all scale it, or all give it the same value. Where they contradict each other, what makes them cannot happen.
+//! Changes of one number or one object at once. PDDL 2.1 (section 8.1) gives them a result only where their order does not matter:
+//! where all add to it, all scale it, or all give it the same value. Where they contradict each other, what makes them cannot happen.
 
 use std::hash::Hash;
 
@@ -46,6 +46,17 @@ pub(crate) fn contradictions<N: Hash + Eq>(
     found
 }
 
+/// Of some values that are set at once the first that another value was given to before, as a pair of places.
+pub(crate) fn reset<N: Hash + Eq, V: PartialEq + Copy>(
+    values: impl Iterator<Item = (N, V)>,
+) -> Option<(usize, usize)> {
+    let mut first: FxHashMap<N, (usize, V)> = FxHashMap::default();
+    values.enumerate().find_map(|(place, (named, value))| {
+        let &mut (earlier, other) = first.entry(named).or_insert((place, value));
+        (other != value).then_some((earlier, place))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -63,6 +74,15 @@ mod tests {
             (vec![(0, ScaleUp, 2.0), (0, Increase, 3.0)], vec![(0, 1)]),
         ] {
             assert_eq!(contradictions(changes.iter().copied()), expected, "{changes:?}");
+        }
+    }
+
+    #[test]
+    fn one_value_at_once() {
+        for (values, expected) in
+            [(vec![(0, 1), (1, 2), (0, 1)], None), (vec![(0, 1), (1, 2), (1, 3), (0, 2)], Some((1, 2)))]
+        {
+            assert_eq!(reset(values.iter().copied()), expected, "{values:?}");
         }
     }
 }

@@ -80,6 +80,7 @@ mod tests {
         check("", "");
         check("\n\n; only\n\n\n; comments", "; only\n\n; comments\n");
         check("(a\r\n\tb)", "(a\n  b)\n");
+        check("; one\r(a ; two\r\tb)", "; one\n(a ; two\n  b)\n");
         check("[call ?x]", "[call ?x]\n");
         for text in ["(a", "a)", "(a]", "((a)"] {
             assert!(format(&Source::new("t", text)).is_err(), "{text}");

@@ -4,7 +4,7 @@
 //! parentheses are found here, where the layout of the text still shows which one is meant, and mended so that the rest
 //! of the file is read as its author intended.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::Symbol;
 use crate::diagnostic::{Diagnostic, Span};
@@ -18,6 +18,7 @@ pub struct Symbols {
     names: Vec<Box<str>>,
     index: FxHashMap<Box<str>, Symbol>,
     folded: String,
+    predicates: FxHashSet<Symbol>,
 }
 
 impl Symbols {
@@ -47,6 +48,24 @@ impl Symbols {
     /// The case-folded name of a symbol.
     pub fn name(&self, symbol: Symbol) -> &str {
         &self.names[symbol.0 as usize]
+    }
+
+    /// Notes the names that a domain's tree declares as predicates: what they begin is no misspelt connective.
+    pub fn declare_predicates(&mut self, tree: &Tree) {
+        let head = |list: usize| match tree.children(list).next().map(|first| tree.nodes[first].kind) {
+            Some(Kind::Word(symbol)) => Some(symbol),
+            _ => None,
+        };
+        let sections = tree.roots().flat_map(|root| tree.children(root));
+        let declaring =
+            sections.filter(|&list| head(list).is_some_and(|symbol| self.name(symbol) == ":predicates"));
+        let declared: Vec<Symbol> = declaring.flat_map(|list| tree.children(list)).filter_map(head).collect();
+        self.predicates.extend(declared);
+    }
+
+    /// Whether the domain declares a predicate of this name.
+    pub fn is_predicate(&self, name: &str) -> bool {
+        self.find(name).is_some_and(|symbol| self.predicates.contains(&symbol))
     }
 
     /// How many there are.

@@ -239,7 +239,7 @@ impl<'a> Improve<'a> {
     /// them, a window's goal says nothing.
     fn fits(&mut self, from: &[u32], window: &[u32], rest: &[u32]) -> bool {
         let task = self.task;
-        if task.numbers.is_empty() {
+        if !task.some_impossible() {
             return true;
         }
         self.work += (window.len() + rest.len()) as u64 * 4;

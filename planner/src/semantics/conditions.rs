@@ -5,6 +5,7 @@ use crate::attachment::Answer;
 use crate::diagnostic::Span;
 use crate::model::relation::{Relation, quotient};
 use crate::model::walk;
+use crate::plan::number_text;
 use crate::state::State;
 use crate::task::{Condition, Expression, Fluent, ObjectId, Quantified, Term};
 
@@ -240,5 +241,5 @@ impl Semantics<'_> {
 
 /// A number for people: short, and the word `undefined` where there is none.
 pub(crate) fn value_text(value: Option<f64>) -> String {
-    value.map_or("undefined".to_string(), |value| format!("{}", (value * 1e6).round() / 1e6))
+    value.map_or("undefined".to_string(), number_text)
 }

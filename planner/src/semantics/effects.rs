@@ -3,7 +3,7 @@
 use super::{Binding, CallFailure, Semantics};
 use crate::attachment::{Answer, FactValue};
 use crate::diagnostic::Span;
-use crate::model::agreement::contradictions;
+use crate::model::agreement::{contradictions, reset};
 use crate::state::State;
 use crate::task::{
     ActionId, Assignment, Call, Change, Effect, Fact, Fluent, GroundFluent, ObjectId, Timed, Written,
@@ -22,6 +22,25 @@ pub struct Changes {
     pub cleared: Vec<GroundFluent>,
     /// Object functions that get or lose a value.
     pub objects: Vec<(GroundFluent, Option<ObjectId>, Span)>,
+}
+
+impl Changes {
+    /// A number or an object of which two changes contradict each other, and the second of them.
+    fn contradiction(&self) -> Option<(&GroundFluent, Span)> {
+        let numbers = self.numbers.iter();
+        let kinds = numbers.clone().map(|(fluent, assignment, number, _)| (fluent, *assignment, *number));
+        if let Some(&(_, second)) = contradictions(kinds).first() {
+            let (fluent, _, _, span) = &self.numbers[second];
+            return Some((fluent, *span));
+        }
+        if let Some((fluent, _, _, span)) = numbers.into_iter().find(|(own, ..)| self.cleared.contains(own)) {
+            return Some((fluent, *span));
+        }
+        let values = self.objects.iter().map(|(fluent, value, _)| (fluent, *value));
+        let (_, second) = reset(values)?;
+        let (fluent, _, span) = &self.objects[second];
+        Some((fluent, *span))
+    }
 }
 
 /// An effect that cannot happen: it needs a number that has no value, or two effects contradict each other.
@@ -240,6 +259,10 @@ impl Semantics<'_> {
 
     /// Makes changes: deletions, then additions, then values; and derives what follows.
     pub fn apply(&self, state: &mut State, changes: &Changes) -> Result<Result<(), Clash>, CallFailure> {
+        if let Some((fluent, span)) = changes.contradiction() {
+            let reason = format!("two changes of {} at once contradict each other", self.ground_text(fluent));
+            return Ok(Err(Clash { reason, span }));
+        }
         for fact in &changes.deleted {
             state.set_fact(fact.predicate, &fact.arguments, false);
         }
@@ -248,13 +271,6 @@ impl Semantics<'_> {
         }
         for fluent in &changes.cleared {
             state.set_number(fluent.function, &fluent.arguments, None);
-        }
-        let numbers = changes.numbers.iter();
-        let kinds = numbers.map(|(fluent, assignment, number, _)| (fluent, *assignment, *number));
-        if let Some(&(_, second)) = contradictions(kinds).first() {
-            let (fluent, _, _, span) = &changes.numbers[second];
-            let reason = format!("two changes of {} at once contradict each other", self.ground_text(fluent));
-            return Ok(Err(Clash { reason, span: *span }));
         }
         for (fluent, assignment, number, span) in &changes.numbers {
             let before = state.number(fluent.function, &fluent.arguments);

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use crate::attachment::Level;
 use crate::calls::{Calls, Failure};
 use crate::ground::{
-    Axiom, Change, ComparisonId, Conjunction, DurationBound, Effect, Expression, GroundTask, NumericId,
-    Origin, Outcome, Place, Relation, Values,
+    Axiom, Change, ComparisonId, Conjunction, DurationBound, Effect, Expression, GroundTask, Origin, Outcome,
+    Place, Relation, Values, Variable, VariableId,
 };
-use crate::model::agreement::contradictions;
+use crate::model::agreement::{contradictions, reset};
 use crate::model::relation::quotient;
 use crate::plan::EPSILON_S;
 use crate::task::{Task, Term};
@@ -117,6 +117,8 @@ pub(crate) struct World<'a> {
     strata: Vec<Vec<&'a Axiom>>,
     /// Variables that axioms set.
     derived: Vec<usize>,
+    /// By variable, whether it is an object; empty where none is.
+    objects: Vec<bool>,
 }
 
 impl<'a> World<'a> {
@@ -170,7 +172,11 @@ impl<'a> World<'a> {
         let derived = (0..ground.variables.len())
             .filter(|&variable| ground.variables[variable].stratum.is_some())
             .collect();
-        World { task, ground, calls, acts, complete: OnceCell::new(), proposes, strata, derived }
+        let mut objects: Vec<bool> = ground.variables.iter().map(Variable::is_object).collect();
+        if !objects.contains(&true) {
+            objects = Vec::new();
+        }
+        World { task, ground, calls, acts, complete: OnceCell::new(), proposes, strata, derived, objects }
     }
 
     /// Whether the steps of the search can make every plan: no action needs a duration that is chosen for its effects, or
@@ -327,7 +333,8 @@ impl<'a> World<'a> {
     /// Lets effects happen: `moment` is the state before them, `into` a copy of it that becomes the state after, with
     /// derived variables up to date. `gate` says whether an effect's conditions on earlier times were met.
     ///
-    /// `Ok(false)` if a number becomes undefined or infinite, or changes of it contradict each other: then the effects cannot happen.
+    /// `Ok(false)` if a number becomes undefined or infinite, or changes of a number or an object contradict each other: then the
+    /// effects cannot happen.
     pub fn apply(
         &self,
         effects: &[Effect],
@@ -335,17 +342,25 @@ impl<'a> World<'a> {
         gate: &dyn Fn(usize, &Effect) -> bool,
         into: &mut Values,
     ) -> Result<bool, Failure> {
-        let changes_number =
-            |effect: &&Effect| matches!(effect.outcome, Outcome::Change { .. } | Outcome::Call(_));
-        let several = effects.iter().filter(changes_number).nth(1).is_some();
+        let may_contradict = |effect: &&Effect| match &effect.outcome {
+            Outcome::Set(fact) => self.is_object(fact.variable),
+            Outcome::Change { .. } | Outcome::Call(_) => true,
+            Outcome::Flow { .. } => false,
+        };
+        let several = effects.iter().filter(may_contradict).nth(1).is_some();
         let mut changes: Vec<(u32, Change, f64)> = Vec::new();
+        let mut objects: Vec<(VariableId, u32)> = Vec::new();
         for (index, effect) in effects.iter().enumerate() {
             let here = effect.when.as_ref().map(|when| &when.here);
             if !gate(index, effect) || !here.map_or(Ok(true), |here| self.holds(here, moment))? {
                 continue;
             }
             match &effect.outcome {
-                Outcome::Set(fact) => into.values[fact.variable as usize] = fact.value,
+                Outcome::Set(fact) => {
+                    into.values[fact.variable as usize] = fact.value;
+                    let is_object = several && self.is_object(fact.variable);
+                    objects.extend(is_object.then_some((fact.variable, fact.value)));
+                }
                 Outcome::Change { fluent, change, amount } => {
                     let amount = self.evaluate(amount, moment)?;
                     changes.extend(several.then_some((*fluent, *change, amount)));
@@ -360,17 +375,30 @@ impl<'a> World<'a> {
                 }
                 Outcome::Call(call) => {
                     self.calls.write(*call, moment.proposal, moment.state, moment.level, into)?;
-                    let written = self.ground.calls[*call as usize].writes.iter().filter_map(number);
-                    let written = written.map(|at| (at, Change::Assign, into.numbers[at as usize]));
-                    changes.extend(written.filter(|(_, _, value)| !value.is_nan()));
+                    for place in &self.ground.calls[*call as usize].writes {
+                        match *place {
+                            Place::Number(at) => {
+                                let value = into.numbers[at as usize];
+                                changes.extend((!value.is_nan()).then_some((at, Change::Assign, value)));
+                            }
+                            Place::Object(at) => objects.push((at, into.values[at as usize])),
+                            Place::Truth(_) | Place::Nowhere => {}
+                        }
+                    }
                 }
             }
         }
-        if changes.len() > 1 && !contradictions(changes.into_iter()).is_empty() {
+        if changes.len() > 1 && !contradictions(changes.into_iter()).is_empty()
+            || objects.len() > 1 && reset(objects.into_iter()).is_some()
+        {
             return Ok(false);
         }
         self.derive(into)?;
         Ok(true)
+    }
+
+    fn is_object(&self, variable: VariableId) -> bool {
+        !self.objects.is_empty() && self.objects[variable as usize]
     }
 
     /// Brings derived variables up to date.
@@ -402,10 +430,6 @@ impl<'a> World<'a> {
         }
         Ok(())
     }
-}
-
-fn number(place: &Place) -> Option<NumericId> {
-    if let Place::Number(number) = place { Some(*number) } else { None }
 }
 
 impl Act<'_> {

@@ -9,7 +9,7 @@ use crate::model::agreement::contradictions;
 use crate::pddl::ast::{self, Arithmetic, Assignment, Comparison, Formula, Name, When};
 use crate::task::{
     Action, Change, Condition, DurationBound, Effect, Expression, Fluent, PreferenceId, Quantified, Rate,
-    Timed,
+    Term, Timed,
 };
 
 /// What stands around an effect.
@@ -67,7 +67,7 @@ impl Checker<'_> {
         });
     }
 
-    /// Changes of one number that happen together, wherever one of them does, and contradict each other.
+    /// Changes of one number or object that happen together, wherever one of them does, and contradict each other.
     fn agree(&mut self, effects: &[Effect]) {
         let is_always = |effect: &Effect| effect.when == Timed::default();
         let together = |one: &Effect, other: &Effect| {
@@ -75,12 +75,13 @@ impl Checker<'_> {
                 && (one.forall == other.forall || one.forall.is_empty() || other.forall.is_empty())
         };
         for (index, effect) in effects.iter().enumerate() {
-            let mut earlier = effects[..index].iter();
-            if let Some(other) = earlier.find(|other| together(other, effect) && contradict(other, effect)) {
-                let message = "two changes of one number at once contradict each other";
+            let earlier = effects[..index].iter().filter(|other| together(other, effect));
+            let found = earlier.filter_map(|other| Some((other, contradict(other, effect)?))).next();
+            if let Some((other, what)) = found {
+                let message = format!("two changes of one {what} at once contradict each other");
                 self.push(
                     Diagnostic::warning("contradicting-effects", message, effect.span, "and here in another way")
-                        .with_label(other.span, "the number is changed here")
+                        .with_label(other.span, format!("the {what} is changed here"))
                         .with_help("PDDL gives no result of both: where they happen together, the action cannot be taken; make one change of the two"),
                 );
             }
@@ -493,17 +494,24 @@ impl Checker<'_> {
     }
 }
 
-/// Whether two effects change one number in ways that contradict each other.
-fn contradict(one: &Effect, other: &Effect) -> bool {
+/// What two effects change in ways that contradict each other: a number or an object.
+fn contradict(one: &Effect, other: &Effect) -> Option<&'static str> {
+    if let (Change::Object(fluent, value), Change::Object(other_fluent, other_value)) =
+        (&one.change, &other.change)
+    {
+        let named = |value: &Option<Term>| value.as_ref().is_none_or(|term| matches!(term, Term::Object(_)));
+        let same = fluent.function == other_fluent.function && fluent.arguments == other_fluent.arguments;
+        return (same && value != other_value && named(value) && named(other_value)).then_some("object");
+    }
     let (Change::Number(how, fluent, amount), Change::Number(other_how, other_fluent, other_amount)) =
         (&one.change, &other.change)
     else {
-        return false;
+        return None;
     };
     let kinds = [(how, amount), (other_how, other_amount)];
     let kinds = kinds.map(|(how, amount)| ((), *how, constant(amount).unwrap_or(f64::NAN)));
     let same = fluent.function == other_fluent.function && fluent.arguments == other_fluent.arguments;
-    same && !contradictions(kinds.into_iter()).is_empty()
+    (same && !contradictions(kinds.into_iter()).is_empty()).then_some("number")
 }
 
 fn has_preference(formula: &Formula) -> bool {

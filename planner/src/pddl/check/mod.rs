@@ -1,6 +1,7 @@
 //! From trees of names to a [`Task`]: every name looked up, every argument counted and typed, all findings at once.
 
 mod actions;
+mod between;
 mod conditions;
 mod declarations;
 mod expressions;
@@ -53,6 +54,7 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
     if let Some(problem) = &problem_tree {
         checker.problem(problem, &domain_tree);
     }
+    checker.told_between();
     let readable = checker.findings.iter().all(|finding| finding.severity != Severity::Error);
     if lints && readable {
         checker.requirements(&domain_tree, problem_tree.as_ref());

@@ -252,7 +252,8 @@ impl Parser<'_> {
             return None;
         }
         // A misspelt connective: its parts are formulas, which no predicate takes.
-        if rest.iter().any(|&part| self.is_list(part) && self.looks_like_formula(part))
+        if !self.symbols.is_predicate(head)
+            && rest.iter().any(|&part| self.is_list(part) && self.looks_like_formula(part))
             && let Some(near) = nearest(head, CONNECTIVES.iter().copied())
         {
             self.expected("a connective", first, format!("did you mean `{near}`?"));

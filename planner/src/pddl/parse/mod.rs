@@ -14,6 +14,7 @@ use crate::pddl::nearest;
 /// Reads a domain file (source number `source`).
 pub fn domain(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec<Diagnostic>) -> Domain {
     let tree = lex::read(text, source, symbols, findings);
+    symbols.declare_predicates(&tree);
     let mut parser = Parser { tree: &tree, text, source, symbols, findings };
     let mut domain = Domain::default();
     if let Some(sections) = parser.definition("domain", &mut domain.name) {

@@ -49,7 +49,7 @@ impl Form {
     /// For a task of plain operators; `None` if it is of another kind or too large.
     pub(super) fn new(task: &Compiled, mutex_groups: &[Vec<Fact>]) -> Option<Form> {
         let conditional = task.effects.all().iter().any(|effect| effect.from != effect.to);
-        if conditional || !task.axiom_heads.is_empty() || !task.numbers.is_empty() {
+        if conditional || !task.axiom_heads.is_empty() || task.some_impossible() {
             return None;
         }
         let pairs = (0..task.operators() as u32)

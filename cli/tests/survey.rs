@@ -207,5 +207,5 @@ fn a_room_is_mapped_and_all_of_a_kind_are_found_in_it() {
 fn two_rooms_are_mapped_and_the_cup_is_found_in_one_run() {
     let folder = tempfile::tempdir().unwrap();
     let goal = "map the room and find cup A";
-    check_found(&run(goal, "default", 3, folder.path(), None).0, goal);
+    check_found(&run(goal, "default", 4, folder.path(), None).0, goal);
 }

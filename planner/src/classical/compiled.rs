@@ -194,7 +194,6 @@ impl Compiled {
             }
             effects.push(list);
         }
-        let contested = contested(task);
         let measure = Measure::new(task, &numbers);
         let (costs, cost_scale) = costs(&measure.estimates);
         let mut axiom_bodies = Lists::new();
@@ -221,7 +220,7 @@ impl Compiled {
             preconditions,
             effects,
             conditions,
-            contested,
+            contested: contested(task),
             objects: task.variables.iter().map(Variable::is_object).collect(),
             unit_cost: measure.estimates.iter().all(|&c| c == 1.0),
             cost_scale,

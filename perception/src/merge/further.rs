@@ -1,9 +1,10 @@
 //! A further look at the same place: what was found of the earlier ones is kept.
 //!
-//! What is known of a view by itself is kept as long as the view is the same. Where the earlier views lie and what was gathered of them is
-//! kept while it is a further view that comes: it alone is aligned, to the views beside it, and gathered. Errors of one look by one do not add
-//! up: whenever there are half as many views more, and whenever a view does not fit in, all are merged anew. Which views are merged together
-//! follows from the views alone, not from what was merged before: the same views give the same bytes, whatever was kept.
+//! What is known of a view by itself is kept as long as the view is the same. Where the earlier views lie, what was gathered of them and what
+//! that was settled to is kept while it is a further view that comes: it alone is aligned, to the views beside it, and gathered, and what it
+//! touches is settled. Errors of one look by one do not add up: whenever there are half as many views more, and whenever a view does not fit
+//! in, all are merged anew. Which views are merged together follows from the views alone, not from what was merged before: the same views
+//! give the same bytes, whatever was kept.
 
 use super::check::belongs;
 use super::fuse::{gather, gather_further};
@@ -76,7 +77,7 @@ impl Merger {
             }
             let mut base = base?;
             let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
-            // With one more all may be merged anew: then nothing of this is wanted.
+            // If with one more all are merged anew, nothing of this is wanted.
             let further = together(views.len() + 1) <= views.len();
             let merged = merged(&mut base.gathered, seen, base.fits.clone(), base.steps.clone(), further);
             self.base = further.then_some(base);

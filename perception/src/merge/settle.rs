@@ -1,7 +1,8 @@
 //! Step 5, second half: the voxels moved onto their common surface.
 //!
 //! Every voxel is moved along its normal onto the weighted mean of the like-facing voxels beside it, every column of a sheet along the sheet's
-//! normal onto that of the columns beside it. What a single view claims and another looked through is left out.
+//! normal onto that of the columns beside it. What a single view claims and another looked through is left out. Of a further look only what it
+//! touched, and what borders on that, is settled anew; the rest is held against the new view alone.
 
 use super::bricks::{Beside, Bricks, Mask, NONE, SIDE, WIDE, is_in};
 use super::check;

@@ -59,9 +59,12 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The same with times of six digits.
+    /// The same without what rounding has left in the last digits of its times; a third of a second stays what it is.
     pub(crate) fn tidy(&self) -> Plan {
-        let rounded = |seconds: f64| (seconds * 1e6).round() / 1e6;
+        let rounded = |seconds: f64| {
+            let short = (seconds * 1e6).round() / 1e6;
+            if (short - seconds).abs() < 1e-9 { short } else { seconds }
+        };
         let mut plan = self.clone();
         for step in &mut plan.steps {
             step.start_s = step.start_s.map(rounded);
@@ -265,6 +268,17 @@ mod tests {
             (f64::INFINITY, "inf"),
         ] {
             assert_eq!(number_text(value), written);
+        }
+    }
+
+    #[test]
+    fn only_what_rounding_left_goes() {
+        for (text, tidy) in [
+            ("0.30000000000000004: (a) [4.0009999999999994]", "0.300: (a) [4.001]\n"),
+            ("0.3343333333333333: (a) [0.3333333333333333]", "0.3343333333333333: (a) [0.3333333333333333]\n"),
+            ("0.125: (a) [0.0000001]", "0.125: (a) [0.0000001]\n"),
+        ] {
+            assert_eq!(read(text).map(|plan| plan.tidy().to_string()).ok().as_deref(), Some(tidy));
         }
     }
 

@@ -368,7 +368,7 @@ def _unsupported(error: Exception) -> PlanGenerationResult:
 
 
 def _fraction(value: float) -> Fraction:
-    """The simplest fraction that a number of a plan stands for: a third is printed with ten digits."""
+    """The simplest fraction that a number of a plan stands for: a third has no last digit."""
     return Fraction(value).limit_denominator(_MOST_DENOMINATOR)
 
 

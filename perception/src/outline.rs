@@ -24,10 +24,11 @@ impl Rectangle {
         Rectangle { x: 0.0, y: 0.0, sides_m: [0.0; 2], turn: (0.0, 1.0), along_m: [0.0; 2], residual_m: 0.0 };
 }
 
-/// Orientations tried over a quarter turn.
+/// Orientations over a quarter turn, and one in so many that is tried before those beside the best.
 const TURNS: usize = 30;
-/// Points that are looked at, at the least, if there are as many.
-const LEAST: usize = 600;
+const APART: usize = 3;
+/// Points that are looked at, at the most.
+const MOST: usize = 600;
 /// Points that are looked at together.
 const BLOCK: usize = 16;
 
@@ -38,16 +39,11 @@ pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
         return None;
     }
     let mut turner = Turner::of(points);
-    let mut best: Option<(f64, usize)> = None;
-    for turn in 0..TURNS {
+    let (_, turn) = best_turn(|turn, bound| {
         let turned = turner.turned(turn);
-        let bound = best.map_or(f64::INFINITY, |(squares, _)| squares);
-        let Some(squares) = turner.squares_within(&turned, bound) else { continue };
-        if squares < bound {
-            best = Some((squares, turn));
-        }
-    }
-    let turned = turner.turned(best?.1);
+        turner.squares_within(&turned, bound)
+    })?;
+    let turned = turner.turned(turn);
     let turned = turner.settled(turned);
     let squares = turner.squares_within(&turned, f64::INFINITY)?;
     Some(turned.rectangle(turner.origin, (squares / turner.len as f64).sqrt()))
@@ -60,10 +56,12 @@ pub(crate) fn fits(points: &[Point3<f64>], residual_m: f64) -> bool {
     }
     let mut turner = Turner::of(points);
     let bound = residual_m * residual_m * turner.len as f64;
-    (0..TURNS).any(|turn| {
+    let best = best_turn(|turn, best| {
         let turned = turner.turned(turn);
-        turner.squares_within(&turned, bound).is_some()
-    })
+        // What fits is good enough.
+        if best <= bound { None } else { turner.squares_within(&turned, best) }
+    });
+    best.is_some_and(|(squares, _)| squares <= bound)
 }
 
 /// The rectangle of least area around nearly all points; it has no residual.
@@ -72,9 +70,32 @@ pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<Rectangle> {
         return None;
     }
     let mut turner = Turner::of(points);
-    (0..TURNS)
-        .map(|turn| turner.turned(turn).rectangle(turner.origin, 0.0))
-        .min_by(|a, b| (a.sides_m[0] * a.sides_m[1]).total_cmp(&(b.sides_m[0] * b.sides_m[1])))
+    let (_, turn) = best_turn(|turn, _| {
+        let [a, b] = turner.turned(turn).along_m();
+        Some(a * b)
+    })?;
+    Some(turner.turned(turn).rectangle(turner.origin, 0.0))
+}
+
+/// The turn that costs least, and what it costs: the best of a few, or one beside it. `cost` is told the least so far, and may give none
+/// for more.
+fn best_turn(mut cost: impl FnMut(usize, f64) -> Option<f64>) -> Option<(f64, usize)> {
+    let mut best: Option<(f64, usize)> = None;
+    let mut ask = |best: &mut Option<(f64, usize)>, turn: usize| {
+        let least = best.map_or(f64::INFINITY, |(least, _)| least);
+        if let Some(cost) = cost(turn, least).filter(|cost| *cost < least) {
+            *best = Some((cost, turn));
+        }
+    };
+    for turn in (0..TURNS).step_by(APART) {
+        ask(&mut best, turn);
+    }
+    let (_, among) = best?;
+    for aside in 1..=APART / 2 {
+        ask(&mut best, (among + aside) % TURNS);
+        ask(&mut best, (among + TURNS - aside) % TURNS);
+    }
+    best
 }
 
 /// Points seen from above, and their coordinates along the sides of the rectangle that was turned last.
@@ -95,7 +116,7 @@ struct Turner {
 
 impl Turner {
     fn of(points: &[Point3<f64>]) -> Turner {
-        let stride = (points.len() / LEAST).max(1);
+        let stride = points.len().div_ceil(MOST).max(1);
         let origin = points.first().map_or([0.0; 2], |p| [p.x, p.y]);
         let from_there = |p: &Point3<f64>| ((p.x - origin[0]) as f32, (p.y - origin[1]) as f32);
         let (mut xs, mut ys): (Vec<f32>, Vec<f32>) = points.iter().step_by(stride).map(from_there).unzip();
@@ -253,11 +274,16 @@ struct Turned {
 }
 
 impl Turned {
+    /// The sides along the axes that are turned, metres.
+    fn along_m(&self) -> [f64; 2] {
+        [self.u, self.v].map(|[low, high]| high - low)
+    }
+
     /// Of points that were looked at as seen from a place.
     fn rectangle(&self, origin: [f64; 2], residual_m: f64) -> Rectangle {
         let ([u0, u1], [v0, v1]) = (self.u, self.v);
         let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));
-        let (a, b) = (u1 - u0, v1 - v0);
+        let [a, b] = self.along_m();
         Rectangle {
             x: origin[0] + self.cos * u - self.sin * v,
             y: origin[1] + self.sin * u + self.cos * v,

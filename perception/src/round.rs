@@ -13,9 +13,9 @@ use std::ops::Range;
 const RADII_M: (f64, f64) = (0.012, 0.20);
 /// Circles proposed. From: chosen.
 const PROPOSALS: usize = 120;
-/// Points that judge a proposal. From: chosen.
+/// Points that judge a proposal, at the most. From: chosen.
 const JUDGES: usize = 160;
-/// Points that all steps of a fit but the last go by, at the least. From: chosen.
+/// Points that all steps of a fit but the last go by, at the most. From: chosen.
 const SCOUTS: usize = 800;
 /// Fewest points of a side that a fit begins with, and fewest near the side that it goes on with. From: chosen.
 const FEWEST: (usize, usize) = (20, 12);
@@ -126,8 +126,8 @@ pub(crate) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64,
     let circle = propose(&side, tolerance, seed)?;
     let middle_m = base_m + 0.5 * height;
     let mut round = Round {
-        x: circle[0],
-        y: circle[1],
+        x: side.origin[0] + circle[0],
+        y: side.origin[1] + circle[1],
         radius_m: circle[2],
         slope: 0.0,
         middle_m,
@@ -227,7 +227,7 @@ pub(crate) fn side_band(base_m: f64, top_m: f64) -> Range<f64> {
     base_m + ENDS.0 * height..top_m - ENDS.1 * height
 }
 
-/// The circle through three points that most points lie on and fewest outside of, seen from above.
+/// The circle through three points that most points lie on and fewest outside of, seen from above, from the first point of the side.
 fn propose(side: &Side, tolerance: f64, seed: u64) -> Option<[f64; 3]> {
     let mut rng = Draws::new(seed);
     let judges = side.judges(JUDGES);

@@ -3,7 +3,7 @@
 use crate::round::Round;
 use crate::surface::range_sigma_m;
 use crate::visibility::{DepthMap, Seen, Visibility};
-use nalgebra::{Isometry3, Point3, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector2, Vector3};
 
 /// Cosine of the angle within which cameras see the same side of a thing. From: chosen.
 const SAME_SIDE: f64 = 0.9;
@@ -23,26 +23,45 @@ pub(super) const IN_VIEW_M: f64 = 0.06;
 #[derive(Clone)]
 pub(super) struct Asker<'a> {
     pub views: Vec<Lying<'a>>,
-    pub world_from_surface: Isometry3<f64>,
     pub tolerance_m: f64,
 }
 
-/// A camera, and how far what it shows of one body lies beside where the body is, world frame, metres.
+/// A camera, and where it is as seen from one body: in the surface's frame.
 #[derive(Clone, Copy)]
 pub(super) struct Lying<'a> {
     pub map: &'a DepthMap,
-    pub offset_m: Vector3<f64>,
+    pub surface_from_camera: Isometry3<f64>,
+    pub viewpoint: Point3<f64>,
+    /// Camera from surface.
+    turn: Matrix3<f64>,
+    shift: Vector3<f64>,
 }
 
-impl Lying<'_> {
-    /// As [`DepthMap::look`].
-    pub fn look(&self, place: &Point3<f64>, tolerance_m: f64) -> Seen {
-        self.map.look(&(place + self.offset_m), tolerance_m)
+impl<'a> Lying<'a> {
+    fn of(map: &'a DepthMap, surface_from_camera: Isometry3<f64>) -> Lying<'a> {
+        let camera_from_surface = surface_from_camera.inverse();
+        Lying {
+            map,
+            surface_from_camera,
+            viewpoint: surface_from_camera.translation.vector.into(),
+            turn: camera_from_surface.rotation.to_rotation_matrix().into_inner(),
+            shift: camera_from_surface.translation.vector,
+        }
     }
 
-    /// Where the camera is, as seen from the body.
-    pub fn viewpoint(&self) -> Point3<f64> {
-        self.map.viewpoint() - self.offset_m
+    /// The same where what it shows lay so far beside the body, metres along both axes of the surface.
+    pub fn moved(&self, [x, y]: [f64; 2]) -> Lying<'a> {
+        Lying::of(self.map, Translation3::new(-x, -y, 0.0) * self.surface_from_camera)
+    }
+
+    /// A place (surface frame) as seen from the camera.
+    fn seen_at(&self, place: &Point3<f64>) -> Point3<f64> {
+        (self.turn * place.coords + self.shift).into()
+    }
+
+    /// As [`DepthMap::look`], of a place in the surface's frame.
+    pub fn look(&self, place: &Point3<f64>, tolerance_m: f64) -> Seen {
+        self.map.look_from(&self.seen_at(place), tolerance_m)
     }
 }
 
@@ -55,18 +74,19 @@ impl<'a> Asker<'a> {
         points: &[Point3<f64>],
         tolerance_m: f64,
     ) -> Asker<'a> {
-        let all: Vec<Lying<'a>> =
-            seen.maps.iter().map(|map| Lying { map, offset_m: Vector3::zeros() }).collect();
+        let surface_from_world = world_from_surface.inverse();
+        let lying = |map: &'a DepthMap| Lying::of(map, surface_from_world * map.camera_from_world.inverse());
+        let all: Vec<Lying<'a>> = seen.maps.iter().map(lying).collect();
         let views = match all.len() {
             0 | 1 => all,
-            _ => without_astray(all, &world_from_surface, points),
+            _ => without_astray(all, points),
         };
-        Asker { views, world_from_surface, tolerance_m }
+        Asker { views, tolerance_m }
     }
 
     /// The best knowledge of a place (surface frame): free in any look outweighs surface, hidden and never.
     pub fn look(&self, x: f64, y: f64, z: f64) -> Seen {
-        let place = self.world_from_surface * Point3::new(x, y, z);
+        let place = Point3::new(x, y, z);
         let mut best = Seen::Never;
         for view in &self.views {
             best = best.max(view.look(&place, self.tolerance_m));
@@ -83,9 +103,9 @@ impl<'a> Asker<'a> {
         const ABOVE_M: f64 = 0.1;
         /// Directions that add up to less cancel out. From: rounding.
         const CANCELLED: f64 = 1e-9;
-        let place = self.world_from_surface * Point3::new(round.x, round.y, round.middle_m);
+        let place = Point3::new(round.x, round.y, round.middle_m);
         let saw = self.views.iter().filter(|view| view.look(&place, IN_VIEW_M) > Seen::Never);
-        let eyes = saw.map(|view| self.world_from_surface.inverse() * view.viewpoint());
+        let eyes = saw.map(|view| view.viewpoint);
         let each: Vec<Vector2<f64>> = eyes
             .filter_map(|eye| Vector2::new(eye.x - round.x, eye.y - round.y).try_normalize(ABOVE_M))
             .collect();
@@ -96,13 +116,12 @@ impl<'a> Asker<'a> {
     /// Standard deviation of the best measurement of a point of the surface, metres; `None` if cameras that measure better look
     /// through it: it is noise, or a mixed pixel of a depth edge.
     pub fn support(&self, p: &Point3<f64>) -> Option<f64> {
-        let place = self.world_from_surface * p;
         let (mut through, mut here) = (0.0, 0.0);
         let mut best_m = f64::INFINITY;
         for view in &self.views {
-            let seen = view.look(&place, self.tolerance_m);
-            let sigma_m = range_sigma_m((place - view.viewpoint()).norm());
-            match seen {
+            let at = view.seen_at(p);
+            let sigma_m = range_sigma_m(at.coords.norm());
+            match view.map.look_from(&at, self.tolerance_m) {
                 Seen::Free => through += sigma_m.powi(-2),
                 Seen::Surface => {
                     here += sigma_m.powi(-2);
@@ -116,15 +135,11 @@ impl<'a> Asker<'a> {
 }
 
 /// Those of the cameras that do not look through a body which others see.
-fn without_astray<'a>(
-    all: Vec<Lying<'a>>,
-    world_from_surface: &Isometry3<f64>,
-    points: &[Point3<f64>],
-) -> Vec<Lying<'a>> {
+fn without_astray<'a>(all: Vec<Lying<'a>>, points: &[Point3<f64>]) -> Vec<Lying<'a>> {
     /// A camera has a body in view if it is asked with success about more than one in so many points. From: chosen.
     const EDGE: usize = 8;
     let step = points.len().div_ceil(WITNESSES).max(1);
-    let witnesses: Vec<Point3<f64>> = points.iter().step_by(step).map(|p| world_from_surface * p).collect();
+    let witnesses: Vec<Point3<f64>> = points.iter().step_by(step).copied().collect();
     let through = |view: &Lying<'_>| {
         let looks = witnesses.iter().map(|p| view.look(p, BESIDE_M));
         let (free, here) = looks.fold((0, 0), |(free, here), seen| match seen {
@@ -137,7 +152,7 @@ fn without_astray<'a>(
     };
     let shares: Vec<Option<f64>> = all.iter().map(through).collect();
     let weight = |view: &Lying<'_>| {
-        let middle = witnesses.get(witnesses.len() / 2).map_or(1.0, |p| (p - view.viewpoint()).norm());
+        let middle = witnesses.get(witnesses.len() / 2).map_or(1.0, |p| (p - view.viewpoint).norm());
         range_sigma_m(middle).powi(-2)
     };
     let [mut for_it, mut against] = [0.0, 0.0];

@@ -200,8 +200,9 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     let bounding = |segment: &Segment| outline::bounding(&segment.points).unwrap_or(Rectangle::NONE);
     let footprint = bounding(segment);
     let world_from_surface = scene.surface.surface_from_world.inverse();
-    let place = world_from_surface * Point3::new(footprint.x, footprint.y, 0.5 * (base_m + top));
-    let near = seen.viewpoints().iter().map(|v| (place - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
+    let place = Point3::new(footprint.x, footprint.y, 0.5 * (base_m + top));
+    let far = |v: &Point3<f64>| (world_from_surface * place - v).norm();
+    let near = seen.viewpoints().iter().map(far).min_by(f64::total_cmp).unwrap_or(1.0);
     let sigma_m = round::sigma_m(near);
     let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m(sigma_m));
     let first = round::fit(&segment.points, base_m, top, sigma_m, round::SEED);
@@ -265,18 +266,21 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
     const BESIDE_M: f64 = 0.012;
     /// Fewest points of a band. From: chosen.
     const FEWEST: usize = 25;
+    /// Points of a band that are enough to go by. From: work.
+    const ENOUGH: usize = 600;
     /// Share of the points of a band that reach less far than its edge. From: chosen.
     const END: f64 = 0.985;
     let bands = SILHOUETTES.map(|(low, high)| (base_m + low * height, base_m + high * height));
     let in_band = |&(low, high): &(f64, f64)| {
         let near = |p: &&Point3<f64>| p.z >= low && p.z < high && round.outside_m(p) < BESIDE_M;
-        segment.points.iter().filter(near).map(|p| [p.x, p.y]).collect::<Vec<[f64; 2]>>()
+        let places: Vec<[f64; 2]> = segment.points.iter().filter(near).map(|p| [p.x, p.y]).collect();
+        let stride = places.len().div_ceil(ENOUGH).max(1);
+        places.into_iter().step_by(stride).collect::<Vec<[f64; 2]>>()
     };
     let near = bands.each_ref().map(in_band);
     let mut edges = Vec::new();
     for view in &asker.views {
-        let eye = asker.world_from_surface.inverse() * view.viewpoint();
-        let (ex, ey) = (round.x - eye.x, round.y - eye.y);
+        let (ex, ey) = (round.x - view.viewpoint.x, round.y - view.viewpoint.y);
         let distance = ex.hypot(ey);
         if distance < 2.0 * round.radius_m {
             continue;
@@ -290,7 +294,7 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
                 let reach_m = end(&reaches, END) + LOST_M;
                 let beyond = reach_m + BESIDE_M - (across[0] * round.x + across[1] * round.y);
                 let place = Point3::new(round.x + across[0] * beyond, round.y + across[1] * beyond, z);
-                if view.look(&(asker.world_from_surface * place), asker.tolerance_m) == Seen::Free {
+                if view.look(&place, asker.tolerance_m) == Seen::Free {
                     edges.push(Edge { direction: across, reach_m, height_m: z });
                 }
             }
@@ -299,7 +303,7 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
     edges
 }
 
-/// Number of looks with the place inside the image and not behind something else.
+/// Number of looks with the place (surface frame) inside the image and not behind something else.
 fn views_of(asker: &Asker, place: &Point3<f64>) -> usize {
     asker.views.iter().filter(|view| !matches!(view.look(place, IN_VIEW_M), Seen::Never)).count()
 }

@@ -13,7 +13,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
 /// Pixels of a view that are asked, about. From: work.
-const PIXELS: f64 = 600.0;
+const PIXELS: f64 = 300.0;
 /// Chance of something nearer, of what is behind being the surface, and of its being something else. From: chosen.
 const NEARER: f64 = 0.1;
 const SURFACE: f64 = 0.6;
@@ -96,7 +96,7 @@ impl Rays {
                 other.remove(&cell(p));
             });
         }
-        let view = |lying: &Lying| ViewRays::of(lying, asker, sensor, around, &other);
+        let view = |lying: &Lying| ViewRays::of(lying, sensor, around, &other);
         Rays { views: asker.views.iter().filter_map(view).collect() }
     }
 
@@ -127,16 +127,12 @@ fn cell(p: &Point3<f64>) -> [i32; 2] {
 impl ViewRays {
     fn of(
         lying: &Lying,
-        asker: &Asker,
         sensor: &Sensor,
         around: &Around,
         other: &FxHashSet<[i32; 2]>,
     ) -> Option<ViewRays> {
         let camera = &lying.map.intrinsics;
-        let surface_from_world = asker.world_from_surface.inverse();
-        let surface_from_camera = surface_from_world
-            * Isometry3::translation(-lying.offset_m.x, -lying.offset_m.y, -lying.offset_m.z)
-            * lying.map.camera_from_world.inverse();
+        let surface_from_camera = lying.surface_from_camera;
         let [columns, rows] = window(lying, &surface_from_camera.inverse(), around)?;
         let step = ((columns.len() * rows.len()) as f64 / PIXELS).sqrt().ceil().max(1.0) as usize;
         let from: [f64; 3] = surface_from_camera.translation.vector.into();

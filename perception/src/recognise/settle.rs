@@ -7,13 +7,13 @@
 
 use super::asker::{Asker, Lying};
 use crate::round::{
-    self, MOST_INDEPENDENT, ON_SIDE_M, RADIUS_SPREAD_M, Round, SLOPE_SPREAD, STEEPEST, side_band,
+    self, MOST_INDEPENDENT, ON_SIDE_M, RADIUS_SPREAD_M, Round, SLOPE_SPREAD, STEEPEST, distance, side_band,
 };
 use crate::segment::Segment;
 use crate::surface::{floor, range_sigma_m};
 use crate::visibility::DepthMap;
-use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
-use rustc_hash::{FxHashMap, FxHashSet};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix4, Point3, Vector3, Vector4};
+use rustc_hash::FxHashMap;
 
 /// Standard deviation of how far a view lies beside the others at one body, metres.
 /// From: chosen, views lie within a centimetre or so of each other at one body.
@@ -62,12 +62,12 @@ pub(super) fn settle<'a>(
         return None;
     }
     let cells = Cells::of(&segment.points);
-    let shown: Vec<Vec<Point3<f64>>> = asker.views.iter().map(|view| shown_of(view, asker, &cells)).collect();
+    let shown: Vec<Vec<Point3<f64>>> = asker.views.iter().map(|view| shown_of(view, &cells)).collect();
     let band = side_band(base_m, top_m);
     let sides: Vec<Side> = shown
         .iter()
         .zip(&asker.views)
-        .map(|(points, view)| Side::of(points.iter().filter(|p| band.contains(&p.z)), view, asker, round))
+        .map(|(points, view)| Side::of(points.iter().filter(|p| band.contains(&p.z)), view, round))
         .collect();
     let (body, shifts) = lay(round, &sides)?;
     let moved = shown
@@ -81,10 +81,7 @@ pub(super) fn settle<'a>(
     if settled.spread_m > ROUNDER * round.spread_m {
         return None;
     }
-    let to_world =
-        |shift: &[f64; 2]| asker.world_from_surface.rotation * Vector3::new(shift[0], shift[1], 0.0);
-    let views = asker.views.iter().zip(&shifts);
-    let views = views.map(|(view, s)| Lying { offset_m: view.offset_m + to_world(s), ..*view }).collect();
+    let views = asker.views.iter().zip(&shifts).map(|(view, shift_m)| view.moved(*shift_m)).collect();
     Some(Settled { segment, asker: Asker { views, ..asker.clone() }, round: settled })
 }
 
@@ -99,7 +96,6 @@ impl Side {
     fn of<'p>(
         points: impl Iterator<Item = &'p Point3<f64>>,
         view: &Lying<'_>,
-        asker: &Asker<'_>,
         round: &Round,
     ) -> Side {
         let near = |p: &&Point3<f64>| round.outside_m(p).abs() < GATES_M[0] + SHIFT_M;
@@ -109,8 +105,8 @@ impl Side {
         if points.len() < FEWEST {
             points.clear();
         }
-        let foot = asker.world_from_surface * Point3::new(round.x, round.y, round.middle_m);
-        Side { points, sigma_m: range_sigma_m((foot - view.viewpoint()).norm()) }
+        let middle = Point3::new(round.x, round.y, round.middle_m);
+        Side { points, sigma_m: range_sigma_m((middle - view.viewpoint).norm()) }
     }
 }
 
@@ -132,20 +128,24 @@ fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
         for (v, side) in sides.iter().enumerate() {
             let weight = (MOST_INDEPENDENT / side.points.len().max(1) as f64).min(1.0) / side.sigma_m.powi(2);
             let at = BODY + 2 * v;
+            let (mut own, mut own_right) = (Matrix4::zeros(), Vector4::zeros());
             for p in &side.points {
                 let (x, y) = (p.x - body.x - shifts[v][0], p.y - body.y - shifts[v][1]);
-                let from_axis = x.hypot(y).max(AT_AXIS_M);
+                let from_axis = distance(x, y).max(AT_AXIS_M);
                 let miss = from_axis - body.radius_at(p.z);
                 if miss.abs() > gate_m {
                     continue;
                 }
                 let w = weight * (1.0 - (miss / gate_m).powi(2)).powi(2);
-                let (ux, uy) = (x / from_axis, y / from_axis);
-                let row = [(0, ux), (1, uy), (2, 1.0), (3, p.z - body.middle_m), (at, ux), (at + 1, uy)];
-                for (i, a) in row {
-                    right[i] += w * a * miss;
-                    row.iter().for_each(|&(j, b)| normal[(i, j)] += w * a * b);
-                }
+                let row = Vector4::new(x / from_axis, y / from_axis, 1.0, p.z - body.middle_m);
+                own += row * (row * w).transpose();
+                own_right += row * (w * miss);
+            }
+            // A shift of the view does what one of the axis does.
+            let columns = [0, 1, 2, 3, at, at + 1].into_iter().zip([0, 1, 2, 3, 0, 1]);
+            for (i, a) in columns.clone() {
+                right[i] += own_right[a];
+                columns.clone().for_each(|(j, b)| normal[(i, j)] += own[(a, b)]);
             }
             for k in 0..2 {
                 normal[(at + k, at + k)] += SHIFT_M.powi(-2);
@@ -189,17 +189,18 @@ impl Side {
 
 /// The cells that the points of a body lie in, seen from above, those beside them, and their range of heights.
 struct Cells {
-    own: FxHashSet<[i32; 2]>,
-    beside: FxHashSet<[i32; 2]>,
+    /// The first cell of a rectangle of them, and how many it has along both axes.
+    first: [i32; 2],
+    sizes: [i32; 2],
+    /// Of each cell of the rectangle: whether points lie in it, and whether any lie in or beside it.
+    own: Vec<bool>,
+    beside: Vec<bool>,
     low: Point3<f64>,
     high: Point3<f64>,
 }
 
 impl Cells {
     fn of(points: &[Point3<f64>]) -> Cells {
-        let own: FxHashSet<[i32; 2]> = points.iter().map(Cells::cell).collect();
-        let around = |&[x, y]: &[i32; 2]| (0..9).map(move |k| [x + k % 3 - 1, y + k / 3 - 1]);
-        let beside = own.iter().flat_map(around).collect();
         let ends = |end: fn(f64, f64) -> f64, from: f64| {
             let reach = points.iter().fold(Point3::new(from, from, from), |a, p| {
                 Point3::new(end(a.x, p.x), end(a.y, p.y), end(a.z, p.z))
@@ -207,39 +208,64 @@ impl Cells {
             reach - Vector3::new(1.0, 1.0, 0.0) * (from.signum() * 2.0 * CELL_M)
         };
         let (low, high) = (ends(f64::min, f64::INFINITY), ends(f64::max, f64::NEG_INFINITY));
-        Cells { own, beside, low, high }
+        let first = Cells::cell(&low);
+        let last = Cells::cell(&high);
+        let sizes = [0, 1].map(|k| last[k] - first[k] + 1);
+        let none = vec![false; (sizes[0] * sizes[1]) as usize];
+        let mut cells = Cells { first, sizes, own: none.clone(), beside: none, low, high };
+        for p in points {
+            if let Some(place) = cells.place(p) {
+                cells.own[place] = true;
+            }
+        }
+        // What has points lies two cells or so within the rectangle.
+        let wide = sizes[0] as usize;
+        for place in (0..cells.own.len()).filter(|&place| cells.own[place]) {
+            for row in [place - wide, place, place + wide] {
+                cells.beside[row - 1..=row + 1].fill(true);
+            }
+        }
+        cells
     }
 
     fn cell(p: &Point3<f64>) -> [i32; 2] {
         [p.x, p.y].map(|m| floor(m / CELL_M))
     }
 
+    /// Where a point's cell is in the rectangle.
+    fn place(&self, p: &Point3<f64>) -> Option<usize> {
+        if !(p.x > self.low.x && p.x < self.high.x && p.y > self.low.y && p.y < self.high.y) {
+            return None;
+        }
+        let [x, y] = Cells::cell(p);
+        Some(((y - self.first[1]) * self.sizes[0] + x - self.first[0]) as usize)
+    }
+
     fn holds(&self, p: &Point3<f64>) -> bool {
-        self.own.contains(&Cells::cell(p))
+        self.place(p).is_some_and(|place| self.own[place])
     }
 
     /// Whether a point is in or beside the cells, no lower and no higher than the body.
     fn reaches(&self, p: &Point3<f64>) -> bool {
-        p.z > self.low.z && p.z < self.high.z && self.beside.contains(&Cells::cell(p))
+        p.z > self.low.z && p.z < self.high.z && self.place(p).is_some_and(|place| self.beside[place])
     }
 }
 
 /// What a camera measured in or beside the cells of a body, surface frame.
-fn shown_of(view: &Lying<'_>, asker: &Asker<'_>, body: &Cells) -> Vec<Point3<f64>> {
-    let surface_from_camera = asker.world_from_surface.inverse() * view.map.camera_from_world.inverse();
+fn shown_of(view: &Lying<'_>, body: &Cells) -> Vec<Point3<f64>> {
     let mut shown = Vec::new();
-    let Some([columns, rows]) = pixels_of(view.map, &surface_from_camera.inverse(), body) else {
+    let Some([columns, rows]) = pixels_of(view.map, &view.surface_from_camera.inverse(), body) else {
         return shown;
     };
     let i = view.map.intrinsics;
+    let turn = view.surface_from_camera.rotation.to_rotation_matrix().into_inner();
+    let across = turn.column(0) / i.fx;
     for v in rows {
-        for u in columns.clone() {
-            let z = f64::from(view.map.depths_m[v * i.width + u]);
-            if !z.is_finite() {
-                continue;
-            }
-            let p = surface_from_camera
-                * Point3::new((u as f64 - i.cx) / i.fx * z, (v as f64 - i.cy) / i.fy * z, z);
+        let first = turn * Vector3::new(-i.cx / i.fx, (v as f64 - i.cy) / i.fy, 1.0);
+        let row = &view.map.depths_m[v * i.width..][columns.clone()];
+        for (u, &z) in columns.clone().zip(row) {
+            let p = view.viewpoint + (first + across * u as f64) * f64::from(z);
+            // What is no number is in no cell.
             if body.reaches(&p) {
                 shown.push(p);
             }

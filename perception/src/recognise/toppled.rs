@@ -23,8 +23,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 const LENGTH_ENDS: (f64, f64) = (0.01, 0.99);
 /// Its axis is sought about the sides of what bounds it from above, turned by so much, radians. From: chosen.
 const TURNS: [f64; 3] = [0.0, 0.1, -0.1];
-/// Points by which the direction of its axis is sought, at the least. From: chosen, as of a fit.
-const SCOUTS: usize = 800;
+/// Points by which the direction of its axis is sought, at the most. From: chosen.
+const SCOUTS: usize = 500;
 /// How far from its radius its axis lies above what it rests on, metres. From: chosen.
 const RESTS_M: f64 = 0.01;
 /// Spread of how long it is however good the camera, metres. From: chosen, twice that of a height: both ends are edges.
@@ -217,7 +217,7 @@ impl Found {
 /// The best round body about an axis along the surface.
 fn fit(segment: &Segment, bounds: &Rectangle, sigma_m: f64) -> Option<Found> {
     let points = &segment.points;
-    let few: Vec<Point3<f64>> = points.iter().step_by((points.len() / SCOUTS).max(1)).copied().collect();
+    let few: Vec<Point3<f64>> = points.iter().step_by(points.len().div_ceil(SCOUTS).max(1)).copied().collect();
     let sides = [0.0, std::f64::consts::FRAC_PI_2];
     let angle = bounds.turn.0.atan2(bounds.turn.1);
     let angles = sides.into_iter().flat_map(|side| TURNS.map(|by| angle + side + by));

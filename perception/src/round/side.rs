@@ -1,24 +1,26 @@
 //! The points that can lie on the side of a body, coordinate by coordinate, and sums over them.
 
-use super::{OUTSIDE_M, Round, distance, side_band};
+use super::{OUTSIDE_M, Round, side_band};
 use nalgebra::{Matrix4, Point3, Vector4};
 
 /// Points that are summed up side by side. From: work.
 const LANES: usize = 4;
 
-type Lanes = [f64; LANES];
+type Lanes = [f32; LANES];
 
-/// Points that judge circles, seen from above. A tenth of a micrometre is more than they know.
+/// Points that judge circles, seen from above, as of [`Side`].
 pub(super) struct Judges {
     x: Vec<f32>,
     y: Vec<f32>,
 }
 
-/// Filled up with NaN, which is on no side.
+/// Points as seen from the first of them, where a tenth of a micrometre is more than they know; filled up with NaN, which is on no side.
 pub(super) struct Side {
-    x: Vec<f64>,
-    y: Vec<f64>,
-    z: Vec<f64>,
+    /// In the surface's frame, metres.
+    pub origin: [f64; 3],
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
     len: usize,
 }
 
@@ -43,58 +45,70 @@ impl Side {
         let band = side_band(base_m, top_m);
         let column = || Vec::with_capacity(points.len().next_multiple_of(LANES));
         let (mut x, mut y, mut z) = (column(), column(), column());
+        let mut origin = [0.0; 3];
         for p in points.iter().filter(|p| band.contains(&p.z)) {
-            x.push(p.x);
-            y.push(p.y);
-            z.push(p.z);
+            if x.is_empty() {
+                origin = [p.x, p.y, p.z];
+            }
+            x.push((p.x - origin[0]) as f32);
+            y.push((p.y - origin[1]) as f32);
+            z.push((p.z - origin[2]) as f32);
         }
         let len = x.len();
         for column in [&mut x, &mut y, &mut z] {
-            column.resize(len.next_multiple_of(LANES), f64::NAN);
+            column.resize(len.next_multiple_of(LANES), f32::NAN);
         }
-        Side { x, y, z, len }
+        Side { origin, x, y, z, len }
     }
 
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// A point's place seen from above.
+    /// A point's place seen from above, from the first of them.
     pub fn place(&self, i: usize) -> [f64; 2] {
-        [self.x[i], self.y[i]]
+        [self.x[i], self.y[i]].map(f64::from)
     }
 
-    /// The same side with every so manieth point: so many, or less than twice as many.
+    /// The same side with every so manieth point: so many at the most.
     pub fn thinned(&self, to: usize) -> Side {
-        let stride = (self.len / to).max(1);
+        let stride = self.len.div_ceil(to).max(1);
         let len = self.len.div_ceil(stride);
-        let pick = |column: &[f64]| {
-            let mut few: Vec<f64> = Vec::with_capacity(len.next_multiple_of(LANES));
+        let pick = |column: &[f32]| {
+            let mut few: Vec<f32> = Vec::with_capacity(len.next_multiple_of(LANES));
             few.extend(column[..self.len].iter().step_by(stride));
-            few.resize(len.next_multiple_of(LANES), f64::NAN);
+            few.resize(len.next_multiple_of(LANES), f32::NAN);
             few
         };
-        Side { x: pick(&self.x), y: pick(&self.y), z: pick(&self.z), len }
+        Side { origin: self.origin, x: pick(&self.x), y: pick(&self.y), z: pick(&self.z), len }
     }
 
-    /// Every so manieth point: so many, or less than twice as many.
+    /// Every so manieth point: so many at the most.
     pub fn judges(&self, count: usize) -> Judges {
-        let stride = (self.len / count).max(1);
-        let pick = |column: &[f64]| column[..self.len].iter().step_by(stride).map(|c| *c as f32).collect();
+        let stride = self.len.div_ceil(count).max(1);
+        let pick = |column: &[f32]| column[..self.len].iter().step_by(stride).copied().collect();
         Judges { x: pick(&self.x), y: pick(&self.y) }
     }
 
     /// Sums over the points within `gate` of the side of a body.
     pub fn sums(&self, round: &Round, gate: f64) -> Sums {
-        let mut sums = [[0.0; LANES]; 17];
-        let columns = [&self.x, &self.y, &self.z].map(|column| column.as_chunks::<LANES>().0);
-        for ((x, y), z) in columns[0].iter().zip(columns[1]).zip(columns[2]) {
-            for (sum, term) in sums.iter_mut().zip(terms(round, gate, [x, y, z])) {
-                *sum = lanes(|i| sum[i] + term[i]);
+        /// Lanes of points whose sums keep enough digits in single precision. From: rounding.
+        const BLOCK: usize = 64;
+        let body = Seen::of(round, gate, self.origin);
+        let mut all = [0.0; 17];
+        let [x, y, z] = [&self.x, &self.y, &self.z].map(|column| column.as_chunks::<LANES>().0.chunks(BLOCK));
+        for ((x, y), z) in x.zip(y).zip(z) {
+            let mut sums = [[0.0; LANES]; 17];
+            for ((x, y), z) in x.iter().zip(y).zip(z) {
+                for (sum, term) in sums.iter_mut().zip(body.terms([x, y, z])) {
+                    *sum = lanes(|i| sum[i] + term[i]);
+                }
+            }
+            for (all, sum) in all.iter_mut().zip(sums) {
+                *all += f64::from(sum.iter().sum::<f32>());
             }
         }
-        let [count, x, y, z, xx, xy, xz, yy, yz, zz, r, xr, yr, zr, squares, outside, spread] =
-            sums.map(|lanes| lanes.iter().sum::<f64>());
+        let [count, x, y, z, xx, xy, xz, yy, yz, zz, r, xr, yr, zr, squares, outside, spread] = all;
         #[rustfmt::skip]
         let normal = Matrix4::new(
             xx, xy, x,     xz,
@@ -140,45 +154,65 @@ impl Judges {
 }
 
 #[inline(always)]
-fn lanes(of: impl Fn(usize) -> f64) -> Lanes {
+fn lanes(of: impl Fn(usize) -> f32) -> Lanes {
     std::array::from_fn(of)
 }
 
-/// What each point adds to the sums: the products of the outward normal, the rise above the middle and the distance from the side, if it is
-/// near, and its square if it is not inside.
-#[inline(always)]
-fn terms(round: &Round, gate: f64, [x, y, z]: [&Lanes; 3]) -> [Lanes; 17] {
-    /// Nearer to the axis there is no direction away from it, metres. From: rounding.
-    const AT_AXIS_M: f64 = 1e-9;
-    let (dx, dy) = (lanes(|i| x[i] - round.x), lanes(|i| y[i] - round.y));
-    let d = lanes(|i| distance(dx[i], dy[i]));
-    let d = lanes(|i| if d[i] > AT_AXIS_M { d[i] } else { AT_AXIS_M });
-    let rise = lanes(|i| z[i] - round.middle_m);
-    let residual = lanes(|i| d[i] - round.radius_m - round.slope * rise[i]);
-    let near = |value: Lanes| lanes(|i| if residual[i].abs() <= gate { value[i] } else { 0.0 });
-    let count = near([1.0; LANES]);
-    let (nx, ny) = (near(lanes(|i| dx[i] / d[i])), near(lanes(|i| dy[i] / d[i])));
-    let (nz, r) = (near(rise), near(residual));
-    let times = |a: &Lanes, b: &Lanes| lanes(|i| a[i] * b[i]);
-    let beside = |value: Lanes| lanes(|i| if residual[i] > -gate { value[i] } else { 0.0 });
-    let miss = lanes(|i| if residual[i] < OUTSIDE_M { residual[i] } else { OUTSIDE_M });
-    [
-        count,
-        nx,
-        ny,
-        nz,
-        times(&nx, &nx),
-        times(&nx, &ny),
-        times(&nx, &nz),
-        times(&ny, &ny),
-        times(&ny, &nz),
-        times(&nz, &nz),
-        r,
-        times(&nx, &r),
-        times(&ny, &r),
-        times(&nz, &r),
-        times(&r, &r),
-        beside([1.0; LANES]),
-        beside(times(&miss, &miss)),
-    ]
+/// A body as seen from the first of the points.
+struct Seen {
+    x: f32,
+    y: f32,
+    middle_m: f32,
+    radius_m: f32,
+    slope: f32,
+    gate: f32,
+}
+
+impl Seen {
+    fn of(round: &Round, gate: f64, origin: [f64; 3]) -> Seen {
+        let [x, y, middle_m] = [round.x - origin[0], round.y - origin[1], round.middle_m - origin[2]];
+        let [x, y, middle_m, radius_m, slope, gate] =
+            [x, y, middle_m, round.radius_m, round.slope, gate].map(|value| value as f32);
+        Seen { x, y, middle_m, radius_m, slope, gate }
+    }
+
+    /// What each point adds to the sums: the products of the outward normal, the rise above the middle and the distance from the side, if
+    /// it is near, and its square if it is not inside.
+    #[inline(always)]
+    fn terms(&self, [x, y, z]: [&Lanes; 3]) -> [Lanes; 17] {
+        /// Nearer to the axis there is no direction away from it, metres. From: rounding.
+        const AT_AXIS_M: f32 = 1e-9;
+        const FARTHEST_M: f32 = OUTSIDE_M as f32;
+        let (dx, dy) = (lanes(|i| x[i] - self.x), lanes(|i| y[i] - self.y));
+        let d = lanes(|i| (dx[i] * dx[i] + dy[i] * dy[i]).sqrt());
+        let d = lanes(|i| if d[i] > AT_AXIS_M { d[i] } else { AT_AXIS_M });
+        let rise = lanes(|i| z[i] - self.middle_m);
+        let residual = lanes(|i| d[i] - self.radius_m - self.slope * rise[i]);
+        let near = |value: Lanes| lanes(|i| if residual[i].abs() <= self.gate { value[i] } else { 0.0 });
+        let count = near([1.0; LANES]);
+        let (nx, ny) = (near(lanes(|i| dx[i] / d[i])), near(lanes(|i| dy[i] / d[i])));
+        let (nz, r) = (near(rise), near(residual));
+        let times = |a: &Lanes, b: &Lanes| lanes(|i| a[i] * b[i]);
+        let beside = |value: Lanes| lanes(|i| if residual[i] > -self.gate { value[i] } else { 0.0 });
+        let miss = lanes(|i| if residual[i] < FARTHEST_M { residual[i] } else { FARTHEST_M });
+        [
+            count,
+            nx,
+            ny,
+            nz,
+            times(&nx, &nx),
+            times(&nx, &ny),
+            times(&nx, &nz),
+            times(&ny, &ny),
+            times(&ny, &nz),
+            times(&nz, &nz),
+            r,
+            times(&nx, &r),
+            times(&ny, &r),
+            times(&nz, &r),
+            times(&r, &r),
+            beside([1.0; LANES]),
+            beside(times(&miss, &miss)),
+        ]
+    }
 }

@@ -86,17 +86,24 @@ impl<'a> Hiding<'a> {
         any
     }
 
-    /// Tells of each cell around some whether the plane may reach on there, if that was not told yet.
-    fn ask(&self, owners: &mut Owners, border: &[[i32; 2]], unseen: bool) {
+    /// Tells of each cell around some whether the plane may reach on there, if that was not told yet; keeps those that do not lie amid
+    /// cells of their own part.
+    fn ask(&self, owners: &mut Owners, border: &mut Vec<[i32; 2]>, unseen: bool) {
         /// Cells that one thread takes in a row. From: work.
         const SOME: usize = 256;
         let mut asked = Vec::new();
-        for cell in border.iter().flat_map(|cell| around(*cell)) {
-            if owners.get(cell) == Owner::Untold {
-                *owners.at(cell) = Owner::Nobody;
-                asked.push(cell);
+        border.retain(|cell| {
+            let (own, mut amid) = (owners.get(*cell), true);
+            for cell in around(*cell) {
+                let of = owners.get(cell);
+                amid &= of == own;
+                if of == Owner::Untold {
+                    *owners.at(cell) = Owner::Nobody;
+                    asked.push(cell);
+                }
             }
-        }
+            !amid
+        });
         let allows = asked.par_iter().with_min_len(SOME).map(|cell| self.allows(*cell, unseen));
         let open: Vec<bool> = allows.collect();
         let open = asked.iter().zip(open).filter(|(_, open)| *open);
@@ -108,7 +115,7 @@ impl<'a> Hiding<'a> {
     pub fn spread(&self, owners: &mut Owners, mut border: Vec<[i32; 2]>, unseen: bool) -> Vec<[usize; 2]> {
         let mut meeting = Vec::new();
         for _ in 0..self.rings {
-            self.ask(owners, &border, unseen);
+            self.ask(owners, &mut border, unseen);
             let mut next = Vec::new();
             for cell in border {
                 let Owner::Part(owner) = owners.get(cell) else { continue };

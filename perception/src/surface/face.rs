@@ -29,17 +29,21 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
     if !viewpoints.is_empty() && viewpoints.iter().all(|v| plane.distance(v) < LEAST_EYE_M) {
         return Vec::new();
     }
-    let held: Vec<&Sample> = samples.iter().filter(|s| plane.holds(s)).collect();
+    let (mut held, mut beside, mut squares) = (Vec::with_capacity(samples.len()), Vec::new(), 0.0);
+    for s in samples {
+        let (distance_m, band_m) = (plane.distance(&s.point), Plane::band_m(s));
+        if distance_m.abs() <= band_m {
+            held.push(s);
+            squares += distance_m * distance_m;
+        } else if distance_m.abs() <= 2.0 * band_m {
+            beside.push((s, usize::from(distance_m > 0.0)));
+        }
+    }
     let grid = Grid::filled_by(plane, &held);
     let held: Vec<([i32; 2], &Sample)> = held.into_iter().map(|s| (grid.cell_of(&s.point), s)).collect();
     let mut counts: Tiles<Counts> = Tiles::new();
     held.iter().for_each(|(cell, _)| counts.at(*cell).near += 1);
-    for s in samples {
-        let (distance_m, band_m) = (plane.distance(&s.point), Plane::band_m(s));
-        if distance_m.abs() > band_m && distance_m.abs() <= 2.0 * band_m {
-            counts.at(grid.cell_of(&s.point)).beside[usize::from(distance_m > 0.0)] += 1;
-        }
-    }
+    beside.iter().for_each(|(s, side)| counts.at(grid.cell_of(&s.point)).beside[*side] += 1);
     let cells = counts.all();
     let mut beneath: Tiles<bool> = Tiles::new();
     let rising = cells.iter().filter(|(_, counts)| counts.beside[1] > 0);
@@ -51,7 +55,6 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
     };
     let near = cells.into_iter().filter(|(cell, counts)| counts.near > 0 && is_face(*cell));
     let mut pieces = parts(near.map(|(cell, counts)| (cell, counts.near)).collect());
-    let squares: f64 = held.iter().map(|(_, s)| plane.distance(&s.point).powi(2)).sum();
     let residual_m = (squares / held.len().max(1) as f64).sqrt();
     let all =
         |cells: &[[i32; 2]]| cells.iter().map(|cell| counts.get(*cell)).fold(Counts::default(), Counts::with);
@@ -155,12 +158,16 @@ pub(super) struct Grid {
     pub turn: UnitQuaternion<f64>,
     /// Of a cell, metres.
     pub side_m: f64,
+    /// Its two axes along the plane, in the world.
+    axes: [Vector3<f64>; 2],
 }
 
 impl Grid {
     /// The finest.
     pub fn fine(plane: &Plane) -> Grid {
-        Grid { turn: level(plane), side_m: CELL_M }
+        let turn = level(plane);
+        let axes = [Vector3::x(), Vector3::y()].map(|axis| turn.inverse() * axis);
+        Grid { turn, side_m: CELL_M, axes }
     }
 
     /// The finest in which samples of the plane lie cell by cell rather than here and there.
@@ -185,8 +192,7 @@ impl Grid {
 
     /// The cell that a place lies in.
     pub fn cell_of(&self, p: &Point3<f64>) -> [i32; 2] {
-        let flat = self.turn * p;
-        [floor(flat.x / self.side_m), floor(flat.y / self.side_m)]
+        self.axes.each_ref().map(|axis| floor(axis.dot(&p.coords) / self.side_m))
     }
 }
 

@@ -14,8 +14,9 @@ const PROPOSALS: usize = 240;
 const ROUNDS: usize = 6;
 /// Proposals go through points of one cube of this side, metres. From: chosen.
 const REACH_M: f64 = 0.3;
-/// Points that judge a proposal, at the least. From: chosen.
+/// Points that judge a proposal, at the most, and after how many of them it may be left. From: chosen; work.
 const JUDGES: usize = 1500;
+const BLOCK: usize = 128;
 
 /// A measurement of a plane lies within this many spreads of its own and this distance of it, metres. From: chosen.
 pub(crate) const BAND: (f64, f64) = (3.0, 0.004);
@@ -155,45 +156,58 @@ impl Cubes {
     }
 }
 
-/// The points that proposals are judged by, each coordinate by itself.
+/// The points that proposals are judged by, each coordinate by itself, from the first of them: a micrometre is more than they know. Filled
+/// up to whole blocks with what is no number, which is near no plane.
 struct Judges {
-    coordinates: [Vec<f64>; 3],
+    count: usize,
+    origin: Vector3<f64>,
+    coordinates: [Vec<f32>; 3],
     /// One over how far each may be off a plane that it speaks for, per metre.
-    per_band: Vec<f64>,
+    per_band: Vec<f32>,
 }
 
 impl Judges {
     fn of(samples: &[Sample]) -> Judges {
         /// Spreads of a judge, beside the distance that a measurement may have, up to which it speaks for a plane. From: chosen.
         const SPREADS: f64 = 2.0;
-        let judges = || samples.iter().step_by((samples.len() / JUDGES).max(1));
-        let axis = |k: usize| judges().map(|s| s.point[k]).collect();
-        let per_band = judges().map(|s| 1.0 / (SPREADS * s.sigma_m + BAND.1)).collect();
-        Judges { coordinates: [axis(0), axis(1), axis(2)], per_band }
+        let judges = || samples.iter().step_by(samples.len().div_ceil(JUDGES).max(1));
+        let (count, origin) = (judges().count(), samples.first().map_or_else(Vector3::zeros, |s| s.point.coords));
+        let column = |of: &dyn Fn(&Sample) -> f64| {
+            let mut column: Vec<f32> = judges().map(|s| of(s) as f32).collect();
+            column.resize(count.next_multiple_of(BLOCK), f32::NAN);
+            column
+        };
+        let coordinates = [0, 1, 2].map(|k| column(&|s| s.point[k] - origin[k]));
+        let per_band = column(&|s| 1.0 / (SPREADS * s.sigma_m + BAND.1));
+        Judges { count, origin, coordinates, per_band }
     }
 
     /// How much speaks for the plane: of each judge the more the nearer it is (Torr and Zisserman 2000), so that a plane that leans through
     /// two steps has less than that of one. `None` as soon as it cannot be more than `beaten`.
     fn near(&self, plane: &Plane, beaten: f64) -> Option<f64> {
-        /// Judges after which a plane may be left. From: work.
-        const BLOCK: usize = 128;
         /// Sums side by side. From: work.
         const LANES: usize = 8;
-        let [x, y, z] = self.coordinates.each_ref().map(|axis| axis.chunks(BLOCK));
-        let (mut found, mut left) = (0.0, self.per_band.len());
-        for (((x, y), z), per_band) in x.zip(y).zip(z).zip(self.per_band.chunks(BLOCK)) {
+        let normal = plane.normal.cast::<f32>();
+        let offset = (plane.offset - plane.normal.dot(&self.origin)) as f32;
+        let columns = self.coordinates.each_ref().map(|axis| axis.as_chunks::<BLOCK>().0);
+        let [x, y, z] = columns.map(|axis| axis.iter().map(|block| block.as_chunks::<LANES>().0));
+        let bands = self.per_band.as_chunks::<BLOCK>().0.iter().map(|block| block.as_chunks::<LANES>().0);
+        let (mut found, mut left) = (0.0, self.count);
+        for (((x, y), z), per_band) in x.zip(y).zip(z).zip(bands) {
             if found + left as f64 <= beaten {
                 return None;
             }
             let mut near = [0.0; LANES];
-            let places = x.iter().zip(y).zip(z).zip(per_band).enumerate();
-            for (k, (((x, y), z), per_band)) in places {
-                let along = plane.normal.x * x + plane.normal.y * y + plane.normal.z * z;
-                let off = (along - plane.offset) * per_band;
-                near[k % LANES] += (1.0 - off * off).max(0.0);
+            for (((x, y), z), per_band) in x.iter().zip(y).zip(z).zip(per_band) {
+                near = std::array::from_fn(|i| {
+                    let along = normal.x * x[i] + normal.y * y[i] + normal.z * z[i];
+                    let off = (along - offset) * per_band[i];
+                    let speaks = 1.0 - off * off;
+                    near[i] + if speaks > 0.0 { speaks } else { 0.0 }
+                });
             }
-            found += near.iter().sum::<f64>();
-            left -= per_band.len();
+            found += f64::from(near.iter().sum::<f32>());
+            left = left.saturating_sub(BLOCK);
         }
         (found > beaten).then_some(found)
     }

@@ -233,16 +233,11 @@ fn most_within<T>(hull: &[[f64; 2]], of: &[T], place: impl Fn(&T) -> [f64; 2]) -
 
 /// True if a convex anticlockwise outline holds the place.
 fn holds(hull: &[[f64; 2]], p: [f64; 2]) -> bool {
-    holds_within(hull, p, 0.0)
-}
-
-/// True if a convex anticlockwise outline that is widened by a margin holds the place.
-fn holds_within(hull: &[[f64; 2]], p: [f64; 2], margin_m: f64) -> bool {
     let n = hull.len();
     n >= 3
         && (0..n).all(|i| {
             let (a, b) = (hull[i], hull[(i + 1) % n]);
             let (x, y) = (b[0] - a[0], b[1] - a[1]);
-            x * (p[1] - a[1]) - y * (p[0] - a[0]) >= -margin_m * (x * x + y * y).sqrt()
+            x * (p[1] - a[1]) - y * (p[0] - a[0]) >= 0.0
         })
 }

@@ -24,7 +24,7 @@ pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
     let mut place = vec![None; voxels.len()];
     sets.iter().for_each(|set| (0..).zip(set).for_each(|(local, &voxel)| place[voxel] = Some(local)));
     let name = |set: &Vec<usize>| match options.part_touching {
-        true => Piece { voxels, of: set, place: &place }.parts(),
+        true => Piece::of(voxels, set, &place).parts(),
         false => vec![set[0] as u32; set.len()],
     };
     let names: Vec<Vec<u32>> = sets.par_iter().with_max_len(1).map(name).collect();
@@ -40,14 +40,26 @@ pub(super) struct Piece<'a> {
     pub voxels: &'a Voxels,
     /// Their numbers among all, ascending.
     pub of: &'a [usize],
-    /// The number here of each of all voxels that is in some piece.
-    place: &'a [Option<u32>],
+    /// Where in `near` the neighbours of each begin, and where the last ones end.
+    starts: Vec<u32>,
+    near: Vec<u32>,
 }
 
-impl Piece<'_> {
+impl<'a> Piece<'a> {
+    /// `place` is the number here of each of all voxels that is in some piece.
+    fn of(voxels: &'a Voxels, of: &'a [usize], place: &[Option<u32>]) -> Piece<'a> {
+        let (mut starts, mut near) = (Vec::with_capacity(of.len() + 1), Vec::new());
+        for &voxel in of {
+            starts.push(near.len() as u32);
+            near.extend(voxels.neighbours(voxel).iter().filter_map(|&j| place[j as usize]));
+        }
+        starts.push(near.len() as u32);
+        Piece { voxels, of, starts, near }
+    }
+
     /// The neighbours of one.
     fn near(&self, voxel: usize) -> impl Iterator<Item = u32> {
-        self.voxels.neighbours(self.of[voxel]).iter().filter_map(|&j| self.place[j as usize])
+        self.near[self.starts[voxel] as usize..self.starts[voxel + 1] as usize].iter().copied()
     }
 
     /// For each the number of its part.

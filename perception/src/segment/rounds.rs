@@ -54,7 +54,7 @@ pub(super) fn part(
     members.retain(|_, _| !is_one.next().unwrap_or(false));
     let all: Vec<usize> = members.values().flatten().copied().collect();
     for mut pool in voxels.together(&all) {
-        while let Some(cut) = Axis::sought(voxels, &pool).iter().find_map(|axis| {
+        while let Some(cut) = Axis::sought(voxels, &pool).par_iter().with_max_len(1).find_map_first(|axis| {
             let body = axis.body(voxels, &pool)?;
             let is_round = is_round(voxels, &body, points, viewpoints);
             is_round.then(|| Cut::around(voxels, body, axis, part_of_voxel, &members))?

@@ -1,12 +1,10 @@
 //! What each thing stands on: the surface, another thing, or the bottom of one that it stands in.
 
-use super::{
-    POINT_ENDS, Segment, bounds, end, holds, holds_within, hull_from_above, middle, quantile, top_m,
-};
-use crate::round::sector;
+use super::{POINT_ENDS, Segment, bounds, end, hull_from_above, middle, quantile, top_m};
+use crate::round::{distance, sector};
 use nalgebra::Point3;
 use rayon::prelude::*;
-use std::cell::OnceCell;
+use std::sync::OnceLock;
 
 /// How high the bottom of a vessel or of an open carton is in which something stands, metres, and its spread. From: chosen.
 const BOTTOM_M: (f64, f64) = (0.005, 0.006);
@@ -29,11 +27,11 @@ pub(super) fn on(parts: &mut [Segment]) -> Vec<f64> {
     const WALL_M: f64 = 0.02;
     let of = |part: &Segment| (top_m(part), bounds(&part.points));
     let (tops, boxes): (Vec<f64>, Vec<_>) = parts.par_iter().with_max_len(1).map(of).unzip();
-    let hulls: Vec<OnceCell<_>> = parts.iter().map(|_| OnceCell::new()).collect();
-    let hull = |part: usize| hulls[part].get_or_init(|| hull_from_above(&parts[part].points));
+    let hulls: Vec<OnceLock<Hull>> = parts.iter().map(|_| OnceLock::new()).collect();
+    let hull = |part: usize| hulls[part].get_or_init(|| Hull::of(&parts[part].points));
     let is_over = |other: usize, place: [f64; 2]| {
         let (low, high) = &boxes[other];
-        (0..2).all(|k| place[k] > low[k] && place[k] < high[k]) && holds(hull(other), place)
+        (0..2).all(|k| place[k] > low[k] && place[k] < high[k]) && hull(other).within_m(place) >= 0.0
     };
     let base = |(i, part): (usize, &Segment)| {
         let heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
@@ -47,7 +45,7 @@ pub(super) fn on(parts: &mut [Segment]) -> Vec<f64> {
         }
         let is_around = |&other: &usize| {
             is_wider(&boxes[other], &boxes[i])
-                && holds_within(hull(other), place, -WALL_M)
+                && hull(other).within_m(place) >= WALL_M
                 && directions(parts[other].points.iter(), place) >= AROUND
         };
         if below.iter().any(is_around) {
@@ -57,7 +55,7 @@ pub(super) fn on(parts: &mut [Segment]) -> Vec<f64> {
         let rims = below.iter().map(|&other| tops[other]).filter(|top| low > CUT_M && *top < low + MEETS_M);
         (rims.max_by(f64::total_cmp).unwrap_or(0.0), 0.0)
     };
-    let bases: Vec<(f64, f64)> = parts.iter().enumerate().map(base).collect();
+    let bases: Vec<(f64, f64)> = parts.par_iter().with_max_len(1).enumerate().map(base).collect();
     for (part, base) in parts.iter_mut().zip(bases) {
         (part.base_m, part.base_sigma_m) = base;
     }
@@ -67,7 +65,7 @@ pub(super) fn on(parts: &mut [Segment]) -> Vec<f64> {
 /// How high another thing bears a part, metres: its top is seen around the part's foot, or its side below. None if it does not.
 fn borne_at_m(
     part: &Segment,
-    hull: &[[f64; 2]],
+    hull: &Hull,
     (place, low): ([f64; 2], f64),
     other: &[Point3<f64>],
 ) -> Option<f64> {
@@ -78,16 +76,39 @@ fn borne_at_m(
     /// Share of them that lie lower than the top. From: chosen.
     const TOP: f64 = 0.8;
     let is_beside = |p: &&Point3<f64>| {
-        let at = [p.x, p.y];
-        (p.z - low).abs() < MEETS_M
-            && holds_within(hull, at, BESIDE_M.0)
-            && !holds_within(hull, at, -BESIDE_M.1)
+        (p.z - low).abs() < MEETS_M && (-BESIDE_M.0..BESIDE_M.1).contains(&hull.within_m([p.x, p.y]))
     };
     let beside: Vec<&Point3<f64>> = other.iter().filter(is_beside).collect();
     let bears = beside.len() >= SEEN.0.max(part.points.len() / SEEN.1)
         && directions(beside.iter().copied(), place) >= BEARS;
     let mut heights: Vec<f64> = beside.iter().map(|p| p.z).collect();
     bears.then(|| quantile(&mut heights, TOP))
+}
+
+/// The convex outline of points seen from above.
+struct Hull {
+    /// Unit vectors across the edges, inwards, and how far along them each edge lies, metres.
+    edges: Vec<([f64; 2], f64)>,
+}
+
+impl Hull {
+    fn of(points: &[Point3<f64>]) -> Hull {
+        let corners = hull_from_above(points);
+        let ends = corners.iter().zip(corners.iter().cycle().skip(1));
+        let edge = |(a, b): (&[f64; 2], &[f64; 2])| {
+            let (x, y) = (b[0] - a[0], b[1] - a[1]);
+            let inwards = [-y / distance(x, y), x / distance(x, y)];
+            (inwards, inwards[0] * a[0] + inwards[1] * a[1])
+        };
+        // What is no area holds nothing.
+        Hull { edges: if corners.len() < 3 { Vec::new() } else { ends.map(edge).collect() } }
+    }
+
+    /// How far within the outline a place lies, metres: less than 0 outside.
+    fn within_m(&self, [x, y]: [f64; 2]) -> f64 {
+        let each = self.edges.iter().map(|([a, b], at)| a * x + b * y - at);
+        each.reduce(f64::min).unwrap_or(f64::NEG_INFINITY)
+    }
 }
 
 /// True if a box is wider than another both ways.

@@ -118,6 +118,8 @@ fn union(a: &Segment, b: &Segment) -> Segment {
 fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
     /// By so much the share of one part may be smaller that lies on a body of both. From: chosen.
     const LESS: f64 = 0.1;
+    /// Points of both that tell a body. From: work.
+    const ENOUGH: usize = 2000;
     if small.segment.indices.len() < FEWEST {
         return false;
     }
@@ -135,9 +137,11 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
     if in_one_place(large, small, viewpoints) {
         return true;
     }
-    let both = union(&large.segment, &small.segment);
+    let parts = [large, small].map(|part| &part.segment.points);
+    let stride = parts.iter().map(|points| points.len()).sum::<usize>().div_ceil(ENOUGH).max(1);
+    let both: Vec<Point3<f64>> = parts.into_iter().flat_map(|points| points.iter().step_by(stride)).copied().collect();
     let top = large.top_m.max(small.top_m);
-    round_body(&both.points, large.low.z.min(small.low.z), top, viewpoints).is_some_and(|body| {
+    round_body(&both, large.low.z.min(small.low.z), top, viewpoints).is_some_and(|body| {
         // Each part on its own must keep to the common body: one alone may carry the fit.
         [large, small].iter().all(|part| share_on(&body, &part.segment) >= ON_BODY - LESS)
     }) || one_rim([large, small], viewpoints)

@@ -5,6 +5,7 @@ use super::hull::{area, convex_hull, parts};
 use super::planes::{Plane, Sample};
 use super::tiles::Tiles;
 use super::{Surface, range_sigma_m};
+use crate::camera::Intrinsics;
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
@@ -31,7 +32,7 @@ pub(super) enum Owner {
     /// The plane is not taken to reach on here.
     Nobody,
     /// The part of this number.
-    Part(usize),
+    Part(u32),
 }
 
 /// The owners of the cells of a plane.
@@ -52,6 +53,8 @@ struct Above<'a> {
     /// The corner of the cell at zero, and one cell on in x and in y, as seen from the camera, metres.
     origin: Vector3<f64>,
     steps: [Vector3<f64>; 2],
+    /// How long the longest ray of the image is for one metre of depth.
+    longest: f64,
 }
 
 impl<'a> Hiding<'a> {
@@ -65,6 +68,7 @@ impl<'a> Hiding<'a> {
                 high_m: plane.distance(&map.viewpoint()),
                 origin: camera_from_flat.translation.vector,
                 steps: [step(Vector3::x()), step(Vector3::y())],
+                longest: longest_ray(&map.intrinsics),
             }
         });
         let cameras = above.filter(|camera| camera.high_m > 0.0).collect();
@@ -112,7 +116,7 @@ impl<'a> Hiding<'a> {
 
     /// Gives the hidden cells around those that are owned to their owners, ring by ring, those that no camera had in view as well if told so;
     /// tells which owners meet.
-    pub fn spread(&self, owners: &mut Owners, mut border: Vec<[i32; 2]>, unseen: bool) -> Vec<[usize; 2]> {
+    pub fn spread(&self, owners: &mut Owners, mut border: Vec<[i32; 2]>, unseen: bool) -> Vec<[u32; 2]> {
         let mut meeting = Vec::new();
         for _ in 0..self.rings {
             self.ask(owners, &mut border, unseen);
@@ -148,12 +152,21 @@ impl Above<'_> {
     fn above(&self, [x, y]: [f64; 2]) -> Option<bool> {
         let q = self.origin + self.steps[0] * x + self.steps[1] * y;
         let (u, v) = self.map.intrinsics.project(&q.into())?;
-        let share = f64::from(self.map.depths_m[self.map.intrinsics.pixel(u, v)?]) / q.z;
+        let depth_m = f64::from(self.map.depths_m[self.map.intrinsics.pixel(u, v)?]);
+        let share = depth_m / q.z;
         let above_m = self.high_m * (1.0 - share);
-        // Where nothing returns it is not a number.
-        let is_off = above_m.abs() > Plane::band_of(range_sigma_m(share * q.norm()));
+        let is_beyond = |range_m: f64| above_m.abs() > Plane::band_of(range_sigma_m(range_m));
+        // Where nothing returns it is not a number. What is off as if the ray were the longest, or not even as if it were the shortest,
+        // needs no length.
+        let is_off = is_beyond(depth_m) && (is_beyond(depth_m * self.longest) || is_beyond(share * q.norm()));
         is_off.then_some(above_m > 0.0)
     }
+}
+
+fn longest_ray(camera: &Intrinsics) -> f64 {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+    let far = corners.map(|[x, y]| camera.unproject(x * camera.width as f64, y * camera.height as f64, 1.0));
+    far.iter().map(|p| p.coords.norm()).fold(1.0, f64::max)
 }
 
 impl Surface {

@@ -68,7 +68,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
     let mut members: Vec<Vec<&Sample>> = vec![Vec::new(); parts.len()];
     for (cell, s) in held {
         if let Owner::Part(part) = part_of.get(cell) {
-            members[part].push(s);
+            members[part as usize].push(s);
         }
     }
     let scale = (cloud.len() as f64 / samples.len().max(1) as f64).max(1.0);
@@ -94,7 +94,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
 fn owners(parts: &[Vec<[i32; 2]>]) -> Owners {
     let mut owners = Owners::new();
     let all = parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, n)));
-    all.for_each(|(cell, n)| *owners.at(cell) = Owner::Part(n));
+    all.for_each(|(cell, n)| *owners.at(cell) = Owner::Part(n as u32));
     owners
 }
 
@@ -106,7 +106,7 @@ fn joined(parts: Vec<Vec<[i32; 2]>>, hiding: &Hiding) -> Vec<Vec<[i32; 2]>> {
     };
     let mut of: Vec<usize> = (0..parts.len()).collect();
     for [a, b] in meeting {
-        let (a, b) = (of[a], of[b]);
+        let (a, b) = (of[a as usize], of[b as usize]);
         of.iter_mut().filter(|part| **part == a.max(b)).for_each(|part| *part = a.min(b));
     }
     let mut whole = vec![Vec::new(); parts.len()];

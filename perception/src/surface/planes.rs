@@ -89,8 +89,10 @@ pub(super) fn large_planes(
         let Some(plane) = propose(&left, &cubes, &mut rng, &plausible) else { break };
         let Some(plane) = refine(plane, &left) else { break };
         let before = left.len();
-        cubes.keep(left.iter().map(|s| !plane.holds(s)));
-        left.retain(|s| !plane.holds(s));
+        let kept: Vec<bool> = left.iter().map(|s| !plane.holds(s)).collect();
+        cubes.keep(kept.iter().copied());
+        let mut kept = kept.into_iter();
+        left.retain(|_| kept.next().unwrap_or(false));
         if before - left.len() < FEWEST {
             break;
         }
@@ -248,9 +250,14 @@ fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
     /// Spreads of a measurement, one a step, and a distance, metres. From: chosen.
     const BANDS: [f64; 4] = [4.0, 3.0, 2.5, 2.5];
     const BESIDE_M: f64 = 0.003;
+    /// What is so many times as far off at first is never near. From: chosen.
+    const EVER: f64 = 3.0;
+    let is_near = |plane: &Plane, s: &Sample, band: f64, times: f64| {
+        plane.distance(&s.point).abs() < times * (band * s.sigma_m + BESIDE_M)
+    };
+    let around: Vec<Sample> = samples.iter().filter(|s| is_near(&plane, s, BANDS[0], EVER)).copied().collect();
     for band in BANDS {
-        let near = samples.iter().filter(|s| plane.distance(&s.point).abs() < band * s.sigma_m + BESIDE_M);
-        plane = least_squares(near, &plane.normal)?;
+        plane = least_squares(around.iter().filter(|s| is_near(&plane, s, band, 1.0)), &plane.normal)?;
     }
     Some(plane)
 }

@@ -11,9 +11,8 @@ use std::ops::Range;
 
 /// Radii that are tried, metres. From: chosen.
 const RADII_M: (f64, f64) = (0.012, 0.20);
-/// Circles proposed, at the most; no more than leave this chance that none goes through three points of the side. From: chosen.
+/// Circles proposed. From: chosen.
 const PROPOSALS: usize = 120;
-const MISSED: f64 = 1e-3;
 /// Points that judge a proposal, at the most. From: chosen.
 const JUDGES: usize = 160;
 /// Points that all steps of a fit but the last go by, at the most. From: chosen.
@@ -233,23 +232,14 @@ fn propose(side: &Side, tolerance: f64, seed: u64) -> Option<[f64; 3]> {
     let mut rng = Draws::new(seed);
     let judges = side.judges(JUDGES);
     let mut best: Option<(f32, [f64; 3])> = None;
-    let mut enough = PROPOSALS;
-    for proposed in 0..PROPOSALS {
-        if proposed >= enough {
-            break;
-        }
+    for _ in 0..PROPOSALS {
         let mut pick = || side.place(rng.below(side.len()));
         let Some(circle) = circumcircle(pick(), pick(), pick()) else { continue };
         if circle[2] < RADII_M.0 || circle[2] > RADII_M.1 {
             continue;
         }
         let beaten = best.map_or(f32::NEG_INFINITY, |(score, _)| score);
-        if let Some(score) = judges.score(circle, tolerance, beaten) {
-            best = Some((score, circle));
-            // What speaks for it is less than the share of the points that lie on it (Fischler and Bolles 1981).
-            let on = (f64::from(score) / judges.len() as f64).clamp(0.0, 1.0);
-            enough = (MISSED.ln() / (1.0 - on.powi(3)).ln()).ceil() as usize;
-        }
+        best = judges.score(circle, tolerance, beaten).map(|score| (score, circle)).or(best);
     }
     best.map(|(_, circle)| circle)
 }

@@ -121,10 +121,6 @@ impl Side {
 }
 
 impl Judges {
-    pub fn len(&self) -> usize {
-        self.x.len()
-    }
-
     /// How well a circle explains the points, seen from above; `None` if not better than `best`.
     pub fn score(&self, circle: [f64; 3], tolerance: f64, best: f32) -> Option<f32> {
         /// What a point inside of the circle says against it: less than one outside, a half. From: chosen.

@@ -28,7 +28,7 @@ impl Rectangle {
 const TURNS: usize = 30;
 const APART: usize = 3;
 /// Points that are looked at, at the most.
-const MOST: usize = 600;
+const MOST: usize = 1200;
 /// Points that are looked at together.
 const BLOCK: usize = 16;
 

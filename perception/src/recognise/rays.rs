@@ -125,12 +125,7 @@ fn cell(p: &Point3<f64>) -> [i32; 2] {
 }
 
 impl ViewRays {
-    fn of(
-        lying: &Lying,
-        sensor: &Sensor,
-        around: &Around,
-        other: &FxHashSet<[i32; 2]>,
-    ) -> Option<ViewRays> {
+    fn of(lying: &Lying, sensor: &Sensor, around: &Around, other: &FxHashSet<[i32; 2]>) -> Option<ViewRays> {
         let camera = &lying.map.intrinsics;
         let surface_from_camera = lying.surface_from_camera;
         let [columns, rows] = window(lying, &surface_from_camera.inverse(), around)?;

@@ -93,11 +93,7 @@ struct Side {
 }
 
 impl Side {
-    fn of<'p>(
-        points: impl Iterator<Item = &'p Point3<f64>>,
-        view: &Lying<'_>,
-        round: &Round,
-    ) -> Side {
+    fn of<'p>(points: impl Iterator<Item = &'p Point3<f64>>, view: &Lying<'_>, round: &Round) -> Side {
         let near = |p: &&Point3<f64>| round.outside_m(p).abs() < GATES_M[0] + SHIFT_M;
         let mut points: Vec<Point3<f64>> = points.filter(near).copied().collect();
         let step = points.len().div_ceil(ENOUGH).max(1);

@@ -217,7 +217,8 @@ impl Found {
 /// The best round body about an axis along the surface.
 fn fit(segment: &Segment, bounds: &Rectangle, sigma_m: f64) -> Option<Found> {
     let points = &segment.points;
-    let few: Vec<Point3<f64>> = points.iter().step_by(points.len().div_ceil(SCOUTS).max(1)).copied().collect();
+    let few: Vec<Point3<f64>> =
+        points.iter().step_by(points.len().div_ceil(SCOUTS).max(1)).copied().collect();
     let sides = [0.0, std::f64::consts::FRAC_PI_2];
     let angle = bounds.turn.0.atan2(bounds.turn.1);
     let angles = sides.into_iter().flat_map(|side| TURNS.map(|by| angle + side + by));

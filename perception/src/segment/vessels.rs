@@ -139,7 +139,8 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
     }
     let parts = [large, small].map(|part| &part.segment.points);
     let stride = parts.iter().map(|points| points.len()).sum::<usize>().div_ceil(ENOUGH).max(1);
-    let both: Vec<Point3<f64>> = parts.into_iter().flat_map(|points| points.iter().step_by(stride)).copied().collect();
+    let both: Vec<Point3<f64>> =
+        parts.into_iter().flat_map(|points| points.iter().step_by(stride)).copied().collect();
     let top = large.top_m.max(small.top_m);
     round_body(&both, large.low.z.min(small.low.z), top, viewpoints).is_some_and(|body| {
         // Each part on its own must keep to the common body: one alone may carry the fit.

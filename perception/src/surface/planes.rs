@@ -14,8 +14,9 @@ const PROPOSALS: usize = 240;
 const ROUNDS: usize = 6;
 /// Proposals go through points of one cube of this side, metres. From: chosen.
 const REACH_M: f64 = 0.3;
-/// Points that judge a proposal, at the most, and after how many of them it may be left. From: chosen; work.
-const JUDGES: usize = 1500;
+/// Points that judge a proposal, at the most. From: chosen.
+const JUDGES: usize = 2400;
+/// Judges after which a proposal may be left. From: work.
 const BLOCK: usize = 128;
 
 /// A measurement of a plane lies within this many spreads of its own and this distance of it, metres. From: chosen.
@@ -173,7 +174,8 @@ impl Judges {
         /// Spreads of a judge, beside the distance that a measurement may have, up to which it speaks for a plane. From: chosen.
         const SPREADS: f64 = 2.0;
         let judges = || samples.iter().step_by(samples.len().div_ceil(JUDGES).max(1));
-        let (count, origin) = (judges().count(), samples.first().map_or_else(Vector3::zeros, |s| s.point.coords));
+        let (count, origin) =
+            (judges().count(), samples.first().map_or_else(Vector3::zeros, |s| s.point.coords));
         let column = |of: &dyn Fn(&Sample) -> f64| {
             let mut column: Vec<f32> = judges().map(|s| of(s) as f32).collect();
             column.resize(count.next_multiple_of(BLOCK), f32::NAN);
@@ -255,7 +257,8 @@ fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
     let is_near = |plane: &Plane, s: &Sample, band: f64, times: f64| {
         plane.distance(&s.point).abs() < times * (band * s.sigma_m + BESIDE_M)
     };
-    let around: Vec<Sample> = samples.iter().filter(|s| is_near(&plane, s, BANDS[0], EVER)).copied().collect();
+    let around: Vec<Sample> =
+        samples.iter().filter(|s| is_near(&plane, s, BANDS[0], EVER)).copied().collect();
     for band in BANDS {
         plane = least_squares(around.iter().filter(|s| is_near(&plane, s, band, 1.0)), &plane.normal)?;
     }

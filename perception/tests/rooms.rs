@@ -352,6 +352,16 @@ fn a_few_outlooks_show_what_can_be_seen() {
     let reach = Reach::over(&floor, &truths[3], &standable(&floor, options.radius_m), &options);
     let found = outlooks(&floor, &reach, &truths[..4], &[], 6, &options);
     assert!(!found.is_empty() && found.len() <= 6);
+    // Nobody looks twice from the same place with the same heading, whatever that has left unknown.
+    let taken = vec![found[0].pose];
+    let after = outlooks(&floor, &reach, &taken, &taken, 6, &options);
+    assert!(
+        !after.is_empty()
+            && after.iter().all(|look| {
+                let off = taken[0].inv_mul(&look.pose);
+                off.translation.vector.norm() >= 0.3 || off.rotation.angle().abs() > 0.25
+            })
+    );
     let mut unseen = Unseen::default();
     for look in &found {
         let gain_m2 = unseen.gain_m2(look);

@@ -50,7 +50,7 @@ const COMPARED: usize = 240;
 /// Poses, no more than `most`, that together show most of what can be seen of the unknown floor: first those to keep as far as they still promise
 /// anything, then each time the one that promises most beyond those before it for its cost.
 ///
-/// `looked`: the poses looked from so far.
+/// `looked`: the poses looked from so far; none is looked from twice.
 pub fn outlooks(
     grid: &Occupancy,
     reach: &Reach,
@@ -72,7 +72,8 @@ pub fn outlooks(
             chosen.push(look);
         }
     }
-    let found = next_within(grid, reach, looked, options);
+    let mut found = next_within(grid, reach, looked, options);
+    found.retain(|next| !was_looked_from(&next.pose, looked));
     // Those that promise most for their cost, and some of all the others.
     let every = found.len().div_ceil(COMPARED).max(1);
     let compared = found.iter().take(COMPARED).chain(found.iter().skip(COMPARED).step_by(every));

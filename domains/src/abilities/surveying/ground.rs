@@ -272,13 +272,17 @@ mod tests {
             let [from, to] = [at(0.15, 0.25), at(1.85, 0.26)].map(|p| map_from_chart * p);
             let mut ground = Ground { driven: vec![[from, to]], barred: Vec::new() };
             let open = ground.open(&mut floor, ROOM_M, &map_from_chart);
-            let along = |x: usize| square(&floor, &at(0.1 * x as f64 + 0.05, 0.25)).unwrap();
-            assert!((1..19).all(|x| open.stand[along(x)]), "{map_from_chart}");
+            let squares: Vec<usize> =
+                (0..20).map(|x| square(&floor, &at(0.1 * f64::from(x) + 0.05, 0.25)).unwrap()).collect();
+            assert!(squares[1..19].iter().all(|&n| open.stand[n]), "{map_from_chart}");
             assert!(floor.cells[noise] == Space::Free && open.pass == open.shown);
             ground.barred.push(map_from_chart * at(1.05, 0.25));
             let barred = ground.open(&mut floor, ROOM_M, &map_from_chart);
             assert!(
-                !barred.stand[noise] && !barred.pass[noise] && barred.shown[noise] && barred.stand[along(3)]
+                !barred.stand[noise]
+                    && !barred.pass[noise]
+                    && barred.shown[noise]
+                    && barred.stand[squares[3]]
             );
         }
     }

@@ -440,19 +440,20 @@ impl<'a> Agent<'a> {
     ) -> Result<(), CommandError> {
         self.check_stopped()?;
         (self.plan, self.failed) = (None, Some(call.to_string()));
-        let therefore = world.learn_from_failure(round, call, part, failure)?;
+        let is_final = |body: &descry_robots::Failure| {
+            matches!(body, descry_robots::Failure::Broken { .. } | descry_robots::Failure::Cancelled { .. })
+        };
         if let SkillFailure::Body(body) = failure
-            && matches!(
-                body,
-                descry_robots::Failure::Broken { .. } | descry_robots::Failure::Cancelled { .. }
-            )
+            && is_final(body)
         {
+            world.learn_from_failure(round, call, part, failure)?;
             return Err(CommandError::broken(body));
         }
-        self.say(&Event::Failed { call: call.to_string(), because: failure.to_string(), therefore })?;
         let here = self.robot.pose().await.map_err(CommandError::broken)?;
         world.stands_at(&here);
-        Ok(())
+        let therefore = world.learn_from_failure(round, call, part, failure)?;
+        self.say(&Event::Failed { call: call.to_string(), because: failure.to_string(), therefore })
+            .map(|_| ())
     }
 
     /// Ends the run where somebody wants it to stop: the body stands by now, and nothing more is asked of it.

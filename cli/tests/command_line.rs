@@ -399,7 +399,7 @@ fn the_points_of_what_was_learned_are_written() {
     let read = read_cloud(&std::fs::read(&file).expect("it was written")).expect("it is a cloud");
     assert_eq!(read.cloud.points, points);
     check(&["name", &store, "thing 2", "--points", &written], 2, &["nothing that was learned is called"]);
-    check(&["name", &store, "thing 1"], 2, &["--points <FILE>"]);
+    check(&["name", &store, "thing 1"], 0, &["thing 1"]);
     check(&["name", &store, "--points", &written], 2, &["OLD"]);
 }
 

@@ -203,9 +203,12 @@ fn a_room_is_mapped_and_all_of_a_kind_are_found_in_it() {
 }
 
 #[test]
-#[ignore = "two rooms, half a minute"]
+#[ignore = "two rooms, two minutes"]
 fn two_rooms_are_mapped_and_the_cup_is_found_in_one_run() {
     let folder = tempfile::tempdir().unwrap();
     let goal = "map the room and find cup A";
-    check_found(&run(goal, "default", 4, folder.path(), None).0, goal);
+    // In the second a drive meets a corner of the passage, in the third the body stands in a corner that its map then closes.
+    for seed in [4, 3, 133_309] {
+        check_found(&run(goal, "default", seed, folder.path(), None).0, goal);
+    }
 }

@@ -297,6 +297,9 @@ impl Asker<'_> {
             let text = format!("no plan was found that brings about {}", self.goal.pddl);
             return (Verdict::CannotTell, format!("{text}{says}"));
         }
+        if let Some(no) = self.no_of_things() {
+            return no;
+        }
         (Verdict::Impossible, self.impossible(&says))
     }
 

@@ -2,7 +2,7 @@
 
 use descry_perception::laser::KnownShape;
 use descry_perception::mapping::{Level, Survey};
-use descry_perception::nalgebra::Isometry2;
+use descry_perception::nalgebra::{Isometry2, Point2};
 use serde::{Deserialize, Serialize};
 
 use crate::Meta;
@@ -39,6 +39,12 @@ pub struct Surveyed {
     pub believed: Vec<Isometry2<f64>>,
     /// Level surfaces to put things on, by the names that they were given.
     pub surfaces: Vec<(String, Level)>,
+    /// Straight lines that it has driven, and places where it does not fit though the map shows nothing there: in its own map.
+    #[serde(default)]
+    pub driven: Vec<[Point2<f64>; 2]>,
+    /// See above.
+    #[serde(default)]
+    pub barred: Vec<Point2<f64>>,
 }
 
 /// What is remembered of all earlier runs.

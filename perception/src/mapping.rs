@@ -27,7 +27,7 @@ pub use cells::{Cells, CellsError, Facet, NormalOptions, by_regions};
 pub use closure::{Closure, ClosureOptions, closures, correct_drive, relocate};
 pub use cylinder::{CylinderOptions, UprightCylinder};
 pub use error::MappingError;
-pub use frontier::{ExploreOptions, Frontier, NextPose, frontiers, next_poses, standable};
+pub use frontier::{ExploreOptions, Frontier, NextPose, Reach, frontiers, next_poses, standable};
 pub use fuse::FuseOptions;
 pub use graph::{Edge, GraphError, PoseGraph, Settled};
 pub use orientation::{OrientationOptions, Orientations, orientations};

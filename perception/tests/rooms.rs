@@ -6,8 +6,8 @@ use crate::tabletop::Draws;
 use corridor::measure::{BODY_M, MAP_FAR_M, score, score_pillars, survey};
 use descry_perception::mapping::{
     Cells, CellsError, ClosureOptions, ExploreOptions, FieldOfView, Fit, MapOptions, MappingError, Matcher,
-    NormalOptions, PairFit, RectifyOptions, RoomMap, Station, Survey, Unseen, by_regions, chained, closures,
-    correct_drive, nearest_frontier, next_poses, outlooks, rectify_drive, rectify_pair, standable,
+    NormalOptions, PairFit, Reach, RectifyOptions, RoomMap, Station, Survey, Unseen, by_regions, chained,
+    closures, correct_drive, nearest_frontier, next_poses, outlooks, rectify_drive, rectify_pair, standable,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, Point3, Vector2, Vector3};
 use descry_perception::occupancy::Space;
@@ -349,8 +349,19 @@ fn a_few_outlooks_show_what_can_be_seen() {
     let map = seen().map(&MapOptions::default()).unwrap();
     let floor = map.floor(&truths[..1], 0.35, 1.6).unwrap();
     let options = ExploreOptions { field: field_of_view(), ..ExploreOptions::default() };
-    let found = outlooks(&floor, &truths[..4], &[], 6, &options);
+    let reach = Reach::over(&floor, &truths[3], &standable(&floor, options.radius_m), &options);
+    let found = outlooks(&floor, &reach, &truths[..4], &[], 6, &options);
     assert!(!found.is_empty() && found.len() <= 6);
+    // Nobody looks twice from the same place with the same heading, whatever that has left unknown.
+    let taken = vec![found[0].pose];
+    let after = outlooks(&floor, &reach, &taken, &taken, 6, &options);
+    assert!(
+        !after.is_empty()
+            && after.iter().all(|look| {
+                let off = taken[0].inv_mul(&look.pose);
+                off.translation.vector.norm() >= 0.3 || off.rotation.angle().abs() > 0.25
+            })
+    );
     let mut unseen = Unseen::default();
     for look in &found {
         let gain_m2 = unseen.gain_m2(look);
@@ -359,7 +370,7 @@ fn a_few_outlooks_show_what_can_be_seen() {
         assert!(unseen.gain_m2(look) < 0.9 * gain_m2);
     }
     let keep: Vec<Isometry2<f64>> = found.iter().rev().take(2).map(|look| look.pose).collect();
-    let again = outlooks(&floor, &truths[..4], &keep, 6, &options);
+    let again = outlooks(&floor, &reach, &truths[..4], &keep, 6, &options);
     assert!(keep.iter().zip(&again).all(|(pose, look)| *pose == look.pose));
     let next = nearest_frontier(&floor, &truths[..4], &options).unwrap();
     assert!(next.way_m.is_finite());

@@ -18,8 +18,7 @@ use descry_agent::keeping::{Address, is_address};
 pub struct Arguments {
     /// Where runs keep what they remember: a folder, or mongodb://HOST/DATABASE
     store: PathBuf,
-    /// What it is called, such as "thing 1"; left out: all that was learned is listed
-    #[arg(requires = "deed")]
+    /// What it is called, such as "thing 1": by itself, it is described; left out, all that was learned is
     old: Option<String>,
     /// What it is to be called, such as "the thing from Tuesday"
     #[arg(group = "deed")]
@@ -49,7 +48,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         std::fs::write(file, points)
             .map_err(|e| CommandError::BadInput(format!("--points {}: {e}", file.display())))?;
     }
-    let all: Vec<Value> = remembered.things.iter().map(|t| described(t, now_unix_s)).collect();
+    // A thing that was just named is shown among the others.
+    let shown: Vec<&LearnedThing> = match (&arguments.old, &arguments.new) {
+        (Some(old), None) => vec![find(&remembered, old)?],
+        _ => remembered.things.iter().collect(),
+    };
+    let all: Vec<Value> = shown.iter().map(|t| described(t, now_unix_s)).collect();
     if arguments.json {
         input::print_json(&json!({ "things": all }))?;
         return Ok(Exit::Done);
@@ -57,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     if all.is_empty() {
         input::narrate("nothing was learned yet; `descry do \"learn what is new\" --domain learning` does");
     }
-    remembered.things.iter().try_for_each(|thing| input::print_text(&line(thing, now_unix_s)))?;
+    shown.iter().try_for_each(|thing| input::print_text(&line(thing, now_unix_s)))?;
     Ok(Exit::Done)
 }
 

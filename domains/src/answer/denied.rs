@@ -2,7 +2,7 @@
 
 use descry_memory::belief::Track;
 
-use super::Asker;
+use super::{Asker, Verdict};
 use crate::abilities::searching::reasons;
 use crate::asked::Denied;
 use crate::lexicon::plural;
@@ -93,6 +93,31 @@ impl Asker<'_> {
                 let why = why(on).unwrap_or_else(|| "not all on it is identified".into());
                 format!("it cannot be told what stands on the {surface}: {why}")
             }
+        })
+    }
+
+    /// That a question about things has the answer no: it is known where they stand, and it is not so, unless another of the same stands elsewhere;
+    /// none if it is another question.
+    pub(super) fn no_of_things(&self) -> Option<(Verdict, String)> {
+        let (s, said) = (self.s, self.surely().join("; "));
+        let is_of_things = self.goal.question && !self.goal.asked.more && self.own().next().is_some();
+        if !is_of_things {
+            return None;
+        }
+        let may_be = |&(what, on): &(usize, usize)| {
+            let is_known = s.presence(what, on) >= s.threshold;
+            !is_known && chance_on(s, what, on) > s.thresholds.not_there
+        };
+        let mut places = self.own().flat_map(|(what, _)| (0..s.surfaces.len()).map(move |on| (what, on)));
+        Some(match places.find(may_be) {
+            Some((what, on)) => {
+                let (thing, surface) = (&s.things[what].name, &s.surfaces[on].name);
+                let chance = chance_on(s, what, on);
+                let left =
+                    format!("a chance of {chance:.2} is left that there is another {thing} on the {surface}");
+                (Verdict::CannotTell, format!("{said}; it cannot be told more, {left}; {}", self.looks()))
+            }
+            None => (Verdict::NotFound, format!("{said}; so it does not hold that {}", self.goal.pddl)),
         })
     }
 

@@ -151,9 +151,9 @@ impl<'a> Floor<'a> {
     }
 
     /// Length of the shortest way to each square over squares where the body may be, metres; infinite where there is none.
-    pub(super) fn ways_m(&self, from: &Point2<f64>, radius_m: f64) -> Vec<f64> {
-        let free = self.standable(radius_m);
-        let mut ways = vec![f64::INFINITY; free.len()];
+    pub(super) fn ways_m(&self, from: &Point2<f64>, stand: &[bool], radius_m: f64) -> Vec<f64> {
+        let may_stand = |index: usize| stand.get(index).copied().unwrap_or(false);
+        let mut ways = vec![f64::INFINITY; (self.width * self.height) as usize];
         // The body stands where it stands, however near to something.
         let start = self.square(from);
         let slack = (radius_m / self.grid.cell_m).ceil() as i64 + 1;
@@ -177,7 +177,7 @@ impl<'a> Floor<'a> {
                 }
                 let index = self.index(next);
                 let there = way + length * self.grid.cell_m;
-                if (free[index] || near(next)) && there < ways[index] {
+                if (may_stand(index) || near(next)) && there < ways[index] {
                     ways[index] = there;
                     open.push(Reverse((there.to_bits(), next)));
                 }
@@ -261,6 +261,24 @@ pub fn standable(grid: &Occupancy, radius_m: f64) -> Vec<bool> {
     Floor::of(grid, 0.0).standable(radius_m)
 }
 
+/// Where a body stands, and what of the floor it can get to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reach {
+    /// Where it stands.
+    pub from: Isometry2<f64>,
+    /// Length of the shortest way to each square of the grid, metres; infinite where there is none.
+    pub ways_m: Vec<f64>,
+}
+
+impl Reach {
+    /// Over the squares on which the middle of the body may be: those of [`standable`], and what else is known of them.
+    pub fn over(grid: &Occupancy, from: &Isometry2<f64>, stand: &[bool], options: &ExploreOptions) -> Reach {
+        let start = Point2::from(from.translation.vector);
+        let ways_m = Floor::of(grid, options.field.far_m).ways_m(&start, stand, options.radius_m);
+        Reach { from: *from, ways_m }
+    }
+}
+
 /// Frontiers of a grid, the longest first.
 pub fn frontiers(grid: &Occupancy, options: &ExploreOptions) -> Vec<Frontier> {
     let floor = Floor::of(grid, options.field.far_m);
@@ -299,15 +317,24 @@ pub fn frontiers(grid: &Occupancy, options: &ExploreOptions) -> Vec<Frontier> {
 ///
 /// `looked`: the poses looked from so far; the body stands at the last. What they should have shown and did not is expected less.
 pub fn next_poses(grid: &Occupancy, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<NextPose> {
-    let _span = tracing::debug_span!("next poses", squares = grid.cells.len()).entered();
     let Some(from) = looked.last() else { return Vec::new() };
-    let floor = Floor::of(grid, options.field.far_m);
-    let start = Point2::from(from.translation.vector);
-    let ways = floor.ways_m(&start, options.radius_m);
+    next_within(grid, &Reach::over(grid, from, &standable(grid, options.radius_m), options), looked, options)
+}
+
+/// The same where it is known what the body can get to.
+pub(super) fn next_within(
+    grid: &Occupancy,
+    reach: &Reach,
+    looked: &[Isometry2<f64>],
+    options: &ExploreOptions,
+) -> Vec<NextPose> {
+    let _span = tracing::debug_span!("next poses", squares = grid.cells.len()).entered();
+    let (floor, from) = (Floor::of(grid, options.field.far_m), &reach.from);
+    let (start, ways) = (Point2::from(from.translation.vector), &reach.ways_m);
     let missed = floor.missed(looked, options);
     let (metre_s, radian_s, look_s) = options.seconds;
     let mut found: Vec<NextPose> = Vec::new();
-    for place in places(&floor, &ways, &start, options) {
+    for place in places(&floor, ways, &start, options) {
         let square = floor.square(&place);
         let way_m = if place == start { 0.0 } else { ways[floor.index(square)] };
         let gains = floor.gains_m2(&place, &missed, options);
@@ -330,6 +357,15 @@ pub fn next_poses(grid: &Occupancy, looked: &[Isometry2<f64>], options: &Explore
     found
 }
 
+/// True if a look was taken from there: what that one did not show, another from the same place and with the same heading does not show either.
+pub(super) fn was_looked_from(pose: &Isometry2<f64>, looked: &[Isometry2<f64>]) -> bool {
+    let (apart_m, turned_rad) = (0.5 * PLACES_M, 0.5 * TAU / HEADINGS as f64);
+    looked.iter().any(|look| {
+        (look.translation.vector - pose.translation.vector).norm() < apart_m
+            && look.rotation.angle_to(&pose.rotation).abs() < turned_rad
+    })
+}
+
 /// Where the body stands, and places around frontiers that it can reach.
 fn places(floor: &Floor, ways: &[f64], start: &Point2<f64>, options: &ExploreOptions) -> Vec<Point2<f64>> {
     let stride = (PLACES_M / floor.grid.cell_m).ceil().max(1.0) as i64;
@@ -344,8 +380,10 @@ fn places(floor: &Floor, ways: &[f64], start: &Point2<f64>, options: &ExploreOpt
         }
     }
     let inside = |s: &(i64, i64)| s.0 >= 0 && s.1 >= 0 && s.0 < floor.width && s.1 < floor.height;
-    let mut squares: Vec<(i64, i64)> =
-        squares.into_iter().filter(|s| inside(s) && ways[floor.index(*s)].is_finite()).collect();
+    let mut squares: Vec<(i64, i64)> = squares
+        .into_iter()
+        .filter(|s| inside(s) && ways.get(floor.index(*s)).is_some_and(|way| way.is_finite()))
+        .collect();
     squares.sort_unstable();
     std::iter::once(*start).chain(squares.into_iter().map(|s| floor.middle(s))).collect()
 }

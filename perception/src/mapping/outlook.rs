@@ -2,7 +2,8 @@
 //! floor would be seen. And what explorers usually do instead: go to the nearest frontier.
 
 use super::frontier::{
-    ExploreOptions, Floor, LEAST_M2, NextPose, RAYS, bearing_rad, frontiers, is_ahead, next_poses,
+    ExploreOptions, Floor, LEAST_M2, NextPose, RAYS, Reach, bearing_rad, frontiers, is_ahead, next_within,
+    standable, was_looked_from,
 };
 use crate::occupancy::{Occupancy, Space};
 use nalgebra::{Isometry2, Point2};
@@ -49,30 +50,30 @@ const COMPARED: usize = 240;
 /// Poses, no more than `most`, that together show most of what can be seen of the unknown floor: first those to keep as far as they still promise
 /// anything, then each time the one that promises most beyond those before it for its cost.
 ///
-/// `looked`: the poses looked from so far; the body stands at the last.
+/// `looked`: the poses looked from so far; none is looked from twice.
 pub fn outlooks(
     grid: &Occupancy,
+    reach: &Reach,
     looked: &[Isometry2<f64>],
     keep: &[Isometry2<f64>],
     most: usize,
     options: &ExploreOptions,
 ) -> Vec<Outlook> {
     let _span = tracing::debug_span!("outlooks", squares = grid.cells.len()).entered();
-    let Some(from) = looked.last() else { return Vec::new() };
     let floor = Floor::of(grid, options.field.far_m);
-    let ways = floor.ways_m(&Point2::from(from.translation.vector), options.radius_m);
     let missed = floor.missed(looked, options);
     let mut unseen = Unseen::default();
     let mut chosen: Vec<Outlook> = Vec::new();
-    for pose in keep {
-        let way_m = floor.way_m(&ways, &pose.translation.vector.into());
+    for pose in keep.iter().filter(|pose| !was_looked_from(pose, looked)) {
+        let way_m = floor.way_m(&reach.ways_m, &pose.translation.vector.into());
         let look = floor.outlook(pose, way_m, &missed, options);
         if way_m.is_finite() && unseen.gain_m2(&look) >= LEAST_M2 && chosen.len() < most {
             unseen.look(&look);
             chosen.push(look);
         }
     }
-    let found = next_poses(grid, looked, options);
+    let mut found = next_within(grid, reach, looked, options);
+    found.retain(|next| !was_looked_from(&next.pose, looked));
     // Those that promise most for their cost, and some of all the others.
     let every = found.len().div_ceil(COMPARED).max(1);
     let compared = found.iter().take(COMPARED).chain(found.iter().skip(COMPARED).step_by(every));
@@ -139,7 +140,7 @@ pub fn nearest_frontier(
     let from = looked.last()?;
     let floor = Floor::of(grid, options.field.far_m);
     let start = Point2::from(from.translation.vector);
-    let ways = floor.ways_m(&start, options.radius_m);
+    let ways = floor.ways_m(&start, &standable(grid, options.radius_m), options.radius_m);
     let missed = floor.missed(looked, options);
     let is_left =
         |square: &(i64, i64)| floor.unknown_beside(*square).iter().any(|&index| missed[index] > LEFT);

@@ -8,6 +8,7 @@ use descry_skills::{Circle, Move, OpenDoor, Outcome};
 
 use super::{Ability, Fact, Meaning, NOTHING_MORE, Reads, SkillWord};
 use crate::abilities::searching::perceive::Eyes;
+use crate::abilities::surveying::ground;
 use crate::mind::Mind;
 use crate::note::Note;
 use crate::situation::Situation;
@@ -64,7 +65,9 @@ pub const ABILITY: Ability = Ability {
                 _ => String::new(),
             },
             learn: driven,
-            failed: NOTHING_MORE,
+            failed: |mind, eyes, s, arguments, failure| {
+                Ok(ground::drive_failed(mind, eyes.robot, s, arguments[1], failure))
+            },
         },
         SkillWord {
             name: "open-door",
@@ -98,7 +101,9 @@ pub(super) fn driven(
     _: &mut Vec<Note>,
 ) -> Result<String, WorldError> {
     let Outcome::Driven(driven) = outcome else { return Err(WorldError::strange(outcome)) };
-    mind.known.at = situation.candidate(arguments[1]).map_err(|e| WorldError::Bug(e.to_string()))?;
+    let to = situation.candidate(arguments[1]).map_err(|e| WorldError::Bug(e.to_string()))?;
+    ground::drove(mind, situation, to);
+    mind.known.at = to;
     mind.known.has_moved();
     mind.distance_m += driven.distance_m;
     Ok(format!("drove {:.2} m in {:.1} s", driven.distance_m, driven.duration_s))

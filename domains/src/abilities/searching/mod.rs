@@ -132,7 +132,7 @@ fn push_failed(
     failure: &SkillFailure,
 ) -> Result<Option<String>, WorldError> {
     let obstacle = situation.obstacle(arguments[1]).map(|n| situation.obstacles()[n].track);
-    mind.known.stuck.extend(obstacle.ok().map(|track| (track, mind.known.at)));
+    mind.known.stuck.extend(obstacle.ok().map(|track| (track, situation.at)));
     let moved_m = match failure {
         SkillFailure::Body(descry_robots::Failure::Slipped { moved_m, .. }) => *moved_m,
         _ => 0.0,

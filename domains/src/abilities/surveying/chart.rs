@@ -6,14 +6,15 @@ use std::sync::Arc;
 use descry_memory::RecordId;
 use descry_memory::remember::Surveyed;
 use descry_perception::mapping::{
-    ExploreOptions, FieldOfView, Level, MapOptions, Outlook, RectifyOptions, RoomMap, Survey, Unseen,
-    frontiers, outlooks, standable,
+    ExploreOptions, FieldOfView, Level, MapOptions, Outlook, Reach, RectifyOptions, RoomMap, Survey, Unseen,
+    frontiers, outlooks,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, UnitComplex, Vector2, Vector3};
 use descry_perception::occupancy::{Occupancy, Space};
 use descry_robots::route::Router;
-use descry_robots::{Base, Camera, Description, Failure, OccupancyGrid, Place, Pose2, Robot, Travel};
+use descry_robots::{Camera, Description, Failure, OccupancyGrid, Place, Pose2, Robot, Travel};
 
+use super::ground::{self, Footing, Ground};
 use crate::config::Candidates;
 use crate::lexicon::symbol;
 use crate::load::Domain;
@@ -51,9 +52,15 @@ pub struct Chart {
     pub(super) map_from_chart: Isometry2<f64>,
     /// Walls, surfaces and open floor, once something was seen.
     pub(super) map: Option<Arc<RoomMap>>,
+    /// Ways on which the body keeps a margin; and those without one, which are taken where no other leads on.
     router: Option<Arc<Router>>,
+    narrow: Option<Arc<Router>>,
+    /// What drives have taught of the floor.
+    pub(super) ground: Ground,
     /// Poses from which more would be seen, by their symbols.
     pub(super) open: Vec<(String, Outlook)>,
+    /// Floor that is unknown and would be seen from where no way leads any more since drives have failed, square metres.
+    cut_off_m2: f64,
     /// Level surfaces to put things on: names, and what was seen of them.
     pub(super) surfaces: Vec<(String, Level)>,
     /// Symbols that were given to poses so far.
@@ -75,6 +82,7 @@ impl Chart {
             chart.stood.clone_from(&kept.stood);
             chart.believed.clone_from(&kept.believed);
             chart.surfaces.clone_from(&kept.surfaces);
+            chart.ground = Ground::of(kept);
             chart.read(robot.description());
         }
         chart
@@ -84,7 +92,11 @@ impl Chart {
     pub(crate) fn kept(&self) -> Option<Surveyed> {
         let survey = self.survey.clone()?;
         let (stood, believed) = (self.stood.clone(), self.believed.clone());
-        Some(Surveyed { survey, stood, believed, surfaces: self.surfaces.clone() })
+        let surfaces = self.surfaces.clone();
+        let (driven, barred) = (Vec::new(), Vec::new());
+        let mut kept = Surveyed { survey, stood, believed, surfaces, driven, barred };
+        self.ground.keep(&mut kept);
+        Some(kept)
     }
 
     /// What was seen so far.
@@ -112,11 +124,6 @@ impl Chart {
     pub(super) fn read(&mut self, body: &Description) {
         self.settle();
         let Some(map) = self.survey.as_ref().and_then(|s| s.map(&MapOptions::default()).ok()) else { return };
-        let floor = map.floor(&self.stood, body.radius_m() + CELL_M, *BODY_M.end());
-        // The grid leaves the body's room out already.
-        let room_m = body.radius_m() + CLEAR_M;
-        let router = |(floor, base): (Occupancy, &Base)| Router::new(&grid(&floor, room_m), 0.0, base.speeds);
-        self.router = floor.zip(body.base.as_ref()).map(router).map(Arc::new);
         for level in map.levels.iter().filter(|l| is_surface(l)) {
             match self.surfaces.iter_mut().find(|(_, known)| is_one(known, level)) {
                 Some((_, known)) => known.clone_from(level),
@@ -124,6 +131,27 @@ impl Chart {
             }
         }
         self.map = Some(Arc::new(map));
+        self.find_ways(body);
+    }
+
+    /// Ways over the floor of the map, as far as looks show it and by what drives have taught.
+    pub(super) fn find_ways(&mut self, body: &Description) {
+        let (Some((floor, footing)), Some(base)) = (self.footing(body), &body.base) else {
+            (self.router, self.narrow) = (None, None);
+            return;
+        };
+        // The grids leave the body's room out already.
+        let over = |may: &[bool]| Some(Arc::new(Router::new(&grid(&floor, may), 0.0, base.speeds)));
+        (self.router, self.narrow) = (over(&footing.stand), over(&footing.pass));
+    }
+
+    /// Where the middle of the body may be by all that is known, in the body's own map.
+    pub(super) fn passable(&self) -> Vec<Point2<f64>> {
+        let Some(router) = &self.narrow else { return Vec::new() };
+        let free = router.map();
+        let squares = (0..free.occupied.len()).filter(|&square| !free.occupied[square]);
+        let middle = |square: usize| free.centre(square % free.width, square / free.width);
+        squares.map(|square| self.map_from_chart * middle(square)).collect()
     }
 
     /// Finds the poses from which more would be seen: those that were found before keep their symbols as long as they promise anything.
@@ -133,13 +161,14 @@ impl Chart {
         body: &Description,
         given_up: impl Fn(&str) -> bool,
     ) {
-        let (Some(floor), Some(options)) = (self.floor(body), explore(body)) else { return };
-        let mut looked = self.stood.clone();
-        looked.push(self.map_from_chart.inv_mul(here));
+        let (Some((floor, footing)), Some(options)) = (self.footing(body), explore(body)) else { return };
+        let here = self.map_from_chart.inv_mul(here);
         self.open.retain(|(symbol, _)| !given_up(symbol));
         let keep: Vec<Isometry2<f64>> = self.open.iter().map(|(_, look)| look.pose).collect();
         // The body's own ways decide: what its footprint does not fit is no pose.
-        let found = outlooks(&floor, &looked, &keep, WEIGHED, &options);
+        let reach = footing.reach(&floor, &here, &options);
+        let found = outlooks(&floor, &reach, &self.stood, &keep, WEIGHED, &options);
+        self.cut_off_m2 = self.cut_off_m2(&floor, &footing, &reach, &found, &options);
         let fits = |look: &Outlook| {
             let pose = Pose2::new(look.pose.translation.x, look.pose.translation.y, 0.0);
             look.way_m == 0.0 || self.router.as_ref().is_some_and(|r| r.fits(&pose.point()).is_ok())
@@ -156,8 +185,44 @@ impl Chart {
         self.open = open;
     }
 
+    /// Floor that would be seen, beyond what is seen from poses that can be reached, from those to which a way led before drives failed, square metres.
+    fn cut_off_m2(
+        &self,
+        floor: &Occupancy,
+        footing: &Footing,
+        reach: &Reach,
+        found: &[Outlook],
+        options: &ExploreOptions,
+    ) -> f64 {
+        if !self.ground.is_barred() {
+            return 0.0;
+        }
+        let before = footing.reach_as_shown(floor, &reach.from, options);
+        let keep: Vec<Isometry2<f64>> = found.iter().map(|look| look.pose).collect();
+        let all = outlooks(floor, &before, &self.stood, &keep, keep.len() + WEIGHED, options);
+        let mut unseen = Unseen::default();
+        found.iter().for_each(|look| unseen.look(look));
+        let is_cut_off = |look: &&Outlook| {
+            let square = ground::square(floor, &look.pose.translation.vector.into());
+            !keep.contains(&look.pose) && square.is_some_and(|square| reach.ways_m[square].is_infinite())
+        };
+        let gain = |look: &Outlook| {
+            let gain_m2 = unseen.gain_m2(look);
+            unseen.look(look);
+            gain_m2
+        };
+        all.iter().filter(is_cut_off).map(gain).sum()
+    }
+
     fn floor(&self, body: &Description) -> Option<Occupancy> {
-        self.map.as_ref()?.floor(&self.stood, body.radius_m() + CELL_M, *BODY_M.end())
+        self.footing(body).map(|(floor, _)| floor)
+    }
+
+    /// The floor, and where on it the middle of the body may be.
+    fn footing(&self, body: &Description) -> Option<(Occupancy, Footing)> {
+        let mut floor = self.map.as_ref()?.floor(&self.stood, body.radius_m() + CELL_M, *BODY_M.end())?;
+        let footing = self.ground.open(&mut floor, (body.radius_m(), CLEAR_M), &self.map_from_chart);
+        Some((floor, footing))
     }
 
     /// The poses from which more would be seen, as places to go to.
@@ -185,7 +250,7 @@ impl Chart {
             unseen.look(look);
             gain_m2
         };
-        self.open.iter().map(gain).sum()
+        self.open.iter().map(gain).sum::<f64>() + self.cut_off_m2
     }
 
     /// Where the map ends without a wall, in words: floor goes on there that was not seen. None if it ends nowhere so, or nothing was mapped.
@@ -230,6 +295,9 @@ impl Chart {
         let (from, to) = (&put(&chart_from_map, from), to.iter().map(pose).collect::<Vec<Pose2>>());
         let mut found = router.travel_to_each(from, &to);
         for (travel, to) in found.iter_mut().zip(&to) {
+            if let (Err(_), Some(narrow)) = (&*travel, self.narrow_to(to)) {
+                *travel = narrow.travel(from, to);
+            }
             // To turn where it stands needs no floor.
             if travel.is_err() && (to.point() - from.point()).norm() < 1e-9 {
                 *travel = Ok(Travel { distance_m: 0.0, duration_s: turn_s(robot, from, to) });
@@ -238,12 +306,19 @@ impl Chart {
         found
     }
 
+    /// Ways without a margin, to where the body stands with one.
+    fn narrow_to(&self, to: &Pose2) -> Option<&Router> {
+        let fits = self.router.as_ref().is_some_and(|router| router.fits(&to.point()).is_ok());
+        self.narrow.as_deref().filter(|_| fits)
+    }
+
     /// The places to drive to one after the other on the way on this map; none without a map, or where no way leads.
     pub(crate) fn way(&self, from: &Place, to: &Place) -> Option<Vec<Place>> {
         let (Place::Pose(from), Place::Pose(to)) = (from, to) else { return None };
         let chart_from_map = self.map_from_chart.inverse();
         let (start, end) = (put(&chart_from_map, from), put(&chart_from_map, to));
-        let route = self.router.as_ref()?.route(&start, &end).ok()?;
+        let narrow = || self.narrow_to(&end)?.route(&start, &end).ok();
+        let route = self.router.as_ref()?.route(&start, &end).ok().or_else(narrow)?;
         let heading = |a: &Point2<f64>, b: &Point2<f64>| (b.y - a.y).atan2(b.x - a.x);
         let turns =
             route.points_m.windows(2).map(|leg| Pose2::new(leg[1].x, leg[1].y, heading(&leg[0], &leg[1])));
@@ -321,14 +396,14 @@ fn is_one(a: &Level, b: &Level) -> bool {
 }
 
 /// A grid in which only that is free where the middle of the body may be.
-fn grid(floor: &Occupancy, radius_m: f64) -> OccupancyGrid {
+fn grid(floor: &Occupancy, stand: &[bool]) -> OccupancyGrid {
     let width = floor.width.max(1);
     OccupancyGrid {
         resolution_m: floor.cell_m,
         origin_m: floor.origin,
         width,
         height: floor.cells.len() / width,
-        occupied: standable(floor, radius_m).into_iter().map(|may| !may).collect(),
+        occupied: stand.iter().map(|may| !may).collect(),
     }
 }
 

@@ -4,6 +4,7 @@
 mod calls;
 pub mod chart;
 mod facts;
+pub(super) mod ground;
 mod picture;
 mod taken;
 mod telling;

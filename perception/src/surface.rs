@@ -7,7 +7,6 @@ mod outline;
 mod planes;
 mod role;
 mod tiles;
-mod upright;
 
 use crate::cloud::{Cloud, is_finite};
 use crate::noise::KINECT;
@@ -23,15 +22,14 @@ pub(crate) use hull::{convex_hull, largest_part};
 pub use outline::Outline;
 pub(crate) use outline::Rows;
 pub(crate) use planes::{BAND, dominant_planes};
-use planes::{FEWEST, Plane, ROUNDS, SAMPLE, Sample, large_planes};
+use planes::{FEWEST, Plane, SAMPLE, Sample, large_planes};
 pub use role::{Role, Sign};
-use upright::Doubt;
 
 /// How to look for the surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SurfaceOptions {
-    /// Up in the world, if known. Otherwise it is told from the planes in view, what stands on them and how the cameras are held.
+    /// Up in the world, if known. Otherwise up is taken from how the cameras are held.
     pub up: Option<Unit<Vector3<f64>>>,
     /// Most angle between the surface's normal and `up`, radians. From: chosen, 15°.
     pub tilt_rad: f64,
@@ -87,11 +85,6 @@ pub enum SurfaceError {
         /// What was wanted, in words.
         wanted: String,
     },
-    /// More than one way may be up, or nothing level is in view.
-    #[error(
-        "which way is up cannot be told from what is in view: say which way is up, or look at the table with what stands on it"
-    )]
-    UpUntold,
     /// What is as wanted is the floor.
     #[error(
         "all that is level here is the floor ({because}): look at the table, or give the height band that it is in"
@@ -280,21 +273,14 @@ pub fn find_surfaces(
 ) -> Result<Vec<Surface>, SurfaceError> {
     pool::within(tracing::debug_span!("find_surfaces", points = cloud.len()), || {
         let viewpoints = seen.viewpoints();
+        /// What cameras are held like is a weaker hint than a known direction: most angle to that, radians. From: chosen, about 70°.
+        const HELD_RAD: f64 = 1.2;
         let samples = sample(cloud, &viewpoints);
         if samples.len() < FEWEST {
             return Err(SurfaceError::TooFew { found: cloud.count_finite(), needed: FEWEST });
         }
-        let up = match options.up {
-            None if !viewpoints.is_empty() => {
-                let wanted = || SurfaceError::NotFound { tried: 0, wanted: wanted(options) };
-                Some(upright::up(&samples, seen, options.seed).map_err(|doubt| match doubt {
-                    Doubt::NoPlane => wanted(),
-                    Doubt::Untold => SurfaceError::UpUntold,
-                })?)
-            }
-            told => told,
-        };
-        let tilt_rad = options.tilt_rad;
+        let up = options.up.or_else(|| held_up(seen));
+        let tilt_rad = if options.up.is_some() { options.tilt_rad } else { HELD_RAD };
         let is_level = |plane: &Plane| up.is_none_or(|up| plane.normal.dot(&up).abs() >= tilt_rad.cos());
         let faces_of = |plane: &Plane| {
             let mut faces = face::faces(&face_up(plane, up.as_deref(), &viewpoints), &samples, cloud, seen);
@@ -313,7 +299,7 @@ pub fn find_surfaces(
                     tried += 1;
                 }
             };
-            large_planes(&samples, (options.seed, ROUNDS), is_level, found);
+            large_planes(&samples, options.seed, is_level, found);
         });
         drop(teller);
         let mut faces: Vec<(usize, Vec<Surface>)> = told.into_iter().collect();

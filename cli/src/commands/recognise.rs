@@ -8,7 +8,6 @@ use descry_perception::files::read_cloud;
 use descry_perception::nalgebra::{Point3, Unit, Vector3};
 use descry_perception::recognise::{Descry, ObjectModel, Percept, Published, Recogniser};
 use descry_perception::segment::{Scene, SceneOptions, segment};
-use descry_perception::surface::{Role, Surface};
 use descry_perception::{Cloud, View, Visibility};
 use serde_json::{Value, json};
 
@@ -30,7 +29,7 @@ pub struct Arguments {
     /// Where the sensor stood in the frame of the cloud, metres [default: what the file says, or the origin]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     viewpoint: Option<[f64; 3]>,
-    /// Direction of up in the frame of the cloud [default: told from what is in view, or not at all]
+    /// Direction of up in the frame of the cloud [default: as the camera was held, or any]
     #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
     up: Option<[f64; 3]>,
     /// Draw the cloud with each object tinted and named, as SVG; of one cloud
@@ -106,7 +105,6 @@ fn look(
             (scene, percepts)
         })
         .map_err(|e| e.to_string());
-    notes.extend(found.iter().filter_map(|(scene, _)| doubt(&scene.surface)));
     Ok(Seen { path: shown, points, notes, cloud: view.cloud, found })
 }
 
@@ -128,12 +126,6 @@ fn seen_from(
     let visibility = Visibility::from_viewpoints(&view.cloud, &[known.unwrap_or(Point3::origin())]);
     let unknown = "the file does not say where the sensor stood: taken at the origin; give --viewpoint";
     (visibility, known.is_none().then_some(unknown))
-}
-
-/// What a person should know of a table that may be none.
-fn doubt(surface: &Surface) -> Option<String> {
-    let because = &surface.because;
-    (surface.role == Role::Untold).then(|| format!("the table may be the floor: {because}"))
 }
 
 /// Three finite numbers with commas between them.

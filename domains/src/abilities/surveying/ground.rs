@@ -309,7 +309,7 @@ mod tests {
 
     #[test]
     fn a_body_that_failed_is_asked_where_it_does_not_fit() {
-        let scene = "[room]\nsize_m = [5.0, 5.0]\n[[surface]]\nname = \"table\"\nsize_m = [1.0, 1.0]\n[start]\nposition_m = [-1.5, 0.0]";
+        let scene = "[room]\nsize_m = [5.0, 5.0]\n[[surface]]\nname = \"table\"\nsize_m = [1.0, 1.0]\nheight_m = 0.7\n[start]\nposition_m = [-1.5, 0.0]";
         let spec = SceneSpec::parse("room.toml", scene).unwrap();
         let robot = SimRobot::new(arrange(&spec, 1).unwrap(), SimOptions::default());
         let places =

@@ -1,8 +1,9 @@
 //! What each thing stands on: the surface, another thing, or the bottom of one that it stands in.
 
 use super::{POINT_ENDS, Segment, bounds, end, hull_from_above, middle, quantile, top_m};
-use crate::round::{distance, sector};
-use nalgebra::Point3;
+use crate::round::sector;
+use crate::surface::Outline;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -27,25 +28,28 @@ pub(super) fn on(parts: &mut [Segment]) -> Vec<f64> {
     const WALL_M: f64 = 0.02;
     let of = |part: &Segment| (top_m(part), bounds(&part.points));
     let (tops, boxes): (Vec<f64>, Vec<_>) = parts.par_iter().with_max_len(1).map(of).unzip();
-    let hulls: Vec<OnceLock<Hull>> = parts.iter().map(|_| OnceLock::new()).collect();
-    let hull = |part: usize| hulls[part].get_or_init(|| Hull::of(&parts[part].points));
-    let is_over = |other: usize, place: [f64; 2]| {
+    let outlines: Vec<OnceLock<Outline>> = parts.iter().map(|_| OnceLock::new()).collect();
+    let outline = |part: usize| outlines[part].get_or_init(|| outline_of(&parts[part].points));
+    let is_over = |other: usize, place: &Point3<f64>| {
         let (low, high) = &boxes[other];
-        (0..2).all(|k| place[k] > low[k] && place[k] < high[k]) && hull(other).within_m(place) >= 0.0
+        (0..2).all(|k| place[k] > low[k] && place[k] < high[k]) && outline(other).covers(place, 0.0)
     };
     let base = |(i, part): (usize, &Segment)| {
         let heights: Vec<f64> = part.points.iter().map(|p| p.z).collect();
         let (low, place) = (end(&heights, POINT_ENDS.0), middle(&part.points));
-        let is_below = |other: &usize| *other != i && tops[*other] > low - MEETS_M && is_over(*other, place);
+        let [x, y] = place;
+        let above = Point3::new(x, y, 0.0);
+        let is_below = |other: &usize| *other != i && tops[*other] > low - MEETS_M && is_over(*other, &above);
         let below: Vec<usize> = (0..parts.len()).filter(is_below).collect();
         let lifted = below.iter().filter(|_| low > LIFTED_M);
-        let borne = lifted.filter_map(|&other| borne_at_m(part, hull(i), (place, low), &parts[other].points));
+        let borne =
+            lifted.filter_map(|&other| borne_at_m(part, outline(i), (place, low), &parts[other].points));
         if let Some(at) = borne.max_by(f64::total_cmp) {
             return (at, 0.0);
         }
         let is_around = |&other: &usize| {
             is_wider(&boxes[other], &boxes[i])
-                && hull(other).within_m(place) >= WALL_M
+                && outline(other).covers(&above, -WALL_M)
                 && directions(parts[other].points.iter(), place) >= AROUND
         };
         if below.iter().any(is_around) {
@@ -65,7 +69,7 @@ pub(super) fn on(parts: &mut [Segment]) -> Vec<f64> {
 /// How high another thing bears a part, metres: its top is seen around the part's foot, or its side below. None if it does not.
 fn borne_at_m(
     part: &Segment,
-    hull: &Hull,
+    outline: &Outline,
     (place, low): ([f64; 2], f64),
     other: &[Point3<f64>],
 ) -> Option<f64> {
@@ -76,7 +80,7 @@ fn borne_at_m(
     /// Share of them that lie lower than the top. From: chosen.
     const TOP: f64 = 0.8;
     let is_beside = |p: &&Point3<f64>| {
-        (p.z - low).abs() < MEETS_M && (-BESIDE_M.0..BESIDE_M.1).contains(&hull.within_m([p.x, p.y]))
+        (p.z - low).abs() < MEETS_M && outline.covers(p, BESIDE_M.0) && !outline.covers(p, -BESIDE_M.1)
     };
     let beside: Vec<&Point3<f64>> = other.iter().filter(is_beside).collect();
     let bears = beside.len() >= SEEN.0.max(part.points.len() / SEEN.1)
@@ -86,29 +90,9 @@ fn borne_at_m(
 }
 
 /// The convex outline of points seen from above.
-struct Hull {
-    /// Unit vectors across the edges, inwards, and how far along them each edge lies, metres.
-    edges: Vec<([f64; 2], f64)>,
-}
-
-impl Hull {
-    fn of(points: &[Point3<f64>]) -> Hull {
-        let corners = hull_from_above(points);
-        let ends = corners.iter().zip(corners.iter().cycle().skip(1));
-        let edge = |(a, b): (&[f64; 2], &[f64; 2])| {
-            let (x, y) = (b[0] - a[0], b[1] - a[1]);
-            let inwards = [-y / distance(x, y), x / distance(x, y)];
-            (inwards, inwards[0] * a[0] + inwards[1] * a[1])
-        };
-        // What is no area holds nothing.
-        Hull { edges: if corners.len() < 3 { Vec::new() } else { ends.map(edge).collect() } }
-    }
-
-    /// How far within the outline a place lies, metres: less than 0 outside.
-    fn within_m(&self, [x, y]: [f64; 2]) -> f64 {
-        let each = self.edges.iter().map(|([a, b], at)| a * x + b * y - at);
-        each.reduce(f64::min).unwrap_or(f64::NEG_INFINITY)
-    }
+fn outline_of(points: &[Point3<f64>]) -> Outline {
+    let corners = hull_from_above(points).into_iter().map(|[x, y]| Point3::new(x, y, 0.0));
+    Outline::of(&corners.collect::<Vec<_>>(), &Vector3::z())
 }
 
 /// True if a box is wider than another both ways.

@@ -183,19 +183,13 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
         let seen = visibility(maps, &aligned.used, &aligned.poses);
         let mut gathered =
             fuse::gather(views, &prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
-        Ok(merged(&mut gathered, seen, fits(&prepared, &mut aligned), steps, false))
+        Ok(merged(&mut gathered, seen, fits(&prepared, &mut aligned), steps))
     })
 }
 
 /// The merged cloud of what was gathered, with what is said of it.
-fn merged(
-    gathered: &mut [Gathered],
-    seen: Visibility,
-    fits: Vec<ViewFit>,
-    mut steps: Vec<Step>,
-    further: bool,
-) -> Merged {
-    let fused = settle::settle(gathered, &seen, further);
+fn merged(gathered: &mut [Gathered], seen: Visibility, fits: Vec<ViewFit>, mut steps: Vec<Step>) -> Merged {
+    let fused = settle::settle(gathered, &seen);
     steps.push(Step {
         name: "fuse".to_owned(),
         points: fused.cloud.len(),
@@ -223,7 +217,7 @@ impl Ready {
     }
 
     fn of_view(view: &View, options: &MergeOptions) -> (Prepared, Option<DepthMap>) {
-        (prepare::prepare(view, options), DepthMap::from_view(view, &view.world_from_camera))
+        rayon::join(|| prepare::prepare(view, options), || DepthMap::from_view(view, &view.world_from_camera))
     }
 }
 

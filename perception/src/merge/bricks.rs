@@ -135,28 +135,6 @@ impl<C> Bricks<C> {
         self.places.len()
     }
 
-    /// The voxels of a brick that were asked for, with all around them.
-    pub fn touched_around(&self, beside: &Beside) -> Mask {
-        let is_touched = |brick: &u32| self.touched[*brick as usize] != Mask::default();
-        if !beside.iter().flatten().any(is_touched) {
-            return Mask::default();
-        }
-        let layers: [u64; WIDE] = std::array::from_fn(|z| {
-            let (above, z) = in_brick(z);
-            let rows: [u8; WIDE] = std::array::from_fn(|y| {
-                let (behind, y) = in_brick(y);
-                let of = |aside: usize| {
-                    let brick = beside[(above * 3 + behind) * 3 + aside];
-                    brick.map_or(0, |brick| (self.touched[brick as usize][z] >> (y * SIDE)) as u8)
-                };
-                let row = of(1);
-                of(0) >> (SIDE - 1) | row | row << 1 | row >> 1 | of(2) << (SIDE - 1)
-            });
-            u64::from_le_bytes(std::array::from_fn(|y| rows[y] | rows[y + 1] | rows[y + 2]))
-        });
-        std::array::from_fn(|z| layers[z] | layers[z + 1] | layers[z + 2])
-    }
-
     /// Calls `found` with the number of each cell that was asked for.
     pub fn visit_touched(&self, mut found: impl FnMut(usize)) {
         for (slots, touched) in self.slots.chunks(self.voxels()).zip(&self.touched) {

@@ -77,10 +77,9 @@ impl Merger {
             }
             let mut base = base?;
             let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
+            let merged = merged(&mut base.gathered, seen, base.fits.clone(), base.steps.clone());
             // If with one more all are merged anew, nothing of this is wanted.
-            let further = together(views.len() + 1) <= views.len();
-            let merged = merged(&mut base.gathered, seen, base.fits.clone(), base.steps.clone(), further);
-            self.base = further.then_some(base);
+            self.base = (together(views.len() + 1) <= views.len()).then_some(base);
             Ok(merged)
         })
     }

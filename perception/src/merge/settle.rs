@@ -2,13 +2,14 @@
 //!
 //! Every voxel is moved along its normal onto the weighted mean of the like-facing voxels beside it, every column of a sheet along the sheet's
 //! normal onto that of the columns beside it. What a single view claims and another looked through is left out. Of a further look only what it
-//! touched, and what borders on that, is settled anew; the rest is held against the new view alone.
+//! touched is settled anew; the rest is held against the new view alone.
 
 use super::bricks::{Beside, Bricks, Mask, NONE, SIDE, WIDE, is_in};
 use super::check;
 use super::fuse::{Cell, Fused, Gathered};
 use crate::cloud::{Cloud, is_finite};
 use crate::visibility::{Gaze, Visibility};
+use bytemuck::Zeroable;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::iter::Peekable;
@@ -22,9 +23,6 @@ const VOXEL_SPREAD_M: f32 = 0.003;
 /// Looks through a place this far off the surface say that nothing is there, metres.
 /// From: derived, as where views are held against each other.
 const CARVE_M: f64 = check::CLEAR_M;
-
-/// Rows of bricks that are settled at a time: what they fill is used again. From: work.
-const ROWS: usize = 16;
 
 /// Bricks that one thread settles in a row. From: work.
 const TOGETHER: usize = 64;
@@ -53,76 +51,70 @@ pub(super) struct Before {
     gazes: usize,
 }
 
-/// One cloud of what was gathered. What is settled is kept for a further look if one is to come.
-pub(super) fn settle(all: &mut [Gathered], seen: &Visibility, further: bool) -> Fused {
-    let most = all.iter().map(|gathered| gathered.bricks.cells.len()).sum();
+/// One cloud of what was gathered. What was settled is kept for a further look.
+pub(super) fn settle(all: &mut [Gathered], seen: &Visibility) -> Fused {
     let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
-    let mut fused = Fused {
-        cloud: Cloud::from_points(Vec::with_capacity(most)),
-        views_per_point: Vec::with_capacity(most),
+    let gazes = seen.gazes();
+    all.iter_mut().for_each(|gathered| gathered.settle(&gazes));
+    let rows: Vec<&[Settled]> =
+        all.iter().flat_map(|gathered| gathered.before.rows.iter().map(Vec::as_slice)).collect();
+    let ((points, normals), (views_per_point, colours)) = rayon::join(
+        || (of_all(&rows, |settled| settled.at), of_all(&rows, |settled| settled.normal)),
+        || {
+            let colours = coloured.then(|| of_all(&rows, |settled| settled.colour));
+            (of_all(&rows, |settled| settled.views), colours)
+        },
+    );
+    Fused {
+        cloud: Cloud { normals: Some(normals), colours, ..Cloud::from_points(points) },
+        views_per_point,
         returns: all.iter().map(|gathered| gathered.returns).sum(),
         voxel_m: all[0].grid.voxel_m,
-    };
-    let mut normals = Vec::with_capacity(most);
-    let mut colours = coloured.then(|| Vec::with_capacity(most));
-    let gazes = seen.gazes();
-    let mut scratch: Vec<Vec<Settled>> = vec![Vec::new(); ROWS];
-    for gathered in all {
-        gathered.settle(&gazes, &mut scratch, further, |settled| {
-            fused.cloud.points.extend(settled.iter().map(|settled| settled.at));
-            normals.extend(settled.iter().map(|settled| settled.normal));
-            fused.views_per_point.extend(settled.iter().map(|settled| settled.views));
-            if let Some(colours) = &mut colours {
-                colours.extend(settled.iter().map(|settled| settled.colour));
-            }
-        });
     }
-    fused.cloud.normals = Some(normals);
-    fused.cloud.colours = colours;
-    fused
+}
+
+/// What is asked of all that is settled, row by row.
+fn of_all<T: Zeroable + Send>(rows: &[&[Settled]], of: impl Fn(&Settled) -> T + Sync) -> Vec<T> {
+    let mut all = bytemuck::zeroed_vec(rows.iter().map(|row| row.len()).sum());
+    let mut rest = &mut all[..];
+    let mut parts = Vec::with_capacity(rows.len());
+    for row in rows {
+        let (part, after) = rest.split_at_mut(row.len());
+        parts.push((part, row));
+        rest = after;
+    }
+    let fill = |(part, row): (&mut [T], &&[Settled])| {
+        part.iter_mut().zip(*row).for_each(|(one, settled)| *one = of(settled));
+    };
+    parts.into_par_iter().for_each(fill);
+    all
 }
 
 impl Gathered {
-    /// Gives what is left of the cells, some rows at a time.
-    fn settle(
-        &mut self,
-        gazes: &[Gaze],
-        scratch: &mut [Vec<Settled>],
-        further: bool,
-        mut give: impl FnMut(&[Settled]),
-    ) {
+    /// Settles the cells: what was touched since the last time anew.
+    fn settle(&mut self, gazes: &[Gaze]) {
         let Before { means, mut rows, gazes: known } = std::mem::take(&mut self.before);
         let is_first = rows.is_empty();
         let means = self.means(means);
-        let settle_row = |number: usize, row: &mut Vec<Settled>, before: &mut Vec<Settled>| {
+        rows.resize_with(self.bricks.len().div_ceil(TOGETHER), Vec::new);
+        let settle_row = |row: &mut Vec<Settled>, (number, before): (usize, &mut Vec<Settled>)| {
             row.clear();
             let mut known_cells = before.iter().peekable();
             for brick in (number * TOGETHER..self.bricks.len()).take(TOGETHER) {
-                let beside = self.bricks.beside(brick);
-                let mask = if is_first { [u64::MAX; SIDE] } else { self.bricks.touched_around(&beside) };
+                let mask = if is_first { [u64::MAX; SIDE] } else { self.bricks.touched[brick] };
                 if mask == Mask::default() {
                     row.extend(self.bricks.cells_of(brick).filter_map(|cell| stays(&mut known_cells, cell)));
                 } else {
-                    self.settle_brick(&beside, &mask, &means, &mut known_cells, row);
+                    self.settle_brick(brick, &mask, &means, &mut known_cells, row);
                 }
             }
             drop_looked_through(row, gazes, known);
-            if further {
-                before.clone_from(row);
-            }
+            // The memory of what was there before is the next row's.
+            std::mem::swap(row, before);
         };
-        let all = self.bricks.len().div_ceil(TOGETHER);
-        rows.resize_with(all, Vec::new);
-        for first in (0..all).step_by(ROWS) {
-            let before = &mut rows[first..all.min(first + ROWS)];
-            let some = scratch.par_iter_mut().zip(before).enumerate();
-            some.for_each(|(row, (settled, before))| settle_row(first + row, settled, before));
-            scratch.iter().take(all - first).for_each(|settled| give(settled));
-        }
-        if further {
-            self.before = Before { means, rows, gazes: gazes.len() };
-            self.bricks.touched.fill(Mask::default());
-        }
+        rows.par_iter_mut().enumerate().for_each_init(Vec::new, settle_row);
+        self.before = Before { means, rows, gazes: gazes.len() };
+        self.bricks.touched.fill(Mask::default());
     }
 
     /// The means of all voxels, from those before. That of a voxel is asked for by all around it, that of a column by few.
@@ -142,16 +134,17 @@ impl Gathered {
         means
     }
 
-    /// Adds what the cells of the brick in the middle are settled to: those of the mask anew, of the others what was settled before.
+    /// Adds what the cells of a brick are settled to: those of the mask anew, of the others what was settled before.
     fn settle_brick(
         &self,
-        beside: &Beside,
+        brick: usize,
         mask: &Mask,
         means: &[Cell],
         before: &mut Peekable<Iter<Settled>>,
         settled: &mut Vec<Settled>,
     ) {
         let Gathered { grid, axes_from_world, flat, bricks, colours: sums, .. } = self;
+        let beside = &bricks.beside(brick);
         let world_from_axes = axes_from_world.inverse().to_rotation_matrix();
         let turn = world_from_axes.cast::<f32>();
         let colour = |number: usize, cell: &Cell| {

@@ -189,7 +189,8 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
 
 /// The merged cloud of what was gathered, with what is said of it.
 fn merged(gathered: &mut [Gathered], seen: Visibility, fits: Vec<ViewFit>, mut steps: Vec<Step>) -> Merged {
-    let fused = settle::settle(gathered, &seen);
+    settle::settle(gathered, &seen);
+    let fused = settle::fused(gathered);
     steps.push(Step {
         name: "fuse".to_owned(),
         points: fused.cloud.len(),

@@ -11,6 +11,7 @@ use super::fuse::{gather, gather_further};
 use super::joint::Found;
 use super::parts::Part;
 use super::prepare::Prepared;
+use super::settle::settle;
 use super::{
     Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Ready, SECOND, Step, ViewFit, check,
     filter_and_thin, fit, fits, joint, merged, objects, only_levelled, place, place_on, visibility,
@@ -44,6 +45,8 @@ struct Base {
     gathered: Vec<Gathered>,
     fits: Vec<ViewFit>,
     steps: Vec<Step>,
+    /// How many views were settled.
+    settled: usize,
 }
 
 impl fmt::Debug for Merger {
@@ -72,12 +75,14 @@ impl Merger {
             let begun = kept.as_ref().map_or(anew, |base| base.digests.len());
             let mut base = kept.map_or_else(|| self.anew(&views[..anew], options), Ok);
             for n in begun + 1..=views.len() {
-                let further = base.ok().and_then(|base| self.further(base, &views[..n], options));
+                let settled = base.ok().map(|base| self.settled(base));
+                let further = settled.and_then(|base| self.further(base, &views[..n], options));
                 base = further.map_or_else(|| self.anew(&views[..n], options), Ok);
             }
             let mut base = base?;
             let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
             let merged = merged(&mut base.gathered, seen, base.fits.clone(), base.steps.clone());
+            base.settled = views.len();
             // If with one more all are merged anew, nothing of this is wanted.
             self.base = (together(views.len() + 1) <= views.len()).then_some(base);
             Ok(merged)
@@ -104,7 +109,18 @@ impl Merger {
         let mut aligned = place(prepared, maps, options, &mut steps);
         let gathered = gather(views, prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
         let fits = fits(prepared, &mut aligned);
-        Ok(Base { digests: self.digests[..views.len()].to_vec(), aligned, gathered, fits, steps })
+        Ok(Base { digests: self.digests[..views.len()].to_vec(), aligned, gathered, fits, steps, settled: 0 })
+    }
+
+    /// What the further look touches is settled on what the earlier ones were settled to, whether they were merged by themselves or not.
+    fn settled(&self, mut base: Base) -> Base {
+        let views = base.digests.len();
+        if base.settled < views {
+            let seen = visibility(self.maps[..views].to_vec(), &base.aligned.used, &base.aligned.poses);
+            settle(&mut base.gathered, &seen);
+            base.settled = views;
+        }
+        base
     }
 
     /// The last of the first views with the others as they lie; `None` if it does not fit in, or another did not.

@@ -51,11 +51,15 @@ pub(super) struct Before {
     gazes: usize,
 }
 
-/// One cloud of what was gathered. What was settled is kept for a further look.
-pub(super) fn settle(all: &mut [Gathered], seen: &Visibility) -> Fused {
-    let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
+/// Settles what was gathered. What is settled is kept for a further look.
+pub(super) fn settle(all: &mut [Gathered], seen: &Visibility) {
     let gazes = seen.gazes();
     all.iter_mut().for_each(|gathered| gathered.settle(&gazes));
+}
+
+/// One cloud of what was settled.
+pub(super) fn fused(all: &[Gathered]) -> Fused {
+    let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
     let rows: Vec<&[Settled]> =
         all.iter().flat_map(|gathered| gathered.before.rows.iter().map(Vec::as_slice)).collect();
     let ((points, normals), (views_per_point, colours)) = rayon::join(

@@ -239,7 +239,7 @@ fn an_answer_is_explained_as_one() {
 #[test]
 fn what_is_nearly_hidden_is_pushed_for_and_what_a_slip_leaves_is_said() {
     check(
-        &["find", "cup A", "--seed", "11", "--scene", "ring-of-boxes"],
+        &["find", "cup A", "--seed", "17", "--scene", "ring-of-boxes"],
         0,
         &[
             "pushing object 0 aside from table-3 failed: slipped",

@@ -212,7 +212,7 @@ impl Asker<'_> {
         let seen = self.seen_of(s.doubt_of(0), left);
         let open = self
             .nothing_seen(kind)
-            .or_else(|| reasons::may_be_floor(s, kind))
+            .or_else(|| reasons::may_be_none(s, kind))
             .or_else(|| (left > s.thresholds.not_there).then(|| format!("none was seen: {seen}")));
         let about = format!("{}{}", kind.name, reasons::in_room(s, kind));
         match open {

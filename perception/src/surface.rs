@@ -7,6 +7,7 @@ mod outline;
 mod planes;
 mod role;
 mod tiles;
+mod upright;
 
 use crate::cloud::{Cloud, is_finite};
 use crate::noise::KINECT;
@@ -22,14 +23,15 @@ pub(crate) use hull::{convex_hull, largest_part};
 pub use outline::Outline;
 pub(crate) use outline::Rows;
 pub(crate) use planes::{BAND, dominant_planes};
-use planes::{FEWEST, Plane, SAMPLE, Sample, large_planes};
+use planes::{FEWEST, Plane, ROUNDS, SAMPLE, Sample, large_planes};
 pub use role::{Role, Sign};
+use upright::Doubt;
 
 /// How to look for the surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SurfaceOptions {
-    /// Up in the world, if known. Otherwise up is taken from how the cameras are held.
+    /// Up in the world, if known. Otherwise it is told from the planes in view, what stands on them and how the cameras are held.
     pub up: Option<Unit<Vector3<f64>>>,
     /// Most angle between the surface's normal and `up`, radians. From: chosen, 15°.
     pub tilt_rad: f64,
@@ -85,6 +87,11 @@ pub enum SurfaceError {
         /// What was wanted, in words.
         wanted: String,
     },
+    /// More than one way may be up, or nothing level is in view.
+    #[error(
+        "which way is up cannot be told from what is in view: say which way is up, or look at the table with what stands on it"
+    )]
+    UpUntold,
     /// What is as wanted is the floor.
     #[error(
         "all that is level here is the floor ({because}): look at the table, or give the height band that it is in"
@@ -143,8 +150,15 @@ pub struct Surface {
     pub because: Sign,
     /// Height above the floor, metres, where the floor is in view.
     pub above_floor_m: Option<f64>,
+    /// How likely up is what it was taken to be when the surface was found: one where it was said.
+    #[serde(default = "said")]
+    pub up_chance: f64,
     /// Outlines of the other surfaces to stand things on that lie above this one, metres in the world.
     pub over: Vec<Level>,
+}
+
+fn said() -> f64 {
+    1.0
 }
 
 /// Where another surface is.
@@ -164,6 +178,18 @@ impl Level {
 }
 
 impl Surface {
+    /// In words, after what it was taken for: why it may be nothing to stand things on; none if that is as good as sure.
+    pub fn doubt(&self) -> Option<String> {
+        let (because, chance) = (&self.because, self.up_chance);
+        match self.role {
+            Role::Untold => Some(format!("may be the floor: {because}")),
+            _ if chance >= upright::SURE => None,
+            _ => {
+                Some(format!("may be a wall: which way is up is told from what is in view, with {chance:.2}"))
+            }
+        }
+    }
+
     /// Height of a point of the world above the plane, metres.
     pub fn height_m(&self, p: &Point3<f64>) -> f64 {
         self.up.dot(&p.coords) - self.offset_m
@@ -273,14 +299,22 @@ pub fn find_surfaces(
 ) -> Result<Vec<Surface>, SurfaceError> {
     pool::within(tracing::debug_span!("find_surfaces", points = cloud.len()), || {
         let viewpoints = seen.viewpoints();
-        /// What cameras are held like is a weaker hint than a known direction: most angle to that, radians. From: chosen, about 70°.
-        const HELD_RAD: f64 = 1.2;
         let samples = sample(cloud, &viewpoints);
         if samples.len() < FEWEST {
             return Err(SurfaceError::TooFew { found: cloud.count_finite(), needed: FEWEST });
         }
-        let up = options.up.or_else(|| held_up(seen));
-        let tilt_rad = if options.up.is_some() { options.tilt_rad } else { HELD_RAD };
+        let way_up = match options.up {
+            None if !viewpoints.is_empty() => {
+                let wanted = || SurfaceError::NotFound { tried: 0, wanted: wanted(options) };
+                Some(upright::up(&samples, seen, options.seed).map_err(|doubt| match doubt {
+                    Doubt::NoPlane => wanted(),
+                    Doubt::Untold => SurfaceError::UpUntold,
+                })?)
+            }
+            said => said.map(|up| (up, 1.0)),
+        };
+        let up = way_up.map(|(up, _)| up);
+        let tilt_rad = options.tilt_rad;
         let is_level = |plane: &Plane| up.is_none_or(|up| plane.normal.dot(&up).abs() >= tilt_rad.cos());
         let faces_of = |plane: &Plane| {
             let mut faces = face::faces(&face_up(plane, up.as_deref(), &viewpoints), &samples, cloud, seen);
@@ -299,7 +333,7 @@ pub fn find_surfaces(
                     tried += 1;
                 }
             };
-            large_planes(&samples, options.seed, is_level, found);
+            large_planes(&samples, (options.seed, ROUNDS), is_level, found);
         });
         drop(teller);
         let mut faces: Vec<(usize, Vec<Surface>)> = told.into_iter().collect();
@@ -309,6 +343,7 @@ pub fn find_surfaces(
             return Err(SurfaceError::NotFound { tried, wanted: wanted(options) });
         }
         let mut surfaces = distinct(surfaces, &samples);
+        surfaces.iter_mut().for_each(|surface| surface.up_chance = way_up.map_or(1.0, |(_, chance)| chance));
         role::tell(&mut surfaces, &samples, seen, up.as_ref(), options);
         surfaces.sort_by_key(|surface| (!options.wants(surface), surface.role));
         let whole = |surface: Surface| match surface.role {

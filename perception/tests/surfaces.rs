@@ -63,9 +63,8 @@ fn pose(eye: [f64; 3], target: [f64; 3]) -> Isometry3<f64> {
 }
 
 /// What a camera sees; a share of the pixels that hit the floor shows what is mirrored in it.
-fn look(room: &[Block], eye: [f64; 3], target: [f64; 3], mirrored: f64, draws: &mut Draws) -> View {
-    let world_from_camera = pose(eye, target);
-    let eye = Point3::from(eye);
+fn look(room: &[Block], world_from_camera: Isometry3<f64>, mirrored: f64, draws: &mut Draws) -> View {
+    let eye = Point3::from(world_from_camera.translation.vector);
     let depth = |u: f64, v: f64| {
         let ray = world_from_camera.rotation * CAMERA.unproject(u, v, 1.0).coords;
         let hits = room.iter().filter_map(|block| enters(block, &eye, &ray));
@@ -104,7 +103,7 @@ struct Looks<'a> {
 impl Looks<'_> {
     fn take(&self, seed: u64) -> (Cloud, Visibility) {
         let mut draws = Draws(seed);
-        let look = |eye: &[f64; 3]| look(self.room, *eye, self.target, self.mirrored, &mut draws);
+        let look = |eye: &[f64; 3]| look(self.room, pose(*eye, self.target), self.mirrored, &mut draws);
         let views: Vec<View> = self.eyes.iter().map(look).collect();
         let mut cloud = Cloud::default();
         views.iter().for_each(|v| cloud.append(&v.cloud.finite().transformed(&v.world_from_camera)));
@@ -330,4 +329,60 @@ fn a_wide_plane_that_is_seen_sparsely_is_one() {
     let found = find_surfaces(&cloud, &Visibility::default(), &options).expect("a surface");
     let areas_m2: Vec<f64> = found.iter().map(|surface| surface.area_m2).collect();
     assert!(areas_m2.len() == 1 && (90.0..110.0).contains(&areas_m2[0]), "{areas_m2:?}");
+}
+
+#[test]
+fn where_nobody_says_it_up_is_told_by_what_is_seen_or_not_at_all() {
+    let cup = |x: f64, y: f64| thing(x, y, 0.72, [0.08, 0.08, 0.11]);
+    let things =
+        [cup(0.1, 0.0), cup(-0.15, 0.08), cup(-0.05, -0.15), thing(0.2, 0.15, 0.72, [0.1, 0.06, 0.2])];
+    let set = room(&[&[FLOOR, WALL], &table([-0.5, 0.5], [-0.3, 0.3], 0.72), &things]);
+    // The front of a cupboard, with its knobs.
+    let knobs = [-0.4, 0.0, 0.4].map(|x| ([x, -0.03, 1.0], [x + 0.02, 0.0, 1.1]));
+    let front = room(&[&[FLOOR, ([-1.5, 0.0, 0.0], [1.5, 0.6, 2.4])], &knobs]);
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let (aslant, above, ahead) = ([0.3, -1.2, 1.5], [0.0, -0.06, 1.7], [0.0, -1.0, 1.1]);
+    // (what, room, from where to where, turned by, whether the table must be found; otherwise it may be)
+    let cases = [
+        ("as cameras are held", &set, aslant, [0.0, 0.0, 0.7], 0.0, true),
+        ("rolled by 15°", &set, aslant, [0.0, 0.0, 0.7], 0.26, true),
+        ("from straight above", &set, above, [0.0, 0.0, 0.7], 0.0, true),
+        ("from straight above, turned", &set, above, [0.0, 0.0, 0.7], 1.0, true),
+        ("on its side", &set, aslant, [0.0, 0.0, 0.7], quarter, false),
+        ("on its other side", &set, aslant, [0.0, 0.0, 0.7], -quarter, false),
+        ("upside down", &set, aslant, [0.0, 0.0, 0.7], 2.0 * quarter, false),
+        ("a front", &front, ahead, [0.0, 0.0, 1.1], 0.0, false),
+        ("a front, turned", &front, ahead, [0.0, 0.0, 1.1], quarter, false),
+    ];
+    for (what, room, eye, target, rolled_rad, must) in cases {
+        for seed in 1..=3 {
+            let roll = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), rolled_rad);
+            let view = look(room, pose(eye, target) * roll, 0.0, &mut Draws(seed));
+            let cloud = view.cloud.transformed(&view.world_from_camera);
+            let seen = Visibility::from_views(std::slice::from_ref(&view));
+            let found = find_surface(&cloud, &seen, &SurfaceOptions::default());
+            let is_right = match &found {
+                Ok(s) => s.up.z > 0.99 && (s.offset_m - 0.72).abs() < 0.015,
+                Err(SurfaceError::UpUntold) => !must,
+                Err(_) => false,
+            };
+            assert!(is_right, "{what}, seed {seed}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn a_ball_has_no_table() {
+    // As much of it as is seen from two radii above.
+    let at = |k: usize| {
+        let (turn, high) = (2.4 * k as f64, 1.0 - 0.5 * k as f64 / 40_000.0);
+        let wide = (1.0 - high * high).sqrt();
+        Point3::new((wide * turn.cos()) as f32, (wide * turn.sin()) as f32, high as f32)
+    };
+    let cloud = Cloud::from_points((0..40_000).map(at).collect());
+    for eye in [Point3::new(0.0, 0.0, 2.0), Point3::new(0.6, 0.0, 2.0)] {
+        let seen = Visibility::from_viewpoints(&cloud, &[eye]);
+        let found = find_surface(&cloud, &seen, &SurfaceOptions::default());
+        assert!(matches!(found, Err(SurfaceError::UpUntold)), "{found:?}");
+    }
 }

@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Where the sensor stood in the frame of the cloud, metres [default: what the file says, or the origin]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     viewpoint: Option<[f64; 3]>,
-    /// Direction of up in the frame of the cloud [default: as the camera was held, or any]
+    /// Direction of up in the frame of the cloud [default: told from what is in view, or not at all]
     #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
     up: Option<[f64; 3]>,
     /// Draw the cloud with each object tinted and named, as SVG; of one cloud
@@ -105,6 +105,8 @@ fn look(
             (scene, percepts)
         })
         .map_err(|e| e.to_string());
+    let doubt = found.iter().find_map(|(scene, _)| scene.surface.doubt());
+    notes.extend(doubt.map(|doubt| format!("the table {doubt}")));
     Ok(Seen { path: shown, points, notes, cloud: view.cloud, found })
 }
 

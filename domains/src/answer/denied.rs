@@ -74,7 +74,7 @@ impl Asker<'_> {
             let there = on_there(on);
             let looks = self.mind.regions[on].taken;
             let unseen = (looks == 0).then(|| format!("the {} was not looked at", s.surfaces[on].name));
-            unseen.or_else(|| self.nothing_seen(&there)).or_else(|| reasons::may_be_floor(s, &there))
+            unseen.or_else(|| self.nothing_seen(&there)).or_else(|| reasons::may_be_none(s, &there))
         };
         Some(match open {
             Open::Thing { what, on } => {

@@ -27,7 +27,7 @@ pub struct KnownSurface {
     pub up: Vector3<f64>,
     /// Whether the outline is all of it (from the map) or what has been seen so far.
     pub whole: bool,
-    /// Why it may be the floor, if it may.
+    /// Why it may be nothing to stand things on, in words after its name, if it may.
     pub doubtful: Option<String>,
     /// How well what was seen of it is laid on the outline of the map; none without such an outline, or while nothing was seen.
     pub placed: Option<Certainty>,

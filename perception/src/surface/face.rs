@@ -237,6 +237,7 @@ fn face(
         role: Role::Untold,
         because: Sign::NoCamera,
         above_floor_m: None,
+        up_chance: 1.0,
         over: Vec::new(),
     }
 }

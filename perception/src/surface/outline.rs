@@ -124,6 +124,7 @@ mod tests {
                 role: super::super::Role::Support,
                 because: super::super::Sign::Asked,
                 above_floor_m: None,
+                up_chance: 1.0,
                 over: Vec::new(),
             };
             let (rows, outline) = (Rows::of(&surface), surface.outline());

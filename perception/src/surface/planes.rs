@@ -11,7 +11,7 @@ pub(super) const FEWEST: usize = 50;
 /// Planes proposed in each round. From: chosen.
 const PROPOSALS: usize = 240;
 /// Planes taken away one after another at most. From: chosen.
-const ROUNDS: usize = 6;
+pub(super) const ROUNDS: usize = 6;
 /// Proposals go through points of one cube of this side, metres. From: chosen.
 const REACH_M: f64 = 0.3;
 /// Points that judge a proposal, at the most. From: chosen.
@@ -69,21 +69,21 @@ pub(crate) fn dominant_planes(
         samples.iter().filter(|s| plane.holds(s)).count() as f64 >= share * samples.len() as f64
     };
     let mut planes = Vec::new();
-    large_planes(&samples, 1, |_| true, |plane| planes.push(plane));
+    large_planes(&samples, (1, ROUNDS), |_| true, |plane| planes.push(plane));
     planes.into_iter().filter(holds).map(|p| (p.normal, p.offset)).collect()
 }
 
-/// Tells of large planes, one after another, each without the points of those before it.
+/// Tells of so many large planes at most, one after another, each without the points of those before it.
 pub(super) fn large_planes(
     samples: &[Sample],
-    seed: u64,
+    (seed, rounds): (u64, usize),
     plausible: impl Fn(&Plane) -> bool,
     mut found: impl FnMut(Plane),
 ) {
     let mut rng = Draws::new(seed);
     let mut left = samples.to_vec();
     let mut cubes = Cubes::of(samples);
-    for _ in 0..ROUNDS {
+    for _ in 0..rounds {
         if left.len() < FEWEST {
             break;
         }

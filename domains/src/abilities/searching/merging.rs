@@ -37,10 +37,14 @@ pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptio
     (MergeOptions { up, height_band_m, ..MergeOptions::default() }, scene)
 }
 
-/// The same for one surface: one that the map has is merged and looked for where its outline is.
+/// The same for one surface: one that the map has is merged and looked for where its outline is, and one that was seen faces up as it was seen
+/// to, where the body does not say which way is up.
 pub(super) fn options_at(robot: &dyn Robot, known: &KnownSurface) -> (MergeOptions, SceneOptions) {
-    let (merging, seeking) = options(robot, Some(&known.symbol));
+    let (merging, mut seeking) = options(robot, Some(&known.symbol));
     if !known.whole {
+        let is_told = !known.outline.is_empty() && known.doubtful.is_none();
+        let seen_up = is_told.then(|| Unit::new_normalize(known.up));
+        seeking.surface.up = seeking.surface.up.or(seen_up);
         return (merging, seeking);
     }
     let region = Some(Region { corners: known.outline.clone(), margin_m: BESIDE_M });

@@ -14,7 +14,7 @@ use descry_perception::noise::axial_sigma_m;
 use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
 use descry_perception::segment::{Scene, segment_on};
-use descry_perception::surface::{Role, SurfaceOptions, find_surface};
+use descry_perception::surface::{SurfaceOptions, find_surface};
 use descry_perception::visibility::{DepthMap, Seen, Visibility};
 use descry_robots::{Description, Robot, Sensed};
 use serde::Serialize;
@@ -381,10 +381,10 @@ pub fn pushed(
     something_moved(mind, eyes.record, obstacle.on, change)
 }
 
-/// What the surface turned out to be: its height and tilt, and where the map knows none its outline, and whether it may be the floor.
+/// What the surface turned out to be: its height and tilt, and where the map knows none its outline, and whether it may be none.
 fn note_surface(known: &mut KnownSurface, scene: &Scene) {
     let seen = &scene.surface;
-    known.doubtful = (!known.whole && seen.role == Role::Untold).then(|| seen.because.to_string());
+    known.doubtful = if known.whole { None } else { seen.doubt() };
     known.up = seen.up.into_inner();
     if known.whole {
         let onto_plane = |p: &Point3<f64>| p - seen.up.into_inner() * seen.height_m(p);

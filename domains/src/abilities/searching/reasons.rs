@@ -103,7 +103,7 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     if s.chance_lost(what) > s.thresholds.not_there {
         return Some("it was lost out of the hand, and where it lies was not seen".into());
     }
-    if let Some(floor) = may_be_floor(s, thing) {
+    if let Some(floor) = may_be_none(s, thing) {
         return Some(floor);
     }
     let doubt = s.doubt_about(what);
@@ -127,11 +127,11 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
 }
 
 /// What was looked at for a thing and may be no surface to stand things on at all.
-pub fn may_be_floor(s: &Situation, thing: &Thing) -> Option<String> {
+pub fn may_be_none(s: &Situation, thing: &Thing) -> Option<String> {
     let asked = s.surfaces.iter().enumerate().filter(|(n, _)| thing.may_be_on(*n));
     asked.into_iter().find_map(|(_, k)| {
-        let because = k.doubtful.as_ref()?;
-        Some(format!("what was taken for the {} may be the floor: {because}", k.name))
+        let doubt = k.doubtful.as_ref()?;
+        Some(format!("what was taken for the {} {doubt}", k.name))
     })
 }
 

@@ -1,0 +1,281 @@
+//! Which way is up where nobody says: the direction under which what was seen is level or upright, and things stand on what is level.
+//!
+//! Every direction that the large planes in view suggest is a hypothesis: a plane may be level, or upright as a wall, alone or with another.
+//! It is as likely as cameras are held so, as most of what was seen lies in planes that are level or upright then, and as what lies in none of
+//! them stands on level ones. A wall seen head-on and a floor seen from straight above are told apart by no more than that; where that is not
+//! enough, nothing is said.
+
+use super::THINGS_M;
+use super::hull::convex_hull;
+use super::outline::Outline;
+use super::planes::{Plane, Sample, large_planes};
+use crate::spread::tangents;
+use crate::visibility::Visibility;
+use nalgebra::{Point3, Unit, Vector3};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+/// Planes that are sought at most. From: chosen, a shelf has a dozen.
+const PLANES: usize = 12;
+/// What holds a lesser share of the returns is a thing or a piece of one. From: chosen.
+const LEAST_SHARE: f64 = 0.0125;
+/// Planes are level or upright if they are no farther off, radians. From: chosen, 8°: twice what a poor camera bends.
+const ALIKE_RAD: f64 = 0.14;
+/// Hypotheses that lie no farther apart are one, radians. From: chosen, 15°.
+const ONE_RAD: f64 = 0.26;
+/// So likely up must be told, against all other directions; and where it is against how cameras are held.
+/// From: chosen, more likely than not, and as good as sure.
+const LIKELY: f64 = 0.5;
+pub(super) const SURE: f64 = 0.95;
+/// A way up that is farther from how cameras are held is against it, radians. From: chosen, about 70°.
+const HELD_RAD: f64 = 1.2;
+/// Independent pieces of evidence that all returns make. From: chosen.
+const PIECES: f64 = 20.0;
+/// Shares of returns on planes that are level and face a camera, upright, level and face none (the underside of boards), and neither, each for
+/// those of a plane that lies anyhow. From: chosen, most of what is built is level or upright.
+const LEVEL: f64 = 4.0;
+const UPRIGHT: f64 = 4.0;
+const UNDERSIDE: f64 = 3.0;
+const OBLIQUE: f64 = 0.05;
+/// Chance that a view that is asked for a surface shows none, and that planes tell no direction at all. From: chosen.
+const NO_LEVEL: f64 = 0.1;
+const SHAPELESS: f64 = 0.2;
+/// Share of what lies in no plane that stands on what is level if up is right, and if nothing is known. From: chosen.
+const STANDS: f64 = 0.8;
+const ANYHOW: f64 = 0.5;
+/// Independent pieces of evidence that things make, and the share of returns from which on they make them all. From: chosen.
+const THINGS: f64 = 10.0;
+const MANY: f64 = 0.05;
+
+/// Why no way is told to be up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Doubt {
+    /// Nothing in view is a plane.
+    NoPlane,
+    /// More than one way may be up, or what is up shows nothing level.
+    Untold,
+}
+
+/// The way up in the world that cameras saw something of, and how likely it is that.
+pub(super) fn up(
+    samples: &[Sample],
+    seen: &Visibility,
+    seed: u64,
+) -> Result<(Unit<Vector3<f64>>, f64), Doubt> {
+    /// One sample in so many is looked at: large planes need no more. From: work.
+    const STRIDE: usize = 4;
+    let samples: Vec<Sample> = samples.iter().step_by(STRIDE).copied().collect();
+    let (faces, rest) = faces(&samples, seen, seed);
+    if faces.is_empty() {
+        return Err(Doubt::NoPlane);
+    }
+    let things = Things {
+        standing: faces.par_iter().map(|face| face.carries(&rest)).collect(),
+        share: rest.len() as f64 / samples.len() as f64,
+    };
+    let mut hypotheses: Vec<Hypothesis> =
+        ways(&faces, seen).into_iter().map(|up| Hypothesis::of(up, &faces, &things, seen)).collect();
+    hypotheses.sort_by(|a, b| b.log.total_cmp(&a.log));
+    let mut distinct: Vec<Hypothesis> = Vec::new();
+    for hypothesis in hypotheses {
+        if distinct.iter().all(|better| better.up.angle(&hypothesis.up) > ONE_RAD) {
+            distinct.push(hypothesis);
+        }
+    }
+    let Some(best) = distinct.first() else { return Err(Doubt::Untold) };
+    let rivals: f64 = distinct.iter().map(|h| (h.log - best.log).exp()).sum();
+    let chance = 1.0 / (rivals + (SHAPELESS.ln() - best.log).exp());
+    tracing::debug!(chance, is_level = best.is_level, "way up");
+    let is_contrary = super::held_up(seen).is_some_and(|held| held.angle(&best.up) > HELD_RAD);
+    let is_told = best.is_level && chance >= if is_contrary { SURE } else { LIKELY };
+    if is_told { Ok((settled(&best.up, &faces), chance)) } else { Err(Doubt::Untold) }
+}
+
+/// The way up that all level planes tell together, each by what it holds: that of a small one may be off.
+fn settled(up: &Unit<Vector3<f64>>, faces: &[Face]) -> Unit<Vector3<f64>> {
+    let level = faces.iter().filter(|face| is_level(face, up));
+    let sum: Vector3<f64> = level.map(|face| face.plane.normal * face.share).sum();
+    Unit::try_new(sum, 0.0).unwrap_or(*up)
+}
+
+/// True if a plane that faces a camera is level where this is up.
+fn is_level(face: &Face, up: &Vector3<f64>) -> bool {
+    face.plane.normal.dot(up) > ALIKE_RAD.cos()
+}
+
+/// A plane with the returns that it holds.
+struct Face {
+    /// Its normal on the side of the cameras.
+    plane: Plane,
+    members: Vec<Point3<f64>>,
+    /// Of all returns.
+    share: f64,
+}
+
+/// The large planes, and what lies in none of them.
+fn faces(samples: &[Sample], seen: &Visibility, seed: u64) -> (Vec<Face>, Vec<Point3<f64>>) {
+    let viewpoints = seen.viewpoints();
+    let mut planes: Vec<Plane> = Vec::new();
+    large_planes(
+        samples,
+        (seed, PLANES),
+        |_| true,
+        |plane| {
+            planes.push(super::face_up(&plane, None, &viewpoints));
+        },
+    );
+    let mut members: Vec<Vec<Point3<f64>>> = vec![Vec::new(); planes.len()];
+    let mut rest = Vec::new();
+    for sample in samples {
+        let holder = planes.iter().position(|plane| plane.holds(sample));
+        holder.map_or(&mut rest, |n| &mut members[n]).push(sample.point);
+    }
+    let mut faces = Vec::new();
+    for (plane, members) in planes.into_iter().zip(members) {
+        let share = members.len() as f64 / samples.len() as f64;
+        if share < LEAST_SHARE {
+            rest.extend(members);
+        } else {
+            faces.push(Face { plane, members, share });
+        }
+    }
+    (faces, rest)
+}
+
+impl Face {
+    /// Which of some places belong to things that would stand on it, were it level: they begin near it and are no higher than things are.
+    fn carries(&self, places: &[Point3<f64>]) -> Vec<bool> {
+        /// Side of the cells in which things are told apart, and how near to the plane one begins, metres. From: chosen.
+        const CELL_M: f64 = 0.04;
+        const FOOT_M: f64 = 0.06;
+        let Plane { normal, offset } = self.plane;
+        let (a, b) = tangents(&normal);
+        let flat = |p: &Point3<f64>| [a.dot(&p.coords), b.dot(&p.coords)];
+        let corner = |[x, y]: [f64; 2]| Point3::from(a * x + b * y + normal * offset);
+        let hull = convex_hull(self.members.iter().map(flat).collect());
+        let outline = Outline::of(&hull.into_iter().map(corner).collect::<Vec<_>>(), &normal);
+        let cell = |p: &Point3<f64>| flat(p).map(|m| super::floor(m / CELL_M));
+        let over = |p: &Point3<f64>| {
+            let high_m = self.plane.distance(p);
+            let is_over = high_m > THINGS_M.0 && high_m < THINGS_M.1 && outline.covers(p, 0.0);
+            is_over.then(|| (cell(p), high_m))
+        };
+        let over: Vec<Option<([i32; 2], f64)>> = places.iter().map(over).collect();
+        let mut lowest: FxHashMap<[i32; 2], f64> = FxHashMap::default();
+        for (cell, high_m) in over.iter().flatten() {
+            let low = lowest.entry(*cell).or_insert(*high_m);
+            *low = low.min(*high_m);
+        }
+        let begins = |cell: [i32; 2]| lowest.get(&cell).is_some_and(|low_m| *low_m < FOOT_M);
+        let stands = |cell: [i32; 2]| super::extent::around(cell).any(begins);
+        over.into_iter().map(|over| over.is_some_and(|(cell, _)| stands(cell))).collect()
+    }
+}
+
+/// What lies in no plane.
+struct Things {
+    /// For each plane, which of it would stand on it.
+    standing: Vec<Vec<bool>>,
+    /// Of all returns.
+    share: f64,
+}
+
+/// Directions that may be up: those in which a plane is level, and those in which one or two are upright.
+fn ways(faces: &[Face], seen: &Visibility) -> Vec<Unit<Vector3<f64>>> {
+    /// A direction that is nearly across all that is asked for is none. From: chosen.
+    const LEAST: f64 = 0.1;
+    /// Planes of which two are taken together, and the sine of the least angle between two walls. From: chosen.
+    const WALLS: usize = 4;
+    const APART: f64 = 0.9;
+    // Upright planes leave open where up is, but for how cameras are held.
+    let held = super::held_up(seen);
+    let aside = |normal: &Vector3<f64>| match held {
+        Some(held) => held.into_inner() - normal * held.dot(normal),
+        None => seen.maps.first().map_or(Vector3::zeros(), |map| {
+            normal.cross(&(map.camera_from_world.rotation.inverse() * Vector3::z()))
+        }),
+    };
+    let single = faces.iter().flat_map(|face| {
+        let level = Some(Unit::new_unchecked(face.plane.normal));
+        [level, Unit::try_new(aside(&face.plane.normal), LEAST)].into_iter().flatten()
+    });
+    let walls = &faces[..faces.len().min(WALLS)];
+    let pairs = walls.iter().enumerate().flat_map(|(n, a)| walls[..n].iter().map(move |b| (a, b)));
+    let crossing = pairs
+        .filter_map(|(a, b)| Unit::try_new(a.plane.normal.cross(&b.plane.normal), APART))
+        .flat_map(|way| [way, -way]);
+    single.chain(crossing).collect()
+}
+
+/// A direction that may be up.
+struct Hypothesis {
+    up: Unit<Vector3<f64>>,
+    /// Log of how likely it is, against planes that lie anyhow.
+    log: f64,
+    /// True if something level that faces a camera is in view.
+    is_level: bool,
+}
+
+impl Hypothesis {
+    fn of(up: Unit<Vector3<f64>>, faces: &[Face], things: &Things, seen: &Visibility) -> Hypothesis {
+        let of_face = |face: &Face| {
+            let rise = face.plane.normal.dot(&up);
+            let times = match () {
+                () if is_level(face, &up) => LEVEL,
+                () if -rise > ALIKE_RAD.cos() => UNDERSIDE,
+                () if rise.abs() < ALIKE_RAD.sin() => UPRIGHT,
+                () => OBLIQUE,
+            };
+            PIECES * face.share * times.ln()
+        };
+        let planes: f64 = faces.iter().map(of_face).sum();
+        let carriers: Vec<&Vec<bool>> = faces
+            .iter()
+            .zip(&things.standing)
+            .filter(|(face, _)| is_level(face, &up))
+            .map(|(_, on)| on)
+            .collect();
+        let all = things.standing.first().map_or(0, Vec::len);
+        let standing = (0..all).filter(|&k| carriers.iter().any(|on| on[k])).count();
+        let share = standing as f64 / all.max(1) as f64;
+        let each = share * (STANDS / ANYHOW).ln() + (1.0 - share) * ((1.0 - STANDS) / (1.0 - ANYHOW)).ln();
+        let stand = THINGS * (things.share / MANY).min(1.0) * each;
+        let bare = if carriers.is_empty() { NO_LEVEL.ln() } else { 0.0 };
+        Hypothesis { up, log: planes + stand + bare + held_log(&up, seen), is_level: !carriers.is_empty() }
+    }
+}
+
+/// Log of how likely cameras are held so that this is up, all of them alike, against the likeliest way.
+fn held_log(up: &Vector3<f64>, seen: &Visibility) -> f64 {
+    /// Spread of how far cameras are rolled, radians, and how likely one is turned by a quarter or a half instead, each, or any other way.
+    /// From: chosen.
+    const ROLLED_RAD: f64 = 0.2;
+    const TURNED: f64 = 0.003;
+    const ANY_WAY: f64 = 0.0003;
+    /// They look up by no more than the first, radians, but for a spread; log of the least chance of more. From: chosen.
+    const RAISED_RAD: f64 = 0.2;
+    const RAISED_SPREAD_RAD: f64 = 0.25;
+    const LEAST_RAISED: f64 = -5.0;
+    /// From the first on, radians, over so much, radians, fewer look down; log of the chance to look straight down. From: chosen.
+    const STEEP_RAD: f64 = 1.1;
+    const STEEPER_RAD: f64 = 0.3;
+    const STRAIGHT: f64 = -2.0;
+    // Rightwards, downwards, and forwards in the image.
+    let turns = [(1.0, [0.0, -1.0]), (TURNED, [1.0, 0.0]), (TURNED, [-1.0, 0.0]), (TURNED, [0.0, 1.0])];
+    let log = |camera: Vector3<f64>| {
+        let down_rad = (-camera.z).clamp(-1.0, 1.0).asin();
+        let spreads = (-down_rad - RAISED_RAD).max(0.0) / RAISED_SPREAD_RAD;
+        let raised = (-0.5 * spreads * spreads).max(LEAST_RAISED);
+        let steep = STRAIGHT * ((down_rad - STEEP_RAD) / STEEPER_RAD).clamp(0.0, 1.0);
+        let rolled = turns.map(|(chance, [x, y])| {
+            let (along, across) = (camera.x * x + camera.y * y, camera.y * x - camera.x * y);
+            let spreads = across.clamp(-1.0, 1.0).asin() / ROLLED_RAD;
+            if along > -ROLLED_RAD { chance * (-0.5 * spreads * spreads).exp() } else { 0.0 }
+        });
+        // Of a bare cloud nobody knows how its sensor was turned.
+        let rolled = if seen.held { rolled.into_iter().fold(ANY_WAY, f64::max).ln() } else { 0.0 };
+        raised + steep + rolled
+    };
+    let logs = seen.maps.iter().map(|map| log(map.camera_from_world.rotation * up));
+    logs.sum::<f64>() / seen.maps.len().max(1) as f64
+}

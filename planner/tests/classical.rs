@@ -223,10 +223,6 @@ fn grounding_hears_the_stop_signal_where_it_finds_nothing() {
             ),
             "(done)".into(),
         ),
-        (
-            format!(":parameters () :precondition (exists ({variables}) (met {variables})) :effect (done)"),
-            "(done)".into(),
-        ),
     ] {
         let domain = format!(
             "(define (domain d) (:requirements :adl) (:predicates (done) (met {variables})) (:action meet {body}))"
